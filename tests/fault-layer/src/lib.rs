@@ -1,0 +1,1 @@
+//! Vulkan fault-injection layer (tests only).
