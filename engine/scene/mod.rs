@@ -197,7 +197,9 @@ impl Material {
 pub enum AlphaMode {
     Opaque,
     /// Cut out where alpha is below the cutoff.
-    Mask { cutoff: f32 },
+    Mask {
+        cutoff: f32,
+    },
     Blend,
 }
 
@@ -285,9 +287,15 @@ pub struct Light {
 pub enum LightKind {
     Directional,
     /// `range`: metres after which the light is cut off smoothly (KHR_lights_punctual); `None`: no cut-off.
-    Point { range: Option<f32> },
+    Point {
+        range: Option<f32>,
+    },
     /// Angles from the axis in radians, inner < outer ≤ π/2.
-    Spot { range: Option<f32>, inner: f32, outer: f32 },
+    Spot {
+        range: Option<f32>,
+        inner: f32,
+        outer: f32,
+    },
 }
 
 #[derive(Clone, Debug)]
@@ -343,7 +351,10 @@ pub enum Keys {
     Rotation(Vec<Quat>),
     Scale(Vec<Vec3>),
     /// All weights of a key in a row.
-    Weights { count: usize, values: Vec<f32> },
+    Weights {
+        count: usize,
+        values: Vec<f32>,
+    },
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
