@@ -1,0 +1,53 @@
+# Shared by the scripts in this folder; sourced, not run.
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+cache=${XDG_CACHE_HOME:-$HOME/.cache}/lucerna
+command -v cargo >/dev/null 2>&1 || PATH=$HOME/.cargo/bin:$PATH
+
+say() { printf '%s\n' "$*"; }
+fail() { printf 'error: %s\n' "$*" >&2; exit 1; }
+
+# stage NAME COMMAND...: runs the command and says how long it took. Stops the script when the command fails.
+stage() {
+    local name=$1 start=$SECONDS status=0
+    shift
+    printf '\n== %s\n' "$name"
+    "$@" || status=$?
+    if [ "$status" -eq 0 ]; then
+        printf '== %s: ok, %d s\n' "$name" $((SECONDS - start))
+    else
+        printf '== %s: FAILED (exit code %d), %d s\n' "$name" "$status" $((SECONDS - start))
+        exit "$status"
+    fi
+}
+
+# The version of a package in Cargo.lock.
+locked_version() {
+    awk -v name="$1" '$1 == "name" { found = ($3 == "\"" name "\"") } found && $1 == "version" { gsub(/"/, "", $3); print $3; exit }' \
+        "$root/Cargo.lock"
+}
+
+# Where the manifests of installed Vulkan drivers lie.
+icd_folders=(/usr/share/vulkan/icd.d /etc/vulkan/icd.d /usr/local/share/vulkan/icd.d)
+
+# The manifest of the system's own lavapipe (Mesa's Vulkan driver for the CPU), the reference driver of the tests.
+reference_icd() {
+    local folder file
+    for folder in "${icd_folders[@]}"; do
+        for file in "$folder"/lvp_icd.json "$folder"/lvp_icd.*.json; do
+            [ -f "$file" ] && { say "$file"; return 0; }
+        done
+    done
+    return 1
+}
+
+# Only this driver is seen by everything started afterwards. The second variable is for loaders older than 1.3.207.
+use_driver() {
+    export VK_DRIVER_FILES=$1 VK_ICD_FILENAMES=$1
+}
+
+# Validation settings that work with the layer versions of Debian 12 (1.3.239) and Debian 13 (1.4.309).
+use_validation() {
+    export VK_LAYER_ENABLES=VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT:VALIDATION_CHECK_ENABLE_SYNCHRONIZATION_VALIDATION_QUEUE_SUBMIT
+    export VK_VALIDATION_SYNCVAL_SHADER_ACCESSES_HEURISTIC=1
+}
