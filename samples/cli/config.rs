@@ -1,0 +1,284 @@
+//! Settings of a technique from its defaults, a TOML file and `-D key=value`, in this order of precedence.
+//!
+//! Works for any serde struct: a key exists if the effective settings, written out again, contain it.
+
+use std::path::Path;
+
+use lucerna::{Error, ErrorKind, Result};
+use serde::{Serialize, de::DeserializeOwned};
+use serde_json::Value;
+
+/// Largest settings file that is read, bytes.
+const MAX_FILE: u64 = 1 << 20;
+
+/// The settings in effect. `defines` are `dotted.key=value`, the value in TOML or a bare word.
+pub fn effective<S: Serialize + DeserializeOwned>(base: &S, file: Option<&Path>, defines: &[String]) -> Result<S> {
+    let mut tree = to_value(base)?;
+    if let Some(path) = file {
+        let text = read_text(path)?;
+        let table: toml::Table =
+            toml::from_str(&text).map_err(|error| Error::input(first_lines(&error.to_string())).in_file(path))?;
+        let overrides = serde_json::to_value(&table).map_err(|error| Error::input(error.to_string()).in_file(path))?;
+        apply_all::<S>(&mut tree, &mut Vec::new(), &overrides)
+            .map_err(|what| Error::input(what.0).at(what.1).in_file(path))?;
+    }
+    for define in defines {
+        let Some((key, text)) = define.split_once('=') else {
+            return Err(Error::usage(format!("-D {define}: expected key=value")));
+        };
+        let path: Vec<String> = key.trim().split('.').map(str::to_owned).collect();
+        apply::<S>(&mut tree, &path, scalar(text.trim()))
+            .map_err(|what| Error::usage(format!("-D {define}: {}", what.0)))?;
+    }
+    serde_json::from_value(tree).map_err(|error| Error::usage(format!("settings: {error}")))
+}
+
+/// The settings as TOML, for `--print-config`; reading it back gives the same settings.
+pub fn to_toml<S: Serialize>(settings: &S) -> Result<String> {
+    toml::to_string(settings).map_err(|error| Error::new(ErrorKind::Runtime, "settings are not TOML").caused_by(error))
+}
+
+/// The settings as JSON with the shortest numbers that read back as the same f32.
+pub fn to_value<S: Serialize>(settings: &S) -> Result<Value> {
+    serde_json::to_string(settings)
+        .and_then(|text| serde_json::from_str(&text))
+        .map_err(|error| Error::new(ErrorKind::Runtime, "settings are not JSON").caused_by(error))
+}
+
+/// Reads a small text file.
+pub(crate) fn read_text(path: &Path) -> Result<String> {
+    let length = std::fs::metadata(path)
+        .map_err(|error| Error::input("could not be read").in_file(path).caused_by(error))?
+        .len();
+    if length > MAX_FILE {
+        return Err(Error::input(format!("is {length} bytes, at most {MAX_FILE} are allowed")).in_file(path));
+    }
+    std::fs::read_to_string(path).map_err(|error| Error::input("could not be read").in_file(path).caused_by(error))
+}
+
+/// What is wrong, and with which key.
+struct Wrong(String, String);
+
+fn apply_all<S: Serialize + DeserializeOwned>(
+    tree: &mut Value,
+    path: &mut Vec<String>,
+    overrides: &Value,
+) -> Result<(), Wrong> {
+    let Value::Object(entries) = overrides else { return Ok(()) };
+    for (key, value) in entries {
+        path.push(key.clone());
+        // A table either goes into a table of the settings, or is a value by itself (an enum variant with fields).
+        if value.is_object() && get(tree, path).is_some_and(Value::is_object) {
+            let mut trial = tree.clone();
+            let as_group = apply_all::<S>(&mut trial, path, value);
+            match as_group {
+                Ok(()) => *tree = trial,
+                Err(wrong) => apply::<S>(tree, path, value.clone()).map_err(|_| wrong)?,
+            }
+        } else {
+            apply::<S>(tree, path, value.clone())?;
+        }
+        path.pop();
+    }
+    Ok(())
+}
+
+/// Sets one key, if the settings have it and take the value.
+fn apply<S: Serialize + DeserializeOwned>(tree: &mut Value, path: &[String], value: Value) -> Result<(), Wrong> {
+    let dotted = path.join(".");
+    let mut trial = tree.clone();
+    if !set(&mut trial, path, value) {
+        return Err(Wrong(unknown(tree, path), dotted));
+    }
+    let settings: S = match serde_json::from_value(trial) {
+        Ok(settings) => settings,
+        Err(_) if get(tree, path).is_none() => return Err(Wrong(unknown(tree, path), dotted)),
+        Err(error) => return Err(Wrong(error.to_string(), dotted)),
+    };
+    let result = to_value(&settings).map_err(|error| Wrong(error.to_string(), dotted.clone()))?;
+    if get(&result, path).is_none() {
+        return Err(Wrong(unknown(tree, path), dotted));
+    }
+    *tree = result;
+    Ok(())
+}
+
+fn get<'a>(tree: &'a Value, path: &[String]) -> Option<&'a Value> {
+    path.iter().try_fold(tree, |value, key| value.as_object()?.get(key))
+}
+
+/// False if the way there leads through something that is not a table.
+fn set(tree: &mut Value, path: &[String], value: Value) -> bool {
+    let Some((last, way)) = path.split_last() else { return false };
+    let mut at = tree;
+    for key in way {
+        match at.as_object_mut().and_then(|table| table.get_mut(key)) {
+            Some(next) => at = next,
+            None => return false,
+        }
+    }
+    match at.as_object_mut() {
+        Some(table) => {
+            table.insert(last.clone(), value);
+            true
+        }
+        None => false,
+    }
+}
+
+/// A TOML value, or else a bare word.
+fn scalar(text: &str) -> Value {
+    toml::from_str::<toml::Table>(&format!("value = {text}"))
+        .ok()
+        .filter(|table| table.len() == 1)
+        .and_then(|mut table| table.remove("value"))
+        .and_then(|value| serde_json::to_value(value).ok())
+        .unwrap_or_else(|| Value::String(text.to_owned()))
+}
+
+fn unknown(tree: &Value, path: &[String]) -> String {
+    let mut keys = Vec::new();
+    leaves(tree, &mut String::new(), &mut keys);
+    let asked = path.join(".");
+    let hint = nearest(&asked, keys.iter().map(String::as_str)).map(|k| format!(" (did you mean '{k}'?)"));
+    format!("unknown setting '{asked}'{}; allowed: {}", hint.unwrap_or_default(), keys.join(", "))
+}
+
+fn leaves(tree: &Value, prefix: &mut String, keys: &mut Vec<String>) {
+    match tree {
+        Value::Object(table) if !table.is_empty() => {
+            for (key, value) in table {
+                let length = prefix.len();
+                if length > 0 {
+                    prefix.push('.');
+                }
+                prefix.push_str(key);
+                leaves(value, prefix, keys);
+                prefix.truncate(length);
+            }
+        }
+        _ => keys.push(prefix.clone()),
+    }
+}
+
+/// The name most like `asked`, if any is much like it.
+pub fn nearest<'a>(asked: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    names
+        .into_iter()
+        .map(|name| (strsim::jaro_winkler(&asked.to_lowercase(), &name.to_lowercase()), name))
+        .filter(|(likeness, _)| *likeness > 0.75)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, name)| name)
+}
+
+/// TOML errors come with the source line drawn below them; one line is enough here.
+fn first_lines(text: &str) -> String {
+    let mut lines = text.lines().filter(|l| !l.trim_start().starts_with('|') && !l.contains(" | "));
+    let first = lines.next().unwrap_or_default().trim();
+    match lines.next_back() {
+        Some(last) => format!("{first}: {}", last.trim()),
+        None => first.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde::Deserialize;
+
+    use super::*;
+
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    enum Shadow {
+        Plain,
+        Esm { c: f32 },
+    }
+
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default)]
+    struct Blur {
+        radius: u32,
+        sigma: f32,
+    }
+    impl Default for Blur {
+        fn default() -> Self {
+            Self { radius: 4, sigma: 0.1 }
+        }
+    }
+
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default)]
+    struct Settings {
+        samples: u32,
+        strength: f32,
+        limit: Option<f32>,
+        shadow: Shadow,
+        blur: Blur,
+    }
+    impl Default for Settings {
+        fn default() -> Self {
+            Self { samples: 48, strength: 0.5, limit: None, shadow: Shadow::Esm { c: 90.0 }, blur: Blur::default() }
+        }
+    }
+
+    fn with(file: Option<&str>, defines: &[&str]) -> Result<Settings> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("s.toml");
+        if let Some(text) = file {
+            std::fs::write(&path, text).unwrap();
+        }
+        let defines: Vec<String> = defines.iter().map(|&d| d.to_owned()).collect();
+        effective(&Settings::default(), file.map(|_| path.as_path()), &defines)
+    }
+
+    #[test]
+    fn defaults_then_file_then_command_line() {
+        let settings =
+            with(Some("samples = 24\nstrength = 1\n[blur]\nradius = 7"), &["samples=80", "limit=2"]).unwrap();
+        let expected = Settings {
+            samples: 80,
+            strength: 1.0,
+            limit: Some(2.0),
+            blur: Blur { radius: 7, sigma: 0.1 },
+            ..Settings::default()
+        };
+        assert_eq!(settings, expected);
+    }
+
+    #[test]
+    fn an_enum_can_change_its_variant() {
+        assert_eq!(with(None, &["shadow=plain"]).unwrap().shadow, Shadow::Plain);
+        assert_eq!(with(None, &["shadow.esm.c=20"]).unwrap().shadow, Shadow::Esm { c: 20.0 });
+        assert_eq!(with(Some("shadow = 'plain'"), &[]).unwrap().shadow, Shadow::Plain);
+        assert_eq!(with(Some("[shadow.esm]\nc = 30.0"), &[]).unwrap().shadow, Shadow::Esm { c: 30.0 });
+    }
+
+    #[test]
+    fn an_unknown_key_names_the_nearest_and_all() {
+        let text = with(None, &["sampels=3"]).unwrap_err().to_string();
+        assert!(text.contains("did you mean 'samples'") && text.contains("blur.radius"), "{text}");
+        let text = with(Some("[blur]\nradios = 3"), &[]).unwrap_err().to_string();
+        assert!(text.contains("s.toml") && text.contains("did you mean 'blur.radius'"), "{text}");
+        for bad in ["blur.radius.x=3", "blur.sigmaa=1", "x.y=1", "=1", "samples"] {
+            assert_eq!(with(None, &[bad]).unwrap_err().exit_code(), 2, "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_type_says_what_is_expected() {
+        let text = with(None, &["samples=many"]).unwrap_err().to_string();
+        assert!(text.contains("samples=many") && text.contains("u32"), "{text}");
+        let text = with(None, &["shadow=soft"]).unwrap_err().to_string();
+        assert!(text.contains("plain"), "{text}");
+        assert_eq!(with(Some("samples = -1"), &[]).unwrap_err().exit_code(), 3);
+        assert_eq!(with(Some("samples = = 1"), &[]).unwrap_err().exit_code(), 3);
+    }
+
+    #[test]
+    fn printed_settings_read_back_the_same() {
+        let settings = with(None, &["strength=0.1", "samples=24"]).unwrap();
+        let text = to_toml(&settings).unwrap();
+        assert!(text.contains("strength = 0.1\n"), "{text}");
+        assert_eq!(with(Some(&text), &[]).unwrap(), settings);
+    }
+}

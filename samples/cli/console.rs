@@ -1,0 +1,81 @@
+//! What a program says on stderr, and the one place that writes to stdout.
+
+use std::io::{IsTerminal, Write};
+
+use lucerna::{Error, ErrorKind, Result};
+
+/// How much is said. Errors always are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Console {
+    /// −1 with `-q`, one more for each `-v`.
+    level: i8,
+    color: bool,
+}
+
+impl Console {
+    /// Colours only on a terminal, and not when `NO_COLOR` is set to anything.
+    pub fn new(quiet: bool, verbose: u8) -> Self {
+        let color = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty());
+        let level = if quiet { -1 } else { verbose.min(3) as i8 };
+        Self { level, color }
+    }
+
+    /// One line for what ended the program.
+    pub fn error(&self, error: &Error) {
+        self.line("error", "31", &error.to_string());
+    }
+
+    /// Something the user should know, although the work goes on. Not silenced by `-q`.
+    pub fn warning(&self, text: &str) {
+        self.line("warning", "33", text);
+    }
+
+    /// What is being done; silenced by `-q`.
+    pub fn info(&self, text: &str) {
+        if self.level >= 0 {
+            self.plain(text);
+        }
+    }
+
+    /// Details; shown from `-v` on.
+    pub fn detail(&self, text: &str) {
+        if self.level >= 1 {
+            self.plain(text);
+        }
+    }
+
+    /// True with `-q`.
+    pub fn is_quiet(&self) -> bool {
+        self.level < 0
+    }
+
+    fn line(&self, label: &str, color: &str, text: &str) {
+        let text = text.trim_end().replace('\n', " | ");
+        if self.color {
+            self.plain(&format!("\x1b[1;{color}m{label}\x1b[0m: {text}"));
+        } else {
+            self.plain(&format!("{label}: {text}"));
+        }
+    }
+
+    /// stderr may be closed: that is no reason to stop.
+    fn plain(&self, text: &str) {
+        let _ = writeln!(std::io::stderr().lock(), "{text}");
+    }
+}
+
+/// Writes `text` and a line end to stdout. A reader that went away (`| head`) is not an error.
+pub fn print(text: &str) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Error::new(ErrorKind::Output, "could not write to standard output").caused_by(error))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes one JSON document to stdout.
+pub fn print_json(value: &serde_json::Value) -> Result<()> {
+    print(&format!("{value:#}"))
+}
