@@ -1,1 +1,136 @@
-//! shader
+//! What a shader is to the engine: its code and its interface, both taken from the GLSL by `build.rs`.
+//!
+//! The GLSL file is the only description of a pass. `build.rs` compiles every entry shader under `shaders-glsl/`, reads its
+//! interface from the SPIR-V, and writes one Rust module per pass into [`crate::shaders`]: `Args` (a named field for each
+//! binding), `Push`, `Spec` and the workgroup size. A forgotten binding is a missing field and does not compile.
+//! `readonly` and `writeonly` in the GLSL are the access declarations from which the render graph derives barriers.
+
+use crate::graph::{Buffer, Image, UniformSlice};
+
+// Used by build.rs as well; in the library only their tests and the types below are needed.
+#[cfg(test)]
+mod codegen;
+#[cfg(test)]
+#[allow(dead_code)]
+mod compile;
+#[cfg(test)]
+mod reflect;
+
+/// A compute or raster program: all its stages, and what it binds.
+#[derive(Debug)]
+pub struct Shader {
+    /// `technique.pass`, from the path of the file.
+    pub name: &'static str,
+    /// One compute stage, or a vertex stage with or without a fragment stage.
+    pub stages: &'static [StageCode],
+    /// Sorted by binding number; all in descriptor set 0.
+    pub bindings: &'static [Binding],
+    /// Bytes of the push-constant block over all stages; 0 if there is none.
+    pub push_size: u32,
+    /// Compute: threads of a workgroup.
+    pub workgroup: [u32; 3],
+    /// Sorted by id.
+    pub spec: &'static [SpecConstant],
+    /// Raster: colour attachments that the fragment stage writes (highest location + 1).
+    pub color_outputs: u32,
+}
+
+/// One stage of a [`Shader`].
+#[derive(Debug)]
+pub struct StageCode {
+    pub stage: Stage,
+    /// Optimised SPIR-V, little endian, a multiple of four bytes, entry point `main`.
+    pub spirv: &'static [u8],
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stage {
+    Compute,
+    Vertex,
+    Fragment,
+}
+
+/// A resource that a shader binds.
+#[derive(Debug)]
+pub struct Binding {
+    /// As the field in `Args`.
+    pub name: &'static str,
+    pub binding: u32,
+    pub kind: BindingKind,
+    pub access: Access,
+    pub stages: &'static [Stage],
+    /// Elements of an array of resources; 1 otherwise.
+    pub count: u32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BindingKind {
+    /// Combined image and sampler.
+    Sampled(Dim),
+    /// Storage image.
+    Storage(Dim),
+    /// Storage buffer.
+    Buffer,
+    /// Uniform buffer of this many bytes.
+    Uniform {
+        size: u32,
+    },
+    AccelerationStructure,
+}
+
+/// Shape of the view that a shader expects.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Dim {
+    D1,
+    D2,
+    D2Array,
+    D3,
+    Cube,
+    CubeArray,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Access {
+    Read,
+    Write,
+    ReadWrite,
+}
+
+/// A specialisation constant; four bytes each.
+#[derive(Debug)]
+pub struct SpecConstant {
+    pub name: &'static str,
+    pub id: u32,
+}
+
+/// What a generated `Args` gives to a binding.
+#[derive(Clone, Copy, Debug)]
+pub enum Resource {
+    Image(Image),
+    Buffer(Buffer),
+    Uniform(UniformSlice),
+}
+
+/// Implemented by every generated `Args`: constructing it is declaring the accesses of a pass.
+pub trait Args {
+    const SHADER: &'static Shader;
+
+    /// The resources in the order of [`Shader::bindings`], arrays element by element.
+    fn resources(&self, out: &mut Vec<Resource>);
+
+    /// The bytes of the push-constant block; empty if there is none.
+    fn push(&self) -> &[u8] {
+        &[]
+    }
+
+    /// The values of [`Shader::spec`], as bits.
+    fn spec(&self) -> Vec<u32> {
+        Vec::new()
+    }
+}
+
+/// `Args` of a compute shader.
+pub trait ComputeArgs: Args {}
+
+/// `Args` of a vertex shader with or without a fragment shader.
+pub trait RasterArgs: Args {}
