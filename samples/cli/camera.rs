@@ -69,7 +69,9 @@ impl CameraFile {
         if !(0.1..=179.0).contains(&self.yfov_degrees) {
             return Err(format!("yfov_degrees is {}, allowed are 0.1 to 179", self.yfov_degrees));
         }
-        if !(self.znear.is_finite() && self.znear > 0.0) || self.zfar.is_some_and(|far| far.is_nan() || far <= self.znear) {
+        if !(self.znear.is_finite() && self.znear > 0.0)
+            || self.zfar.is_some_and(|far| far.is_nan() || far <= self.znear)
+        {
             return Err("znear must be above zero and zfar beyond znear".into());
         }
         Ok(())
