@@ -1,0 +1,149 @@
+//! A camera and light for scenes that bring none, so that every file gives a picture. What was added is said in a note.
+
+use glam::{Mat4, Quat, Vec3};
+use lucerna::scene::{Camera, Environment, Light, LightKind, Node, Note, NoteKind, Projection, Scene, Transform};
+
+use crate::world::{self, Bounds};
+
+/// Full vertical angle of the camera that is added, radians.
+const YFOV: f32 = 45.0 * std::f32::consts::PI / 180.0;
+/// Where the camera that is added stands, seen from the middle of the scene: to the right, above, in front.
+const VIEW_FROM: Vec3 = Vec3::new(0.55, 0.4, 1.0);
+/// Irradiance of the light that is added on a facing plane, W/m². A white wall facing it then has radiance 1.
+const SUN: f32 = std::f32::consts::PI;
+/// Where that light comes from.
+const SUN_FROM: Vec3 = Vec3::new(0.5, 1.0, 0.6);
+/// Radiance of the sky that is added, W/(sr·m²): above, at the horizon, below.
+const SKY: [Vec3; 3] = [Vec3::new(0.32, 0.42, 0.58), Vec3::new(0.45, 0.45, 0.45), Vec3::new(0.16, 0.14, 0.12)];
+
+/// Adds a camera that sees the whole scene if there is none.
+pub fn add_missing_camera(scene: &mut Scene, aspect: f32) {
+    if scene.nodes.iter().any(|node| node.camera.is_some()) {
+        return;
+    }
+    let bounds = world::bounds(scene).unwrap_or(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE });
+    let (world_from_view, projection) = fitted(&bounds, aspect);
+    scene.cameras.push(Camera { name: "fitted".into(), projection });
+    add_node(scene, "fitted camera", world_from_view, |node, scene| node.camera = Some(scene.cameras.len() as u32 - 1));
+    note(scene, "cameras", "the scene has no camera: one was added that sees all of it");
+}
+
+/// Adds a light and a sky if nothing in the scene shines.
+pub fn add_missing_light(scene: &mut Scene) {
+    let shines = |scene: &Scene| {
+        scene.environment.is_some()
+            || scene.nodes.iter().any(|node| node.light.is_some())
+            || scene.materials.iter().any(|material| material.emissive.max_element() > 0.0)
+    };
+    if shines(scene) {
+        return;
+    }
+    scene.lights.push(Light {
+        name: "default sun".into(),
+        kind: LightKind::Directional,
+        color: Vec3::ONE,
+        intensity: SUN,
+    });
+    let rotation = Quat::from_rotation_arc(Vec3::Z, SUN_FROM.normalize());
+    add_node(scene, "default sun", Mat4::from_quat(rotation), |node, scene| {
+        node.light = Some(scene.lights.len() as u32 - 1);
+    });
+    scene.environment = Some(default_sky());
+    note(scene, "lights", "nothing in the scene shines: a sun and a sky were added");
+}
+
+/// Bluish above, grey at the horizon, brown below.
+fn default_sky() -> Environment {
+    let (width, height) = (8, 64);
+    let [above, horizon, below] = SKY;
+    let pixels = (0..height * width)
+        .map(|i| {
+            let elevation = 1.0 - 2.0 * ((i / width) as f32 + 0.5) / height as f32;
+            horizon.lerp(if elevation > 0.0 { above } else { below }, elevation.abs().sqrt())
+        })
+        .collect();
+    Environment { name: "default sky".into(), width, height, pixels, rotation: 0.0, scale: 1.0 }
+}
+
+fn add_node(scene: &mut Scene, name: &str, world: Mat4, fill: impl FnOnce(&mut Node, &Scene)) {
+    let (scale, rotation, translation) = world.to_scale_rotation_translation();
+    let local = Transform::Trs { translation, rotation, scale };
+    let mut node = Node { name: name.into(), local, ..Node::default() };
+    fill(&mut node, scene);
+    scene.nodes.push(node);
+}
+
+fn note(scene: &mut Scene, place: &str, text: &str) {
+    scene.notes.push(Note { kind: NoteKind::Approximated, place: place.into(), text: text.into() });
+}
+
+/// A camera from which the sphere around `bounds` fills the smaller side of the picture.
+fn fitted(bounds: &Bounds, aspect: f32) -> (Mat4, Projection) {
+    let radius = bounds.radius().max(1e-4);
+    let narrow = if aspect < 1.0 { ((YFOV * 0.5).tan() * aspect).atan() } else { YFOV * 0.5 };
+    let distance = radius / narrow.sin();
+    let back = VIEW_FROM.normalize();
+    let position = bounds.center() + back * distance;
+    let right = Vec3::Y.cross(back).normalize();
+    let up = back.cross(right);
+    let world = Mat4::from_cols(right.extend(0.0), up.extend(0.0), back.extend(0.0), position.extend(1.0));
+    let (znear, zfar) = ((distance - radius) * 0.5, Some((distance + radius) * 2.0));
+    (world, Projection::Perspective { yfov: YFOV, aspect: None, znear: znear.max(radius * 1e-3), zfar })
+}
+
+#[cfg(test)]
+mod tests {
+    use lucerna::scene::{Material, Mesh, Primitive};
+
+    use super::*;
+
+    fn cube(min: Vec3, max: Vec3) -> Scene {
+        let primitive = Primitive { positions: vec![min, max], ..Primitive::default() };
+        Scene {
+            meshes: vec![Mesh { primitives: vec![primitive], ..Mesh::default() }],
+            nodes: vec![Node { mesh: Some(0), ..Node::default() }],
+            materials: vec![Material::default()],
+            ..Scene::default()
+        }
+    }
+
+    #[test]
+    fn the_added_camera_sees_every_corner() {
+        for (min, max) in [(Vec3::splat(-1.0), Vec3::ONE), (Vec3::new(100.0, 0.0, -3.0), Vec3::new(400.0, 2.0, 0.0))] {
+            for aspect in [0.3, 1.0, 2.5] {
+                let mut scene = cube(min, max);
+                add_missing_camera(&mut scene, aspect);
+                let view_from_world = scene.nodes.last().unwrap().local.matrix().inverse();
+                let Projection::Perspective { yfov, znear, zfar, .. } = scene.cameras[0].projection else { panic!() };
+                for corner in 0..8 {
+                    let pick = |bit: u32| (corner >> bit & 1) as f32;
+                    let point = min + (max - min) * Vec3::new(pick(0), pick(1), pick(2));
+                    let seen = view_from_world.transform_point3(point);
+                    let half = (yfov * 0.5).tan() * -seen.z * 1.001;
+                    assert!(seen.x.abs() <= half * aspect && seen.y.abs() <= half, "{seen}");
+                    assert!((znear..=zfar.unwrap()).contains(&-seen.z), "{seen}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_added_where_something_is() {
+        let mut scene = cube(Vec3::ZERO, Vec3::ONE);
+        scene.cameras.push(Camera { name: "own".into(), projection: fitted_projection() });
+        scene.nodes[0].camera = Some(0);
+        scene.materials[0].emissive = Vec3::X;
+        add_missing_camera(&mut scene, 1.0);
+        add_missing_light(&mut scene);
+        assert!(scene.nodes.len() == 1 && scene.environment.is_none() && scene.notes.is_empty());
+        scene.materials[0].emissive = Vec3::ZERO;
+        add_missing_light(&mut scene);
+        assert!(scene.lights.len() == 1 && scene.environment.is_some() && scene.notes.len() == 1);
+        // Lights shine down −Z of their node: this one comes from above.
+        assert!(scene.nodes[1].local.matrix().transform_vector3(Vec3::NEG_Z).y < -0.5);
+    }
+
+    fn fitted_projection() -> Projection {
+        fitted(&Bounds { min: Vec3::ZERO, max: Vec3::ONE }, 1.0).1
+    }
+}
