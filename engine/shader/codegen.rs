@@ -28,6 +28,7 @@ pub type Export = (String, &'static str, String);
 #[derive(Debug)]
 pub struct Generated {
     pub rust: String,
+    #[allow(dead_code)] // read by build.rs only
     pub listing: String,
 }
 
