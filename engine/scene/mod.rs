@@ -2,6 +2,12 @@
 //!
 //! Right-handed, Y up, metres, linear Rec. 709. Cameras and lights look down −Z of their node. Nothing here knows Vulkan.
 
+pub mod animate;
+pub mod bvh;
+pub mod deform;
+
+pub use animate::Pose;
+
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 
 /// A complete scene. Indices between its lists are checked by [`Scene::validate`].
