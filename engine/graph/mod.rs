@@ -1,20 +1,44 @@
-//! graph
-#[derive(Clone, Copy, Debug)]
-pub struct Image;
-#[derive(Clone, Copy, Debug)]
-pub struct Buffer;
-#[derive(Clone, Copy, Debug)]
-pub struct UniformSlice;
-#[derive(Debug)]
-pub struct Uniform<T>(std::marker::PhantomData<T>);
-impl<T> Clone for Uniform<T> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<T> Copy for Uniform<T> {}
-impl<T> From<Uniform<T>> for UniformSlice {
-    fn from(_: Uniform<T>) -> Self {
-        UniformSlice
-    }
+//! The render graph: passes in the order they run, from which barriers, layouts, usage, lifetimes, labels and timings follow.
+//!
+//! A [`Graph`] is a list of declared passes; building one touches no Vulkan object. The generated `Args` of a shader names
+//! everything a pass binds, and `readonly` / `writeonly` in the GLSL say how. A plan turns the list into barriers and
+//! physical resources, or into the list of mistakes, each with pass and resource. [`Runner::run`] executes it.
+//!
+//! Declaration order is execution order: nothing is reordered, removed or put on another queue.
+
+mod build;
+mod format;
+mod frame;
+mod handles;
+#[allow(dead_code)]
+mod pass;
+mod pixels;
+mod raster;
+
+pub use build::PassRef;
+pub use format::{Class, Extent, Format, ImageDesc, Threads};
+pub use frame::{Frame, PassTime, Report, Runner};
+pub use handles::{Buffer, BufferRead, GraphId, Image, ImageRead, Sampler, Uniform, UniformSlice};
+pub use pixels::Pixels;
+pub use raster::{
+    Blend, Compare, Cull, Depth, DepthBias, Draw, DrawCall, IndexedCall, Load, Raster, Stencil, StencilLoad, StencilOp,
+    Targets, Topology,
+};
+
+use pass::{BufferEntry, ImageEntry, Pass, ReadEntry};
+
+/// The passes of one frame, in the order they run.
+#[derive(Clone, Debug)]
+pub struct Graph {
+    /// Number of the frame, for shaders that vary over time. 0 unless set.
+    pub frame: u32,
+    /// Seed of everything random. 0 unless set.
+    pub seed: u32,
+    id: GraphId,
+    images: Vec<ImageEntry>,
+    buffers: Vec<BufferEntry>,
+    uniforms: Vec<u8>,
+    passes: Vec<Pass>,
+    reads: Vec<ReadEntry>,
+    scope: Vec<String>,
 }

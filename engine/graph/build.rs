@@ -1,0 +1,322 @@
+//! Declaring resources and passes.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use bytemuck::{NoUninit, Pod};
+
+use super::{
+    Graph,
+    format::{Extent, Format, ImageDesc, Threads},
+    handles::{Buffer, BufferRead, GraphId, Image, ImageRead, Sampler, Uniform, UniformSlice},
+    pass::{Bound, BufferEntry, Groups, ImageEntry, Origin, Pass, ReadEntry, ReadWhat, Work},
+    raster::{Draw, Raster, Targets},
+};
+use crate::shader::{Args, ComputeArgs, RasterArgs};
+
+/// Uniform blocks start at multiples of this: the largest alignment a Vulkan device may ask for.
+const UNIFORM_ALIGNMENT: usize = 256;
+
+/// A pass just declared.
+#[derive(Debug)]
+pub struct PassRef<'g> {
+    graph: &'g mut Graph,
+    index: usize,
+}
+
+impl PassRef<'_> {
+    /// Names it, instead of by its shader. A name used before gets `#2`, `#3`…
+    pub fn named(self, name: impl Into<String>) -> Self {
+        // The old name must not count as used.
+        self.graph.passes[self.index].name.clear();
+        let name = unique(name.into(), self.graph.passes.iter().map(|p| p.name.as_str()));
+        self.graph.passes[self.index].name = name;
+        self
+    }
+
+    /// The name it has in reports and messages.
+    pub fn name(&self) -> &str {
+        &self.graph.passes[self.index].name
+    }
+}
+
+/// `name`, or `name#2`, `name#3`… if it is taken.
+fn unique<'a>(name: String, taken: impl Iterator<Item = &'a str> + Clone) -> String {
+    if !taken.clone().any(|t| t == name) {
+        return name;
+    }
+    (2u32..).map(|n| format!("{name}#{n}")).find(|candidate| !taken.clone().any(|t| t == candidate)).unwrap_or(name)
+}
+
+impl Graph {
+    /// No passes yet. The name is for messages.
+    pub fn new(name: &'static str) -> Self {
+        static NEXT: AtomicU32 = AtomicU32::new(0);
+        Self {
+            frame: 0,
+            seed: 0,
+            id: GraphId { id: NEXT.fetch_add(1, Ordering::Relaxed), name },
+            images: Vec::new(),
+            buffers: Vec::new(),
+            uniforms: Vec::new(),
+            passes: Vec::new(),
+            reads: Vec::new(),
+            scope: Vec::new(),
+        }
+    }
+
+    /// The name given to [`Graph::new`].
+    pub fn name(&self) -> &'static str {
+        self.id.name
+    }
+
+    /// An image of one level and one layer that lives in this graph; undefined until a pass writes it.
+    pub fn image(&mut self, name: impl Into<String>, format: Format, extent: impl Into<Extent>) -> Image {
+        self.image_with(name, ImageDesc::new(format, extent.into()))
+    }
+
+    /// An image that lives in this graph; undefined until a pass writes it.
+    pub fn image_with(&mut self, name: impl Into<String>, desc: ImageDesc) -> Image {
+        self.add_image(name.into(), desc, Origin::Transient)
+    }
+
+    /// The image of the last frame and that of this frame, both of `name`. The former is zero in the first frame, and
+    /// whenever format or extent changed; the latter is undefined until a pass writes it.
+    pub fn history(&mut self, name: impl Into<String>, format: Format, extent: impl Into<Extent>) -> (Image, Image) {
+        self.history_with(name, ImageDesc::new(format, extent.into()))
+    }
+
+    /// As [`Graph::history`], with levels and layers.
+    pub fn history_with(&mut self, name: impl Into<String>, desc: ImageDesc) -> (Image, Image) {
+        let key = name.into();
+        let previous =
+            self.add_image(format!("{key}.previous"), desc, Origin::History { key: key.clone(), next: false });
+        let next = self.add_image(key.clone(), desc, Origin::History { key, next: true });
+        (previous, next)
+    }
+
+    fn add_image(&mut self, name: String, desc: ImageDesc, origin: Origin) -> Image {
+        let name = unique(name, self.images.iter().map(|i| i.name.as_str()));
+        self.images.push(ImageEntry { name, desc, origin });
+        Image {
+            graph: self.id,
+            index: (self.images.len() - 1) as u32,
+            mip: 0,
+            mips: desc.mips,
+            layer: 0,
+            layers: desc.layers,
+            cube: desc.cube,
+            sampler: Sampler::Linear,
+        }
+    }
+
+    /// A buffer of `bytes` bytes that lives in this graph; undefined until a pass writes it.
+    pub fn buffer(&mut self, name: impl Into<String>, bytes: u64) -> Buffer {
+        self.add_buffer(name.into(), bytes, None, false)
+    }
+
+    /// A buffer with these contents at the start of the graph.
+    pub fn buffer_from<T: NoUninit>(&mut self, name: impl Into<String>, contents: &[T]) -> Buffer {
+        let bytes: &[u8] = bytemuck::cast_slice(contents);
+        self.add_buffer(name.into(), bytes.len() as u64, Some(bytes.to_vec()), false)
+    }
+
+    /// As [`Graph::history`], for buffers.
+    pub fn history_buffer(&mut self, name: impl Into<String>, bytes: u64) -> (Buffer, Buffer) {
+        let key = name.into();
+        let previous = self.add_buffer(format!("{key}.previous"), bytes, None, false);
+        let next = self.add_buffer(key.clone(), bytes, None, false);
+        for (buffer, next) in [(previous, false), (next, true)] {
+            self.buffers[buffer.index as usize].origin = Origin::History { key: key.clone(), next };
+        }
+        (previous, next)
+    }
+
+    /// An image that someone else owns, known only by its description: for planning without a device.
+    pub fn import_image_described(&mut self, name: impl Into<String>, desc: ImageDesc) -> Image {
+        self.add_image(name.into(), desc, Origin::Imported)
+    }
+
+    /// A buffer that someone else owns, known only by its size: for planning without a device.
+    pub fn import_buffer_described(&mut self, name: impl Into<String>, bytes: u64) -> Buffer {
+        let buffer = self.add_buffer(name.into(), bytes, None, false);
+        self.buffers[buffer.index as usize].origin = Origin::Imported;
+        buffer
+    }
+
+    fn add_buffer(&mut self, name: String, bytes: u64, contents: Option<Vec<u8>>, host: bool) -> Buffer {
+        let name = unique(name, self.buffers.iter().map(|b| b.name.as_str()));
+        self.buffers.push(BufferEntry { name, bytes, origin: Origin::Transient, contents, host });
+        Buffer { graph: self.id, index: (self.buffers.len() - 1) as u32, offset: 0, size: bytes }
+    }
+
+    /// A uniform block with this value.
+    pub fn uniform<T: Pod>(&mut self, value: &T) -> Uniform<T> {
+        let offset = self.uniforms.len().next_multiple_of(UNIFORM_ALIGNMENT);
+        self.uniforms.resize(offset, 0);
+        self.uniforms.extend_from_slice(bytemuck::bytes_of(value));
+        Uniform::new(UniformSlice { graph: self.id, offset: offset as u32, size: size_of::<T>() as u32 })
+    }
+
+    #[track_caller]
+    fn entry(&self, image: Image) -> &ImageEntry {
+        assert!(
+            image.graph == self.id,
+            "an image of graph `{}` was used in graph `{}`; handles are valid for one graph",
+            image.graph.name,
+            self.id.name
+        );
+        &self.images[image.index as usize]
+    }
+
+    /// Extent of the first level that the handle covers.
+    ///
+    /// # Panics
+    /// If the image belongs to another graph.
+    #[track_caller]
+    pub fn extent(&self, image: Image) -> Extent {
+        self.entry(image).desc.extent.mip(image.mip)
+    }
+
+    /// What the whole image is.
+    ///
+    /// # Panics
+    /// If the image belongs to another graph.
+    #[track_caller]
+    pub fn desc(&self, image: Image) -> ImageDesc {
+        self.entry(image).desc
+    }
+
+    /// The name of an image, for `--view` and `--dump`.
+    ///
+    /// # Panics
+    /// If the image belongs to another graph.
+    #[track_caller]
+    pub fn image_name(&self, image: Image) -> &str {
+        &self.entry(image).name
+    }
+
+    /// Runs a compute shader with at least this many threads; the shader discards those outside.
+    pub fn compute<A: ComputeArgs>(&mut self, args: A, threads: impl Into<Threads>) -> PassRef<'_> {
+        let size = A::SHADER.workgroup;
+        let threads = threads.into().0;
+        let groups = [0, 1, 2].map(|i| threads[i].div_ceil(size[i].max(1)));
+        self.pass(A::SHADER.name, Work::Compute { bound: bound(&args), groups: Groups::Direct(groups) })
+    }
+
+    /// Runs a compute shader with the group counts (three `u32`) that lie at `offset` in `groups`.
+    pub fn compute_indirect<A: ComputeArgs>(&mut self, args: A, groups: Buffer, offset: u64) -> PassRef<'_> {
+        let groups = Groups::Indirect { buffer: groups, offset };
+        self.pass(A::SHADER.name, Work::Compute { bound: bound(&args), groups })
+    }
+
+    /// Draws with a vertex shader and (if there is one) a fragment shader.
+    pub fn raster<A: RasterArgs>(&mut self, targets: Targets, state: Raster, args: A, draw: Draw) -> PassRef<'_> {
+        self.pass(A::SHADER.name, Work::Raster { bound: bound(&args), targets, state, draw })
+    }
+
+    /// Sets every pixel. Integer formats take the value rounded; depth the first component, stencil the second.
+    pub fn clear(&mut self, image: Image, value: [f32; 4]) -> PassRef<'_> {
+        let name = format!("clear {}", self.short_name(image));
+        self.pass(name, Work::Clear { image, value })
+    }
+
+    /// Sets every four bytes.
+    pub fn fill(&mut self, buffer: Buffer, value: u32) -> PassRef<'_> {
+        let name = format!("fill {}", self.short_buffer_name(buffer));
+        self.pass(name, Work::Fill { buffer, value })
+    }
+
+    /// Copies all levels and layers of `from` to those of `to`: same format and extent.
+    pub fn copy(&mut self, from: Image, to: Image) -> PassRef<'_> {
+        let name = format!("copy {}", self.short_name(from));
+        self.pass(name, Work::CopyImage { from, to })
+    }
+
+    /// Copies bytes: as many as both ranges have.
+    pub fn copy_buffer(&mut self, from: Buffer, to: Buffer) -> PassRef<'_> {
+        let name = format!("copy {}", self.short_buffer_name(from));
+        self.pass(name, Work::CopyBuffer { from, to })
+    }
+
+    /// Scales one level of `from` into one level of `to`, with linear filtering (nearest for integers and depth) and
+    /// conversion of the format. As many layers in both.
+    pub fn blit(&mut self, from: Image, to: Image) -> PassRef<'_> {
+        let name = format!("blit {}", self.short_name(from));
+        self.pass(name, Work::Blit { from, to })
+    }
+
+    /// Makes the levels of `image` after its first, each from the one before, by a box filter.
+    pub fn mips(&mut self, image: Image) {
+        let name = format!("mips {}", self.short_name(image));
+        for level in 1..image.mips {
+            self.pass(name.clone(), Work::Blit { from: image.mip(level - 1), to: image.mip(level) });
+        }
+    }
+
+    /// Puts a label around the passes that `body` declares.
+    pub fn scope<R>(&mut self, name: impl Into<String>, body: impl FnOnce(&mut Graph) -> R) -> R {
+        self.scope.push(name.into());
+        let result = body(self);
+        self.scope.pop();
+        result
+    }
+
+    /// Promises the pixels that `image` (one level, its layers) has at this point of the graph.
+    pub fn read_image(&mut self, image: Image) -> ImageRead {
+        let (name, desc) = match self.images.get(image.index as usize) {
+            Some(entry) if image.graph == self.id => {
+                let extent = entry.desc.extent.mip(image.mip);
+                let depth = (entry.desc.depth >> image.mip.min(31)).max(1);
+                let layers = image.layers;
+                (entry.name.clone(), ImageDesc { extent, depth, mips: 1, layers, ..entry.desc })
+            }
+            // The pass below is a mistake that the plan reports.
+            _ => ("?".to_owned(), ImageDesc::new(Format::R8, Extent::square(1))),
+        };
+        let to = self.add_buffer(format!("read {name}"), desc.bytes().next_multiple_of(4), None, true);
+        self.pass(format!("read {name}"), Work::ReadImage { from: image, to });
+        self.reads.push(ReadEntry { to, what: ReadWhat::Image { name, desc, format: desc.format } });
+        ImageRead { graph: self.id, index: (self.reads.len() - 1) as u32 }
+    }
+
+    /// Promises the bytes that `buffer` has at this point of the graph.
+    pub fn read_buffer(&mut self, buffer: Buffer) -> BufferRead {
+        let name = format!("read {}", self.short_buffer_name(buffer));
+        let to = self.add_buffer(name.clone(), buffer.size, None, true);
+        self.pass(name, Work::ReadBuffer { from: buffer, to });
+        self.reads.push(ReadEntry { to, what: ReadWhat::Buffer });
+        BufferRead { graph: self.id, index: (self.reads.len() - 1) as u32 }
+    }
+
+    /// How many passes were declared.
+    pub fn pass_count(&self) -> usize {
+        self.passes.len()
+    }
+
+    fn short_name(&self, image: Image) -> &str {
+        match self.images.get(image.index as usize) {
+            Some(entry) if image.graph == self.id => &entry.name,
+            _ => "?",
+        }
+    }
+
+    fn short_buffer_name(&self, buffer: Buffer) -> &str {
+        match self.buffers.get(buffer.index as usize) {
+            Some(entry) if buffer.graph == self.id => &entry.name,
+            _ => "?",
+        }
+    }
+
+    fn pass(&mut self, name: impl Into<String>, work: Work) -> PassRef<'_> {
+        let name = unique(name.into(), self.passes.iter().map(|p| p.name.as_str()));
+        self.passes.push(Pass { name, scope: self.scope.clone(), work });
+        let index = self.passes.len() - 1;
+        PassRef { graph: self, index }
+    }
+}
+
+fn bound<A: Args>(args: &A) -> Bound {
+    let mut resources = Vec::new();
+    args.resources(&mut resources);
+    Bound { shader: A::SHADER, resources, push: args.push().to_vec(), spec: args.spec() }
+}

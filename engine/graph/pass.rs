@@ -1,0 +1,137 @@
+//! What a graph records: plain data, no Vulkan object.
+
+use super::{
+    format::{Format, ImageDesc},
+    handles::{Buffer, Image},
+    raster::{Draw, Raster, Targets},
+};
+use crate::shader::{Resource, Shader};
+
+/// Where a resource comes from and how long it lives.
+#[derive(Clone, Debug)]
+pub(crate) enum Origin {
+    /// Made by the graph; its memory is shared with others that are not in use at the same time.
+    Transient,
+    /// Last frame's or this frame's half of a pair that outlives the graph.
+    History { key: String, next: bool },
+    /// Owned by someone else; its contents are there at the start, and it is left as found.
+    Imported,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct ImageEntry {
+    pub name: String,
+    pub desc: ImageDesc,
+    pub origin: Origin,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct BufferEntry {
+    pub name: String,
+    pub bytes: u64,
+    pub origin: Origin,
+    /// Contents at the start of the graph.
+    pub contents: Option<Vec<u8>>,
+    /// Read by the CPU after the graph.
+    pub host: bool,
+}
+
+/// How a compute pass is launched.
+#[derive(Clone, Debug)]
+pub(crate) enum Groups {
+    Direct([u32; 3]),
+    /// `VkDispatchIndirectCommand` at this offset into the buffer's range.
+    Indirect {
+        buffer: Buffer,
+        offset: u64,
+    },
+}
+
+/// A shader with everything it binds.
+#[derive(Clone, Debug)]
+pub(crate) struct Bound {
+    pub shader: &'static Shader,
+    pub resources: Vec<Resource>,
+    pub push: Vec<u8>,
+    pub spec: Vec<u32>,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) enum Work {
+    /// Contents of all buffers made with `buffer_from`.
+    Upload {
+        buffers: Vec<Buffer>,
+    },
+    Compute {
+        bound: Bound,
+        groups: Groups,
+    },
+    Raster {
+        bound: Bound,
+        targets: Targets,
+        state: Raster,
+        draw: Draw,
+    },
+    Clear {
+        image: Image,
+        value: [f32; 4],
+    },
+    Fill {
+        buffer: Buffer,
+        value: u32,
+    },
+    CopyImage {
+        from: Image,
+        to: Image,
+    },
+    CopyBuffer {
+        from: Buffer,
+        to: Buffer,
+    },
+    Blit {
+        from: Image,
+        to: Image,
+    },
+    /// One level, all layers of the handle, tightly packed.
+    ReadImage {
+        from: Image,
+        to: Buffer,
+    },
+    ReadBuffer {
+        from: Buffer,
+        to: Buffer,
+    },
+}
+
+impl Work {
+    /// The shader of a compute or raster pass.
+    pub fn bound(&self) -> Option<&Bound> {
+        match self {
+            Work::Compute { bound, .. } | Work::Raster { bound, .. } => Some(bound),
+            _ => None,
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Pass {
+    pub name: String,
+    /// Labels around it, outermost first.
+    pub scope: Vec<String>,
+    pub work: Work,
+}
+
+/// What a readback token stands for.
+#[derive(Clone, Debug)]
+pub(crate) struct ReadEntry {
+    /// The host-visible buffer.
+    pub to: Buffer,
+    /// What is in it.
+    pub what: ReadWhat,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) enum ReadWhat {
+    Image { name: String, desc: ImageDesc, format: Format },
+    Buffer,
+}
