@@ -25,9 +25,21 @@ impl Pose {
     /// Before a channel's first key its first value holds, after the last key its last. An index that the scene lacks
     /// gives the rest pose. To loop, pass the time through [`looped`].
     pub fn at(scene: &Scene, animation: usize, seconds: f32) -> Self {
+        Self::mixed(scene, scene.animations.get(animation).map(|a| (a, seconds)).into_iter())
+    }
+
+    /// The scene after `seconds` with all its animations playing in loops. Where several drive the same property of a
+    /// node, the first in the scene's list has it: a file with many clips of one figure shows its first clip, a file with
+    /// one clip for each object shows them all.
+    pub fn playing(scene: &Scene, seconds: f32) -> Self {
+        // Later writes win, so the first clip comes last.
+        Self::mixed(scene, scene.animations.iter().rev().map(|a| (a, looped(a, seconds))))
+    }
+
+    fn mixed<'a>(scene: &Scene, clips: impl Iterator<Item = (&'a Animation, f32)>) -> Self {
         let mut locals: Vec<Transform> = scene.nodes.iter().map(|node| node.local).collect();
         let mut weights = base_weights(scene);
-        for channel in scene.animations.get(animation).map_or(&[][..], |a| &a.channels) {
+        for (channel, seconds) in clips.flat_map(|(a, seconds)| a.channels.iter().map(move |c| (c, seconds))) {
             let node = channel.node as usize;
             match (sample(channel, seconds), locals.get_mut(node)) {
                 (Some(Value::Weights(values)), Some(_)) => weights[node] = values,

@@ -4,9 +4,13 @@
 
 pub mod animate;
 pub mod bvh;
+pub mod cull;
 pub mod deform;
+pub mod view;
 
 pub use animate::Pose;
+pub use cull::Aabb;
+pub use view::View;
 
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 
