@@ -304,6 +304,22 @@ mod tests {
     }
 
     #[test]
+    fn all_clips_play_and_the_first_has_precedence() {
+        let keys = |node, v| {
+            let keys = Keys::Translation(vec![v]);
+            Channel { node, ..channel(Interpolation::Step, &[0.0], keys) }
+        };
+        let clip = |channels| Animation { name: String::new(), channels };
+        let scene = Scene {
+            nodes: vec![Node::default(), Node::default()],
+            animations: vec![clip(vec![keys(0, Vec3::X)]), clip(vec![keys(0, Vec3::Y), keys(1, Vec3::Z)])],
+            ..Scene::default()
+        };
+        let at: Vec<Vec3> = Pose::playing(&scene, 0.0).world.iter().map(|m| m.w_axis.truncate()).collect();
+        assert_eq!(at, [Vec3::X, Vec3::Z]);
+    }
+
+    #[test]
     fn loops_wrap_but_show_the_last_key() {
         let animation = Animation {
             name: String::new(),
