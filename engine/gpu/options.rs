@@ -1,0 +1,186 @@
+//! What a caller asks of [`super::Gpu::open`], from code, the command line or the environment.
+
+use std::{str::FromStr, time::Duration};
+
+use crate::{Error, Result};
+
+/// Which device to open.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum DeviceChoice {
+    /// The first suitable one, in the order discrete, integrated, virtual, other, CPU.
+    #[default]
+    Auto,
+    /// The position in [`super::list_devices`].
+    Index(usize),
+    /// The first suitable one whose name contains this text, ignoring case.
+    Name(String),
+    /// A CPU driver (lavapipe, SwiftShader).
+    Cpu,
+}
+
+impl FromStr for DeviceChoice {
+    type Err = Error;
+
+    /// `auto`, `cpu`, a number (position in the list of devices), or part of a device name.
+    fn from_str(text: &str) -> Result<Self> {
+        let text = text.trim();
+        Ok(match text.to_ascii_lowercase().as_str() {
+            "" => return Err(Error::usage("an empty device choice").help("Write auto, cpu, an index or part of a name")),
+            "auto" => Self::Auto,
+            "cpu" => Self::Cpu,
+            lower => match lower.parse() {
+                Ok(index) => Self::Index(index),
+                Err(_) => Self::Name(text.to_owned()),
+            },
+        })
+    }
+}
+
+/// How much the Khronos validation layer checks. Everything but `Off` needs the layer; without it a warning is printed,
+/// and [`super::Gpu::validation_active`] is false.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Validation {
+    /// No layer. Costs nothing.
+    #[default]
+    Off,
+    /// Correct use of the interface.
+    Core,
+    /// `Core`, and missing barriers, also between shader accesses and (as far as the layer can) between submits.
+    Sync,
+    /// `Core`, and shaders instrumented for accesses out of bounds. Slow.
+    GpuAssisted,
+}
+
+impl FromStr for Validation {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text.trim().to_ascii_lowercase().as_str() {
+            "off" | "0" => Ok(Self::Off),
+            "core" | "1" => Ok(Self::Core),
+            "sync" => Ok(Self::Sync),
+            "gpu" | "gpu-assisted" => Ok(Self::GpuAssisted),
+            other => Err(Error::usage(format!("validation `{other}` is not known"))
+                .help("Allowed are off, core, sync and gpu-assisted")),
+        }
+    }
+}
+
+/// How to open a device.
+#[derive(Clone, Debug)]
+pub struct Options {
+    pub device: DeviceChoice,
+    /// Refuse CPU drivers.
+    pub require_gpu: bool,
+    pub validation: Validation,
+    /// Print validation messages as they come (at most ten of one kind).
+    pub print_messages: bool,
+    /// After this time a wait names the pass in flight on standard error, once per doubling.
+    pub soft_limit: Duration,
+    /// After this time a wait gives up and the device counts as lost. `None`: ten minutes on CPU drivers, one minute else.
+    pub hard_limit: Option<Duration>,
+    /// Fill every new buffer and image with `0x7FC0DEAD` (a NaN), so that reads of uninitialised memory show. For tests.
+    pub poison: bool,
+    /// Instance extensions that a window needs, as its library lists them. Not empty: the device also gets
+    /// `VK_KHR_swapchain`.
+    pub window_extensions: Vec<String>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            device: DeviceChoice::Auto,
+            require_gpu: false,
+            validation: Validation::Off,
+            print_messages: true,
+            soft_limit: Duration::from_secs(10),
+            hard_limit: None,
+            poison: false,
+            window_extensions: Vec::new(),
+        }
+    }
+}
+
+/// The variables that [`Options::from_env`] reads, with their meaning; for `--help` and documentation.
+pub const ENVIRONMENT: [(&str, &str); 5] = [
+    ("LUCERNA_DEVICE", "auto, cpu, an index or part of a device name"),
+    ("LUCERNA_REQUIRE_GPU", "1: refuse CPU drivers"),
+    ("LUCERNA_VALIDATION", "off, core, sync or gpu-assisted"),
+    ("LUCERNA_WAIT_LIMIT", "seconds after which a wait for the device gives up"),
+    ("LUCERNA_POISON", "1: fill new device memory with NaN"),
+];
+
+impl Options {
+    /// The defaults, changed by the variables of [`ENVIRONMENT`].
+    ///
+    /// # Errors
+    /// `Usage`, naming the variable, if one of them has a value that is not allowed.
+    pub fn from_env() -> Result<Self> {
+        Self::from_variables(|name| std::env::var(name).ok().filter(|value| !value.is_empty()))
+    }
+
+    fn from_variables(variable: impl Fn(&str) -> Option<String>) -> Result<Self> {
+        let mut options = Self::default();
+        if let Some(value) = variable("LUCERNA_DEVICE") {
+            options.device = value.parse().map_err(|e: Error| e.at("LUCERNA_DEVICE"))?;
+        }
+        if let Some(value) = variable("LUCERNA_REQUIRE_GPU") {
+            options.require_gpu = switch(&value).map_err(|e| e.at("LUCERNA_REQUIRE_GPU"))?;
+        }
+        if let Some(value) = variable("LUCERNA_VALIDATION") {
+            options.validation = value.parse().map_err(|e: Error| e.at("LUCERNA_VALIDATION"))?;
+        }
+        if let Some(value) = variable("LUCERNA_WAIT_LIMIT") {
+            options.hard_limit = Some(seconds(&value).map_err(|e| e.at("LUCERNA_WAIT_LIMIT"))?);
+        }
+        if let Some(value) = variable("LUCERNA_POISON") {
+            options.poison = switch(&value).map_err(|e| e.at("LUCERNA_POISON"))?;
+        }
+        Ok(options)
+    }
+}
+
+fn switch(value: &str) -> Result<bool> {
+    match value.trim() {
+        "0" | "false" | "off" => Ok(false),
+        "1" | "true" | "on" => Ok(true),
+        other => Err(Error::usage(format!("`{other}` is neither 0 nor 1"))),
+    }
+}
+
+fn seconds(value: &str) -> Result<Duration> {
+    let wrong = || Error::usage(format!("`{value}` is not a positive number of seconds"));
+    let number: f64 = value.trim().parse().map_err(|_| wrong())?;
+    Duration::try_from_secs_f64(number).ok().filter(|limit| !limit.is_zero()).ok_or_else(wrong)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn device_choices_are_read() {
+        assert_eq!("auto".parse::<DeviceChoice>().unwrap(), DeviceChoice::Auto);
+        assert_eq!("CPU".parse::<DeviceChoice>().unwrap(), DeviceChoice::Cpu);
+        assert_eq!("2".parse::<DeviceChoice>().unwrap(), DeviceChoice::Index(2));
+        assert_eq!("H200".parse::<DeviceChoice>().unwrap(), DeviceChoice::Name("H200".into()));
+        assert!("".parse::<DeviceChoice>().is_err());
+    }
+
+    #[test]
+    fn a_wrong_variable_is_named() {
+        for (name, bad) in [
+            ("LUCERNA_REQUIRE_GPU", "maybe"),
+            ("LUCERNA_VALIDATION", "loud"),
+            ("LUCERNA_WAIT_LIMIT", "-1"),
+            ("LUCERNA_WAIT_LIMIT", "1e300"),
+            ("LUCERNA_POISON", "2"),
+        ] {
+            let error = Options::from_variables(|n| (n == name).then(|| bad.to_owned())).unwrap_err();
+            assert_eq!(error.exit_code(), 2);
+            assert!(error.to_string().contains(name), "{error}");
+        }
+        let options = Options::from_variables(|n| (n == "LUCERNA_WAIT_LIMIT").then(|| "2.5".to_owned())).unwrap();
+        assert_eq!(options.hard_limit, Some(Duration::from_millis(2500)));
+    }
+}
