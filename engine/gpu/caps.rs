@@ -1,7 +1,5 @@
 //! What the open device can do beyond the baseline. Asked once; techniques read this, never the driver.
 
-use std::sync::OnceLock;
-
 use ash::vk;
 
 use super::{facts::Candidate, select::DeviceKind};
@@ -75,9 +73,8 @@ impl Caps {
             [vk::Format::D32_SFLOAT_S8_UINT, vk::Format::D24_UNORM_S8_UINT].into_iter().find(|format| {
                 // SAFETY: query of a physical device of a living instance.
                 let has = unsafe { instance.get_physical_device_format_properties(candidate.physical, *format) };
-                has.optimal_tiling_features.contains(
-                    vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT | vk::FormatFeatureFlags::SAMPLED_IMAGE,
-                )
+                has.optimal_tiling_features
+                    .contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT | vk::FormatFeatureFlags::SAMPLED_IMAGE)
             });
         Self {
             kind: candidate.facts.kind,
@@ -125,7 +122,3 @@ impl Caps {
         }
     }
 }
-
-/// Result of the loop canary, asked at most once for each device.
-#[derive(Debug, Default)]
-pub(crate) struct LoopLimit(pub OnceLock<Option<u32>>);

@@ -4,7 +4,10 @@ use std::{
     collections::HashMap,
     fmt,
     mem::ManuallyDrop,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
     time::Duration,
 };
 
@@ -15,16 +18,16 @@ use gpu_allocator::{
 };
 
 use super::{
-    caps::{Caps, LoopLimit},
+    caps::Caps,
     facts::{Candidate, Features, candidates},
     fault::{Latch, failed},
     instance::{Instance, no_driver},
-    options::{Options, Validation},
+    options::{GpuOptions, Validation},
     pipeline::PipelineCache,
     sampler::SamplerKey,
     select::{DeviceFacts, DeviceKind, Requirements, refusal, select},
     submit::Shell,
-    validation::Log,
+    validation::{Log, Message, Severity},
 };
 use crate::{Error, ErrorKind, Result};
 
@@ -85,15 +88,14 @@ pub(crate) struct Context {
     pub description: Description,
     pub debug: Option<ext::debug_utils::Device>,
     pub lost: Latch,
-    pub options: Options,
+    abandoned: AtomicBool,
+    pub options: GpuOptions,
     pub hard_limit: Duration,
     /// Execution barriers before crash markers; off under synchronisation validation, from which they would hide hazards.
     pub ordered_markers: bool,
     pub shells: Mutex<Vec<Shell>>,
     pub samplers: Mutex<HashMap<SamplerKey, vk::Sampler>>,
     pub pipelines: Mutex<PipelineCache>,
-    pub loop_limit: LoopLimit,
-    pub buffer_device_address: bool,
     /// Last: the instance goes after the device.
     pub instance: Arc<Instance>,
 }
@@ -105,19 +107,34 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 impl Drop for Context {
     fn drop(&mut self) {
+        if self.abandoned() {
+            // The device, and the instance and loader under it, must stay for the driver's threads.
+            std::mem::forget(Arc::clone(&self.instance));
+            return;
+        }
         // SAFETY: this is the last reference, so every image, buffer and submission is gone; submissions wait before
         // they go, so nothing is in flight. After a loss, waiting is useless and destroying is allowed.
         unsafe {
             if !self.lost.is_set() {
                 let _ = self.device.device_wait_idle();
             }
-            let mut allocator = ManuallyDrop::take(&mut self.allocator).into_inner().unwrap_or_else(PoisonError::into_inner);
+            let mut allocator =
+                ManuallyDrop::take(&mut self.allocator).into_inner().unwrap_or_else(PoisonError::into_inner);
             for shell in lock(&self.shells).drain(..) {
                 shell.destroy(&self.device, &mut allocator);
             }
             lock(&self.pipelines).destroy(&self.device);
             for (_, sampler) in lock(&self.samplers).drain() {
                 self.device.destroy_sampler(sampler, None);
+            }
+            let left = allocator.generate_report();
+            for allocation in &left.allocations {
+                self.instance.log.push(Message {
+                    severity: Severity::Error,
+                    id: "LUCERNA-LEAK".into(),
+                    text: format!("memory of `{}` was not given back", allocation.name),
+                    objects: vec![allocation.name.clone()],
+                });
             }
             drop(allocator);
             self.device.destroy_device(None);
@@ -131,7 +148,8 @@ impl Gpu {
     /// # Errors
     /// `NoDevice` if there is no loader, no driver or no suitable device, with one line for each device and missing
     /// item; `OutOfMemory` or `Runtime` if the driver fails while opening.
-    pub fn open(options: &Options) -> Result<Self> {
+    pub fn new(options: GpuOptions) -> Result<Self> {
+        let options = &options;
         let instance = Instance::new(options)?;
         let mut candidates = list(&instance)?;
         let mut needs = Requirements::baseline();
@@ -181,6 +199,20 @@ impl Gpu {
         &self.0.device
     }
 
+    /// Turns a Vulkan result into an error that names `operation` (`vkCmdX for pass …`); a lost device sets the latch. For
+    /// the graph's executor.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost` or `Runtime`, as `result` says.
+    pub fn check<T>(&self, result: Result<T, vk::Result>, operation: impl FnOnce() -> String) -> Result<T> {
+        self.0.check(result, operation)
+    }
+
+    /// Gives a raw object a name for messages and captures.
+    pub fn name<H: vk::Handle>(&self, handle: H, name: &str) {
+        self.0.name(handle, name);
+    }
+
     /// Bytes in use and bytes taken from the driver for images and buffers.
     pub fn memory_in_use(&self) -> (u64, u64) {
         self.0.memory_in_use()
@@ -208,7 +240,7 @@ impl Gpu {
 /// # Errors
 /// `NoDevice` if there is no loader or driver.
 pub fn list_devices() -> Result<Vec<Listed>> {
-    let instance = Instance::new(&Options { print_messages: false, ..Options::default() })?;
+    let instance = Instance::new(&GpuOptions { print_messages: false, ..GpuOptions::default() })?;
     let facts: Vec<DeviceFacts> = list(&instance)?.into_iter().map(|c| c.facts).collect();
     let needs = Requirements::baseline();
     let mut listed = Vec::new();
@@ -235,7 +267,9 @@ pub struct Listed {
 
 fn list(instance: &Instance) -> Result<Vec<Candidate>> {
     match candidates(instance) {
-        Ok(list) if list.is_empty() => Err(no_driver("Vulkan drivers are installed, but none of them has a device".into(), &instance.log)),
+        Ok(list) if list.is_empty() => {
+            Err(no_driver("Vulkan drivers are installed, but none of them has a device".into(), &instance.log))
+        }
         Ok(list) => Ok(list),
         Err(result) => Err(no_driver(
             format!("no Vulkan driver could list its devices (vkEnumeratePhysicalDevices: {result})"),
@@ -245,12 +279,11 @@ fn list(instance: &Instance) -> Result<Vec<Candidate>> {
 }
 
 impl Context {
-    fn new(instance: Arc<Instance>, candidate: Candidate, options: &Options) -> Result<Self> {
+    fn new(instance: Arc<Instance>, candidate: Candidate, options: &GpuOptions) -> Result<Self> {
         let caps = Caps::new(&candidate, &instance.raw);
         let facts = &candidate.facts;
-        let (queue_family, _) = candidate
-            .queue_family
-            .ok_or_else(|| Error::new(ErrorKind::NoDevice, "the chosen device has no queue"))?;
+        let (queue_family, _) =
+            candidate.queue_family.ok_or_else(|| Error::new(ErrorKind::NoDevice, "the chosen device has no queue"))?;
 
         let mut features = candidate.features.wanted();
         // Device addresses serve only acceleration structures; without them they would only cost.
@@ -274,16 +307,20 @@ impl Context {
                 khr::deferred_host_operations::NAME,
             ]);
         }
-        let device = create_device(&instance, &candidate, &mut features, &extensions, queue_family, atomics, caps.ray_query)?;
+        let device =
+            create_device(&instance, &candidate, &mut features, &extensions, queue_family, atomics, caps.ray_query)?;
 
         // From here on `device` must be destroyed on failure.
         // SAFETY: the family was given at creation.
         let queue = unsafe { device.get_device_queue(queue_family, 0) };
+        let mut debug_settings = gpu_allocator::AllocatorDebugSettings::default();
+        // `Context::drop` reports leaks itself.
+        debug_settings.log_leaks_on_shutdown = false;
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.raw.clone(),
             device: device.clone(),
             physical_device: candidate.physical,
-            debug_settings: gpu_allocator::AllocatorDebugSettings { log_leaks_on_shutdown: false, ..Default::default() },
+            debug_settings,
             buffer_device_address: caps.ray_query,
             allocation_sizes: AllocationSizes::new(32 << 20, 8 << 20)
                 .with_max_device_memblock_size(256 << 20)
@@ -314,16 +351,15 @@ impl Context {
             allocator: ManuallyDrop::new(Mutex::new(allocator)),
             heap_bytes,
             description: Description::new(facts),
-            buffer_device_address: caps.ray_query,
             caps,
             lost: Latch::default(),
+            abandoned: AtomicBool::new(false),
             hard_limit: options.hard_limit.unwrap_or(Duration::from_secs(default_limit)),
             ordered_markers: options.validation != Validation::Sync,
             options: options.clone(),
             shells: Mutex::default(),
             samplers: Mutex::default(),
             pipelines: Mutex::default(),
-            loop_limit: LoopLimit::default(),
             facts: candidate.facts,
             instance,
         })
@@ -332,7 +368,9 @@ impl Context {
     /// Turns a Vulkan result into our error; a lost device sets the latch.
     pub fn check<T>(&self, result: Result<T, vk::Result>, operation: impl FnOnce() -> String) -> Result<T> {
         result.map_err(|code| match code {
-            vk::Result::ERROR_DEVICE_LOST => self.lost.set(format!("the device was lost in {} on {}", operation(), self.description)),
+            vk::Result::ERROR_DEVICE_LOST => {
+                self.lost.set(format!("the device was lost in {} on {}", operation(), self.description))
+            }
             other => failed(&operation(), other),
         })
     }
@@ -340,6 +378,15 @@ impl Context {
     /// An error if the device is lost: nothing more may be asked of it.
     pub fn alive(&self) -> Result<()> {
         if self.lost.is_set() { Err(self.lost.error()) } else { Ok(()) }
+    }
+
+    /// The device may still work although it counts as lost: from now on nothing of it is freed or destroyed.
+    pub fn abandon(&self) {
+        self.abandoned.store(true, Ordering::Release);
+    }
+
+    pub fn abandoned(&self) -> bool {
+        self.abandoned.load(Ordering::Acquire)
     }
 
     /// Gives `handle` a name for messages and captures.
@@ -391,7 +438,9 @@ fn create_device(
         let operation = format!("vkCreateDevice for {}", candidate.facts.name);
         match result {
             vk::Result::ERROR_OUT_OF_HOST_MEMORY | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => failed(&operation, result),
-            vk::Result::ERROR_DEVICE_LOST => Error::new(ErrorKind::DeviceLost, format!("the device was lost in {operation}")),
+            vk::Result::ERROR_DEVICE_LOST => {
+                Error::new(ErrorKind::DeviceLost, format!("the device was lost in {operation}"))
+            }
             other => Error::new(ErrorKind::NoDevice, format!("{operation} failed: {other:?}"))
                 .help("Choose another device (`--device`, LUCERNA_DEVICE), or update the driver"),
         }

@@ -175,14 +175,7 @@ fn candidate(instance: &ash::Instance, physical: vk::PhysicalDevice) -> Candidat
         formats: formats(instance, physical),
         has_queue: family.is_some(),
     };
-    Candidate {
-        physical,
-        facts,
-        features,
-        properties,
-        subgroup_size: subgroup.subgroup_size,
-        queue_family: family,
-    }
+    Candidate { physical, facts, features, properties, subgroup_size: subgroup.subgroup_size, queue_family: family }
 }
 
 /// Text of a fixed array that need not be terminated or UTF-8.

@@ -39,7 +39,8 @@ impl Latch {
     }
 }
 
-const LOST_HELP: &str = "Lower the resolution or the sample counts, or choose another device; if it happens again, update the driver";
+const LOST_HELP: &str =
+    "Lower the resolution or the sample counts, or choose another device; if it happens again, update the driver";
 
 /// Bytes for people: `512 B`, `3.5 MiB`.
 pub(crate) fn bytes(count: u64) -> String {
@@ -50,7 +51,11 @@ pub(crate) fn bytes(count: u64) -> String {
         value /= 1024.0;
         unit += 1;
     }
-    if unit == 0 || value >= 100.0 { format!("{value:.0} {}", UNITS[unit]) } else { format!("{value:.1} {}", UNITS[unit]) }
+    if unit == 0 || value >= 100.0 {
+        format!("{value:.0} {}", UNITS[unit])
+    } else {
+        format!("{value:.1} {}", UNITS[unit])
+    }
 }
 
 /// The error for `result` of a call that `operation` describes. A lost device goes through [`Latch::set`] instead.
@@ -59,7 +64,9 @@ pub(crate) fn failed(operation: &str, result: vk::Result) -> Error {
         vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
             Error::new(ErrorKind::OutOfMemory, format!("host memory ran out in {operation}")).help(MEMORY_HELP)
         }
-        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_POOL_MEMORY | vk::Result::ERROR_FRAGMENTED_POOL => {
+        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY
+        | vk::Result::ERROR_OUT_OF_POOL_MEMORY
+        | vk::Result::ERROR_FRAGMENTED_POOL => {
             Error::new(ErrorKind::OutOfMemory, format!("device memory ran out in {operation}")).help(MEMORY_HELP)
         }
         other => Error::new(ErrorKind::Runtime, format!("{operation} failed: {}", describe(other))),

@@ -5,7 +5,7 @@ use std::{ffi::CString, fmt::Write as _, sync::Arc};
 use ash::{ext, khr, vk};
 
 use super::{
-    options::{ENVIRONMENT, Options, Validation},
+    options::{ENVIRONMENT, GpuOptions, Validation},
     validation::{Log, messenger_info},
 };
 use crate::{Error, ErrorKind, Result};
@@ -41,11 +41,12 @@ impl Drop for Instance {
 impl Instance {
     /// # Errors
     /// `NoDevice` if there is no loader or no driver at all, with what to install and the variables in effect.
-    pub fn new(options: &Options) -> Result<Arc<Self>> {
+    pub fn new(options: &GpuOptions) -> Result<Arc<Self>> {
         // SAFETY: loads a system library; nothing of ours depends on what its initialisers do.
         let entry = unsafe { ash::Entry::load() }.map_err(|cause| {
-            Error::new(ErrorKind::NoDevice, format!("the Vulkan loader could not be loaded: {cause}"))
-                .help(hint("Install the Vulkan loader (Debian: libvulkan1) and a driver (without a GPU: mesa-vulkan-drivers)"))
+            Error::new(ErrorKind::NoDevice, format!("the Vulkan loader could not be loaded: {cause}")).help(hint(
+                "Install the Vulkan loader (Debian: libvulkan1) and a driver (without a GPU: mesa-vulkan-drivers)",
+            ))
         })?;
         let log = Arc::new(Log::new(options.print_messages));
 
@@ -53,8 +54,11 @@ impl Instance {
         let version = unsafe { entry.try_enumerate_instance_version() }.ok().flatten().unwrap_or(vk::API_VERSION_1_0);
         if version < vk::API_VERSION_1_3 {
             let (major, minor) = (vk::api_version_major(version), vk::api_version_minor(version));
-            return Err(Error::new(ErrorKind::NoDevice, format!("the Vulkan loader offers {major}.{minor}, needs 1.3"))
-                .help(hint("Update the Vulkan loader (Debian: libvulkan1)")));
+            return Err(Error::new(
+                ErrorKind::NoDevice,
+                format!("the Vulkan loader offers {major}.{minor}, needs 1.3"),
+            )
+            .help(hint("Update the Vulkan loader (Debian: libvulkan1)")));
         }
         // SAFETY: plain queries of the loader.
         let (extensions, layers) = unsafe {
@@ -97,8 +101,11 @@ impl Instance {
             let name = CString::new(name.as_str())
                 .map_err(|_| Error::usage(format!("`{}` is no extension name", name.escape_default())))?;
             if !offers(&extensions, &name) {
-                return Err(Error::new(ErrorKind::NoDevice, format!("the Vulkan loader and its drivers lack {name:?}"))
-                    .help("A window cannot be served on this system; render to a file instead"));
+                return Err(Error::new(
+                    ErrorKind::NoDevice,
+                    format!("the Vulkan loader and its drivers lack {name:?}"),
+                )
+                .help("A window cannot be served on this system; render to a file instead"));
             }
             names.push(name);
         }
@@ -157,10 +164,16 @@ impl Instance {
             match unsafe { functions.create_debug_utils_messenger(&messenger_info(&instance.log), None) } {
                 Ok(handle) => instance.messenger = Some((functions, handle)),
                 Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY) => {
-                    return Err(Error::new(ErrorKind::OutOfMemory, "host memory ran out in vkCreateDebugUtilsMessengerEXT"));
+                    return Err(Error::new(
+                        ErrorKind::OutOfMemory,
+                        "host memory ran out in vkCreateDebugUtilsMessengerEXT",
+                    ));
                 }
                 Err(result) => {
-                    return Err(Error::new(ErrorKind::Runtime, format!("vkCreateDebugUtilsMessengerEXT failed: {result}")));
+                    return Err(Error::new(
+                        ErrorKind::Runtime,
+                        format!("vkCreateDebugUtilsMessengerEXT failed: {result}"),
+                    ));
                 }
             }
         }
@@ -197,12 +210,18 @@ fn enabled_features(validation: Validation) -> &'static [vk::ValidationFeatureEn
 
 fn no_instance(result: vk::Result, log: &Log) -> Error {
     let what = match result {
-        vk::Result::ERROR_INCOMPATIBLE_DRIVER => "no Vulkan driver was found (vkCreateInstance: incompatible driver)".to_owned(),
+        vk::Result::ERROR_INCOMPATIBLE_DRIVER => {
+            "no Vulkan driver was found (vkCreateInstance: incompatible driver)".to_owned()
+        }
         // The loader says this when no driver could be loaded, as with a broken manifest; hardly ever for want of memory.
-        vk::Result::ERROR_OUT_OF_HOST_MEMORY => "no Vulkan driver could be loaded (vkCreateInstance: the loader reports \
+        vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
+            "no Vulkan driver could be loaded (vkCreateInstance: the loader reports \
              out of host memory, which it also does when a driver's manifest file is missing or malformed)"
-            .to_owned(),
-        vk::Result::ERROR_INITIALIZATION_FAILED => "no Vulkan driver could be initialised (vkCreateInstance)".to_owned(),
+                .to_owned()
+        }
+        vk::Result::ERROR_INITIALIZATION_FAILED => {
+            "no Vulkan driver could be initialised (vkCreateInstance)".to_owned()
+        }
         vk::Result::ERROR_LAYER_NOT_PRESENT => "a requested Vulkan layer is missing (vkCreateInstance)".to_owned(),
         other => format!("no Vulkan instance could be made (vkCreateInstance: {other})"),
     };

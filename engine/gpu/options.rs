@@ -1,4 +1,4 @@
-//! What a caller asks of [`super::Gpu::open`], from code, the command line or the environment.
+//! What a caller asks of [`super::Gpu::new`], from code, the command line or the environment.
 
 use std::{str::FromStr, time::Duration};
 
@@ -25,7 +25,9 @@ impl FromStr for DeviceChoice {
     fn from_str(text: &str) -> Result<Self> {
         let text = text.trim();
         Ok(match text.to_ascii_lowercase().as_str() {
-            "" => return Err(Error::usage("an empty device choice").help("Write auto, cpu, an index or part of a name")),
+            "" => {
+                return Err(Error::usage("an empty device choice").help("Write auto, cpu, an index or part of a name"));
+            }
             "auto" => Self::Auto,
             "cpu" => Self::Cpu,
             lower => match lower.parse() {
@@ -68,7 +70,7 @@ impl FromStr for Validation {
 
 /// How to open a device.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct GpuOptions {
     pub device: DeviceChoice,
     /// Refuse CPU drivers.
     pub require_gpu: bool,
@@ -86,7 +88,7 @@ pub struct Options {
     pub window_extensions: Vec<String>,
 }
 
-impl Default for Options {
+impl Default for GpuOptions {
     fn default() -> Self {
         Self {
             device: DeviceChoice::Auto,
@@ -101,7 +103,7 @@ impl Default for Options {
     }
 }
 
-/// The variables that [`Options::from_env`] reads, with their meaning; for `--help` and documentation.
+/// The variables that [`GpuOptions::from_env`] reads, with their meaning; for `--help` and documentation.
 pub const ENVIRONMENT: [(&str, &str); 5] = [
     ("LUCERNA_DEVICE", "auto, cpu, an index or part of a device name"),
     ("LUCERNA_REQUIRE_GPU", "1: refuse CPU drivers"),
@@ -110,7 +112,7 @@ pub const ENVIRONMENT: [(&str, &str); 5] = [
     ("LUCERNA_POISON", "1: fill new device memory with NaN"),
 ];
 
-impl Options {
+impl GpuOptions {
     /// The defaults, changed by the variables of [`ENVIRONMENT`].
     ///
     /// # Errors
@@ -176,11 +178,11 @@ mod tests {
             ("LUCERNA_WAIT_LIMIT", "1e300"),
             ("LUCERNA_POISON", "2"),
         ] {
-            let error = Options::from_variables(|n| (n == name).then(|| bad.to_owned())).unwrap_err();
+            let error = GpuOptions::from_variables(|n| (n == name).then(|| bad.to_owned())).unwrap_err();
             assert_eq!(error.exit_code(), 2);
             assert!(error.to_string().contains(name), "{error}");
         }
-        let options = Options::from_variables(|n| (n == "LUCERNA_WAIT_LIMIT").then(|| "2.5".to_owned())).unwrap();
+        let options = GpuOptions::from_variables(|n| (n == "LUCERNA_WAIT_LIMIT").then(|| "2.5".to_owned())).unwrap();
         assert_eq!(options.hard_limit, Some(Duration::from_millis(2500)));
     }
 }

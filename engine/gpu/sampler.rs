@@ -21,23 +21,26 @@ pub struct SamplerDesc {
 }
 
 impl SamplerDesc {
-    /// Linear inside and between levels, clamped to the edge.
+    /// Linear inside of the nearest level, clamped to the edge.
     pub const LINEAR: Self = Self {
         linear: true,
-        linear_mips: true,
+        linear_mips: false,
         address: [vk::SamplerAddressMode::CLAMP_TO_EDGE; 3],
         compare: None,
         anisotropy: 1.0,
         border: vk::BorderColor::FLOAT_TRANSPARENT_BLACK,
     };
     /// Nearest, clamped to the edge.
-    pub const NEAREST: Self = Self { linear: false, linear_mips: false, ..Self::LINEAR };
-    /// Linear, repeated.
-    pub const REPEAT: Self = Self { address: [vk::SamplerAddressMode::REPEAT; 3], ..Self::LINEAR };
+    pub const NEAREST: Self = Self { linear: false, ..Self::LINEAR };
+    /// Linear inside and between levels, clamped to the edge.
+    pub const TRILINEAR: Self = Self { linear_mips: true, ..Self::LINEAR };
+    /// Linear inside and between levels, repeated.
+    pub const REPEAT: Self = Self { address: [vk::SamplerAddressMode::REPEAT; 3], ..Self::TRILINEAR };
+    /// Nearest, repeated.
+    pub const NEAREST_REPEAT: Self = Self { address: [vk::SamplerAddressMode::REPEAT; 3], ..Self::NEAREST };
     /// For reverse-Z shadow maps: lit (1) where the receiver's depth is greater than or equal to the stored one, and
     /// outside of the map.
     pub const SHADOW: Self = Self {
-        linear_mips: false,
         address: [vk::SamplerAddressMode::CLAMP_TO_BORDER; 3],
         compare: Some(vk::CompareOp::GREATER_OR_EQUAL),
         border: vk::BorderColor::FLOAT_TRANSPARENT_BLACK,
@@ -78,7 +81,8 @@ impl Gpu {
             .border_color(desc.border)
             .max_lod(vk::LOD_CLAMP_NONE);
         // SAFETY: `info` is complete; the device is alive.
-        let sampler = self.0.check(unsafe { self.0.device.create_sampler(&info, None) }, || "vkCreateSampler".into())?;
+        let sampler =
+            self.0.check(unsafe { self.0.device.create_sampler(&info, None) }, || "vkCreateSampler".into())?;
         samplers.insert(key, sampler);
         Ok(sampler)
     }

@@ -151,11 +151,15 @@ fn missing(
     let mut missing = Vec::new();
     match choice {
         DeviceChoice::Auto => {}
-        DeviceChoice::Index(wanted) if *wanted != index => missing.push(format!("is not device {wanted}, which was asked for")),
+        DeviceChoice::Index(wanted) if *wanted != index => {
+            missing.push(format!("is not device {wanted}, which was asked for"))
+        }
         DeviceChoice::Name(part) if !device.name.to_lowercase().contains(&part.to_lowercase()) => {
             missing.push(format!("has not `{part}` in its name, which was asked for"));
         }
-        DeviceChoice::Cpu if device.kind != DeviceKind::Cpu => missing.push("is not a CPU driver, which was asked for".into()),
+        DeviceChoice::Cpu if device.kind != DeviceKind::Cpu => {
+            missing.push("is not a CPU driver, which was asked for".into())
+        }
         _ => {}
     }
     if !missing.is_empty() {
@@ -173,7 +177,8 @@ fn missing(
         missing.push("lacks a queue that draws and computes".into());
     }
     missing.extend(needs.extensions.iter().filter(|e| !device.extensions.contains(**e)).map(|e| format!("lacks {e}")));
-    missing.extend(needs.features.iter().filter(|f| !device.features.contains(*f)).map(|f| format!("lacks feature {f}")));
+    missing
+        .extend(needs.features.iter().filter(|f| !device.features.contains(*f)).map(|f| format!("lacks feature {f}")));
     missing.extend(needs.formats.iter().filter(|f| !device.formats.contains(**f)).map(|f| format!("lacks format {f}")));
     for (limit, least) in &needs.limits {
         let has = device.limits.get(limit).copied().unwrap_or(0);
@@ -273,7 +278,10 @@ mod tests {
 
     #[test]
     fn require_gpu_refuses_cpu_drivers() {
-        assert_eq!(pick(&three()[..1], DeviceChoice::Auto, true).unwrap_err()[0].missing, ["is a CPU driver, and a GPU is required"]);
+        assert_eq!(
+            pick(&three()[..1], DeviceChoice::Auto, true).unwrap_err()[0].missing,
+            ["is a CPU driver, and a GPU is required"]
+        );
         assert_eq!(pick(&three(), DeviceChoice::Auto, true), Ok(2));
     }
 

@@ -9,6 +9,8 @@ use std::{
 
 use ash::vk;
 
+use super::select::Version;
+
 /// How serious a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
@@ -49,7 +51,7 @@ pub struct Allowed {
     /// The message's text contains this.
     pub text: &'static str,
     /// First and last validation layer version (patch of 1.3, or 1.4 as 1.4 itself) that says it; `None`: any.
-    pub layers: Option<((u32, u32, u32), (u32, u32, u32))>,
+    pub layers: Option<(Version, Version)>,
     /// Part of the driver's name; empty: any.
     pub driver: &'static str,
     pub reason: &'static str,
@@ -176,9 +178,7 @@ fn allowed(message: &Message, layer: (u32, u32, u32), driver: &str) -> bool {
 /// The messenger that fills `log`. `log` must stay alive as long as the messenger or the instance.
 pub(crate) fn messenger_info(log: &Log) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
     vk::DebugUtilsMessengerCreateInfoEXT::default()
-        .message_severity(
-            vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
-        )
+        .message_severity(vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR)
         .message_type(
             vk::DebugUtilsMessageTypeFlagsEXT::GENERAL
                 | vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION
