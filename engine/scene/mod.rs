@@ -3,6 +3,7 @@
 //! Right-handed, Y up, metres, linear Rec. 709. Cameras and lights look down −Z of their node. Nothing here knows Vulkan.
 
 pub mod animate;
+pub mod builtin;
 pub mod bvh;
 pub mod cull;
 pub mod deform;

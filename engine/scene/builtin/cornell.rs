@@ -41,26 +41,36 @@ pub const CAMERA: [f32; 3] = [278.0, 273.0, -800.0];
 /// Focal length and side of the square film, metres.
 pub const FILM: (f32, f32) = (0.035, 0.025);
 
-/// The box with its lamp as an emissive rectangle.
+/// Where the stand-in hangs: metres below the centre of the lamp.
+pub const SPOT_DROP: f32 = 0.02;
+/// Outer angle of the stand-in's cone, degrees from its axis. A shadow map cannot see 90°.
+pub const SPOT_OUTER: f32 = 80.0;
+
+/// The box lit by a spot light that stands in for the lamp, so that techniques without area lights show the box too.
+///
+/// The spot hangs [`SPOT_DROP`] below the lamp's centre and shines down. Its axial intensity is the lamp's (radiance ·
+/// area), and its inner angle is chosen so that its flux under glTF's squared ramp is the flux π · radiance · area of
+/// the Lambertian lamp as well: with c the cosines of both angles, 1 − 2/3·c_inner − 1/3·c_outer = 1/2. The lamp's
+/// rectangle glows where it is, but as an unlit pane, which casts no light: nothing is counted twice.
 pub(super) fn build() -> Scene {
     let (mut stage, lamp) = room("cornell");
-    let light = stage.material(Material { double_sided: false, ..Material::emitter("light", emission()) });
-    stage.add("light", Model::of(light, lamp));
+    let shown = stage.material(Material { unlit: true, ..Material::diffuse("light", Vec3::ONE) });
+    stage.add("light", Model::of(shown, lamp));
+    let [a, b, c, d] = LIGHT.map(metres);
+    let intensity = emission() * (b - a).length() * (d - a).length();
+    let peak = intensity.max_element();
+    let place = (a + c) * 0.5 - Vec3::Y * SPOT_DROP;
+    let inner = (0.75 - 0.5 * SPOT_OUTER.to_radians().cos()).acos().to_degrees();
+    let way = (place.to_array(), [place.x, 0.0, place.z]);
+    stage.spot("light", way, intensity / peak, peak, (inner, SPOT_OUTER));
     stage.finish()
 }
 
-/// The box with a spot light instead, for techniques that serve no area lights: it hangs 2 cm below the lamp's centre,
-/// shines down and has the intensity of the lamp along its axis (radiance · area). A pane that glows as the lamp does
-/// shows where it is.
-pub(super) fn build_with_spot() -> Scene {
-    let (mut stage, lamp) = room("cornell-spot");
-    let shown = stage.material(Material { unlit: true, ..Material::diffuse("light", Vec3::splat(1.0)) });
-    stage.add("light", Model::of(shown, lamp));
-    let [a, b, _, d] = LIGHT.map(metres);
-    let intensity = emission() * (b - a).length() * (d - a).length();
-    let peak = intensity.max_element();
-    let centre = (a + LIGHT.map(metres)[2]) * 0.5 - vec3(0.0, 0.02, 0.0);
-    stage.spot("light", (centre.to_array(), [centre.x, 0.0, centre.z]), intensity / peak, peak, (0.0, 89.0));
+/// The box with its lamp as published: an emissive rectangle, for techniques that serve area lights.
+pub(super) fn build_area() -> Scene {
+    let (mut stage, lamp) = room("cornell-area");
+    let light = stage.material(Material::emitter("light", emission()));
+    stage.add("light", Model::of(light, lamp));
     stage.finish()
 }
 
@@ -91,8 +101,8 @@ fn room(name: &str) -> (Stage, Geometry) {
     let local = super::kit::looking(eye, eye + Vec3::Z);
     stage.node(Node { name: "front".to_owned(), local, camera: Some(0), ..Node::default() });
     stage.camera("red corner", [0.1, 0.33, 0.06], [0.5, 0.17, 0.45], 62.0);
-    stage.camera("green corner", [0.5, 0.4, 0.05], [0.1, 0.13, 0.38], 62.0);
-    stage.camera("floor", [0.28, 0.06, 0.03], [0.27, 0.2, 0.5], 68.0);
+    stage.camera("green corner", [0.52, 0.4, 0.04], [0.16, 0.14, 0.42], 58.0);
+    stage.camera("between the blocks", [0.46, 0.09, -0.2], [0.22, 0.17, 0.4], 56.0);
     (stage, sheet(LIGHT))
 }
 
@@ -116,7 +126,7 @@ fn block(top: [[f32; 3]; 4]) -> Geometry {
     geometry.flat_quad([foot[3], foot[2], foot[1], foot[0]]);
     for i in 0..4 {
         let j = (i + 1) % 4;
-        geometry.flat_quad([foot[j], foot[i], top[i], top[j]]);
+        geometry.flat_quad([foot[i], foot[j], top[j], top[i]]);
     }
     geometry
 }

@@ -1,19 +1,21 @@
 //! Scenes made by code: no file to ship, the same on every machine, known in every number.
 //!
 //! ```
-//! let scene = lucerna::scene::builtin::build("cornell")?;
+//! let scene = lucerna::scene::builtin::load("cornell")?;
 //! assert!(scene.cameras.len() >= 3);
 //! # Ok::<(), lucerna::Error>(())
 //! ```
 //!
-//! Lights are chosen so that direct light with one bounce is well exposed at EV 0. Texture coordinates are metres of
-//! surface in set 0. Solids are closed, wound counter-clockwise and have outward normals.
+//! Texture coordinates are metres of surface in set 0. Solids are closed, wound counter-clockwise and have outward
+//! normals. Each scene comes with the exposure ([`exposure`]) at which direct light with one bounce fills an 8-bit
+//! picture well.
 
 pub mod cornell;
 pub mod furnace;
 mod kit;
 mod primitives;
-mod teapot;
+#[cfg(test)]
+mod tests;
 
 use super::Scene;
 use crate::{Error, Result};
@@ -21,69 +23,97 @@ use crate::{Error, Result};
 struct Entry {
     name: &'static str,
     description: &'static str,
+    exposure: f32,
     build: fn() -> Scene,
 }
 
 const ENTRIES: &[Entry] = &[
     Entry {
         name: "cornell",
-        description: "Cornell box with its published measurements and area light",
+        description: "Cornell box by its published measurements; a spot light stands in for the area light",
+        exposure: 2.0,
         build: cornell::build,
     },
     Entry {
-        name: "cornell-spot",
-        description: "Cornell box whose area light is replaced by a spot light of the same axial intensity",
-        build: cornell::build_with_spot,
+        name: "cornell-area",
+        description: "Cornell box by its published measurements, lit by its emissive rectangle",
+        exposure: 2.0,
+        build: cornell::build_area,
     },
     Entry {
         name: "furnace",
-        description: "White furnace: a sphere of albedo 0.5 under uniform light; it must show half that light",
-        build: furnace::build_sphere,
+        description: "Closed box that emits and reflects evenly; every pixel tends to emission / (1 - albedo)",
+        exposure: 1.0,
+        build: furnace::build_box,
     },
     Entry {
-        name: "furnace-box",
-        description: "Closed box that emits and reflects evenly; every pixel tends to emission / (1 - albedo)",
-        build: furnace::build_box,
+        name: "furnace-sphere",
+        description: "A sphere of albedo 0.5 under uniform light; it must show half that light",
+        exposure: 1.0,
+        build: furnace::build_sphere,
     },
     Entry {
         name: "primitives",
         description: "Coloured solids on a ground between two coloured walls, for colour bleeding",
+        exposure: 0.0,
         build: primitives::build,
-    },
-    Entry {
-        name: "teapot",
-        description: "Utah teapot from its 32 Bezier patches, on a table by a coloured wall",
-        build: teapot::build,
     },
 ];
 
 /// Names of all built-in scenes.
-pub fn names() -> &'static [&'static str] {
-    const NAMES: [&str; ENTRIES.len()] = {
-        let mut names = [""; ENTRIES.len()];
-        let mut i = 0;
-        while i < names.len() {
-            names[i] = ENTRIES[i].name;
-            i += 1;
-        }
-        names
-    };
-    &NAMES
-}
+pub const NAMES: &[&str] = &{
+    let mut names = [""; ENTRIES.len()];
+    let mut i = 0;
+    while i < names.len() {
+        names[i] = ENTRIES[i].name;
+        i += 1;
+    }
+    names
+};
 
 /// One line about a built-in scene, if there is one of this name.
 pub fn description(name: &str) -> Option<&'static str> {
-    ENTRIES.iter().find(|entry| entry.name == name).map(|entry| entry.description)
+    entry(name).map(|entry| entry.description)
+}
+
+/// Exposure (stops, 2^EV on the radiance) that suits a built-in scene, if there is one of this name.
+pub fn exposure(name: &str) -> Option<f32> {
+    entry(name).map(|entry| entry.exposure)
 }
 
 /// Builds a scene.
 ///
 /// # Errors
-/// [`crate::ErrorKind::Usage`] if there is no built-in scene of this name; the message lists those that exist.
-pub fn build(name: &str) -> Result<Scene> {
-    match ENTRIES.iter().find(|entry| entry.name == name) {
-        Some(entry) => Ok((entry.build)()),
-        None => Err(Error::usage(format!("there is no built-in scene {name:?}"))
-            .help(format!("Built-in scenes are: {}", names().join(", ")))),
+/// [`crate::ErrorKind::Usage`] if there is no built-in scene of this name; the message lists those that exist and names
+/// the nearest.
+pub fn load(name: &str) -> Result<Scene> {
+    if let Some(entry) = entry(name) {
+        return Ok((entry.build)());
     }
+    let list = NAMES.join(", ");
+    let nearest = NAMES.iter().map(|known| (distance(name, known), known)).min();
+    let help = match nearest {
+        Some((off, known)) if off <= 1 + known.len() / 3 => format!("Did you mean {known:?}? Built-in scenes: {list}"),
+        _ => format!("Built-in scenes: {list}"),
+    };
+    Err(Error::usage(format!("there is no built-in scene {name:?}")).help(help))
+}
+
+fn entry(name: &str) -> Option<&'static Entry> {
+    ENTRIES.iter().find(|entry| entry.name == name)
+}
+
+/// Levenshtein distance in characters, ASCII case ignored.
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, from) in a.chars().enumerate() {
+        let mut diagonal = std::mem::replace(&mut row[0], i + 1);
+        for (j, to) in b.iter().enumerate() {
+            let change = diagonal + usize::from(!from.eq_ignore_ascii_case(to));
+            let best = change.min(row[j] + 1).min(row[j + 1] + 1);
+            diagonal = std::mem::replace(&mut row[j + 1], best);
+        }
+    }
+    row[b.len()]
 }

@@ -3,6 +3,8 @@
 //! Everything here is metres, Y up, counter-clockwise seen from outside. Texture coordinates are metres of surface (so
 //! that a material says how large its texture is), v grows downwards as in glTF.
 
+#![allow(dead_code, unused_imports)]
+
 mod geometry;
 mod pictures;
 mod random;
@@ -11,6 +13,8 @@ mod solids;
 mod stage;
 mod surfaces;
 
+#[cfg(test)]
+pub(crate) use geometry::place;
 pub(crate) use geometry::{Geometry, Model};
 pub(crate) use pictures::{Picture, bricks, carpet, checker, lettering, mottled, planks};
 pub(crate) use random::{Random, fbm, hash, value_noise};

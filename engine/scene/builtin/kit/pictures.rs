@@ -75,14 +75,15 @@ pub(crate) fn planks(size: u32, count: u32, light: Vec3, dark: Vec3, seed: u32) 
         let across = row.fract();
         let joint = (hash(board ^ seed) % 97) as f32 / 97.0;
         let along = (uv.x + joint).fract();
-        let tone = (hash(board.wrapping_mul(31) ^ seed ^ u32::from(along > 0.5) * 5) % 89) as f32 / 89.0;
+        let tone = (hash(board.wrapping_mul(31) ^ seed ^ (u32::from(along > 0.5) * 5)) % 89) as f32 / 89.0;
         // Grain: noise drawn out along the board, with a slow wave.
         let grain_at = Vec2::new(uv.x * 4.0, uv.y * count as f32 * 10.0);
         let grain = fbm(grain_at, 0, 3, seed ^ board.wrapping_mul(7919)) * 0.65 + value_noise(uv * 8.0, 8, seed) * 0.35;
         let edge = across.min(1.0 - across) / count as f32 * size as f32;
         let end = (along - 0.5).abs().min(along.min(1.0 - along)) * size as f32;
         let gap = (edge.min(end) / 1.4).clamp(0.0, 1.0);
-        let color = light.lerp(dark, (0.25 * tone + 0.75 * grain).clamp(0.0, 1.0)) * (0.45 + 0.55 * gap) * (0.85 + 0.3 * tone);
+        let color =
+            light.lerp(dark, (0.25 * tone + 0.75 * grain).clamp(0.0, 1.0)) * (0.45 + 0.55 * gap) * (0.85 + 0.3 * tone);
         (color, 0.003 * gap + 0.0006 * grain)
     })
 }
@@ -94,7 +95,8 @@ pub(crate) fn bricks(size: u32, columns: u32, rows: u32, brick: Vec3, mortar: Ve
         let shifted = uv.x * columns as f32 + if row as i32 % 2 == 0 { 0.0 } else { 0.5 };
         let column = shifted.floor().rem_euclid(columns as f32);
         let inside = Vec2::new(shifted.fract(), (uv.y * rows as f32).fract());
-        let to_edge = Vec2::new(inside.x.min(1.0 - inside.x) * rows as f32 / columns as f32, inside.y.min(1.0 - inside.y));
+        let to_edge =
+            Vec2::new(inside.x.min(1.0 - inside.x) * rows as f32 / columns as f32, inside.y.min(1.0 - inside.y));
         let solid = ((to_edge.min_element() - 0.05) / 0.07).clamp(0.0, 1.0);
         let tone = (hash(hash(row as u32 ^ seed) ^ column as u32) % 101) as f32 / 101.0;
         let rough = fbm(uv * 32.0, 32, 3, seed);
@@ -121,7 +123,7 @@ pub(crate) fn lettering(text: &str, board: Vec3, ink: Vec3, seed: u32) -> Pictur
         let frame = x == 0 || y == 0 || x + 1 == columns || y + 1 == rows;
         let (letter, column) = (x.wrapping_sub(3) / 6, x.wrapping_sub(3) % 6);
         let lit = x >= 3 && column < 5 && (3..10).contains(&y) && {
-            let glyph = text.bytes().nth(letter as usize).map_or([0; 7], glyph);
+            let glyph = text.as_bytes().get(letter as usize).map_or([0; 7], |letter| glyph(*letter));
             glyph[(y - 3) as usize] >> (4 - column) & 1 == 1
         };
         let worn = 0.75 + 0.5 * fbm(Vec2::new(uv.x * 6.0, uv.y * 24.0), 0, 3, seed);

@@ -58,10 +58,11 @@ pub(crate) fn bevel_box(x: f32, y: f32, z: f32, bevel: f32) -> Geometry {
             out.quad(ids[face_a][low], ids[face_b][low], ids[face_b][high], ids[face_a][high]);
         }
     }
-    for index in 0..8 {
-        let sign = |bit: usize| if index >> bit & 1 == 1 { 1.0f32 } else { -1.0 };
-        let on = |axis: usize| ids[axis * 2 + usize::from(sign(axis) < 0.0)][index];
-        if sign(0) * sign(1) * sign(2) > 0.0 {
+    let both = [1.0f32, -1.0];
+    let corners = both.into_iter().flat_map(|x| both.into_iter().flat_map(move |y| both.map(|z| Vec3::new(x, y, z))));
+    for corner in corners {
+        let on = |axis: usize| ids[axis * 2 + usize::from(corner[axis] < 0.0)][corner_index(corner)];
+        if corner.element_product() > 0.0 {
             out.triangle(on(0), on(1), on(2));
         } else {
             out.triangle(on(0), on(2), on(1));
@@ -80,7 +81,11 @@ pub(crate) fn sphere(radius: f32, segments: usize, rings: usize) -> Geometry {
     let profile: Vec<Vec2> = (0..=rings)
         .map(|i| {
             let (sin, cos) = (std::f32::consts::PI * i as f32 / rings as f32).sin_cos();
-            if i == 0 || i == rings { Vec2::new(0.0, -radius * cos.signum()) } else { Vec2::new(radius * sin, -radius * cos) }
+            if i == 0 || i == rings {
+                Vec2::new(0.0, -radius * cos.signum())
+            } else {
+                Vec2::new(radius * sin, -radius * cos)
+            }
         })
         .collect();
     let mut out = lathe(&profile, segments, 180.0);
@@ -122,9 +127,7 @@ pub(crate) fn wall(width: f32, height: f32, thickness: f32, openings: &[Opening]
         }
         let (i, j) = (i as usize, j as usize);
         let (x, y) = ((xs[i] + xs[i + 1]) * 0.5, (ys[j] + ys[j + 1]) * 0.5);
-        !openings
-            .iter()
-            .any(|o| x > o.left && x < o.left + o.width && y > o.bottom && y < o.bottom + o.height)
+        !openings.iter().any(|o| x > o.left && x < o.left + o.width && y > o.bottom && y < o.bottom + o.height)
     };
     let mut out = Geometry::default();
     let mut face = |corners: [Vec3; 4], uv: &dyn Fn(Vec3) -> Vec2| {

@@ -140,7 +140,10 @@ fn skin(
     for side in 0..n {
         let (a, b) = (profile[side], profile[(side + 1) % n]);
         let (na, nb) = if smooth {
-            ((outward(side + n - 1) + outward(side)).normalize_or(outward(side)), (outward(side) + outward(side + 1)).normalize_or(outward(side)))
+            (
+                (outward(side + n - 1) + outward(side)).normalize_or(outward(side)),
+                (outward(side) + outward(side + 1)).normalize_or(outward(side)),
+            )
         } else {
             (outward(side), outward(side))
         };
@@ -221,13 +224,7 @@ pub(crate) fn sheet(x: f32, z: f32, cells_x: usize, cells_z: usize) -> Geometry 
 }
 
 /// A height field over a rectangle of (x, z), facing up, smooth.
-pub(crate) fn terrain(
-    min: Vec2,
-    max: Vec2,
-    cells_x: usize,
-    cells_z: usize,
-    height: impl Fn(Vec2) -> f32,
-) -> Geometry {
+pub(crate) fn terrain(min: Vec2, max: Vec2, cells_x: usize, cells_z: usize, height: impl Fn(Vec2) -> f32) -> Geometry {
     let mut out = Geometry::default();
     let step = (max - min) / Vec2::new(cells_x as f32, cells_z as f32);
     for j in 0..=cells_z {
