@@ -9,7 +9,6 @@
 const uint LIGHT_DIRECTIONAL = 0u; // export
 const uint LIGHT_POINT = 1u; // export
 const uint LIGHT_SPOT = 2u; // export
-const uint NO_SHADOW = 0xffffffffu; // export
 
 struct Light {
     vec3 position;    // metres
@@ -17,10 +16,9 @@ struct Light {
     vec3 direction;   // unit, the way the light shines (spot, directional)
     float range;      // metres; 0: no cut-off
     vec3 intensity;   // colour * intensity: W/sr, or W/m2 for directional lights
-    uint shadow;      // first slot of its shadow maps, or NO_SHADOW
+    uint index;       // its own number
     float spot_scale; // glTF: saturate(cos(angle) * spot_scale + spot_offset)^2; 0 and 1 for other lights
     float spot_offset;
-    uint shadow_slots; // 1 spot, 6 point, cascades of a directional light
 };
 
 layout(binding = LIGHTS_BINDING, scalar) readonly buffer Lights { uint light_count; Light lights[]; };
