@@ -7,6 +7,7 @@ pub mod builtin;
 pub mod bvh;
 pub mod cull;
 pub mod deform;
+pub mod texture;
 pub mod view;
 
 pub use animate::Pose;

@@ -1,0 +1,265 @@
+//! Files in and out with nothing half done: bounded reads, atomic writes.
+
+use std::{
+    collections::HashSet,
+    fs::{self, File, OpenOptions},
+    io::{self, Read, Write},
+    path::{Path, PathBuf},
+    sync::{
+        Mutex,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::{Duration, SystemTime},
+};
+
+use crate::{Error, ErrorKind, Result};
+
+/// Reads a whole regular file of at most `max_bytes` bytes.
+///
+/// Folders, devices and pipes are refused (`/dev/zero` never ends), and so is a file that grows past the limit while
+/// it is read. Errors name the file.
+pub fn read_file_checked(path: impl AsRef<Path>, max_bytes: u64) -> Result<Vec<u8>> {
+    let path = path.as_ref();
+    read_checked(path, max_bytes).map_err(|error| error.in_file(path))
+}
+
+fn read_checked(path: &Path, max_bytes: u64) -> Result<Vec<u8>> {
+    let cannot = |error: io::Error| Error::input("cannot be read").caused_by(error);
+    // Before opening, because opening a pipe blocks.
+    regular(&fs::metadata(path).map_err(cannot)?)?;
+    let file = File::open(path).map_err(cannot)?;
+    let metadata = file.metadata().map_err(cannot)?;
+    regular(&metadata)?;
+    let too_large = |size: u64| Error::input(format!("{size} bytes, at most {max_bytes} are read"));
+    if metadata.len() > max_bytes {
+        return Err(too_large(metadata.len()));
+    }
+    let mut bytes = Vec::new();
+    bytes
+        .try_reserve_exact(usize::try_from(metadata.len()).unwrap_or(usize::MAX))
+        .map_err(|error| Error::new(ErrorKind::OutOfMemory, "cannot be held in memory").caused_by(error))?;
+    file.take(max_bytes.saturating_add(1)).read_to_end(&mut bytes).map_err(cannot)?;
+    if bytes.len() as u64 > max_bytes {
+        return Err(too_large(bytes.len() as u64));
+    }
+    Ok(bytes)
+}
+
+fn regular(metadata: &fs::Metadata) -> Result<()> {
+    if metadata.is_dir() {
+        Err(Error::input("is a folder, a file is needed"))
+    } else if metadata.is_file() {
+        Ok(())
+    } else {
+        Err(Error::input("is a device or a pipe, only regular files are read"))
+    }
+}
+
+/// Writes a whole file or nothing: into a temporary file of the same folder, flushed to disk, then renamed.
+///
+/// Whenever the process dies, `path` is what it was or complete. An existing file is replaced only with `overwrite`
+/// (a symbolic link stays, what it points at is replaced). Devices and pipes (`/dev/null`) are written directly. On
+/// failure nothing is left behind; temporary files of killed processes are swept a day later by the next write into
+/// that folder. The error has [`ErrorKind::Output`] and says how many bytes were needed.
+pub fn write_atomic(path: &Path, bytes: &[u8], overwrite: bool) -> Result<()> {
+    let fail = |error: io::Error| failed(path, &format!("cannot write {} bytes", bytes.len()), error);
+    let target = inspect(path, overwrite)?;
+    if target.device {
+        let mut file = OpenOptions::new().write(true).open(&target.path).map_err(fail)?;
+        return file.write_all(bytes).and_then(|()| file.flush()).map_err(fail);
+    }
+    sweep(&target.folder);
+    let mut temporary = Temporary::create(&target.folder).map_err(fail)?;
+    temporary.file.write_all(bytes).map_err(fail)?;
+    if let Some(permissions) = target.permissions {
+        // A replaced file keeps who may read it; failing to is no reason to lose the picture.
+        let _ = temporary.file.set_permissions(permissions);
+    }
+    temporary.file.sync_all().map_err(fail)?;
+    temporary.publish(&target.path, overwrite).map_err(|error| match error.kind() {
+        io::ErrorKind::AlreadyExists => exists(path),
+        _ => fail(error),
+    })?;
+    // The rename itself reaches the disk with its folder; not every file system can do that.
+    if let Ok(folder) = File::open(&target.folder) {
+        let _ = folder.sync_all();
+    }
+    Ok(())
+}
+
+/// Checks before work starts that [`write_atomic`] has a chance: the folder exists and takes new files, `path` is no
+/// folder, and is free unless `overwrite`. Creates and removes an empty temporary file.
+pub fn probe_output(path: &Path, overwrite: bool) -> Result<()> {
+    let target = inspect(path, overwrite)?;
+    if target.device {
+        return Ok(());
+    }
+    sweep(&target.folder);
+    Temporary::create(&target.folder).map(drop).map_err(|error| failed(path, "cannot be written", error))
+}
+
+struct Target {
+    /// Where the bytes go: `path` with a final symbolic link followed.
+    path: PathBuf,
+    folder: PathBuf,
+    device: bool,
+    permissions: Option<fs::Permissions>,
+}
+
+fn inspect(path: &Path, overwrite: bool) -> Result<Target> {
+    let mut resolved = path.to_path_buf();
+    let existing = match fs::metadata(path) {
+        Ok(metadata) => {
+            resolved = fs::canonicalize(path).map_err(|error| failed(path, "cannot be resolved", error))?;
+            Some(metadata)
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => None,
+        Err(error) => return Err(failed(path, "cannot be written", error)),
+    };
+    if let Some(metadata) = &existing {
+        if metadata.is_dir() {
+            return Err(Error::new(ErrorKind::Output, "is a folder, a file name is needed").in_file(path));
+        }
+        if metadata.is_file() && !overwrite {
+            return Err(exists(path));
+        }
+    }
+    if path.file_name().is_none() {
+        return Err(Error::new(ErrorKind::Output, "is not a file name").in_file(path));
+    }
+    let folder = match resolved.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.to_path_buf(),
+        _ => PathBuf::from("."),
+    };
+    match fs::metadata(&folder) {
+        Ok(metadata) if metadata.is_dir() => {}
+        Ok(_) => {
+            let what = format!("{} is not a folder", folder.display());
+            return Err(Error::new(ErrorKind::Output, what).in_file(path));
+        }
+        Err(error) => {
+            let what = format!("the folder {} cannot be used", folder.display());
+            return Err(failed(path, &what, error).help("Create it, or name another"));
+        }
+    }
+    let device = existing.as_ref().is_some_and(|metadata| !metadata.is_file());
+    Ok(Target { path: resolved, folder, device, permissions: existing.filter(|_| !device).map(|m| m.permissions()) })
+}
+
+fn failed(path: &Path, what: &str, error: io::Error) -> Error {
+    Error::new(ErrorKind::Output, what).in_file(path).caused_by(error)
+}
+
+fn exists(path: &Path) -> Error {
+    Error::new(ErrorKind::Output, "exists already")
+        .in_file(path)
+        .help("Name another file, or allow it to be overwritten")
+}
+
+const PREFIX: &str = ".lucerna-";
+const SUFFIX: &str = ".tmp";
+
+/// An unpublished file; removed when dropped.
+struct Temporary {
+    path: PathBuf,
+    file: File,
+}
+
+impl Temporary {
+    fn create(folder: &Path) -> io::Result<Self> {
+        static COUNTER: AtomicU64 = AtomicU64::new(0);
+        // Another machine may write to the same network folder under the same process id: try on.
+        for _ in 0..1000 {
+            let number = COUNTER.fetch_add(1, Ordering::Relaxed);
+            let path = folder.join(format!("{PREFIX}{}-{number}{SUFFIX}", std::process::id()));
+            match OpenOptions::new().write(true).create_new(true).open(&path) {
+                Ok(file) => return Ok(Self { path, file }),
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Err(io::Error::other("no free name for a temporary file"))
+    }
+
+    fn publish(&mut self, path: &Path, overwrite: bool) -> io::Result<()> {
+        if !overwrite {
+            // A link fails when the name is taken meanwhile; a rename would replace it.
+            match fs::hard_link(&self.path, path) {
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => return Err(error),
+                Ok(()) => return Ok(()),
+                // File systems without hard links.
+                Err(_) if path.exists() => return Err(io::ErrorKind::AlreadyExists.into()),
+                Err(_) => {}
+            }
+        }
+        fs::rename(&self.path, path)
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        // After a rename there is nothing to remove.
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
+/// Removes temporary files older than a day, once a folder and process.
+fn sweep(folder: &Path) {
+    static SWEPT: Mutex<Option<HashSet<PathBuf>>> = Mutex::new(None);
+    if let Ok(mut swept) = SWEPT.lock()
+        && !swept.get_or_insert_default().insert(folder.to_path_buf())
+    {
+        return;
+    }
+    sweep_older_than(folder, Duration::from_secs(24 * 3600));
+}
+
+fn sweep_older_than(folder: &Path, age: Duration) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let ours = name.to_str().is_some_and(|name| name.starts_with(PREFIX) && name.ends_with(SUFFIX));
+        let old = || {
+            let modified = entry.metadata().ok().filter(fs::Metadata::is_file)?.modified().ok()?;
+            SystemTime::now().duration_since(modified).ok().filter(|passed| *passed > age)
+        };
+        if ours && old().is_some() {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_old_temporary_files_of_ours_are_swept() {
+        let folder = tempfile::tempdir().unwrap();
+        let name = |name: &str| folder.path().join(name);
+        for file in [".lucerna-1-0.tmp", ".lucerna-2-0.tmp", "picture.tmp", ".lucerna-notes"] {
+            fs::write(name(file), b"x").unwrap();
+        }
+        let old = SystemTime::now() - Duration::from_secs(25 * 3600);
+        for file in [".lucerna-1-0.tmp", "picture.tmp", ".lucerna-notes"] {
+            File::options().write(true).open(name(file)).unwrap().set_modified(old).unwrap();
+        }
+        sweep(folder.path());
+        assert!(!name(".lucerna-1-0.tmp").exists());
+        assert!([".lucerna-2-0.tmp", "picture.tmp", ".lucerna-notes"].iter().all(|file| name(file).exists()));
+    }
+
+    #[test]
+    fn a_file_that_is_too_large_or_no_file_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("five.bin");
+        fs::write(&path, b"12345").unwrap();
+        assert_eq!(read_file_checked(&path, 5).unwrap(), b"12345");
+        let error = read_file_checked(&path, 4).unwrap_err().to_string();
+        assert!(error.contains("five.bin: 5 bytes, at most 4"), "{error}");
+        assert!(read_file_checked(folder.path(), 4).unwrap_err().to_string().contains("is a folder"));
+        let error = read_file_checked(folder.path().join("none"), 4).unwrap_err();
+        assert!(error.to_string().contains("none: cannot be read"), "{error}");
+        assert_eq!(error.kind(), ErrorKind::Input);
+    }
+}

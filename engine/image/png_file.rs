@@ -1,0 +1,166 @@
+//! PNG files: sRGB-encoded on disk, linear in memory.
+
+use std::io::Cursor;
+
+use super::{Layer, Layers, Metadata, WriteOptions, check_size, srgb, zeroed};
+use crate::{Error, ErrorKind, Result, scene::Limits};
+
+/// Keyword of the iTXt chunk with the metadata.
+const KEYWORD: &str = "lucerna";
+
+pub(super) fn encode(layers: &Layers, layer: &Layer, options: &WriteOptions) -> Result<Vec<u8>> {
+    let alpha = layer.channel("A").filter(|_| layer.channels.len() > 1);
+    let pixels = layer.rgb_pixels().ok_or_else(|| {
+        let channels = layer.channels.join(" ");
+        Error::usage(format!("layer {:?} has the channels {channels}; PNG files hold RGB or one channel", layer.name))
+    })?;
+    let grey = layer.channels.len() - usize::from(alpha.is_some()) == 1;
+    let depth = match options.png_bits {
+        8 => png::BitDepth::Eight,
+        16 => png::BitDepth::Sixteen,
+        bits => return Err(Error::usage(format!("{bits} bits a channel: PNG files are written with 8 or 16"))),
+    };
+    let scale = options.exposure_ev.exp2();
+    let mut samples = Vec::with_capacity(pixels.len() * 8);
+    let mut push = |encoded: f32| match depth {
+        png::BitDepth::Sixteen => samples.extend(((encoded * 65535.0 + 0.5) as u16).to_be_bytes()),
+        _ => samples.push((encoded * 255.0 + 0.5) as u8),
+    };
+    for (i, pixel) in pixels.iter().enumerate() {
+        let a = alpha.map(|a| layer.data[i * layer.channels.len() + a].clamp(0.0, 1.0));
+        let unassociate = match a {
+            Some(a) if a > 0.0 && a < 1.0 => scale / a,
+            _ => scale,
+        };
+        for &value in &pixel[..if grey { 1 } else { 3 }] {
+            let shown = value * unassociate;
+            push(if shown.is_nan() { 0.0 } else { srgb::encode(shown.clamp(0.0, 1.0)) });
+        }
+        if let Some(a) = a {
+            push(if a.is_nan() { 0.0 } else { a });
+        }
+    }
+    let fail = |error: png::EncodingError| Error::new(ErrorKind::Runtime, "PNG encoding failed").caused_by(error);
+    let mut out = Vec::new();
+    let mut encoder = png::Encoder::new(&mut out, layers.width, layers.height);
+    encoder.set_color(match (grey, alpha.is_some()) {
+        (true, false) => png::ColorType::Grayscale,
+        (true, true) => png::ColorType::GrayscaleAlpha,
+        (false, false) => png::ColorType::Rgb,
+        (false, true) => png::ColorType::Rgba,
+    });
+    encoder.set_depth(depth);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+    if !layers.metadata.is_empty() {
+        encoder.add_itxt_chunk(KEYWORD.to_owned(), layers.metadata.to_json()?).map_err(fail)?;
+    }
+    let mut writer = encoder.write_header().map_err(fail)?;
+    writer.write_image_data(&samples).map_err(fail)?;
+    writer.finish().map_err(fail)?;
+    Ok(out)
+}
+
+fn open<'a>(bytes: &'a [u8], limits: &Limits) -> Result<png::Reader<Cursor<&'a [u8]>>> {
+    let bytes_limit = usize::try_from(limits.max_alloc).unwrap_or(usize::MAX);
+    let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), png::Limits { bytes: bytes_limit });
+    decoder.set_transformations(png::Transformations::EXPAND);
+    decoder.read_info().map_err(damaged)
+}
+
+fn damaged(error: png::DecodingError) -> Error {
+    Error::input("PNG decoding failed").caused_by(error)
+}
+
+pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Layers> {
+    let mut reader = open(bytes, limits)?;
+    let (width, height) = reader.info().size();
+    let (colour, depth) = reader.output_color_type();
+    let names: &[&str] = match colour {
+        png::ColorType::Grayscale => &["Y"],
+        png::ColorType::GrayscaleAlpha => &["Y", "A"],
+        png::ColorType::Rgba => &["R", "G", "B", "A"],
+        _ => &["R", "G", "B"],
+    };
+    let wide = depth == png::BitDepth::Sixteen;
+    // The encoded bytes and the floats stand side by side.
+    let per_pixel = names.len() as u64 * if wide { 6 } else { 5 };
+    check_size(width.into(), height.into(), per_pixel, limits)?;
+    let count = width as usize * height as usize * names.len();
+    let size = reader.output_buffer_size().ok_or_else(|| Error::input("too large for this machine"))?;
+    let mut encoded = vec![0; size];
+    reader.next_frame(&mut encoded).map_err(damaged)?;
+    let transfer = Transfer::of(reader.info());
+    let mut data = zeroed(count)?;
+    let alpha = names.iter().position(|&name| name == "A");
+    for (i, value) in data.iter_mut().enumerate() {
+        let code = if wide {
+            f32::from(u16::from_be_bytes([encoded[2 * i], encoded[2 * i + 1]])) / 65535.0
+        } else {
+            f32::from(encoded[i]) / 255.0
+        };
+        *value = if Some(i % names.len()) == alpha { code } else { transfer.decode(code) };
+    }
+    if let Some(alpha) = alpha {
+        for pixel in data.chunks_exact_mut(names.len()) {
+            let a = pixel[alpha];
+            pixel[..alpha].iter_mut().for_each(|value| *value *= if a > 0.0 { a } else { 1.0 });
+        }
+    }
+    // Text chunks may stand after the pixels.
+    let _ = reader.finish();
+    let metadata = text(reader.info())?;
+    Ok(Layers { metadata, ..Layers::new(width, height).with(Layer::new("", names, data)) })
+}
+
+pub(super) fn metadata(bytes: &[u8], limits: &Limits) -> Result<Metadata> {
+    let mut reader = open(bytes, limits)?;
+    // Only files whose text stands after the pixels need those read.
+    let before = text(reader.info())?;
+    if !before.is_empty() {
+        return Ok(before);
+    }
+    let _ = reader.finish();
+    text(reader.info())
+}
+
+fn text(info: &png::Info<'_>) -> Result<Metadata> {
+    for chunk in &info.utf8_text {
+        if chunk.keyword == KEYWORD {
+            let json = chunk.get_text().map_err(|error| Error::input("damaged text").caused_by(error).at("iTXt"))?;
+            return Metadata::from_json(&json).map_err(|error| error.at("iTXt"));
+        }
+    }
+    let mut metadata = Metadata::default();
+    for chunk in &info.uncompressed_latin1_text {
+        metadata.extra.insert(chunk.keyword.clone(), chunk.text.clone());
+    }
+    for chunk in &info.utf8_text {
+        metadata.extra.insert(chunk.keyword.clone(), chunk.get_text().unwrap_or_default());
+    }
+    Ok(metadata)
+}
+
+/// How codes become light: sRGB unless the file says another gamma and not sRGB.
+enum Transfer {
+    Srgb,
+    Gamma(f32),
+}
+
+impl Transfer {
+    fn of(info: &png::Info<'_>) -> Self {
+        match info.gama_chunk.map(|gamma| gamma.into_value()) {
+            // 1/2.2 is how programs without an sRGB chunk say sRGB.
+            Some(gamma) if info.srgb.is_none() && gamma > 0.01 && (gamma - 1.0 / 2.2).abs() > 0.005 => {
+                Self::Gamma(1.0 / gamma)
+            }
+            _ => Self::Srgb,
+        }
+    }
+
+    fn decode(&self, code: f32) -> f32 {
+        match self {
+            Self::Srgb => srgb::decode(code),
+            Self::Gamma(exponent) => code.powf(*exponent),
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! Images for materials: PNG, JPEG, WebP and KTX2 (plain, block compressed, Basis Universal) to 8-bit RGBA.
+//!
+//! Only the largest level is kept: mip levels are made on the device, where the use of the texture (sRGB or linear) is
+//! known. Colour profiles, gamma chunks and EXIF orientation are ignored, as glTF 2.0 asks (section 3.9.4).
+
+mod basis;
+mod blocks;
+mod ktx;
+
+use std::{
+    io::Cursor,
+    panic::{AssertUnwindSafe, catch_unwind},
+};
+
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+
+use super::{Limits, Texture};
+use crate::{Error, ErrorKind, Result, image::check_size};
+
+/// Decodes an image file to 8-bit RGBA, top row first, with the name left empty.
+///
+/// The first bytes say what it is; `mime_hint` only helps to word the error when they do not. Sizes are checked against
+/// `limits` before anything is allocated. Errors say what is wrong; the caller names the file and the place
+/// ([`Error::at`]).
+pub fn decode(bytes: &[u8], mime_hint: Option<&str>, limits: &Limits) -> Result<Texture> {
+    if bytes.len() as u64 > limits.max_file {
+        return Err(Error::input(format!("{} bytes, at most {} are read", bytes.len(), limits.max_file)));
+    }
+    match Format::sniff(bytes) {
+        Some(Format::Ktx2) => guarded("KTX2", || ktx::decode(bytes, limits)),
+        Some(Format::Png) => guarded("PNG", || decode_plain(bytes, ImageFormat::Png, "PNG", limits)),
+        Some(Format::Jpeg) => guarded("JPEG", || decode_plain(bytes, ImageFormat::Jpeg, "JPEG", limits)),
+        Some(Format::WebP) => guarded("WebP", || decode_plain(bytes, ImageFormat::WebP, "WebP", limits)),
+        None => {
+            let start: Vec<String> = bytes.iter().take(4).map(|byte| format!("{byte:02x}")).collect();
+            let said = mime_hint.map(|mime| format!(", said to be {mime}")).unwrap_or_default();
+            let what = format!("{} bytes that start with [{}]{said}", bytes.len(), start.join(" "));
+            Err(Error::input(what).help("Textures are PNG, JPEG, WebP or KTX2"))
+        }
+    }
+}
+
+/// Bytes that a texture takes on the device as 8-bit RGBA: the base level and, with `mips`, all levels below it.
+pub fn device_bytes(width: u32, height: u32, mips: bool) -> u64 {
+    let (mut w, mut h) = (u64::from(width), u64::from(height));
+    let mut bytes = 4 * w * h;
+    while mips && w.max(h) > 1 {
+        (w, h) = ((w / 2).max(1), (h / 2).max(1));
+        bytes += 4 * w * h;
+    }
+    bytes
+}
+
+impl Texture {
+    /// Bytes that it takes in this process's memory.
+    pub fn host_bytes(&self) -> u64 {
+        self.rgba.len() as u64 * 4
+    }
+
+    /// Bytes that it takes on the device with all mip levels.
+    pub fn device_bytes(&self) -> u64 {
+        device_bytes(self.width, self.height, true)
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Png,
+    Jpeg,
+    WebP,
+    Ktx2,
+}
+
+impl Format {
+    fn sniff(bytes: &[u8]) -> Option<Self> {
+        match bytes {
+            [0x89, b'P', b'N', b'G', 0x0d, 0x0a, 0x1a, 0x0a, ..] => Some(Self::Png),
+            [0xff, 0xd8, 0xff, ..] => Some(Self::Jpeg),
+            [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Some(Self::WebP),
+            _ if bytes.starts_with(&ktx2::MAGIC) => Some(Self::Ktx2),
+            _ => None,
+        }
+    }
+}
+
+/// Turns a panic inside a decoder of others into an error. Sizes are checked before; this is the last resort against
+/// an index or an overflow that their authors missed: one damaged texture must not end the process.
+fn guarded(format: &str, decode: impl FnOnce() -> Result<Texture>) -> Result<Texture> {
+    catch_unwind(AssertUnwindSafe(decode))
+        .unwrap_or_else(|_| Err(Error::input(format!("damaged: the {format} decoder gave up"))))
+}
+
+fn decode_plain(bytes: &[u8], format: ImageFormat, name: &str, limits: &Limits) -> Result<Texture> {
+    let damaged = |error| match error {
+        image::ImageError::Limits(limit) => Error::input(format!("{name} over the limits")).caused_by(limit),
+        error => Error::input(format!("{name} decoding failed")).caused_by(error),
+    };
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    let mut decoder_limits = image::Limits::default();
+    decoder_limits.max_alloc = Some(limits.max_alloc);
+    reader.limits(decoder_limits);
+    let decoder = reader.into_decoder().map_err(damaged)?;
+    let (width, height) = decoder.dimensions();
+    // The decoded samples and the RGBA texels stand side by side for a moment.
+    let per_texel = 4 + u64::from(decoder.color_type().bytes_per_pixel());
+    check_size(width.into(), height.into(), per_texel, limits)?;
+    let rgba = DynamicImage::from_decoder(decoder).map_err(damaged)?.into_rgba8();
+    Ok(Texture { name: String::new(), width, height, rgba: rgba.into_raw().as_chunks::<4>().0.to_vec() })
+}
+
+/// `count` texels to fill, or an error where `vec!` would abort.
+fn texels(count: usize) -> Result<Vec<[u8; 4]>> {
+    let mut list = Vec::new();
+    list.try_reserve_exact(count)
+        .map_err(|error| Error::new(ErrorKind::OutOfMemory, format!("{count} texels")).caused_by(error))?;
+    list.resize(count, [0; 4]);
+    Ok(list)
+}
+
+#[cfg(test)]
+mod tests;
