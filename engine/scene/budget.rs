@@ -14,6 +14,13 @@ const BASE: u64 = 192 << 20;
 /// stay below this.
 const FACTOR: u64 = 48;
 
+/// Texels that every scene may have, however small its files: half a GiB of RGBA.
+const BASE_TEXELS: u64 = 1 << 27;
+/// Texels per byte read. JPEG needs a byte for 5 to 20 texels; what is more is mostly one colour.
+const TEXEL_FACTOR: u64 = 64;
+/// Texels of one texture, 8192². Larger ones go past what devices must support, and small files can ask for them.
+const MAX_TEXTURE: u64 = 1 << 26;
+
 /// Counts decoded bytes, vertices and indices against what is allowed.
 #[derive(Debug)]
 pub struct Budget {
@@ -24,7 +31,9 @@ pub struct Budget {
     indices: Cell<u64>,
     max_vertices: u64,
     texels: Cell<u64>,
+    allowed_texels: Cell<u64>,
     max_texels: u64,
+    max_texture: u64,
 }
 
 impl Budget {
@@ -38,7 +47,9 @@ impl Budget {
             indices: Cell::new(0),
             max_vertices: limits.max_vertices,
             texels: Cell::new(0),
+            allowed_texels: Cell::new(BASE_TEXELS.min(limits.max_alloc)),
             max_texels: limits.max_alloc,
+            max_texture: limits.max_image_pixels.min(MAX_TEXTURE),
         }
     }
 
@@ -46,10 +57,18 @@ impl Budget {
     pub fn read(&self, bytes: usize) {
         let allowed = self.allowed.get().saturating_add((bytes as u64).saturating_mul(FACTOR));
         self.allowed.set(allowed.min(self.ceiling));
+        let texels = self.allowed_texels.get().saturating_add((bytes as u64).saturating_mul(TEXEL_FACTOR));
+        self.allowed_texels.set(texels.min(self.max_texels));
     }
 
     /// `count` elements of `size` bytes are about to be allocated.
     pub fn take(&self, count: u64, size: u64) -> Result<()> {
+        self.used.set(self.could_take(count, size)?);
+        Ok(())
+    }
+
+    /// Checks that so much is left, without taking it. Gives what would be used in all.
+    pub fn could_take(&self, count: u64, size: u64) -> Result<u64> {
         let used = count.checked_mul(size).and_then(|bytes| bytes.checked_add(self.used.get())).unwrap_or(u64::MAX);
         if used > self.allowed.get() {
             return Err(Error::input(format!(
@@ -59,8 +78,7 @@ impl Budget {
                 self.allowed.get() >> 20
             )));
         }
-        self.used.set(used);
-        Ok(())
+        Ok(used)
     }
 
     /// A primitive of this size is about to be built.
@@ -75,15 +93,16 @@ impl Budget {
         Ok(())
     }
 
-    /// Texels that textures may still have.
+    /// Texels that the next texture may have.
     pub fn texels_left(&self) -> u64 {
-        self.max_texels.saturating_sub(self.texels.get())
+        self.allowed_texels.get().saturating_sub(self.texels.get()).min(self.max_texture)
     }
 
     /// A texture of this many texels was decoded.
     pub fn texture(&self, texels: u64) -> Result<()> {
         if texels > self.texels_left() {
-            return Err(Error::input(format!("the textures have over {} texels together", self.max_texels)));
+            let allowed = self.texels_left();
+            return Err(Error::input(format!("the texture has {texels} texels, {allowed} more are allowed")));
         }
         self.texels.set(self.texels.get() + texels);
         Ok(())

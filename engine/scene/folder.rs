@@ -3,8 +3,12 @@
 //! A scene file is data from elsewhere. It names its buffers and textures by relative reference, and a reference that
 //! leaves the folder (`../../etc/passwd`, `/dev/zero`, `file:///…`, a symbolic link) is refused instead of followed.
 
-use crate::{Error, Result};
-use std::path::{Path, PathBuf};
+use crate::{Error, ErrorKind, Result};
+use std::{
+    fs::File,
+    io::Read,
+    path::{Path, PathBuf},
+};
 
 const REMEDY: &str = "A scene may only refer to files in its own folder or below it; put the file there";
 
@@ -48,6 +52,34 @@ impl Folder {
         }
         Ok(real)
     }
+}
+
+/// Reads a regular file of at most `limit` bytes. Devices, pipes and folders are refused before they are opened.
+pub fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>> {
+    let cannot = |error| Error::input("the file cannot be read").caused_by(error).in_file(path);
+    let metadata = path.metadata().map_err(cannot)?;
+    if !metadata.is_file() {
+        let what = if metadata.is_dir() { "is a folder" } else { "is not a regular file" };
+        return Err(Error::input(what).in_file(path));
+    }
+    let too_large = |size: u64| {
+        Err(Error::input(format!("the file has {size} bytes or more, {limit} are allowed")).in_file(path))
+    };
+    if metadata.len() > limit {
+        return too_large(metadata.len());
+    }
+    let mut bytes = Vec::new();
+    bytes.try_reserve_exact(metadata.len() as usize).map_err(|error| {
+        Error::new(ErrorKind::OutOfMemory, format!("no memory for {} bytes", metadata.len()))
+            .caused_by(error)
+            .in_file(path)
+    })?;
+    // The file may grow while it is read.
+    File::open(path).map_err(cannot)?.take(limit.saturating_add(1)).read_to_end(&mut bytes).map_err(cannot)?;
+    if bytes.len() as u64 > limit {
+        return too_large(bytes.len() as u64);
+    }
+    Ok(bytes)
 }
 
 /// The relative path that a URI reference names, or an error if it names anything but a file below the scene's folder.

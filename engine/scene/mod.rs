@@ -3,15 +3,24 @@
 //! Right-handed, Y up, metres, linear Rec. 709. Cameras and lights look down −Z of their node. Nothing here knows Vulkan.
 
 pub mod animate;
+mod budget;
 pub mod builtin;
 pub mod bvh;
 pub mod cull;
 pub mod deform;
+mod folder;
+pub mod gltf;
+mod load;
+mod notes;
+mod surface;
+mod tangents;
 pub mod texture;
+mod validate;
 pub mod view;
 
 pub use animate::Pose;
 pub use cull::Aabb;
+pub use load::{LoadOptions, load};
 pub use view::View;
 
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};

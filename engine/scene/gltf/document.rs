@@ -1,130 +1,31 @@
 //! The JSON of a glTF file as typed lists, each element read with its place known.
 //!
-//! Types come from the `gltf` crate where they read what files really hold; its own validation and import are not used,
-//! because they panic on malformed files and follow references out of the folder.
+//! No crate for glTF is used: the known ones panic on malformed files or follow references out of the folder.
 
+use super::types::*;
 use crate::{Error, Result, scene::Limits};
-use gltf::json;
-use serde::{Deserialize, de::DeserializeOwned};
+use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
-use std::collections::BTreeMap;
-
-/// Extension objects by name.
-pub type Extensions = Option<Map<String, Value>>;
 
 #[derive(Debug)]
 pub struct Document {
     pub extensions_used: Vec<String>,
     pub extensions_required: Vec<String>,
-    pub accessors: Vec<json::Accessor>,
+    pub accessors: Vec<Accessor>,
     pub animations: Vec<Animation>,
-    pub buffers: Vec<json::Buffer>,
-    pub views: Vec<json::buffer::View>,
-    pub cameras: Vec<json::Camera>,
-    pub images: Vec<json::Image>,
+    pub buffers: Vec<Buffer>,
+    pub views: Vec<View>,
+    pub cameras: Vec<Camera>,
+    pub images: Vec<Image>,
     pub lights: Vec<Light>,
-    pub materials: Vec<json::Material>,
+    pub materials: Vec<Material>,
     pub meshes: Vec<Mesh>,
-    pub nodes: Vec<json::Node>,
-    pub samplers: Vec<json::texture::Sampler>,
+    pub nodes: Vec<Node>,
+    pub samplers: Vec<Sampler>,
     pub scene: Option<u32>,
     pub scenes: Vec<Scene>,
-    pub skins: Vec<json::Skin>,
+    pub skins: Vec<Skin>,
     pub textures: Vec<Texture>,
-}
-
-#[derive(Debug, Deserialize)]
-pub struct Scene {
-    pub name: Option<String>,
-    #[serde(default)]
-    pub nodes: Vec<u32>,
-}
-
-#[derive(Debug, Deserialize)]
-pub struct Mesh {
-    pub name: Option<String>,
-    pub primitives: Vec<Primitive>,
-    #[serde(default)]
-    pub weights: Vec<f32>,
-}
-
-#[derive(Debug, Deserialize)]
-pub struct Primitive {
-    pub attributes: Attributes,
-    pub indices: Option<u32>,
-    pub material: Option<u32>,
-    #[serde(default = "triangles")]
-    pub mode: u32,
-    #[serde(default)]
-    pub targets: Vec<Attributes>,
-}
-
-/// Accessor index by semantic.
-pub type Attributes = BTreeMap<String, u32>;
-
-fn triangles() -> u32 {
-    4
-}
-
-#[derive(Debug, Deserialize)]
-pub struct Texture {
-    pub sampler: Option<u32>,
-    pub source: Option<u32>,
-    pub extensions: Extensions,
-}
-
-#[derive(Debug, Deserialize)]
-pub struct Animation {
-    pub name: Option<String>,
-    pub channels: Vec<Channel>,
-    pub samplers: Vec<json::animation::Sampler>,
-}
-
-#[derive(Debug, Deserialize)]
-pub struct Channel {
-    pub sampler: u32,
-    pub target: Target,
-}
-
-#[derive(Debug, Deserialize)]
-pub struct Target {
-    pub node: Option<u32>,
-    pub path: String,
-}
-
-/// KHR_lights_punctual.
-#[derive(Debug, Deserialize)]
-pub struct Light {
-    pub name: Option<String>,
-    #[serde(default = "white")]
-    pub color: [f32; 3],
-    #[serde(default = "one")]
-    pub intensity: f32,
-    pub range: Option<f32>,
-    #[serde(rename = "type")]
-    pub kind: String,
-    pub spot: Option<Spot>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub struct Spot {
-    #[serde(default)]
-    pub inner_cone_angle: f32,
-    #[serde(default = "quarter_turn")]
-    pub outer_cone_angle: f32,
-}
-
-fn white() -> [f32; 3] {
-    [1.0; 3]
-}
-
-fn one() -> f32 {
-    1.0
-}
-
-fn quarter_turn() -> f32 {
-    std::f32::consts::FRAC_PI_4
 }
 
 impl Document {
@@ -275,16 +176,16 @@ fn kind(value: &Value) -> &'static str {
 }
 
 /// The extension `name` in `extensions`, typed.
-pub fn extension<T: DeserializeOwned>(extensions: Option<&Map<String, Value>>, name: &str) -> Result<Option<T>> {
-    match extensions.and_then(|map| map.get(name)) {
+pub fn extension<T: DeserializeOwned>(extensions: &Extensions, name: &str) -> Result<Option<T>> {
+    match extensions.as_ref().and_then(|map| map.get(name)) {
         None => Ok(None),
         Some(value) => typed(value.clone()).map(Some).map_err(|error| error.at(format!("extensions.{name}"))),
     }
 }
 
 /// The element of a list that an index in the file points to.
-pub fn item<'a, T>(list: &'a [T], name: &str, index: usize) -> Result<&'a T> {
-    list.get(index).ok_or_else(|| {
+pub fn item<'a, T>(list: &'a [T], name: &str, index: u32) -> Result<&'a T> {
+    list.get(index as usize).ok_or_else(|| {
         Error::input(format!("refers to {name}[{index}], but the file has {} {name}", list.len()))
             .help("The file is not valid glTF; re-export it or run glTF-Validator")
     })

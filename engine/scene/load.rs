@@ -1,0 +1,68 @@
+//! From a file name to a scene.
+
+use super::{Limits, Scene, folder, gltf};
+use crate::{Error, Result};
+use std::path::Path;
+
+/// How scene files are read.
+#[derive(Clone, Debug, Default)]
+pub struct LoadOptions {
+    /// What a file may ask for.
+    pub limits: Limits,
+}
+
+/// Reads a scene file: glTF 2.0 (`.gltf`, `.glb`) or OBJ (`.obj`). The content decides, and where it leaves the format
+/// open, the extension.
+///
+/// Only files in the scene's own folder and below it are read. Every index of the result is valid and every number
+/// finite ([`Scene::validate`]). What could not be read as the file means it stands in [`Scene::notes`].
+///
+/// # Errors
+/// [`ErrorKind::Input`](crate::ErrorKind::Input), with the file and the place in it, for anything that is unreadable,
+/// malformed, over a limit, or needs an extension that is not supported.
+pub fn load(path: impl AsRef<Path>, options: &LoadOptions) -> Result<Scene> {
+    let path = path.as_ref();
+    read(path, options).map_err(|error| error.in_file(path))
+}
+
+fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
+    if path.is_dir() {
+        return Err(Error::input("is a folder").help(match scene_in(path) {
+            Some(name) => format!("Name the scene file in it, for example {name}"),
+            None => "Name a .gltf, .glb or .obj file".to_owned(),
+        }));
+    }
+    let bytes = folder::read_file(path, options.limits.max_file)?;
+    let scene = match format(path, &bytes)? {
+        Format::Gltf => gltf::read(path, &bytes, &options.limits)?,
+    };
+    scene.validate()?;
+    Ok(scene)
+}
+
+/// Name of a scene file in a folder, the first one in alphabetical order.
+fn scene_in(folder: &Path) -> Option<String> {
+    let names = folder.read_dir().ok()?.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
+    names.filter(|name| extension(Path::new(name)).is_some()).min()
+}
+
+enum Format {
+    Gltf,
+}
+
+fn extension(path: &Path) -> Option<Format> {
+    match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+        "gltf" | "glb" => Some(Format::Gltf),
+        _ => None,
+    }
+}
+
+fn format(path: &Path, bytes: &[u8]) -> Result<Format> {
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    if gltf::is_glb(bytes) || text.trim_ascii_start().starts_with(b"{") {
+        return Ok(Format::Gltf);
+    }
+    extension(path).ok_or_else(|| {
+        Error::input("is no scene file that can be read").help("Scenes are .gltf and .glb (glTF 2.0) and .obj files")
+    })
+}
