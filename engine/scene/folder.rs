@@ -36,6 +36,7 @@ impl Folder {
         self.resolve(&path_of_uri(uri)?)
     }
 
+    #[allow(dead_code)] // for OBJ, next
     /// The real path of a file named by a plain path (as in MTL files, which use either slash).
     pub fn resolve_path(&self, path: &str) -> Result<PathBuf> {
         self.resolve(&checked_path(&path.replace('\\', "/"))?)
@@ -62,9 +63,8 @@ pub fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>> {
         let what = if metadata.is_dir() { "is a folder" } else { "is not a regular file" };
         return Err(Error::input(what).in_file(path));
     }
-    let too_large = |size: u64| {
-        Err(Error::input(format!("the file has {size} bytes or more, {limit} are allowed")).in_file(path))
-    };
+    let too_large =
+        |size: u64| Err(Error::input(format!("the file has {size} bytes or more, {limit} are allowed")).in_file(path));
     if metadata.len() > limit {
         return too_large(metadata.len());
     }

@@ -102,7 +102,9 @@ impl Geometry for Corners<'_> {
 /// Whether MikkTSpace will end soon, and will not meet numbers that leave the range of floats.
 fn tame(primitive: &Primitive, uvs: &[Vec2]) -> bool {
     let small = |value: f32| value.abs() < 1e12;
-    if !primitive.positions.iter().all(|p| p.to_array().into_iter().all(small)) || !uvs.iter().all(|uv| small(uv.x) && small(uv.y)) {
+    if !primitive.positions.iter().all(|p| p.to_array().into_iter().all(small))
+        || !uvs.iter().all(|uv| small(uv.x) && small(uv.y))
+    {
         return false;
     }
     // Vertices that are equal in everything count as one.

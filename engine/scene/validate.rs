@@ -178,7 +178,7 @@ fn check_primitive(primitive: &Primitive) -> Result<()> {
     all_finite(&primitive.normals, Vec3::is_finite, "normals")?;
     all_finite(&primitive.tangents, Vec4::is_finite, "tangents")?;
     all_finite(&primitive.colors, Vec4::is_finite, "colors")?;
-    if primitive.indices.len() % 3 != 0 {
+    if !primitive.indices.len().is_multiple_of(3) {
         return Err(Error::input(format!("{} do not make whole triangles", primitive.indices.len())).at("indices"));
     }
     match primitive.indices.iter().position(|&index| index as usize >= count) {

@@ -148,7 +148,8 @@ impl Accessors<'_> {
                     return Err(Error::input("0 elements, at least 1 is needed").at("count"));
                 }
                 let sparse = accessor.sparse.as_ref();
-                let views = [accessor.buffer_view, sparse.map(|s| s.indices.buffer_view), sparse.map(|s| s.values.buffer_view)];
+                let views =
+                    [accessor.buffer_view, sparse.map(|s| s.indices.buffer_view), sparse.map(|s| s.values.buffer_view)];
                 for view in views.into_iter().flatten() {
                     item(&self.document.views, "bufferViews", view)?;
                 }

@@ -154,7 +154,9 @@ impl<'a> Buffers<'a> {
             Some(Bytes::File(path, length)) => {
                 Ok(self.files.get(path).and_then(|bytes| bytes.get(..*length)).unwrap_or_default())
             }
-            None => Err(Error::input("has no uri, and the file has no BIN chunk for it").at(format!("buffers[{index}]"))),
+            None => {
+                Err(Error::input("has no uri, and the file has no BIN chunk for it").at(format!("buffers[{index}]")))
+            }
         }
     }
 
@@ -187,7 +189,7 @@ impl<'a> Buffers<'a> {
     }
 
     fn unpack(&self, view: &View, packed: &Meshopt) -> Result<Vec<u8>> {
-        let size = packed.count.checked_mul(packed.byte_stride).unwrap_or(u64::MAX);
+        let size = packed.count.saturating_mul(packed.byte_stride);
         if size != view.byte_length {
             let (count, stride, length) = (packed.count, packed.byte_stride, view.byte_length);
             return Err(Error::input(format!("{count} elements of {stride} bytes do not fill the view's {length}")));

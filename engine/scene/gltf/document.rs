@@ -120,9 +120,10 @@ fn check_version(root: &Map<String, Value>) -> Result<()> {
                 .help(help))
         }
         (Some((2, _)), _) => Ok(()),
-        (Some((major, minor)), _) => {
-            Err(Error::input(format!("glTF {major}.{minor} is not supported, only 2.x")).at("version").at("asset").help(help))
-        }
+        (Some((major, minor)), _) => Err(Error::input(format!("glTF {major}.{minor} is not supported, only 2.x"))
+            .at("version")
+            .at("asset")
+            .help(help)),
     }
 }
 

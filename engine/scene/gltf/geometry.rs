@@ -45,9 +45,12 @@ impl Meshes<'_> {
         for (i, primitive) in source.primitives.iter().enumerate() {
             let here = format!("{place}.primitives[{i}]");
             if primitive.targets.len() != targets {
-                return Err(Error::input(format!("{} morph targets, the first primitive has {targets}", primitive.targets.len()))
-                    .at("targets")
-                    .at(here));
+                return Err(Error::input(format!(
+                    "{} morph targets, the first primitive has {targets}",
+                    primitive.targets.len()
+                ))
+                .at("targets")
+                .at(here));
             }
             let primitive = self.primitive(primitive, &here).map_err(|error| error.at(&here))?;
             mesh.primitives.extend(primitive);
@@ -200,14 +203,17 @@ impl Meshes<'_> {
                 if let Some(at) = bad {
                     let index = rows[at][0];
                     let what = if index == restart { " (primitive restart, which glTF forbids)" } else { "" };
-                    return Err(Error::input(format!("index {index}{what} (at {at}) but POSITION has {count} vertices"))
-                        .help("The file is not valid glTF; re-export it or run glTF-Validator"));
+                    return Err(Error::input(format!(
+                        "index {index}{what} (at {at}) but POSITION has {count} vertices"
+                    ))
+                    .help("The file is not valid glTF; re-export it or run glTF-Validator"));
                 }
                 rows.into_iter().map(|[index]| index).collect()
             }
         };
-        if order.len() < 3 || (source.mode == 4 && order.len() % 3 != 0) {
-            self.notes.ignored(here, format!("{} indices do not make whole triangles; the rest is left out", order.len()));
+        if order.len() < 3 || (source.mode == 4 && !order.len().is_multiple_of(3)) {
+            self.notes
+                .ignored(here, format!("{} indices do not make whole triangles; the rest is left out", order.len()));
         }
         Ok(match source.mode {
             // A strip turns every second triangle around (glTF 2.0, section 3.7.2.1).
@@ -228,8 +234,7 @@ impl Meshes<'_> {
 
     /// Supplies what is missing: normals, tangents where the material has a normal map, uv sets that its textures use.
     fn finish(&mut self, primitive: &mut Primitive, material: &Material, here: &str) -> Result<()> {
-        let mut repairs =
-            Repairs { degenerate_triangles: primitive.drop_degenerate_triangles(), ..Repairs::default() };
+        let mut repairs = Repairs { degenerate_triangles: primitive.drop_degenerate_triangles(), ..Repairs::default() };
         let corners = primitive.indices.len() as u64;
         if primitive.normals.is_empty() {
             self.accessors.budget.take(corners, primitive.vertex_size())?;
@@ -239,9 +244,10 @@ impl Meshes<'_> {
         } else {
             repairs.bad_normals = primitive.repair_normals();
         }
-        for (what, count) in
-            [("triangles without area dropped", repairs.degenerate_triangles), ("zero normals recomputed", repairs.bad_normals)]
-        {
+        for (what, count) in [
+            ("triangles without area dropped", repairs.degenerate_triangles),
+            ("zero normals recomputed", repairs.bad_normals),
+        ] {
             if count > 0 {
                 self.notes.repaired(here, format!("{count} {what}"));
             }
@@ -263,7 +269,8 @@ impl Meshes<'_> {
                 self.accessors.budget.take(corners, 200 + primitive.vertex_size())?;
                 let before = primitive.positions.len();
                 if primitive.make_tangents(texture.uv_set as usize) == Made::Mean {
-                    self.notes.approximated(here, "tangents are means instead of MikkTSpace: the mesh is too irregular");
+                    self.notes
+                        .approximated(here, "tangents are means instead of MikkTSpace: the mesh is too irregular");
                 }
                 let more = primitive.positions.len().saturating_sub(before);
                 self.accessors.budget.primitive(more as u64, 0)?;

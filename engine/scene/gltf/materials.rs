@@ -118,7 +118,8 @@ impl Materials<'_> {
 
     fn extensions(&mut self, source: &types::Material, place: &str, out: &mut Material) -> Result<()> {
         let extensions = &source.extensions;
-        if let Some(EmissiveStrength { emissive_strength }) = extension(extensions, "KHR_materials_emissive_strength")? {
+        if let Some(EmissiveStrength { emissive_strength }) = extension(extensions, "KHR_materials_emissive_strength")?
+        {
             let what = "extensions.KHR_materials_emissive_strength.emissiveStrength";
             out.emissive *= bounded(emissive_strength, 0.0..=f32::MAX, what, place, self.notes)?;
             if !out.emissive.is_finite() {
@@ -216,7 +217,7 @@ impl Materials<'_> {
             (None, None) => return Err(Error::input("has neither a uri nor a bufferView").at(here)),
         };
         let limits = Limits { max_image_pixels: self.budget.texels_left(), ..self.limits.clone() };
-        let mut decoded = texture::decode(&bytes, mime.as_deref(), &limits, here)?;
+        let mut decoded = texture::decode(&bytes, mime.as_deref(), &limits).map_err(|error| error.at(here))?;
         decoded.name = name.unwrap_or_else(|| here.to_owned());
         Ok(decoded)
     }
@@ -305,7 +306,10 @@ mod tests {
         assert_eq!(set, 1);
         for (uv, want) in [([0.0, 0.0], [0.0, 1.0]), ([1.0, 0.0], [0.0, 0.5]), ([0.0, 1.0], [0.5, 1.0])] {
             let got = apply(matrix, uv);
-            assert!((got[0] - want[0]).abs() < 1e-6 && (got[1] - want[1]).abs() < 1e-6, "{uv:?}: {got:?}, not {want:?}");
+            assert!(
+                (got[0] - want[0]).abs() < 1e-6 && (got[1] - want[1]).abs() < 1e-6,
+                "{uv:?}: {got:?}, not {want:?}"
+            );
         }
     }
 

@@ -36,8 +36,10 @@ pub fn decode(data: &[u8], mode: Mode, filter: Filter, count: usize, stride: usi
         .map_err(|_| Error::new(crate::ErrorKind::OutOfMemory, format!("no memory for {size} bytes")))?;
     match mode {
         Mode::Attributes => {
-            if stride == 0 || stride > 256 || stride % 4 != 0 {
-                return Err(Error::input(format!("byteStride {stride} of ATTRIBUTES must be a multiple of 4 up to 256")));
+            if stride == 0 || stride > 256 || !stride.is_multiple_of(4) {
+                return Err(Error::input(format!(
+                    "byteStride {stride} of ATTRIBUTES must be a multiple of 4 up to 256"
+                )));
             }
             out.resize(size, 0);
             attributes(data, count, stride, &mut out)?;
@@ -91,7 +93,7 @@ fn attributes(data: &[u8], count: usize, stride: usize, out: &mut [u8]) -> Resul
     let body_end = data.len().checked_sub(tail).filter(|&end| end >= 1).ok_or_else(truncated)?;
     let body = &data[1..body_end];
     let mut last = data[data.len() - stride..].to_vec();
-    let block_length = (8192 / stride & !15).min(256);
+    let block_length = ((8192 / stride) & !15).min(256);
     let mut at = 0;
     for block in out.chunks_mut(block_length * stride) {
         let elements = block.len() / stride;
@@ -185,7 +187,7 @@ impl<T: Copy> Recent<T> {
 /// A triangle list: one code byte a triangle that refers to recent edges and vertices.
 fn triangles(data: &[u8], count: usize) -> Result<Vec<u32>> {
     let version = header(data, 0xe0, 1, "triangles")?;
-    if count % 3 != 0 {
+    if !count.is_multiple_of(3) {
         return Err(Error::input(format!("a triangle list cannot have {count} indices")));
     }
     let faces = count / 3;
@@ -308,7 +310,7 @@ fn apply(filter: Filter, data: &mut [u8], stride: usize, mode: Mode) -> Result<(
         Filter::None => return Ok(()),
         Filter::Octahedral => stride == 4 || stride == 8,
         Filter::Quaternion => stride == 8,
-        Filter::Exponential => stride % 4 == 0,
+        Filter::Exponential => stride.is_multiple_of(4),
     };
     if !fits || mode != Mode::Attributes {
         return Err(Error::input(format!("filter {filter:?} cannot be applied to {mode:?} of {stride} bytes")));

@@ -68,8 +68,7 @@ pub fn animations(accessors: &Accessors, hierarchy: &Hierarchy, notes: &mut Note
             let read = channel_of(accessors, hierarchy, source, channel, &here, notes);
             let Some(read) = read.map_err(|error| error.at(&here))? else { continue };
             let twice = animation.channels.iter().any(|other: &Channel| {
-                other.node == read.node
-                    && std::mem::discriminant(&other.values) == std::mem::discriminant(&read.values)
+                other.node == read.node && std::mem::discriminant(&other.values) == std::mem::discriminant(&read.values)
             });
             if twice {
                 return Err(Error::input("another channel of the animation moves the same property").at(here));
@@ -152,7 +151,9 @@ fn times(accessors: &Accessors, index: u32) -> Result<Vec<f32>> {
     let bad = (0..times.len()).find(|&i| times[i] < 0.0 || (i > 0 && times[i] <= times[i - 1]));
     match bad {
         None => Ok(times),
-        Some(i) => Err(Error::input(format!("time {} (at {i}) is negative or not later than the one before", times[i]))),
+        Some(i) => {
+            Err(Error::input(format!("time {} (at {i}) is negative or not later than the one before", times[i])))
+        }
     }
 }
 

@@ -121,7 +121,9 @@ fn roots(document: &Document, parents: &[Option<u32>], notes: &mut Notes) -> Res
             let place = || format!("scenes[{s}].nodes[{n}]");
             item(&document.nodes, "nodes", node).map_err(|error| error.at(place()))?;
             if let Some(parent) = parents[node as usize] {
-                return Err(Error::input(format!("nodes[{node}] is no root, but a child of nodes[{parent}]")).at(place()));
+                return Err(
+                    Error::input(format!("nodes[{node}] is no root, but a child of nodes[{parent}]")).at(place())
+                );
             }
         }
     }
@@ -148,8 +150,11 @@ fn node(document: &Document, index: usize, notes: &mut Notes) -> Result<Node> {
         out.mesh = Some(mesh);
         let targets = mesh_of.primitives.first().map_or(0, |primitive| primitive.targets.len());
         if !source.weights.is_empty() && source.weights.len() != targets {
-            return Err(Error::input(format!("{} weights, meshes[{mesh}] has {targets} morph targets", source.weights.len()))
-                .at("weights"));
+            return Err(Error::input(format!(
+                "{} weights, meshes[{mesh}] has {targets} morph targets",
+                source.weights.len()
+            ))
+            .at("weights"));
         }
         finite(&source.weights, "weights")?;
         out.weights = source.weights.clone();
@@ -294,7 +299,9 @@ fn light(light: &types::Light, place: &str, notes: &mut Notes) -> Result<Light> 
             let mut outer = spot.outer_cone_angle;
             let mut inner = not_negative(spot.inner_cone_angle, "spot.innerConeAngle")?;
             if !(outer > 0.0 && outer <= std::f32::consts::FRAC_PI_2 + 1e-4) {
-                return Err(Error::input(format!("{outer} rad, must be above 0 and at most π/2")).at("spot.outerConeAngle"));
+                return Err(
+                    Error::input(format!("{outer} rad, must be above 0 and at most π/2")).at("spot.outerConeAngle")
+                );
             }
             outer = outer.min(std::f32::consts::FRAC_PI_2);
             if inner >= outer {

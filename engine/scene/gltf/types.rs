@@ -51,7 +51,6 @@ pub struct SparseValues {
 pub struct Buffer {
     pub uri: Option<String>,
     pub byte_length: u64,
-    pub extensions: Extensions,
 }
 
 #[derive(Debug, Deserialize)]
