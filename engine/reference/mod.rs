@@ -1,1 +1,4 @@
-//! reference
+//! Slow and obvious CPU versions of what the shaders compute, written from the papers and not from the shaders.
+
+pub mod isr;
+pub mod isr_scene;

@@ -1,0 +1,264 @@
+//! Image-space radiosity in double precision: the terms of the dissertation's equations, and each pass as a plain loop.
+//!
+//! Nothing here is meant to be fast. The shaders are tested against it, and it is tested against closed forms.
+
+use super::isr_scene::{Buffers, Eye};
+use glam::{DVec2, DVec3};
+use std::f64::consts::PI;
+
+/// Equation 6: the share of what leaves a differential patch at `p` that arrives at the area `d_area` (m²) at `x`.
+/// Unbounded as the two touch.
+pub fn form_factor(p: DVec3, p_normal: DVec3, x: DVec3, x_normal: DVec3, d_area: f64) -> f64 {
+    let line = x - p;
+    let direction = line.normalize_or_zero();
+    let cos_p = p_normal.dot(direction).max(0.0);
+    let cos_x = x_normal.dot(-direction).max(0.0);
+    if cos_p * cos_x == 0.0 { 0.0 } else { cos_p * cos_x * d_area / (PI * line.length_squared()) }
+}
+
+/// Equation 26 without the factor 2π/N: how much a sphere of `radius` at `x` hides from `p`.
+pub fn occlusion(p: DVec3, normal: DVec3, x: DVec3, radius: f64, bias: f64) -> f64 {
+    let distance = p.distance(x);
+    if distance < 1e-6 {
+        return 0.0;
+    }
+    let sine = (radius / distance).clamp(0.0, 1.0);
+    (1.0 - (1.0 - sine.powi(2)).sqrt()) * (normal.dot((x - p) / distance) - bias).max(0.0)
+}
+
+/// Equation 16.
+pub fn paper_attenuation(distance: f64, light_radius: f64) -> f64 {
+    (1.0 - (distance / light_radius).powi(2)).clamp(0.0, 1.0)
+}
+
+/// Equation 29. `accessibility` = 1 − accumulated occlusion, clamped to 0..1.
+pub fn sum(direct: DVec3, accessibility: f64, indirect: DVec3, k_ssao: f64, k_isr: f64) -> DVec3 {
+    direct * (accessibility + 1.0 - k_ssao).clamp(0.0, 1.0) + indirect * k_isr
+}
+
+/// Where the samples of a gather lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pattern {
+    /// Square grid of `(2n + 1)²` points without its centre.
+    Grid,
+    /// `8k` points on the k-th of n square rings; ring radii grow with the given power.
+    Rings { spread: f64 },
+}
+
+/// Offset in texels and the area in texels² of each of `samples` (24, 48, 80) samples within `reach` texels.
+/// `jitter`: position within the cell, 0..1 each; `None`: the middle.
+pub fn samples(pattern: Pattern, samples: usize, reach: f64, jitter: Option<DVec2>) -> Vec<(DVec2, f64)> {
+    let rings = ((((samples + 1) as f64).sqrt() - 1.0) / 2.0).round() as i32;
+    let n = f64::from(rings);
+    let within = jitter.unwrap_or(DVec2::splat(0.5));
+    let mut found = Vec::new();
+    match pattern {
+        Pattern::Grid => {
+            let spacing = reach / n;
+            for y in -rings..=rings {
+                for x in -rings..=rings {
+                    if (x, y) != (0, 0) {
+                        let at = DVec2::new(f64::from(x), f64::from(y)) + within - 0.5;
+                        found.push((at * spacing, spacing * spacing));
+                    }
+                }
+            }
+        }
+        Pattern::Rings { spread } => {
+            for k in 1..=rings {
+                let k_f = f64::from(k);
+                let m = (k_f - 1.0 + within.y) / n;
+                // Area inside the square of half width reach · m^spread, and its growth with m.
+                let inside = |m: f64| 4.0 * reach.powi(2) * m.powf(2.0 * spread);
+                let growth = 8.0 * reach.powi(2) * spread * m.powf(2.0 * spread - 1.0);
+                let ring_area =
+                    if jitter.is_some() { growth / n } else { inside(k_f / n) - inside((k_f - 1.0) / n) };
+                for q in 0..8 * k {
+                    // Walk along the rim of the unit square: 8 units long, from (1, -1) up, left, down, right.
+                    let walked = (f64::from(q) + within.x) / k_f;
+                    let along = walked % 2.0 - 1.0;
+                    let rim = match (walked / 2.0) as u32 {
+                        0 => DVec2::new(1.0, along),
+                        1 => DVec2::new(-along, 1.0),
+                        2 => DVec2::new(-1.0, -along),
+                        _ => DVec2::new(along, -1.0),
+                    };
+                    found.push((rim * reach * m.powf(spread), ring_area / f64::from(8 * k)));
+                }
+            }
+        }
+    }
+    found
+}
+
+/// The offset within a cell that texel (x, y) uses: the ordered-dither matrix of 4 × 4, and a shuffle of it.
+pub fn jitter(x: usize, y: usize) -> DVec2 {
+    const BAYER: [[u32; 4]; 4] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]];
+    let index = BAYER[y % 4][x % 4];
+    let other = (index * 7 + 3) % 16;
+    DVec2::new(f64::from(index) + 0.5, f64::from(other) + 0.5) / 16.0
+}
+
+/// What one sample of the sum stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Estimator {
+    /// Equation 25: (2π/N) · F, with the footprint of one texel in F.
+    Paper,
+    /// F with the footprint of the sample's whole cell; at most one in total.
+    Area,
+}
+
+/// What a gather needs to know.
+#[derive(Clone, Copy, Debug)]
+pub struct Gather {
+    pub estimator: Estimator,
+    pub pattern: Pattern,
+    pub samples: usize,
+    pub jitter: bool,
+    /// Coarse texels.
+    pub reach: f64,
+    /// Coarse texels.
+    pub occlusion_reach: f64,
+    /// Coarse texels.
+    pub occluder_radius: f64,
+    pub occlusion_bias: f64,
+}
+
+/// Gathered radiance of a white receiver (rgb) and accumulated occlusion (w) for every texel.
+pub fn gather(eye: &Eye, buffers: &Buffers, settings: &Gather) -> Vec<(DVec3, f64)> {
+    let mut result = Vec::new();
+    for y in 0..buffers.height {
+        for x in 0..buffers.width {
+            result.push(gather_texel(eye, buffers, settings, x, y));
+        }
+    }
+    result
+}
+
+/// [`gather`] for one texel.
+pub fn gather_texel(eye: &Eye, buffers: &Buffers, settings: &Gather, x: usize, y: usize) -> (DVec3, f64) {
+    let here = buffers.at(x, y);
+    if buffers.depth[here] >= 1.0 {
+        return (DVec3::ZERO, 0.0);
+    }
+    let p = buffers.position(eye, x, y);
+    let n = buffers.normal[here].normalize();
+    let jitter = settings.jitter.then(|| jitter(x, y));
+    let count = settings.samples as f64;
+    let others = |reach: f64| {
+        samples(settings.pattern, settings.samples, reach, jitter).into_iter().filter_map(move |(offset, area)| {
+            let at = DVec2::new(x as f64, y as f64) + offset.round();
+            let inside = at.x >= 0.0 && at.y >= 0.0 && at.x < buffers.width as f64 && at.y < buffers.height as f64;
+            let (sx, sy) = (at.x as usize, at.y as usize);
+            (inside && (sx, sy) != (x, y) && buffers.depth[buffers.at(sx, sy)] < 1.0).then_some((sx, sy, area))
+        })
+    };
+    let mut light = DVec3::ZERO;
+    let mut factors = 0.0;
+    for (sx, sy, area) in others(settings.reach) {
+        let sender = buffers.at(sx, sy);
+        let (q, q_normal) = (buffers.position(eye, sx, sy), buffers.normal[sender].normalize());
+        let texel = buffers.footprint(eye, sx, sy);
+        let factor = match settings.estimator {
+            Estimator::Paper => 2.0 * PI / count * form_factor(p, n, q, q_normal, texel),
+            Estimator::Area => {
+                let r2 = p.distance_squared(q);
+                let bounded = PI * r2 / (PI * r2 + texel);
+                (form_factor(p, n, q, q_normal, texel * area) * bounded).min(1.0)
+            }
+        };
+        light += factor * buffers.mask[sender] * buffers.sender[sender];
+        factors += factor;
+    }
+    if settings.estimator == Estimator::Area {
+        light /= factors.max(1.0);
+    }
+    let mut hidden = 0.0;
+    for (sx, sy, _) in others(settings.occlusion_reach) {
+        let z = buffers.depth[buffers.at(sx, sy)];
+        let radius = settings.occluder_radius * buffers.facing_area(eye, z).sqrt();
+        hidden += 2.0 * PI / count * occlusion(p, n, buffers.position(eye, sx, sy), radius, settings.occlusion_bias);
+    }
+    (light * buffers.mask[here], hidden)
+}
+
+/// The sum of the area estimator over every texel of the image as a sender: what more and more samples converge to.
+pub fn gather_all(eye: &Eye, buffers: &Buffers, x: usize, y: usize) -> DVec3 {
+    let (p, n) = (buffers.position(eye, x, y), buffers.normal[buffers.at(x, y)].normalize());
+    let mut light = DVec3::ZERO;
+    for sy in 0..buffers.height {
+        for sx in 0..buffers.width {
+            let i = buffers.at(sx, sy);
+            if (sx, sy) != (x, y) && buffers.depth[i] < 1.0 {
+                let q = buffers.position(eye, sx, sy);
+                let texel = buffers.footprint(eye, sx, sy);
+                light += form_factor(p, n, q, buffers.normal[i].normalize(), texel) * buffers.sender[i];
+            }
+        }
+    }
+    light
+}
+
+/// The 2 × 2 mean of a row-major image; texels beyond an odd border repeat the border. `takes` chooses among the four by
+/// their depth and the nearest of the four.
+pub fn downsample<T>(
+    width: usize,
+    height: usize,
+    depth: &[f64],
+    value: impl Fn(usize) -> T,
+    takes: impl Fn(f64, f64) -> bool,
+) -> Vec<T>
+where
+    T: std::ops::Add<Output = T> + std::ops::Div<f64, Output = T>,
+{
+    let mut result = Vec::new();
+    for y in (0..height).step_by(2) {
+        for x in (0..width).step_by(2) {
+            let (right, below) = ((x + 1).min(width - 1), (y + 1).min(height - 1));
+            let four = [y * width + x, y * width + right, below * width + x, below * width + right];
+            let nearest = four.iter().map(|&i| depth[i]).fold(f64::INFINITY, f64::min);
+            let taken: Vec<T> = four.iter().filter(|&&i| takes(depth[i], nearest)).map(|&i| value(i)).collect();
+            let count = taken.len() as f64;
+            if let Some(total) = taken.into_iter().reduce(|a, b| a + b) {
+                result.push(total / count);
+            }
+        }
+    }
+    result
+}
+
+/// Gaussian blur of a row-major image with the two-dimensional kernel (the shader uses that it separates).
+pub fn gaussian(width: usize, height: usize, image: &[f64], radius: i64, sigma: f64) -> Vec<f64> {
+    let clamp = |at: i64, size: usize| at.clamp(0, size as i64 - 1) as usize;
+    let mut result = Vec::new();
+    for y in 0..height as i64 {
+        for x in 0..width as i64 {
+            let (mut sum, mut weights) = (0.0, 0.0);
+            for dy in -radius..=radius {
+                for dx in -radius..=radius {
+                    let w = (-((dx * dx + dy * dy) as f64) / (2.0 * sigma * sigma)).exp();
+                    sum += w * image[clamp(y + dy, height) * width + clamp(x + dx, width)];
+                    weights += w;
+                }
+            }
+            result.push(sum / weights);
+        }
+    }
+    result
+}
+
+/// Equations 27 and 28 for one pixel between four coarse samples, each with value and distance in depth; (x, y) in 0..1 from
+/// the first. `None` stands for background. If the best share of the largest weight 1/ε is below 1 %, the nearest in depth.
+pub fn upsample(samples: [Option<(f64, f64)>; 4], x: f64, y: f64, epsilon: f64) -> f64 {
+    let bilinear = [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y];
+    let weighted: Vec<(f64, f64, f64)> = samples
+        .iter()
+        .zip(bilinear)
+        .filter_map(|(sample, b)| sample.map(|(value, off)| (value, off, b / (epsilon + off))))
+        .collect();
+    let total: f64 = weighted.iter().map(|w| w.2).sum();
+    if total * epsilon < 0.01 {
+        return weighted.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |w| w.0);
+    }
+    weighted.iter().map(|w| w.0 * w.2).sum::<f64>() / total
+}

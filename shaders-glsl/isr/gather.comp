@@ -1,0 +1,130 @@
+// Image-space radiosity and ambient occlusion on the coarse buffers (dissertation, listing 6).
+// rgb: gathered radiance for a white receiver; a: accumulated occlusion (equation 26), not clamped.
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "lib/view.glsl"
+#include "lib/screen.glsl"
+#include "lib/isr.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(constant_id = 0) const uint SAMPLES = 48;
+// 0: the dissertation's (2π/N)·F, dA the footprint of one pixel. 1: each sample stands for its whole cell of the image.
+layout(constant_id = 1) const uint AREA_ESTIMATOR = 1;
+layout(constant_id = 2) const uint RINGS = 1;
+layout(constant_id = 3) const uint JITTER = 1;
+layout(constant_id = 4) const uint INDIRECT = 1;
+layout(constant_id = 5) const uint OCCLUSION = 1;
+// Depth-buffer tests between the pixel and each sender; 0: senders are taken as visible, as in the dissertation.
+layout(constant_id = 6) const uint VISIBILITY_STEPS = 0;
+
+layout(binding = 0, scalar) uniform ViewBlock { View view; };
+layout(binding = 1) uniform sampler2D sender;  // rgb radiance, a radiation mask
+layout(binding = 2) uniform sampler2D albedo;  // a: radiation mask of the receiver
+layout(binding = 3) uniform sampler2D normal;  // world, not normalised
+layout(binding = 4) uniform sampler2D depth;   // linear z / far; background 1
+layout(binding = 5, rgba16f) uniform writeonly image2D gathered;
+
+layout(push_constant, scalar) uniform Push {
+    float reach;            // of the indirect samples, coarse pixels
+    float occlusion_reach;  // of the occlusion samples, coarse pixels
+    float occluder_radius;  // coarse pixels
+    float occlusion_bias;   // subtracted from the cosine
+    float spread;           // exponent of the ring radii
+    float thickness;        // of what hides a sender, relative to its depth
+    float factor;           // 2 on half-resolution buffers, 1 on full
+};
+
+// The part of the depth-buffer samples between P and X that do not hide X. Along a line in the image, 1/z is linear
+// under perspective.
+bool hidden(ivec2 from, ivec2 to, float z_from, float z_to) {
+    for (uint i = 1u; i <= VISIBILITY_STEPS; ++i) {
+        float t = float(i) / float(VISIBILITY_STEPS + 1u);
+        ivec2 at = ivec2(round(mix(vec2(from), vec2(to), t)));
+        if (at == from || at == to) {
+            continue;
+        }
+        float line = 1.0 / mix(1.0 / z_from, 1.0 / z_to, t);
+        float z = texelFetch(depth, at, 0).r;
+        if (z < line * 0.98 && z > line * (0.98 - thickness)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 extent = imageSize(gathered);
+    if (any(greaterThanEqual(pixel, extent))) {
+        return;
+    }
+    float z = texelFetch(depth, pixel, 0).r;
+    float mask = texelFetch(albedo, pixel, 0).a;
+    vec3 n = texelFetch(normal, pixel, 0).xyz;
+    if (z >= 1.0 || dot(n, n) < 1e-8) {
+        imageStore(gathered, pixel, vec4(0.0));
+        return;
+    }
+    n = normalize(n);
+    vec3 p = screen_position(view, pixel, factor, z);
+    vec3 axis = screen_axis(view);
+    vec2 jitter = JITTER != 0 ? isr_jitter(pixel) : vec2(0.5);
+
+    vec3 light = vec3(0.0);
+    float factors = 0.0;
+    if (INDIRECT != 0 && mask > 0.0) {
+        for (uint i = 0u; i < SAMPLES; ++i) {
+            vec3 s = isr_sample(i, SAMPLES, RINGS != 0, reach, spread, jitter, JITTER != 0);
+            ivec2 at = pixel + ivec2(round(s.xy));
+            if (at == pixel || any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, extent))) {
+                continue;
+            }
+            float xz = texelFetch(depth, at, 0).r;
+            vec3 xn = texelFetch(normal, at, 0).xyz;
+            if (xz >= 1.0 || dot(xn, xn) < 1e-8) {
+                continue;
+            }
+            xn = normalize(xn);
+            vec2 uv = screen_uv(view, at, factor);
+            vec3 x = world_from_depth(view, uv, xz);
+            float cell = isr_footprint(screen_facing_area(view, factor, xz), axis, view_ray(view, uv), xn);
+            float f;
+            if (AREA_ESTIMATOR != 0) {
+                // One pixel's area in the denominator bounds the factor of touching pixels and vanishes elsewhere.
+                f = min(isr_form_factor(p, n, x, xn, cell) * cell * s.z, 1.0);
+            } else {
+                f = isr_form_factor(p, n, x, xn, 0.0) * cell;
+            }
+            if (f > 0.0 && VISIBILITY_STEPS > 0 && hidden(pixel, at, z, xz)) {
+                continue;
+            }
+            vec4 l = texelFetch(sender, at, 0);
+            light += f * l.a * l.rgb;
+            factors += f;
+        }
+        // Without visibility, senders behind each other are counted twice; form factors over a hemisphere cannot
+        // sum to more than one.
+        light *= AREA_ESTIMATOR != 0 ? mask / max(factors, 1.0) : mask * 2.0 * ISR_PI / float(SAMPLES);
+    }
+
+    float occlusion = 0.0;
+    if (OCCLUSION != 0) {
+        for (uint i = 0u; i < SAMPLES; ++i) {
+            vec3 s = isr_sample(i, SAMPLES, RINGS != 0, occlusion_reach, spread, jitter, JITTER != 0);
+            ivec2 at = pixel + ivec2(round(s.xy));
+            if (at == pixel || any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, extent))) {
+                continue;
+            }
+            float xz = texelFetch(depth, at, 0).r;
+            if (xz >= 1.0) {
+                continue;
+            }
+            float radius = occluder_radius * sqrt(screen_facing_area(view, factor, xz));
+            occlusion += isr_occlusion(p, n, screen_position(view, at, factor, xz), radius, occlusion_bias);
+        }
+        occlusion *= 2.0 * ISR_PI / float(SAMPLES);
+    }
+    imageStore(gathered, pixel, vec4(light, occlusion));
+}

@@ -1,0 +1,85 @@
+// Image-space radiosity: form factor, occlusion, and the samples around a pixel. Twin: engine/reference/isr.rs.
+
+const float ISR_PI = 3.14159265358979;
+
+// Which receiver cell of a surface a pixel sees, m²: the pixel's area at its depth on a plane facing the camera axis, turned
+// onto the surface. `ray` is not normalised; `grazing` bounds the stretch (1 / smallest cosine).
+float isr_footprint(float facing_area, vec3 axis, vec3 ray, vec3 normal) {
+    float along = dot(axis, ray);
+    return facing_area * along / max(abs(dot(normal, ray)), 0.05 * along);
+}
+
+// Equation 6 without dA: cos P · cos X / (π r²), with `extra` (m²) added to π r² against the singularity.
+float isr_form_factor(vec3 p, vec3 p_normal, vec3 x, vec3 x_normal, float extra) {
+    vec3 to = x - p;
+    float r2 = dot(to, to);
+    // cos · r each, so that only one division by r⁴ = (r²)² remains.
+    float cosines = max(dot(p_normal, to), 0.0) * max(-dot(x_normal, to), 0.0);
+    return cosines <= 0.0 ? 0.0 : cosines / (r2 * (ISR_PI * r2 + extra));
+}
+
+// Equation 26 without 2π/N: the spherical cap that an occluder of `radius` at x covers, weighted by the cosine.
+// `bias` is subtracted from the cosine: 8-bit normals make flat surfaces occlude themselves.
+float isr_occlusion(vec3 p, vec3 normal, vec3 x, float radius, float bias) {
+    vec3 to = x - p;
+    float r = length(to);
+    if (r < 1e-6) {
+        return 0.0;
+    }
+    float s = clamp(radius / r, 0.0, 1.0);
+    return (1.0 - sqrt(1.0 - s * s)) * max(dot(normal, to) / r - bias, 0.0);
+}
+
+// Samples to each side of the pixel: 24, 48, 80 are 5², 7², 9² without the centre.
+uint isr_half_width(uint samples) {
+    return samples <= 24u ? 2u : samples <= 48u ? 3u : 4u;
+}
+
+// Point of the square [-1, 1]² rim at s in [0, 1), counter-clockwise from (1, -1).
+vec2 isr_rim(float s) {
+    float at = fract(s) * 4.0;
+    float t = fract(at) * 2.0 - 1.0;
+    return at < 1.0 ? vec2(1.0, t) : at < 2.0 ? vec2(-t, 1.0) : at < 3.0 ? vec2(-1.0, -t) : vec2(t, -1.0);
+}
+
+// Offset (xy, pixels) of sample i and the image area (z, pixels²) it stands for.
+//
+// Grid: the dissertation's square grid of spacing reach / half_width.
+// Rings: as many samples, 8k on square ring k, with no hole in the middle; ring radius ∝ m^spread, so that spread > 1 puts
+// more samples near the pixel, where the form factor is large. `jitter` in [0, 1)² moves a sample within its cell.
+vec3 isr_sample(uint i, uint samples, bool rings, float reach, float spread, vec2 jitter, bool jittered) {
+    uint n = isr_half_width(samples);
+    if (!rings) {
+        float spacing = reach / float(n);
+        uint side = 2u * n + 1u;
+        uint cell = i < samples / 2u ? i : i + 1u;
+        vec2 at = vec2(float(cell % side), float(cell / side)) - float(n) + jitter - 0.5;
+        return vec3(at * spacing, spacing * spacing);
+    }
+    uint ring = i < 8u ? 1u : i < 24u ? 2u : i < 48u ? 3u : 4u;
+    float k = float(ring);
+    float q = float(i - 4u * ring * (ring - 1u));
+    float m = (k - 1.0 + jitter.y) / float(n);
+    float radius = reach * pow(m, spread);
+    float area;
+    if (jittered) {
+        area = spread * reach * reach * pow(m, 2.0 * spread - 1.0) / (k * float(n));
+    } else {
+        float outer = pow(k / float(n), 2.0 * spread);
+        float inner = ring == 1u ? 0.0 : pow((k - 1.0) / float(n), 2.0 * spread);
+        area = reach * reach * (outer - inner) / (2.0 * k);
+    }
+    return vec3(isr_rim((q + jitter.x) / (8.0 * k)) * radius, area);
+}
+
+// The offset within a cell that pixel (x, y) uses: 16 combinations that repeat every 4 × 4 pixels, so that a blur over at
+// least that area sees each of them.
+vec2 isr_jitter(ivec2 pixel) {
+    uint x = uint(pixel.x) & 3u;
+    uint y = uint(pixel.y) & 3u;
+    // 4 × 4 Bayer index: bit-interleaved x ^ y and y, reversed.
+    uint e = x ^ y;
+    uint index = (e & 1u) << 3 | (y & 1u) << 2 | (e & 2u) | (y & 2u) >> 1;
+    uint other = (index * 7u + 3u) & 15u;
+    return (vec2(float(index), float(other)) + 0.5) / 16.0;
+}

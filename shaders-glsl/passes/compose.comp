@@ -1,0 +1,104 @@
+// Bilateral upsampling of the coarse result (dissertation, equations 27 and 28) and the sum of all light (equation 29).
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "lib/view.glsl"
+#include "lib/screen.glsl"
+#include "lib/gbuffer.glsl"
+#include "lib/bilateral.glsl"
+#include "lib/ambient.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(constant_id = 0) const uint FACTOR = 2;
+// 0: |z_p - z_i| of linear z / far (dissertation). 1: distance from the pixel's plane relative to its depth.
+layout(constant_id = 1) const uint PLANE = 1;
+// 0: the gathered radiance is added as it is (dissertation). 1: times the albedo of the pixel.
+layout(constant_id = 2) const uint TINT = 1;
+// 0: occlusion darkens direct light (equation 29). 1: it darkens ambient light only.
+layout(constant_id = 3) const uint OCCLUDE_AMBIENT = 1;
+
+layout(binding = 0, scalar) uniform ViewBlock { View view; };
+layout(binding = 1, scalar) uniform AmbientBlock { Ambient ambient; };
+layout(binding = 2) uniform sampler2D albedo;
+layout(binding = 3) uniform sampler2D normal;
+layout(binding = 4) uniform sampler2D depth;
+layout(binding = 5) uniform sampler2D emission;
+layout(binding = 6) uniform sampler2D direct;        // with emission
+layout(binding = 7) uniform sampler2D gathered;      // coarse: rgb radiance, a occlusion
+layout(binding = 8) uniform sampler2D coarse_depth;
+layout(binding = 9, rgba16f) uniform writeonly image2D total;
+layout(binding = 10, rgba16f) uniform writeonly image2D indirect;
+layout(binding = 11, r32f) uniform writeonly image2D accessibility;
+
+layout(push_constant, scalar) uniform Push {
+    float k_ssao;
+    float k_isr;
+    float epsilon;  // of the depth weight; same unit as the depth difference
+};
+
+// Below this share of the largest possible weight no coarse texel matches, and the nearest in depth is taken.
+const float NO_MATCH = 0.01;
+
+vec4 upsample(ivec2 pixel, float z, vec3 n, vec3 p) {
+    ivec2 last = textureSize(coarse_depth, 0) - 1;
+    vec2 at = (vec2(pixel) + 0.5) / float(FACTOR) - 0.5;
+    ivec2 base = ivec2(floor(at));
+    vec2 f = at - vec2(base);
+    vec4 sum = vec4(0.0);
+    float weights = 0.0;
+    vec4 nearest = vec4(0.0);
+    float nearest_off = 1e30;
+    for (int i = 0; i < 4; ++i) {
+        ivec2 corner = ivec2(i & 1, i >> 1);
+        ivec2 coarse = clamp(base + corner, ivec2(0), last);
+        float bilinear = (corner.x == 1 ? f.x : 1.0 - f.x) * (corner.y == 1 ? f.y : 1.0 - f.y);
+        float coarse_z = texelFetch(coarse_depth, coarse, 0).r;
+        if (coarse_z >= 1.0) {
+            continue;
+        }
+        vec4 value = texelFetch(gathered, coarse, 0);
+        float off = abs(z - coarse_z);
+        if (PLANE != 0) {
+            vec3 x = screen_position(view, coarse, float(FACTOR), coarse_z);
+            off = bilateral_plane_distance(p, n, x, z * view.far);
+        }
+        float w = bilinear / (epsilon + off);
+        sum += w * value;
+        weights += w;
+        if (off < nearest_off) {
+            nearest_off = off;
+            nearest = value;
+        }
+    }
+    return weights * epsilon < NO_MATCH ? nearest : sum / weights;
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(pixel, imageSize(total)))) {
+        return;
+    }
+    float z = texelFetch(depth, pixel, 0).r;
+    vec4 light = texelFetch(direct, pixel, 0);
+    if (z >= 1.0) {
+        imageStore(total, pixel, vec4(light.rgb, 0.0));
+        imageStore(indirect, pixel, vec4(0.0));
+        imageStore(accessibility, pixel, vec4(1.0));
+        return;
+    }
+    vec4 color = texelFetch(albedo, pixel, 0);
+    vec3 n = decode_normal(texelFetch(normal, pixel, 0));
+    vec3 p = screen_position(view, pixel, 1.0, z);
+    vec4 coarse = upsample(pixel, z, n, p);
+    float open = 1.0 - clamp(coarse.a, 0.0, 1.0);
+    float lit = clamp(open + 1.0 - k_ssao, 0.0, 1.0);
+    vec3 bounced = k_isr * coarse.rgb * (TINT != 0 ? color.rgb : vec3(1.0));
+    vec3 around = color.rgb * color.a * ambient_irradiance(ambient, n) / 3.14159265358979;
+    vec3 glow = texelFetch(emission, pixel, 0).rgb;
+    vec3 direct_part = OCCLUDE_AMBIENT != 0 ? light.rgb : (light.rgb - glow) * lit + glow;
+    vec3 sum = direct_part + around * lit + bounced;
+    imageStore(total, pixel, vec4(sum, 1.0));
+    imageStore(indirect, pixel, vec4(around * lit + bounced, 1.0));
+    imageStore(accessibility, pixel, vec4(open));
+}
