@@ -23,14 +23,14 @@ fn corner() -> (Eye, Vec<Patch>) {
 fn facing() -> (Eye, Vec<Patch>) {
     let floor = patch(dvec3(-1.0, 0.0, 0.0), dvec3(2.0, 0.0, 0.0), dvec3(0.0, 0.0, -2.0), 0.0);
     let ceiling = patch(dvec3(-1.0, 1.0, -2.0), dvec3(2.0, 0.0, 0.0), dvec3(0.0, 0.0, 2.0), 1.0);
-    let eye = Eye::look_at(dvec3(0.0, 0.5, 2.5), dvec3(0.0, 0.5, -1.0), 0.9, 10.0, 160, 120);
+    let eye = Eye::look_at(dvec3(0.0, 0.5, 2.5), dvec3(0.0, 0.5, -1.0), 0.7, 10.0, 240, 180);
     (eye, vec![floor, ceiling])
 }
 
 fn area(samples: usize, jitter: bool, reach: f64) -> Gather {
     Gather {
         estimator: Estimator::Area,
-        pattern: Pattern::Rings { spread: 2.0 },
+        pattern: Pattern::Rings { spread: 1.5 },
         samples,
         jitter,
         reach,
@@ -155,7 +155,7 @@ fn every_texel_as_sender_is_the_area_integral() {
             }
             let exact = patches[1].reflected_by_white(p, DVec3::Y).x;
             let summed = isr::gather_all(&eye, &buffers, x, y).x;
-            assert!((summed / exact - 1.0).abs() < 0.03, "{name} at {p}: {summed} instead of {exact}");
+            assert!((summed / exact - 1.0).abs() < 0.05, "{name} at {p}: {summed} instead of {exact}");
             tested += 1;
         }
         assert!(tested > 10, "{name}: only {tested} receivers");
@@ -192,8 +192,8 @@ fn quality(eye: &Eye, patches: &[Patch], settings: &Gather) -> (f64, f64) {
 #[test]
 fn the_area_estimator_is_consistent() {
     for (name, (eye, patches)) in [("corner", corner()), ("facing", facing())] {
-        for (samples, bias, noise) in [(24, 0.15, 0.25), (48, 0.05, 0.1), (80, 0.05, 0.1)] {
-            let (mean, error) = quality(&eye, &patches, &area(samples, true, 80.0));
+        for (samples, bias, noise) in [(24, 0.15, 0.25), (48, 0.08, 0.15), (80, 0.05, 0.12)] {
+            let (mean, error) = quality(&eye, &patches, &area(samples, true, eye.width as f64 / 4.0));
             println!("{name}, area, {samples} samples: mean {mean:.3}, relative error {error:.3}");
             assert!((mean - 1.0).abs() < bias, "{name}, {samples} samples: {mean} of the true irradiance");
 assert!(error < noise, "{name}, {samples} samples: relative error {error}");

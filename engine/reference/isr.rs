@@ -104,9 +104,13 @@ pub fn jitter(x: usize, y: usize) -> DVec2 {
 pub enum Estimator {
     /// Equation 25: (2π/N) · F, with the footprint of one texel in F.
     Paper,
-    /// F with the footprint of the sample's whole cell; at most one in total.
+    /// F with the footprint of the sample's whole cell; at most [`MOST`] in total.
     Area,
 }
+
+/// Bound on the sum of form factors of one texel. True ones sum to at most one, but a single estimate scatters about it: a
+/// bound of one would take light away on average, none would leave bright specks where few cells cover a near sender.
+pub const MOST: f64 = 2.0;
 
 /// What a gather needs to know.
 #[derive(Clone, Copy, Debug)]
@@ -164,14 +168,14 @@ pub fn gather_texel(eye: &Eye, buffers: &Buffers, settings: &Gather, x: usize, y
             Estimator::Area => {
                 let r2 = p.distance_squared(q);
                 let bounded = PI * r2 / (PI * r2 + texel);
-                (form_factor(p, n, q, q_normal, texel * area) * bounded).min(1.0)
+                form_factor(p, n, q, q_normal, texel * area) * bounded
             }
         };
         light += factor * buffers.mask[sender] * buffers.sender[sender];
         factors += factor;
     }
     if settings.estimator == Estimator::Area {
-        light /= factors.max(1.0);
+        light /= (factors / MOST).max(1.0);
     }
     let mut hidden = 0.0;
     for (sx, sy, _) in others(settings.occlusion_reach) {

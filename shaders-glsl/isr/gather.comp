@@ -36,8 +36,11 @@ layout(push_constant, scalar) uniform Push {
     float factor;           // 2 on half-resolution buffers, 1 on full
 };
 
-// The part of the depth-buffer samples between P and X that do not hide X. Along a line in the image, 1/z is linear
-// under perspective.
+// Bound on the sum of form factors: see reference::isr::MOST.
+const float MOST = 2.0;
+
+// Whether something lies between P and X: compares the depth buffer with the line between them, along which 1/z is linear in
+// the image under perspective, and z under orthographic projection.
 bool hidden(ivec2 from, ivec2 to, float z_from, float z_to) {
     for (uint i = 1u; i <= VISIBILITY_STEPS; ++i) {
         float t = float(i) / float(VISIBILITY_STEPS + 1u);
@@ -45,7 +48,7 @@ bool hidden(ivec2 from, ivec2 to, float z_from, float z_to) {
         if (at == from || at == to) {
             continue;
         }
-        float line = 1.0 / mix(1.0 / z_from, 1.0 / z_to, t);
+        float line = view.orthographic != 0u ? mix(z_from, z_to, t) : 1.0 / mix(1.0 / z_from, 1.0 / z_to, t);
         float z = texelFetch(depth, at, 0).r;
         if (z < line * 0.98 && z > line * (0.98 - thickness)) {
             return true;
@@ -93,7 +96,7 @@ void main() {
             float f;
             if (AREA_ESTIMATOR != 0) {
                 // One pixel's area in the denominator bounds the factor of touching pixels and vanishes elsewhere.
-                f = min(isr_form_factor(p, n, x, xn, cell) * cell * s.z, 1.0);
+                f = isr_form_factor(p, n, x, xn, cell) * cell * s.z;
             } else {
                 f = isr_form_factor(p, n, x, xn, 0.0) * cell;
             }
@@ -104,9 +107,8 @@ void main() {
             light += f * l.a * l.rgb;
             factors += f;
         }
-        // Without visibility, senders behind each other are counted twice; form factors over a hemisphere cannot
-        // sum to more than one.
-        light *= AREA_ESTIMATOR != 0 ? mask / max(factors, 1.0) : mask * 2.0 * ISR_PI / float(SAMPLES);
+        // True form factors sum to at most one, estimates scatter about it.
+        light *= AREA_ESTIMATOR != 0 ? mask / max(factors / MOST, 1.0) : mask * 2.0 * ISR_PI / float(SAMPLES);
     }
 
     float occlusion = 0.0;
