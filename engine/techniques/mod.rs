@@ -1,1 +1,3 @@
-//! techniques
+//! The papers' methods, one module each.
+
+pub mod isr;
