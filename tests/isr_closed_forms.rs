@@ -196,7 +196,7 @@ fn the_area_estimator_is_consistent() {
             let (mean, error) = quality(&eye, &patches, &area(samples, true, eye.width as f64 / 4.0));
             println!("{name}, area, {samples} samples: mean {mean:.3}, relative error {error:.3}");
             assert!((mean - 1.0).abs() < bias, "{name}, {samples} samples: {mean} of the true irradiance");
-assert!(error < noise, "{name}, {samples} samples: relative error {error}");
+            assert!(error < noise, "{name}, {samples} samples: relative error {error}");
         }
     }
 }

@@ -1,9 +1,4 @@
 //! Passes that several techniques use: plain functions on handles.
 
 pub mod ambient;
-pub mod bilateral;
 pub mod blur;
-pub mod compose;
-pub mod direct;
-pub mod downsample;
-pub mod gbuffer;

@@ -71,8 +71,7 @@ pub fn samples(pattern: Pattern, samples: usize, reach: f64, jitter: Option<DVec
                 // Area inside the square of half width reach · m^spread, and its growth with m.
                 let inside = |m: f64| 4.0 * reach.powi(2) * m.powf(2.0 * spread);
                 let growth = 8.0 * reach.powi(2) * spread * m.powf(2.0 * spread - 1.0);
-                let ring_area =
-                    if jitter.is_some() { growth / n } else { inside(k_f / n) - inside((k_f - 1.0) / n) };
+                let ring_area = if jitter.is_some() { growth / n } else { inside(k_f / n) - inside((k_f - 1.0) / n) };
                 for q in 0..8 * k {
                     // Walk along the rim of the unit square: 8 units long, from (1, -1) up, left, down, right.
                     let walked = (f64::from(q) + within.x) / k_f;

@@ -1,3 +1,1 @@
 //! The papers' methods, one module each.
-
-pub mod isr;

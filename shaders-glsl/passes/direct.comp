@@ -6,7 +6,8 @@
 #include "lib/screen.glsl"
 #include "lib/gbuffer.glsl"
 #define LIGHTS_BINDING 8
-#include "lib/lights.glsl"
+#define SHADOWS_BINDING 9
+#define SHADOW_MAPS_BINDING 10
 #include "lib/shadow.glsl"
 #include "lib/brdf.glsl"
 
@@ -79,7 +80,7 @@ void main() {
         if (cosine <= 0.0 || e == vec3(0.0)) {
             continue;
         }
-        e *= shadow_factor(i, p, n);
+        e *= shadow_factor(one, p, n);
         matt += e * cosine;
         if (SPECULAR != 0) {
             shine += e * brdf_specular_cosine(n, v, to_light, gloss.rgb, gloss.a);
