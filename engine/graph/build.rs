@@ -8,8 +8,9 @@ use super::{
     Graph,
     format::{Extent, Format, ImageDesc, Threads},
     handles::{Buffer, BufferRead, GraphId, Image, ImageRead, Sampler, Uniform, UniformSlice},
-    pass::{Bound, BufferEntry, Groups, ImageEntry, Origin, Pass, ReadEntry, ReadWhat, Work},
+    pass::{Bound, BufferEntry, Groups, ImageEntry, Imported, Origin, Owner, Pass, ReadEntry, ReadWhat, Work},
     raster::{Draw, Raster, Targets},
+    vocab::{Layout, Resource},
 };
 use crate::shader::{Args, ComputeArgs, RasterArgs};
 
@@ -94,12 +95,18 @@ impl Graph {
         (previous, next)
     }
 
-    fn add_image(&mut self, name: String, desc: ImageDesc, origin: Origin) -> Image {
+    pub(super) fn add_image(&mut self, name: String, desc: ImageDesc, origin: Origin) -> Image {
         let name = unique(name, self.images.iter().map(|i| i.name.as_str()));
         self.images.push(ImageEntry { name, desc, origin });
+        self.whole_image((self.images.len() - 1) as u32)
+    }
+
+    /// All levels and layers of an image.
+    pub(super) fn whole_image(&self, index: u32) -> Image {
+        let desc = self.images[index as usize].desc;
         Image {
             graph: self.id,
-            index: (self.images.len() - 1) as u32,
+            index,
             mip: 0,
             mips: desc.mips,
             layer: 0,
@@ -133,13 +140,16 @@ impl Graph {
 
     /// An image that someone else owns, known only by its description: for planning without a device.
     pub fn import_image_described(&mut self, name: impl Into<String>, desc: ImageDesc) -> Image {
-        self.add_image(name.into(), desc, Origin::Imported)
+        let rest = Layout::ShaderRead;
+        let imported = Imported { rest, contents: true, usage: None, owner: Owner::Described };
+        self.add_image(name.into(), desc, Origin::Imported(imported))
     }
 
     /// A buffer that someone else owns, known only by its size: for planning without a device.
     pub fn import_buffer_described(&mut self, name: impl Into<String>, bytes: u64) -> Buffer {
         let buffer = self.add_buffer(name.into(), bytes, None, false);
-        self.buffers[buffer.index as usize].origin = Origin::Imported;
+        let imported = Imported { rest: Layout::Buffer, contents: true, usage: None, owner: Owner::Described };
+        self.buffers[buffer.index as usize].origin = Origin::Imported(imported);
         buffer
     }
 
@@ -293,14 +303,26 @@ impl Graph {
         self.passes.len()
     }
 
-    fn short_name(&self, image: Image) -> &str {
+    /// All bytes of a buffer.
+    pub(super) fn whole_buffer(&self, index: u32) -> Buffer {
+        Buffer { graph: self.id, index, offset: 0, size: self.buffers[index as usize].bytes }
+    }
+
+    pub(super) fn resource_name(&self, resource: Resource) -> String {
+        match resource {
+            Resource::Image(i) => self.images[i as usize].name.clone(),
+            Resource::Buffer(i) => self.buffers[i as usize].name.clone(),
+        }
+    }
+
+    pub(super) fn short_name(&self, image: Image) -> &str {
         match self.images.get(image.index as usize) {
             Some(entry) if image.graph == self.id => &entry.name,
             _ => "?",
         }
     }
 
-    fn short_buffer_name(&self, buffer: Buffer) -> &str {
+    pub(super) fn short_buffer_name(&self, buffer: Buffer) -> &str {
         match self.buffers.get(buffer.index as usize) {
             Some(entry) if buffer.graph == self.id => &entry.name,
             _ => "?",

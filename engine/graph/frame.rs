@@ -9,13 +9,25 @@ use super::{
     handles::{BufferRead, ImageRead},
     pixels::Pixels,
 };
-use crate::{Error, ErrorKind, Result};
+use crate::{Error, ErrorKind, Result, gpu::Gpu};
 
 /// Executes graphs on a device, and keeps what outlives them: memory, pipelines, history.
-#[derive(Debug, Default)]
-pub struct Runner {}
+#[derive(Debug)]
+pub struct Runner {
+    gpu: Gpu,
+}
 
 impl Runner {
+    /// Nothing kept yet.
+    pub fn new(gpu: &Gpu) -> Self {
+        Self { gpu: gpu.clone() }
+    }
+
+    /// The device it runs on.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
     /// Runs all passes and waits for them.
     ///
     /// # Errors

@@ -6,24 +6,33 @@
 //!
 //! Declaration order is execution order: nothing is reordered, removed or put on another queue.
 
+mod access;
 mod build;
 mod format;
 mod frame;
 mod handles;
+mod import;
 #[allow(dead_code)]
 mod pass;
 mod pixels;
+#[allow(dead_code)]
+mod plan;
 mod raster;
+mod vocab;
+#[allow(dead_code)]
+mod vulkan;
 
 pub use build::PassRef;
 pub use format::{Class, Extent, Format, ImageDesc, Threads};
 pub use frame::{Frame, PassTime, Report, Runner};
 pub use handles::{Buffer, BufferRead, GraphId, Image, ImageRead, Sampler, Uniform, UniformSlice};
 pub use pixels::Pixels;
+pub use plan::{Barrier, Physical, Plan, PlannedPass, Shape, Source};
 pub use raster::{
     Blend, Compare, Cull, Depth, DepthBias, Draw, DrawCall, IndexedCall, Load, Raster, Stencil, StencilLoad, StencilOp,
     Targets, Topology,
 };
+pub use vocab::{Access, Layout, Mistake, MistakeKind, Region, Resource, Scope, Stages, Usage, Use};
 
 use pass::{BufferEntry, ImageEntry, Pass, ReadEntry};
 

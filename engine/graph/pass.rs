@@ -4,7 +4,9 @@ use super::{
     format::{Format, ImageDesc},
     handles::{Buffer, Image},
     raster::{Draw, Raster, Targets},
+    vocab::{Layout, Usage},
 };
+use crate::gpu::{OwnedBuffer, OwnedImage};
 use crate::shader::{Resource, Shader};
 
 /// Where a resource comes from and how long it lives.
@@ -14,8 +16,28 @@ pub(crate) enum Origin {
     Transient,
     /// Last frame's or this frame's half of a pair that outlives the graph.
     History { key: String, next: bool },
-    /// Owned by someone else; its contents are there at the start, and it is left as found.
-    Imported,
+    /// Owned by someone else, and left as found.
+    Imported(Imported),
+}
+
+/// An image or buffer that someone else owns.
+#[derive(Clone, Debug)]
+pub(crate) struct Imported {
+    /// Layout before and after the graph.
+    pub rest: Layout,
+    /// It holds data at the start.
+    pub contents: bool,
+    /// What it was made for; `None`: known only by description.
+    pub usage: Option<Usage>,
+    /// Keeps it alive; `Described` for planning without a device.
+    pub owner: Owner,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) enum Owner {
+    Described,
+    Image(OwnedImage),
+    Buffer(OwnedBuffer),
 }
 
 #[derive(Clone, Debug)]
