@@ -171,6 +171,22 @@ mod tests {
     }
 
     #[test]
+    fn the_conference_room_has_its_published_counts() {
+        let path =
+            std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets/scenes/conference/conference.bin");
+        if !path.exists() {
+            assert!(std::env::var_os("CI").is_none(), "{} is missing", path.display());
+            eprintln!("SKIPPED: {} is missing", path.display());
+            return;
+        }
+        let options = crate::scene::LoadOptions { unit: Some(0.003), ..Default::default() };
+        let scene = crate::scene::load(&path, &options).unwrap();
+        let triangles = scene.meshes[0].primitives[0].indices.len() / 3;
+        // 331,179 triangles, of which 53,627 have no area.
+        assert_eq!(triangles, 331_179 - 53_627);
+    }
+
+    #[test]
     fn limits_hold() {
         let limits = Limits { max_vertices: 3, ..Limits::default() };
         assert!(read(QUAD.as_bytes(), 1.0, &limits).unwrap_err().to_string().contains("more than 9"));

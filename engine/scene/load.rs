@@ -1,6 +1,6 @@
 //! From a file name to a scene.
 
-use super::{Limits, Scene, folder, gltf};
+use super::{Limits, Scene, c_arrays, folder, gltf};
 use crate::{Error, Result};
 use std::path::Path;
 
@@ -9,9 +9,12 @@ use std::path::Path;
 pub struct LoadOptions {
     /// What a file may ask for.
     pub limits: Limits,
+    /// Metres that one unit of the file stands for, in formats that leave it open (OBJ, C arrays); 1 if not given. glTF
+    /// files are always in metres.
+    pub unit: Option<f32>,
 }
 
-/// Reads a scene file: glTF 2.0 (`.gltf`, `.glb`) or OBJ (`.obj`). The content decides, and where it leaves the format
+/// Reads a scene file: glTF 2.0 (`.gltf`, `.glb`), OBJ (`.obj`) or two C arrays ([`c_arrays`]). The content decides, and where it leaves the format
 /// open, the extension.
 ///
 /// Only files in the scene's own folder and below it are read. Every index of the result is valid and every number
@@ -35,6 +38,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let bytes = folder::read_file(path, options.limits.max_file)?;
     let scene = match format(path, &bytes)? {
         Format::Gltf => gltf::read(path, &bytes, &options.limits)?,
+        Format::Arrays => c_arrays::read(&bytes, options.unit.unwrap_or(1.0), &options.limits)?,
     };
     scene.validate()?;
     Ok(scene)
@@ -48,6 +52,7 @@ fn scene_in(folder: &Path) -> Option<String> {
 
 enum Format {
     Gltf,
+    Arrays,
 }
 
 fn extension(path: &Path) -> Option<Format> {
@@ -61,6 +66,9 @@ fn format(path: &Path, bytes: &[u8]) -> Result<Format> {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     if gltf::is_glb(bytes) || text.trim_ascii_start().starts_with(b"{") {
         return Ok(Format::Gltf);
+    }
+    if c_arrays::recognise(bytes) {
+        return Ok(Format::Arrays);
     }
     extension(path).ok_or_else(|| {
         Error::input("is no scene file that can be read").help("Scenes are .gltf and .glb (glTF 2.0) and .obj files")
