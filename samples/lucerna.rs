@@ -1,1 +1,146 @@
-fn main() {}
+//! `lucerna`: what is in a scene or an image, which devices there are, the same picture once more.
+
+use std::{path::PathBuf, process::ExitCode};
+
+use clap::{Parser, Subcommand};
+use lucerna::{Result, scene::builtin};
+use lucerna_samples::{
+    args::{DeviceArgs, TalkArgs},
+    console::{self, Console},
+    devices, info, inspect, program, rerun,
+    source::{self, SceneArgs},
+};
+
+/// Looks into scenes and images, lists devices and built-in scenes, makes pictures again.
+#[derive(Parser, Debug)]
+#[command(name = "lucerna", version, max_term_width = 120)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Say what is in a scene, and what of it is not supported
+    Inspect {
+        #[command(flatten)]
+        scene: SceneArgs,
+        #[command(flatten)]
+        talk: TalkArgs,
+        /// Print one JSON document
+        #[arg(long)]
+        json: bool,
+    },
+    /// Say what is in an image and how it was made
+    Info {
+        /// .exr, .png, .hdr or .pfm
+        image: PathBuf,
+        #[command(flatten)]
+        talk: TalkArgs,
+        /// Print one JSON document
+        #[arg(long)]
+        json: bool,
+    },
+    /// Make a picture again from what it says about itself, and compare the bits
+    Rerun {
+        /// An image that `render` wrote
+        image: PathBuf,
+        /// Largest difference of two samples that is accepted [default: the same bits]
+        #[arg(long, value_name = "X", value_parser = tolerance)]
+        tolerance: Option<f32>,
+        #[command(flatten)]
+        device: DeviceArgs,
+        #[command(flatten)]
+        talk: TalkArgs,
+        /// Print one JSON document
+        #[arg(long)]
+        json: bool,
+    },
+    /// List the Vulkan devices, and what the unsuitable ones lack
+    Devices {
+        /// Fail unless one of them is a usable GPU
+        #[arg(long)]
+        require_gpu: bool,
+        #[command(flatten)]
+        talk: TalkArgs,
+        /// Print one JSON document
+        #[arg(long)]
+        json: bool,
+    },
+    /// List the built-in scenes
+    List {
+        #[command(flatten)]
+        talk: TalkArgs,
+        /// Print one JSON document
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+impl Command {
+    fn console(&self) -> Console {
+        match self {
+            Self::Inspect { talk, .. }
+            | Self::Info { talk, .. }
+            | Self::Rerun { talk, .. }
+            | Self::Devices { talk, .. }
+            | Self::List { talk, .. } => talk.console(),
+        }
+    }
+}
+
+fn tolerance(text: &str) -> Result<f32, String> {
+    text.parse().ok().filter(|x: &f32| x.is_finite() && *x >= 0.0).ok_or_else(|| "expected a number from 0 on".into())
+}
+
+fn main() -> ExitCode {
+    let command = Arguments::parse().command;
+    let console = command.console();
+    program::run(console, || serve(command, console).map(|()| ExitCode::SUCCESS))
+}
+
+fn serve(command: Command, console: Console) -> Result<()> {
+    match command {
+        Command::Inspect { scene, json, .. } => {
+            let (scene, _) = source::open(scene.scene.as_deref(), scene.builtin.as_deref())?;
+            let summary = inspect::summary(&scene);
+            match json {
+                true => console::print_json(&console::to_json(&summary)?),
+                false => console::print(&summary.text()),
+            }
+        }
+        Command::Info { image, json, .. } => {
+            let layers = info::read(&image)?;
+            match json {
+                true => console::print_json(&info::json(&layers)),
+                false => console::print(&info::text(&image, &layers)),
+            }
+        }
+        Command::Rerun { image, tolerance, device, json, .. } => {
+            let result = rerun::rerun(&image, &device, console.is_quiet())?;
+            match json {
+                true => console::print_json(&console::to_json(&result)?)?,
+                false => console::print(&result.text(&image))?,
+            }
+            result.verdict(&image, tolerance)
+        }
+        Command::Devices { require_gpu, json, .. } => {
+            let list = devices::list(require_gpu)?;
+            match json {
+                true => console::print_json(&devices::json(&list)),
+                false => console::print(&devices::text(&list)),
+            }
+        }
+        Command::List { json, .. } => {
+            let list: Vec<(&str, &str)> =
+                builtin::names().iter().map(|&name| (name, builtin::description(name).unwrap_or_default())).collect();
+            if json {
+                let json = list.iter().map(|(name, text)| serde_json::json!({ "name": name, "description": text }));
+                return console::print_json(&json.collect());
+            }
+            let width = list.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+            let lines: Vec<String> = list.iter().map(|(name, text)| format!("{name:width$}  {text}")).collect();
+            console::print(&lines.join("\n"))
+        }
+    }
+}

@@ -75,6 +75,11 @@ pub fn print(text: &str) -> Result<()> {
     }
 }
 
+/// Anything as JSON.
+pub fn to_json(value: &impl serde::Serialize) -> Result<serde_json::Value> {
+    serde_json::to_value(value).map_err(|error| Error::new(ErrorKind::Runtime, "cannot be JSON").caused_by(error))
+}
+
 /// Writes one JSON document to stdout.
 pub fn print_json(value: &serde_json::Value) -> Result<()> {
     print(&format!("{value:#}"))

@@ -1,0 +1,157 @@
+//! Which image files a run writes: names from patterns, checked before work starts, written whole.
+
+use std::{
+    collections::HashSet,
+    path::{Path, PathBuf},
+};
+
+use lucerna::{
+    Error, ErrorKind, Result,
+    image::{self, Format, Layers, WriteOptions},
+};
+
+use crate::pattern::{Pattern, Values};
+
+/// Standard output as a file name.
+const STDOUT: &str = "-";
+
+/// The image files of a run.
+#[derive(Debug)]
+pub struct Outputs {
+    targets: Vec<(Pattern, Format)>,
+    options: WriteOptions,
+}
+
+impl Outputs {
+    /// Reads the names of `-o`; none: one PNG file named after scene, camera and technique.
+    ///
+    /// # Errors
+    /// `Usage` for names that are not understood, or that several frames would share.
+    pub fn new(names: &[String], frames: usize, options: WriteOptions) -> Result<Self> {
+        let default = match frames {
+            1 => "{scene}-{camera}-{technique}.png",
+            _ => "{scene}-{camera}-{technique}-{frame:04}.png",
+        };
+        let given: Vec<&str> = if names.is_empty() { vec![default] } else { names.iter().map(String::as_str).collect() };
+        let mut targets = Vec::new();
+        for name in given {
+            let pattern = Pattern::parse(name)?;
+            if frames > 1 && !pattern.has_frame() {
+                let what = format!("output '{name}': {frames} frames would be written over each other");
+                return Err(Error::usage(what).help("Put {frame:04} into the name"));
+            }
+            let format = if name == STDOUT { Format::Exr } else { Format::from_path(Path::new(name))? };
+            targets.push((pattern, format));
+        }
+        Ok(Self { targets, options })
+    }
+
+    /// True if some file holds more than the picture.
+    pub fn wants_layers(&self) -> bool {
+        self.targets.iter().any(|(pattern, format)| *format == Format::Exr || pattern.has_layer())
+    }
+
+    /// True if the image goes to standard output.
+    pub fn uses_stdout(&self) -> bool {
+        self.targets.iter().any(|(pattern, _)| pattern.text() == STDOUT)
+    }
+
+    /// Checks that the files of a frame can be written: the folders are there, nothing is overwritten unasked.
+    ///
+    /// # Errors
+    /// `Usage` if two files have one name, `Output` if one cannot be written.
+    pub fn probe(&self, values: &Values<'_>, layers: &[&str]) -> Result<()> {
+        let mut seen = HashSet::new();
+        for (pattern, _) in &self.targets {
+            let each: &[&str] = if pattern.has_layer() { layers } else { &[""] };
+            for &layer in each {
+                let name = pattern.fill(&Values { layer, ..*values });
+                if !seen.insert(name.clone()) {
+                    return Err(Error::usage(format!("output '{name}' is named twice")));
+                }
+                if name != STDOUT {
+                    image::probe_output(Path::new(&name), self.options.overwrite)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the files of a frame and returns their names with what was odd about the values.
+    ///
+    /// # Errors
+    /// `Output`: that file is not there, the ones before it are complete.
+    pub fn write(&self, values: &Values<'_>, layers: &Layers) -> Result<Vec<(String, image::Report)>> {
+        let mut written = Vec::new();
+        for (pattern, format) in &self.targets {
+            if !pattern.has_layer() {
+                written.push(self.write_one(&pattern.fill(values), *format, layers)?);
+                continue;
+            }
+            for layer in &layers.layers {
+                let shown = if layer.name.is_empty() { "picture" } else { &layer.name };
+                let single = Layers {
+                    layers: vec![layer.clone()],
+                    metadata: layers.metadata.clone(),
+                    ..Layers::new(layers.width, layers.height)
+                };
+                written.push(self.write_one(&pattern.fill(&Values { layer: shown, ..*values }), *format, &single)?);
+            }
+        }
+        Ok(written)
+    }
+
+    fn write_one(&self, name: &str, format: Format, layers: &Layers) -> Result<(String, image::Report)> {
+        if name == STDOUT {
+            use std::io::Write;
+            let (bytes, report) = image::encode(format, layers, &self.options)?;
+            let mut out = std::io::stdout().lock();
+            out.write_all(&bytes).and_then(|()| out.flush()).map_err(|error| {
+                Error::new(ErrorKind::Output, "could not write to standard output").caused_by(error)
+            })?;
+            return Ok((name.to_owned(), report));
+        }
+        let report = image::write(&PathBuf::from(name), layers, &self.options)?;
+        Ok((name.to_owned(), report))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lucerna::image::Layer;
+
+    use super::*;
+
+    const VALUES: Values<'_> = Values { scene: "s", camera: "c", technique: "t", frame: 3, layer: "" };
+
+    fn picture() -> Layers {
+        Layers::rgb(2, 1, vec![0.5; 6]).with(Layer::new("depth", &["Z"], vec![1.0, 2.0]))
+    }
+
+    fn outputs(names: &[&str], frames: usize) -> Result<Outputs> {
+        let names: Vec<String> = names.iter().map(|&n| n.to_owned()).collect();
+        Outputs::new(&names, frames, WriteOptions::default())
+    }
+
+    #[test]
+    fn names_are_checked_before_the_work() {
+        for (names, frames) in [(["a.png"], 2), (["a.tga"], 1), (["a"], 1), (["{oops}.png"], 1)] {
+            assert_eq!(outputs(&names, frames).unwrap_err().exit_code(), 2, "{names:?}");
+        }
+        assert_eq!(outputs(&["a.exr", "a.exr"], 1).unwrap().probe(&VALUES, &[]).unwrap_err().exit_code(), 2);
+        let missing = outputs(&["no/such/folder/a.exr"], 1).unwrap().probe(&VALUES, &[]).unwrap_err();
+        assert!(missing.exit_code() == 1 && missing.to_string().contains("no/such/folder"), "{missing}");
+    }
+
+    #[test]
+    fn a_file_for_each_layer() {
+        let folder = tempfile::tempdir().unwrap();
+        let name = folder.path().join("x-{layer}-{frame:03}.pfm").to_string_lossy().into_owned();
+        let written = outputs(&[&name], 2).unwrap().write(&VALUES, &picture()).unwrap();
+        let mut files: Vec<String> =
+            std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        files.sort();
+        assert_eq!(files, ["x-depth-003.pfm", "x-picture-003.pfm"]);
+        assert_eq!(written.len(), 2);
+    }
+}

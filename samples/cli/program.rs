@@ -1,0 +1,43 @@
+//! The frame around `main`: errors become one line and an exit code, panics too.
+
+use std::process::ExitCode;
+
+use lucerna::{Error, Result};
+
+use crate::console::Console;
+
+/// Stopped on request before the work was done, but with complete output of a part of it.
+pub const STOPPED_EARLY: u8 = 8;
+/// Stopped by SIGINT before anything was written.
+pub const INTERRUPTED: u8 = 130;
+
+/// Runs a program's body. Exit codes: 0 success, else [`Error::exit_code`], or what the body chose.
+pub fn run(console: Console, body: impl FnOnce() -> Result<ExitCode>) -> ExitCode {
+    std::panic::set_hook(Box::new(move |info| {
+        let place = info.location().map(|at| format!(" at {}:{}", at.file(), at.line())).unwrap_or_default();
+        let text = info.payload_as_str().unwrap_or("no message");
+        console.error(&Error::new(
+            lucerna::ErrorKind::Runtime,
+            format!("internal error{place}: {text}. This is a bug in lucerna; please report it with the command you ran"),
+        ));
+        if std::env::var_os("RUST_BACKTRACE").is_some_and(|v| v != "0") {
+            eprintln!("{}", std::backtrace::Backtrace::force_capture());
+        }
+    }));
+    match std::panic::catch_unwind(std::panic::AssertUnwindSafe(body)) {
+        Ok(Ok(code)) => code,
+        Ok(Err(error)) => {
+            console.error(&error);
+            ExitCode::from(error.exit_code())
+        }
+        Err(_) => ExitCode::from(1),
+    }
+}
+
+/// What `--version` prints, and what pictures carry.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// The git revision that this was built from, if it was built in a checkout; `+` if files were edited since.
+pub fn revision() -> Option<&'static str> {
+    option_env!("LUCERNA_REVISION").filter(|revision| !revision.is_empty())
+}

@@ -1,0 +1,181 @@
+//! What a picture remembers of the command that made it, enough to make it again.
+
+use std::{ffi::OsString, path::Path};
+
+use lucerna::{Error, Result};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::{args::Size, camera::CameraFile, config};
+
+/// The `config` of a picture's metadata.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// Executable and verb: `isr render`.
+    pub command: Vec<String>,
+    pub scene: Source,
+    /// Changes when the scene changes.
+    pub fingerprint: String,
+    pub width: u32,
+    pub height: u32,
+    pub camera: View,
+    /// First frame of the run: frames may depend on the ones before.
+    pub first_frame: u32,
+    pub frame: u32,
+    /// Time of frame 0, seconds.
+    pub time: f64,
+    pub fps: f64,
+    /// EV.
+    pub exposure: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub environment: Option<String>,
+    pub seed: u64,
+    /// The image of the render graph that is shown instead of the result.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub view: Option<String>,
+    /// What the picture consists of: everything, direct light, …
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mode: Option<String>,
+    #[serde(default)]
+    pub f32: bool,
+    /// All settings of the technique, as `--print-config` prints them.
+    pub settings: Value,
+}
+
+/// Where the scene came from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Source {
+    File(String),
+    Builtin(String),
+}
+
+/// The camera.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum View {
+    /// Index into the scene's cameras.
+    Scene(usize),
+    File(CameraFile),
+}
+
+impl Record {
+    /// From the metadata of a picture.
+    ///
+    /// # Errors
+    /// `Input` if the picture was not written by `render`.
+    pub fn from_config(config: &Value) -> Result<Self> {
+        let missing = || Error::input("does not say how it was made").help("Pictures written by `render` do");
+        if config.is_null() {
+            return Err(missing());
+        }
+        serde_json::from_value(config.clone()).map_err(|error| missing().caused_by(error))
+    }
+
+    /// The command line that makes the picture again, without device and output. Files go into `folder`.
+    pub fn arguments(&self, folder: &Path) -> Result<Vec<OsString>> {
+        let settings = folder.join("settings.toml");
+        write(&settings, &config::to_toml(&without_nulls(&self.settings))?)?;
+        let mut list: Vec<OsString> = self.command.iter().skip(1).map(OsString::from).collect();
+        let mut add = |words: &[&str]| list.extend(words.iter().map(OsString::from));
+        match &self.scene {
+            // A file name may begin with a dash.
+            Source::File(path) if path.starts_with('-') => add(&[&format!("./{path}")]),
+            Source::File(path) => add(&[path]),
+            Source::Builtin(name) => add(&["--builtin", name]),
+        }
+        add(&["--size", &Size { width: self.width, height: self.height }.to_string()]);
+        match &self.camera {
+            View::Scene(index) => add(&["--camera", &index.to_string()]),
+            View::File(camera) => {
+                let path = folder.join("camera.toml");
+                write(&path, &config::to_toml(camera)?)?;
+                add(&["--camera", &path.to_string_lossy()]);
+            }
+        }
+        add(&["--frames", &format!("{}..={}", self.first_frame, self.frame)]);
+        add(&[&format!("--time={}", self.time), &format!("--fps={}", self.fps)]);
+        add(&[&format!("--exposure={}", self.exposure), &format!("--seed={}", self.seed)]);
+        for (option, value) in [("environment", &self.environment), ("view", &self.view), ("mode", &self.mode)] {
+            if let Some(value) = value {
+                add(&[&format!("--{option}={value}")]);
+            }
+        }
+        if self.f32 {
+            add(&["--f32"]);
+        }
+        add(&["--settings", &settings.to_string_lossy()]);
+        Ok(list)
+    }
+}
+
+/// TOML has no null: what is not set is left out.
+fn without_nulls(value: &Value) -> Value {
+    match value {
+        Value::Object(table) => {
+            let kept = table.iter().filter(|(_, value)| !value.is_null());
+            Value::Object(kept.map(|(key, value)| (key.clone(), without_nulls(value))).collect())
+        }
+        other => other.clone(),
+    }
+}
+
+fn write(path: &Path, text: &str) -> Result<()> {
+    lucerna::image::write_atomic(path, text.as_bytes(), true)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn comes_back_from_json_and_becomes_a_command() {
+        let camera = CameraFile {
+            position: Vec3::new(0.1, 1.6, 4.0),
+            target: Vec3::ZERO,
+            up: Vec3::Y,
+            yfov_degrees: 45.0,
+            znear: 0.05,
+            zfar: None,
+        };
+        let record = Record {
+            command: vec!["isr".into(), "render".into()],
+            scene: Source::File("-odd.gltf".into()),
+            fingerprint: "0".into(),
+            width: 64,
+            height: 48,
+            camera: View::File(camera.clone()),
+            first_frame: 2,
+            frame: 5,
+            time: -0.1,
+            fps: 24.0,
+            exposure: 1.5,
+            environment: None,
+            seed: u64::MAX,
+            view: None,
+            mode: Some("direct".into()),
+            f32: true,
+            settings: serde_json::json!({"samples": 24, "strength": 0.1, "limit": null}),
+        };
+        let again = Record::from_config(&serde_json::to_value(&record).unwrap()).unwrap();
+        assert_eq!(again, record);
+        let folder = tempfile::tempdir().unwrap();
+        let list: Vec<String> =
+            again.arguments(folder.path()).unwrap().into_iter().map(|a| a.into_string().unwrap()).collect();
+        let all = list.join(" ");
+        for part in ["render ./-odd.gltf --size 64x48", "--frames 2..=5", "--time=-0.1", "--mode=direct", "--f32"] {
+            assert!(all.contains(part), "{part} is not in {all}");
+        }
+        assert_eq!(CameraFile::read(&folder.path().join("camera.toml")).unwrap(), camera);
+        assert!(std::fs::read_to_string(folder.path().join("settings.toml")).unwrap().contains("strength = 0.1"));
+    }
+
+    #[test]
+    fn a_picture_of_another_program_is_refused() {
+        for config in [Value::Null, serde_json::json!({"samples": 3})] {
+            assert_eq!(Record::from_config(&config).unwrap_err().exit_code(), 3);
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! The scene of a command line.
+
+use std::path::{Path, PathBuf};
+
+use lucerna::{
+    Error, Result,
+    scene::{self, Limits, Scene, builtin},
+};
+
+use crate::{config, record::Source};
+
+/// `SCENE | --builtin NAME`.
+#[derive(clap::Args, Clone, Debug)]
+#[group(required = true, multiple = false)]
+pub struct SceneArgs {
+    /// Scene file: .gltf, .glb or .obj
+    #[arg(value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
+
+    /// A built-in scene instead of a file (`lucerna list` names them)
+    #[arg(long, value_name = "NAME")]
+    pub builtin: Option<String>,
+}
+
+/// Reads a file or makes a built-in scene.
+///
+/// # Errors
+/// `Input` if the file cannot be served, `Usage` if there is no such built-in scene.
+pub fn open(file: Option<&Path>, name: Option<&str>) -> Result<(Scene, Source)> {
+    match (file, name) {
+        (Some(path), _) => {
+            let scene = scene::load(path, &Limits::default())?;
+            Ok((scene, Source::File(path.to_string_lossy().into_owned())))
+        }
+        (None, Some(name)) => Ok((builtin_scene(name)?, Source::Builtin(name.to_owned()))),
+        (None, None) => Err(Error::usage("no scene was named").help("Name a file, or a built-in scene with --builtin")),
+    }
+}
+
+fn builtin_scene(name: &str) -> Result<Scene> {
+    let names = builtin::names();
+    if !names.contains(&name) {
+        let hint = config::nearest(name, names.iter().copied()).map(|near| format!(" (did you mean '{near}'?)"));
+        let what = format!("no built-in scene '{name}'{}; there are {}", hint.unwrap_or_default(), names.join(", "));
+        return Err(Error::usage(what));
+    }
+    builtin::build(name)
+}
