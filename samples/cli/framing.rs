@@ -1,9 +1,9 @@
 //! A camera and light for scenes that bring none, so that every file gives a picture. What was added is said in a note.
 
 use glam::{Mat4, Quat, Vec3};
-use lucerna::scene::{Camera, Environment, Light, LightKind, Node, Note, NoteKind, Projection, Scene, Transform};
+use lucerna::scene::{Aabb, Camera, Environment, Light, LightKind, Node, Note, NoteKind, Projection, Scene, Transform};
 
-use crate::world::{self, Bounds};
+use crate::world;
 
 /// Full vertical angle of the camera that is added, radians.
 const YFOV: f32 = 45.0 * std::f32::consts::PI / 180.0;
@@ -21,7 +21,7 @@ pub fn add_missing_camera(scene: &mut Scene, aspect: f32) {
     if scene.nodes.iter().any(|node| node.camera.is_some()) {
         return;
     }
-    let bounds = world::bounds(scene).unwrap_or(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE });
+    let bounds = world::reach(scene).unwrap_or(Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE });
     let (world_from_view, projection) = fitted(&bounds, aspect);
     scene.cameras.push(Camera { name: "fitted".into(), projection });
     add_node(scene, "fitted camera", world_from_view, |node, scene| node.camera = Some(scene.cameras.len() as u32 - 1));
@@ -78,12 +78,12 @@ fn note(scene: &mut Scene, place: &str, text: &str) {
 }
 
 /// A camera from which the sphere around `bounds` fills the smaller side of the picture.
-fn fitted(bounds: &Bounds, aspect: f32) -> (Mat4, Projection) {
-    let radius = bounds.radius().max(1e-4);
+fn fitted(bounds: &Aabb, aspect: f32) -> (Mat4, Projection) {
+    let radius = bounds.half().length().max(1e-4);
     let narrow = if aspect < 1.0 { ((YFOV * 0.5).tan() * aspect).atan() } else { YFOV * 0.5 };
     let distance = radius / narrow.sin();
     let back = VIEW_FROM.normalize();
-    let position = bounds.center() + back * distance;
+    let position = bounds.centre() + back * distance;
     let right = Vec3::Y.cross(back).normalize();
     let up = back.cross(right);
     let world = Mat4::from_cols(right.extend(0.0), up.extend(0.0), back.extend(0.0), position.extend(1.0));
@@ -144,6 +144,6 @@ mod tests {
     }
 
     fn fitted_projection() -> Projection {
-        fitted(&Bounds { min: Vec3::ZERO, max: Vec3::ONE }, 1.0).1
+        fitted(&Aabb { min: Vec3::ZERO, max: Vec3::ONE }, 1.0).1
     }
 }

@@ -3,10 +3,10 @@
 use std::fmt::Write;
 
 use glam::{Mat4, Vec3};
-use lucerna::scene::{AlphaMode, LightKind, Material, Note, Projection, Scene};
+use lucerna::scene::{Aabb, AlphaMode, LightKind, Material, Note, Pose, Projection, Scene};
 use serde::Serialize;
 
-use crate::world::{self, Bounds};
+use crate::world;
 
 /// What `inspect` tells; the fields of its JSON.
 #[derive(Debug, Serialize)]
@@ -24,6 +24,12 @@ pub struct Summary {
     pub environment: Option<TextureInfo>,
     /// What is unsupported, approximated or was repaired.
     pub notes: Vec<Note>,
+}
+
+#[derive(Debug, Serialize)]
+pub struct Bounds {
+    pub min: Vec3,
+    pub max: Vec3,
 }
 
 #[derive(Debug, Serialize)]
@@ -105,7 +111,8 @@ pub struct AnimationInfo {
 
 /// Looks at a scene.
 pub fn summary(scene: &Scene) -> Summary {
-    let world = world::transforms(scene);
+    let pose = Pose::rest(scene);
+    let world = &pose.world;
     let place = |index: usize, of: fn(&lucerna::scene::Node) -> Option<u32>| {
         let found = scene.nodes.iter().position(|node| of(node) == Some(index as u32))?;
         world.get(found).copied()
@@ -113,10 +120,10 @@ pub fn summary(scene: &Scene) -> Summary {
     Summary {
         scene: scene.name.clone(),
         counts: counts(scene),
-        bounds: world::bounds(scene),
+        bounds: world::bounds(scene, &pose).map(|Aabb { min, max }| Bounds { min, max }),
         memory: memory(scene),
         cameras: (0..scene.cameras.len()).map(|i| camera(scene, i, place(i, |node| node.camera))).collect(),
-        lights: lights(scene, &world),
+        lights: lights(scene, world),
         materials: scene.materials.iter().map(material).collect(),
         textures: scene
             .textures
