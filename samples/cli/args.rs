@@ -80,7 +80,7 @@ pub struct RenderArgs {
 
     /// Seed of everything random
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Picture")]
-    pub seed: u64,
+    pub seed: u32,
 
     /// Set one setting of the technique (`--print-config` shows all)
     #[arg(short = 'D', value_name = "KEY=VALUE", help_heading = "Technique")]

@@ -2,7 +2,7 @@
 
 use lucerna::{
     Error, Result,
-    gpu::{self, DeviceKind, Listed, Options},
+    gpu::{self, DeviceKind, Listed, GpuOptions},
 };
 use serde_json::{Value, json};
 
@@ -10,8 +10,8 @@ use crate::args::DeviceArgs;
 
 impl DeviceArgs {
     /// The environment's choices, changed by the command line.
-    pub fn options(&self) -> Result<Options> {
-        let mut options = Options::from_env()?;
+    pub fn options(&self) -> Result<GpuOptions> {
+        let mut options = GpuOptions::from_env()?;
         if let Some(device) = &self.device {
             options.device = device.parse().map_err(|error: Error| error.at("--device"))?;
         }

@@ -29,7 +29,7 @@ pub struct Record {
     pub exposure: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub environment: Option<String>,
-    pub seed: u64,
+    pub seed: u32,
     /// The image of the render graph that is shown instead of the result.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub view: Option<String>,
@@ -153,7 +153,7 @@ mod tests {
             fps: 24.0,
             exposure: 1.5,
             environment: None,
-            seed: u64::MAX,
+            seed: u32::MAX,
             view: None,
             mode: Some("direct".into()),
             f32: true,
