@@ -133,7 +133,7 @@ fn serve(command: Command, console: Console) -> Result<()> {
         }
         Command::List { json, .. } => {
             let list: Vec<(&str, &str)> =
-                builtin::names().iter().map(|&name| (name, builtin::description(name).unwrap_or_default())).collect();
+                builtin::NAMES.iter().map(|&name| (name, builtin::description(name).unwrap_or_default())).collect();
             if json {
                 let json = list.iter().map(|(name, text)| serde_json::json!({ "name": name, "description": text }));
                 return console::print_json(&json.collect());

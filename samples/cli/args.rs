@@ -70,12 +70,12 @@ pub struct RenderArgs {
     #[arg(long, default_value_t = 30.0, value_parser = positive, help_heading = "Picture")]
     pub fps: f64,
 
-    /// Exposure: colours of .png files are multiplied by 2^EV
-    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
-    pub exposure: f64,
+    /// Exposure: colours of .png files are multiplied by 2^EV [default: 0, or what suits the built-in scene]
+    #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
+    pub exposure: Option<f64>,
 
     /// Light the scene with this .hdr or .exr environment instead of its own
-    #[arg(long, value_name = "FILE", help_heading = "Picture")]
+    #[arg(long, alias = "env", value_name = "FILE", help_heading = "Picture")]
     pub environment: Option<PathBuf>,
 
     /// Seed of everything random
@@ -149,6 +149,13 @@ pub struct Size {
 /// Longest side that is accepted, pixels.
 pub const MAX_SIDE: u32 = 16384;
 
+impl Size {
+    /// Width over height.
+    pub fn aspect(&self) -> f32 {
+        self.width as f32 / self.height as f32
+    }
+}
+
 impl FromStr for Size {
     type Err = String;
 
@@ -172,6 +179,13 @@ pub struct Frames(pub Range<u32>);
 
 /// Most frames of one run.
 const MAX_FRAMES: u32 = 1_000_000;
+
+impl Frames {
+    /// The frames of `--frames`, or only frame 0.
+    pub fn of(asked: Option<&Self>) -> Range<u32> {
+        asked.map_or(0..1, |frames| frames.0.clone())
+    }
+}
 
 impl FromStr for Frames {
     type Err = String;

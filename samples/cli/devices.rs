@@ -2,7 +2,7 @@
 
 use lucerna::{
     Error, Result,
-    gpu::{self, DeviceKind, Listed, GpuOptions},
+    gpu::{self, DeviceKind, GpuOptions, Listed},
 };
 use serde_json::{Value, json};
 
@@ -25,7 +25,10 @@ pub fn text(list: &[Listed]) -> String {
     let mut lines = Vec::new();
     for (index, device) in list.iter().enumerate() {
         let d = &device.description;
-        lines.push(format!("{index} {} ({}), {} {}, Vulkan {}", d.device, d.kind, d.driver, d.driver_info, d.api_version));
+        lines.push(format!(
+            "{index} {} ({}), {} {}, Vulkan {}",
+            d.device, d.kind, d.driver, d.driver_info, d.api_version
+        ));
         if !device.missing.is_empty() {
             lines.push(format!("  cannot be used, it lacks {}", device.missing.join(", ")));
         }

@@ -39,9 +39,11 @@ impl Statistics {
 
 fn channels(layer: &Layer) -> impl Iterator<Item = (&str, Statistics)> {
     let count = layer.channels.len();
-    layer.channels.iter().enumerate().map(move |(i, name)| {
-        (name.as_str(), Statistics::of(layer.data.iter().skip(i).step_by(count.max(1)).copied()))
-    })
+    layer
+        .channels
+        .iter()
+        .enumerate()
+        .map(move |(i, name)| (name.as_str(), Statistics::of(layer.data.iter().skip(i).step_by(count.max(1)).copied())))
 }
 
 /// Reads an image of any format.
@@ -78,7 +80,11 @@ pub fn text(path: &Path, layers: &Layers) -> String {
         let name = if layer.name.is_empty() { "picture" } else { &layer.name };
         for (channel, s) in channels(layer) {
             let odd = if s.not_finite > 0 { format!(", {} not finite", s.not_finite) } else { String::new() };
-            let range = if s.min <= s.max { format!("{:.6} to {:.6}, mean {:.6}", s.min, s.max, s.mean) } else { "nothing finite".into() };
+            let range = if s.min <= s.max {
+                format!("{:.6} to {:.6}, mean {:.6}", s.min, s.max, s.mean)
+            } else {
+                "nothing finite".into()
+            };
             // Writing into a String cannot fail.
             let _ = write!(out, "\n  {name} {channel}: {range}{odd}");
         }
@@ -137,7 +143,10 @@ mod tests {
     fn statistics_leave_out_what_is_not_finite() {
         let layers = Layers::rgb(2, 1, vec![0.0, 1.0, f32::NAN, 2.0, 3.0, f32::INFINITY]);
         let json = json(&layers);
-        assert_eq!(json["layers"][0]["channels"]["R"], serde_json::json!({"min": 0.0, "max": 2.0, "mean": 1.0, "not_finite": 0}));
+        assert_eq!(
+            json["layers"][0]["channels"]["R"],
+            serde_json::json!({"min": 0.0, "max": 2.0, "mean": 1.0, "not_finite": 0})
+        );
         assert_eq!(json["layers"][0]["channels"]["B"]["not_finite"], 2);
         let text = text(Path::new("a.exr"), &layers);
         assert!(text.contains("picture B: nothing finite, 2 not finite") && text.contains("no metadata"), "{text}");

@@ -32,7 +32,8 @@ impl Outputs {
             1 => "{scene}-{camera}-{technique}.png",
             _ => "{scene}-{camera}-{technique}-{frame:04}.png",
         };
-        let given: Vec<&str> = if names.is_empty() { vec![default] } else { names.iter().map(String::as_str).collect() };
+        let given: Vec<&str> =
+            if names.is_empty() { vec![default] } else { names.iter().map(String::as_str).collect() };
         let mut targets = Vec::new();
         for name in given {
             let pattern = Pattern::parse(name)?;

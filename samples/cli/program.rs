@@ -18,7 +18,9 @@ pub fn run(console: Console, body: impl FnOnce() -> Result<ExitCode>) -> ExitCod
         let text = info.payload_as_str().unwrap_or("no message");
         console.error(&Error::new(
             lucerna::ErrorKind::Runtime,
-            format!("internal error{place}: {text}. This is a bug in lucerna; please report it with the command you ran"),
+            format!(
+                "internal error{place}: {text}. This is a bug in lucerna; please report it with the command you ran"
+            ),
         ));
         if std::env::var_os("RUST_BACKTRACE").is_some_and(|v| v != "0") {
             eprintln!("{}", std::backtrace::Backtrace::force_capture());

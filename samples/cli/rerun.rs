@@ -64,8 +64,8 @@ impl Comparison {
 pub fn rerun(path: &Path, device: &DeviceArgs, quiet: bool) -> Result<Comparison> {
     let old = info::read(path)?;
     let record = Record::from_config(&old.metadata.config).map_err(|error| error.in_file(path))?;
-    let folder = tempfile::tempdir()
-        .map_err(|error| Error::new(ErrorKind::Output, "no temporary folder").caused_by(error))?;
+    let folder =
+        tempfile::tempdir().map_err(|error| Error::new(ErrorKind::Output, "no temporary folder").caused_by(error))?;
     let extension = path.extension().unwrap_or_default();
     let fresh = folder.path().join("{frame}").with_extension(extension);
 
@@ -177,7 +177,9 @@ mod tests {
         let result = compare(&old, &new, false);
         assert_eq!((result.different, result.largest, result.same_pixels), (2, Some(1.0), false));
         assert_eq!(result.place.as_deref(), Some("picture B at (1, 0): 5 became 4"));
-        assert!(result.verdict(Path::new("a"), Some(1.0)).is_ok() && result.verdict(Path::new("a"), Some(0.9)).is_err());
+        assert!(
+            result.verdict(Path::new("a"), Some(1.0)).is_ok() && result.verdict(Path::new("a"), Some(0.9)).is_err()
+        );
         new.layers[0].data[0] = f32::NAN;
         let broken = compare(&old, &new, false);
         assert_eq!(broken.largest, None);

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use lucerna::{
     Error, Result,
-    scene::{self, Limits, Scene, builtin},
+    scene::{self, LoadOptions, Scene, builtin},
 };
 
-use crate::{config, record::Source};
+use crate::record::Source;
 
 /// `SCENE | --builtin NAME`.
 #[derive(clap::Args, Clone, Debug)]
@@ -29,20 +29,10 @@ pub struct SceneArgs {
 pub fn open(file: Option<&Path>, name: Option<&str>) -> Result<(Scene, Source)> {
     match (file, name) {
         (Some(path), _) => {
-            let scene = scene::load(path, &Limits::default())?;
+            let scene = scene::load(path, &LoadOptions::default())?;
             Ok((scene, Source::File(path.to_string_lossy().into_owned())))
         }
-        (None, Some(name)) => Ok((builtin_scene(name)?, Source::Builtin(name.to_owned()))),
+        (None, Some(name)) => Ok((builtin::load(name)?, Source::Builtin(name.to_owned()))),
         (None, None) => Err(Error::usage("no scene was named").help("Name a file, or a built-in scene with --builtin")),
     }
-}
-
-fn builtin_scene(name: &str) -> Result<Scene> {
-    let names = builtin::names();
-    if !names.contains(&name) {
-        let hint = config::nearest(name, names.iter().copied()).map(|near| format!(" (did you mean '{near}'?)"));
-        let what = format!("no built-in scene '{name}'{}; there are {}", hint.unwrap_or_default(), names.join(", "));
-        return Err(Error::usage(what));
-    }
-    builtin::build(name)
 }

@@ -45,7 +45,12 @@ mod tests {
 
     #[test]
     fn a_row_for_each_pass() {
-        let pass = |name: &str, gpu_ms| PassTime { name: name.into(), scope: vec!["a".into(), "b".into()], gpu_ms, cpu_ms: 0.25 };
+        let pass = |name: &str, gpu_ms| PassTime {
+            name: name.into(),
+            scope: vec!["a".into(), "b".into()],
+            gpu_ms,
+            cpu_ms: 0.25,
+        };
         let report = Report { passes: vec![pass("x", Some(1.5)), pass("y, \"z\"", None)], ..Report::default() };
         let mut timings = Timings::default();
         timings.add(7, &report);

@@ -1,0 +1,113 @@
+//! `render`: a scene in, images out, frame after frame.
+
+use std::{process::ExitCode, time::Instant};
+
+use lucerna::{
+    Result,
+    gpu::Gpu,
+    graph::{Graph, Runner},
+    scene::{Pose, Scene, View},
+};
+use serde::{Serialize, de::DeserializeOwned};
+
+use crate::{
+    args::RenderArgs,
+    config, console,
+    program::{self, STOPPED_EARLY},
+    progress::Progress,
+    run::Run,
+    shown::Shown,
+    signals::Interrupt,
+};
+
+/// Who renders.
+#[derive(Clone, Copy, Debug)]
+pub struct Technique {
+    /// Executable, and technique in names and metadata: `isr`.
+    pub name: &'static str,
+    /// What the picture consists of, as `--mode` takes it; the word for "everything" is left out of file names.
+    pub mode: Option<&'static str>,
+}
+
+/// A frame to be composed.
+#[derive(Debug)]
+pub struct Input<'a> {
+    pub gpu: &'a Gpu,
+    pub scene: &'a Scene,
+    /// At this frame's time.
+    pub pose: &'a Pose,
+    pub view: &'a View,
+    pub frame: u32,
+    /// Time of the frame.
+    pub seconds: f64,
+}
+
+/// Runs `render` for one technique.
+///
+/// `base` are the settings to start from; `prepare` makes what lives as long as the run; `compose` declares one frame.
+///
+/// # Errors
+/// Whatever fails, with the kind that decides the exit code.
+pub fn render<S: Serialize + DeserializeOwned, R>(
+    technique: Technique,
+    args: &RenderArgs,
+    base: &S,
+    prepare: impl FnOnce(&Gpu, &Scene, &S) -> Result<R>,
+    mut compose: impl FnMut(&mut Graph, &mut R, &Input<'_>, &S) -> Result<Shown>,
+) -> Result<ExitCode> {
+    let started = Instant::now();
+    let console = args.talk.console();
+    let settings = config::effective(base, args.settings.as_deref(), &args.define)?;
+    if args.print_config {
+        console::print(config::to_toml(&settings)?.trim_end())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let interrupt = Interrupt::install();
+    let mut run = Run::new(technique, args, console, &settings)?;
+    let loaded = started.elapsed();
+
+    let gpu = Gpu::open(&args.device.options()?)?;
+    console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
+    let opened = started.elapsed();
+    let mut resources = prepare(&gpu, &run.stage.scene, &settings)?;
+    let uploaded = started.elapsed();
+    run.phases = vec![("load", loaded), ("device", opened - loaded), ("upload", uploaded - opened)];
+
+    let mut runner = Runner::new(&gpu)?;
+    let mut progress = Progress::new(args.progress, console.is_quiet(), run.frames.len() as u64);
+    for frame in run.frames.clone() {
+        if interrupt.requested() {
+            break;
+        }
+        let begun = Instant::now();
+        let seconds = args.time + f64::from(frame) / args.fps;
+        let (pose, view) = run.stage.at(seconds, args.size);
+        let mut graph = Graph::new(technique.name);
+        (graph.frame, graph.seed) = (frame, args.seed);
+        let input = Input { gpu: &gpu, scene: &run.stage.scene, pose: &pose, view: &view, frame, seconds };
+        let shown = compose(&mut graph, &mut resources, &input, &settings)?;
+        if args.list_passes {
+            console::print(&lucerna::graph::Plan::new(&graph)?.list_passes())?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        let reading = shown.read(&mut graph, run.outputs.wants_layers());
+        let result = runner.run(&graph)?;
+        // What was asked to stop is not written, unless it is all there.
+        if interrupt.requested() {
+            break;
+        }
+        let mut layers = reading.layers(&result);
+        layers.metadata = run.metadata(&gpu, &view, frame)?;
+        let milliseconds = begun.elapsed().as_secs_f64() * 1e3;
+        let files = run.write(&layers, frame)?;
+        progress.frame(frame, milliseconds, &files);
+        run.done(frame, seconds, milliseconds, files, &result.report);
+    }
+    progress.finish();
+    run.finish(&gpu)?;
+    Ok(match run.progress() {
+        (done, asked) if done == asked => ExitCode::SUCCESS,
+        (0, _) => ExitCode::from(interrupt.exit_code()),
+        _ => ExitCode::from(STOPPED_EARLY),
+    })
+}

@@ -1,0 +1,258 @@
+//! The state of one `render`: what it was asked, what it has done, and what it tells about it.
+
+use std::{ops::Range, path::Path, time::Duration};
+
+use lucerna::{
+    Error, ErrorKind, Result,
+    gpu::Gpu,
+    graph::Report,
+    image::{self, Layers, Metadata, WriteOptions},
+    scene::{NoteKind, View, builtin},
+};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::{
+    args::{Frames, RenderArgs},
+    config,
+    console::{self, Console},
+    outputs::Outputs,
+    pattern::Values,
+    program,
+    record::{Record, Source},
+    render::Technique,
+    stage::Stage,
+    timings::Timings,
+};
+
+/// A running `render`.
+#[derive(Debug)]
+pub struct Run<'a> {
+    args: &'a RenderArgs,
+    console: Console,
+    /// As in file names: `isr`, or `isr-direct` in another mode.
+    label: String,
+    pub stage: Stage,
+    pub outputs: Outputs,
+    pub frames: Range<u32>,
+    /// Everything of the record but the frame.
+    record: Record,
+    timings: Timings,
+    done: Vec<Done>,
+    warnings: Vec<String>,
+    /// Wall-clock time of the steps before the first frame.
+    pub phases: Vec<(&'static str, Duration)>,
+}
+
+#[derive(Debug, Serialize)]
+struct Done {
+    frame: u32,
+    seconds: f64,
+    milliseconds: f64,
+    /// Of all passes on the device; `null` if it has no clock.
+    gpu_milliseconds: Option<f64>,
+    files: Vec<String>,
+}
+
+impl<'a> Run<'a> {
+    /// Reads the scene and checks that everything asked for can be written.
+    pub fn new<S: Serialize>(
+        technique: Technique,
+        args: &'a RenderArgs,
+        console: Console,
+        settings: &S,
+    ) -> Result<Self> {
+        let frames = Frames::of(args.frames.as_ref());
+        // Names before scenes: a wrong name shows at once.
+        let mut options = WriteOptions { overwrite: args.overwrite, f32: args.f32, ..WriteOptions::default() };
+        Outputs::new(&args.output, frames.len(), options.clone())?;
+        let stage = Stage::open(args)?;
+        let suits = match &stage.source {
+            Source::Builtin(name) => builtin::exposure(name).map(f64::from),
+            Source::File(_) => None,
+        };
+        let exposure = args.exposure.or(suits).unwrap_or(0.0);
+        options.exposure_ev = exposure as f32;
+        let outputs = Outputs::new(&args.output, frames.len(), options)?;
+        if outputs.uses_stdout() && args.json {
+            return Err(Error::usage("--json and an image both want standard output").help("Give the image a name"));
+        }
+        let label = match technique.mode {
+            Some(mode) if mode != technique.name => format!("{}-{mode}", technique.name),
+            _ => technique.name.to_owned(),
+        };
+        let record = Record {
+            command: vec![technique.name.into(), "render".into()],
+            scene: stage.source.clone(),
+            fingerprint: stage.fingerprint.clone(),
+            width: args.size.width,
+            height: args.size.height,
+            camera: stage.eye.clone(),
+            first_frame: frames.start,
+            frame: frames.start,
+            time: args.time,
+            fps: args.fps,
+            exposure,
+            environment: args.environment.as_ref().map(|path| path.to_string_lossy().into_owned()),
+            seed: args.seed,
+            view: args.view.clone(),
+            mode: technique.mode.map(str::to_owned),
+            f32: args.f32,
+            settings: config::to_value(settings)?,
+        };
+        let run = Self {
+            args,
+            console,
+            label,
+            stage,
+            outputs,
+            frames,
+            record,
+            timings: Timings::default(),
+            done: Vec::new(),
+            warnings: Vec::new(),
+            phases: Vec::new(),
+        };
+        if !args.list_passes {
+            run.probe()?;
+        }
+        run.tell();
+        Ok(run)
+    }
+
+    /// The first and the last frame stand for all.
+    fn probe(&self) -> Result<()> {
+        for frame in [self.frames.start, self.frames.end - 1] {
+            self.outputs.probe(&self.values(frame), &["picture"])?;
+        }
+        let files = self.args.timings.iter().map(|path| (path, true));
+        for (path, overwrite) in files {
+            image::probe_output(path, overwrite)?;
+        }
+        if let Some(folder) = self.args.dump.as_deref().filter(|folder| !folder.is_dir()) {
+            return Err(Error::new(ErrorKind::Output, "is not a folder")
+                .in_file(folder)
+                .help("Create it, or name another"));
+        }
+        Ok(())
+    }
+
+    fn tell(&self) {
+        let scene = &self.stage.scene;
+        let triangles: usize =
+            scene.meshes.iter().flat_map(|mesh| &mesh.primitives).map(|primitive| primitive.indices.len() / 3).sum();
+        let (lights, materials) = (scene.lights.len(), scene.materials.len());
+        self.console.info(&format!(
+            "{}: {triangles} triangles, {materials} materials, {lights} lights, camera '{}'",
+            scene.name, self.stage.camera_name
+        ));
+        for note in self.stage.notes() {
+            let text = format!("note: {}: {}", note.place, note.text);
+            match note.kind {
+                NoteKind::Repaired => self.console.detail(&text),
+                NoteKind::Ignored | NoteKind::Approximated => self.console.info(&text),
+            }
+        }
+    }
+
+    fn values(&self, frame: u32) -> Values<'_> {
+        let (scene, camera) = (&self.stage.scene.name, &self.stage.camera_name);
+        Values { scene, camera, technique: &self.label, frame, layer: "" }
+    }
+
+    /// What a picture says about itself.
+    pub fn metadata(&self, gpu: &Gpu, view: &View, frame: u32) -> Result<Metadata> {
+        let about = gpu.describe();
+        Ok(Metadata {
+            program: self.record.command.join(" "),
+            version: program::VERSION.into(),
+            revision: program::revision().map(str::to_owned),
+            scene: self.stage.scene.name.clone(),
+            camera: self.stage.camera_name.clone(),
+            technique: self.label.clone(),
+            seed: self.args.seed.into(),
+            device: about.device.clone(),
+            driver: format!("{} {}", about.driver, about.driver_info).trim().to_owned(),
+            config: config::to_value(&Record { frame, ..self.record.clone() })?,
+            world_to_camera: Some(view.view_from_world.to_cols_array()),
+            world_to_ndc: Some(view.clip_from_world.to_cols_array()),
+            ..Metadata::default()
+        })
+    }
+
+    /// Writes the files of a frame and returns their names.
+    pub fn write(&mut self, layers: &Layers, frame: u32) -> Result<Vec<String>> {
+        let written = self.outputs.write(&self.values(frame), layers)?;
+        for (name, report) in &written {
+            if !report.is_finite() {
+                let first = report.first.as_deref().unwrap_or_default();
+                let (nan, infinite) = (report.nan, report.infinite);
+                self.warn(format!("{name}: {nan} samples are not numbers, {infinite} are infinite; first: {first}"));
+            }
+        }
+        Ok(written.into_iter().map(|(name, _)| name).collect())
+    }
+
+    /// Writes an image of the graph into the `--dump` folder.
+    pub fn dump(&self, folder: &Path, frame: u32, name: &str, layers: &Layers) -> Result<()> {
+        let path = folder.join(format!("{frame:04}-{}.exr", crate::pattern::file_part(name)));
+        image::write(&path, layers, &WriteOptions { overwrite: self.args.overwrite, f32: true, ..Default::default() })?;
+        Ok(())
+    }
+
+    fn warn(&mut self, text: String) {
+        self.console.warning(&text);
+        self.warnings.push(text);
+    }
+
+    /// A frame is complete.
+    pub fn done(&mut self, frame: u32, seconds: f64, milliseconds: f64, files: Vec<String>, report: &Report) {
+        self.timings.add(frame, report);
+        let gpu_milliseconds = report.passes.iter().map(|pass| pass.gpu_ms).sum();
+        self.done.push(Done { frame, seconds, milliseconds, gpu_milliseconds, files });
+    }
+
+    /// Frames done, and frames asked for.
+    pub fn progress(&self) -> (usize, usize) {
+        (self.done.len(), self.frames.len())
+    }
+
+    /// Writes the timings and prints the JSON document, if they were asked for.
+    pub fn finish(&self, gpu: &Gpu) -> Result<()> {
+        if let Some(path) = &self.args.timings {
+            self.timings.write(path)?;
+        }
+        if self.args.json {
+            console::print_json(&self.json(gpu)?)?;
+        }
+        Ok(())
+    }
+
+    fn json(&self, gpu: &Gpu) -> Result<Value> {
+        let about = gpu.describe();
+        let median = |mut values: Vec<f64>| {
+            values.sort_by(f64::total_cmp);
+            values.get(values.len() / 2).copied()
+        };
+        let phases: serde_json::Map<String, Value> =
+            self.phases.iter().map(|(name, time)| ((*name).to_owned(), json!(time.as_secs_f64() * 1e3))).collect();
+        Ok(json!({
+            "program": self.record.command.join(" "),
+            "version": program::VERSION,
+            "revision": program::revision(),
+            "device": about.device,
+            "driver": format!("{} {}", about.driver, about.driver_info).trim(),
+            "scene": self.stage.scene.name,
+            "camera": self.stage.camera_name,
+            "technique": self.label,
+            "config": config::to_value(&self.record)?,
+            "phases_ms": phases,
+            "frames": console::to_json(&self.done)?,
+            "median_ms": median(self.done.iter().map(|done| done.milliseconds).collect()),
+            "median_gpu_ms": median(self.done.iter().filter_map(|done| done.gpu_milliseconds).collect()),
+            "notes": console::to_json(&self.stage.notes())?,
+            "warnings": self.warnings,
+            "complete": self.done.len() == self.frames.len(),
+        }))
+    }
+}

@@ -1,0 +1,125 @@
+//! From images of the render graph to layers of a picture.
+
+use lucerna::{
+    graph::{Frame, Graph, Image, ImageRead, Pixels},
+    image::{Layer, Layers},
+};
+
+/// Turns a pixel as the shader wrote it into what the layer holds.
+type Decode = Box<dyn Fn([f32; 4]) -> [f32; 4]>;
+
+/// What a technique shows of a frame: the picture, and layers for formats that hold them.
+pub struct Shown {
+    pub picture: Image,
+    layers: Vec<Source>,
+}
+
+struct Source {
+    name: &'static str,
+    channels: &'static [&'static str],
+    image: Image,
+    decode: Decode,
+}
+
+impl std::fmt::Debug for Shown {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let names: Vec<&str> = self.layers.iter().map(|layer| layer.name).collect();
+        write!(f, "Shown({:?}, layers {names:?})", self.picture)
+    }
+}
+
+impl Shown {
+    /// Only the picture: its red, green and blue are radiance.
+    pub fn new(picture: Image) -> Self {
+        Self { picture, layers: Vec::new() }
+    }
+
+    /// With a layer of colours, `NAME.R` `NAME.G` `NAME.B`.
+    #[must_use]
+    pub fn color(self, name: &'static str, image: Image) -> Self {
+        self.layer(name, &["R", "G", "B"], image, |pixel| pixel)
+    }
+
+    /// With a layer of other values.
+    #[must_use]
+    pub fn layer(
+        mut self,
+        name: &'static str,
+        channels: &'static [&'static str],
+        image: Image,
+        decode: impl Fn([f32; 4]) -> [f32; 4] + 'static,
+    ) -> Self {
+        self.layers.push(Source { name, channels, image, decode: Box::new(decode) });
+        self
+    }
+
+    /// Names of the layers, the picture first.
+    pub fn names(&self) -> Vec<&'static str> {
+        std::iter::once("picture").chain(self.layers.iter().map(|layer| layer.name)).collect()
+    }
+
+    /// Asks the graph for the pixels.
+    pub fn read(self, graph: &mut Graph, with_layers: bool) -> Reading {
+        let picture = graph.read_image(self.picture);
+        let layers = if with_layers { self.layers } else { Vec::new() };
+        let layers = layers.into_iter().map(|layer| (graph.read_image(layer.image), layer)).collect();
+        Reading { picture, layers }
+    }
+}
+
+/// Pixels that were asked for.
+pub struct Reading {
+    picture: ImageRead,
+    layers: Vec<(ImageRead, Source)>,
+}
+
+impl std::fmt::Debug for Reading {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Reading({} layers)", self.layers.len())
+    }
+}
+
+impl Reading {
+    /// The picture with its layers, once the graph has run. Layers of another size are stretched to that of the picture.
+    pub fn layers(&self, frame: &Frame) -> Layers {
+        let picture = frame.image(self.picture);
+        let (width, height) = (picture.extent.width, picture.extent.height);
+        let mut layers = Layers::new(width, height).with(Layer::rgb("", &stretched(&picture, width, height)));
+        for (token, source) in &self.layers {
+            let pixels = stretched(&frame.image(*token), width, height);
+            let count = source.channels.len().min(4);
+            let data = pixels.into_iter().flat_map(|p| (source.decode)(p).into_iter().take(count)).collect();
+            layers = layers.with(Layer::new(source.name, source.channels, data));
+        }
+        layers
+    }
+}
+
+/// The first layer of `pixels` at another size, each pixel from its nearest.
+fn stretched(pixels: &Pixels, width: u32, height: u32) -> Vec<[f32; 4]> {
+    let all = pixels.to_f32();
+    let (w, h) = (pixels.extent.width, pixels.extent.height);
+    if (w, h) == (width, height) {
+        return all.into_iter().take(w as usize * h as usize).collect();
+    }
+    let nearest = |i: u32, to: u32, from: u32| u64::from(i) * u64::from(from) / u64::from(to);
+    let at = |x, y| all[(nearest(y, height, h) * u64::from(w) + nearest(x, width, w)) as usize];
+    (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| at(x, y)).collect()
+}
+
+/// Any image of the graph as layers: R G B A of its first layer and level.
+pub fn raw(pixels: &Pixels) -> Layers {
+    let (width, height) = (pixels.extent.width, pixels.extent.height);
+    let count = pixels.format.channels().clamp(1, 4) as usize;
+    let channels: &[&str] = match count {
+        1 => &["Y"],
+        2 => &["X", "Y"],
+        3 => &["R", "G", "B"],
+        _ => &["R", "G", "B", "A"],
+    };
+    let values = pixels.to_f32().into_iter().take(width as usize * height as usize);
+    let data = values.flat_map(|p| p.into_iter().take(count)).collect();
+    let mut layer = Layer::new("", channels, data);
+    layer.precision = lucerna::image::Precision::Full;
+    Layers::new(width, height).with(layer)
+}

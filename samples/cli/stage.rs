@@ -1,0 +1,99 @@
+//! The scene and the camera of a run.
+
+use std::path::Path;
+
+use glam::Mat4;
+use lucerna::{
+    Result,
+    scene::{Camera, Note, Pose, Scene, View, environment},
+};
+
+use crate::{
+    args::{RenderArgs, Size},
+    camera::{self, CameraFile, Choice},
+    fingerprint, framing,
+    record::{self, Source},
+    source, world,
+};
+
+/// What is rendered, and from where.
+#[derive(Debug)]
+pub struct Stage {
+    pub scene: Scene,
+    pub source: Source,
+    pub fingerprint: String,
+    /// For file names and metadata, never empty.
+    pub camera_name: String,
+    pub eye: record::View,
+    camera: Camera,
+    /// The node that carries the camera, or where it stands.
+    node: Option<usize>,
+    world_from_camera: Mat4,
+}
+
+impl Stage {
+    /// Reads the scene, adds what it lacks to be seen, and chooses the camera.
+    ///
+    /// # Errors
+    /// `Input` for files that cannot be served, `Usage` for names that do not exist.
+    pub fn open(args: &RenderArgs) -> Result<Self> {
+        let (mut scene, source) = source::open(args.scene.as_deref(), args.builtin.as_deref())?;
+        if scene.name.is_empty() {
+            scene.name = "scene".into();
+        }
+        if let Some(path) = &args.environment {
+            scene.environment = Some(environment::load(path, &Default::default())?);
+        }
+        let fingerprint = fingerprint::scene(&scene);
+        framing::add_missing_light(&mut scene);
+        let from_file = args.camera.as_deref().is_some_and(|asked| Path::new(asked).is_file());
+        if !from_file {
+            framing::add_missing_camera(&mut scene, args.size.aspect());
+        }
+        let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
+        let choice = match &args.camera {
+            Some(asked) => camera::choose(asked, &names)?,
+            None => Choice::Scene(first_placed(&scene)),
+        };
+        Ok(match choice {
+            Choice::Scene(index) => {
+                let camera = scene.cameras[index].clone();
+                let node = scene.nodes.iter().position(|node| node.camera == Some(index as u32));
+                let camera_name = if camera.name.is_empty() { format!("camera{index}") } else { camera.name.clone() };
+                let eye = record::View::Scene(index);
+                Self { source, fingerprint, camera_name, eye, camera, node, world_from_camera: Mat4::IDENTITY, scene }
+            }
+            Choice::File(file) => {
+                let world_from_camera = file.world_from_view();
+                let camera_name = name_of(args.camera.as_deref().unwrap_or_default());
+                let camera = Camera { name: camera_name.clone(), projection: file.projection() };
+                let eye = record::View::File(file);
+                Self { source, fingerprint, camera_name, eye, camera, node: None, world_from_camera, scene }
+            }
+        })
+    }
+
+    /// What the user should know about how the scene was read.
+    pub fn notes(&self) -> &[Note] {
+        &self.scene.notes
+    }
+
+    /// The pose of a time, seconds, and what the camera sees then.
+    pub fn at(&self, seconds: f64, size: Size) -> (Pose, View) {
+        let pose = Pose::playing(&self.scene, seconds as f32);
+        let world_from_camera = self.node.map_or(self.world_from_camera, |node| pose.world[node]);
+        let view = View::new(&self.camera, world_from_camera, [size.width, size.height]);
+        (pose, view)
+    }
+}
+
+/// The first camera that stands somewhere.
+fn first_placed(scene: &Scene) -> usize {
+    let placed = |index: usize| scene.nodes.iter().any(|node| node.camera == Some(index as u32));
+    (0..scene.cameras.len()).find(|&index| placed(index)).unwrap_or(0)
+}
+
+/// `views/left.toml` → `left`.
+fn name_of(file: &str) -> String {
+    Path::new(file).file_stem().map_or_else(|| "camera".into(), |stem| stem.to_string_lossy().into_owned())
+}
