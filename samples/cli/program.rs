@@ -15,7 +15,9 @@ pub const INTERRUPTED: u8 = 130;
 pub fn run(console: Console, body: impl FnOnce() -> Result<ExitCode>) -> ExitCode {
     std::panic::set_hook(Box::new(move |info| {
         let place = info.location().map(|at| format!(" at {}:{}", at.file(), at.line())).unwrap_or_default();
-        let text = info.payload_as_str().unwrap_or("no message");
+        let payload = info.payload();
+        let text = payload.downcast_ref::<&str>().copied().or(payload.downcast_ref::<String>().map(String::as_str));
+        let text = text.unwrap_or("no message");
         console.error(&Error::new(
             lucerna::ErrorKind::Runtime,
             format!(

@@ -135,7 +135,7 @@ fn compare(old: &Layers, new: &Layers, same_file: bool) -> Comparison {
             }
             result.different += 1;
             let difference = (x - y).abs();
-            if result.largest.is_some_and(|largest| !(difference <= largest)) {
+            if result.largest.is_some_and(|largest| difference.is_nan() || difference > largest) {
                 let (pixel, channel) = (i / a.channels.len(), &a.channels[i % a.channels.len()]);
                 let (column, row) = (pixel % old.width as usize, pixel / old.width as usize);
                 let layer = if a.name.is_empty() { "picture" } else { &a.name };

@@ -4,16 +4,16 @@ use std::path::Path;
 
 use glam::Mat4;
 use lucerna::{
-    Result,
-    scene::{Camera, Note, Pose, Scene, View, environment},
+    Error, Result,
+    scene::{Camera, Note, Pose, Scene, View},
 };
 
 use crate::{
     args::{RenderArgs, Size},
-    camera::{self, CameraFile, Choice},
+    camera::{self, Choice},
     fingerprint, framing,
     record::{self, Source},
-    source, world,
+    source,
 };
 
 /// What is rendered, and from where.
@@ -42,7 +42,7 @@ impl Stage {
             scene.name = "scene".into();
         }
         if let Some(path) = &args.environment {
-            scene.environment = Some(environment::load(path, &Default::default())?);
+            return Err(Error::usage("environments are not read yet").in_file(path));
         }
         let fingerprint = fingerprint::scene(&scene);
         framing::add_missing_light(&mut scene);
