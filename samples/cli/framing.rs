@@ -93,12 +93,14 @@ fn fitted(bounds: &Aabb, aspect: f32) -> (Mat4, Projection) {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec4;
     use lucerna::scene::{Material, Mesh, Primitive};
 
     use super::*;
 
     fn cube(min: Vec3, max: Vec3) -> Scene {
-        let primitive = Primitive { positions: vec![min, max], ..Primitive::default() };
+        let (normals, tangents) = (vec![Vec3::Y; 2], vec![Vec4::ZERO; 2]);
+        let primitive = Primitive { positions: vec![min, max], normals, tangents, ..Primitive::default() };
         Scene {
             meshes: vec![Mesh { primitives: vec![primitive], ..Mesh::default() }],
             nodes: vec![Node { mesh: Some(0), ..Node::default() }],

@@ -352,8 +352,13 @@ mod tests {
 
     #[test]
     fn counts_instances_and_names_everything() {
-        let primitive =
-            Primitive { positions: vec![Vec3::ZERO; 4], indices: vec![0, 1, 2, 2, 1, 3], ..Primitive::default() };
+        let primitive = Primitive {
+            positions: vec![Vec3::ZERO; 4],
+            normals: vec![Vec3::Y; 4],
+            tangents: vec![glam::Vec4::ZERO; 4],
+            indices: vec![0, 1, 2, 2, 1, 3],
+            ..Primitive::default()
+        };
         let instance = || Node { mesh: Some(0), ..Node::default() };
         let projection = Projection::Perspective { yfov: 1.0, aspect: None, znear: 0.1, zfar: None };
         let scene = Scene {

@@ -28,7 +28,7 @@ pub fn reach(scene: &Scene) -> Option<Aabb> {
 
 #[cfg(test)]
 mod tests {
-    use glam::{Quat, Vec3};
+    use glam::{Quat, Vec3, Vec4};
     use lucerna::scene::{Animation, Channel, Interpolation, Keys, Mesh, Node, Primitive, Transform};
 
     use super::*;
@@ -41,7 +41,8 @@ mod tests {
     #[test]
     fn bounds_follow_hierarchy_and_animation() {
         let positions = vec![Vec3::ZERO, Vec3::ONE];
-        let primitive = Primitive { normals: positions.clone(), positions, ..Primitive::default() };
+        let (normals, tangents) = (vec![Vec3::Y; 2], vec![Vec4::ZERO; 2]);
+        let primitive = Primitive { positions, normals, tangents, ..Primitive::default() };
         let mut scene =
             Scene { meshes: vec![Mesh { primitives: vec![primitive], ..Mesh::default() }], ..Scene::default() };
         assert_eq!(reach(&scene), None);
