@@ -73,7 +73,7 @@ pub fn render<S: Serialize + DeserializeOwned, R>(
     let uploaded = started.elapsed();
     run.phases = vec![("load", loaded), ("device", opened - loaded), ("upload", uploaded - opened)];
 
-    let mut runner = Runner::default();
+    let mut runner = Runner::new(&gpu);
     let mut progress = Progress::new(args.progress, console.is_quiet(), run.frames.len() as u64);
     for frame in run.frames.clone() {
         if interrupt.requested() {
