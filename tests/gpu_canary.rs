@@ -5,13 +5,13 @@
 use std::process::Command;
 
 use ash::vk;
-use lucerna::{
-    gpu::{
-        BufferDesc, DescriptorArena, Gpu, GpuOptions, OwnedBuffer,
-        testing::{self, with_gpu},
-    },
-    shader::{Access, Binding, BindingKind, Shader, Stage, StageCode},
+use gpu_common::successors;
+use lucerna::gpu::{
+    BufferDesc, Gpu, GpuOptions, OwnedBuffer,
+    testing::{self, with_gpu},
 };
+
+mod gpu_common;
 
 /// What `with_gpu` says about `body`; `None`: skipped, as there is no device or no layer (never with `CI` set).
 fn complaint(body: impl FnOnce(&Gpu)) -> Option<String> {
@@ -32,95 +32,10 @@ fn must_say(expected: &str, body: impl FnOnce(&Gpu)) {
     }
 }
 
-/// A compute shader that writes each of 64 words plus one to another buffer.
-fn successor() -> &'static Shader {
-    let source = "#version 460
-        layout(local_size_x = 64) in;
-        layout(binding = 0) readonly buffer From { uint from[]; };
-        layout(binding = 1) writeonly buffer To { uint to[]; };
-        void main() { to[gl_GlobalInvocationID.x] = from[gl_GlobalInvocationID.x] + 1u; }";
-    let compiler = shaderc::Compiler::new().unwrap();
-    let mut options = shaderc::CompileOptions::new().unwrap();
-    options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
-    let code = compiler
-        .compile_into_spirv(source, shaderc::ShaderKind::Compute, "successor.comp", "main", Some(&options))
-        .unwrap();
-    let spirv: &'static [u8] = code.as_binary_u8().to_vec().leak();
-    let binding = |name, binding, access| Binding {
-        name,
-        binding,
-        kind: BindingKind::Buffer,
-        access,
-        stages: &[Stage::Compute],
-        count: 1,
-    };
-    Box::leak(Box::new(Shader {
-        name: "test.successor",
-        stages: Box::leak(Box::new([StageCode { stage: Stage::Compute, spirv }])),
-        bindings: Box::leak(Box::new([binding("from", 0, Access::Read), binding("to", 1, Access::Write)])),
-        push_size: 0,
-        workgroup: [64, 1, 1],
-        spec: &[],
-        color_outputs: 0,
-    }))
-}
-
-/// A chain of buffers, each the successor of the one before, beginning with zeros: as many steps in each submission as
-/// `submissions` says, with or without barriers in between. Returns the last buffer.
-fn successors(gpu: &Gpu, submissions: &[u32], barriers: bool) -> Vec<u8> {
-    let steps: u32 = submissions.iter().sum();
-    let buffers: Vec<OwnedBuffer> =
-        (0..=steps).map(|i| OwnedBuffer::with_contents(gpu, &format!("words {i}"), &[0; 256]).unwrap()).collect();
-    let pipeline = gpu.compute_pipeline(successor(), &[]).unwrap();
-    let mut arena = DescriptorArena::new(gpu);
-    let mut pairs = buffers.windows(2);
-    let mut running = Vec::new();
-    for count in submissions {
-        let mut commands = gpu.commands("successors").unwrap();
-        for pair in pairs.by_ref().take(*count as usize) {
-            let set = arena.allocate("test.successor", pipeline.set_layout).unwrap();
-            let infos: Vec<_> = pair
-                .iter()
-                .map(|buffer| [vk::DescriptorBufferInfo::default().buffer(buffer.raw()).range(vk::WHOLE_SIZE)])
-                .collect();
-            let writes: Vec<_> = infos
-                .iter()
-                .enumerate()
-                .map(|(i, info)| {
-                    vk::WriteDescriptorSet::default()
-                        .dst_set(set)
-                        .dst_binding(i as u32)
-                        .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
-                        .buffer_info(info)
-                })
-                .collect();
-            commands.begin_pass("test.successor");
-            // SAFETY: in recording; everything bound lives until the submissions are waited for below.
-            unsafe {
-                let device = gpu.device();
-                let raw = commands.raw();
-                device.update_descriptor_sets(&writes, &[]);
-                device.cmd_bind_pipeline(raw, pipeline.bind_point, pipeline.raw);
-                device.cmd_bind_descriptor_sets(raw, pipeline.bind_point, pipeline.layout, 0, &[set], &[]);
-                device.cmd_dispatch(raw, 1, 1, 1);
-            }
-            commands.end_pass();
-            if barriers {
-                commands.everything_barrier();
-            }
-        }
-        running.push(commands.submit().unwrap());
-    }
-    for submission in running {
-        submission.wait().unwrap();
-    }
-    buffers[steps as usize].read().unwrap()
-}
-
 #[test]
 fn correct_use_is_silent() {
     with_gpu(|gpu| {
-        let words = successors(gpu, &[3, 2], true);
+        let words = successors(gpu, &[3, 2], true).unwrap();
         assert!(words.chunks(4).all(|word| word == [5, 0, 0, 0]), "{words:?}");
     });
 }
@@ -138,7 +53,7 @@ fn a_wrong_call_is_reported() {
 #[test]
 fn a_missing_barrier_between_dispatches_is_reported() {
     must_say("SYNC-HAZARD", |gpu| {
-        successors(gpu, &[2], false);
+        successors(gpu, &[2], false).unwrap();
     });
 }
 
@@ -188,7 +103,7 @@ fn a_missing_barrier_between_submissions_is_reported() {
     const INSIDE: &str = "LUCERNA_TEST_INSIDE";
     if std::env::var_os(INSIDE).is_some() {
         must_say("SYNC-HAZARD", |gpu| {
-            successors(gpu, &[1, 1], false);
+            successors(gpu, &[1, 1], false).unwrap();
         });
         return;
     }

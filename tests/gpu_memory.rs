@@ -3,6 +3,8 @@
 use ash::vk;
 use lucerna::gpu::{self, BufferDesc, ImageDesc, OwnedBuffer, OwnedImage, Region, Timestamps, testing::with_gpu};
 
+mod gpu_common;
+
 #[test]
 fn buffers_keep_their_contents() {
     with_gpu(|gpu| {
@@ -136,5 +138,23 @@ fn samplers_are_shared() {
         for other in others {
             assert_ne!(first, gpu.sampler(other).unwrap());
         }
+    });
+}
+
+#[test]
+fn a_drawn_image_is_the_same_image() {
+    with_gpu(|gpu| {
+        let rgba: Vec<u8> = (0..7 * 5 * 4).map(|i| (i * 7 % 256) as u8).collect();
+        assert_eq!(gpu_common::show(gpu, 7, 5, &rgba).unwrap(), rgba);
+    });
+}
+
+#[test]
+fn a_shader_of_the_wrong_sort_is_refused() {
+    with_gpu(|gpu| {
+        let error = gpu.compute_pipeline(&lucerna::shaders::test::show::SHADER, &[]).unwrap_err();
+        assert!(error.to_string().starts_with("test.show: is no compute shader"), "{error}");
+        let error = gpu.compute_pipeline(gpu_common::successor(), &[1]).unwrap_err();
+        assert!(error.to_string().contains("1 specialisation constants were given, it has 0"), "{error}");
     });
 }

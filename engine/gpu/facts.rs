@@ -114,8 +114,10 @@ fn candidate(instance: &ash::Instance, physical: vk::PhysicalDevice) -> Candidat
     // SAFETY (whole function): queries of a physical device of this living instance, with chains of local structures.
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
+    let mut id = vk::PhysicalDeviceIDProperties::default();
     let properties = {
-        let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut subgroup);
+        let mut all =
+            vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut subgroup).push_next(&mut id);
         unsafe { instance.get_physical_device_properties2(physical, &mut all) };
         all.properties
     };
@@ -166,6 +168,7 @@ fn candidate(instance: &ash::Instance, physical: vk::PhysicalDevice) -> Candidat
             vk::PhysicalDeviceType::CPU => DeviceKind::Cpu,
             _ => DeviceKind::Other,
         },
+        uuid: uuid(&id.device_uuid),
         api_version: version_of(properties.api_version),
         driver_name: name(&driver.driver_name),
         driver_info: name(&driver.driver_info),
@@ -176,6 +179,18 @@ fn candidate(instance: &ash::Instance, physical: vk::PhysicalDevice) -> Candidat
         has_queue: family.is_some(),
     };
     Candidate { physical, facts, features, properties, subgroup_size: subgroup.subgroup_size, queue_family: family }
+}
+
+/// `00112233-4455-6677-8899-aabbccddeeff`
+fn uuid(bytes: &[u8; 16]) -> String {
+    let mut text = String::with_capacity(36);
+    for (i, byte) in bytes.iter().enumerate() {
+        if matches!(i, 4 | 6 | 8 | 10) {
+            text.push('-');
+        }
+        text += &format!("{byte:02x}");
+    }
+    text
 }
 
 /// Text of a fixed array that need not be terminated or UTF-8.

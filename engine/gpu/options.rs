@@ -12,7 +12,7 @@ pub enum DeviceChoice {
     Auto,
     /// The position in [`super::list_devices`].
     Index(usize),
-    /// The first suitable one whose name contains this text, ignoring case.
+    /// The first suitable one whose name or UUID contains this text, ignoring case.
     Name(String),
     /// A CPU driver (lavapipe, SwiftShader).
     Cpu,
@@ -21,12 +21,14 @@ pub enum DeviceChoice {
 impl FromStr for DeviceChoice {
     type Err = Error;
 
-    /// `auto`, `cpu`, a number (position in the list of devices), or part of a device name.
+    /// `auto`, `cpu`, a number (position in the list of devices), or part of a device name or UUID.
     fn from_str(text: &str) -> Result<Self> {
         let text = text.trim();
         Ok(match text.to_ascii_lowercase().as_str() {
             "" => {
-                return Err(Error::usage("an empty device choice").help("Write auto, cpu, an index or part of a name"));
+                return Err(
+                    Error::usage("an empty device choice").help("Write auto, cpu, an index, or part of a name or UUID")
+                );
             }
             "auto" => Self::Auto,
             "cpu" => Self::Cpu,
@@ -105,7 +107,7 @@ impl Default for GpuOptions {
 
 /// The variables that [`GpuOptions::from_env`] reads, with their meaning; for `--help` and documentation.
 pub const ENVIRONMENT: [(&str, &str); 5] = [
-    ("LUCERNA_DEVICE", "auto, cpu, an index or part of a device name"),
+    ("LUCERNA_DEVICE", "auto, cpu, an index, or part of a device name or UUID"),
     ("LUCERNA_REQUIRE_GPU", "1: refuse CPU drivers"),
     ("LUCERNA_VALIDATION", "off, core, sync or gpu-assisted"),
     ("LUCERNA_WAIT_LIMIT", "seconds after which a wait for the device gives up"),

@@ -39,6 +39,9 @@ pub struct DeviceFacts {
     /// As the driver calls it.
     pub name: String,
     pub kind: DeviceKind,
+    /// Hexadecimal digits in lower case, in groups as usual: `6d657361-3235-2e30-2e37-2d3200000000`. Stays the same from run
+    /// to run; tells two devices of the same name apart.
+    pub uuid: String,
     pub api_version: Version,
     pub driver_name: String,
     /// Version text of the driver, as free as drivers write it.
@@ -52,6 +55,14 @@ pub struct DeviceFacts {
     pub formats: BTreeSet<String>,
     /// It has a queue that draws, computes and copies.
     pub has_queue: bool,
+}
+
+impl DeviceFacts {
+    /// `part`, ignoring case, is part of the name or of the UUID.
+    pub fn is_called(&self, part: &str) -> bool {
+        let part = part.to_lowercase();
+        self.name.to_lowercase().contains(&part) || self.uuid.contains(&part)
+    }
 }
 
 /// What a device must have.
@@ -154,8 +165,8 @@ fn missing(
         DeviceChoice::Index(wanted) if *wanted != index => {
             missing.push(format!("is not device {wanted}, which was asked for"))
         }
-        DeviceChoice::Name(part) if !device.name.to_lowercase().contains(&part.to_lowercase()) => {
-            missing.push(format!("has not `{part}` in its name, which was asked for"));
+        DeviceChoice::Name(part) if !device.is_called(part) => {
+            missing.push(format!("has not `{part}` in its name or UUID ({}), which was asked for", device.uuid));
         }
         DeviceChoice::Cpu if device.kind != DeviceKind::Cpu => {
             missing.push("is not a CPU driver, which was asked for".into())
@@ -218,6 +229,7 @@ mod tests {
         DeviceFacts {
             name: name.into(),
             kind,
+            uuid: format!("00112233-4455-6677-8899-{:012x}", name.len()),
             api_version: (1, 3, 230),
             driver_name: "test".into(),
             driver_info: "1".into(),
@@ -263,6 +275,8 @@ mod tests {
         assert_eq!(pick(&three(), DeviceChoice::Cpu, false), Ok(0));
         assert_eq!(pick(&three(), DeviceChoice::Index(1), false), Ok(1));
         assert_eq!(pick(&three(), DeviceChoice::Name("big".into()), false), Ok(2));
+        assert_eq!(pick(&three(), DeviceChoice::Name("8899-00000000000E".into()), false), Ok(1));
+        assert_eq!(pick(&three(), DeviceChoice::Name("8899-000000000007".into()), false), Ok(2));
     }
 
     #[test]
