@@ -14,6 +14,7 @@ pub mod gltf;
 mod load;
 pub mod normals;
 mod notes;
+pub mod resident;
 mod surface;
 mod tangents;
 pub mod texture;
