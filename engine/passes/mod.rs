@@ -2,3 +2,6 @@
 
 pub mod ambient;
 pub mod blur;
+pub mod gbuffer;
+pub mod shadow;
+pub mod skybox;

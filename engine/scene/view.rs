@@ -86,21 +86,9 @@ impl View {
         let least = self.near.abs() * 1.001 + 1e-4;
         self.far = if far.is_finite() { far.max(self.near + least) } else { DEFAULT_FAR.max(self.near + least) };
         let half = self.half_extent();
-        let (n, f) = (self.near, self.far);
-        let depth = f - n;
         self.clip_from_view = match self.projection {
-            Projection::Perspective { .. } => Mat4::from_cols(
-                Vec4::new(1.0 / half.x, 0.0, 0.0, 0.0),
-                Vec4::new(0.0, 1.0 / half.y, 0.0, 0.0),
-                Vec4::new(0.0, 0.0, n / depth, -1.0),
-                Vec4::new(0.0, 0.0, n * f / depth, 0.0),
-            ),
-            Projection::Orthographic { .. } => Mat4::from_cols(
-                Vec4::new(1.0 / half.x, 0.0, 0.0, 0.0),
-                Vec4::new(0.0, 1.0 / half.y, 0.0, 0.0),
-                Vec4::new(0.0, 0.0, 1.0 / depth, 0.0),
-                Vec4::new(0.0, 0.0, f / depth, 1.0),
-            ),
+            Projection::Perspective { .. } => perspective(half, self.near, self.far),
+            Projection::Orthographic { .. } => orthographic(half, self.near, self.far),
         };
         self.clip_from_world = self.clip_from_view * self.view_from_world;
     }
@@ -167,6 +155,35 @@ impl View {
         let base = v(u.base_o) + uv.x * v(u.base_u) + uv.y * v(u.base_v);
         base + (v(u.frustum_o) + uv.x * v(u.frustum_u) + uv.y * v(u.frustum_v)) * z
     }
+}
+
+/// `clip_from_view` with reversed depth; `half`: tangents of half the angles of view.
+pub(crate) fn perspective(half: Vec2, near: f32, far: f32) -> Mat4 {
+    let depth = far - near;
+    Mat4::from_cols(
+        Vec4::new(1.0 / half.x, 0.0, 0.0, 0.0),
+        Vec4::new(0.0, 1.0 / half.y, 0.0, 0.0),
+        Vec4::new(0.0, 0.0, near / depth, -1.0),
+        Vec4::new(0.0, 0.0, near * far / depth, 0.0),
+    )
+}
+
+/// `clip_from_view` with reversed depth; `half`: half the width and height, metres.
+pub(crate) fn orthographic(half: Vec2, near: f32, far: f32) -> Mat4 {
+    let depth = far - near;
+    Mat4::from_cols(
+        Vec4::new(1.0 / half.x, 0.0, 0.0, 0.0),
+        Vec4::new(0.0, 1.0 / half.y, 0.0, 0.0),
+        Vec4::new(0.0, 0.0, 1.0 / depth, 0.0),
+        Vec4::new(0.0, 0.0, far / depth, 1.0),
+    )
+}
+
+/// `view_from_world` at `at`, looking along a unit vector; which way is up is not specified.
+pub(crate) fn looking_along(at: Vec3, along: Vec3) -> Mat4 {
+    let right = along.any_orthonormal_vector();
+    let up = right.cross(along);
+    rigid_inverse(Mat4::from_cols(right.extend(0.0), up.extend(0.0), (-along).extend(0.0), at.extend(1.0)))
 }
 
 /// Inverse of the rotation and translation in `world_from_camera`; scale, shear and mirroring are dropped.

@@ -18,6 +18,7 @@ const uint SHADOW_PCF = 2u; // export
 const uint SHADOW_EXPONENTIAL = 3u; // export
 
 // One layer: the view of a spot light, of a face of a point light, or of a cascade of a directional light.
+// Faces and spot views are a little wider than needed, so that filters find neighbours at the border.
 struct ShadowSlot {
     mat4 clip_from_world; // reversed depth
     float near;           // metres from the light (perspective) or along its axis
@@ -100,7 +101,7 @@ float shadow_factor(Light l, vec3 world, vec3 normal) {
         uint cascade = cascade_of(place.first, place.count, world);
         if (cascade == place.count) return 1.0;
         index += cascade;
-    } else if (l.kind == LIGHT_POINT) {
+    } else if (place.count == 6u) { // a cube around a point light or a very wide spot light
         index += cube_face(world - l.position);
     }
     ShadowSlot slot = shadow_slots[index];

@@ -8,17 +8,18 @@
 #define SHADOW_MAPS_BINDING 22
 #include "lib/shadow.glsl"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = 8, local_size_y = 8) in; // z: slots
 layout(constant_id = 0) const uint FROM_HARDWARE = 0;
 layout(binding = 1, r32f) uniform writeonly image2DArray filtered;
 layout(push_constant, scalar) uniform Push {
     ivec2 step;
     int radius;      // texels to each side; 0: copy
     float deviation; // texels
-    uint slot;
+    uint slots;
 };
 
 float depth_at(ivec2 at) {
+    uint slot = gl_GlobalInvocationID.z;
     float stored = shadow_texel(at, slot);
     if (FROM_HARDWARE == 0u) return stored;
     vec2 ndc = (vec2(at) + 0.5) / shadow_settings.size * vec2(2.0, -2.0) + vec2(-1.0, 1.0);
@@ -28,7 +29,7 @@ float depth_at(ivec2 at) {
 void main() {
     ivec2 at = ivec2(gl_GlobalInvocationID.xy);
     int size = int(shadow_settings.size);
-    if (any(greaterThanEqual(at, ivec2(size)))) return;
+    if (any(greaterThanEqual(at, ivec2(size))) || gl_GlobalInvocationID.z >= slots) return;
     float c = shadow_settings.exponent;
     // Sum of weights * exp(c (depth - most)), with the largest depth so far taken out of it.
     float most = depth_at(at);
@@ -44,5 +45,5 @@ void main() {
         most = larger;
         total += w;
     }
-    imageStore(filtered, ivec3(at, int(slot)), vec4(most + log(sum / total) / c));
+    imageStore(filtered, ivec3(at, int(gl_GlobalInvocationID.z)), vec4(most + log(sum / total) / c));
 }

@@ -65,7 +65,7 @@ impl Batches {
 
     /// As [`Batches::new`], without a difference between the sides of triangles: for shadow maps.
     pub fn of_casters(moment: &Moment, frustum: Option<&Frustum>, eye: Vec3) -> Self {
-        let mut all = Self::filtered(moment, |i| frustum.is_none_or(|f| f.sees(&i.bounds)), eye);
+        let mut all = Self::filtered(moment, |i| i.casts && frustum.is_none_or(|f| f.sees(&i.bounds)), eye);
         let mut merged: Vec<Batch> = Vec::new();
         for batch in all.list {
             match merged.last_mut() {
@@ -136,7 +136,7 @@ mod tests {
 
     fn instance(at: f32, mesh: u32, cutout: Cutout, sided: Sided) -> Instance {
         let bounds = Aabb::of([Vec3::new(at, 0.0, 0.0)]).grown(0.5);
-        Instance { node: 0, bounds, first_index: 30 * mesh, indices: 30, cutout, sided }
+        Instance { node: 0, bounds, first_index: 30 * mesh, indices: 30, cutout, sided, casts: true }
     }
 
     #[test]

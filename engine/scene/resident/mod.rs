@@ -65,6 +65,7 @@ struct Item {
     job: Option<usize>,
     cutout: Cutout,
     double_sided: bool,
+    casts: bool,
 }
 
 /// One primitive of one node in one frame: what culling and sorting need to know.
@@ -78,6 +79,8 @@ pub struct Instance {
     pub indices: u32,
     pub cutout: Cutout,
     pub sided: Sided,
+    /// Stops light: all but unlit surfaces.
+    pub casts: bool,
 }
 
 /// The scene of one frame on the host.
@@ -255,6 +258,7 @@ impl Resident {
                 first_index,
                 indices,
                 cutout: item.cutout,
+                casts: item.casts,
                 sided: match (item.double_sided, mirrored) {
                     (true, _) => Sided::Both,
                     (false, false) => Sided::Front,
@@ -300,6 +304,7 @@ fn items(
                     AlphaMode::Blend => Cutout::Blend,
                 },
                 double_sided: material.double_sided,
+                casts: !material.unlit,
             };
             blended |= item.cutout == Cutout::Blend;
             if deform::deforms(primitive, node.skin.is_some()) {

@@ -1,0 +1,145 @@
+//! The G-buffer: attributes of the nearest visible surface of every pixel, in one pass over the culled scene
+//! (ISR dissertation, section 4.2: CLR, NRM, DPT; with what physical materials need besides).
+
+use crate::{
+    graph::{Depth, Extent, Format, Graph, Image, Load, Raster, Stencil, StencilLoad, Targets, Uniform},
+    scene::{
+        View,
+        cull::Frustum,
+        resident::{Batches, Cutout, Handles},
+    },
+    shaders::{passes::gbuffer as shader, types},
+};
+use serde::{Deserialize, Serialize};
+
+/// How normals are stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Normals {
+    /// The dissertation's: 8 bits a component, decoded as 2c/255 − 1.
+    Bytes,
+    /// Octahedral, 16 bits a component.
+    #[default]
+    Octahedral,
+}
+
+/// What becomes of alpha-blended surfaces, which a G-buffer cannot hold next to what is behind them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Blended {
+    /// Each pixel shows the surface with probability alpha, by a fixed pattern of the seed.
+    #[default]
+    Dithered,
+    /// The surface is shown where alpha is at least one half.
+    Threshold,
+    /// Not drawn.
+    Hidden,
+}
+
+/// Choices of [`draw`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Settings {
+    pub normals: Normals,
+    pub blended: Blended,
+    /// Leaves out what lies outside of the view. Off only to check that it changes nothing.
+    pub culling: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { normals: Normals::default(), blended: Blended::default(), culling: true }
+    }
+}
+
+/// Full-resolution images; encodings in `lib/gbuffer.glsl`.
+#[derive(Clone, Copy, Debug)]
+pub struct GBuffer {
+    /// sRGB8: (1 − metallic) · base colour (linear when sampled); alpha: radiation mask, 1 ordinary, 0 unlit.
+    pub albedo: Image,
+    /// World normal; read it with `decode_normal`.
+    pub normal: Image,
+    /// R32F: eye distance / far; background exactly 1.
+    pub depth: Image,
+    /// RGBA8: reflectance at normal incidence; alpha: roughness.
+    pub specular: Image,
+    /// RGBA16F: emitted radiance, W/(sr·m²); alpha: accessibility from the occlusion texture.
+    pub emission: Image,
+    /// D32 with stencil: 1 geometry, 0 background. Reversed depth.
+    pub hardware: Image,
+    /// The view it was drawn for.
+    pub view: Uniform<types::View>,
+}
+
+/// Draws the scene as `view` sees it.
+pub fn draw(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings) -> GBuffer {
+    let extent = Extent::from(view.extent);
+    let normal_format = match settings.normals {
+        Normals::Bytes => Format::RGBA8,
+        Normals::Octahedral => Format::RG16,
+    };
+    let gbuffer = GBuffer {
+        albedo: graph.image("gbuffer.albedo", Format::RGBA8Srgb, extent),
+        normal: graph.image("gbuffer.normal", normal_format, extent),
+        depth: graph.image("gbuffer.depth", Format::R32F, extent),
+        specular: graph.image("gbuffer.specular", Format::RGBA8, extent),
+        emission: graph.image("gbuffer.emission", Format::RGBA16F, extent),
+        hardware: graph.image("gbuffer.hardware", Format::D32S8, extent),
+        view: graph.uniform(&view.uniform()),
+    };
+    let frustum = settings.culling.then(|| Frustum::new(view));
+    let batches = Batches::new(&scene.moment, frustum.as_ref(), view.position);
+    let visible = batches.visible_buffer(graph, "gbuffer.visible");
+    let drawn = batches.list.iter().filter(|b| b.cutout != Cutout::Blend || settings.blended != Blended::Hidden);
+    let drawn: Vec<_> = drawn.collect();
+    graph.scope("gbuffer", |graph| {
+        // Without anything to draw one empty pass still clears.
+        for index in 0..drawn.len().max(1) {
+            let batch = drawn.get(index);
+            let cutout = match batch.map(|b| b.cutout) {
+                None | Some(Cutout::Opaque) => 0,
+                Some(Cutout::Mask) => 1,
+                Some(Cutout::Blend) if settings.blended == Blended::Dithered => 2,
+                Some(Cutout::Blend) => 3,
+            };
+            let args = shader::Args {
+                view: gbuffer.view,
+                instances: scene.instances,
+                visible,
+                positions: scene.positions,
+                normals: scene.normals,
+                tangents: scene.tangents,
+                uvs: scene.uvs,
+                colors: scene.colors,
+                materials: scene.materials,
+                scene_textures: scene.textures,
+                spec: shader::Spec {
+                    cutout,
+                    octahedral: u32::from(settings.normals == Normals::Octahedral),
+                },
+            };
+            let state = Raster::new().cull(batch.map_or_else(Default::default, |b| b.sided.cull()));
+            let draw = batch.map_or_else(
+                || crate::graph::Draw::indexed(scene.indices, Vec::new()),
+                |batch| batch.draw(scene),
+            );
+            graph.raster(targets(&gbuffer, index == 0), state.stencil(Stencil::write(1)), args, draw);
+        }
+    });
+    gbuffer
+}
+
+fn targets(gbuffer: &GBuffer, first: bool) -> Targets {
+    let load = |value| if first { Load::Clear(value) } else { Load::Keep };
+    let targets = Targets::new()
+        .color(gbuffer.albedo, load([0.0; 4]))
+        .color(gbuffer.normal, load([0.5, 0.5, 0.5, 0.0]))
+        .color(gbuffer.depth, load([1.0; 4]))
+        .color(gbuffer.specular, load([0.0, 0.0, 0.0, 1.0]))
+        .color(gbuffer.emission, load([0.0, 0.0, 0.0, 1.0]));
+    if first {
+        targets.depth(gbuffer.hardware, Depth::Clear(0.0)).stencil(StencilLoad::Clear(0))
+    } else {
+        targets.depth(gbuffer.hardware, Depth::Keep).stencil(StencilLoad::Keep)
+    }
+}

@@ -1,0 +1,217 @@
+//! Shadow maps of spot, point and directional lights: plain, percentage closer, or exponential (ISR dissertation,
+//! section 4.6, eq. 30 and listing 8; cascades as its section 4.7 proposes).
+
+mod slots;
+
+pub use slots::{Assignment, assign};
+
+use crate::{
+    graph::{Buffer, Depth, Extent, Format, Graph, Image, ImageDesc, Raster, Targets},
+    scene::{
+        Note, NoteKind, View,
+        cull::Frustum,
+        resident::{Batches, Cutout, Handles},
+    },
+    shaders::{
+        consts,
+        passes::{shadow as opaque, shadow_blur as blur, shadow_cutout as cutout},
+        types,
+    },
+};
+use serde::{Deserialize, Serialize};
+
+/// How the depth of a map is compared with that of a receiver.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// No shadows.
+    Off,
+    /// One texel, yes or no.
+    Plain,
+    /// Percentage closer filter of 3×3 texels.
+    #[default]
+    Pcf,
+    /// Exponential: exp(−c (r − o)) on prefiltered depth.
+    Exponential,
+}
+
+/// Choices of [`draw`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Settings {
+    pub kind: Kind,
+    /// Texels of a side of each map.
+    pub size: u32,
+    /// Maps of a directional light, 1 to 8.
+    pub cascades: u32,
+    /// Where cascades end: 0 evenly spaced, 1 in geometric progression.
+    pub split: f32,
+    /// Metres from the camera after which directional lights cast no shadow; 0: as far as the scene reaches.
+    pub distance: f32,
+    /// c of eq. 30, for depths from 0 (at the light) to 1 (its range, or the end of the scene).
+    pub exponent: f32,
+    /// Standard deviation of the logarithmic Gaussian prefilter, texels; 0: no filter.
+    pub blur: f32,
+    /// Texels that a receiver is moved to the light before the comparison (plain and PCF).
+    pub depth_bias: f32,
+    /// Texels that a receiver is moved along its normal where light grazes it.
+    pub normal_bias: f32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            kind: Kind::default(),
+            size: 1024,
+            cascades: 4,
+            split: 0.8,
+            distance: 0.0,
+            exponent: 90.0,
+            blur: 1.5,
+            depth_bias: 1.0,
+            normal_bias: 1.5,
+        }
+    }
+}
+
+/// What `lib/shadow.glsl` binds, and what could not be served.
+#[derive(Clone, Debug)]
+pub struct ShadowMaps {
+    /// Block `Lights`: the scene's lights.
+    pub lights: Buffer,
+    /// Block `Shadows`.
+    pub shadows: Buffer,
+    /// Sampler `shadow_maps`: an array, one layer a slot.
+    pub maps: Image,
+    /// Lights without shadows because all [`consts::MAX_SHADOW_SLOTS`] maps are taken, and why.
+    pub notes: Vec<Note>,
+}
+
+/// Draws the shadow maps of all lights of the scene; the first lights of the list get maps while there are any.
+pub fn draw(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings) -> ShadowMaps {
+    let settings = sane(settings);
+    let assignment = match settings.kind {
+        Kind::Off => Assignment::none(scene.moment.lights.len()),
+        _ => assign(&scene.moment.lights, &scene.bounds(), view, &settings),
+    };
+    let shadows = graph.buffer_from("shadow.slots", &block(&assignment, &settings));
+    let notes = assignment.unshadowed.iter().map(|light| Note {
+        kind: NoteKind::Ignored,
+        place: format!("lights[{light}]"),
+        text: format!("casts no shadow: all {} shadow maps are taken", consts::MAX_SHADOW_SLOTS),
+    });
+    let maps = graph.scope("shadow", |graph| maps(graph, scene, &assignment, shadows, &settings));
+    ShadowMaps { lights: scene.lights, shadows, maps, notes: notes.collect() }
+}
+
+fn sane(settings: &Settings) -> Settings {
+    let positive = |x: f32, or: f32| if x.is_finite() && x >= 0.0 { x } else { or };
+    Settings {
+        size: settings.size.clamp(16, 8192),
+        cascades: settings.cascades.clamp(1, 8),
+        split: positive(settings.split, 0.8).min(1.0),
+        distance: positive(settings.distance, 0.0),
+        exponent: positive(settings.exponent, 90.0).max(1e-3),
+        blur: positive(settings.blur, 0.0).min(16.0),
+        depth_bias: positive(settings.depth_bias, 0.0),
+        normal_bias: positive(settings.normal_bias, 0.0),
+        ..*settings
+    }
+}
+
+/// The bytes of block `Shadows`.
+fn block(assignment: &Assignment, settings: &Settings) -> Vec<u32> {
+    let header = types::ShadowSettings {
+        kind: match settings.kind {
+            Kind::Off => consts::SHADOW_OFF,
+            Kind::Plain => consts::SHADOW_PLAIN,
+            Kind::Pcf => consts::SHADOW_PCF,
+            Kind::Exponential => consts::SHADOW_EXPONENTIAL,
+        },
+        exponent: settings.exponent,
+        depth_bias: settings.depth_bias,
+        normal_bias: settings.normal_bias,
+        size: settings.size as f32,
+    };
+    let mut slots = vec![types::ShadowSlot::default(); consts::MAX_SHADOW_SLOTS as usize];
+    slots[..assignment.slots.len()].copy_from_slice(&assignment.slots);
+    let mut out = bytemuck::cast_slice(&[header]).to_vec();
+    out.extend_from_slice(bytemuck::cast_slice(&slots));
+    out.extend_from_slice(bytemuck::cast_slice(&assignment.lights));
+    if assignment.lights.is_empty() {
+        out.extend_from_slice(&[0, 0]);
+    }
+    out
+}
+
+fn maps(
+    graph: &mut Graph,
+    scene: &Handles,
+    assignment: &Assignment,
+    shadows: Buffer,
+    settings: &Settings,
+) -> Image {
+    let count = assignment.slots.len() as u32;
+    if count == 0 {
+        let none = graph.image("shadow.none", Format::R32F, Extent::square(1));
+        graph.clear(none, [1.0; 4]);
+        return none.nearest();
+    }
+    let extent = Extent::square(settings.size);
+    let depth = graph.image_with("shadow.depth", ImageDesc::new(Format::D32F, extent).layers(count));
+    for (index, slot) in assignment.slots.iter().enumerate() {
+        draw_slot(graph, scene, depth.layer(index as u32), slot);
+    }
+    if settings.kind != Kind::Exponential {
+        return depth.nearest();
+    }
+    let desc = ImageDesc::new(Format::R32F, extent).layers(count);
+    let across = graph.image_with("shadow.exponential.across", desc);
+    let filtered = graph.image_with("shadow.exponential", desc);
+    let radius = (2.0 * settings.blur).ceil() as i32;
+    for (from, to, step, from_hardware) in [(depth, across, [1, 0], 1), (across, filtered, [0, 1], 0)] {
+        let args = blur::Args {
+            filtered: to,
+            lights: scene.lights,
+            shadows,
+            shadow_maps: from.nearest(),
+            push: blur::Push { step, radius, deviation: settings.blur.max(1e-3), slots: count },
+            spec: blur::Spec { from_hardware },
+        };
+        graph.compute(args, [settings.size, settings.size, count]);
+    }
+    filtered.nearest()
+}
+
+fn draw_slot(graph: &mut Graph, scene: &Handles, layer: Image, slot: &types::ShadowSlot) {
+    let clip_from_world = slot.clip_from_world;
+    let frustum = Frustum::from_clip(&glam::Mat4::from_cols_array_2d(&clip_from_world));
+    let batches = Batches::of_casters(&scene.moment, Some(&frustum), glam::Vec3::ZERO);
+    let visible = batches.visible_buffer(graph, "shadow.visible");
+    let state = Raster::new();
+    let args = opaque::Args {
+        instances: scene.instances,
+        visible,
+        positions: scene.positions,
+        push: opaque::Push { clip_from_world },
+    };
+    let (solid, holed): (Vec<_>, Vec<_>) = batches.list.iter().partition(|b| b.cutout == Cutout::Opaque);
+    let calls = solid.iter().flat_map(|b| b.calls.iter().copied()).collect();
+    let targets = |load| Targets::new().depth(layer, load);
+    graph.raster(targets(Depth::Clear(0.0)), state, args, crate::graph::Draw::indexed(scene.indices, calls));
+    if holed.is_empty() {
+        return;
+    }
+    let args = cutout::Args {
+        instances: scene.instances,
+        visible,
+        positions: scene.positions,
+        uvs: scene.uvs,
+        colors: scene.colors,
+        materials: scene.materials,
+        scene_textures: scene.textures,
+        push: cutout::Push { clip_from_world },
+    };
+    let calls = holed.iter().flat_map(|b| b.calls.iter().copied()).collect();
+    graph.raster(targets(Depth::Keep), state, args, crate::graph::Draw::indexed(scene.indices, calls));
+}
