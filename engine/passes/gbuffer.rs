@@ -113,16 +113,11 @@ pub fn draw(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings
                 colors: scene.colors,
                 materials: scene.materials,
                 scene_textures: scene.textures,
-                spec: shader::Spec {
-                    cutout,
-                    octahedral: u32::from(settings.normals == Normals::Octahedral),
-                },
+                spec: shader::Spec { cutout, octahedral: u32::from(settings.normals == Normals::Octahedral) },
             };
             let state = Raster::new().cull(batch.map_or_else(Default::default, |b| b.sided.cull()));
-            let draw = batch.map_or_else(
-                || crate::graph::Draw::indexed(scene.indices, Vec::new()),
-                |batch| batch.draw(scene),
-            );
+            let draw =
+                batch.map_or_else(|| crate::graph::Draw::indexed(scene.indices, Vec::new()), |batch| batch.draw(scene));
             graph.raster(targets(&gbuffer, index == 0), state.stencil(Stencil::write(1)), args, draw);
         }
     });

@@ -3,7 +3,7 @@
 
 mod slots;
 
-pub use slots::{Assignment, assign};
+pub use slots::{Assignment, assign, project};
 
 use crate::{
     graph::{Buffer, Depth, Extent, Format, Graph, Image, ImageDesc, Raster, Targets},
@@ -144,13 +144,7 @@ fn block(assignment: &Assignment, settings: &Settings) -> Vec<u32> {
     out
 }
 
-fn maps(
-    graph: &mut Graph,
-    scene: &Handles,
-    assignment: &Assignment,
-    shadows: Buffer,
-    settings: &Settings,
-) -> Image {
+fn maps(graph: &mut Graph, scene: &Handles, assignment: &Assignment, shadows: Buffer, settings: &Settings) -> Image {
     let count = assignment.slots.len() as u32;
     if count == 0 {
         let none = graph.image("shadow.none", Format::R32F, Extent::square(1));

@@ -20,10 +20,8 @@ pub fn draw(graph: &mut Graph, scene: &Handles, gbuffer: &GBuffer, constant: Vec
             constant: constant.to_array(),
         },
     };
-    let targets = Targets::new()
-        .color(target, Load::Keep)
-        .depth(gbuffer.hardware, Depth::ReadOnly)
-        .stencil(StencilLoad::Keep);
+    let targets =
+        Targets::new().color(target, Load::Keep).depth(gbuffer.hardware, Depth::ReadOnly).stencil(StencilLoad::Keep);
     let state = Raster::new().depth_write(false).stencil(Stencil::equals(0));
     graph.raster(targets, state, args, Draw::fullscreen());
 }

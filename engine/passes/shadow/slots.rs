@@ -8,7 +8,7 @@ use crate::{
     },
     shaders::{consts, types},
 };
-use glam::{Mat4, Vec2, Vec3, Vec4Swizzles};
+use glam::{Mat4, Vec2, Vec3, Vec3Swizzles, Vec4Swizzles};
 
 /// Spot lights with a half angle over this many radians get six maps as point lights do.
 const WIDEST_SPOT: f32 = 1.2;
@@ -222,7 +222,8 @@ mod tests {
 
     fn light(kind: u32) -> types::Light {
         let direction = Vec3::new(0.3, -1.0, 0.2).normalize().to_array();
-        let (spot_scale, spot_offset) = if kind == consts::LIGHT_SPOT { (2.0, -2.0 * 0.6_f32.cos()) } else { (0.0, 1.0) };
+        let (spot_scale, spot_offset) =
+            if kind == consts::LIGHT_SPOT { (2.0, -2.0 * 0.6_f32.cos()) } else { (0.0, 1.0) };
         types::Light { kind, direction, position: [1.0, 15.0, 2.0], spot_scale, spot_offset, ..Default::default() }
     }
 

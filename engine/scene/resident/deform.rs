@@ -94,6 +94,11 @@ impl Deform {
         Ok((self.jobs.len() - 1, target))
     }
 
+    /// Forgets the vertices, which the device has now.
+    pub fn uploaded(self) -> Self {
+        Self { skin_vertices: Vec::new(), morph_deltas: Vec::new(), ..self }
+    }
+
     /// World boxes of the jobs in `pose`, in their order.
     pub fn bounds(&self, scene: &Scene, pose: &Pose) -> Vec<Aabb> {
         self.jobs

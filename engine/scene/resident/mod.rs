@@ -171,7 +171,7 @@ impl Resident {
             white: one_texel(gpu, "scene.white", vk::Format::R8G8B8A8_UNORM, &[255; 4])?,
             environment: environment(gpu, scene.environment.as_ref(), limits.image_2d)?,
             items,
-            deform: deform::Deform { skin_vertices: Vec::new(), morph_deltas: Vec::new(), ..deform },
+            deform: deform.uploaded(),
             notes,
         })
     }

@@ -76,7 +76,7 @@ fn uses(scene: &Scene) -> BTreeMap<(u32, Encoding), ()> {
 /// `Runtime` if they do not fit into the arrays that there are.
 pub(super) fn pack(scene: &Scene, max_side: u32, max_layers: u32) -> Result<Packing> {
     let mut arrays: Vec<Array> = Vec::new();
-    let mut add = |arrays: &mut Vec<Array>, array: Array| match arrays
+    let add = |arrays: &mut Vec<Array>, array: Array| match arrays
         .iter_mut()
         .find(|a| (a.width, a.height, a.encoding) == (array.width, array.height, array.encoding))
     {
@@ -102,8 +102,9 @@ pub(super) fn pack(scene: &Scene, max_side: u32, max_layers: u32) -> Result<Pack
             let cost = |a: &Array, b: &Array| a.merged(b).texels() - a.texels() - b.texels();
             let same = pairs.filter(|(a, b)| arrays[*a].encoding == arrays[*b].encoding);
             let Some((a, b)) = same.min_by_key(|(a, b)| cost(&arrays[*a], &arrays[*b])) else { break };
-            let union = arrays[b].merged(&arrays.swap_remove(a));
-            arrays[b] = union;
+            // b < a, so b stays where it is.
+            let removed = arrays.swap_remove(a);
+            arrays[b] = arrays[b].merged(&removed);
         }
     }
     // An array with more layers than the device has is split.
