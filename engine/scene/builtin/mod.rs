@@ -14,6 +14,7 @@ pub mod cornell;
 pub mod furnace;
 mod kit;
 mod primitives;
+mod teapot;
 #[cfg(test)]
 mod tests;
 
@@ -57,6 +58,12 @@ const ENTRIES: &[Entry] = &[
         description: "Coloured solids on a ground between two coloured walls, for colour bleeding",
         exposure: 0.0,
         build: primitives::build,
+    },
+    Entry {
+        name: "teapot",
+        description: "Utah teapot from its 32 Bezier patches, with cups on a table by coloured walls",
+        exposure: 1.0,
+        build: teapot::build,
     },
 ];
 

@@ -18,6 +18,7 @@ const TRIANGLES: &[(&str, std::ops::RangeInclusive<usize>)] = &[
     ("furnace", 12..=12),
     ("furnace-sphere", 9024..=9024),
     ("primitives", 10_000..=25_000),
+    ("teapot", 15_000..=40_000),
 ];
 
 fn world(scene: &Scene) -> Vec<Mat4> {

@@ -24,10 +24,11 @@ impl Geometry {
         (self.positions.len() - 1) as u32
     }
 
-    /// Adds a triangle, unless two of its corners coincide (the poles of surfaces of revolution).
+    /// Adds a triangle, unless it has no area (the poles of surfaces of revolution).
     pub fn triangle(&mut self, a: u32, b: u32, c: u32) {
         let [pa, pb, pc] = [a, b, c].map(|i| self.positions[i as usize]);
-        if pa != pb && pb != pc && pc != pa {
+        let longest = (pb - pa).length_squared().max((pc - pb).length_squared()).max((pa - pc).length_squared());
+        if (pb - pa).cross(pc - pa).length() > 2e-5 * longest {
             self.indices.extend([a, b, c]);
         }
     }
