@@ -13,6 +13,7 @@
 pub mod cornell;
 pub mod furnace;
 mod kit;
+mod office;
 mod primitives;
 mod teapot;
 #[cfg(test)]
@@ -64,6 +65,12 @@ const ENTRIES: &[Entry] = &[
         description: "Utah teapot from its 32 Bezier patches, with cups on a table by coloured walls",
         exposure: 1.0,
         build: teapot::build,
+    },
+    Entry {
+        name: "office",
+        description: "Office for four: sun through blinds and a lamp, about 21 000 triangles",
+        exposure: 1.0,
+        build: office::build,
     },
 ];
 

@@ -19,6 +19,7 @@ const TRIANGLES: &[(&str, std::ops::RangeInclusive<usize>)] = &[
     ("furnace-sphere", 9024..=9024),
     ("primitives", 10_000..=25_000),
     ("teapot", 15_000..=40_000),
+    ("office", 20_000..=22_000),
 ];
 
 fn world(scene: &Scene) -> Vec<Mat4> {

@@ -16,7 +16,7 @@ mod surfaces;
 #[cfg(test)]
 pub(crate) use geometry::place;
 pub(crate) use geometry::{Geometry, Model};
-pub(crate) use pictures::{Picture, bricks, carpet, checker, lettering, mottled, planks};
+pub(crate) use pictures::{Picture, bricks, carpet, checker, lettering, mottled, planks, veneer};
 pub(crate) use random::{Random, fbm, hash, value_noise};
 pub(crate) use sky::{GradientSky, uniform_environment};
 pub(crate) use solids::{Opening, bevel_box, cuboid, slab, sphere, torus, wall};

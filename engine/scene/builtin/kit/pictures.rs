@@ -88,6 +88,17 @@ pub(crate) fn planks(size: u32, count: u32, light: Vec3, dark: Vec3, seed: u32) 
     })
 }
 
+/// Sliced wood without joints: fine grain along u with slow bands across it.
+pub(crate) fn veneer(size: u32, light: Vec3, dark: Vec3, seed: u32) -> Picture {
+    Picture::new(size, size, |uv| {
+        let wave = 0.02 * value_noise(uv * 4.0, 4, seed ^ 3);
+        // Lattices whose periods (2, 8 and 128 cells) divide the picture, so that it tiles.
+        let bands = value_noise(Vec2::new(uv.x * 2.0, (uv.y + wave) * 16.0), 0, seed);
+        let grain = value_noise(Vec2::new(uv.x * 8.0, (uv.y + wave) * 128.0), 128, seed ^ 1);
+        (light.lerp(dark, (0.6 * bands + 0.4 * grain) * 0.9), 0.0)
+    })
+}
+
 /// Running-bond brickwork, `columns` × `rows` bricks (even rows tile).
 pub(crate) fn bricks(size: u32, columns: u32, rows: u32, brick: Vec3, mortar: Vec3, seed: u32) -> Picture {
     Picture::new(size, size, |uv| {

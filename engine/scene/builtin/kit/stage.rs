@@ -103,6 +103,12 @@ impl Stage {
         self.place(name, mesh, Mat4::IDENTITY)
     }
 
+    /// A mesh that occurs once, under a rigid or scaled transform.
+    pub fn mesh_at(&mut self, name: &str, model: Model, world: Mat4) -> u32 {
+        let mesh = self.mesh(name, model);
+        self.place(name, mesh, world)
+    }
+
     /// A perspective camera at `eye` that looks at `target`; `yfov` in degrees.
     pub fn camera(&mut self, name: &str, eye: [f32; 3], target: [f32; 3], yfov: f32) -> u32 {
         let projection =
