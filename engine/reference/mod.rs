@@ -2,3 +2,4 @@
 
 pub mod isr;
 pub mod isr_scene;
+pub mod path;

@@ -46,6 +46,17 @@ impl Ray {
     }
 }
 
+/// How [`Bvh::walk`] goes on after a hit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// As if the triangle were not there.
+    Ignore,
+    /// Only what is nearer still counts.
+    Nearer,
+    /// Nothing more is wanted.
+    End,
+}
+
 /// Triangles and the tree above them.
 pub struct Bvh {
     tree: Bvh2,
@@ -129,7 +140,7 @@ impl Bvh {
         let mut best = None;
         self.walk(ray, |hit| {
             best = Some(hit);
-            Some(hit.t)
+            Step::Nearer
         });
         best
     }
@@ -139,13 +150,13 @@ impl Bvh {
         let mut found = false;
         self.walk(ray, |_| {
             found = true;
-            None
+            Step::End
         });
         found
     }
 
-    /// Calls `hit` for hits in the segment, which it may shorten (new `t_max`) or end (`None`).
-    fn walk(&self, ray: &Ray, mut hit: impl FnMut(Hit) -> Option<f32>) {
+    /// Calls `hit` for hits in the ray's segment, in no particular order, and does what it says.
+    pub fn walk(&self, ray: &Ray, mut hit: impl FnMut(Hit) -> Step) {
         if self.tree.nodes.is_empty() {
             return;
         }
@@ -165,8 +176,9 @@ impl Bvh {
                     let Some((t, u, v)) = frame.intersect(&self.triangles[triangle as usize]) else { continue };
                     if t >= ray.t_min && t < t_max {
                         match hit(Hit { t, u, v, triangle }) {
-                            Some(nearer) => t_max = nearer,
-                            None => return,
+                            Step::Ignore => {}
+                            Step::Nearer => t_max = t,
+                            Step::End => return,
                         }
                     }
                 }
