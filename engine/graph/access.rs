@@ -4,7 +4,7 @@ use super::{
     Graph,
     format::{Class, Extent, Format, ImageDesc},
     handles::{Buffer, GraphId, Image, Sampler},
-    pass::{Bound, Groups, Origin, Pass, Work},
+    pass::{Bound, Groups, Imported, Origin, Pass, Work},
     raster::{Depth, Draw, DrawKind, Load, Raster, Targets},
     vocab::{Access, Layout, Mistake, MistakeKind, Region, Resource, Scope, Stages, Usage, Use},
 };
@@ -102,12 +102,24 @@ impl<'a> Collector<'a> {
         (image.graph == self.graph.id).then(|| self.graph.images[image.index as usize].desc)
     }
 
+    /// Someone else's resource must have been made for this use.
+    fn made_for(&mut self, origin: &Origin, usage: Usage, name: &str, role: &str) {
+        if let Origin::Imported(Imported { usage: Some(made), .. }) = origin
+            && !made.contains(usage)
+        {
+            let what = format!("`{role}` needs usage {usage:?}, but it was made for {made:?}");
+            self.mistake(MistakeKind::ReadOnly, name, what);
+        }
+    }
+
     fn image(&mut self, image: Image, scope: Scope, layout: Layout, usage: Usage, role: &str) {
         if !self.own(image.graph, "image") {
             return;
         }
-        let entry = &self.graph.images[image.index as usize];
+        let graph = self.graph;
+        let entry = &graph.images[image.index as usize];
         let (name, desc) = (entry.name.clone(), entry.desc);
+        self.made_for(&entry.origin, usage, &name, role);
         let Image { mip, mips, layer, layers, .. } = image;
         let ends = (mip.checked_add(mips), layer.checked_add(layers));
         let (Some(mip_end), Some(layer_end)) = ends else {
@@ -138,8 +150,10 @@ impl<'a> Collector<'a> {
         if !self.own(buffer.graph, "buffer") {
             return;
         }
-        let entry = &self.graph.buffers[buffer.index as usize];
+        let graph = self.graph;
+        let entry = &graph.buffers[buffer.index as usize];
         let (name, bytes) = (entry.name.clone(), entry.bytes);
+        self.made_for(&entry.origin, usage, &name, role);
         let read_only = matches!(entry.origin, Origin::History { next: false, .. });
         let end = buffer.offset.saturating_add(buffer.size);
         if end > bytes {

@@ -1,60 +1,62 @@
 //! What comes back from a graph that ran.
 
-use std::borrow::Borrow;
-
 use bytemuck::AnyBitPattern;
 
 use super::{
-    Graph,
-    handles::{BufferRead, ImageRead},
+    handles::{BufferRead, GraphId, ImageRead},
     pixels::Pixels,
 };
-use crate::{Error, ErrorKind, Result, gpu::Gpu};
-
-/// Executes graphs on a device, and keeps what outlives them: memory, pipelines, history.
-#[derive(Debug)]
-pub struct Runner {
-    gpu: Gpu,
-}
-
-impl Runner {
-    /// Nothing kept yet.
-    pub fn new(gpu: &Gpu) -> Self {
-        Self { gpu: gpu.clone() }
-    }
-
-    /// The device it runs on.
-    pub fn gpu(&self) -> &Gpu {
-        &self.gpu
-    }
-
-    /// Runs all passes and waits for them.
-    ///
-    /// # Errors
-    /// `Usage` with every mistake of the graph; `OutOfMemory`; `DeviceLost`, naming the pass.
-    pub fn run(&mut self, graph: impl Borrow<Graph>) -> Result<Frame> {
-        let graph = graph.borrow();
-        Err(Error::new(ErrorKind::Runtime, "running graphs is not built yet").at(graph.name()))
-    }
-}
 
 /// Results of one graph.
 #[derive(Debug)]
 pub struct Frame {
     /// Passes and their times.
     pub report: Report,
-    images: Vec<Pixels>,
-    buffers: Vec<Vec<u8>>,
+    graph: GraphId,
+    /// In the order in which they were promised.
+    reads: Vec<Read>,
+}
+
+#[derive(Debug)]
+enum Read {
+    Image(Pixels),
+    Buffer(Vec<u8>),
 }
 
 impl Frame {
+    pub(super) fn new(graph: GraphId, report: Report) -> Self {
+        Self { report, graph, reads: Vec::new() }
+    }
+
+    pub(super) fn push_image(&mut self, pixels: Pixels) {
+        self.reads.push(Read::Image(pixels));
+    }
+
+    pub(super) fn push_buffer(&mut self, bytes: Vec<u8>) {
+        self.reads.push(Read::Buffer(bytes));
+    }
+
+    #[track_caller]
+    fn read(&self, graph: GraphId, index: u32) -> &Read {
+        assert!(
+            graph == self.graph,
+            "a token of graph `{}` was redeemed from a frame of graph `{}`",
+            graph.name,
+            self.graph.name
+        );
+        &self.reads[index as usize]
+    }
+
     /// The pixels promised by [`Graph::read_image`].
     ///
     /// # Panics
     /// If the token is of another graph.
     #[track_caller]
     pub fn image(&self, token: ImageRead) -> Pixels {
-        self.images[token.index as usize].clone()
+        match self.read(token.graph, token.index) {
+            Read::Image(pixels) => pixels.clone(),
+            Read::Buffer(_) => unreachable!("image tokens stand for images"),
+        }
     }
 
     /// The contents promised by [`Graph::read_buffer`]; bytes after the last whole `T` are left out.
@@ -63,7 +65,9 @@ impl Frame {
     /// If the token is of another graph.
     #[track_caller]
     pub fn buffer<T: AnyBitPattern>(&self, token: BufferRead) -> Vec<T> {
-        let bytes = &self.buffers[token.index as usize];
+        let Read::Buffer(bytes) = self.read(token.graph, token.index) else {
+            unreachable!("buffer tokens stand for buffers")
+        };
         bytes.chunks_exact(size_of::<T>().max(1)).map(bytemuck::pod_read_unaligned).collect()
     }
 }
@@ -74,6 +78,8 @@ pub struct PassTime {
     pub name: String,
     /// Labels around it, outermost first.
     pub scope: Vec<String>,
+    /// Draw calls, or dispatches.
+    pub launches: usize,
     /// Milliseconds on the device; `None` if it has no timestamps.
     pub gpu_ms: Option<f64>,
     /// Milliseconds the CPU took to record it.
@@ -87,4 +93,15 @@ pub struct Report {
     /// Device and driver.
     pub device: String,
     pub passes: Vec<PassTime>,
+    /// Milliseconds to derive the plan.
+    pub plan_ms: f64,
+    /// Milliseconds to record and to make what was missing: memory, pipelines.
+    pub record_ms: f64,
+    /// Milliseconds from submission to the end.
+    pub wait_ms: f64,
+    pub barriers: usize,
+    /// Memory of images and buffers that live in the graph.
+    pub transient_bytes: u64,
+    /// Things that are no mistake but look like one.
+    pub warnings: Vec<String>,
 }

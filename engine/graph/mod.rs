@@ -8,23 +8,22 @@
 
 mod access;
 mod build;
+mod execute;
 mod format;
 mod frame;
 mod handles;
 mod import;
-#[allow(dead_code)]
 mod pass;
 mod pixels;
-#[allow(dead_code)]
 mod plan;
 mod raster;
 mod vocab;
-#[allow(dead_code)]
 mod vulkan;
 
 pub use build::PassRef;
+pub use execute::Runner;
 pub use format::{Class, Extent, Format, ImageDesc, Threads};
-pub use frame::{Frame, PassTime, Report, Runner};
+pub use frame::{Frame, PassTime, Report};
 pub use handles::{Buffer, BufferRead, GraphId, Image, ImageRead, Sampler, Uniform, UniformSlice};
 pub use pixels::Pixels;
 pub use plan::{Barrier, Physical, Plan, PlannedPass, Shape, Source};

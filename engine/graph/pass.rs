@@ -125,16 +125,6 @@ pub(crate) enum Work {
     },
 }
 
-impl Work {
-    /// The shader of a compute or raster pass.
-    pub fn bound(&self) -> Option<&Bound> {
-        match self {
-            Work::Compute { bound, .. } | Work::Raster { bound, .. } => Some(bound),
-            _ => None,
-        }
-    }
-}
-
 #[derive(Clone, Debug)]
 pub(crate) struct Pass {
     pub name: String,

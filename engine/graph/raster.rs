@@ -306,6 +306,15 @@ impl Draw {
         Self { kind, depth: None }
     }
 
+    /// Draw calls.
+    pub(crate) fn count(&self) -> usize {
+        match &self.kind {
+            DrawKind::Calls(calls) => calls.len(),
+            DrawKind::Indexed { calls, .. } => calls.len(),
+            DrawKind::Indirect { count, .. } | DrawKind::IndexedIndirect { count, .. } => *count as usize,
+        }
+    }
+
     /// One triangle over the whole target, at depth 0.
     pub fn fullscreen() -> Self {
         Self::vertices(3)

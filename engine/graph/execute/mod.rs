@@ -1,0 +1,269 @@
+//! Runs a plan on a device.
+#![allow(unsafe_code)]
+
+mod bind;
+mod pool;
+mod record;
+mod transfer;
+
+use std::{borrow::Borrow, time::Instant};
+
+use ash::vk;
+
+use self::{
+    pool::{Memory, Pool, device_format},
+    record::Recorder,
+};
+use super::{
+    Graph,
+    frame::{Frame, PassTime, Report},
+    pass::{ReadWhat, Work},
+    pixels::Pixels,
+    plan::{Plan, Shape, Source},
+    vocab::{Mistake, Resource},
+};
+use crate::{
+    Error, ErrorKind, Result,
+    gpu::{BufferDesc, DescriptorArena, Gpu, OwnedBuffer, Timestamps},
+};
+
+/// Contents of uploaded buffers start at multiples of this in the staging buffer.
+const STAGING_ALIGNMENT: u64 = 16;
+
+/// Executes graphs on a device, and keeps what outlives them: memory and history. Pipelines live as long as the device.
+#[derive(Debug)]
+pub struct Runner {
+    gpu: Gpu,
+    pool: Pool,
+    sets: DescriptorArena,
+    uniforms: Option<OwnedBuffer>,
+    staging: Option<OwnedBuffer>,
+    timestamps: Option<Timestamps>,
+}
+
+impl Runner {
+    /// Nothing kept yet.
+    pub fn new(gpu: &Gpu) -> Self {
+        Self {
+            gpu: gpu.clone(),
+            pool: Pool::default(),
+            sets: DescriptorArena::new(gpu),
+            uniforms: None,
+            staging: None,
+            timestamps: None,
+        }
+    }
+
+    /// The device it runs on.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Forgets all history: the next frame is a first one.
+    pub fn forget_history(&mut self) {
+        self.pool.forget();
+    }
+
+    /// Runs all passes and waits for them.
+    ///
+    /// # Errors
+    /// `Runtime` with every mistake of the graph, or a limit of the device that a pass is over; `OutOfMemory`;
+    /// `DeviceLost`, naming the pass.
+    pub fn run(&mut self, graph: impl Borrow<Graph>) -> Result<Frame> {
+        let graph = graph.borrow();
+        let begun = Instant::now();
+        let plan = Plan::new(graph).map_err(|mistakes| refused(graph, &mistakes))?;
+        let plan_ms = milliseconds(begun);
+        self.execute(graph, &plan, plan_ms).map_err(|e| e.at(graph.name()))
+    }
+
+    fn execute(&mut self, graph: &Graph, plan: &Plan, plan_ms: f64) -> Result<Frame> {
+        let begun = Instant::now();
+        let (memory, fresh) = self.pool.acquire(&self.gpu, graph, plan)?;
+        self.sets.reset()?;
+        self.fill_uniforms(graph)?;
+        self.fill_staging(graph)?;
+        let stamps = plan.passes.len() as u32 + 1;
+        if self.timestamps.as_ref().is_none_or(|t| t.count() < stamps) {
+            self.timestamps = Some(Timestamps::new(&self.gpu, stamps.next_power_of_two())?);
+        }
+        let mut commands = self.gpu.commands(graph.name())?;
+        for memory in &memory {
+            match memory {
+                Memory::Image(image) => commands.keep(image.clone()),
+                Memory::Buffer(buffer) => commands.keep(buffer.clone()),
+            }
+        }
+        for buffer in self.uniforms.iter().chain(&self.staging) {
+            commands.keep(buffer.clone());
+        }
+        transfer::clear_fresh(&self.gpu, &mut commands, &fresh);
+        let end = vk::PipelineStageFlags2::ALL_COMMANDS;
+        if let Some(timestamps) = &self.timestamps {
+            timestamps.reset(&mut commands);
+            timestamps.write(&mut commands, 0, end);
+        }
+        let mut times = Vec::with_capacity(plan.passes.len());
+        let mut recorder = Recorder {
+            gpu: &self.gpu,
+            graph,
+            plan,
+            memory: &memory,
+            uniforms: self.uniforms.clone(),
+            staging: self.staging.clone(),
+            sets: &mut self.sets,
+            commands: &mut commands,
+        };
+        let works = plan.upload.iter().chain(&graph.passes).map(|p| &p.work);
+        let mut open: &[String] = &[];
+        for (index, (pass, work)) in plan.passes.iter().zip(works).enumerate() {
+            let begun = Instant::now();
+            open = labels(recorder.commands, open, &pass.scope);
+            recorder.barriers(plan.barriers_before(index));
+            recorder.commands.begin_pass(&pass.name);
+            let recorded = recorder.work(index, work);
+            recorder.commands.end_pass();
+            recorded.map_err(|e| e.at(&pass.name))?;
+            if let Some(timestamps) = &self.timestamps {
+                timestamps.write(recorder.commands, index as u32 + 1, end);
+            }
+            let (name, scope) = (pass.name.clone(), pass.scope.clone());
+            times.push(PassTime { name, scope, launches: work.launches(), gpu_ms: None, cpu_ms: milliseconds(begun) });
+        }
+        labels(recorder.commands, open, &[]);
+        recorder.barriers(plan.barriers_before(plan.passes.len()));
+        let cpu_ms = milliseconds(begun);
+        let submitted = Instant::now();
+        commands.submit()?.wait()?;
+        let wait_ms = milliseconds(submitted);
+
+        self.pool.turn(graph);
+        for (physical, memory) in plan.physical.iter().zip(&memory) {
+            if let (Source::Imported(_), Some(rest), Memory::Image(image)) = (&physical.source, physical.rest, memory) {
+                image.set_layout(rest.to_vk());
+            }
+        }
+        if let Some(timestamps) = &self.timestamps {
+            let stamps = timestamps.read()?;
+            for (i, time) in times.iter_mut().enumerate() {
+                if let (Some(Some(from)), Some(Some(to))) = (stamps.get(i), stamps.get(i + 1)) {
+                    time.gpu_ms = Some(to - from);
+                }
+            }
+        }
+        let report = Report {
+            graph: graph.name().to_owned(),
+            device: self.gpu.describe().to_string(),
+            passes: times,
+            plan_ms,
+            record_ms: cpu_ms,
+            wait_ms,
+            barriers: plan.barriers.len(),
+            transient_bytes: transient_bytes(plan),
+            warnings: plan.warnings.clone(),
+        };
+        self.results(graph, plan, &memory, report)
+    }
+
+    fn fill_uniforms(&mut self, graph: &Graph) -> Result<()> {
+        if graph.uniforms.is_empty() {
+            return Ok(());
+        }
+        let size = graph.uniforms.len() as u64;
+        if self.uniforms.as_ref().is_none_or(|b| b.size() < size) {
+            let desc = BufferDesc::upload(size.next_power_of_two());
+            self.uniforms = Some(OwnedBuffer::new(&self.gpu, "uniforms", desc)?);
+        }
+        // The last graph that used it was waited for.
+        self.uniforms.as_ref().map_or(Ok(()), |b| b.write(0, &graph.uniforms))
+    }
+
+    fn fill_staging(&mut self, graph: &Graph) -> Result<()> {
+        let contents: Vec<&Vec<u8>> = graph.buffers.iter().filter_map(|b| b.contents.as_ref()).collect();
+        let size = contents.iter().map(|c| (c.len() as u64).next_multiple_of(STAGING_ALIGNMENT)).sum();
+        if contents.is_empty() {
+            self.staging = None;
+            return Ok(());
+        }
+        if self.staging.as_ref().is_none_or(|b| b.size() < size) {
+            self.staging = Some(OwnedBuffer::new(&self.gpu, "staging", BufferDesc::upload(size))?);
+        }
+        let Some(staging) = &self.staging else { return Ok(()) };
+        let mut offset = 0;
+        for bytes in contents {
+            staging.write(offset, bytes)?;
+            offset += (bytes.len() as u64).next_multiple_of(STAGING_ALIGNMENT);
+        }
+        Ok(())
+    }
+
+    /// Fetches what was promised.
+    fn results(&self, graph: &Graph, plan: &Plan, memory: &[Memory], report: Report) -> Result<Frame> {
+        let mut frame = Frame::new(graph.id, report);
+        for read in &graph.reads {
+            let physical = plan.physical_of(Resource::Buffer(read.to.index));
+            let bytes = match physical.and_then(|p| memory.get(p)) {
+                Some(Memory::Buffer(buffer)) => buffer.mapped_bytes(0, read.to.size as usize)?,
+                _ => return Err(Error::new(ErrorKind::Runtime, "a read without memory")),
+            };
+            match &read.what {
+                ReadWhat::Buffer => frame.push_buffer(bytes),
+                ReadWhat::Image { name, desc, format } => {
+                    let format = device_format(&self.gpu, *format);
+                    let layers = desc.layers * desc.depth;
+                    let mut bytes = bytes;
+                    bytes.truncate(desc.extent.pixels() as usize * layers as usize * format.bytes() as usize);
+                    frame.push_image(Pixels { name: name.clone(), extent: desc.extent, format, layers, bytes });
+                }
+            }
+        }
+        Ok(frame)
+    }
+}
+
+/// Closes and opens labels to come from the scopes `open` to `wanted`.
+fn labels<'a>(commands: &mut crate::gpu::Commands, open: &[String], wanted: &'a [String]) -> &'a [String] {
+    let common = open.iter().zip(wanted).take_while(|(a, b)| a == b).count();
+    for _ in common..open.len() {
+        commands.end_label();
+    }
+    for name in &wanted[common..] {
+        commands.begin_label(name);
+    }
+    wanted
+}
+
+fn milliseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
+}
+
+fn transient_bytes(plan: &Plan) -> u64 {
+    let pooled = plan.physical.iter().filter(|p| p.source == Source::Pool);
+    pooled
+        .map(|p| match p.shape {
+            Shape::Image(desc) => desc.bytes(),
+            Shape::Buffer(bytes) => bytes,
+        })
+        .sum()
+}
+
+/// All mistakes as one error.
+fn refused(graph: &Graph, mistakes: &[Mistake]) -> Error {
+    let lines: Vec<String> = mistakes.iter().map(ToString::to_string).collect();
+    Error::new(
+        ErrorKind::Runtime,
+        format!("graph `{}` has {} mistakes: {}", graph.name(), lines.len(), lines.join("; ")),
+    )
+}
+
+// Passes that only move data have no shader.
+impl Work {
+    /// Number of draw calls, or of dispatches.
+    pub(super) fn launches(&self) -> usize {
+        match self {
+            Work::Compute { .. } => 1,
+            Work::Raster { draw, .. } => draw.count(),
+            _ => 0,
+        }
+    }
+}
