@@ -45,7 +45,7 @@ impl<'a> Collector<'a> {
             Work::Clear { image, .. } => c.transfer(*image, true, "clear"),
             Work::Fill { buffer, .. } => {
                 c.buffer(*buffer, Stages::TRANSFER, Access::TRANSFER_WRITE, Usage::COPY_TO, "fill");
-                if buffer.offset % 4 != 0 || buffer.size % 4 != 0 {
+                if !buffer.offset.is_multiple_of(4) || !buffer.size.is_multiple_of(4) {
                     let what =
                         format!("bytes {}..{} are not multiples of 4", buffer.offset, buffer.offset + buffer.size);
                     c.mistake(MistakeKind::Range, c.buffer_name(*buffer), what);
@@ -194,7 +194,7 @@ impl<'a> Collector<'a> {
                     }
                     (BindingKind::Buffer, Some(shader::Resource::Buffer(buffer))) => {
                         self.buffer(*buffer, stages, storage_access(binding.access), Usage::STORAGE, &role);
-                        if buffer.offset % BINDING_ALIGNMENT != 0 {
+                        if !buffer.offset.is_multiple_of(BINDING_ALIGNMENT) {
                             let what = format!(
                                 "`{role}` starts at byte {}; a shader needs a multiple of {BINDING_ALIGNMENT}",
                                 buffer.offset
@@ -222,7 +222,9 @@ impl<'a> Collector<'a> {
             Dim::D2 if image.layers != 1 => Some(format!("{} layers; choose one with `.layer(i)`", image.layers)),
             Dim::D3 if desc.depth <= 1 => Some("a flat image is bound to a volume".to_owned()),
             Dim::Cube if !desc.cube || image.layers != 6 => Some("it is no cube of six layers".to_owned()),
-            Dim::CubeArray if !desc.cube || image.layers % 6 != 0 => Some("it is no array of cubes".to_owned()),
+            Dim::CubeArray if !desc.cube || !image.layers.is_multiple_of(6) => {
+                Some("it is no array of cubes".to_owned())
+            }
             _ => None,
         };
         if let Some(wrong) = wrong {
@@ -350,7 +352,7 @@ impl<'a> Collector<'a> {
     }
 
     fn commands(&mut self, buffer: Buffer, offset: u64, bytes: u64) {
-        if offset % 4 != 0 || buffer.offset % 4 != 0 || offset.saturating_add(bytes) > buffer.size {
+        if !offset.is_multiple_of(4) || !buffer.offset.is_multiple_of(4) || offset.saturating_add(bytes) > buffer.size {
             let what = format!("{bytes} bytes of commands at {offset} do not fit into {}", buffer.size);
             self.mistake(MistakeKind::Range, self.buffer_name(buffer), what);
         }
@@ -367,7 +369,7 @@ impl<'a> Collector<'a> {
                 self.buffer(*indices, Stages::INDEX, Access::INDEX_READ, Usage::INDEX, "indices");
                 let end =
                     calls.iter().map(|c| (u64::from(c.first_index) + u64::from(c.indices)) * 4).max().unwrap_or(0);
-                if end > indices.size || indices.offset % 4 != 0 {
+                if end > indices.size || !indices.offset.is_multiple_of(4) {
                     let what = format!("draws reach byte {end} of the indices, which have {}", indices.size);
                     self.mistake(MistakeKind::Range, self.buffer_name(*indices), what);
                 }

@@ -461,7 +461,7 @@ fn shapes(graph: &Graph) -> Vec<Mistake> {
             || d.depth == 0
             || d.layers == 0
             || !(1..=levels).contains(&d.mips)
-            || (d.cube && (d.layers % 6 != 0 || d.extent.width != d.extent.height))
+            || (d.cube && (!d.layers.is_multiple_of(6) || d.extent.width != d.extent.height))
     };
     let bad = graph.images.iter().filter(|i| wrong(&i.desc));
     bad.map(|i| Mistake {
