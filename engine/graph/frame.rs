@@ -73,7 +73,7 @@ impl Frame {
 }
 
 /// What one pass cost.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct PassTime {
     pub name: String,
     /// Labels around it, outermost first.

@@ -48,6 +48,7 @@ mod tests {
         let pass = |name: &str, gpu_ms| PassTime {
             name: name.into(),
             scope: vec!["a".into(), "b".into()],
+            launches: 1,
             gpu_ms,
             cpu_ms: 0.25,
         };
