@@ -1,7 +1,11 @@
 //! Passes that several techniques use: plain functions on handles.
 
 pub mod ambient;
+pub mod bilateral;
 pub mod blur;
+pub mod compose;
+pub mod direct;
+pub mod downsample;
 pub mod gbuffer;
 pub mod shadow;
 pub mod skybox;

@@ -1,1 +1,3 @@
 //! The papers' methods, one module each.
+
+pub mod isr;

@@ -1,0 +1,78 @@
+//! Coarse light brought to full resolution and added to direct light.
+
+use super::gbuffer::GBuffer;
+use crate::{
+    graph::{Format, Graph, Image, Uniform},
+    shaders::{passes::compose, types},
+};
+
+/// Choices and constants of [`sum`].
+#[derive(Clone, Copy, Debug)]
+pub struct Compose {
+    /// Pixels along the side of a coarse texel: 1 or 2.
+    pub factor: u32,
+    /// Weight by distance from the pixel's plane, relative to its depth, instead of difference of depth / far.
+    pub plane: bool,
+    /// ε of the dissertation's equation 27.
+    pub epsilon: f32,
+    /// Multiply gathered light by the albedo.
+    pub tint: bool,
+    /// Occlusion darkens ambient light instead of direct light.
+    pub occlude_ambient: bool,
+    pub k_ssao: f32,
+    pub k_isr: f32,
+}
+
+/// What [`sum`] writes, at full resolution.
+#[derive(Clone, Copy, Debug)]
+pub struct Composed {
+    /// RGBA16F; alpha 1 on geometry.
+    pub total: Image,
+    /// RGBA16F: gathered and ambient light as they enter the sum.
+    pub indirect: Image,
+    /// R32F: 1 open, 0 occluded.
+    pub accessibility: Image,
+}
+
+/// Equations 27 to 29. `gathered`: rgb radiance, a accumulated occlusion, at the resolution of `coarse_depth`.
+#[allow(clippy::too_many_arguments)]
+pub fn sum(
+    graph: &mut Graph,
+    g: &GBuffer,
+    view: Uniform<types::View>,
+    ambient: Uniform<types::Ambient>,
+    direct: Image,
+    gathered: Image,
+    coarse_depth: Image,
+    choices: &Compose,
+) -> Composed {
+    let extent = graph.extent(g.depth);
+    let result = Composed {
+        total: graph.image("total", Format::RGBA16F, extent),
+        indirect: graph.image("indirect", Format::RGBA16F, extent),
+        accessibility: graph.image("occlusion", Format::R32F, extent),
+    };
+    let args = compose::Args {
+        view,
+        ambient,
+        albedo: g.albedo,
+        normal: g.normal,
+        depth: g.depth,
+        emission: g.emission,
+        direct,
+        gathered,
+        coarse_depth,
+        total: result.total,
+        indirect: result.indirect,
+        accessibility: result.accessibility,
+        push: compose::Push { k_ssao: choices.k_ssao, k_isr: choices.k_isr, epsilon: choices.epsilon },
+        spec: compose::Spec {
+            factor: choices.factor,
+            plane: choices.plane.into(),
+            tint: choices.tint.into(),
+            occlude_ambient: choices.occlude_ambient.into(),
+        },
+    };
+    graph.compute(args, extent);
+    result
+}

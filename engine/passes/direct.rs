@@ -1,0 +1,66 @@
+//! Direct light of all punctual lights.
+
+use super::gbuffer::GBuffer;
+use crate::{
+    graph::{Buffer, Format, Graph, Image, Uniform},
+    shaders::{passes::direct, types},
+};
+
+/// The lights of the scene and their shadow maps.
+#[derive(Clone, Copy, Debug)]
+pub struct Lights {
+    /// `lib/lights.glsl`
+    pub lights: Buffer,
+    /// `lib/shadow.glsl`
+    pub shadows: Buffer,
+    /// All shadow maps, an array image.
+    pub shadow_maps: Image,
+}
+
+/// Choices of [`light`].
+#[derive(Clone, Copy, Debug)]
+pub struct Direct {
+    /// The dissertation's equation 16 instead of radiometry.
+    pub paper_law: bool,
+    /// GGX highlights.
+    pub specular: bool,
+    /// Paper law: of lights without a range, metres.
+    pub light_radius: f32,
+    /// Paper law: of the brightest light.
+    pub light_power: f32,
+}
+
+/// What [`light`] writes, RGBA16F, at the resolution of the G-buffer.
+#[derive(Clone, Copy, Debug)]
+pub struct Lit {
+    /// Radiance towards the camera, with emission.
+    pub direct: Image,
+    /// Radiance that leaves in all directions: reflected by Lambert's law, and emitted.
+    pub diffuse: Image,
+}
+
+/// Adds up the light of every light at every pixel.
+pub fn light(graph: &mut Graph, g: &GBuffer, view: Uniform<types::View>, lights: Lights, choices: &Direct) -> Lit {
+    let extent = graph.extent(g.depth);
+    let lit = Lit {
+        direct: graph.image("direct", Format::RGBA16F, extent),
+        diffuse: graph.image("direct.diffuse", Format::RGBA16F, extent),
+    };
+    let args = direct::Args {
+        view,
+        albedo: g.albedo,
+        normal: g.normal,
+        depth: g.depth,
+        specular: g.specular,
+        emission: g.emission,
+        direct: lit.direct,
+        diffuse: lit.diffuse,
+        lights: lights.lights,
+        shadows: lights.shadows,
+        shadow_maps: lights.shadow_maps,
+        push: direct::Push { light_radius: choices.light_radius, light_power: choices.light_power },
+        spec: direct::Spec { paper_law: choices.paper_law.into(), specular: choices.specular.into() },
+    };
+    graph.compute(args, extent);
+    lit
+}

@@ -1,0 +1,155 @@
+//! Image-space radiosity (the ISR dissertation, chapters 3 to 5): one bounce of diffuse light and ambient occlusion from what
+//! the G-buffer of a frame holds, with nothing precomputed.
+//!
+//! [`frame`] declares every pass after G-buffer and shadow maps. What it computes: the light that visible surfaces reflect onto
+//! visible surfaces. Senders outside the image or hidden behind others do not count, and unless
+//! [`Settings::visibility_steps`] is set, light passes through what stands between.
+
+mod settings;
+
+pub use settings::{
+    Blur, Downsample, Estimator, LightLaw, Occlude, Pattern, Receiver, Resolution, Sender, Settings, Upsample,
+};
+
+use crate::{
+    Result,
+    graph::{Format, Graph, Image},
+    passes::{
+        ambient::Irradiance,
+        bilateral, blur,
+        compose::{self, Compose},
+        direct::{self, Direct},
+        downsample,
+        gbuffer::GBuffer,
+    },
+    scene::view::View,
+    shaders,
+};
+
+/// Images of a frame, at full resolution unless stated. Radiance in W/(sr·m²).
+#[derive(Clone, Copy, Debug)]
+pub struct Outputs {
+    /// Sum of all light (equation 29); alpha 1 on geometry, 0 on background, where rgb is 0 until a sky is drawn.
+    pub total: Image,
+    /// Direct light with emission.
+    pub direct: Image,
+    /// Gathered light and light of the environment, as they enter the sum.
+    pub indirect: Image,
+    /// R32F: 1 open, 0 occluded.
+    pub occlusion: Image,
+    /// The coarse result before the blur: rgb radiance of a white receiver, a accumulated occlusion.
+    pub gathered: Image,
+    /// And after it.
+    pub blurred: Image,
+}
+
+/// Everything a frame starts from.
+#[derive(Clone, Copy, Debug)]
+pub struct Inputs<'a> {
+    pub gbuffer: GBuffer,
+    pub view: &'a View,
+    pub lights: direct::Lights,
+    /// Light of the environment; default none.
+    pub ambient: Irradiance,
+}
+
+/// Declares direct light, downsampling, gathering, blur, upsampling and sum.
+///
+/// # Errors
+/// `Usage` if a setting is out of its range ([`Settings::validate`]).
+pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<Outputs> {
+    settings.validate()?;
+    let g = inputs.gbuffer;
+    let view = graph.uniform(&inputs.view.uniform());
+    let extent = graph.extent(g.depth);
+    let factor = settings.resolution.factor();
+
+    let direct = Direct {
+        paper_law: settings.light_law == LightLaw::Paper,
+        specular: settings.specular,
+        light_radius: if settings.light_radius > 0.0 { settings.light_radius } else { inputs.view.far },
+        light_power: settings.light_power,
+    };
+    let lit = direct::light(graph, &g, view, inputs.lights, &direct);
+
+    let aware = settings.downsample == Downsample::DepthAware;
+    let coarse = downsample::gbuffer(graph, &g, factor, aware);
+    let sender = match settings.sender {
+        Sender::Albedo => coarse.albedo,
+        Sender::Lit => downsample::color(graph, lit.diffuse, &g, factor, aware),
+    };
+
+    let gather = |graph: &mut Graph, sender: Image| {
+        let gathered = graph.image("isr.gathered", Format::RGBA16F, graph.extent(coarse.depth));
+        let longer = extent.width.max(extent.height) as f32;
+        let reach = if settings.reach > 0.0 { settings.reach } else { longer / 2.0 };
+        let push = shaders::isr::gather::Push {
+            reach: reach / factor as f32,
+            occlusion_reach: settings.occlusion_reach / factor as f32,
+            occluder_radius: settings.occluder_radius / factor as f32,
+            occlusion_bias: settings.occlusion_bias,
+            spread: settings.spread,
+            thickness: settings.thickness,
+            factor: factor as f32,
+        };
+        let spec = shaders::isr::gather::Spec {
+            samples: settings.samples,
+            area_estimator: (settings.estimator == Estimator::Area).into(),
+            rings: (settings.pattern == Pattern::Rings).into(),
+            jitter: settings.jitter.into(),
+            indirect: settings.indirect.into(),
+            occlusion: settings.occlusion.into(),
+            visibility_steps: settings.visibility_steps,
+        };
+        let args = shaders::isr::gather::Args {
+            view,
+            sender,
+            albedo: coarse.albedo,
+            normal: coarse.normal,
+            depth: coarse.depth,
+            gathered,
+            push,
+            spec,
+        };
+        graph.compute(args, graph.extent(gathered));
+        gathered
+    };
+    let filter = |graph: &mut Graph, gathered: Image| match settings.blur {
+        Blur::None => gathered,
+        _ if settings.blur_radius == 0 => gathered,
+        Blur::Gaussian => blur::gaussian(graph, gathered, settings.blur_radius),
+        Blur::Bilateral => {
+            bilateral::blur(graph, gathered, &coarse, view, factor, settings.blur_radius, settings.blur_range)
+        }
+    };
+
+    let mut gathered = gather(graph, sender);
+    let mut blurred = filter(graph, gathered);
+    for _ in 1..settings.bounces {
+        let next = graph.image("isr.sender", Format::RGBA16F, graph.extent(coarse.depth));
+        let args = shaders::isr::bounce::Args { sender, albedo: coarse.albedo, gathered: blurred, next };
+        graph.compute(args, graph.extent(next));
+        gathered = gather(graph, next);
+        blurred = filter(graph, gathered);
+    }
+
+    let ambient = inputs.ambient.upload(graph);
+    let choices = Compose {
+        factor,
+        plane: settings.upsample == Upsample::Plane,
+        epsilon: settings.upsample_epsilon,
+        tint: settings.receiver == Receiver::Albedo,
+        occlude_ambient: settings.occlude == Occlude::Ambient,
+        k_ssao: settings.k_ssao,
+        k_isr: settings.k_isr,
+    };
+    let composed = compose::sum(graph, &g, view, ambient, lit.direct, blurred, coarse.depth, &choices);
+    Ok(Outputs {
+        total: composed.total,
+        direct: lit.direct,
+        indirect: composed.indirect,
+        occlusion: composed.accessibility,
+        gathered,
+        blurred,
+    })
+}

@@ -1,0 +1,310 @@
+//! What can be chosen in image-space radiosity, and what the dissertation chose.
+
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// What a pixel sends to others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sender {
+    /// Its colour, as in the dissertation: no light needed, and none considered.
+    Albedo,
+    /// The direct light that it reflects diffusely, and what it emits.
+    Lit,
+}
+
+/// What one sample of the gather stands for.
+///
+/// Equation 25 sums (2π/N)·F over N samples, F the form factor to the footprint of *one pixel*. With samples s pixels apart
+/// that is 2π/(N s²) times the irradiance that the area integral gives: the result depends on N, reach and resolution, and is
+/// a few thousandths of the true value for a wide reach. It must be balanced by `k_isr` for each choice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Estimator {
+    /// Equation 25 as written.
+    Paper,
+    /// F to the footprint of the whole cell of the image that a sample represents: converges to the one-bounce irradiance from
+    /// all senders in reach, whatever N, reach and resolution.
+    Area,
+}
+
+/// Where the samples lie around the pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Pattern {
+    /// A square grid without its centre, as in the dissertation.
+    Grid,
+    /// As many samples on square rings that grow with `spread`: denser near the pixel.
+    Rings,
+}
+
+/// Size of the buffers on which light is gathered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Resolution {
+    /// Half width and height, as in the dissertation.
+    Half,
+    Full,
+}
+
+impl Resolution {
+    /// Pixels along the side of a coarse texel.
+    pub fn factor(self) -> u32 {
+        match self {
+            Self::Half => 2,
+            Self::Full => 1,
+        }
+    }
+}
+
+/// How four texels become one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Downsample {
+    /// Their mean, as in the dissertation; at a silhouette it lies between the surfaces.
+    Mean,
+    /// The mean of those on the nearest surface.
+    DepthAware,
+}
+
+/// Filter of the gathered light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Blur {
+    None,
+    /// As in the dissertation.
+    Gaussian,
+    /// Stops at depth steps and creases.
+    Bilateral,
+}
+
+/// What tells surfaces apart when coarse light is brought to full resolution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Upsample {
+    /// Difference of linear depth / far (equation 27).
+    Depth,
+    /// Distance from the pixel's plane, relative to its depth: steep surfaces are one surface.
+    Plane,
+}
+
+/// What the receiver does with gathered light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Receiver {
+    /// ρ_P is the radiation mask, as in the dissertation: receivers are white.
+    Mask,
+    /// ρ_P is the albedo.
+    Albedo,
+}
+
+/// What occlusion darkens.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Occlude {
+    /// Direct light, as in equation 29.
+    Direct,
+    /// Light of the environment only: direct light has its own shadows.
+    Ambient,
+}
+
+/// How punctual lights fall off and how surfaces reflect them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LightLaw {
+    /// Equation 16 and k_dl: colours relative to the brightest light times `light_power`, no π.
+    Paper,
+    /// W/sr over squared distance, ρ/π.
+    Physical,
+}
+
+/// All choices. `Default` is physically lit; [`Settings::paper`] is the dissertation's.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    pub sender: Sender,
+    pub estimator: Estimator,
+    pub pattern: Pattern,
+    /// 24, 48 or 80.
+    pub samples: u32,
+    /// How far senders are looked for, pixels of the full image; 0: half the longer side of the image.
+    pub reach: f32,
+    /// Rings: exponent of their radii, 1 to 4. 1 is uniform.
+    pub spread: f32,
+    /// Moves samples within their cells in a pattern of 4 × 4, which the blur averages.
+    pub jitter: bool,
+    /// Depth-buffer tests between receiver and sender, 0 to 16. 0: every sender in the image counts, as in the dissertation.
+    pub visibility_steps: u32,
+    /// Thickness that a surface in the depth buffer is taken to have, relative to its depth, when `visibility_steps` > 0.
+    pub thickness: f32,
+    /// Diffuse bounces after the direct light, 1 to 4. Each takes a gather.
+    pub bounces: u32,
+    pub resolution: Resolution,
+    pub downsample: Downsample,
+    /// Gather light.
+    pub indirect: bool,
+    /// Gather occlusion.
+    pub occlusion: bool,
+    /// How far occluders are looked for, pixels of the full image.
+    pub occlusion_reach: f32,
+    /// Radius of an occluder, pixels of the full image at its depth.
+    pub occluder_radius: f32,
+    /// Subtracted from the cosine of equation 26, against flat surfaces that occlude themselves by rounded normals.
+    pub occlusion_bias: f32,
+    pub blur: Blur,
+    /// Texels of the coarse buffers to each side, 0 to 16; the standard deviation is half of it.
+    pub blur_radius: u32,
+    /// Bilateral: distance from a texel's plane, relative to its depth, at which another weighs 0.6.
+    pub blur_range: f32,
+    pub upsample: Upsample,
+    /// ε of equation 27, in the unit that `upsample` compares.
+    pub upsample_epsilon: f32,
+    pub receiver: Receiver,
+    /// Power of indirect light. The area estimator needs no balancing: 1.
+    pub k_isr: f32,
+    /// Power of occlusion, 0 to 1.
+    pub k_ssao: f32,
+    pub occlude: Occlude,
+    pub light_law: LightLaw,
+    /// Paper law: radius l_r of lights without a range, metres; 0: the far distance of the camera.
+    pub light_radius: f32,
+    /// Paper law: l_pow of the brightest light.
+    pub light_power: f32,
+    /// GGX highlights of direct light.
+    pub specular: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            sender: Sender::Lit,
+            estimator: Estimator::Area,
+            pattern: Pattern::Rings,
+            samples: 48,
+            reach: 0.0,
+            spread: 1.5,
+            jitter: true,
+            visibility_steps: 0,
+            thickness: 0.1,
+            bounces: 1,
+            resolution: Resolution::Half,
+            downsample: Downsample::DepthAware,
+            indirect: true,
+            occlusion: true,
+            occlusion_reach: 32.0,
+            occluder_radius: 4.0,
+            occlusion_bias: 0.05,
+            blur: Blur::Bilateral,
+            blur_radius: 4,
+            blur_range: 0.01,
+            upsample: Upsample::Plane,
+            upsample_epsilon: 1e-3,
+            receiver: Receiver::Albedo,
+            k_isr: 1.0,
+            k_ssao: 0.5,
+            occlude: Occlude::Ambient,
+            light_law: LightLaw::Physical,
+            light_radius: 0.0,
+            light_power: 1.0,
+            specular: true,
+        }
+    }
+}
+
+impl Settings {
+    /// The dissertation's choices. It states neither the reach of its grid nor the radius of its occluders; these take
+    /// neighbouring coarse texels ("adjacent pixels") and spheres that touch.
+    pub fn paper() -> Self {
+        Self {
+            sender: Sender::Albedo,
+            estimator: Estimator::Paper,
+            pattern: Pattern::Grid,
+            reach: 6.0,
+            spread: 1.0,
+            jitter: false,
+            downsample: Downsample::Mean,
+            occlusion_reach: 24.0,
+            occluder_radius: 4.0,
+            occlusion_bias: 0.0,
+            blur: Blur::Gaussian,
+            upsample: Upsample::Depth,
+            receiver: Receiver::Mask,
+            k_isr: 0.5,
+            k_ssao: 0.5,
+            occlude: Occlude::Direct,
+            light_law: LightLaw::Paper,
+            specular: false,
+            ..Self::default()
+        }
+    }
+
+    /// # Errors
+    /// `Usage`, naming the key, the value found and the values allowed.
+    pub fn validate(&self) -> Result<()> {
+        let wrong = |key: &str, found: String, allowed: &str| {
+            Err(Error::usage(format!("{found} is not allowed; allowed: {allowed}")).at(key))
+        };
+        if ![24, 48, 80].contains(&self.samples) {
+            return wrong("samples", self.samples.to_string(), "24, 48, 80");
+        }
+        for (key, value, least, most) in [
+            ("bounces", self.bounces, 1, 4),
+            ("visibility_steps", self.visibility_steps, 0, 16),
+            ("blur_radius", self.blur_radius, 0, 16),
+        ] {
+            if !(least..=most).contains(&value) {
+                return wrong(key, value.to_string(), &format!("{least} to {most}"));
+            }
+        }
+        for (key, value, least, most) in [
+            ("reach", self.reach, 0.0, 16384.0),
+            ("spread", self.spread, 1.0, 4.0),
+            ("thickness", self.thickness, 0.0, 1.0),
+            ("occlusion_reach", self.occlusion_reach, 1.0, 16384.0),
+            ("occluder_radius", self.occluder_radius, 0.0, 16384.0),
+            ("occlusion_bias", self.occlusion_bias, 0.0, 1.0),
+            ("blur_range", self.blur_range, 1e-6, 1e6),
+            ("upsample_epsilon", self.upsample_epsilon, 1e-9, 1.0),
+            ("k_isr", self.k_isr, 0.0, 1000.0),
+            ("k_ssao", self.k_ssao, 0.0, 1.0),
+            ("light_radius", self.light_radius, 0.0, 1e9),
+            ("light_power", self.light_power, 0.0, 1e9),
+        ] {
+            // Written so that a value that is not a number is refused.
+            if !(least..=most).contains(&value) {
+                return wrong(key, value.to_string(), &format!("{least} to {most}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_and_the_papers_choices_are_valid() {
+        Settings::default().validate().unwrap();
+        Settings::paper().validate().unwrap();
+    }
+
+    #[test]
+    fn an_error_names_key_value_and_what_is_allowed() {
+        let message = |s: Settings| s.validate().unwrap_err().to_string();
+        let error = message(Settings { samples: 50, ..Settings::default() });
+        assert_eq!(error, "samples: 50 is not allowed; allowed: 24, 48, 80");
+        let error = message(Settings { k_ssao: f32::NAN, ..Settings::default() });
+        assert_eq!(error, "k_ssao: NaN is not allowed; allowed: 0 to 1");
+        let error = message(Settings { bounces: 0, ..Settings::default() });
+        assert_eq!(error, "bounces: 0 is not allowed; allowed: 1 to 4");
+    }
+
+    #[test]
+    fn unknown_keys_are_refused_and_missing_ones_default() {
+        let settings: Settings = toml::from_str("samples = 80\nsender = \"albedo\"\ndownsample = \"depth-aware\"").unwrap();
+        assert_eq!(settings, Settings { samples: 80, sender: Sender::Albedo, ..Settings::default() });
+        let error = toml::from_str::<Settings>("smaples = 80").unwrap_err().to_string();
+        assert!(error.contains("smaples") && error.contains("samples"), "{error}");
+    }
+}
