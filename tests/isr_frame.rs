@@ -3,7 +3,7 @@
 mod isr_lab;
 
 use glam::{DVec3, Vec3, dvec3, vec3};
-use isr_lab::{close, gbuffer, lights, point, read, view};
+use isr_lab::{close, gbuffer, lights, point, read};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::Graph,
@@ -33,10 +33,9 @@ fn corner() -> (Eye, Vec<Patch>) {
 }
 
 fn declare(graph: &mut Graph, eye: &Eye, buffers: &Buffers, lamp: Vec3, settings: &Settings) -> Outputs {
-    let gbuffer = gbuffer(graph, buffers);
+    let gbuffer = gbuffer(graph, eye, buffers);
     let lights = lights(graph, &[point(vec3(0.2, 1.0, -0.6), lamp)]);
-    let view = view(eye);
-    let inputs = Inputs { gbuffer, view: &view, lights, ambient: Irradiance::default() };
+    let inputs = Inputs { gbuffer, lights, ambient: Irradiance::default() };
     frame(graph, &inputs, settings).unwrap()
 }
 
@@ -179,11 +178,10 @@ fn wrong_settings_are_refused_before_any_pass() {
     let (eye, patches) = corner();
     let buffers = Buffers::cast(&eye, &patches, 8);
     let mut graph = Graph::new("refused");
-    let gbuffer = gbuffer(&mut graph, &buffers);
+    let gbuffer = gbuffer(&mut graph, &eye, &buffers);
     let lights = lights(&mut graph, &[]);
-    let view = view(&eye);
     let before = graph.pass_count();
-    let inputs = Inputs { gbuffer, view: &view, lights, ambient: Irradiance::default() };
+    let inputs = Inputs { gbuffer, lights, ambient: Irradiance::default() };
     let error = frame(&mut graph, &inputs, &Settings { samples: 47, ..Settings::default() }).unwrap_err();
     assert_eq!(error.to_string(), "samples: 47 is not allowed; allowed: 24, 48, 80");
     assert_eq!(graph.pass_count(), before);

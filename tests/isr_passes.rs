@@ -137,7 +137,8 @@ fn downsampling_is_the_mean_of_four_with_repeated_border() {
             let mut graph = Graph::new("downsample");
             let extent = Extent::new(width, height);
             let buffers = Buffers::default();
-            let mut g = gbuffer(&mut graph, &Buffers { width: 1, height: 1, depth: vec![1.0], ..filled(buffers) });
+            let eye = Eye::look_at(DVec3::ZERO, -DVec3::Z, 0.9, 10.0, 7, 5);
+            let mut g = gbuffer(&mut graph, &eye, &Buffers { width: 1, height: 1, depth: vec![1.0], ..filled(buffers) });
             g.albedo = image(&mut graph, "texels", extent, &texels);
             g.normal = image(&mut graph, "normals", extent, &normals);
             g.depth = image(&mut graph, "depths", extent, &depths);
@@ -353,8 +354,7 @@ fn composing_is_equations_27_to_29() {
         let direct: Vec<[f32; 4]> = (0..width * height).map(|_| random.texel()).collect();
         for (plane, tint, occlude_ambient) in [(false, false, false), (true, true, true)] {
             let mut graph = Graph::new("compose");
-            let g = gbuffer(&mut graph, &fine);
-            let view = graph.uniform(&view(&eye).uniform());
+            let g = gbuffer(&mut graph, &eye, &fine);
             let ambient = Irradiance::constant(Vec3::splat(if tint { 0.4 } else { 0.0 })).upload(&mut graph);
             let coarse_extent = Extent::new(cw as u32, ch as u32);
             let depth: Vec<_> = coarse_depth.iter().map(|z| [*z; 4]).collect();
@@ -363,7 +363,7 @@ fn composing_is_equations_27_to_29() {
             let direct_image = image(&mut graph, "direct", Extent::new(16, 8), &direct);
             let choices =
                 Compose { factor: 2, plane, epsilon: 1e-3, tint, occlude_ambient, k_ssao: 0.6, k_isr: 0.7 };
-            let sum = compose::sum(&mut graph, &g, view, ambient, direct_image, coarse, depth, &choices);
+            let sum = compose::sum(&mut graph, &g, ambient, direct_image, coarse, depth, &choices);
             let [total, indirect, open] = read(gpu, graph, [sum.total, sum.indirect, sum.accessibility]);
             for y in 0..height {
                 for x in 0..width {
@@ -418,8 +418,7 @@ fn upsampling_falls_back_to_the_nearest_in_depth() {
             factor: 1.0,
         };
         let mut graph = Graph::new("fallback");
-        let g = gbuffer(&mut graph, &fine);
-        let view = graph.uniform(&view(&eye).uniform());
+        let g = gbuffer(&mut graph, &eye, &fine);
         let ambient = Irradiance::default().upload(&mut graph);
         // No coarse texel is near 0.2; 0.5 is the nearest.
         let extent = Extent::new(2, 2);
@@ -436,7 +435,7 @@ fn upsampling_falls_back_to_the_nearest_in_depth() {
             k_ssao: 0.5,
             k_isr: 1.0,
         };
-        let sum = compose::sum(&mut graph, &g, view, ambient, direct, coarse, depth, &choices);
+        let sum = compose::sum(&mut graph, &g, ambient, direct, coarse, depth, &choices);
         let [total] = read(gpu, graph, [sum.total]);
         // The four middle pixels lie between all four coarse texels.
         for i in [5, 6, 9, 10] {
@@ -455,13 +454,12 @@ fn direct_light_by_the_inverse_square_and_by_equation_16() {
         let lamp = vec3(0.4, 1.2, -0.3);
         let light_with = |paper_law: bool, intensity: Vec3, kinds: &[shaders::types::Light]| {
             let mut graph = Graph::new("direct");
-            let g = gbuffer(&mut graph, &fine);
-            let view = graph.uniform(&view(&eye).uniform());
+            let g = gbuffer(&mut graph, &eye, &fine);
             let mut all = vec![point(lamp, intensity)];
             all.extend_from_slice(kinds);
             let lights = lights(&mut graph, &all);
             let choices = Direct { paper_law, specular: false, light_radius: 2.0, light_power: 0.9 };
-            let lit = direct::light(&mut graph, &g, view, lights, &choices);
+            let lit = direct::light(&mut graph, &g, lights, &choices);
             read(gpu, graph, [lit.direct, lit.diffuse])
         };
         let expect = |paper_law: bool, x: usize, y: usize| {

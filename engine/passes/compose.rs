@@ -39,7 +39,6 @@ pub struct Composed {
 pub fn sum(
     graph: &mut Graph,
     g: &GBuffer,
-    view: Uniform<types::View>,
     ambient: Uniform<types::Ambient>,
     direct: Image,
     gathered: Image,
@@ -53,7 +52,7 @@ pub fn sum(
         accessibility: graph.image("occlusion", Format::R32F, extent),
     };
     let args = compose::Args {
-        view,
+        view: g.view,
         ambient,
         albedo: g.albedo,
         normal: g.normal,

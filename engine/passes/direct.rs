@@ -2,8 +2,8 @@
 
 use super::gbuffer::GBuffer;
 use crate::{
-    graph::{Buffer, Format, Graph, Image, Uniform},
-    shaders::{passes::direct, types},
+    graph::{Buffer, Format, Graph, Image},
+    shaders::passes::direct,
 };
 
 /// The lights of the scene and their shadow maps.
@@ -24,7 +24,7 @@ pub struct Direct {
     pub paper_law: bool,
     /// GGX highlights.
     pub specular: bool,
-    /// Paper law: of lights without a range, metres.
+    /// Paper law: of lights without a range, metres; 0: the far distance of the camera.
     pub light_radius: f32,
     /// Paper law: of the brightest light.
     pub light_power: f32,
@@ -40,14 +40,14 @@ pub struct Lit {
 }
 
 /// Adds up the light of every light at every pixel.
-pub fn light(graph: &mut Graph, g: &GBuffer, view: Uniform<types::View>, lights: Lights, choices: &Direct) -> Lit {
+pub fn light(graph: &mut Graph, g: &GBuffer, lights: Lights, choices: &Direct) -> Lit {
     let extent = graph.extent(g.depth);
     let lit = Lit {
         direct: graph.image("direct", Format::RGBA16F, extent),
         diffuse: graph.image("direct.diffuse", Format::RGBA16F, extent),
     };
     let args = direct::Args {
-        view,
+        view: g.view,
         albedo: g.albedo,
         normal: g.normal,
         depth: g.depth,

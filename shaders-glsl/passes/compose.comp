@@ -23,7 +23,7 @@ layout(binding = 1, scalar) uniform AmbientBlock { Ambient ambient; };
 layout(binding = 2) uniform sampler2D albedo;
 layout(binding = 3) uniform sampler2D normal;
 layout(binding = 4) uniform sampler2D depth;
-layout(binding = 5) uniform sampler2D emission;
+layout(binding = 5) uniform sampler2D emission;      // a: accessibility by the material
 layout(binding = 6) uniform sampler2D direct;        // with emission
 layout(binding = 7) uniform sampler2D gathered;      // coarse: rgb radiance, a occlusion
 layout(binding = 8) uniform sampler2D coarse_depth;
@@ -94,8 +94,10 @@ void main() {
     float open = 1.0 - clamp(coarse.a, 0.0, 1.0);
     float lit = clamp(open + 1.0 - k_ssao, 0.0, 1.0);
     vec3 bounced = k_isr * coarse.rgb * (TINT != 0 ? color.rgb : vec3(1.0));
-    vec3 around = color.rgb * color.a * ambient_irradiance(ambient, n) / 3.14159265358979;
-    vec3 glow = texelFetch(emission, pixel, 0).rgb;
+    vec4 own = texelFetch(emission, pixel, 0);
+    vec3 glow = own.rgb;
+    // The occlusion texture of the material darkens light from all around and nothing else.
+    vec3 around = color.rgb * color.a * own.a * ambient_irradiance(ambient, n) / 3.14159265358979;
     vec3 direct_part = OCCLUDE_AMBIENT != 0 ? light.rgb : (light.rgb - glow) * lit + glow;
     vec3 sum = direct_part + around * lit + bounced;
     imageStore(total, pixel, vec4(sum, 1.0));

@@ -28,7 +28,7 @@ layout(binding = 6, rgba16f) uniform writeonly image2D direct;   // all that lea
 layout(binding = 7, rgba16f) uniform writeonly image2D diffuse;  // what leaves in all directions: Lambert part and emission
 
 layout(push_constant, scalar) uniform Push {
-    float light_radius;  // l_r of lights without a range, metres
+    float light_radius;  // l_r of lights without a range, metres; 0: the camera's far distance
     float light_power;   // l_pow
 };
 
@@ -73,7 +73,7 @@ void main() {
         if (PAPER_LAW != 0) {
             e = one.intensity / brightest * light_power;
             if (one.kind != LIGHT_DIRECTIONAL) {
-                float radius = one.range > 0.0 ? one.range : light_radius;
+                float radius = one.range > 0.0 ? one.range : light_radius > 0.0 ? light_radius : view.far;
                 e *= paper_attenuation(distance(one.position, p), radius) * light_cone(one, to_light);
             }
         }

@@ -22,7 +22,6 @@ use crate::{
         downsample,
         gbuffer::GBuffer,
     },
-    scene::view::View,
     shaders,
 };
 
@@ -45,9 +44,8 @@ pub struct Outputs {
 
 /// Everything a frame starts from.
 #[derive(Clone, Copy, Debug)]
-pub struct Inputs<'a> {
+pub struct Inputs {
     pub gbuffer: GBuffer,
-    pub view: &'a View,
     pub lights: direct::Lights,
     /// Light of the environment; default none.
     pub ambient: Irradiance,
@@ -60,17 +58,17 @@ pub struct Inputs<'a> {
 pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<Outputs> {
     settings.validate()?;
     let g = inputs.gbuffer;
-    let view = graph.uniform(&inputs.view.uniform());
+    let view = g.view;
     let extent = graph.extent(g.depth);
     let factor = settings.resolution.factor();
 
     let direct = Direct {
         paper_law: settings.light_law == LightLaw::Paper,
         specular: settings.specular,
-        light_radius: if settings.light_radius > 0.0 { settings.light_radius } else { inputs.view.far },
+        light_radius: settings.light_radius,
         light_power: settings.light_power,
     };
-    let lit = direct::light(graph, &g, view, inputs.lights, &direct);
+    let lit = direct::light(graph, &g, inputs.lights, &direct);
 
     let aware = settings.downsample == Downsample::DepthAware;
     let coarse = downsample::gbuffer(graph, &g, factor, aware);
@@ -143,7 +141,7 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
         k_ssao: settings.k_ssao,
         k_isr: settings.k_isr,
     };
-    let composed = compose::sum(graph, &g, view, ambient, lit.direct, blurred, coarse.depth, &choices);
+    let composed = compose::sum(graph, &g, ambient, lit.direct, blurred, coarse.depth, &choices);
     Ok(Outputs {
         total: composed.total,
         direct: lit.direct,
