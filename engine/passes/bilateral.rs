@@ -28,8 +28,7 @@ pub fn blur(
             range,
             factor: factor as f32,
         };
-        let args =
-            bilateral::Args { view, color: result, normal: coarse.normal, depth: coarse.depth, blurred, push };
+        let args = bilateral::Args { view, color: result, normal: coarse.normal, depth: coarse.depth, blurred, push };
         graph.compute(args, extent).named(format!("passes.{name}"));
         result = blurred;
     }

@@ -1,6 +1,6 @@
 //! Direct light of all punctual lights.
 
-use super::gbuffer::GBuffer;
+use super::{gbuffer::GBuffer, shadow::ShadowMaps};
 use crate::{
     graph::{Buffer, Format, Graph, Image},
     shaders::passes::direct,
@@ -15,6 +15,12 @@ pub struct Lights {
     pub shadows: Buffer,
     /// All shadow maps, an array image.
     pub shadow_maps: Image,
+}
+
+impl From<&ShadowMaps> for Lights {
+    fn from(maps: &ShadowMaps) -> Self {
+        Self { lights: maps.lights, shadows: maps.shadows, shadow_maps: maps.maps }
+    }
 }
 
 /// Choices of [`light`].

@@ -5,8 +5,10 @@
 //! visible surfaces. Senders outside the image or hidden behind others do not count, and unless
 //! [`Settings::visibility_steps`] is set, light passes through what stands between.
 
+mod picture;
 mod settings;
 
+pub use picture::{Picture, PictureSettings, picture};
 pub use settings::{
     Blur, Downsample, Estimator, LightLaw, Occlude, Pattern, Receiver, Resolution, Sender, Settings, Upsample,
 };

@@ -302,7 +302,8 @@ mod tests {
 
     #[test]
     fn unknown_keys_are_refused_and_missing_ones_default() {
-        let settings: Settings = toml::from_str("samples = 80\nsender = \"albedo\"\ndownsample = \"depth-aware\"").unwrap();
+        let settings: Settings =
+            toml::from_str("samples = 80\nsender = \"albedo\"\ndownsample = \"depth-aware\"").unwrap();
         assert_eq!(settings, Settings { samples: 80, sender: Sender::Albedo, ..Settings::default() });
         let error = toml::from_str::<Settings>("smaples = 80").unwrap_err().to_string();
         assert!(error.contains("smaples") && error.contains("samples"), "{error}");

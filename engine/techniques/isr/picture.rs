@@ -1,0 +1,72 @@
+//! Everything from a scene on the device to the final picture.
+
+use super::{Inputs, Outputs, Settings, frame};
+use crate::{
+    Result,
+    graph::Graph,
+    passes::{
+        ambient::Irradiance,
+        direct::Lights,
+        gbuffer::{self, GBuffer, Normals},
+        shadow::{self, ShadowMaps},
+        skybox,
+    },
+    scene::{View, resident::Handles},
+};
+use serde::{Deserialize, Serialize};
+
+/// Settings of all stages.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PictureSettings {
+    pub isr: Settings,
+    pub gbuffer: gbuffer::Settings,
+    pub shadow: shadow::Settings,
+    /// Radiance behind everything in scenes without an environment, linear RGB.
+    pub background: [f32; 3],
+}
+
+impl PictureSettings {
+    /// The dissertation's: normals of eight bits, exponential shadow maps with c = 90.
+    pub fn paper() -> Self {
+        Self {
+            isr: Settings::paper(),
+            gbuffer: gbuffer::Settings { normals: Normals::Bytes, ..Default::default() },
+            shadow: shadow::Settings {
+                kind: shadow::Kind::Exponential,
+                exponent: 90.0,
+                size: 512,
+                ..Default::default()
+            },
+            background: [0.0; 3],
+        }
+    }
+}
+
+/// A picture and the stages before it.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    pub gbuffer: GBuffer,
+    pub shadows: ShadowMaps,
+    pub outputs: Outputs,
+}
+
+/// Declares G-buffer, shadow maps, [`frame`] and sky. `ambient`: [`Irradiance::of`] the scene's environment, computed once.
+///
+/// # Errors
+/// `Usage` if a setting is out of its range.
+pub fn picture(
+    graph: &mut Graph,
+    scene: &Handles,
+    view: &View,
+    ambient: Irradiance,
+    settings: &PictureSettings,
+) -> Result<Picture> {
+    settings.isr.validate().map_err(|error| error.at("isr"))?;
+    let gbuffer = gbuffer::draw(graph, scene, view, &settings.gbuffer);
+    let shadows = shadow::draw(graph, scene, view, &settings.shadow);
+    let inputs = Inputs { gbuffer, lights: Lights::from(&shadows), ambient };
+    let outputs = graph.scope("isr", |graph| frame(graph, &inputs, &settings.isr))?;
+    skybox::draw(graph, scene, &gbuffer, settings.background.into(), outputs.total);
+    Ok(Picture { gbuffer, shadows, outputs })
+}
