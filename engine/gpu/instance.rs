@@ -231,7 +231,7 @@ fn no_instance(result: vk::Result, log: &Log) -> Error {
 /// "No driver" in all its forms.
 pub(crate) fn no_driver(mut what: String, log: &Log) -> Error {
     for line in log.loader_messages() {
-        let _ = write!(what, "\n  loader: {}", line.trim());
+        let _ = write!(what, "\n  loader: {}", line.trim().trim_end_matches(['.', '!']));
     }
     Error::new(ErrorKind::NoDevice, what).help(hint(
         "Install a Vulkan driver (Debian: mesa-vulkan-drivers, which also has one that needs no GPU), or point VK_DRIVER_FILES at one",

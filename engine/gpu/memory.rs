@@ -72,20 +72,30 @@ impl Context {
     }
 }
 
-/// gpu-allocator has one variant for "out of device memory" and puts every other result into text.
+/// gpu-allocator has one variant for "out of device memory" and puts every other result into text: in the spelling of
+/// `Debug` where memory is allocated, of `Display` where it is mapped.
 fn kind(error: &AllocationError) -> ErrorKind {
-    match error {
-        AllocationError::OutOfMemory => ErrorKind::OutOfMemory,
-        AllocationError::Internal(text) if text.contains("OUT_OF") => ErrorKind::OutOfMemory,
-        AllocationError::FailedToMap(text) if text.contains("OUT_OF") || text.contains("MEMORY_MAP_FAILED") => {
-            ErrorKind::OutOfMemory
+    const MEMORY: [vk::Result; 3] = [
+        vk::Result::ERROR_OUT_OF_HOST_MEMORY,
+        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
+        vk::Result::ERROR_MEMORY_MAP_FAILED,
+    ];
+    let memory = match error {
+        AllocationError::OutOfMemory => true,
+        AllocationError::Internal(text) | AllocationError::FailedToMap(text) => {
+            MEMORY.iter().any(|result| says(text, *result))
         }
-        _ => ErrorKind::Runtime,
-    }
+        _ => false,
+    };
+    if memory { ErrorKind::OutOfMemory } else { ErrorKind::Runtime }
+}
+
+fn says(text: &str, result: vk::Result) -> bool {
+    text.contains(&format!("{result:?}")) || text.contains(&result.to_string())
 }
 
 fn lost(error: &AllocationError) -> bool {
-    matches!(error, AllocationError::Internal(text) | AllocationError::FailedToMap(text) if text.contains("DEVICE_LOST"))
+    matches!(error, AllocationError::Internal(text) | AllocationError::FailedToMap(text) if says(text, vk::Result::ERROR_DEVICE_LOST))
 }
 
 #[cfg(test)]
@@ -96,6 +106,8 @@ mod tests {
     fn host_memory_hidden_in_text_is_found() {
         let hidden = format!("Unexpected error: {:?}", vk::Result::ERROR_OUT_OF_HOST_MEMORY);
         assert_eq!(kind(&AllocationError::Internal(hidden)), ErrorKind::OutOfMemory);
+        let mapped = vk::Result::ERROR_OUT_OF_HOST_MEMORY.to_string();
+        assert_eq!(kind(&AllocationError::FailedToMap(mapped)), ErrorKind::OutOfMemory);
         assert_eq!(kind(&AllocationError::OutOfMemory), ErrorKind::OutOfMemory);
         assert_eq!(kind(&AllocationError::NoCompatibleMemoryTypeFound), ErrorKind::Runtime);
         assert!(lost(&AllocationError::Internal(format!("{:?}", vk::Result::ERROR_DEVICE_LOST))));

@@ -328,6 +328,7 @@ impl Submission {
         let Some(shell) = self.shell.take() else { return Ok(()) };
         if self.context.lost.is_set() {
             // Lost through another submission: whether the device still works on this one, nobody can say.
+            self.threads_may_go_on();
             self.leave(shell);
             return self.context.alive();
         }
@@ -386,15 +387,22 @@ impl Submission {
     }
 
     fn failed(&self, shell: &Shell, call: &str, result: vk::Result) -> Error {
-        if result == vk::Result::ERROR_DEVICE_LOST && self.context.caps.kind == DeviceKind::Cpu {
-            // The threads of a CPU driver know nothing of the loss and may still write.
-            self.context.abandon();
+        if result == vk::Result::ERROR_DEVICE_LOST {
+            self.threads_may_go_on();
         }
         let place = self.where_it_was(shell);
         let checked: Result<()> = self.context.check(Err(result), || format!("{call}{place}"));
         match checked {
             Err(error) => error.at(&self.name),
             Ok(()) => Error::usage("success is no failure"),
+        }
+    }
+
+    /// The threads of a CPU driver know nothing of a loss and may still write. (Real devices are stopped by their driver
+    /// before it reports the loss, so that everything may be destroyed.)
+    fn threads_may_go_on(&self) {
+        if self.context.caps.kind == DeviceKind::Cpu {
+            self.context.abandon();
         }
     }
 
@@ -422,7 +430,10 @@ impl Submission {
 
 impl Drop for Submission {
     fn drop(&mut self) {
-        if let Err(error) = self.finish() {
+        let known = self.context.lost.is_set();
+        if let Err(error) = self.finish()
+            && !known
+        {
             eprintln!("warning: {error}");
         }
     }

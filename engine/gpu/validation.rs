@@ -157,7 +157,9 @@ impl Log {
     /// What the loader said, for errors about instances and devices that could not be made.
     pub(crate) fn loader_messages(&self) -> Vec<String> {
         let mut lines: Vec<String> = Vec::new();
-        for message in self.state().messages.iter().filter(|m| m.id == "Loader Message") {
+        for message in
+            self.state().messages.iter().filter(|m| m.id == "Loader Message" && m.severity == Severity::Error)
+        {
             if !lines.contains(&message.text) && lines.len() < 6 {
                 lines.push(message.text.clone());
             }
@@ -240,8 +242,9 @@ mod tests {
     fn only_listed_messages_are_allowed() {
         let log = Log::new(false);
         log.push(message("Loader Message", "driver x skipped"));
+        log.push(Message { severity: Severity::Warning, ..message("Loader Message", "a layer was added") });
         log.push(message("VUID-vkCmdDispatch-None-02706", "out of bounds"));
-        assert_eq!(log.messages().len(), 2);
+        assert_eq!(log.messages().len(), 3);
         assert_eq!(log.unexpected().len(), 1);
         assert_eq!(log.loader_messages(), ["driver x skipped"]);
     }

@@ -83,7 +83,7 @@ pub unsafe fn physical_next(handle: u64, name: &'static CStr) -> Option<usize> {
 
 unsafe fn find(mut info: *mut LayerInfo, kind: vk::StructureType) -> *mut LayerInfo {
     unsafe {
-        while !info.is_null() && !((*info).kind == kind.as_raw() && (*info).function == 0) {
+        while !info.is_null() && ((*info).kind != kind.as_raw() || (*info).function != 0) {
             info = (*info).next.cast_mut().cast();
         }
     }

@@ -1,0 +1,608 @@
+//! What goes wrong around a device becomes an error that says where and what to do: no panic, no hang, no leak.
+//!
+//! Each case starts this program anew as a child with the fault in its environment: a layer (`tests/fault-layer`) that fails
+//! chosen calls or lies about devices, or a broken loader or driver. The child does small work and exits as the
+//! executables do.
+
+use std::{
+    collections::HashMap,
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, ExitCode, Stdio},
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use lucerna::{
+    Error, Result,
+    gpu::{self, BufferDesc, DescriptorArena, Gpu, GpuOptions, OwnedBuffer, Validation, testing},
+};
+
+mod gpu_common;
+
+/// Says to a child what to do.
+const TASK: &str = "LUCERNA_TEST_TASK";
+
+/// Everything a child does, in one place: `main` of the child.
+fn child(task: &str) -> ExitCode {
+    let (task, argument) = task.split_once(':').unwrap_or((task, ""));
+    let result = match task {
+        "work" => whole_program(),
+        "long" => long_dispatch(),
+        "capabilities" => capabilities(),
+        "harness" => match testing::run(GpuOptions::default(), |_| {}) {
+            Ok(()) => Ok(()),
+            Err(text) => {
+                eprintln!("error: {text}");
+                return ExitCode::from(101);
+            }
+        },
+        "each" => {
+            every_call(argument);
+            Ok(())
+        }
+        other => Err(Error::usage(format!("no task {other}"))),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// A bit of everything, checked.
+fn work(gpu: &Gpu) -> Result<()> {
+    let words = gpu_common::successors(gpu, &[2, 1], true)?;
+    assert!(words.chunks(4).all(|word| word == [3, 0, 0, 0]), "{words:?}");
+    let rgba: Vec<u8> = (0..9 * 4 * 4).map(|i| i as u8).collect();
+    assert_eq!(gpu_common::show(gpu, 9, 4, &rgba)?, rgba);
+    Ok(())
+}
+
+fn options() -> Result<GpuOptions> {
+    Ok(GpuOptions { validation: Validation::Sync, print_messages: false, ..GpuOptions::from_env()? })
+}
+
+/// Opens, works, closes, and holds against it what validation said.
+fn whole_program() -> Result<()> {
+    let gpu = Gpu::new(options()?)?;
+    let log = Arc::clone(gpu.log());
+    let device = gpu.describe().to_string();
+    let result = work(&gpu);
+    drop(gpu);
+    let said: Vec<String> = log.unexpected().iter().map(ToString::to_string).collect();
+    assert!(said.is_empty(), "{said:#?}\nafter {result:?}");
+    println!("worked on {device}");
+    result
+}
+
+/// Work that takes seconds on a CPU driver, in a named pass.
+fn long_dispatch() -> Result<()> {
+    let gpu = Gpu::new(GpuOptions { validation: Validation::Off, ..GpuOptions::from_env()? })?;
+    // No loop longer than old CPU drivers run (65 535 turns), but many threads.
+    let slow = gpu_common::compute(
+        "test.slow",
+        "#version 460
+        layout(local_size_x = 64) in;
+        layout(binding = 0) readonly buffer From { uint from[]; };
+        layout(binding = 1) writeonly buffer To { uint to[]; };
+        void main() {
+            uint x = from[gl_LocalInvocationIndex] + gl_WorkGroupID.x;
+            for (uint i = 0u; i < 60000u; ++i) { x = (x ^ (x >> 7)) * 747796405u + i; }
+            if (x == 12345u) to[0] = x;
+        }",
+    );
+    let from = OwnedBuffer::with_contents(&gpu, "from", &[1; 256])?;
+    let to = OwnedBuffer::new(&gpu, "to", BufferDesc::device(256))?;
+    let pipeline = gpu.compute_pipeline(slow, &[])?;
+    let quick = gpu.compute_pipeline(gpu_common::successor(), &[])?;
+    let mut arena = DescriptorArena::new(&gpu);
+    let mut commands = gpu.commands("frame 7")?;
+    let set = arena.allocate("test.quick", quick.set_layout)?;
+    gpu_common::dispatch(&mut commands, "test.quick", quick, set, [&from, &to], 1);
+    commands.everything_barrier();
+    let set = arena.allocate("test.slow", pipeline.set_layout)?;
+    gpu_common::dispatch(&mut commands, "test.slow", pipeline, set, [&from, &to], 6000);
+    commands.everything_barrier();
+    let set = arena.allocate("test.quick", quick.set_layout)?;
+    gpu_common::dispatch(&mut commands, "test.after", quick, set, [&from, &to], 1);
+    commands.keep((from, to, arena));
+    let first = commands.submit()?.wait();
+    assert_eq!(gpu.is_lost(), first.is_err());
+    if let Err(first) = &first {
+        // Nothing more is tried, and what is said refers to the first report.
+        let later = gpu.commands("frame 8").unwrap_err();
+        assert_eq!(later.exit_code(), first.exit_code());
+        assert!(later.to_string().contains("test.slow"), "{later}");
+    }
+    first
+}
+
+/// Prints what the device can do beyond the baseline.
+fn capabilities() -> Result<()> {
+    let gpu = Gpu::new(options()?)?;
+    let caps = gpu.caps();
+    println!("anisotropy {}", caps.sampler_anisotropy.is_some());
+    println!("float atomics {}", caps.float_atomic_add);
+    println!("depth clamp {}", caps.depth_clamp);
+    println!("depth stencil {:?}", caps.depth_stencil_format);
+    println!("alignment {}", caps.limits.storage_alignment);
+    println!("push {}", caps.limits.push_bytes);
+    work(&gpu)
+}
+
+/// Fails the first call of `function`, then the second, and so on, once and from then on, until the work is done before the
+/// fault comes. `argument`: `FUNCTION RESULT`.
+fn every_call(argument: &str) {
+    let (function, fault) = argument.split_once(' ').unwrap();
+    let report = PathBuf::from(std::env::var_os("VKFAULT_REPORT").unwrap());
+    let mut runs = 0;
+    for sticky in ["", "+"] {
+        for n in 1.. {
+            assert!(n < 400, "{function} is called without end");
+            let _ = fs::remove_file(&report);
+            // SAFETY: this process has one test thread, and the main thread waits for it.
+            unsafe { std::env::set_var("VKFAULT", format!("{function}@{n}{sticky}={fault}")) };
+            let begun = Instant::now();
+            let mut log = None;
+            let result = options().and_then(Gpu::new).and_then(|gpu| {
+                log = Some(Arc::clone(gpu.log()));
+                work(&gpu)
+            });
+            let what = format!("{function}@{n}{sticky}={fault} gave {result:?}");
+            assert!(begun.elapsed() < Duration::from_secs(20), "slow: {what}");
+            let said: Vec<String> =
+                log.iter().flat_map(|log| log.unexpected()).map(|message| message.to_string()).collect();
+            assert!(said.is_empty(), "{said:#?}\nafter {what}");
+            runs += 1;
+            let fired = fs::read_to_string(&report).unwrap_or_default();
+            if fired.is_empty() {
+                assert!(result.is_ok(), "no fault, but {what}");
+                break;
+            }
+            if let Err(error) = result {
+                let expected = match fault {
+                    "OOM_HOST" | "OOM_DEVICE" => 5,
+                    "DEVICE_LOST" => 6,
+                    _ => 1,
+                };
+                assert_eq!(error.exit_code(), expected, "{what}");
+                let text = error.to_string();
+                assert!(expected == 1 || text.ends_with('.'), "no advice: {what}");
+                let named = text.contains(function) || text.contains("no memory for `");
+                assert!(named, "the call is not named: {what}");
+            } else {
+                // A single failure may be made good; a lasting one of something that is needed may not.
+                assert!(sticky.is_empty() || function == "vkDeviceWaitIdle", "{what}");
+            }
+        }
+    }
+    println!("{function}: {runs} runs");
+}
+
+/// Children come here; for others it does nothing.
+#[test]
+fn child_process() {
+    if let Ok(task) = std::env::var(TASK) {
+        let code = child(&task);
+        // Not through the test harness: the exit code is what is tested.
+        std::process::exit(if code == ExitCode::SUCCESS { 0 } else { code_of(&code) });
+    }
+}
+
+fn code_of(code: &ExitCode) -> i32 {
+    (0..=255).find(|n| ExitCode::from(*n) == *code).map_or(1, i32::from)
+}
+
+/// What a child left behind.
+#[derive(Debug)]
+struct Outcome {
+    code: Option<i32>,
+    out: String,
+    err: String,
+}
+
+impl Outcome {
+    #[track_caller]
+    fn fails_with(&self, code: i32, parts: &[&str]) {
+        assert_eq!(self.code, Some(code), "{self:#?}");
+        let error = self.err.split("error: ").nth(1).unwrap_or_default();
+        for part in parts {
+            assert!(error.contains(part), "no `{part}` in {self:#?}");
+        }
+    }
+
+    #[track_caller]
+    fn succeeds(&self) {
+        assert_eq!(self.code, Some(0), "{self:#?}");
+    }
+}
+
+/// A child in preparation.
+struct Case {
+    command: Command,
+    folder: tempfile::TempDir,
+    variables: HashMap<String, String>,
+}
+
+impl Case {
+    fn new(task: &str) -> Self {
+        let mut command = Command::new(std::env::current_exe().unwrap());
+        command.args(["--exact", "child_process", "--nocapture", "--test-threads=1"]).env(TASK, task);
+        for (name, _) in gpu::ENVIRONMENT {
+            if name != "LUCERNA_DEVICE" {
+                command.env_remove(name);
+            }
+        }
+        Self { command, folder: tempfile::tempdir().unwrap(), variables: HashMap::new() }
+    }
+
+    fn env(mut self, name: &str, value: impl AsRef<std::ffi::OsStr>) -> Self {
+        self.command.env(name, value);
+        self
+    }
+
+    fn env_remove(mut self, name: &str) -> Self {
+        self.command.env_remove(name);
+        self
+    }
+
+    fn file(self, name: &str, contents: &str) -> Self {
+        fs::write(self.folder.path().join(name), contents).unwrap();
+        self
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Puts the fault layer in, with these rules.
+    fn layer(mut self, rules: &[(&str, &str)]) -> Self {
+        let library = std::env::current_exe().unwrap().parent().unwrap().join("liblucerna_fault_layer.so");
+        assert!(library.exists(), "{} was not built with the tests", library.display());
+        let manifest = format!(
+            r#"{{"file_format_version":"1.2.0","layer":{{"name":"VK_LAYER_LUCERNA_fault","type":"GLOBAL",
+            "library_path":"{}","api_version":"1.3.0","implementation_version":"1","description":"fault injection"}}}}"#,
+            library.display()
+        );
+        fs::write(self.path("fault.json"), manifest).unwrap();
+        for (name, value) in rules {
+            self.variables.insert((*name).into(), (*value).into());
+        }
+        let mut folders = vec![self.folder.path().to_path_buf()];
+        match std::env::var_os("VK_LAYER_PATH") {
+            Some(path) => folders.extend(std::env::split_paths(&path)),
+            None => folders.extend(
+                [
+                    "/usr/share/vulkan/explicit_layer.d",
+                    "/etc/vulkan/explicit_layer.d",
+                    "/usr/local/share/vulkan/explicit_layer.d",
+                ]
+                .map(PathBuf::from),
+            ),
+        }
+        let report = self.path("report");
+        self.env("VK_LAYER_PATH", std::env::join_paths(folders).unwrap())
+            .env("VK_INSTANCE_LAYERS", "VK_LAYER_LUCERNA_fault")
+            .env("VKFAULT_REPORT", report)
+    }
+
+    /// Runs it, at most two minutes.
+    fn run(mut self) -> Outcome {
+        let (out, err) = (self.path("out"), self.path("err"));
+        self.command
+            .envs(&self.variables)
+            .stdin(Stdio::null())
+            .stdout(fs::File::create(&out).unwrap())
+            .stderr(fs::File::create(&err).unwrap());
+        let mut process = self.command.spawn().unwrap();
+        let begun = Instant::now();
+        let status = loop {
+            if let Some(status) = process.try_wait().unwrap() {
+                break Some(status);
+            }
+            if begun.elapsed() > Duration::from_secs(120) {
+                process.kill().unwrap();
+                process.wait().unwrap();
+                break None;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        };
+        let read = |path: &Path| String::from_utf8_lossy(&fs::read(path).unwrap()).into_owned();
+        let outcome = Outcome { code: status.and_then(|s| s.code()), out: read(&out), err: read(&err) };
+        assert!(status.is_some(), "the child hangs: {outcome:#?}");
+        outcome
+    }
+}
+
+/// Without a device here (and no `CI`), only the cases that need none are run.
+fn have_device() -> bool {
+    let has = gpu::list_devices().is_ok_and(|list| list.iter().any(|d| d.missing.is_empty()));
+    if !has {
+        assert!(std::env::var_os("CI").is_none(), "no Vulkan device, and CI is set");
+        eprintln!("SKIPPED: this test needs a Vulkan device");
+    }
+    has
+}
+
+// Row 1.
+#[test]
+fn without_a_loader_it_says_what_to_install() {
+    let case = Case::new("work").file("libvulkan.so.1", "not a library").file("libvulkan.so", "not a library");
+    let folder = case.folder.path().to_path_buf();
+    let outcome = case.env("LD_LIBRARY_PATH", folder).run();
+    outcome.fails_with(4, &["Vulkan loader could not be loaded", "libvulkan1", "LD_LIBRARY_PATH="]);
+}
+
+// Row 2.
+#[test]
+fn without_a_driver_it_says_what_to_install() {
+    let case = Case::new("work");
+    let missing = case.path("missing.json");
+    let outcome = case.env("VK_DRIVER_FILES", &missing).env("VK_ICD_FILENAMES", &missing).run();
+    outcome.fails_with(4, &["no Vulkan driver", "mesa-vulkan-drivers", "VK_DRIVER_FILES="]);
+}
+
+// Row 3.
+#[test]
+fn a_broken_driver_manifest_is_no_want_of_memory() {
+    let case = Case::new("work").file("broken.json", "{ \"ICD\": ");
+    let broken = case.path("broken.json");
+    let outcome = case.env("VK_DRIVER_FILES", &broken).env("VK_ICD_FILENAMES", &broken).run();
+    outcome.fails_with(4, &["no Vulkan driver", "mesa-vulkan-drivers", "broken.json"]);
+}
+
+// Row 4.
+#[test]
+fn a_driver_without_hardware_is_no_device() {
+    if have_device() {
+        let outcome = Case::new("work").layer(&[("VKFAULT", "vkEnumeratePhysicalDevices@1+=INIT_FAILED")]).run();
+        outcome.fails_with(4, &["no Vulkan driver could list its devices", "mesa-vulkan-drivers"]);
+        // Mesa's layer that sorts devices does not survive having none from another layer.
+        let outcome = Case::new("work").env("NODEVICE_SELECT", "1").layer(&[("VKFAULT_NO_DEVICES", "1")]).run();
+        outcome.fails_with(4, &["none of them has a device", "mesa-vulkan-drivers"]);
+    }
+}
+
+// Row 5.
+#[test]
+fn an_unsuitable_device_is_refused_with_each_missing_item() {
+    if have_device() {
+        let outcome = Case::new("work")
+            .layer(&[
+                ("VKFAULT_HIDE_FEATURE", "synchronization2,scalarBlockLayout"),
+                ("VKFAULT_LIMIT", "maxStorageBufferRange=1000"),
+                // D32_SFLOAT
+                ("VKFAULT_HIDE_FORMAT", "126"),
+            ])
+            .run();
+        outcome.fails_with(
+            4,
+            &[
+                "no suitable Vulkan device",
+                "lacks feature synchronization2\n",
+                "lacks feature scalarBlockLayout\n",
+                "needs maxStorageBufferRange >= 134217728, has 1000\n",
+                "lacks format D32_SFLOAT depth\n",
+            ],
+        );
+        let outcome = Case::new("work").layer(&[("VKFAULT_API", "1.2")]).run();
+        outcome.fails_with(4, &["offers Vulkan 1.2.0, needs 1.3.0"]);
+        let outcome = Case::new("work").env("LUCERNA_DEVICE", "no such device").run();
+        outcome.fails_with(4, &["has not `no such device` in its name"]);
+    }
+}
+
+// Row 6.
+#[test]
+fn optional_abilities_may_be_missing() {
+    if have_device() {
+        let whole = Case::new("capabilities").run();
+        whole.succeeds();
+        let poor = Case::new("capabilities")
+            .layer(&[
+                ("VKFAULT_HIDE_EXT", "VK_EXT_shader_atomic_float"),
+                ("VKFAULT_HIDE_FEATURE", "samplerAnisotropy,depthClamp"),
+                // D32_SFLOAT_S8_UINT
+                ("VKFAULT_HIDE_FORMAT", "130"),
+                (
+                    "VKFAULT_LIMIT",
+                    "minStorageBufferOffsetAlignment=256,maxPushConstantsSize=128,nonCoherentAtomSize=256",
+                ),
+            ])
+            .run();
+        poor.succeeds();
+        for line in ["anisotropy false", "float atomics false", "depth clamp false", "alignment 256", "push 128"] {
+            assert!(poor.out.contains(line), "no `{line}` in {poor:#?}");
+        }
+        assert!(!poor.out.contains("D32_SFLOAT_S8"), "{poor:#?}");
+    }
+}
+
+// Row 7.
+#[test]
+fn a_missing_validation_layer_warns_and_fails_in_ci() {
+    if have_device() {
+        let program = Case::new("work").env("VK_LAYER_PATH", "/nowhere").env_remove("VK_INSTANCE_LAYERS").run();
+        program.succeeds();
+        assert!(program.err.contains("VK_LAYER_KHRONOS_validation is not installed"), "{program:#?}");
+        let ci = Case::new("harness").env("VK_LAYER_PATH", "/nowhere").env("CI", "1").run();
+        ci.fails_with(101, &["the validation layer is not installed, and CI is set"]);
+    }
+}
+
+// Row 7, the other half: no device under CI.
+#[test]
+fn no_device_fails_in_ci_and_is_skipped_loudly_elsewhere() {
+    let case = |ci: bool| {
+        let case = Case::new("harness");
+        let missing = case.path("missing.json");
+        let case = case.env("VK_DRIVER_FILES", &missing).env("VK_ICD_FILENAMES", &missing);
+        if ci { case.env("CI", "1") } else { case.env_remove("CI") }.run()
+    };
+    case(true).fails_with(101, &["no Vulkan driver"]);
+    let skipped = case(false);
+    skipped.succeeds();
+    assert!(skipped.err.contains("SKIPPED"), "{skipped:#?}");
+}
+
+// Row 8.
+#[test]
+fn device_memory_that_ran_out_is_an_error_with_sizes() {
+    if have_device() {
+        let outcome = Case::new("work").layer(&[("VKFAULT", "vkAllocateMemory@1=OOM_DEVICE")]).run();
+        outcome.succeeds();
+        let outcome = Case::new("work").layer(&[("VKFAULT", "vkAllocateMemory@1+=OOM_DEVICE")]).run();
+        outcome.fails_with(5, &["no memory for `", "asked for", "in use on", "Use a smaller image"]);
+        let outcome = Case::new("work").layer(&[("VKFAULT_HEAP_MB", "1")]).run();
+        outcome.succeeds();
+        let outcome = Case::new("work").layer(&[("VKFAULT_HEAP_MB", "0")]).run();
+        outcome.fails_with(5, &["no memory for `"]);
+    }
+}
+
+// Row 9.
+#[test]
+fn host_memory_that_ran_out_is_an_error() {
+    if have_device() {
+        let outcome = Case::new("work").layer(&[("VKFAULT", "vkAllocateMemory@1+=OOM_HOST")]).run();
+        outcome.fails_with(5, &["no memory for `"]);
+        let outcome = Case::new("work").layer(&[("VKFAULT", "vkCreateDevice=OOM_HOST")]).run();
+        outcome.fails_with(5, &["host memory ran out in vkCreateDevice"]);
+    }
+}
+
+// Row 10.
+#[test]
+fn a_pipeline_that_cannot_be_made_names_its_shader() {
+    if have_device() {
+        for (rule, parts) in [
+            ("vkCreateComputePipelines=UNKNOWN", ["test.successor: ", "vkCreateComputePipelines"]),
+            ("vkCreateGraphicsPipelines=UNKNOWN", ["test.show: ", "vkCreateGraphicsPipelines"]),
+            ("vkCreateShaderModule@2=UNKNOWN", ["test.show: ", "vkCreateShaderModule of the Vertex stage"]),
+            ("vkAllocateDescriptorSets=UNKNOWN", ["test.successor: ", "vkAllocateDescriptorSets"]),
+            ("vkCreateImageView=UNKNOWN", ["vkCreateImageView of `picture`", ""]),
+        ] {
+            Case::new("work").layer(&[("VKFAULT", rule)]).run().fails_with(1, &parts);
+        }
+    }
+}
+
+// Row 11.
+#[test]
+fn a_device_lost_at_submit_or_wait_names_the_pass() {
+    if have_device() {
+        let outcome = Case::new("work").layer(&[("VKFAULT", "vkQueueSubmit2@5=DEVICE_LOST")]).run();
+        outcome.fails_with(6, &["successors: ", "vkQueueSubmit2 of pass", "test.successor"]);
+        let outcome = Case::new("work").layer(&[("VKFAULT", "vkWaitForFences@5=DEVICE_LOST")]).run();
+        outcome.fails_with(6, &["successors: ", "vkWaitForFences, ", "pass `test.successor`"]);
+    }
+}
+
+// Row 11, as a driver reports it: Mesa gives the device up when a wait takes longer.
+#[test]
+fn a_device_that_the_driver_gives_up_names_the_pass() {
+    if have_device() {
+        let outcome = Case::new("long").env("MESA_VK_MAX_TIMEOUT", "100").run();
+        if outcome.code != Some(0) || is_mesa() {
+            outcome.fails_with(6, &["frame 7: ", "device was lost in vkWaitForFences", "in pass `test.slow` (2 of 3)"]);
+        }
+    }
+}
+
+// Row 12.
+#[test]
+fn a_wait_that_never_ends_is_given_up_and_names_the_pass() {
+    if have_device() {
+        let outcome = Case::new("work")
+            .layer(&[("VKFAULT", "vkWaitForFences@5+=TIMEOUT")])
+            .env("LUCERNA_WAIT_LIMIT", "0.3")
+            .run();
+        outcome.fails_with(6, &["successors: the device did not finish within 0.", "pass `test.successor`"]);
+        // Once is no fault.
+        Case::new("work").layer(&[("VKFAULT", "vkWaitForFences@5=TIMEOUT")]).run().succeeds();
+    }
+}
+
+// Row 12 without a layer: the device really works longer than the limit.
+#[test]
+fn a_pass_longer_than_the_limit_is_given_up_by_name() {
+    if have_device() && is_cpu() {
+        let outcome = Case::new("long").env("LUCERNA_WAIT_LIMIT", "0.2").run();
+        outcome.fails_with(6, &["frame 7: the device did not finish within 0.2 s, in pass `test.slow` (2 of 3)"]);
+    }
+}
+
+fn is_mesa() -> bool {
+    gpu::list_devices().is_ok_and(|list| list.iter().all(|d| d.description.driver.contains("llvmpipe")))
+}
+
+fn is_cpu() -> bool {
+    gpu::list_devices().is_ok_and(|list| list.iter().all(|d| d.description.kind == gpu::DeviceKind::Cpu))
+}
+
+#[track_caller]
+fn each(faults: &[&str]) {
+    if have_device() {
+        for fault in faults {
+            let outcome = Case::new(&format!("each:{fault}")).layer(&[]).run();
+            outcome.succeeds();
+            print!(
+                "{}",
+                outcome.out.lines().filter(|l| l.contains(" runs")).map(|l| format!("{l}\n")).collect::<String>()
+            );
+        }
+    }
+}
+
+// The n-th failure loop (rows 8 to 11): every call of each function fails once, and from then on.
+#[test]
+fn every_allocation_may_fail() {
+    each(&["vkAllocateMemory OOM_DEVICE", "vkAllocateMemory OOM_HOST", "vkMapMemory OOM_HOST"]);
+}
+
+#[test]
+fn every_creation_of_a_resource_may_fail() {
+    each(&[
+        "vkCreateBuffer OOM_DEVICE",
+        "vkBindBufferMemory OOM_DEVICE",
+        "vkCreateImage OOM_HOST",
+        "vkBindImageMemory OOM_DEVICE",
+        "vkCreateImageView OOM_HOST",
+        "vkCreateSampler OOM_DEVICE",
+        "vkCreateQueryPool OOM_HOST",
+    ]);
+}
+
+#[test]
+fn every_creation_for_pipelines_may_fail() {
+    each(&[
+        "vkCreateShaderModule OOM_HOST",
+        "vkCreateDescriptorSetLayout OOM_HOST",
+        "vkCreatePipelineLayout OOM_HOST",
+        "vkCreatePipelineCache OOM_HOST",
+        "vkCreateComputePipelines OOM_DEVICE",
+        "vkCreateGraphicsPipelines OOM_DEVICE",
+        "vkCreateDescriptorPool OOM_HOST",
+        "vkAllocateDescriptorSets UNKNOWN",
+    ]);
+}
+
+#[test]
+fn every_step_of_a_submission_may_fail() {
+    each(&[
+        "vkCreateCommandPool OOM_HOST",
+        "vkAllocateCommandBuffers OOM_HOST",
+        "vkBeginCommandBuffer OOM_HOST",
+        "vkEndCommandBuffer OOM_DEVICE",
+        "vkCreateFence OOM_HOST",
+        "vkQueueSubmit2 OOM_HOST",
+    ]);
+}
+
+#[test]
+fn the_device_may_be_lost_at_every_submit_and_wait() {
+    each(&["vkQueueSubmit2 DEVICE_LOST", "vkWaitForFences DEVICE_LOST", "vkGetQueryPoolResults DEVICE_LOST"]);
+}
