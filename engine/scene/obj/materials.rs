@@ -65,7 +65,9 @@ impl Textures<'_> {
             }
             Some(4 | 6 | 7) => {
                 (out.transmission, out.roughness) = (1.0, 0.0);
-                out.base_color = Vec3::from(mtl.filter.unwrap_or([1.0; 3])).min(Vec3::ONE).extend(1.0);
+                // Programs do not agree whether the filter says what passes or what stays; a dark one means clear glass.
+                let filter = mtl.filter.map(Vec3::from).filter(|filter| filter.max_element() > 0.5);
+                out.base_color = filter.unwrap_or(Vec3::ONE).min(Vec3::ONE).extend(1.0);
             }
             _ if mtl.diffuse.is_some_and(|color| black(color.into()))
                 && !black(specular)

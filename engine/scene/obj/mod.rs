@@ -16,6 +16,7 @@ use super::{
     budget::Budget,
     folder::{self, Folder, shorten},
     notes::Notes,
+    surface,
 };
 use crate::{Error, Result};
 use glam::{Vec3, Vec4};
@@ -44,8 +45,9 @@ pub(crate) fn read(path: &Path, bytes: &[u8], limits: &Limits) -> Result<Scene> 
         notes.ignored(keyword.as_str(), format!("{count} elements are not drawn; only faces are"));
     }
     let folder = Folder::of(path)?;
-    let (materials, textures) = read_materials(&obj, &folder, limits, &budget, &mut notes)?;
+    let (mut materials, textures) = read_materials(&obj, &folder, limits, &budget, &mut notes)?;
     let meshes = read_meshes(&obj, &materials, &budget, &mut notes)?;
+    surface::drop_unused_default(&mut materials, &meshes);
     let nodes = meshes
         .iter()
         .enumerate()
@@ -108,19 +110,24 @@ fn read_materials(
     }
     let mut textures = Textures { folder, limits, budget, notes, textures: Vec::new(), known: HashMap::new() };
     let mut out = Vec::with_capacity(obj.materials.len() + 1);
+    let mut missing = Vec::new();
     for name in &obj.materials {
         out.push(match known.get(name) {
             Some((mtl, path)) => textures.material(mtl).map_err(|error| error.in_file(path))?,
             None => {
-                textures
-                    .notes
-                    .approximated("usemtl", format!("material {name:?} is in no material file; grey stands in"));
+                missing.push(format!("{:?}", shorten(name)));
                 grey(name)
             }
         });
     }
     out.push(grey("default"));
     let textures = textures.textures;
+    if !missing.is_empty() {
+        let names = missing[..missing.len().min(8)].join(", ");
+        let more = if missing.len() > 8 { ", …" } else { "" };
+        let text = format!("{} are in no material file, grey stands in: {names}{more}", missing.len());
+        notes.approximated("usemtl", text);
+    }
     if out.len() > 1 && !known.is_empty() {
         notes.approximated("materials", "Phong materials are converted to metallic-roughness");
     }
