@@ -3,10 +3,6 @@
 
 use super::{Material, Mesh, Primitive};
 use glam::{DVec3, Vec3, Vec4};
-use std::collections::HashMap;
-
-/// Where more triangles than this meet, normals are those of the triangles: the search takes the square of their number.
-const MAX_AROUND: usize = 256;
 
 /// What was repaired, for the scene's notes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -83,66 +79,6 @@ impl Primitive {
             .collect();
         // Differences to normals that the file does not have mean nothing.
         self.morphs.iter_mut().for_each(|morph| morph.normals.clear());
-    }
-
-    /// Computes the normals that are zero from the triangles around their place that meet the corner's own triangle at
-    /// an angle of at least the cosine `smooth`, weighted by area and angle. Splits vertices at sharper edges.
-    pub(crate) fn smooth_normals(&mut self, smooth: f32) {
-        if self.normals.iter().all(|&normal| normal != Vec3::ZERO) {
-            return;
-        }
-        // Triangles around each place; vertices of equal position are one place.
-        let mut place_of: HashMap<[u32; 3], u32> = HashMap::with_capacity(self.positions.len());
-        let places: Vec<u32> = self
-            .positions
-            .iter()
-            .map(|position| {
-                let next = place_of.len() as u32;
-                *place_of.entry(position.to_array().map(|value| (value + 0.0).to_bits())).or_insert(next)
-            })
-            .collect();
-        let mut around: Vec<Vec<(u32, f32)>> = vec![Vec::new(); place_of.len()];
-        let mut faces = Vec::with_capacity(self.indices.len() / 3);
-        for (triangle, corners) in self.indices.chunks_exact(3).enumerate() {
-            let p = [0, 1, 2].map(|c| self.positions[corners[c] as usize]);
-            let area = area_vector(p);
-            faces.push((area.normalize_or_zero().as_vec3(), area.length() as f32));
-            for c in 0..3 {
-                let (to, fro) = (p[(c + 1) % 3] - p[c], p[(c + 2) % 3] - p[c]);
-                let angle = if to == Vec3::ZERO || fro == Vec3::ZERO { 0.0 } else { to.angle_between(fro) };
-                around[places[corners[c] as usize] as usize].push((triangle as u32, angle));
-            }
-        }
-        let mut from = Vec::with_capacity(self.positions.len());
-        let mut normals = Vec::with_capacity(self.positions.len());
-        let mut known: HashMap<(u32, [u32; 3]), u32> = HashMap::with_capacity(self.positions.len());
-        let indices = std::mem::take(&mut self.indices);
-        self.indices.reserve_exact(indices.len());
-        for (i, &index) in indices.iter().enumerate() {
-            let own = faces[i / 3].0;
-            let given = self.normals[index as usize];
-            let neighbours = &around[places[index as usize] as usize];
-            let normal = if given != Vec3::ZERO {
-                given
-            } else if neighbours.len() > MAX_AROUND {
-                own
-            } else {
-                let near = neighbours.iter().map(|&(face, angle)| (faces[face as usize], angle));
-                near.filter(|((normal, _), _)| normal.dot(own) >= smooth)
-                    .map(|((normal, area), angle)| normal * area * angle)
-                    .sum::<Vec3>()
-                    .try_normalize()
-                    .unwrap_or(own)
-            };
-            let vertex = known.entry((index, normal.to_array().map(f32::to_bits))).or_insert_with(|| {
-                from.push(index);
-                normals.push(normal);
-                from.len() as u32 - 1
-            });
-            self.indices.push(*vertex);
-        }
-        self.gather_vertices(&from);
-        self.normals = normals;
     }
 
     /// Makes normals unit length; those without a direction get that of the triangles around. Says how many those were.
@@ -244,30 +180,6 @@ mod tests {
         assert_eq!(primitive.normals[..3], [Vec3::Z; 3]);
         let want = Vec3::new(1.0, -1.0, 1.0).normalize();
         assert!(primitive.normals[3..].iter().all(|n| n.abs_diff_eq(want, 1e-6)), "{:?}", primitive.normals);
-    }
-
-    #[test]
-    fn edges_are_smooth_up_to_the_angle() {
-        // Two quads that share an edge and meet at `angle`; the second has its own vertices there.
-        for (angle, smooth) in [(40.0f32, true), (50.0, false)] {
-            let (sin, cos) = angle.to_radians().sin_cos();
-            let far = Vec3::new(1.0 + cos, 0.0, sin);
-            let points =
-                [Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Y, Vec3::Y, Vec3::X, far, far + Vec3::Y, Vec3::X + Vec3::Y];
-            let mut primitive = Primitive {
-                positions: points.to_vec(),
-                normals: vec![Vec3::ZERO; 8],
-                indices: vec![0, 1, 2, 0, 2, 3, 4, 5, 6, 4, 6, 7],
-                ..Primitive::default()
-            };
-            primitive.smooth_normals(std::f32::consts::FRAC_1_SQRT_2);
-            assert_eq!(primitive.positions.len(), 8);
-            let half = (angle / 2.0).to_radians();
-            let mean = Vec3::new(-half.sin(), 0.0, half.cos());
-            let (edge, border) = (primitive.normals[primitive.indices[1] as usize], primitive.normals[0]);
-            assert!(border.abs_diff_eq(Vec3::Z, 1e-6));
-            assert!(edge.abs_diff_eq(if smooth { mean } else { Vec3::Z }, 1e-2), "{angle}° gives {edge}");
-        }
     }
 
     #[test]

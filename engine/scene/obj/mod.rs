@@ -12,14 +12,15 @@ mod parse;
 mod polygon;
 
 use super::{
-    Limits, Material, Mesh, Node, Primitive, Scene,
+    Limits, Material, Mesh, Node, Primitive, Scene, Transform,
     budget::Budget,
     folder::{self, Folder, shorten},
+    normals,
     notes::Notes,
     surface,
 };
 use crate::{Error, Result};
-use glam::{Vec3, Vec4};
+use glam::{Quat, Vec3, Vec4};
 use materials::Textures;
 use parse::{Corner, NONE, Obj, Part};
 use std::{
@@ -28,11 +29,11 @@ use std::{
     path::Path,
 };
 
-/// Edges flatter than this are smooth where normals are missing: cos 45°.
-pub(crate) const SMOOTH: f32 = std::f32::consts::FRAC_1_SQRT_2;
+/// Edges flatter than this are smooth where normals are missing: 45° in radians.
+const CREASE: f32 = std::f32::consts::FRAC_PI_4;
 
-/// Reads the scene in `bytes`, the content of the file `path`.
-pub(crate) fn read(path: &Path, bytes: &[u8], limits: &Limits) -> Result<Scene> {
+/// Reads the scene in `bytes`, the content of the file `path`, whose unit is `unit` metres.
+pub(crate) fn read(path: &Path, bytes: &[u8], unit: f32, limits: &Limits) -> Result<Scene> {
     let budget = Budget::new(limits);
     budget.read(bytes.len());
     let text = decode_text(bytes);
@@ -48,10 +49,11 @@ pub(crate) fn read(path: &Path, bytes: &[u8], limits: &Limits) -> Result<Scene> 
     let (mut materials, textures) = read_materials(&obj, &folder, limits, &budget, &mut notes)?;
     let meshes = read_meshes(&obj, &materials, &budget, &mut notes)?;
     surface::drop_unused_default(&mut materials, &meshes);
+    let local = Transform::Trs { translation: Vec3::ZERO, rotation: Quat::IDENTITY, scale: Vec3::splat(unit) };
     let nodes = meshes
         .iter()
         .enumerate()
-        .map(|(i, mesh)| Node { name: mesh.name.clone(), mesh: Some(i as u32), ..Node::default() })
+        .map(|(i, mesh)| Node { name: mesh.name.clone(), mesh: Some(i as u32), local, ..Node::default() })
         .collect();
     Ok(Scene {
         name: path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
@@ -198,7 +200,7 @@ fn primitive(
     if out.indices.is_empty() {
         return Ok(None);
     }
-    out.smooth_normals(SMOOTH);
+    supply_normals(&mut out);
     out.repair_normals();
     match &materials[material].normal_texture {
         Some(_) => {
@@ -208,4 +210,19 @@ fn primitive(
         None => out.tangents = vec![Vec4::ZERO; out.positions.len()],
     }
     Ok(Some(out))
+}
+
+/// Computes the normals that the file leaves out, which are zero.
+fn supply_normals(primitive: &mut Primitive) {
+    if primitive.normals.iter().all(|&normal| normal != Vec3::ZERO) {
+        return;
+    }
+    let computed = normals::creased(&primitive.positions, &primitive.indices, CREASE);
+    primitive.gather_vertices(&computed.source);
+    primitive.indices = computed.indices;
+    for (normal, computed) in primitive.normals.iter_mut().zip(computed.normals) {
+        if *normal == Vec3::ZERO {
+            *normal = computed;
+        }
+    }
 }
