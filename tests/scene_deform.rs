@@ -1,0 +1,93 @@
+//! Skinning and morphing on the GPU against the CPU.
+
+mod scene_kit;
+
+use glam::{Mat4, Quat, Vec3, Vec4};
+use lucerna::{
+    gpu::testing::with_gpu,
+    scene::{Material, MorphTarget, Node, Pose, Scene, Skin, Transform, deform::world_vertices},
+};
+use scene_kit::*;
+
+/// A cylinder of two bones that bends and bulges; two nodes share its mesh.
+fn figure() -> Scene {
+    let mut scene = Scene::default();
+    let mut body = sphere(12);
+    let count = body.positions.len();
+    body.tangents = body.normals.iter().map(|n| n.any_orthonormal_vector().extend(1.0)).collect();
+    let share = |p: &Vec3| 0.5 + 0.5 * p.y;
+    body.joints = vec![vec![[0, 1, 0, 0]; count], vec![[1, 0, 0, 0]; count]];
+    // Eight influences: the second set carries a quarter of the second joint's share.
+    body.weights = vec![
+        body.positions.iter().map(|p| Vec4::new(1.0 - share(p), 0.75 * share(p), 0.0, 0.0)).collect(),
+        body.positions.iter().map(|p| Vec4::new(0.25 * share(p), 0.0, 0.0, 0.0)).collect(),
+    ];
+    body.morphs = vec![
+        MorphTarget {
+            positions: body.positions.iter().map(|p| Vec3::new(0.5 * p.x, 0.0, 0.0)).collect(),
+            normals: body.normals.iter().map(|n| Vec3::new(-0.3 * n.x, 0.0, 0.0)).collect(),
+            ..MorphTarget::default()
+        },
+        MorphTarget { positions: vec![Vec3::new(0.0, 0.0, 0.7); count], ..MorphTarget::default() },
+    ];
+    let mesh = mesh(&mut scene, body, Material::diffuse("", Vec3::splat(0.5)));
+    let joint = |m| Node { local: Transform::Matrix(m), ..Node::default() };
+    scene.nodes.push(joint(Mat4::from_translation(Vec3::new(0.3, 0.0, -0.2))));
+    scene.nodes.push(Node {
+        parent: Some(0),
+        ..joint(Mat4::from_rotation_translation(Quat::from_rotation_z(0.9), Vec3::new(0.0, 1.0, 0.0)))
+    });
+    let inverse_bind = vec![Mat4::IDENTITY, Mat4::from_translation(Vec3::new(0.0, -1.0, 0.0))];
+    scene.skins = vec![Skin { name: String::new(), joints: vec![0, 1], inverse_bind }];
+    let shown = |weights: Vec<f32>, skin| Node { mesh: Some(mesh), skin, weights, ..Node::default() };
+    scene.nodes.push(shown(vec![0.4, 0.0], Some(0)));
+    scene.nodes.push(shown(vec![-0.5, 1.5], None));
+    scene
+}
+
+#[test]
+fn skinned_and_morphed_vertices_are_those_of_the_cpu() {
+    let scene = figure();
+    let pose = Pose::rest(&scene);
+    let primitive = &scene.meshes[0].primitives[0];
+    let count = primitive.positions.len();
+    with_gpu(|gpu| {
+        let (frame, [positions, normals, tangents]) = frame(gpu, &scene, |graph, handles| {
+            [handles.positions, handles.normals, handles.tangents].map(|b| graph.read_buffer(b))
+        });
+        let positions = frame.buffer::<[f32; 3]>(positions);
+        let normals = frame.buffer::<[f32; 3]>(normals);
+        let tangents = frame.buffer::<[f32; 4]>(tangents);
+        assert_eq!(positions.len(), 3 * count, "the vertices at rest and two deformed copies");
+        for (copy, node) in [(1, 2), (2, 3)] {
+            let twin = world_vertices(&scene, &pose, node, primitive);
+            let mut moved = 0.0_f32;
+            for v in 0..count {
+                let at = copy * count + v;
+                let near = |a: Vec3, b: Vec3| a.abs_diff_eq(b, 2e-5);
+                assert!(near(positions[at].into(), twin.positions[v]), "{node} {v}");
+                assert!(near(normals[at].into(), twin.normals[v]), "{node} {v}: {:?} {}", normals[at], twin.normals[v]);
+                assert!(Vec4::from(tangents[at]).abs_diff_eq(twin.tangents[v], 2e-5), "{node} {v}");
+                moved = moved.max(twin.positions[v].distance(primitive.positions[v]));
+            }
+            assert!(moved > 0.5, "the pose must move something");
+        }
+        assert!((0..count).all(|v| positions[v] == primitive.positions[v].to_array()), "the rest stays");
+    });
+}
+
+#[test]
+fn deforming_twice_starts_from_the_rest_each_time() {
+    let scene = figure();
+    with_gpu(|gpu| {
+        let mut resident = lucerna::scene::resident::Resident::new(gpu, &scene).unwrap();
+        let mut runner = lucerna::graph::Runner::new(gpu);
+        let mut run = || {
+            let mut graph = lucerna::graph::Graph::new("twice");
+            let handles = resident.frame(&mut graph, &scene, 0.0);
+            let read = graph.read_buffer(handles.positions);
+            runner.run(graph).unwrap().buffer::<[f32; 3]>(read)
+        };
+        assert_eq!(run(), run());
+    });
+}

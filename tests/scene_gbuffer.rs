@@ -1,0 +1,269 @@
+//! The G-buffer of known scenes against closed forms.
+
+mod scene_kit;
+
+use glam::{Mat4, Quat, Vec2, Vec3};
+use lucerna::{
+    gpu::testing::with_gpu,
+    graph::{Graph, Runner},
+    passes::gbuffer::{Blended, Normals, Settings},
+    scene::{AlphaMode, Camera, Material, Projection, Scene, View},
+    shaders::{test::view as view_shader, types},
+};
+use scene_kit::*;
+
+const EXTENT: [u32; 2] = [96, 64];
+
+/// World-space ray through the centre of pixel `i`.
+fn ray(view: &View, i: usize) -> (Vec3, Vec3) {
+    let uv = pixel_uv(i);
+    let (a, b) = (view.world_from_depth(uv, 0.01), view.world_from_depth(uv, 1.0));
+    (a, (b - a).normalize())
+}
+
+fn pixel_uv(i: usize) -> Vec2 {
+    let [w, h] = EXTENT.map(|e| e as usize);
+    Vec2::new(((i % w) as f32 + 0.5) / w as f32, ((i / w) as f32 + 0.5) / h as f32)
+}
+
+#[test]
+fn positions_come_back_from_linear_depth_on_the_gpu() {
+    for orthographic in [false, true] {
+        let projection = match orthographic {
+            false => Projection::Perspective { yfov: 0.9, aspect: None, znear: 0.1, zfar: Some(60.0) },
+            true => Projection::Orthographic { xmag: 4.0, ymag: 3.0, znear: 0.1, zfar: 60.0 },
+        };
+        let camera = Camera { name: String::new(), projection };
+        let view = View::new(&camera, look(Vec3::new(3.0, 2.0, 5.0), Vec3::new(-1.0, 0.5, 0.0)), [640, 480]);
+        let probes: Vec<types::ViewProbe> = (0..200)
+            .map(|i| {
+                let t = i as f32 / 200.0;
+                let uv = [(t * 7.3).fract(), (t * 13.7).fract()];
+                types::ViewProbe { uv, z: 0.01 + 0.99 * t, ..Default::default() }
+            })
+            .collect();
+        with_gpu(|gpu| {
+            let mut graph = Graph::new("view");
+            let buffer = graph.buffer_from("probes", &probes);
+            let args = view_shader::Args { view: graph.uniform(&view.uniform()), probes: buffer };
+            graph.compute(args, probes.len() as u32);
+            let read = graph.read_buffer(buffer);
+            let frame = Runner::new(gpu).run(graph).unwrap();
+            for probe in frame.buffer::<types::ViewProbe>(read) {
+                let eye = view.view_from_world.transform_point3(probe.world.into());
+                assert!((-eye.z - probe.z * view.far).abs() < 1e-3, "eye distance of {probe:?} is {}", -eye.z);
+                assert!((probe.z_back - probe.z).abs() < 1e-5, "{probe:?}");
+                assert!(Vec2::from(probe.uv_back).distance(probe.uv.into()) < 1e-4, "{probe:?}");
+                let expected = view.world_from_depth(probe.uv.into(), probe.z);
+                assert!(expected.distance(probe.world.into()) < 1e-3, "{probe:?}");
+            }
+        });
+    }
+}
+
+#[test]
+fn a_plane_has_its_albedo_normal_depth_and_emission() {
+    let mut scene = Scene::default();
+    let material = Material {
+        metallic: 0.25,
+        roughness: 0.6,
+        emissive: Vec3::new(0.0, 3.0, 0.5),
+        ior: 2.0,
+        ..Material::diffuse("", Vec3::new(0.8, 0.4, 0.1))
+    };
+    let plane = mesh(&mut scene, square(), material);
+    place(&mut scene, plane, Mat4::from_scale(Vec3::splat(2.0)));
+    let view = view(Vec3::new(0.0, 3.0, 4.0), Vec3::ZERO, EXTENT);
+    with_gpu(|gpu| {
+        let got = surfaces(gpu, &scene, &view, Settings::default());
+        let mut seen = 0;
+        for i in 0..got.depth.len() {
+            let (origin, direction) = ray(&view, i);
+            let t = -origin.y / direction.y;
+            let hit = origin + direction * t;
+            let inside = t > 0.0 && hit.x.abs().max(hit.z.abs()) <= 2.0;
+            if (hit.x.abs() - 2.0).abs().min((hit.z.abs() - 2.0).abs()) < 0.05 {
+                continue; // the edge may fall on either side
+            }
+            if !inside {
+                assert_eq!(got.depth[i], 1.0, "background has exactly depth 1");
+                assert_eq!(got.albedo[i][3], 0.0);
+                continue;
+            }
+            seen += 1;
+            let expected = view.view_from_world.transform_point3(hit).z / -view.far;
+            assert!((got.depth[i] - expected).abs() < 1e-4 * expected, "{} {expected}", got.depth[i]);
+            let back = view.world_from_depth(pixel_uv(i), got.depth[i]);
+            assert!(back.distance(hit) < 2e-3, "{back} {hit}");
+            assert!(got.normal[i].abs_diff_eq(Vec3::Y, 1e-3), "{}", got.normal[i]);
+            for (c, rho) in [0.8, 0.4, 0.1].into_iter().enumerate() {
+                // sRGB8 keeps about half a percent.
+                assert!((got.albedo[i][c] - 0.75 * rho).abs() < 4e-3, "{:?}", got.albedo[i]);
+                // F0 of index 2 is 1/9.
+                let f0 = 0.75 / 9.0 + 0.25 * rho;
+                assert!((got.specular[i][c] - f0).abs() < 3e-3, "{:?}", got.specular[i]);
+            }
+            assert!((got.specular[i][3] - 0.6).abs() < 3e-3);
+            assert_eq!(got.emission[i], [0.0, 3.0, 0.5, 1.0]);
+            assert_eq!(got.albedo[i][3], 1.0);
+        }
+        assert!(seen > 500, "{seen} pixels show the plane");
+    });
+}
+
+#[test]
+fn a_sphere_has_the_normals_and_depths_of_a_sphere_in_both_encodings() {
+    let mut scene = Scene::default();
+    let ball = mesh(&mut scene, sphere(96), Material::diffuse("", Vec3::splat(0.5)));
+    // Uneven scale: an ellipsoid, whose normals are not scaled positions.
+    let world = Mat4::from_scale_rotation_translation(
+        Vec3::new(1.5, 0.7, 1.0),
+        Quat::from_rotation_z(0.4),
+        Vec3::new(0.2, 0.1, 0.0),
+    );
+    place(&mut scene, ball, world);
+    let view = view(Vec3::new(0.5, 1.0, 4.0), Vec3::ZERO, EXTENT);
+    with_gpu(|gpu| {
+        for (normals, tolerance) in [(Normals::Octahedral, 0.04), (Normals::Bytes, 0.045)] {
+            let got = surfaces(gpu, &scene, &view, Settings { normals, ..Settings::default() });
+            let local = world.inverse();
+            let mut seen = 0;
+            for i in 0..got.depth.len() {
+                let (origin, direction) = ray(&view, i);
+                let (o, d) = (local.transform_point3(origin), local.transform_vector3(direction));
+                let (a, b, c) = (d.dot(d), o.dot(d), o.dot(o) - 1.0);
+                let root = b * b - a * c;
+                // Grazing pixels see the polygons of the mesh.
+                if root < 0.05 * a {
+                    continue;
+                }
+                let t = (-b - root.sqrt()) / a;
+                let hit = origin + direction * t;
+                let at = o + d * t;
+                let normal = (local.transpose().transform_vector3(at)).normalize();
+                let depth = -view.view_from_world.transform_point3(hit).z / view.far;
+                assert!((got.depth[i] - depth).abs() < 2e-3 * depth, "{} {depth}", got.depth[i]);
+                assert!(got.normal[i].distance(normal) < tolerance, "{} {normal}", got.normal[i]);
+                seen += 1;
+            }
+            assert!(seen > 400, "{seen}");
+        }
+    });
+}
+
+fn crowd(shared: bool) -> Scene {
+    let mut scene = Scene::default();
+    let make = |scene: &mut Scene| mesh(scene, sphere(8), Material::diffuse("", Vec3::new(0.2, 0.5, 0.7)));
+    let one = make(&mut scene);
+    for i in 0..25 {
+        let which = if shared || i == 0 { one } else { make(&mut scene) };
+        let at = Vec3::new((i % 5) as f32 - 2.0, (i / 5) as f32 - 2.0, -0.3 * i as f32);
+        // Every other one is mirrored.
+        let scale = Vec3::new(if i % 2 == 0 { 0.4 } else { -0.4 }, 0.4, 0.4);
+        place(&mut scene, which, Mat4::from_scale_rotation_translation(scale, Quat::IDENTITY, at));
+    }
+    scene
+}
+
+#[test]
+fn instances_look_like_copies() {
+    let view = view(Vec3::new(0.0, 0.0, 4.0), Vec3::ZERO, EXTENT);
+    with_gpu(|gpu| {
+        let shared = surfaces(gpu, &crowd(true), &view, Settings::default());
+        assert!(shared.depth.iter().filter(|d| **d < 1.0).count() > 1000);
+        assert_eq!(shared, surfaces(gpu, &crowd(false), &view, Settings::default()));
+    });
+}
+
+#[test]
+fn culling_changes_no_pixel() {
+    // Half of the crowd lies outside.
+    let view = view(Vec3::new(0.0, 0.0, 2.0), Vec3::new(2.0, 1.0, 0.0), EXTENT);
+    with_gpu(|gpu| {
+        let on = surfaces(gpu, &crowd(true), &view, Settings::default());
+        let off = surfaces(gpu, &crowd(true), &view, Settings { culling: false, ..Settings::default() });
+        assert_eq!(on, off);
+    });
+}
+
+#[test]
+fn sides_are_culled_shown_or_turned_to_the_viewer() {
+    // From below, the square shows its back.
+    for (double_sided, mirrored, below) in
+        [(false, false, true), (false, true, true), (true, false, true), (true, true, true), (false, true, false)]
+    {
+        let mut scene = Scene::default();
+        let material = Material { double_sided, ..Material::diffuse("", Vec3::ONE) };
+        let plane = mesh(&mut scene, square(), material);
+        let flip = if mirrored { -1.0 } else { 1.0 };
+        place(&mut scene, plane, Mat4::from_scale(Vec3::new(flip, 1.0, 1.0)));
+        let eye = Vec3::new(0.0, if below { -2.0 } else { 2.0 }, 0.5);
+        let view = view(eye, Vec3::ZERO, EXTENT);
+        with_gpu(|gpu| {
+            let got = surfaces(gpu, &scene, &view, Settings::default());
+            let middle = (EXTENT[1] / 2 * EXTENT[0] + EXTENT[0] / 2) as usize;
+            let label = format!("double-sided {double_sided}, mirrored {mirrored}, below {below}");
+            let visible = double_sided || !below;
+            assert_eq!(got.depth[middle] < 1.0, visible, "{label}");
+            if visible {
+                let towards = if below { Vec3::NEG_Y } else { Vec3::Y };
+                assert!(got.normal[middle].abs_diff_eq(towards, 1e-3), "{label}: {}", got.normal[middle]);
+            }
+        });
+    }
+}
+
+#[test]
+fn unlit_surfaces_only_emit_and_vertex_colours_multiply() {
+    let mut scene = Scene::default();
+    let mut primitive = square();
+    primitive.colors = vec![glam::Vec4::new(0.5, 0.25, 1.0, 1.0); 4];
+    let material = Material { unlit: true, ..Material::diffuse("", Vec3::new(0.8, 0.8, 0.2)) };
+    let plane = mesh(&mut scene, primitive, material);
+    place(&mut scene, plane, Mat4::from_scale(Vec3::splat(9.0)));
+    let view = view(Vec3::new(0.0, 2.0, 0.1), Vec3::ZERO, EXTENT);
+    with_gpu(|gpu| {
+        let got = surfaces(gpu, &scene, &view, Settings::default());
+        for i in 0..got.depth.len() {
+            assert_eq!(got.albedo[i], [0.0; 4]);
+            let [r, g, b, _] = got.emission[i];
+            assert!(Vec3::new(r, g, b).abs_diff_eq(Vec3::new(0.4, 0.2, 0.2), 1e-3), "{:?}", got.emission[i]);
+        }
+    });
+}
+
+#[test]
+fn alpha_cuts_dithers_or_hides() {
+    let coverage = |alpha: AlphaMode, opacity: f32, blended: Blended| {
+        let mut scene = Scene::default();
+        let mut material = Material::diffuse("", Vec3::ONE);
+        material.base_color.w = opacity;
+        material.alpha = alpha;
+        let plane = mesh(&mut scene, square(), material);
+        place(&mut scene, plane, Mat4::from_scale(Vec3::splat(9.0)));
+        let view = view(Vec3::new(0.0, 2.0, 0.1), Vec3::ZERO, EXTENT);
+        let mut share = 0.0;
+        with_gpu(|gpu| {
+            let got = surfaces(gpu, &scene, &view, Settings { blended, ..Settings::default() });
+            share = got.depth.iter().filter(|d| **d < 1.0).count() as f32 / got.depth.len() as f32;
+        });
+        share
+    };
+    assert_eq!(coverage(AlphaMode::Opaque, 0.1, Blended::Dithered), 1.0);
+    assert_eq!(coverage(AlphaMode::Mask { cutoff: 0.5 }, 0.49, Blended::Dithered), 0.0);
+    assert_eq!(coverage(AlphaMode::Mask { cutoff: 0.5 }, 0.51, Blended::Dithered), 1.0);
+    assert_eq!(coverage(AlphaMode::Blend, 0.3, Blended::Threshold), 0.0);
+    assert_eq!(coverage(AlphaMode::Blend, 0.9, Blended::Hidden), 0.0);
+    // 6144 pixels: three standard deviations are 0.018.
+    let dithered = coverage(AlphaMode::Blend, 0.3, Blended::Dithered);
+    assert!((dithered - 0.3).abs() < 0.02, "{dithered}");
+}
+
+#[test]
+fn an_empty_scene_is_all_background() {
+    let view = view(Vec3::Z, Vec3::ZERO, EXTENT);
+    with_gpu(|gpu| {
+        let got = surfaces(gpu, &Scene::default(), &view, Settings::default());
+        assert!(got.depth.iter().all(|d| *d == 1.0));
+    });
+}
