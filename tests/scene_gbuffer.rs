@@ -170,7 +170,7 @@ fn instances_look_like_copies() {
     let view = view(Vec3::new(0.0, 0.0, 4.0), Vec3::ZERO, EXTENT);
     with_gpu(|gpu| {
         let shared = surfaces(gpu, &crowd(true), &view, Settings::default());
-        assert!(shared.depth.iter().filter(|d| **d < 1.0).count() > 1000);
+        assert!(shared.depth.iter().filter(|d| **d < 1.0).count() > 300);
         assert_eq!(shared, surfaces(gpu, &crowd(false), &view, Settings::default()));
     });
 }
