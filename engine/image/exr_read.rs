@@ -1,9 +1,302 @@
-//! OpenEXR in.
-use super::{Layers, Metadata};
+//! OpenEXR files in: all parts and layers, scan lines and tiles, the largest level, all compressions of the `exr` crate.
+//!
+//! Chunks are decoded into our own planes, allocated after all sizes were checked: what a header says is never believed
+//! before.
+
+use std::{
+    io::Cursor,
+    panic::{AssertUnwindSafe, catch_unwind},
+};
+
+use exr::{
+    block::{reader::ChunksReader, reader::Reader},
+    meta::{
+        BlockDescription, MetaData,
+        attribute::{AttributeValue, EnvironmentMap, SampleType},
+        header::Header,
+    },
+    prelude::f16,
+};
+
+use super::{
+    Chromaticities, Layer, Layers, Metadata, Precision, check_size,
+    exr_write::{JSON, PREFIX},
+    zeroed,
+};
 use crate::{Error, Result, scene::Limits};
-pub(super) fn decode(_: &[u8], _: &Limits) -> Result<Layers> {
-    Err(Error::input("EXR files are not read yet"))
+
+/// Channels of all parts together. Cryptomatte files have a few dozen.
+const MAX_CHANNELS: usize = 1024;
+
+pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Layers> {
+    guarded(|| decode_unguarded(bytes, limits))
 }
-pub(super) fn metadata(_: &[u8]) -> Result<Metadata> {
-    Err(Error::input("EXR files are not read yet"))
+
+pub(super) fn metadata(bytes: &[u8]) -> Result<Metadata> {
+    guarded(|| read_metadata(&headers(bytes)?))
+}
+
+/// Turns a panic inside the decoder into an error. All sizes are checked before; this is the last resort against an
+/// index or an overflow in its decompression (there are known ones), so that one damaged file cannot end the process.
+fn guarded<T>(decode: impl FnOnce() -> Result<T>) -> Result<T> {
+    catch_unwind(AssertUnwindSafe(decode)).unwrap_or_else(|_| Err(Error::input("damaged: the EXR decoder gave up")))
+}
+
+fn damaged(error: exr::error::Error) -> Error {
+    Error::input("damaged or not served").caused_by(error)
+}
+
+fn headers(bytes: &[u8]) -> Result<Vec<Header>> {
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|error| damaged(error).at("header"))?;
+    Ok(meta.headers.into_vec())
+}
+
+/// Where the samples of a channel of the file go.
+#[derive(Clone, Copy, Default)]
+struct Slot {
+    layer: usize,
+    /// Position among the channels of the layer.
+    channel: usize,
+}
+
+fn decode_unguarded(bytes: &[u8], limits: &Limits) -> Result<Layers> {
+    let headers = headers(bytes)?;
+    let (width, height) = check_headers(&headers, bytes.len(), limits)?;
+    let (mut layers, slots) = lay_out(&headers);
+    for layer in &mut layers {
+        layer.data = zeroed(width * height * layer.channels.len())?;
+    }
+    // From pixels of a part's data window to pixels of the image.
+    let offset_of = |header: &Header| {
+        let display = header.shared_attributes.display_window.position;
+        let data = header.own_attributes.layer_position;
+        [i64::from(data.0) - i64::from(display.0), i64::from(data.1) - i64::from(display.1)]
+    };
+
+    let reader = Reader::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
+    let chunks = reader.all_chunks(false).map_err(|error| damaged(error).at("chunk table"))?;
+    let mut seen = vec![0u64; headers.len()];
+    for block in chunks.sequential_decompressor(false) {
+        let block = block.map_err(|error| damaged(error).at("pixels"))?;
+        let index = block.index;
+        let Some((header, slots)) = headers.get(index.layer).zip(slots.get(index.layer)) else { continue };
+        let offset = offset_of(header);
+        if index.level.0 != 0 || index.level.1 != 0 {
+            continue;
+        }
+        let pixels = index.pixel_size.0 as u64 * index.pixel_size.1 as u64;
+        seen[index.layer] += pixels;
+        let mut rest = &block.data[..];
+        for y in 0..index.pixel_size.1 {
+            for (channel, slot) in header.channels.list.iter().zip(slots) {
+                let bytes = index.pixel_size.0 * channel.sample_type.bytes_per_sample();
+                let cut = || Error::input("a chunk is shorter than its pixels").at("pixels");
+                let (line, tail) = rest.split_at_checked(bytes).ok_or_else(cut)?;
+                rest = tail;
+                let row = (index.pixel_position.1 + y) as i64 + offset[1];
+                let column = index.pixel_position.0 as i64 + offset[0];
+                put_line(
+                    line,
+                    channel.sample_type,
+                    [column, row],
+                    [width, height],
+                    &mut layers[slot.layer],
+                    slot.channel,
+                );
+            }
+        }
+    }
+    for (part, (header, seen)) in headers.iter().zip(seen).enumerate() {
+        let all = header.layer_size.0 as u64 * header.layer_size.1 as u64;
+        if seen < all {
+            return Err(Error::input(format!("{seen} of {all} pixels are there")).at(format!("part[{part}]")));
+        }
+    }
+
+    let mut picture = Layers { metadata: read_metadata(&headers)?, ..Layers::new(width as u32, height as u32) };
+    picture.layers = layers;
+    if let Some(given) = headers[0].shared_attributes.chromaticities {
+        let pair = |v: exr::math::Vec2<f32>| [v.0, v.1];
+        let given = Chromaticities {
+            red: pair(given.red),
+            green: pair(given.green),
+            blue: pair(given.blue),
+            white: pair(given.white),
+        };
+        if let Some(matrix) = given.rec709_from_rgb().map_err(|error| error.at("header"))? {
+            picture.layers.iter_mut().for_each(|layer| convert(layer, matrix));
+        }
+    }
+    Ok(picture)
+}
+
+/// Copies the part of a line of samples that lies inside the image.
+fn put_line(line: &[u8], kind: SampleType, [x, y]: [i64; 2], [width, height]: [usize; 2], layer: &mut Layer, k: usize) {
+    if y < 0 || y >= height as i64 {
+        return;
+    }
+    let stride = layer.channels.len();
+    let row = &mut layer.data[y as usize * width * stride..][..width * stride];
+    let value = |sample: &[u8]| match (kind, sample) {
+        (SampleType::F16, &[a, b]) => f16::from_ne_bytes([a, b]).to_f32(),
+        (SampleType::F32, &[a, b, c, d]) => f32::from_ne_bytes([a, b, c, d]),
+        (SampleType::U32, &[a, b, c, d]) => u32::from_ne_bytes([a, b, c, d]) as f32,
+        _ => 0.0,
+    };
+    let skip = usize::try_from(-x).unwrap_or(0);
+    let start = usize::try_from(x).unwrap_or(0).min(width);
+    let samples = line.chunks_exact(kind.bytes_per_sample()).skip(skip);
+    for (pixel, sample) in row[start * stride..].chunks_exact_mut(stride).zip(samples) {
+        pixel[k] = value(sample);
+    }
+}
+
+/// Size of the image (the display window), when everything that the headers ask for is within the limits.
+fn check_headers(headers: &[Header], file_bytes: usize, limits: &Limits) -> Result<(usize, usize)> {
+    let first = headers.first().ok_or_else(|| Error::input("no parts").at("header"))?;
+    let size = first.shared_attributes.display_window.size;
+    let channels: usize = headers.iter().map(|header| header.channels.list.len()).sum();
+    if channels == 0 || channels > MAX_CHANNELS {
+        return Err(Error::input(format!("{channels} channels, 1 to {MAX_CHANNELS} are read")).at("channels"));
+    }
+    // Every channel becomes f32.
+    check_size(size.0 as u64, size.1 as u64, 4 * channels as u64, limits).map_err(|e| e.at("displayWindow"))?;
+    for (i, header) in headers.iter().enumerate() {
+        let wrong = |what: String| Err(Error::input(what).at(format!("part[{i}]")));
+        if header.deep {
+            return wrong("deep pixels are not read".into());
+        }
+        if let Some(channel) = header.channels.list.iter().find(|c| c.sampling.0 != 1 || c.sampling.1 != 1) {
+            let (name, x, y) = (&channel.name, channel.sampling.0, channel.sampling.1);
+            return wrong(format!("channel {name} has one sample for {x}×{y} pixels, only 1×1 is read"));
+        }
+        let data = header.layer_size;
+        check_size(data.0 as u64, data.1 as u64, header.channels.bytes_per_pixel as u64, limits)
+            .map_err(|error| error.at("dataWindow"))?;
+        // No compression of the format packs more tightly than deflate (1032 : 1).
+        let pixel_bytes = data.0 as u64 * data.1 as u64 * header.channels.bytes_per_pixel as u64;
+        if pixel_bytes / 2048 > file_bytes as u64 {
+            return wrong(format!("{pixel_bytes} bytes of pixels cannot come from {file_bytes} bytes"));
+        }
+        // An entry in the table, a position and a length.
+        let least = header.chunk_count as u64 * 16;
+        if least > file_bytes as u64 {
+            return wrong(format!("{} chunks do not fit into {file_bytes} bytes", header.chunk_count));
+        }
+        // The decoder holds some chunks at a time.
+        let chunk = match header.blocks {
+            BlockDescription::Tiles(tiles) => (tiles.tile_size.0 as u64).checked_mul(tiles.tile_size.1 as u64),
+            BlockDescription::ScanLines => Some(data.0 as u64 * header.compression.scan_lines_per_block() as u64),
+        };
+        let chunk = chunk.and_then(|pixels| pixels.checked_mul(header.channels.bytes_per_pixel as u64));
+        if chunk.is_none_or(|bytes| bytes > limits.max_alloc / 4) {
+            return wrong(format!("chunks of more than {} bytes", limits.max_alloc / 4));
+        }
+    }
+    Ok((size.0, size.1))
+}
+
+/// Layer and channel from the names of a part and a channel.
+fn split_name(part: &str, channel: &str, many_parts: bool) -> (String, String) {
+    let (prefix, name) = channel.rsplit_once('.').unwrap_or(("", channel));
+    let layer = match (many_parts && !part.is_empty(), prefix) {
+        (false, "") if name == "Z" => "depth",
+        (false, _) => prefix,
+        (true, "") => part,
+        // Some programs name the part and repeat it in front of its channels.
+        (true, _) if prefix == part || prefix.starts_with(&format!("{part}.")) => prefix,
+        (true, _) => return (format!("{part}.{prefix}"), name.to_owned()),
+    };
+    (layer.to_owned(), name.to_owned())
+}
+
+/// The layers without their samples, the unnamed one first, and for each part where its channels go.
+fn lay_out(headers: &[Header]) -> (Vec<Layer>, Vec<Vec<Slot>>) {
+    let mut layers: Vec<Layer> = Vec::new();
+    let mut slots: Vec<Vec<Slot>> = Vec::new();
+    for header in headers {
+        let part = header.own_attributes.layer_name.as_ref().map(text_of).unwrap_or_default();
+        let mut part_slots = Vec::new();
+        for channel in &header.channels.list {
+            let (layer, name) = split_name(&part, &text_of(&channel.name), headers.len() > 1);
+            // A channel that a layer has already (in another part or view) begins another layer of that name.
+            let free = |l: &Layer| l.name == layer && l.channel(&name).is_none();
+            let at = layers.iter().position(free).unwrap_or_else(|| {
+                layers.push(Layer { name: layer, channels: vec![], data: vec![], precision: Precision::Half });
+                layers.len() - 1
+            });
+            if channel.sample_type != SampleType::F16 {
+                layers[at].precision = Precision::Full;
+            }
+            part_slots.push(Slot { layer: at, channel: layers[at].channels.len() });
+            layers[at].channels.push(name);
+        }
+        slots.push(part_slots);
+    }
+    // The file has channels by the alphabet: A B G R becomes R G B A; X Y Z and U V stay in that order.
+    let rank = |name: &str| ["R", "G", "B", "A"].iter().position(|&c| c == name).unwrap_or(9);
+    let mut places: Vec<Vec<usize>> = Vec::new();
+    for layer in &mut layers {
+        let mut order: Vec<usize> = (0..layer.channels.len()).collect();
+        order.sort_by_key(|&k| rank(&layer.channels[k]));
+        layer.channels = order.iter().map(|&k| layer.channels[k].clone()).collect();
+        let mut place = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(to, &from)| place[from] = to);
+        places.push(place);
+    }
+    let mut order: Vec<usize> = (0..layers.len()).collect();
+    order.sort_by_key(|&at| !layers[at].name.is_empty());
+    let mut moved = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(to, &from)| moved[from] = to);
+    layers.sort_by_key(|layer| !layer.name.is_empty());
+    for slot in slots.iter_mut().flatten() {
+        *slot = Slot { layer: moved[slot.layer], channel: places[slot.layer][slot.channel] };
+    }
+    (layers, slots)
+}
+
+fn convert(layer: &mut Layer, matrix: glam::Mat3) {
+    let (Some(r), Some(g), Some(b)) = (layer.channel("R"), layer.channel("G"), layer.channel("B")) else { return };
+    let channels = layer.channels.len();
+    for pixel in layer.data.chunks_exact_mut(channels) {
+        [pixel[r], pixel[g], pixel[b]] = (matrix * glam::Vec3::new(pixel[r], pixel[g], pixel[b])).to_array();
+    }
+}
+
+fn read_metadata(headers: &[Header]) -> Result<Metadata> {
+    let Some(header) = headers.first() else { return Ok(Metadata::default()) };
+    let mut own = Metadata::default();
+    for (name, value) in header.all_named_attributes() {
+        let name = String::from_utf8_lossy(name).into_owned();
+        let text = match value {
+            AttributeValue::Text(text) => text_of(&text),
+            AttributeValue::F32(value) => value.to_string(),
+            AttributeValue::F64(value) => value.to_string(),
+            AttributeValue::I32(value) => value.to_string(),
+            AttributeValue::Compression(value) => format!("{value:?}"),
+            AttributeValue::EnvironmentMap(EnvironmentMap::Cube) => "cube".into(),
+            AttributeValue::EnvironmentMap(EnvironmentMap::LatitudeLongitude) => "latlong".into(),
+            AttributeValue::Matrix4x4(matrix) => {
+                match name.as_str() {
+                    "worldToCamera" => own.world_to_camera = Some(matrix),
+                    "worldToNDC" => own.world_to_ndc = Some(matrix),
+                    _ => {}
+                }
+                continue;
+            }
+            _ => continue,
+        };
+        if name == JSON {
+            return Metadata::from_json(&text).map_err(|error| error.at("header.lucerna"));
+        }
+        if !name.starts_with(PREFIX) {
+            own.extra.insert(name, text);
+        }
+    }
+    Ok(own)
+}
+
+/// Texts are bytes of no stated encoding; nearly always UTF-8.
+fn text_of(text: &exr::meta::attribute::Text) -> String {
+    String::from_utf8_lossy(text.bytes()).into_owned()
 }

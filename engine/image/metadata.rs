@@ -19,7 +19,13 @@ pub struct Metadata {
     /// Git revision, if known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub revision: Option<String>,
+    /// Arguments that made the image, without the program's name; what `lucerna rerun` runs again.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub command: Vec<String>,
     pub scene: String,
+    /// Hash of the scene's files and of everything that is built in, as hexadecimal digits.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub scene_hash: String,
     pub camera: String,
     pub technique: String,
     pub seed: u64,
@@ -73,13 +79,14 @@ impl Metadata {
     }
 
     /// The readable singles that stand beside the JSON, by name; empty ones left out.
-    #[allow(dead_code)]
     pub(crate) fn singles(&self) -> Vec<(&'static str, String)> {
         let all = [
             ("program", self.program.clone()),
             ("version", self.version.clone()),
             ("revision", self.revision.clone().unwrap_or_default()),
+            ("command", self.command.join(" ")),
             ("scene", self.scene.clone()),
+            ("sceneHash", self.scene_hash.clone()),
             ("camera", self.camera.clone()),
             ("technique", self.technique.clone()),
             ("seed", self.seed.to_string()),

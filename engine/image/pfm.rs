@@ -3,7 +3,7 @@
 use super::{Layer, Layers, Precision, check_size};
 use crate::{Error, Result, scene::Limits};
 
-pub(super) fn encode(layers: &Layers, layer: &Layer) -> Result<Vec<u8>> {
+pub(super) fn encode(picture: &Layers, layer: &Layer) -> Result<Vec<u8>> {
     let grey = layer.channels.len() == 1;
     let pixels = layer.rgb_pixels().ok_or_else(|| {
         Error::usage(format!(
@@ -13,8 +13,8 @@ pub(super) fn encode(layers: &Layers, layer: &Layer) -> Result<Vec<u8>> {
         ))
     })?;
     let mut out =
-        format!("{}\n{} {}\n-1.0\n", if grey { "Pf" } else { "PF" }, layers.width, layers.height).into_bytes();
-    for row in pixels.chunks_exact(layers.width as usize).rev() {
+        format!("{}\n{} {}\n-1.0\n", if grey { "Pf" } else { "PF" }, picture.width, picture.height).into_bytes();
+    for row in pixels.chunks_exact(picture.width as usize).rev() {
         for value in row.iter().flat_map(|pixel| if grey { &pixel[..1] } else { &pixel[..] }) {
             out.extend_from_slice(&value.to_le_bytes());
         }

@@ -1,4 +1,4 @@
-//! PNG files: sRGB-encoded on disk, linear in memory.
+//! PNG files: sRGB-encoded on disk, linear in memory; normals, depth and other numbers mapped straight.
 
 use std::io::Cursor;
 
@@ -7,8 +7,10 @@ use crate::{Error, ErrorKind, Result, scene::Limits};
 
 /// Keyword of the iTXt chunk with the metadata.
 const KEYWORD: &str = "lucerna";
+/// Keyword of the iTXt chunk that says what codes of numbers mean.
+const MAPPING: &str = "lucerna mapping";
 
-pub(super) fn encode(layers: &Layers, layer: &Layer, options: &WriteOptions) -> Result<Vec<u8>> {
+pub(super) fn encode(picture: &Layers, layer: &Layer, options: &WriteOptions) -> Result<Vec<u8>> {
     let alpha = layer.channel("A").filter(|_| layer.channels.len() > 1);
     let pixels = layer.rgb_pixels().ok_or_else(|| {
         let channels = layer.channels.join(" ");
@@ -20,6 +22,7 @@ pub(super) fn encode(layers: &Layers, layer: &Layer, options: &WriteOptions) -> 
         16 => png::BitDepth::Sixteen,
         bits => return Err(Error::usage(format!("{bits} bits a channel: PNG files are written with 8 or 16"))),
     };
+    let mapping = Mapping::of(layer);
     let scale = options.exposure_ev.exp2();
     let mut samples = Vec::with_capacity(pixels.len() * 8);
     let mut push = |encoded: f32| match depth {
@@ -33,16 +36,18 @@ pub(super) fn encode(layers: &Layers, layer: &Layer, options: &WriteOptions) -> 
             _ => scale,
         };
         for &value in &pixel[..if grey { 1 } else { 3 }] {
-            let shown = value * unassociate;
-            push(if shown.is_nan() { 0.0 } else { srgb::encode(shown.clamp(0.0, 1.0)) });
+            push(match mapping {
+                Mapping::Colour => srgb::encode(clamp(value * unassociate)),
+                Mapping::Affine { black, white } => clamp((value - black) / (white - black)),
+            });
         }
         if let Some(a) = a {
-            push(if a.is_nan() { 0.0 } else { a });
+            push(clamp(a));
         }
     }
     let fail = |error: png::EncodingError| Error::new(ErrorKind::Runtime, "PNG encoding failed").caused_by(error);
     let mut out = Vec::new();
-    let mut encoder = png::Encoder::new(&mut out, layers.width, layers.height);
+    let mut encoder = png::Encoder::new(&mut out, picture.width, picture.height);
     encoder.set_color(match (grey, alpha.is_some()) {
         (true, false) => png::ColorType::Grayscale,
         (true, true) => png::ColorType::GrayscaleAlpha,
@@ -50,14 +55,55 @@ pub(super) fn encode(layers: &Layers, layer: &Layer, options: &WriteOptions) -> 
         (false, true) => png::ColorType::Rgba,
     });
     encoder.set_depth(depth);
-    encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
-    if !layers.metadata.is_empty() {
-        encoder.add_itxt_chunk(KEYWORD.to_owned(), layers.metadata.to_json()?).map_err(fail)?;
+    match mapping {
+        Mapping::Colour => encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric),
+        // Numbers, not colours: without a statement about colour, but with one about the numbers.
+        Mapping::Affine { black, white } => {
+            let text = format!("{}: value = {black} + code * {}", layer.name, white - black);
+            encoder.add_itxt_chunk(MAPPING.to_owned(), text).map_err(fail)?;
+        }
+    }
+    if !picture.metadata.is_empty() {
+        encoder.add_itxt_chunk(KEYWORD.to_owned(), picture.metadata.to_json()?).map_err(fail)?;
     }
     let mut writer = encoder.write_header().map_err(fail)?;
     writer.write_image_data(&samples).map_err(fail)?;
     writer.finish().map_err(fail)?;
     Ok(out)
+}
+
+/// Into [0, 1]; NaN becomes 0.
+fn clamp(value: f32) -> f32 {
+    if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) }
+}
+
+/// How values become codes between 0 and 1.
+#[derive(Clone, Copy)]
+enum Mapping {
+    /// sRGB, with exposure.
+    Colour,
+    /// Straight between two values, for what is no colour.
+    Affine { black: f32, white: f32 },
+}
+
+impl Mapping {
+    /// Normals from −1 to 1; depth from far (black) to near (white); other numbers from their smallest to their largest.
+    fn of(layer: &Layer) -> Self {
+        let depth = layer.name == "depth" || layer.channels == ["Z"];
+        if layer.name == "normal" {
+            return Self::Affine { black: -1.0, white: 1.0 };
+        }
+        if !depth && layer.channels.iter().all(|c| matches!(c.as_str(), "R" | "G" | "B" | "A" | "Y")) {
+            return Self::Colour;
+        }
+        let finite = || layer.data.iter().copied().filter(|value| value.is_finite());
+        let (least, most) = (finite().fold(f32::INFINITY, f32::min), finite().fold(f32::NEG_INFINITY, f32::max));
+        match (least < most, depth) {
+            (false, _) => Self::Affine { black: 0.0, white: 1.0 },
+            (true, true) => Self::Affine { black: most, white: least },
+            (true, false) => Self::Affine { black: least, white: most },
+        }
+    }
 }
 
 fn open<'a>(bytes: &'a [u8], limits: &Limits) -> Result<png::Reader<Cursor<&'a [u8]>>> {

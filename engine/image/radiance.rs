@@ -18,15 +18,15 @@ pub(super) fn sniff(bytes: &[u8]) -> bool {
         || bytes[..bytes.len().min(2048)].windows(8).any(|w| w == b"\nFORMAT=")
 }
 
-pub(super) fn encode(layers: &Layers, layer: &Layer) -> Result<Vec<u8>> {
+pub(super) fn encode(picture: &Layers, layer: &Layer) -> Result<Vec<u8>> {
     let pixels = layer.rgb_pixels().ok_or_else(|| {
         let channels = layer.channels.join(" ");
         Error::usage(format!("layer {:?} has the channels {channels}; .hdr files hold RGB or one channel", layer.name))
     })?;
     let mut out = b"#?RADIANCE\n".to_vec();
-    if !layers.metadata.is_empty() {
+    if !picture.metadata.is_empty() {
         // ASCII, so any byte is the boundary of a character.
-        let json = layers.metadata.to_json()?;
+        let json = picture.metadata.to_json()?;
         for part in json.as_bytes().chunks(COMMENT_BYTES) {
             out.extend_from_slice(COMMENT.as_bytes());
             out.extend_from_slice(part);
@@ -34,8 +34,8 @@ pub(super) fn encode(layers: &Layers, layer: &Layer) -> Result<Vec<u8>> {
         }
     }
     out.extend_from_slice(b"FORMAT=32-bit_rle_rgbe\n\n");
-    out.extend_from_slice(format!("-Y {} +X {}\n", layers.height, layers.width).as_bytes());
-    let width = layers.width as usize;
+    out.extend_from_slice(format!("-Y {} +X {}\n", picture.height, picture.width).as_bytes());
+    let width = picture.width as usize;
     for row in pixels.chunks_exact(width) {
         let rgbe: Vec<[u8; 4]> = row.iter().map(|&pixel| to_rgbe(pixel)).collect();
         if !(8..0x8000).contains(&width) {

@@ -1,0 +1,169 @@
+//! A file is what it was or complete, whatever happens while it is written.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+    time::Duration,
+};
+
+use lucerna::{
+    ErrorKind,
+    image::{self, Format, Layers, WriteOptions},
+};
+
+const OVERWRITE: fn() -> WriteOptions = || WriteOptions { overwrite: true, f32: true, ..WriteOptions::default() };
+
+/// A noisy picture, so that compression leaves hundreds of kilobytes.
+fn picture(seed: u32) -> Layers {
+    let mut state = seed;
+    let data = (0..300 * 300 * 3).map(|_| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32
+    });
+    Layers::rgb(300, 300, data.collect())
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+/// This test binary again, running only `child` with `target` to write.
+fn spawn(target: &Path, shell: &str) -> Command {
+    let mut command = Command::new("sh");
+    command
+        .args(["-c", &format!("{shell} exec \"$0\" child --exact --ignored --nocapture --test-threads 1")])
+        .arg(std::env::current_exe().unwrap())
+        .env("LUCERNA_TEST_TARGET", target)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+/// Not a test of its own: writes one picture after the other until it is killed, or until the first error.
+#[test]
+#[ignore = "run by the other tests in a process of its own"]
+fn child() {
+    let Some(target) = std::env::var_os("LUCERNA_TEST_TARGET").map(PathBuf::from) else { return };
+    // Encoded once: most of the time goes into writing, which is what is to be interrupted.
+    let files = [1, 2].map(|seed| image::encode(Format::Exr, &picture(seed), &OVERWRITE()).unwrap().0);
+    for i in 0..1_000_000 {
+        if let Err(error) = image::write_atomic(&target, &files[i % 2], true) {
+            println!("{:?}: {error}", error.kind());
+            std::process::exit(1);
+        }
+    }
+}
+
+#[test]
+fn a_killed_writer_leaves_the_old_or_the_new_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("frame.exr");
+    let complete = [1, 2].map(|seed| image::encode(Format::Exr, &picture(seed), &OVERWRITE()).unwrap().0);
+    fs::write(&target, &complete[0]).unwrap();
+    let (mut unfinished, mut finished) = (0, 0);
+    for round in 0..16u64 {
+        let mut process = spawn(&target, "").spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(120 + 13 * round));
+        process.kill().unwrap();
+        process.wait().unwrap();
+        let found = fs::read(&target).unwrap();
+        assert!(complete.contains(&found), "round {round}: {} bytes are neither file", found.len());
+        finished += u32::from(found == complete[1]);
+        unfinished += names(folder.path()).iter().filter(|name| name.ends_with(".tmp")).count();
+    }
+    // The test must be able to fail: some were killed while they wrote, and some had replaced the file.
+    assert!(unfinished > 0 && finished > 0, "{unfinished} temporary files, {finished} replacements");
+}
+
+#[test]
+fn a_full_disk_is_an_error_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("frame.exr");
+    // No file may grow over 16 blocks; the signal for that is ignored, so that the write fails as on a full disk.
+    let output = spawn(&target, "trap '' XFSZ; ulimit -f 16;").output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("Output: ") && said.contains("frame.exr: cannot write"), "{said}");
+    assert!(names(folder.path()).is_empty(), "{:?}", names(folder.path()));
+
+    // With a file there already, that one stays.
+    fs::write(&target, b"old").unwrap();
+    spawn(&target, "trap '' XFSZ; ulimit -f 16;").output().unwrap();
+    assert_eq!(fs::read(&target).unwrap(), b"old");
+    assert_eq!(names(folder.path()), ["frame.exr"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn no_space_left_is_reported_with_its_cause() {
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("frame.png");
+    std::os::unix::fs::symlink("/dev/full", &target).unwrap();
+    let error = image::write(&target, &picture(1), &OVERWRITE()).unwrap_err();
+    assert_eq!((error.kind(), error.exit_code()), (ErrorKind::Output, 1));
+    assert!(error.to_string().contains("No space left on device"), "{error}");
+}
+
+#[test]
+fn folders_that_are_missing_or_cannot_be_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let missing = folder.path().join("renders/frame.png");
+    let error = image::write(&missing, &picture(1), &WriteOptions::default()).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Output);
+    assert!(error.to_string().contains("renders cannot be used") && error.to_string().contains("Create it"), "{error}");
+    assert_eq!(image::probe_output(&missing, false).unwrap_err().kind(), ErrorKind::Output);
+
+    // The target is a folder.
+    fs::create_dir(folder.path().join("folder.png")).unwrap();
+    let error = image::write(folder.path().join("folder.png"), &picture(1), &OVERWRITE()).unwrap_err();
+    assert!(error.to_string().contains("is a folder"), "{error}");
+
+    // A parent that is a file.
+    fs::write(folder.path().join("file"), b"").unwrap();
+    let error = image::write(folder.path().join("file/x.png"), &picture(1), &OVERWRITE()).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Output);
+}
+
+/// /proc takes no new files from anyone, root included.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_folder_that_takes_no_files_is_an_error() {
+    let target = Path::new("/proc/frame.png");
+    let error = image::write(target, &picture(1), &OVERWRITE()).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Output);
+    assert!(error.to_string().starts_with("/proc/frame.png: "), "{error}");
+    assert!(image::probe_output(target, true).is_err());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_read_only_folder_is_an_error() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let closed = folder.path().join("closed");
+    fs::create_dir(&closed).unwrap();
+    fs::set_permissions(&closed, fs::Permissions::from_mode(0o555)).unwrap();
+    if fs::write(closed.join("probe"), b"").is_ok() {
+        eprintln!("SKIPPED: permissions do not bind this user");
+        return;
+    }
+    let error = image::write(closed.join("frame.png"), &picture(1), &OVERWRITE()).unwrap_err();
+    assert!(error.to_string().contains("ermission denied"), "{error}");
+}
+
+#[test]
+fn an_existing_file_is_kept_unless_overwriting_is_allowed() {
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("frame.pfm");
+    image::write(&target, &picture(1), &WriteOptions::default()).unwrap();
+    let first = fs::read(&target).unwrap();
+    let error = image::write(&target, &picture(2), &WriteOptions::default()).unwrap_err();
+    assert!(error.to_string().contains("exists already"), "{error}");
+    assert_eq!(fs::read(&target).unwrap(), first);
+    image::write(&target, &picture(2), &OVERWRITE()).unwrap();
+    assert_ne!(fs::read(&target).unwrap(), first);
+    assert_eq!(names(folder.path()), ["frame.pfm"]);
+}
