@@ -7,7 +7,7 @@ use std::process::Command;
 use ash::vk;
 use gpu_common::successors;
 use lucerna::gpu::{
-    BufferDesc, Gpu, GpuOptions, OwnedBuffer,
+    BufferDesc, DescriptorArena, Gpu, GpuOptions, OwnedBuffer, Validation,
     testing::{self, with_gpu},
 };
 
@@ -135,4 +135,27 @@ fn variables_that_silence_the_layer_are_refused() {
         .status()
         .unwrap();
     assert!(status.success());
+}
+
+#[test]
+fn an_access_out_of_bounds_is_reported_by_gpu_assisted_validation() {
+    let mut text = None;
+    let options = GpuOptions { validation: Validation::GpuAssisted, print_messages: false, ..GpuOptions::default() };
+    let result = testing::run(options, |gpu| {
+        text = gpu.validation_active().then(String::new);
+        // One word too few for 64 threads.
+        let from = OwnedBuffer::with_contents(gpu, "from", &[0; 252]).unwrap();
+        let to = OwnedBuffer::new(gpu, "to", BufferDesc::device(256)).unwrap();
+        let pipeline = gpu.compute_pipeline(gpu_common::successor(), &[]).unwrap();
+        let mut arena = DescriptorArena::new(gpu);
+        let set = arena.allocate("test.successor", pipeline.set_layout).unwrap();
+        let mut commands = gpu.commands("out of bounds").unwrap();
+        gpu_common::dispatch(&mut commands, "test.successor", pipeline, set, [&from, &to], 1);
+        commands.keep((from, to, arena));
+        commands.submit().unwrap().wait().unwrap();
+    });
+    if text.is_some() {
+        let text = result.unwrap_err();
+        assert!(text.contains("VUID-vkCmdDispatch-"), "{text}");
+    }
 }

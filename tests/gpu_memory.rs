@@ -158,3 +158,64 @@ fn a_shader_of_the_wrong_sort_is_refused() {
         assert!(error.to_string().contains("1 specialisation constants were given, it has 0"), "{error}");
     });
 }
+
+#[test]
+fn poisoned_memory_shows() {
+    use lucerna::gpu::{GpuOptions, testing::with_gpu_options};
+    with_gpu_options(GpuOptions { poison: true, ..GpuOptions::default() }, |gpu| {
+        let words = OwnedBuffer::new(gpu, "never written", BufferDesc::device(10)).unwrap().read().unwrap();
+        assert_eq!(words, [0xAD, 0xDE, 0xC0, 0x7F, 0xAD, 0xDE, 0xC0, 0x7F, 0xAD, 0xDE]);
+        for format in [
+            vk::Format::R32G32B32A32_SFLOAT,
+            vk::Format::R16G16_SFLOAT,
+            vk::Format::B10G11R11_UFLOAT_PACK32,
+            vk::Format::R32_UINT,
+            vk::Format::R8G8B8A8_UNORM,
+            vk::Format::D32_SFLOAT,
+            vk::Format::BC7_UNORM_BLOCK,
+        ] {
+            if gpu.format_features(format).contains(vk::FormatFeatureFlags::SAMPLED_IMAGE) {
+                let image =
+                    OwnedImage::new(gpu, "never written", ImageDesc::new(format, 4, 4).layers(2).mips(2)).unwrap();
+                if format == vk::Format::BC7_UNORM_BLOCK {
+                    // Cannot be filled, and must not be tried.
+                    continue;
+                }
+                // What a pass that forgets to write would leave.
+                image.set_layout(vk::ImageLayout::TRANSFER_DST_OPTIMAL);
+                let bytes = image.read(1, 1);
+                if format == vk::Format::R32G32B32A32_SFLOAT {
+                    let bytes = bytes.unwrap();
+                    assert!(bytes.chunks(4).all(|b| f32::from_le_bytes(b.try_into().unwrap()).is_nan()), "{bytes:?}");
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn eight_threads_may_use_one_device() {
+    fn shared<T: Send + Sync>() {}
+    shared::<gpu::Gpu>();
+    shared::<OwnedBuffer>();
+    shared::<OwnedImage>();
+    with_gpu(|gpu| {
+        std::thread::scope(|scope| {
+            for thread in 0..8_u8 {
+                scope.spawn(move || {
+                    for round in 0..8_u8 {
+                        let bytes = vec![thread * 16 + round; 777];
+                        let buffer = OwnedBuffer::with_contents(gpu, "mine", &bytes).unwrap();
+                        let desc = ImageDesc::new(vk::Format::R8_UNORM, 21, 37);
+                        let region = Region { mip: 0, layer: 0, bytes: &bytes };
+                        let image = OwnedImage::with_contents(gpu, "mine", desc, &[region]).unwrap();
+                        image.view(image.whole()).unwrap();
+                        gpu.sampler(gpu::SamplerDesc::TRILINEAR).unwrap();
+                        assert_eq!(buffer.read().unwrap(), bytes);
+                        assert_eq!(image.read(0, 0).unwrap(), bytes);
+                    }
+                });
+            }
+        });
+    });
+}

@@ -5,7 +5,7 @@ use std::{fmt, sync::Arc};
 use ash::vk;
 use gpu_allocator::{MemoryLocation, vulkan::Allocation};
 
-use super::{Gpu, device::Context, memory::Owner};
+use super::{Gpu, device::Context, memory::Owner, poison};
 use crate::{Error, ErrorKind, Result};
 
 /// Where a buffer's memory is.
@@ -120,7 +120,11 @@ impl OwnedBuffer {
         inner.allocation = Some(allocation);
         context.check(bound, || format!("vkBindBufferMemory for `{name}`"))?;
         context.name(raw, name);
-        Ok(Self(Arc::new(inner)))
+        let buffer = Self(Arc::new(inner));
+        if context.options.poison && desc.usage.contains(vk::BufferUsageFlags::TRANSFER_DST) {
+            poison::buffer(gpu, name, raw, size)?;
+        }
+        Ok(buffer)
     }
 
     /// A buffer on the device with `contents`; returns when they are there.

@@ -14,6 +14,7 @@ use super::{
     device::{Context, lock},
     format::{aspects, block},
     memory::Owner,
+    poison,
     submit::Commands,
 };
 use crate::{Error, ErrorKind, Result};
@@ -165,9 +166,12 @@ impl OwnedImage {
     ///
     /// # Errors
     /// `Runtime` if the device cannot have such an image (the message says what it allows), `OutOfMemory`.
-    pub fn new(gpu: &Gpu, name: &str, desc: ImageDesc) -> Result<Self> {
+    pub fn new(gpu: &Gpu, name: &str, mut desc: ImageDesc) -> Result<Self> {
         let context = &gpu.0;
         context.alive()?;
+        if context.options.poison {
+            desc.usage |= vk::ImageUsageFlags::TRANSFER_DST;
+        }
         let info = check_limits(context, &desc).map_err(|what| {
             Error::new(ErrorKind::Runtime, format!("image `{name}`: {what}"))
                 .help("Use a smaller image or another format, or another device")
@@ -193,7 +197,11 @@ impl OwnedImage {
         inner.allocation = Some(allocation);
         context.check(bound, || format!("vkBindImageMemory for `{name}`"))?;
         context.name(raw, name);
-        Ok(Self(Arc::new(inner)))
+        let image = Self(Arc::new(inner));
+        if context.options.poison {
+            poison::image(gpu, name, raw, &desc)?;
+        }
+        Ok(image)
     }
 
     /// A new image with contents; returns when they are there. Levels and layers without a region stay undefined.

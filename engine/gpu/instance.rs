@@ -124,7 +124,7 @@ impl Instance {
         let name_pointers: Vec<_> = names.iter().map(|n| n.as_ptr()).collect();
         let layer_pointers: Vec<_> = layer.iter().map(|_| VALIDATION_LAYER.as_ptr()).collect();
         let mut messenger = messenger_info(&log);
-        let on = vk::TRUE.to_ne_bytes();
+        let on = vk::TRUE;
         let settings = layer_setting_names(options.validation)
             .iter()
             .map(|name| {
@@ -132,7 +132,7 @@ impl Instance {
                     .layer_name(VALIDATION_LAYER)
                     .setting_name(name)
                     .ty(vk::LayerSettingTypeEXT::BOOL32)
-                    .values(&on);
+                    .values(bytemuck::bytes_of(&on));
                 // `values` counts bytes; the count is in values.
                 setting.value_count = 1;
                 setting

@@ -29,6 +29,7 @@ mod instance;
 mod memory;
 mod options;
 mod pipeline;
+mod poison;
 mod sampler;
 mod select;
 mod submit;

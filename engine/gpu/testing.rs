@@ -13,7 +13,7 @@ static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 /// is still alive.
 ///
 /// Without a device or without the validation layer: panics if the variable `CI` is set, else skips loudly (no device) or
-/// goes on without validation. `LUCERNA_DEVICE` chooses the device.
+/// goes on without validation. `LUCERNA_DEVICE` chooses the device, `LUCERNA_POISON=1` fills new memory with NaN.
 #[track_caller]
 pub fn with_gpu(body: impl FnOnce(&Gpu)) {
     with_gpu_options(GpuOptions::default(), body);
@@ -41,6 +41,7 @@ pub fn run(options: GpuOptions, body: impl FnOnce(&Gpu)) -> Result<(), String> {
     let options = GpuOptions {
         device: environment.device,
         require_gpu: environment.require_gpu,
+        poison: options.poison || environment.poison,
         validation: if options.validation == Validation::GpuAssisted { options.validation } else { Validation::Sync },
         ..options
     };
