@@ -1,18 +1,8 @@
 //! Every glTF model of the asset collection, against what its list says about it.
 
-use lucerna::scene::{LoadOptions, Scene, load};
-use std::path::{Path, PathBuf};
+mod common;
 
-/// The asset collection; `None` (with a message) where it is not, which only a user's machine may do.
-fn assets() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets");
-    if folder.join("manifest.json").is_file() {
-        return Some(folder);
-    }
-    assert!(std::env::var_os("CI").is_none(), "{} is missing", folder.display());
-    eprintln!("SKIPPED: {} is missing", folder.display());
-    None
-}
+use lucerna::scene::{LoadOptions, Scene, load};
 
 fn triangles(scene: &Scene) -> usize {
     scene.meshes.iter().flat_map(|mesh| &mesh.primitives).map(|primitive| primitive.indices.len() / 3).sum()
@@ -32,7 +22,7 @@ fn stated(what: &str, word: &str) -> Option<usize> {
 
 #[test]
 fn every_model_loads_with_the_stated_counts() {
-    let Some(assets) = assets() else { return };
+    let Some(assets) = common::assets() else { return };
     let manifest: serde_json::Value =
         serde_json::from_slice(&std::fs::read(assets.join("manifest.json")).unwrap()).unwrap();
     let mut failures = vec![];

@@ -36,7 +36,6 @@ impl Folder {
         self.resolve(&path_of_uri(uri)?)
     }
 
-    #[allow(dead_code)] // for OBJ, next
     /// The real path of a file named by a plain path (as in MTL files, which use either slash).
     pub fn resolve_path(&self, path: &str) -> Result<PathBuf> {
         self.resolve(&checked_path(&path.replace('\\', "/"))?)

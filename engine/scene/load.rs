@@ -1,6 +1,6 @@
 //! From a file name to a scene.
 
-use super::{Limits, Scene, c_arrays, folder, gltf};
+use super::{Limits, Scene, c_arrays, folder, gltf, obj};
 use crate::{Error, Result};
 use std::path::Path;
 
@@ -14,8 +14,8 @@ pub struct LoadOptions {
     pub unit: Option<f32>,
 }
 
-/// Reads a scene file: glTF 2.0 (`.gltf`, `.glb`), OBJ (`.obj`) or two C arrays ([`c_arrays`]). The content decides, and where it leaves the format
-/// open, the extension.
+/// Reads a scene file: glTF 2.0 (`.gltf`, `.glb`), OBJ (`.obj`) or two C arrays ([`c_arrays`]). The content decides,
+/// and where it leaves the format open, the extension.
 ///
 /// Only files in the scene's own folder and below it are read. Every index of the result is valid and every number
 /// finite ([`Scene::validate`]). What could not be read as the file means it stands in [`Scene::notes`].
@@ -29,6 +29,9 @@ pub fn load(path: impl AsRef<Path>, options: &LoadOptions) -> Result<Scene> {
 }
 
 fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
+    if let Some(unit) = options.unit.filter(|unit| !(unit.is_finite() && *unit > 0.0)) {
+        return Err(Error::usage(format!("a unit of {unit} m, it must be above 0")));
+    }
     if path.is_dir() {
         return Err(Error::input("is a folder").help(match scene_in(path) {
             Some(name) => format!("Name the scene file in it, for example {name}"),
@@ -38,6 +41,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let bytes = folder::read_file(path, options.limits.max_file)?;
     let scene = match format(path, &bytes)? {
         Format::Gltf => gltf::read(path, &bytes, &options.limits)?,
+        Format::Obj => obj::read(path, &bytes, options.unit.unwrap_or(1.0), &options.limits)?,
         Format::Arrays => c_arrays::read(&bytes, options.unit.unwrap_or(1.0), &options.limits)?,
     };
     scene.validate()?;
@@ -52,12 +56,14 @@ fn scene_in(folder: &Path) -> Option<String> {
 
 enum Format {
     Gltf,
+    Obj,
     Arrays,
 }
 
 fn extension(path: &Path) -> Option<Format> {
     match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
         "gltf" | "glb" => Some(Format::Gltf),
+        "obj" => Some(Format::Obj),
         _ => None,
     }
 }

@@ -15,6 +15,7 @@ pub mod gltf;
 mod load;
 pub mod normals;
 mod notes;
+mod obj;
 pub mod resident;
 mod surface;
 mod tangents;

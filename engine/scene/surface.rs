@@ -1,7 +1,7 @@
 //! What every front end does to a primitive once its attributes are read: drop triangles without area, supply missing
 //! normals, make vectors unit length.
 
-use super::Primitive;
+use super::{Material, Mesh, Primitive};
 use glam::{DVec3, Vec3, Vec4};
 
 /// What was repaired, for the scene's notes.
@@ -109,6 +109,14 @@ impl Primitive {
         for (tangent, &normal) in self.tangents.iter_mut().zip(&self.normals) {
             *tangent = tangent_of(tangent.truncate(), normal, tangent.w);
         }
+    }
+}
+
+/// Front ends put a default material last; it stays only where a primitive uses it.
+pub(crate) fn drop_unused_default(materials: &mut Vec<Material>, meshes: &[Mesh]) {
+    let default = materials.len().wrapping_sub(1) as u32;
+    if !meshes.iter().flat_map(|mesh| &mesh.primitives).any(|primitive| primitive.material == default) {
+        materials.pop();
     }
 }
 

@@ -17,7 +17,7 @@ mod types;
 
 pub(crate) use container::is_glb;
 
-use super::{Limits, Scene, budget::Budget, folder::Folder, notes::Notes};
+use super::{Limits, Scene, budget::Budget, folder::Folder, notes::Notes, surface};
 use crate::{Error, Result};
 use document::Document;
 use std::path::Path;
@@ -55,7 +55,7 @@ pub(crate) fn read(path: &Path, bytes: &[u8], limits: &Limits) -> Result<Scene> 
     let skins = motion::skins(&accessors, &hierarchy)?;
     let animations = motion::animations(&accessors, &hierarchy, &mut notes)?;
 
-    let mut materials = materials::Materials {
+    let mut reader = materials::Materials {
         document: &document,
         buffers: &buffers,
         folder: &folder,
@@ -65,24 +65,20 @@ pub(crate) fn read(path: &Path, bytes: &[u8], limits: &Limits) -> Result<Scene> 
         textures: Vec::new(),
         of_image: vec![None; document.images.len()],
     };
-    let mut surface = materials.read_all()?;
-    let textures = std::mem::take(&mut materials.textures);
+    let mut materials = reader.read_all()?;
+    let textures = std::mem::take(&mut reader.textures);
 
-    let mut reader = geometry::Meshes { accessors: &accessors, materials: &surface, notes: &mut notes };
+    let mut reader = geometry::Meshes { accessors: &accessors, materials: &materials, notes: &mut notes };
     let mut meshes = Vec::with_capacity(document.meshes.len());
     for i in 0..document.meshes.len() {
         meshes.push(reader.mesh(i)?);
     }
-    // The default material stays only where it is used.
-    let default = surface.len() as u32 - 1;
-    if !meshes.iter().flat_map(|mesh| &mesh.primitives).any(|primitive| primitive.material == default) {
-        surface.pop();
-    }
+    surface::drop_unused_default(&mut materials, &meshes);
     Ok(Scene {
         name: path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
         nodes: hierarchy.nodes,
         meshes,
-        materials: surface,
+        materials,
         textures,
         lights,
         cameras,
