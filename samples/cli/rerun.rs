@@ -69,7 +69,7 @@ pub fn rerun(path: &Path, device: &DeviceArgs, quiet: bool) -> Result<Comparison
     let extension = path.extension().unwrap_or_default();
     let fresh = folder.path().join("{frame}").with_extension(extension);
 
-    let program = program(&record)?;
+    let program = program(&record).map_err(|error| error.in_file(path))?;
     let mut command = Command::new(&program);
     command.args(record.arguments(folder.path())?).arg("--output").arg(&fresh).stdin(Stdio::null());
     command.args(device.device.iter().flat_map(|device| ["--device", device]));
