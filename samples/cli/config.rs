@@ -26,7 +26,7 @@ pub fn effective<S: Serialize + DeserializeOwned>(base: &S, file: Option<&Path>,
         let Some((key, text)) = define.split_once('=') else {
             return Err(Error::usage(format!("-D {define}: expected key=value")));
         };
-        let path: Vec<String> = key.trim().split('.').map(str::to_owned).collect();
+        let path = full_path(&tree, key.trim());
         apply::<S>(&mut tree, &path, scalar(text.trim()))
             .map_err(|what| Error::usage(format!("-D {define}: {}", what.0)))?;
     }
@@ -81,6 +81,22 @@ fn apply_all<S: Serialize + DeserializeOwned>(
         path.pop();
     }
     Ok(())
+}
+
+/// The path of `key`. Its groups may be left out where one setting alone has that ending: `samples` for `isr.samples`.
+fn full_path(tree: &Value, key: &str) -> Vec<String> {
+    let split = |key: &str| key.split('.').map(str::to_owned).collect::<Vec<_>>();
+    let asked = split(key);
+    if get(tree, &asked[..1]).is_some() {
+        return asked;
+    }
+    let mut keys = Vec::new();
+    leaves(tree, &mut String::new(), &mut keys);
+    let ending = format!(".{key}");
+    match keys.iter().filter(|full| full.ends_with(&ending)).collect::<Vec<_>>()[..] {
+        [only] => split(only),
+        _ => asked,
+    }
 }
 
 /// Sets one key, if the settings have it and take the value.
@@ -251,6 +267,13 @@ mod tests {
         assert_eq!(with(None, &["shadow.esm.c=20"]).unwrap().shadow, Shadow::Esm { c: 20.0 });
         assert_eq!(with(Some("shadow = 'plain'"), &[]).unwrap().shadow, Shadow::Plain);
         assert_eq!(with(Some("[shadow.esm]\nc = 30.0"), &[]).unwrap().shadow, Shadow::Esm { c: 30.0 });
+    }
+
+    #[test]
+    fn groups_may_be_left_out_where_it_is_clear() {
+        assert_eq!(with(None, &["radius=9"]).unwrap().blur.radius, 9);
+        assert_eq!(with(None, &["blur.radius=8"]).unwrap().blur.radius, 8);
+        assert!(with(None, &["adius=9"]).is_err());
     }
 
     #[test]
