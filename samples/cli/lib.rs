@@ -7,6 +7,7 @@ pub mod console;
 pub mod devices;
 pub mod fingerprint;
 pub mod framing;
+pub mod gbuffer_layers;
 pub mod info;
 pub mod inspect;
 pub mod outputs;

@@ -27,6 +27,8 @@ pub struct Technique {
     pub name: &'static str,
     /// What the picture consists of, as `--mode` takes it; the word for "everything" is left out of file names.
     pub mode: Option<&'static str>,
+    /// The picture is radiance, which exposure scales to be seen; else it is shown as it is.
+    pub radiance: bool,
 }
 
 /// A frame to be composed.
@@ -90,6 +92,8 @@ pub fn render<S: Serialize + DeserializeOwned, R>(
             console::print("passes cannot be listed yet")?;
             return Ok(ExitCode::SUCCESS);
         }
+        run.note(&shown.notes);
+        let seen = shown.view.unwrap_or(view);
         let reading = shown.read(&mut graph, run.outputs.wants_layers());
         let result = runner.run(&graph)?;
         // What was asked to stop is not written, unless it is all there.
@@ -97,7 +101,7 @@ pub fn render<S: Serialize + DeserializeOwned, R>(
             break;
         }
         let mut layers = reading.layers(&result);
-        layers.metadata = run.metadata(&gpu, &view, frame)?;
+        layers.metadata = run.metadata(&gpu, &seen, frame)?;
         let milliseconds = begun.elapsed().as_secs_f64() * 1e3;
         let files = run.write(&layers, frame)?;
         progress.frame(frame, milliseconds, &files);

@@ -7,7 +7,7 @@ use lucerna::{
     gpu::Gpu,
     graph::Report,
     image::{self, Layers, Metadata, WriteOptions},
-    scene::{NoteKind, View, builtin},
+    scene::{Note, NoteKind, View, builtin},
 };
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -71,7 +71,7 @@ impl<'a> Run<'a> {
             Source::Builtin(name) => builtin::exposure(name).map(f64::from),
             Source::File(_) => None,
         };
-        let exposure = args.exposure.or(suits).unwrap_or(0.0);
+        let exposure = args.exposure.or(suits.filter(|_| technique.radiance)).unwrap_or(0.0);
         options.exposure_ev = exposure as f32;
         let outputs = Outputs::new(&args.output, frames.len(), options)?;
         if outputs.uses_stdout() && args.json {
@@ -146,11 +146,23 @@ impl<'a> Run<'a> {
             "{}: {triangles} triangles, {materials} materials, {lights} lights, camera '{}'",
             scene.name, self.stage.camera_name
         ));
-        for note in self.stage.notes() {
-            let text = format!("note: {}: {}", note.place, note.text);
-            match note.kind {
-                NoteKind::Repaired => self.console.detail(&text),
-                NoteKind::Ignored | NoteKind::Approximated => self.console.info(&text),
+        self.stage.notes().iter().for_each(|note| self.tell_note(note));
+    }
+
+    fn tell_note(&self, note: &Note) {
+        let text = format!("note: {}: {}", note.place, note.text);
+        match note.kind {
+            NoteKind::Repaired => self.console.detail(&text),
+            NoteKind::Ignored | NoteKind::Approximated => self.console.info(&text),
+        }
+    }
+
+    /// Notes of a frame; each is told once.
+    pub fn note(&mut self, notes: &[Note]) {
+        for note in notes {
+            if !self.stage.scene.notes.contains(note) {
+                self.tell_note(note);
+                self.stage.scene.notes.push(note.clone());
             }
         }
     }

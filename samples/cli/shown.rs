@@ -3,6 +3,7 @@
 use lucerna::{
     graph::{Frame, Graph, Image, ImageRead, Pixels},
     image::{Layer, Layers},
+    scene::{Note, View},
 };
 
 /// Turns a pixel as the shader wrote it into what the layer holds.
@@ -10,8 +11,14 @@ type Decode = Box<dyn Fn([f32; 4]) -> [f32; 4]>;
 
 /// What a technique shows of a frame: the picture, and layers for formats that hold them.
 pub struct Shown {
-    pub picture: Image,
+    picture: Image,
+    /// One channel, shown as grey.
+    grey: bool,
     layers: Vec<Source>,
+    /// What the camera really saw, if the technique changed it (its far plane).
+    pub view: Option<View>,
+    /// What the technique could not serve in this frame.
+    pub notes: Vec<Note>,
 }
 
 struct Source {
@@ -31,7 +38,24 @@ impl std::fmt::Debug for Shown {
 impl Shown {
     /// Only the picture: its red, green and blue are radiance.
     pub fn new(picture: Image) -> Self {
-        Self { picture, layers: Vec::new() }
+        Self { picture, grey: false, layers: Vec::new(), view: None, notes: Vec::new() }
+    }
+
+    /// Only the picture: the first channel of an image, as grey.
+    pub fn grey(picture: Image) -> Self {
+        Self { grey: true, ..Self::new(picture) }
+    }
+
+    /// With the view that was rendered.
+    #[must_use]
+    pub fn seen_by(self, view: View) -> Self {
+        Self { view: Some(view), ..self }
+    }
+
+    /// With what could not be served.
+    #[must_use]
+    pub fn noting(self, notes: Vec<Note>) -> Self {
+        Self { notes, ..self }
     }
 
     /// With a layer of colours, `NAME.R` `NAME.G` `NAME.B`.
@@ -63,13 +87,14 @@ impl Shown {
         let picture = graph.read_image(self.picture);
         let layers = if with_layers { self.layers } else { Vec::new() };
         let layers = layers.into_iter().map(|layer| (graph.read_image(layer.image), layer)).collect();
-        Reading { picture, layers }
+        Reading { picture, grey: self.grey, layers }
     }
 }
 
 /// Pixels that were asked for.
 pub struct Reading {
     picture: ImageRead,
+    grey: bool,
     layers: Vec<(ImageRead, Source)>,
 }
 
@@ -84,7 +109,11 @@ impl Reading {
     pub fn layers(&self, frame: &Frame) -> Layers {
         let picture = frame.image(self.picture);
         let (width, height) = (picture.extent.width, picture.extent.height);
-        let mut layers = Layers::new(width, height).with(Layer::rgb("", &stretched(&picture, width, height)));
+        let mut pixels = stretched(&picture, width, height);
+        if self.grey {
+            pixels.iter_mut().for_each(|pixel| *pixel = [pixel[0]; 4]);
+        }
+        let mut layers = Layers::new(width, height).with(Layer::rgb("", &pixels));
         for (token, source) in &self.layers {
             let pixels = stretched(&frame.image(*token), width, height);
             let count = source.channels.len().min(4);
