@@ -106,6 +106,15 @@ fn run(render: &Render) -> Result<ExitCode> {
     )
 }
 
+fn direct_choices(settings: &isr::Settings) -> direct::Direct {
+    direct::Direct {
+        paper_law: settings.light_law == isr::LightLaw::Paper,
+        specular: settings.specular,
+        light_radius: settings.light_radius,
+        light_power: settings.light_power,
+    }
+}
+
 /// Declares one frame.
 fn compose(
     graph: &mut Graph,
@@ -123,7 +132,7 @@ fn compose(
     let sky = |graph: &mut Graph, target| skybox::draw(graph, &scene, &gbuffer, glam::Vec3::ZERO, target);
 
     let shown = if mode == Mode::Direct {
-        let lit = direct::light(graph, &gbuffer, lights, &settings.isr.direct());
+        let lit = direct::light(graph, &gbuffer, lights, &direct_choices(&settings.isr));
         sky(graph, lit.direct);
         Shown::new(lit.direct)
     } else {
@@ -141,5 +150,6 @@ fn compose(
             |pixel| pixel,
         )
     };
-    Ok(gbuffer_layers::add(shown, &gbuffer, &view).seen_by(view).noting(maps.notes))
+    let notes = [resident.notes(), &maps.notes].concat();
+    Ok(gbuffer_layers::add(shown, &gbuffer, &view).seen_by(view).noting(notes))
 }

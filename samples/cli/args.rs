@@ -4,7 +4,7 @@ use std::{ops::Range, path::PathBuf, str::FromStr};
 
 use clap::{ArgAction, Args};
 
-use crate::{console::Console, progress::ProgressMode};
+use crate::{console::Console, framing::DefaultLight, progress::ProgressMode};
 
 /// Options of `render`, the same for every technique.
 #[derive(Args, Clone, Debug)]
@@ -77,6 +77,10 @@ pub struct RenderArgs {
     /// Light the scene with this .hdr or .exr environment instead of its own
     #[arg(long, alias = "env", value_name = "FILE", help_heading = "Picture")]
     pub environment: Option<PathBuf>,
+
+    /// Whether a sun and a sky are added
+    #[arg(long, value_enum, default_value_t, value_name = "WHEN", help_heading = "Picture")]
+    pub default_light: DefaultLight,
 
     /// Seed of everything random
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Picture")]

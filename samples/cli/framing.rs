@@ -1,20 +1,25 @@
 //! A camera and light for scenes that bring none, so that every file gives a picture. What was added is said in a note.
 
 use glam::{Mat4, Quat, Vec3};
-use lucerna::scene::{Aabb, Camera, Environment, Light, LightKind, Node, Note, NoteKind, Projection, Scene, Transform};
+use lucerna::scene::{
+    Aabb, Camera, Environment, Light, LightKind, Material, Node, Note, NoteKind, Projection, Scene, Transform,
+};
+use serde::{Deserialize, Serialize};
 
 use crate::world;
 
 /// Full vertical angle of the camera that is added, radians.
 const YFOV: f32 = 45.0 * std::f32::consts::PI / 180.0;
+/// How much farther away than just seeing everything it stands.
+const ROOM: f32 = 1.05;
 /// Where the camera that is added stands, seen from the middle of the scene: to the right, above, in front.
 const VIEW_FROM: Vec3 = Vec3::new(0.55, 0.4, 1.0);
-/// Irradiance of the light that is added on a facing plane, W/m². A white wall facing it then has radiance 1.
-const SUN: f32 = std::f32::consts::PI;
+/// Irradiance of the light that is added on a facing plane, W/m²: with the sky, a white wall facing it stays below radiance 1.
+const SUN: f32 = 2.0;
 /// Where that light comes from.
 const SUN_FROM: Vec3 = Vec3::new(0.5, 1.0, 0.6);
 /// Radiance of the sky that is added, W/(sr·m²): above, at the horizon, below.
-const SKY: [Vec3; 3] = [Vec3::new(0.32, 0.42, 0.58), Vec3::new(0.45, 0.45, 0.45), Vec3::new(0.16, 0.14, 0.12)];
+const SKY: [Vec3; 3] = [Vec3::new(0.24, 0.32, 0.44), Vec3::new(0.34, 0.34, 0.34), Vec3::new(0.12, 0.11, 0.09)];
 
 /// Adds a camera that sees the whole scene if there is none.
 pub fn add_missing_camera(scene: &mut Scene, aspect: f32) {
@@ -28,14 +33,26 @@ pub fn add_missing_camera(scene: &mut Scene, aspect: f32) {
     note(scene, "cameras", "the scene has no camera: one was added that sees all of it");
 }
 
-/// Adds a light and a sky if nothing in the scene shines.
-pub fn add_missing_light(scene: &mut Scene) {
-    let shines = |scene: &Scene| {
-        scene.environment.is_some()
-            || scene.nodes.iter().any(|node| node.light.is_some())
-            || scene.materials.iter().any(|material| material.emissive.max_element() > 0.0)
-    };
-    if shines(scene) {
+/// When a light and a sky are added.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DefaultLight {
+    /// If the scene has no light, no environment, and no surface that is a lamp
+    #[default]
+    Auto,
+    Always,
+    Never,
+}
+
+/// Adds a sun and a sky to a scene that is dark, or as `choice` says.
+///
+/// A surface with an emissive texture is a display, not a lamp: it lights nothing that one would notice.
+pub fn add_missing_light(scene: &mut Scene, choice: DefaultLight) {
+    let lamp = |m: &Material| m.emissive.max_element() > 0.0 && m.emissive_texture.is_none();
+    let lit = scene.environment.is_some()
+        || scene.nodes.iter().any(|node| node.light.is_some())
+        || scene.materials.iter().any(lamp);
+    if choice == DefaultLight::Never || (choice == DefaultLight::Auto && lit) {
         return;
     }
     scene.lights.push(Light {
@@ -48,8 +65,8 @@ pub fn add_missing_light(scene: &mut Scene) {
     add_node(scene, "default sun", Mat4::from_quat(rotation), |node, scene| {
         node.light = Some(scene.lights.len() as u32 - 1);
     });
-    scene.environment = Some(default_sky());
-    note(scene, "lights", "nothing in the scene shines: a sun and a sky were added");
+    scene.environment.get_or_insert_with(default_sky);
+    note(scene, "lights", "a sun and a sky were added (--default-light never leaves them out)");
 }
 
 /// Bluish above, grey at the horizon, brown below.
@@ -77,15 +94,19 @@ fn note(scene: &mut Scene, place: &str, text: &str) {
     scene.notes.push(Note { kind: NoteKind::Approximated, place: place.into(), text: text.into() });
 }
 
-/// A camera from which the sphere around `bounds` fills the smaller side of the picture.
+/// A camera from which every corner of `bounds` is in the picture, with a little room around.
 fn fitted(bounds: &Aabb, aspect: f32) -> (Mat4, Projection) {
     let radius = bounds.half().length().max(1e-4);
-    let narrow = if aspect < 1.0 { ((YFOV * 0.5).tan() * aspect).atan() } else { YFOV * 0.5 };
-    let distance = radius / narrow.sin();
     let back = VIEW_FROM.normalize();
-    let position = bounds.centre() + back * distance;
     let right = Vec3::Y.cross(back).normalize();
     let up = back.cross(right);
+    let slope = (YFOV * 0.5).tan();
+    let needed = |corner: Vec3| {
+        let p = corner - bounds.centre();
+        p.dot(back) + (p.dot(right).abs() / (slope * aspect)).max(p.dot(up).abs() / slope)
+    };
+    let distance = bounds.corners().into_iter().map(needed).fold(radius, f32::max) * ROOM;
+    let position = bounds.centre() + back * distance;
     let world = Mat4::from_cols(right.extend(0.0), up.extend(0.0), back.extend(0.0), position.extend(1.0));
     let (znear, zfar) = ((distance - radius) * 0.5, Some((distance + radius) * 2.0));
     (world, Projection::Perspective { yfov: YFOV, aspect: None, znear: znear.max(radius * 1e-3), zfar })
@@ -94,7 +115,7 @@ fn fitted(bounds: &Aabb, aspect: f32) -> (Mat4, Projection) {
 #[cfg(test)]
 mod tests {
     use glam::Vec4;
-    use lucerna::scene::{Material, Mesh, Primitive};
+    use lucerna::scene::{Mesh, Primitive, TextureRef};
 
     use super::*;
 
@@ -136,10 +157,12 @@ mod tests {
         scene.nodes[0].camera = Some(0);
         scene.materials[0].emissive = Vec3::X;
         add_missing_camera(&mut scene, 1.0);
-        add_missing_light(&mut scene);
+        add_missing_light(&mut scene, DefaultLight::Auto);
         assert!(scene.nodes.len() == 1 && scene.environment.is_none() && scene.notes.is_empty());
-        scene.materials[0].emissive = Vec3::ZERO;
-        add_missing_light(&mut scene);
+        scene.materials[0].emissive_texture = Some(TextureRef::new(0));
+        add_missing_light(&mut scene, DefaultLight::Never);
+        assert!(scene.lights.is_empty());
+        add_missing_light(&mut scene, DefaultLight::Auto);
         assert!(scene.lights.len() == 1 && scene.environment.is_some() && scene.notes.len() == 1);
         // Lights shine down −Z of their node: this one comes from above.
         assert!(scene.nodes[1].local.matrix().transform_vector3(Vec3::NEG_Z).y < -0.5);

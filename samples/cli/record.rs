@@ -6,7 +6,7 @@ use lucerna::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::{args::Size, camera::CameraFile, config};
+use crate::{args::Size, camera::CameraFile, config, framing::DefaultLight};
 
 /// The `config` of a picture's metadata.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -29,6 +29,8 @@ pub struct Record {
     pub exposure: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub environment: Option<String>,
+    #[serde(default)]
+    pub default_light: DefaultLight,
     pub seed: u32,
     /// The image of the render graph that is shown instead of the result.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -96,6 +98,11 @@ impl Record {
         add(&["--frames", &format!("{}..={}", self.first_frame, self.frame)]);
         add(&[&format!("--time={}", self.time), &format!("--fps={}", self.fps)]);
         add(&[&format!("--exposure={}", self.exposure), &format!("--seed={}", self.seed)]);
+        match self.default_light {
+            DefaultLight::Auto => {}
+            DefaultLight::Always => add(&["--default-light=always"]),
+            DefaultLight::Never => add(&["--default-light=never"]),
+        }
         for (option, value) in [("environment", &self.environment), ("view", &self.view), ("mode", &self.mode)] {
             if let Some(value) = value {
                 add(&[&format!("--{option}={value}")]);
@@ -153,6 +160,7 @@ mod tests {
             fps: 24.0,
             exposure: 1.5,
             environment: None,
+            default_light: DefaultLight::Never,
             seed: u32::MAX,
             view: None,
             mode: Some("direct".into()),
@@ -165,7 +173,14 @@ mod tests {
         let list: Vec<String> =
             again.arguments(folder.path()).unwrap().into_iter().map(|a| a.into_string().unwrap()).collect();
         let all = list.join(" ");
-        for part in ["render ./-odd.gltf --size 64x48", "--frames 2..=5", "--time=-0.1", "--mode=direct", "--f32"] {
+        for part in [
+            "render ./-odd.gltf --size 64x48",
+            "--frames 2..=5",
+            "--time=-0.1",
+            "--mode=direct",
+            "--f32",
+            "--default-light=never",
+        ] {
             assert!(all.contains(part), "{part} is not in {all}");
         }
         assert_eq!(CameraFile::read(&folder.path().join("camera.toml")).unwrap(), camera);

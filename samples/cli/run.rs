@@ -94,6 +94,7 @@ impl<'a> Run<'a> {
             fps: args.fps,
             exposure,
             environment: args.environment.as_ref().map(|path| path.to_string_lossy().into_owned()),
+            default_light: args.default_light,
             seed: args.seed,
             view: args.view.clone(),
             mode: technique.mode.map(str::to_owned),

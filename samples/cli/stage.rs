@@ -45,7 +45,7 @@ impl Stage {
             return Err(Error::usage("environments are not read yet").in_file(path));
         }
         let fingerprint = fingerprint::scene(&scene);
-        framing::add_missing_light(&mut scene);
+        framing::add_missing_light(&mut scene, args.default_light);
         let from_file = args.camera.as_deref().is_some_and(|asked| Path::new(asked).is_file());
         if !from_file {
             framing::add_missing_camera(&mut scene, args.size.aspect());
