@@ -13,10 +13,12 @@ mod format;
 mod frame;
 mod handles;
 mod import;
+pub mod oracle;
 mod pass;
 mod pixels;
 mod plan;
 mod raster;
+pub mod testing;
 mod vocab;
 mod vulkan;
 
