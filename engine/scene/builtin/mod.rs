@@ -11,6 +11,7 @@
 //! picture well.
 
 pub mod cornell;
+mod figure;
 pub mod furnace;
 mod kit;
 mod office;
@@ -71,6 +72,12 @@ const ENTRIES: &[Entry] = &[
         description: "Office for four: sun through blinds and a lamp, about 21 000 triangles",
         exposure: 1.0,
         build: office::build,
+    },
+    Entry {
+        name: "figure",
+        description: "Animated court: a walking skinned figure, a morphing sculpture, turning rings, a bouncing ball",
+        exposure: 0.5,
+        build: figure::build,
     },
 ];
 

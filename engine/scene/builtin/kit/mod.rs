@@ -6,6 +6,7 @@
 #![allow(dead_code, unused_imports)]
 
 mod geometry;
+mod nets;
 mod pictures;
 mod random;
 mod sky;
@@ -16,6 +17,7 @@ mod surfaces;
 #[cfg(test)]
 pub(crate) use geometry::place;
 pub(crate) use geometry::{Geometry, Model};
+pub(crate) use nets::{blend, round_cone, surface_net};
 pub(crate) use pictures::{Picture, bricks, carpet, checker, lettering, mottled, planks, veneer};
 pub(crate) use random::{Random, fbm, hash, value_noise};
 pub(crate) use sky::{GradientSky, uniform_environment};

@@ -8,6 +8,7 @@ use glam::{Mat3, Vec2, Vec3, vec2, vec3};
 pub(super) type Patch = [[Vec3; 4]; 4];
 
 /// Height of the teapot in its own units, z up.
+#[cfg(test)]
 pub(super) const HEIGHT: f32 = 3.15;
 
 /// Handles of a quarter circle of radius 1 stand at this distance from its ends in Newell's data.

@@ -1,0 +1,103 @@
+//! Smooth closed bodies from a signed distance: naive surface nets (Gibson 1998).
+
+use super::Geometry;
+use glam::{UVec3, Vec2, Vec3};
+
+/// The surface where `distance` is zero (negative inside) in the box from `low` to `high`, sampled every `cell` metres.
+/// Closed as long as it does not touch the box. Normals are gradients; uv is (x, −y).
+pub(crate) fn surface_net(low: Vec3, high: Vec3, cell: f32, distance: impl Fn(Vec3) -> f32) -> Geometry {
+    let count = ((high - low) / cell).ceil().as_uvec3() + UVec3::ONE;
+    let at = |p: UVec3| low + p.as_vec3() * cell;
+    let index = |p: UVec3| ((p.z * count.y + p.y) * count.x + p.x) as usize;
+    let mut values = Vec::with_capacity((count.x * count.y * count.z) as usize);
+    for z in 0..count.z {
+        for y in 0..count.y {
+            values.extend((0..count.x).map(|x| distance(at(UVec3::new(x, y, z)))));
+        }
+    }
+    let inside = |p: UVec3| values[index(p)] < 0.0;
+    let gradient = |p: Vec3| {
+        let e = 0.25 * cell;
+        let along = |axis: Vec3| distance(p + axis * e) - distance(p - axis * e);
+        Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z)).normalize_or(Vec3::Y)
+    };
+
+    let mut out = Geometry::default();
+    let mut vertex_of = vec![u32::MAX; values.len()];
+    let cells = count - UVec3::ONE;
+    let all = |size: UVec3| {
+        (0..size.z).flat_map(move |z| (0..size.y).flat_map(move |y| (0..size.x).map(move |x| UVec3::new(x, y, z))))
+    };
+    for p in all(cells) {
+        let (mut sum, mut crossings) = (Vec3::ZERO, 0.0);
+        for (axis, u, v) in
+            [(UVec3::X, UVec3::Y, UVec3::Z), (UVec3::Y, UVec3::Z, UVec3::X), (UVec3::Z, UVec3::X, UVec3::Y)]
+        {
+            for offset in [UVec3::ZERO, u, v, u + v] {
+                let (a, b) = (p + offset, p + offset + axis);
+                if inside(a) != inside(b) {
+                    let (da, db) = (values[index(a)], values[index(b)]);
+                    sum += at(a).lerp(at(b), da / (da - db));
+                    crossings += 1.0;
+                }
+            }
+        }
+        if crossings > 0.0 {
+            let mut point = sum / crossings;
+            // One step down the gradient brings the mean of the crossings onto the surface, but not out of its cell.
+            let step = gradient(point) * distance(point);
+            point = (point - step).clamp(at(p), at(p + UVec3::ONE));
+            vertex_of[index(p)] = out.vertex(point, gradient(point), Vec2::new(point.x, -point.y));
+        }
+    }
+    for (axis, u, v) in [(UVec3::X, UVec3::Y, UVec3::Z), (UVec3::Y, UVec3::Z, UVec3::X), (UVec3::Z, UVec3::X, UVec3::Y)]
+    {
+        for p in all(cells).filter(|p| p.dot(u) > 0 && p.dot(v) > 0) {
+            if inside(p) == inside(p + axis) {
+                continue;
+            }
+            let [a, b, c, d] = [p - u - v, p - v, p, p - u].map(|q| vertex_of[index(q)]);
+            if inside(p) {
+                out.quad(a, b, c, d);
+            } else {
+                out.quad(a, d, c, b);
+            }
+        }
+    }
+    out
+}
+
+/// Distance to a cone with round ends of radii `ra` at `a` and `rb` at `b`, close to exact where the radii are alike.
+pub(crate) fn round_cone(p: Vec3, (a, ra): (Vec3, f32), (b, rb): (Vec3, f32)) -> f32 {
+    let axis = b - a;
+    let t = ((p - a).dot(axis) / axis.length_squared().max(1e-12)).clamp(0.0, 1.0);
+    (p - a - axis * t).length() - (ra + (rb - ra) * t)
+}
+
+/// Union of two distances with a fillet of about `radius` (quadratic polynomial).
+pub(crate) fn blend(a: f32, b: f32, radius: f32) -> f32 {
+    let h = (radius - (a - b).abs()).max(0.0) / radius;
+    a.min(b) - h * h * radius * 0.25
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn net_of_a_ball_is_a_ball() {
+        let ball = surface_net(Vec3::splat(-1.2), Vec3::splat(1.2), 0.1, |p| p.length() - 1.0);
+        for (p, n) in ball.positions.iter().zip(&ball.normals) {
+            assert!((p.length() - 1.0).abs() < 2e-3 && n.dot(p.normalize()) > 0.999);
+        }
+        let six_fold: f32 = ball
+            .indices
+            .chunks_exact(3)
+            .map(|c| {
+                ball.positions[c[0] as usize].dot(ball.positions[c[1] as usize].cross(ball.positions[c[2] as usize]))
+            })
+            .sum();
+        let expected = 4.0 / 3.0 * std::f32::consts::PI;
+        assert!((six_fold / 6.0 / expected - 1.0).abs() < 0.02, "{}", six_fold / 6.0);
+    }
+}
