@@ -146,7 +146,7 @@ float shadow_factor(Light l, vec3 world, vec3 normal) {
             sum += axis - bias <= stored ? wx * wy : 0.0;
         }
     }
-    return sum / 9.0;
+    return min(sum / 9.0, 1.0);
 }
 
 #endif

@@ -295,7 +295,7 @@ mod tests {
         }
 
         #[test]
-        fn a_spot_map_holds_its_cone(angle in 0.0f32..0.6, turn in 0.0f32..6.28, distance in 0.5f32..20.0) {
+        fn a_spot_map_holds_its_cone(angle in 0.0f32..0.6, turn in 0.0f32..std::f32::consts::TAU, distance in 0.5f32..20.0) {
             let light = light(consts::LIGHT_SPOT);
             let along = Vec3::from(light.direction);
             let side = glam::Quat::from_axis_angle(along, turn) * along.any_orthonormal_vector();
