@@ -145,7 +145,7 @@ pub(super) fn cabinet(palette: &Palette) -> Model {
     for i in 0..4 {
         let y = 0.18 + 0.315 * i as f32;
         model.add(palette.grey, cuboid(0.43, 0.3, 0.012).at(0.0, y, 0.304));
-        handles.append(&cuboid(0.14, 0.014, 0.022).at(0.0, y + 0.06, 0.318));
+        handles.append(&cuboid(0.14, 0.014, 0.022).at(0.0, y + 0.06, 0.317));
     }
     model.add(palette.steel, handles);
     model
