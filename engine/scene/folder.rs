@@ -45,7 +45,7 @@ impl Folder {
         let joined = self.root.join(relative);
         let real = joined
             .canonicalize()
-            .map_err(|error| Error::input("the file cannot be opened").caused_by(error).in_file(&joined))?;
+            .map_err(|error| Error::input(format!("{relative:?} cannot be opened")).caused_by(error))?;
         // Canonical paths have no links left: what still starts with the root is inside it.
         if !real.starts_with(&self.root) {
             return Err(Error::input(format!("{relative:?} leads out of the scene's folder")).help(REMEDY));
@@ -54,24 +54,23 @@ impl Folder {
     }
 }
 
-/// Reads a regular file of at most `limit` bytes. Devices, pipes and folders are refused before they are opened.
-pub fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>> {
-    let cannot = |error| Error::input("the file cannot be read").caused_by(error).in_file(path);
+/// Reads a regular file of at most `limit` bytes. Devices, pipes and folders are refused before they are opened. Errors
+/// call the file `name`.
+pub fn read_file(path: &Path, name: &str, limit: u64) -> Result<Vec<u8>> {
+    let cannot = |error| Error::input(format!("{name} cannot be read")).caused_by(error);
     let metadata = path.metadata().map_err(cannot)?;
     if !metadata.is_file() {
         let what = if metadata.is_dir() { "is a folder" } else { "is not a regular file" };
-        return Err(Error::input(what).in_file(path));
+        return Err(Error::input(format!("{name} {what}")));
     }
-    let too_large =
-        |size: u64| Err(Error::input(format!("the file has {size} bytes or more, {limit} are allowed")).in_file(path));
+    let too_large = |size: u64| Err(Error::input(format!("{name} has {size} bytes or more, {limit} are allowed")));
     if metadata.len() > limit {
         return too_large(metadata.len());
     }
     let mut bytes = Vec::new();
     bytes.try_reserve_exact(metadata.len() as usize).map_err(|error| {
-        Error::new(ErrorKind::OutOfMemory, format!("no memory for {} bytes", metadata.len()))
+        Error::new(ErrorKind::OutOfMemory, format!("no memory for the {} bytes of {name}", metadata.len()))
             .caused_by(error)
-            .in_file(path)
     })?;
     // The file may grow while it is read.
     File::open(path).map_err(cannot)?.take(limit.saturating_add(1)).read_to_end(&mut bytes).map_err(cannot)?;
@@ -79,6 +78,12 @@ pub fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>> {
         return too_large(bytes.len() as u64);
     }
     Ok(bytes)
+}
+
+/// As [`read_file`], for a file that a scene names.
+pub fn read_named(path: &Path, limit: u64) -> Result<Vec<u8>> {
+    let name = path.file_name().unwrap_or_default();
+    read_file(path, &format!("{name:?}"), limit)
 }
 
 /// The relative path that a URI reference names, or an error if it names anything but a file below the scene's folder.

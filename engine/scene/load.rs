@@ -38,7 +38,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
             None => "Name a .gltf, .glb or .obj file".to_owned(),
         }));
     }
-    let bytes = folder::read_file(path, options.limits.max_file)?;
+    let bytes = folder::read_file(path, "the file", options.limits.max_file)?;
     let scene = match format(path, &bytes)? {
         Format::Gltf => gltf::read(path, &bytes, &options.limits)?,
         Format::Obj => obj::read(path, &bytes, options.unit.unwrap_or(1.0), &options.limits)?,

@@ -141,23 +141,55 @@ impl Accessors<'_> {
     /// Checks what can be checked of every accessor, used or not, without reading its elements.
     pub fn check_all(&self) -> Result<()> {
         for (i, accessor) in self.document.accessors.iter().enumerate() {
-            let check = || {
-                let component = Component::of(accessor.component_type)?;
-                shape(&accessor.kind, component)?;
-                if accessor.count == 0 {
-                    return Err(Error::input("0 elements, at least 1 is needed").at("count"));
-                }
-                let sparse = accessor.sparse.as_ref();
-                let views =
-                    [accessor.buffer_view, sparse.map(|s| s.indices.buffer_view), sparse.map(|s| s.values.buffer_view)];
-                for view in views.into_iter().flatten() {
-                    item(&self.document.views, "bufferViews", view)?;
-                }
-                Ok(())
-            };
-            check().map_err(|error: Error| error.at(format!("accessors[{i}]")))?;
+            self.check(accessor).map_err(|error| error.at(format!("accessors[{i}]")))?;
         }
         Ok(())
+    }
+
+    fn check(&self, accessor: &Accessor) -> Result<()> {
+        let component = Component::of(accessor.component_type)?;
+        if accessor.count == 0 {
+            return Err(Error::input("0 elements, at least 1 is needed").at("count"));
+        }
+        // Types may be added to the format; they matter only where they are used.
+        let element = shape(&accessor.kind, component).map_or(0, |(_, element)| element);
+        if let Some(index) = accessor.buffer_view {
+            let view = item(&self.document.views, "bufferViews", index)?;
+            let stride = view.byte_stride.unwrap_or(element);
+            self.fits(index, accessor.byte_offset, accessor.count, stride, element)?;
+        }
+        if let Some(sparse) = &accessor.sparse {
+            let check = || {
+                if sparse.count == 0 || sparse.count > accessor.count {
+                    return Err(Error::input(format!("{} of {} elements", sparse.count, accessor.count)).at("count"));
+                }
+                let index = Component::of(sparse.indices.component_type)?.size();
+                self.fits(sparse.indices.buffer_view, sparse.indices.byte_offset, sparse.count, index, index)
+                    .map_err(|error| error.at("indices"))?;
+                self.fits(sparse.values.buffer_view, sparse.values.byte_offset, sparse.count, element, element)
+                    .map_err(|error| error.at("values"))
+            };
+            check().map_err(|error| error.at("sparse"))?;
+        }
+        Ok(())
+    }
+
+    /// Checks that `count` elements lie inside a view.
+    fn fits(&self, view: u32, offset: u64, count: u64, stride: u64, element: u64) -> Result<()> {
+        let length = item(&self.document.views, "bufferViews", view)?.byte_length;
+        if stride < element {
+            return Err(Error::input(format!("{stride} bytes, elements have {element}"))
+                .at(format!("bufferViews[{view}].byteStride")));
+        }
+        let end =
+            count.checked_sub(1).and_then(|last| last.checked_mul(stride)?.checked_add(element)?.checked_add(offset));
+        match end.filter(|&end| end <= length) {
+            Some(_) => Ok(()),
+            None => Err(Error::input(format!(
+                "{count} elements of {stride} bytes from byte {offset} on do not fit into the {length} bytes of \
+                 bufferViews[{view}]"
+            ))),
+        }
     }
 
     /// Rows of floats. Elements with fewer than `N` components are filled up with ones (colours without alpha).
@@ -217,40 +249,17 @@ impl Accessors<'_> {
                 format.components
             )));
         }
-        if accessor.count == 0 {
-            return Err(Error::input("0 elements, at least 1 is needed").at("count"));
-        }
-        let too_many = || Error::input(format!("{} elements are too many", accessor.count)).at("count");
         // Before anything is allocated: what the scene may take at all.
         self.budget.could_take(accessor.count, 4).map_err(|error| error.at("count"))?;
-        let count = usize::try_from(accessor.count).map_err(|_| too_many())?;
+        self.check(accessor)?;
+        let count = accessor.count as usize;
         let mut stride = element;
         let bytes = match accessor.buffer_view {
             None => None,
             Some(index) => {
-                let view = item(&self.document.views, "bufferViews", index)?;
-                if let Some(wanted) = view.byte_stride {
-                    if wanted < element || wanted > 65536 {
-                        return Err(Error::input(format!("{wanted} bytes, elements have {element}"))
-                            .at(format!("bufferViews[{index}].byteStride")));
-                    }
-                    stride = wanted;
-                }
-                let bytes = self.buffers.view(index)?;
-                let end = (accessor.count - 1)
-                    .checked_mul(stride)
-                    .and_then(|last| last.checked_add(element)?.checked_add(accessor.byte_offset))
-                    .unwrap_or(u64::MAX);
-                if end > bytes.len() as u64 {
-                    return Err(Error::input(format!(
-                        "{count} elements of {stride} bytes from byte {} on do not fit into the {} bytes of \
-                         bufferViews[{index}]",
-                        accessor.byte_offset,
-                        bytes.len()
-                    ))
-                    .at("count"));
-                }
-                Some(&bytes[accessor.byte_offset as usize..])
+                stride = item(&self.document.views, "bufferViews", index)?.byte_stride.unwrap_or(element);
+                // The view has the length that it says, so that what was checked against that holds.
+                Some(&self.buffers.view(index)?[accessor.byte_offset as usize..])
             }
         };
         let sparse = self.sparse(accessor, element).map_err(|error| error.at("sparse"))?;
@@ -261,21 +270,9 @@ impl Accessors<'_> {
     fn sparse(&self, accessor: &Accessor, element: u64) -> Result<Option<(Vec<u32>, &[u8])>> {
         let Some(sparse) = &accessor.sparse else { return Ok(None) };
         let count = sparse.count;
-        if count == 0 || count > accessor.count {
-            return Err(Error::input(format!("{count} of {} elements", accessor.count)).at("count"));
-        }
         let range = |view: u32, offset: u64, size: u64, place: &str| {
             let bytes = self.buffers.view(view).map_err(|error| error.at(place))?;
-            let end = count.checked_mul(size).and_then(|length| length.checked_add(offset)).unwrap_or(u64::MAX);
-            if end > bytes.len() as u64 {
-                return Err(Error::input(format!(
-                    "{count} elements of {size} bytes from byte {offset} on do not fit into the {} bytes of \
-                     bufferViews[{view}]",
-                    bytes.len()
-                ))
-                .at(place));
-            }
-            Ok(&bytes[offset as usize..end as usize])
+            Ok::<_, Error>(&bytes[offset as usize..(offset + count * size) as usize])
         };
         let component = Component::of(sparse.indices.component_type).map_err(|error| error.at("indices"))?;
         if !matches!(component, U8 | U16 | U32) {

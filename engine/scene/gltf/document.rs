@@ -133,9 +133,17 @@ fn list<T: DeserializeOwned>(root: &mut Map<String, Value>, key: &str) -> Result
         Some(Value::Array(values)) => values
             .into_iter()
             .enumerate()
-            .map(|(i, value)| typed(value).map_err(|error| error.at(format!("{key}[{i}]"))))
+            .map(|(i, value)| element(value).map_err(|error| error.at(format!("{key}[{i}]"))))
             .collect(),
         Some(other) => Err(Error::input(format!("must be an array, found {}", kind(&other))).at(key)),
+    }
+}
+
+/// An element of a top-level list: an object, or a name. Without the check, objects would be read from arrays too.
+fn element<T: DeserializeOwned>(value: Value) -> Result<T> {
+    match value {
+        Value::Object(_) | Value::String(_) => typed(value),
+        other => Err(Error::input(format!("must be an object, found {}", kind(&other)))),
     }
 }
 

@@ -105,7 +105,7 @@ fn channel_of(
         }
     };
     let at = |error: Error| error.at(format!("samplers[{}]", channel.sampler));
-    let times = times(accessors, sampler.input).map_err(|error| at(error.at("input")))?;
+    let mut times = times(accessors, sampler.input).map_err(|error| at(error.at("input")))?;
     let rows = times.len() * if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
     let output = |error: Error| at(error.at("output"));
     let exactly = |count: usize, wanted: usize| match count == wanted {
@@ -117,7 +117,7 @@ fn channel_of(
         exactly(values.len(), rows)?;
         Ok(values.into_iter().map(Vec3::from).collect())
     };
-    let values = match channel.target.path.as_str() {
+    let mut values = match channel.target.path.as_str() {
         "translation" => Keys::Translation(vectors().map_err(output)?),
         "scale" => Keys::Scale(vectors().map_err(output)?),
         "rotation" => Keys::Rotation(rotations(accessors, sampler.output, rows, interpolation).map_err(output)?),
@@ -143,17 +143,43 @@ fn channel_of(
     if !matches!(values, Keys::Weights { .. }) && matches!(hierarchy.nodes[new as usize].local, Transform::Matrix(_)) {
         return Err(Error::input(format!("nodes[{target}] has a matrix, which cannot be animated")).at("target.node"));
     }
+    let repeated = drop_repeated_keys(&mut times, &mut values, interpolation);
+    if repeated > 0 {
+        notes.repaired(here, format!("{repeated} keys dropped that are not later than the one before"));
+    }
     Ok(Some(Channel { node: new, interpolation, times, values }))
+}
+
+/// Keeps the first of keys at the same time, and says how many went.
+fn drop_repeated_keys(times: &mut Vec<f32>, values: &mut Keys, interpolation: Interpolation) -> usize {
+    let before = times.len();
+    let kept: Vec<bool> = (0..before).map(|i| i == 0 || times[i] > times[i - 1]).collect();
+    if kept.iter().all(|&kept| kept) {
+        return 0;
+    }
+    let rows = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
+    fn retain<T>(list: &mut Vec<T>, width: usize, kept: &[bool]) {
+        let mut at = 0;
+        list.retain(|_| {
+            at += 1;
+            kept[(at - 1) / width]
+        });
+    }
+    retain(times, 1, &kept);
+    match values {
+        Keys::Translation(values) | Keys::Scale(values) => retain(values, rows, &kept),
+        Keys::Rotation(values) => retain(values, rows, &kept),
+        Keys::Weights { count, values } => retain(values, rows * *count, &kept),
+    }
+    before - times.len()
 }
 
 fn times(accessors: &Accessors, index: u32) -> Result<Vec<f32>> {
     let times: Vec<f32> = accessors.floats::<1>(index, Format::TIME)?.into_iter().map(|[time]| time).collect();
-    let bad = (0..times.len()).find(|&i| times[i] < 0.0 || (i > 0 && times[i] <= times[i - 1]));
+    let bad = (0..times.len()).find(|&i| times[i] < 0.0 || (i > 0 && times[i] < times[i - 1]));
     match bad {
         None => Ok(times),
-        Some(i) => {
-            Err(Error::input(format!("time {} (at {i}) is negative or not later than the one before", times[i])))
-        }
+        Some(i) => Err(Error::input(format!("time {} (at {i}) is negative or earlier than the one before", times[i]))),
     }
 }
 

@@ -311,7 +311,12 @@ fn light(light: &types::Light, place: &str, notes: &mut Notes) -> Result<Light> 
             }
             LightKind::Spot { range, inner, outer }
         }
-        other => return Err(Error::input(format!("{other:?} is unknown")).at("type")),
+        other => {
+            // Types may be added to the extension. The light keeps its place in the list, without shining.
+            notes.ignored(place, format!("a light of type {other:?} is not supported"));
+            let name = light.name.clone().unwrap_or_default();
+            return Ok(Light { name, kind: LightKind::Point { range: None }, color: Vec3::ZERO, intensity: 0.0 });
+        }
     };
     Ok(Light {
         name: light.name.clone().unwrap_or_default(),

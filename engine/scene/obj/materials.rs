@@ -161,7 +161,7 @@ impl Textures<'_> {
     }
 
     fn read(&mut self, path: &Path, bumps: Option<f32>) -> Result<Texture> {
-        let bytes = folder::read_file(path, self.limits.max_file.min(self.limits.max_alloc))?;
+        let bytes = folder::read_named(path, self.limits.max_file.min(self.limits.max_alloc))?;
         self.budget.read(bytes.len());
         let limits = Limits { max_image_pixels: self.budget.texels_left(), ..self.limits.clone() };
         let decode = || -> Result<Texture> {

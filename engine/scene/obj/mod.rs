@@ -102,7 +102,7 @@ fn read_materials(
         if !read.insert(path.clone()) {
             continue;
         }
-        let bytes = folder::read_file(&path, limits.max_file.min(limits.max_alloc))?;
+        let bytes = folder::read_named(&path, limits.max_file.min(limits.max_alloc))?;
         budget.read(bytes.len());
         budget.take(bytes.len() as u64, 16)?;
         let library = mtl::parse(&decode_text(&bytes)).map_err(|error| error.in_file(&path))?;

@@ -1,0 +1,197 @@
+//! Every malformed, hostile and odd file of the asset collection: the outcome that `tests/malformed.tsv` says, without
+//! panic, in under five seconds, with under one GiB of memory at any time.
+//!
+//! A line of the table: file, outcome (`ok` or the kind of the error), and part of the message, or of a note where the
+//! file is read.
+
+mod common;
+
+use libtest_mimic::{Arguments, Failed, Trial};
+use lucerna::{
+    Error, image,
+    scene::{Limits, LoadOptions, load, texture},
+};
+use std::{
+    alloc::{GlobalAlloc, Layout, System},
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    sync::atomic::{AtomicUsize, Ordering::Relaxed},
+    sync::mpsc,
+    time::Duration,
+};
+
+const TIME: Duration = Duration::from_secs(5);
+const MEMORY: usize = 1 << 30;
+
+/// The system's allocator, counting.
+struct Counting;
+
+static USED: AtomicUsize = AtomicUsize::new(0);
+static PEAK: AtomicUsize = AtomicUsize::new(0);
+static PANICS: AtomicUsize = AtomicUsize::new(0);
+
+impl Counting {
+    fn more(size: usize) {
+        let used = USED.fetch_add(size, Relaxed) + size;
+        PEAK.fetch_max(used, Relaxed);
+    }
+}
+
+// SAFETY: all requests go to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        Self::more(layout.size());
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        Self::more(layout.size());
+        unsafe { System.alloc_zeroed(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        USED.fetch_sub(layout.size(), Relaxed);
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        // Both blocks may exist for a moment.
+        Self::more(size);
+        USED.fetch_sub(layout.size(), Relaxed);
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// What reading a file gave: `ok` with its notes, or the error.
+struct Outcome {
+    kind: String,
+    text: String,
+}
+
+fn outcome(result: Result<String, Error>) -> Outcome {
+    match result {
+        Ok(text) => Outcome { kind: "ok".into(), text },
+        Err(error) => Outcome { kind: format!("{:?}", error.kind()).to_lowercase(), text: error.to_string() },
+    }
+}
+
+fn extension(path: &Path) -> String {
+    path.extension().and_then(|extension| extension.to_str()).unwrap_or_default().to_lowercase()
+}
+
+fn is_scene(path: &Path) -> bool {
+    ["gltf", "glb", "obj"].contains(&extension(path).as_str())
+}
+
+/// Reads a file by the way that its folder and extension call for.
+fn read(path: &Path) -> Outcome {
+    if is_scene(path) {
+        return outcome(load(path, &LoadOptions::default()).map(|scene| {
+            // Using it must be safe too.
+            scene.validate().expect("a loaded scene is valid");
+            scene.notes.iter().map(|note| format!("{}: {}", note.place, note.text)).collect::<Vec<_>>().join("; ")
+        }));
+    }
+    if ["png", "jpg", "jpeg", "webp", "bmp", "tga"].contains(&extension(path).as_str()) {
+        let bytes = std::fs::read(path).unwrap();
+        let decoded = texture::decode(&bytes, None, &Limits::default());
+        return outcome(decoded.map(|texture| format!("{}×{}", texture.width, texture.height)));
+    }
+    outcome(image::read(path, &Limits::default()).map(|image| format!("{}×{}", image.width, image.height)))
+}
+
+fn check(path: PathBuf, expected: Option<(String, String)>) -> Result<(), Failed> {
+    let panics = PANICS.load(Relaxed);
+    let before = USED.load(Relaxed);
+    PEAK.store(before, Relaxed);
+    let (sender, receiver) = mpsc::channel();
+    let file = path.clone();
+    std::thread::spawn(move || sender.send(read(&file)));
+    let outcome = match receiver.recv_timeout(TIME) {
+        Ok(outcome) => outcome,
+        Err(mpsc::RecvTimeoutError::Timeout) => return Err(format!("took more than {TIME:?}").into()),
+        Err(mpsc::RecvTimeoutError::Disconnected) => return Err("panicked".into()),
+    };
+    let peak = PEAK.load(Relaxed).saturating_sub(before);
+    if peak > MEMORY {
+        return Err(format!("took {} MiB", peak >> 20).into());
+    }
+    if PANICS.load(Relaxed) != panics {
+        return Err("a panic was caught inside".into());
+    }
+    let found = format!("{}\t{}", outcome.kind, outcome.text);
+    match expected {
+        None => Err(format!("is not in the table: {found}").into()),
+        Some((kind, part)) if kind != outcome.kind || !outcome.text.contains(&part) => {
+            Err(format!("expected {kind}\t{part}, found {found}").into())
+        }
+        Some((kind, _)) if is_scene(&path) && kind != "ok" && !outcome.text.starts_with(&*path.to_string_lossy()) => {
+            Err(format!("the error does not begin with the file: {found}").into())
+        }
+        Some(_) => Ok(()),
+    }
+}
+
+fn table() -> BTreeMap<String, (String, String)> {
+    let lines = include_str!("malformed.tsv").lines().filter(|line| !line.starts_with('#') && !line.is_empty());
+    lines
+        .map(|line| {
+            let mut cells = line.splitn(3, '\t').map(str::to_owned);
+            let mut next = || cells.next().unwrap_or_default();
+            (next(), (next(), next()))
+        })
+        .collect()
+}
+
+/// The files to read: all but what belongs to another one, and the expected reports beside the validator's cases.
+fn inputs(assets: &Path) -> Vec<String> {
+    let manifest: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(assets.join("manifest.json")).unwrap()).unwrap();
+    let files = manifest["files"].as_array().unwrap().iter();
+    files
+        .filter(|entry| entry["role"] == "main")
+        .filter_map(|entry| entry["file"].as_str()?.strip_prefix("malformed/"))
+        .filter(|file| !file.ends_with(".report.json"))
+        .map(str::to_owned)
+        .collect()
+}
+
+fn main() {
+    let mut arguments = Arguments::from_args();
+    // Memory is counted for the process as a whole.
+    arguments.test_threads = Some(1);
+    let default = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        PANICS.fetch_add(1, Relaxed);
+        default(info);
+    }));
+    let mut trials = vec![];
+    if let Some(assets) = common::assets() {
+        let mut table = table();
+        for file in inputs(&assets) {
+            let path = assets.join("malformed").join(&file);
+            let expected = table.remove(&file);
+            trials.push(Trial::test(file, move || check(path, expected)));
+        }
+        trials.push(Trial::test("every_line_of_the_table_has_a_file", move || match table.keys().next() {
+            None => Ok(()),
+            Some(file) => Err(format!("{file} is in the table only").into()),
+        }));
+        trials.push(Trial::test("zz_peak_of_the_process", process_peak));
+    }
+    libtest_mimic::run(&arguments, trials).exit();
+}
+
+/// Memory of foreign code is not counted by the allocator, but by the system.
+fn process_peak() -> Result<(), Failed> {
+    let Ok(status) = std::fs::read_to_string("/proc/self/status") else { return Ok(()) };
+    let peak =
+        status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB")?.parse::<usize>().ok());
+    match peak {
+        Some(peak) if peak > MEMORY >> 10 => Err(format!("{} MiB", peak >> 10).into()),
+        _ => Ok(()),
+    }
+}
