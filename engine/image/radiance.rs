@@ -1,4 +1,7 @@
 //! Radiance .hdr (RGBE) files: all scan-line schemes, all orientations, the headers found in the wild.
+//!
+//! `PRIMARIES` lines are not applied: most say the same default with an equal-energy white, which no program honours,
+//! or zeros. XYZE files are converted.
 
 use std::collections::BTreeMap;
 
