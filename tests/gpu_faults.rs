@@ -15,7 +15,8 @@ use std::{
 
 use lucerna::{
     Error, Result,
-    gpu::{self, BufferDesc, DescriptorArena, Gpu, GpuOptions, OwnedBuffer, Validation, testing},
+    gpu::{self, BufferDesc, DescriptorArena, Gpu, GpuOptions, OwnedBuffer, Tiles, Validation, testing},
+    shader::Shader,
 };
 
 mod gpu_common;
@@ -29,6 +30,7 @@ fn child(task: &str) -> ExitCode {
     let result = match task {
         "work" => whole_program(),
         "long" => long_dispatch(),
+        "tiled" => tiled_dispatch(),
         "capabilities" => capabilities(),
         "harness" => match testing::run(GpuOptions::default(), |_| {}) {
             Ok(()) => Ok(()),
@@ -78,11 +80,9 @@ fn whole_program() -> Result<()> {
     result
 }
 
-/// Work that takes seconds on a CPU driver, in a named pass.
-fn long_dispatch() -> Result<()> {
-    let gpu = Gpu::new(GpuOptions { validation: Validation::Off, ..GpuOptions::from_env()? })?;
-    // No loop longer than old CPU drivers run (65 535 turns), but many threads.
-    let slow = gpu_common::compute(
+/// No loop longer than old CPU drivers run (65 535 turns), so that many threads are needed to take long.
+fn slow() -> &'static Shader {
+    gpu_common::compute(
         "test.slow",
         "#version 460
         layout(local_size_x = 64) in;
@@ -93,7 +93,43 @@ fn long_dispatch() -> Result<()> {
             for (uint i = 0u; i < 60000u; ++i) { x = (x ^ (x >> 7)) * 747796405u + i; }
             if (x == 12345u) to[0] = x;
         }",
-    );
+    )
+}
+
+/// Workgroups of work that takes many seconds on two cores, and some tenths of a second on a hundred.
+const LONG: u32 = 60_000;
+/// Workgroups of work that takes a second or some on two cores.
+const TILED: u64 = 800;
+
+/// The long work in tiles: no submission takes long, so no watchdog bites.
+fn tiled_dispatch() -> Result<()> {
+    let gpu = Gpu::new(GpuOptions { validation: Validation::Off, ..GpuOptions::from_env()? })?;
+    let from = OwnedBuffer::with_contents(&gpu, "from", &[1; 256])?;
+    let to = OwnedBuffer::new(&gpu, "to", BufferDesc::device(256))?;
+    let pipeline = gpu.compute_pipeline(slow(), &[])?;
+    let mut arena = DescriptorArena::new(&gpu);
+    let mut tiles = Tiles::new(TILED, 1);
+    let begun = Instant::now();
+    let (mut count, mut longest) = (0, Duration::ZERO);
+    while let Some(tile) = tiles.next_tile() {
+        arena.reset()?;
+        let set = arena.allocate("test.slow", pipeline.set_layout)?;
+        let mut commands = gpu.commands("tile")?;
+        gpu_common::dispatch(&mut commands, "test.slow", pipeline, set, [&from, &to], (tile.end - tile.start) as u32);
+        let begun = Instant::now();
+        commands.submit()?.wait()?;
+        longest = longest.max(begun.elapsed());
+        tiles.took(begun.elapsed());
+        count += 1;
+    }
+    println!("{count} tiles in {:?}, longest {longest:?}", begun.elapsed());
+    Ok(())
+}
+
+/// Work that takes seconds on a CPU driver, in a named pass.
+fn long_dispatch() -> Result<()> {
+    let gpu = Gpu::new(GpuOptions { validation: Validation::Off, ..GpuOptions::from_env()? })?;
+    let slow = slow();
     let from = OwnedBuffer::with_contents(&gpu, "from", &[1; 256])?;
     let to = OwnedBuffer::new(&gpu, "to", BufferDesc::device(256))?;
     let pipeline = gpu.compute_pipeline(slow, &[])?;
@@ -104,7 +140,7 @@ fn long_dispatch() -> Result<()> {
     gpu_common::dispatch(&mut commands, "test.quick", quick, set, [&from, &to], 1);
     commands.everything_barrier();
     let set = arena.allocate("test.slow", pipeline.set_layout)?;
-    gpu_common::dispatch(&mut commands, "test.slow", pipeline, set, [&from, &to], 6000);
+    gpu_common::dispatch(&mut commands, "test.slow", pipeline, set, [&from, &to], LONG);
     commands.everything_barrier();
     let set = arena.allocate("test.quick", quick.set_layout)?;
     gpu_common::dispatch(&mut commands, "test.after", quick, set, [&from, &to], 1);
@@ -509,6 +545,16 @@ fn a_device_that_the_driver_gives_up_names_the_pass() {
         if outcome.code != Some(0) || is_mesa() {
             outcome.fails_with(6, &["frame 7: ", "device was lost in vkWaitForFences", "in pass `test.slow` (2 of 3)"]);
         }
+    }
+}
+
+// Row 13: the same work in tiles passes under the same watchdog.
+#[test]
+fn long_work_in_tiles_is_not_given_up() {
+    if have_device() {
+        let outcome = Case::new("tiled").env("MESA_VK_MAX_TIMEOUT", "500").run();
+        outcome.succeeds();
+        println!("{}", outcome.out);
     }
 }
 

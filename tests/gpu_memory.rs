@@ -219,3 +219,19 @@ fn eight_threads_may_use_one_device() {
         });
     });
 }
+
+#[test]
+fn the_loop_limit_of_old_cpu_drivers_is_found() {
+    with_gpu(|gpu| {
+        let limit = gpu.loop_limit().unwrap();
+        assert_eq!(limit, gpu.loop_limit().unwrap());
+        let driver = gpu.describe();
+        if driver.driver_info.contains("Mesa 22.") {
+            let limit = limit.expect("Mesa 22 stops loops early");
+            assert!((60_000..=65_536).contains(&limit), "{limit}");
+        } else if driver.driver_info.contains("Mesa 25.") {
+            assert_eq!(limit, None);
+        }
+        println!("loop limit {limit:?} on {driver}");
+    });
+}

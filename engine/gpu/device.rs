@@ -5,7 +5,7 @@ use std::{
     fmt,
     mem::ManuallyDrop,
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
+        Arc, Mutex, MutexGuard, OnceLock, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
     time::Duration,
@@ -96,6 +96,8 @@ pub(crate) struct Context {
     pub shells: Mutex<Vec<Shell>>,
     pub samplers: Mutex<HashMap<SamplerKey, vk::Sampler>>,
     pub pipelines: Mutex<PipelineCache>,
+    /// Answer of [`Gpu::loop_limit`].
+    pub loop_limit: OnceLock<Option<u32>>,
     /// Last: the instance goes after the device.
     pub instance: Arc<Instance>,
 }
@@ -360,6 +362,7 @@ impl Context {
             shells: Mutex::default(),
             samplers: Mutex::default(),
             pipelines: Mutex::default(),
+            loop_limit: OnceLock::new(),
             facts: candidate.facts,
             instance,
         })

@@ -10,6 +10,7 @@
 //! | samplers | [`Gpu::sampler`] with the stock [`SamplerDesc`]s |
 //! | descriptor sets of one frame | [`DescriptorArena`] |
 //! | times of passes | [`Timestamps`] |
+//! | long work in short submissions | [`Tiles`] |
 //! | what the device can do | [`Gpu::caps`] |
 //! | tests | [`testing::with_gpu`] |
 //!
@@ -26,6 +27,7 @@ mod fault;
 mod format;
 mod image;
 mod instance;
+mod loops;
 mod memory;
 mod options;
 mod pipeline;
@@ -34,6 +36,7 @@ mod sampler;
 mod select;
 mod submit;
 pub mod testing;
+mod tiles;
 mod timestamps;
 mod validation;
 
@@ -48,5 +51,6 @@ pub use pipeline::{Blend, Pipeline, RasterState, Stencil};
 pub use sampler::SamplerDesc;
 pub use select::{Choice, DeviceFacts, DeviceKind, Rejection, Requirements, Version, refusal, select};
 pub use submit::{Commands, Submission};
+pub use tiles::Tiles;
 pub use timestamps::Timestamps;
 pub use validation::{ALLOWED, Allowed, Log, Message, Severity};
