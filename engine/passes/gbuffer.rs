@@ -65,7 +65,7 @@ pub struct GBuffer {
     pub specular: Image,
     /// RGBA16F: emitted radiance, W/(sr·m²); alpha: accessibility from the occlusion texture.
     pub emission: Image,
-    /// D32 with stencil: 1 geometry, 0 background. Reversed depth.
+    /// Depth with stencil: 1 geometry, 0 background. Reversed depth.
     pub hardware: Image,
     /// The view it was drawn for.
     pub view: Uniform<types::View>,
@@ -84,7 +84,7 @@ pub fn draw(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings
         depth: graph.image("gbuffer.depth", Format::R32F, extent),
         specular: graph.image("gbuffer.specular", Format::RGBA8, extent),
         emission: graph.image("gbuffer.emission", Format::RGBA16F, extent),
-        hardware: graph.image("gbuffer.hardware", Format::D32S8, extent),
+        hardware: graph.image("gbuffer.hardware", scene.depth_stencil, extent),
         view: graph.uniform(&view.uniform()),
     };
     let frustum = settings.culling.then(|| Frustum::new(view));

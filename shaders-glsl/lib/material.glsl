@@ -18,6 +18,8 @@ const uint MATERIAL_UNLIT = 1u; // export
 const uint MATERIAL_DOUBLE_SIDED = 2u; // export
 const uint MATERIAL_MASK = 4u; // export
 const uint MATERIAL_BLEND = 8u; // export
+const uint MATERIAL_FIRST_TEXTURE = 8u; // export
+// Bits from there on: which slots of Material.textures are used.
 
 // Bits of TextureUse.mode.
 const uint SAMPLER_CLAMP_U = 1u; // export
@@ -64,6 +66,11 @@ struct Material {
 
 layout(binding = MATERIALS_BINDING, scalar) readonly buffer Materials { Material materials[]; };
 layout(binding = TEXTURES_BINDING) uniform sampler2DArray scene_textures[8];
+
+// Does material m have a texture in this slot?
+bool has_texture(uint flags, uint slot) {
+    return (flags >> (MATERIAL_FIRST_TEXTURE + slot) & 1u) != 0u;
+}
 
 // Sampled with a repeating trilinear sampler; lod explicit, so that it may stand in any control flow and stage.
 vec4 sample_array(uint array, vec3 at, float lod) {

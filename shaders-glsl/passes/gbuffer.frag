@@ -42,8 +42,8 @@ void main() {
     vec4 texels[5];
     for (uint slot = 0u; slot < 5u; ++slot) {
         texels[slot] = vec4(1.0);
-        TextureUse use = materials[m].textures[slot];
-        if (use.array != NO_TEXTURE) {
+        if (has_texture(flags, slot)) {
+            TextureUse use = materials[m].textures[slot];
             float lod = texture_lod(use, of_set(dx01, dx23, use.uv_set), of_set(dy01, dy23, use.uv_set));
             texels[slot] = sample_texture(use, of_set(uv01, uv23, use.uv_set), lod);
         }
@@ -62,7 +62,7 @@ void main() {
     bool flipped = (instances[instance_in].flags & INSTANCE_FLIPPED) != 0u;
     bool front = gl_FrontFacing != flipped;
     vec3 n = normalize(normal_in);
-    if (materials[m].textures[TEXTURE_NORMAL].array != NO_TEXTURE && dot(tangent_in.xyz, tangent_in.xyz) > 0.0) {
+    if (has_texture(flags, TEXTURE_NORMAL) && dot(tangent_in.xyz, tangent_in.xyz) > 0.0) {
         vec3 t = normalize(tangent_in.xyz);
         vec3 b = cross(n, t) * tangent_in.w;
         vec3 mapped = (texels[TEXTURE_NORMAL].xyz * 2.0 - 1.0) * vec3(vec2(materials[m].normal_scale), 1.0);

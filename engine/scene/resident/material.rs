@@ -30,6 +30,7 @@ pub(super) fn material(material: &Material, packing: &Packing) -> types::Materia
     let mut put = |slot: u32, used: &Option<TextureRef>, encoding| {
         if let Some(found) = used.as_ref().and_then(|r| texture_use(r, encoding, packing)) {
             textures[slot as usize] = found;
+            flags |= 1 << (consts::MATERIAL_FIRST_TEXTURE + slot);
         }
     };
     put(consts::TEXTURE_BASE_COLOR, &material.base_color_texture, Encoding::Srgb);

@@ -22,7 +22,7 @@ pub use material::lights;
 use crate::{
     Error, ErrorKind, Result,
     gpu::{Gpu, ImageDesc, OwnedBuffer, OwnedImage, Region},
-    graph::{Buffer, Graph, Image},
+    graph::{Buffer, Format, Graph, Image},
     scene::{Aabb, AlphaMode, Environment, Note, NoteKind, Pose, Scene, deform::cofactor},
     shaders::{consts::MAX_TEXTURE_ARRAYS, types},
 };
@@ -53,6 +53,7 @@ pub struct Resident {
     deform: deform::Deform,
     notes: Vec<Note>,
     bytes: u64,
+    depth_stencil: Format,
 }
 
 /// One primitive of one node.
@@ -116,6 +117,8 @@ pub struct Handles {
     pub textures: [Image; MAX_TEXTURE_ARRAYS as usize],
     /// Latitude-longitude radiance, repeating; black without an environment.
     pub environment: Image,
+    /// Depth with stencil, as the device has it.
+    pub depth_stencil: Format,
     /// The same moment on the host.
     pub moment: Arc<Moment>,
 }
@@ -173,6 +176,10 @@ impl Resident {
             items,
             deform: deform.uploaded(),
             notes,
+            depth_stencil: match gpu.caps().depth_stencil_format {
+                Some(vk::Format::D24_UNORM_S8_UINT) => Format::D24S8,
+                _ => Format::D32S8,
+            },
         })
     }
 
@@ -226,6 +233,7 @@ impl Resident {
             lights: graph.buffer_from("scene.lights", &lights),
             textures,
             environment: graph.import_image(&self.environment).repeat(),
+            depth_stencil: self.depth_stencil,
             moment: Arc::new(moment),
         }
     }
