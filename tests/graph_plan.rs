@@ -431,3 +431,18 @@ fn handles_of_another_graph_are_named() {
     let text = panic.downcast_ref::<String>().unwrap();
     assert!(text.contains("`other`") && text.contains("`mistaken`"), "{text}");
 }
+
+#[test]
+fn plans_are_listed_as_text() {
+    let mut graph = Graph::new("list");
+    let [a, b] = ["a", "b"].map(|n| rgba(&mut graph, n));
+    graph.scope("first", |g| write(g, a));
+    step(&mut graph, a, b);
+    let plan = every_barrier_matters(&graph);
+    let lines = plan.list_passes();
+    let lines: Vec<&str> = lines.lines().collect();
+    assert_eq!(lines[0], "  0  first / test.pattern  writes a  (2 barriers)");
+    assert_eq!(lines[1], "  1  test.advance  reads a  writes b  (1 barrier)");
+    assert_eq!(plan.list_memory().lines().count(), 2);
+    assert_eq!(plan.warnings, ["image `b` is written and never read"]);
+}

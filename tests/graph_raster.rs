@@ -294,3 +294,33 @@ fn mistakes_are_errors_that_name_pass_and_resource() {
         assert!(error.contains("pass `too early`, resource `a`"), "{error}");
     });
 }
+
+#[test]
+fn any_image_can_be_looked_at_by_name() {
+    with_gpu(|gpu| {
+        let mut graph = Graph::new("tap");
+        let [a, b] = ["scene.a", "scene.normal"].map(|n| graph.image(n, Format::RGBA32F, SMALL));
+        let half = graph.image_with("half", ImageDesc::new(Format::RGBA32F, SMALL).layers(2));
+        let depth = graph.image("depth", Format::D32F, SMALL);
+        graph.clear(a, [2.0; 4]);
+        graph.clear(b, [-1.0, 0.0, 1.0, 1.0]);
+        graph.clear(half.layer(0), [1.0; 4]);
+        graph.clear(depth, [0.125, 0.0, 0.0, 0.0]);
+        assert_eq!(graph.image_names(), ["scene.a", "scene.normal", "depth"], "`half` has a layer without contents");
+        let error = graph.view("scene.b").unwrap_err().to_string();
+        assert!(error.contains("`scene.b`") && error.contains("scene.normal"), "{error}");
+        let view = graph.view("scene.normal").unwrap();
+        let dump = graph.dump();
+        // Reads are of that point: this clear comes later.
+        graph.clear(a, [0.0; 4]);
+        let frame = run(gpu, graph);
+        assert_eq!(frame.image(view).picture()[0], [0.0, 0.5, 1.0, 1.0]);
+        let names: Vec<&str> = dump.iter().map(|(n, _)| n.as_str()).collect();
+        assert_eq!(names, ["scene.a", "scene.normal", "depth"]);
+        assert_eq!(frame.image(dump[0].1).picture()[0], [2.0; 4]);
+        let depth = frame.image(dump[2].1);
+        assert_eq!((depth.to_f32()[5][0], depth.picture()[5]), (0.125, [1.0; 4]));
+        let table = frame.report.to_string();
+        assert!(table.contains("clear scene.a#2") && table.contains("barriers"), "{table}");
+    });
+}

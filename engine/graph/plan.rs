@@ -226,6 +226,7 @@ impl Plan {
             plan.synchronise(graph, physical, &mut mistakes);
         }
         plan.barriers.sort_by_key(|b| b.before);
+        plan.warn(graph);
         if mistakes.is_empty() { Ok(plan) } else { Err(mistakes) }
     }
 
@@ -255,6 +256,18 @@ impl Plan {
         let mut plan = self.clone();
         plan.barriers.remove(index);
         plan
+    }
+
+    /// What is written and never read. Depth is read by its own tests.
+    fn warn(&mut self, graph: &Graph) {
+        for (i, image) in graph.images.iter().enumerate() {
+            let resource = Resource::Image(i as u32);
+            let mut uses = self.passes.iter().flat_map(|p| &p.uses).filter(|u| u.resource == resource).peekable();
+            let kept = !matches!(image.origin, Origin::Transient) || image.desc.format.is_depth();
+            if uses.peek().is_some() && !kept && uses.all(|u| !u.reads()) {
+                self.warnings.push(format!("image `{}` is written and never read", image.name));
+            }
+        }
     }
 
     /// Gives every used logical resource a physical one; those of equal shape that are never in use together share.

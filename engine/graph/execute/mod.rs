@@ -4,6 +4,8 @@
 mod bind;
 mod pool;
 mod record;
+#[cfg(test)]
+mod tests;
 mod transfer;
 
 use std::{borrow::Borrow, time::Instant};

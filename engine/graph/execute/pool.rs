@@ -172,6 +172,12 @@ impl Pool {
         }
     }
 
+    /// Transient images and buffers kept.
+    #[cfg(test)]
+    pub fn len(&self) -> usize {
+        self.slots.len()
+    }
+
     /// Forgets all history: the next frame is a first one.
     pub fn forget(&mut self) {
         self.history.clear();

@@ -1,0 +1,90 @@
+//! Does synchronisation validation see what the oracle sees? Without this canary, clean logs would prove nothing.
+
+use super::*;
+use crate::{
+    gpu::{GpuOptions, testing},
+    graph::{Access, Extent, Format, Image, Stages, oracle},
+    shaders::test::{advance, pattern},
+};
+
+const SMALL: Extent = Extent::new(16, 12);
+
+fn graph() -> Graph {
+    let mut graph = Graph::new("canary");
+    let [a, b]: [Image; 2] = ["a", "b"].map(|n| graph.image(n, Format::RGBA32F, SMALL));
+    graph.compute(pattern::Args { image_out: a, push: pattern::Push { tag: 1.0 } }, SMALL);
+    graph.compute(advance::Args { previous: a, next: b }, SMALL);
+    graph.read_image(b);
+    graph
+}
+
+/// What validation says when `spoil` has spoilt the plan of [`graph`].
+fn said(spoil: impl FnOnce(&mut Plan)) -> Option<Result<(), String>> {
+    let graph = graph();
+    let mut plan = Plan::new(&graph).unwrap();
+    spoil(&mut plan);
+    let mut ran = None;
+    let options = GpuOptions { print_messages: false, ..GpuOptions::default() };
+    let result = testing::run(options, |gpu| {
+        if gpu.validation_active() {
+            ran = Some(Runner::new(gpu).execute(&graph, &plan, 0.0).map(|_| ()));
+        }
+    });
+    ran.map(|_| result)
+}
+
+#[test]
+fn validation_misses_a_dropped_barrier() {
+    if let Some(result) = said(|_| ()) {
+        result.unwrap_or_else(|messages| panic!("the whole plan is right, but: {messages}"));
+    }
+    let wrong_layout = |p: &mut Plan| p.barriers.retain(|b| b.before != 1 || b.name != "a");
+    if let Some(result) = said(wrong_layout) {
+        assert!(result.is_err(), "validation did not see a wrong layout");
+    }
+    // The layout stays right, only the wait is gone.
+    let no_wait = |p: &mut Plan| {
+        for b in p.barriers.iter_mut().filter(|b| b.before == 1 && b.name == "a") {
+            b.src.stages = Stages::INDEX;
+            b.src.access = Access::NONE;
+        }
+        assert!(!oracle::check(p).is_empty());
+    };
+    if let Some(result) = said(no_wait) {
+        let messages = result.expect_err("synchronisation validation is not alive");
+        assert!(messages.contains("HAZARD"), "{messages}");
+    }
+}
+
+#[test]
+fn memory_does_not_grow_from_frame_to_frame() {
+    testing::with_gpu(|gpu| {
+        let mut runner = Runner::new(gpu);
+        let mut in_use = Vec::new();
+        for _ in 0..12 {
+            runner.run(graph()).unwrap();
+            in_use.push(gpu.memory_in_use().0);
+        }
+        assert!(in_use[1..].iter().all(|bytes| *bytes == in_use[1]), "{in_use:?}");
+        // Another graph; the memory of the first is given back after a while.
+        let mut other = Graph::new("other");
+        let image = other.image("other", Format::RGBA32F, Extent::square(512));
+        other.clear(image, [1.0; 4]);
+        for _ in 0..12 {
+            runner.run(&other).unwrap();
+        }
+        let slots = runner.pool.len();
+        assert_eq!(slots, 1, "only the image of the other graph is left");
+    });
+}
+
+#[test]
+fn what_is_only_described_cannot_run() {
+    testing::with_gpu(|gpu| {
+        let mut graph = Graph::new("described");
+        let buffer = graph.import_buffer_described("someone else's", 16);
+        graph.read_buffer(buffer);
+        let error = Runner::new(gpu).run(graph).unwrap_err().to_string();
+        assert!(error.contains("`someone else's` is only described"), "{error}");
+    });
+}
