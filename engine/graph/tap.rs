@@ -6,11 +6,24 @@ use super::{
     format::{Class, Format},
     handles::{Image, ImageRead},
     pixels::Pixels,
+    plan::Plan,
     vocab::Resource,
 };
-use crate::{Error, Result};
+use crate::{Error, ErrorKind, Result};
 
 impl Graph {
+    /// The plan of the passes declared so far, for `--list-passes` ([`Plan::list_passes`]).
+    ///
+    /// # Errors
+    /// `Runtime`, with every mistake of the graph.
+    pub fn plan(&self) -> Result<Plan> {
+        Plan::new(self).map_err(|mistakes| {
+            let lines: Vec<String> = mistakes.iter().map(ToString::to_string).collect();
+            let what = format!("graph `{}` has {} mistakes: {}", self.name(), lines.len(), lines.join("; "));
+            Error::new(ErrorKind::Runtime, what)
+        })
+    }
+
     /// Names of the images whose first level is written by the passes declared so far, in the order of declaration.
     pub fn image_names(&self) -> Vec<&str> {
         self.written().into_iter().map(|i| self.images[i as usize].name.as_str()).collect()

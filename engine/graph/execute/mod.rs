@@ -22,7 +22,7 @@ use super::{
     pass::{ReadWhat, Work},
     pixels::Pixels,
     plan::{Plan, Shape, Source},
-    vocab::{Mistake, Resource},
+    vocab::Resource,
 };
 use crate::{
     Error, ErrorKind, Result,
@@ -74,7 +74,7 @@ impl Runner {
     pub fn run(&mut self, graph: impl Borrow<Graph>) -> Result<Frame> {
         let graph = graph.borrow();
         let begun = Instant::now();
-        let plan = Plan::new(graph).map_err(|mistakes| refused(graph, &mistakes))?;
+        let plan = graph.plan()?;
         let plan_ms = milliseconds(begun);
         self.execute(graph, &plan, plan_ms).map_err(|e| e.at(graph.name()))
     }
@@ -247,15 +247,6 @@ fn transient_bytes(plan: &Plan) -> u64 {
             Shape::Buffer(bytes) => bytes,
         })
         .sum()
-}
-
-/// All mistakes as one error.
-fn refused(graph: &Graph, mistakes: &[Mistake]) -> Error {
-    let lines: Vec<String> = mistakes.iter().map(ToString::to_string).collect();
-    Error::new(
-        ErrorKind::Runtime,
-        format!("graph `{}` has {} mistakes: {}", graph.name(), lines.len(), lines.join("; ")),
-    )
 }
 
 // Passes that only move data have no shader.
