@@ -33,6 +33,7 @@ struct Arguments {
 #[derive(Subcommand, Debug)]
 enum Command {
     /// Render a scene into images
+    #[command(args_override_self = true)]
     Render(Box<Render>),
 }
 

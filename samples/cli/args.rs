@@ -10,7 +10,7 @@ use crate::{console::Console, framing::DefaultLight, progress::ProgressMode};
 #[derive(Args, Clone, Debug)]
 pub struct RenderArgs {
     /// Scene file: .gltf, .glb or .obj
-    #[arg(value_name = "SCENE", required_unless_present_any = ["builtin", "print_config"])]
+    #[arg(value_name = "SCENE")]
     pub scene: Option<PathBuf>,
 
     /// A built-in scene instead of a file (`lucerna list` names them)

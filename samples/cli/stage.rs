@@ -4,8 +4,8 @@ use std::path::Path;
 
 use glam::Mat4;
 use lucerna::{
-    Error, Result,
-    scene::{Camera, Note, Pose, Scene, View},
+    Result,
+    scene::{Camera, Limits, Note, Pose, Scene, View, environment},
 };
 
 use crate::{
@@ -42,7 +42,9 @@ impl Stage {
             scene.name = "scene".into();
         }
         if let Some(path) = &args.environment {
-            return Err(Error::usage("environments are not read yet").in_file(path));
+            let (environment, notes) = environment::load(path, &Limits::default())?;
+            scene.environment = Some(environment);
+            scene.notes.extend(notes);
         }
         let fingerprint = fingerprint::scene(&scene);
         framing::add_missing_light(&mut scene, args.default_light);

@@ -93,7 +93,8 @@ fn settings_are_printed_and_read_back() {
     let again = isr(["render", "--print-config", "--settings", &settings]).expect(0, &[]).stdout;
     assert_eq!(again, printed);
     // -D wins over the file, which wins over the defaults.
-    let third = isr(["render", "--print-config", "--settings", &settings, "-D", "isr.samples=24"]).expect(0, &[]).stdout;
+    let third =
+        isr(["render", "--print-config", "--settings", &settings, "-D", "isr.samples=24"]).expect(0, &[]).stdout;
     assert_eq!(third, printed.replace("samples = 80", "samples = 24"));
 }
 
@@ -168,7 +169,8 @@ fn frames_and_layers_get_their_own_files() {
         return;
     }
     let folder = folder();
-    let ran = isr(with(&["-o", &path(&folder, "{scene}.{frame:03}.{layer}.pfm"), "--frames", "2..4", "--progress", "plain"]));
+    let ran =
+        isr(with(&["-o", &path(&folder, "{scene}.{frame:03}.{layer}.pfm"), "--frames", "2..4", "--progress", "plain"]));
     let ran = ran.expect(0, &[]);
     let names = files(folder.path());
     assert!(names.contains(&"cornell.002.picture.pfm".to_owned()), "{names:?}");
@@ -208,7 +210,10 @@ fn the_timings_name_every_pass() {
     let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
     for frame in ["0", "1"] {
         for pass in ["passes.gbuffer", "isr.gather"] {
-            assert!(rows.iter().any(|row| row[0] == frame && row[2].starts_with(pass)), "{pass} of frame {frame}: {text}");
+            assert!(
+                rows.iter().any(|row| row[0] == frame && row[2].starts_with(pass)),
+                "{pass} of frame {frame}: {text}"
+            );
         }
     }
     assert!(rows.iter().all(|row| row.len() == 5 && row[4].parse::<f64>().is_ok()), "{text}");
@@ -225,16 +230,38 @@ fn a_full_disk_is_exit_code_1_and_leaves_nothing() {
         std::os::unix::fs::symlink("/dev/full", folder.path().join(name)).unwrap();
         isr(with(&["-o", &path(&folder, name)])).expect(1, &[name, "No space left"]);
     }
-    // A limit on file sizes ends in the middle of the file: it must not stay there.
-    let script = format!("ulimit -f 1; exec '{}' \"$@\"", env!("CARGO_BIN_EXE_isr"));
-    let mut limited = command("sh");
-    limited.args(["-c", &script, "sh", "render", "--builtin", "cornell", "--size", "400x300", "-q"]);
-    ran(limited.args(["-o", &path(&folder, "big.exr")])).expect(1, &["big.exr"]);
     assert_eq!(files(folder.path()), ["x.exr", "x.png"]);
     let full = || Stdio::from(fs::File::options().write(true).open("/dev/full").unwrap());
     let mut json = command(env!("CARGO_BIN_EXE_isr"));
     json.args(with(&["-o", &path(&folder, "y.png"), "--json"])).stdout(full()).stderr(Stdio::null());
     assert_eq!(json.status().unwrap().code(), Some(1));
+}
+
+/// A disk that is full in the middle of the file.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_disk_that_fills_up_keeps_no_half_file() {
+    if !device() {
+        return;
+    }
+    let folder = folder();
+    let script = "mount -t tmpfs -o size=64k tmpfs \"$0\" || exit 99; \"$@\"; code=$?; ls -A \"$0\"; exit $code";
+    let root = command("id").arg("-u").output().is_ok_and(|id| id.stdout == b"0\n");
+    let mut limited = command("unshare");
+    limited.args(if root { &["-m"][..] } else { &["-Urm"] }).args(["sh", "-c", script]).arg(folder.path());
+    limited.arg(env!("CARGO_BIN_EXE_isr")).args(["render", "--builtin", "cornell", "--size", "400x300", "-q"]);
+    let Ok(output) = limited.args(["-o", &path(&folder, "big.exr")]).output() else {
+        eprintln!("SKIPPED: there is no unshare");
+        return;
+    };
+    let said = String::from_utf8_lossy(&output.stderr);
+    if output.status.code() == Some(99) || said.contains("unshare") {
+        eprintln!("SKIPPED: no file system can be mounted here: {said}");
+        return;
+    }
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("big.exr") && said.contains("No space left"), "{said}");
+    assert_eq!(String::from_utf8_lossy(&output.stdout), "", "something was left behind");
 }
 
 /// Starts a long run, waits until it has written `after` files, sends a signal, and returns its exit code and the files.
