@@ -181,10 +181,14 @@ fn leaves(tree: &Value, prefix: &mut String, keys: &mut Vec<String>) {
 pub fn nearest<'a>(asked: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     names
         .into_iter()
-        .map(|name| (strsim::jaro_winkler(&asked.to_lowercase(), &name.to_lowercase()), name))
+        .map(|name| (likeness(asked, name).max(likeness(asked, name.rsplit('.').next().unwrap_or(name))), name))
         .filter(|(likeness, _)| *likeness > 0.75)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, name)| name)
+}
+
+fn likeness(a: &str, b: &str) -> f64 {
+    strsim::jaro_winkler(&a.to_lowercase(), &b.to_lowercase())
 }
 
 /// TOML errors come with the source line drawn below them; one line is enough here.

@@ -1,9 +1,6 @@
 //! Which image files a run writes: names from patterns, checked before work starts, written whole.
 
-use std::{
-    collections::HashSet,
-    path::{Path, PathBuf},
-};
+use std::{collections::HashSet, path::Path};
 
 use lucerna::{
     Error, ErrorKind, Result,
@@ -112,7 +109,7 @@ impl Outputs {
             })?;
             return Ok((name.to_owned(), report));
         }
-        let report = image::write(&PathBuf::from(name), layers, &self.options)?;
+        let report = image::write(Path::new(name), layers, &self.options)?;
         Ok((name.to_owned(), report))
     }
 }
