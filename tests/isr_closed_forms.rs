@@ -203,28 +203,34 @@ fn the_area_estimator_is_consistent() {
 
 #[test]
 fn the_papers_sum_depends_on_the_number_of_samples_and_the_resolution() {
-    // (2π/N) Σ F estimates 2π / (N s²) of the irradiance from within reach, s the spacing of the grid in texels: constants
-    // must be tuned to each choice of N, reach and resolution. This holds the documented deviation.
+    // (2π/N) Σ F estimates 2π/N of the irradiance from within reach, and with single texels for dA 2π / (N s²), s the
+    // spacing of the grid in texels. This holds the documented deviation.
     let (eye, patches) = corner();
     let reach = 24.0;
     for samples in [24, 48, 80] {
         let n = (((samples + 1) as f64).sqrt() - 1.0) / 2.0;
         let spacing = reach / n;
-        let paper = Gather { estimator: Estimator::Paper, pattern: Pattern::Grid, ..area(samples, true, reach) };
-        let grid = Gather { pattern: Pattern::Grid, ..area(samples, true, reach) };
         let buffers = Buffers::cast(&eye, &patches, 2);
-        let (mut by_paper, mut by_area) = (0.0, 0.0);
-        for (x, y) in (0..buffers.width).flat_map(|x| (0..buffers.height).map(move |y| (x, y))) {
-            let p = buffers.position(&eye, x, y);
-            if buffers.depth[buffers.at(x, y)] < 1.0 && p.y < 1e-6 && p.z > -1.7 {
-                by_paper += isr::gather_texel(&eye, &buffers, &paper, x, y).0.x;
-                by_area += isr::gather_texel(&eye, &buffers, &grid, x, y).0.x;
+        let total = |estimator: Estimator| {
+            let settings = Gather { estimator, pattern: Pattern::Grid, ..area(samples, true, reach) };
+            let mut sum = 0.0;
+            for (x, y) in (0..buffers.width).flat_map(|x| (0..buffers.height).map(move |y| (x, y))) {
+                let p = buffers.position(&eye, x, y);
+                if buffers.depth[buffers.at(x, y)] < 1.0 && p.y < 1e-6 && p.z > -1.7 {
+                    sum += isr::gather_texel(&eye, &buffers, &settings, x, y).0.x;
+                }
             }
+            sum
+        };
+        let by_area = total(Estimator::Area);
+        for (estimator, expected) in [
+            (Estimator::PaperCells, 2.0 * PI / samples as f64),
+            (Estimator::Paper, 2.0 * PI / (samples as f64 * spacing * spacing)),
+        ] {
+            let found = total(estimator) / by_area;
+            println!("{samples} samples, {estimator:?}: {found:.4} of the area estimate, expected {expected:.4}");
+            assert!((found / expected - 1.0).abs() < 0.05, "{samples} samples: {found} instead of {expected}");
         }
-        let expected = 2.0 * PI / (samples as f64 * spacing * spacing);
-        let found = by_paper / by_area;
-        println!("{samples} samples: paper / area = {found:.4}, 2π/(N s²) = {expected:.4}");
-        assert!((found / expected - 1.0).abs() < 0.05, "{samples} samples: {found} instead of {expected}");
     }
 }
 

@@ -43,7 +43,7 @@ pub fn gbuffer(graph: &mut Graph, g: &GBuffer, factor: u32, depth_aware: bool) -
     coarse
 }
 
-/// Radiance `color` likewise; alpha is the radiation mask.
+/// Radiance `color` likewise; alpha is the radiation mask times the share of the texel that the chosen ones cover.
 pub fn color(graph: &mut Graph, color: Image, g: &GBuffer, factor: u32, depth_aware: bool) -> Image {
     let extent = graph.extent(g.depth).div_ceil(factor);
     let coarse = graph.image("coarse.color", Format::RGBA16F, extent);

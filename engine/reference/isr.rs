@@ -103,6 +103,8 @@ pub fn jitter(x: usize, y: usize) -> DVec2 {
 pub enum Estimator {
     /// Equation 25: (2π/N) · F, with the footprint of one texel in F.
     Paper,
+    /// The same with the footprint of the sample's whole cell in F.
+    PaperCells,
     /// F with the footprint of the sample's whole cell; at most [`MOST`] in total.
     Area,
 }
@@ -164,6 +166,7 @@ pub fn gather_texel(eye: &Eye, buffers: &Buffers, settings: &Gather, x: usize, y
         let texel = buffers.footprint(eye, sx, sy);
         let factor = match settings.estimator {
             Estimator::Paper => 2.0 * PI / count * form_factor(p, n, q, q_normal, texel),
+            Estimator::PaperCells => 2.0 * PI / count * form_factor(p, n, q, q_normal, texel * area),
             Estimator::Area => {
                 let r2 = p.distance_squared(q);
                 let bounded = PI * r2 / (PI * r2 + texel);

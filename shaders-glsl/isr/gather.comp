@@ -10,13 +10,15 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(constant_id = 0) const uint SAMPLES = 48;
-// 0: the dissertation's (2π/N)·F, dA the footprint of one pixel. 1: each sample stands for its whole cell of the image.
+// 0: the dissertation's (2π/N)·F. 1: F alone, with the footprint of the sample's cell.
 layout(constant_id = 1) const uint AREA_ESTIMATOR = 1;
 layout(constant_id = 2) const uint RINGS = 1;
 layout(constant_id = 3) const uint JITTER = 1;
 layout(constant_id = 4) const uint INDIRECT = 1;
 layout(constant_id = 5) const uint OCCLUSION = 1;
 // Depth-buffer tests between the pixel and each sender; 0: senders are taken as visible, as in the dissertation.
+// dA in the dissertation's sum: 0 the footprint of one texel, 1 of the sample's cell.
+layout(constant_id = 7) const uint PAPER_CELLS = 0;
 layout(constant_id = 6) const uint VISIBILITY_STEPS = 0;
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
@@ -98,7 +100,7 @@ void main() {
                 // One pixel's area in the denominator bounds the factor of touching pixels and vanishes elsewhere.
                 f = isr_form_factor(p, n, x, xn, cell) * cell * s.z;
             } else {
-                f = isr_form_factor(p, n, x, xn, 0.0) * cell;
+                f = isr_form_factor(p, n, x, xn, 0.0) * cell * (PAPER_CELLS != 0 ? s.z : 1.0);
             }
             if (f > 0.0 && VISIBILITY_STEPS > 0 && hidden(pixel, at, z, xz)) {
                 continue;

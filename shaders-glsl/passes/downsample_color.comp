@@ -1,4 +1,5 @@
-// A radiance image at half width and height, with the texel choice of passes/downsample. Alpha becomes the radiation mask.
+// A radiance image at half width and height, with the texel choice of passes/downsample. Alpha becomes the radiation mask times
+// the share of the texel that the chosen ones cover, so that surfaces do not send from more area than they have.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -41,5 +42,5 @@ void main() {
             count += 1.0;
         }
     }
-    imageStore(coarse, pixel, vec4(sum, mask) / count);
+    imageStore(coarse, pixel, vec4(sum / count, mask / float(factor * factor)));
 }

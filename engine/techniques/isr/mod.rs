@@ -10,7 +10,7 @@ mod settings;
 
 pub use picture::{Picture, PictureSettings, picture};
 pub use settings::{
-    Blur, Downsample, Estimator, LightLaw, Occlude, Pattern, Receiver, Resolution, Sender, Settings, Upsample,
+    Blur, Downsample, Estimator, LightLaw, Occlude, Patch, Pattern, Receiver, Resolution, Sender, Settings, Upsample,
 };
 
 use crate::{
@@ -100,6 +100,7 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
             indirect: settings.indirect.into(),
             occlusion: settings.occlusion.into(),
             visibility_steps: settings.visibility_steps,
+            paper_cells: (settings.patch == Patch::Cell).into(),
         };
         let args = shaders::isr::gather::Args {
             view,

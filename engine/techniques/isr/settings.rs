@@ -15,9 +15,10 @@ pub enum Sender {
 
 /// What one sample of the gather stands for.
 ///
-/// Equation 25 sums (2π/N)·F over N samples, F the form factor to the footprint of *one pixel*. With samples s pixels apart
-/// that is 2π/(N s²) times the irradiance that the area integral gives: the result depends on N, reach and resolution, and is
-/// a few thousandths of the true value for a wide reach. It must be balanced by `k_isr` for each choice.
+/// Equation 25 sums (2π/N)·F over N samples. The area integral that it stands for is the sum of F alone, F the form factor to
+/// the whole [`Patch`] that a sample represents. So the dissertation's sum is 2π/N of the true irradiance from within reach
+/// (0.26, 0.13, 0.08 for 24, 48, 80 samples), and with single texels as patches 2π/(N s²), s the spacing of the grid in texels:
+/// more samples make it darker, and `k_isr` balances it for one choice only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
@@ -26,6 +27,17 @@ pub enum Estimator {
     /// F to the footprint of the whole cell of the image that a sample represents: converges to the one-bounce irradiance from
     /// all senders in reach, whatever N, reach and resolution.
     Area,
+}
+
+/// The area dA in the form factor of [`Estimator::Paper`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Patch {
+    /// The footprint of one texel of the buffers.
+    Pixel,
+    /// The footprint of the cell of the grid around the sample: what "N samples, each covering a solid angle of 2π/N"
+    /// amounts to. The same where the grid takes every texel.
+    Cell,
 }
 
 /// Where the samples lie around the pixel.
@@ -124,6 +136,8 @@ pub enum LightLaw {
 pub struct Settings {
     pub sender: Sender,
     pub estimator: Estimator,
+    /// With `estimator = "paper"`.
+    pub patch: Patch,
     pub pattern: Pattern,
     /// 24, 48 or 80.
     pub samples: u32,
@@ -179,6 +193,7 @@ impl Default for Settings {
         Self {
             sender: Sender::Lit,
             estimator: Estimator::Area,
+            patch: Patch::Cell,
             pattern: Pattern::Rings,
             samples: 48,
             reach: 0.0,
@@ -212,19 +227,19 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The dissertation's choices. It states neither the reach of its grid nor the radius of its occluders; these take
-    /// neighbouring coarse texels ("adjacent pixels") and spheres that touch.
+    /// The dissertation's choices. It states neither the reach of its grid, nor dA, nor the radius of its occluders; taken
+    /// here are 32 of its 1024 pixels, the cells of the grid, and spheres as wide as two cells.
     pub fn paper() -> Self {
         Self {
             sender: Sender::Albedo,
             estimator: Estimator::Paper,
             pattern: Pattern::Grid,
-            reach: 6.0,
+            reach: 32.0,
             spread: 1.0,
             jitter: false,
             downsample: Downsample::Mean,
             occlusion_reach: 24.0,
-            occluder_radius: 4.0,
+            occluder_radius: 8.0,
             occlusion_bias: 0.0,
             blur: Blur::Gaussian,
             upsample: Upsample::Depth,
