@@ -50,7 +50,12 @@ pub enum Pattern {
 pub fn samples(pattern: Pattern, samples: usize, reach: f64, jitter: Option<DVec2>) -> Vec<(DVec2, f64)> {
     let rings = ((((samples + 1) as f64).sqrt() - 1.0) / 2.0).round() as i32;
     let n = f64::from(rings);
-    let within = jitter.unwrap_or(DVec2::splat(0.5));
+    // Each sample moves on within its cell by a fixed irrational step.
+    let step = DVec2::new(0.754_877_666_2, 0.618_033_988_7);
+    let place = |i: usize| match jitter {
+        Some(jitter) => (jitter + step * i as f64).fract(),
+        None => DVec2::splat(0.5),
+    };
     let mut found = Vec::new();
     match pattern {
         Pattern::Grid => {
@@ -58,7 +63,7 @@ pub fn samples(pattern: Pattern, samples: usize, reach: f64, jitter: Option<DVec
             for y in -rings..=rings {
                 for x in -rings..=rings {
                     if (x, y) != (0, 0) {
-                        let at = DVec2::new(f64::from(x), f64::from(y)) + within - 0.5;
+                        let at = DVec2::new(f64::from(x), f64::from(y)) + place(found.len()) - 0.5;
                         found.push((at * spacing, spacing * spacing));
                     }
                 }
@@ -67,12 +72,14 @@ pub fn samples(pattern: Pattern, samples: usize, reach: f64, jitter: Option<DVec
         Pattern::Rings { spread } => {
             for k in 1..=rings {
                 let k_f = f64::from(k);
-                let m = (k_f - 1.0 + within.y) / n;
                 // Area inside the square of half width reach · m^spread, and its growth with m.
                 let inside = |m: f64| 4.0 * reach.powi(2) * m.powf(2.0 * spread);
-                let growth = 8.0 * reach.powi(2) * spread * m.powf(2.0 * spread - 1.0);
-                let ring_area = if jitter.is_some() { growth / n } else { inside(k_f / n) - inside((k_f - 1.0) / n) };
+                let growth = |m: f64| 8.0 * reach.powi(2) * spread * m.powf(2.0 * spread - 1.0);
                 for q in 0..8 * k {
+                    let within = place(found.len());
+                    let m = (k_f - 1.0 + within.y) / n;
+                    let ring_area =
+                        if jitter.is_some() { growth(m) / n } else { inside(k_f / n) - inside((k_f - 1.0) / n) };
                     // Walk along the rim of the unit square: 8 units long, from (1, -1) up, left, down, right.
                     let walked = (f64::from(q) + within.x) / k_f;
                     let along = walked % 2.0 - 1.0;
@@ -124,7 +131,7 @@ pub struct Gather {
     pub reach: f64,
     /// Coarse texels.
     pub occlusion_reach: f64,
-    /// Coarse texels.
+    /// Sides of the sample's cell.
     pub occluder_radius: f64,
     pub occlusion_bias: f64,
 }
@@ -180,9 +187,9 @@ pub fn gather_texel(eye: &Eye, buffers: &Buffers, settings: &Gather, x: usize, y
         light /= (factors / MOST).max(1.0);
     }
     let mut hidden = 0.0;
-    for (sx, sy, _) in others(settings.occlusion_reach) {
+    for (sx, sy, area) in others(settings.occlusion_reach) {
         let z = buffers.depth[buffers.at(sx, sy)];
-        let radius = settings.occluder_radius * buffers.facing_area(eye, z).sqrt();
+        let radius = settings.occluder_radius * (area * buffers.facing_area(eye, z)).sqrt();
         hidden += 2.0 * PI / count * occlusion(p, n, buffers.position(eye, sx, sy), radius, settings.occlusion_bias);
     }
     (light * buffers.mask[here], hidden)

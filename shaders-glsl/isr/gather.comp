@@ -31,7 +31,7 @@ layout(binding = 5, rgba16f) uniform writeonly image2D gathered;
 layout(push_constant, scalar) uniform Push {
     float reach;            // of the indirect samples, coarse pixels
     float occlusion_reach;  // of the occlusion samples, coarse pixels
-    float occluder_radius;  // coarse pixels
+    float occluder_radius;  // sides of the sample's cell
     float occlusion_bias;   // subtracted from the cosine
     float spread;           // exponent of the ring radii
     float thickness;        // of what hides a sender, relative to its depth
@@ -125,7 +125,7 @@ void main() {
             if (xz >= 1.0) {
                 continue;
             }
-            float radius = occluder_radius * sqrt(screen_facing_area(view, factor, xz));
+            float radius = occluder_radius * sqrt(s.z * screen_facing_area(view, factor, xz));
             occlusion += isr_occlusion(p, n, screen_position(view, at, factor, xz), radius, occlusion_bias);
         }
         occlusion *= 2.0 * ISR_PI / float(SAMPLES);

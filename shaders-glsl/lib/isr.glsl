@@ -42,6 +42,12 @@ vec2 isr_rim(float s) {
     return at < 1.0 ? vec2(1.0, t) : at < 2.0 ? vec2(-t, 1.0) : at < 3.0 ? vec2(-1.0, -t) : vec2(t, -1.0);
 }
 
+// Where in its cell sample i lies: the pixel's place moved on by a different step for each sample, or else the error of all
+// samples would have the same pattern.
+vec2 isr_within(uint i, vec2 jitter) {
+    return fract(jitter + float(i) * vec2(0.7548776662, 0.6180339887));
+}
+
 // Offset (xy, pixels) of sample i and the image area (z, pixels²) it stands for.
 //
 // Grid: the dissertation's square grid of spacing reach / half_width.
@@ -49,17 +55,18 @@ vec2 isr_rim(float s) {
 // more samples near the pixel, where the form factor is large. `jitter` in [0, 1)² moves a sample within its cell.
 vec3 isr_sample(uint i, uint samples, bool rings, float reach, float spread, vec2 jitter, bool jittered) {
     uint n = isr_half_width(samples);
+    vec2 within = jittered ? isr_within(i, jitter) : vec2(0.5);
     if (!rings) {
         float spacing = reach / float(n);
         uint side = 2u * n + 1u;
         uint cell = i < samples / 2u ? i : i + 1u;
-        vec2 at = vec2(float(cell % side), float(cell / side)) - float(n) + jitter - 0.5;
+        vec2 at = vec2(float(cell % side), float(cell / side)) - float(n) + within - 0.5;
         return vec3(at * spacing, spacing * spacing);
     }
     uint ring = i < 8u ? 1u : i < 24u ? 2u : i < 48u ? 3u : 4u;
     float k = float(ring);
     float q = float(i - 4u * ring * (ring - 1u));
-    float m = (k - 1.0 + jitter.y) / float(n);
+    float m = (k - 1.0 + within.y) / float(n);
     float radius = reach * pow(m, spread);
     float area;
     if (jittered) {
@@ -69,7 +76,7 @@ vec3 isr_sample(uint i, uint samples, bool rings, float reach, float spread, vec
         float inner = ring == 1u ? 0.0 : pow((k - 1.0) / float(n), 2.0 * spread);
         area = reach * reach * (outer - inner) / (2.0 * k);
     }
-    return vec3(isr_rim((q + jitter.x) / (8.0 * k)) * radius, area);
+    return vec3(isr_rim((q + within.x) / (8.0 * k)) * radius, area);
 }
 
 // The offset within a cell that pixel (x, y) uses: 16 combinations that repeat every 4 × 4 pixels, so that a blur over at

@@ -86,7 +86,7 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
         let push = shaders::isr::gather::Push {
             reach: reach / factor as f32,
             occlusion_reach: settings.occlusion_reach / factor as f32,
-            occluder_radius: settings.occluder_radius / factor as f32,
+            occluder_radius: settings.occluder_radius,
             occlusion_bias: settings.occlusion_bias,
             spread: settings.spread,
             thickness: settings.thickness,

@@ -161,7 +161,7 @@ pub struct Settings {
     pub occlusion: bool,
     /// How far occluders are looked for, pixels of the full image.
     pub occlusion_reach: f32,
-    /// Radius of an occluder, pixels of the full image at its depth.
+    /// Radius of the sphere that a sample stands for in equation 26, in sides of its cell.
     pub occluder_radius: f32,
     /// Subtracted from the cosine of equation 26, against flat surfaces that occlude themselves by rounded normals.
     pub occlusion_bias: f32,
@@ -207,7 +207,7 @@ impl Default for Settings {
             indirect: true,
             occlusion: true,
             occlusion_reach: 32.0,
-            occluder_radius: 4.0,
+            occluder_radius: 0.5,
             occlusion_bias: 0.05,
             blur: Blur::Bilateral,
             blur_radius: 4,
@@ -239,7 +239,7 @@ impl Settings {
             jitter: false,
             downsample: Downsample::Mean,
             occlusion_reach: 24.0,
-            occluder_radius: 8.0,
+            occluder_radius: 1.0,
             occlusion_bias: 0.0,
             blur: Blur::Gaussian,
             upsample: Upsample::Depth,
@@ -276,7 +276,7 @@ impl Settings {
             ("spread", self.spread, 1.0, 4.0),
             ("thickness", self.thickness, 0.0, 1.0),
             ("occlusion_reach", self.occlusion_reach, 1.0, 16384.0),
-            ("occluder_radius", self.occluder_radius, 0.0, 16384.0),
+            ("occluder_radius", self.occluder_radius, 0.0, 16.0),
             ("occlusion_bias", self.occlusion_bias, 0.0, 1.0),
             ("blur_range", self.blur_range, 1e-6, 1e6),
             ("upsample_epsilon", self.upsample_epsilon, 1e-9, 1.0),
