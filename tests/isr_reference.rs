@@ -5,9 +5,9 @@ use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::{Graph, Runner},
     passes::{ambient::Irradiance, shadow},
-    reference::one_bounce::OneBounce,
+    reference::one_bounce::{OneBounce, Surface},
     scene::{Pose, Scene, View, builtin, resident::Resident},
-    techniques::isr::{Estimator, Pattern, PictureSettings, Settings, picture},
+    techniques::isr::{Estimator, Pattern, PictureSettings, Resolution, Settings, picture},
 };
 
 const EXTENT: [u32; 2] = [160, 120];
@@ -35,8 +35,18 @@ fn render(gpu: &Gpu, scene: &Scene, settings: &Settings) -> [Vec<[f32; 4]>; 2] {
     tokens.map(|token| frame.image(token).to_f32())
 }
 
-/// Pixel, direct light and one bounce, by rays, on a coarse raster.
-fn reference(scene: &Scene) -> Vec<(usize, Vec3, Vec3)> {
+/// A pixel and its light by rays.
+struct Truth {
+    pixel: usize,
+    direct: Vec3,
+    /// One bounce from everywhere.
+    indirect: Vec3,
+    /// One bounce from surfaces that the camera sees: as much as a method can know that has only the picture.
+    from_visible: Vec3,
+}
+
+/// On a coarse raster.
+fn reference(scene: &Scene) -> Vec<Truth> {
     let pose = Pose::rest(scene);
     let view = first_view(scene, &pose);
     let truth = OneBounce::new(scene, &pose);
@@ -46,8 +56,16 @@ fn reference(scene: &Scene) -> Vec<(usize, Vec3, Vec3)> {
             let uv = (Vec2::new(x as f32, y as f32) + 0.5) / Vec2::new(EXTENT[0] as f32, EXTENT[1] as f32);
             let direction = (view.world_from_depth(uv, 1.0) - view.position).normalize();
             if let Some(surface) = truth.surface(view.position, direction).filter(|s| s.albedo != Vec3::ZERO) {
-                let gathered = surface.albedo * truth.gathered(&surface, 16);
-                found.push(((y * EXTENT[0] + x) as usize, truth.direct(&surface), gathered));
+                let visible = |other: &Surface| {
+                    let clip = view.clip_from_world * other.position.extend(1.0);
+                    clip.x.abs() < clip.w && clip.y.abs() < clip.w && truth.sees(view.position, other.position)
+                };
+                found.push(Truth {
+                    pixel: (y * EXTENT[0] + x) as usize,
+                    direct: truth.direct(&surface),
+                    indirect: surface.albedo * truth.gathered(&surface, 16, |_| true),
+                    from_visible: surface.albedo * truth.gathered(&surface, 16, visible),
+                });
             }
         }
     }
@@ -77,27 +95,32 @@ fn the_cornell_box_by_rays() {
     let scene = builtin::load("cornell").unwrap();
     let expected = reference(&scene);
     assert!(expected.len() > 200);
+    let all: Vec3 = expected.iter().map(|e| e.indirect).sum();
+    let seen: Vec3 = expected.iter().map(|e| e.from_visible).sum();
+    println!("{:?} of the indirect light comes from what the camera sees", seen / all);
     with_gpu(|gpu| {
+        let default = Settings::default();
         let choices = [
-            ("default", Settings::default()),
-            ("80 samples", Settings { samples: 80, ..Settings::default() }),
-            ("visibility 4", Settings { visibility_steps: 4, ..Settings::default() }),
-            ("visibility 8", Settings { visibility_steps: 8, ..Settings::default() }),
-            ("reach 40", Settings { reach: 40.0, ..Settings::default() }),
-            ("reach 160", Settings { reach: 160.0, ..Settings::default() }),
-            ("grid", Settings { pattern: Pattern::Grid, ..Settings::default() }),
-            ("paper's sum", Settings { estimator: Estimator::Paper, ..Settings::default() }),
+            ("default", default.clone()),
+            ("24 samples", Settings { samples: 24, ..default.clone() }),
+            ("80 samples", Settings { samples: 80, ..default.clone() }),
+            ("full resolution", Settings { resolution: Resolution::Full, samples: 80, ..default.clone() }),
+            ("all visible", Settings { visibility_steps: 0, ..default.clone() }),
+            ("reach 40", Settings { reach: 40.0, ..default.clone() }),
+            ("grid", Settings { pattern: Pattern::Grid, ..default.clone() }),
+            ("paper's sum", Settings { estimator: Estimator::Paper, ..default.clone() }),
         ];
         for (name, settings) in choices {
             let [direct, indirect] = render(gpu, &scene, &settings);
-            let (share, error, correlation) = compare(&indirect, expected.iter().map(|e| (e.0, e.2)));
-            println!(
-                "{name:>14}: indirect {share:.3} of the reference, error {error:.3}, correlation {correlation:.3}"
-            );
-            if name == "default" {
-                let (share, error, correlation) = compare(&direct, expected.iter().map(|e| (e.0, e.1)));
-                println!("        direct: {share:.3} of the reference, error {error:.3}, correlation {correlation:.3}");
-                assert!((share - 1.0).abs() < 0.05 && error < 0.08 && correlation > 0.98);
+            let (share, error, correlation) = compare(&indirect, expected.iter().map(|e| (e.pixel, e.from_visible)));
+            println!("{name:>16}: indirect {share:.3} of the visible, error {error:.3}, correlation {correlation:.3}");
+            if matches!(name, "default" | "80 samples" | "full resolution") {
+                assert!((share - 1.0).abs() < 0.15 && error < 0.3 && correlation > 0.88, "{name}");
+                let (share, error, correlation) = compare(&direct, expected.iter().map(|e| (e.pixel, e.direct)));
+                println!(
+                    "          direct: {share:.3} of the reference, error {error:.3}, correlation {correlation:.3}"
+                );
+                assert!((share - 1.0).abs() < 0.02 && error < 0.02 && correlation > 0.99);
             }
         }
     });

@@ -97,12 +97,14 @@ pub fn samples(pattern: Pattern, samples: usize, reach: f64, jitter: Option<DVec
     found
 }
 
-/// The offset within a cell that texel (x, y) uses: the ordered-dither matrix of 4 × 4, and a shuffle of it.
+/// The place within a cell that texel (x, y) uses: multiples of t⁻¹ … t⁻⁴, with t⁵ = t + 1.
 pub fn jitter(x: usize, y: usize) -> DVec2 {
-    const BAYER: [[u32; 4]; 4] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]];
-    let index = BAYER[y % 4][x % 4];
-    let other = (index * 7 + 3) % 16;
-    DVec2::new(f64::from(index) + 0.5, f64::from(other) + 0.5) / 16.0
+    let mut t: f64 = 1.0;
+    for _ in 0..100 {
+        t = (1.0 + t).powf(0.2);
+    }
+    let step = |power: i32| t.powi(-power);
+    (x as f64 * DVec2::new(step(1), step(2)) + y as f64 * DVec2::new(step(3), step(4))).fract()
 }
 
 /// What one sample of the sum stands for.

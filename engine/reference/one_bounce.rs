@@ -74,6 +74,13 @@ impl<'a> OneBounce<'a> {
         Some(Surface { position: a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v, normal, albedo, emission })
     }
 
+    /// Does nothing lie between two points?
+    pub fn sees(&self, from: Vec3, to: Vec3) -> bool {
+        let line = to - from;
+        let (distance, direction) = (line.length(), line.normalize_or_zero());
+        !self.bvh.any(&Ray { origin: from, direction, t_min: 1e-3, t_max: distance - 1e-3 })
+    }
+
     /// Radiance that a surface reflects of all punctual lights.
     pub fn direct(&self, surface: &Surface) -> Vec3 {
         let mut irradiance = Vec3::ZERO;
@@ -104,8 +111,8 @@ impl<'a> OneBounce<'a> {
     }
 
     /// Radiance that a white surface would reflect of what others emit and reflect directly: `side`² rays, stratified,
-    /// distributed by the cosine.
-    pub fn gathered(&self, surface: &Surface, side: u32) -> Vec3 {
+    /// distributed by the cosine. Only surfaces that `counts` accepts send.
+    pub fn gathered(&self, surface: &Surface, side: u32, counts: impl Fn(&Surface) -> bool) -> Vec3 {
         let tangent = surface.normal.any_orthonormal_vector();
         let bitangent = surface.normal.cross(tangent);
         let mut sum = Vec3::ZERO;
@@ -117,7 +124,8 @@ impl<'a> OneBounce<'a> {
                 let (radius, phi) = (u.sqrt(), 2.0 * PI * v);
                 let local = vec3(radius * phi.cos(), radius * phi.sin(), (1.0 - u).sqrt());
                 let direction = tangent * local.x + bitangent * local.y + surface.normal * local.z;
-                if let Some(other) = self.surface(surface.position + surface.normal * 1e-4, direction) {
+                let other = self.surface(surface.position + surface.normal * 1e-4, direction);
+                if let Some(other) = other.filter(&counts) {
                     sum += other.emission + self.direct(&other);
                 }
             }

@@ -79,14 +79,8 @@ vec3 isr_sample(uint i, uint samples, bool rings, float reach, float spread, vec
     return vec3(isr_rim((q + within.x) / (8.0 * k)) * radius, area);
 }
 
-// The offset within a cell that pixel (x, y) uses: 16 combinations that repeat every 4 × 4 pixels, so that a blur over at
-// least that area sees each of them.
+// The place within a cell that pixel (x, y) uses: a lattice whose steps are powers of the root of t⁵ = t + 1, so that the
+// pixels of any small block are spread evenly over the cell and a blur averages them.
 vec2 isr_jitter(ivec2 pixel) {
-    uint x = uint(pixel.x) & 3u;
-    uint y = uint(pixel.y) & 3u;
-    // 4 × 4 Bayer index: bit-interleaved x ^ y and y, reversed.
-    uint e = x ^ y;
-    uint index = (e & 1u) << 3 | (y & 1u) << 2 | (e & 2u) | (y & 2u) >> 1;
-    uint other = (index * 7u + 3u) & 15u;
-    return (vec2(float(index), float(other)) + 0.5) / 16.0;
+    return fract(float(pixel.x) * vec2(0.8566748839, 0.7338918566) + float(pixel.y) * vec2(0.6287067210, 0.5385972572));
 }

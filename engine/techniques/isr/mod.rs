@@ -82,7 +82,7 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
     let gather = |graph: &mut Graph, sender: Image| {
         let gathered = graph.image("isr.gathered", Format::RGBA16F, graph.extent(coarse.depth));
         let longer = extent.width.max(extent.height) as f32;
-        let reach = if settings.reach > 0.0 { settings.reach } else { longer / 2.0 };
+        let reach = if settings.reach > 0.0 { settings.reach } else { 0.75 * longer };
         let push = shaders::isr::gather::Push {
             reach: reach / factor as f32,
             occlusion_reach: settings.occlusion_reach / factor as f32,

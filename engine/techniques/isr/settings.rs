@@ -141,11 +141,11 @@ pub struct Settings {
     pub pattern: Pattern,
     /// 24, 48 or 80.
     pub samples: u32,
-    /// How far senders are looked for, pixels of the full image; 0: half the longer side of the image.
+    /// How far senders are looked for, pixels of the full image; 0: three quarters of its longer side.
     pub reach: f32,
     /// Rings: exponent of their radii, 1 to 4. 1 is uniform.
     pub spread: f32,
-    /// Moves samples within their cells in a pattern of 4 × 4, which the blur averages.
+    /// Moves samples within their cells, differently from texel to texel; the blur averages.
     pub jitter: bool,
     /// Depth-buffer tests between receiver and sender, 0 to 16. 0: every sender in the image counts, as in the dissertation.
     pub visibility_steps: u32,
@@ -199,7 +199,7 @@ impl Default for Settings {
             reach: 0.0,
             spread: 1.5,
             jitter: true,
-            visibility_steps: 0,
+            visibility_steps: 4,
             thickness: 0.1,
             bounces: 1,
             resolution: Resolution::Half,
@@ -210,7 +210,7 @@ impl Default for Settings {
             occluder_radius: 0.5,
             occlusion_bias: 0.05,
             blur: Blur::Bilateral,
-            blur_radius: 4,
+            blur_radius: 8,
             blur_range: 0.01,
             upsample: Upsample::Plane,
             upsample_epsilon: 1e-3,
@@ -237,6 +237,8 @@ impl Settings {
             reach: 32.0,
             spread: 1.0,
             jitter: false,
+            visibility_steps: 0,
+            blur_radius: 4,
             downsample: Downsample::Mean,
             occlusion_reach: 24.0,
             occluder_radius: 1.0,
