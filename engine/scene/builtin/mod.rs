@@ -13,6 +13,7 @@
 pub mod cornell;
 mod figure;
 pub mod furnace;
+mod garage;
 mod kit;
 mod office;
 mod primitives;
@@ -72,6 +73,12 @@ const ENTRIES: &[Entry] = &[
         description: "Office for four: sun through blinds and a lamp, about 21 000 triangles",
         exposure: 1.0,
         build: office::build,
+    },
+    Entry {
+        name: "garage",
+        description: "Garage with cars, racks and a workbench, its door open to daylight",
+        exposure: 1.0,
+        build: garage::build,
     },
     Entry {
         name: "figure",

@@ -20,6 +20,7 @@ const TRIANGLES: &[(&str, std::ops::RangeInclusive<usize>)] = &[
     ("primitives", 10_000..=25_000),
     ("teapot", 15_000..=40_000),
     ("office", 20_000..=22_000),
+    ("garage", 50_000..=150_000),
     ("figure", 20_000..=60_000),
 ];
 

@@ -17,7 +17,7 @@ mod surfaces;
 #[cfg(test)]
 pub(crate) use geometry::place;
 pub(crate) use geometry::{Geometry, Model};
-pub(crate) use nets::{blend, round_cone, surface_net};
+pub(crate) use nets::{blend, blend_max, polygon_distance, round_cone, shrink_wrap, surface_net};
 pub(crate) use pictures::{Picture, bricks, carpet, checker, lettering, mottled, planks, veneer};
 pub(crate) use random::{Random, fbm, hash, value_noise};
 pub(crate) use sky::{GradientSky, uniform_environment};

@@ -80,6 +80,61 @@ pub(crate) fn blend(a: f32, b: f32, radius: f32) -> f32 {
     a.min(b) - h * h * radius * 0.25
 }
 
+/// Intersection of two distances with an edge rounded by about `radius`.
+pub(crate) fn blend_max(a: f32, b: f32, radius: f32) -> f32 {
+    -blend(-a, -b, radius)
+}
+
+/// Signed distance to a simple polygon in its plane, negative inside.
+pub(crate) fn polygon_distance(p: Vec2, polygon: &[Vec2]) -> f32 {
+    let (mut nearest, mut inside) = (f32::INFINITY, false);
+    for i in 0..polygon.len() {
+        let (a, b) = (polygon[i], polygon[(i + 1) % polygon.len()]);
+        let (edge, way) = (b - a, p - a);
+        let t = (way.dot(edge) / edge.length_squared().max(1e-12)).clamp(0.0, 1.0);
+        nearest = nearest.min((way - edge * t).length_squared());
+        // Crossings of the ray towards +x.
+        if (a.y > p.y) != (b.y > p.y) && p.x < a.x + edge.x * (p.y - a.y) / edge.y {
+            inside = !inside;
+        }
+    }
+    if inside { -nearest.sqrt() } else { nearest.sqrt() }
+}
+
+/// A sheet of `cells` that lies `offset` metres outside the surface of a body: `ray` gives origin and direction towards
+/// the body for (u, v) in [0, 1]². Rays that miss stop where they come nearest.
+pub(crate) fn shrink_wrap(
+    cells: (usize, usize),
+    offset: f32,
+    ray: impl Fn(f32, f32) -> (Vec3, Vec3),
+    distance: impl Fn(Vec3) -> f32,
+) -> Geometry {
+    let mut out = Geometry::default();
+    for j in 0..=cells.1 {
+        for i in 0..=cells.0 {
+            let (u, v) = (i as f32 / cells.0 as f32, j as f32 / cells.1 as f32);
+            let (origin, direction) = ray(u, v);
+            let mut p = origin;
+            for _ in 0..96 {
+                p += direction * (distance(p) - offset) * 0.8;
+            }
+            let along = |axis: Vec3| distance(p + axis * 0.01) - distance(p - axis * 0.01);
+            let normal = Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z)).normalize_or(-direction);
+            out.vertex(p, normal, Vec2::new(u, 1.0 - v));
+        }
+    }
+    let row = cells.0 as u32 + 1;
+    for at in (0..cells.1 as u32).flat_map(|j| (0..cells.0 as u32).map(move |i| j * row + i)) {
+        let [a, b, d] = [at, at + 1, at + row].map(|i| out.positions[i as usize]);
+        if (b - a).cross(d - a).dot(out.normals[at as usize]) > 0.0 {
+            out.quad(at, at + 1, at + row + 1, at + row);
+        } else {
+            out.quad(at, at + row, at + row + 1, at + 1);
+        }
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
