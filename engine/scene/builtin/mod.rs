@@ -77,7 +77,7 @@ const ENTRIES: &[Entry] = &[
     Entry {
         name: "garage",
         description: "Garage with cars, racks and a workbench, its door open to daylight",
-        exposure: 1.0,
+        exposure: 1.3,
         build: garage::build,
     },
     Entry {

@@ -1,9 +1,9 @@
 //! A small hatchback: a smooth body from a distance field, glass and lamps wrapped onto it, four wheels.
 
+use crate::scene::Material;
 use crate::scene::builtin::kit::{
     Geometry, Model, Stage, bevel_box, blend_max, cylinder, lathe, polygon_distance, shrink_wrap, srgb, surface_net,
 };
-use crate::scene::Material;
 use glam::{Vec2, Vec3, vec2, vec3};
 
 /// Radius of the wheels and where their axles are: (±x, z).
@@ -175,7 +175,16 @@ fn wheel(finish: &Finish) -> Model {
         (0.2, -0.09),
     ];
     let mut model = Model::of(finish.rubber, lathe(&tyre.map(|(r, y)| vec2(r, y)), 40, 30.0));
-    let rim = [(0.0, -0.05), (0.199, -0.05), (0.205, 0.088), (0.19, 0.092), (0.18, 0.07), (0.1, 0.035), (0.07, 0.06), (0.0, 0.065)];
+    let rim = [
+        (0.0, -0.05),
+        (0.199, -0.05),
+        (0.205, 0.088),
+        (0.19, 0.092),
+        (0.18, 0.07),
+        (0.1, 0.035),
+        (0.07, 0.06),
+        (0.0, 0.065),
+    ];
     let mut metal = lathe(&rim.map(|(r, y)| vec2(r, y)), 40, 30.0);
     for i in 0..5 {
         let spoke = bevel_box(0.13, 0.03, 0.045, 0.01).at(0.125, 0.062, 0.0).turned_y(72.0 * i as f32);

@@ -46,7 +46,8 @@ fn fill_shelf(model: &mut Model, palette: &Palette, (width, y): (f32, f32), rand
             2 | 3 => {
                 let (r, h) = (random.range(0.055, 0.1), random.range(0.12, 0.24));
                 let tin = lathe(
-                    &[(0.0, 0.0), (r, 0.0), (r, h), (r * 0.96, h), (r * 0.92, h - 0.008), (0.0, h - 0.008)].map(|(r, y)| vec2(r, y)),
+                    &[(0.0, 0.0), (r, 0.0), (r, h), (r * 0.96, h), (r * 0.92, h - 0.008), (0.0, h - 0.008)]
+                        .map(|(r, y)| vec2(r, y)),
                     24,
                     30.0,
                 );
@@ -60,7 +61,12 @@ fn fill_shelf(model: &mut Model, palette: &Palette, (width, y): (f32, f32), rand
                 model.add(palette.colored, canister.colored(color));
                 let cap = cylinder(0.022, 0.03, 16).at(x + 0.04, y + 0.24, z);
                 model.add(palette.rubber, cap);
-                let bar = [vec3(x + 0.07, y + 0.235, z), vec3(x + 0.08, y + 0.28, z), vec3(x + 0.14, y + 0.28, z), vec3(x + 0.15, y + 0.235, z)];
+                let bar = [
+                    vec3(x + 0.07, y + 0.235, z),
+                    vec3(x + 0.08, y + 0.28, z),
+                    vec3(x + 0.14, y + 0.28, z),
+                    vec3(x + 0.15, y + 0.235, z),
+                ];
                 model.add(palette.colored, sweep(&bar, &circle(0.009, 6), true, |_| 1.0).colored(color));
                 x += 0.2;
             }
@@ -112,9 +118,8 @@ fn toolbox(palette: &Palette) -> Model {
 pub(super) fn tool_board(palette: &Palette, width: f32) -> Model {
     let mut model = Model::of(palette.board, bevel_box(width, 0.9, 0.018, 0.003).at(0.0, 0.45, 0.009));
     let front = 0.03;
-    let flat = |points: &[(f32, f32)], depth: f32| {
-        extrude(&points.iter().map(|p| Vec2::from(*p)).collect::<Vec<_>>(), depth)
-    };
+    let flat =
+        |points: &[(f32, f32)], depth: f32| extrude(&points.iter().map(|p| Vec2::from(*p)).collect::<Vec<_>>(), depth);
     let mut steel = Geometry::default();
     let mut grips = Geometry::default();
     // Spanners of falling size.
@@ -142,7 +147,8 @@ pub(super) fn tool_board(palette: &Palette, width: f32) -> Model {
     for (x, tilt) in [(0.0, 0.0), (0.16, 4.0)] {
         let head = bevel_box(0.11, 0.034, 0.034, 0.006).at(0.0, 0.15, 0.02);
         steel.append(&head.turned_z(tilt).at(x + 0.03, 0.55, front));
-        let handle = sweep(&[vec3(0.0, -0.16, 0.02), vec3(0.0, 0.17, 0.02)], &circle(0.013, 10), true, |i| [1.1, 0.8][i]);
+        let handle =
+            sweep(&[vec3(0.0, -0.16, 0.02), vec3(0.0, 0.17, 0.02)], &circle(0.013, 10), true, |i| [1.1, 0.8][i]);
         grips.append(&handle.turned_z(tilt).at(x + 0.03, 0.55, front));
     }
     // A saw: blade and grip.
@@ -175,7 +181,17 @@ pub(super) fn tool_board(palette: &Palette, width: f32) -> Model {
 
 /// A tyre lying on y = 0.
 pub(super) fn tyre(palette: &Palette) -> Model {
-    let profile = [(0.2, 0.02), (0.26, 0.0), (0.29, 0.01), (0.31, 0.04), (0.31, 0.15), (0.29, 0.18), (0.26, 0.19), (0.2, 0.17), (0.2, 0.02)];
+    let profile = [
+        (0.2, 0.02),
+        (0.26, 0.0),
+        (0.29, 0.01),
+        (0.31, 0.04),
+        (0.31, 0.15),
+        (0.29, 0.18),
+        (0.26, 0.19),
+        (0.2, 0.17),
+        (0.2, 0.02),
+    ];
     Model::of(palette.rubber, lathe(&profile.map(|(r, y)| vec2(r, y)), 44, 40.0))
 }
 
@@ -257,7 +273,17 @@ pub(super) fn tube_lamp(palette: &Palette) -> Model {
 
 /// A clamp lamp: hood towards −Y, its mouth at the origin.
 pub(super) fn hood(palette: &Palette) -> Model {
-    let profile = [(0.1, 0.0), (0.103, 0.0), (0.05, 0.1), (0.03, 0.16), (0.0, 0.165), (0.0, 0.16), (0.028, 0.155), (0.046, 0.1), (0.1, 0.0)];
+    let profile = [
+        (0.1, 0.0),
+        (0.103, 0.0),
+        (0.05, 0.1),
+        (0.03, 0.16),
+        (0.0, 0.165),
+        (0.0, 0.16),
+        (0.028, 0.155),
+        (0.046, 0.1),
+        (0.1, 0.0),
+    ];
     let mut model = Model::of(palette.enamel, lathe(&profile.map(|(r, y)| vec2(r, y)), 32, 40.0));
     model.add(palette.tube, crate::scene::builtin::kit::sphere(0.035, 20, 10).at(0.0, 0.06, 0.0));
     let arm = [vec3(0.0, 0.16, 0.0), vec3(0.0, 0.3, -0.05), vec3(0.0, 0.32, -0.25)];
@@ -270,11 +296,14 @@ pub(super) fn hedge(size: Vec3, seed: u32) -> Geometry {
     use crate::scene::builtin::kit::{surface_net, value_noise};
     let half = size * 0.5;
     let lumps = move |p: Vec3| {
-        let n = value_noise(vec2(p.x * 6.0, p.y * 6.0 + p.z * 3.1), 0, seed) + value_noise(vec2(p.z * 6.0, p.y * 6.0), 0, seed + 1);
-        let fine = value_noise(vec2(p.x * 19.0 + p.z * 7.0, p.y * 19.0), 0, seed + 2);
+        let n = value_noise(vec2(p.x * 6.0, p.y * 6.0 + p.z * 3.1), 0, seed)
+            + value_noise(vec2(p.z * 6.0, p.y * 6.0), 0, seed + 1);
+        let fine = value_noise(vec2(p.x * 12.0 + p.z * 5.0, p.y * 12.0), 0, seed + 2);
         let q = (p - Vec3::Y * half.y).abs() - (half - Vec3::splat(0.15));
-        q.max(Vec3::ZERO).length() + q.max_element().min(0.0) - 0.15 + 0.1 * n + 0.05 * fine - 0.1
+        q.max(Vec3::ZERO).length() + q.max_element().min(0.0) - 0.15 + 0.08 * n + 0.035 * fine - 0.1
     };
     let margin = Vec3::splat(0.15);
     surface_net(vec3(-half.x, -0.1, -half.z) - margin, vec3(half.x, size.y, half.z) + margin, 0.09, lumps)
+        // The field is too rough for its own gradients.
+        .displaced(|p| p)
 }

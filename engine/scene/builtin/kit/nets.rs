@@ -19,7 +19,7 @@ pub(crate) fn surface_net(low: Vec3, high: Vec3, cell: f32, distance: impl Fn(Ve
     let gradient = |p: Vec3| {
         let e = 0.25 * cell;
         let along = |axis: Vec3| distance(p + axis * e) - distance(p - axis * e);
-        Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z)).normalize_or(Vec3::Y)
+        Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z)) / (2.0 * e)
     };
 
     let mut out = Geometry::default();
@@ -45,9 +45,11 @@ pub(crate) fn surface_net(low: Vec3, high: Vec3, cell: f32, distance: impl Fn(Ve
         if crossings > 0.0 {
             let mut point = sum / crossings;
             // One step down the gradient brings the mean of the crossings onto the surface, but not out of its cell.
-            let step = gradient(point) * distance(point);
-            point = (point - step).clamp(at(p), at(p + UVec3::ONE));
-            vertex_of[index(p)] = out.vertex(point, gradient(point), Vec2::new(point.x, -point.y));
+            let slope = gradient(point);
+            let step = slope * (distance(point) / slope.length_squared().max(1e-3));
+            point = (point - step.clamp_length_max(0.5 * cell)).clamp(at(p), at(p + UVec3::ONE));
+            let normal = gradient(point).normalize_or(Vec3::Y);
+            vertex_of[index(p)] = out.vertex(point, normal, Vec2::new(point.x, -point.y));
         }
     }
     for (axis, u, v) in [(UVec3::X, UVec3::Y, UVec3::Z), (UVec3::Y, UVec3::Z, UVec3::X), (UVec3::Z, UVec3::X, UVec3::Y)]
@@ -57,10 +59,18 @@ pub(crate) fn surface_net(low: Vec3, high: Vec3, cell: f32, distance: impl Fn(Ve
                 continue;
             }
             let [a, b, c, d] = [p - u - v, p - v, p, p - u].map(|q| vertex_of[index(q)]);
-            if inside(p) {
+            let [a, b, c, d] = if inside(p) { [a, b, c, d] } else { [a, d, c, b] };
+            // The diagonal along which the halves agree better with the normals.
+            let agreement = |corners: [u32; 3]| {
+                let [i, j, k] = corners.map(|i| i as usize);
+                let face = (out.positions[j] - out.positions[i]).cross(out.positions[k] - out.positions[i]);
+                face.normalize_or_zero().dot(out.normals[i] + out.normals[j] + out.normals[k])
+            };
+            let split = |halves: [[u32; 3]; 2]| agreement(halves[0]).min(agreement(halves[1]));
+            if split([[a, b, c], [a, c, d]]) >= split([[b, c, d], [b, d, a]]) {
                 out.quad(a, b, c, d);
             } else {
-                out.quad(a, d, c, b);
+                out.quad(b, c, d, a);
             }
         }
     }
