@@ -16,7 +16,7 @@ use crate::{
     program::{self, STOPPED_EARLY},
     progress::Progress,
     run::Run,
-    shown::Shown,
+    shown::{self, Reading, Shown},
     signals::Interrupt,
 };
 
@@ -89,12 +89,16 @@ pub fn render<S: Serialize + DeserializeOwned, R>(
         let input = Input { gpu: &gpu, scene: &run.stage.scene, pose: &pose, view: &view, frame, seconds };
         let shown = compose(&mut graph, &mut resources, &input, &settings)?;
         if args.list_passes {
-            console::print("passes cannot be listed yet")?;
+            console::print(graph.plan()?.list_passes().trim_end())?;
             return Ok(ExitCode::SUCCESS);
         }
         run.note(&shown.notes);
         let seen = shown.view.unwrap_or(view);
-        let reading = shown.read(&mut graph, run.outputs.wants_layers());
+        let reading = match &args.view {
+            Some(name) => Reading::view(&mut graph, name)?,
+            None => shown.read(&mut graph, run.outputs.wants_layers()),
+        };
+        let dump = args.dump.as_ref().map(|folder| (folder, graph.dump()));
         let result = runner.run(&graph)?;
         // What was asked to stop is not written, unless it is all there.
         if interrupt.requested() {
@@ -104,6 +108,11 @@ pub fn render<S: Serialize + DeserializeOwned, R>(
         layers.metadata = run.metadata(&gpu, &seen, frame)?;
         let milliseconds = begun.elapsed().as_secs_f64() * 1e3;
         let files = run.write(&layers, frame)?;
+        for (folder, images) in &dump {
+            for (name, token) in images {
+                run.dump(folder, frame, name, shown::raw(&result.image(*token)))?;
+            }
+        }
         progress.frame(frame, milliseconds, &files);
         run.done(frame, seconds, milliseconds, files, &result.report);
     }

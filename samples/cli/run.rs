@@ -71,7 +71,7 @@ impl<'a> Run<'a> {
             Source::Builtin(name) => builtin::exposure(name).map(f64::from),
             Source::File(_) => None,
         };
-        let exposure = args.exposure.or(suits.filter(|_| technique.radiance)).unwrap_or(0.0);
+        let exposure = args.exposure.or(suits.filter(|_| technique.radiance && args.view.is_none())).unwrap_or(0.0);
         options.exposure_ev = exposure as f32;
         let outputs = Outputs::new(&args.output, frames.len(), options)?;
         if outputs.uses_stdout() && args.json {
@@ -207,9 +207,9 @@ impl<'a> Run<'a> {
     }
 
     /// Writes an image of the graph into the `--dump` folder.
-    pub fn dump(&self, folder: &Path, frame: u32, name: &str, layers: &Layers) -> Result<()> {
+    pub fn dump(&self, folder: &Path, frame: u32, name: &str, layers: Layers) -> Result<()> {
         let path = folder.join(format!("{frame:04}-{}.exr", crate::pattern::file_part(name)));
-        image::write(&path, layers, &WriteOptions { overwrite: self.args.overwrite, f32: true, ..Default::default() })?;
+        image::write(&path, &layers, &WriteOptions { overwrite: self.args.overwrite, ..Default::default() })?;
         Ok(())
     }
 

@@ -1,6 +1,7 @@
 //! From images of the render graph to layers of a picture.
 
 use lucerna::{
+    Result,
     graph::{Frame, Graph, Image, ImageRead, Pixels},
     image::{Layer, Layers},
     scene::{Note, View},
@@ -87,7 +88,7 @@ impl Shown {
         let picture = graph.read_image(self.picture);
         let layers = if with_layers { self.layers } else { Vec::new() };
         let layers = layers.into_iter().map(|layer| (graph.read_image(layer.image), layer)).collect();
-        Reading { picture, grey: self.grey, layers }
+        Reading { picture, grey: self.grey, view: false, layers }
     }
 }
 
@@ -95,6 +96,8 @@ impl Shown {
 pub struct Reading {
     picture: ImageRead,
     grey: bool,
+    /// Any image of the graph, to look at.
+    view: bool,
     layers: Vec<(ImageRead, Source)>,
 }
 
@@ -105,10 +108,27 @@ impl std::fmt::Debug for Reading {
 }
 
 impl Reading {
+    /// Asks for the image of this name instead of a technique's picture.
+    ///
+    /// # Errors
+    /// `Usage` if no pass writes it; the message lists the names.
+    pub fn view(graph: &mut Graph, name: &str) -> Result<Self> {
+        let picture = graph.view(name).map_err(|error| error.at("--view"))?;
+        Ok(Self { picture, grey: false, view: true, layers: Vec::new() })
+    }
+
     /// The picture with its layers, once the graph has run. Layers of another size are stretched to that of the picture.
     pub fn layers(&self, frame: &Frame) -> Layers {
         let picture = frame.image(self.picture);
         let (width, height) = (picture.extent.width, picture.extent.height);
+        if self.view {
+            // What is looked at may be anything: made visible as the picture, and as it is in a layer.
+            let visible = picture.picture().into_iter().take(width as usize * height as usize);
+            let data = visible.flat_map(|[r, g, b, _]| [r, g, b]).collect();
+            let mut layers = Layers::rgb(width, height, data);
+            layers.layers.extend(raw(&picture).layers.into_iter().map(|layer| Layer { name: "raw".into(), ..layer }));
+            return layers;
+        }
         let mut pixels = stretched(&picture, width, height);
         if self.grey {
             pixels.iter_mut().for_each(|pixel| *pixel = [pixel[0]; 4]);
@@ -136,7 +156,7 @@ fn stretched(pixels: &Pixels, width: u32, height: u32) -> Vec<[f32; 4]> {
     (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| at(x, y)).collect()
 }
 
-/// Any image of the graph as layers: R G B A of its first layer and level.
+/// An image of the graph as it is: R G B A of its first layer and level.
 pub fn raw(pixels: &Pixels) -> Layers {
     let (width, height) = (pixels.extent.width, pixels.extent.height);
     let count = pixels.format.channels().clamp(1, 4) as usize;

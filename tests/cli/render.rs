@@ -219,6 +219,30 @@ fn the_timings_name_every_pass() {
     assert!(rows.iter().all(|row| row.len() == 5 && row[4].parse::<f64>().is_ok()), "{text}");
 }
 
+#[test]
+fn every_image_of_the_graph_can_be_looked_at() {
+    if !device() {
+        return;
+    }
+    let folder = folder();
+    let listed = isr(with(&["--list-passes", "-o", "no/such/folder/x.png"])).expect(0, &[]).stdout;
+    assert!(listed.contains("isr.gather") && listed.contains("reads") && listed.contains("writes"), "{listed}");
+    isr(with(&["--view", "gbufer.depth", "-o", &path(&folder, "x.png")])).expect(2, &["--view", "gbuffer.depth"]);
+    isr(with(&["--view", "gbuffer.depth", "-o", &path(&folder, "z.exr")])).expect(0, &[]);
+    let view = image::read(path(&folder, "z.exr"), &Limits::default()).unwrap();
+    let raw = &view.layer("raw").unwrap().data;
+    assert!(raw.len() == 48 * 40 && raw.iter().all(|z| (0.0..=1.0).contains(z)) && raw.iter().any(|z| *z < 0.99));
+    isr(with(&["--dump", &path(&folder, "none"), "-o", &path(&folder, "y.png")])).expect(1, &["none", "not a folder"]);
+    let dumped = folder.path().join("dump");
+    fs::create_dir(&dumped).unwrap();
+    isr(with(&["--dump", dumped.to_str().unwrap(), "-o", &path(&folder, "y.png")])).expect(0, &[]);
+    let names = files(&dumped);
+    for image in ["gbuffer.depth", "gbuffer.normal", "isr.gathered"] {
+        assert!(names.contains(&format!("0000-{image}.exr")), "{names:?}");
+    }
+    assert_eq!(image::read(dumped.join("0000-isr.gathered.exr"), &Limits::default()).unwrap().width, 24);
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_is_exit_code_1_and_leaves_nothing() {
