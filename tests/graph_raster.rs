@@ -324,3 +324,77 @@ fn any_image_can_be_looked_at_by_name() {
         assert!(table.contains("clear scene.a#2") && table.contains("barriers"), "{table}");
     });
 }
+
+#[test]
+fn volumes_and_cubes_are_seen_in_their_shapes() {
+    with_gpu(|gpu| {
+        let mut graph = Graph::new("shapes");
+        let volume = graph.image_with("volume", ImageDesc::volume(Format::RGBA32F, Extent::new(4, 6), 8));
+        graph.compute(slices::Args { volume_out: volume }, [4, 6, 8]);
+        let sky = graph.image_with("sky", ImageDesc::cube(Format::RGBA32F, 8));
+        for face in 0..6 {
+            let push = pattern::Push { tag: face as f32 };
+            graph.compute(pattern::Args { image_out: sky.layer(face), push }, Extent::square(8));
+        }
+        let seen = graph.buffer("seen", 7 * 16);
+        graph.compute(shapes::Args { volume, sky, seen }, 1);
+        let (seen, volume) = (graph.read_buffer(seen), graph.read_image(volume));
+        let frame = run(gpu, graph);
+        let volume = frame.image(volume);
+        assert_eq!((volume.layers, volume.at(3, 5, 7)), (8, Some([3.0, 5.0, 7.0, 1.0])));
+        let seen = frame.buffer::<[f32; 4]>(seen);
+        assert_eq!(seen[0], [1.5, 2.5, 3.5, 1.0], "the middle of the volume");
+        for (face, value) in seen[1..].iter().enumerate() {
+            // Faces in the order +X, -X, +Y, -Y, +Z, -Z.
+            assert_eq!(*value, [3.5, 3.5, face as f32, 1.0]);
+        }
+    });
+}
+
+#[test]
+fn depth_is_tested_and_sampled_by_one_pass() {
+    with_gpu(|gpu| {
+        let mut graph = Graph::new("read only");
+        let (color, depth) = (graph.image("color", Format::RGBA32F, SMALL), graph.image("depth", Format::D32S8, SMALL));
+        let (other, id) = (graph.image("other", Format::RGBA32F, SMALL), graph.image("id", Format::RG32U, SMALL));
+        let corners = graph.buffer_from("corners", &corners());
+        // The left half at depth 0.25.
+        let targets =
+            Targets::new().color(other, Load::Discard).color(id, Load::Discard).depth(depth, Depth::Clear(0.0));
+        let args = mesh::Args { corners, push: mesh::Push::default() };
+        graph.raster(targets, Raster::new(), args, Draw::vertices(6));
+        // At depth 0.125, in front of what is empty; its colour is the depth it samples.
+        let targets = Targets::new().color(color, Load::Clear([9.0; 4])).depth(depth, Depth::ReadOnly);
+        let args = show::Args { image: depth.nearest() };
+        graph.raster(targets, Raster::new(), args, Draw::fullscreen_at(0.125));
+        let (color, depth) = (graph.read_image(color), graph.read_image(depth));
+        let frame = run(gpu, graph);
+        let (color, depth) = (frame.image(color), frame.image(depth));
+        for x in 0..16 {
+            let (seen, stored) = if x < 8 { (9.0, 0.25) } else { (0.0, 0.0) };
+            assert_eq!(color.at(x, 5, 0).unwrap()[0], seen, "column {x}");
+            assert_eq!(depth.at(x, 5, 0).unwrap()[0], stored, "column {x}: nothing was written");
+        }
+    });
+}
+
+#[test]
+fn indexed_draws_come_from_buffers_that_passes_wrote() {
+    with_gpu(|gpu| {
+        let mut graph = Graph::new("indexed");
+        let (color, id) = (graph.image("color", Format::RGBA32F, SMALL), graph.image("id", Format::RG32U, SMALL));
+        let corners = graph.buffer_from("corners", &corners());
+        let indices = graph.buffer("indices", 24);
+        graph.compute(ramp::Args { values: indices, push: ramp::Push { count: 6, first: 0, step_size: 1 } }, 6);
+        // Two draws: instance 3 on the left half, instance 4 (vertices from 6 on) on the top half.
+        let commands = graph.buffer_from("commands", &[6u32, 1, 0, 0, 3, 6, 1, 0, 6, 4]);
+        let targets = Targets::new().color(color, Load::Clear([0.0; 4])).color(id, Load::ClearUint([9; 4]));
+        let args = mesh::Args { corners, push: mesh::Push::default() };
+        graph.raster(targets, Raster::new(), args, Draw::indexed_indirect(indices, commands, 2));
+        let id = graph.read_image(id);
+        let frame = run(gpu, graph);
+        let id = frame.image(id);
+        let at = |x, y| id.at(x, y, 0).unwrap()[0];
+        assert_eq!([at(2, 9), at(12, 2), at(2, 2), at(12, 9)], [3.0, 4.0, 4.0, 9.0]);
+    });
+}
