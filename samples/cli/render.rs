@@ -108,7 +108,7 @@ pub fn render<S: Serialize + DeserializeOwned, R>(
         layers.metadata = run.metadata(&gpu, &seen, frame)?;
         let milliseconds = begun.elapsed().as_secs_f64() * 1e3;
         let files = run.write(&layers, frame)?;
-        for (folder, images) in &dump {
+        for (folder, images) in dump.iter() {
             for (name, token) in images {
                 run.dump(folder, frame, name, shown::raw(&result.image(*token)))?;
             }
