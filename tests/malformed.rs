@@ -1,10 +1,15 @@
-//! Every malformed, hostile and odd file of the asset collection: the outcome that `tests/malformed.tsv` says, without
-//! panic, in under five seconds, with under one GiB of memory at any time.
+//! Every malformed, hostile and odd file of the asset collection, and scene files made here to do harm: the outcome that
+//! `tests/malformed.tsv` says, without panic, in under five seconds, with under one GiB of memory at any time.
 //!
 //! A line of the table: file, outcome (`ok` or the kind of the error), and part of the message, or of a note where the
 //! file is read.
 
 mod common;
+#[path = "common/gltf.rs"]
+#[allow(dead_code)]
+mod gltf;
+#[path = "common/hostile.rs"]
+mod hostile;
 
 use libtest_mimic::{Arguments, Failed, Trial};
 use lucerna::{
@@ -20,7 +25,9 @@ use std::{
     time::Duration,
 };
 
+/// Time on the processor; the machine may be busy with other things.
 const TIME: Duration = Duration::from_secs(5);
+const HANG: Duration = Duration::from_secs(120);
 const MEMORY: usize = 1 << 30;
 
 /// The system's allocator, counting.
@@ -83,7 +90,7 @@ fn extension(path: &Path) -> String {
 }
 
 fn is_scene(path: &Path) -> bool {
-    ["gltf", "glb", "obj"].contains(&extension(path).as_str())
+    ["gltf", "glb", "obj", "txt", "bin"].contains(&extension(path).as_str())
 }
 
 /// Reads a file by the way that its folder and extension call for.
@@ -103,19 +110,37 @@ fn read(path: &Path) -> Outcome {
     outcome(image::read(path, &Limits::default()).map(|image| format!("{}×{}", image.width, image.height)))
 }
 
+/// Reads a file that was made here.
+fn check_made(case: hostile::Case) -> Result<(), Failed> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(case.file);
+    std::fs::write(&path, &case.content).unwrap();
+    drop(case.content);
+    match case.expected {
+        "ok" => check(path, Some(("ok".into(), String::new()))),
+        part => check(path, Some(("input".into(), part.into()))),
+    }
+}
+
 fn check(path: PathBuf, expected: Option<(String, String)>) -> Result<(), Failed> {
     let panics = PANICS.load(Relaxed);
     let before = USED.load(Relaxed);
     PEAK.store(before, Relaxed);
     let (sender, receiver) = mpsc::channel();
     let file = path.clone();
-    std::thread::spawn(move || sender.send(read(&file)));
-    let outcome = match receiver.recv_timeout(TIME) {
-        Ok(outcome) => outcome,
-        Err(mpsc::RecvTimeoutError::Timeout) => return Err(format!("took more than {TIME:?}").into()),
+    std::thread::spawn(move || {
+        let outcome = read(&file);
+        sender.send((outcome, processor_time()))
+    });
+    let (outcome, time) = match receiver.recv_timeout(HANG) {
+        Ok(done) => done,
+        Err(mpsc::RecvTimeoutError::Timeout) => return Err("hangs".into()),
         Err(mpsc::RecvTimeoutError::Disconnected) => return Err("panicked".into()),
     };
     let peak = PEAK.load(Relaxed).saturating_sub(before);
+    if time.is_some_and(|time| time > TIME) {
+        return Err(format!("took {time:?}").into());
+    }
     if peak > MEMORY {
         return Err(format!("took {} MiB", peak >> 20).into());
     }
@@ -133,6 +158,12 @@ fn check(path: PathBuf, expected: Option<(String, String)>) -> Result<(), Failed
         }
         Some(_) => Ok(()),
     }
+}
+
+/// Time that the current thread was on the processor; Linux only.
+fn processor_time() -> Option<Duration> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    text.split_whitespace().next()?.parse().ok().map(Duration::from_nanos)
 }
 
 fn table() -> BTreeMap<String, (String, String)> {
@@ -169,6 +200,9 @@ fn main() {
         default(info);
     }));
     let mut trials = vec![];
+    for case in hostile::cases() {
+        trials.push(Trial::test(format!("made/{}", case.name), move || check_made(case)));
+    }
     if let Some(assets) = common::assets() {
         let mut table = table();
         for file in inputs(&assets) {
