@@ -10,13 +10,13 @@ static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 /// Runs `body` on a device with validation and synchronisation validation, closes the device, and panics if validation,
 /// loader or driver said anything that is not on the allow-list ([`super::ALLOWED`]), or if anything made from the device
-/// is still alive.
+/// is still alive. New memory is filled with NaN, so that a read of what was never written shows in the results.
 ///
 /// Without a device or without the validation layer: panics if the variable `CI` is set, else skips loudly (no device) or
-/// goes on without validation. `LUCERNA_DEVICE` chooses the device, `LUCERNA_POISON=1` fills new memory with NaN.
+/// goes on without validation. `LUCERNA_DEVICE` chooses the device.
 #[track_caller]
 pub fn with_gpu(body: impl FnOnce(&Gpu)) {
-    with_gpu_options(GpuOptions::default(), body);
+    with_gpu_options(GpuOptions { poison: true, ..GpuOptions::default() }, body);
 }
 
 /// [`with_gpu`] with other options; validation is always on. The device comes from the environment.

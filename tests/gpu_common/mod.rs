@@ -1,6 +1,8 @@
 //! Small work for a device, shared by the tests of `engine/gpu`.
 #![allow(dead_code)]
 
+pub mod fault;
+
 use std::sync::OnceLock;
 
 use ash::vk;
