@@ -191,9 +191,9 @@ fn without_shadows_everything_is_lit_and_late_lights_are_named() {
 
 /// A block `Shadows` of one slot.
 fn shadows(graph: &mut Graph, size: u32, exponent: f32) -> lucerna::graph::Buffer {
-    let header = types::ShadowSettings { exponent, size: size as f32, ..Default::default() };
+    let header = types::ShadowSettings { size: size as f32, ..Default::default() };
     let mut words: Vec<u32> = bytemuck::cast_slice(&[header]).to_vec();
-    words.extend_from_slice(bytemuck::cast_slice(&[types::ShadowSlot::default(); 64]));
+    words.extend_from_slice(bytemuck::cast_slice(&[types::ShadowSlot { exponent, ..Default::default() }; 64]));
     words.extend_from_slice(&[0, 1]);
     graph.buffer_from("shadows", &words)
 }

@@ -50,6 +50,12 @@ pub struct Settings {
     pub distance: f32,
     /// c of eq. 30, for depths from 0 (at the light) to 1 (its range, or the end of the scene).
     pub exponent: f32,
+    /// Metres: where a light reaches farther than this, c grows in proportion, so that large scenes do not leak light
+    /// through thin walls. 0: c is the same everywhere, as in the dissertation.
+    pub exponent_reach: f32,
+    /// Exponential: the least share of c that remains where light grazes a surface. 0: c falls with the cosine, as in
+    /// listing 8, which leaks light along walls.
+    pub grazing: f32,
     /// Standard deviation of the logarithmic Gaussian prefilter, texels; 0: no filter.
     pub blur: f32,
     /// Texels that a receiver is moved to the light before the comparison (plain and PCF).
@@ -67,6 +73,8 @@ impl Default for Settings {
             split: 0.8,
             distance: 0.0,
             exponent: 90.0,
+            exponent_reach: 3.0,
+            grazing: 0.5,
             blur: 1.5,
             depth_bias: 1.0,
             normal_bias: 1.5,
@@ -112,6 +120,8 @@ fn sane(settings: &Settings) -> Settings {
         split: positive(settings.split, 0.8).min(1.0),
         distance: positive(settings.distance, 0.0),
         exponent: positive(settings.exponent, 90.0).max(1e-3),
+        exponent_reach: positive(settings.exponent_reach, 0.0),
+        grazing: positive(settings.grazing, 0.0).min(1.0),
         blur: positive(settings.blur, 0.0).min(16.0),
         depth_bias: positive(settings.depth_bias, 0.0),
         normal_bias: positive(settings.normal_bias, 0.0),
@@ -128,10 +138,10 @@ fn block(assignment: &Assignment, settings: &Settings) -> Vec<u32> {
             Kind::Pcf => consts::SHADOW_PCF,
             Kind::Exponential => consts::SHADOW_EXPONENTIAL,
         },
-        exponent: settings.exponent,
         depth_bias: settings.depth_bias,
         normal_bias: settings.normal_bias,
         size: settings.size as f32,
+        grazing: settings.grazing,
     };
     let mut slots = vec![types::ShadowSlot::default(); consts::MAX_SHADOW_SLOTS as usize];
     slots[..assignment.slots.len()].copy_from_slice(&assignment.slots);

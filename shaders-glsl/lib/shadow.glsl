@@ -26,6 +26,7 @@ struct ShadowSlot {
     float texel;          // metres: size of a texel at one metre (perspective) or everywhere
     uint perspective;
     vec2 half_angle;      // tangent of half the field of view, x and y (perspective)
+    float exponent;       // c of eq. 30 for linear depth 0..1
 };
 
 struct ShadowLight {
@@ -35,10 +36,10 @@ struct ShadowLight {
 
 struct ShadowSettings {
     uint kind;         // SHADOW_
-    float exponent;    // c of eq. 30
     float depth_bias;  // texels
     float normal_bias; // texels
     float size;        // texels of a side
+    float grazing;     // least share of the exponent that remains where light grazes; 0 as in listing 8
 };
 
 layout(binding = SHADOWS_BINDING, scalar) readonly buffer Shadows {
@@ -119,14 +120,14 @@ float shadow_factor(Light l, vec3 world, vec3 normal) {
     float axis = shadow_axis_depth(slot, ndc.z);
 
     if (exponential) {
-        // Listing 8: the test at the four nearest texels, blended; weakened at grazing angles.
+        // Listing 8: the test at the four nearest texels, blended; weakened at grazing angles (listing 8: by the cosine).
         float receiver = shadow_linear_depth(slot, ndc.xy, axis);
         vec2 corner = floor(at - 0.5);
         vec2 f = at - 0.5 - corner;
         float s[4];
         for (int i = 0; i < 4; ++i) {
             float occluder = shadow_texel(ivec2(corner) + ivec2(i & 1, i >> 1), index);
-            s[i] = exponential_visibility(receiver, occluder, shadow_settings.exponent * facing);
+            s[i] = exponential_visibility(receiver, occluder, slot.exponent * max(facing, shadow_settings.grazing));
         }
         return mix(mix(s[0], s[1], f.x), mix(s[2], s[3], f.x), f.y);
     }

@@ -30,7 +30,7 @@ void main() {
     ivec2 at = ivec2(gl_GlobalInvocationID.xy);
     int size = int(shadow_settings.size);
     if (any(greaterThanEqual(at, ivec2(size))) || gl_GlobalInvocationID.z >= slots) return;
-    float c = shadow_settings.exponent;
+    float c = shadow_slots[gl_GlobalInvocationID.z].exponent;
     // Sum of weights * exp(c (depth - most)), with the largest depth so far taken out of it.
     float most = depth_at(at);
     float sum = 1.0;

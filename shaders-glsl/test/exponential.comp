@@ -9,5 +9,5 @@ layout(binding = 0, scalar) buffer Probes { DepthProbe probes[]; };
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= probes.length()) return;
-    probes[i].visibility = exponential_visibility(probes[i].receiver, probes[i].occluder, shadow_settings.exponent);
+    probes[i].visibility = exponential_visibility(probes[i].receiver, probes[i].occluder, shadow_slots[0].exponent);
 }

@@ -68,6 +68,12 @@ fn reach(light: &types::Light, bounds: &Aabb) -> f32 {
     reach.max(1e-3)
 }
 
+/// c for linear depth that spans `range` metres.
+fn exponent(range: f32, settings: &Settings) -> f32 {
+    let reach = settings.exponent_reach;
+    if reach > 0.0 { settings.exponent * (range / reach).max(1.0) } else { settings.exponent }
+}
+
 /// Texels of border on each side for the filter that reads the map.
 fn border(settings: &Settings) -> f32 {
     BORDER + if settings.kind == Kind::Exponential { 2.0 * settings.blur } else { 0.0 }
@@ -86,6 +92,7 @@ fn looking(at: Vec3, along: Vec3, half: f32, far: f32, settings: &Settings) -> t
         texel: 2.0 * half / size,
         perspective: 1,
         half_angle: [half; 2],
+        exponent: exponent(far, settings),
     }
 }
 
@@ -157,6 +164,7 @@ fn parallel(
         texel,
         perspective: 0,
         half_angle: [1.0; 2],
+        exponent: exponent(far - near, settings),
     }
 }
 
