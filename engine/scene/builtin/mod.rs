@@ -17,6 +17,7 @@ mod garage;
 mod kit;
 mod office;
 mod primitives;
+mod street;
 mod teapot;
 #[cfg(test)]
 mod tests;
@@ -79,6 +80,12 @@ const ENTRIES: &[Entry] = &[
         description: "Garage with cars, racks and a workbench, its door open to daylight",
         exposure: 1.3,
         build: garage::build,
+    },
+    Entry {
+        name: "street",
+        description: "Western street: wooden buildings, hills, trees, grass and cacti, about 200 000 triangles",
+        exposure: 0.5,
+        build: street::build,
     },
     Entry {
         name: "figure",

@@ -28,6 +28,7 @@ const TRIANGLES: &[(&str, std::ops::RangeInclusive<usize>)] = &[
     ("teapot", 15_000..=40_000),
     ("office", 20_000..=22_000),
     ("garage", 50_000..=150_000),
+    ("street", 150_000..=300_000),
     ("figure", 20_000..=60_000),
 ];
 
