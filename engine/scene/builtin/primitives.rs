@@ -13,7 +13,7 @@ pub(super) fn build() -> Scene {
     solids(&mut stage);
 
     stage.spot("key", ([2.6, 4.6, 3.4], [-0.1, 0.2, 0.0]), srgb(0xfff1dc), 90.0, (24.0, 42.0));
-    stage.spot("fill", ([-3.4, 3.2, 3.2], [0.0, 0.3, 0.0]), srgb(0xc9dcff), 14.0, (24.0, 44.0));
+    stage.point("fill", [-3.4, 3.2, 3.2], srgb(0xc9dcff), 14.0);
     let sky = GradientSky {
         zenith: Vec3::new(0.05, 0.07, 0.1),
         horizon: Vec3::new(0.1, 0.11, 0.12),

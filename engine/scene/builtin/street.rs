@@ -62,7 +62,7 @@ pub(super) fn build() -> Scene {
     stage.camera("rooftops", [19.0, 14.0, 44.0], [-3.0, 1.5, -2.0], 46.0);
     let hill = vec2(-37.0, 34.0);
     stage.camera("outskirts", [hill.x, ground(hill) + 1.9, hill.y], [-8.0, 3.4, 4.0], 46.0);
-    stage.camera("wagon", [5.3, 1.5, 8.2], [0.2, 1.1, -1.5], 50.0);
+    stage.camera("wagon", [5.0, 1.6, 2.4], [-0.7, 1.35, -3.0], 52.0);
     stage.finish()
 }
 
@@ -116,7 +116,7 @@ fn ground(p: Vec2) -> f32 {
 fn land(stage: &mut Stage) {
     // Lines gather around the road: near spacing 0.3 m, far 3 m.
     let warp = |c: f32, near: f32| REACH * (near * c + (1.0 - near) * c * c * c);
-    let mut sheet = terrain(vec2(-1.0, -1.0), vec2(1.0, 1.0), 176, 168, |_| 0.0).displaced(|p| {
+    let mut sheet = terrain(vec2(-1.0, -1.0), vec2(1.0, 1.0), 152, 148, |_| 0.0).displaced(|p| {
         let (x, z) = (warp(p.x, 0.3), warp(p.z, 0.62));
         vec3(x, ground(vec2(x, z)), z)
     });
@@ -137,7 +137,10 @@ fn land(stage: &mut Stage) {
         let fine = value_noise(uv * 128.0, 128, 88);
         let broad = fbm(uv * 8.0, 8, 4, 89);
         let pebble = smooth(0.8, 0.9, value_noise(uv * 48.0, 48, 90));
-        (Vec3::splat((0.62 + 0.3 * broad + 0.16 * fine - 0.1 * pebble).min(1.0)), 0.006 * broad + 0.002 * fine + 0.008 * pebble)
+        (
+            Vec3::splat((0.62 + 0.3 * broad + 0.16 * fine - 0.1 * pebble).min(1.0)),
+            0.006 * broad + 0.002 * fine + 0.008 * pebble,
+        )
     });
     let soil = stage.textured("soil", &gravel, 4.0, 0.95);
     stage.add("ground", Model::of(soil, sheet));
@@ -164,19 +167,112 @@ fn row(stage: &mut Stage, left: bool) -> Vec<(f32, Plan)> {
     };
     if left {
         vec![
-            (0.0, plan("saloon", (12.0, 13.0), (6.2, 7.9), 2, (0xa8472f, 0xe8dcc0), sign("SALOON", 0x2f2018, 0xe9b949, 0.95))),
-            (2.6, plan("bank", (8.0, 11.0), (3.9, 6.0), 1, (0xcdb98c, 0x5b3a26), sign("BANK", 0x24382e, 0xe6d8b0, 0.85))),
-            (0.4, plan("barber", (6.4, 9.0), (3.5, 4.9), 1, (0x6f93a0, 0xe9e4d6), sign("BARBER", 0xe6dfcc, 0x9a2f28, 0.55))),
-            (4.2, plan("assay office", (8.2, 10.0), (3.7, 5.3), 1, (0x9a8a63, 0x463423), sign("ASSAY OFFICE", 0x3b2a1c, 0xe3d1a4, 0.48))),
-            (1.6, plan("livery", (12.0, 15.0), (4.6, 7.0), 1, (0x7d3b2a, 0xd9cbb0), sign("LIVERY", 0xd9cbb0, 0x4a2a1e, 0.85))),
+            (
+                0.0,
+                plan(
+                    "saloon",
+                    (12.0, 13.0),
+                    (6.2, 7.9),
+                    2,
+                    (0xa8472f, 0xe8dcc0),
+                    sign("SALOON", 0x2f2018, 0xe9b949, 0.95),
+                ),
+            ),
+            (
+                2.6,
+                plan("bank", (8.0, 11.0), (3.9, 6.0), 1, (0xcdb98c, 0x5b3a26), sign("BANK", 0x24382e, 0xe6d8b0, 0.85)),
+            ),
+            (
+                0.4,
+                plan(
+                    "barber",
+                    (6.4, 9.0),
+                    (3.5, 4.9),
+                    1,
+                    (0x6f93a0, 0xe9e4d6),
+                    sign("BARBER", 0xe6dfcc, 0x9a2f28, 0.55),
+                ),
+            ),
+            (
+                4.2,
+                plan(
+                    "assay office",
+                    (8.2, 10.0),
+                    (3.7, 5.3),
+                    1,
+                    (0x9a8a63, 0x463423),
+                    sign("ASSAY OFFICE", 0x3b2a1c, 0xe3d1a4, 0.48),
+                ),
+            ),
+            (
+                1.6,
+                plan(
+                    "livery",
+                    (12.0, 15.0),
+                    (4.6, 7.0),
+                    1,
+                    (0x7d3b2a, 0xd9cbb0),
+                    sign("LIVERY", 0xd9cbb0, 0x4a2a1e, 0.85),
+                ),
+            ),
         ]
     } else {
         vec![
-            (0.6, plan("general store", (10.4, 12.0), (4.0, 5.9), 1, (0x7f9a6b, 0xe8dfc6), sign("GENERAL STORE", 0x3a2a1c, 0xe8c872, 0.55))),
-            (1.2, plan("sheriff", (7.0, 9.0), (3.6, 5.0), 1, (0xb59a6e, 0x4f3a28), sign("SHERIFF", 0xe4dcc6, 0x2f2a26, 0.6))),
-            (3.8, plan("hotel", (12.4, 13.0), (6.3, 8.2), 2, (0xd8c8a6, 0x7b3f2c), sign("HOTEL", 0x5b2f24, 0xf0e2bd, 1.0))),
-            (1.0, plan("post office", (7.6, 9.5), (3.6, 5.2), 1, (0x93765a, 0xe6dcc4), sign("POST OFFICE", 0x26323f, 0xe9dfc4, 0.48))),
-            (4.4, plan("gunsmith", (7.2, 9.0), (3.5, 5.1), 1, (0x8c6a86, 0x3c2a22), sign("GUNSMITH", 0xe0d3b4, 0x3a2620, 0.55))),
+            (
+                0.6,
+                plan(
+                    "general store",
+                    (10.4, 12.0),
+                    (4.0, 5.9),
+                    1,
+                    (0x7f9a6b, 0xe8dfc6),
+                    sign("GENERAL STORE", 0x3a2a1c, 0xe8c872, 0.55),
+                ),
+            ),
+            (
+                1.2,
+                plan(
+                    "sheriff",
+                    (7.0, 9.0),
+                    (3.6, 5.0),
+                    1,
+                    (0xb59a6e, 0x4f3a28),
+                    sign("SHERIFF", 0xe4dcc6, 0x2f2a26, 0.6),
+                ),
+            ),
+            (
+                3.8,
+                plan(
+                    "hotel",
+                    (12.4, 13.0),
+                    (6.3, 8.2),
+                    2,
+                    (0xd8c8a6, 0x7b3f2c),
+                    sign("HOTEL", 0x5b2f24, 0xf0e2bd, 1.0),
+                ),
+            ),
+            (
+                1.0,
+                plan(
+                    "post office",
+                    (7.6, 9.5),
+                    (3.6, 5.2),
+                    1,
+                    (0x93765a, 0xe6dcc4),
+                    sign("POST OFFICE", 0x26323f, 0xe9dfc4, 0.48),
+                ),
+            ),
+            (
+                4.4,
+                plan(
+                    "gunsmith",
+                    (7.2, 9.0),
+                    (3.5, 5.1),
+                    1,
+                    (0x8c6a86, 0x3c2a22),
+                    sign("GUNSMITH", 0xe0d3b4, 0x3a2620, 0.55),
+                ),
+            ),
         ]
     }
 }
@@ -223,7 +319,12 @@ fn things_in_the_street(stage: &mut Stage, palette: &Palette) {
         stage.place(&format!("barrel {}", i + 1), barrel, placed(vec3(x, STEP, z), 67.0 * i as f32));
     }
     let boxes = [0.8, 0.6].map(|size| stage.mesh("crate", things::crate_of_boards(palette, size, &mut random)));
-    let crates = [(near, STEP, 29.6, 0, 8.0), (near, STEP, 28.6, 1, -12.0), (near, STEP + 0.8, 29.55, 1, 24.0), (-near, STEP, -21.4, 0, 5.0)];
+    let crates = [
+        (near, STEP, 29.6, 0, 8.0),
+        (near, STEP, 28.6, 1, -12.0),
+        (near, STEP + 0.8, 29.55, 1, 24.0),
+        (-near, STEP, -21.4, 0, 5.0),
+    ];
     for (i, (x, y, z, kind, turn)) in crates.into_iter().enumerate() {
         stage.place(&format!("crate {}", i + 1), boxes[kind], placed(vec3(x, y, z), turn));
     }
@@ -235,7 +336,9 @@ fn things_in_the_street(stage: &mut Stage, palette: &Palette) {
     stage.mesh_at("wagon", things::wagon(palette, &mut random), placed(vec3(0.3, 0.0, -2.0), 108.0));
     let rail = stage.mesh("hitching rail", things::hitching_rail(palette, 3.2));
     let edge = FRONT - WALK - 0.7;
-    for (i, (side, z)) in [(-1.0, 28.5), (-1.0, 14.2), (-1.0, -13.5), (1.0, 17.0), (1.0, 3.5), (1.0, -19.5)].into_iter().enumerate() {
+    for (i, (side, z)) in
+        [(-1.0, 28.5), (-1.0, 14.2), (-1.0, -13.5), (1.0, 17.0), (1.0, 3.5), (1.0, -19.5)].into_iter().enumerate()
+    {
         stage.place(&format!("hitching rail {}", i + 1), rail, placed(vec3(side * edge, 0.0, z), 90.0));
     }
     let trough = stage.mesh("trough", things::trough(palette, 2.2));
@@ -247,7 +350,9 @@ fn things_in_the_street(stage: &mut Stage, palette: &Palette) {
         stage.place(&format!("bench {}", i + 1), bench, placed(vec3(side * (FRONT - 0.42), STEP, z), -side * 90.0));
     }
     let lantern = stage.mesh("lantern", things::lantern(palette));
-    for (i, (side, z)) in [(-1.0, 28.0), (-1.0, 24.0), (1.0, 5.5), (1.0, 1.0), (1.0, 26.0), (-1.0, 13.4)].into_iter().enumerate() {
+    for (i, (side, z)) in
+        [(-1.0, 28.0), (-1.0, 24.0), (1.0, 5.5), (1.0, 1.0), (1.0, 26.0), (-1.0, 13.4)].into_iter().enumerate()
+    {
         stage.place(&format!("lantern {}", i + 1), lantern, at(side * (FRONT - WALK * 0.55), STEP + 2.62, z));
     }
 }
@@ -266,8 +371,8 @@ fn wires(stage: &mut Stage, palette: &Palette) {
     }
     let mut lines = Geometry::default();
     for pair in spots.windows(2) {
-        for (x, y) in [-0.75, -0.4, 0.4, 0.75].into_iter().flat_map(|x| [(x, 0.27), (x, 0.82)]) {
-            let end = vec3(x, 7.5 - y, 0.11);
+        for x in [-0.75, 0.75] {
+            let end = vec3(x, 7.5 - 0.27, 0.11);
             lines.append(&things::wire(pair[0] + end, pair[1] + end));
         }
     }
@@ -334,7 +439,9 @@ fn plants(stage: &mut Stage) {
         let size = Mat4::from_scale(Vec3::splat(0.9 + 0.04 * (i % 5) as f32));
         stage.place(&format!("tree {}", i + 1), kinds[i % 3], placed(on_ground(vec2(x, z)), 73.0 * i as f32) * size);
     }
-    let bushes: Vec<u32> = (0..2).map(|i| stage.mesh("bush", Model::of(leaf, vegetation::bush(1.3 + 0.4 * i as f32, 70, &mut random)))).collect();
+    let bushes: Vec<u32> = (0..2)
+        .map(|i| stage.mesh("bush", Model::of(leaf, vegetation::bush(1.3 + 0.4 * i as f32, 70, &mut random))))
+        .collect();
     for i in 0..36 {
         let p = somewhere(&mut random, 60.0);
         let size = Mat4::from_scale(Vec3::splat(random.range(0.6, 1.2)));
@@ -366,15 +473,18 @@ fn plants(stage: &mut Stage) {
         stage.place(&format!("cactus {}", i + 1), cacti[i % 3], placed(on_ground(p), random.range(0.0, 360.0)));
     }
     let stone = stage.textured("sandstone", &mottled(128, 10, srgb(0xb87a52), srgb(0x8f5a3e), 0.01, 97), 1.2, 0.95);
-    let rocks: Vec<u32> = (0..3).map(|i| stage.mesh("rock", Model::of(stone, vegetation::rock(1.6, 40 + 9 * i)))).collect();
+    let rocks: Vec<u32> =
+        (0..3).map(|i| stage.mesh("rock", Model::of(stone, vegetation::rock(1.6, 40 + 9 * i)))).collect();
     for i in 0..38 {
         let p = somewhere(&mut random, 70.0);
         let size = random.range(0.25, 1.0f32).powi(2) * 1.8 + 0.15;
-        let map = placed(on_ground(p) + Vec3::Y * size * 0.2, random.range(0.0, 360.0)) * Mat4::from_scale(vec3(size, size * 0.8, size));
+        let map = placed(on_ground(p) + Vec3::Y * size * 0.2, random.range(0.0, 360.0))
+            * Mat4::from_scale(vec3(size, size * 0.8, size));
         stage.place(&format!("rock {}", i + 1), rocks[i % 3], map);
     }
     let sage = stage.paint("sagebrush", 0x8f9a78, 0.95);
-    let scrub: Vec<u32> = (0..2).map(|i| stage.mesh("scrub", Model::of(sage, vegetation::scrub(0.55, 50 + i)))).collect();
+    let scrub: Vec<u32> =
+        (0..2).map(|i| stage.mesh("scrub", Model::of(sage, vegetation::scrub(0.55, 50 + i)))).collect();
     for i in 0..70 {
         let p = somewhere(&mut random, 82.0);
         let size = Mat4::from_scale(Vec3::splat(random.range(0.4, 1.3)));

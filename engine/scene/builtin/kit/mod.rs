@@ -3,8 +3,6 @@
 //! Everything here is metres, Y up, counter-clockwise seen from outside. Texture coordinates are metres of surface (so
 //! that a material says how large its texture is), v grows downwards as in glTF.
 
-#![allow(dead_code, unused_imports)]
-
 mod geometry;
 mod nets;
 mod pictures;

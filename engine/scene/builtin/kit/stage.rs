@@ -38,11 +38,6 @@ impl Stage {
         self.material(Material { metallic: 1.0, roughness, ..Material::diffuse(name, srgb(hex)) })
     }
 
-    /// A dark body that emits `radiance`, W/(sr·m²).
-    pub fn glow(&mut self, name: &str, radiance: Vec3) -> u32 {
-        self.material(Material::emitter(name, radiance))
-    }
-
     /// A rough dielectric coloured by a picture that spans `metres` on the surface; its relief becomes a normal map
     /// where it has one.
     pub fn textured(&mut self, name: &str, picture: &Picture, metres: f32, roughness: f32) -> u32 {

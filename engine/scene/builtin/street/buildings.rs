@@ -39,9 +39,11 @@ pub(super) fn building(palette: &Palette, plan: &Plan, random: &mut Random) -> M
     let core = slab([-w * 0.5 + 0.03, -0.6, -d + 0.03], [w * 0.5 - 0.03, plan.walls - 0.02, -0.03]);
     model.add(palette.wood, core.colored(paint * 0.5));
     model.add(palette.wood, boards(w, plan.front, 0.19, paint, random));
-    for (turn, at, length) in
-        [(90.0, vec3(w * 0.5, 0.0, -d * 0.5), d), (-90.0, vec3(-w * 0.5, 0.0, -d * 0.5), d), (180.0, vec3(0.0, 0.0, -d), w)]
-    {
+    for (turn, at, length) in [
+        (90.0, vec3(w * 0.5, 0.0, -d * 0.5), d),
+        (-90.0, vec3(-w * 0.5, 0.0, -d * 0.5), d),
+        (180.0, vec3(0.0, 0.0, -d), w),
+    ] {
         let side = boards(length, plan.walls, 0.24, paint * 0.85, random);
         model.add(palette.wood, side.turned_y(turn).at(at.x, at.y, at.z));
     }
@@ -52,7 +54,11 @@ pub(super) fn building(palette: &Palette, plan: &Plan, random: &mut Random) -> M
         porch(&mut model, palette, plan);
     }
     if let Some((sign, (width, height))) = plan.sign {
-        let y = if plan.storeys > 1 { plan.front - 0.35 - height } else { (plan.front + plan.walls - 1.1).max(PORCH.1 + 0.25) - height * 0.5 };
+        let y = if plan.storeys > 1 {
+            plan.front - 0.35 - height
+        } else {
+            (plan.front - 0.35 + plan.walls.max(PORCH.1 + 0.35)) * 0.5 - height * 0.5
+        };
         let mut face = Geometry::default();
         let corner = |x: f32, up: f32| vec3(x * width, y + up * height, 0.121);
         face.flat_quad([corner(-0.5, 0.0), corner(0.5, 0.0), corner(0.5, 1.0), corner(-0.5, 1.0)]);
@@ -94,7 +100,11 @@ fn front_trim(model: &mut Model, palette: &Palette, plan: &Plan) {
     let mut out = Geometry::default();
     for x in [-0.5f32, 0.5] {
         out.append(&cuboid(0.16, plan.front, 0.07).at(x * (w - 0.14), plan.front * 0.5, 0.02));
-        out.append(&cuboid(0.1, plan.front - plan.walls, 0.5).at(x * (w - 0.1), (plan.front + plan.walls) * 0.5, -0.24));
+        out.append(&cuboid(0.1, plan.front - plan.walls, 0.5).at(
+            x * (w - 0.1),
+            (plan.front + plan.walls) * 0.5,
+            -0.24,
+        ));
     }
     out.append(&cuboid(w, plan.front - plan.walls, 0.04).at(0.0, (plan.front + plan.walls) * 0.5, -0.03));
     out.append(&bevel_box(w + 0.3, 0.12, 0.36, 0.03).at(0.0, plan.front + 0.06, 0.06));
@@ -132,7 +142,10 @@ fn roof(model: &mut Model, palette: &Palette, plan: &Plan) {
     }
     shingles.append(&cuboid(0.2, 0.05, d + 0.35).at(0.0, y + rise + 0.02, -d * 0.5 - 0.22));
     model.add(palette.shingles, shingles);
-    let stack = slab([plan.width * 0.22, plan.walls, -d * 0.7], [plan.width * 0.22 + 0.55, plan.walls + rise + 0.9, -d * 0.7 + 0.5]);
+    let stack = slab(
+        [plan.width * 0.22, plan.walls, -d * 0.7],
+        [plan.width * 0.22 + 0.55, plan.walls + rise + 0.9, -d * 0.7 + 0.5],
+    );
     model.add(palette.brick, stack);
 }
 
@@ -140,7 +153,8 @@ fn roof(model: &mut Model, palette: &Palette, plan: &Plan) {
 fn openings(model: &mut Model, palette: &Palette, plan: &Plan) {
     let trim = srgb(plan.trim);
     let count = ((plan.width - 1.6) / 2.1) as usize;
-    let spots: Vec<f32> = (0..=count).map(|i| (i as f32 - count as f32 * 0.5) * (plan.width - 2.0) / count.max(1) as f32).collect();
+    let spots: Vec<f32> =
+        (0..=count).map(|i| (i as f32 - count as f32 * 0.5) * (plan.width - 2.0) / count.max(1) as f32).collect();
     let door = spots.len() / 2;
     for (i, x) in spots.iter().enumerate() {
         if i == door {
@@ -308,7 +322,11 @@ pub(super) fn church(palette: &Palette, random: &mut Random) -> Model {
     model.add(palette.wood, gable);
     let tower = (2.4, 8.4);
     let mut shaft = Model::default();
-    shaft.add(palette.wood, slab([-tower.0 * 0.5 + 0.03, -0.6, -tower.0 + 0.03], [tower.0 * 0.5 - 0.03, tower.1, -0.03]).colored(paint * 0.6));
+    shaft.add(
+        palette.wood,
+        slab([-tower.0 * 0.5 + 0.03, -0.6, -tower.0 + 0.03], [tower.0 * 0.5 - 0.03, tower.1, -0.03])
+            .colored(paint * 0.6),
+    );
     for (turn, x, z) in [(0.0, 0.0, 0.0), (90.0, 1.2, -1.2), (-90.0, -1.2, -1.2), (180.0, 0.0, -2.4)] {
         shaft.add(palette.wood, boards(tower.0, tower.1, 0.19, paint, random).turned_y(turn).at(x, 0.0, z));
     }

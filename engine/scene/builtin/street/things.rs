@@ -30,7 +30,11 @@ pub(super) fn barrel(palette: &Palette) -> Model {
     let mut hoops = Geometry::default();
     for (y, r) in [(0.09, 0.296), (0.26, 0.325), (0.6, 0.325), (0.77, 0.296)] {
         let ring: Vec<Vec3> = circle(r, 22).iter().map(|p| vec3(p.x, y, -p.y)).collect();
-        hoops.append(&loop_sweep(&ring, &[vec2(-0.008, -0.025), vec2(0.008, -0.025), vec2(0.008, 0.025), vec2(-0.008, 0.025)], false));
+        hoops.append(&loop_sweep(
+            &ring,
+            &[vec2(-0.008, -0.025), vec2(0.008, -0.025), vec2(0.008, 0.025), vec2(-0.008, 0.025)],
+            false,
+        ));
     }
     model.add(palette.iron, hoops);
     model
@@ -48,7 +52,8 @@ pub(super) fn crate_of_boards(palette: &Palette, size: f32, random: &mut Random)
             out.append(&board.colored(tone(random)));
         }
         for x in [-0.44, 0.44] {
-            let batten = cuboid(size * 0.1, size, 0.02).at(x * size, size * 0.5, size * 0.5).turned_y(90.0 * face as f32);
+            let batten =
+                cuboid(size * 0.1, size, 0.02).at(x * size, size * 0.5, size * 0.5).turned_y(90.0 * face as f32);
             out.append(&batten.colored(tone(random)));
         }
     }
@@ -65,7 +70,8 @@ fn spoked_wheel(palette: &Palette, r: f32) -> Model {
     let mut wood = loop_sweep(&rim, &square(0.035), false);
     wood.append(&cylinder(0.09, 0.26, 16).turned_x(90.0).at(0.0, 0.0, -0.13));
     for i in 0..12 {
-        let spoke = sweep(&[vec3(0.0, 0.07, 0.0), vec3(0.0, r - 0.06, 0.0)], &circle(0.024, 6), true, |k| [1.0, 0.75][k]);
+        let spoke =
+            sweep(&[vec3(0.0, 0.07, 0.0), vec3(0.0, r - 0.06, 0.0)], &circle(0.024, 6), true, |k| [1.0, 0.75][k]);
         wood.append(&spoke.turned_z(30.0 * i as f32));
     }
     let mut model = Model::of(palette.wood, wood.colored(srgb(0x7c4a2c)));
@@ -122,7 +128,11 @@ pub(super) fn wagon(palette: &Palette, random: &mut Random) -> Model {
             let angle = std::f32::consts::PI * v;
             let sag = 1.0 - 0.045 * (std::f32::consts::PI * u * 4.0).sin().powi(2) * (angle.sin() + 0.2);
             let flare = 1.0 + 0.1 * (2.0 * u - 1.0).powi(4);
-            let p = vec3((u - 0.5) * (length + 0.5), floor + 0.5 + 1.12 * angle.sin() * sag * flare, -0.68 * angle.cos() * sag * flare);
+            let p = vec3(
+                (u - 0.5) * (length + 0.5),
+                floor + 0.5 + 1.12 * angle.sin() * sag * flare,
+                -0.68 * angle.cos() * sag * flare,
+            );
             cover.vertex(p, Vec3::Y, vec2(u * 4.0, v * 3.0));
         }
     }
@@ -192,13 +202,16 @@ pub(super) fn lantern(palette: &Palette) -> Model {
 /// A telegraph pole of `height` m; wires run along Z at the ends of its arm.
 pub(super) fn pole(palette: &Palette, height: f32) -> Model {
     let mut wood = frustum(0.14, 0.09, height + 0.5, 12).at(0.0, -0.5, 0.0);
-    for y in [0.35, 0.9] {
-        wood.append(&bevel_box(1.7, 0.11, 0.1, 0.01).at(0.0, height - y, 0.11));
-    }
+    wood.append(&bevel_box(1.7, 0.11, 0.1, 0.01).at(0.0, height - 0.35, 0.11));
     let mut model = Model::of(palette.wood, wood.colored(srgb(0x7d6850)));
-    for (x, y) in [-0.75, -0.4, 0.4, 0.75].into_iter().flat_map(|x| [(x, 0.35), (x, 0.9)]) {
-        let knob = lathe(&[(0.0, 0.0), (0.03, 0.0), (0.045, 0.04), (0.025, 0.06), (0.04, 0.09), (0.0, 0.12)].map(|(r, y)| vec2(r, y)), 10, 50.0);
-        model.add(palette.porcelain, knob.at(x, height - y + 0.055, 0.11));
+    for x in [-0.75, -0.4, 0.4, 0.75] {
+        let knob = lathe(
+            &[(0.0, 0.0), (0.03, 0.0), (0.045, 0.04), (0.025, 0.06), (0.04, 0.09), (0.0, 0.12)]
+                .map(|(r, y)| vec2(r, y)),
+            10,
+            50.0,
+        );
+        model.add(palette.porcelain, knob.at(x, height - 0.295, 0.11));
     }
     model
 }

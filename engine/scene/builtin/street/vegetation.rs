@@ -75,7 +75,7 @@ pub(super) fn grass_picture() -> Texture {
             let t = up / height;
             let x = foot + bend * t * t;
             if t < 1.0 && (uv.x - x).abs() < width * (1.0 - t) + 0.002 {
-                color = srgb(0xc2b068).lerp(srgb(0x6f7f36), *tone) * (0.55 + 0.5 * t);
+                color = srgb(0xc2b068).lerp(srgb(0x84913f), *tone) * (0.7 + 0.5 * t);
                 covered = true;
             }
         }
@@ -200,7 +200,7 @@ pub(super) fn bush(size: f32, cards: usize, random: &mut Random) -> Geometry {
 /// A ribbed cactus of `height` m with `arms`.
 pub(super) fn cactus(height: f32, arms: usize, random: &mut Random) -> Geometry {
     let column = |path: &[Vec3], radius: f32| {
-        let ribs = 11;
+        let ribs = 9;
         let ring: Vec<Vec2> = (0..ribs * 2)
             .map(|i| Vec2::from_angle(TAU * i as f32 / (2 * ribs) as f32) * radius * if i % 2 == 0 { 1.0 } else { 0.8 })
             .collect();
@@ -210,17 +210,18 @@ pub(super) fn cactus(height: f32, arms: usize, random: &mut Random) -> Geometry 
             (0.82 + 0.18 * (t * 3.0).min(1.0)) * (1.0 - ((t - 0.82) / 0.19).max(0.0).powi(2)).max(0.0).sqrt().max(0.06)
         })
     };
-    let trunk: Vec<Vec3> = (0..=16).map(|i| vec3(0.0, height * i as f32 / 16.0 - 0.1, 0.0)).collect();
+    let trunk: Vec<Vec3> = (0..=12).map(|i| vec3(0.0, height * i as f32 / 12.0 - 0.1, 0.0)).collect();
     let mut out = column(&trunk, height * 0.058);
     for k in 0..arms {
         let start = height * random.range(0.35, 0.6);
         let (reach, rise) = (height * random.range(0.13, 0.18), height * random.range(0.22, 0.38));
-        let path: Vec<Vec3> = (0..=14)
+        let path: Vec<Vec3> = (0..=11)
             .map(|i| {
-                let t = i as f32 / 14.0;
+                let t = i as f32 / 11.0;
                 let bend = (t * 2.2).min(1.0);
                 let x = reach * (bend * std::f32::consts::FRAC_PI_2).sin();
-                let y = reach * 0.55 * (1.0 - (bend * std::f32::consts::FRAC_PI_2).cos()) + rise * ((t - 0.4) / 0.6).max(0.0);
+                let y = reach * 0.55 * (1.0 - (bend * std::f32::consts::FRAC_PI_2).cos())
+                    + rise * ((t - 0.4) / 0.6).max(0.0);
                 vec3(x, start + y, 0.0)
             })
             .collect();
@@ -248,20 +249,26 @@ pub(super) fn rock(size: f32, seed: u32) -> Geometry {
         (cut.max(q.length() - 0.52) + 0.07 * (n(2.2, 1) - 1.0)) * size
     };
     let reach = Vec3::splat(size * 0.68);
-    surface_net(-reach, reach, size * 0.085, shape)
+    surface_net(-reach, reach, size * 0.115, shape)
 }
 
 /// A ball of dry stems that the wind rolls.
 pub(super) fn tumbleweed(size: f32, random: &mut Random) -> Geometry {
     let mut out = Geometry::default();
-    for _ in 0..46 {
-        let turn = Quat::from_euler(glam::EulerRot::XYZ, random.range(0.0, TAU), random.range(0.0, TAU), random.range(0.0, TAU));
+    for _ in 0..34 {
+        let turn = Quat::from_euler(
+            glam::EulerRot::XYZ,
+            random.range(0.0, TAU),
+            random.range(0.0, TAU),
+            random.range(0.0, TAU),
+        );
         let arc = random.range(1.2, 3.0);
         let radius = size * random.range(0.3, 0.5);
-        let path: Vec<Vec3> = (0..=6)
+        let path: Vec<Vec3> = (0..=5)
             .map(|i| {
-                let angle = arc * i as f32 / 6.0;
-                turn * vec3(radius * angle.cos(), radius * angle.sin(), radius * 0.3 * (angle * 2.0).sin()) + Vec3::Y * size * 0.45
+                let angle = arc * i as f32 / 5.0;
+                turn * vec3(radius * angle.cos(), radius * angle.sin(), radius * 0.3 * (angle * 2.0).sin())
+                    + Vec3::Y * size * 0.45
             })
             .collect();
         let stem = [vec2(0.005, 0.0), vec2(-0.0025, 0.0043), vec2(-0.0025, -0.0043)];
