@@ -1,4 +1,53 @@
 //! lucerna: real-time global illumination and HDR tone mapping from six papers, on any Vulkan device or none.
+//!
+//! A frame off-screen, with image-space radiosity, from a scene to an EXR file:
+//!
+//! ```
+//! # fn main() -> lucerna::Result<()> {
+//! #     match frame() {
+//! #         // A machine without any Vulkan driver shows nothing about the example.
+//! #         Err(e) if e.kind() == lucerna::ErrorKind::NoDevice && std::env::var_os("CI").is_none() => Ok(()),
+//! #         result => result,
+//! #     }
+//! # }
+//! # fn frame() -> lucerna::Result<()> {
+//! # let folder = tempfile::tempdir().unwrap();
+//! # let path = folder.path().join("cornell.exr");
+//! use lucerna::{gpu::Gpu, graph::{Graph, Runner}, image, scene::{self, Pose, View, resident::Resident}, techniques::isr};
+//!
+//! let scene = scene::builtin::load("cornell")?; // or scene::load("model.glb", &Default::default())?
+//! let gpu = Gpu::new(Default::default())?; // the best device there is; a CPU driver if there is no GPU
+//! let mut resident = Resident::new(&gpu, &scene)?; // the scene in device memory
+//! let mut graph = Graph::new("frame"); // the passes of one frame, in order
+//! let handles = resident.frame(&mut graph, &scene, 0.0);
+//! let view = View::of_camera(&scene, &Pose::rest(&scene), 0, [320, 240])?.fit_far(&handles.bounds());
+//! let picture = isr::picture(&mut graph, &handles, &view, (&scene).into(), &Default::default())?;
+//! let total = graph.read_image(picture.outputs.total);
+//! let pixels = Runner::new(&gpu).run(&graph)?.image(total).to_f32(); // linear radiance, top row first
+//! image::write(&path, &image::Layers::rgba(320, 240, pixels.concat()), &Default::default())?;
+//! # // The white wall, lit: neither black nor endless.
+//! # let wall = pixels[100 * 320 + 160];
+//! # assert!(wall[0] > 0.01 && wall[0].is_finite(), "{wall:?}");
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Where things are
+//! | module | what it does |
+//! |---|---|
+//! | [`scene`] | scenes in main memory, from glTF, OBJ or built in; cameras, poses; [`scene::resident`] puts one onto a device |
+//! | [`gpu`] | device choice, memory, pipelines, validation |
+//! | [`graph`] | the render graph: passes declared in order, barriers and memory derived |
+//! | [`shaders`] | one typed module for each shader, generated from its interface |
+//! | [`passes`] | G-buffer, shadow maps, filters and other passes that techniques share |
+//! | [`techniques`] | the papers' methods |
+//! | [`reference`](mod@reference) | slow CPU versions that tests hold the shaders against; a path tracer |
+//! | [`image`](mod@image) | linear images in and out |
+//!
+//! # Conventions
+//! Right-handed, +Y up, metres; cameras look down −Z. Linear Rec. 709. Radiance in W/(sr·m²), irradiance in W/m², intensity in
+//! W/sr. A Lambertian surface of albedo ρ reflects ρ/π · E. Matrices are named `to_from`: `clip_from_view`. Images have their top
+//! row first. Every random choice has a seed: the same call on the same device gives the same bits.
 #![deny(unsafe_code)]
 #![warn(missing_debug_implementations)]
 

@@ -3,7 +3,7 @@
 
 use crate::{
     graph::{Graph, Uniform},
-    scene::Environment,
+    scene::{Environment, Scene},
     shaders::types,
 };
 use glam::Vec3;
@@ -14,6 +14,13 @@ use std::f32::consts::PI;
 pub struct Irradiance {
     /// Coefficients for 1, y, z, x, xy, yz, 3z²−1, xz, x²−y²; cosine and basis constants folded in.
     pub coefficients: [Vec3; 9],
+}
+
+/// Of the scene's environment; none without one.
+impl From<&Scene> for Irradiance {
+    fn from(scene: &Scene) -> Self {
+        scene.environment.as_ref().map(Self::of).unwrap_or_default()
+    }
 }
 
 impl Irradiance {

@@ -1,7 +1,8 @@
 //! The camera of a frame: matrices, and the far-plane vectors that give a world position from linear depth without any.
 
 use crate::{
-    scene::{Camera, Projection, cull::Aabb},
+    Error, Result,
+    scene::{Camera, Pose, Projection, Scene, cull::Aabb},
     shaders,
 };
 use glam::{Mat4, Vec2, Vec3, Vec4};
@@ -56,6 +57,21 @@ impl View {
         };
         view.set_range(near, far);
         view
+    }
+
+    /// The view through the scene's camera number `camera`, where the first node that carries it stands in `pose`.
+    ///
+    /// # Errors
+    /// `Usage` if the scene has no such camera or no node carries it.
+    pub fn of_camera(scene: &Scene, pose: &Pose, camera: usize, extent: [u32; 2]) -> Result<Self> {
+        let there = scene.cameras.len();
+        let missing = || Error::usage(format!("there is no camera {camera}; the scene has {there}"));
+        let found = scene.cameras.get(camera).ok_or_else(missing)?;
+        let node = scene.nodes.iter().position(|node| node.camera == Some(camera as u32));
+        let world = node
+            .and_then(|node| pose.world.get(node))
+            .ok_or_else(|| Error::usage(format!("camera {camera} stands nowhere: no node carries it")))?;
+        Ok(Self::new(found, *world, extent))
     }
 
     /// Moves an infinite far plane to just behind `bounds`, so that linear depth has one scale for near and far scenes.
