@@ -78,12 +78,12 @@ fn without_a_fault_it_works() {
 fn errors_name_graph_and_pass() {
     if have_device() {
         for (rule, code, parts) in [
-            ("vkCreateComputePipelines@2=UNKNOWN", 1, ["frame.test.advance.", "vkCreateComputePipelines"]),
-            ("vkCreateGraphicsPipelines=OOM_DEVICE", 5, ["frame.test.tint.", "vkCreateGraphicsPipelines"]),
-            ("vkCreateShaderModule@2=OOM_HOST", 5, ["frame.test.advance.", "vkCreateShaderModule"]),
+            ("vkCreateComputePipelines@2=UNKNOWN", 1, ["frame.test.advance: ", "vkCreateComputePipelines"]),
+            ("vkCreateGraphicsPipelines=OOM_DEVICE", 5, ["frame.test.tint: ", "vkCreateGraphicsPipelines"]),
+            ("vkCreateShaderModule@2=OOM_HOST", 5, ["frame.test.advance: ", "vkCreateShaderModule"]),
             ("vkAllocateMemory@1+=OOM_DEVICE", 5, ["frame: no memory for `", "Use a smaller image"]),
-            ("vkQueueSubmit2@2=DEVICE_LOST", 6, ["frame", "vkQueueSubmit2 of passes `"]),
-            ("vkWaitForFences@2=DEVICE_LOST", 6, ["frame", "vkWaitForFences, "]),
+            ("vkQueueSubmit2@2=DEVICE_LOST", 6, ["frame: ", "vkQueueSubmit2 of `frame`, passes `"]),
+            ("vkWaitForFences@2=DEVICE_LOST", 6, ["frame: ", "vkWaitForFences for `frame`, "]),
         ] {
             Case::new("frames").layer(&[("VKFAULT", rule)]).run().fails_with(code, &parts);
         }
@@ -95,7 +95,7 @@ fn a_wait_that_never_ends_names_the_pass() {
     if have_device() {
         let case = Case::new("frames").layer(&[("VKFAULT", "vkWaitForFences@2+=TIMEOUT")]);
         let outcome = case.env("LUCERNA_WAIT_LIMIT", "0.3").run();
-        outcome.fails_with(6, &["frame", "the device did not finish within 0.", "pass `"]);
+        outcome.fails_with(6, &["frame: the device did not finish `frame` within 0.", "pass `"]);
     }
 }
 

@@ -153,9 +153,12 @@ fn a_drawn_image_is_the_same_image() {
 fn a_shader_of_the_wrong_sort_is_refused() {
     with_gpu(|gpu| {
         let error = gpu.compute_pipeline(&lucerna::shaders::test::show::SHADER, &[]).unwrap_err();
-        assert!(error.to_string().starts_with("test.show: is no compute shader"), "{error}");
+        assert!(error.to_string().starts_with("shader `test.show` is no compute shader"), "{error}");
         let error = gpu.compute_pipeline(gpu_common::successor(), &[1]).unwrap_err();
-        assert!(error.to_string().contains("1 specialisation constants were given, it has 0"), "{error}");
+        assert!(
+            error.to_string().contains("1 specialisation constants were given to shader `test.successor`, it has 0"),
+            "{error}"
+        );
     });
 }
 

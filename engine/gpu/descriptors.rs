@@ -43,14 +43,14 @@ impl DescriptorArena {
     /// A set of `layout` with undefined contents.
     ///
     /// # Errors
-    /// `OutOfMemory`, `DeviceLost`; `name` (the pass) is the place.
+    /// `OutOfMemory`, `DeviceLost`; the message has `name`, the pass.
     pub fn allocate(&mut self, name: &str, layout: vk::DescriptorSetLayout) -> Result<vk::DescriptorSet> {
         self.context.alive()?;
         let layouts = [layout];
         let mut fresh = false;
         loop {
             if self.current == self.pools.len() {
-                let pool = self.new_pool().map_err(|e| e.at(name))?;
+                let pool = self.new_pool(name)?;
                 self.pools.push(pool);
                 fresh = true;
             }
@@ -64,10 +64,7 @@ impl DescriptorArena {
                     self.current += 1;
                 }
                 Err(result) => {
-                    return self
-                        .context
-                        .check(Err(result), || "vkAllocateDescriptorSets".into())
-                        .map_err(|e| e.at(name));
+                    return self.context.check(Err(result), || format!("vkAllocateDescriptorSets for `{name}`"));
                 }
             }
         }
@@ -89,7 +86,7 @@ impl DescriptorArena {
         Ok(())
     }
 
-    fn new_pool(&self) -> Result<vk::DescriptorPool> {
+    fn new_pool(&self, name: &str) -> Result<vk::DescriptorPool> {
         let size = |ty, each: u32| vk::DescriptorPoolSize { ty, descriptor_count: SETS * each };
         let mut sizes = vec![
             size(vk::DescriptorType::COMBINED_IMAGE_SAMPLER, 16),
@@ -103,7 +100,7 @@ impl DescriptorArena {
         let info = vk::DescriptorPoolCreateInfo::default().max_sets(SETS).pool_sizes(&sizes);
         // SAFETY: complete info, living device.
         self.context.check(unsafe { self.context.device.create_descriptor_pool(&info, None) }, || {
-            "vkCreateDescriptorPool".into()
+            format!("vkCreateDescriptorPool for `{name}`")
         })
     }
 }

@@ -216,7 +216,7 @@ fn no_instance(result: vk::Result, log: &Log) -> Error {
         // The loader says this when no driver could be loaded, as with a broken manifest; hardly ever for want of memory.
         vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
             "no Vulkan driver could be loaded (vkCreateInstance: the loader reports \
-             out of host memory, which it also does when a driver's manifest file is missing or malformed)"
+             out of host memory, which it also does when the manifest file of a driver or layer is malformed)"
                 .to_owned()
         }
         vk::Result::ERROR_INITIALIZATION_FAILED => {

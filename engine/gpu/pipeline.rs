@@ -175,7 +175,7 @@ impl Gpu {
     /// The pipeline of a compute shader; `spec` has a value for each of [`Shader::spec`], in that order.
     ///
     /// # Errors
-    /// `OutOfMemory`, `DeviceLost`, `Runtime`, with the shader as place.
+    /// `OutOfMemory`, `DeviceLost`, `Runtime`; the message has the shader's name.
     pub fn compute_pipeline(&self, shader: &'static Shader, spec: &[u32]) -> Result<Pipeline> {
         self.pipeline(shader, spec, None)
     }
@@ -195,8 +195,8 @@ impl Gpu {
         if let Some(pipeline) = cache.pipelines.get(&key) {
             return Ok(*pipeline);
         }
-        let pipeline = context.alive().and_then(|()| make(context, &mut cache, shader, spec, state));
-        let pipeline = pipeline.map_err(|e| e.at(shader.name))?;
+        context.alive()?;
+        let pipeline = make(context, &mut cache, shader, spec, state)?;
         context.name(pipeline.raw, shader.name);
         cache.pipelines.insert(key, pipeline);
         Ok(pipeline)
@@ -213,7 +213,12 @@ fn make(
     if spec.len() != shader.spec.len() {
         return Err(Error::new(
             ErrorKind::Runtime,
-            format!("{} specialisation constants were given, it has {}", spec.len(), shader.spec.len()),
+            format!(
+                "{} specialisation constants were given to shader `{}`, it has {}",
+                spec.len(),
+                shader.name,
+                shader.spec.len()
+            ),
         ));
     }
     check_stages(context, shader, state)?;
@@ -265,7 +270,7 @@ fn make(
 
 /// The wrong sort of shader, or more than the device can, is an error and not a crash in the driver.
 fn check_stages(context: &Context, shader: &Shader, state: Option<&RasterState>) -> Result<()> {
-    let fail = |what: String| Err(Error::new(ErrorKind::Runtime, what));
+    let fail = |what: String| Err(Error::new(ErrorKind::Runtime, format!("shader `{}` {what}", shader.name)));
     let has = |stage| shader.stages.iter().any(|code| code.stage == stage);
     if state.is_none() != has(Stage::Compute) || (state.is_some() && !has(Stage::Vertex)) {
         return fail(format!("is no {} shader", if state.is_some() { "raster" } else { "compute" }));
@@ -395,14 +400,21 @@ impl<'a> Modules<'a> {
         let mut modules = Self { context, list: Vec::new() };
         for StageCode { stage, spirv } in shader.stages {
             if spirv.len() % 4 != 0 {
-                return Err(Error::new(ErrorKind::Runtime, format!("its SPIR-V has {} bytes", spirv.len())));
+                return Err(Error::new(
+                    ErrorKind::Runtime,
+                    format!("the SPIR-V of shader `{}` has {} bytes", shader.name, spirv.len()),
+                ));
             }
             // A byte slice need not be aligned for words.
             let words: Vec<u32> = spirv.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
             let info = vk::ShaderModuleCreateInfo::default().code(&words);
             // SAFETY: the code was made and checked by the compiler at build time.
             let made = unsafe { context.device.create_shader_module(&info, None) };
-            modules.list.push(context.check(made, || format!("vkCreateShaderModule of the {stage:?} stage"))?);
+            modules.list.push(
+                context.check(made, || {
+                    format!("vkCreateShaderModule for the {stage:?} stage of shader `{}`", shader.name)
+                })?,
+            );
         }
         Ok(modules)
     }

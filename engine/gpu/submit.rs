@@ -138,7 +138,7 @@ impl Gpu {
         let used = lock(&context.shells).pop();
         let shell = match used {
             Some(shell) => shell,
-            None => Shell::new(context).map_err(|e| e.at(name))?,
+            None => Shell::new(context)?,
         };
         shell.clear_marks();
         let commands = Commands {
@@ -152,7 +152,7 @@ impl Gpu {
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the buffer is new or its pool was reset.
         let begun = unsafe { context.device.begin_command_buffer(commands.raw, &begin) };
-        context.check(begun, || "vkBeginCommandBuffer".into()).map_err(|e| e.at(name))?;
+        context.check(begun, || format!("vkBeginCommandBuffer for `{name}`"))?;
         Ok(commands)
     }
 }
@@ -243,7 +243,7 @@ impl Commands {
     /// Hands the commands to the device.
     ///
     /// # Errors
-    /// `DeviceLost`, `OutOfMemory`; the place names the commands.
+    /// `DeviceLost`, `OutOfMemory`; the message names commands and passes.
     pub fn submit(mut self) -> Result<Submission> {
         let context = Arc::clone(&self.context);
         context.alive()?;
@@ -251,21 +251,23 @@ impl Commands {
         let fence = shell.fence;
         // SAFETY: in recording.
         let ended = unsafe { context.device.end_command_buffer(self.raw) };
-        context.check(ended, || "vkEndCommandBuffer".into()).map_err(|e| e.at(&self.name))?;
+        context.check(ended, || format!("vkEndCommandBuffer for `{}`", self.name))?;
         let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(self.raw)];
         let submits = [vk::SubmitInfo2::default().command_buffer_infos(&buffers)];
         let queue = lock(&context.queue);
         // SAFETY: the queue is locked; the fence is unsignalled and not in use.
         let submitted = unsafe { context.device.queue_submit2(*queue, &submits, fence) };
         drop(queue);
-        let passes = &self.passes;
-        context
-            .check(submitted, || match (passes.first(), passes.last()) {
-                (Some(first), Some(last)) if first != last => format!("vkQueueSubmit2 of passes `{first}` to `{last}`"),
-                (Some(only), _) => format!("vkQueueSubmit2 of pass `{only}`"),
-                (None, _) => "vkQueueSubmit2".into(),
-            })
-            .map_err(|e| e.at(&self.name))?;
+        context.check(submitted, || {
+            let Self { name, passes, .. } = &self;
+            match (passes.first(), passes.last()) {
+                (Some(first), Some(last)) if first != last => {
+                    format!("vkQueueSubmit2 of `{name}`, passes `{first}` to `{last}`")
+                }
+                (Some(only), _) => format!("vkQueueSubmit2 of `{name}`, pass `{only}`"),
+                (None, _) => format!("vkQueueSubmit2 of `{name}`"),
+            }
+        })?;
         Ok(Submission {
             context,
             shell: self.shell.take(),
@@ -364,12 +366,13 @@ impl Submission {
             if waited >= context.hard_limit {
                 context.abandon();
                 let report = format!(
-                    "the device did not finish within {:.1} s{} on {}",
+                    "the device did not finish `{}` within {:.1} s{} on {}",
+                    self.name,
                     waited.as_secs_f64(),
                     self.where_it_was(shell),
                     context.description
                 );
-                return Err(context.lost.set(report).at(&self.name));
+                return Err(context.lost.set(report));
             }
             if waited >= warn_at {
                 eprintln!(
@@ -391,9 +394,8 @@ impl Submission {
             self.threads_may_go_on();
         }
         let place = self.where_it_was(shell);
-        let checked: Result<()> = self.context.check(Err(result), || format!("{call}{place}"));
-        match checked {
-            Err(error) => error.at(&self.name),
+        match self.context.check::<()>(Err(result), || format!("{call} for `{}`{place}", self.name)) {
+            Err(error) => error,
             Ok(()) => Error::usage("success is no failure"),
         }
     }
