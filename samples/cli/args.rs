@@ -70,7 +70,7 @@ pub struct RenderArgs {
     #[arg(long, default_value_t = 30.0, value_parser = positive, help_heading = "Picture")]
     pub fps: f64,
 
-    /// Exposure: colours of .png files are multiplied by 2^EV [default: 0, or what suits the built-in scene]
+    /// Exposure: colours of .png files are multiplied by 2^EV [default: 0, or what suits the scene]
     #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
     pub exposure: Option<f64>,
 

@@ -5,6 +5,7 @@ pub mod camera;
 pub mod config;
 pub mod console;
 pub mod devices;
+pub mod exposure;
 pub mod fingerprint;
 pub mod framing;
 pub mod gbuffer_layers;

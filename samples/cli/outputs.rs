@@ -44,6 +44,11 @@ impl Outputs {
         Ok(Self { targets, options })
     }
 
+    /// PNG files show the radiance times 2^`ev` from now on.
+    pub fn expose(&mut self, ev: f64) {
+        self.options.exposure_ev = ev as f32;
+    }
+
     /// True if some file holds more than the picture.
     pub fn wants_layers(&self) -> bool {
         self.targets.iter().any(|(pattern, format)| *format == Format::Exr || pattern.has_layer())

@@ -105,6 +105,7 @@ pub fn render<S: Serialize + DeserializeOwned, R>(
             break;
         }
         let mut layers = reading.layers(&result);
+        run.expose(&layers);
         layers.metadata = run.metadata(&gpu, &seen, frame)?;
         let milliseconds = begun.elapsed().as_secs_f64() * 1e3;
         let files = run.write(&layers, frame)?;

@@ -16,6 +16,7 @@ use crate::{
     args::{Frames, RenderArgs},
     config,
     console::{self, Console},
+    exposure,
     outputs::Outputs,
     pattern::Values,
     program,
@@ -32,6 +33,8 @@ pub struct Run<'a> {
     console: Console,
     /// As in file names: `isr`, or `isr-direct` in another mode.
     label: String,
+    /// The exposure follows from the first frame.
+    fit_exposure: bool,
     pub stage: Stage,
     pub outputs: Outputs,
     pub frames: Range<u32>,
@@ -71,8 +74,9 @@ impl<'a> Run<'a> {
             Source::Builtin(name) => builtin::exposure(name).map(f64::from),
             Source::File(_) => None,
         };
-        let exposure = args.exposure.or(suits.filter(|_| technique.radiance && args.view.is_none())).unwrap_or(0.0);
-        options.exposure_ev = exposure as f32;
+        let radiance = technique.radiance && args.view.is_none();
+        let exposure = args.exposure.or(suits.filter(|_| radiance));
+        options.exposure_ev = exposure.unwrap_or(0.0) as f32;
         let outputs = Outputs::new(&args.output, frames.len(), options)?;
         if outputs.uses_stdout() && args.json {
             return Err(Error::usage("--json and an image both want standard output").help("Give the image a name"));
@@ -92,7 +96,7 @@ impl<'a> Run<'a> {
             frame: frames.start,
             time: args.time,
             fps: args.fps,
-            exposure,
+            exposure: exposure.unwrap_or(0.0),
             environment: args.environment.as_ref().map(|path| path.to_string_lossy().into_owned()),
             default_light: args.default_light,
             seed: args.seed,
@@ -105,6 +109,7 @@ impl<'a> Run<'a> {
             args,
             console,
             label,
+            fit_exposure: exposure.is_none() && radiance,
             stage,
             outputs,
             frames,
@@ -191,6 +196,20 @@ impl<'a> Run<'a> {
             world_to_ndc: Some(view.clip_from_world.to_cols_array()),
             ..Metadata::default()
         })
+    }
+
+    /// Chooses the exposure by the first frame, if nobody did.
+    pub fn expose(&mut self, picture: &Layers) {
+        if !std::mem::take(&mut self.fit_exposure) {
+            return;
+        }
+        let ev = exposure::fitting(picture);
+        if ev != 0.0 {
+            self.console
+                .info(&format!("note: exposure {ev:+} EV was chosen for .png files, to see something (--exposure)"));
+        }
+        self.record.exposure = ev;
+        self.outputs.expose(ev);
     }
 
     /// Writes the files of a frame and returns their names.

@@ -1,0 +1,44 @@
+//! An exposure for scenes whose light is far from what a screen shows.
+//!
+//! glTF lights are in candela and lux: a scene lit by a bright sun has radiances of thousands.
+
+use lucerna::image::Layers;
+
+/// Medians of luminance that are shown as they are, W/(sr·m²).
+const FINE: std::ops::RangeInclusive<f32> = 0.01..=1.0;
+/// The median after exposure, where it had to be changed.
+const TARGET: f32 = 0.2;
+
+/// Whole stops by which the picture must be scaled to be seen: 0 if it can be seen as it is.
+///
+/// From the median luminance of what is not black. Whole stops, so that rounding on another device does not show.
+pub fn fitting(picture: &Layers) -> f64 {
+    let Some(pixels) = picture.main().and_then(|layer| layer.rgb_pixels()) else { return 0.0 };
+    let luminance = pixels.iter().map(|[r, g, b]| 0.2126 * r + 0.7152 * g + 0.0722 * b);
+    let mut lit: Vec<f32> = luminance.filter(|l| l.is_finite() && *l > 0.0).collect();
+    if lit.is_empty() {
+        return 0.0;
+    }
+    let middle = lit.len() / 2;
+    let median = *lit.select_nth_unstable_by(middle, f32::total_cmp).1;
+    if FINE.contains(&median) { 0.0 } else { f64::from((TARGET / median).log2().round().clamp(-64.0, 64.0)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(luminance: f32) -> f64 {
+        let black = [0.0; 3 * 3];
+        let lit = [luminance; 3 * 4];
+        fitting(&Layers::rgb(7, 1, [&black[..], &lit[..]].concat()))
+    }
+
+    #[test]
+    fn only_what_cannot_be_seen_is_changed() {
+        assert_eq!((of(0.02), of(0.5), of(1.0), of(0.0)), (0.0, 0.0, 0.0, 0.0));
+        assert_eq!((of(0.2 * 1024.0), of(0.2 / 1024.0)), (-10.0, 10.0));
+        assert_eq!(of(0.2 * 1100.0), of(0.2 * 1000.0));
+        assert_eq!(fitting(&Layers::rgb(1, 1, vec![f32::NAN; 3])), 0.0);
+    }
+}
