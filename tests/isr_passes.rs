@@ -12,7 +12,7 @@ use lucerna::{
         bilateral, blur,
         compose::{self, Compose},
         direct::{self, Direct},
-        downsample,
+        downsample::{self, Coarse},
     },
     reference::{
         isr::{self as cpu, Estimator, Gather, Pattern},
@@ -389,10 +389,19 @@ fn composing_is_equations_27_to_29() {
             let coarse_extent = Extent::new(cw as u32, ch as u32);
             let depth: Vec<_> = coarse_depth.iter().map(|z| [*z; 4]).collect();
             let depth = image(&mut graph, "coarse depth", coarse_extent, &depth);
+            let normal = image(&mut graph, "coarse normal", coarse_extent, &vec![[0.0, 0.0, 1.0, 0.0]; cw * ch]);
             let coarse = image(&mut graph, "gathered", coarse_extent, &gathered);
             let direct_image = image(&mut graph, "direct", Extent::new(16, 8), &direct);
             let choices = Compose { factor: 2, plane, epsilon: 1e-3, tint, occlude_ambient, k_ssao: 0.6, k_isr: 0.7 };
-            let sum = compose::sum(&mut graph, &g, ambient, direct_image, coarse, depth, &choices);
+            let sum = compose::sum(
+                &mut graph,
+                &g,
+                ambient,
+                direct_image,
+                coarse,
+                &Coarse { albedo: depth, normal, depth },
+                &choices,
+            );
             let [total, indirect, open] = read(gpu, graph, [sum.total, sum.indirect, sum.accessibility]);
             for y in 0..height {
                 for x in 0..width {
@@ -456,6 +465,7 @@ fn upsampling_falls_back_to_the_nearest_in_depth() {
         // No coarse texel is near 0.2; 0.5 is the nearest.
         let extent = Extent::new(2, 2);
         let depth = image(&mut graph, "depth", extent, &[[0.7; 4], [0.5; 4], [0.9; 4], [1.0; 4]]);
+        let normal = image(&mut graph, "normal", extent, &[[0.0, 0.0, 1.0, 0.0]; 4]);
         let values = [[1.0, 0.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0], [3.0, 0.0, 0.0, 0.0], [4.0, 0.0, 0.0, 0.0]];
         let coarse = image(&mut graph, "gathered", extent, &values);
         let direct = image(&mut graph, "direct", Extent::new(4, 4), &[[0.0; 4]; 16]);
@@ -468,7 +478,8 @@ fn upsampling_falls_back_to_the_nearest_in_depth() {
             k_ssao: 0.5,
             k_isr: 1.0,
         };
-        let sum = compose::sum(&mut graph, &g, ambient, direct, coarse, depth, &choices);
+        let sum =
+            compose::sum(&mut graph, &g, ambient, direct, coarse, &Coarse { albedo: depth, normal, depth }, &choices);
         let [total] = read(gpu, graph, [sum.total]);
         // The four middle pixels lie between all four coarse texels.
         for i in [5, 6, 9, 10] {

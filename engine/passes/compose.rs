@@ -1,6 +1,6 @@
 //! Coarse light brought to full resolution and added to direct light.
 
-use super::gbuffer::GBuffer;
+use super::{downsample::Coarse, gbuffer::GBuffer};
 use crate::{
     graph::{Format, Graph, Image, Uniform},
     shaders::{passes::compose, types},
@@ -11,7 +11,8 @@ use crate::{
 pub struct Compose {
     /// Pixels along the side of a coarse texel: 1 or 2.
     pub factor: u32,
-    /// Weight by distance from the pixel's plane, relative to its depth, instead of difference of depth / far.
+    /// Weight by likeness of normals and distance from the pixel's plane, relative to its depth, instead of difference of
+    /// depth / far.
     pub plane: bool,
     /// ε of the dissertation's equation 27.
     pub epsilon: f32,
@@ -34,7 +35,7 @@ pub struct Composed {
     pub accessibility: Image,
 }
 
-/// Equations 27 to 29. `gathered`: rgb radiance, a accumulated occlusion, at the resolution of `coarse_depth`.
+/// Equations 27 to 29. `gathered`: rgb radiance, a accumulated occlusion, at the resolution of `coarse`.
 #[allow(clippy::too_many_arguments)]
 pub fn sum(
     graph: &mut Graph,
@@ -42,7 +43,7 @@ pub fn sum(
     ambient: Uniform<types::Ambient>,
     direct: Image,
     gathered: Image,
-    coarse_depth: Image,
+    coarse: &Coarse,
     choices: &Compose,
 ) -> Composed {
     let extent = graph.extent(g.depth);
@@ -60,7 +61,8 @@ pub fn sum(
         emission: g.emission,
         direct,
         gathered,
-        coarse_depth,
+        coarse_depth: coarse.depth,
+        coarse_normal: coarse.normal,
         total: result.total,
         indirect: result.indirect,
         accessibility: result.accessibility,

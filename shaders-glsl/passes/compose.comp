@@ -11,7 +11,8 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(constant_id = 0) const uint FACTOR = 2;
-// 0: |z_p - z_i| of linear z / far (dissertation). 1: distance from the pixel's plane relative to its depth.
+// 0: |z_p - z_i| of linear z / far (dissertation). 1: distance from the pixel's plane relative to its depth, and likeness of
+// the normals.
 layout(constant_id = 1) const uint PLANE = 1;
 // 0: the gathered radiance is added as it is (dissertation). 1: times the albedo of the pixel.
 layout(constant_id = 2) const uint TINT = 1;
@@ -27,9 +28,10 @@ layout(binding = 5) uniform sampler2D emission;      // a: accessibility by the 
 layout(binding = 6) uniform sampler2D direct;        // with emission
 layout(binding = 7) uniform sampler2D gathered;      // coarse: rgb radiance, a occlusion
 layout(binding = 8) uniform sampler2D coarse_depth;
-layout(binding = 9, rgba16f) uniform writeonly image2D total;
-layout(binding = 10, rgba16f) uniform writeonly image2D indirect;
-layout(binding = 11, r32f) uniform writeonly image2D accessibility;
+layout(binding = 9) uniform sampler2D coarse_normal;
+layout(binding = 10, rgba16f) uniform writeonly image2D total;
+layout(binding = 11, rgba16f) uniform writeonly image2D indirect;
+layout(binding = 12, r32f) uniform writeonly image2D accessibility;
 
 layout(push_constant, scalar) uniform Push {
     float k_ssao;
@@ -64,6 +66,11 @@ vec4 upsample(ivec2 pixel, float z, vec3 n, vec3 p) {
             off = bilateral_plane_distance(p, n, x, z * view.far);
         }
         float w = bilinear / (epsilon + off);
+        if (PLANE != 0) {
+            vec3 m = texelFetch(coarse_normal, coarse, 0).xyz;
+            float like = max(dot(n, m) * inversesqrt(max(dot(m, m), 1e-12)), 0.0);
+            w *= like * like * like * like;
+        }
         sum += w * value;
         weights += w;
         if (off < nearest_off) {

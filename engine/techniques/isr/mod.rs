@@ -134,7 +134,7 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
         blurred = filter(graph, gathered);
     }
 
-    let ambient = inputs.ambient.upload(graph);
+    let ambient = if settings.environment { inputs.ambient } else { Irradiance::default() }.upload(graph);
     let choices = Compose {
         factor,
         plane: settings.upsample == Upsample::Plane,
@@ -144,7 +144,7 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
         k_ssao: settings.k_ssao,
         k_isr: settings.k_isr,
     };
-    let composed = compose::sum(graph, &g, ambient, lit.direct, blurred, coarse.depth, &choices);
+    let composed = compose::sum(graph, &g, ambient, lit.direct, blurred, &coarse, &choices);
     Ok(Outputs {
         total: composed.total,
         direct: lit.direct,

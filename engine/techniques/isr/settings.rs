@@ -96,7 +96,7 @@ pub enum Blur {
 pub enum Upsample {
     /// Difference of linear depth / far (equation 27).
     Depth,
-    /// Distance from the pixel's plane, relative to its depth: steep surfaces are one surface.
+    /// Normal, and distance from the pixel's plane relative to its depth: steep surfaces are one surface, creases part them.
     Plane,
 }
 
@@ -184,6 +184,8 @@ pub struct Settings {
     pub light_radius: f32,
     /// Paper law: l_pow of the brightest light.
     pub light_power: f32,
+    /// Light of the environment on matt surfaces, times accessibility. The dissertation has none.
+    pub environment: bool,
     /// GGX highlights of direct light.
     pub specular: bool,
 }
@@ -206,8 +208,8 @@ impl Default for Settings {
             downsample: Downsample::DepthAware,
             indirect: true,
             occlusion: true,
-            occlusion_reach: 32.0,
-            occluder_radius: 0.5,
+            occlusion_reach: 64.0,
+            occluder_radius: 1.5,
             occlusion_bias: 0.05,
             blur: Blur::Bilateral,
             blur_radius: 8,
@@ -221,6 +223,7 @@ impl Default for Settings {
             light_law: LightLaw::Physical,
             light_radius: 0.0,
             light_power: 1.0,
+            environment: true,
             specular: true,
         }
     }
@@ -228,7 +231,7 @@ impl Default for Settings {
 
 impl Settings {
     /// The dissertation's choices. It states neither the reach of its grid, nor dA, nor the radius of its occluders; taken
-    /// here are 32 of its 1024 pixels, the cells of the grid, and spheres as wide as two cells.
+    /// here are 32 of its 1024 pixels, the cells of the grid, and spheres as wide as three cells.
     pub fn paper() -> Self {
         Self {
             sender: Sender::Albedo,
@@ -240,8 +243,8 @@ impl Settings {
             visibility_steps: 0,
             blur_radius: 4,
             downsample: Downsample::Mean,
-            occlusion_reach: 24.0,
-            occluder_radius: 1.0,
+            occlusion_reach: 32.0,
+            occluder_radius: 1.5,
             occlusion_bias: 0.0,
             blur: Blur::Gaussian,
             upsample: Upsample::Depth,
@@ -250,6 +253,7 @@ impl Settings {
             k_ssao: 0.5,
             occlude: Occlude::Direct,
             light_law: LightLaw::Paper,
+            environment: false,
             specular: false,
             ..Self::default()
         }
