@@ -4,6 +4,7 @@
 //! known. Colour profiles, gamma chunks and EXIF orientation are ignored, as glTF 2.0 asks (section 3.9.4).
 
 mod basis;
+mod bc7;
 mod blocks;
 mod ktx;
 

@@ -45,12 +45,12 @@ pub(super) fn decode_etc1s(width: u32, height: u32, global: &[u8], level: &[u8])
     }
     let payloads = &global[start..start + endpoint_bytes + selector_bytes + table_bytes];
     let codebooks = Codebooks { endpoints, selectors, endpoint_bytes, selector_bytes, table_bytes, payloads };
-    transcode(width, height, Some(&codebooks), &slices)
+    texels(width, height, Some(&codebooks), &slices)
 }
 
 /// `level`: 16 bytes a block of 4×4 texels.
 pub(super) fn decode_uastc(width: u32, height: u32, level: &[u8]) -> Result<Vec<[u8; 4]>> {
-    transcode(width, height, None, &[level])
+    texels(width, height, None, &[level])
 }
 
 struct Codebooks<'a> {
@@ -62,17 +62,29 @@ struct Codebooks<'a> {
     payloads: &'a [u8],
 }
 
-fn transcode(width: u32, height: u32, codebooks: Option<&Codebooks<'_>>, slices: &[&[u8]]) -> Result<Vec<[u8; 4]>> {
+fn texels(width: u32, height: u32, codebooks: Option<&Codebooks<'_>>, slices: &[&[u8]]) -> Result<Vec<[u8; 4]>> {
+    let bytes = transcode(width, height, codebooks, slices, TranscoderTextureFormat::RGBA32)?;
+    let count = width as usize * height as usize;
+    bytes.as_chunks::<4>().0.get(..count).map(<[_]>::to_vec).ok_or_else(damaged)
+}
+
+fn damaged() -> Error {
+    Error::input("Basis texels are damaged").at("level 0")
+}
+
+fn transcode(
+    width: u32,
+    height: u32,
+    codebooks: Option<&Codebooks<'_>>,
+    slices: &[&[u8]],
+    format: TranscoderTextureFormat,
+) -> Result<Vec<u8>> {
     let too_large = || Error::input(format!("Basis image of {width}×{height} texels is too large"));
     let file = basis_file(width, height, codebooks, slices).ok_or_else(too_large)?;
-    let damaged = || Error::input("Basis texels are damaged").at("level 0");
     let mut transcoder = Transcoder::new();
     transcoder.prepare_transcoding(&file).map_err(|()| damaged())?;
     let parameters = TranscodeParameters { decode_flags: Some(DecodeFlags::HIGH_QUALITY), ..Default::default() };
-    let bytes =
-        transcoder.transcode_image_level(&file, TranscoderTextureFormat::RGBA32, parameters).map_err(|_| damaged())?;
-    let count = width as usize * height as usize;
-    bytes.as_chunks::<4>().0.get(..count).map(<[_]>::to_vec).ok_or_else(damaged)
+    transcoder.transcode_image_level(&file, format, parameters).map_err(|_| damaged())
 }
 
 /// A `.basis` file of one image. `None`: something does not fit into its header fields.
@@ -151,4 +163,42 @@ fn take_u32(rest: &mut &[u8]) -> Option<u32> {
     let (value, tail) = rest.split_first_chunk()?;
     *rest = tail;
     Some(u32::from_le_bytes(*value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::texture::bc7;
+
+    /// UASTC becomes BC7 with little loss: what the transcoder packs, our BC7 decoder must unpack to nearly the texels
+    /// that the transcoder gives for the same block.
+    #[test]
+    fn bc7_of_the_transcoder_is_what_our_decoder_reads() {
+        let mut state = 1u64;
+        let mut random = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 56) as u8
+        };
+        let mut errors = Vec::new();
+        let mut modes = [0; 8];
+        for _ in 0..4000 {
+            let block: [u8; 16] = std::array::from_fn(|_| random());
+            let (Ok(texels), Ok(packed)) =
+                (decode_uastc(4, 4, &block), transcode(4, 4, None, &[&block], TranscoderTextureFormat::BC7_RGBA))
+            else {
+                continue;
+            };
+            let packed: [u8; 16] = packed.try_into().unwrap();
+            modes[packed[0].trailing_zeros() as usize] += 1;
+            let ours = bc7::decode(packed);
+            let difference = |a: &[u8; 4], b: &[u8; 4]| (0..4).map(|c| u32::from(a[c].abs_diff(b[c]))).sum::<u32>();
+            errors.push(texels.iter().zip(&ours).map(|(a, b)| difference(a, b)).sum::<u32>() as f32 / 64.0);
+        }
+        errors.sort_by(f32::total_cmp);
+        assert!(errors.len() > 1000, "{}", errors.len());
+        // Five modes and more are met; a wrong table or bit would be off by dozens.
+        assert!(modes.iter().filter(|&&count| count > 20).count() >= 5, "{modes:?}");
+        let (median, most) = (errors[errors.len() / 2], errors[errors.len() * 99 / 100]);
+        assert!(median < 1.5 && most < 12.0, "median {median}, 99 % {most}");
+    }
 }

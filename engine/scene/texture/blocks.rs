@@ -1,4 +1,4 @@
-//! Block-compressed texels: BC1, BC3, BC4, BC5 (Khronos Data Format Specification 1.3, sections 18 and 19).
+//! Block-compressed texels: BC1, BC3, BC4, BC5, BC7 (Khronos Data Format Specification 1.3, sections 18 and 19).
 
 /// Sixteen RGBA texels, row by row.
 pub(super) type Block = [[u8; 4]; 16];
@@ -9,19 +9,23 @@ pub(super) enum Codec {
     Bc3,
     Bc4,
     Bc5,
+    Bc7,
 }
 
 impl Codec {
     pub(super) fn block_bytes(self) -> usize {
         match self {
             Self::Bc1 { .. } | Self::Bc4 => 8,
-            Self::Bc3 | Self::Bc5 => 16,
+            Self::Bc3 | Self::Bc5 | Self::Bc7 => 16,
         }
     }
 
     /// Texels of a block of [`Codec::block_bytes`] bytes; black of any other length.
     pub(super) fn decode(self, bytes: &[u8]) -> Block {
         let mut block = [[0, 0, 0, 255]; 16];
+        if let (Self::Bc7, Some(bytes)) = (self, bytes.first_chunk()) {
+            return super::bc7::decode(*bytes);
+        }
         match (self, bytes.as_chunks::<8>().0) {
             (Self::Bc1 { alpha }, [colour]) => block = bc1(*colour, true, alpha),
             (Self::Bc3, [alpha, colour]) => {

@@ -168,9 +168,10 @@ impl Layout {
             Format::BC3_UNORM_BLOCK | Format::BC3_SRGB_BLOCK => Self::Blocks(Codec::Bc3),
             Format::BC4_UNORM_BLOCK => Self::Blocks(Codec::Bc4),
             Format::BC5_UNORM_BLOCK => Self::Blocks(Codec::Bc5),
+            Format::BC7_UNORM_BLOCK | Format::BC7_SRGB_BLOCK => Self::Blocks(Codec::Bc7),
             format => {
                 return Err(Error::input(format!("KTX2 with the Vulkan format {format:?}"))
-                    .help("Read are 8, 16 and 32-bit plain formats, BC1, BC3, BC4, BC5, and Basis Universal"));
+                    .help("Read are 8, 16 and 32-bit plain formats, BC1, BC3, BC4, BC5, BC7, and Basis Universal"));
             }
         })
     }

@@ -22,12 +22,13 @@ fn read(name: &str) -> Option<Texture> {
 /// The pictures show the name of their format in white on a plain ground; the last row is ground only.
 #[test]
 fn every_encoding_shows_its_name_on_its_ground() {
-    let grounds: [(&str, [u8; 3], u8); 7] = [
+    let grounds: [(&str, [u8; 3], u8); 8] = [
         ("2d_rgba8", [77, 175, 74], 0),
         ("2d_rgb8", [77, 175, 74], 0),
         ("2d_uastc", [186, 151, 0], 1),
         ("2d_etc1s", [186, 151, 0], 6),
         ("2d_bc1", [255, 128, 0], 3),
+        ("2d_bc7", [255, 127, 0], 0),
         ("2d_rgba16_linear", [20, 110, 18], 1),
         ("2d_rgba32_linear", [20, 110, 18], 1),
     ];
@@ -112,7 +113,7 @@ fn device_bytes_are_a_third_more_with_mips() {
 /// Damaged files of every kind give an error or an image of the stated size, never a panic of the caller or an abort.
 #[test]
 fn damaged_files_do_not_end_the_process() {
-    let names = ["2d_rgba8", "2d_uastc", "2d_etc1s", "2d_bc1"].map(|name| format!("gltf/ktx2/{name}.ktx2"));
+    let names = ["2d_rgba8", "2d_uastc", "2d_etc1s", "2d_bc1", "2d_bc7"].map(|name| format!("gltf/ktx2/{name}.ktx2"));
     let limits = Limits { max_image_pixels: 1 << 16, max_alloc: 1 << 22, ..Limits::default() };
     let mut state = 1u64;
     let mut random = move |below: usize| {
