@@ -120,6 +120,15 @@ fn hdr_header(height: &str, width: &str) -> Vec<u8> {
     format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n").into_bytes()
 }
 
+/// A PNG file that is nothing but a header of that size.
+fn png_header(width: u32, height: u32) -> Vec<u8> {
+    let chunk = [&b"IHDR"[..], &width.to_be_bytes(), &height.to_be_bytes(), &[8, 0, 0, 0, 0]].concat();
+    let sum = !chunk.iter().fold(!0u32, |sum, &byte| {
+        (0..8).fold(sum ^ u32::from(byte), |c, _| if c & 1 == 1 { (c >> 1) ^ 0xedb8_8320 } else { c >> 1 })
+    });
+    [b"\x89PNG\r\n\x1a\n", &13u32.to_be_bytes()[..], &chunk, &sum.to_be_bytes(), &[0, 0, 0, 9], b"IDAT"].concat()
+}
+
 /// Headers that ask for what is not there: little memory, little time, an error that says so.
 #[test]
 fn promises_without_pixels_cost_nothing() {
@@ -137,6 +146,7 @@ fn promises_without_pixels_cost_nothing() {
         ("hdr 2^33", hdr_header("8589934592", "1"), "is no size"),
         ("hdr 64 MiB line", long_line, "header"),
         ("hdr short", hdr_header("8", "8"), "line 0 of 8"),
+        ("png 60000²", png_header(60_000, 60_000), "60000×60000 pixels"),
         ("pfm 60000²", b"PF\n60000 60000\n-1\n".to_vec(), "60000×60000 pixels"),
         ("pfm short", b"PF\n100 100\n-1\n".to_vec(), "0 bytes of pixels where 100×100 need 120000"),
         ("pfm scale", b"PF\n1 1\n0\n\0\0\0\0\0\0\0\0\0\0\0\0".to_vec(), "scale"),

@@ -27,13 +27,13 @@ pub fn load(path: &Path, limits: &Limits) -> Result<(Environment, Vec<Note>)> {
             .and_then(|cube| finish_cube(&cube, name, limits))
             .map_err(|e| e.in_file(path));
     }
-    let picture = image::read(path, limits)?;
+    let picture = image::read(path, &half(limits))?;
     from_picture(&picture, name, limits).map_err(|error| error.in_file(path))
 }
 
 /// As [`load`], for a file in memory.
 pub fn decode(bytes: &[u8], name: impl Into<String>, limits: &Limits) -> Result<(Environment, Vec<Note>)> {
-    from_picture(&image::decode(bytes, limits)?, name, limits)
+    from_picture(&image::decode(bytes, &half(limits))?, name, limits)
 }
 
 /// As [`load`], for a picture that is read already.
@@ -97,6 +97,11 @@ pub fn from_picture(picture: &Layers, name: impl Into<String>, limits: &Limits) 
             "Latitude-longitude images are 2 : 1, cubes 6 : 1 or 1 : 6 (strips), 4 : 3 or 3 : 4 (crosses) or six files in a folder",
         ))
     }
+}
+
+/// The picture and the environment that is made of it stand side by side.
+fn half(limits: &Limits) -> Limits {
+    Limits { max_alloc: limits.max_alloc / 2, ..limits.clone() }
 }
 
 fn pixels(picture: &Layers) -> Result<Vec<Vec3>> {
