@@ -44,6 +44,34 @@ fn work(gpu: &Gpu) -> Result<()> {
     assert!(words.chunks(4).all(|word| word == [3, 0, 0, 0]), "{words:?}");
     let rgba: Vec<u8> = (0..9 * 4 * 4).map(|i| i as u8).collect();
     assert_eq!(gpu_common::show(gpu, 9, 4, &rgba)?, rgba);
+    frames(gpu)
+}
+
+/// Two frames of a graph: upload, uniform block, history, compute, raster with depth, levels, readback.
+fn frames(gpu: &Gpu) -> Result<()> {
+    use lucerna::{
+        graph::*,
+        shaders::{test::*, types::Bias},
+    };
+    let extent = Extent::new(8, 4);
+    let mut runner = Runner::new(gpu);
+    for frame in 1..3 {
+        let mut graph = Graph::new("faulty frame");
+        let (given, out) = (graph.buffer_from("given", &[frame; 64]), graph.buffer("out", 256));
+        let bias = graph.uniform(&Bias { count: 64, bias: 1 });
+        graph.compute(twice::Args { values: given, values_out: out, bias, spec: twice::Spec::default() }, 64);
+        let (previous, next) = graph.history("history", Format::RGBA32F, extent);
+        graph.compute(advance::Args { previous, next }, extent);
+        let drawn = graph.image_with("drawn", ImageDesc::new(Format::RGBA32F, extent).mips(2));
+        let depth = graph.image("depth", Format::D32F, extent);
+        let targets = Targets::new().color(drawn.mip(0), Load::Discard).depth(depth, Depth::Clear(0.0));
+        graph.raster(targets, Raster::new(), show::Args { image: next }, Draw::fullscreen_at(0.5));
+        graph.mips(drawn);
+        let (out, drawn) = (graph.read_buffer(out), graph.read_image(drawn.mip(1)));
+        let result = runner.run(graph)?;
+        assert_eq!(result.buffer::<u32>(out), [2 * frame + 1; 64]);
+        assert!(result.image(drawn).to_f32().iter().all(|p| p[0] == frame as f32));
+    }
     Ok(())
 }
 

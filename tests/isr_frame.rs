@@ -205,6 +205,6 @@ fn every_barrier_of_the_shipped_graphs_matters() {
         for image in [out.total, out.direct, out.indirect, out.occlusion] {
             graph.read_image(image);
         }
-        // lucerna::graph::testing::every_barrier_matters(&graph);
+        lucerna::graph::testing::every_barrier_matters(&graph);
     }
 }

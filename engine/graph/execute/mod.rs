@@ -19,6 +19,7 @@ use self::{
 use super::{
     Graph,
     frame::{Frame, PassTime, Report},
+    oracle,
     pass::{ReadWhat, Work},
     pixels::Pixels,
     plan::{Plan, Shape, Source},
@@ -76,6 +77,13 @@ impl Runner {
         let begun = Instant::now();
         let plan = graph.plan()?;
         let plan_ms = milliseconds(begun);
+        if cfg!(debug_assertions) && self.gpu.validation_active() {
+            let objections = oracle::check(&plan);
+            if !objections.is_empty() {
+                let what = format!("the plan of graph `{}` is wrong: {}", graph.name(), objections.join("; "));
+                return Err(Error::new(ErrorKind::Runtime, what));
+            }
+        }
         self.execute(graph, &plan, plan_ms).map_err(|e| e.at(graph.name()))
     }
 
