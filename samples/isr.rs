@@ -76,7 +76,7 @@ impl Settings {
         Self {
             isr: isr::Settings::paper(),
             gbuffer: gbuffer::Settings { normals: gbuffer::Normals::Bytes, ..defaults.gbuffer },
-            shadow: shadow::Settings { kind: shadow::Kind::Exponential, exponent: 90.0, ..defaults.shadow },
+            shadow: shadow::Settings::dissertation(),
         }
     }
 }

@@ -82,6 +82,13 @@ impl Default for Settings {
     }
 }
 
+impl Settings {
+    /// As in the dissertation: exponential with c = 90 everywhere, weakened by the cosine (listing 8), maps of 512².
+    pub fn dissertation() -> Self {
+        Self { kind: Kind::Exponential, size: 512, exponent_reach: 0.0, grazing: 0.0, ..Self::default() }
+    }
+}
+
 /// What `lib/shadow.glsl` binds, and what could not be served.
 #[derive(Clone, Debug)]
 pub struct ShadowMaps {

@@ -32,12 +32,7 @@ impl PictureSettings {
         Self {
             isr: Settings::paper(),
             gbuffer: gbuffer::Settings { normals: Normals::Bytes, ..Default::default() },
-            shadow: shadow::Settings {
-                kind: shadow::Kind::Exponential,
-                exponent: 90.0,
-                size: 512,
-                ..Default::default()
-            },
+            shadow: shadow::Settings::dissertation(),
             background: [0.0; 3],
         }
     }
