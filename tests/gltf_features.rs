@@ -354,7 +354,7 @@ fn skins_bring_their_joints_into_the_scene() {
 
     // A joint that the skin does not have.
     file.json["skins"][0]["joints"] = json!([1]);
-    assert!(file.error().contains("nodes[0].skin.meshes[0].primitives[0].joints: joint 1 is used"), "{}", file.error());
+    assert!(file.error().contains("nodes[0].skin: meshes[0] uses joint 1, the skin has 1 joints"), "{}", file.error());
 }
 
 #[test]

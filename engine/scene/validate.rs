@@ -28,6 +28,7 @@ impl Scene {
     /// # Errors
     /// [`ErrorKind::Input`](crate::ErrorKind::Input), naming the first element that does not hold.
     pub fn validate(&self) -> Result<()> {
+        let joints_used: Vec<Option<u16>> = self.meshes.iter().map(highest_joint).collect();
         for (i, node) in self.nodes.iter().enumerate() {
             let check = || {
                 if let Some(parent) = node.parent.filter(|&parent| parent as usize >= i) {
@@ -53,7 +54,12 @@ impl Scene {
             check().map_err(|error: Error| error.at(format!("nodes[{i}]")))?;
             if let (Some(mesh), Some(skin)) = (node.mesh, node.skin) {
                 let joints = self.skins[skin as usize].joints.len();
-                self.check_joints(mesh, joints).map_err(|error| error.at(format!("nodes[{i}].skin")))?;
+                if let Some(joint) = joints_used[mesh as usize].filter(|&joint| usize::from(joint) >= joints) {
+                    return Err(Error::input(format!(
+                        "meshes[{mesh}] uses joint {joint}, the skin has {joints} joints"
+                    ))
+                    .at(format!("nodes[{i}].skin")));
+                }
             }
         }
         for (i, mesh) in self.meshes.iter().enumerate() {
@@ -96,17 +102,6 @@ impl Scene {
         Ok(())
     }
 
-    fn check_joints(&self, mesh: u32, joints: usize) -> Result<()> {
-        for (p, primitive) in self.meshes[mesh as usize].primitives.iter().enumerate() {
-            let most = primitive.joints.iter().flatten().flatten().copied().max();
-            if let Some(joint) = most.filter(|&joint| usize::from(joint) >= joints) {
-                return Err(Error::input(format!("joint {joint} is used, the skin has {joints} joints"))
-                    .at(format!("meshes[{mesh}].primitives[{p}].joints")));
-            }
-        }
-        Ok(())
-    }
-
     fn check_animations(&self) -> Result<()> {
         for (i, animation) in self.animations.iter().enumerate() {
             for (c, channel) in animation.channels.iter().enumerate() {
@@ -141,6 +136,11 @@ impl Scene {
         }
         Ok(())
     }
+}
+
+/// The highest joint that a mesh refers to.
+fn highest_joint(mesh: &Mesh) -> Option<u16> {
+    mesh.primitives.iter().flat_map(|primitive| &primitive.joints).flatten().flatten().copied().max()
 }
 
 fn check_primitive(primitive: &Primitive) -> Result<()> {

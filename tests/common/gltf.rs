@@ -41,7 +41,7 @@ impl File {
     }
 
     pub fn view(&mut self, data: &[u8]) -> usize {
-        while self.bin.len() % 4 != 0 {
+        while !self.bin.len().is_multiple_of(4) {
             self.bin.push(0);
         }
         let offset = self.bin.len();

@@ -11,13 +11,15 @@ use crate::{
     scene::{Animation, Channel, Interpolation, Keys, Skin, Transform, notes::Notes},
 };
 use glam::{Mat4, Quat, Vec3};
+use std::collections::HashSet;
 
 /// Reads the skins of a file. Those that no shown node uses come out empty, as their joints may not be shown.
 pub fn skins(accessors: &Accessors, hierarchy: &Hierarchy) -> Result<Vec<Skin>> {
     let document = accessors.document;
     let mut out = Vec::with_capacity(document.skins.len());
+    let used: HashSet<u32> = hierarchy.nodes.iter().filter_map(|node| node.skin).collect();
     for (i, source) in document.skins.iter().enumerate() {
-        let used = hierarchy.nodes.iter().any(|node| node.skin == Some(i as u32));
+        let used = used.contains(&(i as u32));
         let skin = skin(accessors, hierarchy, source, used).map_err(|error| error.at(format!("skins[{i}]")))?;
         out.push(skin);
     }
@@ -63,14 +65,12 @@ pub fn animations(accessors: &Accessors, hierarchy: &Hierarchy, notes: &mut Note
     for (i, source) in document.animations.iter().enumerate() {
         let place = format!("animations[{i}]");
         let mut animation = Animation { name: source.name.clone().unwrap_or_default(), channels: vec![] };
+        let mut moved = HashSet::new();
         for (c, channel) in source.channels.iter().enumerate() {
             let here = format!("{place}.channels[{c}]");
             let read = channel_of(accessors, hierarchy, source, channel, &here, notes);
             let Some(read) = read.map_err(|error| error.at(&here))? else { continue };
-            let twice = animation.channels.iter().any(|other: &Channel| {
-                other.node == read.node && std::mem::discriminant(&other.values) == std::mem::discriminant(&read.values)
-            });
-            if twice {
+            if !moved.insert((read.node, std::mem::discriminant(&read.values))) {
                 return Err(Error::input("another channel of the animation moves the same property").at(here));
             }
             animation.channels.push(read);

@@ -9,6 +9,7 @@ use crate::{
     scene::{Camera, Light, LightKind, Limits, Node, Projection, Transform, notes::Notes},
 };
 use glam::{Mat4, Quat, Vec3};
+use std::collections::HashSet;
 
 /// The nodes that are shown, parents before children, and where the file's nodes went.
 #[derive(Debug)]
@@ -39,8 +40,9 @@ pub fn read(document: &Document, limits: &Limits, notes: &mut Notes) -> Result<H
         }
     }
     let mut needed = shown.clone();
+    let mut skins = HashSet::new();
     for (i, node) in document.nodes.iter().enumerate() {
-        let Some(skin) = node.skin.filter(|_| shown[i]) else { continue };
+        let Some(skin) = node.skin.filter(|&skin| shown[i] && skins.insert(skin)) else { continue };
         let skin = item(&document.skins, "skins", skin).map_err(|error| error.at(format!("nodes[{i}].skin")))?;
         for &joint in &skin.joints {
             let mut at = Some(joint);
