@@ -47,7 +47,7 @@ impl Frame {
         &self.reads[index as usize]
     }
 
-    /// The pixels promised by [`Graph::read_image`].
+    /// The pixels promised by [`Graph::read_image`](super::Graph::read_image).
     ///
     /// # Panics
     /// If the token is of another graph.
@@ -59,7 +59,7 @@ impl Frame {
         }
     }
 
-    /// The contents promised by [`Graph::read_buffer`]; bytes after the last whole `T` are left out.
+    /// The contents promised by [`Graph::read_buffer`](super::Graph::read_buffer); bytes after the last whole `T` are left out.
     ///
     /// # Panics
     /// If the token is of another graph.

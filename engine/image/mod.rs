@@ -150,7 +150,7 @@ pub fn write(path: impl AsRef<Path>, picture: &Layers, options: &WriteOptions) -
     Ok(report)
 }
 
-/// The bytes that [`write`] writes. The same image gives the same bytes.
+/// The bytes that [`write()`] writes. The same image gives the same bytes.
 pub fn encode(format: Format, picture: &Layers, options: &WriteOptions) -> Result<(Vec<u8>, Report)> {
     picture.validate()?;
     let all: Vec<&Layer> = picture.layers.iter().collect();
