@@ -1,0 +1,58 @@
+//! The graphs that the executables run: plans checked, each barrier dropped in turn, and the whole clean under
+//! synchronisation validation, the same bits twice.
+
+use lucerna::{
+    gpu::testing::with_gpu,
+    graph::{Graph, Runner, testing::every_barrier_matters},
+    passes::{ambient::Irradiance, shadow},
+    scene::{Pose, View, builtin, resident::Resident},
+    techniques::isr::{Blur, PictureSettings, Resolution, picture},
+};
+
+fn settings() -> Vec<PictureSettings> {
+    let default = PictureSettings::default();
+    let mut plain = default.clone();
+    plain.shadow.kind = shadow::Kind::Plain;
+    plain.isr.blur = Blur::None;
+    plain.isr.resolution = Resolution::Full;
+    let mut off = default.clone();
+    off.shadow.kind = shadow::Kind::Off;
+    off.isr.bounces = 3;
+    let mut exponential = PictureSettings::paper();
+    exponential.shadow.size = 64;
+    vec![default, plain, off, exponential]
+}
+
+#[test]
+fn every_barrier_of_the_shipped_graphs_matters() {
+    with_gpu(|gpu| {
+        let mut runner = Runner::new(gpu);
+        // Lights of several kinds; an area light; a deforming figure.
+        for name in ["cornell-area", "office", "figure"] {
+            let scene = builtin::load(name).unwrap();
+            let ambient = scene.environment.as_ref().map(Irradiance::of).unwrap_or_default();
+            let mut resident = Resident::new(gpu, &scene).unwrap();
+            for (number, settings) in settings().iter().enumerate() {
+                let mut pictures = Vec::new();
+                for _ in 0..2 {
+                    let mut graph = Graph::new("shipped");
+                    let pose = Pose::playing(&scene, 0.25);
+                    let handles = resident.frame_in(&mut graph, &scene, &pose);
+                    let view = View::of_camera(&scene, &pose, 0, [64, 48]).unwrap().fit_far(&handles.bounds());
+                    let out = picture(&mut graph, &handles, &view, ambient, settings).unwrap();
+                    let dump = graph.dump();
+                    let total = graph.read_image(out.outputs.total);
+                    if pictures.is_empty() {
+                        let plan = every_barrier_matters(&graph);
+                        assert!(plan.barriers.len() > 30 && dump.len() > 5, "{name}: {}", plan.list_passes());
+                    }
+                    let frame = runner.run(&graph).unwrap_or_else(|e| panic!("{name}, settings {number}: {e}"));
+                    let pixels = frame.image(total);
+                    assert!(pixels.to_f32().iter().flatten().all(|v| v.is_finite()), "{name}, settings {number}");
+                    pictures.push(pixels.bytes);
+                }
+                assert_eq!(pictures[0], pictures[1], "{name}, settings {number}: two runs differ");
+            }
+        }
+    });
+}
