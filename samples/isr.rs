@@ -1,4 +1,4 @@
-//! `isr`: image-space radiosity. The whole pipeline of a frame stands in [`compose`].
+//! `isr`: image-space radiosity. A frame is declared in [`compose`].
 
 use std::process::ExitCode;
 
@@ -8,11 +8,11 @@ use lucerna::{
     graph::Graph,
     passes::{
         ambient::Irradiance,
-        direct::{self, Lights},
+        direct::{self, Direct, Lights},
         gbuffer, shadow, skybox,
     },
     scene::resident::Resident,
-    techniques::isr,
+    techniques::isr::{self, LightLaw, PictureSettings},
 };
 use lucerna_samples::{
     args::RenderArgs,
@@ -20,7 +20,6 @@ use lucerna_samples::{
     render::{self, Input, Technique},
     shown::Shown,
 };
-use serde::{Deserialize, Serialize};
 
 /// Image-space radiosity: one bounce of indirect light and ambient occlusion from what the camera sees.
 #[derive(Parser, Debug)]
@@ -60,34 +59,13 @@ enum Mode {
     Occlusion,
 }
 
-/// All settings, by the passes that they belong to.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-struct Settings {
-    isr: isr::Settings,
-    gbuffer: gbuffer::Settings,
-    shadow: shadow::Settings,
-}
-
-impl Settings {
-    /// The dissertation's choices.
-    fn paper() -> Self {
-        let defaults = Self::default();
-        Self {
-            isr: isr::Settings::paper(),
-            gbuffer: gbuffer::Settings { normals: gbuffer::Normals::Bytes, ..defaults.gbuffer },
-            shadow: shadow::Settings::dissertation(),
-        }
-    }
-}
-
 fn main() -> ExitCode {
     let Command::Render(render) = Arguments::parse().command;
     program::run(render.common.talk.console(), || run(&render))
 }
 
 fn run(render: &Render) -> Result<ExitCode> {
-    let base = if render.common.paper { Settings::paper() } else { Settings::default() };
+    let base = if render.common.paper { PictureSettings::paper() } else { PictureSettings::default() };
     let mode = match render.mode {
         Mode::Isr => "isr",
         Mode::Direct => "direct",
@@ -107,50 +85,40 @@ fn run(render: &Render) -> Result<ExitCode> {
     )
 }
 
-fn direct_choices(settings: &isr::Settings) -> direct::Direct {
-    direct::Direct {
-        paper_law: settings.light_law == isr::LightLaw::Paper,
-        specular: settings.specular,
-        light_radius: settings.light_radius,
-        light_power: settings.light_power,
-    }
-}
-
 /// Declares one frame.
 fn compose(
     graph: &mut Graph,
     resident: &mut Resident,
     ambient: Irradiance,
     input: &Input<'_>,
-    settings: &Settings,
+    settings: &PictureSettings,
     mode: Mode,
 ) -> Result<Shown> {
     let scene = resident.frame_in(graph, input.scene, input.pose);
     let view = input.view.fit_far(&scene.bounds());
-    let gbuffer = gbuffer::draw(graph, &scene, &view, &settings.gbuffer);
-    let maps = shadow::draw(graph, &scene, &view, &settings.shadow);
-    let lights = Lights { lights: maps.lights, shadows: maps.shadows, shadow_maps: maps.maps };
-    let sky = |graph: &mut Graph, target| skybox::draw(graph, &scene, &gbuffer, glam::Vec3::ZERO, target);
-
-    let shown = if mode == Mode::Direct {
-        let lit = direct::light(graph, &gbuffer, lights, &direct_choices(&settings.isr));
-        sky(graph, lit.direct);
-        Shown::new(lit.direct)
+    let (shown, gbuffer, shadows) = if mode == Mode::Direct {
+        let gbuffer = gbuffer::draw(graph, &scene, &view, &settings.gbuffer);
+        let shadows = shadow::draw(graph, &scene, &view, &settings.shadow);
+        let choices = Direct {
+            paper_law: settings.isr.light_law == LightLaw::Paper,
+            specular: settings.isr.specular,
+            light_radius: settings.isr.light_radius,
+            light_power: settings.isr.light_power,
+        };
+        let lit = direct::light(graph, &gbuffer, Lights::from(&shadows), &choices);
+        skybox::draw(graph, &scene, &gbuffer, settings.background.into(), lit.direct);
+        (Shown::new(lit.direct), gbuffer, shadows)
     } else {
-        let out = isr::frame(graph, &isr::Inputs { gbuffer, lights, ambient }, &settings.isr)?;
-        sky(graph, out.total);
+        let picture = isr::picture(graph, &scene, &view, ambient, settings)?;
+        let out = picture.outputs;
         let shown = match mode {
             Mode::Indirect => Shown::new(out.indirect),
             Mode::Occlusion => Shown::grey(out.occlusion),
             Mode::Isr | Mode::Direct => Shown::new(out.total),
         };
-        shown.color("direct", out.direct).color("indirect", out.indirect).layer(
-            "occlusion",
-            &["Y"],
-            out.occlusion,
-            |pixel| pixel,
-        )
+        let shown = shown.color("direct", out.direct).color("indirect", out.indirect);
+        (shown.layer("occlusion", &["Y"], out.occlusion, |pixel| pixel), picture.gbuffer, picture.shadows)
     };
-    let notes = [resident.notes(), &maps.notes].concat();
+    let notes = [resident.notes(), &shadows.notes].concat();
     Ok(gbuffer_layers::add(shown, &gbuffer, &view).seen_by(view).noting(notes))
 }
