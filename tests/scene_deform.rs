@@ -2,7 +2,7 @@
 
 mod scene_kit;
 
-use glam::{Mat4, Quat, Vec3, Vec4};
+use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::{Material, MorphTarget, Node, Pose, Scene, Skin, Transform, deform::world_vertices},
@@ -89,5 +89,38 @@ fn deforming_twice_starts_from_the_rest_each_time() {
             runner.run(graph).unwrap().buffer::<[f32; 3]>(read)
         };
         assert_eq!(run(), run());
+    });
+}
+
+#[test]
+fn texture_coordinates_and_colours_morph_too() {
+    let mut scene = Scene::default();
+    let mut card = square();
+    card.colors = vec![Vec4::new(0.5, 0.5, 0.5, 1.0); 4];
+    let target = |uv: f32, red: f32| MorphTarget {
+        uvs: vec![vec![Vec2::new(uv, -uv); 4]],
+        colors: vec![Vec4::new(red, 0.1, 0.0, 0.0); 4],
+        ..MorphTarget::default()
+    };
+    // The last target changes nothing of the kind.
+    card.morphs = vec![target(1.0, 0.2), target(10.0, 4.0), MorphTarget::default()];
+    let uvs_at_rest = card.uvs[0].clone();
+    let card = mesh(&mut scene, card, Material::diffuse("", Vec3::ONE));
+    let node = place(&mut scene, card, Mat4::IDENTITY);
+    scene.nodes[node].weights = vec![0.5, 0.25, 1.0];
+    with_gpu(|gpu| {
+        let (frame, [uvs, colors]) =
+            frame(gpu, &scene, |graph, handles| [handles.uvs, handles.colors].map(|b| graph.read_buffer(b)));
+        let (uvs, colors) = (frame.buffer::<[f32; 2]>(uvs), frame.buffer::<[f32; 4]>(colors));
+        assert_eq!((uvs.len(), colors.len()), (8, 8), "at rest and morphed");
+        for v in 0..4 {
+            assert!(Vec2::from(uvs[4 + v]).abs_diff_eq(uvs_at_rest[v] + Vec2::new(3.0, -3.0), 1e-5));
+            // 0.5 + 0.1 + 1.0 is cut at one.
+            assert!(
+                Vec4::from(colors[4 + v]).abs_diff_eq(Vec4::new(1.0, 0.575, 0.5, 1.0), 1e-5),
+                "{:?}",
+                colors[4 + v]
+            );
+        }
     });
 }

@@ -1,13 +1,16 @@
 //! Skinned and morphed primitives: what the GPU needs to deform them, and boxes that hold them whatever the pose.
 
-use super::geometry::{Range, Streams};
+use super::geometry::{NONE, Range, Streams};
 use crate::{
     Result,
     graph::{Buffer, Graph},
     scene::{Aabb, MorphTarget, Pose, Primitive, Scene},
-    shaders::{scene::deform as shader, types},
+    shaders::{
+        scene::{deform as shader, morph_stream},
+        types,
+    },
 };
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Vec2, Vec3, Vec4};
 
 /// One primitive of one node that changes shape.
 #[derive(Clone, Debug)]
@@ -16,6 +19,8 @@ pub(super) struct Job {
     /// Skin whose joints move it; `None`: morphed only, stays in the space of its node.
     pub skin: Option<usize>,
     push: shader::Push,
+    /// Texture coordinates and colours that morph: `true` for colours.
+    streams: Vec<(bool, morph_stream::Push)>,
     bounds: Extent,
 }
 
@@ -34,6 +39,8 @@ pub(super) struct Deform {
     pub jobs: Vec<Job>,
     pub skin_vertices: Vec<types::SkinVertex>,
     pub morph_deltas: Vec<types::MorphDelta>,
+    /// Differences of texture coordinates and colours, number by number.
+    pub stream_deltas: Vec<f32>,
     /// Matrices and weights of one frame, in all.
     joints: u32,
     weights: u32,
@@ -45,7 +52,7 @@ pub(super) fn deforms(primitive: &Primitive, skinned: bool) -> bool {
 }
 
 impl Deform {
-    /// Adds `primitive` of `node`; returns the job and the first vertex that it writes.
+    /// Adds `primitive` of `node`; returns the job and where it writes: `range` with other first vertices.
     ///
     /// # Errors
     /// As [`Streams::new`].
@@ -56,8 +63,10 @@ impl Deform {
         primitive: &Primitive,
         range: &Range,
         streams: &mut Streams,
-    ) -> Result<(usize, u32)> {
+    ) -> Result<(usize, Range)> {
         let target = streams.reserve(range)?;
+        let mut written = Range { first_vertex: target, ..*range };
+        let streams = self.streams(primitive, &mut written, streams)?;
         let skin = scene.nodes[node].skin.map(|s| s as usize).filter(|_| !primitive.joints.is_empty());
         let joint_count = skin.map_or(0, |s| scene.skins[s].joints.len());
         let push = shader::Push {
@@ -90,13 +99,56 @@ impl Deform {
         }
         self.joints += joint_count as u32;
         self.weights += primitive.morphs.len() as u32;
-        self.jobs.push(Job { node, skin, push, bounds: Extent::new(primitive, skin.is_some()) });
-        Ok((self.jobs.len() - 1, target))
+        self.jobs.push(Job { node, skin, push, streams, bounds: Extent::new(primitive, skin.is_some()) });
+        Ok((self.jobs.len() - 1, written))
+    }
+
+    /// The streams of `primitive` that its morph targets change besides its vertices; `range` gets their copies.
+    fn streams(
+        &mut self,
+        primitive: &Primitive,
+        range: &mut Range,
+        streams: &mut Streams,
+    ) -> Result<Vec<(bool, morph_stream::Push)>> {
+        let mut out = Vec::new();
+        let vertices = range.vertices;
+        let mut add = |deltas: &mut Vec<f32>, numbers: u32, source: u32, target: u32, of: Vec<Vec<f32>>| {
+            let push = morph_stream::Push {
+                source: source * numbers,
+                target: target * numbers,
+                count: vertices * numbers,
+                targets: of.len() as u32,
+                delta_first: deltas.len() as u32,
+                weight_first: self.weights,
+                limited: u32::from(numbers == 4),
+            };
+            for mut target in of {
+                target.resize((vertices * numbers) as usize, 0.0);
+                deltas.extend(target);
+            }
+            out.push((numbers == 4, push));
+        };
+        for (set, first) in range.uv_first.iter_mut().enumerate().filter(|(_, first)| **first != NONE) {
+            if primitive.morphs.iter().any(|m| m.uvs.get(set).is_some_and(|uvs| !uvs.is_empty())) {
+                let copy = streams.reserve_uvs(*first, vertices)?;
+                let of =
+                    |m: &MorphTarget| m.uvs.get(set).into_iter().flatten().flat_map(|d: &Vec2| d.to_array()).collect();
+                add(&mut self.stream_deltas, 2, *first, copy, primitive.morphs.iter().map(of).collect());
+                *first = copy;
+            }
+        }
+        if range.color_first != NONE && primitive.morphs.iter().any(|m| !m.colors.is_empty()) {
+            let copy = streams.reserve_colors(range.color_first, vertices)?;
+            let of = |m: &MorphTarget| m.colors.iter().flat_map(|d: &Vec4| d.to_array()).collect();
+            add(&mut self.stream_deltas, 4, range.color_first, copy, primitive.morphs.iter().map(of).collect());
+            range.color_first = copy;
+        }
+        Ok(out)
     }
 
     /// Forgets the vertices, which the device has now.
     pub fn uploaded(self) -> Self {
-        Self { skin_vertices: Vec::new(), morph_deltas: Vec::new(), ..self }
+        Self { skin_vertices: Vec::new(), morph_deltas: Vec::new(), stream_deltas: Vec::new(), ..self }
     }
 
     /// World boxes of the jobs in `pose`, in their order.
@@ -141,6 +193,11 @@ impl Deform {
                     push: job.push,
                 };
                 graph.compute(args, job.push.count);
+                for &(colors, push) in &job.streams {
+                    let stream = if colors { buffers.colors } else { buffers.uvs };
+                    let stream_deltas = buffers.stream_deltas;
+                    graph.compute(morph_stream::Args { stream, stream_deltas, weights, push }, push.count);
+                }
             }
         });
     }
@@ -154,6 +211,9 @@ pub(super) struct Buffers {
     pub tangents: Buffer,
     pub skin_vertices: Buffer,
     pub morph_deltas: Buffer,
+    pub stream_deltas: Buffer,
+    pub uvs: Buffer,
+    pub colors: Buffer,
 }
 
 impl Extent {

@@ -80,6 +80,26 @@ impl Streams {
         })
     }
 
+    /// Room for a morphed copy of one set of texture coordinates: its first element.
+    ///
+    /// # Errors
+    /// As [`Streams::new`].
+    pub fn reserve_uvs(&mut self, first: u32, vertices: u32) -> Result<u32> {
+        let copy = offset(self.uvs.len(), vertices as usize)?;
+        self.uvs.extend_from_within(first as usize..(first + vertices) as usize);
+        Ok(copy)
+    }
+
+    /// As [`Streams::reserve_uvs`], for colours.
+    ///
+    /// # Errors
+    /// As [`Streams::new`].
+    pub fn reserve_colors(&mut self, first: u32, vertices: u32) -> Result<u32> {
+        let copy = offset(self.colors.len(), vertices as usize)?;
+        self.colors.extend_from_within(first as usize..(first + vertices) as usize);
+        Ok(copy)
+    }
+
     /// Room for a deformed copy of `range`: its first vertex.
     ///
     /// # Errors

@@ -45,6 +45,7 @@ pub struct Resident {
     materials: OwnedBuffer,
     skin_vertices: OwnedBuffer,
     morph_deltas: OwnedBuffer,
+    stream_deltas: OwnedBuffer,
     textures: Vec<OwnedImage>,
     /// For array slots that no texture needs.
     white: OwnedImage,
@@ -60,9 +61,8 @@ pub struct Resident {
 #[derive(Clone, Copy, Debug)]
 struct Item {
     node: usize,
+    /// The primitive's own vertices, or the deformed copy.
     range: Range,
-    /// In the streams: the primitive's own vertices, or the deformed copy.
-    first_vertex: u32,
     job: Option<usize>,
     cutout: Cutout,
     double_sided: bool,
@@ -169,6 +169,7 @@ impl Resident {
             materials: buffer("scene.materials", &raw(&materials))?,
             skin_vertices: buffer("scene.skin_vertices", &raw(&deform.skin_vertices))?,
             morph_deltas: buffer("scene.morph_deltas", &raw(&deform.morph_deltas))?,
+            stream_deltas: buffer("scene.stream_deltas", &raw(&deform.stream_deltas))?,
             bytes: bytes + textures.iter().map(image_bytes).sum::<u64>(),
             textures,
             white: one_texel(gpu, "scene.white", vk::Format::R8G8B8A8_UNORM, &[255; 4])?,
@@ -206,12 +207,17 @@ impl Resident {
         let positions = graph.import_buffer(&self.positions);
         let normals = graph.import_buffer(&self.normals);
         let tangents = graph.import_buffer(&self.tangents);
+        let uvs = graph.import_buffer(&self.uvs);
+        let colors = graph.import_buffer(&self.colors);
         let buffers = deform::Buffers {
             positions,
             normals,
             tangents,
             skin_vertices: graph.import_buffer(&self.skin_vertices),
             morph_deltas: graph.import_buffer(&self.morph_deltas),
+            stream_deltas: graph.import_buffer(&self.stream_deltas),
+            uvs,
+            colors,
         };
         self.deform.declare(graph, scene, pose, &buffers);
         let (instances, moment) = self.moment(scene, pose);
@@ -226,8 +232,8 @@ impl Resident {
             positions,
             normals,
             tangents,
-            uvs: graph.import_buffer(&self.uvs),
-            colors: graph.import_buffer(&self.colors),
+            uvs,
+            colors,
             instances: graph.buffer_from("scene.instances", &at_least_one(&instances)),
             materials: graph.import_buffer(&self.materials),
             lights: graph.buffer_from("scene.lights", &lights),
@@ -248,11 +254,11 @@ impl Resident {
             let world = if skinned { Mat4::IDENTITY } else { pose.world[item.node] };
             let linear = Mat3::from_mat4(world);
             let mirrored = linear.determinant() < 0.0;
-            let Range { uv_first, color_first, material, first_index, indices, bounds, .. } = item.range;
+            let Range { first_vertex, uv_first, color_first, material, first_index, indices, bounds, .. } = item.range;
             gpu.push(types::Instance {
                 world_from_object: world.to_cols_array_2d(),
                 normal_from_object: cofactor(linear).to_cols_array_2d(),
-                first_vertex: item.first_vertex,
+                first_vertex,
                 uv_first,
                 color_first,
                 material,
@@ -304,7 +310,6 @@ fn items(
             let mut item = Item {
                 node: index,
                 range,
-                first_vertex: range.first_vertex,
                 job: None,
                 cutout: match material.alpha {
                     AlphaMode::Opaque => Cutout::Opaque,
@@ -316,12 +321,8 @@ fn items(
             };
             blended |= item.cutout == Cutout::Blend;
             if deform::deforms(primitive, node.skin.is_some()) {
-                let (job, first_vertex) = deform.add(scene, index, primitive, &range, streams)?;
-                (item.job, item.first_vertex) = (Some(job), first_vertex);
-                if primitive.morphs.iter().any(|m| !m.colors.is_empty() || !m.uvs.is_empty()) {
-                    let place = format!("meshes[{mesh_index}].primitives[{slot}].targets");
-                    notes.push(note(place, "colours and texture coordinates stay at rest"));
-                }
+                let (job, range) = deform.add(scene, index, primitive, &range, streams)?;
+                (item.job, item.range) = (Some(job), range);
             }
             items.push(item);
         }
