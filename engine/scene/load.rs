@@ -9,8 +9,8 @@ use std::path::Path;
 pub struct LoadOptions {
     /// What a file may ask for.
     pub limits: Limits,
-    /// Metres that one unit of the file stands for, in formats that leave it open (OBJ, C arrays); 1 if not given. glTF
-    /// files are always in metres.
+    /// Metres that one unit of the file stands for, in formats that leave it open (OBJ, C arrays); 1 if not given, but
+    /// 0.003 for the Conference room. glTF files are always in metres.
     pub unit: Option<f32>,
 }
 
@@ -42,7 +42,9 @@ fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let scene = match format(path, &bytes)? {
         Format::Gltf => gltf::read(path, &bytes, &options.limits)?,
         Format::Obj => obj::read(path, &bytes, options.unit.unwrap_or(1.0), &options.limits)?,
-        Format::Arrays => c_arrays::read(&bytes, options.unit.unwrap_or(1.0), &options.limits)?,
+        Format::Arrays => {
+            c_arrays::read(&bytes, options.unit.unwrap_or_else(|| c_arrays::usual_unit(&bytes)), &options.limits)?
+        }
     };
     scene.validate()?;
     Ok(scene)
