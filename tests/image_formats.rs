@@ -39,7 +39,6 @@ fn metadata() -> Metadata {
         program: "isr render".into(),
         version: "0.1.0".into(),
         revision: Some("0123abc".into()),
-        command: ["render", "--builtin", "cornell", "-D", "isr.samples=48"].map(str::to_owned).to_vec(),
         scene: "Zürich — hall".into(),
         scene_hash: "00ff".into(),
         camera: "main".into(),

@@ -9,17 +9,17 @@ use std::{
 };
 
 use exr::{
-    block::{reader::ChunksReader, reader::Reader},
+    block::{UncompressedBlock, chunk::Chunk, reader::ChunksReader, reader::Reader},
     meta::{
         BlockDescription, MetaData,
-        attribute::{AttributeValue, EnvironmentMap, SampleType},
+        attribute::{AttributeValue, ChannelDescription, EnvironmentMap, SampleType},
         header::Header,
     },
     prelude::f16,
 };
 
 use super::{
-    Chromaticities, Layer, Layers, Metadata, Precision, check_size,
+    Chromaticities, Layer, Layers, Metadata, Precision, REC_709, check_size, exr_chroma,
     exr_write::{JSON, PREFIX},
     zeroed,
 };
@@ -76,8 +76,13 @@ fn decode_unguarded(bytes: &[u8], limits: &Limits) -> Result<Layers> {
     let reader = Reader::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
     let chunks = reader.all_chunks(false).map_err(|error| damaged(error).at("chunk table"))?;
     let mut seen = vec![0u64; headers.len()];
-    for block in chunks.sequential_decompressor(false) {
-        let block = block.map_err(|error| damaged(error).at("pixels"))?;
+    let meta = chunks.meta_data().clone();
+    for chunk in chunks {
+        let unpack = |chunk: Chunk| match headers.get(chunk.layer_index) {
+            Some(header) if exr_chroma::is_subsampled(header) => exr_chroma::decompress(chunk, header),
+            _ => UncompressedBlock::decompress_chunk(chunk, &meta, false),
+        };
+        let block = chunk.and_then(unpack).map_err(|error| damaged(error).at("pixels"))?;
         let index = block.index;
         let Some((header, slots)) = headers.get(index.layer).zip(slots.get(index.layer)) else { continue };
         let offset = offset_of(header);
@@ -89,20 +94,19 @@ fn decode_unguarded(bytes: &[u8], limits: &Limits) -> Result<Layers> {
         let mut rest = &block.data[..];
         for y in 0..index.pixel_size.1 {
             for (channel, slot) in header.channels.list.iter().zip(slots) {
-                let bytes = index.pixel_size.0 * channel.sample_type.bytes_per_sample();
+                let line_number = index.pixel_position.1 + y;
+                let samples = exr_chroma::samples_in_line(channel, index.pixel_size.0, line_number);
+                let bytes = samples * channel.sample_type.bytes_per_sample();
                 let cut = || Error::input("a chunk is shorter than its pixels").at("pixels");
                 let (line, tail) = rest.split_at_checked(bytes).ok_or_else(cut)?;
                 rest = tail;
-                let row = (index.pixel_position.1 + y) as i64 + offset[1];
+                if samples == 0 {
+                    continue;
+                }
+                let row = line_number as i64 + offset[1];
                 let column = index.pixel_position.0 as i64 + offset[0];
-                put_line(
-                    line,
-                    channel.sample_type,
-                    [column, row],
-                    [width, height],
-                    &mut layers[slot.layer],
-                    slot.channel,
-                );
+                let target = &mut layers[slot.layer];
+                put_line(line, channel, [column, row], [width, height], target, slot.channel);
             }
         }
     }
@@ -114,28 +118,46 @@ fn decode_unguarded(bytes: &[u8], limits: &Limits) -> Result<Layers> {
     }
 
     let mut picture = Layers { metadata: read_metadata(&headers)?, ..Layers::new(width as u32, height as u32) };
-    picture.layers = layers;
-    if let Some(given) = headers[0].shared_attributes.chromaticities {
-        let pair = |v: exr::math::Vec2<f32>| [v.0, v.1];
-        let given = Chromaticities {
-            red: pair(given.red),
-            green: pair(given.green),
-            blue: pair(given.blue),
-            white: pair(given.white),
-        };
-        if let Some(matrix) = given.rec709_from_rgb().map_err(|error| error.at("header"))? {
-            picture.layers.iter_mut().for_each(|layer| convert(layer, matrix));
+    for (header, slots) in headers.iter().zip(&slots) {
+        let subsampled = header.channels.list.iter().zip(slots).filter(|(channel, _)| channel.sampling.0 == 2);
+        for (_, slot) in subsampled {
+            exr_chroma::upsample(&mut layers[slot.layer], slot.channel, [width, height]);
         }
     }
+    let primaries = chromaticities(&headers[0]);
+    let weights = primaries.luminance_weights().map_err(|error| error.at("header"))?;
+    layers.iter_mut().for_each(|layer| exr_chroma::to_rgb(layer, weights));
+    if let Some(matrix) = primaries.rec709_from_rgb().map_err(|error| error.at("header"))? {
+        layers.iter_mut().for_each(|layer| convert(layer, matrix));
+    }
+    picture.layers = layers;
     Ok(picture)
 }
 
+/// Of the file, or Rec. 709, which files without that attribute are in.
+fn chromaticities(header: &Header) -> Chromaticities {
+    let pair = |v: exr::math::Vec2<f32>| [v.0, v.1];
+    header.shared_attributes.chromaticities.map_or(REC_709, |given| Chromaticities {
+        red: pair(given.red),
+        green: pair(given.green),
+        blue: pair(given.blue),
+        white: pair(given.white),
+    })
+}
+
 /// Copies the part of a line of samples that lies inside the image.
-fn put_line(line: &[u8], kind: SampleType, [x, y]: [i64; 2], [width, height]: [usize; 2], layer: &mut Layer, k: usize) {
+fn put_line(
+    line: &[u8],
+    channel: &ChannelDescription,
+    [x, y]: [i64; 2],
+    [width, height]: [usize; 2],
+    layer: &mut Layer,
+    k: usize,
+) {
     if y < 0 || y >= height as i64 {
         return;
     }
-    let stride = layer.channels.len();
+    let (kind, stride, step) = (channel.sample_type, layer.channels.len(), channel.sampling.0);
     let row = &mut layer.data[y as usize * width * stride..][..width * stride];
     let value = |sample: &[u8]| match (kind, sample) {
         (SampleType::F16, &[a, b]) => f16::from_ne_bytes([a, b]).to_f32(),
@@ -146,7 +168,7 @@ fn put_line(line: &[u8], kind: SampleType, [x, y]: [i64; 2], [width, height]: [u
     let skip = usize::try_from(-x).unwrap_or(0);
     let start = usize::try_from(x).unwrap_or(0).min(width);
     let samples = line.chunks_exact(kind.bytes_per_sample()).skip(skip);
-    for (pixel, sample) in row[start * stride..].chunks_exact_mut(stride).zip(samples) {
+    for (pixel, sample) in row[start * stride..].chunks_exact_mut(stride).step_by(step).zip(samples) {
         pixel[k] = value(sample);
     }
 }
@@ -166,9 +188,8 @@ fn check_headers(headers: &[Header], file_bytes: usize, limits: &Limits) -> Resu
         if header.deep {
             return wrong("deep pixels are not read".into());
         }
-        if let Some(channel) = header.channels.list.iter().find(|c| c.sampling.0 != 1 || c.sampling.1 != 1) {
-            let (name, x, y) = (&channel.name, channel.sampling.0, channel.sampling.1);
-            return wrong(format!("channel {name} has one sample for {x}×{y} pixels, only 1×1 is read"));
+        if exr_chroma::is_subsampled(header) {
+            exr_chroma::check(header).map_err(|error| error.at(format!("part[{i}]")))?;
         }
         let data = header.layer_size;
         check_size(data.0 as u64, data.1 as u64, header.channels.bytes_per_pixel as u64, limits)
@@ -234,7 +255,13 @@ fn lay_out(headers: &[Header]) -> (Vec<Layer>, Vec<Vec<Slot>>) {
         slots.push(part_slots);
     }
     // The file has channels by the alphabet: A B G R becomes R G B A; X Y Z and U V stay in that order.
-    let rank = |name: &str| ["R", "G", "B", "A"].iter().position(|&c| c == name).unwrap_or(9);
+    let rank = |name: &str| match name {
+        "R" | "RY" => 0,
+        "G" | "Y" => 1,
+        "B" | "BY" => 2,
+        "A" => 3,
+        _ => 9,
+    };
     let mut places: Vec<Vec<usize>> = Vec::new();
     for layer in &mut layers {
         let mut order: Vec<usize> = (0..layer.channels.len()).collect();

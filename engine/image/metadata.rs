@@ -19,11 +19,8 @@ pub struct Metadata {
     /// Git revision, if known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub revision: Option<String>,
-    /// Arguments that made the image, without the program's name; what `lucerna rerun` runs again.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub command: Vec<String>,
     pub scene: String,
-    /// Hash of the scene's files and of everything that is built in, as hexadecimal digits.
+    /// Changes when the scene changes.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub scene_hash: String,
     pub camera: String,
@@ -84,7 +81,6 @@ impl Metadata {
             ("program", self.program.clone()),
             ("version", self.version.clone()),
             ("revision", self.revision.clone().unwrap_or_default()),
-            ("command", self.command.join(" ")),
             ("scene", self.scene.clone()),
             ("sceneHash", self.scene_hash.clone()),
             ("camera", self.camera.clone()),

@@ -7,6 +7,7 @@
 //! Everything is encoded in memory and then written by [`write_atomic`]: a file is complete or not there.
 
 mod color;
+mod exr_chroma;
 mod exr_read;
 mod exr_write;
 mod file;

@@ -186,6 +186,7 @@ impl<'a> Run<'a> {
             version: program::VERSION.into(),
             revision: program::revision().map(str::to_owned),
             scene: self.stage.scene.name.clone(),
+            scene_hash: self.record.fingerprint.clone(),
             camera: self.stage.camera_name.clone(),
             technique: self.label.clone(),
             seed: self.args.seed.into(),

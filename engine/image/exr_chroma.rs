@@ -1,0 +1,105 @@
+//! OpenEXR files with fewer samples in some channels: luminance with chroma at half resolution.
+//!
+//! The `exr` crate decompresses such chunks but expects as many bytes as without subsampling, so it is told how many
+//! there really are.
+
+use exr::{
+    block::{BlockIndex, UncompressedBlock, chunk::Chunk, chunk::CompressedBlock},
+    meta::{
+        attribute::{ChannelDescription, IntegerBounds},
+        header::Header,
+    },
+};
+use glam::Vec3;
+
+use super::Layer;
+use crate::{Error, Result};
+
+/// Whether any channel has not a sample for each pixel.
+pub(super) fn is_subsampled(header: &Header) -> bool {
+    header.channels.list.iter().any(|channel| channel.sampling.0 != 1 || channel.sampling.1 != 1)
+}
+
+/// What can be served: chroma at half resolution, in a part without offset.
+pub(super) fn check(header: &Header) -> Result<()> {
+    let display = header.shared_attributes.display_window;
+    if header.own_attributes.layer_position != display.position || header.layer_size != display.size {
+        return Err(Error::input("subsampled channels whose data window is not the display window are not read"));
+    }
+    match header.channels.list.iter().find(|c| !matches!((c.sampling.0, c.sampling.1), (1, 1) | (2, 2))) {
+        Some(channel) => {
+            let (name, x, y) = (&channel.name, channel.sampling.0, channel.sampling.1);
+            Err(Error::input(format!("channel {name} has one sample for {x}×{y} pixels, 1×1 and 2×2 are read")))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Samples of a channel in a line of that many pixels; lines count from the top of the data window.
+pub(super) fn samples_in_line(channel: &ChannelDescription, width: usize, y: usize) -> usize {
+    if y.is_multiple_of(channel.sampling.1) { width.div_ceil(channel.sampling.0) } else { 0 }
+}
+
+/// Decompresses a chunk of a subsampled part.
+pub(super) fn decompress(chunk: Chunk, header: &Header) -> Result<UncompressedBlock, exr::error::Error> {
+    let tile = header.get_block_data_indices(&chunk.compressed_block)?;
+    let bounds: IntegerBounds = header.get_absolute_block_pixel_coordinates(tile)?;
+    let position = bounds.position.to_usize("chunk position")?;
+    let lines = position.1..position.1 + bounds.size.1;
+    let line_bytes = |y: usize| -> usize {
+        let bytes = |c: &ChannelDescription| samples_in_line(c, bounds.size.0, y) * c.sample_type.bytes_per_sample();
+        header.channels.list.iter().map(bytes).sum()
+    };
+    let total: usize = lines.map(line_bytes).sum();
+    let area = bounds.size.0 * bounds.size.1;
+    if area == 0 || !total.is_multiple_of(area) {
+        return Err(exr::error::Error::NotSupported("subsampled channels in a size that is not even".into()));
+    }
+    let mut header = header.clone();
+    header.channels.bytes_per_pixel = total / area;
+    let CompressedBlock::ScanLine(block) = chunk.compressed_block else {
+        return Err(exr::error::Error::Invalid("subsampled channels in tiles".into()));
+    };
+    let compression = header.compression;
+    let data = compression.decompress_image_section_from_le(&header, block.compressed_pixels_le, bounds, false)?;
+    let index = BlockIndex {
+        layer: chunk.layer_index,
+        pixel_position: position,
+        pixel_size: bounds.size,
+        level: tile.level_index,
+    };
+    Ok(UncompressedBlock { index, data })
+}
+
+/// Fills the pixels between samples that stand at even columns and rows, linearly; the last is repeated.
+pub(super) fn upsample(layer: &mut Layer, channel: usize, [width, height]: [usize; 2]) {
+    let stride = layer.channels.len();
+    let at = |x: usize, y: usize| (y * width + x) * stride + channel;
+    for y in (0..height).step_by(2) {
+        for x in (1..width).step_by(2) {
+            let right = if x + 1 < width { x + 1 } else { x - 1 };
+            layer.data[at(x, y)] = 0.5 * (layer.data[at(x - 1, y)] + layer.data[at(right, y)]);
+        }
+    }
+    for y in (1..height).step_by(2) {
+        let below = if y + 1 < height { y + 1 } else { y - 1 };
+        for x in 0..width {
+            layer.data[at(x, y)] = 0.5 * (layer.data[at(x, y - 1)] + layer.data[at(x, below)]);
+        }
+    }
+}
+
+/// Luminance Y and the chroma differences RY = (R − Y) / Y, BY = (B − Y) / Y become R G B. `weights`: of R, G and B in Y.
+pub(super) fn to_rgb(layer: &mut Layer, weights: Vec3) {
+    let (Some(y), Some(ry), Some(by)) = (layer.channel("Y"), layer.channel("RY"), layer.channel("BY")) else { return };
+    let channels = layer.channels.len();
+    for pixel in layer.data.chunks_exact_mut(channels) {
+        let luminance = pixel[y];
+        let (red, blue) = ((pixel[ry] + 1.0) * luminance, (pixel[by] + 1.0) * luminance);
+        let green = (luminance - red * weights.x - blue * weights.z) / weights.y;
+        (pixel[ry], pixel[y], pixel[by]) = (red, green, blue);
+    }
+    for (at, name) in [(ry, "R"), (y, "G"), (by, "B")] {
+        layer.channels[at] = name.to_owned();
+    }
+}
