@@ -4,15 +4,17 @@
 //! there really are.
 
 use exr::{
-    block::{BlockIndex, UncompressedBlock, chunk::Chunk, chunk::CompressedBlock},
+    block::{BlockIndex, UncompressedBlock, chunk::CompressedBlock, chunk::CompressedScanLineBlock},
+    meta::BlockDescription,
     meta::{
         attribute::{ChannelDescription, IntegerBounds},
         header::Header,
     },
+    prelude::Compression,
 };
 use glam::Vec3;
 
-use super::Layer;
+use super::{Layer, exr_write::header_end};
 use crate::{Error, Result};
 
 /// Whether any channel has not a sample for each pixel.
@@ -20,8 +22,17 @@ pub(super) fn is_subsampled(header: &Header) -> bool {
     header.channels.list.iter().any(|channel| channel.sampling.0 != 1 || channel.sampling.1 != 1)
 }
 
-/// What can be served: chroma at half resolution, in a part without offset.
-pub(super) fn check(header: &Header) -> Result<()> {
+/// What can be served: chroma at half resolution, in the only part, which has scan lines and no offset.
+pub(super) fn check(header: &Header, parts: usize) -> Result<()> {
+    if parts > 1 || header.blocks != BlockDescription::ScanLines {
+        return Err(Error::input("subsampled channels in tiles or in one of several parts are not read"));
+    }
+    // The crate's decoders of these leave the bounds of their buffers.
+    if matches!(header.compression, Compression::B44 | Compression::B44A | Compression::DWAA(_) | Compression::DWAB(_))
+    {
+        let what = format!("subsampled channels in {:?} compression are not read", header.compression);
+        return Err(Error::input(what).help("Convert the file to PIZ or ZIP, or to RGB"));
+    }
     let display = header.shared_attributes.display_window;
     if header.own_attributes.layer_position != display.position || header.layer_size != display.size {
         return Err(Error::input("subsampled channels whose data window is not the display window are not read"));
@@ -40,9 +51,28 @@ pub(super) fn samples_in_line(channel: &ChannelDescription, width: usize, y: usi
     if y.is_multiple_of(channel.sampling.1) { width.div_ceil(channel.sampling.0) } else { 0 }
 }
 
+/// The blocks of a file of one subsampled part. The crate's reader refuses such files, so the chunks are found here.
+pub(super) fn blocks<'a>(file: &'a [u8], header: &'a Header) -> impl Iterator<Item = Result<UncompressedBlock>> + 'a {
+    let cut = || Error::input("a chunk lies outside of the file").at("chunk table");
+    let table = header_end(file).and_then(|start| file.get(start..)).unwrap_or_default();
+    (0..header.chunk_count).map(move |i| {
+        let entry = table.get(8 * i..).and_then(<[u8]>::first_chunk).ok_or_else(cut)?;
+        let start = usize::try_from(u64::from_le_bytes(*entry)).map_err(|_| cut())?;
+        let chunk = file.get(start..).ok_or_else(cut)?;
+        let (y, rest) = chunk.split_first_chunk().ok_or_else(cut)?;
+        let (bytes, rest) = rest.split_first_chunk().ok_or_else(cut)?;
+        let data = rest.get(..u32::from_le_bytes(*bytes) as usize).ok_or_else(cut)?;
+        let block =
+            CompressedScanLineBlock { y_coordinate: i32::from_le_bytes(*y), compressed_pixels_le: data.to_vec() };
+        decompress(block, header)
+            .map_err(|error| Error::input("damaged or not served").caused_by(error).at(format!("pixels.chunk[{i}]")))
+    })
+}
+
 /// Decompresses a chunk of a subsampled part.
-pub(super) fn decompress(chunk: Chunk, header: &Header) -> Result<UncompressedBlock, exr::error::Error> {
-    let tile = header.get_block_data_indices(&chunk.compressed_block)?;
+fn decompress(block: CompressedScanLineBlock, header: &Header) -> Result<UncompressedBlock, exr::error::Error> {
+    let block = CompressedBlock::ScanLine(block);
+    let tile = header.get_block_data_indices(&block)?;
     let bounds: IntegerBounds = header.get_absolute_block_pixel_coordinates(tile)?;
     let position = bounds.position.to_usize("chunk position")?;
     let lines = position.1..position.1 + bounds.size.1;
@@ -57,17 +87,10 @@ pub(super) fn decompress(chunk: Chunk, header: &Header) -> Result<UncompressedBl
     }
     let mut header = header.clone();
     header.channels.bytes_per_pixel = total / area;
-    let CompressedBlock::ScanLine(block) = chunk.compressed_block else {
-        return Err(exr::error::Error::Invalid("subsampled channels in tiles".into()));
-    };
+    let CompressedBlock::ScanLine(block) = block else { return Err(exr::error::Error::Invalid("tiles".into())) };
     let compression = header.compression;
     let data = compression.decompress_image_section_from_le(&header, block.compressed_pixels_le, bounds, false)?;
-    let index = BlockIndex {
-        layer: chunk.layer_index,
-        pixel_position: position,
-        pixel_size: bounds.size,
-        level: tile.level_index,
-    };
+    let index = BlockIndex { layer: 0, pixel_position: position, pixel_size: bounds.size, level: tile.level_index };
     Ok(UncompressedBlock { index, data })
 }
 
@@ -92,14 +115,17 @@ pub(super) fn upsample(layer: &mut Layer, channel: usize, [width, height]: [usiz
 /// Luminance Y and the chroma differences RY = (R − Y) / Y, BY = (B − Y) / Y become R G B. `weights`: of R, G and B in Y.
 pub(super) fn to_rgb(layer: &mut Layer, weights: Vec3) {
     let (Some(y), Some(ry), Some(by)) = (layer.channel("Y"), layer.channel("RY"), layer.channel("BY")) else { return };
+    let mut places = [y, ry, by];
+    places.sort_unstable();
+    let [r, g, b] = places;
     let channels = layer.channels.len();
     for pixel in layer.data.chunks_exact_mut(channels) {
         let luminance = pixel[y];
         let (red, blue) = ((pixel[ry] + 1.0) * luminance, (pixel[by] + 1.0) * luminance);
         let green = (luminance - red * weights.x - blue * weights.z) / weights.y;
-        (pixel[ry], pixel[y], pixel[by]) = (red, green, blue);
+        (pixel[r], pixel[g], pixel[b]) = (red, green, blue);
     }
-    for (at, name) in [(ry, "R"), (y, "G"), (by, "B")] {
+    for (at, name) in [(r, "R"), (g, "G"), (b, "B")] {
         layer.channels[at] = name.to_owned();
     }
 }

@@ -9,7 +9,7 @@ use std::{
 };
 
 use exr::{
-    block::{UncompressedBlock, chunk::Chunk, reader::ChunksReader, reader::Reader},
+    block::{UncompressedBlock, reader::ChunksReader, reader::Reader},
     meta::{
         BlockDescription, MetaData,
         attribute::{AttributeValue, ChannelDescription, EnvironmentMap, SampleType},
@@ -73,16 +73,9 @@ fn decode_unguarded(bytes: &[u8], limits: &Limits) -> Result<Layers> {
         [i64::from(data.0) - i64::from(display.0), i64::from(data.1) - i64::from(display.1)]
     };
 
-    let reader = Reader::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
-    let chunks = reader.all_chunks(false).map_err(|error| damaged(error).at("chunk table"))?;
     let mut seen = vec![0u64; headers.len()];
-    let meta = chunks.meta_data().clone();
-    for chunk in chunks {
-        let unpack = |chunk: Chunk| match headers.get(chunk.layer_index) {
-            Some(header) if exr_chroma::is_subsampled(header) => exr_chroma::decompress(chunk, header),
-            _ => UncompressedBlock::decompress_chunk(chunk, &meta, false),
-        };
-        let block = chunk.and_then(unpack).map_err(|error| damaged(error).at("pixels"))?;
+    for block in blocks(bytes, &headers)? {
+        let block = block?;
         let index = block.index;
         let Some((header, slots)) = headers.get(index.layer).zip(slots.get(index.layer)) else { continue };
         let offset = offset_of(header);
@@ -132,6 +125,22 @@ fn decode_unguarded(bytes: &[u8], limits: &Limits) -> Result<Layers> {
     }
     picture.layers = layers;
     Ok(picture)
+}
+
+/// All chunks of the file, unpacked one after the other.
+fn blocks<'a>(
+    bytes: &'a [u8],
+    headers: &'a [Header],
+) -> Result<Box<dyn Iterator<Item = Result<UncompressedBlock>> + 'a>> {
+    if let [header] = headers
+        && exr_chroma::is_subsampled(header)
+    {
+        return Ok(Box::new(exr_chroma::blocks(bytes, header)));
+    }
+    let reader = Reader::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
+    let chunks = reader.all_chunks(false).map_err(|error| damaged(error).at("chunk table"))?;
+    let blocks = chunks.sequential_decompressor(false);
+    Ok(Box::new(blocks.map(|block| block.map_err(|error| damaged(error).at("pixels")))))
 }
 
 /// Of the file, or Rec. 709, which files without that attribute are in.
@@ -189,7 +198,7 @@ fn check_headers(headers: &[Header], file_bytes: usize, limits: &Limits) -> Resu
             return wrong("deep pixels are not read".into());
         }
         if exr_chroma::is_subsampled(header) {
-            exr_chroma::check(header).map_err(|error| error.at(format!("part[{i}]")))?;
+            exr_chroma::check(header, headers.len()).map_err(|error| error.at(format!("part[{i}]")))?;
         }
         let data = header.layer_size;
         check_size(data.0 as u64, data.1 as u64, header.channels.bytes_per_pixel as u64, limits)
@@ -255,13 +264,7 @@ fn lay_out(headers: &[Header]) -> (Vec<Layer>, Vec<Vec<Slot>>) {
         slots.push(part_slots);
     }
     // The file has channels by the alphabet: A B G R becomes R G B A; X Y Z and U V stay in that order.
-    let rank = |name: &str| match name {
-        "R" | "RY" => 0,
-        "G" | "Y" => 1,
-        "B" | "BY" => 2,
-        "A" => 3,
-        _ => 9,
-    };
+    let rank = |name: &str| ["R", "RY", "G", "B", "BY", "A"].iter().position(|&c| c == name).unwrap_or(9);
     let mut places: Vec<Vec<usize>> = Vec::new();
     for layer in &mut layers {
         let mut order: Vec<usize> = (0..layer.channels.len()).collect();

@@ -107,30 +107,33 @@ fn attribute_bytes(metadata: &Metadata) -> Result<Vec<u8>> {
 /// process: the same picture would not give the same bytes.
 fn insert_attributes(file: &[u8], attributes: &[u8]) -> Result<Vec<u8>> {
     let broken = || Error::new(ErrorKind::Runtime, "EXR encoding gave a header that cannot be read");
-    const START: usize = 8;
-    let zero = |from: usize| file.get(from..)?.iter().position(|&b| b == 0).map(|n| from + n);
-    let word = |at: usize| Some(u32::from_le_bytes(*file.get(at..)?.first_chunk()?) as usize);
-    // The offset table begins after the header and ends where its first entry points.
-    let header_end = || {
-        let mut at = START;
-        while *file.get(at)? != 0 {
-            let kind = zero(at)? + 1;
-            let size = zero(kind)? + 1;
-            at = size + 4 + word(size)?;
-        }
-        Some(at + 1)
-    };
-    let table = header_end().ok_or_else(broken)?;
+    let table = header_end(file).ok_or_else(broken)?;
     let offset = |at: usize| Some(u64::from_le_bytes(*file.get(at..)?.first_chunk()?));
     let chunks = offset(table).and_then(|first| usize::try_from(first).ok()).ok_or_else(broken)?;
     let entries = file.get(table..chunks).ok_or_else(broken)?;
     let mut out = Vec::with_capacity(file.len() + attributes.len());
-    out.extend_from_slice(&file[..START]);
+    out.extend_from_slice(&file[..ATTRIBUTES]);
     out.extend_from_slice(attributes);
-    out.extend_from_slice(&file[START..table]);
+    out.extend_from_slice(&file[ATTRIBUTES..table]);
     for entry in entries.as_chunks::<8>().0 {
         out.extend_from_slice(&(u64::from_le_bytes(*entry) + attributes.len() as u64).to_le_bytes());
     }
     out.extend_from_slice(&file[chunks..]);
     Ok(out)
+}
+
+/// Where the attributes of the first part begin: after magic number and version.
+const ATTRIBUTES: usize = 8;
+
+/// Where the offset table of a file of one part begins: after its attributes and their end mark.
+pub(super) fn header_end(file: &[u8]) -> Option<usize> {
+    let zero = |from: usize| file.get(from..)?.iter().position(|&b| b == 0).map(|n| from + n);
+    let mut at = ATTRIBUTES;
+    while *file.get(at)? != 0 {
+        let kind = zero(at)? + 1;
+        let size = zero(kind)? + 1;
+        let bytes = u32::from_le_bytes(*file.get(size..)?.first_chunk()?);
+        at = (size + 4).checked_add(bytes as usize)?;
+    }
+    Some(at + 1)
 }
