@@ -8,7 +8,7 @@ use super::{
     raster::{Depth, Draw, DrawKind, Load, Raster, Targets},
     vocab::{Access, Layout, Mistake, MistakeKind, Region, Resource, Scope, Stages, Usage, Use},
 };
-use crate::shader::{self, BindingKind, Dim, Stage};
+use crate::shader::{self, Binding, BindingKind, Dim, Stage, Texel};
 
 /// Storage and uniform bindings start at multiples of this: the largest alignment that a device may ask for.
 const BINDING_ALIGNMENT: u64 = 256;
@@ -185,7 +185,11 @@ impl<'a> Collector<'a> {
             }
             for element in 0..binding.count {
                 let role = if binding.count > 1 { format!("{}[{element}]", binding.name) } else { binding.name.into() };
-                match (binding.kind, resources.next()) {
+                let resource = resources.next();
+                if let Some(shader::Resource::Image(image)) = resource {
+                    self.texels(*image, binding, &role);
+                }
+                match (binding.kind, resource) {
                     (BindingKind::Sampled(dim), Some(shader::Resource::Image(image))) => {
                         self.sampled(*image, dim, stages, &role);
                     }
@@ -212,6 +216,24 @@ impl<'a> Collector<'a> {
                 }
             }
         }
+    }
+
+    /// Format and kind of numbers must be those that the shader names.
+    fn texels(&mut self, image: Image, binding: &Binding, role: &str) {
+        let Some(desc) = self.desc(image) else { return };
+        let texel = match desc.format.class() {
+            Class::Uint => Texel::Uint,
+            Class::Sint => Texel::Sint,
+            Class::Float | Class::Depth | Class::DepthStencil => Texel::Float,
+        };
+        let wanted = Format::from_spirv(binding.format);
+        let wrong = match wanted {
+            _ if texel != binding.texel => format!("{:?} values", binding.texel),
+            Some(format) if format != desc.format => format!("{format:?}"),
+            _ => return,
+        };
+        let what = format!("`{role}` is {wrong} in the shader, but the image is {:?}", desc.format);
+        self.mistake(MistakeKind::Format, self.image_name(image), what);
     }
 
     fn view(&mut self, image: Image, dim: Dim, role: &str) {

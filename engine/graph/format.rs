@@ -81,6 +81,39 @@ impl Format {
         }
     }
 
+    /// The format that SPIR-V numbers so, for storage images; `None` if no image here has it.
+    pub fn from_spirv(number: u32) -> Option<Self> {
+        use Format::*;
+        Some(match number {
+            1 => RGBA32F,
+            2 => RGBA16F,
+            3 => R32F,
+            4 => RGBA8,
+            6 => RG32F,
+            7 => RG16F,
+            8 => R11G11B10F,
+            9 => R16F,
+            10 => RGBA16,
+            11 => RGB10A2,
+            12 => RG16,
+            13 => RG8,
+            14 => R16,
+            15 => R8,
+            21 => RGBA32I,
+            24 => R32I,
+            25 => RG32I,
+            30 => RGBA32U,
+            31 => RGBA16U,
+            32 => RGBA8U,
+            33 => R32U,
+            35 => RG32U,
+            36 => RG16U,
+            38 => R16U,
+            39 => R8U,
+            _ => return None,
+        })
+    }
+
     /// Depth, with or without stencil.
     pub fn is_depth(self) -> bool {
         matches!(self.class(), Class::Depth | Class::DepthStencil)

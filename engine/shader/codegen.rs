@@ -303,12 +303,14 @@ fn write_shader(
         let _ = writeln!(
             out,
             "                crate::shader::Binding {{ name: {:?}, binding: {}, kind: crate::shader::BindingKind::{kind}, access: \
-             crate::shader::Access::{:?}, stages: &[{}], count: {} }},",
+             crate::shader::Access::{:?}, stages: &[{}], count: {}, texel: crate::shader::Texel::{}, format: {} }},",
             b.name,
             b.binding,
             m.access,
             stages.join(", "),
-            b.count
+            b.count,
+            b.texel,
+            b.format
         );
     }
     let _ = writeln!(

@@ -61,6 +61,21 @@ pub struct Binding {
     pub stages: &'static [Stage],
     /// Elements of an array of resources; 1 otherwise.
     pub count: u32,
+    /// Images: what a texel is to the shader.
+    pub texel: Texel,
+    /// Storage images: the format that the shader names, by its number in SPIR-V; 0: none.
+    pub format: u32,
+}
+
+/// What a texel is to a shader: `vec4`, `uvec4` or `ivec4`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Texel {
+    /// The resource is no image.
+    None,
+    /// Floats, normalised integers and depth.
+    Float,
+    Uint,
+    Sint,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -59,6 +59,10 @@ pub struct Binding {
     pub kind: Kind,
     pub access: Access,
     pub count: u32,
+    /// Images: `Float`, `Uint` or `Sint`; else `None`.
+    pub texel: &'static str,
+    /// Storage images: format as SPIR-V numbers it; else 0.
+    pub format: u32,
 }
 
 /// Scalar type and name of a specialisation constant, with its default as bits.
@@ -88,7 +92,7 @@ enum Raw {
     Int { width: u32, signed: bool },
     Vector(u32, u32),
     Matrix(u32, u32),
-    Image { dim: u32, arrayed: bool, sampled: u32 },
+    Image { texel: u32, dim: u32, arrayed: bool, sampled: u32, format: u32 },
     SampledImage(u32),
     Array(u32, u32),
     RuntimeArray(u32),
@@ -149,7 +153,12 @@ fn walk(words: &[u32]) -> Result<Walk, String> {
             22 => drop(w.types.insert(a[0], Raw::Float(a[1]))),
             23 => drop(w.types.insert(a[0], Raw::Vector(a[1], a[2]))),
             24 => drop(w.types.insert(a[0], Raw::Matrix(a[1], a[2]))),
-            25 => drop(w.types.insert(a[0], Raw::Image { dim: a[2], arrayed: a[4] == 1, sampled: a[6] })),
+            25 => {
+                drop(w.types.insert(
+                    a[0],
+                    Raw::Image { texel: a[1], dim: a[2], arrayed: a[4] == 1, sampled: a[6], format: a[7] },
+                ))
+            }
             27 => drop(w.types.insert(a[0], Raw::SampledImage(a[1]))),
             28 => drop(w.types.insert(a[0], Raw::Array(a[1], a[2]))),
             29 => drop(w.types.insert(a[0], Raw::RuntimeArray(a[1]))),
@@ -404,7 +413,7 @@ fn resource(w: &Walk, id: u32, pointee: u32, storage: u32, structs: &mut Vec<Str
             Some(Raw::Image { dim: d, arrayed, .. }) => (Kind::Sampled(dim(*d, *arrayed)?), Access::Read),
             _ => return Err(format!("{name}: unexpected sampler type")),
         },
-        (0, Some(Raw::Image { dim: d, arrayed, sampled: 2 })) => {
+        (0, Some(Raw::Image { dim: d, arrayed, sampled: 2, .. })) => {
             (Kind::Storage(dim(*d, *arrayed)?), w.access(id, None))
         }
         (0, Some(Raw::AccelerationStructure)) => (Kind::AccelerationStructure, Access::Read),
@@ -424,5 +433,17 @@ fn resource(w: &Walk, id: u32, pointee: u32, storage: u32, structs: &mut Vec<Str
         }
         _ => return Err(format!("{name}: separate images and samplers are not supported; use a combined sampler")),
     };
-    Ok(Binding { name, binding, kind, access, count })
+    let image = match w.types.get(&ty) {
+        Some(Raw::SampledImage(image)) => w.types.get(image),
+        other => other,
+    };
+    let (texel, format) = match image {
+        Some(Raw::Image { texel, format, .. }) => match w.types.get(texel) {
+            Some(Raw::Int { signed: true, .. }) => ("Sint", *format),
+            Some(Raw::Int { signed: false, .. }) => ("Uint", *format),
+            _ => ("Float", *format),
+        },
+        _ => ("None", 0),
+    };
+    Ok(Binding { name, binding, kind, access, count, texel, format })
 }

@@ -12,7 +12,7 @@ use lucerna::{
         Commands, DescriptorArena, Gpu, ImageDesc, OwnedBuffer, OwnedImage, Pipeline, RasterState, Region, SamplerDesc,
         Timestamps,
     },
-    shader::{Access, Binding, BindingKind, Shader, Stage, StageCode},
+    shader::{Access, Binding, BindingKind, Shader, Stage, StageCode, Texel},
 };
 
 /// A compute shader that writes each of 64 words plus one to another buffer.
@@ -40,6 +40,8 @@ pub fn compute(name: &'static str, source: &str) -> &'static Shader {
         access,
         stages: &[Stage::Compute],
         count: 1,
+        texel: Texel::None,
+        format: 0,
     };
     Box::leak(Box::new(Shader {
         name,
