@@ -109,10 +109,10 @@ fn column() -> Geometry {
     lathe(&profile.map(|(r, y)| vec2(r, y)), 32, 30.0)
 }
 
-/// Evenly spaced keys of a quarter turn each, about `axis`, `turns` times in `seconds`.
-fn spin(node: u32, axis: Vec3, turns: i32, seconds: f32) -> Channel {
+/// Evenly spaced keys of a quarter turn each, from `start` radians about `axis`, `turns` times in `seconds`.
+fn spin(node: u32, (axis, start): (Vec3, f32), turns: i32, seconds: f32) -> Channel {
     let steps = 4 * turns.unsigned_abs();
-    let key = |i: u32| Quat::from_axis_angle(axis, FRAC_PI_2 * i as f32 * turns.signum() as f32);
+    let key = |i: u32| Quat::from_axis_angle(axis, start + FRAC_PI_2 * i as f32 * turns.signum() as f32);
     Channel {
         node,
         interpolation: Interpolation::Linear,
@@ -163,7 +163,7 @@ fn walker(stage: &mut Stage) {
         channels.push(channel(first + i as u32, Keys::Rotation(postures.iter().map(|p| p.rotations[i]).collect())));
     }
     stage.scene.animations.push(Animation { name: "walk".to_owned(), channels });
-    let round = spin(pivot, Vec3::Y, 1, CYCLES * walk::PERIOD);
+    let round = spin(pivot, (Vec3::Y, 0.0), 1, CYCLES * walk::PERIOD);
     stage.scene.animations.push(Animation { name: "path".to_owned(), channels: vec![round] });
 }
 
@@ -225,7 +225,7 @@ fn sculpture(stage: &mut Stage) {
         let name = format!("ring {}", i + 1);
         let mesh = stage.mesh(&name, Model::of(brass, ring));
         parent = stage.node(Node { name, parent: Some(parent), mesh: Some(mesh), ..Node::default() });
-        channels.push(spin(parent, axis, turns, 8.0));
+        channels.push(spin(parent, (axis, 0.5 + 0.4 * i as f32), turns, 8.0));
     }
     stage.scene.animations.push(Animation { name: "rings".to_owned(), channels });
 }
@@ -239,7 +239,7 @@ fn ball(stage: &mut Stage) {
     let rubber = stage.paint("ball", 0x2f6fd0, 0.35);
     let mesh = stage.mesh("ball", Model::of(rubber, sphere(0.2, 48, 24)));
     let ball = stage.place("ball", mesh, at(2.9, 0.2, -1.6));
-    // A parabola is a cubic: fall and rise in 1.2 s under 9.81 m/s², exactly.
+    // A parabola is a cubic: fall and rise take 1.2 s under 9.81 m/s², exactly.
     let (half, gravity) = (0.6f32, 9.81);
     let (low, high) = (vec3(2.9, 0.2, -1.6), vec3(2.9, 0.2 + 0.5 * gravity * half * half, -1.6));
     let speed = Vec3::Y * gravity * half;
@@ -247,14 +247,14 @@ fn ball(stage: &mut Stage) {
         node: ball,
         interpolation: Interpolation::CubicSpline,
         times: vec![0.0, half, 2.0 * half],
-        values: Keys::Translation(vec![-speed, low, speed, Vec3::ZERO, high, Vec3::ZERO, -speed, low, speed]),
+        values: Keys::Translation(vec![Vec3::ZERO, high, Vec3::ZERO, -speed, low, speed, Vec3::ZERO, high, Vec3::ZERO]),
     };
     let (flat, tall) = (vec3(1.14, 0.78, 1.14), vec3(0.96, 1.08, 0.96));
     let squash = Channel {
         node: ball,
         interpolation: Interpolation::Linear,
-        times: vec![0.0, 0.1, 0.3, 0.9, 1.1, 1.2],
-        values: Keys::Scale(vec![flat, tall, Vec3::ONE, Vec3::ONE, tall, flat]),
+        times: vec![0.0, 0.3, 0.5, 0.6, 0.7, 0.9, 1.2],
+        values: Keys::Scale(vec![Vec3::ONE, Vec3::ONE, tall, flat, tall, Vec3::ONE, Vec3::ONE]),
     };
     stage.scene.animations.push(Animation { name: "ball".to_owned(), channels: vec![fall, squash] });
 }
@@ -289,5 +289,5 @@ fn follower(stage: &mut Stage) {
     let figure = stage.scene.nodes.iter().position(|n| n.name == "figure").map(|i| i as u32);
     let node = &mut stage.scene.nodes[node as usize];
     node.parent = figure;
-    node.local = super::kit::looking(vec3(1.35, 1.4, 1.9), vec3(0.05, 0.92, 0.1));
+    node.local = super::kit::looking(vec3(1.75, 1.5, 2.15), vec3(0.0, 0.9, 0.1));
 }

@@ -97,10 +97,13 @@ fn shell(stage: &mut Stage, palette: &Palette) {
     stage.add("floor", Model::of(concrete, sheet(2.0 * x, 2.0 * z + 0.6, 1, 1).at(0.0, 0.0, 0.3)));
     let blocks = stage.textured("painted blocks", &bricks(256, 4, 8, srgb(0xd6d2c6), srgb(0xb6b2a7), 8), 1.6, 0.9);
     let brick = stage.textured("brick", &bricks(512, 6, 18, srgb(0x9b4a32), srgb(0xb5aea0), 9), 1.4, 0.9);
-    stage.add("back wall", Model::of(blocks, wall(2.0 * x, HEIGHT, 0.2, &[]).at(-x, 0.0, -z)));
-    stage.add("left wall", Model::of(blocks, wall(2.0 * z, HEIGHT, 0.2, &[]).turned_y(90.0).at(-x, 0.0, z)));
+    stage.add("back wall", Model::of(blocks, wall(2.0 * x + 0.4, HEIGHT + 0.35, 0.2, &[]).at(-x - 0.2, 0.0, -z)));
+    stage.add("left wall", Model::of(blocks, wall(2.0 * z, HEIGHT + 0.35, 0.2, &[]).turned_y(90.0).at(-x, 0.0, z)));
     let window = Opening { left: 2.2, bottom: 1.3, width: 1.4, height: 0.8 };
-    stage.add("right wall", Model::of(blocks, wall(2.0 * z, HEIGHT, 0.2, &[window]).turned_y(-90.0).at(x, 0.0, -z)));
+    stage.add(
+        "right wall",
+        Model::of(blocks, wall(2.0 * z, HEIGHT + 0.35, 0.2, &[window]).turned_y(-90.0).at(x, 0.0, -z)),
+    );
     let mut frame = cuboid(0.06, 0.05, 1.4).at(x + 0.1, 1.325, -z + 2.9);
     frame.append(&cuboid(0.06, 0.05, 1.4).at(x + 0.1, 2.075, -z + 2.9));
     for k in -1..=1 {
@@ -192,11 +195,12 @@ fn lights(stage: &mut Stage, palette: &Palette) {
     }
     stage.spot("tubes", ([0.2, HEIGHT - 0.48, -1.6], [0.2, 0.0, -1.6]), srgb(0xe6f0ff), 13.0, (45.0, 80.0));
     let sky = GradientSky {
-        zenith: vec3(0.12, 0.24, 0.5),
-        horizon: vec3(0.55, 0.64, 0.72),
-        ground: vec3(0.2, 0.2, 0.16),
+        // Darker than by the sun, as in the office: the sky must not flood the room of a technique that lets it in.
+        zenith: vec3(0.04, 0.08, 0.16),
+        horizon: vec3(0.16, 0.19, 0.22),
+        ground: vec3(0.06, 0.06, 0.05),
         to_sun,
-        glow: vec3(0.8, 0.68, 0.5),
+        glow: vec3(0.2, 0.17, 0.12),
     };
     stage.scene.environment = Some(sky.environment("summer sky", 256, 128));
 }

@@ -66,13 +66,13 @@ const ENTRIES: &[Entry] = &[
     Entry {
         name: "teapot",
         description: "Utah teapot from its 32 Bezier patches, with cups on a table by coloured walls",
-        exposure: 1.0,
+        exposure: 0.7,
         build: teapot::build,
     },
     Entry {
         name: "office",
         description: "Office for four: sun through blinds and a lamp, about 21 000 triangles",
-        exposure: 1.0,
+        exposure: 1.3,
         build: office::build,
     },
     Entry {

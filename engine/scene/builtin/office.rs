@@ -40,6 +40,7 @@ pub(super) fn build() -> Scene {
     shell(&mut stage, &palette);
     desks(&mut stage, &palette);
     along_the_walls(&mut stage, &palette);
+    skyline(&mut stage);
     lights(&mut stage, &palette);
 
     stage.camera("door", [-3.35, 1.62, 2.45], [0.6, 0.75, -0.9], 52.0);
@@ -98,12 +99,15 @@ fn shell(stage: &mut Stage, palette: &Palette) {
     let pile = stage.textured("carpet", &carpet(256, srgb(0x8f9296), 2), 0.9, 1.0);
     stage.add("floor", Model::of(pile, sheet(2.0 * x, 2.0 * z, 1, 1)));
     let ceiling = stage.paint("ceiling", 0xecebe6, 0.95);
-    stage.add("ceiling", Model::of(ceiling, sheet(2.0 * x, 2.0 * z, 1, 1).turned_x(180.0).at(0.0, HEIGHT, 0.0)));
+    stage.add("ceiling", Model::of(ceiling, slab([-x - 0.5, HEIGHT, -z - 0.5], [x + 0.5, HEIGHT + 0.3, z + 0.5])));
 
     let plaster = stage.textured("plaster", &mottled(128, 16, srgb(0xe2ddd2), srgb(0xd8d2c6), 0.0008, 6), 1.0, 0.95);
     let sage = stage.textured("sage plaster", &mottled(128, 16, srgb(0x8da58a), srgb(0x83997f), 0.0008, 7), 1.0, 0.95);
-    stage.add("back wall", Model::of(plaster, wall(2.0 * x, HEIGHT, 0.15, &[]).at(-x, 0.0, -z)));
-    stage.add("front wall", Model::of(plaster, wall(2.0 * x, HEIGHT, 0.15, &[]).turned_y(180.0).at(x, 0.0, z)));
+    stage.add("back wall", Model::of(plaster, wall(2.0 * x + 0.6, HEIGHT, 0.15, &[]).at(-x - 0.3, 0.0, -z)));
+    stage.add(
+        "front wall",
+        Model::of(plaster, wall(2.0 * x + 0.6, HEIGHT, 0.15, &[]).turned_y(180.0).at(x + 0.3, 0.0, z)),
+    );
     let door = Opening { left: 0.5, bottom: 0.0, width: 0.95, height: 2.08 };
     stage.add("left wall", Model::of(sage, wall(2.0 * z, HEIGHT, 0.15, &[door]).turned_y(90.0).at(-x, 0.0, z)));
     let leaf = bevel_box(0.94, 2.07, 0.045, 0.004).turned_y(90.0).at(-x - 0.06, 1.035, z - 0.975);
@@ -284,6 +288,29 @@ fn poster(stage: &mut Stage) {
     stage.mesh_at("sign", Model::of(sign, face), placed(vec3(x + 0.006, 2.2, HALF.1 - 0.76), 90.0));
 }
 
+/// What the windows show: a bright unlit picture of a skyline, low enough to let the sun pass above it.
+fn skyline(stage: &mut Stage) {
+    let picture = Picture::new(256, 64, |uv| {
+        let block = (uv.x * 23.0).floor();
+        let roof = 0.42 + 0.34 * value_noise(vec2(block * 5.3, 0.5), 0, 33);
+        let pane = ((uv.x * 138.0).fract() > 0.45) && ((uv.y * 32.0).fract() > 0.5);
+        let wall = srgb(0xc7c9c8).lerp(srgb(0x9aa3ab), value_noise(vec2(block * 2.1, 3.5), 0, 34));
+        let sky = srgb(0xe6eef6).lerp(srgb(0xc3d8ee), 1.0 - uv.y);
+        let color = match (uv.y > roof, pane) {
+            (true, true) => wall * 0.72,
+            (true, false) => wall,
+            _ => sky,
+        };
+        (color, 0.0)
+    });
+    let view = stage.pictured("skyline", &picture, vec2(36.0, 8.0), 1.0);
+    stage.scene.materials[view as usize].unlit = true;
+    let x = HALF.0 + 9.0;
+    let mut pane = Geometry::default();
+    pane.flat_quad([(-18.0, -3.0), (18.0, -3.0), (18.0, 5.0), (-18.0, 5.0)].map(|(z, y)| vec3(x, y, z)));
+    stage.add("skyline", Model::of(view, pane));
+}
+
 /// The sun through the blinds and a lamp over the desks.
 fn lights(stage: &mut Stage, palette: &Palette) {
     let to_sun = vec3(0.8, 0.52, 0.3).normalize();
@@ -293,11 +320,12 @@ fn lights(stage: &mut Stage, palette: &Palette) {
     let below = [lamp.x, HEIGHT - 0.5 - 0.09, lamp.z];
     stage.spot("pendant", (below, [lamp.x, 0.0, lamp.z]), srgb(0xffe8c8), 13.0, (40.0, 80.0));
     let sky = GradientSky {
-        zenith: Vec3::new(0.22, 0.36, 0.62),
-        horizon: Vec3::new(0.62, 0.7, 0.78),
-        ground: Vec3::new(0.2, 0.2, 0.17),
+        // Much darker than by the sun: techniques that take the sky for unshadowed ambient light would flood the room.
+        zenith: Vec3::new(0.03, 0.05, 0.085),
+        horizon: Vec3::new(0.1, 0.115, 0.13),
+        ground: Vec3::new(0.05, 0.048, 0.04),
         to_sun,
-        glow: Vec3::new(0.6, 0.5, 0.35),
+        glow: Vec3::new(0.1, 0.085, 0.06),
     };
     stage.scene.environment = Some(sky.environment("morning sky", 128, 64));
 }

@@ -62,7 +62,7 @@ fn clothes(p: Vec3) -> Vec3 {
         srgb(0x33251f)
     } else if mouth < 0.016 {
         srgb(0xa4534a)
-    } else if p.y > 1.47 && p.x.abs() < 0.095 {
+    } else if p.y > 1.47 && (p.x.abs() < 0.095 || p.y > 1.52) {
         let hairline = p.y - 1.655 - 0.9 * (p.z - 0.01).max(-0.09) + 0.4 * p.x.abs();
         if p.y > 1.56 && hairline > 0.0 { srgb(0x3a2416) } else { srgb(0xd9a07c) }
     } else if far_out && on_arm > 0.12 {

@@ -33,9 +33,9 @@ impl Stage {
         self.material(Material { roughness, double_sided: true, ..Material::diffuse(name, srgb(hex)) })
     }
 
-    /// A metal of an sRGB colour.
+    /// A worn metal of an sRGB colour: half metallic, so that techniques without reflections do not show it black.
     pub fn metal(&mut self, name: &str, hex: u32, roughness: f32) -> u32 {
-        self.material(Material { metallic: 1.0, roughness, ..Material::diffuse(name, srgb(hex)) })
+        self.material(Material { metallic: 0.5, roughness, ..Material::diffuse(name, srgb(hex)) })
     }
 
     /// A rough dielectric coloured by a picture that spans `metres` on the surface; its relief becomes a normal map
