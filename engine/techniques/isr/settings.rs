@@ -176,7 +176,8 @@ pub struct Settings {
     pub receiver: Receiver,
     /// Power of indirect light. The area estimator needs no balancing: 1.
     pub k_isr: f32,
-    /// Power of occlusion, 0 to 1.
+    /// Power of occlusion, 0 to 1: light is multiplied by accessibility + 1 − k_ssao, at most 1 (equation 29). With 1 this is
+    /// accessibility itself; with the dissertation's 0.5, light is darkened only where more than half is occluded.
     pub k_ssao: f32,
     pub occlude: Occlude,
     pub light_law: LightLaw,
@@ -218,7 +219,7 @@ impl Default for Settings {
             upsample_epsilon: 1e-3,
             receiver: Receiver::Albedo,
             k_isr: 1.0,
-            k_ssao: 0.5,
+            k_ssao: 1.0,
             occlude: Occlude::Ambient,
             light_law: LightLaw::Physical,
             light_radius: 0.0,
