@@ -145,6 +145,12 @@ impl Resident {
         if packing.resampled > 0 {
             notes.push(note("textures", format!("{} resized to share array images", packing.resampled)));
         }
+        if scene.materials.iter().any(|m| m.transmission > 0.0) {
+            notes.push(note("materials", "surfaces with transmission are drawn opaque"));
+        }
+        if scene.environment.iter().flat_map(|e| &e.pixels).any(|p| p.max_element() > BRIGHTEST) {
+            notes.push(note("environment", format!("radiance over {BRIGHTEST} is cut there")));
+        }
         let materials: Vec<types::Material> = scene.materials.iter().map(|m| material::material(m, &packing)).collect();
         let mut bytes = 0;
         let mut buffer = |name: &str, contents: &[u8]| -> Result<OwnedBuffer> {
@@ -365,7 +371,10 @@ fn one_texel(gpu: &Gpu, name: &str, format: vk::Format, bytes: &[u8]) -> Result<
     OwnedImage::with_contents(gpu, name, ImageDesc::new(format, 1, 1), &[Region { mip: 0, layer: 0, bytes }])
 }
 
-/// The environment in half floats; radiance over 65504 is cut there.
+/// The largest half float.
+const BRIGHTEST: f32 = 65504.0;
+
+/// The environment in half floats; radiance over [`BRIGHTEST`] is cut there.
 fn environment(gpu: &Gpu, environment: Option<&Environment>, max_side: u32) -> Result<OwnedImage> {
     let name = "scene.environment";
     let format = vk::Format::R16G16B16A16_SFLOAT;
@@ -382,7 +391,7 @@ fn environment(gpu: &Gpu, environment: Option<&Environment>, max_side: u32) -> R
     let texels: Vec<[f16; 4]> = env
         .pixels
         .iter()
-        .map(|p| p.clamp(glam::Vec3::ZERO, glam::Vec3::splat(65504.0)).extend(1.0).to_array().map(f16::from_f32))
+        .map(|p| p.clamp(glam::Vec3::ZERO, glam::Vec3::splat(BRIGHTEST)).extend(1.0).to_array().map(f16::from_f32))
         .collect();
     let bits: Vec<[u16; 4]> = texels.iter().map(|t| t.map(f16::to_bits)).collect();
     let desc = ImageDesc::new(format, env.width, env.height);

@@ -186,6 +186,7 @@ fn chains(scene: &Scene, array: &Array, textures: &[u32]) -> Vec<Vec<Vec<Texel>>
 
 /// All levels of an image, the given one first; each is the 2×2 mean of the one before, taken in linear light.
 fn mips(base: Vec<Texel>, width: u32, height: u32, encoding: Encoding) -> Vec<Vec<Texel>> {
+    let tables = Tables::get();
     let mut levels = vec![base];
     let (mut w, mut h) = (width as usize, height as usize);
     while w > 1 || h > 1 {
@@ -193,10 +194,15 @@ fn mips(base: Vec<Texel>, width: u32, height: u32, encoding: Encoding) -> Vec<Ve
         let last = &levels[levels.len() - 1];
         let mut next = Vec::with_capacity(nw * nh);
         for y in 0..nh {
-            let rows = [(2 * y).min(h - 1) * w, (2 * y + 1).min(h - 1) * w];
+            let top = &last[(2 * y).min(h - 1) * w..][..w];
+            let bottom = &last[(2 * y + 1).min(h - 1) * w..][..w];
             for x in 0..nw {
-                let columns = [(2 * x).min(w - 1), (2 * x + 1).min(w - 1)];
-                next.push(mean(rows.map(|r| columns.map(|c| last[r + c])), encoding));
+                let (left, right) = ((2 * x).min(w - 1), (2 * x + 1).min(w - 1));
+                let four = [top[left], top[right], bottom[left], bottom[right]];
+                next.push(match encoding {
+                    Encoding::Srgb => mean_of_light(four, tables),
+                    Encoding::Linear => mean(four),
+                });
             }
         }
         (w, h) = (nw, nh);
@@ -205,18 +211,25 @@ fn mips(base: Vec<Texel>, width: u32, height: u32, encoding: Encoding) -> Vec<Ve
     levels
 }
 
-fn mean(texels: [[Texel; 2]; 2], encoding: Encoding) -> Texel {
-    let tables = Tables::get();
-    std::array::from_fn(|channel| {
-        let all = texels.as_flattened().iter().map(|t| t[channel]);
-        if encoding == Encoding::Srgb && channel < 3 {
-            let sum: u32 = all.map(|v| u32::from(tables.linear[usize::from(v)])).sum();
-            tables.encoded[((sum + 2) / 4) as usize]
-        } else {
-            let sum: u32 = all.map(u32::from).sum();
-            ((sum + 2) / 4) as u8
-        }
-    })
+// Written out for speed in unoptimised builds: all textures of a scene pass through here at start.
+fn mean([a, b, c, d]: [Texel; 4]) -> Texel {
+    let mut out = [0; 4];
+    for i in 0..4 {
+        out[i] = ((u32::from(a[i]) + u32::from(b[i]) + u32::from(c[i]) + u32::from(d[i]) + 2) / 4) as u8;
+    }
+    out
+}
+
+/// As [`mean`], of sRGB texels in linear light; alpha is linear as it is.
+fn mean_of_light(four: [Texel; 4], tables: &Tables) -> Texel {
+    let [a, b, c, d] = four;
+    let linear = |v: u8| u32::from(tables.linear[usize::from(v)]);
+    let mut out = mean(four);
+    for i in 0..3 {
+        let sum = linear(a[i]) + linear(b[i]) + linear(c[i]) + linear(d[i]);
+        out[i] = tables.encoded[((sum + 2) / 4) as usize];
+    }
+    out
 }
 
 /// sRGB to 16-bit linear and back.
