@@ -99,6 +99,17 @@ fn a_wait_that_never_ends_names_the_pass() {
     }
 }
 
+/// Threads of a CPU driver still work on the frame while the process ends: it must end with its own exit code.
+#[test]
+fn the_exit_code_survives_a_loss_in_the_middle_of_work() {
+    if have_device() {
+        for _ in 0..20 {
+            let outcome = Case::new("frames").layer(&[("VKFAULT", "vkWaitForFences@2+=DEVICE_LOST")]).run();
+            assert_eq!(outcome.code, Some(6), "{outcome:#?}");
+        }
+    }
+}
+
 #[test]
 fn every_call_may_fail() {
     each(&[

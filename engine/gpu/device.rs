@@ -19,6 +19,7 @@ use gpu_allocator::{
 
 use super::{
     caps::Caps,
+    exit::skip_foreign_handlers,
     facts::{Candidate, Features, candidates},
     fault::{Latch, failed},
     instance::{Instance, no_driver},
@@ -385,6 +386,7 @@ impl Context {
 
     /// The device may still work although it counts as lost: from now on nothing of it is freed or destroyed.
     pub fn abandon(&self) {
+        skip_foreign_handlers();
         self.abandoned.store(true, Ordering::Release);
     }
 

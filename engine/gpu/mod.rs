@@ -22,6 +22,7 @@ mod buffer;
 mod caps;
 mod descriptors;
 mod device;
+mod exit;
 mod facts;
 mod fault;
 mod format;

@@ -1,4 +1,5 @@
-//! Starting this program anew with a fault in its environment, and failing every call of a function in turn.
+//! Starting a program with a fault in its environment, and failing every call of a function in turn.
+#![allow(dead_code)]
 
 use std::{
     collections::HashMap,
@@ -118,15 +119,26 @@ pub struct Case {
 }
 
 impl Case {
+    /// This test program, as a child with this task.
     pub fn new(task: &str) -> Self {
         let mut command = Command::new(std::env::current_exe().unwrap());
         command.args(["--exact", "child_process", "--nocapture", "--test-threads=1"]).env(TASK, task);
+        Self::of(command)
+    }
+
+    /// Any program.
+    pub fn of(mut command: Command) -> Self {
         for (name, _) in gpu::ENVIRONMENT {
             if name != "LUCERNA_DEVICE" {
                 command.env_remove(name);
             }
         }
         Self { command, folder: tempfile::tempdir().unwrap(), variables: HashMap::new() }
+    }
+
+    pub fn args(mut self, args: impl IntoIterator<Item = impl AsRef<std::ffi::OsStr>>) -> Self {
+        self.command.args(args);
+        self
     }
 
     pub fn env(mut self, name: &str, value: impl AsRef<std::ffi::OsStr>) -> Self {
@@ -179,8 +191,18 @@ impl Case {
             .env("VKFAULT_REPORT", report)
     }
 
+    /// The faults that the layer has injected so far.
+    pub fn fired(&self) -> String {
+        fs::read_to_string(self.path("report")).unwrap_or_default()
+    }
+
     /// Runs it, at most two minutes.
     pub fn run(mut self) -> Outcome {
+        self.run_here()
+    }
+
+    /// [`Self::run`], so that the folder can be looked at afterwards.
+    pub fn run_here(&mut self) -> Outcome {
         let (out, err) = (self.path("out"), self.path("err"));
         self.command
             .envs(&self.variables)
