@@ -102,7 +102,7 @@ fn main() -> ExitCode {
 fn serve(command: Command, console: Console) -> Result<()> {
     match command {
         Command::Inspect { scene, json, .. } => {
-            let (scene, _) = source::open(scene.scene.as_deref(), scene.builtin.as_deref())?;
+            let (scene, _) = source::open(scene.scene.as_deref(), scene.builtin.as_deref(), &Default::default())?;
             let summary = inspect::summary(&scene);
             match json {
                 true => console::print_json(&console::to_json(&summary)?),

@@ -4,7 +4,12 @@ use std::{ops::Range, path::PathBuf, str::FromStr};
 
 use clap::{ArgAction, Args};
 
-use crate::{console::Console, framing::DefaultLight, progress::ProgressMode};
+use crate::{
+    console::Console,
+    framing::DefaultLight,
+    lights::{Point, Sun},
+    progress::ProgressMode,
+};
 
 /// Options of `render`, the same for every technique.
 #[derive(Args, Clone, Debug)]
@@ -16,6 +21,10 @@ pub struct RenderArgs {
     /// A built-in scene instead of a file (`lucerna list` names them)
     #[arg(long, value_name = "NAME", conflicts_with = "scene")]
     pub builtin: Option<String>,
+
+    /// Metres that one unit of the scene file stands for, where the format leaves it open (OBJ, C arrays) [default: 1]
+    #[arg(long, value_name = "METRES", value_parser = positive, conflicts_with = "builtin")]
+    pub unit: Option<f64>,
 
     /// Image to write; may be given more than once. The ending chooses the format: .exr (all layers), .png, .hdr, .pfm.
     /// Placeholders: {scene} {camera} {technique} {frame:04} {layer}. [default: {scene}-{camera}-{technique}.png]
@@ -77,6 +86,14 @@ pub struct RenderArgs {
     /// Light the scene with this .hdr or .exr environment instead of its own
     #[arg(long, alias = "env", value_name = "FILE", help_heading = "Picture")]
     pub environment: Option<PathBuf>,
+
+    /// Add a white point light: place in metres, intensity in W/sr; may be given more than once
+    #[arg(long, value_name = "X,Y,Z,INTENSITY", allow_hyphen_values = true, help_heading = "Picture")]
+    pub light: Vec<Point>,
+
+    /// Add a white sun, and a sky if there is no environment: degrees (azimuth 0 is over +Z, 90 over +X), W/m² [default: 2]
+    #[arg(long, value_name = "AZIMUTH,ELEVATION[,IRRADIANCE]", allow_hyphen_values = true, help_heading = "Picture")]
+    pub sun: Option<Sun>,
 
     /// Whether a sun and a sky are added
     #[arg(long, value_enum, default_value_t, value_name = "WHEN", help_heading = "Picture")]

@@ -55,22 +55,21 @@ pub fn add_missing_light(scene: &mut Scene, choice: DefaultLight) {
     if choice == DefaultLight::Never || (choice == DefaultLight::Auto && lit) {
         return;
     }
-    scene.lights.push(Light {
-        name: "default sun".into(),
-        kind: LightKind::Directional,
-        color: Vec3::ONE,
-        intensity: SUN,
-    });
-    let rotation = Quat::from_rotation_arc(Vec3::Z, SUN_FROM.normalize());
-    add_node(scene, "default sun", Mat4::from_quat(rotation), |node, scene| {
-        node.light = Some(scene.lights.len() as u32 - 1);
-    });
+    let light = Light { name: "default sun".into(), kind: LightKind::Directional, color: Vec3::ONE, intensity: SUN };
+    add_light(scene, light, Mat4::from_quat(Quat::from_rotation_arc(Vec3::Z, SUN_FROM.normalize())));
     scene.environment.get_or_insert_with(default_sky);
     note(scene, "lights", "a sun and a sky were added (--default-light never leaves them out)");
 }
 
+/// Adds a light that stands at `world`.
+pub fn add_light(scene: &mut Scene, light: Light, world: Mat4) {
+    let name = light.name.clone();
+    scene.lights.push(light);
+    add_node(scene, &name, world, |node, scene| node.light = Some(scene.lights.len() as u32 - 1));
+}
+
 /// Bluish above, grey at the horizon, brown below.
-fn default_sky() -> Environment {
+pub fn default_sky() -> Environment {
     let (width, height) = (8, 64);
     let [above, horizon, below] = SKY;
     let pixels = (0..height * width)

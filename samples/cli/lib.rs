@@ -11,6 +11,7 @@ pub mod framing;
 pub mod gbuffer_layers;
 pub mod info;
 pub mod inspect;
+pub mod lights;
 pub mod outputs;
 pub mod pattern;
 pub mod program;

@@ -6,7 +6,13 @@ use lucerna::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::{args::Size, camera::CameraFile, config, framing::DefaultLight};
+use crate::{
+    args::Size,
+    camera::CameraFile,
+    config,
+    framing::DefaultLight,
+    lights::{Point, Sun},
+};
 
 /// The `config` of a picture's metadata.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -14,6 +20,9 @@ pub struct Record {
     /// Executable and verb: `isr render`.
     pub command: Vec<String>,
     pub scene: Source,
+    /// Metres of one unit of the scene file, if it was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<f64>,
     /// Changes when the scene changes.
     pub fingerprint: String,
     pub width: u32,
@@ -31,6 +40,10 @@ pub struct Record {
     pub environment: Option<String>,
     #[serde(default)]
     pub default_light: DefaultLight,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub light: Vec<Point>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sun: Option<Sun>,
     pub seed: u32,
     /// The image of the render graph that is shown instead of the result.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -95,6 +108,13 @@ impl Record {
                 add(&["--camera", &path.to_string_lossy()]);
             }
         }
+        self.light.iter().for_each(|light| add(&[&format!("--light={light}")]));
+        if let Some(sun) = self.sun {
+            add(&[&format!("--sun={sun}")]);
+        }
+        if let Some(unit) = self.unit {
+            add(&[&format!("--unit={unit}")]);
+        }
         add(&["--frames", &format!("{}..={}", self.first_frame, self.frame)]);
         add(&[&format!("--time={}", self.time), &format!("--fps={}", self.fps)]);
         add(&[&format!("--exposure={}", self.exposure), &format!("--seed={}", self.seed)]);
@@ -149,7 +169,8 @@ mod tests {
         };
         let record = Record {
             command: vec!["isr".into(), "render".into()],
-            scene: Source::File("-odd.gltf".into()),
+            scene: Source::File("-odd.obj".into()),
+            unit: Some(0.01),
             fingerprint: "0".into(),
             width: 64,
             height: 48,
@@ -161,6 +182,8 @@ mod tests {
             exposure: 1.5,
             environment: None,
             default_light: DefaultLight::Never,
+            light: vec!["1,2,-3,4".parse().unwrap()],
+            sun: Some("-10,20".parse().unwrap()),
             seed: u32::MAX,
             view: None,
             mode: Some("direct".into()),
@@ -174,9 +197,12 @@ mod tests {
             again.arguments(folder.path()).unwrap().into_iter().map(|a| a.into_string().unwrap()).collect();
         let all = list.join(" ");
         for part in [
-            "render ./-odd.gltf --size 64x48",
+            "render ./-odd.obj --size 64x48",
             "--frames 2..=5",
             "--time=-0.1",
+            "--unit=0.01",
+            "--light=1,2,-3,4",
+            "--sun=-10,20,2",
             "--mode=direct",
             "--f32",
             "--default-light=never",

@@ -88,6 +88,7 @@ impl<'a> Run<'a> {
         let record = Record {
             command: vec![technique.name.into(), "render".into()],
             scene: stage.source.clone(),
+            unit: args.unit,
             fingerprint: stage.fingerprint.clone(),
             width: args.size.width,
             height: args.size.height,
@@ -99,6 +100,8 @@ impl<'a> Run<'a> {
             exposure: exposure.unwrap_or(0.0),
             environment: args.environment.as_ref().map(|path| path.to_string_lossy().into_owned()),
             default_light: args.default_light,
+            light: args.light.clone(),
+            sun: args.sun,
             seed: args.seed,
             view: args.view.clone(),
             mode: technique.mode.map(str::to_owned),

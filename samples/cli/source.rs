@@ -22,14 +22,19 @@ pub struct SceneArgs {
     pub builtin: Option<String>,
 }
 
+/// Options for reading a scene whose unit stands for `unit` metres.
+pub fn in_unit(unit: Option<f64>) -> LoadOptions {
+    LoadOptions { unit: unit.map(|metres| metres as f32), ..LoadOptions::default() }
+}
+
 /// Reads a file or makes a built-in scene.
 ///
 /// # Errors
 /// `Input` if the file cannot be served, `Usage` if there is no such built-in scene.
-pub fn open(file: Option<&Path>, name: Option<&str>) -> Result<(Scene, Source)> {
+pub fn open(file: Option<&Path>, name: Option<&str>, options: &LoadOptions) -> Result<(Scene, Source)> {
     match (file, name) {
         (Some(path), _) => {
-            let scene = scene::load(path, &LoadOptions::default())?;
+            let scene = scene::load(path, options)?;
             Ok((scene, Source::File(path.to_string_lossy().into_owned())))
         }
         (None, Some(name)) => Ok((builtin::load(name)?, Source::Builtin(name.to_owned()))),

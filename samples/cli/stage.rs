@@ -11,7 +11,7 @@ use lucerna::{
 use crate::{
     args::{RenderArgs, Size},
     camera::{self, Choice},
-    fingerprint, framing,
+    fingerprint, framing, lights,
     record::{self, Source},
     source,
 };
@@ -37,7 +37,8 @@ impl Stage {
     /// # Errors
     /// `Input` for files that cannot be served, `Usage` for names that do not exist.
     pub fn open(args: &RenderArgs) -> Result<Self> {
-        let (mut scene, source) = source::open(args.scene.as_deref(), args.builtin.as_deref())?;
+        let (mut scene, source) =
+            source::open(args.scene.as_deref(), args.builtin.as_deref(), &source::in_unit(args.unit))?;
         if scene.name.is_empty() {
             scene.name = "scene".into();
         }
@@ -47,6 +48,7 @@ impl Stage {
             scene.notes.extend(notes);
         }
         let fingerprint = fingerprint::scene(&scene);
+        lights::add(&mut scene, &args.light, args.sun.as_ref());
         framing::add_missing_light(&mut scene, args.default_light);
         let from_file = args.camera.as_deref().is_some_and(|asked| Path::new(asked).is_file());
         if !from_file {

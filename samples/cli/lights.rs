@@ -1,0 +1,159 @@
+//! Lights from the command line, for scenes that have none or the wrong ones.
+
+use std::{fmt, str::FromStr};
+
+use glam::{Mat4, Quat, Vec3};
+use lucerna::scene::{Light, LightKind, Scene};
+use serde::{Deserialize, Serialize};
+
+use crate::framing;
+
+/// Irradiance of a sun without a stated one, W/m².
+const SUN: f32 = 2.0;
+
+/// A white point light: `X,Y,Z,INTENSITY`, metres and W/sr.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub struct Point {
+    position: Vec3,
+    intensity: f32,
+}
+
+/// A white sun: `AZIMUTH,ELEVATION[,IRRADIANCE]`, degrees and W/m². Azimuth 0 stands over +Z, 90 over +X.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub struct Sun {
+    azimuth: f32,
+    elevation: f32,
+    irradiance: f32,
+}
+
+impl FromStr for Point {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match numbers(text)?[..] {
+            [x, y, z, intensity] if intensity > 0.0 => Ok(Self { position: Vec3::new(x, y, z), intensity }),
+            _ => Err("expected X,Y,Z,INTENSITY with an intensity above 0, like 0,2.5,0,10".into()),
+        }
+    }
+}
+
+impl FromStr for Sun {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (azimuth, elevation, irradiance) = match numbers(text)?[..] {
+            [azimuth, elevation] => (azimuth, elevation, SUN),
+            [azimuth, elevation, irradiance] => (azimuth, elevation, irradiance),
+            _ => return Err("expected AZIMUTH,ELEVATION[,IRRADIANCE], like 45,60".into()),
+        };
+        if !(-90.0..=90.0).contains(&elevation) || irradiance <= 0.0 {
+            return Err("the elevation must be from -90 to 90 degrees, the irradiance above 0".into());
+        }
+        Ok(Self { azimuth, elevation, irradiance })
+    }
+}
+
+fn numbers(text: &str) -> Result<Vec<f32>, String> {
+    let one = |word: &str| word.trim().parse().ok().filter(|x: &f32| x.is_finite());
+    text.split(',').map(|word| one(word).ok_or_else(|| format!("'{word}' is not a number"))).collect()
+}
+
+impl fmt::Display for Point {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Vec3 { x, y, z } = self.position;
+        write!(f, "{x},{y},{z},{}", self.intensity)
+    }
+}
+
+impl fmt::Display for Sun {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{},{},{}", self.azimuth, self.elevation, self.irradiance)
+    }
+}
+
+impl From<Point> for String {
+    fn from(light: Point) -> Self {
+        light.to_string()
+    }
+}
+
+impl From<Sun> for String {
+    fn from(sun: Sun) -> Self {
+        sun.to_string()
+    }
+}
+
+impl TryFrom<String> for Point {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+impl TryFrom<String> for Sun {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+impl Sun {
+    /// Unit vector towards the sun.
+    fn direction(&self) -> Vec3 {
+        let (azimuth, elevation) = (self.azimuth.to_radians(), self.elevation.to_radians());
+        Vec3::new(azimuth.sin() * elevation.cos(), elevation.sin(), azimuth.cos() * elevation.cos())
+    }
+}
+
+/// Adds the lights; a sun brings the default sky if the scene has no environment.
+pub fn add(scene: &mut Scene, points: &[Point], sun: Option<&Sun>) {
+    for (i, point) in points.iter().enumerate() {
+        let name = format!("light {i}");
+        let kind = LightKind::Point { range: None };
+        let light = Light { name, kind, color: Vec3::ONE, intensity: point.intensity };
+        framing::add_light(scene, light, Mat4::from_translation(point.position));
+    }
+    if let Some(sun) = sun {
+        let light =
+            Light { name: "sun".into(), kind: LightKind::Directional, color: Vec3::ONE, intensity: sun.irradiance };
+        // Lights shine down −Z of their node.
+        framing::add_light(scene, light, Mat4::from_quat(Quat::from_rotation_arc(Vec3::Z, sun.direction())));
+        scene.environment.get_or_insert_with(framing::default_sky);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lights_are_read_and_written() {
+        let point: Point = "1, -2.5,3,10".parse().unwrap();
+        assert_eq!(point, Point { position: Vec3::new(1.0, -2.5, 3.0), intensity: 10.0 });
+        assert_eq!(point.to_string().parse(), Ok(point));
+        let sun: Sun = "90,30".parse().unwrap();
+        assert_eq!(sun, Sun { azimuth: 90.0, elevation: 30.0, irradiance: SUN });
+        assert_eq!(sun.to_string().parse(), Ok(sun));
+        for wrong in ["", "1,2,3", "1,2,3,0", "1,2,3,x", "1,2,3,inf", "1,2,3,4,5"] {
+            assert!(wrong.parse::<Point>().is_err(), "{wrong}");
+        }
+        for wrong in ["90", "0,91", "0,45,-1", "0,nan"] {
+            assert!(wrong.parse::<Sun>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_sun_shines_from_where_it_stands() {
+        let mut scene = Scene::default();
+        add(&mut scene, &["0,2,0,5".parse().unwrap()], Some(&"90,0".parse().unwrap()));
+        assert_eq!((scene.lights.len(), scene.nodes.len()), (2, 2));
+        let shines = scene.nodes[1].local.matrix().transform_vector3(Vec3::NEG_Z);
+        assert!(shines.abs_diff_eq(Vec3::NEG_X, 1e-6), "{shines}");
+        assert!(scene.environment.is_some());
+        assert_eq!(scene.nodes[0].local.matrix().transform_point3(Vec3::ZERO), Vec3::Y * 2.0);
+    }
+}
