@@ -2,8 +2,8 @@
 //! has to find its way to the back wall; a work lamp helps at the bench.
 
 use super::kit::{
-    GradientSky, Model, Opening, Picture, Random, Stage, at, bevel_box, bricks, cuboid, fbm, mottled, placed, planks,
-    sheet, slab, srgb, value_noise, wall,
+    Geometry, GradientSky, Model, Opening, Picture, Random, Stage, at, bevel_box, bricks, cuboid, fbm, mottled, placed,
+    planks, sheet, slab, srgb, value_noise, wall,
 };
 use crate::scene::{Material, Scene};
 use glam::{Mat4, Vec3, vec2, vec3};
@@ -38,9 +38,13 @@ pub(super) fn build() -> Scene {
     outside(&mut stage);
     contents(&mut stage, &palette);
     let red = car::finish(&mut stage, "red paint", 0xb3241c);
-    stage.mesh_at("red car", car::car(&red), placed(vec3(-1.35, 0.0, 0.25), 3.0));
-    let blue = car::Finish { paint: stage.paint("blue paint", 0x2d5f8f, 0.22), ..red };
-    stage.mesh_at("blue car", car::car(&blue), placed(vec3(1.9, 0.0, 10.6), 172.0));
+    let hatchback = car::car(&red);
+    // The same car in another colour.
+    let blue = stage.paint("blue paint", 0x2d5f8f, 0.22);
+    let repainted = |part: &(u32, Geometry)| (if part.0 == red.paint { blue } else { part.0 }, part.1.clone());
+    let blue = Model { parts: hatchback.parts.iter().map(repainted).collect() };
+    stage.mesh_at("red car", hatchback, placed(vec3(-1.35, 0.0, 0.25), 3.0));
+    stage.mesh_at("blue car", blue, placed(vec3(1.9, 0.0, 10.6), 172.0));
     lights(&mut stage, &palette);
 
     stage.camera("drive", [1.9, 1.65, 8.0], [-0.35, 1.0, 0.0], 46.0);
@@ -118,7 +122,7 @@ fn shell(stage: &mut Stage, palette: &Palette) {
     let ceiling = stage.textured("ceiling boards", &planks(256, 8, srgb(0xc6b18c), srgb(0xa48a62), 42), 1.2, 0.85);
     stage.add("ceiling", Model::of(ceiling, sheet(2.0 * x, 2.0 * z, 1, 1).turned_x(180.0).at(0.0, HEIGHT, 0.0)));
     stage.add("roof", Model::of(lintel, slab([-x - 0.4, HEIGHT + 0.35, -z - 0.4], [x + 0.4, HEIGHT + 0.5, z + 0.5])));
-    let mut beams = super::kit::Geometry::default();
+    let mut beams = Geometry::default();
     for i in 0..4 {
         beams.append(&cuboid(2.0 * x, 0.16, 0.09).at(0.0, HEIGHT - 0.08, -2.4 + 1.6 * i as f32));
     }

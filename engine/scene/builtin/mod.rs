@@ -1,4 +1,4 @@
-//! Scenes made by code: no file to ship, the same on every machine, known in every number.
+//! Scenes made by code: no file to ship, the same every time, known in every number.
 //!
 //! ```
 //! let scene = lucerna::scene::builtin::load("cornell")?;
