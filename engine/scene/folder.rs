@@ -80,6 +80,17 @@ pub fn read_file(path: &Path, name: &str, limit: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// The first bytes of a regular file, up to `length`, by which its format is told before it is read as a whole.
+pub fn read_head(path: &Path, length: u64) -> Result<Vec<u8>> {
+    let cannot = |error| Error::input("the file cannot be read").caused_by(error);
+    if !path.metadata().map_err(cannot)?.is_file() {
+        return Err(Error::input("is not a regular file"));
+    }
+    let mut head = Vec::new();
+    File::open(path).map_err(cannot)?.take(length).read_to_end(&mut head).map_err(cannot)?;
+    Ok(head)
+}
+
 /// As [`read_file`], for a file that a scene names.
 pub fn read_named(path: &Path, limit: u64) -> Result<Vec<u8>> {
     let name = path.file_name().unwrap_or_default();

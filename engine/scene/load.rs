@@ -38,8 +38,13 @@ fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
             None => "Name a .gltf, .glb or .obj file".to_owned(),
         }));
     }
-    let bytes = folder::read_file(path, "the file", options.limits.max_file)?;
-    let scene = match format(path, &bytes)? {
+    let head = folder::read_head(path, 4096)?;
+    let format = format(path, &head)?;
+    // Text is parsed as a whole in memory; the binary format may be larger.
+    let limits = &options.limits;
+    let limit = if gltf::is_glb(&head) { limits.max_file } else { limits.max_file.min(limits.max_alloc) };
+    let bytes = folder::read_file(path, "the file", limit)?;
+    let scene = match format {
         Format::Gltf => gltf::read(path, &bytes, &options.limits)?,
         Format::Obj => obj::read(path, &bytes, options.unit.unwrap_or(1.0), &options.limits)?,
         Format::Arrays => {
@@ -70,15 +75,20 @@ fn extension(path: &Path) -> Option<Format> {
     }
 }
 
-fn format(path: &Path, bytes: &[u8]) -> Result<Format> {
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    if gltf::is_glb(bytes) || text.trim_ascii_start().starts_with(b"{") {
+/// The format of a file that begins with `head`.
+fn format(path: &Path, head: &[u8]) -> Result<Format> {
+    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
+    if gltf::is_glb(head) || text.trim_ascii_start().starts_with(b"{") {
         return Ok(Format::Gltf);
     }
-    if c_arrays::recognise(bytes) {
+    if c_arrays::recognise(head) {
         return Ok(Format::Arrays);
     }
-    extension(path).ok_or_else(|| {
-        Error::input("is no scene file that can be read").help("Scenes are .gltf and .glb (glTF 2.0) and .obj files")
-    })
+    let none = |what: &str| Err(Error::input(what).help("Scenes are .gltf and .glb (glTF 2.0) and .obj files"));
+    let wide = head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff");
+    match extension(path) {
+        None => none("is no scene file that can be read"),
+        Some(_) if head.contains(&0) && !wide => none("is neither text nor a GLB container"),
+        Some(format) => Ok(format),
+    }
 }
