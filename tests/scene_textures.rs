@@ -117,3 +117,38 @@ fn transforms_move_coordinates_and_base_colours_are_decoded() {
         }
     });
 }
+
+#[test]
+fn mip_levels_are_chosen_by_the_sampler() {
+    // Every other texel is white: level 0 is black or white, all others are half.
+    let rgba = (0..64).map(|i| [if (i % 8 + i / 8) % 2 == 0 { 255 } else { 0 }; 4]).collect();
+    let texture = Texture { name: String::new(), width: 8, height: 8, rgba };
+    // The middle of texel (2, 2), which is white, at these levels of detail.
+    let lods = [-1.0, 0.0, 0.4, 0.6, 1.0, 2.0, 9.0];
+    let expected = [
+        (MipFilter::Linear, [1.0, 1.0, 0.8, 0.7, 0.5, 0.5, 0.5]),
+        (MipFilter::Nearest, [1.0, 1.0, 1.0, 0.5, 0.5, 0.5, 0.5]),
+        (MipFilter::None, [1.0; 7]),
+    ];
+    with_gpu(|gpu| {
+        for (mip, want) in expected {
+            let sampler = Sampler { mip, ..Sampler::default() };
+            let used = Some(TextureRef { sampler, ..TextureRef::new(0) });
+            let mut scene = Scene { textures: vec![texture.clone()], ..Scene::default() };
+            mesh(&mut scene, square(), Material { metallic_roughness_texture: used, ..Material::default() });
+            let probes = lods.map(|lod| types::TextureProbe { uv: [2.5 / 8.0; 2], slot: 1, lod, ..Default::default() });
+            let (frame, read) = frame(gpu, &scene, |graph, handles| {
+                let buffer = graph.buffer_from("probes", &probes);
+                let args =
+                    probe::Args { probes: buffer, materials: handles.materials, scene_textures: handles.textures };
+                graph.compute(args, lods.len() as u32);
+                graph.read_buffer(buffer)
+            });
+            let got: Vec<f32> = frame.buffer::<types::TextureProbe>(read).iter().map(|p| p.texel[1]).collect();
+            for (got, want) in got.iter().zip(want) {
+                // Hardware may keep as few as six bits of the level of detail.
+                assert!((got - want).abs() < 0.012, "{mip:?}: {got} is not {want}");
+            }
+        }
+    });
+}

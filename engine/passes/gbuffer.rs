@@ -118,7 +118,10 @@ pub fn draw(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings
             let state = Raster::new().cull(batch.map_or_else(Default::default, |b| b.sided.cull()));
             let draw =
                 batch.map_or_else(|| crate::graph::Draw::indexed(scene.indices, Vec::new()), |batch| batch.draw(scene));
-            graph.raster(targets(&gbuffer, index == 0), state.stencil(Stencil::write(1)), args, draw);
+            let pass = graph.raster(targets(&gbuffer, index == 0), state.stencil(Stencil::write(1)), args, draw);
+            if let Some(batch) = batch {
+                pass.named(format!("passes.gbuffer.{:?}.{:?}", batch.cutout, batch.sided).to_lowercase());
+            }
         }
     });
     gbuffer

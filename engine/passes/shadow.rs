@@ -6,7 +6,7 @@ mod slots;
 pub use slots::{Assignment, assign, project};
 
 use crate::{
-    graph::{Buffer, Depth, Extent, Format, Graph, Image, ImageDesc, Raster, Targets},
+    graph::{Buffer, Depth, Draw, Extent, Format, Graph, Image, ImageDesc, Raster, Targets},
     scene::{
         Note, NoteKind, View,
         cull::Frustum,
@@ -171,7 +171,7 @@ fn maps(graph: &mut Graph, scene: &Handles, assignment: &Assignment, shadows: Bu
     let extent = Extent::square(settings.size);
     let depth = graph.image_with("shadow.depth", ImageDesc::new(Format::D32F, extent).layers(count));
     for (index, slot) in assignment.slots.iter().enumerate() {
-        draw_slot(graph, scene, depth.layer(index as u32), slot);
+        draw_slot(graph, scene, depth.layer(index as u32), slot, &format!("passes.shadow.map{index}"));
     }
     if settings.kind != Kind::Exponential {
         return depth.nearest();
@@ -189,12 +189,13 @@ fn maps(graph: &mut Graph, scene: &Handles, assignment: &Assignment, shadows: Bu
             push: blur::Push { step, radius, deviation: settings.blur.max(1e-3), slots: count },
             spec: blur::Spec { from_hardware },
         };
-        graph.compute(args, [settings.size, settings.size, count]);
+        let name = if step == [1, 0] { "passes.shadow.blur.x" } else { "passes.shadow.blur.y" };
+        graph.compute(args, [settings.size, settings.size, count]).named(name);
     }
     filtered.nearest()
 }
 
-fn draw_slot(graph: &mut Graph, scene: &Handles, layer: Image, slot: &types::ShadowSlot) {
+fn draw_slot(graph: &mut Graph, scene: &Handles, layer: Image, slot: &types::ShadowSlot, name: &str) {
     let clip_from_world = slot.clip_from_world;
     let frustum = Frustum::from_clip(&glam::Mat4::from_cols_array_2d(&clip_from_world));
     let batches = Batches::of_casters(&scene.moment, Some(&frustum), glam::Vec3::ZERO);
@@ -209,7 +210,8 @@ fn draw_slot(graph: &mut Graph, scene: &Handles, layer: Image, slot: &types::Sha
     let (solid, holed): (Vec<_>, Vec<_>) = batches.list.iter().partition(|b| b.cutout == Cutout::Opaque);
     let calls = solid.iter().flat_map(|b| b.calls.iter().copied()).collect();
     let targets = |load| Targets::new().depth(layer, load);
-    graph.raster(targets(Depth::Clear(0.0)), state, args, crate::graph::Draw::indexed(scene.indices, calls));
+    let draw = Draw::indexed(scene.indices, calls);
+    graph.raster(targets(Depth::Clear(0.0)), state, args, draw).named(name);
     if holed.is_empty() {
         return;
     }
@@ -224,5 +226,6 @@ fn draw_slot(graph: &mut Graph, scene: &Handles, layer: Image, slot: &types::Sha
         push: cutout::Push { clip_from_world },
     };
     let calls = holed.iter().flat_map(|b| b.calls.iter().copied()).collect();
-    graph.raster(targets(Depth::Keep), state, args, crate::graph::Draw::indexed(scene.indices, calls));
+    let draw = Draw::indexed(scene.indices, calls);
+    graph.raster(targets(Depth::Keep), state, args, draw).named(format!("{name}.cutout"));
 }
