@@ -48,25 +48,25 @@ impl Image {
     /// Level `level` of the levels this handle covers.
     #[must_use]
     pub const fn mip(self, level: u32) -> Self {
-        Self { mip: self.mip + level, mips: 1, ..self }
+        Self { mip: self.mip.saturating_add(level), mips: 1, ..self }
     }
 
     /// Some of the levels this handle covers.
     #[must_use]
     pub const fn mips(self, levels: Range<u32>) -> Self {
-        Self { mip: self.mip + levels.start, mips: levels.end.saturating_sub(levels.start), ..self }
+        Self { mip: self.mip.saturating_add(levels.start), mips: levels.end.saturating_sub(levels.start), ..self }
     }
 
     /// Layer `layer` of the layers this handle covers.
     #[must_use]
     pub const fn layer(self, layer: u32) -> Self {
-        Self { layer: self.layer + layer, layers: 1, cube: false, ..self }
+        Self { layer: self.layer.saturating_add(layer), layers: 1, cube: false, ..self }
     }
 
     /// Some of the layers this handle covers.
     #[must_use]
     pub const fn layers(self, layers: Range<u32>) -> Self {
-        Self { layer: self.layer + layers.start, layers: layers.end.saturating_sub(layers.start), ..self }
+        Self { layer: self.layer.saturating_add(layers.start), layers: layers.end.saturating_sub(layers.start), ..self }
     }
 
     /// Six layers as one cube map.
@@ -125,7 +125,7 @@ impl Buffer {
     /// Bytes `range` of the bytes this handle covers. A shader may want the start to be a multiple of 256.
     #[must_use]
     pub const fn range(self, range: Range<u64>) -> Self {
-        Self { offset: self.offset + range.start, size: range.end.saturating_sub(range.start), ..self }
+        Self { offset: self.offset.saturating_add(range.start), size: range.end.saturating_sub(range.start), ..self }
     }
 
     /// Bytes that this handle covers.

@@ -12,6 +12,7 @@ use super::{
     Graph,
     access::Collector,
     format::ImageDesc,
+    grid::Grid,
     pass::{Origin, Pass, Work},
     vocab::{Access, Layout, Mistake, MistakeKind, Region, Resource, Scope, Stages, Usage, Use},
 };
@@ -96,64 +97,6 @@ pub struct Plan {
     names: BTreeMap<Resource, String>,
     /// The contents of buffers, uploaded before the first declared pass.
     pub(super) upload: Option<Pass>,
-}
-
-/// The cells of a physical resource.
-struct Grid {
-    a: Vec<u64>,
-    b: Vec<u64>,
-}
-
-impl Grid {
-    fn new<'a>(whole: &Region, regions: impl Iterator<Item = &'a Region>) -> Self {
-        let (mut a, mut b) = (vec![whole.a.0, whole.a.1], vec![whole.b.0, whole.b.1]);
-        for r in regions {
-            a.extend([r.a.0, r.a.1]);
-            b.extend([r.b.0, r.b.1]);
-        }
-        for cuts in [&mut a, &mut b] {
-            cuts.sort_unstable();
-            cuts.dedup();
-        }
-        Self { a, b }
-    }
-
-    fn columns(&self) -> usize {
-        self.b.len() - 1
-    }
-
-    fn cells(&self, region: &Region) -> impl Iterator<Item = usize> + use<> {
-        let at = |cuts: &[u64], v: u64| cuts.partition_point(|c| *c < v);
-        let (a0, a1) = (at(&self.a, region.a.0), at(&self.a, region.a.1));
-        let (b0, b1) = (at(&self.b, region.b.0), at(&self.b, region.b.1));
-        let columns = self.columns();
-        (a0..a1).flat_map(move |a| (b0..b1).map(move |b| a * columns + b))
-    }
-
-    /// `cells` (ascending) as few rectangles.
-    fn rectangles(&self, cells: &[usize]) -> Vec<Region> {
-        let columns = self.columns();
-        let mut runs: Vec<(usize, usize, usize)> = Vec::new();
-        for cell in cells {
-            let (a, b) = (cell / columns, cell % columns);
-            match runs.last_mut() {
-                Some((row, _, end)) if *row == a && *end == b => *end = b + 1,
-                _ => runs.push((a, b, b + 1)),
-            }
-        }
-        // (first row, end row, first column, end column)
-        let mut boxes: Vec<(usize, usize, usize, usize)> = Vec::new();
-        for (row, begin, end) in runs {
-            match boxes.iter_mut().find(|(_, row_end, b, e)| *row_end == row && *b == begin && *e == end) {
-                Some((_, row_end, ..)) => *row_end = row + 1,
-                None => boxes.push((row, row + 1, begin, end)),
-            }
-        }
-        boxes
-            .iter()
-            .map(|(r0, r1, c0, c1)| Region { a: (self.a[*r0], self.a[*r1]), b: (self.b[*c0], self.b[*c1]) })
-            .collect()
-    }
 }
 
 /// The epoch that a cell is in.
@@ -355,7 +298,7 @@ impl Plan {
         };
         let owner = (physical.source != Source::Pool).then(|| physical.occupants[0]);
         let start = Cell { scope: EARLIER, layout, owner, contents: physical.contents, untouched: true, barrier: None };
-        let mut cells = vec![start; (grid.a.len() - 1) * grid.columns()];
+        let mut cells = vec![start; grid.len()];
         let mut list: Vec<CellBarrier> = Vec::new();
         for (number, u) in &touches {
             let mut unwritten = false;
