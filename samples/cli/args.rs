@@ -51,6 +51,10 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub timings: Option<PathBuf>,
 
+    /// Render every frame N times; times are medians, and the picture is the first one
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = "Output")]
+    pub repeat: u32,
+
     /// List the passes with what they read and write, then stop
     #[arg(long, help_heading = "Output")]
     pub list_passes: bool,

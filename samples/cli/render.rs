@@ -116,6 +116,18 @@ pub fn render<S: Serialize + DeserializeOwned, R>(
         }
         progress.frame(frame, milliseconds, &files);
         run.done(frame, seconds, milliseconds, files, &result.report);
+        for _ in 1..args.repeat {
+            if interrupt.requested() {
+                break;
+            }
+            let begun = Instant::now();
+            let mut graph = Graph::new(technique.name);
+            (graph.frame, graph.seed) = (frame, args.seed);
+            let input = Input { gpu: &gpu, scene: &run.stage.scene, pose: &pose, view: &view, frame, seconds };
+            compose(&mut graph, &mut resources, &input, &settings)?;
+            let report = runner.run(&graph)?.report;
+            run.again(begun.elapsed().as_secs_f64() * 1e3, &report);
+        }
     }
     progress.finish();
     run.finish(&gpu)?;

@@ -203,7 +203,11 @@ fn the_timings_name_every_pass() {
     }
     let folder = folder();
     let csv = path(&folder, "t.csv");
-    isr(with(&["-o", &path(&folder, "{frame}.png"), "--frames", "0..2", "--timings", &csv])).expect(0, &[]);
+    let name = path(&folder, "{frame}.png");
+    let json = isr(with(&["-o", &name, "--frames", "0..2", "--timings", &csv, "--repeat", "3", "--json"]))
+        .expect(0, &[])
+        .json();
+    assert_eq!(json["frames"][1]["runs"].as_array().unwrap().len(), 3);
     let text = fs::read_to_string(&csv).unwrap();
     let mut lines = text.lines();
     assert_eq!(lines.next(), Some("frame,scope,pass,gpu_ms,cpu_ms"));
