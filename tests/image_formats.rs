@@ -250,9 +250,9 @@ fn png_maps_normals_and_depth_straight() {
     };
     assert_eq!(codes("normal", &picture).0, [128, 128, 255, 0, 153, 128]);
     // Near is white, far is black, the sky is black.
-    let depth = Layers::new(4, 1).with(Layer::new("depth", &["Z"], vec![2.0, 6.0, 4.0, f32::INFINITY]));
+    let depth = Layers::new(5, 1).with(Layer::new("depth", &["Z"], vec![2.0, 6.0, 4.0, f32::INFINITY, 1e10]));
     let (found, text) = codes("depth", &depth);
-    assert_eq!(found, [255, 0, 128, 0]);
+    assert_eq!(found, [255, 0, 128, 0, 0]);
     assert_eq!(text, "depth: value = 6 + code * -4");
 }
 

@@ -72,6 +72,9 @@ pub(super) fn encode(picture: &Layers, layer: &Layer, options: &WriteOptions) ->
     Ok(out)
 }
 
+/// Depth from here on is that of the background, and must not stretch the range. Metres.
+const SKY: f32 = 1e9;
+
 /// Into [0, 1]; NaN becomes 0.
 fn clamp(value: f32) -> f32 {
     if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) }
@@ -96,7 +99,7 @@ impl Mapping {
         if !depth && layer.channels.iter().all(|c| matches!(c.as_str(), "R" | "G" | "B" | "A" | "Y")) {
             return Self::Colour;
         }
-        let finite = || layer.data.iter().copied().filter(|value| value.is_finite());
+        let finite = || layer.data.iter().copied().filter(|value| value.abs() < SKY);
         let (least, most) = (finite().fold(f32::INFINITY, f32::min), finite().fold(f32::NEG_INFINITY, f32::max));
         match (least < most, depth) {
             (false, _) => Self::Affine { black: 0.0, white: 1.0 },
