@@ -321,6 +321,7 @@ fn gather_is_the_reference() {
                 normal: coarse.normal,
                 depth: coarse.depth,
                 gathered,
+                filtered: sender,
                 push: shaders::isr::gather::Push {
                     reach: 18.37,
                     occlusion_reach: 9.13,
@@ -342,6 +343,7 @@ fn gather_is_the_reference() {
                     occlusion: 1,
                     visibility_steps: 0,
                     paper_cells: (estimator == Estimator::PaperCells).into(),
+                    prefilter: 0,
                 },
             };
             graph.compute(args, extent);

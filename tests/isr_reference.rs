@@ -105,6 +105,7 @@ fn the_cornell_box_by_rays() {
             ("24 samples", Settings { samples: 24, ..default.clone() }),
             ("80 samples", Settings { samples: 80, ..default.clone() }),
             ("full resolution", Settings { resolution: Resolution::Full, samples: 80, ..default.clone() }),
+            ("no prefilter", Settings { prefilter: false, ..default.clone() }),
             ("all visible", Settings { visibility_steps: 0, ..default.clone() }),
             ("reach 40", Settings { reach: 40.0, ..default.clone() }),
             ("grid", Settings { pattern: Pattern::Grid, ..default.clone() }),

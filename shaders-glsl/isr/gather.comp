@@ -21,12 +21,16 @@ layout(constant_id = 5) const uint OCCLUSION = 1;
 layout(constant_id = 7) const uint PAPER_CELLS = 0;
 layout(constant_id = 6) const uint VISIBILITY_STEPS = 0;
 
+// A sample sends the mean radiance of a part of its cell instead of that of one texel.
+layout(constant_id = 8) const uint PREFILTER = 0;
+
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D sender;  // rgb radiance, a radiation mask
 layout(binding = 2) uniform sampler2D albedo;  // a: radiation mask of the receiver
 layout(binding = 3) uniform sampler2D normal;  // world, not normalised
 layout(binding = 4) uniform sampler2D depth;   // linear z / far; background 1
 layout(binding = 5, rgba16f) uniform writeonly image2D gathered;
+layout(binding = 6) uniform sampler2D filtered;  // mip levels of the senders, rgb times mask
 
 layout(push_constant, scalar) uniform Push {
     float reach;            // of the indirect samples, coarse pixels
@@ -106,6 +110,11 @@ void main() {
                 continue;
             }
             vec4 l = texelFetch(sender, at, 0);
+            if (PREFILTER != 0) {
+                float level = max(0.5 * log2(s.z) - 1.0, 0.0);
+                vec4 mean = textureLod(filtered, (vec2(at) + 0.5) / vec2(extent), level);
+                l.rgb = mean.a > 1e-3 ? mean.rgb / mean.a : l.rgb;
+            }
             light += f * l.a * l.rgb;
             factors += f;
         }

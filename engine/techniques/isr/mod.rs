@@ -15,7 +15,7 @@ pub use settings::{
 
 use crate::{
     Result,
-    graph::{Format, Graph, Image},
+    graph::{Format, Graph, Image, ImageDesc},
     passes::{
         ambient::Irradiance,
         bilateral, blur,
@@ -83,6 +83,16 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
         let gathered = graph.image("isr.gathered", Format::RGBA16F, graph.extent(coarse.depth));
         let longer = extent.width.max(extent.height) as f32;
         let reach = if settings.reach > 0.0 { settings.reach } else { 0.75 * longer };
+        let filtered = if settings.prefilter {
+            let desc = ImageDesc::new(Format::RGBA16F, graph.extent(coarse.depth)).all_mips();
+            let filtered = graph.image_with("isr.filtered", desc);
+            let args = shaders::isr::premultiply::Args { sender, premultiplied: filtered.mip(0) };
+            graph.compute(args, graph.extent(filtered));
+            graph.mips(filtered);
+            filtered.trilinear()
+        } else {
+            sender
+        };
         let push = shaders::isr::gather::Push {
             reach: reach / factor as f32,
             occlusion_reach: settings.occlusion_reach / factor as f32,
@@ -101,6 +111,7 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
             occlusion: settings.occlusion.into(),
             visibility_steps: settings.visibility_steps,
             paper_cells: (settings.patch == Patch::Cell).into(),
+            prefilter: settings.prefilter.into(),
         };
         let args = shaders::isr::gather::Args {
             view,
@@ -109,6 +120,7 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
             normal: coarse.normal,
             depth: coarse.depth,
             gathered,
+            filtered,
             push,
             spec,
         };

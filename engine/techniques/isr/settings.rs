@@ -147,6 +147,9 @@ pub struct Settings {
     pub spread: f32,
     /// Moves samples within their cells, differently from texel to texel; the blur averages.
     pub jitter: bool,
+    /// A sample sends the mean radiance around it, over half the side of its cell, instead of that of one texel: less noise
+    /// where senders are small and bright, and light of the wrong surface where surfaces meet.
+    pub prefilter: bool,
     /// Depth-buffer tests between receiver and sender, 0 to 16. 0: every sender in the image counts, as in the dissertation.
     pub visibility_steps: u32,
     /// Thickness that a surface in the depth buffer is taken to have, relative to its depth, when `visibility_steps` > 0.
@@ -202,6 +205,7 @@ impl Default for Settings {
             reach: 0.0,
             spread: 1.5,
             jitter: true,
+            prefilter: true,
             visibility_steps: 4,
             thickness: 0.1,
             bounces: 1,
@@ -241,6 +245,7 @@ impl Settings {
             reach: 32.0,
             spread: 1.0,
             jitter: false,
+            prefilter: false,
             visibility_steps: 0,
             blur_radius: 4,
             downsample: Downsample::Mean,
