@@ -116,7 +116,7 @@ fn the_cornell_box_by_rays() {
             let (share, error, correlation) = compare(&indirect, expected.iter().map(|e| (e.pixel, e.from_visible)));
             println!("{name:>16}: indirect {share:.3} of the visible, error {error:.3}, correlation {correlation:.3}");
             if matches!(name, "default" | "80 samples" | "full resolution") {
-                assert!((share - 1.0).abs() < 0.15 && error < 0.3 && correlation > 0.88, "{name}");
+                assert!((share - 1.0).abs() < 0.2 && error < 0.3 && correlation > 0.88, "{name}");
                 let (share, error, correlation) = compare(&direct, expected.iter().map(|e| (e.pixel, e.direct)));
                 println!(
                     "          direct: {share:.3} of the reference, error {error:.3}, correlation {correlation:.3}"

@@ -21,7 +21,7 @@ layout(constant_id = 5) const uint OCCLUSION = 1;
 layout(constant_id = 7) const uint PAPER_CELLS = 0;
 layout(constant_id = 6) const uint VISIBILITY_STEPS = 0;
 
-// A sample sends the mean radiance of a part of its cell instead of that of one texel.
+// A sample sends the mean radiance over a quarter of the side of its cell instead of that of one texel.
 layout(constant_id = 8) const uint PREFILTER = 0;
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
@@ -111,7 +111,7 @@ void main() {
             }
             vec4 l = texelFetch(sender, at, 0);
             if (PREFILTER != 0) {
-                float level = max(0.5 * log2(s.z) - 1.0, 0.0);
+                float level = max(0.5 * log2(s.z) - 2.0, 0.0);
                 vec4 mean = textureLod(filtered, (vec2(at) + 0.5) / vec2(extent), level);
                 l.rgb = mean.a > 1e-3 ? mean.rgb / mean.a : l.rgb;
             }

@@ -147,7 +147,7 @@ pub struct Settings {
     pub spread: f32,
     /// Moves samples within their cells, differently from texel to texel; the blur averages.
     pub jitter: bool,
-    /// A sample sends the mean radiance around it, over half the side of its cell, instead of that of one texel: less noise
+    /// A sample sends the mean radiance around it, over a quarter of the side of its cell, instead of that of one texel: less noise
     /// where senders are small and bright, and light of the wrong surface where surfaces meet.
     pub prefilter: bool,
     /// Depth-buffer tests between receiver and sender, 0 to 16. 0: every sender in the image counts, as in the dissertation.
