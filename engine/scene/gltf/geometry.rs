@@ -155,7 +155,10 @@ impl Meshes<'_> {
         }
         out.joints = joints.into_iter().map(|(_, rows)| rows).collect();
         out.weights = weights.into_iter().map(|(_, rows)| rows).collect();
-        normalize_weights(out)?;
+        let scaled = normalize_weights(out)?;
+        if scaled > 0 {
+            self.notes.repaired(here, format!("joint weights of {scaled} vertices scaled to a sum of one"));
+        }
         Ok(())
     }
 
@@ -306,15 +309,19 @@ fn vec4s(accessors: &Accessors, index: u32, format: Format) -> Result<Vec<Vec4>>
     Ok(accessors.floats::<4>(index, format)?.into_iter().map(Vec4::from).collect())
 }
 
-/// Makes the weights of each vertex sum to one; a vertex without weights follows its first joint.
-fn normalize_weights(primitive: &mut Primitive) -> Result<()> {
-    let Some(count) = primitive.weights.first().map(Vec::len) else { return Ok(()) };
+/// Makes the weights of each vertex sum to one, and says of how many vertices they did not. A vertex without weights
+/// follows its first joint.
+fn normalize_weights(primitive: &mut Primitive) -> Result<usize> {
+    let Some(count) = primitive.weights.first().map(Vec::len) else { return Ok(0) };
+    let mut scaled = 0;
     for i in 0..count {
         let weights = primitive.weights.iter().flat_map(|set| set[i].to_array());
         if let Some(weight) = weights.clone().find(|&weight| weight < 0.0) {
             return Err(Error::input(format!("weight {weight} of vertex {i} is negative")).at("WEIGHTS_0"));
         }
         let sum: f64 = weights.map(f64::from).sum();
+        // Eight-bit weights cannot do better than half a step each.
+        scaled += usize::from((sum - 1.0).abs() > 4.0 * 0.5 / 255.0);
         for (set, rows) in primitive.weights.iter_mut().enumerate() {
             rows[i] = match sum > 0.0 {
                 true => Vec4::from_array(rows[i].to_array().map(|weight| (f64::from(weight) / sum) as f32)),
@@ -323,5 +330,5 @@ fn normalize_weights(primitive: &mut Primitive) -> Result<()> {
             };
         }
     }
-    Ok(())
+    Ok(scaled)
 }
