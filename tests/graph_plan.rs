@@ -407,6 +407,11 @@ fn formats_and_shapes_must_fit() {
     assert_eq!(found, one(Shape, "test.pattern", "array"), "two layers as one image");
     let found = mistakes(|g| {
         let image = rgba(g, "a");
+        tinted(g, Targets::new().color(image, Load::Discard).stencil(StencilLoad::Keep));
+    });
+    assert_eq!(found, one(Shape, "test.tint", "-"), "stencil of no depth");
+    let found = mistakes(|g| {
+        let image = rgba(g, "a");
         write(g, image.mip(1));
     });
     assert_eq!(found, one(Range, "test.pattern", "a"));

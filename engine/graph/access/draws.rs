@@ -91,8 +91,8 @@ impl Collector<'_> {
                 Depth::Clear(_) => (Scope { access: Access::DEPTH_WRITE, ..keep }, Layout::Depth),
             };
             self.image(image, scope, layout, Usage::DEPTH, "depth");
-        } else if state.stencil.is_some() {
-            self.mistake(MistakeKind::Shape, "-", "a stencil test without a depth target");
+        } else if state.stencil.is_some() || targets.stencil.is_some() {
+            self.mistake(MistakeKind::Shape, "-", "stencil without a depth target");
         }
     }
 

@@ -84,6 +84,13 @@ impl Recorder<'_> {
                     }
                     (BindingKind::Uniform { size }, Some(Resource::Uniform(slice))) => {
                         let Some(arena) = &self.uniforms else { return Err(mismatch(binding.name)) };
+                        let limit = self.gpu.caps().limits.uniform_range;
+                        if u64::from(size) > limit {
+                            let what = format!("`{}` has {size} bytes; the device allows {limit}", binding.name);
+                            return Err(
+                                Error::new(ErrorKind::Runtime, what).help("Use a buffer instead of a uniform block")
+                            );
+                        }
                         buffers.push(
                             vk::DescriptorBufferInfo::default()
                                 .buffer(arena.raw())
