@@ -1,5 +1,7 @@
 //! Skinning and morphing on the GPU against the CPU.
 
+#[allow(dead_code)]
+mod common;
 mod scene_kit;
 
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
@@ -123,4 +125,46 @@ fn texture_coordinates_and_colours_morph_too() {
             );
         }
     });
+}
+
+/// Every vertex of every deformed primitive of real files, at a moment of their animations.
+#[test]
+fn animated_files_deform_as_on_the_cpu() {
+    let Some(assets) = common::assets() else { return };
+    for (file, seconds) in [
+        ("CesiumMan/CesiumMan.glb", 0.7),
+        ("Fox/Fox.glb", 1.1),
+        ("AnimatedMorphCube/AnimatedMorphCube.gltf", 1.3),
+        ("RiggedSimple/RiggedSimple.gltf", 1.9),
+    ] {
+        let path = assets.join("gltf").join(file);
+        let scene = lucerna::scene::load(&path, &Default::default()).unwrap();
+        let pose = Pose::playing(&scene, seconds);
+        with_gpu(|gpu| {
+            let mut resident = lucerna::scene::resident::Resident::new(gpu, &scene).unwrap();
+            let mut graph = lucerna::graph::Graph::new("animated");
+            let handles = resident.frame(&mut graph, &scene, seconds);
+            let reads = [handles.positions, handles.instances].map(|b| graph.read_buffer(b));
+            let frame = lucerna::graph::Runner::new(gpu).run(graph).unwrap();
+            let positions = frame.buffer::<[f32; 3]>(reads[0]);
+            let instances = frame.buffer::<lucerna::shaders::types::Instance>(reads[1]);
+            let mut farthest = 0.0_f32;
+            for (instance, host) in instances.iter().zip(&handles.moment.instances) {
+                let node = host.node as usize;
+                let mesh = &scene.meshes[scene.nodes[node].mesh.unwrap() as usize];
+                let primitive = mesh.primitives.iter().find(|p| p.indices.len() as u32 == host.indices).unwrap();
+                let world = Mat4::from_cols_array_2d(&instance.world_from_object);
+                let twin = world_vertices(&scene, &pose, node, primitive);
+                let size = host.bounds.half().length();
+                let bounds = host.bounds.grown(1e-4 * size);
+                for (v, expected) in twin.positions.iter().enumerate() {
+                    let got = world.transform_point3(positions[instance.first_vertex as usize + v].into());
+                    assert!(got.distance(*expected) < 2e-5 * size, "{file}, node {node}, vertex {v}: {got} {expected}");
+                    assert!(bounds.min.cmple(got).all() && got.cmple(bounds.max).all(), "{file}: {got} is outside");
+                    farthest = farthest.max(got.distance(primitive.positions[v]));
+                }
+            }
+            assert!(farthest > 0.05, "{file}: nothing moved");
+        });
+    }
 }
