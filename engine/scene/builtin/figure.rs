@@ -43,7 +43,7 @@ pub(super) fn build() -> Scene {
     stage.camera("court", [4.3, 2.3, 5.2], [-0.3, 0.85, -0.4], 42.0);
     stage.camera("eye level", [0.6, 1.55, 5.4], [0.0, 1.1, 0.0], 40.0);
     stage.camera("above", [-2.8, 6.4, 4.6], [0.0, 0.5, 0.0], 44.0);
-    stage.camera("sculpture", [1.0, 1.7, 2.5], [0.0, 1.42, 0.0], 42.0);
+    stage.camera("sculpture", [1.1, 1.75, 2.7], [0.0, 1.45, 0.0], 42.0);
     follower(&mut stage);
     stage.finish()
 }
@@ -173,7 +173,7 @@ fn sculpture(stage: &mut Stage) {
     let mut pedestal = bevel_box(0.62, 0.12, 0.62, 0.02).at(0.0, 0.06, 0.0);
     pedestal.append(&bevel_box(0.46, 0.68, 0.46, 0.02).at(0.0, 0.46, 0.0));
     pedestal.append(&bevel_box(0.6, 0.1, 0.6, 0.02).at(0.0, 0.85, 0.0));
-    pedestal.append(&frustum(0.08, 0.02, 0.2, 24).at(0.0, 0.9, 0.0));
+    pedestal.append(&frustum(0.09, 0.02, 0.32, 24).at(0.0, 0.9, 0.0));
     stage.add("pedestal", Model::of(stone, pedestal));
 
     let coral = stage.paint("coral", 0xe65a4f, 0.3);
@@ -201,7 +201,7 @@ fn sculpture(stage: &mut Stage) {
         })
         .collect();
     mesh_data.weights = vec![0.0, 0.0];
-    let form = stage.place("sculpture", mesh, at(0.0, 1.42, 0.0));
+    let form = stage.place("sculpture", mesh, at(0.0, 1.52, 0.0));
     // Ball, cube, star, ball; flat tangents hold each form for a moment.
     let keys = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0]];
     let morphing = Channel {
@@ -218,7 +218,8 @@ fn sculpture(stage: &mut Stage) {
     let brass = stage.metal("brass", 0xd2a95a, 0.28);
     let mut parent = stage.node(Node { name: "rings".to_owned(), local: form_place(), ..Node::default() });
     let mut channels = Vec::new();
-    for (i, (size, axis, turns)) in [(0.5, Vec3::X, 1), (0.44, Vec3::Y, -2), (0.38, Vec3::X, 2)].into_iter().enumerate()
+    for (i, (size, axis, turns)) in
+        [(0.55, Vec3::X, 1), (0.49, Vec3::Y, -2), (0.43, Vec3::X, 2)].into_iter().enumerate()
     {
         let path: Vec<Vec3> = circle(size, 72).iter().map(|p| vec3(p.x, p.y, 0.0)).collect();
         let ring = loop_sweep(&path, &circle(0.017, 12), true);
@@ -231,17 +232,17 @@ fn sculpture(stage: &mut Stage) {
 }
 
 fn form_place() -> Transform {
-    super::kit::trs(at(0.0, 1.42, 0.0))
+    super::kit::trs(at(0.0, 1.52, 0.0))
 }
 
 /// A ball that bounces on the spot, squashed where it lands.
 fn ball(stage: &mut Stage) {
     let rubber = stage.paint("ball", 0x2f6fd0, 0.35);
     let mesh = stage.mesh("ball", Model::of(rubber, sphere(0.2, 48, 24)));
-    let ball = stage.place("ball", mesh, at(2.9, 0.2, -1.6));
+    let ball = stage.place("ball", mesh, at(2.3, 0.2, -2.0));
     // A parabola is a cubic: fall and rise take 1.2 s under 9.81 m/s², exactly.
     let (half, gravity) = (0.6f32, 9.81);
-    let (low, high) = (vec3(2.9, 0.2, -1.6), vec3(2.9, 0.2 + 0.5 * gravity * half * half, -1.6));
+    let (low, high) = (vec3(2.3, 0.2, -2.0), vec3(2.3, 0.2 + 0.5 * gravity * half * half, -2.0));
     let speed = Vec3::Y * gravity * half;
     let fall = Channel {
         node: ball,

@@ -117,7 +117,7 @@ fn shell(stage: &mut Stage, palette: &Palette) {
     let gate = Opening { left: x + 0.2 - DOOR.0 * 0.5, bottom: 0.0, width: DOOR.0, height: DOOR.1 };
     let front = wall(2.0 * x + 0.4, HEIGHT + 0.35, 0.3, &[gate]).at(-x - 0.2, 0.0, z + 0.3);
     stage.add("front wall", Model::of(brick, front));
-    let lintel = stage.paint("lintel", 0xcfc8b8, 0.8);
+    let lintel = stage.paint("lintel", 0xb3ab9a, 0.8);
     stage.add("lintel", Model::of(lintel, bevel_box(DOOR.0 + 0.5, 0.22, 0.34, 0.015).at(0.0, DOOR.1 + 0.11, z + 0.16)));
     let ceiling = stage.textured("ceiling boards", &planks(256, 8, srgb(0xc6b18c), srgb(0xa48a62), 42), 1.2, 0.85);
     stage.add("ceiling", Model::of(ceiling, sheet(2.0 * x, 2.0 * z, 1, 1).turned_x(180.0).at(0.0, HEIGHT, 0.0)));

@@ -78,7 +78,7 @@ const ENTRIES: &[Entry] = &[
     Entry {
         name: "garage",
         description: "Garage with cars, racks and a workbench, its door open to daylight",
-        exposure: 1.3,
+        exposure: 1.0,
         build: garage::build,
     },
     Entry {

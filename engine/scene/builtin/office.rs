@@ -218,7 +218,7 @@ fn along_the_walls(stage: &mut Stage, palette: &Palette) {
     let size = Mat4::from_scale(Vec3::splat(0.45));
     stage.place("small plant", small, placed(vec3(3.1, 1.3, -z + 0.3), 40.0) * size);
     let plant = furniture::plant(palette, 24, &mut random);
-    stage.mesh_at("plant", plant, at(-x + 0.4, 0.0, -1.4 + 2.4));
+    stage.mesh_at("plant", plant, at(-x + 0.45, 0.0, -1.65));
     stage.mesh_at("basket", things::basket(palette), at(0.15, 0.0, -0.1));
     stage.mesh_at("clock", things::clock(palette), at(0.0, 2.2, -z + 0.001));
     board(stage, palette);
