@@ -314,6 +314,9 @@ fn text_beside_a_pfm_does_not_speak_for_another_image() {
     std::fs::write(&path, b"Pf 1 1 -1.0\n\0\0\0\0").unwrap();
     let error = image::metadata(&path).unwrap_err().to_string();
     assert!(error.contains("p.pfm.json: belongs to another image"), "{error}");
+    // The pixels are read all the same.
+    let picture = image::read(&path, &Default::default()).unwrap();
+    assert!(picture.metadata.is_empty() && picture.layers[0].data == [0.0]);
 }
 
 #[test]

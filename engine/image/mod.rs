@@ -180,7 +180,8 @@ pub fn read(path: impl AsRef<Path>, limits: &Limits) -> Result<Layers> {
     let bytes = read_file_checked(path, limits.max_file)?;
     let mut picture = decode(&bytes, limits).map_err(|error| error.in_file(path))?;
     if Format::sniff(&bytes) == Some(Format::Pfm) {
-        picture.metadata = sidecar::read(path, &bytes)?;
+        // Text of another image does not make this one unreadable; `metadata` says what is wrong with it.
+        picture.metadata = sidecar::read(path, &bytes).unwrap_or_default();
     }
     Ok(picture)
 }
