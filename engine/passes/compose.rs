@@ -59,6 +59,7 @@ pub fn sum(
         normal: g.normal,
         depth: g.depth,
         emission: g.emission,
+        specular: g.specular,
         direct,
         gathered,
         coarse_depth: coarse.depth,

@@ -29,9 +29,10 @@ layout(binding = 6) uniform sampler2D direct;        // with emission
 layout(binding = 7) uniform sampler2D gathered;      // coarse: rgb radiance, a occlusion
 layout(binding = 8) uniform sampler2D coarse_depth;
 layout(binding = 9) uniform sampler2D coarse_normal;
-layout(binding = 10, rgba16f) uniform writeonly image2D total;
-layout(binding = 11, rgba16f) uniform writeonly image2D indirect;
-layout(binding = 12, r32f) uniform writeonly image2D accessibility;
+layout(binding = 10) uniform sampler2D specular;  // rgb F0, a roughness
+layout(binding = 11, rgba16f) uniform writeonly image2D total;
+layout(binding = 12, rgba16f) uniform writeonly image2D indirect;
+layout(binding = 13, r32f) uniform writeonly image2D accessibility;
 
 layout(push_constant, scalar) uniform Push {
     float k_ssao;
@@ -104,7 +105,13 @@ void main() {
     vec4 own = texelFetch(emission, pixel, 0);
     vec3 glow = own.rgb;
     // The occlusion texture of the material darkens light from all around and nothing else.
-    vec3 around = color.rgb * color.a * own.a * ambient_irradiance(ambient, n) / 3.14159265358979;
+    vec3 around = color.rgb * ambient_irradiance(ambient, n);
+    // Metals have no diffuse part and would be black: what they reflect beyond a dielectric's 4 % takes the environment as
+    // blurred as its irradiance, from the mirrored direction.
+    vec4 gloss = texelFetch(specular, pixel, 0);
+    vec3 mirrored = normalize(mix(reflect(-to_camera(view, p), n), n, gloss.a * gloss.a));
+    around += max(gloss.rgb - 0.04, 0.0) * ambient_irradiance(ambient, mirrored);
+    around *= color.a * own.a / 3.14159265358979;
     vec3 direct_part = OCCLUDE_AMBIENT != 0 ? light.rgb : (light.rgb - glow) * lit + glow;
     vec3 sum = direct_part + around * lit + bounced;
     imageStore(total, pixel, vec4(sum, 1.0));

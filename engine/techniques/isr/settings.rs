@@ -188,7 +188,7 @@ pub struct Settings {
     pub light_radius: f32,
     /// Paper law: l_pow of the brightest light.
     pub light_power: f32,
-    /// Light of the environment on matt surfaces, times accessibility. The dissertation has none.
+    /// Light of the environment, times accessibility: on matt surfaces, and blurred on metals. The dissertation has none.
     pub environment: bool,
     /// GGX highlights of direct light.
     pub specular: bool,
