@@ -4,18 +4,19 @@
 
 use lucerna::image::Layers;
 
-/// Medians of luminance that are shown as they are, W/(sr·m²).
+/// Medians of the brightest channel that are shown as they are, W/(sr·m²).
 const FINE: std::ops::RangeInclusive<f32> = 0.01..=1.0;
 /// The median after exposure, where it had to be changed.
 const TARGET: f32 = 0.2;
 
 /// Whole stops by which the picture must be scaled to be seen: 0 if it can be seen as it is.
 ///
-/// From the median luminance of what is not black. Whole stops, so that rounding on another device does not show.
+/// From the median of what is not black. Whole stops, so that rounding on another device does not show.
 pub fn fitting(picture: &Layers) -> f64 {
     let Some(pixels) = picture.main().and_then(|layer| layer.rgb_pixels()) else { return 0.0 };
-    let luminance = pixels.iter().map(|[r, g, b]| 0.2126 * r + 0.7152 * g + 0.0722 * b);
-    let mut lit: Vec<f32> = luminance.filter(|l| l.is_finite() && *l > 0.0).collect();
+    // Not luminance: a blue room is not dark.
+    let brightest = pixels.iter().map(|[r, g, b]| r.max(*g).max(*b));
+    let mut lit: Vec<f32> = brightest.filter(|l| l.is_finite() && *l > 0.0).collect();
     if lit.is_empty() {
         return 0.0;
     }

@@ -6,16 +6,23 @@ use lucerna::scene::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::world;
+use crate::{
+    room::{self, Room},
+    world,
+};
 
 /// Full vertical angle of the camera that is added, radians.
 const YFOV: f32 = 45.0 * std::f32::consts::PI / 180.0;
+/// The same inside a room.
+const YFOV_ROOM: f32 = 60.0 * std::f32::consts::PI / 180.0;
 /// How much farther away than just seeing everything it stands.
 const ROOM: f32 = 1.05;
 /// Where the camera that is added stands, seen from the middle of the scene: to the right, above, in front.
 const VIEW_FROM: Vec3 = Vec3::new(0.55, 0.4, 1.0);
 /// Irradiance of the light that is added on a facing plane, W/m²: with the sky, a white wall facing it stays below radiance 1.
 const SUN: f32 = 2.0;
+/// Height of the lamp that is added in a closed room, of the height of the room. On the floor it gives as much as the sun.
+const LAMP: f32 = 0.8;
 /// Where that light comes from.
 const SUN_FROM: Vec3 = Vec3::new(0.5, 1.0, 0.6);
 /// Radiance of the sky that is added, W/(sr·m²): above, at the horizon, below.
@@ -26,11 +33,25 @@ pub fn add_missing_camera(scene: &mut Scene, aspect: f32) {
     if scene.nodes.iter().any(|node| node.camera.is_some()) {
         return;
     }
-    let bounds = world::reach(scene).unwrap_or(Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE });
-    let (world_from_view, projection) = fitted(&bounds, aspect);
-    scene.cameras.push(Camera { name: "fitted".into(), projection });
-    add_node(scene, "fitted camera", world_from_view, |node, scene| node.camera = Some(scene.cameras.len() as u32 - 1));
-    note(scene, "cameras", "the scene has no camera: one was added that sees all of it");
+    let (name, text, (world_from_view, projection)) = match room::find(scene) {
+        Some(room) => ("inside", "one was added inside the room that it is", in_room(&room)),
+        None => {
+            let bounds = world::reach(scene).unwrap_or(Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE });
+            ("fitted", "one was added that sees all of it", fitted(&bounds, aspect))
+        }
+    };
+    scene.cameras.push(Camera { name: name.into(), projection });
+    add_node(scene, "added camera", world_from_view, |node, scene| node.camera = Some(scene.cameras.len() as u32 - 1));
+    note(scene, "cameras", &format!("the scene has no camera: {text}"));
+}
+
+/// A camera at one end of a room, looking along it.
+fn in_room(room: &Room) -> (Mat4, Projection) {
+    let back = -room.forward;
+    let right = Vec3::Y.cross(back);
+    let world = Mat4::from_cols(right.extend(0.0), Vec3::Y.extend(0.0), back.extend(0.0), room.eye.extend(1.0));
+    let znear = (room.length * 2e-3).max(1e-4);
+    (world, Projection::Perspective { yfov: YFOV_ROOM, aspect: None, znear, zfar: Some(room.length * 2.0) })
 }
 
 /// When a light and a sky are added.
@@ -53,6 +74,19 @@ pub fn add_missing_light(scene: &mut Scene, choice: DefaultLight) {
         || scene.nodes.iter().any(|node| node.light.is_some())
         || scene.materials.iter().any(lamp);
     if choice == DefaultLight::Never || (choice == DefaultLight::Auto && lit) {
+        return;
+    }
+    if let Some((under, floor)) = room::find(scene).and_then(|room| Some((room.ceiling?, room.floor))) {
+        // The sun does not reach a closed room, and a sky would shine through its walls.
+        let height = under.y - floor.y;
+        let lamp = Light {
+            name: "default lamp".into(),
+            kind: LightKind::Point { range: None },
+            color: Vec3::ONE,
+            intensity: SUN * (LAMP * height).powi(2),
+        };
+        add_light(scene, lamp, Mat4::from_translation(floor + Vec3::Y * LAMP * height));
+        note(scene, "lights", "a lamp was added inside the room (--default-light never leaves it out)");
         return;
     }
     let light = Light { name: "default sun".into(), kind: LightKind::Directional, color: Vec3::ONE, intensity: SUN };

@@ -19,6 +19,7 @@ pub mod progress;
 pub mod record;
 pub mod render;
 pub mod rerun;
+pub mod room;
 pub mod run;
 pub mod shown;
 pub mod signals;
