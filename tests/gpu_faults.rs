@@ -361,7 +361,7 @@ fn a_device_lost_at_submit_or_wait_names_the_pass() {
 #[test]
 fn a_device_that_the_driver_gives_up_names_the_pass() {
     if have_device() {
-        let outcome = Case::new("long").env("MESA_VK_MAX_TIMEOUT", "100").run();
+        let outcome = Case::new("long").env("MESA_VK_MAX_TIMEOUT", "1000").run();
         if outcome.code != Some(0) || is_mesa() {
             outcome
                 .fails_with(6, &["device was lost in vkWaitForFences for `frame 7`", "in pass `test.slow` (2 of 3)"]);
@@ -373,7 +373,7 @@ fn a_device_that_the_driver_gives_up_names_the_pass() {
 #[test]
 fn long_work_in_tiles_is_not_given_up() {
     if have_device() {
-        let outcome = Case::new("tiled").env("MESA_VK_MAX_TIMEOUT", "500").run();
+        let outcome = Case::new("tiled").env("MESA_VK_MAX_TIMEOUT", "1000").run();
         outcome.succeeds();
         println!("{}", outcome.out);
     }
@@ -383,11 +383,9 @@ fn long_work_in_tiles_is_not_given_up() {
 #[test]
 fn a_wait_that_never_ends_is_given_up_and_names_the_pass() {
     if have_device() {
-        let outcome = Case::new("work")
-            .layer(&[("VKFAULT", "vkWaitForFences@5+=TIMEOUT")])
-            .env("LUCERNA_WAIT_LIMIT", "0.3")
-            .run();
-        outcome.fails_with(6, &["the device did not finish `successors` within 0.", "pass `test.successor`"]);
+        let outcome =
+            Case::new("work").layer(&[("VKFAULT", "vkWaitForFences@5+=TIMEOUT")]).env("LUCERNA_WAIT_LIMIT", "2").run();
+        outcome.fails_with(6, &["the device did not finish `successors` within ", "pass `test.successor`"]);
         // Once is no fault.
         Case::new("work").layer(&[("VKFAULT", "vkWaitForFences@5=TIMEOUT")]).run().succeeds();
     }
@@ -398,7 +396,7 @@ fn a_wait_that_never_ends_is_given_up_and_names_the_pass() {
 fn a_pass_longer_than_the_limit_is_given_up_by_name() {
     if have_device() && is_cpu() {
         let outcome = Case::new("long").env("LUCERNA_WAIT_LIMIT", "1").run();
-        outcome.fails_with(6, &["the device did not finish `frame 7` within 1.0 s, in pass `test.slow` (2 of 3)"]);
+        outcome.fails_with(6, &["the device did not finish `frame 7` within ", " s, in pass `test.slow` (2 of 3)"]);
     }
 }
 

@@ -347,14 +347,15 @@ impl Submission {
         }
     }
 
-    /// Waits in slices, warning after the soft limit and giving up after the hard one.
+    /// Waits, warning after the soft limit and giving up after the hard one.
     fn poll(&self, shell: &Shell) -> Result<()> {
         let context = &self.context;
         let begun = Instant::now();
         let mut warn_at = context.options.soft_limit;
         loop {
-            let left = context.hard_limit.saturating_sub(begun.elapsed());
-            let slice = left.min(Duration::from_secs(1)).max(Duration::from_millis(1));
+            let waited = begun.elapsed();
+            let left = context.hard_limit.saturating_sub(waited).min(warn_at.saturating_sub(waited));
+            let slice = left.max(Duration::from_millis(1));
             let slice_begun = Instant::now();
             // SAFETY: the fence is alive and was submitted.
             match unsafe { context.device.wait_for_fences(&[shell.fence], true, slice.as_nanos() as u64) } {

@@ -64,8 +64,8 @@ fn each_fault_has_its_exit_code_and_names_its_place() {
 #[test]
 fn a_wait_that_never_ends_is_exit_code_6() {
     if have_device() {
-        let mut case = render("vkWaitForFences@3+=TIMEOUT").env("LUCERNA_WAIT_LIMIT", "0.3");
-        case.run_here().fails_with(6, &["the device did not finish `", "within 0."]);
+        let mut case = render("vkWaitForFences@3+=TIMEOUT").env("LUCERNA_WAIT_LIMIT", "2");
+        case.run_here().fails_with(6, &["the device did not finish `", "within "]);
         assert_eq!(pictures(&case), [""; 0]);
     }
 }
