@@ -2,13 +2,14 @@
 
 mod isr_lab;
 
-use glam::{DVec3, Vec3, dvec3, vec3};
-use isr_lab::{close, gbuffer, lights, point, read};
+use glam::{DVec2, DVec3, Mat4, Vec3, dvec3, vec3};
+use isr_lab::{close, gbuffer, gbuffer_seen, lights, point, read};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::Graph,
     passes::ambient::Irradiance,
     reference::isr_scene::{Buffers, Eye, Patch},
+    scene::{Camera, Projection, View},
     techniques::isr::{self, Blur, Inputs, Outputs, Resolution, Sender, Settings, frame},
 };
 
@@ -83,6 +84,59 @@ fn a_glowing_wall_lights_the_floor_as_the_closed_form_says() {
             assert!((mean - 1.0).abs().max_element() < 0.1, "{mean} of the true light");
             assert!(error < 0.12 || blur == Blur::None, "relative error {error}");
         }
+    });
+}
+
+#[test]
+fn an_orthographic_camera_gathers_the_same_light() {
+    with_gpu(|gpu| {
+        let (_, patches) = corner();
+        // Parallel rays, 45° down onto floor and wall.
+        let (width, height, half, far) = (160usize, 120usize, DVec2::new(2.0, 1.5), 10.0);
+        let forward = dvec3(0.0, -1.0, -1.0).normalize();
+        let (right, middle) = (DVec3::X, dvec3(0.0, 0.5, -1.5) - forward * 4.0);
+        let up = right.cross(forward);
+        let mut buffers = Buffers { width, height, factor: 1.0, ..Buffers::default() };
+        let mut places = Vec::new();
+        for y in 0..height {
+            for x in 0..width {
+                let u = 2.0 * (x as f64 + 0.5) / width as f64 - 1.0;
+                let v = 1.0 - 2.0 * (y as f64 + 0.5) / height as f64;
+                let origin = middle + right * u * half.x + up * v * half.y;
+                let hits = patches.iter().filter_map(|p| p.hit(origin, forward).map(|t| (t, p)));
+                let hit = hits.min_by(|a, b| a.0.total_cmp(&b.0));
+                places.push(hit.map(|(t, patch)| (origin + forward * t, patch.normal())));
+                buffers.depth.push(hit.map_or(1.0, |(t, _)| t / far));
+                buffers.albedo.push(hit.map_or(DVec3::ZERO, |(_, p)| p.albedo));
+                buffers.normal.push(hit.map_or(DVec3::ZERO, |(_, p)| p.normal()));
+                buffers.sender.push(hit.map_or(DVec3::ZERO, |(_, p)| p.radiance));
+                buffers.mask.push(if hit.is_some() { 1.0 } else { 0.0 });
+            }
+        }
+        let projection =
+            Projection::Orthographic { xmag: half.x as f32, ymag: half.y as f32, znear: 0.1, zfar: far as f32 };
+        let columns = [right, up, -forward].map(|c| c.as_vec3().extend(0.0));
+        let place = Mat4::from_cols(columns[0], columns[1], columns[2], middle.as_vec3().extend(1.0));
+        let view = View::new(&Camera { name: String::new(), projection }, place, [width as u32, height as u32]);
+        let mut graph = Graph::new("orthographic");
+        let gbuffer = gbuffer_seen(&mut graph, &view, &buffers);
+        let lights = lights(&mut graph, &[]);
+        let inputs = Inputs { gbuffer, lights, ambient: Irradiance::default() };
+        let out = frame(&mut graph, &inputs, &Settings { blur_radius: 4, ..Settings::default() }).unwrap();
+        let [indirect] = read(gpu, graph, [out.indirect]);
+        let (mut ratios, mut count) = (0.0, 0.0);
+        for (texel, place) in indirect.iter().zip(&places) {
+            if let Some((p, normal)) = *place
+                && normal.y > 0.9
+                && p.x.abs() < 0.8
+                && (-1.6..-0.3).contains(&p.z)
+            {
+                ratios += f64::from(texel[0]) / (0.5 * patches[1].reflected_by_white(p, DVec3::Y).x);
+                count += 1.0;
+            }
+        }
+        assert!(count > 1000.0, "{count}");
+        assert!((ratios / count - 1.0f64).abs() < 0.1, "{} of the true light", ratios / count);
     });
 }
 

@@ -59,7 +59,8 @@ impl Patch {
         self.a.cross(self.b).normalize()
     }
 
-    fn hit(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+    /// Where a ray meets it, in lengths of `direction`.
+    pub fn hit(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
         let normal = self.a.cross(self.b);
         let t = normal.dot(self.corner - origin) / normal.dot(direction);
         let local = origin + direction * t - self.corner;

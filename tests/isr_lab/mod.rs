@@ -63,6 +63,11 @@ pub fn coarse(graph: &mut Graph, buffers: &Buffers) -> (Coarse, Image) {
 
 /// A G-buffer of matt surfaces that emit what the buffers send, with normals in 8-bit coding but unrounded.
 pub fn gbuffer(graph: &mut Graph, eye: &Eye, buffers: &Buffers) -> GBuffer {
+    gbuffer_seen(graph, &view(eye), buffers)
+}
+
+/// The same, seen by any camera.
+pub fn gbuffer_seen(graph: &mut Graph, view: &View, buffers: &Buffers) -> GBuffer {
     let extent = Extent::new(buffers.width as u32, buffers.height as u32);
     let (coarse, emission) = coarse(graph, buffers);
     let coded: Vec<_> = buffers.normal.iter().map(|n| texel(*n * 0.5 + 0.5, 0.0)).collect();
@@ -73,7 +78,7 @@ pub fn gbuffer(graph: &mut Graph, eye: &Eye, buffers: &Buffers) -> GBuffer {
         specular: image(graph, "specular", extent, &vec![[0.0, 0.0, 0.0, 1.0]; buffers.depth.len()]),
         emission,
         hardware: coarse.depth,
-        view: graph.uniform(&view(eye).uniform()),
+        view: graph.uniform(&view.uniform()),
     }
 }
 
