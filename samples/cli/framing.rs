@@ -70,10 +70,14 @@ pub enum DefaultLight {
 /// A surface with an emissive texture is a display, not a lamp: it lights nothing that one would notice.
 pub fn add_missing_light(scene: &mut Scene, choice: DefaultLight) {
     let lamp = |m: &Material| m.emissive.max_element() > 0.0 && m.emissive_texture.is_none();
-    let lit = scene.environment.is_some()
-        || scene.nodes.iter().any(|node| node.light.is_some())
-        || scene.materials.iter().any(lamp);
-    if choice == DefaultLight::Never || (choice == DefaultLight::Auto && lit) {
+    let lit = scene.environment.is_some() || scene.nodes.iter().any(|node| node.light.is_some());
+    let lamps = scene.materials.iter().any(lamp);
+    if !lit && lamps && choice != DefaultLight::Always {
+        let text = "the scene is lit by its emissive surfaces alone, and of these only what the picture shows gives light \
+                    (--default-light always adds a sun and a sky, --light a lamp)";
+        note(scene, "lights", text);
+    }
+    if choice == DefaultLight::Never || (choice == DefaultLight::Auto && (lit || lamps)) {
         return;
     }
     if let Some((under, floor)) = room::find(scene).and_then(|room| Some((room.ceiling?, room.floor))) {
@@ -191,12 +195,13 @@ mod tests {
         scene.materials[0].emissive = Vec3::X;
         add_missing_camera(&mut scene, 1.0);
         add_missing_light(&mut scene, DefaultLight::Auto);
-        assert!(scene.nodes.len() == 1 && scene.environment.is_none() && scene.notes.is_empty());
+        assert!(scene.nodes.len() == 1 && scene.environment.is_none());
+        assert!(scene.notes.len() == 1 && scene.notes[0].text.contains("emissive"), "{:?}", scene.notes);
         scene.materials[0].emissive_texture = Some(TextureRef::new(0));
         add_missing_light(&mut scene, DefaultLight::Never);
         assert!(scene.lights.is_empty());
         add_missing_light(&mut scene, DefaultLight::Auto);
-        assert!(scene.lights.len() == 1 && scene.environment.is_some() && scene.notes.len() == 1);
+        assert!(scene.lights.len() == 1 && scene.environment.is_some() && scene.notes.len() == 2);
         // Lights shine down −Z of their node: this one comes from above.
         assert!(scene.nodes[1].local.matrix().transform_vector3(Vec3::NEG_Z).y < -0.5);
     }
