@@ -9,6 +9,11 @@ const FINE: std::ops::RangeInclusive<f32> = 0.01..=1.0;
 /// The median after exposure, where it had to be changed.
 const TARGET: f32 = 0.2;
 
+/// Nothing at all is seen.
+pub fn is_black(picture: &Layers) -> bool {
+    picture.main().is_some_and(|layer| layer.data.iter().all(|value| *value <= 0.0))
+}
+
 /// Whole stops by which the picture must be scaled to be seen: 0 if it can be seen as it is.
 ///
 /// From the median of what is not black. Whole stops, so that rounding on another device does not show.

@@ -37,7 +37,8 @@ pub fn add_missing_camera(scene: &mut Scene, aspect: f32) {
         Some(room) => ("inside", "one was added inside the room that it is", in_room(&room)),
         None => {
             let bounds = world::reach(scene).unwrap_or(Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE });
-            ("fitted", "one was added that sees all of it", fitted(&bounds, aspect))
+            let from = room::opening(scene).unwrap_or(VIEW_FROM);
+            ("fitted", "one was added that sees all of it", fitted(&bounds, aspect, from))
         }
     };
     scene.cameras.push(Camera { name: name.into(), projection });
@@ -131,10 +132,10 @@ fn note(scene: &mut Scene, place: &str, text: &str) {
     scene.notes.push(Note { kind: NoteKind::Approximated, place: place.into(), text: text.into() });
 }
 
-/// A camera from which every corner of `bounds` is in the picture, with a little room around.
-fn fitted(bounds: &Aabb, aspect: f32) -> (Mat4, Projection) {
+/// A camera in direction `from` of the middle, from which every corner of `bounds` is in the picture, with a little room around.
+fn fitted(bounds: &Aabb, aspect: f32, from: Vec3) -> (Mat4, Projection) {
     let radius = bounds.half().length().max(1e-4);
-    let back = VIEW_FROM.normalize();
+    let back = from.normalize();
     let right = Vec3::Y.cross(back).normalize();
     let up = back.cross(right);
     let slope = (YFOV * 0.5).tan();
@@ -207,6 +208,6 @@ mod tests {
     }
 
     fn fitted_projection() -> Projection {
-        fitted(&Aabb { min: Vec3::ZERO, max: Vec3::ONE }, 1.0).1
+        fitted(&Aabb { min: Vec3::ZERO, max: Vec3::ONE }, 1.0, VIEW_FROM).1
     }
 }

@@ -10,6 +10,8 @@ use lucerna::scene::{
 const DIRECTIONS: u32 = 24;
 /// So many of them must end at the inside of a wall.
 const WALLS: u32 = 19;
+/// So many make a box that is open to one side.
+const BOX: u32 = 15;
 /// Height of the eye over the floor, of the height of the room and of its length, whichever is less.
 const EYE: (f32, f32) = (0.45, 0.15);
 
@@ -28,35 +30,68 @@ pub struct Room {
     pub length: f32,
 }
 
-/// A room if walls with their front towards the middle stand all around it, and a floor lies below. A solid body shows its
-/// backs to its middle, so it is none.
+/// What the middle of a scene sees around it.
+struct Survey {
+    bvh: Bvh,
+    min: Vec3,
+    max: Vec3,
+    middle: Vec3,
+    floor: Vec3,
+    /// Directions without a wall.
+    open: Vec<Vec3>,
+}
+
+impl Survey {
+    fn of(scene: &Scene) -> Option<Self> {
+        let bvh = Bvh::build(scene, &Pose::playing(scene, 0.0));
+        let (min, max) = bvh.bounds()?;
+        let middle = (min + max) * 0.5;
+        let mut survey = Self { bvh, min, max, middle, floor: middle, open: Vec::new() };
+        survey.floor -= Vec3::Y * survey.inside(middle, Vec3::NEG_Y)?;
+        let around = (0..DIRECTIONS).map(|i| {
+            let angle = std::f32::consts::TAU * (i as f32 + 0.5) / DIRECTIONS as f32;
+            Vec3::new(angle.cos(), 0.0, angle.sin())
+        });
+        survey.open = around.filter(|&direction| survey.inside(middle, direction).is_none()).collect();
+        Some(survey)
+    }
+
+    /// How far it is to a surface that shows its front. A solid body shows its backs to its middle.
+    fn inside(&self, from: Vec3, direction: Vec3) -> Option<f32> {
+        let hit = self.bvh.closest(&Ray::new(from, direction))?;
+        let [a, b, c] = self.bvh.triangles()[hit.triangle as usize];
+        ((b - a).cross(c - a).dot(direction) < 0.0).then_some(hit.t)
+    }
+
+    fn walls(&self) -> u32 {
+        DIRECTIONS - self.open.len() as u32
+    }
+}
+
+/// A room if walls with their front towards the middle stand all around it, and a floor lies below.
 pub fn find(scene: &Scene) -> Option<Room> {
-    let bvh = Bvh::build(scene, &Pose::playing(scene, 0.0));
-    let (min, max) = bvh.bounds()?;
-    let middle = (min + max) * 0.5;
-    let inside = |from: Vec3, direction: Vec3| {
-        let t = bvh.closest(&Ray::new(from, direction))?;
-        let [a, b, c] = bvh.triangles()[t.triangle as usize];
-        ((b - a).cross(c - a).dot(direction) < 0.0).then_some(t.t)
-    };
-    let around = |i: u32| {
-        let angle = std::f32::consts::TAU * (i as f32 + 0.5) / DIRECTIONS as f32;
-        Vec3::new(angle.cos(), 0.0, angle.sin())
-    };
-    let walls = (0..DIRECTIONS).filter(|&i| inside(middle, around(i)).is_some()).count() as u32;
-    let floor = middle - Vec3::Y * inside(middle, Vec3::NEG_Y)?;
-    if walls < WALLS {
+    let survey = Survey::of(scene)?;
+    if survey.walls() < WALLS {
         return None;
     }
-    let ceiling = inside(middle, Vec3::Y).map(|t| middle + Vec3::Y * t);
+    let Survey { min, max, middle, floor, .. } = survey;
+    let ceiling = survey.inside(middle, Vec3::Y).map(|t| middle + Vec3::Y * t);
     let size = max - min;
     let forward = if size.x >= size.z { Vec3::X } else { Vec3::NEG_Z };
     let top = ceiling.map_or(max.y, |ceiling| ceiling.y);
     let length = size.x.max(size.z);
     let height = floor.y + (EYE.0 * (top - floor.y)).min(EYE.1 * length);
     let centre = Vec3::new(middle.x, height, middle.z);
-    let back = inside(centre, -forward).unwrap_or(0.0);
+    let back = survey.inside(centre, -forward).unwrap_or(0.0);
     Some(Room { eye: centre - forward * back * 0.9, forward, ceiling, floor, length })
+}
+
+/// Where a box is open to one side (the Cornell box): the direction out of it, horizontal.
+pub fn opening(scene: &Scene) -> Option<Vec3> {
+    let survey = Survey::of(scene)?;
+    let sum: Vec3 = survey.open.iter().sum();
+    let one_side = sum.length() > 0.8 * survey.open.len() as f32;
+    (one_side && (BOX..WALLS).contains(&survey.walls())).then(|| sum.normalize_or_zero())
 }
 
 #[cfg(test)]
@@ -71,8 +106,13 @@ mod tests {
         let ceiling = room.ceiling.expect("it is closed above");
         assert!(room.floor.y < room.eye.y && room.eye.y < ceiling.y && room.length > 0.0);
         for body in ["furnace-sphere", "primitives"] {
-            assert_eq!(find(&builtin::load(body).unwrap()), None, "{body}");
+            let scene = builtin::load(body).unwrap();
+            assert_eq!((find(&scene), opening(&scene)), (None, None), "{body}");
         }
+        // The Cornell box is open to where its camera stands.
+        let scene = builtin::load("cornell").unwrap();
+        let out = opening(&scene).expect("it is open");
+        assert!(find(&scene).is_none() && out.dot(Vec3::NEG_Z) > 0.95, "{out}");
         assert_eq!(find(&Scene::default()), None);
     }
 }

@@ -212,6 +212,10 @@ impl<'a> Run<'a> {
 
     /// Chooses the exposure by the first frame, if nobody did.
     pub fn expose(&mut self, picture: &Layers) {
+        if self.done.is_empty() && exposure::is_black(picture) {
+            self.console
+                .info("note: the picture is black (--default-light always adds a sun, --light and --sun add others)");
+        }
         if !std::mem::take(&mut self.fit_exposure) {
             return;
         }
