@@ -1,7 +1,7 @@
 //! Known texels into the passes of image-space radiosity, and their results back.
 #![allow(dead_code)]
 
-use glam::{DVec3, Mat4, Vec3};
+use glam::{DVec3, Mat4, Vec3, dvec3};
 use lucerna::{
     gpu::Gpu,
     graph::{Extent, Format, Graph, Image, Runner},
@@ -10,6 +10,24 @@ use lucerna::{
     scene::{Camera, Projection, view::View},
     shaders::{test::unpack, types},
 };
+
+/// Reproducible numbers in 0..1.
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 40) as f64 / (1u64 << 24) as f64
+    }
+
+    pub fn vector(&mut self) -> DVec3 {
+        dvec3(self.next(), self.next(), self.next()) * 2.0 - 1.0
+    }
+
+    pub fn texel(&mut self) -> [f32; 4] {
+        [self.next() as f32, self.next() as f32, self.next() as f32, self.next() as f32]
+    }
+}
 
 /// An RGBA32F image of these texels.
 pub fn image(graph: &mut Graph, name: &str, extent: Extent, texels: &[[f32; 4]]) -> Image {
