@@ -2,33 +2,19 @@
 
 mod isr_lab;
 
-use glam::{DVec3, dvec3};
-use isr_lab::{Random, close, coarse, gbuffer, image, read, view};
+use glam::DVec3;
+use isr_lab::{Random, close, coarse, gbuffer, image, read, scene, view};
 use lucerna::{
     gpu::testing::with_gpu,
     graph::{Extent, Format, Graph},
     passes::{bilateral, blur, downsample},
     reference::{
         isr::{self as cpu, Estimator, Gather, Pattern},
-        isr_scene::{Buffers, Eye, Patch},
+        isr_scene::{Buffers, Eye},
     },
     shaders,
 };
 use std::f64::consts::PI;
-
-fn patch(corner: DVec3, a: DVec3, b: DVec3, albedo: DVec3, radiance: DVec3) -> Patch {
-    Patch { corner, a, b, albedo, radiance }
-}
-
-/// Floor, lit wall, and a small block's top between them and the camera; background above.
-fn scene(width: usize, height: usize) -> (Eye, Vec<Patch>) {
-    let (red, white) = (dvec3(0.7, 0.1, 0.1), dvec3(0.6, 0.6, 0.6));
-    let floor = patch(dvec3(-1.0, 0.0, 0.0), dvec3(2.0, 0.0, 0.0), dvec3(0.0, 0.0, -2.0), white, white * 0.2);
-    let wall = patch(dvec3(-1.0, 0.0, -2.0), dvec3(2.0, 0.0, 0.0), dvec3(0.0, 1.0, 0.0), red, dvec3(1.0, 0.4, 0.1));
-    let block = patch(dvec3(-0.3, 0.4, -0.4), dvec3(0.6, 0.0, 0.0), dvec3(0.0, 0.0, -0.5), white, white);
-    let eye = Eye::look_at(dvec3(0.3, 1.5, 2.0), dvec3(0.0, 0.3, -1.3), 0.9, 10.0, width, height);
-    (eye, vec![floor, wall, block])
-}
 
 #[test]
 fn form_factor_occlusion_and_sample_places() {

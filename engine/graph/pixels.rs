@@ -3,6 +3,7 @@
 use half::f16;
 
 use super::format::{Extent, Format};
+use crate::image::srgb;
 
 /// Pixels of one level of an image: rows from the top, layer after layer, slice after slice.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,10 +15,6 @@ pub struct Pixels {
     pub layers: u32,
     /// As stored, tightly packed; depth without stencil.
     pub bytes: Vec<u8>,
-}
-
-fn srgb_to_linear(v: f32) -> f32 {
-    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
 }
 
 /// An unsigned float of five exponent bits and `mantissa` mantissa bits.
@@ -56,10 +53,9 @@ fn decode(format: Format, pixel: &[u8]) -> [f32; 4] {
     use Format::*;
     match format {
         R8 | RG8 | RGBA8 | BGRA8 => fill(&|c| f32::from(pixel[c]) / 255.0),
-        RGBA8Srgb | BGRA8Srgb => fill(&|c| {
-            let v = f32::from(pixel[c]) / 255.0;
-            if c < 3 { srgb_to_linear(v) } else { v }
-        }),
+        RGBA8Srgb | BGRA8Srgb => {
+            fill(&|c| if c < 3 { srgb::decode_u8(pixel[c]) } else { f32::from(pixel[c]) / 255.0 });
+        }
         R8U | RGBA8U => fill(&|c| f32::from(pixel[c])),
         R16 | RG16 | RGBA16 => fill(&|c| f32::from(half(c)) / 65535.0),
         R16F | RG16F | RGBA16F => fill(&|c| f16::from_bits(half(c)).to_f32()),

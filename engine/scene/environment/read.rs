@@ -54,7 +54,7 @@ pub fn from_picture(picture: &Layers, name: impl Into<String>, limits: &Limits) 
         Some("cube") => return Err(Error::input(format!("{w}×{h} pixels said to be a cube, which is 1 : 6"))),
         _ => {}
     }
-    let cut = |size: u32, at: fn(Face) -> (u32, u32)| {
+    let cut = |size: u32, at: &dyn Fn(Face) -> (u32, u32)| {
         Face::ALL.map(|face| {
             let (column, row) = at(face);
             let line = |y: u32| ((row * size + y) * w + column * size) as usize;
@@ -62,33 +62,28 @@ pub fn from_picture(picture: &Layers, name: impl Into<String>, limits: &Limits) 
             rows.copied().collect::<Vec<_>>()
         })
     };
+    // Column and row of each face of a cross; the two kinds differ in where the back is.
+    let cross = |back| {
+        move |face| match face {
+            Face::Px => (2, 1),
+            Face::Nx => (0, 1),
+            Face::Py => (1, 0),
+            Face::Ny => (1, 2),
+            Face::Pz => (1, 1),
+            Face::Nz => back,
+        }
+    };
     let cube = |size, faces| Cube { size, faces, edge_centred: false };
     if squares(2, 1) {
         latlong(name, pixels)
     } else if squares(6, 1) {
-        finish_cube(&cube(h, cut(h, |face| (face as u32, 0))), name, limits)
+        finish_cube(&cube(h, cut(h, &|face| (face as u32, 0))), name, limits)
     } else if squares(1, 6) {
-        finish_cube(&cube(w, cut(w, |face| (0, face as u32))), name, limits)
+        finish_cube(&cube(w, cut(w, &|face| (0, face as u32))), name, limits)
     } else if squares(4, 3) {
-        let at = |face| match face {
-            Face::Px => (2, 1),
-            Face::Nx => (0, 1),
-            Face::Py => (1, 0),
-            Face::Ny => (1, 2),
-            Face::Pz => (1, 1),
-            Face::Nz => (3, 1),
-        };
-        finish_cube(&cube(h / 3, cut(h / 3, at)), name, limits)
+        finish_cube(&cube(h / 3, cut(h / 3, &cross((3, 1)))), name, limits)
     } else if squares(3, 4) {
-        let at = |face| match face {
-            Face::Px => (2, 1),
-            Face::Nx => (0, 1),
-            Face::Py => (1, 0),
-            Face::Ny => (1, 2),
-            Face::Pz => (1, 1),
-            Face::Nz => (1, 3),
-        };
-        let mut faces = cut(w / 3, at);
+        let mut faces = cut(w / 3, &cross((1, 3)));
         // Folded up from below, the back stands on its head.
         faces[Face::Nz as usize].reverse();
         finish_cube(&cube(w / 3, faces), name, limits)
