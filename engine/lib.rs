@@ -43,6 +43,7 @@
 //! | [`techniques`] | the papers' methods |
 //! | [`reference`](mod@reference) | slow CPU versions that tests hold the shaders against; a path tracer |
 //! | [`image`](mod@image) | linear images in and out |
+//! | [`measure`] | how far an image is from a reference |
 //!
 //! # Conventions
 //! Right-handed, +Y up, metres; cameras look down −Z. Linear Rec. 709. Radiance in W/(sr·m²), irradiance in W/m², intensity in
@@ -55,6 +56,7 @@ pub mod error;
 pub mod gpu;
 pub mod graph;
 pub mod image;
+pub mod measure;
 pub mod passes;
 pub mod reference;
 pub mod scene;
