@@ -9,6 +9,7 @@ use lucerna_samples::{
     console::{self, Console},
     devices, info, inspect, program, rerun,
     source::{self, SceneArgs},
+    views::{self, command::ViewsArgs},
 };
 
 /// Looks into scenes and images, lists devices and built-in scenes, makes pictures again.
@@ -67,6 +68,8 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Write a list of views of a scene: its own cameras, and random ones that show something
+    Views(Box<ViewsArgs>),
     /// List the built-in scenes
     List {
         #[command(flatten)]
@@ -80,6 +83,7 @@ enum Command {
 impl Command {
     fn console(&self) -> Console {
         match self {
+            Self::Views(args) => args.talk.console(),
             Self::Inspect { talk, .. }
             | Self::Info { talk, .. }
             | Self::Rerun { talk, .. }
@@ -131,6 +135,7 @@ fn serve(command: Command, console: Console) -> Result<()> {
                 false => console::print(&devices::text(&list)),
             }
         }
+        Command::Views(args) => views::command::run(&args, console),
         Command::List { json, .. } => {
             let list: Vec<(&str, &str)> =
                 builtin::NAMES.iter().map(|&name| (name, builtin::description(name).unwrap_or_default())).collect();

@@ -67,7 +67,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "WxH", default_value = "1024x768", help_heading = "Picture")]
     pub size: Size,
 
-    /// Camera by name, by index, or from a .toml file; default: the scene's first one
+    /// Camera by name, by index, from a .toml file, or from a list of views (LIST.toml#NAME); default: the scene's first one
     #[arg(long, value_name = "NAME|INDEX|FILE", help_heading = "Picture")]
     pub camera: Option<String>,
 
@@ -233,7 +233,7 @@ fn finite(text: &str) -> Result<f64, String> {
     text.parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(|| "expected a finite number".into())
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
     finite(text).ok().filter(|x| *x > 0.0).ok_or_else(|| "expected a number above zero".into())
 }
 

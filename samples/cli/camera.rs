@@ -6,7 +6,7 @@ use glam::{Mat4, Vec3};
 use lucerna::{Error, Result, scene::Projection};
 use serde::{Deserialize, Serialize};
 
-use crate::config;
+use crate::{config, views::ViewList};
 
 /// A camera file. Lengths in metres, world space.
 ///
@@ -56,7 +56,7 @@ impl CameraFile {
         Ok(camera)
     }
 
-    fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self) -> Result<(), String> {
         for (name, v) in [("position", self.position), ("target", self.target), ("up", self.up)] {
             if !v.is_finite() {
                 return Err(format!("{name} is {v}, not finite"));
@@ -103,7 +103,7 @@ pub enum Choice {
     File(CameraFile),
 }
 
-/// Resolves `--camera` against the names of a scene's cameras: an index, a name, the one name that begins so, a file.
+/// Resolves `--camera` against the names of a scene's cameras: an index, a name, a file, a view of a list (`LIST.toml#NAME`).
 pub fn choose(asked: &str, names: &[&str]) -> Result<Choice> {
     if let Ok(index) = asked.parse::<usize>() {
         return match index < names.len() {
@@ -116,11 +116,19 @@ pub fn choose(asked: &str, names: &[&str]) -> Result<Choice> {
     if let Some(index) = exact.or_else(relaxed) {
         return Ok(Choice::Scene(index));
     }
+    if let Some((file, view)) = in_list(asked) {
+        return ViewList::read(Path::new(file))?.find(view).map(|view| Choice::File(view.camera()));
+    }
     let path = Path::new(asked);
     if path.extension().is_some_and(|e| e == "toml") || path.is_file() {
         return CameraFile::read(path).map(Choice::File);
     }
     Err(unknown(asked, names))
+}
+
+/// Takes `LIST.toml#VIEW` apart.
+pub fn in_list(asked: &str) -> Option<(&str, &str)> {
+    asked.rsplit_once('#').filter(|(file, _)| Path::new(file).extension().is_some_and(|e| e == "toml"))
 }
 
 fn unknown(asked: &str, names: &[&str]) -> Error {

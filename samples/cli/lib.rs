@@ -26,4 +26,5 @@ pub mod signals;
 pub mod source;
 pub mod stage;
 pub mod timings;
+pub mod views;
 pub mod world;

@@ -50,7 +50,9 @@ impl Stage {
         let fingerprint = fingerprint::scene(&scene);
         lights::add(&mut scene, &args.light, args.sun.as_ref());
         framing::add_missing_light(&mut scene, args.default_light);
-        let from_file = args.camera.as_deref().is_some_and(|asked| Path::new(asked).is_file());
+        let from_file = args.camera.as_deref().is_some_and(|asked| {
+            Path::new(asked).is_file() || camera::in_list(asked).is_some_and(|(file, _)| Path::new(file).is_file())
+        });
         if !from_file {
             framing::add_missing_camera(&mut scene, args.size.aspect());
         }
@@ -97,7 +99,10 @@ fn first_placed(scene: &Scene) -> usize {
     (0..scene.cameras.len()).find(|&index| placed(index)).unwrap_or(0)
 }
 
-/// `views/left.toml` → `left`.
+/// `views/left.toml` → `left`, `office.toml#office-003` → `office-003`.
 fn name_of(file: &str) -> String {
+    if let Some((_, view)) = camera::in_list(file) {
+        return view.to_owned();
+    }
     Path::new(file).file_stem().map_or_else(|| "camera".into(), |stem| stem.to_string_lossy().into_owned())
 }

@@ -1,0 +1,105 @@
+//! `lucerna views`.
+
+use std::path::{Path, PathBuf};
+
+use lucerna::{Error, Result, image, scene::Pose};
+
+use super::{NamedView, ViewList, draw, recorded};
+use crate::{
+    args::TalkArgs,
+    camera::CameraFile,
+    config,
+    console::{self, Console},
+    source::{self, SceneArgs},
+};
+
+/// Options of `lucerna views`.
+#[derive(clap::Args, Clone, Debug)]
+pub struct ViewsArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+
+    /// Metres that one unit of the scene file stands for, where the format leaves it open [default: 1]
+    #[arg(long, value_name = "METRES", value_parser = crate::args::positive, conflicts_with = "builtin")]
+    pub unit: Option<f64>,
+
+    /// How many views in all; recorded ones come first, the rest is drawn
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub count: u32,
+
+    /// Seed of the random views
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub seed: u64,
+
+    /// A recorded camera (.toml) that belongs to the list; may be given more than once
+    #[arg(long, value_name = "FILE")]
+    pub camera: Vec<PathBuf>,
+
+    /// Leave the scene's own cameras out
+    #[arg(long)]
+    pub only_random: bool,
+
+    /// The list to write (.toml) [default: standard output]
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+
+    /// Replace a list that exists
+    #[arg(long)]
+    pub overwrite: bool,
+
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}
+
+/// Draws and writes.
+///
+/// # Errors
+/// `Input` if the scene or a camera cannot be read, or shows too little for that many views; `Output` if the list cannot be written.
+pub fn run(args: &ViewsArgs, console: Console) -> Result<()> {
+    if let Some(path) = &args.output {
+        image::probe_output(path, args.overwrite)?;
+    }
+    let options = source::in_unit(args.unit);
+    let (scene, _) = source::open(args.scene.scene.as_deref(), args.scene.builtin.as_deref(), &options)?;
+    let list = list(&scene, args)?;
+    let heading = "# Written by `lucerna views`; `render --camera FILE.toml#NAME` takes one view. Lengths in metres.\n";
+    let text = format!("{heading}{}", config::to_toml(&list)?);
+    match &args.output {
+        Some(path) => {
+            image::write_atomic(path, text.as_bytes(), args.overwrite)?;
+            console.info(&format!("wrote {} views to {}", list.views.len(), path.display()));
+            Ok(())
+        }
+        None => console::print(text.trim_end()),
+    }
+}
+
+fn list(scene: &lucerna::scene::Scene, args: &ViewsArgs) -> Result<ViewList> {
+    let pose = Pose::playing(scene, 0.0);
+    let (named, stem) = match (&args.scene.builtin, &args.scene.scene) {
+        (Some(name), _) => (name.clone(), name.clone()),
+        (None, Some(path)) => (path.to_string_lossy().into_owned(), stem(path)),
+        (None, None) => return Err(Error::usage("no scene was named")),
+    };
+    let mut views = Vec::new();
+    for path in &args.camera {
+        views.push(NamedView::recorded(self::stem(path), &CameraFile::read(path)?));
+    }
+    if !args.only_random {
+        views.extend(recorded(scene, &pose));
+    }
+    views.truncate(args.count as usize);
+    let missing = args.count as usize - views.len();
+    if missing > 0 {
+        views.extend(draw::views(scene, &pose, &stem, missing, args.seed)?);
+    }
+    let mut seen = std::collections::HashSet::new();
+    if let Some(twice) = views.iter().find(|view| !seen.insert(view.name.as_str())) {
+        return Err(Error::usage(format!("two views would be named '{}'", twice.name)).help("Rename a camera file"));
+    }
+    Ok(ViewList { scene: named, seed: args.seed, views })
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().map_or_else(|| "scene".into(), |stem| stem.to_string_lossy().into_owned())
+}

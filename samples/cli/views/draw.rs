@@ -1,0 +1,235 @@
+//! Random views that show something.
+//!
+//! A place is drawn evenly in the box around the scene (the box is [`ROOM`] larger to the sides and above), a direction evenly
+//! in azimuth and between [`PITCH`] degrees in elevation, a vertical angle of view between [`YFOV`] degrees. CPU rays then
+//! decide; all lengths are relative to the diagonal of the scene's box:
+//!
+//! - *inside geometry*: of [`AROUND`] rays evenly around the place, more than [`MOST_BACKS`] meet the back of a single-sided
+//!   surface, or one meets any surface nearer than [`CLEARANCE`];
+//! - *mostly sky*: of [`RAYS`] rays through the picture more than [`MOST_SKY`] meet nothing;
+//! - *seen from behind*: more than [`MOST_BEHIND`] of them meet the back of a single-sided surface, which a rasteriser leaves out;
+//! - *into a wall*: the nearest hit is nearer than [`NEAREST`], the median farther than [`FARTHEST`] or nearer than [`MEDIAN`], or
+//!   fewer than [`SURFACES`] different planes each show on at least [`SHARE`] of the picture.
+//!
+//! Light plays no part in the choice.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+use lucerna::{
+    Error, Result,
+    scene::{
+        Pose, Scene,
+        bvh::{Bvh, Ray},
+    },
+};
+
+use super::{NamedView, Origin};
+
+/// Share of the diagonal by which the box is larger than the scene.
+pub const ROOM: f32 = 0.1;
+/// Lowest and highest elevation of the line of sight, degrees.
+pub const PITCH: [f32; 2] = [-45.0, 20.0];
+/// Smallest and largest vertical angle of view, degrees.
+pub const YFOV: [f32; 2] = [40.0, 65.0];
+/// Rays around the place.
+pub const AROUND: u32 = 64;
+/// Largest share of them that may meet backs.
+pub const MOST_BACKS: f32 = 0.45;
+/// Least distance to any surface around.
+pub const CLEARANCE: f32 = 0.01;
+/// Rays through the picture, across and down.
+pub const RAYS: [u32; 2] = [16, 12];
+/// Largest share of them that may meet nothing.
+pub const MOST_SKY: f32 = 0.5;
+/// Largest share of them that may meet backs.
+pub const MOST_BEHIND: f32 = 0.01;
+/// Least distance of the nearest hit.
+pub const NEAREST: f32 = 0.015;
+/// Least and largest median distance.
+pub const MEDIAN: f32 = 0.05;
+pub const FARTHEST: f32 = 1.5;
+/// How many planes must show …
+pub const SURFACES: usize = 4;
+/// … on what share of the picture each.
+pub const SHARE: f32 = 0.03;
+/// Width over height of the pictures.
+pub const ASPECT: f32 = 4.0 / 3.0;
+/// Places tried for each view wanted.
+const PATIENCE: u64 = 4000;
+
+/// Why a view was not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    InsideGeometry,
+    MostlySky,
+    SeenFromBehind,
+    IntoAWall,
+}
+
+/// SplitMix64 (Steele et al. 2014).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ z >> 31) >> 40) as f32 / (1u64 << 24) as f32
+    }
+
+    fn between(&mut self, [low, high]: [f32; 2]) -> f32 {
+        low + (high - low) * self.next()
+    }
+}
+
+/// What the rays know.
+pub struct Judge<'a> {
+    scene: &'a Scene,
+    bvh: Bvh,
+    min: Vec3,
+    max: Vec3,
+}
+
+impl<'a> Judge<'a> {
+    /// # Errors
+    /// `Input` if the scene has no surface.
+    pub fn new(scene: &'a Scene, pose: &Pose) -> Result<Self> {
+        let bvh = Bvh::build(scene, pose);
+        let (min, max) = bvh.bounds().ok_or_else(|| Error::input("the scene has no surface to look at"))?;
+        Ok(Self { scene, bvh, min, max })
+    }
+
+    fn diagonal(&self) -> f32 {
+        (self.max - self.min).length().max(1e-6)
+    }
+
+    /// Distance along a unit direction, unit normal towards the ray, and whether it is the back of a single-sided surface.
+    fn look(&self, origin: Vec3, direction: Vec3) -> Option<(f32, Vec3, bool)> {
+        let hit = self.bvh.closest(&Ray::new(origin, direction))?;
+        let [a, b, c] = self.bvh.triangles()[hit.triangle as usize];
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let id = self.bvh.id(hit.triangle);
+        let mesh = self.scene.nodes.get(id.node as usize)?.mesh?;
+        let primitive = &self.scene.meshes.get(mesh as usize)?.primitives[id.primitive as usize];
+        let double = self.scene.materials.get(primitive.material as usize).is_some_and(|m| m.double_sided);
+        let back = normal.dot(direction) > 0.0;
+        Some((hit.t, if back { -normal } else { normal }, back && !double))
+    }
+
+    /// Whether the view shows something, by the rule above.
+    ///
+    /// # Errors
+    /// Which part of the rule it breaks.
+    pub fn judge(&self, view: &NamedView) -> Result<(), Refusal> {
+        let diagonal = self.diagonal();
+        let eye = view.position;
+        let mut backs = 0;
+        for i in 0..AROUND {
+            // A spiral of equal areas around the sphere.
+            let y = 1.0 - 2.0 * (i as f32 + 0.5) / AROUND as f32;
+            let (r, phi) = ((1.0 - y * y).sqrt(), i as f32 * 2.399_963_2);
+            if let Some((t, _, back)) = self.look(eye, Vec3::new(r * phi.cos(), y, r * phi.sin())) {
+                backs += u32::from(back);
+                if t < CLEARANCE * diagonal {
+                    return Err(Refusal::InsideGeometry);
+                }
+            }
+        }
+        if backs as f32 > MOST_BACKS * AROUND as f32 {
+            return Err(Refusal::InsideGeometry);
+        }
+        let forward = (view.target - eye).normalize();
+        let right = forward.cross(view.up).normalize();
+        let up = right.cross(forward);
+        let slope = (0.5 * view.yfov_degrees.to_radians()).tan();
+        let rays = (RAYS[0] * RAYS[1]) as f32;
+        let (mut behind, mut distances, mut planes) = (0, Vec::new(), HashMap::<[i32; 4], u32>::new());
+        for j in 0..RAYS[1] {
+            for i in 0..RAYS[0] {
+                let x = 2.0 * (i as f32 + 0.5) / RAYS[0] as f32 - 1.0;
+                let y = 1.0 - 2.0 * (j as f32 + 0.5) / RAYS[1] as f32;
+                let direction = (forward + right * (x * slope * ASPECT) + up * (y * slope)).normalize();
+                let Some((t, normal, back)) = self.look(eye, direction) else { continue };
+                behind += u32::from(back);
+                distances.push(t);
+                // Directions to about 20°, distance of the plane from the middle to 5 % of the diagonal.
+                let offset = (eye + direction * t - 0.5 * (self.min + self.max)).dot(normal) / (0.05 * diagonal);
+                let n = normal * 3.0;
+                let key = [n.x, n.y, n.z, offset].map(|v| v.round() as i32);
+                *planes.entry(key).or_default() += 1;
+            }
+        }
+        if (rays - distances.len() as f32) > MOST_SKY * rays {
+            return Err(Refusal::MostlySky);
+        }
+        if behind as f32 > MOST_BEHIND * rays {
+            return Err(Refusal::SeenFromBehind);
+        }
+        distances.sort_by(f32::total_cmp);
+        let (nearest, median) = (distances[0] / diagonal, distances[distances.len() / 2] / diagonal);
+        let shown = planes.values().filter(|count| **count as f32 >= SHARE * rays).count();
+        if nearest < NEAREST || !(MEDIAN..=FARTHEST).contains(&median) || shown < SURFACES {
+            return Err(Refusal::IntoAWall);
+        }
+        Ok(())
+    }
+
+    /// A view anywhere, good or not.
+    fn any(&self, random: &mut Random) -> NamedView {
+        let diagonal = self.diagonal();
+        let margin = Vec3::splat(ROOM * diagonal);
+        let min = self.min - margin * Vec3::new(1.0, 0.0, 1.0);
+        let max = self.max + margin;
+        let place = |random: &mut Random, axis: usize| random.between([min[axis], max[axis]]);
+        let position = Vec3::new(place(random, 0), place(random, 1), place(random, 2));
+        let azimuth = random.next() * std::f32::consts::TAU;
+        let elevation = random.between(PITCH).to_radians();
+        let level = Vec3::new(azimuth.sin(), 0.0, -azimuth.cos()) * elevation.cos();
+        let yfov_degrees = random.between(YFOV).round();
+        // Files hold millimetres of a scene of metres: what is written is what was judged.
+        let digits = 10f32.powi(3 - diagonal.log10().floor().clamp(-30.0, 30.0) as i32);
+        let round = |v: Vec3| (v * digits).round() / digits;
+        let position = round(position);
+        let target = round(position + (level + Vec3::Y * elevation.sin()) * (0.2 * diagonal));
+        let znear = (2e-3 * diagonal * digits).round().max(1.0) / digits;
+        let (name, up) = (String::new(), Vec3::Y);
+        NamedView { name, origin: Origin::Random, position, target, up, yfov_degrees, znear, zfar: None }
+    }
+}
+
+/// `count` views that pass [`Judge::judge`], named `{name}-000` and so on. The same for the same arguments.
+///
+/// # Errors
+/// `Input` if the scene has no surface, or too few places in it see enough of it.
+pub fn views(scene: &Scene, pose: &Pose, name: &str, count: usize, seed: u64) -> Result<Vec<NamedView>> {
+    let judge = Judge::new(scene, pose)?;
+    let mut random = Random(seed.wrapping_mul(0xd134_2543_de82_ef95));
+    let mut found = Vec::new();
+    let mut refusals = [0u64; 4];
+    for _ in 0..PATIENCE * count as u64 {
+        if found.len() == count {
+            break;
+        }
+        let mut view = judge.any(&mut random);
+        match judge.judge(&view) {
+            Ok(()) => {
+                view.name = format!("{name}-{:03}", found.len());
+                found.push(view);
+            }
+            Err(why) => refusals[why as usize] += 1,
+        }
+    }
+    if found.len() < count {
+        let [inside, sky, behind, wall] = refusals;
+        let tried = inside + sky + behind + wall + found.len() as u64;
+        let found = found.len();
+        let text = format!(
+            "only {found} of {count} views were found in {tried} places tried: {inside} inside or too near to geometry, {sky} \
+             mostly sky, {behind} behind single-sided surfaces, {wall} in front of a wall"
+        );
+        return Err(Error::input(text).help("Ask for fewer, or record cameras by hand (--camera FILE.toml)"));
+    }
+    Ok(found)
+}
