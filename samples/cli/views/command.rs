@@ -10,6 +10,7 @@ use crate::{
     camera::CameraFile,
     config,
     console::{self, Console},
+    framing::{self, DefaultLight},
     source::{self, SceneArgs},
 };
 
@@ -60,7 +61,9 @@ pub fn run(args: &ViewsArgs, console: Console) -> Result<()> {
         image::probe_output(path, args.overwrite)?;
     }
     let options = source::in_unit(args.unit);
-    let (scene, _) = source::open(args.scene.scene.as_deref(), args.scene.builtin.as_deref(), &options)?;
+    let (mut scene, _) = source::open(args.scene.scene.as_deref(), args.scene.builtin.as_deref(), &options)?;
+    // The light that `render` adds to dark scenes, as it decides what is seen.
+    framing::add_missing_light(&mut scene, DefaultLight::Auto);
     let list = list(&scene, args)?;
     let heading = "# Written by `lucerna views`; `render --camera FILE.toml#NAME` takes one view. Lengths in metres.\n";
     let text = format!("{heading}{}", config::to_toml(&list)?);

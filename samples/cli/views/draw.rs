@@ -9,17 +9,16 @@
 //! - *mostly sky*: of [`RAYS`] rays through the picture more than [`MOST_SKY`] meet nothing;
 //! - *seen from behind*: more than [`MOST_BEHIND`] of them meet the back of a single-sided surface, which a rasteriser leaves out;
 //! - *into a wall*: the nearest hit is nearer than [`NEAREST`], the median farther than [`FARTHEST`] or nearer than [`MEDIAN`], or
-//!   fewer than [`SURFACES`] different planes each show on at least [`SHARE`] of the picture.
-//!
-//! Light plays no part in the choice.
+//!   fewer than [`SURFACES`] different planes each show on at least [`SHARE`] of the picture;
+//! - *in the dark*: in scenes with lights, less than [`LEAST_LIT`] of what the rays meet gets light from one, or is a lamp.
 
 use std::collections::HashMap;
 
-use glam::Vec3;
+use glam::{Mat4, Vec3};
 use lucerna::{
     Error, Result,
     scene::{
-        Pose, Scene,
+        LightKind, Pose, Scene,
         bvh::{Bvh, Ray},
     },
 };
@@ -41,7 +40,7 @@ pub const CLEARANCE: f32 = 0.01;
 /// Rays through the picture, across and down.
 pub const RAYS: [u32; 2] = [16, 12];
 /// Largest share of them that may meet nothing.
-pub const MOST_SKY: f32 = 0.5;
+pub const MOST_SKY: f32 = 0.4;
 /// Largest share of them that may meet backs.
 pub const MOST_BEHIND: f32 = 0.01;
 /// Least distance of the nearest hit.
@@ -50,9 +49,11 @@ pub const NEAREST: f32 = 0.015;
 pub const MEDIAN: f32 = 0.05;
 pub const FARTHEST: f32 = 1.5;
 /// How many planes must show …
-pub const SURFACES: usize = 4;
+pub const SURFACES: usize = 6;
 /// … on what share of the picture each.
-pub const SHARE: f32 = 0.03;
+pub const SHARE: f32 = 0.015;
+/// Least share of what is seen that must be lit.
+pub const LEAST_LIT: f32 = 0.15;
 /// Width over height of the pictures.
 pub const ASPECT: f32 = 4.0 / 3.0;
 /// Places tried for each view wanted.
@@ -65,6 +66,7 @@ pub enum Refusal {
     MostlySky,
     SeenFromBehind,
     IntoAWall,
+    InTheDark,
 }
 
 /// SplitMix64 (Steele et al. 2014).
@@ -88,8 +90,39 @@ impl Random {
 pub struct Judge<'a> {
     scene: &'a Scene,
     bvh: Bvh,
+    lamps: Vec<Lamp>,
     min: Vec3,
     max: Vec3,
+}
+
+/// A light in world space: its place, or the direction to it from everywhere, and where a spot shines.
+enum Lamp {
+    At(Vec3, Option<(Vec3, f32)>),
+    Towards(Vec3),
+}
+
+fn lamps(scene: &Scene, pose: &Pose) -> Vec<Lamp> {
+    let lit = |(node, world): (&lucerna::scene::Node, &Mat4)| {
+        let light = scene.lights.get(node.light? as usize)?;
+        let axis = -world.z_axis.truncate().normalize_or(Vec3::Z);
+        let at = world.w_axis.truncate();
+        Some(match light.kind {
+            LightKind::Directional => Lamp::Towards(-axis),
+            LightKind::Point { .. } => Lamp::At(at, None),
+            LightKind::Spot { outer, .. } => Lamp::At(at, Some((axis, outer.cos()))),
+        })
+    };
+    scene.nodes.iter().zip(&pose.world).filter_map(lit).collect()
+}
+
+/// What a ray meets.
+struct Seen {
+    distance: f32,
+    /// Unit, towards the ray.
+    normal: Vec3,
+    /// The back of a single-sided surface.
+    back: bool,
+    emissive: bool,
 }
 
 impl<'a> Judge<'a> {
@@ -98,24 +131,47 @@ impl<'a> Judge<'a> {
     pub fn new(scene: &'a Scene, pose: &Pose) -> Result<Self> {
         let bvh = Bvh::build(scene, pose);
         let (min, max) = bvh.bounds().ok_or_else(|| Error::input("the scene has no surface to look at"))?;
-        Ok(Self { scene, bvh, min, max })
+        Ok(Self { scene, bvh, lamps: lamps(scene, pose), min, max })
     }
 
     fn diagonal(&self) -> f32 {
         (self.max - self.min).length().max(1e-6)
     }
 
-    /// Distance along a unit direction, unit normal towards the ray, and whether it is the back of a single-sided surface.
-    fn look(&self, origin: Vec3, direction: Vec3) -> Option<(f32, Vec3, bool)> {
+    /// The nearest surface along a unit direction.
+    fn look(&self, origin: Vec3, direction: Vec3) -> Option<Seen> {
         let hit = self.bvh.closest(&Ray::new(origin, direction))?;
         let [a, b, c] = self.bvh.triangles()[hit.triangle as usize];
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let id = self.bvh.id(hit.triangle);
         let mesh = self.scene.nodes.get(id.node as usize)?.mesh?;
         let primitive = &self.scene.meshes.get(mesh as usize)?.primitives[id.primitive as usize];
-        let double = self.scene.materials.get(primitive.material as usize).is_some_and(|m| m.double_sided);
+        let material = self.scene.materials.get(primitive.material as usize)?;
         let back = normal.dot(direction) > 0.0;
-        Some((hit.t, if back { -normal } else { normal }, back && !double))
+        Some(Seen {
+            distance: hit.t,
+            normal: if back { -normal } else { normal },
+            back: back && !material.double_sided,
+            emissive: material.unlit || material.emissive != Vec3::ZERO,
+        })
+    }
+
+    fn is_lit(&self, at: Vec3, normal: Vec3) -> bool {
+        let lift = 1e-4 * self.diagonal();
+        self.lamps.iter().any(|lamp| {
+            let (to, t_max) = match lamp {
+                Lamp::Towards(to) => (*to, f32::INFINITY),
+                Lamp::At(place, cone) => {
+                    let to = *place - at;
+                    if cone.is_some_and(|(axis, cosine)| -to.normalize_or_zero().dot(axis) < cosine) {
+                        return false;
+                    }
+                    (to, 1.0 - 1e-3)
+                }
+            };
+            let origin = at + normal * lift;
+            to.dot(normal) > 0.0 && !self.bvh.any(&Ray { origin, direction: to, t_min: 0.0, t_max })
+        })
     }
 
     /// Whether the view shows something, by the rule above.
@@ -130,9 +186,9 @@ impl<'a> Judge<'a> {
             // A spiral of equal areas around the sphere.
             let y = 1.0 - 2.0 * (i as f32 + 0.5) / AROUND as f32;
             let (r, phi) = ((1.0 - y * y).sqrt(), i as f32 * 2.399_963_2);
-            if let Some((t, _, back)) = self.look(eye, Vec3::new(r * phi.cos(), y, r * phi.sin())) {
-                backs += u32::from(back);
-                if t < CLEARANCE * diagonal {
+            if let Some(seen) = self.look(eye, Vec3::new(r * phi.cos(), y, r * phi.sin())) {
+                backs += u32::from(seen.back);
+                if seen.distance < CLEARANCE * diagonal {
                     return Err(Refusal::InsideGeometry);
                 }
             }
@@ -145,17 +201,19 @@ impl<'a> Judge<'a> {
         let up = right.cross(forward);
         let slope = (0.5 * view.yfov_degrees.to_radians()).tan();
         let rays = (RAYS[0] * RAYS[1]) as f32;
-        let (mut behind, mut distances, mut planes) = (0, Vec::new(), HashMap::<[i32; 4], u32>::new());
+        let (mut behind, mut lit, mut distances, mut planes) = (0, 0, Vec::new(), HashMap::<[i32; 4], u32>::new());
         for j in 0..RAYS[1] {
             for i in 0..RAYS[0] {
                 let x = 2.0 * (i as f32 + 0.5) / RAYS[0] as f32 - 1.0;
                 let y = 1.0 - 2.0 * (j as f32 + 0.5) / RAYS[1] as f32;
                 let direction = (forward + right * (x * slope * ASPECT) + up * (y * slope)).normalize();
-                let Some((t, normal, back)) = self.look(eye, direction) else { continue };
+                let Some(Seen { distance, normal, back, emissive }) = self.look(eye, direction) else { continue };
+                let at = eye + direction * distance;
                 behind += u32::from(back);
-                distances.push(t);
+                lit += u32::from(emissive || self.is_lit(at, normal));
+                distances.push(distance);
                 // Directions to about 20°, distance of the plane from the middle to 5 % of the diagonal.
-                let offset = (eye + direction * t - 0.5 * (self.min + self.max)).dot(normal) / (0.05 * diagonal);
+                let offset = (at - 0.5 * (self.min + self.max)).dot(normal) / (0.05 * diagonal);
                 let n = normal * 3.0;
                 let key = [n.x, n.y, n.z, offset].map(|v| v.round() as i32);
                 *planes.entry(key).or_default() += 1;
@@ -172,6 +230,9 @@ impl<'a> Judge<'a> {
         let shown = planes.values().filter(|count| **count as f32 >= SHARE * rays).count();
         if nearest < NEAREST || !(MEDIAN..=FARTHEST).contains(&median) || shown < SURFACES {
             return Err(Refusal::IntoAWall);
+        }
+        if !self.lamps.is_empty() && (lit as f32) < LEAST_LIT * distances.len() as f32 {
+            return Err(Refusal::InTheDark);
         }
         Ok(())
     }
@@ -207,7 +268,7 @@ pub fn views(scene: &Scene, pose: &Pose, name: &str, count: usize, seed: u64) ->
     let judge = Judge::new(scene, pose)?;
     let mut random = Random(seed.wrapping_mul(0xd134_2543_de82_ef95));
     let mut found = Vec::new();
-    let mut refusals = [0u64; 4];
+    let mut refusals = [0u64; 5];
     for _ in 0..PATIENCE * count as u64 {
         if found.len() == count {
             break;
@@ -222,12 +283,12 @@ pub fn views(scene: &Scene, pose: &Pose, name: &str, count: usize, seed: u64) ->
         }
     }
     if found.len() < count {
-        let [inside, sky, behind, wall] = refusals;
-        let tried = inside + sky + behind + wall + found.len() as u64;
+        let [inside, sky, behind, wall, dark] = refusals;
+        let tried = inside + sky + behind + wall + dark + found.len() as u64;
         let found = found.len();
         let text = format!(
             "only {found} of {count} views were found in {tried} places tried: {inside} inside or too near to geometry, {sky} \
-             mostly sky, {behind} behind single-sided surfaces, {wall} in front of a wall"
+             mostly sky, {behind} behind single-sided surfaces, {wall} in front of a wall, {dark} in the dark"
         );
         return Err(Error::input(text).help("Ask for fewer, or record cameras by hand (--camera FILE.toml)"));
     }
