@@ -39,6 +39,7 @@
 //! | [`gpu`] | device choice, memory, pipelines, validation |
 //! | [`graph`] | the render graph: passes declared in order, barriers and memory derived |
 //! | [`shaders`] | one typed module for each shader, generated from its interface |
+//! | [`rays`] | the scene as shaders trace rays through it |
 //! | [`passes`] | G-buffer, shadow maps, filters and other passes that techniques share |
 //! | [`techniques`] | the papers' methods |
 //! | [`reference`](mod@reference) | slow CPU versions that tests hold the shaders against; a path tracer |
@@ -58,6 +59,7 @@ pub mod graph;
 pub mod image;
 pub mod measure;
 pub mod passes;
+pub mod rays;
 pub mod reference;
 pub mod scene;
 pub mod shader;

@@ -47,7 +47,7 @@ pub(super) struct Deform {
 }
 
 /// Does `primitive` change shape at a node with or without a skin?
-pub(super) fn deforms(primitive: &Primitive, skinned: bool) -> bool {
+pub(crate) fn deforms(primitive: &Primitive, skinned: bool) -> bool {
     !primitive.morphs.is_empty() || (skinned && !primitive.joints.is_empty())
 }
 

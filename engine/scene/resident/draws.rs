@@ -136,7 +136,18 @@ mod tests {
 
     fn instance(at: f32, mesh: u32, cutout: Cutout, sided: Sided) -> Instance {
         let bounds = Aabb::of([Vec3::new(at, 0.0, 0.0)]).grown(0.5);
-        Instance { node: 0, bounds, first_index: 30 * mesh, indices: 30, cutout, sided, casts: true }
+        Instance {
+            node: 0,
+            bounds,
+            first_index: 30 * mesh,
+            indices: 30,
+            cutout,
+            sided,
+            casts: true,
+            world_from_object: glam::Mat4::IDENTITY,
+            first_vertex: 0,
+            deformed: false,
+        }
     }
 
     #[test]

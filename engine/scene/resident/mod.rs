@@ -16,6 +16,7 @@ mod geometry;
 mod material;
 mod textures;
 
+pub(crate) use deform::deforms;
 pub use draws::{Batches, Cutout, Sided};
 pub use material::lights;
 
@@ -82,6 +83,12 @@ pub struct Instance {
     pub sided: Sided,
     /// Stops light: all but unlit surfaces.
     pub casts: bool,
+    /// Of vertices in the streams; the identity for skinned ones.
+    pub world_from_object: Mat4,
+    /// Of its own, into the streams of positions, normals and tangents.
+    pub first_vertex: u32,
+    /// Its vertices are written anew each frame.
+    pub deformed: bool,
 }
 
 /// The scene of one frame on the host.
@@ -279,6 +286,9 @@ impl Resident {
                 indices,
                 cutout: item.cutout,
                 casts: item.casts,
+                world_from_object: world,
+                first_vertex,
+                deformed: item.job.is_some(),
                 sided: match (item.double_sided, mirrored) {
                     (true, _) => Sided::Both,
                     (false, false) => Sided::Front,

@@ -1,0 +1,185 @@
+//! Which triangles share a bottom tree, and where each tree stands.
+
+use super::tree::Tree;
+use crate::{
+    scene::{Aabb, AlphaMode, Material, Pose, Primitive, Scene, resident::deforms},
+    shaders::consts::{TRACE_CUTOUT, TRACE_REVERSED, TRACE_SINGLE_SIDED, TRACE_UNLIT},
+};
+use glam::{Mat3, Mat4, Vec3};
+use std::collections::BTreeMap;
+
+/// Shapes that stand in several places are put into one tree with everything that does not move while the scene has no more
+/// triangles than this that way.
+const MERGED_TRIANGLES: usize = 2_000_000;
+
+/// A triangle of a shape.
+#[derive(Clone, Copy, Debug)]
+pub struct Record {
+    pub corners: [Vec3; 3],
+    /// From the first instance of the shape's use.
+    pub instance: u32,
+    pub triangle: u32,
+    /// `TRACE_SINGLE_SIDED` …
+    pub surface: u32,
+}
+
+/// Triangles and the tree over them.
+#[derive(Debug)]
+pub struct Shape {
+    pub tree: Tree,
+    /// In the order of the leaves.
+    records: Vec<Record>,
+    pub bounds: Aabb,
+    /// Everything that does not move by itself, in world space.
+    pub merged: bool,
+    /// Reference to the root among the nodes on the device.
+    pub root: u32,
+}
+
+/// A shape in a place.
+#[derive(Clone, Copy, Debug)]
+pub struct Use {
+    pub shape: usize,
+    /// Into the resident scene's instances; its transform is that of all of them.
+    pub first_instance: u32,
+}
+
+/// One primitive of one node, in the order of the resident scene's instances.
+struct Piece<'a> {
+    node: usize,
+    mesh: usize,
+    primitive: &'a Primitive,
+    material: &'a Material,
+    deformed: bool,
+}
+
+fn pieces(scene: &Scene) -> Vec<Piece<'_>> {
+    let mut out = Vec::new();
+    for (node, n) in scene.nodes.iter().enumerate() {
+        let Some(mesh) = n.mesh.map(|m| m as usize) else { continue };
+        for primitive in scene.meshes.get(mesh).map_or(&[][..], |m| &m.primitives) {
+            let Some(material) = scene.materials.get(primitive.material as usize) else { continue };
+            let deformed = deforms(primitive, n.skin.is_some());
+            out.push(Piece { node, mesh, primitive, material, deformed });
+        }
+    }
+    out
+}
+
+/// For each node, whether an animation moves it or something it stands on.
+fn moving(scene: &Scene) -> Vec<bool> {
+    let mut moving = vec![false; scene.nodes.len()];
+    for channel in scene.animations.iter().flat_map(|a| &a.channels) {
+        if let Some(node) = moving.get_mut(channel.node as usize) {
+            *node = true;
+        }
+    }
+    // Parents stand before their children.
+    for (index, node) in scene.nodes.iter().enumerate() {
+        moving[index] |= node.parent.is_some_and(|p| moving.get(p as usize).copied().unwrap_or(false));
+    }
+    moving
+}
+
+/// All shapes of a scene and their uses.
+pub fn gather(scene: &Scene) -> (Vec<Shape>, Vec<Use>) {
+    let pose = Pose::rest(scene);
+    let moving = moving(scene);
+    let pieces = pieces(scene);
+    let triangles = |p: &&Piece<'_>| p.primitive.indices.len() / 3;
+    let still: usize = pieces.iter().filter(|p| !p.deformed && !moving[p.node]).map(|p| triangles(&p)).sum();
+    let mut users: BTreeMap<usize, usize> = BTreeMap::new();
+    for node in scene.nodes.iter() {
+        *users.entry(node.mesh.map_or(usize::MAX, |m| m as usize)).or_default() += 1;
+    }
+    let merges =
+        |p: &Piece<'_>| !p.deformed && !moving[p.node] && (still <= MERGED_TRIANGLES || users.get(&p.mesh) == Some(&1));
+
+    let mut merged = Vec::new();
+    let mut shapes = Vec::new();
+    let mut uses = Vec::new();
+    // Mesh, skinned → shape.
+    let mut shared: BTreeMap<(usize, bool), usize> = BTreeMap::new();
+    let mut first_of_node = 0;
+    for (index, piece) in pieces.iter().enumerate() {
+        let first = index == 0 || pieces[index - 1].node != piece.node;
+        if first {
+            first_of_node = index;
+        }
+        if piece.deformed {
+            uses.push(Use { shape: shapes.len(), first_instance: index as u32 });
+            shapes.push(Shape::new(records(piece, 0, Mat4::IDENTITY, false), false));
+        } else if merges(piece) {
+            merged.extend(records(piece, index as u32, pose.world[piece.node], true));
+        } else {
+            let key = (piece.mesh, scene.nodes[piece.node].skin.is_some());
+            let first_instance = first_of_node as u32;
+            let of_node = pieces[first_of_node..].iter().take_while(|p| p.node == piece.node);
+            let rigid: Vec<_> = of_node.enumerate().filter(|(_, p)| !p.deformed).collect();
+            // Once a node.
+            if rigid.first().is_none_or(|(i, _)| first_of_node + i != index) {
+                continue;
+            }
+            let shape = *shared.entry(key).or_insert_with(|| {
+                let list = rigid.iter().flat_map(|(i, p)| records(p, *i as u32, Mat4::IDENTITY, false)).collect();
+                shapes.push(Shape::new(list, false));
+                shapes.len() - 1
+            });
+            uses.push(Use { shape, first_instance });
+        }
+    }
+    if !merged.is_empty() {
+        uses.push(Use { shape: shapes.len(), first_instance: 0 });
+        shapes.push(Shape::new(merged, true));
+    }
+    (shapes, uses)
+}
+
+/// Triangles of `piece` carried by `world`; those that are nowhere are left out.
+fn records(piece: &Piece<'_>, instance: u32, world: Mat4, placed: bool) -> Vec<Record> {
+    let mut surface = 0;
+    if !piece.material.double_sided {
+        surface |= TRACE_SINGLE_SIDED;
+    }
+    if piece.material.unlit {
+        surface |= TRACE_UNLIT;
+    }
+    if !matches!(piece.material.alpha, AlphaMode::Opaque) {
+        surface |= TRACE_CUTOUT;
+    }
+    // In world space a mirrored triangle winds the other way round.
+    if placed && Mat3::from_mat4(world).determinant() < 0.0 {
+        surface |= TRACE_REVERSED;
+    }
+    let at = |i: u32| piece.primitive.positions.get(i as usize).copied().unwrap_or(Vec3::NAN);
+    let place = |p: Vec3| if placed { world.transform_point3(p) } else { p };
+    let corners = piece.primitive.indices.chunks_exact(3).map(|c| [place(at(c[0])), place(at(c[1])), place(at(c[2]))]);
+    corners
+        .enumerate()
+        .map(|(triangle, corners)| Record { corners, instance, triangle: triangle as u32, surface })
+        .filter(|r| piece.deformed || r.corners.iter().all(|p| p.is_finite()))
+        .collect()
+}
+
+impl Shape {
+    fn new(mut records: Vec<Record>, merged: bool) -> Self {
+        let finite = |p: &&Vec3| p.is_finite();
+        let around = |r: &Record| {
+            let aabb = Aabb::of(r.corners.iter().filter(finite).copied());
+            if aabb.is_empty() { Aabb::of([Vec3::ZERO]) } else { aabb }
+        };
+        let boxes: Vec<Aabb> = records.iter().map(around).collect();
+        let tree = Tree::build(&boxes);
+        let bounds = boxes.into_iter().fold(Aabb::EMPTY, Aabb::union);
+        records = tree.order.iter().map(|i| records[*i as usize]).collect();
+        Self { tree, records, bounds, merged, root: 0 }
+    }
+
+    /// Appends three vectors for each record.
+    pub fn encode(&self, out: &mut Vec<[f32; 4]>) {
+        for record in &self.records {
+            let bits = [record.instance, record.triangle, record.surface];
+            out.extend(record.corners.iter().zip(bits).map(|(p, b)| p.extend(f32::from_bits(b)).to_array()));
+        }
+    }
+}

@@ -1,0 +1,11 @@
+// The ray interface: nearest and any hit of the resident scene (lucerna::rays). Bindings 40 to 55 are its own; it also uses
+// those of lib/material.glsl. Args take the fields of RayHandles of the same names.
+#ifndef LIB_TRACE
+#define LIB_TRACE
+#include "lib/trace_common.glsl"
+#ifdef TRACE_QUERY
+#include "lib/trace_query.glsl"
+#else
+#include "lib/trace_compute.glsl"
+#endif
+#endif
