@@ -123,11 +123,11 @@ fn what_is_chosen_is_done() {
 
 #[test]
 fn every_measure_likes_the_reference_best_and_no_number_of_threads_matters() {
-    let reference = noise(5, 61, 47);
+    let reference = noise(5, 181, 177);
     let worse = |amount: f32| {
-        let other = noise(6, 61, 47);
+        let other = noise(6, 181, 177);
         let mix = |i: usize| std::array::from_fn(|c| reference.pixels[i][c] + amount * (other.pixels[i][c] - 0.5));
-        Picture::from_fn(61, 47, |x, y| mix((y * 61 + x) as usize))
+        Picture::from_fn(181, 177, |x, y| mix((y * 181 + x) as usize))
     };
     let baseline = worse(0.2);
     for measure in Measure::ALL {
@@ -146,7 +146,7 @@ fn every_measure_likes_the_reference_best_and_no_number_of_threads_matters() {
             assert_eq!(one, measure_at(&worse(0.1), threads), "{measure} on {threads} threads");
         }
         let map = &one.map;
-        assert!(map.values.len() == 61 * 47 && map.values.iter().all(|v| v.is_finite()), "{measure}");
+        assert!(map.values.len() == 181 * 177 && map.values.iter().all(|v| v.is_finite()), "{measure}");
         assert!(map.range[0] < map.range[1] && !map.meaning.is_empty(), "{measure}");
     }
 }

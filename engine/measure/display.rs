@@ -33,7 +33,7 @@ pub enum ToneCurve {
     Reinhard,
     /// Narkowicz's fit of ACES' filmic curve on each channel, with its exposure of 0.6; HDR-FLIP's default.
     Aces,
-    /// Hable's filmic curve on each channel, white at 11.2.
+    /// Hable's filmic curve on each channel, with his exposure bias of 2 and white at 11.2.
     Hable,
 }
 
@@ -52,10 +52,7 @@ impl ToneCurve {
                 color.map(|v| v * scale)
             }
             Self::Aces => color.map(|v| ratio(v, ACES)),
-            Self::Hable => {
-                let white = 1.0 / ratio(11.2, HABLE);
-                color.map(|v| ratio(v, HABLE) * white)
-            }
+            Self::Hable => color.map(|v| ratio(v, HABLE)),
         };
         mapped.map(|v| v.clamp(0.0, 1.0))
     }
@@ -63,8 +60,8 @@ impl ToneCurve {
 
 /// Coefficients of (k0 x² + k1 x + k2) / (k3 x² + k4 x + k5). Narkowicz 2015 with 0.6 x put in.
 pub(super) const ACES: [f32; 6] = [0.6 * 0.6 * 2.51, 0.6 * 0.03, 0.0, 0.6 * 0.6 * 2.43, 0.6 * 0.59, 0.14];
-/// Hable 2010 (A 0.15, B 0.5, C 0.1, D 0.2, E 0.02, F 0.3), E/F subtracted.
-pub(super) const HABLE: [f32; 6] = [0.15 * (1.0 - 0.02 / 0.3), 0.1 * 0.5 - 0.5 * 0.02 / 0.3, 0.0, 0.15, 0.5, 0.2 * 0.3];
+/// Hable 2010 (A 0.15, B 0.5, C 0.1, D 0.2, E 0.02, F 0.3) with its exposure bias of 2, divided by its value at the white of 11.2.
+pub(super) const HABLE: [f32; 6] = [0.231_683, 0.013_791, 0.0, 0.18, 0.3, 0.018];
 
 /// Value of such a quotient.
 pub(super) fn ratio(x: f32, k: [f32; 6]) -> f32 {
@@ -143,7 +140,7 @@ mod tests {
         assert!(
             (ToneCurve::Aces.apply([1.0; 3])[0] - (2.51 * 0.36 + 0.018) / (2.43 * 0.36 + 0.354 + 0.14)).abs() < 1e-6
         );
-        assert!((ToneCurve::Hable.apply([11.2; 3])[0] - 1.0).abs() < 1e-6);
+        assert!((ToneCurve::Hable.apply([5.6; 3])[0] - 1.0).abs() < 1e-4);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use super::{Measured, Options, Pair, arithmetic, baseline};
+use super::{Measured, Options, Pair, arithmetic, baseline, flip, pdiff, ssim};
 use crate::{Error, Result};
 
 /// A measure. The formulas stand at the functions that compute them.
@@ -30,6 +30,16 @@ pub enum Measure {
     Gain,
     /// On how many pixels the error fell against a baseline ([`baseline::improved`]).
     Improved,
+    /// Structural similarity ([`ssim::ssim`]).
+    Ssim,
+    /// Structural similarity at five scales ([`ssim::ms_ssim`]).
+    MsSsim,
+    /// How different the images look when flipped between ([`flip::flip`]).
+    Flip,
+    /// The same over a range of exposures ([`flip::hdr_flip`]).
+    HdrFlip,
+    /// On how many pixels an observer sees a difference ([`pdiff::pdiff`]).
+    Pdiff,
 }
 
 /// What a user must know about a measure.
@@ -50,7 +60,7 @@ pub struct Info {
 
 impl Measure {
     /// In the order of the documentation.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 16] = [
         Self::Mae,
         Self::Rmse,
         Self::Nrmse,
@@ -62,12 +72,18 @@ impl Measure {
         Self::Fq,
         Self::Gain,
         Self::Improved,
+        Self::Ssim,
+        Self::MsSsim,
+        Self::Flip,
+        Self::HdrFlip,
+        Self::Pdiff,
     ];
 
     /// Name, direction, unit, source.
     pub const fn info(self) -> Info {
         const ERROR: Info =
             Info { name: "", what: "", unit: "", higher_is_better: false, needs_baseline: false, display: false };
+        const DISPLAY: Info = Info { display: true, ..ERROR };
         const BASELINE: Info = Info { needs_baseline: true, ..ERROR };
         match self {
             Self::Mae => Info { name: "mae", what: "mean absolute error of all channels (Imalyzer, eq. 19)", ..ERROR },
@@ -95,8 +111,7 @@ impl Measure {
                 what: "peak signal-to-noise ratio of what a screen shows",
                 unit: "dB",
                 higher_is_better: true,
-                display: true,
-                ..ERROR
+                ..DISPLAY
             },
             Self::Pearson => Info {
                 name: "pearson",
@@ -122,6 +137,30 @@ impl Measure {
                 unit: "%",
                 higher_is_better: true,
                 ..BASELINE
+            },
+            Self::Ssim => Info {
+                name: "ssim",
+                what: "structural similarity, 11×11 Gaussian window (Wang et al. 2004)",
+                higher_is_better: true,
+                ..DISPLAY
+            },
+            Self::MsSsim => Info {
+                name: "ms-ssim",
+                what: "structural similarity at five scales (Wang et al. 2003)",
+                higher_is_better: true,
+                ..DISPLAY
+            },
+            Self::Flip => Info { name: "flip", what: "LDR-FLIP, mean (Andersson et al. 2020)", ..DISPLAY },
+            Self::HdrFlip => Info {
+                name: "hdr-flip",
+                what: "HDR-FLIP, mean: the worst of many exposures (Andersson et al. 2021)",
+                ..ERROR
+            },
+            Self::Pdiff => Info {
+                name: "pdiff",
+                what: "share of pixels that look different (PerceptualDiff, Yee and Newman 2004)",
+                unit: "%",
+                ..DISPLAY
             },
         }
     }
@@ -149,6 +188,11 @@ impl Measure {
             Self::Fq => baseline::fq(pair, options),
             Self::Gain => baseline::gain(pair, options),
             Self::Improved => baseline::improved(pair, options),
+            Self::Ssim => ssim::ssim(pair, options),
+            Self::MsSsim => ssim::ms_ssim(pair, options),
+            Self::Flip => flip::flip(pair, options),
+            Self::HdrFlip => flip::hdr_flip(pair, options),
+            Self::Pdiff => pdiff::pdiff(pair, options),
         }
     }
 }

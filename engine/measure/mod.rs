@@ -22,17 +22,21 @@
 
 pub mod arithmetic;
 pub mod baseline;
+mod convolve;
 mod display;
+pub mod flip;
 mod info;
 mod map;
 mod options;
 mod parallel;
+pub mod pdiff;
 mod picture;
+pub mod ssim;
 
 pub use display::{Display, Exposure, ToneCurve};
 pub use info::{Info, Measure};
 pub use map::{Map, magma};
-pub use options::{NrmseRange, Options, Space};
+pub use options::{NrmseRange, Options, Space, SsimChannels};
 pub use picture::{Pair, Picture};
 
 /// What a measure found.

@@ -13,6 +13,8 @@ pub struct Options {
     /// Added to the squared reference in the relative MSE, in the square of the image's unit. Radiance around 0.1 and below then
     /// counts less and less.
     pub rel_mse_epsilon: f64,
+    /// What SSIM and MS-SSIM compare.
+    pub ssim_channels: SsimChannels,
     /// Pixels that one degree of the field of view takes: FLIP and VDP. 67.02 is FLIP's: a screen 0.7 m and 3840 pixels wide, seen
     /// from 0.7 m.
     pub pixels_per_degree: f64,
@@ -29,6 +31,9 @@ pub struct Options {
     pub pdiff_fov: f64,
     /// PerceptualDiff's conversion of codes to light: `None` takes sRGB's curve (the light itself); the program's way is 2.2.
     pub pdiff_gamma: Option<f64>,
+    /// PerceptualDiff takes red for blue and blue for red, as the program (2.1, with FreeImage) does on little-endian machines: its
+    /// numbers are reproduced to the pixel. False: the paper's luminance.
+    pub pdiff_swapped: bool,
     /// Weight of differences in colour beside those in luminance, 0 to 1.
     pub pdiff_color: f64,
     /// Failing pixels from which on PerceptualDiff's verdict is "visibly different".
@@ -50,6 +55,7 @@ impl Default for Options {
             space: None,
             nrmse_range: NrmseRange::Reference,
             rel_mse_epsilon: 0.01,
+            ssim_channels: SsimChannels::Rgb,
             pixels_per_degree: 0.7 * (3840.0 / 0.7) * std::f64::consts::PI / 180.0,
             flip_start: None,
             flip_stop: None,
@@ -58,6 +64,7 @@ impl Default for Options {
             white_luminance: 100.0,
             pdiff_fov: 45.0,
             pdiff_gamma: Some(2.2),
+            pdiff_swapped: true,
             pdiff_color: 1.0,
             pdiff_threshold: 100,
             vdp_masking_slope: 0.7,
@@ -128,4 +135,13 @@ pub enum NrmseRange {
     Reference,
     /// Of both images together.
     Both,
+}
+
+/// The planes of structural similarity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SsimChannels {
+    /// Red, green and blue codes each, and their mean: scikit-image with `channel_axis`.
+    Rgb,
+    /// Rec. 709 weights on the codes: one grey image, as Wang et al. took.
+    Luma,
 }
