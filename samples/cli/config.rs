@@ -33,6 +33,24 @@ pub fn effective<S: Serialize + DeserializeOwned>(base: &S, file: Option<&Path>,
     serde_json::from_value(tree).map_err(|error| Error::usage(format!("settings: {error}")))
 }
 
+/// `base` with some settings changed; keys as with `-D`, or groups of them.
+///
+/// # Errors
+/// `Usage`, naming the key.
+pub fn with<'a, S: Serialize + DeserializeOwned>(
+    base: &S,
+    changes: impl IntoIterator<Item = (&'a String, &'a Value)>,
+) -> Result<S> {
+    let mut tree = to_value(base)?;
+    for (key, value) in changes {
+        let path = full_path(&tree, key);
+        let nested = path.iter().rev().fold(value.clone(), |value, key| serde_json::json!({ key: value }));
+        apply_all::<S>(&mut tree, &mut Vec::new(), &nested)
+            .map_err(|what| Error::usage(what.0).at(what.1))?;
+    }
+    serde_json::from_value(tree).map_err(|error| Error::usage(format!("settings: {error}")))
+}
+
 /// The settings as TOML, for `--print-config`; reading it back gives the same settings.
 pub fn to_toml<S: Serialize>(settings: &S) -> Result<String> {
     toml::to_string(settings).map_err(|error| Error::new(ErrorKind::Runtime, "settings are not TOML").caused_by(error))

@@ -1,0 +1,262 @@
+//! How pictures are made: the techniques and references that experiments can name.
+
+use std::{any::Any, collections::HashMap, time::Instant};
+
+use lucerna::{
+    Error, Result,
+    gpu::Gpu,
+    graph::{Graph, Report, Runner},
+    image::{Layer, Layers},
+    passes::ambient::Irradiance,
+    reference::path,
+    scene::{Pose, Scene, View, bvh::Bvh, resident::Resident},
+    techniques::isr::{self, PictureSettings},
+};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde_json::Value;
+
+use super::file::{Changes, Method};
+use crate::{config, gbuffer_layers, shown::Shown, signals::Interrupt};
+
+/// A way to make a picture.
+pub struct Kind {
+    pub name: &'static str,
+    pub description: &'static str,
+    /// Its pictures depend on device and driver.
+    pub on_device: bool,
+    /// Folders of the source tree that decide its pictures; when one changes, pictures are made again.
+    pub sources: &'static [&'static str],
+    settings: fn(paper: bool, changes: &Changes) -> Result<Value>,
+    /// The picture, or `None` if it was interrupted.
+    pub render: fn(&mut Warm<'_>, &Job<'_>) -> Result<Option<Rendered>>,
+    /// Version of the program that it needs, or why it is not available.
+    pub available: fn() -> std::result::Result<String, String>,
+}
+
+impl Kind {
+    /// All settings of a variant, those that are not named included.
+    ///
+    /// # Errors
+    /// `Usage` for unknown keys and values out of range.
+    pub fn effective(&self, method: &Method, variant: &Changes) -> Result<Value> {
+        let mut changes = method.settings.clone();
+        changes.extend(variant.iter().map(|(key, value)| (key.clone(), value.clone())));
+        (self.settings)(method.paper, &changes)
+    }
+}
+
+/// What is to be rendered.
+pub struct Job<'a> {
+    pub view: &'a View,
+    /// All settings.
+    pub settings: &'a Value,
+    pub seed: u32,
+    pub repeat: u32,
+    pub interrupt: &'a Interrupt,
+}
+
+/// A picture and what it cost.
+pub struct Rendered {
+    pub layers: Layers,
+    pub times: Times,
+}
+
+/// What a picture cost. Milliseconds.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Times {
+    /// Wall clock of each repetition, with reading back in the first.
+    pub wall: Vec<f64>,
+    /// On the device, each repetition; empty if there is no clock.
+    pub device: Vec<f64>,
+    /// Passes by their names, median over repetitions (without the first, if there are more).
+    pub passes: Vec<(String, f64)>,
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+impl Times {
+    /// Median of the repetitions; the first, which makes pipelines, does not count if there are more.
+    pub fn frame(&self) -> Option<f64> {
+        let list = if self.device.is_empty() { &self.wall } else { &self.device };
+        median(list.iter().skip(usize::from(list.len() > 1)).copied().collect())
+    }
+
+    /// Sum of the passes whose names begin so.
+    pub fn of_passes(&self, prefix: &str) -> f64 {
+        self.passes.iter().filter(|(name, _)| name.starts_with(prefix)).map(|(_, ms)| ms).sum()
+    }
+}
+
+/// Device and scene, and what was made for them, kept from picture to picture.
+pub struct Warm<'a> {
+    pub gpu: &'a Gpu,
+    pub scene: &'a Scene,
+    pub pose: &'a Pose,
+    /// Of this scene.
+    kept: HashMap<&'static str, Box<dyn Any>>,
+}
+
+impl<'a> Warm<'a> {
+    pub fn new(gpu: &'a Gpu, scene: &'a Scene, pose: &'a Pose) -> Self {
+        Self { gpu, scene, pose, kept: HashMap::new() }
+    }
+
+    /// Something made once for the scene.
+    ///
+    /// # Errors
+    /// Those of `make`.
+    pub fn keep<T: 'static>(
+        &mut self,
+        name: &'static str,
+        make: impl FnOnce(&Gpu, &Scene, &Pose) -> Result<T>,
+    ) -> Result<&mut T> {
+        if !self.kept.contains_key(name) {
+            self.kept.insert(name, Box::new(make(self.gpu, self.scene, self.pose)?));
+        }
+        let kept = self.kept.get_mut(name).and_then(|kept| kept.downcast_mut());
+        kept.ok_or_else(|| Error::new(lucerna::ErrorKind::Runtime, format!("'{name}' is kept as something else")))
+    }
+}
+
+/// All kinds.
+pub const KINDS: &[Kind] = &[
+    Kind {
+        name: "isr",
+        description: "image-space radiosity; layers direct, indirect, occlusion, albedo, normal, depth",
+        on_device: true,
+        sources: &["engine", "shaders-glsl", "engine/techniques/isr", "shaders-glsl/isr", "shaders-glsl/passes", "shaders-glsl/lib"],
+        settings: |paper, changes| {
+            let base = if paper { PictureSettings::paper() } else { PictureSettings::default() };
+            let settings: PictureSettings = config::with(&base, changes)?;
+            settings.isr.validate()?;
+            config::to_value(&settings)
+        },
+        render: isr_picture,
+        available: || Ok(String::new()),
+    },
+    Kind {
+        name: "path",
+        description: "path tracer on the CPU; layers direct, indirect, albedo",
+        on_device: false,
+        sources: &["engine/reference"],
+        settings: |_, changes| config::to_value(&config::with::<PathSettings>(&PathSettings::default(), changes)?),
+        render: path_picture,
+        available: || Ok(String::new()),
+    },
+];
+
+/// Finds a kind.
+///
+/// # Errors
+/// `Input` if there is none of this name.
+pub fn find(name: &str) -> Result<&'static Kind> {
+    KINDS.iter().find(|kind| kind.name == name).ok_or_else(|| {
+        let names: Vec<&str> = KINDS.iter().map(|kind| kind.name).collect();
+        let hint = config::nearest(name, names.iter().copied()).map(|name| format!(" (did you mean '{name}'?)"));
+        Error::input(format!("no kind '{name}'{}; there are {}", hint.unwrap_or_default(), names.join(", ")))
+    })
+}
+
+/// Settings as their type.
+fn read<S: DeserializeOwned>(settings: &Value) -> Result<S> {
+    serde_json::from_value(settings.clone()).map_err(|error| Error::input(format!("settings: {error}")))
+}
+
+/// Renders `repeat` times what `compose` declares; the picture is the first one.
+pub fn on_device(
+    runner: &mut Runner,
+    job: &Job<'_>,
+    name: &str,
+    mut compose: impl FnMut(&mut Graph) -> Result<Shown>,
+) -> Result<Option<Rendered>> {
+    let (mut layers, mut times) = (None, Times::default());
+    let mut reports: Vec<Report> = Vec::new();
+    for _ in 0..job.repeat {
+        if job.interrupt.requested() {
+            return Ok(None);
+        }
+        let begun = Instant::now();
+        let mut graph = Graph::new(name);
+        graph.seed = job.seed;
+        let shown = compose(&mut graph)?;
+        let reading = layers.is_none().then(|| shown.read(&mut graph, true));
+        let frame = runner.run(&graph)?;
+        if let Some(reading) = reading {
+            layers = Some(reading.layers(&frame));
+        }
+        times.wall.push(begun.elapsed().as_secs_f64() * 1e3);
+        reports.push(frame.report);
+    }
+    let device = |report: &Report| report.passes.iter().map(|pass| pass.gpu_ms).sum::<Option<f64>>();
+    times.device = reports.iter().map(device).collect::<Option<_>>().unwrap_or_default();
+    let counted = &reports[usize::from(reports.len() > 1)..];
+    if let Some(first) = counted.first() {
+        let of = |index: usize| counted.iter().filter_map(|report| report.passes.get(index)?.gpu_ms).collect();
+        let passes = first.passes.iter().enumerate().filter_map(|(i, pass)| Some((pass.name.clone(), median(of(i))?)));
+        times.passes = passes.collect();
+    }
+    Ok(layers.map(|layers| Rendered { layers, times }))
+}
+
+fn isr_picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
+    let settings: PictureSettings = read(job.settings)?;
+    let (scene, pose) = (warm.scene, warm.pose);
+    let kept = warm.keep("isr", |gpu, scene, _| {
+        let ambient = scene.environment.as_ref().map(Irradiance::of).unwrap_or_default();
+        Ok((Resident::new(gpu, scene)?, ambient, Runner::new(gpu)))
+    })?;
+    let (resident, ambient, runner) = kept;
+    let view = job.view.fit_far(&scene.bounds());
+    on_device(runner, job, "isr", |graph| {
+        let handles = resident.frame_in(graph, scene, pose);
+        let picture = isr::picture(graph, &handles, &view, *ambient, &settings)?;
+        let out = picture.outputs;
+        let shown = Shown::new(out.total).color("direct", out.direct).color("indirect", out.indirect);
+        let shown = shown.layer("occlusion", &["Y"], out.occlusion, |pixel| pixel);
+        Ok(gbuffer_layers::add(shown, &picture.gbuffer, &view))
+    })
+}
+
+/// Settings of the path tracer on the CPU.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct PathSettings {
+    /// Paths a pixel.
+    samples: u32,
+    bounces: u32,
+    specular: bool,
+    jitter: bool,
+}
+
+impl Default for PathSettings {
+    fn default() -> Self {
+        let path::Settings { samples, bounces, specular, jitter, .. } = path::Settings::default();
+        Self { samples, bounces, specular, jitter }
+    }
+}
+
+fn path_picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
+    let PathSettings { samples, bounces, specular, jitter } = read(job.settings)?;
+    let (scene, pose) = (warm.scene, warm.pose);
+    let bvh: &mut Bvh = warm.keep("bvh", |_, scene, pose| Ok(Bvh::build(scene, pose)))?;
+    let begun = Instant::now();
+    let settings = path::Settings { samples, bounces, specular, jitter, seed: job.seed };
+    let traced = path::trace(scene, pose, bvh, job.view, &settings);
+    let [width, height] = job.view.extent;
+    let rgb = |pixels: &[glam::Vec3]| pixels.iter().map(|v| v.to_array()).collect::<Vec<[f32; 3]>>();
+    let total = traced.total();
+    let indirect: Vec<glam::Vec3> =
+        (0..total.len()).map(|i| total[i] - traced.direct[i] - traced.emitted[i]).collect();
+    let direct: Vec<glam::Vec3> = (0..total.len()).map(|i| traced.direct[i] + traced.emitted[i]).collect();
+    let layers = Layers::new(width, height)
+        .with(Layer::rgb("", &rgb(&total)))
+        .with(Layer::rgb("direct", &rgb(&direct)))
+        .with(Layer::rgb("indirect", &rgb(&indirect)))
+        .with(Layer::rgb("albedo", &rgb(&traced.albedo)));
+    let times = Times { wall: vec![begun.elapsed().as_secs_f64() * 1e3], ..Times::default() };
+    Ok(Some(Rendered { layers, times }))
+}

@@ -1,0 +1,148 @@
+//! Reports: one self-contained HTML file, and the same data as JSON and CSV.
+//!
+//! A [`Page`] is a list of sections of texts, [`Table`]s, [`Plot`]s and [`Comparison`]s of images. [`Page::write`] makes of it
+//! `report.html`, `report.json` and `report.csv`. What was measured with a clock differs from run to run: tables and plots
+//! that are marked so ([`Table::timed`], [`Plot::timed`]) go into `times.json` and `times.csv` instead, so that the files
+//! named `report` are the same bytes whenever the pictures are.
+//!
+//! ```
+//! use lucerna_samples::report::{Axis, Page, Plot, Section, Table};
+//!
+//! let mut page = Page::new("Square roots");
+//! let mut section = Section::new("Growth");
+//! section.text("Slower than a line.");
+//! section.add(Table::new("roots", "Roots", ["x", "√x"]).row(["4".into(), 2.0.into()]).row(["9".into(), 3.0.into()]));
+//! let points = (1..10).map(|x| (f64::from(x), f64::from(x).sqrt()));
+//! section.add(Plot::new("curve", "Roots", Axis::new("x"), Axis::new("√x")).line("√x", points));
+//! page.add(section);
+//! assert!(page.html().unwrap().starts_with("<!doctype html>"));
+//! ```
+
+mod data;
+mod html;
+mod images;
+mod plot;
+mod svg;
+mod table;
+mod ticks;
+
+use std::path::{Path, PathBuf};
+
+use lucerna::{Result, image};
+
+pub use images::{Comparison, Image};
+pub use plot::{Axis, Kind, Plot, Rule, Series};
+pub use table::{Cell, Table, number};
+
+/// Everything that a report says.
+#[derive(Clone, Debug, Default)]
+pub struct Page {
+    pub title: String,
+    /// A sentence or two under the title.
+    pub summary: String,
+    pub sections: Vec<Section>,
+    /// Device, driver, versions, seeds, command line: name and value. They stand at the end of the page.
+    pub facts: Vec<(String, String)>,
+    /// Why the report is not complete, if so; shown at the top.
+    pub warnings: Vec<String>,
+}
+
+/// A part of the page with a heading.
+#[derive(Clone, Debug, Default)]
+pub struct Section {
+    pub title: String,
+    pub blocks: Vec<Block>,
+}
+
+/// What a section consists of.
+#[derive(Clone, Debug)]
+pub enum Block {
+    /// A paragraph. `*emphasis*` and `` `code` `` are understood; everything else is text.
+    Text(String),
+    Table(Table),
+    Plot(Plot),
+    Images(Box<Comparison>),
+}
+
+impl From<Table> for Block {
+    fn from(table: Table) -> Self {
+        Self::Table(table)
+    }
+}
+
+impl From<Plot> for Block {
+    fn from(plot: Plot) -> Self {
+        Self::Plot(plot)
+    }
+}
+
+impl From<Comparison> for Block {
+    fn from(images: Comparison) -> Self {
+        Self::Images(Box::new(images))
+    }
+}
+
+impl Section {
+    pub fn new(title: impl Into<String>) -> Self {
+        Self { title: title.into(), blocks: Vec::new() }
+    }
+
+    /// Adds a paragraph.
+    pub fn text(&mut self, text: impl Into<String>) {
+        self.blocks.push(Block::Text(text.into()));
+    }
+
+    /// Adds a table, a plot or images.
+    pub fn add(&mut self, block: impl Into<Block>) {
+        self.blocks.push(block.into());
+    }
+}
+
+impl Page {
+    pub fn new(title: impl Into<String>) -> Self {
+        Self { title: title.into(), ..Self::default() }
+    }
+
+    pub fn add(&mut self, section: Section) {
+        self.sections.push(section);
+    }
+
+    fn blocks(&self) -> impl Iterator<Item = &Block> {
+        self.sections.iter().flat_map(|section| &section.blocks)
+    }
+
+    /// The page as one HTML file.
+    ///
+    /// # Errors
+    /// `Runtime` if an image cannot be packed.
+    pub fn html(&self) -> Result<String> {
+        html::page(self)
+    }
+
+    /// Writes `report.html`, `report.json`, `report.csv` and, if anything was timed, `times.json` and `times.csv` into a folder.
+    /// Each file is complete or not there. Returns their paths, the page first.
+    ///
+    /// # Errors
+    /// `Output` if a file cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>> {
+        let mut files = vec![
+            ("report.html", self.html()?),
+            ("report.json", data::json(self, false)?),
+            ("report.csv", data::csv(self, false)),
+        ];
+        if data::has_times(self) {
+            files.push(("times.json", data::json(self, true)?));
+            files.push(("times.csv", data::csv(self, true)));
+        }
+        let mut written = Vec::new();
+        for (name, text) in files {
+            let path = folder.join(name);
+            image::write_atomic(&path, text.as_bytes(), true)?;
+            written.push(path);
+        }
+        Ok(written)
+    }
+}
+
+#[cfg(test)]
+mod tests;
