@@ -7,7 +7,9 @@ use lucerna::{Result, scene::builtin};
 use lucerna_samples::{
     args::{DeviceArgs, TalkArgs},
     console::{self, Console},
-    devices, info, inspect, program, rerun,
+    devices,
+    experiment::command::{self as experiment, ReportArgs, ReproduceArgs},
+    info, inspect, program, rerun,
     source::{self, SceneArgs},
     views::{self, command::ViewsArgs},
 };
@@ -70,6 +72,10 @@ enum Command {
     },
     /// Write a list of views of a scene: its own cameras, and random ones that show something
     Views(Box<ViewsArgs>),
+    /// Run an experiment and write its report
+    Reproduce(Box<ReproduceArgs>),
+    /// Write the report of an experiment again, from the pictures that are there
+    Report(ReportArgs),
     /// List the built-in scenes
     List {
         #[command(flatten)]
@@ -84,6 +90,8 @@ impl Command {
     fn console(&self) -> Console {
         match self {
             Self::Views(args) => args.talk.console(),
+            Self::Reproduce(args) => args.talk.console(),
+            Self::Report(args) => args.talk.console(),
             Self::Inspect { talk, .. }
             | Self::Info { talk, .. }
             | Self::Rerun { talk, .. }
@@ -100,7 +108,10 @@ fn tolerance(text: &str) -> Result<f32, String> {
 fn main() -> ExitCode {
     let command = Arguments::parse().command;
     let console = command.console();
-    program::run(console, || serve(command, console).map(|()| ExitCode::SUCCESS))
+    program::run(console, || match &command {
+        Command::Reproduce(args) => experiment::reproduce(args, console),
+        _ => serve(command, console).map(|()| ExitCode::SUCCESS),
+    })
 }
 
 fn serve(command: Command, console: Console) -> Result<()> {
@@ -136,6 +147,9 @@ fn serve(command: Command, console: Console) -> Result<()> {
             }
         }
         Command::Views(args) => views::command::run(&args, console),
+        // It chooses its exit code itself.
+        Command::Reproduce(args) => experiment::reproduce(&args, console).map(|_| ()),
+        Command::Report(args) => experiment::report(&args, console),
         Command::List { json, .. } => {
             let list: Vec<(&str, &str)> =
                 builtin::NAMES.iter().map(|&name| (name, builtin::description(name).unwrap_or_default())).collect();

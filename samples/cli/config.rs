@@ -45,8 +45,7 @@ pub fn with<'a, S: Serialize + DeserializeOwned>(
     for (key, value) in changes {
         let path = full_path(&tree, key);
         let nested = path.iter().rev().fold(value.clone(), |value, key| serde_json::json!({ key: value }));
-        apply_all::<S>(&mut tree, &mut Vec::new(), &nested)
-            .map_err(|what| Error::usage(what.0).at(what.1))?;
+        apply_all::<S>(&mut tree, &mut Vec::new(), &nested).map_err(|what| Error::usage(what.0).at(what.1))?;
     }
     serde_json::from_value(tree).map_err(|error| Error::usage(format!("settings: {error}")))
 }

@@ -186,7 +186,16 @@ impl Method {
     pub fn variants(&self) -> Vec<Changes> {
         self.matrix.iter().fold(vec![Changes::new()], |variants, (key, values)| {
             let extended = |variant: &Changes| {
-                values.iter().map(|value| variant.iter().map(|(k, v)| (k.clone(), v.clone())).chain([(key.clone(), value.clone())]).collect()).collect::<Vec<Changes>>()
+                values
+                    .iter()
+                    .map(|value| {
+                        variant
+                            .iter()
+                            .map(|(k, v)| (k.clone(), v.clone()))
+                            .chain([(key.clone(), value.clone())])
+                            .collect()
+                    })
+                    .collect::<Vec<Changes>>()
             };
             variants.iter().flat_map(extended).collect()
         })
@@ -307,7 +316,9 @@ pub fn parse(name: &str, path: Option<&Path>, text: &str, quick: bool) -> Result
     let raw: Raw = toml::from_str(text).map_err(|error| {
         at(error.span().unwrap_or(0..0), error.message().lines().next().unwrap_or_default().to_owned())
     })?;
-    let size = |size: &Spanned<String>| size.get_ref().parse().map_err(|what: String| at(size.span(), format!("size: {what}")));
+    let size = |size: &Spanned<String>| {
+        size.get_ref().parse().map_err(|what: String| at(size.span(), format!("size: {what}")))
+    };
     let mut experiment = Experiment {
         name: name.to_owned(),
         path: path.map(Path::to_path_buf),
@@ -324,9 +335,11 @@ pub fn parse(name: &str, path: Option<&Path>, text: &str, quick: bool) -> Result
         scenes: Vec::new(),
         methods: Vec::new(),
     };
-    super::analysis::find(raw.analysis.get_ref()).map_err(|error| wrong(line_at(text, raw.analysis.span().start), error))?;
+    super::analysis::find(raw.analysis.get_ref())
+        .map_err(|error| wrong(line_at(text, raw.analysis.span().start), error))?;
     for measure in &raw.measures {
-        super::results::known_measure(measure.get_ref()).map_err(|error| wrong(line_at(text, measure.span().start), error))?;
+        super::results::known_measure(measure.get_ref())
+            .map_err(|error| wrong(line_at(text, measure.span().start), error))?;
     }
     for entry in raw.scene {
         let line = line_at(text, entry.span().start);

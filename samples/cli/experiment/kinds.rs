@@ -128,7 +128,16 @@ pub const KINDS: &[Kind] = &[
         name: "isr",
         description: "image-space radiosity; layers direct, indirect, occlusion, albedo, normal, depth",
         on_device: true,
-        sources: &["engine", "shaders-glsl", "engine/techniques/isr", "shaders-glsl/isr", "shaders-glsl/passes", "shaders-glsl/lib"],
+        sources: &[
+            "engine/techniques/isr",
+            "engine/passes",
+            "engine/scene",
+            "shaders-glsl/common",
+            "shaders-glsl/isr",
+            "shaders-glsl/lib",
+            "shaders-glsl/passes",
+            "shaders-glsl/scene",
+        ],
         settings: |paper, changes| {
             let base = if paper { PictureSettings::paper() } else { PictureSettings::default() };
             let settings: PictureSettings = config::with(&base, changes)?;
@@ -142,7 +151,7 @@ pub const KINDS: &[Kind] = &[
         name: "path",
         description: "path tracer on the CPU; layers direct, indirect, albedo",
         on_device: false,
-        sources: &["engine/reference"],
+        sources: &["engine/reference/path"],
         settings: |_, changes| config::to_value(&config::with::<PathSettings>(&PathSettings::default(), changes)?),
         render: path_picture,
         available: || Ok(String::new()),
@@ -170,7 +179,7 @@ fn read<S: DeserializeOwned>(settings: &Value) -> Result<S> {
 pub fn on_device(
     runner: &mut Runner,
     job: &Job<'_>,
-    name: &str,
+    name: &'static str,
     mut compose: impl FnMut(&mut Graph) -> Result<Shown>,
 ) -> Result<Option<Rendered>> {
     let (mut layers, mut times) = (None, Times::default());
@@ -210,9 +219,9 @@ fn isr_picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
         Ok((Resident::new(gpu, scene)?, ambient, Runner::new(gpu)))
     })?;
     let (resident, ambient, runner) = kept;
-    let view = job.view.fit_far(&scene.bounds());
     on_device(runner, job, "isr", |graph| {
         let handles = resident.frame_in(graph, scene, pose);
+        let view = job.view.fit_far(&handles.bounds());
         let picture = isr::picture(graph, &handles, &view, *ambient, &settings)?;
         let out = picture.outputs;
         let shown = Shown::new(out.total).color("direct", out.direct).color("indirect", out.indirect);
@@ -249,8 +258,7 @@ fn path_picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> 
     let [width, height] = job.view.extent;
     let rgb = |pixels: &[glam::Vec3]| pixels.iter().map(|v| v.to_array()).collect::<Vec<[f32; 3]>>();
     let total = traced.total();
-    let indirect: Vec<glam::Vec3> =
-        (0..total.len()).map(|i| total[i] - traced.direct[i] - traced.emitted[i]).collect();
+    let indirect: Vec<glam::Vec3> = (0..total.len()).map(|i| total[i] - traced.direct[i] - traced.emitted[i]).collect();
     let direct: Vec<glam::Vec3> = (0..total.len()).map(|i| traced.direct[i] + traced.emitted[i]).collect();
     let layers = Layers::new(width, height)
         .with(Layer::rgb("", &rgb(&total)))

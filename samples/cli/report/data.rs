@@ -9,7 +9,8 @@ use super::{Block, Cell, Page, Plot, Table};
 
 /// Whether anything was measured with a clock.
 pub(super) fn has_times(page: &Page) -> bool {
-    page.blocks().any(|block| matches!(block, Block::Table(Table { timed: true, .. }) | Block::Plot(Plot { timed: true, .. })))
+    page.blocks()
+        .any(|block| matches!(block, Block::Table(Table { timed: true, .. }) | Block::Plot(Plot { timed: true, .. })))
 }
 
 fn tables(page: &Page, timed: bool) -> impl Iterator<Item = &Table> {
@@ -75,11 +76,14 @@ pub(super) fn csv(page: &Page, timed: bool) -> String {
         let _ = writeln!(text, "{}", field(&format!("# {}: {}", table.id, table.caption)));
         line(&mut text, table.columns.iter().map(|name| field(name)));
         for row in &table.rows {
-            line(&mut text, row.iter().map(|cell| match cell {
-                Cell::Empty => String::new(),
-                Cell::Text(text) => field(text),
-                Cell::Number(value) => value.to_string(),
-            }));
+            line(
+                &mut text,
+                row.iter().map(|cell| match cell {
+                    Cell::Empty => String::new(),
+                    Cell::Text(text) => field(text),
+                    Cell::Number(value) => value.to_string(),
+                }),
+            );
         }
         text.push('\n');
     }

@@ -95,7 +95,8 @@ pub(super) fn page(page: &Page) -> Result<String> {
                 Block::Plot(plot) => {
                     let (id, caption) = (escape(&plot.id), prose(&plot.caption));
                     let drawn = svg::plot(plot);
-                    let _ = writeln!(out, "<figure id=\"plot-{id}\"><figcaption>{caption}</figcaption>{drawn}</figure>");
+                    let _ =
+                        writeln!(out, "<figure id=\"plot-{id}\"><figcaption>{caption}</figcaption>{drawn}</figure>");
                 }
                 Block::Images(images) => comparison(&mut out, images)?,
             }

@@ -65,11 +65,13 @@ impl Comparison {
             let (half_w, half_h) = (w.div_ceil(2), h.div_ceil(2));
             for image in &mut self.images {
                 let average = |x: usize, y: usize| {
-                    let corner = |dx: usize, dy: usize| image.pixels[(2 * y + dy).min(h - 1) * w + (2 * x + dx).min(w - 1)];
+                    let corner =
+                        |dx: usize, dy: usize| image.pixels[(2 * y + dy).min(h - 1) * w + (2 * x + dx).min(w - 1)];
                     let four = [corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1)];
                     [0, 1, 2].map(|c| four.iter().map(|pixel| pixel[c]).sum::<f32>() * 0.25)
                 };
-                image.pixels = (0..half_h).flat_map(|y| (0..half_w).map(move |x| (x, y))).map(|(x, y)| average(x, y)).collect();
+                image.pixels =
+                    (0..half_h).flat_map(|y| (0..half_w).map(move |x| (x, y))).map(|(x, y)| average(x, y)).collect();
             }
             (self.width, self.height) = (half_w as u32, half_h as u32);
             self.halved += 1;
@@ -108,7 +110,8 @@ pub(super) fn packed(image: &Image, width: u32) -> Result<String> {
     }
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
     let bytes = encoder.write_all(&planes).and_then(|()| encoder.finish());
-    let failed = |error| Error::new(ErrorKind::Runtime, format!("image '{}' cannot be packed", image.name)).caused_by(error);
+    let failed =
+        |error| Error::new(ErrorKind::Runtime, format!("image '{}' cannot be packed", image.name)).caused_by(error);
     bytes.map(|bytes| base64(&bytes)).map_err(failed)
 }
 

@@ -143,6 +143,3 @@ impl Page {
         Ok(written)
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -108,7 +108,11 @@ impl Plot {
 
     /// With dots that have a name each (the third), seen when the mouse rests on them.
     #[must_use]
-    pub fn named_points(mut self, name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64, String)>) -> Self {
+    pub fn named_points(
+        mut self,
+        name: impl Into<String>,
+        points: impl IntoIterator<Item = (f64, f64, String)>,
+    ) -> Self {
         self.series.push(Series { name: name.into(), kind: Kind::Points, points: points.into_iter().collect() });
         self
     }

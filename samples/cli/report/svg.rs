@@ -173,7 +173,9 @@ fn axes(text: &mut String, plot: &Plot, frame: &Frame, height: f64) {
                 y + 16.0,
                 escape(&shortened(name))
             ),
-            false => write!(text, "<text class=\"mark middle\" x=\"{x:.1}\" y=\"{:.1}\">{}</text>", y + 19.0, escape(name)),
+            false => {
+                write!(text, "<text class=\"mark middle\" x=\"{x:.1}\" y=\"{:.1}\">{}</text>", y + 19.0, escape(name))
+            }
         };
     }
     let _ = write!(
@@ -285,12 +287,21 @@ fn rules(text: &mut String, plot: &Plot, frame: &Frame) {
             let y = frame.at(frame.x.low, rule.at).1;
             let above = if y < TOP + 16.0 { y + 15.0 } else { y - 6.0 };
             let (left, right) = (frame.left, WIDTH - RIGHT);
-            let _ = write!(text, "<path class=\"rule\" d=\"M{left:.1} {y:.1}H{right:.1}\"/><text class=\"note end\" x=\"{:.1}\" y=\"{above:.1}\">{label}</text>", right - 4.0);
+            let _ = write!(
+                text,
+                "<path class=\"rule\" d=\"M{left:.1} {y:.1}H{right:.1}\"/><text class=\"note end\" x=\"{:.1}\" y=\"{above:.1}\">{label}</text>",
+                right - 4.0
+            );
         } else {
             let x = frame.at(rule.at, frame.y.low).0;
             let near_right = x > WIDTH - RIGHT - 110.0;
             let (class, at) = if near_right { ("note end", x - 6.0) } else { ("note", x + 6.0) };
-            let _ = write!(text, "<path class=\"rule\" d=\"M{x:.1} {TOP}V{:.1}\"/><text class=\"{class}\" x=\"{at:.1}\" y=\"{:.1}\">{label}</text>", frame.bottom, TOP + 12.0);
+            let _ = write!(
+                text,
+                "<path class=\"rule\" d=\"M{x:.1} {TOP}V{:.1}\"/><text class=\"{class}\" x=\"{at:.1}\" y=\"{:.1}\">{label}</text>",
+                frame.bottom,
+                TOP + 12.0
+            );
         }
     }
 }

@@ -76,7 +76,13 @@ impl Table {
 
     /// A row of [`Table::figures`]. The ratio stays empty where it means nothing.
     #[must_use]
-    pub fn figure(self, quantity: &str, unit: &str, paper: impl Into<Option<f64>>, ours: impl Into<Option<f64>>) -> Self {
+    pub fn figure(
+        self,
+        quantity: &str,
+        unit: &str,
+        paper: impl Into<Option<f64>>,
+        ours: impl Into<Option<f64>>,
+    ) -> Self {
         let (paper, ours) = (paper.into(), ours.into());
         let ratio = paper.zip(ours).map(|(paper, ours)| ours / paper).filter(|ratio| ratio.is_finite());
         self.row([quantity.into(), unit.into(), paper.into(), ours.into(), ratio.into()])

@@ -31,13 +31,15 @@ impl Scale {
         }
         let rough = (high - low) / about.max(1) as f64;
         let power = 10f64.powf(rough.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0].map(|f| f * power).into_iter().find(|s| *s >= rough * 0.999).unwrap_or(power * 10.0);
+        let step =
+            [1.0, 2.0, 5.0, 10.0].map(|f| f * power).into_iter().find(|s| *s >= rough * 0.999).unwrap_or(power * 10.0);
         let (first, last) = ((low / step + 1e-9).floor(), (high / step - 1e-9).ceil());
         let decimals = (-(step.log10().floor())).max(0.0) as usize;
         let mark = |i: i64| {
             let value = (first + i as f64) * step;
             let plain = |v: f64| {
-                let text = if step.abs() >= 1e7 || step.abs() < 1e-5 { number(v, 3) } else { format!("{v:.decimals$}") };
+                let text =
+                    if step.abs() >= 1e7 || step.abs() < 1e-5 { number(v, 3) } else { format!("{v:.decimals$}") };
                 text.replace('-', "−")
             };
             (value, if value.abs() < step * 1e-6 { "0".into() } else { plain(value) })
@@ -103,7 +105,10 @@ mod tests {
 
     #[test]
     fn marks_are_round_numbers() {
-        assert_eq!(texts(&Scale::of([0.13, 0.97].into_iter(), false, 5)), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"].map(|t| if t == "0.0" { "0" } else { t }));
+        assert_eq!(
+            texts(&Scale::of([0.13, 0.97].into_iter(), false, 5)),
+            ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"].map(|t| if t == "0.0" { "0" } else { t })
+        );
         assert_eq!(texts(&Scale::of([-3.0, 12.0].into_iter(), false, 4)), ["−5", "0", "5", "10", "15"]);
         assert_eq!(texts(&Scale::of([3.0, 800.0].into_iter(), true, 5)), ["1", "10", "100", "1000"]);
         assert_eq!(texts(&Scale::of([24.0, 80.0].into_iter(), true, 5)), ["20", "50", "100"]);

@@ -1,0 +1,188 @@
+//! `lucerna reproduce` and `lucerna report`.
+
+use std::{
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
+
+use lucerna::{Result, gpu::Gpu};
+use serde_json::json;
+
+use super::{
+    analysis,
+    cache::Cache,
+    file::{self, BUILTIN},
+    place::Folders,
+    results::Results,
+    run::{self, Context, Planned},
+};
+use crate::{
+    args::{DeviceArgs, TalkArgs},
+    console::{self, Console},
+    program::STOPPED_EARLY,
+    progress::ProgressMode,
+    signals::Interrupt,
+};
+
+/// Options of `lucerna reproduce`.
+#[derive(clap::Args, Clone, Debug)]
+pub struct ReproduceArgs {
+    /// An experiment that comes with the program (`--list` names them), or a .toml file
+    #[arg(value_name = "NAME|FILE.toml", required_unless_present = "list")]
+    pub experiment: Option<String>,
+
+    /// Fewer views, smaller pictures, fewer samples, as the experiment says
+    #[arg(long)]
+    pub quick: bool,
+
+    /// Folder for the report and the pictures; what is there is not rendered again [default: NAME-report]
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+
+    /// Where scenes are that do not come with the program [default: $LUCERNA_ASSETS, else ../shared/assets]
+    #[arg(long, value_name = "DIR")]
+    pub assets: Option<PathBuf>,
+
+    /// List the experiments that come with the program, then stop
+    #[arg(long)]
+    pub list: bool,
+
+    /// List what would be rendered, and what is there already, then stop
+    #[arg(long)]
+    pub dry_run: bool,
+
+    /// Print one JSON document about the run on stdout
+    #[arg(long)]
+    pub json: bool,
+
+    #[command(flatten)]
+    pub device: DeviceArgs,
+
+    #[command(flatten)]
+    pub talk: TalkArgs,
+
+    /// How progress is shown on stderr
+    #[arg(long, value_enum, default_value_t, value_name = "HOW")]
+    pub progress: ProgressMode,
+}
+
+/// Options of `lucerna report`.
+#[derive(clap::Args, Clone, Debug)]
+pub struct ReportArgs {
+    /// A folder that `lucerna reproduce` wrote
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+
+    /// Print one JSON document on stdout
+    #[arg(long)]
+    pub json: bool,
+
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}
+
+/// Runs an experiment and writes its report.
+///
+/// # Errors
+/// `Usage` and `Input` for what was asked; whatever fails while rendering.
+pub fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCode> {
+    let Some(asked) = args.experiment.as_deref().filter(|_| !args.list) else {
+        list(args.json)?;
+        return Ok(ExitCode::SUCCESS);
+    };
+    let experiment = file::open(asked, args.quick)?;
+    let interrupt = Interrupt::install();
+    let quick = if args.quick { "-quick" } else { "" };
+    let folder = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}{quick}-report", experiment.name)));
+    let cache = if args.dry_run { Cache::open(&folder) } else { Cache::create(&folder)? };
+    let gpu = Gpu::new(args.device.options()?)?;
+    let context = Context {
+        gpu: &gpu,
+        folders: Folders::new(&experiment, args.assets.as_deref()),
+        cache: &cache,
+        console,
+        progress: args.progress,
+        interrupt: &interrupt,
+        command: format!("lucerna reproduce {asked}{}", if args.quick { " --quick" } else { "" }),
+        dry: args.dry_run,
+    };
+    let (results, planned) = run::run(experiment, &context)?;
+    if args.dry_run {
+        return dry(&planned, args.json).map(|()| ExitCode::SUCCESS);
+    }
+    if results.runs.is_empty() {
+        return Ok(ExitCode::from(interrupt.exit_code()));
+    }
+    results.write_manifest(&folder)?;
+    write(&results, &folder, console, args.json)?;
+    if results.missing > 0 {
+        let all = results.runs.len() + results.missing;
+        console.info(&format!("stopped: {} of {all} runs are done; the same command goes on", results.runs.len()));
+        return Ok(ExitCode::from(STOPPED_EARLY));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes the report of a folder again.
+///
+/// # Errors
+/// `Input` if there are no results.
+pub fn report(args: &ReportArgs, console: Console) -> Result<()> {
+    write(&Results::open(&args.folder)?, &args.folder, console, args.json)
+}
+
+fn write(results: &Results, folder: &Path, console: Console, as_json: bool) -> Result<()> {
+    let files = analysis::report(results)?.write(folder)?;
+    let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    if as_json {
+        let (runs, missing) = (results.runs.len(), results.missing);
+        let skipped: Vec<&String> = results.skipped.iter().map(|(what, _)| what).collect();
+        let name = &results.experiment.name;
+        return console::print_json(&json!({
+            "experiment": name, "runs": runs, "missing": missing, "skipped": skipped, "files": names,
+        }));
+    }
+    console.info(&format!("wrote {}", names.join(", ")));
+    Ok(())
+}
+
+fn list(as_json: bool) -> Result<()> {
+    let mut all = Vec::new();
+    for (name, text) in BUILTIN {
+        all.push((*name, file::parse(name, None, text, false)?.title));
+    }
+    if as_json {
+        let list: Vec<_> = all.iter().map(|(name, title)| json!({ "name": name, "title": title })).collect();
+        return console::print_json(&json!(list));
+    }
+    let width = all.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+    let lines: Vec<String> = all.iter().map(|(name, title)| format!("{name:width$}  {title}")).collect();
+    console::print(&lines.join("\n"))
+}
+
+fn dry(planned: &[Planned], as_json: bool) -> Result<()> {
+    if as_json {
+        let runs = planned.iter().map(|run| Ok(json!({ "run": console::to_json(&run.done)?, "there": run.there })));
+        return console::print_json(&json!(runs.collect::<Result<Vec<_>>>()?));
+    }
+    let there = planned.iter().filter(|run| run.there).count();
+    for run in planned {
+        let mark = if run.there { "there " } else { "render" };
+        console::print(&format!("{mark}  {}/{}  {}", run.done.scene, run.done.view, run.done.label()))?;
+    }
+    console::print(&format!("{} runs, {there} are there already", planned.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_experiment_that_comes_along_can_be_read() {
+        for (name, text) in BUILTIN {
+            for quick in [false, true] {
+                file::parse(name, None, text, quick).unwrap_or_else(|error| panic!("{name}: {error}"));
+            }
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! Scenes of an experiment with their views.
+
+use std::path::{Path, PathBuf};
+
+use glam::Mat4;
+use lucerna::{
+    Error, ErrorKind, Result,
+    scene::{self, Camera, Limits, Pose, View, builtin, environment},
+};
+
+use super::file::{Experiment, IfMissing, Scene as Entry};
+use crate::{
+    args::Size,
+    camera::{self, CameraFile, Choice},
+    config, fingerprint, framing, lights, source,
+    views::{self, ViewList},
+};
+
+/// Where relative file names are looked for.
+#[derive(Clone, Debug)]
+pub struct Folders(Vec<PathBuf>);
+
+impl Folders {
+    /// Beside the experiment's file; in `assets` or, without it, in `$LUCERNA_ASSETS` or `../shared/assets`; and here.
+    pub fn new(experiment: &Experiment, assets: Option<&Path>) -> Self {
+        let beside = experiment.path.as_ref().and_then(|path| path.parent()).map(Path::to_path_buf);
+        let assets = assets.map(Path::to_path_buf).or_else(|| std::env::var_os("LUCERNA_ASSETS").map(PathBuf::from));
+        let assets = assets.unwrap_or_else(|| PathBuf::from("../shared/assets"));
+        Self(beside.into_iter().chain([assets, PathBuf::from(".")]).collect())
+    }
+
+    /// The first that exists.
+    fn find(&self, name: &str) -> Option<PathBuf> {
+        self.0.iter().map(|folder| folder.join(name)).find(|path| path.is_file())
+    }
+
+    fn missing(&self, name: &str) -> Error {
+        let places: Vec<String> = self.0.iter().map(|folder| folder.display().to_string()).collect();
+        Error::input(format!("no file '{name}' in {}", places.join(", ")))
+            .help("Say where with --assets DIR, or let it be skipped with if_missing = \"skip\"")
+    }
+}
+
+/// A view of a scene.
+#[derive(Clone, Debug)]
+pub struct Placed {
+    pub name: String,
+    camera: Camera,
+    /// The node that carries the camera, or where it stands.
+    node: Option<usize>,
+    world_from_camera: Mat4,
+}
+
+impl Placed {
+    fn from_file(name: String, file: &CameraFile) -> Self {
+        let camera = Camera { name: name.clone(), projection: file.projection() };
+        Self { name, camera, node: None, world_from_camera: file.world_from_view() }
+    }
+
+    /// What it sees.
+    pub fn view(&self, pose: &Pose, size: Size) -> View {
+        let world = self.node.map_or(self.world_from_camera, |node| pose.world[node]);
+        View::new(&self.camera, world, [size.width, size.height])
+    }
+}
+
+/// A scene in memory.
+#[derive(Debug)]
+pub struct Loaded {
+    pub scene: scene::Scene,
+    pub pose: Pose,
+    pub fingerprint: String,
+    pub triangles: usize,
+    pub views: Vec<Placed>,
+    /// EV that suits it, if known.
+    pub exposure: Option<f64>,
+}
+
+/// Reads a scene and makes its views; `None` if it is not there and may be skipped.
+///
+/// # Errors
+/// `Input`, naming the experiment's file and the line of the scene.
+pub fn load(experiment: &Experiment, entry: &Entry, folders: &Folders) -> Result<Option<Loaded>> {
+    let named = |error: Error| {
+        let file = experiment.path.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", experiment.name)));
+        let place = format!("line {}: scene '{}'", entry.line, entry.name);
+        // What was wrong with another file stands in the text.
+        match error.file() {
+            Some(_) => Error::new(error.kind(), error.to_string()).at(place).in_file(file),
+            None => error.at(place).in_file(file),
+        }
+    };
+    let missing = [&entry.file, &entry.environment, &entry.list].into_iter().flatten();
+    let missing = missing.chain(entry.cameras.iter().filter(|camera| camera.ends_with(".toml")));
+    if let Some(name) = missing.into_iter().find(|name| folders.find(name).is_none()) {
+        return match entry.if_missing {
+            IfMissing::Skip => Ok(None),
+            IfMissing::Fail => Err(named(folders.missing(name))),
+        };
+    }
+    read(experiment, entry, folders).map(Some).map_err(named)
+}
+
+fn read(experiment: &Experiment, entry: &Entry, folders: &Folders) -> Result<Loaded> {
+    let found = |name: &String| folders.find(name).ok_or_else(|| folders.missing(name));
+    let path = entry.file.as_ref().map(found).transpose()?;
+    let (mut scene, _) = source::open(path.as_deref(), entry.builtin.as_deref(), &source::in_unit(entry.unit))?;
+    scene.name.clone_from(&entry.name);
+    if let Some(name) = &entry.environment {
+        scene.environment = Some(environment::load(&found(name)?, &Limits::default())?.0);
+    }
+    lights::add(&mut scene, &entry.light, entry.sun.as_ref());
+    framing::add_missing_light(&mut scene, entry.default_light);
+    if !entry.cameras.is_empty() {
+        framing::add_missing_camera(&mut scene, experiment.size.aspect());
+    }
+    let pose = Pose::playing(&scene, 0.0);
+    let views = all_views(entry, &scene, &pose, folders)?;
+    let triangles =
+        scene.meshes.iter().flat_map(|mesh| &mesh.primitives).map(|primitive| primitive.indices.len() / 3).sum();
+    let exposure = entry.exposure.or_else(|| entry.builtin.as_deref().and_then(builtin::exposure).map(f64::from));
+    Ok(Loaded { fingerprint: fingerprint::scene(&scene), scene, pose, triangles, views, exposure })
+}
+
+fn all_views(entry: &Entry, scene: &scene::Scene, pose: &Pose, folders: &Folders) -> Result<Vec<Placed>> {
+    let mut list: Vec<Placed> = Vec::new();
+    let found = |name: &str| folders.find(name).ok_or_else(|| folders.missing(name));
+    for asked in &entry.cameras {
+        list.push(match camera::in_list(asked) {
+            Some((file, view)) => {
+                let views = ViewList::read(&found(file)?)?;
+                let view = views.find(view)?;
+                Placed::from_file(view.name.clone(), &view.camera())
+            }
+            None => one(asked, scene, folders)?,
+        });
+    }
+    if let Some(name) = &entry.list {
+        let views = ViewList::read(&found(name)?)?;
+        list.extend(views.views.iter().map(|view| Placed::from_file(view.name.clone(), &view.camera())));
+    }
+    if entry.recorded {
+        list.extend(views::recorded(scene, pose).iter().map(|v| Placed::from_file(v.name.clone(), &v.camera())));
+    }
+    if entry.random > 0 {
+        let drawn = views::draw::views(scene, pose, &entry.name, entry.random, entry.seed)?;
+        list.extend(drawn.iter().map(|view| Placed::from_file(view.name.clone(), &view.camera())));
+    }
+    if let Some(twice) = list.iter().enumerate().find(|(i, view)| list[..*i].iter().any(|v| v.name == view.name)) {
+        return Err(Error::input(format!("two views are named '{}'", twice.1.name)));
+    }
+    if list.is_empty() {
+        return Err(Error::new(ErrorKind::Input, "there are no views"));
+    }
+    Ok(spread(&list, entry.most_views).into_iter().cloned().collect())
+}
+
+/// One camera by index, name or file.
+fn one(asked: &str, scene: &scene::Scene, folders: &Folders) -> Result<Placed> {
+    if asked.ends_with(".toml") {
+        let path = folders.find(asked).ok_or_else(|| folders.missing(asked))?;
+        let name = path.file_stem().map_or_else(|| "camera".into(), |stem| stem.to_string_lossy().into_owned());
+        return Ok(Placed::from_file(name, &CameraFile::read(&path)?));
+    }
+    let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
+    Ok(match camera::choose(asked, &names)? {
+        Choice::Scene(index) => {
+            let camera = scene.cameras[index].clone();
+            let node = scene.nodes.iter().position(|node| node.camera == Some(index as u32));
+            let name = if camera.name.is_empty() { format!("camera{index}") } else { camera.name.clone() };
+            Placed { name, camera, node, world_from_camera: Mat4::IDENTITY }
+        }
+        Choice::File(file) => Placed::from_file(asked.to_owned(), &file),
+    })
+}
+
+/// At most `most` of a list, spread evenly, the first always among them.
+pub fn spread<T>(list: &[T], most: Option<usize>) -> Vec<&T> {
+    match most {
+        Some(most) if most < list.len() => (0..most).map(|i| &list[i * list.len() / most]).collect(),
+        _ => list.iter().collect(),
+    }
+}
+
+/// Everything of a view that decides a picture.
+pub fn view_key(view: &View) -> Result<serde_json::Value> {
+    let camera = [view.view_from_world, view.clip_from_view].map(|m| m.to_cols_array().to_vec());
+    config::to_value(&(camera, view.extent))
+}

@@ -1,0 +1,275 @@
+//! Renders what an experiment asks for and is not there yet.
+
+use std::{collections::BTreeMap, time::Instant};
+
+use lucerna::{
+    Error, Result,
+    gpu::Gpu,
+    image::{Layer, Layers, Metadata},
+};
+use serde_json::json;
+
+use super::{
+    cache::{Cache, Key},
+    file::{Changes, Experiment, IfMissing, Method, Scene},
+    kinds::{self, Job, Kind, Warm},
+    place::{self, Folders, Loaded, Placed},
+    progress::Progress,
+    results::{Done, Results, label},
+};
+use crate::{config, console::Console, program, progress::ProgressMode, signals::Interrupt};
+
+/// One picture to be made.
+#[derive(Clone, Debug)]
+struct Step {
+    /// Index into the scene's views.
+    view: usize,
+    method: usize,
+    variant: Changes,
+}
+
+/// What belongs to a run of the program and not to the experiment.
+#[derive(Debug)]
+pub struct Context<'a> {
+    pub gpu: &'a Gpu,
+    pub folders: Folders,
+    pub cache: &'a Cache,
+    pub console: Console,
+    pub progress: ProgressMode,
+    pub interrupt: &'a Interrupt,
+    /// For the report.
+    pub command: String,
+    /// Only says what would be rendered.
+    pub dry: bool,
+}
+
+/// A run and whether its picture is there.
+#[derive(Clone, Debug)]
+pub struct Planned {
+    pub done: Done,
+    pub there: bool,
+}
+
+/// Everything that is to be rendered, scene after scene; with `dry` nothing is.
+///
+/// # Errors
+/// `Input` for scenes that cannot be read, and whatever fails while rendering.
+pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Vec<Planned>)> {
+    let Context { gpu, cache, console, .. } = context;
+    let mut skipped = Vec::new();
+    let needs = available(&experiment, &mut skipped)?;
+    // All scenes are looked at first: what is missing shows at once, and how much there is to do.
+    let mut steps: Vec<(&Scene, Vec<Step>)> = Vec::new();
+    let mut counts = BTreeMap::<String, usize>::new();
+    let mut first = None;
+    for entry in &experiment.scenes {
+        let Some(loaded) = place::load(&experiment, entry, &context.folders)? else {
+            let file = entry.file.clone().unwrap_or_default();
+            console.warning(&format!("scene '{}' is skipped: {file} is not there", entry.name));
+            skipped.push((format!("scene {}", entry.name), format!("a file is not there: {file}")));
+            continue;
+        };
+        let list = of_scene(&experiment, entry, &loaded, &needs);
+        list.iter().for_each(|step| *counts.entry(experiment.methods[step.method].name.clone()).or_default() += 1);
+        steps.push((entry, list));
+        // The first one is needed next.
+        first.get_or_insert(loaded);
+    }
+    let total: usize = counts.values().sum();
+    if total == 0 {
+        return Err(Error::input("nothing is left to be rendered").help("Scenes or programs were skipped; see above"));
+    }
+    console.info(&format!(
+        "{}: {total} runs, {} scenes, {} on {}",
+        experiment.name,
+        steps.len(),
+        experiment.size,
+        gpu.describe()
+    ));
+    let mut progress = Progress::new(context.progress, console.is_quiet() || context.dry, counts);
+    let mut planned = Vec::new();
+    'all: for (entry, list) in &steps {
+        let loaded = match first.take() {
+            Some(loaded) => loaded,
+            None => match place::load(&experiment, entry, &context.folders)? {
+                Some(loaded) => loaded,
+                None => {
+                    return Err(
+                        Error::input("went away while the experiment ran").at(format!("scene '{}'", entry.name))
+                    );
+                }
+            },
+        };
+        let mut warm = Warm::new(gpu, &loaded.scene, &loaded.pose);
+        for step in list {
+            if context.interrupt.requested() {
+                break 'all;
+            }
+            let method = &experiment.methods[step.method];
+            let one = One { experiment: &experiment, entry, loaded: &loaded, method, step, needs: &needs[step.method] };
+            let (done, key) = one.describe(gpu)?;
+            let what = format!("{}/{} {}", done.scene, done.view, done.label());
+            let mut there = cache.times(&done.key).is_some();
+            let begun = Instant::now();
+            let mut seconds = None;
+            if !there && !context.dry {
+                if !one.render(&mut warm, context, &key).map_err(|error| error.at(&what))? {
+                    break 'all;
+                }
+                there = true;
+                seconds = Some(begun.elapsed().as_secs_f64());
+            }
+            progress.run(&method.name, &what, seconds);
+            planned.push(Planned { done, there });
+        }
+    }
+    progress.finish();
+    let runs: Vec<Done> = planned.iter().filter(|run| run.there).map(|run| run.done.clone()).collect();
+    let missing = total - runs.len();
+    let facts = facts(&experiment, context);
+    Ok((Results { experiment, runs, skipped, missing, facts, cache: (*cache).clone() }, planned))
+}
+
+/// Versions of the programs that methods need; `None` where one is missing and may be skipped.
+fn available(experiment: &Experiment, skipped: &mut Vec<(String, String)>) -> Result<Vec<Option<String>>> {
+    let mut list = Vec::new();
+    for method in &experiment.methods {
+        let kind = kinds::find(&method.kind)?;
+        list.push(match ((kind.available)(), method.if_missing) {
+            (Ok(version), _) => Some(version),
+            (Err(why), IfMissing::Skip) => {
+                skipped.push((method.name.clone(), why));
+                None
+            }
+            (Err(why), IfMissing::Fail) => {
+                return Err(Error::input(why).at(format!("line {}: '{}'", method.line, method.name)));
+            }
+        });
+    }
+    Ok(list)
+}
+
+/// The runs of a scene: view after view, so that a stopped experiment has whole views.
+fn of_scene(experiment: &Experiment, entry: &Scene, loaded: &Loaded, needs: &[Option<String>]) -> Vec<Step> {
+    let indices: Vec<usize> = (0..loaded.views.len()).collect();
+    let mut steps = Vec::new();
+    for &view in &indices {
+        for (index, method) in experiment.methods.iter().enumerate() {
+            let chosen = place::spread(&indices, method.most_views).contains(&&view);
+            if chosen && method.takes(&entry.name) && needs[index].is_some() {
+                steps.extend(method.variants().into_iter().map(|variant| Step { view, method: index, variant }));
+            }
+        }
+    }
+    steps
+}
+
+struct One<'a> {
+    experiment: &'a Experiment,
+    entry: &'a Scene,
+    loaded: &'a Loaded,
+    method: &'a Method,
+    step: &'a Step,
+    needs: &'a Option<String>,
+}
+
+impl One<'_> {
+    fn placed(&self) -> &Placed {
+        &self.loaded.views[self.step.view]
+    }
+
+    fn kind(&self) -> Result<&'static Kind> {
+        kinds::find(&self.method.kind)
+    }
+
+    fn describe(&self, gpu: &Gpu) -> Result<(Done, Key)> {
+        let Self { experiment, entry, loaded, method, step, .. } = self;
+        let view = self.placed().view(&loaded.pose, experiment.size);
+        let what = json!({
+            "scene": loaded.fingerprint,
+            "view": place::view_key(&view)?,
+            "settings": self.kind()?.effective(method, &step.variant)?,
+            "seed": experiment.seed,
+            "repeat": method.repeat,
+            "layers": method.layers,
+        });
+        let key = Key::new(self.kind()?, gpu, self.needs.as_deref().unwrap_or_default(), what)?;
+        let done = Done {
+            scene: entry.name.clone(),
+            group: entry.group.clone(),
+            triangles: loaded.triangles,
+            view: self.placed().name.clone(),
+            method: method.name.clone(),
+            variant: step.variant.clone(),
+            key: key.name.clone(),
+            exposure: loaded.exposure,
+        };
+        Ok((done, key))
+    }
+
+    /// Renders and keeps the picture; false if it was interrupted.
+    fn render(&self, warm: &mut Warm<'_>, context: &Context<'_>, key: &Key) -> Result<bool> {
+        let Self { experiment, entry, loaded, method, step, .. } = self;
+        let view = self.placed().view(&loaded.pose, experiment.size);
+        let settings = self.kind()?.effective(method, &step.variant)?;
+        let job = Job {
+            view: &view,
+            settings: &settings,
+            seed: experiment.seed,
+            repeat: method.repeat,
+            interrupt: context.interrupt,
+        };
+        let Some(rendered) = (self.kind()?.render)(warm, &job)? else { return Ok(false) };
+        if context.interrupt.requested() {
+            return Ok(false);
+        }
+        let about = context.gpu.describe();
+        let kept = |layer: &Layer| layer.name.is_empty() || method.layers.contains(&layer.name);
+        let layers = Layers {
+            layers: rendered.layers.layers.into_iter().filter(kept).collect(),
+            metadata: Metadata {
+                program: "lucerna reproduce".into(),
+                version: program::VERSION.into(),
+                scene: entry.name.clone(),
+                scene_hash: loaded.fingerprint.clone(),
+                camera: self.placed().name.clone(),
+                technique: label(&method.name, &step.variant),
+                seed: experiment.seed.into(),
+                device: about.device.clone(),
+                driver: format!("{} {}", about.driver, about.driver_info).trim().to_owned(),
+                config: json!({ "kind": method.kind, "settings": settings }),
+                world_to_camera: Some(view.view_from_world.to_cols_array()),
+                world_to_ndc: Some(view.clip_from_world.to_cols_array()),
+                ..Metadata::default()
+            },
+            ..rendered.layers
+        };
+        context.cache.put(key, &layers, &rendered.times)?;
+        Ok(true)
+    }
+}
+
+fn facts(experiment: &Experiment, context: &Context<'_>) -> Vec<(String, String)> {
+    let about = context.gpu.describe();
+    let mut facts: Vec<(&str, String)> = vec![
+        ("Command", context.command.clone()),
+        ("Program", format!("lucerna {}", program::VERSION)),
+        ("Revision", program::revision().unwrap_or("unknown").to_owned()),
+        ("Device", format!("{} ({})", about.device, about.kind)),
+        ("Driver", format!("{} {}", about.driver, about.driver_info).trim().to_owned()),
+        ("Vulkan", about.api_version.clone()),
+        ("Size", format!("{} pixels", experiment.size)),
+        ("Seed", experiment.seed.to_string()),
+        ("Mode", if experiment.quick { "quick".into() } else { "full".into() }),
+    ];
+    for method in &experiment.methods {
+        let mut changes = config::to_value(&method.settings).unwrap_or_default().to_string();
+        if method.paper {
+            changes = format!("the paper's choices; {changes}");
+        }
+        let matrix: Vec<String> =
+            method.matrix.iter().map(|(key, values)| format!("; {key} = {}", json!(values))).collect();
+        facts.push(("Settings", format!("{} ({}): {changes}{}", method.name, method.kind, matrix.concat())));
+    }
+    facts.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+}
