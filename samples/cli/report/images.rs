@@ -93,7 +93,7 @@ fn stored(value: f32) -> u16 {
     }
     // Round to the kept bits; a carry into the exponent is right, one into infinity is not.
     let drop = 10 - KEPT_BITS;
-    let rounded = (bits & 0x7fff) + (1 << (drop - 1)) & !((1 << drop) - 1);
+    let rounded = ((bits & 0x7fff) + (1 << (drop - 1))) & !((1 << drop) - 1);
     (bits & 0x8000) | rounded.min(0x7bff & !((1 << drop) - 1))
 }
 
