@@ -8,11 +8,11 @@ use lucerna::{
     graph::Graph,
     passes::{
         ambient::Irradiance,
-        direct::{self, Direct, Lights},
+        direct::{self, Lights},
         gbuffer, shadow, skybox,
     },
     scene::resident::Resident,
-    techniques::isr::{self, LightLaw, PictureSettings},
+    techniques::isr::{self, PictureSettings},
 };
 use lucerna_samples::{
     args::RenderArgs,
@@ -99,13 +99,7 @@ fn compose(
     let (shown, gbuffer, shadows) = if mode == Mode::Direct {
         let gbuffer = gbuffer::draw(graph, &scene, &view, &settings.gbuffer);
         let shadows = shadow::draw(graph, &scene, &view, &settings.shadow);
-        let choices = Direct {
-            paper_law: settings.isr.light_law == LightLaw::Paper,
-            specular: settings.isr.specular,
-            light_radius: settings.isr.light_radius,
-            light_power: settings.isr.light_power,
-        };
-        let lit = direct::light(graph, &gbuffer, Lights::from(&shadows), &choices);
+        let lit = direct::light(graph, &gbuffer, Lights::from(&shadows), &settings.isr.direct());
         skybox::draw(graph, &scene, &gbuffer, settings.background.into(), lit.direct);
         (Shown::new(lit.direct), gbuffer, shadows)
     } else {

@@ -2,13 +2,16 @@
 //! (ISR dissertation, section 4.2: CLR, NRM, DPT; with what physical materials need besides).
 
 use crate::{
-    graph::{Depth, Extent, Format, Graph, Image, Load, Raster, Stencil, StencilLoad, Targets, Uniform},
+    graph::{Cull, Depth, Extent, Format, Graph, Image, Load, Raster, Stencil, StencilLoad, Targets, Uniform},
     scene::{
         View,
         cull::Frustum,
         resident::{Batches, Cutout, Handles},
     },
-    shaders::{passes::gbuffer as shader, types},
+    shaders::{
+        passes::{gbuffer as shader, gbuffer_behind as behind_shader},
+        types,
+    },
 };
 use serde::{Deserialize, Serialize};
 
@@ -73,6 +76,16 @@ pub struct GBuffer {
 
 /// Draws the scene as `view` sees it.
 pub fn draw(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings) -> GBuffer {
+    layer(graph, scene, view, settings, None)
+}
+
+/// What `view` would see if everything at and before the linear depths `nearer` (R32F, same extent) were not there: the next layer
+/// of a depth peeling. Backs of single-sided surfaces are there, with the normal of their front.
+pub fn draw_behind(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, nearer: Image) -> GBuffer {
+    layer(graph, scene, view, settings, Some(nearer))
+}
+
+fn layer(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, nearer: Option<Image>) -> GBuffer {
     let extent = Extent::from(view.extent);
     let normal_format = match settings.normals {
         Normals::Bytes => Format::RGBA8,
@@ -102,23 +115,47 @@ pub fn draw(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings
                 Some(Cutout::Blend) if settings.blended == Blended::Dithered => 2,
                 Some(Cutout::Blend) => 3,
             };
-            let args = shader::Args {
-                view: gbuffer.view,
-                instances: scene.instances,
-                visible,
-                positions: scene.positions,
-                normals: scene.normals,
-                tangents: scene.tangents,
-                uvs: scene.uvs,
-                colors: scene.colors,
-                materials: scene.materials,
-                scene_textures: scene.textures,
-                spec: shader::Spec { cutout, octahedral: u32::from(settings.normals == Normals::Octahedral) },
-            };
-            let state = Raster::new().cull(batch.map_or_else(Default::default, |b| b.sided.cull()));
+            let octahedral = u32::from(settings.normals == Normals::Octahedral);
+            let sided = batch.map_or_else(Default::default, |b| b.sided.cull());
             let draw =
                 batch.map_or_else(|| crate::graph::Draw::indexed(scene.indices, Vec::new()), |batch| batch.draw(scene));
-            let pass = graph.raster(targets(&gbuffer, index == 0), state.stencil(Stencil::write(1)), args, draw);
+            let targets = targets(&gbuffer, index == 0);
+            let state = Raster::new().stencil(Stencil::write(1));
+            let pass = match nearer {
+                None => {
+                    let args = shader::Args {
+                        view: gbuffer.view,
+                        instances: scene.instances,
+                        visible,
+                        positions: scene.positions,
+                        normals: scene.normals,
+                        tangents: scene.tangents,
+                        uvs: scene.uvs,
+                        colors: scene.colors,
+                        materials: scene.materials,
+                        scene_textures: scene.textures,
+                        spec: shader::Spec { cutout, octahedral },
+                    };
+                    graph.raster(targets, state.cull(sided), args, draw)
+                }
+                Some(nearer) => {
+                    let args = behind_shader::Args {
+                        view: gbuffer.view,
+                        instances: scene.instances,
+                        visible,
+                        positions: scene.positions,
+                        normals: scene.normals,
+                        tangents: scene.tangents,
+                        uvs: scene.uvs,
+                        colors: scene.colors,
+                        nearer,
+                        materials: scene.materials,
+                        scene_textures: scene.textures,
+                        spec: behind_shader::Spec { cutout, octahedral },
+                    };
+                    graph.raster(targets, state.cull(Cull::None), args, draw)
+                }
+            };
             if let Some(batch) = batch {
                 pass.named(format!("passes.gbuffer.{:?}.{:?}", batch.cutout, batch.sided).to_lowercase());
             }

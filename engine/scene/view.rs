@@ -93,6 +93,19 @@ impl View {
         self
     }
 
+    /// The same camera with the tangents of its angles of view (orthographic: its size) times `factor`, for an image of `extent`
+    /// pixels. Angles stop short of 180°.
+    #[must_use]
+    pub fn wider(mut self, factor: f32, extent: [u32; 2]) -> Self {
+        match &mut self.projection {
+            Projection::Perspective { yfov, .. } => *yfov = 2.0 * ((0.5 * yfov.clamp(1e-3, 3.1)).tan() * factor).atan(),
+            Projection::Orthographic { ymag, .. } => *ymag *= factor,
+        }
+        self.extent = extent.map(|e| e.max(1));
+        self.set_range(self.near, self.far);
+        self
+    }
+
     fn set_range(&mut self, near: f32, far: f32) {
         self.near = if near.is_finite() { near } else { 0.01 };
         if matches!(self.projection, Projection::Perspective { .. }) {

@@ -21,6 +21,7 @@
 //! surfaces, and numbers of samples that vary over the picture do not exist yet.
 
 mod picture;
+pub mod senders;
 mod settings;
 
 pub use picture::{Picture, PictureSettings, picture};
@@ -35,7 +36,7 @@ use crate::{
         ambient::Irradiance,
         bilateral, blur,
         compose::{self, Compose},
-        direct::{self, Direct},
+        direct,
         downsample,
         gbuffer::GBuffer,
     },
@@ -66,6 +67,8 @@ pub struct Inputs {
     pub lights: direct::Lights,
     /// Light of the environment; default none.
     pub ambient: Irradiance,
+    /// Surfaces beside those of the frame that send light ([`senders::draw`]).
+    pub senders: Option<senders::Senders>,
 }
 
 /// Declares direct light, downsampling, gathering, blur, upsampling and sum.
@@ -79,13 +82,7 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
     let extent = graph.extent(g.depth);
     let factor = settings.resolution.factor();
 
-    let direct = Direct {
-        paper_law: settings.light_law == LightLaw::Paper,
-        specular: settings.specular,
-        light_radius: settings.light_radius,
-        light_power: settings.light_power,
-    };
-    let lit = direct::light(graph, &g, inputs.lights, &direct);
+    let lit = direct::light(graph, &g, inputs.lights, &settings.direct());
 
     let aware = settings.downsample == Downsample::DepthAware;
     let coarse = downsample::gbuffer(graph, &g, factor, aware);
@@ -152,12 +149,18 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
     };
 
     let mut gathered = gather(graph, sender);
+    if let Some(senders) = inputs.senders.filter(|_| settings.indirect) {
+        gathered = senders.gather(graph, &g, &coarse, gathered, settings);
+    }
     let mut blurred = filter(graph, gathered);
     for _ in 1..settings.bounces {
         let next = graph.image("isr.sender", Format::RGBA16F, graph.extent(coarse.depth));
         let args = shaders::isr::bounce::Args { sender, albedo: coarse.albedo, gathered: blurred, next };
         graph.compute(args, graph.extent(next));
         gathered = gather(graph, next);
+        if let Some(senders) = inputs.senders.filter(|_| settings.indirect) {
+            gathered = senders.gather(graph, &g, &coarse, gathered, settings);
+        }
         blurred = filter(graph, gathered);
     }
 

@@ -1,6 +1,6 @@
 //! Everything from a scene on the device to the final picture.
 
-use super::{Inputs, Outputs, Settings, frame};
+use super::{Inputs, Outputs, Settings, frame, senders};
 use crate::{
     Result,
     graph::Graph,
@@ -60,7 +60,11 @@ pub fn picture(
     settings.isr.validate().map_err(|error| error.at("isr"))?;
     let gbuffer = gbuffer::draw(graph, scene, view, &settings.gbuffer);
     let shadows = shadow::draw(graph, scene, view, &settings.shadow);
-    let inputs = Inputs { gbuffer, lights: Lights::from(&shadows), ambient };
+    let lights = Lights::from(&shadows);
+    let senders = graph.scope("isr.senders", |graph| {
+        senders::draw(graph, scene, view, lights, &settings.gbuffer, &settings.shadow, &settings.isr)
+    });
+    let inputs = Inputs { gbuffer, lights, ambient, senders };
     let outputs = graph.scope("isr", |graph| frame(graph, &inputs, &settings.isr))?;
     skybox::draw(graph, scene, &gbuffer, settings.background.into(), outputs.total);
     Ok(Picture { gbuffer, shadows, outputs })

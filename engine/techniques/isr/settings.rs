@@ -1,6 +1,6 @@
 //! What can be chosen in image-space radiosity, and what the dissertation chose.
 
-use crate::{Error, Result};
+use crate::{Error, Result, passes::direct::Direct};
 use serde::{Deserialize, Serialize};
 
 /// What a pixel sends to others.
@@ -156,6 +156,20 @@ pub struct Settings {
     pub thickness: f32,
     /// Diffuse bounces after the direct light, 1 to 4. Each takes a gather.
     pub bounces: u32,
+    /// A number of samples for each pixel by its depth: one step of 24, 48, 80 more where it is nearer than half the mean depth of the
+    /// picture, one less where it is farther than one and a half of it.
+    pub samples_by_depth: bool,
+    /// Surfaces around the picture send too: share of its width and height that a view behind it reaches further on each side, 0 (none)
+    /// to 4.
+    pub border: f32,
+    /// Layers of surfaces behind each other that send and block light, 1 (the visible one) to 4.
+    pub layers: u32,
+    /// Further views that look for senders, 0 to 4: backwards, from the far side of the scene, from the left, from the right.
+    pub cameras: u32,
+    /// Pixels of the picture along the side of a texel of the views of `border`, `layers` and `cameras`, 1 to 16.
+    pub sender_scale: u32,
+    /// Samples in each of these views, 8 to 96.
+    pub sender_samples: u32,
     pub resolution: Resolution,
     pub downsample: Downsample,
     /// Gather light.
@@ -209,6 +223,12 @@ impl Default for Settings {
             visibility_steps: 4,
             thickness: 0.1,
             bounces: 1,
+            samples_by_depth: false,
+            border: 0.0,
+            layers: 1,
+            cameras: 0,
+            sender_scale: 4,
+            sender_samples: 48,
             resolution: Resolution::Half,
             downsample: Downsample::DepthAware,
             indirect: true,
@@ -265,6 +285,16 @@ impl Settings {
         }
     }
 
+    /// The choices of direct light.
+    pub fn direct(&self) -> Direct {
+        Direct {
+            paper_law: self.light_law == LightLaw::Paper,
+            specular: self.specular,
+            light_radius: self.light_radius,
+            light_power: self.light_power,
+        }
+    }
+
     /// # Errors
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
@@ -276,6 +306,10 @@ impl Settings {
         }
         for (key, value, least, most) in [
             ("bounces", self.bounces, 1, 4),
+            ("layers", self.layers, 1, 4),
+            ("cameras", self.cameras, 0, 4),
+            ("sender_scale", self.sender_scale, 1, 16),
+            ("sender_samples", self.sender_samples, 8, 96),
             ("visibility_steps", self.visibility_steps, 0, 16),
             ("blur_radius", self.blur_radius, 0, 16),
         ] {
@@ -285,6 +319,7 @@ impl Settings {
         }
         for (key, value, least, most) in [
             ("reach", self.reach, 0.0, 16384.0),
+            ("border", self.border, 0.0, 4.0),
             ("spread", self.spread, 1.0, 4.0),
             ("thickness", self.thickness, 0.0, 1.0),
             ("occlusion_reach", self.occlusion_reach, 1.0, 16384.0),
