@@ -20,7 +20,10 @@ fn settings() -> Vec<PictureSettings> {
     off.isr.bounces = 3;
     let mut exponential = PictureSettings::paper();
     exponential.shadow.size = 64;
-    vec![default, plain, off, exponential]
+    let mut beyond = default.clone();
+    (beyond.isr.border, beyond.isr.layers, beyond.isr.cameras) = (0.5, 2, 1);
+    beyond.isr.samples_by_depth = true;
+    vec![default, plain, off, exponential, beyond]
 }
 
 #[test]

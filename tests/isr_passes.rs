@@ -284,6 +284,8 @@ fn gather_is_the_reference() {
                 depth: coarse.depth,
                 gathered,
                 filtered: sender,
+                mean_depth: coarse.depth,
+                peeled: [coarse.depth; 3],
                 push: shaders::isr::gather::Push {
                     reach: 18.37,
                     occlusion_reach: 9.13,
@@ -295,6 +297,7 @@ fn gather_is_the_reference() {
                     },
                     thickness: 0.0,
                     factor: 2.0,
+                    peeled_scale: 1.0,
                 },
                 spec: shaders::isr::gather::Spec {
                     samples: samples as u32,
@@ -306,6 +309,8 @@ fn gather_is_the_reference() {
                     visibility_steps: 0,
                     paper_cells: (estimator == Estimator::PaperCells).into(),
                     prefilter: 0,
+                    by_depth: 0,
+                    peeled: 0,
                 },
             };
             graph.compute(args, extent);

@@ -16,13 +16,18 @@ layout(constant_id = 2) const uint RINGS = 1;
 layout(constant_id = 3) const uint JITTER = 1;
 layout(constant_id = 4) const uint INDIRECT = 1;
 layout(constant_id = 5) const uint OCCLUSION = 1;
-// Depth-buffer tests between the pixel and each sender; 0: senders are taken as visible, as in the dissertation.
 // dA in the dissertation's sum: 0 the footprint of one texel, 1 of the sample's cell.
 layout(constant_id = 7) const uint PAPER_CELLS = 0;
+// Depth-buffer tests between the pixel and each sender; 0: senders are taken as visible, as in the dissertation.
 layout(constant_id = 6) const uint VISIBILITY_STEPS = 0;
 
 // A sample sends the mean radiance over a quarter of the side of its cell instead of that of one texel.
 layout(constant_id = 8) const uint PREFILTER = 0;
+
+// Whether the number of samples depends on the pixel's depth beside the mean depth of the picture.
+layout(constant_id = 9) const uint BY_DEPTH = 0;
+// Layers behind the visible one that hide senders, 0 to 3.
+layout(constant_id = 10) const uint PEELED = 0;
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D sender;  // rgb radiance, a radiation mask
@@ -31,6 +36,8 @@ layout(binding = 3) uniform sampler2D normal;  // world, not normalised
 layout(binding = 4) uniform sampler2D depth;   // linear z / far; background 1
 layout(binding = 5, rgba16f) uniform writeonly image2D gathered;
 layout(binding = 6) uniform sampler2D filtered;  // mip levels of the senders, rgb times mask
+layout(binding = 7) uniform sampler2D mean_depth;  // mip levels: r linear depth of geometry, g share of geometry
+layout(binding = 8) uniform sampler2D peeled[3];   // linear depth of further layers, in a picture wider by peeled_scale
 
 layout(push_constant, scalar) uniform Push {
     float reach;            // of the indirect samples, coarse pixels
@@ -40,6 +47,7 @@ layout(push_constant, scalar) uniform Push {
     float spread;           // exponent of the ring radii
     float thickness;        // of what hides a sender, relative to its depth
     float factor;           // 2 on half-resolution buffers, 1 on full
+    float peeled_scale;
 };
 
 // Bound on the sum of form factors: see reference::isr::MOST.
@@ -58,6 +66,15 @@ bool hidden(ivec2 from, ivec2 to, float z_from, float z_to) {
         float z = texelFetch(depth, at, 0).r;
         if (z < line * 0.98 && z > line * (0.98 - thickness)) {
             return true;
+        }
+        if (PEELED > 0) {
+            vec2 uv = 0.5 + (screen_uv(view, at, factor) - 0.5) / peeled_scale;
+            vec3 behind = vec3(texelFetch(peeled[0], ivec2(uv * vec2(textureSize(peeled[0], 0))), 0).r, 1.0, 1.0);
+            if (PEELED > 1) behind.y = texelFetch(peeled[1], ivec2(uv * vec2(textureSize(peeled[1], 0))), 0).r;
+            if (PEELED > 2) behind.z = texelFetch(peeled[2], ivec2(uv * vec2(textureSize(peeled[2], 0))), 0).r;
+            if (any(lessThan(abs(behind - line * (0.98 - 0.5 * thickness)), vec3(line * 0.5 * thickness)))) {
+                return true;
+            }
         }
     }
     return false;
@@ -80,12 +97,17 @@ void main() {
     vec3 p = screen_position(view, pixel, factor, z);
     vec3 axis = screen_axis(view);
     vec2 jitter = JITTER != 0 ? isr_jitter(pixel) : vec2(0.5);
+    uint samples = SAMPLES;
+    if (BY_DEPTH != 0) {
+        vec2 mean = texelFetch(mean_depth, ivec2(0), textureQueryLevels(mean_depth) - 1).rg;
+        samples = isr_samples_at(z * max(mean.g, 1e-6) / max(mean.r, 1e-12), SAMPLES);
+    }
 
     vec3 light = vec3(0.0);
     float factors = 0.0;
     if (INDIRECT != 0 && mask > 0.0) {
-        for (uint i = 0u; i < SAMPLES; ++i) {
-            vec3 s = isr_sample(i, SAMPLES, RINGS != 0, reach, spread, jitter, JITTER != 0);
+        for (uint i = 0u; i < samples; ++i) {
+            vec3 s = isr_sample(i, samples, RINGS != 0, reach, spread, jitter, JITTER != 0);
             ivec2 at = pixel + ivec2(round(s.xy));
             if (at == pixel || any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, extent))) {
                 continue;
@@ -119,13 +141,13 @@ void main() {
             factors += f;
         }
         // True form factors sum to at most one, estimates scatter about it.
-        light *= AREA_ESTIMATOR != 0 ? mask / max(factors / MOST, 1.0) : mask * 2.0 * ISR_PI / float(SAMPLES);
+        light *= AREA_ESTIMATOR != 0 ? mask / max(factors / MOST, 1.0) : mask * 2.0 * ISR_PI / float(samples);
     }
 
     float occlusion = 0.0;
     if (OCCLUSION != 0) {
-        for (uint i = 0u; i < SAMPLES; ++i) {
-            vec3 s = isr_sample(i, SAMPLES, RINGS != 0, occlusion_reach, spread, jitter, JITTER != 0);
+        for (uint i = 0u; i < samples; ++i) {
+            vec3 s = isr_sample(i, samples, RINGS != 0, occlusion_reach, spread, jitter, JITTER != 0);
             ivec2 at = pixel + ivec2(round(s.xy));
             if (at == pixel || any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, extent))) {
                 continue;
@@ -137,7 +159,7 @@ void main() {
             float radius = occluder_radius * sqrt(s.z * screen_facing_area(view, factor, xz));
             occlusion += isr_occlusion(p, n, screen_position(view, at, factor, xz), radius, occlusion_bias);
         }
-        occlusion *= 2.0 * ISR_PI / float(SAMPLES);
+        occlusion *= 2.0 * ISR_PI / float(samples);
     }
     imageStore(gathered, pixel, vec4(light, occlusion));
 }

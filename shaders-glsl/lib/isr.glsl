@@ -35,6 +35,13 @@ uint isr_half_width(uint samples) {
     return samples <= 24u ? 2u : samples <= 48u ? 3u : 4u;
 }
 
+// Samples of a pixel whose depth is `relative` to the mean of the picture: one step of 24, 48, 80 more or less than `samples`.
+uint isr_samples_at(float relative, uint samples) {
+    if (relative < 0.5) return samples <= 24u ? 48u : 80u;
+    if (relative > 1.5) return samples > 48u ? 48u : 24u;
+    return samples;
+}
+
 // Point of the square [-1, 1]² rim at s in [0, 1), counter-clockwise from (1, -1).
 vec2 isr_rim(float s) {
     float at = fract(s) * 4.0;

@@ -17,8 +17,8 @@
 //! - Occlusion darkens only light of the environment ([`Occlude`]).
 //! - Further bounces ([`Settings::bounces`]) gather again in the same frame; nothing is kept from frame to frame.
 //!
-//! Of the dissertation's future work, depth peeling, a field of view wider than the picture, further cameras for grazing
-//! surfaces, and numbers of samples that vary over the picture do not exist yet.
+//! The dissertation's future work is there too, switched off by default: surfaces beyond the border of the picture, behind others, or
+//! turned away ([`senders`]), full resolution, and numbers of samples that follow the depth ([`Settings::samples_by_depth`]).
 
 mod picture;
 pub mod senders;
@@ -36,8 +36,7 @@ use crate::{
         ambient::Irradiance,
         bilateral, blur,
         compose::{self, Compose},
-        direct,
-        downsample,
+        direct, downsample,
         gbuffer::GBuffer,
     },
     shaders,
@@ -91,6 +90,19 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
         Sender::Lit => downsample::color(graph, lit.diffuse, &g, factor, aware),
     };
 
+    let mean_depth = if settings.samples_by_depth {
+        let desc = ImageDesc::new(Format::RGBA16F, graph.extent(coarse.depth)).all_mips();
+        let moments = graph.image_with("isr.mean-depth", desc);
+        graph.compute(
+            shaders::isr::mean_depth::Args { depth: coarse.depth, moments: moments.mip(0) },
+            graph.extent(moments),
+        );
+        graph.mips(moments);
+        moments
+    } else {
+        coarse.depth
+    };
+    let behind = inputs.senders.map(|s| s.behind).unwrap_or_default();
     let gather = |graph: &mut Graph, sender: Image| {
         let gathered = graph.image("isr.gathered", Format::RGBA16F, graph.extent(coarse.depth));
         let longer = extent.width.max(extent.height) as f32;
@@ -113,6 +125,7 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
             spread: settings.spread,
             thickness: settings.thickness,
             factor: factor as f32,
+            peeled_scale: 1.0 + settings.border,
         };
         let spec = shaders::isr::gather::Spec {
             samples: settings.samples,
@@ -124,6 +137,8 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
             visibility_steps: settings.visibility_steps,
             paper_cells: (settings.patch == Patch::Cell).into(),
             prefilter: settings.prefilter.into(),
+            by_depth: settings.samples_by_depth.into(),
+            peeled: behind.iter().flatten().count() as u32,
         };
         let args = shaders::isr::gather::Args {
             view,
@@ -133,6 +148,8 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
             depth: coarse.depth,
             gathered,
             filtered,
+            mean_depth,
+            peeled: behind.map(|layer| layer.unwrap_or(coarse.depth)),
             push,
             spec,
         };

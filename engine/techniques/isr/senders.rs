@@ -33,6 +33,9 @@ pub struct Senders {
     /// Block of `SenderView`.
     pub views: Buffer,
     pub count: u32,
+    /// Linear depth of the layers behind the visible one, for telling what hides senders; the picture of each is wider than the
+    /// frame's by 1 + [`Settings::border`].
+    pub behind: [Option<Image>; 3],
 }
 
 /// A view to gather from.
@@ -63,6 +66,7 @@ impl Senders {
                 &views.iter().map(|v| types::SenderView { view: v.uniform, hole: v.hole }).collect::<Vec<_>>(),
             ),
             count,
+            behind: [None; 3],
         };
         for layer in 0..layers {
             let view = &views[layer.min(count - 1) as usize];
@@ -149,6 +153,7 @@ pub fn draw(
         SenderView { gbuffer, color, uniform: view.uniform(), hole }
     };
     let mut views = Vec::new();
+    let mut behind = [None; 3];
     if settings.border > 0.0 || settings.layers > 1 {
         let wider = 1.0 + settings.border;
         let around = view.wider(wider, size);
@@ -157,8 +162,9 @@ pub fn draw(
             // A little less than the frame: the shares of the surfaces decide at its edge.
             views.push(lit(graph, layer, &around, 0.96 / wider));
         }
-        for _ in 1..settings.layers {
+        for index in 1..settings.layers as usize {
             layer = gbuffer::draw_behind(graph, scene, &around, gbuffers, layer.depth);
+            behind[index - 1] = Some(layer.depth);
             views.push(lit(graph, layer, &around, 0.0));
         }
     }
@@ -166,7 +172,7 @@ pub fn draw(
         let seen = gbuffer::draw(graph, scene, &camera, gbuffers);
         views.push(lit(graph, seen, &camera, 0.0));
     }
-    Senders::pack(graph, &views)
+    Senders::pack(graph, &views).map(|senders| Senders { behind, ..senders })
 }
 
 /// The frame's lights; where one is directional, with shadow maps that reach over the whole scene instead of what the frame shows.
