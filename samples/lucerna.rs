@@ -9,6 +9,7 @@ use lucerna_samples::{
     console::{self, Console},
     devices,
     experiment::command::{self as experiment, ReportArgs, ReproduceArgs},
+    export_pov::{self, ExportPovArgs},
     info, inspect, program, rerun,
     source::{self, SceneArgs},
     views::{self, command::ViewsArgs},
@@ -59,6 +60,8 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Write a scene and a view as a POV-Ray file, and render it where `povray` is installed
+    ExportPov(Box<ExportPovArgs>),
     /// List the Vulkan devices, and what the unsuitable ones lack
     Devices {
         /// Fail unless one of them is a usable GPU
@@ -97,6 +100,7 @@ impl Command {
             | Self::Rerun { talk, .. }
             | Self::Devices { talk, .. }
             | Self::List { talk, .. } => talk.console(),
+            Self::ExportPov(args) => args.talk.console(),
         }
     }
 }
@@ -139,6 +143,7 @@ fn serve(command: Command, console: Console) -> Result<()> {
             }
             result.verdict(&image, tolerance)
         }
+        Command::ExportPov(args) => export_pov::run(&args),
         Command::Devices { require_gpu, json, .. } => {
             let list = devices::list(require_gpu)?;
             match json {

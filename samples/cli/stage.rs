@@ -31,33 +31,65 @@ pub struct Stage {
     world_from_camera: Mat4,
 }
 
+/// What of a scene's options decides what is rendered.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked<'a> {
+    pub scene: Option<&'a Path>,
+    pub builtin: Option<&'a str>,
+    /// Metres that one unit of the file stands for.
+    pub unit: Option<f64>,
+    pub environment: Option<&'a Path>,
+    pub light: &'a [lights::Point],
+    pub sun: Option<&'a lights::Sun>,
+    pub default_light: framing::DefaultLight,
+    pub camera: Option<&'a str>,
+    pub size: Size,
+}
+
 impl Stage {
     /// Reads the scene, adds what it lacks to be seen, and chooses the camera.
     ///
     /// # Errors
     /// `Input` for files that cannot be served, `Usage` for names that do not exist.
     pub fn open(args: &RenderArgs) -> Result<Self> {
-        let (mut scene, source) =
-            source::open(args.scene.as_deref(), args.builtin.as_deref(), &source::in_unit(args.unit))?;
+        Self::of(&Asked {
+            scene: args.scene.as_deref(),
+            builtin: args.builtin.as_deref(),
+            unit: args.unit,
+            environment: args.environment.as_deref(),
+            light: &args.light,
+            sun: args.sun.as_ref(),
+            default_light: args.default_light,
+            camera: args.camera.as_deref(),
+            size: args.size,
+        })
+    }
+
+    /// As [`Stage::open`], for programs with other options than `render`.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn of(args: &Asked<'_>) -> Result<Self> {
+        let (mut scene, source) = source::open(args.scene, args.builtin, &source::in_unit(args.unit))?;
         if scene.name.is_empty() {
             scene.name = "scene".into();
         }
-        if let Some(path) = &args.environment {
+        if let Some(path) = args.environment {
             let (environment, notes) = environment::load(path, &Limits::default())?;
             scene.environment = Some(environment);
             scene.notes.extend(notes);
         }
         let fingerprint = fingerprint::scene(&scene);
-        lights::add(&mut scene, &args.light, args.sun.as_ref());
+        lights::add(&mut scene, args.light, args.sun);
         framing::add_missing_light(&mut scene, args.default_light);
-        let from_file = args.camera.as_deref().is_some_and(|asked| {
+        let from_file = args.camera.is_some_and(|asked| {
             Path::new(asked).is_file() || camera::in_list(asked).is_some_and(|(file, _)| Path::new(file).is_file())
         });
         if !from_file {
             framing::add_missing_camera(&mut scene, args.size.aspect());
         }
         let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
-        let choice = match &args.camera {
+        let choice = match args.camera {
             Some(asked) => camera::choose(asked, &names)?,
             None => Choice::Scene(first_placed(&scene)),
         };
@@ -71,7 +103,7 @@ impl Stage {
             }
             Choice::File(file) => {
                 let world_from_camera = file.world_from_view();
-                let camera_name = name_of(args.camera.as_deref().unwrap_or_default());
+                let camera_name = name_of(args.camera.unwrap_or_default());
                 let camera = Camera { name: camera_name.clone(), projection: file.projection() };
                 let eye = record::View::File(file);
                 Self { source, fingerprint, camera_name, eye, camera, node: None, world_from_camera, scene }
