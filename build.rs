@@ -9,6 +9,8 @@ mod codegen;
 mod compile;
 #[path = "engine/shader/reflect.rs"]
 mod reflect;
+#[path = "engine/shader/variants.rs"]
+mod variants;
 
 use codegen::{Export, Pass, Stage};
 use std::{
@@ -88,14 +90,27 @@ fn run() -> Result<(), String> {
     write_if_changed(&out.join("interfaces.txt"), generated.listing.as_bytes())
 }
 
-/// Compiles one file unless its text is the one compiled last.
+/// Compiles one file, in both variants if it traces rays.
 fn build(root: &Path, out: &Path, stage: &'static str, file: &str) -> Result<Stage, String> {
+    let (interface, spirv) = variant(root, out, stage, file, false)?;
+    let query = compile::traces(root, file).then(|| variant(root, out, stage, file, true)).transpose()?;
+    Ok(Stage { stage, interface, spirv, query })
+}
+
+/// Compiles one variant of a file unless its text is the one compiled last.
+fn variant(
+    root: &Path,
+    out: &Path,
+    stage: &'static str,
+    file: &str,
+    query: bool,
+) -> Result<(reflect::Interface, String), String> {
     let key = {
         let mut hasher = DefaultHasher::new();
         (compile::closure(root, file), include_str!("engine/shader/compile.rs")).hash(&mut hasher);
         format!("{:016x}", hasher.finish())
     };
-    let base = out.join(file.replace('/', "."));
+    let base = out.join(file.replace('/', ".") + if query { ".query" } else { "" });
     let (ship, raw, stamp) = (with(&base, "spv"), with(&base, "raw"), with(&base, "key"));
     let fresh = fs::read_to_string(&stamp).is_ok_and(|k| k == key) && ship.exists() && raw.exists();
     if !fresh {
@@ -104,7 +119,7 @@ fn build(root: &Path, out: &Path, stage: &'static str, file: &str) -> Result<Sta
             "Vertex" => shaderc::ShaderKind::Vertex,
             _ => shaderc::ShaderKind::Fragment,
         };
-        let compiled = compile::compile(root, file, kind)?;
+        let compiled = compile::compile(root, file, kind, query)?;
         write_if_changed(&ship, &compiled.ship)?;
         let bytes: Vec<u8> = compiled.reflect.iter().flat_map(|w| w.to_le_bytes()).collect();
         write_if_changed(&raw, &bytes)?;
@@ -113,7 +128,7 @@ fn build(root: &Path, out: &Path, stage: &'static str, file: &str) -> Result<Sta
     let bytes = fs::read(&raw).map_err(|e| format!("{}: {e}", raw.display()))?;
     let words: Vec<u32> = bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
     let interface = reflect::reflect(&words).map_err(|e| format!("{}: error: {e}", root.join(file).display()))?;
-    Ok(Stage { stage, interface, spirv: ship.display().to_string() })
+    Ok((interface, ship.display().to_string()))
 }
 
 fn with(base: &Path, extension: &str) -> PathBuf {

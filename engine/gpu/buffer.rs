@@ -100,8 +100,18 @@ impl OwnedBuffer {
         context.alive()?;
         // Fills and copies go by words; a buffer of no bytes cannot be bound.
         let size = desc.size.max(16).next_multiple_of(4);
-        let info =
-            vk::BufferCreateInfo::default().size(size).usage(desc.usage).sharing_mode(vk::SharingMode::EXCLUSIVE);
+        // What shaders read, acceleration structures may be built from.
+        let storage = desc.place == Place::Device && desc.usage.contains(vk::BufferUsageFlags::STORAGE_BUFFER);
+        let rays = if context.caps.ray_query && storage {
+            vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS
+                | vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR
+        } else {
+            vk::BufferUsageFlags::empty()
+        };
+        let info = vk::BufferCreateInfo::default()
+            .size(size)
+            .usage(desc.usage | rays)
+            .sharing_mode(vk::SharingMode::EXCLUSIVE);
         // SAFETY: `info` is complete; the device is alive.
         let raw = context
             .check(unsafe { context.device.create_buffer(&info, None) }, || format!("vkCreateBuffer for `{name}`"))?;
@@ -164,6 +174,16 @@ impl OwnedBuffer {
     /// The raw handle, valid as long as a clone lives.
     pub fn raw(&self) -> vk::Buffer {
         self.0.raw
+    }
+
+    /// Where it lies for the device; `None` unless shaders read it and [`super::Caps::ray_query`].
+    pub fn address(&self) -> Option<vk::DeviceAddress> {
+        let Inner { context, desc, raw, .. } = &*self.0;
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
+        let has = context.caps.ray_query && desc.place == Place::Device && desc.usage.intersects(usage);
+        let info = vk::BufferDeviceAddressInfo::default().buffer(*raw);
+        // SAFETY: a living buffer that was made with a usage that has addresses, on a device with that feature.
+        has.then(|| unsafe { context.device.get_buffer_device_address(&info) })
     }
 
     /// Writes `data` at `offset` bytes. The memory is coherent: a submission after this call sees it. The caller sees to it

@@ -21,6 +21,8 @@ pub struct Caps {
     pub shader_output_layer: bool,
     pub multiview: bool,
     pub image_cube_array: bool,
+    /// Shaders may use ray queries, and acceleration structures can be built: the device can, and
+    /// [`super::GpuOptions::ray_query`] does not forbid it.
     pub ray_query: bool,
     pub float_atomic_add: bool,
     pub sampled_array_dynamic_indexing: bool,
@@ -61,10 +63,12 @@ pub struct Limits {
     /// Bytes.
     pub shared_memory: u32,
     pub indirect_draws: u32,
+    /// Bytes; scratch memory of acceleration structures starts at multiples of it.
+    pub accel_scratch_alignment: u64,
 }
 
 impl Caps {
-    pub(crate) fn new(candidate: &Candidate, instance: &ash::Instance) -> Self {
+    pub(crate) fn new(candidate: &Candidate, instance: &ash::Instance, ray_query: bool) -> Self {
         let f = &candidate.features;
         let on = |flag: vk::Bool32| flag == vk::TRUE;
         let limits = &candidate.properties.limits;
@@ -87,9 +91,7 @@ impl Caps {
             shader_output_layer: on(f.v12.shader_output_layer),
             multiview: on(f.v11.multiview),
             image_cube_array: on(f.core.image_cube_array),
-            ray_query: on(f.ray_query.ray_query)
-                && on(f.acceleration.acceleration_structure)
-                && on(f.v12.buffer_device_address),
+            ray_query,
             float_atomic_add: on(f.float_atomics.shader_buffer_float32_atomic_add),
             sampled_array_dynamic_indexing: on(f.core.shader_sampled_image_array_dynamic_indexing),
             storage_read_without_format: on(f.core.shader_storage_image_read_without_format),
@@ -118,6 +120,7 @@ impl Caps {
                 work_group_invocations: limits.max_compute_work_group_invocations,
                 shared_memory: limits.max_compute_shared_memory_size,
                 indirect_draws: limits.max_draw_indirect_count,
+                accel_scratch_alignment: candidate.accel_scratch_alignment.max(1),
             },
         }
     }

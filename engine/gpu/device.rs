@@ -23,7 +23,7 @@ use super::{
     facts::{Candidate, Features, candidates},
     fault::{Latch, failed},
     instance::{Instance, no_driver},
-    options::{GpuOptions, Validation},
+    options::{GpuOptions, RayQuery, Validation},
     pipeline::PipelineCache,
     sampler::SamplerKey,
     select::{DeviceFacts, DeviceKind, Requirements, refusal, select},
@@ -88,6 +88,8 @@ pub(crate) struct Context {
     pub facts: DeviceFacts,
     pub description: Description,
     pub debug: Option<ext::debug_utils::Device>,
+    /// Functions of acceleration structures, where [`Caps::ray_query`].
+    pub accel: Option<khr::acceleration_structure::Device>,
     pub lost: Latch,
     abandoned: AtomicBool,
     pub options: GpuOptions,
@@ -156,6 +158,9 @@ impl Gpu {
         let instance = Instance::new(options)?;
         let mut candidates = list(&instance)?;
         let mut needs = Requirements::baseline();
+        if options.ray_query == RayQuery::On {
+            needs = needs.and_ray_query();
+        }
         if !options.window_extensions.is_empty() {
             needs.extensions.push("VK_KHR_swapchain");
         }
@@ -283,7 +288,8 @@ fn list(instance: &Instance) -> Result<Vec<Candidate>> {
 
 impl Context {
     fn new(instance: Arc<Instance>, candidate: Candidate, options: &GpuOptions) -> Result<Self> {
-        let caps = Caps::new(&candidate, &instance.raw);
+        let ray_query = options.ray_query != RayQuery::Off && candidate.facts.lacks_of_ray_query().is_empty();
+        let caps = Caps::new(&candidate, &instance.raw, ray_query);
         let facts = &candidate.facts;
         let (queue_family, _) =
             candidate.queue_family.ok_or_else(|| Error::new(ErrorKind::NoDevice, "the chosen device has no queue"))?;
@@ -346,6 +352,7 @@ impl Context {
             .sum();
         let default_limit = if caps.kind == DeviceKind::Cpu { 600 } else { 60 };
         Ok(Self {
+            accel: caps.ray_query.then(|| khr::acceleration_structure::Device::new(&instance.raw, &device)),
             debug: instance.debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device)),
             device,
             physical: candidate.physical,

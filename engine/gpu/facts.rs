@@ -101,6 +101,8 @@ pub(crate) struct Candidate {
     pub subgroup_size: u32,
     /// Family of the queue that does everything, and its valid timestamp bits.
     pub queue_family: Option<(u32, u32)>,
+    /// Bytes; 0: it builds no acceleration structures.
+    pub accel_scratch_alignment: u64,
 }
 
 /// All devices of the instance, in the loader's order.
@@ -147,6 +149,13 @@ fn candidate(instance: &ash::Instance, physical: vk::PhysicalDevice) -> Candidat
         unsafe { instance.get_physical_device_features2(physical, &mut all) };
         features.core = all.features;
     }
+    let mut accel_scratch_alignment = 0;
+    if features.acceleration.acceleration_structure == vk::TRUE {
+        let mut accel = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
+        let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut accel);
+        unsafe { instance.get_physical_device_properties2(physical, &mut all) };
+        accel_scratch_alignment = accel.min_acceleration_structure_scratch_offset_alignment.into();
+    }
     // The chain pointed at locals; only the answers are kept.
     features = features.wanted();
 
@@ -178,7 +187,15 @@ fn candidate(instance: &ash::Instance, physical: vk::PhysicalDevice) -> Candidat
         formats: formats(instance, physical),
         has_queue: family.is_some(),
     };
-    Candidate { physical, facts, features, properties, subgroup_size: subgroup.subgroup_size, queue_family: family }
+    Candidate {
+        physical,
+        facts,
+        features,
+        properties,
+        subgroup_size: subgroup.subgroup_size,
+        queue_family: family,
+        accel_scratch_alignment,
+    }
 }
 
 /// `00112233-4455-6677-8899-aabbccddeeff`

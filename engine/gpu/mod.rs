@@ -5,6 +5,7 @@
 //! | open a device | [`Gpu::new`] with [`GpuOptions`] (`GpuOptions::from_env` reads `LUCERNA_DEVICE` and friends) |
 //! | list devices | [`list_devices`] |
 //! | images and buffers that outlive a frame | [`OwnedImage`], [`OwnedBuffer`]: cheap to clone, freed with the last clone |
+//! | acceleration structures for ray queries | [`OwnedAccel`], where [`Caps::ray_query`] |
 //! | record and run commands | [`Gpu::commands`] → [`Commands`] → [`Submission`]; waits are bounded and name the pass |
 //! | pipelines, layouts | [`Gpu::compute_pipeline`], [`Gpu::raster_pipeline`]: cached, owned by the device |
 //! | samplers | [`Gpu::sampler`] with the stock [`SamplerDesc`]s |
@@ -18,6 +19,7 @@
 //! everything later fails at once with a reference to it.
 #![allow(unsafe_code)]
 
+mod accel;
 mod buffer;
 mod caps;
 mod descriptors;
@@ -42,6 +44,7 @@ mod tiles;
 mod timestamps;
 mod validation;
 
+pub use accel::{AccelLayout, AccelLevel, BottomDesc, BottomInput, INSTANCE_BYTES, MAX_INSTANCES, OwnedAccel};
 pub use buffer::{BufferDesc, OwnedBuffer, Place};
 pub use caps::{Caps, Limits};
 pub use descriptors::DescriptorArena;
@@ -49,7 +52,7 @@ pub use device::{Description, Gpu, Listed, list_devices};
 pub use format::{Block, aspects, block};
 pub use image::OwnedImage;
 pub use image_desc::{ImageDesc, Region, ViewDesc};
-pub use options::{DeviceChoice, ENVIRONMENT, GpuOptions, Validation};
+pub use options::{DeviceChoice, ENVIRONMENT, GpuOptions, RayQuery, Validation};
 pub use pipeline::{Blend, Pipeline, RasterState, Stencil};
 pub use sampler::SamplerDesc;
 pub use select::{Choice, DeviceFacts, DeviceKind, Rejection, Requirements, Version, refusal, select};

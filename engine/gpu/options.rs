@@ -70,6 +70,33 @@ impl FromStr for Validation {
     }
 }
 
+/// Whether shaders may trace by hardware ray queries.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RayQuery {
+    /// Where the device has them.
+    #[default]
+    Auto,
+    /// Refuse devices without them.
+    On,
+    /// Never: rays are traced in compute on every device.
+    Off,
+}
+
+impl FromStr for RayQuery {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text.trim().to_ascii_lowercase().as_str() {
+            "auto" => Ok(Self::Auto),
+            "on" | "1" => Ok(Self::On),
+            "off" | "0" => Ok(Self::Off),
+            other => {
+                Err(Error::usage(format!("ray query `{other}` is not known")).help("Allowed are auto, on and off"))
+            }
+        }
+    }
+}
+
 /// How to open a device.
 #[derive(Clone, Debug)]
 pub struct GpuOptions {
@@ -77,6 +104,7 @@ pub struct GpuOptions {
     /// Refuse CPU drivers.
     pub require_gpu: bool,
     pub validation: Validation,
+    pub ray_query: RayQuery,
     /// Print validation messages as they come (at most ten of one kind).
     pub print_messages: bool,
     /// After this time a wait names the pass in flight on standard error, once per doubling.
@@ -96,6 +124,7 @@ impl Default for GpuOptions {
             device: DeviceChoice::Auto,
             require_gpu: false,
             validation: Validation::Off,
+            ray_query: RayQuery::Auto,
             print_messages: true,
             soft_limit: Duration::from_secs(10),
             hard_limit: None,
@@ -106,10 +135,11 @@ impl Default for GpuOptions {
 }
 
 /// The variables that [`GpuOptions::from_env`] reads, with their meaning; for `--help` and documentation.
-pub const ENVIRONMENT: [(&str, &str); 5] = [
+pub const ENVIRONMENT: [(&str, &str); 6] = [
     ("LUCERNA_DEVICE", "auto, cpu, an index, or part of a device name or UUID"),
     ("LUCERNA_REQUIRE_GPU", "1: refuse CPU drivers"),
     ("LUCERNA_VALIDATION", "off, core, sync or gpu-assisted"),
+    ("LUCERNA_RAY_QUERY", "auto, on (refuse devices without) or off (trace rays in compute)"),
     ("LUCERNA_WAIT_LIMIT", "seconds after which a wait for the device gives up"),
     ("LUCERNA_POISON", "1: fill new device memory with NaN"),
 ];
@@ -133,6 +163,9 @@ impl GpuOptions {
         }
         if let Some(value) = variable("LUCERNA_VALIDATION") {
             options.validation = value.parse().map_err(|e: Error| e.at("LUCERNA_VALIDATION"))?;
+        }
+        if let Some(value) = variable("LUCERNA_RAY_QUERY") {
+            options.ray_query = value.parse().map_err(|e: Error| e.at("LUCERNA_RAY_QUERY"))?;
         }
         if let Some(value) = variable("LUCERNA_WAIT_LIMIT") {
             options.hard_limit = Some(seconds(&value).map_err(|e| e.at("LUCERNA_WAIT_LIMIT"))?);
@@ -176,6 +209,7 @@ mod tests {
         for (name, bad) in [
             ("LUCERNA_REQUIRE_GPU", "maybe"),
             ("LUCERNA_VALIDATION", "loud"),
+            ("LUCERNA_RAY_QUERY", "maybe"),
             ("LUCERNA_WAIT_LIMIT", "-1"),
             ("LUCERNA_WAIT_LIMIT", "1e300"),
             ("LUCERNA_POISON", "2"),

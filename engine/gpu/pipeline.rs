@@ -275,6 +275,9 @@ fn check_stages(context: &Context, shader: &Shader, state: Option<&RasterState>)
     if state.is_none() != has(Stage::Compute) || (state.is_some() && !has(Stage::Vertex)) {
         return fail(format!("is no {} shader", if state.is_some() { "raster" } else { "compute" }));
     }
+    if shader.ray_query && !context.caps.ray_query {
+        return fail(format!("traces by ray query, which is not on for {}", context.description.device));
+    }
     let limits = &context.caps.limits;
     let threads = shader.workgroup.iter().map(|n| u64::from(*n)).product::<u64>();
     if has(Stage::Compute) && threads > u64::from(limits.work_group_invocations) {

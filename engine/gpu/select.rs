@@ -65,6 +65,23 @@ impl DeviceFacts {
     }
 }
 
+/// Extensions and features that ray queries take.
+const RAY_QUERY: ([&str; 3], [&str; 3]) = (
+    ["VK_KHR_acceleration_structure", "VK_KHR_deferred_host_operations", "VK_KHR_ray_query"],
+    ["accelerationStructure", "bufferDeviceAddress", "rayQuery"],
+);
+
+impl DeviceFacts {
+    /// What it lacks of what ray queries take; empty: it has them.
+    pub fn lacks_of_ray_query(&self) -> Vec<String> {
+        let (extensions, features) = RAY_QUERY;
+        let lacking = extensions.iter().filter(|e| !self.extensions.contains(**e)).map(|e| format!("lacks {e}"));
+        lacking
+            .chain(features.iter().filter(|f| !self.features.contains(*f)).map(|f| format!("lacks feature {f}")))
+            .collect()
+    }
+}
+
 /// What a device must have.
 #[derive(Clone, Debug)]
 pub struct Requirements {
@@ -77,6 +94,14 @@ pub struct Requirements {
 }
 
 impl Requirements {
+    /// The same, and ray queries.
+    #[must_use]
+    pub fn and_ray_query(mut self) -> Self {
+        self.extensions.extend(RAY_QUERY.0);
+        self.features.extend(RAY_QUERY.1);
+        self
+    }
+
     /// What all of the engine needs.
     pub fn baseline() -> Self {
         Self {
@@ -288,6 +313,33 @@ mod tests {
         assert!(rejections[0].missing.iter().any(|m| m == "lacks feature synchronization2"));
         assert_eq!(pick(&three(), DeviceChoice::Index(9), false).unwrap_err().len(), 3);
         assert_eq!(pick(&three(), DeviceChoice::Name("voodoo".into()), false).unwrap_err().len(), 3);
+    }
+
+    #[test]
+    fn ray_query_needs_every_extension_and_feature() {
+        let mut all = device("Tracer", DeviceKind::Discrete);
+        assert_eq!(all.lacks_of_ray_query().len(), 6);
+        let needs = Requirements::baseline().and_ray_query();
+        all.extensions = needs.extensions.iter().map(|e| (*e).to_owned()).collect();
+        all.features = needs.features.iter().copied().collect();
+        assert_eq!(all.lacks_of_ray_query(), [""; 0]);
+        for extension in RAY_QUERY.0 {
+            let mut one = all.clone();
+            one.extensions.remove(extension);
+            assert_eq!(one.lacks_of_ray_query(), [format!("lacks {extension}")]);
+        }
+        for feature in RAY_QUERY.1 {
+            let mut one = all.clone();
+            one.features.remove(feature);
+            assert_eq!(one.lacks_of_ray_query(), [format!("lacks feature {feature}")]);
+            // Demanded, it decides between devices; the baseline does without.
+            let devices = [one, device("llvmpipe", DeviceKind::Cpu), all.clone()];
+            let choose = |needs: &Requirements| select(&devices, needs, &DeviceChoice::Auto, false).map(|c| c.index);
+            assert_eq!((choose(&needs), choose(&Requirements::baseline())), (Ok(2), Ok(0)));
+            let rejections = select(&devices[..2], &needs, &DeviceChoice::Auto, false).unwrap_err();
+            assert_eq!(rejections[0].missing, [format!("lacks feature {feature}")]);
+            assert_eq!(rejections[1].missing.len(), 6);
+        }
     }
 
     #[test]

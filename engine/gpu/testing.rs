@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::{Gpu, GpuOptions, Validation};
+use super::{Gpu, GpuOptions, RayQuery, Validation};
 use crate::ErrorKind;
 
 /// One device test at a time in a process: the layers cost memory, and a CPU driver uses all cores anyway.
@@ -41,6 +41,7 @@ pub fn run(options: GpuOptions, body: impl FnOnce(&Gpu)) -> Result<(), String> {
     let options = GpuOptions {
         device: environment.device,
         require_gpu: environment.require_gpu,
+        ray_query: if options.ray_query == RayQuery::Auto { environment.ray_query } else { options.ray_query },
         poison: options.poison || environment.poison,
         validation: if options.validation == Validation::GpuAssisted { options.validation } else { Validation::Sync },
         ..options

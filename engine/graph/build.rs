@@ -155,7 +155,7 @@ impl Graph {
 
     fn add_buffer(&mut self, name: String, bytes: u64, contents: Option<Vec<u8>>, host: bool) -> Buffer {
         let name = unique(name, self.buffers.iter().map(|b| b.name.as_str()));
-        self.buffers.push(BufferEntry { name, bytes, origin: Origin::Transient, contents, host });
+        self.buffers.push(BufferEntry { name, bytes, origin: Origin::Transient, contents, host, accel: None });
         Buffer { graph: self.id, index: (self.buffers.len() - 1) as u32, offset: 0, size: bytes }
     }
 
@@ -329,7 +329,7 @@ impl Graph {
         }
     }
 
-    fn pass(&mut self, name: impl Into<String>, work: Work) -> PassRef<'_> {
+    pub(super) fn pass(&mut self, name: impl Into<String>, work: Work) -> PassRef<'_> {
         let name = unique(name.into(), self.passes.iter().map(|p| p.name.as_str()));
         self.passes.push(Pass { name, scope: self.scope.clone(), work });
         let index = self.passes.len() - 1;
@@ -339,6 +339,6 @@ impl Graph {
 
 fn bound<A: Args>(args: &A) -> Bound {
     let mut resources = Vec::new();
-    args.resources(&mut resources);
-    Bound { shader: A::SHADER, resources, push: args.push().to_vec(), spec: args.spec() }
+    let shader = args.variant(&mut resources);
+    Bound { shader, resources, push: args.push().to_vec(), spec: args.spec() }
 }

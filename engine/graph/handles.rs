@@ -134,6 +134,24 @@ impl Buffer {
     }
 }
 
+/// Acceleration structures ([`Graph::import_accel`](super::Graph::import_accel)), or none. Valid for the graph that made it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Accel {
+    pub(crate) graph: GraphId,
+    /// Of the buffer in which they lie.
+    pub(crate) index: u32,
+}
+
+impl Accel {
+    /// None: shaders that take it trace rays in compute.
+    pub const NONE: Self = Self { graph: GraphId { id: u32::MAX, name: "" }, index: u32::MAX };
+
+    /// There are none.
+    pub const fn is_none(self) -> bool {
+        self.index == u32::MAX
+    }
+}
+
 /// Bytes in the uniform arena of a graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct UniformSlice {

@@ -32,6 +32,7 @@
 //! | one that outlives the frame | [`Graph::history`], [`Graph::import_image`], [`Graph::import_buffer`] |
 //! | a part of it, another sampler | [`Image::mip`], [`Image::layer`], [`Image::nearest`], [`Buffer::range`] … |
 //! | a pass | [`Graph::compute`], [`Graph::raster`] with [`Targets`], [`Raster`] and [`Draw`], [`Graph::clear`], [`Graph::copy`], [`Graph::mips`] … |
+//! | acceleration structures for ray queries | [`Graph::import_accel`], [`Graph::build_bottoms`], [`Graph::build_top`] |
 //! | results on the CPU | [`Graph::read_image`], [`Graph::read_buffer`] |
 //! | to look into a graph | [`Plan::list_passes`], [`Graph::view`], [`Graph::dump`] |
 //! | to test a graph | [`testing::every_barrier_matters`] |
@@ -44,6 +45,7 @@
 //! validation is on, every plan that runs), tests drop each barrier of each shipped graph, random graphs are compared with
 //! a simulation on the CPU, and synchronisation validation listens to all tests on a device.
 
+mod accel;
 mod access;
 mod build;
 mod execute;
@@ -63,11 +65,12 @@ pub mod testing;
 mod vocab;
 mod vulkan;
 
+pub use accel::{BottomBuild, TopInstance};
 pub use build::PassRef;
 pub use execute::Runner;
 pub use format::{Class, Extent, Format, ImageDesc, Threads};
 pub use frame::{Frame, PassTime, Report};
-pub use handles::{Buffer, BufferRead, GraphId, Image, ImageRead, Sampler, Uniform, UniformSlice};
+pub use handles::{Accel, Buffer, BufferRead, GraphId, Image, ImageRead, Sampler, Uniform, UniformSlice};
 pub use pixels::Pixels;
 pub use plan::{Barrier, Physical, Plan, PlannedPass, Shape, Source};
 pub use raster::{

@@ -1,12 +1,15 @@
 //! What a graph records: plain data, no Vulkan object.
 
 use super::{
+    accel::BottomBuild,
     format::{Format, ImageDesc},
-    handles::{Buffer, Image},
+    handles::{Accel, Buffer, Image},
     raster::{Draw, Raster, Targets},
     vocab::{Layout, Usage},
 };
-use crate::gpu::{OwnedBuffer, OwnedImage};
+use std::sync::Arc;
+
+use crate::gpu::{AccelLayout, OwnedAccel, OwnedBuffer, OwnedImage};
 use crate::shader::{Resource, Shader};
 
 /// Where a resource comes from and how long it lives.
@@ -38,6 +41,7 @@ pub(crate) enum Owner {
     Described,
     Image(OwnedImage),
     Buffer(OwnedBuffer),
+    Accel(OwnedAccel),
 }
 
 #[derive(Clone, Debug)]
@@ -56,6 +60,8 @@ pub(crate) struct BufferEntry {
     pub contents: Option<Vec<u8>>,
     /// Read by the CPU after the graph.
     pub host: bool,
+    /// It holds acceleration structures.
+    pub accel: Option<Arc<AccelLayout>>,
 }
 
 /// How a compute pass is launched.
@@ -93,6 +99,19 @@ pub(crate) enum Work {
         targets: Targets,
         state: Raster,
         draw: Draw,
+    },
+    /// Bottom levels from triangles.
+    BuildBottoms {
+        accel: Accel,
+        builds: Vec<BottomBuild>,
+        scratch: Buffer,
+    },
+    /// The top level from `count` instances.
+    BuildTop {
+        accel: Accel,
+        instances: Buffer,
+        count: u32,
+        scratch: Buffer,
     },
     Clear {
         image: Image,

@@ -83,8 +83,10 @@ bits! {
         /// Copies, blits, clears.
         TRANSFER = 128,
         HOST = 256,
+        /// Builds of acceleration structures.
+        ACCEL = 512,
         /// Everything on the device.
-        ALL = 0xFF,
+        ALL = 0xFF + 512,
     }
 }
 
@@ -95,10 +97,16 @@ bits! {
         COLOR_READ = 8, COLOR_WRITE = 16, DEPTH_READ = 32, DEPTH_WRITE = 64,
         TRANSFER_READ = 128, TRANSFER_WRITE = 256, INDIRECT_READ = 512, INDEX_READ = 1024,
         HOST_READ = 2048, UNIFORM_READ = 4096,
+        /// Of acceleration structures, by builds and ray queries.
+        ACCEL_READ = 8192,
+        /// Of acceleration structures and of scratch memory, by builds.
+        ACCEL_WRITE = 16384,
+        /// Of vertices, indices and instances, by builds.
+        BUILD_INPUT = 32768,
         /// Everything on the device that writes.
-        WRITES = 4 + 16 + 64 + 256,
+        WRITES = 4 + 16 + 64 + 256 + 16384,
         /// Everything on the device.
-        EVERYTHING = 2047 + 4096,
+        EVERYTHING = 2047 + 4096 + 8192 + 16384 + 32768,
     }
 }
 
@@ -123,6 +131,8 @@ bits! {
         /// Mapped for the CPU to read.
         HOST = 256,
         UNIFORM = 512,
+        /// Holds acceleration structures.
+        ACCEL = 1024,
     }
 }
 

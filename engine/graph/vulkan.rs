@@ -100,6 +100,7 @@ pub(super) fn stages(stages: Stages) -> vk::PipelineStageFlags2 {
         (Stages::COMPUTE, S::COMPUTE_SHADER),
         (Stages::TRANSFER, S::ALL_TRANSFER),
         (Stages::HOST, S::HOST),
+        (Stages::ACCEL, S::ACCELERATION_STRUCTURE_BUILD_KHR),
     ];
     table.iter().filter(|(s, _)| stages.contains(*s)).fold(S::NONE, |all, (_, vk)| all | *vk)
 }
@@ -126,6 +127,9 @@ pub(super) fn access(access: Access) -> vk::AccessFlags2 {
         (Access::INDEX_READ, A::INDEX_READ),
         (Access::HOST_READ, A::HOST_READ),
         (Access::UNIFORM_READ, A::UNIFORM_READ),
+        (Access::ACCEL_READ, A::ACCELERATION_STRUCTURE_READ_KHR),
+        (Access::ACCEL_WRITE, A::ACCELERATION_STRUCTURE_WRITE_KHR),
+        (Access::BUILD_INPUT, A::SHADER_READ),
     ];
     table.iter().filter(|(a, _)| access.contains(*a)).fold(A::NONE, |all, (_, vk)| all | *vk)
 }
@@ -159,6 +163,7 @@ pub(super) fn usage_of_buffer(usage: vk::BufferUsageFlags) -> Usage {
         (Usage::INDIRECT, U::INDIRECT_BUFFER),
         (Usage::COPY_FROM, U::TRANSFER_SRC),
         (Usage::COPY_TO, U::TRANSFER_DST),
+        (Usage::ACCEL, U::ACCELERATION_STRUCTURE_STORAGE_KHR),
     ];
     table.iter().filter(|(_, vk)| usage.contains(*vk)).fold(Usage::NONE, |all, (u, _)| all | *u)
 }

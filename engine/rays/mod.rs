@@ -15,13 +15,14 @@
 //! # }
 //! ```
 
+mod query;
 mod shapes;
 mod tree;
 
 use crate::{
     Error, ErrorKind, Result,
     gpu::{Gpu, OwnedBuffer},
-    graph::{Buffer, Graph, Image},
+    graph::{Accel, Buffer, Graph, Image},
     scene::{
         Aabb, Scene,
         resident::{Handles, Resident},
@@ -42,6 +43,8 @@ pub struct Rays {
     triangles: OwnedBuffer,
     shapes: Vec<Shape>,
     uses: Vec<Use>,
+    /// What ray queries trace instead.
+    query: Option<query::Query>,
     /// Nodes at the start of the buffer that are left to the top tree.
     top_nodes: u32,
 }
@@ -56,6 +59,8 @@ pub struct RayHandles {
     pub trace_uvs: Buffer,
     pub trace_colors: Buffer,
     pub trace_scene: Buffer,
+    /// `NONE`: rays are traced in compute.
+    pub trace_accel: Accel,
     pub materials: Buffer,
     pub scene_textures: [Image; MAX_TEXTURE_ARRAYS as usize],
 }
@@ -65,7 +70,16 @@ impl Rays {
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
-    pub fn new(gpu: &Gpu, scene: &Scene, _resident: &Resident) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &Scene, resident: &Resident) -> Result<Self> {
+        let query = if gpu.caps().ray_query { Some(query::Query::new(gpu, resident)?) } else { None };
+        Ok(Self { query, ..Self::in_compute(gpu, scene, resident)? })
+    }
+
+    /// As [`Self::new`], but rays are traced in compute also where the device has ray queries.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn in_compute(gpu: &Gpu, scene: &Scene, _resident: &Resident) -> Result<Self> {
         let (mut shapes, uses) = shapes::gather(scene);
         // A node for every two uses, and one for an empty scene.
         let top_nodes = uses.len().max(2) as u32;
@@ -101,6 +115,7 @@ impl Rays {
         Ok(Self {
             nodes: upload("rays.nodes", &nodes)?,
             triangles: upload("rays.triangles", &records)?,
+            query: None,
             shapes,
             uses,
             top_nodes,
@@ -121,6 +136,7 @@ impl Rays {
             trace_uvs: scene.uvs,
             trace_colors: scene.colors,
             trace_scene: scene.instances,
+            trace_accel: self.query.as_mut().map_or(Accel::NONE, |query| query.frame(graph, scene)),
             materials: scene.materials,
             scene_textures: scene.textures,
         }

@@ -1,6 +1,9 @@
 //! Writes the Rust modules and the plain-text listing of all shader interfaces.
 
-use super::reflect::{Access, Binding, Interface, Kind, Spec, Struct, Type, size_of, struct_size};
+use super::{
+    reflect::{Interface, Kind, Spec, Struct, Type, size_of, struct_size},
+    variants::{Merged, check_variants, merge, unite},
+};
 use std::{collections::BTreeMap, fmt::Write};
 
 /// One stage of a pass, as compiled.
@@ -11,6 +14,18 @@ pub struct Stage {
     pub interface: Interface,
     /// Absolute path of the optimised SPIR-V.
     pub spirv: String,
+    /// The same stage, tracing by ray query: interface and path. Only stages that trace have it.
+    pub query: Option<(Interface, String)>,
+}
+
+impl Stage {
+    /// Interface and path in the variant that traces by ray query, or not.
+    pub fn variant(&self, query: bool) -> (&Interface, &str) {
+        match &self.query {
+            Some((interface, spirv)) if query => (interface, spirv),
+            _ => (&self.interface, &self.spirv),
+        }
+    }
 }
 
 /// One pass: module `folder::stem`.
@@ -30,13 +45,6 @@ pub struct Generated {
     pub rust: String,
     #[allow(dead_code)] // read by build.rs only
     pub listing: String,
-}
-
-/// A binding after merging the stages of a pass.
-struct Merged<'a> {
-    binding: &'a Binding,
-    access: Access,
-    stages: Vec<&'static str>,
 }
 
 fn rust_type(ty: &Type, types: &str) -> String {
@@ -77,36 +85,6 @@ fn write_struct(out: &mut String, s: &Struct, structs: &[Struct], indent: &str, 
     let _ = writeln!(out, "{indent}const _: () = assert!(::core::mem::size_of::<{name}>() == {size});");
 }
 
-fn merge<'a>(pass: &'a Pass) -> Result<Vec<Merged<'a>>, String> {
-    let mut merged: Vec<Merged> = Vec::new();
-    for stage in &pass.stages {
-        for b in &stage.interface.bindings {
-            match merged.iter_mut().find(|m| m.binding.binding == b.binding) {
-                None => merged.push(Merged { binding: b, access: b.access, stages: vec![stage.stage] }),
-                Some(m) if m.binding.name == b.name && m.binding.kind == b.kind && m.binding.count == b.count => {
-                    m.stages.push(stage.stage);
-                    if m.access != b.access {
-                        m.access = Access::ReadWrite;
-                    }
-                }
-                Some(m) => {
-                    return Err(format!(
-                        "binding {} is {} in one stage and {} in the other; number bindings over both stages",
-                        b.binding, m.binding.name, b.name
-                    ));
-                }
-            }
-        }
-    }
-    merged.sort_by_key(|m| m.binding.binding);
-    for (i, m) in merged.iter().enumerate() {
-        if merged[..i].iter().any(|other| other.binding.name == m.binding.name) {
-            return Err(format!("two bindings are named {}", m.binding.name));
-        }
-    }
-    Ok(merged)
-}
-
 fn one<'a, T: PartialEq>(
     pass: &'a Pass,
     get: impl Fn(&'a Interface) -> Option<&'a T>,
@@ -126,7 +104,16 @@ fn one<'a, T: PartialEq>(
 
 fn write_pass(out: &mut String, listing: &mut String, pass: &Pass, structs: &[Struct]) -> Result<(), String> {
     let name = format!("{}.{}", pass.folder, pass.stem);
-    let bindings = merge(pass)?;
+    check_variants(pass)?;
+    let bindings = merge(pass, false)?;
+    let two = pass.stages.iter().any(|s| s.query.is_some());
+    let query = if two { merge(pass, true)? } else { Vec::new() };
+    let fields = unite(&bindings, &query)?;
+    let traced =
+        fields.iter().find(|f| !f.compute && f.binding.kind == Kind::AccelerationStructure && f.binding.count == 1);
+    if two && traced.is_none() {
+        return Err("the variant that traces by ray query binds no acceleration structure of its own".into());
+    }
     let push = one(pass, |i| i.push.as_ref(), "push constants")?;
     let empty = Vec::new();
     let spec: &Vec<Spec> =
@@ -148,6 +135,7 @@ fn write_pass(out: &mut String, listing: &mut String, pass: &Pass, structs: &[St
         listing,
         "{name}{}",
         if compute { format!("  workgroup {workgroup:?}") } else { format!("  raster, {outputs} colours") }
+            + if two { ", in compute and by ray query" } else { "" }
     );
     if compute {
         let _ = writeln!(
@@ -186,11 +174,12 @@ fn write_pass(out: &mut String, listing: &mut String, pass: &Pass, structs: &[St
         out,
         "        /// Everything `{name}` binds.\n        #[derive(Clone, Copy, Debug)]\n        pub struct Args {{"
     );
-    for m in &bindings {
+    for m in &fields {
         let b = m.binding;
         let ty = match &b.kind {
             Kind::Sampled(_) | Kind::Storage(_) => "crate::graph::Image".to_owned(),
-            Kind::Buffer | Kind::AccelerationStructure => "crate::graph::Buffer".to_owned(),
+            Kind::Buffer => "crate::graph::Buffer".to_owned(),
+            Kind::AccelerationStructure => "crate::graph::Accel".to_owned(),
             Kind::Uniform(s) => format!("crate::graph::Uniform<super::super::types::{s}>"),
         };
         let ty = if b.count > 1 { format!("[{ty}; {}]", b.count) } else { ty };
@@ -203,7 +192,12 @@ fn write_pass(out: &mut String, listing: &mut String, pass: &Pass, structs: &[St
             Kind::AccelerationStructure => "acceleration structure".into(),
         };
         let count = if b.count > 1 { format!(" × {}", b.count) } else { String::new() };
-        let _ = writeln!(listing, "    {:2} {}: {kind}{count}, {:?}", b.binding, b.name, m.access);
+        let only = match (two, m.compute, m.query) {
+            (true, true, false) => ", only in compute",
+            (true, false, true) => ", only by ray query",
+            _ => "",
+        };
+        let _ = writeln!(listing, "    {:2} {}: {kind}{count}, {:?}{only}", b.binding, b.name, m.access);
     }
     if let Some(push) = push {
         let _ = writeln!(out, "            pub push: Push,");
@@ -216,7 +210,22 @@ fn write_pass(out: &mut String, listing: &mut String, pass: &Pass, structs: &[St
     }
     let _ = writeln!(out, "        }}\n");
 
-    write_shader(out, &name, pass, &bindings, spec, push_size, workgroup, outputs, structs);
+    let mut shader = Written {
+        pass,
+        name: name.clone(),
+        bindings: &bindings,
+        spec,
+        push_size,
+        workgroup,
+        outputs,
+        structs,
+        query: false,
+    };
+    shader.write(out, if two { "Some(&QUERY)" } else { "None" });
+    if two {
+        shader = Written { name: format!("{name} (ray query)"), bindings: &query, query: true, ..shader };
+        shader.write(out, "None");
+    }
 
     let _ = writeln!(
         out,
@@ -224,29 +233,18 @@ fn write_pass(out: &mut String, listing: &mut String, pass: &Pass, structs: &[St
     );
     let unused = if bindings.is_empty() { "_out" } else { "out" };
     let _ = writeln!(out, "            fn resources(&self, {unused}: &mut Vec<crate::shader::Resource>) {{");
-    for m in &bindings {
-        let b = m.binding;
-        let variant = match &b.kind {
-            Kind::Sampled(_) | Kind::Storage(_) => "Image",
-            Kind::Buffer | Kind::AccelerationStructure => "Buffer",
-            Kind::Uniform(_) => "Uniform",
-        };
-        let convert = if variant == "Uniform" { ".into()" } else { "" };
-        if b.count > 1 {
-            let _ = writeln!(
-                out,
-                "                out.extend(self.{}.iter().map(|r| crate::shader::Resource::{variant}(*r)));",
-                b.name
-            );
-        } else {
-            let _ = writeln!(
-                out,
-                "                out.push(crate::shader::Resource::{variant}(self.{}{convert}));",
-                b.name
-            );
-        }
-    }
+    write_resources(out, &bindings);
     let _ = writeln!(out, "            }}");
+    if let Some(traced) = traced {
+        let _ = writeln!(
+            out,
+            "            fn variant(&self, out: &mut Vec<crate::shader::Resource>) -> &'static crate::shader::Shader {{\n                \
+             if self.{}.is_none() {{\n                    crate::shader::Args::resources(self, out);\n                    return &SHADER;\n                }}",
+            traced.binding.name
+        );
+        write_resources(out, &query);
+        let _ = writeln!(out, "                &QUERY\n            }}");
+    }
     if push.is_some() {
         let _ = writeln!(out, "            fn push(&self) -> &[u8] {{ ::bytemuck::bytes_of(&self.push) }}");
     }
@@ -266,61 +264,102 @@ fn write_pass(out: &mut String, listing: &mut String, pass: &Pass, structs: &[St
     Ok(())
 }
 
-#[allow(clippy::too_many_arguments)]
-fn write_shader(
-    out: &mut String,
-    name: &str,
-    pass: &Pass,
-    bindings: &[Merged],
-    spec: &[Spec],
+/// Pushes the resources of these bindings.
+fn write_resources(out: &mut String, bindings: &[Merged]) {
+    for m in bindings {
+        let b = m.binding;
+        let variant = match &b.kind {
+            Kind::Sampled(_) | Kind::Storage(_) => "Image",
+            Kind::Buffer => "Buffer",
+            Kind::AccelerationStructure => "Accel",
+            Kind::Uniform(_) => "Uniform",
+        };
+        let convert = if variant == "Uniform" { ".into()" } else { "" };
+        if b.count > 1 {
+            let _ = writeln!(
+                out,
+                "                out.extend(self.{}.iter().map(|r| crate::shader::Resource::{variant}(*r)));",
+                b.name
+            );
+        } else {
+            let _ = writeln!(
+                out,
+                "                out.push(crate::shader::Resource::{variant}(self.{}{convert}));",
+                b.name
+            );
+        }
+    }
+}
+
+/// One variant of a pass, as a `Shader`.
+struct Written<'a> {
+    pass: &'a Pass,
+    name: String,
+    bindings: &'a [Merged<'a>],
+    spec: &'a [Spec],
     push_size: u32,
     workgroup: [u32; 3],
     outputs: u32,
-    structs: &[Struct],
-) {
-    let _ = writeln!(
-        out,
-        "        /// Code and interface.\n        pub static SHADER: crate::shader::Shader = crate::shader::Shader {{\n            name: {name:?},\n            stages: &["
-    );
-    for s in &pass.stages {
+    structs: &'a [Struct],
+    /// The one that traces by ray query.
+    query: bool,
+}
+
+impl Written<'_> {
+    fn write(&self, out: &mut String, other: &str) {
+        let Self { pass, name, bindings, spec, push_size, workgroup, outputs, structs, query } = self;
+        let (doc, item) =
+            if *query { ("The same, tracing by ray query", "QUERY") } else { ("Code and interface", "SHADER") };
         let _ = writeln!(
             out,
-            "                crate::shader::StageCode {{ stage: crate::shader::Stage::{}, spirv: include_bytes!({:?}) }},",
-            s.stage, s.spirv
+            "        /// {doc}.\n        pub static {item}: crate::shader::Shader = crate::shader::Shader {{\n            name: {name:?},\n            stages: &["
         );
-    }
-    let _ = writeln!(out, "            ],\n            bindings: &[");
-    for m in bindings {
-        let b = m.binding;
-        let kind = match &b.kind {
-            Kind::Sampled(d) => format!("Sampled(crate::shader::Dim::{d})"),
-            Kind::Storage(d) => format!("Storage(crate::shader::Dim::{d})"),
-            Kind::Buffer => "Buffer".into(),
-            Kind::Uniform(s) => format!("Uniform {{ size: {} }}", size_of(&Type::Struct(s.clone()), structs)),
-            Kind::AccelerationStructure => "AccelerationStructure".into(),
-        };
-        let stages: Vec<String> = m.stages.iter().map(|s| format!("crate::shader::Stage::{s}")).collect();
+        for s in &pass.stages {
+            let _ = writeln!(
+                out,
+                "                crate::shader::StageCode {{ stage: crate::shader::Stage::{}, spirv: include_bytes!({:?}) }},",
+                s.stage,
+                s.variant(*query).1
+            );
+        }
+        let _ = writeln!(out, "            ],\n            bindings: &[");
+        for m in *bindings {
+            let b = m.binding;
+            let kind = match &b.kind {
+                Kind::Sampled(d) => format!("Sampled(crate::shader::Dim::{d})"),
+                Kind::Storage(d) => format!("Storage(crate::shader::Dim::{d})"),
+                Kind::Buffer => "Buffer".into(),
+                Kind::Uniform(s) => format!("Uniform {{ size: {} }}", size_of(&Type::Struct(s.clone()), structs)),
+                Kind::AccelerationStructure => "AccelerationStructure".into(),
+            };
+            let stages: Vec<String> = m.stages.iter().map(|s| format!("crate::shader::Stage::{s}")).collect();
+            let _ = writeln!(
+                out,
+                "                crate::shader::Binding {{ name: {:?}, binding: {}, kind: crate::shader::BindingKind::{kind}, access: \
+                 crate::shader::Access::{:?}, stages: &[{}], count: {}, texel: crate::shader::Texel::{}, format: {} }},",
+                b.name,
+                b.binding,
+                m.access,
+                stages.join(", "),
+                b.count,
+                b.texel,
+                b.format
+            );
+        }
         let _ = writeln!(
             out,
-            "                crate::shader::Binding {{ name: {:?}, binding: {}, kind: crate::shader::BindingKind::{kind}, access: \
-             crate::shader::Access::{:?}, stages: &[{}], count: {}, texel: crate::shader::Texel::{}, format: {} }},",
-            b.name,
-            b.binding,
-            m.access,
-            stages.join(", "),
-            b.count,
-            b.texel,
-            b.format
+            "            ],\n            push_size: {push_size},\n            workgroup: {workgroup:?},\n            spec: &["
+        );
+        for s in *spec {
+            let _ =
+                writeln!(out, "                crate::shader::SpecConstant {{ name: {:?}, id: {} }},", s.name, s.id);
+        }
+        let ray_query = pass.stages.iter().any(|s| s.variant(*query).0.ray_query);
+        let _ = writeln!(
+            out,
+            "            ],\n            color_outputs: {outputs},\n            ray_query: {ray_query},\n            query: {other},\n        }};\n"
         );
     }
-    let _ = writeln!(
-        out,
-        "            ],\n            push_size: {push_size},\n            workgroup: {workgroup:?},\n            spec: &["
-    );
-    for s in spec {
-        let _ = writeln!(out, "                crate::shader::SpecConstant {{ name: {:?}, id: {} }},", s.name, s.id);
-    }
-    let _ = writeln!(out, "            ],\n            color_outputs: {outputs},\n        }};\n");
 }
 
 /// Generates everything for `passes`, which are sorted by folder and stem.
@@ -332,7 +371,8 @@ pub fn generate(passes: &[Pass], exports: &[Export]) -> Result<Generated, String
     let mut owner: BTreeMap<String, String> = BTreeMap::new();
     for pass in passes {
         let name = format!("{}/{}", pass.folder, pass.stem);
-        for s in pass.stages.iter().flat_map(|s| &s.interface.structs) {
+        let interfaces = pass.stages.iter().flat_map(|s| [Some(&s.interface), s.query.as_ref().map(|q| &q.0)]);
+        for s in interfaces.flatten().flat_map(|i| &i.structs) {
             match structs.iter().find(|known| known.name == s.name) {
                 Some(known) if known == s => {}
                 Some(_) => {
@@ -381,9 +421,15 @@ pub fn generate(passes: &[Pass], exports: &[Export]) -> Result<Generated, String
     if !folder.is_empty() {
         rust.push_str("}\n");
     }
-    let _ = writeln!(rust, "/// Every shader of the engine.\npub static ALL: &[&crate::shader::Shader] = &[");
+    let _ = writeln!(
+        rust,
+        "/// Every shader of the engine, in all variants.\npub static ALL: &[&crate::shader::Shader] = &["
+    );
     for pass in passes {
         let _ = writeln!(rust, "    &{}::{}::SHADER,", pass.folder, pass.stem);
+        if pass.stages.iter().any(|s| s.query.is_some()) {
+            let _ = writeln!(rust, "    &{}::{}::QUERY,", pass.folder, pass.stem);
+        }
     }
     rust.push_str("];\n");
     let _ = writeln!(
@@ -394,92 +440,5 @@ pub fn generate(passes: &[Pass], exports: &[Export]) -> Result<Generated, String
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::{compile, reflect};
-    use super::*;
-
-    const HEAD: &str = "#version 460\n#extension GL_EXT_scalar_block_layout : require\n";
-
-    fn stage(kind: &'static str, source: &str) -> Result<Stage, String> {
-        let dir = tempfile::tempdir().unwrap();
-        std::fs::write(dir.path().join("x"), format!("{HEAD}{source}")).unwrap();
-        let shader = match kind {
-            "Compute" => shaderc::ShaderKind::Compute,
-            "Vertex" => shaderc::ShaderKind::Vertex,
-            _ => shaderc::ShaderKind::Fragment,
-        };
-        let compiled = compile::compile(dir.path(), "x", shader).unwrap_or_else(|e| panic!("{e}"));
-        Ok(Stage { stage: kind, interface: reflect::reflect(&compiled.reflect)?, spirv: "x.spv".into() })
-    }
-
-    fn pass(stem: &str, stages: Vec<Stage>) -> Pass {
-        Pass { folder: "t".into(), stem: stem.into(), stages }
-    }
-
-    fn comp(body: &str) -> Result<Stage, String> {
-        stage("Compute", &format!("layout(local_size_x = 64) in;\n{body}"))
-    }
-
-    #[test]
-    fn scalar_layout_has_no_padding() {
-        let s = comp("layout(binding = 0, scalar) uniform Block { vec3 a; vec4 b; mat3 m; float c[3]; };\nlayout(binding = 1, scalar) writeonly buffer O { float o[]; };\nvoid main() { o[0] = a.x + b.x + m[0].x + c[1]; }").unwrap();
-        let offsets: Vec<u32> = s.interface.structs[0].members.iter().map(|m| m.offset).collect();
-        assert_eq!(offsets, [0, 12, 28, 64]);
-        assert_eq!(reflect::struct_size(&s.interface.structs[0], &s.interface.structs), 76);
-    }
-
-    #[test]
-    fn another_layout_than_scalar_is_refused_by_name() {
-        let error = comp("layout(binding = 0, std140) uniform Block { float c[3]; };\nlayout(binding = 1, scalar) writeonly buffer O { float o[]; };\nvoid main() { o[0] = c[1]; }").unwrap_err();
-        assert!(error.contains("Block.c: array stride"), "{error}");
-    }
-
-    #[test]
-    fn qualifiers_are_the_access() {
-        let s = comp("layout(binding = 0, scalar) readonly buffer A { float a[]; };\nlayout(binding = 1, scalar) writeonly buffer B { float b[]; };\nlayout(binding = 2, scalar) buffer C { float c[]; };\nlayout(binding = 3, r32f) uniform readonly image2D d;\nlayout(binding = 4, r32f) uniform writeonly image2D e;\nlayout(binding = 5, r32f) uniform image2D f;\nvoid main() { b[0] = a[0]; c[0] += 1.0; imageStore(e, ivec2(0), imageLoad(d, ivec2(0))); imageStore(f, ivec2(0), vec4(0)); }").unwrap();
-        let access: Vec<Access> = s.interface.bindings.iter().map(|b| b.access).collect();
-        use Access::*;
-        assert_eq!(access, [Read, Write, ReadWrite, Read, Write, ReadWrite]);
-    }
-
-    #[test]
-    fn an_unused_binding_stays_in_the_interface() {
-        let s = comp("layout(binding = 7) uniform samplerCube sky;\nvoid main() {}").unwrap();
-        assert_eq!(s.interface.bindings[0].name, "sky");
-        assert_eq!(s.interface.bindings[0].kind, Kind::Sampled("Cube"));
-    }
-
-    #[test]
-    fn too_many_push_constants_are_refused_with_the_shader_named() {
-        let s = comp("layout(push_constant, scalar) uniform Push { mat4 a; mat4 b; float c; };\nlayout(binding = 0, scalar) writeonly buffer O { float o[]; };\nvoid main() { o[0] = a[0].x + b[0].x + c; }").unwrap();
-        let error = generate(&[pass("big", vec![s])], &[]).unwrap_err();
-        assert!(error.starts_with("t/big: 132 bytes"), "{error}");
-    }
-
-    #[test]
-    fn two_structs_of_one_name_must_agree() {
-        let a = comp(
-            "struct S { float x; };\nlayout(binding = 0, scalar) buffer A { S s[]; };\nvoid main() { s[0].x = 1.0; }",
-        )
-        .unwrap();
-        let b = comp("struct S { vec2 x; };\nlayout(binding = 0, scalar) buffer A { S s[]; };\nvoid main() { s[0].x = vec2(1.0); }").unwrap();
-        let error = generate(&[pass("a", vec![a]), pass("b", vec![b])], &[]).unwrap_err();
-        assert!(error.contains("t/b: struct S differs from the one in t/a"), "{error}");
-    }
-
-    #[test]
-    fn stages_that_disagree_on_a_binding_are_refused() {
-        let v = stage("Vertex", "layout(binding = 0, scalar) readonly buffer P { vec4 p[]; };\nvoid main() { gl_Position = p[gl_VertexIndex]; }").unwrap();
-        let f = stage("Fragment", "layout(binding = 0) uniform sampler2D image;\nlayout(location = 0) out vec4 c;\nvoid main() { c = textureLod(image, vec2(0), 0.0); }").unwrap();
-        let error = generate(&[pass("r", vec![v, f])], &[]).unwrap_err();
-        assert!(error.contains("binding 0 is p in one stage") || error.contains("binding 0 is"), "{error}");
-    }
-
-    #[test]
-    fn specialisation_constants_keep_their_defaults() {
-        let s = comp("layout(constant_id = 2) const float SCALE = 0.5;\nlayout(constant_id = 1) const int SHIFT = -3;\nlayout(binding = 0, scalar) writeonly buffer O { float o[]; };\nvoid main() { o[0] = SCALE + float(SHIFT); }").unwrap();
-        let text = generate(&[pass("s", vec![s])], &[]).unwrap().rust;
-        assert!(text.contains("shift: -3,"), "{text}");
-        assert!(text.contains(&format!("scale: f32::from_bits({})", 0.5f32.to_bits())), "{text}");
-    }
-}
+#[path = "codegen_tests.rs"]
+mod tests;

@@ -14,6 +14,17 @@ pub struct Compiled {
     pub ship: Vec<u8>,
 }
 
+/// Defined in the variant of a shader that traces by ray query.
+pub const QUERY_DEFINE: &str = "TRACE_QUERY";
+/// Shaders that include this file are compiled in both variants.
+pub const TRACE_FILE: &str = "lib/trace.glsl";
+
+/// Whether `root/file` traces rays: it or something that it includes includes [`TRACE_FILE`].
+pub fn traces(root: &Path, file: &str) -> bool {
+    let path = root.join(TRACE_FILE).display().to_string();
+    closure(root, file).lines().any(|line| line.strip_prefix("//// ") == Some(&path))
+}
+
 /// Includes deeper than this are taken for a cycle.
 const MAX_INCLUDE_DEPTH: usize = 16;
 
@@ -46,21 +57,31 @@ pub fn closure(root: &Path, file: &str) -> String {
     all
 }
 
-/// Compiles `root/file`.
+/// Compiles `root/file`; `query`: in the variant that traces by ray query.
 ///
 /// # Errors
 /// The compiler's message, each line as `path:line: error: …`.
-pub fn compile(root: &Path, file: &str, kind: shaderc::ShaderKind) -> Result<Compiled, String> {
+pub fn compile(root: &Path, file: &str, kind: shaderc::ShaderKind, query: bool) -> Result<Compiled, String> {
     let path = root.join(file);
-    let source = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let mut source = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
     if source.trim().is_empty() {
         return Err(format!("{}: the file is empty", path.display()));
+    }
+    if query {
+        // An extension must be named before the first declaration, and so cannot be named by an include.
+        let version = source.find("#version").unwrap_or(0);
+        let at = source[version..].find('\n').map_or(source.len(), |end| version + end);
+        let next = source[..at].lines().count() + 1;
+        source.insert_str(at, &format!("\n#extension GL_EXT_ray_query : require\n#line {next}"));
     }
     let compiler = shaderc::Compiler::new().map_err(|e| format!("cannot start shaderc: {e}"))?;
     let run = |ship: bool| -> Result<shaderc::CompilationArtifact, String> {
         let mut options = shaderc::CompileOptions::new().map_err(|e| format!("cannot start shaderc: {e}"))?;
         options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
         options.set_warnings_as_errors();
+        if query {
+            options.add_macro_definition(QUERY_DEFINE, None);
+        }
         if ship {
             options.set_optimization_level(shaderc::OptimizationLevel::Performance);
         } else {
@@ -106,7 +127,7 @@ mod tests {
     fn an_error_inside_an_include_names_its_file_and_line() {
         let main = format!("{HEAD}#include \"lib/bad.glsl\"\nlayout(local_size_x = 1) in;\nvoid main() {{}}\n");
         let dir = tree(&[("a/x.comp", &main), ("lib/bad.glsl", "float ok;\nfloat f() { return undeclared; }\n")]);
-        let error = compile(dir.path(), "a/x.comp", shaderc::ShaderKind::Compute).unwrap_err();
+        let error = compile(dir.path(), "a/x.comp", shaderc::ShaderKind::Compute, false).unwrap_err();
         assert!(error.contains("lib/bad.glsl:2: error: 'undeclared'"), "{error}");
     }
 
@@ -114,7 +135,7 @@ mod tests {
     fn an_include_cycle_ends_with_a_message() {
         let main = format!("{HEAD}#include \"lib/a.glsl\"\nlayout(local_size_x = 1) in;\nvoid main() {{}}\n");
         let dir = tree(&[("a/x.comp", &main), ("lib/a.glsl", "#include \"lib/a.glsl\"\n")]);
-        let error = compile(dir.path(), "a/x.comp", shaderc::ShaderKind::Compute).unwrap_err();
+        let error = compile(dir.path(), "a/x.comp", shaderc::ShaderKind::Compute, false).unwrap_err();
         assert!(error.contains("cycle"), "{error}");
         assert!(closure(dir.path(), "a/x.comp").len() < 10_000);
     }
@@ -123,7 +144,7 @@ mod tests {
     fn includes_stay_inside_the_tree() {
         let main = format!("{HEAD}#include \"../secret.glsl\"\nlayout(local_size_x = 1) in;\nvoid main() {{}}\n");
         let dir = tree(&[("a/x.comp", &main)]);
-        let error = compile(dir.path(), "a/x.comp", shaderc::ShaderKind::Compute).unwrap_err();
+        let error = compile(dir.path(), "a/x.comp", shaderc::ShaderKind::Compute, false).unwrap_err();
         assert!(error.contains("must stay inside"), "{error}");
     }
 

@@ -5,7 +5,7 @@
 //! binding), `Push`, `Spec` and the workgroup size. A forgotten binding is a missing field and does not compile.
 //! `readonly` and `writeonly` in the GLSL are the access declarations from which the render graph derives barriers.
 
-use crate::graph::{Buffer, Image, UniformSlice};
+use crate::graph::{Accel, Buffer, Image, UniformSlice};
 
 // Used by build.rs as well; in the library only their tests and the types below are needed.
 #[cfg(test)]
@@ -15,6 +15,8 @@ mod codegen;
 mod compile;
 #[cfg(test)]
 mod reflect;
+#[cfg(test)]
+mod variants;
 
 /// A compute or raster program: all its stages, and what it binds.
 #[derive(Debug)]
@@ -33,6 +35,10 @@ pub struct Shader {
     pub spec: &'static [SpecConstant],
     /// Raster: colour attachments that the fragment stage writes (highest location + 1).
     pub color_outputs: u32,
+    /// It traces by ray query: only for devices that have it.
+    pub ray_query: bool,
+    /// The same pass, tracing by ray query instead of in compute.
+    pub query: Option<&'static Shader>,
 }
 
 /// One stage of a [`Shader`].
@@ -124,6 +130,7 @@ pub enum Resource {
     Image(Image),
     Buffer(Buffer),
     Uniform(UniformSlice),
+    Accel(Accel),
 }
 
 /// Implemented by every generated `Args`: constructing it is declaring the accesses of a pass.
@@ -132,6 +139,13 @@ pub trait Args {
 
     /// The resources in the order of [`Shader::bindings`], arrays element by element.
     fn resources(&self, out: &mut Vec<Resource>);
+
+    /// The variant for these resources, and its resources as [`Self::resources`] has them: the one that traces by ray query
+    /// where there is an acceleration structure to trace.
+    fn variant(&self, out: &mut Vec<Resource>) -> &'static Shader {
+        self.resources(out);
+        Self::SHADER
+    }
 
     /// The bytes of the push-constant block; empty if there is none.
     fn push(&self) -> &[u8] {

@@ -83,6 +83,8 @@ pub struct Interface {
     pub spec: Vec<Spec>,
     pub workgroup: [u32; 3],
     pub color_outputs: u32,
+    /// It declares that it traces by ray query, which not every device can.
+    pub ray_query: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -113,9 +115,11 @@ struct Walk {
     variables: Vec<(u32, u32, u32)>,
     workgroup: [u32; 3],
     spec: Vec<u32>,
+    ray_query: bool,
 }
 
-// Decorations and storage classes of the SPIR-V specification that matter here.
+// Capabilities, decorations and storage classes of the SPIR-V specification that matter here.
+const RAY_QUERY: u32 = 4472;
 const SPEC_ID: u32 = 1;
 const ARRAY_STRIDE: u32 = 6;
 const MATRIX_STRIDE: u32 = 7;
@@ -142,6 +146,7 @@ fn walk(words: &[u32]) -> Result<Walk, String> {
         match op {
             5 => drop(w.names.insert(a[0], string(&a[1..]))),
             6 => drop(w.member_names.insert((a[0], a[1]), string(&a[2..]))),
+            17 => w.ray_query |= a[0] == RAY_QUERY,
             16 if a[1] == 17 => w.workgroup = [a[2], a[3], a[4]],
             331 if a[1] == 38 => {
                 for i in 0..3 {
@@ -354,7 +359,7 @@ fn dim(dim: u32, arrayed: bool) -> Result<&'static str, String> {
 /// What in the interface is not supported, by the name it has in the shader.
 pub fn reflect(words: &[u32]) -> Result<Interface, String> {
     let w = walk(words)?;
-    let mut interface = Interface { workgroup: w.workgroup, ..Interface::default() };
+    let mut interface = Interface { workgroup: w.workgroup, ray_query: w.ray_query, ..Interface::default() };
     for &(pointer, id, storage) in &w.variables {
         let Some(Raw::Pointer(pointee)) = w.types.get(&pointer).cloned() else { continue };
         match storage {

@@ -144,6 +144,10 @@ pub struct DeviceArgs {
     /// Fail if the device is not a GPU
     #[arg(long, help_heading = "Device")]
     pub require_gpu: bool,
+
+    /// Hardware ray queries: auto, on (refuse devices without) or off (trace rays in compute) [default: auto]
+    #[arg(long, value_name = "CHOICE", help_heading = "Device")]
+    pub ray_query: Option<String>,
 }
 
 /// How much is said.

@@ -16,6 +16,9 @@ impl DeviceArgs {
             options.device = device.parse().map_err(|error: Error| error.at("--device"))?;
         }
         options.require_gpu |= self.require_gpu;
+        if let Some(choice) = &self.ray_query {
+            options.ray_query = choice.parse().map_err(|error: Error| error.at("--ray-query"))?;
+        }
         Ok(options)
     }
 }
@@ -44,6 +47,7 @@ pub fn json(list: &[Listed]) -> Value {
             "index": index, "device": d.device, "kind": d.kind.to_string(), "driver": d.driver,
             "driver_info": d.driver_info, "api_version": d.api_version,
             "usable": device.missing.is_empty(), "missing": device.missing,
+            "ray_query": device.facts.lacks_of_ray_query().is_empty(),
         })
     };
     Value::Array(list.iter().enumerate().map(device).collect())

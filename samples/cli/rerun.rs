@@ -73,6 +73,7 @@ pub fn rerun(path: &Path, device: &DeviceArgs, quiet: bool) -> Result<Comparison
     let mut command = Command::new(&program);
     command.args(record.arguments(folder.path())?).arg("--output").arg(&fresh).stdin(Stdio::null());
     command.args(device.device.iter().flat_map(|device| ["--device", device]));
+    command.args(device.ray_query.iter().flat_map(|choice| ["--ray-query", choice]));
     command.args(device.require_gpu.then_some("--require-gpu"));
     command.args(quiet.then_some("--quiet"));
     let status = command.stdout(Stdio::null()).status().map_err(|error| {

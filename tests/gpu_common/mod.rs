@@ -51,6 +51,8 @@ pub fn compute(name: &'static str, source: &str) -> &'static Shader {
         workgroup: [64, 1, 1],
         spec: &[],
         color_outputs: 0,
+        ray_query: false,
+        query: None,
     }))
 }
 

@@ -77,6 +77,7 @@ impl<'a> Traceable<'a> {
                 rays: list,
                 hits,
                 trace_nodes: traced.trace_nodes,
+                trace_accel: traced.trace_accel,
                 trace_triangles: traced.trace_triangles,
                 trace_instances: traced.trace_instances,
                 trace_indices: traced.trace_indices,

@@ -55,6 +55,9 @@ impl Collector<'_> {
                             self.mistake(MistakeKind::Shape, role, what);
                         }
                     }
+                    (BindingKind::AccelerationStructure, Some(shader::Resource::Accel(accel))) => {
+                        self.traced(*accel, stages, &role);
+                    }
                     _ => self.mistake(MistakeKind::Shape, role, "this kind of resource cannot be bound"),
                 }
             }

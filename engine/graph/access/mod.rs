@@ -1,5 +1,6 @@
 //! What each pass does to which part of which resource, in one table, and the mistakes that show in a pass by itself.
 
+mod accel;
 mod bindings;
 mod draws;
 
@@ -40,6 +41,8 @@ impl<'a> Collector<'a> {
                 c.targets(bound, targets, state);
                 c.draw(draw);
             }
+            Work::BuildBottoms { accel, builds, scratch } => c.build_bottoms(*accel, builds, *scratch),
+            Work::BuildTop { accel, instances, count, scratch } => c.build_top(*accel, *instances, *count, *scratch),
             Work::Clear { image, .. } => c.transfer(*image, true, "clear"),
             Work::Fill { buffer, .. } => {
                 c.buffer(*buffer, Stages::TRANSFER, Access::TRANSFER_WRITE, Usage::COPY_TO, "fill");

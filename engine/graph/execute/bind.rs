@@ -23,6 +23,7 @@ use crate::{
 enum Place {
     Images(usize),
     Buffers(usize),
+    Accels(usize),
 }
 
 impl Recorder<'_> {
@@ -54,6 +55,7 @@ impl Recorder<'_> {
         let set = self.sets.allocate(name, pipeline.set_layout)?;
         let mut images = Vec::new();
         let mut buffers = Vec::new();
+        let mut accels = Vec::new();
         let mut places = Vec::new();
         let mut resources = bound.resources.iter();
         // The plan lists the uses of bindings first, in their order; uniform blocks are no uses.
@@ -61,6 +63,7 @@ impl Recorder<'_> {
         for binding in bound.shader.bindings {
             places.push(match binding.kind {
                 BindingKind::Sampled(_) | BindingKind::Storage(_) => Place::Images(images.len()),
+                BindingKind::AccelerationStructure => Place::Accels(accels.len()),
                 _ => Place::Buffers(buffers.len()),
             });
             for _ in 0..binding.count {
@@ -115,19 +118,35 @@ impl Recorder<'_> {
                                 .range(buffer.size.max(4)),
                         );
                     }
+                    (BindingKind::AccelerationStructure, Some(Resource::Accel(accel))) => {
+                        uses.next();
+                        accels.push(self.owned_accel(*accel)?.raw());
+                    }
                     _ => return Err(mismatch(binding.name)),
                 }
             }
         }
-        let writes: Vec<_> = bound
-            .shader
-            .bindings
-            .iter()
-            .zip(&places)
-            .map(|(binding, place)| {
+        let bindings = || bound.shader.bindings.iter().zip(&places);
+        let mut traced: Vec<_> = bindings()
+            .map(|(binding, place)| match place {
+                Place::Accels(at) => &accels[*at..at + binding.count as usize],
+                _ => &[],
+            })
+            .map(|list| vk::WriteDescriptorSetAccelerationStructureKHR::default().acceleration_structures(list))
+            .collect();
+        let writes: Vec<_> = bindings()
+            .zip(&mut traced)
+            .map(|((binding, place), traced)| {
                 let write = vk::WriteDescriptorSet::default().dst_set(set).dst_binding(binding.binding);
                 let count = binding.count as usize;
                 match (place, binding.kind) {
+                    (Place::Accels(_), _) => {
+                        let mut write =
+                            write.descriptor_type(vk::DescriptorType::ACCELERATION_STRUCTURE_KHR).push_next(traced);
+                        // The number is taken from the list of the extending structure.
+                        write.descriptor_count = binding.count;
+                        write
+                    }
                     (Place::Images(at), BindingKind::Sampled(_)) => write
                         .descriptor_type(vk::DescriptorType::COMBINED_IMAGE_SAMPLER)
                         .image_info(&images[*at..at + count]),

@@ -1,6 +1,7 @@
 //! Runs a plan on a device.
 #![allow(unsafe_code)]
 
+mod accel;
 mod bind;
 mod pool;
 mod record;
@@ -102,6 +103,7 @@ impl Runner {
             match memory {
                 Memory::Image(image) => commands.keep(image.clone()),
                 Memory::Buffer(buffer) => commands.keep(buffer.clone()),
+                Memory::Accel(accel) => commands.keep(accel.clone()),
             }
         }
         for buffer in self.uniforms.iter().chain(&self.staging) {
@@ -147,6 +149,7 @@ impl Runner {
         commands.submit()?.wait()?;
         let wait_ms = milliseconds(submitted);
 
+        accel::remember_built(graph);
         self.pool.turn(graph);
         for (physical, memory) in plan.physical.iter().zip(&memory) {
             if let (Source::Imported(_), Some(rest), Memory::Image(image)) = (&physical.source, physical.rest, memory) {
@@ -264,6 +267,8 @@ impl Work {
         match self {
             Work::Compute { .. } => 1,
             Work::Raster { draw, .. } => draw.count(),
+            Work::BuildBottoms { builds, .. } => builds.len(),
+            Work::BuildTop { .. } => 1,
             _ => 0,
         }
     }

@@ -14,7 +14,7 @@ use super::super::{
 };
 use crate::{
     Error, ErrorKind, Result,
-    gpu::{BufferDesc, Gpu, OwnedBuffer, OwnedImage},
+    gpu::{BufferDesc, Gpu, OwnedAccel, OwnedBuffer, OwnedImage},
 };
 
 /// Runs after which memory that no graph asked for is given back.
@@ -25,6 +25,7 @@ const PATIENCE: u64 = 8;
 pub(super) enum Memory {
     Image(OwnedImage),
     Buffer(OwnedBuffer),
+    Accel(OwnedAccel),
 }
 
 #[derive(Debug)]
@@ -134,6 +135,7 @@ impl Pool {
                 match &slot.memory {
                     Memory::Image(image) => gpu.name(image.raw(), &name),
                     Memory::Buffer(buffer) => gpu.name(buffer.raw(), &name),
+                    Memory::Accel(_) => {}
                 }
                 slot.name = name;
             }
@@ -205,6 +207,7 @@ fn imported(graph: &Graph, physical: &Physical) -> Result<Memory> {
             Ok(Memory::Image(image.clone()))
         }
         Origin::Imported(Imported { owner: Owner::Buffer(buffer), .. }) => Ok(Memory::Buffer(buffer.clone())),
+        Origin::Imported(Imported { owner: Owner::Accel(accel), .. }) => Ok(Memory::Accel(accel.clone())),
         _ => Err(Error::new(ErrorKind::Runtime, format!("`{name}` is only described; it cannot be run"))),
     }
 }

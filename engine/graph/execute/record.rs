@@ -44,7 +44,7 @@ impl Recorder<'_> {
     pub fn raw_image(&self, image: Image) -> Result<vk::Image> {
         match self.memory_of_image(image)? {
             Memory::Image(owned) => Ok(owned.raw()),
-            Memory::Buffer(_) => Err(mismatch(self.graph.short_name(image))),
+            _ => Err(mismatch(self.graph.short_name(image))),
         }
     }
 
@@ -71,9 +71,14 @@ impl Recorder<'_> {
         let mut buffers = Vec::new();
         for b in barriers {
             let (src, dst) = (vulkan::stages(b.src.stages), vulkan::stages(b.dst.stages));
+            let buffer = match self.memory.get(b.physical) {
+                Some(Memory::Buffer(buffer)) => Some(buffer),
+                Some(Memory::Accel(accel)) => Some(accel.buffer()),
+                _ => None,
+            };
             let (made, seen) = (vulkan::access(b.src.access), vulkan::access(b.dst.access));
-            match self.memory.get(b.physical) {
-                Some(Memory::Image(image)) => images.push(
+            match (self.memory.get(b.physical), buffer) {
+                (Some(Memory::Image(image)), _) => images.push(
                     vk::ImageMemoryBarrier2::default()
                         .src_stage_mask(src)
                         .src_access_mask(made)
@@ -90,7 +95,7 @@ impl Recorder<'_> {
                             layer_count: (b.region.b.1 - b.region.b.0) as u32,
                         }),
                 ),
-                Some(Memory::Buffer(buffer)) => buffers.push(
+                (_, Some(buffer)) => buffers.push(
                     vk::BufferMemoryBarrier2::default()
                         .src_stage_mask(src)
                         .src_access_mask(made)
@@ -100,7 +105,7 @@ impl Recorder<'_> {
                         .offset(b.region.a.0)
                         .size(b.region.a.1 - b.region.a.0),
                 ),
-                None => {}
+                _ => {}
             }
         }
         if images.is_empty() && buffers.is_empty() {
@@ -116,6 +121,8 @@ impl Recorder<'_> {
         match work {
             Work::Compute { bound, groups } => self.compute(index, bound, groups),
             Work::Raster { bound, targets, state, draw } => self.raster(index, bound, targets, state, draw),
+            Work::BuildBottoms { accel, builds, scratch } => self.build_bottoms(*accel, builds, *scratch),
+            Work::BuildTop { accel, instances, count, scratch } => self.build_top(*accel, *instances, *count, *scratch),
             other => self.transfer(other),
         }
     }

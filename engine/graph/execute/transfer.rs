@@ -148,7 +148,9 @@ impl Recorder<'_> {
                 let (a, b) = (self.raw_image(*from)?, self.raw_buffer(*to)?);
                 unsafe { device.cmd_copy_image_to_buffer(raw, a, source, b, &[region]) };
             }
-            Work::Compute { .. } | Work::Raster { .. } => return Err(mismatch("pass")),
+            Work::Compute { .. } | Work::Raster { .. } | Work::BuildBottoms { .. } | Work::BuildTop { .. } => {
+                return Err(mismatch("pass"));
+            }
         }
         Ok(())
     }
@@ -163,6 +165,8 @@ pub(super) fn clear_fresh(gpu: &crate::gpu::Gpu, commands: &mut Commands, fresh:
     for memory in fresh {
         // SAFETY: in recording, outside of rendering; memory of the pool, which nothing else uses now.
         match memory {
+            // Never history.
+            Memory::Accel(_) => {}
             Memory::Buffer(buffer) => unsafe { device.cmd_fill_buffer(raw, buffer.raw(), 0, vk::WHOLE_SIZE, 0) },
             Memory::Image(image) => {
                 let range = image.range();

@@ -70,6 +70,18 @@ struct Item {
     casts: bool,
 }
 
+/// A primitive's place in the streams, or that of a deformed copy.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StreamShape {
+    pub first_vertex: u32,
+    /// From the first one to the end of the stream.
+    pub vertices: u32,
+    pub first_index: u32,
+    pub indices: u32,
+    /// Its vertices are written anew each frame.
+    pub deforms: bool,
+}
+
 /// One primitive of one node in one frame: what culling and sorting need to know.
 #[derive(Clone, Copy, Debug)]
 pub struct Instance {
@@ -195,6 +207,17 @@ impl Resident {
                 _ => Format::D32S8,
             },
         })
+    }
+
+    /// Of each instance, in the order of [`Moment::instances`].
+    pub(crate) fn shapes(&self) -> Vec<StreamShape> {
+        let vertices = (self.positions.size() / 12) as u32;
+        let shape = |item: &Item| {
+            let Range { first_vertex, first_index, indices, .. } = item.range;
+            let vertices = vertices.saturating_sub(first_vertex);
+            StreamShape { first_vertex, vertices, first_index, indices, deforms: item.job.is_some() }
+        };
+        self.items.iter().map(shape).collect()
     }
 
     /// What is served by something simpler here.
