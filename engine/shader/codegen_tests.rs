@@ -49,7 +49,7 @@ fn another_layout_than_scalar_is_refused_by_name() {
 #[test]
 fn qualifiers_are_the_access() {
     let s = comp("layout(binding = 0, scalar) readonly buffer A { float a[]; };\nlayout(binding = 1, scalar) writeonly buffer B { float b[]; };\nlayout(binding = 2, scalar) buffer C { float c[]; };\nlayout(binding = 3, r32f) uniform readonly image2D d;\nlayout(binding = 4, r32f) uniform writeonly image2D e;\nlayout(binding = 5, r32f) uniform image2D f;\nvoid main() { b[0] = a[0]; c[0] += 1.0; imageStore(e, ivec2(0), imageLoad(d, ivec2(0))); imageStore(f, ivec2(0), vec4(0)); }").unwrap();
-    let access: Vec<Access> = s.interface.bindings.iter().map(|b| b.access).collect();
+    let access: Vec<_> = s.interface.bindings.iter().map(|b| b.access).collect();
     use super::super::reflect::Access::*;
     assert_eq!(access, [Read, Write, ReadWrite, Read, Write, ReadWrite]);
 }
