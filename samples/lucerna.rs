@@ -6,6 +6,7 @@ use clap::{Parser, Subcommand};
 use lucerna::{Result, scene::builtin};
 use lucerna_samples::{
     args::{DeviceArgs, TalkArgs},
+    compare::{self, CompareArgs},
     console::{self, Console},
     devices,
     experiment::command::{self as experiment, ReportArgs, ReproduceArgs},
@@ -37,7 +38,7 @@ enum Command {
     },
     /// Say what is in an image and how it was made
     Info {
-        /// .exr, .png, .hdr or .pfm
+        /// .exr, .png, .hdr, .pfm or .jpg
         image: PathBuf,
         #[command(flatten)]
         talk: TalkArgs,
@@ -62,6 +63,8 @@ enum Command {
     },
     /// Write a scene and a view as a POV-Ray file, and render it where `povray` is installed
     ExportPov(Box<ExportPovArgs>),
+    /// Measure how far images are from a reference
+    Compare(Box<CompareArgs>),
     /// List the Vulkan devices, and what the unsuitable ones lack
     Devices {
         /// Fail unless one of them is a usable GPU
@@ -95,6 +98,7 @@ impl Command {
             Self::Views(args) => args.talk.console(),
             Self::Reproduce(args) => args.talk.console(),
             Self::Report(args) => args.talk.console(),
+            Self::Compare(args) => args.talk.console(),
             Self::Inspect { talk, .. }
             | Self::Info { talk, .. }
             | Self::Rerun { talk, .. }
@@ -113,7 +117,9 @@ fn main() -> ExitCode {
     let command = Arguments::parse().command;
     let console = command.console();
     program::run(console, || match &command {
+        // Those that choose their exit code themselves.
         Command::Reproduce(args) => experiment::reproduce(args, console),
+        Command::Compare(args) => compare::run(args, console),
         _ => serve(command, console).map(|()| ExitCode::SUCCESS),
     })
 }
@@ -151,6 +157,7 @@ fn serve(command: Command, console: Console) -> Result<()> {
                 false => console::print(&devices::text(&list)),
             }
         }
+        Command::Compare(args) => compare::run(&args, console).map(drop),
         Command::Views(args) => views::command::run(&args, console),
         // It chooses its exit code itself.
         Command::Reproduce(args) => experiment::reproduce(&args, console).map(|_| ()),

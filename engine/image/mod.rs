@@ -1,6 +1,7 @@
 //! Linear images in and out, with the metadata that makes them reproducible.
 //!
-//! [`Layers`] are a stack of images of one size, each a [`Layer`]. Files: OpenEXR (all layers), Radiance .hdr, PFM and PNG (one layer).
+//! [`Layers`] are a stack of images of one size, each a [`Layer`]. Files: OpenEXR (all layers), Radiance .hdr, PFM and PNG (one layer);
+//! JPEG is read, not written.
 //! Pixels are linear Rec. 709, top row first; sRGB encoding ([`srgb`]) happens only in PNG files. Colour is
 //! premultiplied by alpha, as in OpenEXR; PNG files hold it unassociated.
 //!
@@ -11,6 +12,7 @@ mod exr_chroma;
 mod exr_read;
 mod exr_write;
 mod file;
+mod jpeg;
 mod metadata;
 mod pfm;
 mod picture;
@@ -193,6 +195,7 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Layers> {
         Some(Format::Hdr) => radiance::decode(bytes, limits),
         Some(Format::Pfm) => pfm::decode(bytes, limits),
         Some(Format::Png) => png_file::decode(bytes, limits),
+        None if jpeg::sniff(bytes) => jpeg::decode(bytes, limits),
         None => Err(unknown()),
     }
 }
@@ -206,13 +209,19 @@ pub fn metadata(path: impl AsRef<Path>) -> Result<Metadata> {
         Some(Format::Hdr) => radiance::metadata(&bytes),
         Some(Format::Png) => png_file::metadata(&bytes, &Limits::default()),
         Some(Format::Pfm) => return sidecar::read(path, &bytes),
+        None if jpeg::sniff(&bytes) => Ok(Metadata::default()),
         None => Err(unknown()),
     };
     metadata.map_err(|error| error.in_file(path))
 }
 
 fn unknown() -> Error {
-    Error::input("no image format that is known here").help("Images are .exr, .hdr, .pfm or .png")
+    Error::input("no image format that is known here").help("Images are .exr, .hdr, .pfm, .png or .jpg")
+}
+
+/// Whether the bytes of an image file hold codes of a screen (PNG, JPEG), in which white is 1; others hold light of any range.
+pub fn is_display_referred(bytes: &[u8]) -> bool {
+    Format::sniff(bytes) == Some(Format::Png) || jpeg::sniff(bytes)
 }
 
 /// Checks `width · height` pixels of `bytes_per_pixel` against the limits, before anything is allocated.

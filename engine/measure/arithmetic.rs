@@ -214,7 +214,8 @@ pub fn psnr(pair: &Pair<'_>, options: &Options) -> Result<Measured> {
     let mse = sum / values.pixels();
     let value = if mse == 0.0 { f64::INFINITY } else { 10.0 * (peak * peak / mse).log10() };
     let map = values.map("√ of the channels' mean (r − t)²", [0.0, values.scale], |r, t| squared(r, t).sqrt());
-    Ok(values.finish(Measured::new(Measure::Psnr, value, map).with("peak", peak)))
+    let measured = Measured::new(Measure::Psnr, value, map).with("peak", peak);
+    Ok(values.finish(if mse == 0.0 { measured.noted("infinite: the images are equal") } else { measured }))
 }
 
 /// Correlation of all channel values, 1/n Σ (r − μr)/σr (t − μt)/σt (the dissertation's eq. 20).

@@ -107,6 +107,12 @@ pub(super) fn shown(pair: &Pair<'_>, options: &Options) -> Shown {
     Shown { reference: show(pair.reference), test: show(pair.test), stops }
 }
 
+/// What a screen shows of a picture after `stops` of exposure and a tone curve: a display-referred picture.
+pub fn develop(picture: &Picture, stops: f64, curve: ToneCurve) -> Picture {
+    let pixels = expose(picture, stops, curve, parallel::threads(None));
+    Picture { width: picture.width, height: picture.height, pixels, display_referred: true }
+}
+
 /// Linear light in [0, 1].
 pub(super) fn expose(picture: &Picture, stops: f64, curve: ToneCurve, threads: usize) -> Vec<[f32; 3]> {
     let scale = stops.exp2() as f32;

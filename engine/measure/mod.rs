@@ -33,7 +33,7 @@ pub mod pdiff;
 mod picture;
 pub mod ssim;
 
-pub use display::{Display, Exposure, ToneCurve};
+pub use display::{Display, Exposure, ToneCurve, develop};
 pub use info::{Info, Measure};
 pub use map::{Map, magma};
 pub use options::{NrmseRange, Options, Space, SsimChannels};

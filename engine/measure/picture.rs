@@ -2,7 +2,7 @@
 
 use crate::{
     Error, Result,
-    image::{Layer, Layers},
+    image::{self, Layer, Layers},
 };
 
 /// A linear Rec. 709 image of three channels, top row first.
@@ -59,6 +59,18 @@ impl Picture {
             Error::input(format!("layer '{}' has the channels {channels}; one or three are compared", shown(found)))
         })?;
         Self::new(image.width, image.height, pixels)
+    }
+
+    /// A layer of an image file of any format that is read; PNG and JPEG files are display-referred.
+    ///
+    /// # Errors
+    /// As [`image::decode`] and [`from_layers`](Self::from_layers), naming the file.
+    pub fn read(path: impl AsRef<std::path::Path>, layer: Option<&str>) -> Result<Self> {
+        let (path, limits) = (path.as_ref(), crate::scene::Limits::default());
+        let bytes = image::read_file_checked(path, limits.max_file)?;
+        let layers = image::decode(&bytes, &limits).map_err(|error| error.in_file(path))?;
+        let picture = Self::from_layers(&layers, layer).map_err(|error| error.in_file(path))?;
+        Ok(Self { display_referred: image::is_display_referred(&bytes), ..picture })
     }
 
     /// The rectangle of `size` whose first pixel is `origin`.

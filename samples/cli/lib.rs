@@ -2,6 +2,7 @@
 
 pub mod args;
 pub mod camera;
+pub mod compare;
 pub mod config;
 pub mod console;
 pub mod devices;

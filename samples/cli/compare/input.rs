@@ -1,0 +1,121 @@
+//! The images of a comparison: files, layers, crops, NaN, HDR beside LDR.
+
+use std::path::Path;
+
+use lucerna::{
+    Error, Result,
+    measure::{self, Picture},
+};
+
+use super::CompareArgs;
+use crate::console::Console;
+
+/// Why there is nothing to show.
+pub(super) struct Stop {
+    pub error: Error,
+    /// The reason has an exit code of its own in idiff.
+    pub sizes_differ: bool,
+}
+
+impl From<Error> for Stop {
+    fn from(error: Error) -> Self {
+        Self { error, sizes_differ: false }
+    }
+}
+
+/// A picture as the user named it.
+pub(super) struct Image {
+    pub name: String,
+    pub picture: Picture,
+}
+
+/// All pictures of a run, ready to be compared.
+pub(super) struct Images {
+    pub reference: Image,
+    pub tests: Vec<Image>,
+    pub baseline: Option<Image>,
+    pub notes: Vec<String>,
+    /// Light was exposed because it stands beside screen codes.
+    pub developed: bool,
+}
+
+impl Images {
+    /// Reads all of them and puts them on common ground.
+    ///
+    /// # Errors
+    /// `Input` for files that cannot be read, layers that are not there, and light compared with screen codes.
+    pub fn read(args: &CompareArgs, console: Console) -> Result<Self, Stop> {
+        let mut notes = Vec::new();
+        let mut one = |name: &String| image(name, args, &mut notes);
+        let reference = one(&args.reference)?;
+        let tests = args.tests.iter().map(&mut one).collect::<Result<Vec<_>>>()?;
+        let baseline = args.baseline.as_ref().map(&mut one).transpose()?;
+        let mut images = Self { reference, tests, baseline, notes, developed: false };
+        images.common_ground(args)?;
+        images.crop(args)?;
+        for note in &images.notes {
+            console.warning(note);
+        }
+        Ok(images)
+    }
+
+    fn each(&mut self) -> impl Iterator<Item = &mut Image> {
+        std::iter::once(&mut self.reference).chain(&mut self.tests).chain(&mut self.baseline)
+    }
+
+    /// Light and screen codes are compared only when it is said how the light is shown.
+    fn common_ground(&mut self, args: &CompareArgs) -> Result<()> {
+        let (mut light, mut codes) = (None, None);
+        for image in self.each() {
+            let first = if image.picture.display_referred { &mut codes } else { &mut light };
+            first.get_or_insert_with(|| image.name.clone());
+        }
+        let (Some(light), Some(codes)) = (light, codes) else { return Ok(()) };
+        let Some(stops) = args.exposure.0 else {
+            return Err(Error::input(format!("{light} holds light of any range, {codes} what a screen shows"))
+                .help("Say with --exposure EV (and --tone-curve) how the light was shown; 0 takes 1 as white"));
+        };
+        let curve = args.tone_curve.curve();
+        for image in self.each().filter(|image| !image.picture.display_referred) {
+            image.picture = measure::develop(&image.picture, stops, curve);
+        }
+        let note = format!(
+            "{light} and others with light of any range are shown with {stops} stops and compared as screen values"
+        );
+        self.notes.push(note);
+        self.developed = true;
+        Ok(())
+    }
+
+    fn crop(&mut self, args: &CompareArgs) -> Result<()> {
+        let Some((size, origin)) = args.crop else { return Ok(()) };
+        for image in self.each() {
+            image.picture = image.picture.crop(origin, size).map_err(|error| error.in_file(&image.name))?;
+        }
+        Ok(())
+    }
+}
+
+fn image(name: &str, args: &CompareArgs, notes: &mut Vec<String>) -> Result<Image> {
+    let (file, own) = split(name);
+    let mut picture = Picture::read(file, own.or(args.layer.as_deref()))?;
+    if let Some(value) = args.nan_as {
+        let count = picture.replace_non_finite(value as f32);
+        if count > 0 {
+            notes.push(format!("{name}: {count} samples were NaN or infinite and are taken as {value}"));
+        }
+    }
+    Ok(Image { name: name.to_owned(), picture })
+}
+
+/// File and layer of `FILE:LAYER`; a file that is there with a colon in its name is a file.
+pub(super) fn split(name: &str) -> (&str, Option<&str>) {
+    if Path::new(name).exists() {
+        return (name, None);
+    }
+    match name.rsplit_once(':') {
+        // Not the drive of `C:\picture.exr`.
+        Some((file, layer)) if !layer.contains(['/', '\\']) && file.len() > 1 => (file, Some(layer)),
+        _ => (name, None),
+    }
+}
