@@ -50,6 +50,13 @@ impl Tiles {
         self
     }
 
+    /// The first tile has about `items` items: a size that suited work of the same kind before ([`Tiles::size`]).
+    #[must_use]
+    pub fn first(mut self, items: u64) -> Self {
+        self.size = (items.min(self.most) / self.granule * self.granule).max(self.granule);
+        self
+    }
+
     /// Goes on after `items` that an earlier run has done.
     #[must_use]
     pub fn after(mut self, items: u64) -> Self {
@@ -74,6 +81,11 @@ impl Tiles {
         let ideal = u128::from(self.last.max(1)) * AIM.as_nanos() / nanos;
         let next = u64::try_from(ideal).unwrap_or(u64::MAX).min(self.last.saturating_mul(GROWTH)).min(self.most);
         self.size = (next / self.granule * self.granule).max(self.granule);
+    }
+
+    /// Items that the next tile is to have.
+    pub fn size(&self) -> u64 {
+        self.size
     }
 
     /// Share of the items begun so far, 0 to 1.
@@ -143,6 +155,8 @@ mod tests {
         assert_eq!(tiles[0], 120..128);
         assert_eq!(tiles.last().unwrap().end, 1000);
         assert!(tiles.iter().all(|t| t.end - t.start <= 100));
+        assert_eq!(run(Tiles::new(1000, 8).at_most(100).first(4000), |_| 1).0[0], 0..96);
+        assert_eq!(Tiles::new(1000, 8).first(3).size(), 8);
         assert_eq!(run(Tiles::new(0, 8), |_| 1).0, []);
         assert_eq!(run(Tiles::new(5, 8).after(9), |_| 1).0, []);
     }

@@ -1,0 +1,76 @@
+// Attributes at a point of a triangle, for rays: what the rasteriser interpolates for passes/gbuffer.frag.
+// Before including: lib/scene.glsl, and define SURFACE_BINDING, the first of seven bindings.
+#ifndef LIB_HIT_SURFACE
+#define LIB_HIT_SURFACE
+
+layout(binding = SURFACE_BINDING, scalar) readonly buffer SurfaceInstances { Instance surface_instances[]; };
+layout(binding = SURFACE_BINDING + 1, scalar) readonly buffer SurfaceIndices { uint surface_indices[]; };
+layout(binding = SURFACE_BINDING + 2, scalar) readonly buffer SurfacePositions { vec3 surface_positions[]; };
+layout(binding = SURFACE_BINDING + 3, scalar) readonly buffer SurfaceNormals { vec3 surface_normals[]; };
+layout(binding = SURFACE_BINDING + 4, scalar) readonly buffer SurfaceTangents { vec4 surface_tangents[]; };
+layout(binding = SURFACE_BINDING + 5, scalar) readonly buffer SurfaceUvs { vec2 surface_uvs[]; };
+layout(binding = SURFACE_BINDING + 6, scalar) readonly buffer SurfaceColors { vec4 surface_colors[]; };
+
+struct SurfacePoint {
+    vec3 position;  // world, metres
+    vec3 area;      // world normal of the front, twice the triangle's area long
+    float reach;    // largest coordinate of the corners: rounding errors are a share of it
+    uvec3 vertices; // of the primitive
+    vec3 weights;   // of the vertices
+};
+
+SurfacePoint surface_point(uint instance, uint triangle, vec2 barycentrics) {
+    SurfacePoint p;
+    uint first = surface_instances[instance].first_index + 3u * triangle;
+    p.vertices = uvec3(surface_indices[first], surface_indices[first + 1u], surface_indices[first + 2u]);
+    p.weights = vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics);
+    mat4 m = surface_instances[instance].world_from_object;
+    uint at = surface_instances[instance].first_vertex;
+    vec3 a = (m * vec4(surface_positions[at + p.vertices.x], 1.0)).xyz;
+    vec3 b = (m * vec4(surface_positions[at + p.vertices.y], 1.0)).xyz;
+    vec3 c = (m * vec4(surface_positions[at + p.vertices.z], 1.0)).xyz;
+    p.position = p.weights.x * a + p.weights.y * b + p.weights.z * c;
+    p.area = cross(b - a, c - a);
+    if ((surface_instances[instance].flags & INSTANCE_FLIPPED) != 0u) p.area = -p.area;
+    vec3 most = max(max(abs(a), abs(b)), abs(c));
+    p.reach = max(most.x, max(most.y, most.z));
+    return p;
+}
+
+// World shading normal of the front, without normal map; not normalised.
+vec3 surface_normal(uint instance, SurfacePoint p) {
+    uint at = surface_instances[instance].first_vertex;
+    vec3 n = p.weights.x * surface_normals[at + p.vertices.x] + p.weights.y * surface_normals[at + p.vertices.y]
+        + p.weights.z * surface_normals[at + p.vertices.z];
+    return surface_instances[instance].normal_from_object * n;
+}
+
+// World tangent, not normalised, and the side of the bitangent.
+vec4 surface_tangent(uint instance, SurfacePoint p) {
+    uint at = surface_instances[instance].first_vertex;
+    vec4 t = p.weights.x * surface_tangents[at + p.vertices.x] + p.weights.y * surface_tangents[at + p.vertices.y]
+        + p.weights.z * surface_tangents[at + p.vertices.z];
+    float side = (surface_instances[instance].flags & INSTANCE_FLIPPED) != 0u ? -1.0 : 1.0;
+    return vec4(mat3(surface_instances[instance].world_from_object) * t.xyz, t.w * side);
+}
+
+vec2 surface_uv(uint instance, SurfacePoint p, uint set) {
+    uint at = surface_instances[instance].uv_first[min(set, 3u)];
+    if (at == NONE) return vec2(0.0);
+    return p.weights.x * surface_uvs[at + p.vertices.x] + p.weights.y * surface_uvs[at + p.vertices.y]
+        + p.weights.z * surface_uvs[at + p.vertices.z];
+}
+
+vec4 surface_color(uint instance, SurfacePoint p) {
+    uint at = surface_instances[instance].color_first;
+    if (at == NONE) return vec4(1.0);
+    return p.weights.x * surface_colors[at + p.vertices.x] + p.weights.y * surface_colors[at + p.vertices.y]
+        + p.weights.z * surface_colors[at + p.vertices.z];
+}
+
+// How far to step off a surface so that rounding cannot put the start on the wrong side.
+float surface_gap(SurfacePoint p) {
+    return max(p.reach, 1e-6) * 1e-5;
+}
+
+#endif
