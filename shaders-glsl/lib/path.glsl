@@ -26,6 +26,7 @@ struct PathSettings {
     uint roulette;             // scatterings before paths may be ended at random
     uint flags;                // PATH_
     uint seed;
+    uint slots;                // TEXTURE_SLOTS + 2; a number that compilers do not know, lest they unroll the loop
 };
 
 struct PathState {
@@ -41,6 +42,14 @@ struct PathState {
     vec3 emission;     // no scattering
     vec3 direct;       // one
     vec3 indirect;     // more
+    // A light that counts if nothing is in the way.
+    uint waiting;      // 1: there is one
+    uint salt;         // for surfaces in the way that are blended
+    vec3 light_origin;
+    float light_limit;
+    vec3 light_direction;
+    uint light_scatterings;
+    vec3 light;
 };
 
 // Four independent random words: a pure function of seed, pixel, sample and dimension.

@@ -1,4 +1,4 @@
-// One surface of a path. Included by reference/path.comp, whose bindings it uses.
+// One ray of a path. Included by reference/path.comp, whose bindings it uses.
 
 PathState camera_path(uvec2 pixel) {
     PathState path;
@@ -21,6 +21,7 @@ PathState camera_path(uvec2 pixel) {
     path.emission = vec3(0.0);
     path.direct = vec3(0.0);
     path.indirect = vec3(0.0);
+    path.waiting = 0u;
     return path;
 }
 
@@ -86,12 +87,24 @@ LightSample sample_light(vec3 from, uvec4 which, uvec4 where) {
     return s;
 }
 
+// Either a light that waits for it, or the next surface: one place where rays are traced, so that their code exists once.
 void path_step(uvec2 pixel, inout PathState path) {
     uint dimension = 1u + 4u * path.vertex;
     uvec4 salts = random_words(pixel, sample_index, dimension, settings.seed);
+    bool to_light = path.waiting != 0u;
+    Ray ray = Ray(path.origin, 0.0, path.direction, path.limit);
     uint mask = path.vertex == 0u ? TRACE_CAMERA : path.scattered > 0u ? TRACE_SHADOW : 0u;
+    if (to_light) {
+        ray = Ray(path.light_origin, 0.0, path.light_direction, path.light_limit);
+        mask = TRACE_SHADOW;
+    }
+    Hit hit = trace(ray, mask, to_light ? path.salt : salts.x, to_light);
+    if (to_light) {
+        path.waiting = 0u;
+        if (hit.instance == NONE) add_radiance(path, path.light_scatterings, path.light);
+        return;
+    }
     vec3 toward = normalize(path.direction);
-    Hit hit = trace_closest(Ray(path.origin, 0.0, path.direction, path.limit), mask, salts.x);
     if (hit.instance == NONE) {
         path.alive = 0u;
         if ((settings.flags & PATH_SEES_ENVIRONMENT) != 0u) {
@@ -122,7 +135,7 @@ void path_step(uvec2 pixel, inout PathState path) {
         sample_of = sample_light(above, which, where);
     }
     vec4 texels[TEXTURE_SLOTS + 2u];
-    for (uint i = 0u; i < TEXTURE_SLOTS + 2u; ++i) {
+    for (uint i = 0u; i < settings.slots; ++i) {
         bool of_light = i >= TEXTURE_SLOTS;
         uint slot = of_light ? (i == TEXTURE_SLOTS ? TEXTURE_BASE_COLOR : TEXTURE_EMISSIVE) : i;
         uint which = of_light ? sample_of.material : material;
@@ -222,9 +235,13 @@ void path_step(uvec2 pixel, inout PathState path) {
             if (value != vec3(0.0)) {
                 // A lamp or a triangle itself must not be in the way.
                 float until = sample_of.far ? 1e30 : 0.99999;
-                if (!trace_any(Ray(above, 0.0, to, until), TRACE_SHADOW, salts.y)) {
-                    add_radiance(path, path.scattered + 1u, path.throughput * b.rough * value);
-                }
+                path.waiting = 1u;
+                path.salt = salts.y;
+                path.light_origin = above;
+                path.light_limit = until;
+                path.light_direction = to;
+                path.light_scatterings = path.scattered + 1u;
+                path.light = path.throughput * b.rough * value;
             }
         }
     }

@@ -1,4 +1,4 @@
-// Path tracing of a tile of pixels, one sample each: up to `segments` surfaces along each path, then its state is kept for
+// Path tracing of a tile of pixels, one sample each: up to `rays` rays of each path, then its state is kept for
 // the next dispatch. Radiance is kept apart by the number of scatterings on its way: none, one, more.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
@@ -35,7 +35,7 @@ layout(push_constant, scalar) uniform Push {
     uint count;    // slots
     uint sample_index;
     uint begin;    // 1: new paths
-    uint segments; // surfaces to visit
+    uint rays;     // to trace
 };
 
 #include "lib/path_sums.glsl"
@@ -59,11 +59,11 @@ void main() {
         path = camera_path(pixel);
     } else {
         path = paths[at];
-        if (path.alive == 0u) return;
+        if ((path.alive | path.waiting) == 0u) return;
     }
-    for (uint i = 0u; i < segments && path.alive != 0u; ++i) {
+    for (uint i = 0u; i < rays && (path.alive | path.waiting) != 0u; ++i) {
         path_step(pixel, path);
     }
-    if (path.alive == 0u) add_light(pixel, path);
+    if ((path.alive | path.waiting) == 0u) add_light(pixel, path);
     paths[at] = path;
 }

@@ -46,6 +46,7 @@ use crate::{
     gpu::{Gpu, ImageDesc, OwnedBuffer, OwnedImage, Region},
     graph::{Graph, Runner},
     image::Layers,
+    rays::Rays,
     scene::{Aabb, Environment, Note, Pose, Scene, View, resident::Resident},
     shaders::types,
 };
@@ -60,6 +61,7 @@ pub struct Tracer<'s> {
     scene: &'s Scene,
     pose: Pose,
     resident: Resident,
+    rays: Rays,
     runner: Runner,
     environment: OwnedImage,
     environment_columns: OwnedBuffer,
@@ -113,6 +115,7 @@ impl<'s> Tracer<'s> {
             gpu: gpu.clone(),
             scene,
             pose: pose.clone(),
+            rays: Rays::new(gpu, scene, &resident)?,
             resident,
             runner: Runner::new(gpu),
             environment: radiance_map(gpu, scene.environment.as_ref())?,

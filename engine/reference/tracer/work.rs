@@ -19,10 +19,10 @@ const GRANULE: u32 = BLOCK * BLOCK;
 const MOST_SLOTS: u64 = 1 << 18;
 /// Most dispatches of one submission.
 const MOST_PASSES: u64 = 64;
-/// Surfaces of a path that one invocation visits.
-const SEGMENTS: u32 = 16;
-/// The same where a driver ends loops early: two traversals of at most 30,000 steps stay below its limit.
-const SEGMENTS_LIMITED: u32 = 1;
+/// Rays of a path that one invocation traces.
+const RAYS: u32 = 32;
+/// The same where a driver ends loops early: two rays of at most 30,000 steps stay below its limit.
+const RAYS_LIMITED: u32 = 2;
 /// Images of the sums: six sums, and the rounding errors of the first three.
 const LAYERS: u32 = consts::PATH_SUMS + consts::PATH_EXACT_SUMS;
 
@@ -114,9 +114,9 @@ impl Tracer<'_> {
         }
         let total = samples.saturating_mul(slots).max(done);
         let limited = self.gpu.loop_limit()?.is_some();
-        let segments = if limited { SEGMENTS_LIMITED } else { SEGMENTS };
-        let surfaces = longest(self.scene, &job.settings);
-        let rounds = surfaces.div_ceil(segments);
+        let rays = if limited { RAYS_LIMITED } else { RAYS };
+        // To each surface, and from it to a light.
+        let rounds = (2 * longest(self.scene, &job.settings)).div_ceil(rays);
         let capacity = MOST_SLOTS.min(slots);
         self.prepare_paths(capacity)?;
         // Also when a picture is small and its samples are many passes.
@@ -127,7 +127,7 @@ impl Tracer<'_> {
         }
         while let Some(tile) = tiles.next_tile() {
             let mut graph = Graph::new("tracer");
-            self.declare(&mut graph, tile.clone(), (segments, rounds), capacity)?;
+            self.declare(&mut graph, tile.clone(), (rays, rounds), capacity)?;
             let frame = self.runner.run(&graph)?;
             let time = Duration::from_secs_f64(frame.report.wait_ms.max(0.0) * 1e-3);
             if std::env::var_os("PROF").is_some() { eprintln!("{:?} plan {:.1} record {:.1} wait {:.1} passes {}", tile, frame.report.plan_ms, frame.report.record_ms, frame.report.wait_ms, frame.report.passes.len()); }
@@ -162,10 +162,11 @@ impl Tracer<'_> {
         &mut self,
         graph: &mut Graph,
         tile: std::ops::Range<u64>,
-        (segments, rounds): (u32, u32),
+        (rays_each, rounds): (u32, u32),
         capacity: u64,
     ) -> Result<()> {
         let handles = self.resident.frame_in(graph, self.scene, &self.pose);
+        let rays = self.rays.frame(graph, &handles);
         let (Some(job), Some(lights), Some(paths)) = (&self.job, &self.lights, &self.paths) else {
             return Err(super::not_started());
         };
@@ -196,7 +197,13 @@ impl Tracer<'_> {
             lights: handles.lights,
             materials: handles.materials,
             scene_textures: handles.textures,
-            trace_stub: graph.buffer_from("stub", &[handles.moment.instances.len() as u32]),
+            trace_nodes: rays.trace_nodes,
+            trace_triangles: rays.trace_triangles,
+            trace_instances: rays.trace_instances,
+            trace_indices: rays.trace_indices,
+            trace_uvs: rays.trace_uvs,
+            trace_colors: rays.trace_colors,
+            trace_scene: rays.trace_scene,
             push: shader::Push::default(),
         };
         let mut at = tile.start;
@@ -209,7 +216,7 @@ impl Tracer<'_> {
                     count,
                     sample_index: sample as u32,
                     begin: u32::from(round == 0),
-                    segments,
+                    rays: rays_each,
                 };
                 graph.compute(shader::Args { push, ..args.clone() }, count);
             }
@@ -247,5 +254,6 @@ fn path_settings(tracer: &Tracer<'_>, job: &Job, lights: &super::Lights) -> type
         roulette: settings.roulette,
         flags,
         seed: settings.seed,
+        slots: consts::TEXTURE_SLOTS + 2,
     }
 }
