@@ -2,14 +2,9 @@
 
 mod tracer_lab;
 
-use glam::{Mat4, Vec3, vec3};
-use lucerna::{
-    gpu::testing::with_gpu,
-    reference::tracer::{Settings, Sources},
-    scene::{Environment, LightKind, Material},
-};
-use std::f64::consts::PI;
-use tracer_lab::{Stage, expect_mean, flat_view, luminance, matt, mean, render, view};
+use glam::{Vec3, vec3};
+use lucerna::{gpu::testing::with_gpu, scene::Material};
+use tracer_lab::{Stage, expect_mean, matt, mean, render, view};
 
 /// A box of two metres whose walls emit `e` and reflect `rho`.
 fn closed_box(e: f32, rho: f32) -> Stage {

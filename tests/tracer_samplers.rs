@@ -69,7 +69,7 @@ fn plain(gpu: &Gpu, ask: Ask) -> [Vec<[f32; 4]>; 2] {
 }
 
 fn table(sources: Sources) -> tables::LightTable {
-    let mut scene = builtin::load("cornell").unwrap();
+    let mut scene = builtin::load("cornell-area").unwrap();
     scene.environment = Some(Environment::constant(Vec3::splat(0.1)));
     let pose = Pose::rest(&scene);
     let lights = resident::lights(&scene, &pose);
@@ -118,7 +118,11 @@ fn check_directions(name: &str, samples: &[[f32; 4]], runs: u32, density: impl F
     assert!(p > sidak(runs), "{name}: p = {p:e}");
     for sample in samples.iter().step_by(997) {
         let want = density(direction(sample).normalize());
-        assert!((f64::from(sample[3]) - want).abs() <= 2e-3 * want + 1e-6, "{name}: density {} at {sample:?}, {want} by formula", sample[3]);
+        assert!(
+            (f64::from(sample[3]) - want).abs() <= 2e-3 * want + 1e-6,
+            "{name}: density {} at {sample:?}, {want} by formula",
+            sample[3]
+        );
     }
 }
 
@@ -173,7 +177,9 @@ fn random_words_are_even_and_independent() {
             assert!(p > sidak(24), "whole numbers: p = {p:e}");
             // Neighbouring pixels: pairs that follow each other in a row.
             let mut counts = vec![0.0; 256];
-            drawn.chunks_exact(2).for_each(|s| counts[(s[0][0] * 16.0) as usize * 16 + (s[1][0] * 16.0) as usize] += 1.0);
+            drawn
+                .chunks_exact(2)
+                .for_each(|s| counts[(s[0][0] * 16.0) as usize * 16 + (s[1][0] * 16.0) as usize] += 1.0);
             let p = chi_square(&counts, &even.iter().map(|e| e / 2.0).collect::<Vec<_>>());
             assert!(p > sidak(24), "neighbours: p = {p:e}");
         }
@@ -208,14 +214,19 @@ fn shapes_are_sampled_evenly() {
             for s in &flat {
                 let [x, y] = [s[0], s[1]].map(|v| (place(v.into()) * N as f64).clamp(0.0, N as f64 - 1.0) as usize);
                 counts[y * N + x] += 1.0;
-                let outside = if triangle { s[0] + s[1] > 1.0 + 1e-6 || s[0] < 0.0 || s[1] < 0.0 } else { s[0] * s[0] + s[1] * s[1] > 1.0 + 1e-6 };
+                let outside = if triangle {
+                    s[0] + s[1] > 1.0 + 1e-6 || s[0] < 0.0 || s[1] < 0.0
+                } else {
+                    s[0] * s[0] + s[1] * s[1] > 1.0 + 1e-6
+                };
                 assert!(!outside && (1.0 / f64::from(s[3]) - area).abs() < 1e-5, "{s:?}");
             }
             let mut total = 0.0;
             for y in 0..N * FINE {
                 for x in 0..N * FINE {
                     let [x01, y01] = [x, y].map(|v| (v as f64 + 0.5) / (N * FINE) as f64);
-                    let inside = if triangle { x01 + y01 < 1.0 } else { (2.0 * x01 - 1.0).hypot(2.0 * y01 - 1.0) < 1.0 };
+                    let inside =
+                        if triangle { x01 + y01 < 1.0 } else { (2.0 * x01 - 1.0).hypot(2.0 * y01 - 1.0) < 1.0 };
                     bins[y / FINE * N + x / FINE] += f64::from(u8::from(inside));
                     total += f64::from(u8::from(inside));
                 }
@@ -224,7 +235,10 @@ fn shapes_are_sampled_evenly() {
             // Bins that the edge only touches are estimated too coarsely to be held against anything.
             let full = bins.iter().fold(0.0f64, |a, &b| a.max(b));
             let kept: Vec<usize> = (0..N * N).filter(|&i| bins[i] > 0.02 * full).collect();
-            let p = chi_square(&kept.iter().map(|&i| counts[i]).collect::<Vec<_>>(), &kept.iter().map(|&i| bins[i]).collect::<Vec<_>>());
+            let p = chi_square(
+                &kept.iter().map(|&i| counts[i]).collect::<Vec<_>>(),
+                &kept.iter().map(|&i| bins[i]).collect::<Vec<_>>(),
+            );
             assert!(p > sidak(6), "{which}: p = {p:e}");
         }
     });
@@ -250,7 +264,9 @@ fn visible_normals_of_ggx() {
 #[test]
 fn the_two_lobes_together() {
     with_gpu(|gpu| {
-        for (view, alpha, share) in [(Vec3::new(0.6, 0.0, 0.8), 0.4f32, 0.5f32), (Vec3::new(0.0, -0.96, 0.28), 0.7, 0.2)] {
+        for (view, alpha, share) in
+            [(Vec3::new(0.6, 0.0, 0.8), 0.4f32, 0.5f32), (Vec3::new(0.0, -0.96, 0.28), 0.7, 0.2)]
+        {
             let mut both = ask(consts::SAMPLER_BSDF);
             (both.push.view, both.push.alpha, both.push.share) = (view.to_array(), alpha, share);
             (both.push.albedo, both.push.f0) = ([0.5; 3], [0.3; 3]);
@@ -312,7 +328,8 @@ fn the_sky_is_sampled_by_its_light() {
             let (mut sum, n) = (0.0, 720);
             for y in 0..n / 2 {
                 let polar = PI * (f64::from(y) + 0.5) / f64::from(n / 2);
-                let band = 2.0 * PI / f64::from(n) * ((PI * f64::from(y) / f64::from(n / 2)).cos() - (PI * f64::from(y + 1) / f64::from(n / 2)).cos());
+                let band = 2.0 * PI / f64::from(n)
+                    * ((PI * f64::from(y) / f64::from(n / 2)).cos() - (PI * f64::from(y + 1) / f64::from(n / 2)).cos());
                 for x in 0..n {
                     let azimuth = 2.0 * PI * (f64::from(x) + 0.5) / f64::from(n);
                     let d = DVec3::new(polar.sin() * azimuth.sin(), polar.cos(), -polar.sin() * azimuth.cos());

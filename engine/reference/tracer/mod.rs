@@ -284,7 +284,12 @@ fn radiance_map(gpu: &Gpu, environment: Option<&Environment>) -> Result<OwnedIma
     let (name, format) = ("tracer.environment radiance", vk::Format::R32G32B32A32_SFLOAT);
     let upload = |width, height, texels: &[[f32; 4]]| {
         let bytes = bytemuck::cast_slice(texels);
-        OwnedImage::with_contents(gpu, name, ImageDesc::new(format, width, height), &[Region { mip: 0, layer: 0, bytes }])
+        OwnedImage::with_contents(
+            gpu,
+            name,
+            ImageDesc::new(format, width, height),
+            &[Region { mip: 0, layer: 0, bytes }],
+        )
     };
     let Some(env) = environment.filter(|e| !e.pixels.is_empty()) else { return upload(1, 1, &[[0.0; 4]]) };
     let most = gpu.caps().limits.image_2d;

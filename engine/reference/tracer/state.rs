@@ -60,7 +60,8 @@ impl State {
             Ok(u64::from_le_bytes(*head))
         };
         let (length, samples, begun, count) = (number()?, number()?, number()?, number()?);
-        let length = usize::try_from(length).ok().filter(|&l| l <= rest.len()).ok_or_else(|| broken("it ends early"))?;
+        let length =
+            usize::try_from(length).ok().filter(|&l| l <= rest.len()).ok_or_else(|| broken("it ends early"))?;
         let (about, pixels) = rest.split_at(length);
         let about: Value = serde_json::from_slice(about).map_err(|error| broken("its text").caused_by(error))?;
         let side = |i: usize| about["extent"][i].as_u64().and_then(|v| u32::try_from(v).ok());
@@ -141,7 +142,10 @@ mod tests {
 
     fn state() -> State {
         let layers = (0..9).map(|i| vec![[i as f32, 1.5, -2.0, f32::MIN_POSITIVE]; 6]).collect();
-        State { about: json!({ "extent": [3, 2], "settings": { "bounces": 1 } }), sums: Sums::new([3, 2], layers, 7, 5) }
+        State {
+            about: json!({ "extent": [3, 2], "settings": { "bounces": 1 } }),
+            sums: Sums::new([3, 2], layers, 7, 5),
+        }
     }
 
     #[test]

@@ -108,7 +108,8 @@ impl Sums {
     /// | `variance` | Y | of the mean luminance of the total |
     pub fn layers(&self) -> Layers {
         let all = 0..self.pixels();
-        let color = |layer: u32| -> Vec<f32> { all.clone().flat_map(|i| self.mean(layer, i).map(|v| v as f32)).collect() };
+        let color =
+            |layer: u32| -> Vec<f32> { all.clone().flat_map(|i| self.mean(layer, i).map(|v| v as f32)).collect() };
         let total = all
             .clone()
             .flat_map(|i| {

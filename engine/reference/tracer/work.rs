@@ -46,7 +46,8 @@ impl Job {
             return Err(Error::new(ErrorKind::Runtime, what));
         }
         let mut desc = ImageDesc::new(vk::Format::R32G32B32A32_SFLOAT, width, height).layers(LAYERS);
-        desc.usage = vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
+        desc.usage =
+            vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
         let sums = OwnedImage::new(gpu, "tracer.sums", desc)?;
         Ok(Self { view, settings, sums, done: 0, time: Duration::ZERO })
     }
@@ -99,8 +100,7 @@ impl Job {
 fn longest(scene: &Scene, settings: &Settings) -> u32 {
     let sharp = !settings.diffuse_only
         && scene.materials.iter().any(|m| {
-            m.transmission > 0.0
-                || (m.metallic > 0.5 && (m.roughness < 0.05 || m.metallic_roughness_texture.is_some()))
+            m.transmission > 0.0 || (m.metallic > 0.5 && (m.roughness < 0.05 || m.metallic_roughness_texture.is_some()))
         });
     settings.bounces + 3 + if sharp { settings.specular_bounces } else { 0 }
 }
@@ -130,7 +130,6 @@ impl Tracer<'_> {
             self.declare(&mut graph, tile.clone(), (rays, rounds), capacity)?;
             let frame = self.runner.run(&graph)?;
             let time = Duration::from_secs_f64(frame.report.wait_ms.max(0.0) * 1e-3);
-            if std::env::var_os("PROF").is_some() { eprintln!("{:?} plan {:.1} record {:.1} wait {:.1} passes {}", tile, frame.report.plan_ms, frame.report.record_ms, frame.report.wait_ms, frame.report.passes.len()); }
             match self.fixed_tile {
                 Some(fixed) => tiles = Tiles::new(total, GRANULE).at_most(most).after(tile.end).first(fixed),
                 None => tiles.took(time),
@@ -218,7 +217,7 @@ impl Tracer<'_> {
                     begin: u32::from(round == 0),
                     rays: rays_each,
                 };
-                graph.compute(shader::Args { push, ..args.clone() }, count);
+                graph.compute(shader::Args { push, ..args }, count);
             }
             at += u64::from(count);
         }
