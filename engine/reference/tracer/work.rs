@@ -203,6 +203,7 @@ impl Tracer<'_> {
             trace_uvs: rays.trace_uvs,
             trace_colors: rays.trace_colors,
             trace_scene: rays.trace_scene,
+            trace_accel: rays.trace_accel,
             push: shader::Push::default(),
         };
         let mut at = tile.start;
