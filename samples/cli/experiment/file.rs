@@ -366,7 +366,7 @@ pub fn parse(name: &str, path: Option<&Path>, text: &str, quick: bool) -> Result
         }
         apply_quick(&mut experiment, changes, &|span, what| at(span.unwrap_or(0..0), what), line)?;
     }
-    check(&experiment, &wrong)?;
+    check(&experiment, &wrong, &|error, place| error.at(place).in_file(&shown))?;
     Ok(experiment)
 }
 
@@ -418,7 +418,11 @@ fn apply_quick(
 }
 
 /// What can only be said once everything is read.
-fn check(experiment: &Experiment, wrong: &dyn Fn(usize, Error) -> Error) -> Result<()> {
+fn check(
+    experiment: &Experiment,
+    wrong: &dyn Fn(usize, Error) -> Error,
+    place_in: &dyn Fn(Error, &str) -> Error,
+) -> Result<()> {
     let mut names = BTreeSet::new();
     for scene in &experiment.scenes {
         if !names.insert(&scene.name) {
@@ -433,7 +437,8 @@ fn check(experiment: &Experiment, wrong: &dyn Fn(usize, Error) -> Error) -> Resu
     }
     let mut methods = BTreeSet::new();
     for method in &experiment.methods {
-        let fail = |error: Error| wrong(method.line, error.at(format!("'{}'", method.name)));
+        let place = format!("line {}: '{}'", method.line, method.name);
+        let fail = |error: Error| place_in(error, &place);
         if !methods.insert(&method.name) {
             return Err(fail(Error::input("there are two techniques or references of this name")));
         }

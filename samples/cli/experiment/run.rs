@@ -251,7 +251,7 @@ impl One<'_> {
 
 fn facts(experiment: &Experiment, context: &Context<'_>) -> Vec<(String, String)> {
     let about = context.gpu.describe();
-    let mut facts: Vec<(&str, String)> = vec![
+    let facts = [
         ("Command", context.command.clone()),
         ("Program", format!("lucerna {}", program::VERSION)),
         ("Revision", program::revision().unwrap_or("unknown").to_owned()),
@@ -262,6 +262,7 @@ fn facts(experiment: &Experiment, context: &Context<'_>) -> Vec<(String, String)
         ("Seed", experiment.seed.to_string()),
         ("Mode", if experiment.quick { "quick".into() } else { "full".into() }),
     ];
+    let mut facts: Vec<(String, String)> = facts.map(|(name, value)| (name.to_owned(), value)).to_vec();
     for method in &experiment.methods {
         let mut changes = config::to_value(&method.settings).unwrap_or_default().to_string();
         if method.paper {
@@ -269,7 +270,7 @@ fn facts(experiment: &Experiment, context: &Context<'_>) -> Vec<(String, String)
         }
         let matrix: Vec<String> =
             method.matrix.iter().map(|(key, values)| format!("; {key} = {}", json!(values))).collect();
-        facts.push(("Settings", format!("{} ({}): {changes}{}", method.name, method.kind, matrix.concat())));
+        facts.push((format!("Settings of {}", method.name), format!("{}: {changes}{}", method.kind, matrix.concat())));
     }
-    facts.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+    facts
 }

@@ -38,7 +38,11 @@
     node.append(...children);
     return node;
   };
-  const shown = x => Number.isFinite(x) ? (x === 0 ? "0" : Math.abs(x) >= 1e5 || Math.abs(x) < 1e-3 ? x.toExponential(2) : x.toPrecision(3)) : String(x);
+  const shown = x => {
+    const size = Math.abs(x);
+    if (!Number.isFinite(x) || x === 0) return String(x);
+    return size >= 1e5 || size < 1e-3 ? x.toExponential(2) : size >= 999.5 ? String(+x.toPrecision(3)) : x.toPrecision(3);
+  };
   const GAINS = [1, 4, 16, 64];
 
   class Viewer {
@@ -84,8 +88,8 @@
           element("span", { class: "group" }, "B", choice("Image B", "b", this.state.b)),
           this.swapButton = button("A ⇄ B", "Show the other image (space)", () => this.flip(), { "data-do": "flip" }));
       }
-      this.evText = element("output", { class: "number" });
-      this.zoomText = element("output", { class: "number" });
+      this.evText = element("output", { class: "state" });
+      this.zoomText = element("output", { class: "state" });
       this.gainGroup = element("span", { class: "group" }, "difference", this.gainButton = button("×1", "Amplify the difference (G)", () => this.gain(), { "data-do": "gain" }));
       const second = element("div", { class: "bar" },
         element("span", { class: "group" }, "exposure", button("−", "Darker by a stop ([)", () => this.expose(-1)), this.evText, button("+", "Brighter by a stop (])", () => this.expose(1))),
@@ -289,7 +293,7 @@
     // What is known of the pixel under the cursor, as text.
     lines() {
       const [x, y] = this.state.pixel, at = (y * this.width + x) * 3;
-      return [`pixel ${x}, ${y}`, ...this.names.map((name, i) => `${name}: ${[0, 1, 2].map(c => shown(HALF[this.values[i][at + c]])).join("  ")}`)];
+      return [`pixel ${x}, ${y}`, ...this.names.map((name, i) => `${name}: ${[0, 1, 2].map(c => shown(HALF[this.values[i][at + c]])).join(" ")}`)];
     }
 
     read() {

@@ -15,6 +15,7 @@ const TOP: f64 = 14.0;
 const RIGHT: f64 = 18.0;
 /// Width of a letter at the size of the marks, on average.
 const LETTER: f64 = 6.6;
+const WIDEST_BAR: f64 = 64.0;
 /// Colours of the style sheet; further series begin again.
 const COLOURS: usize = 8;
 
@@ -239,11 +240,12 @@ fn line(text: &mut String, series: &Series, frame: &Frame, index: usize) {
 
 fn bars(text: &mut String, series: &Series, frame: &Frame, plot: &Plot, (group, groups): (usize, usize)) {
     let place = frame.at(1.0, frame.y.low).0 - frame.at(0.0, frame.y.low).0;
-    let width = place * 0.76 / groups.max(1) as f64;
+    // One bar alone would be a wall.
+    let width = (place * 0.76 / groups.max(1) as f64).min(WIDEST_BAR);
     for point in series.points.iter().filter(|(x, y, _)| frame.shows(*x, *y)) {
         let (middle, top) = frame.at(point.0, point.1);
         let base = frame.at(point.0, frame.base()).1;
-        let left = middle - place * 0.38 + width * group as f64;
+        let left = middle + width * (group as f64 - groups as f64 / 2.0);
         text.push_str("<g>");
         tip(text, &told(series, point, plot.x.names.get(point.0 as usize)));
         let _ = write!(

@@ -1,0 +1,261 @@
+//! `lucerna reproduce` and `lucerna report`: what is kept, what is rendered again, and what mistakes are told.
+
+mod support;
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    io::{BufRead, BufReader},
+    path::{Path, PathBuf},
+    process::{Child, Stdio},
+};
+
+use serde_json::Value;
+use support::{command, lucerna};
+
+const EXPERIMENT: &str = r#"
+title = "Test"
+size = "40x30"
+measures = ["mae", "pearson"]
+images = 1
+
+[[scene]]
+name = "cornell"
+builtin = "cornell"
+cameras = ["0"]
+
+[[technique]]
+name = "isr"
+kind = "isr"
+matrix = { "isr.samples" = [24, 48] }
+
+[[reference]]
+name = "path"
+kind = "path"
+settings = { bounces = 1 }
+matrix = { samples = [1, 2, 3] }
+
+[quick]
+size = "20x15"
+
+[quick.reference.path]
+matrix = { samples = [1] }
+"#;
+
+struct Place {
+    folder: tempfile::TempDir,
+}
+
+impl Place {
+    fn new() -> Self {
+        let place = Self { folder: tempfile::tempdir().unwrap() };
+        place.file(EXPERIMENT);
+        place
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn file(&self, text: &str) {
+        fs::write(self.path("e.toml"), text).unwrap();
+    }
+
+    fn arguments(&self, output: &str, more: &[&str]) -> Vec<String> {
+        let (file, output) = (self.path("e.toml"), self.path(output));
+        let first = ["reproduce", file.to_str().unwrap(), "-o", output.to_str().unwrap()];
+        first.iter().chain(more).map(|text| (*text).to_owned()).collect()
+    }
+
+    fn run(&self, output: &str, more: &[&str]) -> support::Ran {
+        lucerna(self.arguments(output, more))
+    }
+
+    /// How many runs there are, and how many of them would be rendered.
+    fn planned(&self, output: &str, more: &[&str]) -> (usize, usize) {
+        let runs = self.run(output, &[&["--dry-run", "--json"], more].concat()).expect(0, &[]).json();
+        let runs = runs.as_array().unwrap();
+        (runs.len(), runs.iter().filter(|run| run["there"] == false).count())
+    }
+
+    /// Starts it and waits until `runs` are done.
+    fn start(&self, output: &str, runs: u64) -> Child {
+        let mut child = command(env!("CARGO_BIN_EXE_lucerna"))
+            .args(self.arguments(output, &["--progress", "json"]))
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
+        let done = lines
+            .by_ref()
+            .map_while(Result::ok)
+            .any(|line| serde_json::from_str::<Value>(&line).is_ok_and(|line| line["done"].as_u64() >= Some(runs)));
+        assert!(done, "it ended too early");
+        // It must be able to go on talking.
+        std::thread::spawn(move || lines.for_each(drop));
+        child
+    }
+}
+
+/// Pictures and everything that does not come from a clock.
+fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for part in ["", "runs", "measures"] {
+        for entry in fs::read_dir(folder.join(part)).unwrap().map(Result::unwrap) {
+            let name = entry.file_name().into_string().unwrap();
+            // Records of runs hold times, and the page shows them.
+            let timed =
+                (part == "runs" && name.ends_with(".json")) || name.starts_with("times.") || name.ends_with(".html");
+            if entry.path().is_file() && !timed {
+                found.insert(format!("{part}/{name}"), fs::read(entry.path()).unwrap());
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn what_was_killed_goes_on_and_ends_the_same() {
+    let place = Place::new();
+    place.run("whole", &[]).expect(0, &["wrote"]);
+    let whole = contents(&place.path("whole"));
+    assert_eq!(whole.keys().filter(|name| name.ends_with(".exr")).count(), 5);
+    assert!(
+        whole.contains_key("/report.json") && whole.contains_key("/report.csv") && whole.contains_key("/manifest.json")
+    );
+
+    // Killed in the middle: no report yet, but complete pictures.
+    let mut child = place.start("parts", 2);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(!place.path("parts/report.html").exists());
+    let (all, left) = place.planned("parts", &[]);
+    assert!(all == 5 && (1..=3).contains(&left), "{left} of {all} are left");
+    let kept: Vec<(PathBuf, Vec<u8>)> = fs::read_dir(place.path("parts/runs"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "json"))
+        .map(|path| (path.clone(), fs::read(path).unwrap()))
+        .collect();
+    assert_eq!(kept.len(), all - left);
+    place.run("parts", &[]).expect(0, &["wrote"]);
+    let parts = contents(&place.path("parts"));
+    let temporary = |name: &&String| !name.contains(".lucerna-");
+    assert_eq!(parts.keys().filter(temporary).collect::<Vec<_>>(), whole.keys().collect::<Vec<_>>());
+    for (name, bytes) in &whole {
+        assert!(parts[name] == *bytes, "{name} differs");
+    }
+    // What was there, with its times, was not made again.
+    for (path, bytes) in kept {
+        assert!(fs::read(&path).unwrap() == bytes, "{} was written again", path.display());
+    }
+
+    // From what is there, the same page again, by both ways.
+    let page = fs::read(place.path("parts/report.html")).unwrap();
+    fs::remove_file(place.path("parts/report.html")).unwrap();
+    lucerna(["report".into(), place.path("parts")]).expect(0, &["wrote"]);
+    assert!(fs::read(place.path("parts/report.html")).unwrap() == page, "the page differs");
+    place.run("parts", &[]).expect(0, &[]);
+    assert!(fs::read(place.path("parts/report.html")).unwrap() == page, "the page differs");
+
+    only_what_changed_is_rendered(&place);
+}
+
+fn only_what_changed_is_rendered(place: &Place) {
+    assert_eq!(place.planned("whole", &[]), (5, 0));
+    // One value of a matrix, another order, a title, a measure: only the first needs a picture.
+    let edited = EXPERIMENT.replace("[24, 48]", "[48, 80]").replace("Test", "Other").replace("\"pearson\"", "\"psnr\"");
+    place.file(&edited);
+    assert_eq!(place.planned("whole", &[]), (5, 1));
+    place.file(&EXPERIMENT.replace("bounces = 1", "bounces = 0"));
+    assert_eq!(place.planned("whole", &[]), (5, 3));
+    place.file(&EXPERIMENT.replace("40x30", "41x30"));
+    assert_eq!(place.planned("whole", &[]), (5, 5));
+    place.file(&EXPERIMENT.replace("cameras = [\"0\"]", "cameras = [\"0\"]\nlight = [\"0,1.5,0,2\"]"));
+    assert_eq!(place.planned("whole", &[]), (5, 5));
+    place.file(EXPERIMENT);
+    // Quick mode is other pictures, and can be beside.
+    assert_eq!(place.planned("whole", &["--quick"]), (3, 3));
+    place.run("whole", &["--quick"]).expect(0, &["20x15"]);
+    assert_eq!((place.planned("whole", &[]), place.planned("whole", &["--quick"])), ((5, 0), (3, 0)));
+    let json: Value = serde_json::from_slice(&fs::read(place.path("whole/report.json")).unwrap()).unwrap();
+    assert_eq!((&json["facts"]["Mode"], &json["facts"]["Size"]), (&Value::from("quick"), &Value::from("20x15 pixels")));
+    assert!(json["warnings"][0].as_str().unwrap().contains("Quick"));
+    // A picture that is gone is rendered again, a damaged text too.
+    let first = fs::read_dir(place.path("whole/runs"))
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .find(|p| p.extension().is_some_and(|e| e == "exr"));
+    fs::remove_file(first.unwrap()).unwrap();
+    let (normal, quick) = (place.planned("whole", &[]).1, place.planned("whole", &["--quick"]).1);
+    assert_eq!(normal + quick, 1);
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_interrupted_shows_what_is_there() {
+    let place = Place::new();
+    place.file(&EXPERIMENT.replace("[1, 2, 3]", "[2, 3, 4, 5, 6, 7, 8, 9]"));
+    let mut child = place.start("out", 3);
+    let interrupted = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(interrupted.success());
+    assert_eq!(child.wait().unwrap().code(), Some(8));
+    let json: Value = serde_json::from_slice(&fs::read(place.path("out/report.json")).unwrap()).unwrap();
+    assert!(json["warnings"][0].as_str().unwrap().contains("Not complete"), "{}", json["warnings"]);
+    let page = fs::read_to_string(place.path("out/report.html")).unwrap();
+    assert!(page.contains("Not complete") && page.ends_with("</html>\n"));
+    let (all, left) = place.planned("out", &[]);
+    assert!(all == 10 && (1..=7).contains(&left), "{left} of {all}");
+}
+
+#[test]
+fn mistakes_name_the_line() {
+    let place = Place::new();
+    let line = |part: &str| EXPERIMENT.lines().position(|line| line.contains(part)).unwrap() + 1;
+    let scene = line("[[scene]]");
+    let technique = line("[[technique]]");
+    let cases = [
+        ("size = \"40x30\"", "size = \"40\"", line("size ="), "WIDTHxHEIGHT"),
+        ("size = \"40x30\"", "size = 40", line("size ="), "string"),
+        ("\"mae\"", "\"mea\"", line("measures"), "mea"),
+        ("images = 1", "imags = 1", line("images"), "imags"),
+        ("builtin = \"cornell\"", "", scene, "either builtin or file"),
+        ("cameras = [\"0\"]", "", scene, "has no views"),
+        ("cameras = [\"0\"]", "cameras = [\"7\"]", scene, "7"),
+        ("builtin = \"cornell\"", "builtin = \"cornel\"", scene, "cornell"),
+        ("kind = \"isr\"", "kind = \"irs\"", technique, "there are isr"),
+        ("isr.samples", "isr.sampels", technique, "isr.samples"),
+        ("[24, 48]", "[24, \"many\"]", technique, "many"),
+        ("[24, 48]", "[]", technique, "no values"),
+        ("name = \"path\"", "name = \"isr\"", line("[[reference]]"), "two"),
+        ("[quick.reference.path]", "[quick.reference.paht]", line("[quick.reference"), "paht"),
+    ];
+    for (from, to, line, says) in cases {
+        assert!(EXPERIMENT.contains(from));
+        place.file(&EXPERIMENT.replacen(from, to, 1));
+        let quick = from.contains("quick");
+        let ran = place.run("out", if quick { &["--quick"] } else { &[] });
+        let known = ran.code == 3 || ran.code == 2;
+        assert!(known && ran.stderr.contains(&format!("line {line}")), "{to}: {} {}", ran.code, ran.stderr);
+        assert!(ran.stderr.contains(says) && ran.stderr.contains("e.toml"), "{to}: {}", ran.stderr);
+        assert!(!place.path("out/report.html").exists());
+    }
+    lucerna(["reproduce", "smok"]).expect(2, &["did you mean 'smoke'"]);
+    lucerna(["report", "/nowhere"]).expect(3, &["/nowhere", "reproduce"]);
+    let list = lucerna(["reproduce", "--list", "--json"]).expect(0, &[]).json();
+    assert!(list.as_array().unwrap().iter().any(|entry| entry["name"] == "smoke"));
+}
+
+#[test]
+fn scenes_that_are_not_there_fail_or_are_skipped_by_name() {
+    let place = Place::new();
+    let hall = "\n[[scene]]\nname = \"hall\"\nfile = \"scenes/hall.gltf\"\ncameras = [\"0\"]\n";
+    let text = EXPERIMENT.replacen("\n[[technique]]", &format!("{hall}\n[[technique]]"), 1);
+    place.file(&text);
+    let line = text.lines().position(|line| line.contains("hall")).unwrap();
+    place.run("out", &["--quick"]).expect(3, &["hall", "scenes/hall.gltf", &format!("line {line}"), "--assets"]);
+    place.file(&text.replace("scenes/hall.gltf\"", "scenes/hall.gltf\"\nif_missing = \"skip\""));
+    place.run("out", &["--quick"]).expect(0, &["'hall' is skipped", "scenes/hall.gltf"]);
+    let page = fs::read_to_string(place.path("out/report.html")).unwrap();
+    assert!(page.contains("Left out: scene hall"));
+}
