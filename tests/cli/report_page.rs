@@ -98,7 +98,7 @@ fn a_page_is_complete_and_answers_to_mouse_and_keys() {
     let outside: Vec<String> = browser.requests().into_iter().filter(|url| !ours(url)).collect();
     assert_eq!(outside, Vec::<String>::new());
     // The page itself, and nothing beside it.
-    assert!(!std::fs::read_to_string(&files[0]).unwrap().contains("http"), "an address in the page");
+    assert!(!std::fs::read_to_string(&files[0]).unwrap().contains("://"), "an address in the page");
 }
 
 fn text_and_tables(browser: &Browser, folder: &std::path::Path) {
