@@ -15,7 +15,9 @@
 //! # }
 //! ```
 
+mod encode;
 mod query;
+mod refit;
 mod shapes;
 mod tree;
 
@@ -28,13 +30,21 @@ use crate::{
         resident::{Handles, Resident},
     },
     shaders::{
-        consts::{MAX_TEXTURE_ARRAYS, TRACE_FIRST_MASK, TRACE_LEAF},
+        consts::{MAX_TEXTURE_ARRAYS, TRACE_DEPTH, TRACE_NODE_WORDS},
         types,
     },
 };
+use encode::{WORDS, encode};
 use glam::{Mat4, Vec3};
-use shapes::{Shape, Use};
-use tree::Tree;
+use shapes::{Encoded, Gathered, Shape, Use};
+use tree::{DEPTH, EIGHTHS_DEPTH, Tree};
+
+// The stack has an entry for each level, two for the way back up, and one for the end.
+const _: () = assert!(DEPTH + EIGHTHS_DEPTH + 2 <= TRACE_DEPTH);
+const _: () = assert!(WORDS == TRACE_NODE_WORDS as usize);
+
+/// Nodes, triangles and instances have numbers of 24 bits.
+const MOST: usize = 1 << 24;
 
 /// Trees of one scene on a device.
 #[derive(Debug)]
@@ -43,6 +53,10 @@ pub struct Rays {
     triangles: OwnedBuffer,
     shapes: Vec<Shape>,
     uses: Vec<Use>,
+    /// Instances in world space with where they stood when the tree was built.
+    merged: Vec<(u32, Mat4)>,
+    /// Some have stood elsewhere since.
+    disturbed: bool,
     /// What ray queries trace instead.
     query: Option<query::Query>,
     /// Nodes at the start of the buffer that are left to the top tree.
@@ -71,8 +85,12 @@ impl Rays {
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
     pub fn new(gpu: &Gpu, scene: &Scene, resident: &Resident) -> Result<Self> {
-        let query = if gpu.caps().ray_query { Some(query::Query::new(gpu, resident)?) } else { None };
-        Ok(Self { query, ..Self::in_compute(gpu, scene, resident)? })
+        if !gpu.caps().ray_query {
+            return Self::in_compute(gpu, scene, resident);
+        }
+        // No trees of our own are needed then.
+        let query = Some(query::Query::new(gpu, resident)?);
+        Ok(Self { query, ..Self::in_compute(gpu, &Scene::default(), resident)? })
     }
 
     /// As [`Self::new`], but rays are traced in compute also where the device has ray queries.
@@ -80,29 +98,21 @@ impl Rays {
     /// # Errors
     /// As [`Self::new`].
     pub fn in_compute(gpu: &Gpu, scene: &Scene, _resident: &Resident) -> Result<Self> {
-        let (mut shapes, uses) = shapes::gather(scene);
-        // A node for every two uses, and one for an empty scene.
-        let top_nodes = uses.len().max(2) as u32;
-        let mut nodes = vec![[0.0f32; 4]; 4 * top_nodes as usize];
-        let mut records = Vec::new();
-        for shape in &mut shapes {
-            let first_record = (records.len() / 3) as u32;
-            let first_node = (nodes.len() / 4) as u32;
-            nodes.extend(shape.tree.encode(first_node, first_record));
-            shape.encode(&mut records);
-            shape.root = shape.tree.refer(shape.tree.root, first_node, first_record);
+        let mut out = Encoded::default();
+        // Each node but the last of a level has eight children; how many uses there will be is not known yet.
+        let pieces: usize =
+            scene.nodes.iter().filter_map(|n| scene.meshes.get(n.mesh? as usize)).map(|m| m.primitives.len()).sum();
+        let top_nodes = (pieces as u32).div_ceil(4) + EIGHTHS_DEPTH;
+        out.nodes.resize(WORDS * top_nodes as usize, 0);
+        let Gathered { shapes, uses, merged } = shapes::gather(scene, &mut out);
+        let most = (out.records.len() / 3).max(out.nodes.len() / WORDS).max(uses.len() + 1);
+        if most > MOST {
+            return Err(Error::new(ErrorKind::Runtime, format!("{most} triangles; rays can be traced through {MOST}"))
+                .help("Use a scene with fewer triangles"));
         }
-        if records.len() / 3 > TRACE_FIRST_MASK as usize {
-            return Err(Error::new(
-                ErrorKind::Runtime,
-                format!("{} triangles; rays can be traced through {TRACE_FIRST_MASK}", records.len() / 3),
-            )
-            .help("Use a scene with fewer triangles"));
-        }
-        records.resize(records.len().max(3), [0.0; 4]);
+        out.records.resize(out.records.len().max(3), [0.0; 4]);
         let limit = gpu.caps().limits.storage_range;
-        let upload = |name: &str, contents: &[[f32; 4]]| {
-            let bytes: &[u8] = bytemuck::cast_slice(contents);
+        let upload = |name: &str, bytes: &[u8]| {
             if bytes.len() as u64 > limit {
                 return Err(Error::new(
                     ErrorKind::Runtime,
@@ -113,11 +123,13 @@ impl Rays {
             OwnedBuffer::with_contents(gpu, name, bytes)
         };
         Ok(Self {
-            nodes: upload("rays.nodes", &nodes)?,
-            triangles: upload("rays.triangles", &records)?,
+            nodes: upload("rays.nodes", bytemuck::cast_slice(&out.nodes))?,
+            triangles: upload("rays.triangles", bytemuck::cast_slice(&out.records))?,
             query: None,
             shapes,
             uses,
+            merged,
+            disturbed: false,
             top_nodes,
         })
     }
@@ -125,12 +137,22 @@ impl Rays {
     /// The trees as the scene stands in `scene`, for its graph.
     pub fn frame(&mut self, graph: &mut Graph, scene: &Handles) -> RayHandles {
         let nodes = graph.import_buffer(&self.nodes);
+        let moved = |(i, built): &(u32, Mat4)| {
+            scene.moment.instances.get(*i as usize).is_some_and(|i| i.world_from_object != *built)
+        };
+        self.disturbed |= self.merged.iter().any(moved);
         let (top, instances) = self.top(scene);
-        let staging = graph.buffer_from("rays.top", &top.encode(0, 1));
+        let mut words = Vec::new();
+        encode(&top, 0, 1, &mut words);
+        let staging = graph.buffer_from("rays.top", &words);
         graph.copy_buffer(staging, nodes.range(0..staging.size));
+        let triangles = graph.import_buffer(&self.triangles);
+        let used = self.uses.iter().filter_map(|u| Some((self.shapes.get(u.shape)?, u.first_instance)));
+        let refitted: Vec<_> = used.filter(|(s, _)| s.deformed || (s.merged && self.disturbed)).collect();
+        refit::declare(graph, scene, nodes, triangles, &refitted);
         RayHandles {
             trace_nodes: nodes,
-            trace_triangles: graph.import_buffer(&self.triangles),
+            trace_triangles: triangles,
             trace_instances: graph.buffer_from("rays.instances", &instances),
             trace_indices: scene.indices,
             trace_uvs: scene.uvs,
@@ -148,36 +170,38 @@ impl Rays {
         let mut places = Vec::new();
         for usage in &self.uses {
             let Some(shape) = self.shapes.get(usage.shape) else { continue };
-            let instance = scene.moment.instances.get(usage.first_instance as usize);
-            let (world, bounds) = match instance {
-                _ if shape.merged => (Mat4::IDENTITY, shape.bounds),
-                Some(i) if i.deformed => (i.world_from_object, i.bounds),
-                Some(i) => (i.world_from_object, shape.bounds.transformed(&i.world_from_object)),
-                None => continue,
+            let Some(instance) = scene.moment.instances.get(usage.first_instance as usize) else { continue };
+            let world = if shape.merged { Mat4::IDENTITY } else { instance.world_from_object };
+            // Rounding of the inverse would carry rays past what they meet.
+            let inverse = world.as_dmat4().inverse().as_mat4();
+            let bounds = match (shape.merged, shape.deformed) {
+                (true, _) if self.disturbed => {
+                    let of = |(i, _): &(u32, Mat4)| scene.moment.instances.get(*i as usize).map(|i| i.bounds);
+                    self.merged.iter().filter_map(of).fold(Aabb::EMPTY, Aabb::union)
+                }
+                (_, true) => instance.bounds,
+                _ => shape.bounds.transformed(&world),
             };
-            let inverse = world.inverse();
             if bounds.is_empty() || !inverse.is_finite() {
                 continue;
             }
-            boxes.push(Aabb { min: bounds.min.max(-HUGE), max: bounds.max.min(HUGE) });
+            let bounds = Aabb { min: bounds.min.max(-HUGE), max: bounds.max.min(HUGE) };
+            // Corners are rounded on the way to the world.
+            boxes.push(bounds.grown(1e-5 * reach(&bounds)));
             let rows = inverse.transpose();
             places.push(types::TraceInstance {
                 object_from_world: [rows.x_axis.to_array(), rows.y_axis.to_array(), rows.z_axis.to_array()],
                 first_instance: if shape.merged { 0 } else { usage.first_instance },
                 root: shape.root,
-                reach: reach(&shape.bounds),
+                reach: reach(&bounds.transformed(&inverse)),
             });
         }
-        let mut top = Tree::halved(&boxes, 1);
+        let top = Tree::eighths(&boxes);
+        debug_assert!(top.nodes.len() <= self.top_nodes as usize);
         let ordered = top.order.iter().map(|i| places[*i as usize]);
         let all = boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union);
-        let world = types::TraceInstance { root: top.refer(top.root, 0, 1), reach: reach(&all), ..Default::default() };
+        let world = types::TraceInstance { root: 0, reach: reach(&all), ..Default::default() };
         let instances = std::iter::once(world).chain(ordered).collect();
-        if top.nodes.is_empty() {
-            // The root is a leaf.
-            top.nodes.push(tree::Node { boxes: [tree::NOTHING; 2], children: [TRACE_LEAF; 2] });
-        }
-        debug_assert!(top.nodes.len() <= self.top_nodes as usize);
         (top, instances)
     }
 }

@@ -1,6 +1,9 @@
 //! Which triangles share a bottom tree, and where each tree stands.
 
-use super::tree::Tree;
+use super::{
+    encode::{WORDS, encode},
+    tree::Tree,
+};
 use crate::{
     scene::{Aabb, AlphaMode, Material, Pose, Primitive, Scene, resident::deforms},
     shaders::consts::{TRACE_CUTOUT, TRACE_REVERSED, TRACE_SINGLE_SIDED, TRACE_UNLIT},
@@ -23,17 +26,21 @@ pub struct Record {
     pub surface: u32,
 }
 
-/// Triangles and the tree over them.
+/// Triangles and where the tree over them lies on the device.
 #[derive(Debug)]
 pub struct Shape {
-    pub tree: Tree,
-    /// In the order of the leaves.
-    records: Vec<Record>,
+    /// At rest.
     pub bounds: Aabb,
     /// Everything that does not move by itself, in world space.
     pub merged: bool,
-    /// Reference to the root among the nodes on the device.
+    /// Its vertices are written anew each frame.
+    pub deformed: bool,
+    /// Node.
     pub root: u32,
+    /// First node of each level from the root, and the number of nodes.
+    pub levels: Vec<u32>,
+    pub first_record: u32,
+    records: u32,
 }
 
 /// A shape in a place.
@@ -81,8 +88,15 @@ fn moving(scene: &Scene) -> Vec<bool> {
     moving
 }
 
-/// All shapes of a scene and their uses.
-pub fn gather(scene: &Scene) -> (Vec<Shape>, Vec<Use>) {
+/// All shapes of a scene, their uses, and the instances that stand in the merged one with where they stood.
+pub struct Gathered {
+    pub shapes: Vec<Shape>,
+    pub uses: Vec<Use>,
+    pub merged: Vec<(u32, Mat4)>,
+}
+
+/// All shapes of a scene; `out` gets their nodes and records.
+pub fn gather(scene: &Scene, out: &mut Encoded) -> Gathered {
     let pose = Pose::rest(scene);
     let moving = moving(scene);
     let pieces = pieces(scene);
@@ -96,6 +110,7 @@ pub fn gather(scene: &Scene) -> (Vec<Shape>, Vec<Use>) {
         |p: &Piece<'_>| !p.deformed && !moving[p.node] && (still <= MERGED_TRIANGLES || users.get(&p.mesh) == Some(&1));
 
     let mut merged = Vec::new();
+    let mut merged_places = Vec::new();
     let mut shapes = Vec::new();
     let mut uses = Vec::new();
     // Mesh, skinned → shape.
@@ -108,9 +123,10 @@ pub fn gather(scene: &Scene) -> (Vec<Shape>, Vec<Use>) {
         }
         if piece.deformed {
             uses.push(Use { shape: shapes.len(), first_instance: index as u32 });
-            shapes.push(Shape::new(records(piece, 0, Mat4::IDENTITY, false), false));
+            shapes.push(out.add(&records(piece, 0, Mat4::IDENTITY, false), false, true));
         } else if merges(piece) {
             merged.extend(records(piece, index as u32, pose.world[piece.node], true));
+            merged_places.push((index as u32, pose.world[piece.node]));
         } else {
             let key = (piece.mesh, scene.nodes[piece.node].skin.is_some());
             let first_instance = first_of_node as u32;
@@ -121,8 +137,9 @@ pub fn gather(scene: &Scene) -> (Vec<Shape>, Vec<Use>) {
                 continue;
             }
             let shape = *shared.entry(key).or_insert_with(|| {
-                let list = rigid.iter().flat_map(|(i, p)| records(p, *i as u32, Mat4::IDENTITY, false)).collect();
-                shapes.push(Shape::new(list, false));
+                let list: Vec<Record> =
+                    rigid.iter().flat_map(|(i, p)| records(p, *i as u32, Mat4::IDENTITY, false)).collect();
+                shapes.push(out.add(&list, false, false));
                 shapes.len() - 1
             });
             uses.push(Use { shape, first_instance });
@@ -130,9 +147,9 @@ pub fn gather(scene: &Scene) -> (Vec<Shape>, Vec<Use>) {
     }
     if !merged.is_empty() {
         uses.push(Use { shape: shapes.len(), first_instance: 0 });
-        shapes.push(Shape::new(merged, true));
+        shapes.push(out.add(&merged, true, false));
     }
-    (shapes, uses)
+    Gathered { shapes, uses, merged: merged_places }
 }
 
 /// Triangles of `piece` carried by `world`; those that are nowhere are left out.
@@ -162,24 +179,42 @@ fn records(piece: &Piece<'_>, instance: u32, world: Mat4, placed: bool) -> Vec<R
 }
 
 impl Shape {
-    fn new(mut records: Vec<Record>, merged: bool) -> Self {
-        let finite = |p: &&Vec3| p.is_finite();
-        let around = |r: &Record| {
-            let aabb = Aabb::of(r.corners.iter().filter(finite).copied());
-            if aabb.is_empty() { Aabb::of([Vec3::ZERO]) } else { aabb }
-        };
-        let boxes: Vec<Aabb> = records.iter().map(around).collect();
-        let tree = Tree::build(&boxes);
-        let bounds = boxes.into_iter().fold(Aabb::EMPTY, Aabb::union);
-        records = tree.order.iter().map(|i| records[*i as usize]).collect();
-        Self { tree, records, bounds, merged, root: 0 }
+    /// Nodes of the tree.
+    pub fn node_count(&self) -> usize {
+        self.levels.last().map_or(0, |n| *n as usize)
     }
 
-    /// Appends three vectors for each record.
-    pub fn encode(&self, out: &mut Vec<[f32; 4]>) {
-        for record in &self.records {
-            let bits = [record.instance, record.triangle, record.surface];
-            out.extend(record.corners.iter().zip(bits).map(|(p, b)| p.extend(f32::from_bits(b)).to_array()));
+    /// Triangles; more than there are where a tree has one in several leaves.
+    pub fn record_count(&self) -> u32 {
+        self.records
+    }
+}
+
+/// Nodes and records of all shapes as they go to the device.
+#[derive(Debug, Default)]
+pub struct Encoded {
+    pub nodes: Vec<u32>,
+    pub records: Vec<[f32; 4]>,
+}
+
+impl Encoded {
+    fn add(&mut self, list: &[Record], merged: bool, deformed: bool) -> Shape {
+        let around = |r: &Record| {
+            let aabb = Aabb::of(r.corners.iter().filter(|p| p.is_finite()).copied());
+            if aabb.is_empty() { Aabb::of([Vec3::ZERO]) } else { aabb }
+        };
+        let boxes: Vec<Aabb> = list.iter().map(around).collect();
+        let tree = Tree::build(&boxes);
+        let root = (self.nodes.len() / WORDS) as u32;
+        let first_record = (self.records.len() / 3) as u32;
+        encode(&tree, root, first_record, &mut self.nodes);
+        for record in tree.order.iter().map(|i| &list[*i as usize]) {
+            let bits = [record.surface, record.instance, record.triangle];
+            let corner = |(p, b): (&Vec3, u32)| p.extend(f32::from_bits(b)).to_array();
+            self.records.extend(record.corners.iter().zip(bits).map(corner));
         }
+        let records = tree.order.len() as u32;
+        let bounds = boxes.into_iter().fold(Aabb::EMPTY, Aabb::union);
+        Shape { bounds, merged, deformed, root, levels: tree.levels, first_record, records }
     }
 }

@@ -1,40 +1,49 @@
-//! Trees as the shaders read them (`lib/trace_compute.glsl`).
+//! Trees of eight-way nodes, built on the CPU.
+//!
+//! A binary tree by obvhs (PLOC with reinsertion) is collapsed to eight children a node as in Ylitie, Karras and Laine,
+//! "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017, section 3.2, with one thing a leaf.
 
-use crate::{
-    scene::Aabb,
-    shaders::consts::{TRACE_COUNT_SHIFT, TRACE_FIRST_MASK, TRACE_LEAF},
-};
+use crate::scene::Aabb;
 use glam::Vec3;
-use obvhs::{Boundable, BvhBuildParams, bvh2::Bvh2, bvh2::builder::build_bvh2};
-use std::time::Duration;
+use obvhs::{Boundable, BvhBuildParams, bvh2::Bvh2, bvh2::reinsertion::ReinsertionOptimizer, ploc::PlocBuilder};
 
-/// Most things in a leaf.
-pub const LEAF: u32 = 4;
-/// Nodes on the way from a bottom tree's root to a leaf, at most.
-pub const DEPTH: u32 = 40;
+/// Levels of a tree, at most: what the shaders' stack has room for, see [`Tree::build`].
+pub const DEPTH: u32 = 22;
+/// Levels of a tree by [`Tree::eighths`] over as many things as there may be, ⌈log₈ 2²⁴⌉.
+pub const EIGHTHS_DEPTH: u32 = 8;
 
-/// Two boxes and what they hold: a child is a reference (`TRACE_LEAF` …).
+/// What a slot of a node holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Child {
+    #[default]
+    Empty,
+    /// Place in [`Tree::order`].
+    Leaf(u32),
+    Node(u32),
+}
+
+/// Eight boxes and what they hold. Slots are in the order of the octants as seen from the middle: bit 0 is set on the
+/// side of larger x, bit 1 of y, bit 2 of z, as far as there is room.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node {
-    pub boxes: [Aabb; 2],
-    pub children: [u32; 2],
+    pub boxes: [Aabb; 8],
+    pub children: [Child; 8],
 }
 
-/// A tree over things with boxes.
-#[derive(Clone, Debug, Default, PartialEq)]
+impl Node {
+    const EMPTY: Self = Self { boxes: [Aabb::EMPTY; 8], children: [Child::Empty; 8] };
+}
+
+/// A tree over things with boxes. Nodes of a level stand together, levels from the root (node 0) down; the children of a
+/// node that are nodes follow each other in the order of its slots, and so do the places of those that are leaves.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Tree {
-    /// Children stand after their parents.
     pub nodes: Vec<Node>,
-    /// What stands at each place of the leaves: indices of the things given.
+    /// First node of each level, and the number of nodes.
+    pub levels: Vec<u32>,
+    /// Which thing stands at each place.
     pub order: Vec<u32>,
-    /// Reference to the root; counts in `nodes` and `order`.
-    pub root: u32,
-    /// Nodes on the longest way to a leaf.
-    pub depth: u32,
 }
-
-/// A box that nothing hits.
-pub const NOTHING: Aabb = Aabb { min: Vec3::splat(3e37), max: Vec3::splat(-3e37) };
 
 struct Boxed(Aabb);
 
@@ -44,122 +53,262 @@ impl Boundable for Boxed {
     }
 }
 
-fn leaf(first: u32, count: u32) -> u32 {
-    TRACE_LEAF | (count - 1) << TRACE_COUNT_SHIFT | (first & TRACE_FIRST_MASK)
-}
-
 impl Tree {
-    /// A tree for many rays over `boxes`, which are finite; leaves of up to [`LEAF`].
+    /// A tree for many rays over `boxes`, which are finite and not empty. It has at most [`DEPTH`] levels.
     pub fn build(boxes: &[Aabb]) -> Self {
-        if boxes.len() <= LEAF as usize {
-            return Self::halved(boxes, LEAF);
+        if boxes.len() <= 8 {
+            return Self::eighths(boxes);
         }
         let boxed: Vec<Boxed> = boxes.iter().map(|b| Boxed(*b)).collect();
-        let params = BvhBuildParams { max_prims_per_leaf: LEAF, ..BvhBuildParams::medium_build() };
-        let tree = build_bvh2(&boxed, params, &mut Duration::default());
-        match Self::from_bvh2(&tree) {
-            Some(tree) if tree.depth <= DEPTH => tree,
-            // Equal boxes can make it as deep as they are many.
-            _ => Self::halved(boxes, LEAF),
-        }
+        let p = BvhBuildParams::medium_build();
+        let mut binary = PlocBuilder::with_capacity(boxed.len()).build(
+            p.ploc_search_distance,
+            &boxed,
+            (0..boxed.len() as u32).collect(),
+            p.sort_precision,
+            p.search_depth_threshold,
+        );
+        ReinsertionOptimizer::default().run(&mut binary, p.reinsertion_batch_ratio, None);
+        // Equal boxes can make it as deep as they are many.
+        collapse(&binary).filter(|t| t.levels.len() as u32 <= DEPTH + 1).unwrap_or_else(|| Self::eighths(boxes))
     }
 
-    /// A tree whose nodes halve the list along the longest side, so that it has ⌈log₂ n⌉ levels whatever the boxes are.
-    pub fn halved(boxes: &[Aabb], leaf_size: u32) -> Self {
-        let mut tree = Self { order: (0..boxes.len() as u32).collect(), ..Self::default() };
-        if boxes.is_empty() {
-            tree.nodes.push(Node { boxes: [NOTHING; 2], children: [leaf(0, 1); 2] });
-            tree.depth = 1;
-            return tree;
+    /// A tree whose nodes cut the list into eighths along the longest sides, so that it has ⌈log₈ n⌉ levels whatever the
+    /// boxes are.
+    pub fn eighths(boxes: &[Aabb]) -> Self {
+        Self::by_levels(Part::new(boxes, (0..boxes.len() as u32).collect()), |part| part.eighths(boxes))
+    }
+
+    /// Lays out the tree that `split` makes of `root`.
+    fn by_levels<T: Split>(root: T, split: impl Fn(&T) -> Vec<T>) -> Self {
+        let mut tree = Self { nodes: Vec::new(), levels: vec![0], order: Vec::new() };
+        let mut level = vec![root];
+        while !level.is_empty() {
+            let first_below = (tree.nodes.len() + level.len()) as u32;
+            let mut below = Vec::new();
+            for item in &level {
+                let children = split(item);
+                let boxes: Vec<Aabb> = children.iter().map(Split::bounds).collect();
+                let mut node = Node::EMPTY;
+                let slots = slots(&boxes);
+                let mut by_slot: Vec<(usize, T)> = slots.into_iter().zip(children).collect();
+                by_slot.sort_by_key(|(slot, _)| *slot);
+                for (slot, child) in by_slot {
+                    node.boxes[slot] = child.bounds();
+                    node.children[slot] = match child.leaf() {
+                        Some(thing) => {
+                            tree.order.push(thing);
+                            Child::Leaf(tree.order.len() as u32 - 1)
+                        }
+                        None => {
+                            below.push(child);
+                            Child::Node(first_below + below.len() as u32 - 1)
+                        }
+                    };
+                }
+                tree.nodes.push(node);
+            }
+            tree.levels.push(tree.nodes.len() as u32);
+            level = below;
         }
-        let mut order = std::mem::take(&mut tree.order);
-        let count = order.len();
-        tree.root = tree.halve(boxes, &mut order, 0, count, leaf_size, 0);
-        tree.order = order;
         tree
     }
+}
 
-    fn halve(
-        &mut self,
-        boxes: &[Aabb],
-        order: &mut [u32],
-        first: usize,
-        count: usize,
-        leaf_size: u32,
-        depth: u32,
-    ) -> u32 {
-        if count <= leaf_size as usize {
-            self.depth = self.depth.max(depth);
-            return leaf(first as u32, count as u32);
-        }
-        let centre = |i: u32| (boxes[i as usize].min + boxes[i as usize].max) * 0.5;
-        let part = &mut order[first..first + count];
-        let spread = Aabb::of(part.iter().map(|i| centre(*i)));
-        let size = spread.max - spread.min;
-        let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
-        part.sort_by(|a, b| centre(*a)[axis].total_cmp(&centre(*b)[axis]).then(a.cmp(b)));
-        let half = count / 2;
-        let around = |list: &[u32]| list.iter().map(|i| boxes[*i as usize]).fold(Aabb::EMPTY, Aabb::union);
-        let pair = [around(&part[..half]), around(&part[half..])];
-        let index = self.nodes.len();
-        self.nodes.push(Node { boxes: pair, children: [0; 2] });
-        let left = self.halve(boxes, order, first, half, leaf_size, depth + 1);
-        let right = self.halve(boxes, order, first + half, count - half, leaf_size, depth + 1);
-        self.nodes[index].children = [left, right];
-        index as u32
-    }
+/// A part of a tree that is being laid out.
+trait Split {
+    fn bounds(&self) -> Aabb;
+    /// The only thing in it, if it is not to be a node.
+    fn leaf(&self) -> Option<u32>;
+}
 
-    /// `None` for a tree that is not one.
-    fn from_bvh2(tree: &Bvh2) -> Option<Self> {
-        let mut out = Self { order: tree.primitive_indices.clone(), ..Self::default() };
-        let aabb = |i: u32| {
-            let aabb = tree.nodes[i as usize].aabb();
-            Aabb { min: aabb.min.into(), max: aabb.max.into() }
-        };
-        let refer = |i: u32| {
-            let node = &tree.nodes[i as usize];
-            node.is_leaf().then(|| leaf(node.first_index, node.prim_count))
-        };
-        if let Some(root) = refer(0) {
-            out.root = root;
-            return Some(out);
-        }
-        // Nodes of the other tree whose place here is known, with their depth.
-        let mut todo = vec![(0u32, 0usize, 1u32)];
-        out.nodes.push(Node { boxes: [NOTHING; 2], children: [0; 2] });
-        while let Some((from, to, depth)) = todo.pop() {
-            out.depth = out.depth.max(depth);
-            let first = tree.nodes[from as usize].first_index;
-            for (slot, child) in [first, first + 1].into_iter().enumerate() {
-                out.nodes[to].boxes[slot] = aabb(child);
-                out.nodes[to].children[slot] = refer(child).unwrap_or(out.nodes.len() as u32);
-                if refer(child).is_none() {
-                    todo.push((child, out.nodes.len(), depth + 1));
-                    out.nodes.push(Node { boxes: [NOTHING; 2], children: [0; 2] });
-                }
-                if out.nodes.len() > tree.nodes.len() {
-                    return None;
+/// Puts up to eight boxes into slots so that those on the far side of an octant's direction get numbers with that octant's
+/// bits (greedily, Ylitie et al., section 3.3).
+fn slots(boxes: &[Aabb]) -> Vec<usize> {
+    let all = boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union);
+    let middle = all.centre();
+    let gain = |b: &Aabb, slot: usize| {
+        let sign = |bit: usize| if slot >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        (b.centre() - middle).dot(Vec3::new(sign(0), sign(1), sign(2)))
+    };
+    let mut slots = vec![usize::MAX; boxes.len()];
+    let mut free = [true; 8];
+    for _ in 0..boxes.len().min(8) {
+        let mut best = (f32::NEG_INFINITY, 0, 0);
+        for (i, b) in boxes.iter().enumerate().filter(|(i, _)| slots[*i] == usize::MAX) {
+            for slot in (0..8).filter(|s| free[*s]) {
+                let gain = gain(b, slot);
+                // Without numbers to compare the first free one.
+                if gain > best.0 || best.0 == f32::NEG_INFINITY {
+                    best = (gain, i, slot);
                 }
             }
         }
-        Some(out)
+        slots[best.1] = best.2;
+        free[best.2] = false;
+    }
+    slots
+}
+
+/// Things of a tree by halves.
+struct Part {
+    order: Vec<u32>,
+    bounds: Aabb,
+}
+
+impl Split for Part {
+    fn bounds(&self) -> Aabb {
+        self.bounds
     }
 
-    /// The four vectors of each node, with references that count from `first_node` and `first_record`.
-    pub fn encode(&self, first_node: u32, first_record: u32) -> Vec<[f32; 4]> {
-        let mut out = Vec::with_capacity(4 * self.nodes.len());
-        for node in &self.nodes {
-            for (aabb, child) in node.boxes.iter().zip(node.children) {
-                let child = self.refer(child, first_node, first_record);
-                out.push(aabb.min.extend(f32::from_bits(child)).to_array());
-                out.push(aabb.max.extend(0.0).to_array());
+    fn leaf(&self) -> Option<u32> {
+        (self.order.len() == 1).then(|| self.order[0])
+    }
+}
+
+impl Part {
+    fn new(boxes: &[Aabb], order: Vec<u32>) -> Self {
+        let bounds = order.iter().map(|i| boxes[*i as usize]).fold(Aabb::EMPTY, Aabb::union);
+        Self { order, bounds }
+    }
+
+    fn eighths(&self, boxes: &[Aabb]) -> Vec<Self> {
+        let mut parts = vec![self.order.clone()];
+        for _ in 0..3 {
+            let halves = parts.into_iter().flat_map(|part| halve(part, boxes));
+            parts = halves.filter(|half| !half.is_empty()).collect();
+        }
+        parts.into_iter().map(|order| Self::new(boxes, order)).collect()
+    }
+}
+
+fn halve(mut part: Vec<u32>, boxes: &[Aabb]) -> [Vec<u32>; 2] {
+    let centre = |i: &u32| (boxes[*i as usize].min + boxes[*i as usize].max) * 0.5;
+    let spread = Aabb::of(part.iter().map(centre));
+    let size = spread.max - spread.min;
+    let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
+    let half = part.len().div_ceil(2);
+    if half < part.len() {
+        part.select_nth_unstable_by(half, |a, b| centre(a)[axis].total_cmp(&centre(b)[axis]).then(a.cmp(b)));
+    }
+    let rest = part.split_off(half);
+    [part, rest]
+}
+
+/// A node of the binary tree.
+struct Binary<'a> {
+    tree: &'a Bvh2,
+    node: u32,
+}
+
+impl Split for Binary<'_> {
+    fn bounds(&self) -> Aabb {
+        bounds(self.tree, self.node)
+    }
+
+    fn leaf(&self) -> Option<u32> {
+        let node = &self.tree.nodes[self.node as usize];
+        node.is_leaf().then(|| self.tree.primitive_indices[node.first_index as usize])
+    }
+}
+
+fn bounds(tree: &Bvh2, node: u32) -> Aabb {
+    let aabb = tree.nodes[node as usize].aabb();
+    Aabb { min: aabb.min.into(), max: aabb.max.into() }
+}
+
+/// How the best of a subtree as at most i + 1 children of one node is reached.
+#[derive(Clone, Copy, Default)]
+struct Plan {
+    /// Expected cost, relative to a node's.
+    cost: [f32; 7],
+    /// Children that the left one becomes; 0: it stays one node.
+    left: [u8; 7],
+    /// The same where it is a node of its own.
+    own: u8,
+}
+
+/// A triangle test beside a node's.
+const TRIANGLE_COST: f32 = 0.5;
+
+/// `None` if it is not a tree with one thing a leaf.
+fn collapse(tree: &Bvh2) -> Option<Tree> {
+    // Parents before children, whatever the order of the nodes is.
+    let mut order = vec![0u32];
+    let mut at = 0;
+    while let Some(&node) = order.get(at) {
+        at += 1;
+        let n = tree.nodes.get(node as usize)?;
+        if !n.is_leaf() {
+            order.extend([n.first_index, n.first_index + 1]);
+        } else if n.prim_count != 1 {
+            return None;
+        }
+        if order.len() > tree.nodes.len() {
+            return None;
+        }
+    }
+    let mut plans = vec![Plan::default(); tree.nodes.len()];
+    for &node in order.iter().rev() {
+        let n = &tree.nodes[node as usize];
+        let size = bounds(tree, node);
+        let d = size.max - size.min;
+        let area = d.x * d.y + d.y * d.z + d.z * d.x;
+        let mut plan = Plan::default();
+        if n.is_leaf() {
+            plan.cost = [area * TRIANGLE_COST; 7];
+        } else {
+            let (left, right) = (plans[n.first_index as usize], plans[n.first_index as usize + 1]);
+            // The best of `slots` children.
+            let best = |slots: usize| {
+                let ways = (1..slots).filter(|k| *k <= 7 && slots - k <= 7);
+                let cost = |k: usize| left.cost[k - 1] + right.cost[slots - k - 1];
+                ways.map(|k| (cost(k), k as u8)).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f32::INFINITY, 1))
+            };
+            let (inside, own) = best(8);
+            plan.own = own;
+            plan.cost[0] = inside + area;
+            for i in 1..7 {
+                let (cost, k) = best(i + 1);
+                (plan.cost[i], plan.left[i]) =
+                    if cost < plan.cost[i - 1] { (cost, k) } else { (plan.cost[i - 1], plan.left[i - 1]) };
+                // Fewer slots than there are may be best: remember how many that were.
+                if cost >= plan.cost[i - 1] {
+                    plan.left[i] |= KEEP;
+                }
             }
         }
-        out
+        plans[node as usize] = plan;
     }
+    Some(Tree::by_levels(Binary { tree, node: 0 }, |item| {
+        let mut out = Vec::new();
+        let n = &tree.nodes[item.node as usize];
+        if n.is_leaf() {
+            out.push(item.node);
+        } else {
+            let left = usize::from(plans[item.node as usize].own);
+            open(tree, &plans, n.first_index, left, &mut out);
+            open(tree, &plans, n.first_index + 1, 8 - left, &mut out);
+        }
+        out.into_iter().map(|node| Binary { tree, node }).collect()
+    }))
+}
 
-    /// `child` with other places counted.
-    pub fn refer(&self, child: u32, first_node: u32, first_record: u32) -> u32 {
-        if child & TRACE_LEAF != 0 { child + first_record } else { child + first_node }
+/// In [`Plan::left`]: as with one slot less.
+const KEEP: u8 = 0x80;
+
+/// Appends what `node` becomes with `slots` slots.
+fn open(tree: &Bvh2, plans: &[Plan], node: u32, mut slots: usize, out: &mut Vec<u32>) {
+    let n = &tree.nodes[node as usize];
+    let plan = &plans[node as usize];
+    while slots > 1 && plan.left[slots - 1] & KEEP != 0 {
+        slots -= 1;
+    }
+    if n.is_leaf() || slots == 1 {
+        out.push(node);
+    } else {
+        let left = usize::from(plan.left[slots - 1]);
+        open(tree, plans, n.first_index, left, out);
+        open(tree, plans, n.first_index + 1, slots - left, out);
     }
 }

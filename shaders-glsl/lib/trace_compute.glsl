@@ -1,41 +1,20 @@
-// Tracing by a compute traversal of two levels: a top tree over instances, below each a bottom tree over triangles that
-// instances of the same shape share (built by lucerna::rays).
+// Tracing by a compute traversal of the trees of lib/trace_nodes.glsl.
 #ifndef LIB_TRACE_COMPUTE
 #define LIB_TRACE_COMPUTE
+#include "lib/trace_nodes.glsl"
 
-// A bottom tree where it stands.
-struct TraceInstance {
-    vec4 object_from_world[3]; // rows
-    uint first_instance;       // added to the instances of the records
-    uint root;                 // reference
-    float reach;               // no coordinate in the tree is larger
-};
-
-// References to children: with TRACE_LEAF, a leaf: in the top tree the number of an instance, in a bottom tree count - 1 in
-// bits 28 to 30 and the first record. Without: the number of a node.
-const uint TRACE_LEAF = 0x80000000u; // export
-const uint TRACE_COUNT_SHIFT = 28u; // export
-const uint TRACE_FIRST_MASK = 0x0fffffffu; // export
-// On the stack: back to the top tree. No reference has this value.
-const uint TRACE_UP = 0x7fffffffu;
-
-// Nodes a ray passes from the root to a leaf, both trees together, are at most this; lucerna::rays keeps to it.
-const uint TRACE_DEPTH = 64u; // export
-// Steps of one ray, including triangles; a ray that needs more ends with what it has. CPU drivers stop loops at 65,535.
-const uint TRACE_STEPS = 30000u; // export
-
-// A node is four vectors: lower corner and reference of its first child, upper corner, then the second child's.
-layout(binding = 40, scalar) readonly buffer TraceNodes { vec4 trace_nodes[]; };
-// A record is three vectors: corners in xyz; in w the bits of instance, triangle, surface (TRACE_SINGLE_SIDED …).
+layout(binding = 40, scalar) readonly buffer TraceNodes { uint trace_nodes[]; };
+// A record is three vectors: corners in xyz; in w the bits of surface (TRACE_SINGLE_SIDED …), instance, triangle.
 layout(binding = 41, scalar) readonly buffer TraceTriangles { vec4 trace_triangles[]; };
 // The first is the top tree itself, in world space.
 layout(binding = 42, scalar) readonly buffer TraceInstances { TraceInstance trace_instances[]; };
 
-// A ray as the boxes of one tree see it.
+// A ray as the nodes of one tree see it.
 struct TraceSlabs {
+    vec3 origin;
     vec3 inverse;
-    vec3 near; // t = corner * inverse - near, less than exact
-    vec3 far;  // t = corner * inverse - far, more than exact
+    vec3 pad;    // boxes are grown by this much time
+    uint octant; // bits of the axes along which it goes up
 };
 
 TraceSlabs trace_slabs(vec3 origin, vec3 direction, float reach) {
@@ -43,98 +22,184 @@ TraceSlabs trace_slabs(vec3 origin, vec3 direction, float reach) {
     float tiny = 1e-20 * max(abs(direction.x), max(abs(direction.y), abs(direction.z)));
     vec3 d = mix(max(direction, vec3(tiny)), min(direction, vec3(-tiny)), lessThan(direction, vec3(0.0)));
     TraceSlabs slabs;
+    slabs.origin = origin;
     slabs.inverse = 1.0 / d;
-    // Boxes are grown by more than what the triangle test rounds, so that no box hides what that test hits.
+    // More than what the triangle test rounds, so that no box hides what that test hits.
     float size = max(reach, max(abs(origin.x), max(abs(origin.y), abs(origin.z))));
-    vec3 pad = abs(slabs.inverse) * (size * 1e-6);
-    slabs.near = origin * slabs.inverse + pad;
-    slabs.far = origin * slabs.inverse - pad;
+    slabs.pad = abs(slabs.inverse) * (size * 1e-6);
+    slabs.octant = (d.x > 0.0 ? 1u : 0u) | (d.y > 0.0 ? 2u : 0u) | (d.z > 0.0 ? 4u : 0u);
     return slabs;
 }
 
-// Where the ray enters a box; TRACE_MISS if it does not between t_min and t_max.
-const float TRACE_MISS = 3.4e38;
+// Four bytes of a word as floats.
+vec4 trace_bytes(uint word) {
+    return vec4(ivec4(word & 0xffu, word >> 8u & 0xffu, word >> 16u & 0xffu, word >> 24u));
+}
 
-float trace_box(vec3 low, vec3 high, TraceSlabs slabs, float t_min, float t_max) {
+// Which of four boxes the ray meets between t_min and t_max: bounds in steps, near ones first.
+uint trace_boxes(uvec3 near_words, uvec3 far_words, vec3 step_time, vec3 near_time, vec3 far_time, float t_min, float t_max) {
+    vec4 near = max(trace_bytes(near_words.x) * step_time.x + near_time.x, trace_bytes(near_words.y) * step_time.y + near_time.y);
+    near = max(max(near, trace_bytes(near_words.z) * step_time.z + near_time.z), t_min);
+    vec4 far = min(trace_bytes(far_words.x) * step_time.x + far_time.x, trace_bytes(far_words.y) * step_time.y + far_time.y);
+    far = min(min(far, trace_bytes(far_words.z) * step_time.z + far_time.z), t_max);
+    bvec4 hit = lessThanEqual(near, far);
+    return uint(hit.x) | uint(hit.y) << 1u | uint(hit.z) << 2u | uint(hit.w) << 3u;
+}
+
+// Slots of a node that the ray meets, as bits.
+uint trace_node(uint node, TraceSlabs slabs, float t_min, float t_max) {
+    uint w = TRACE_NODE_WORDS * node;
+    vec3 corner = vec3(uintBitsToFloat(trace_nodes[w]), uintBitsToFloat(trace_nodes[w + 1u]), uintBitsToFloat(trace_nodes[w + 2u]));
+    uint exponents = trace_nodes[w + 3u];
+    uvec3 steps = uvec3(exponents << 23u, exponents << 15u, exponents << 7u) & 0x7f800000u;
+    vec3 step_time = uintBitsToFloat(steps) * slabs.inverse;
+    vec3 time = (corner - slabs.origin) * slabs.inverse;
+    vec3 near_time = time - slabs.pad, far_time = time + slabs.pad;
+    uvec3 low0 = uvec3(trace_nodes[w + 6u], trace_nodes[w + 8u], trace_nodes[w + 10u]);
+    uvec3 low1 = uvec3(trace_nodes[w + 7u], trace_nodes[w + 9u], trace_nodes[w + 11u]);
+    uvec3 high0 = uvec3(trace_nodes[w + 12u], trace_nodes[w + 14u], trace_nodes[w + 16u]);
+    uvec3 high1 = uvec3(trace_nodes[w + 13u], trace_nodes[w + 15u], trace_nodes[w + 17u]);
     bvec3 backward = lessThan(slabs.inverse, vec3(0.0));
-    vec3 enter = mix(low, high, backward) * slabs.inverse - slabs.near;
-    vec3 leave = mix(high, low, backward) * slabs.inverse - slabs.far;
-    float near = max(max(enter.x, enter.y), max(enter.z, t_min));
-    float far = min(min(leave.x, leave.y), min(leave.z, t_max));
-    return near <= far ? near : TRACE_MISS;
+    return trace_boxes(mix(low0, high0, backward), mix(high0, low0, backward), step_time, near_time, far_time, t_min, t_max)
+        | trace_boxes(mix(low1, high1, backward), mix(high1, low1, backward), step_time, near_time, far_time, t_min, t_max) << 4u;
+}
+
+// Moves bit i of a byte to bit i ^ octant.
+uint trace_permuted(uint bits, uint octant) {
+    bits = (octant & 1u) != 0u ? (bits & 0x55u) << 1u | (bits >> 1u & 0x55u) : bits;
+    bits = (octant & 2u) != 0u ? (bits & 0x33u) << 2u | (bits >> 2u & 0x33u) : bits;
+    return (octant & 4u) != 0u ? (bits & 0x0fu) << 4u | bits >> 4u : bits;
 }
 
 Hit trace(Ray ray, uint mask, uint salt, bool any) {
     Hit hit = Hit(ray.t_max, vec2(0.0), NONE, NONE);
+    uint best = NONE; // record of the hit
+    // Entries: a node and the slots that are still to be visited, permuted so that bit 0 is the nearest; 0: the tree's end.
     uint stack[TRACE_DEPTH];
     uint height = 0u;
-    vec3 origin = ray.origin;
-    TraceSlabs world = trace_slabs(origin, ray.direction, trace_instances[0].reach);
-    TraceSlabs slabs = world;
-    TraceShear shear;
+    TraceSlabs slabs = trace_slabs(ray.origin, ray.direction, trace_instances[0].reach);
+    TraceShear shear = trace_shear(ray.direction);
     uint first_instance = 0u;
     bool inside = false;
-    uint item = trace_instances[0].root;
-    for (uint left = TRACE_STEPS; left > 0u; --left) {
-        bool pop = true;
-        if (item == TRACE_UP) {
-            inside = false;
-            slabs = world;
-        } else if ((item & TRACE_LEAF) == 0u) {
-            vec4 a = trace_nodes[4u * item], b = trace_nodes[4u * item + 1u];
-            vec4 c = trace_nodes[4u * item + 2u], d = trace_nodes[4u * item + 3u];
-            float first = trace_box(a.xyz, b.xyz, slabs, ray.t_min, hit.t);
-            float second = trace_box(c.xyz, d.xyz, slabs, ray.t_min, hit.t);
-            uint near = floatBitsToUint(a.w), far = floatBitsToUint(c.w);
-            if (second < first) {
-                uint swapped = near;
-                near = far;
-                far = swapped;
+    stack[height++] = 0u;
+    uint next = trace_instances[0].root; // node to visit, NONE: the tree is done
+    uint leaves = 0u;                    // first record and the slots that were hit and not yet looked at
+    uint leaf_slots = 0u;
+    uint above = 0u, above_slots = 0u;   // the same of the top tree while inside
+    int left = int(TRACE_STEPS);
+    bool done = false;
+    // CPU drivers run both sides of every branch for all their lanes and skip only loops: what is rare stands outside.
+    while (!done) {
+        // Until something rare comes: a place to enter or to leave, a surface that may be cut out, the end.
+        uint candidate = NONE;
+        vec3 candidate_at = vec3(0.0);
+        bool rare = false;
+        while (!rare) {
+            while (leaf_slots == 0u && next != NONE) {
+                uint w = TRACE_NODE_WORDS * next;
+                uint hits = trace_node(next, slabs, ray.t_min, hit.t);
+                leaves = trace_nodes[w + 5u];
+                leaf_slots = hits & leaves & 0xffu;
+                uint slots = trace_permuted(hits & trace_nodes[w + 4u] & 0xffu, slabs.octant);
+                uint entry = next << 8u | slots;
+                if (slots == 0u) {
+                    entry = stack[--height];
+                }
+                if (entry == 0u) {
+                    next = NONE;
+                } else {
+                    uint slot = uint(findLSB(entry)) ^ slabs.octant;
+                    uint nodes = trace_nodes[TRACE_NODE_WORDS * (entry >> 8u) + 4u];
+                    next = (nodes >> 8u) + uint(bitCount(nodes & ((1u << slot) - 1u)));
+                    entry &= entry - 1u;
+                    if ((entry & 0xffu) != 0u) {
+                        stack[height++] = entry;
+                    }
+                }
+                if (--left <= 0) {
+                    next = NONE;
+                    leaf_slots = 0u;
+                }
             }
-            if (max(first, second) < TRACE_MISS) {
-                stack[height++] = far;
+            rare = !inside || leaf_slots == 0u;
+            while (!rare && leaf_slots != 0u) {
+                uint slot = uint(findLSB(leaf_slots));
+                uint record = (leaves >> 8u) + uint(bitCount(leaves & ((1u << slot) - 1u)));
+                leaf_slots &= leaf_slots - 1u;
+                --left;
+                vec4 a = trace_triangles[3u * record];
+                vec3 b = trace_triangles[3u * record + 1u].xyz, c = trace_triangles[3u * record + 2u].xyz;
+                vec3 at;
+                float side = trace_triangle(a.xyz, b, c, slabs.origin, shear, at);
+                uint surface = floatBitsToUint(a.w);
+                if (at.x >= ray.t_min && at.x <= hit.t && trace_counts(surface, side, mask)) {
+                    bool equal = at.x == hit.t;
+                    if ((surface & TRACE_CUTOUT) != 0u || equal) {
+                        candidate = record;
+                        candidate_at = at;
+                        rare = true;
+                    } else {
+                        hit.t = at.x;
+                        hit.barycentrics = at.yz;
+                        best = record;
+                        hit.instance = first_instance;
+                        done = any;
+                        rare = any;
+                    }
+                }
             }
-            if (min(first, second) < TRACE_MISS) {
-                item = near;
-                pop = false;
+        }
+        if (candidate != NONE) {
+            uint instance = first_instance + floatBitsToUint(trace_triangles[3u * candidate + 1u].w);
+            uint triangle = floatBitsToUint(trace_triangles[3u * candidate + 2u].w);
+            uint surface = floatBitsToUint(trace_triangles[3u * candidate].w);
+            // Of equals the first instance's first triangle, whatever the order of the tree.
+            bool nearer = candidate_at.x < hit.t;
+            if (!nearer && best != NONE) {
+                uint other = hit.instance + floatBitsToUint(trace_triangles[3u * best + 1u].w);
+                uint other_triangle = floatBitsToUint(trace_triangles[3u * best + 2u].w);
+                nearer = instance < other || (instance == other && triangle < other_triangle);
             }
-        } else if (!inside) {
-            TraceInstance instance = trace_instances[item & TRACE_FIRST_MASK];
+            if (nearer && ((surface & TRACE_CUTOUT) == 0u || trace_covered(instance, triangle, candidate_at.yz, salt))) {
+                hit.t = candidate_at.x;
+                hit.barycentrics = candidate_at.yz;
+                hit.instance = first_instance;
+                best = candidate;
+                done = any;
+            }
+        } else if (leaf_slots != 0u && !done) {
+            // Down into the next instance.
+            uint slot = uint(findLSB(leaf_slots));
+            uint place = (leaves >> 8u) + uint(bitCount(leaves & ((1u << slot) - 1u)));
+            above = leaves;
+            above_slots = leaf_slots & (leaf_slots - 1u);
+            leaf_slots = 0u;
+            stack[height++] = next;
+            stack[height++] = 0u;
+            TraceInstance instance = trace_instances[place];
             vec4 x = instance.object_from_world[0], y = instance.object_from_world[1], z = instance.object_from_world[2];
-            origin = vec3(dot(x.xyz, ray.origin) + x.w, dot(y.xyz, ray.origin) + y.w, dot(z.xyz, ray.origin) + z.w);
+            vec3 origin = vec3(dot(x.xyz, ray.origin) + x.w, dot(y.xyz, ray.origin) + y.w, dot(z.xyz, ray.origin) + z.w);
             vec3 direction = vec3(dot(x.xyz, ray.direction), dot(y.xyz, ray.direction), dot(z.xyz, ray.direction));
             slabs = trace_slabs(origin, direction, instance.reach);
             shear = trace_shear(direction);
             first_instance = instance.first_instance;
+            next = instance.root;
             inside = true;
-            stack[height++] = TRACE_UP;
-            item = instance.root;
-            pop = false;
+        } else if (inside && !done) {
+            // Up again.
+            inside = false;
+            slabs = trace_slabs(ray.origin, ray.direction, trace_instances[0].reach);
+            leaves = above;
+            leaf_slots = above_slots;
+            next = stack[--height];
+            done = left <= 0 || (next == NONE && leaf_slots == 0u);
         } else {
-            uint count = (item >> TRACE_COUNT_SHIFT & 7u) + 1u;
-            uint record = item & TRACE_FIRST_MASK;
-            for (uint i = 0u; i < count; ++i) {
-                left -= uint(left > 1u);
-                uint r = 3u * (record + i);
-                vec4 a = trace_triangles[r], b = trace_triangles[r + 1u], c = trace_triangles[r + 2u];
-                vec3 at;
-                float side = trace_triangle(a.xyz, b.xyz, c.xyz, origin, shear, at);
-                uint instance = first_instance + floatBitsToUint(a.w);
-                uint triangle = floatBitsToUint(b.w), surface = floatBitsToUint(c.w);
-                // Of equals the first instance's first triangle, whatever the order of the tree.
-                bool earlier = instance < hit.instance || (instance == hit.instance && triangle < hit.triangle);
-                bool nearer = at.x < hit.t || (at.x == hit.t && hit.instance != NONE && earlier);
-                if (at.x >= ray.t_min && nearer && trace_counts(surface, side, mask)
-                    && ((surface & TRACE_CUTOUT) == 0u || trace_covered(instance, triangle, at.yz, salt))) {
-                    hit = Hit(at.x, at.yz, instance, triangle);
-                }
-            }
-            if (any && hit.instance != NONE) break;
+            done = true;
         }
-        if (pop) {
-            if (height == 0u) break;
-            item = stack[--height];
-        }
+    }
+    if (best != NONE) {
+        hit.instance += floatBitsToUint(trace_triangles[3u * best + 1u].w);
+        hit.triangle = floatBitsToUint(trace_triangles[3u * best + 2u].w);
     }
     return hit;
 }

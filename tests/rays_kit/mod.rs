@@ -61,7 +61,7 @@ pub struct Traceable<'a> {
 impl<'a> Traceable<'a> {
     pub fn new(gpu: &Gpu, scene: &'a Scene) -> Self {
         let resident = Resident::new(gpu, scene).unwrap();
-        let rays = Rays::new(gpu, scene, &resident).unwrap();
+        let rays = Rays::in_compute(gpu, scene, &resident).unwrap();
         Self { scene, resident, rays, runner: Runner::new(gpu) }
     }
 
