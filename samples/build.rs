@@ -30,7 +30,7 @@ fn list_sources() {
     let (Some(here), Some(out)) = (env::var_os("CARGO_MANIFEST_DIR"), env::var_os("OUT_DIR")) else { return };
     let root = Path::new(&here).join("..");
     let mut found = Vec::new();
-    for folder in ["engine", "shaders-glsl"] {
+    for folder in ["engine", "shaders-glsl", "samples/cli/export_pov"] {
         println!("cargo::rerun-if-changed=../{folder}");
         sources(&root.join(folder), &mut found);
     }

@@ -8,7 +8,7 @@ use lucerna::{
     graph::{Graph, Report, Runner},
     image::{Layer, Layers},
     passes::ambient::Irradiance,
-    reference::path,
+    reference::{path, tracer},
     scene::{Pose, Scene, View, bvh::Bvh, resident::Resident},
     techniques::isr::{self, PictureSettings},
 };
@@ -16,7 +16,14 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
 
 use super::file::{Changes, Method};
-use crate::{config, gbuffer_layers, shown::Shown, signals::Interrupt};
+use crate::{
+    args::Size,
+    config,
+    export_pov::{self, Pov, povray},
+    gbuffer_layers,
+    shown::Shown,
+    signals::Interrupt,
+};
 
 /// A way to make a picture.
 pub struct Kind {
@@ -98,11 +105,13 @@ pub struct Warm<'a> {
     pub pose: &'a Pose,
     /// Of this scene.
     kept: HashMap<&'static str, Box<dyn Any>>,
+    /// Borrows the scene, so it cannot be among these.
+    tracer: Option<tracer::Tracer<'a>>,
 }
 
 impl<'a> Warm<'a> {
     pub fn new(gpu: &'a Gpu, scene: &'a Scene, pose: &'a Pose) -> Self {
-        Self { gpu, scene, pose, kept: HashMap::new() }
+        Self { gpu, scene, pose, kept: HashMap::new(), tracer: None }
     }
 
     /// Something made once for the scene.
@@ -146,6 +155,41 @@ pub const KINDS: &[Kind] = &[
         },
         render: isr_picture,
         available: || Ok(String::new()),
+    },
+    Kind {
+        name: "tracer",
+        description: "path tracer on the device; layers emission, direct, indirect, albedo, normal, depth, samples, variance",
+        on_device: true,
+        sources: &[
+            "engine/reference/tracer",
+            "engine/rays",
+            "engine/scene",
+            "shaders-glsl/reference",
+            "shaders-glsl/rays",
+            "shaders-glsl/lib",
+        ],
+        settings: |_, changes| {
+            let settings: TracerSettings = config::with(&TracerSettings::default(), changes)?;
+            settings.tracer.validate()?;
+            match settings.samples {
+                1..=MOST_SAMPLES => config::to_value(&settings),
+                other => Err(Error::usage(format!("samples is {other}, allowed are 1 to {MOST_SAMPLES}"))),
+            }
+        },
+        render: traced,
+        available: || Ok(String::new()),
+    },
+    Kind {
+        name: "povray",
+        description: "the program povray, with radiosity as the dissertation has it; the picture alone",
+        on_device: false,
+        sources: &["samples/cli/export_pov"],
+        settings: |_, changes| config::to_value(&config::with::<PovSettings>(&PovSettings::default(), changes)?),
+        render: by_povray,
+        available: || {
+            let program = povray::find().map_err(|error| error.to_string())?;
+            povray::version(&program).map_err(|error| error.to_string())
+        },
     },
     Kind {
         name: "path",
@@ -267,4 +311,75 @@ fn path_picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> 
         .with(Layer::rgb("albedo", &rgb(&traced.albedo)));
     let times = Times { wall: vec![begun.elapsed().as_secs_f64() * 1e3], ..Times::default() };
     Ok(Some(Rendered { layers, times }))
+}
+
+/// More paths a pixel are no experiment.
+const MOST_SAMPLES: u32 = 1 << 24;
+
+/// Settings of the path tracer on the device.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct TracerSettings {
+    /// Paths a pixel.
+    samples: u32,
+    tracer: tracer::Settings,
+}
+
+impl Default for TracerSettings {
+    /// What a rasterised picture with one bounce is held against.
+    fn default() -> Self {
+        let tracer = tracer::Settings { bounces: 1, filter: tracer::Filter::Centre, ..tracer::Settings::default() };
+        Self { samples: 64, tracer }
+    }
+}
+
+fn traced(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
+    let TracerSettings { samples, mut tracer } = read(job.settings)?;
+    // Two references may have two seeds, to tell their noise.
+    tracer.seed = tracer.seed.wrapping_add(job.seed);
+    if warm.tracer.is_none() {
+        warm.tracer = Some(tracer::Tracer::new(warm.gpu, warm.scene, warm.pose)?);
+    }
+    let Some(running) = warm.tracer.as_mut() else { return Ok(None) };
+    running.start(job.view, &tracer)?;
+    let progress = running.run(samples.into(), |_| !job.interrupt.requested())?;
+    if job.interrupt.requested() {
+        return Ok(None);
+    }
+    let times = Times { wall: vec![progress.time.as_secs_f64() * 1e3], ..Times::default() };
+    Ok(Some(Rendered { layers: running.layers()?, times }))
+}
+
+/// Settings of POV-Ray.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct PovSettings {
+    /// Rays a pixel are the square of this; 1: one, through the centre.
+    subpixels: u32,
+    /// With more than one, POV-Ray's radiosity differs from run to run.
+    threads: u32,
+    /// Seconds after which it is stopped.
+    time_limit: u64,
+    pov: Pov,
+}
+
+impl Default for PovSettings {
+    fn default() -> Self {
+        Self { subpixels: 1, threads: 1, time_limit: 3600, pov: Pov::default() }
+    }
+}
+
+fn by_povray(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
+    let PovSettings { subpixels, threads, time_limit, pov } = read(job.settings)?;
+    let export = export_pov::export(warm.scene, warm.pose, job.view, &pov, "scene")?;
+    let [width, height] = job.view.extent;
+    let options = povray::Options { subpixels, threads, time_limit: std::time::Duration::from_secs(time_limit) };
+    match povray::render(&export, Size { width, height }, &options) {
+        // The signal reaches the other program too.
+        Err(_) if job.interrupt.requested() => Ok(None),
+        rendered => rendered.map(|rendered| {
+            let times = Times { wall: vec![rendered.seconds * 1e3], ..Times::default() };
+            Some(Rendered { layers: rendered.picture, times })
+        }),
+    }
 }

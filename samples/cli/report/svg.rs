@@ -70,6 +70,10 @@ pub(super) fn plot(plot: &Plot) -> String {
         }
         text.push_str("</g>");
     }
+    if !plot.y.log && frame.y.low < 0.0 && frame.y.high > 0.0 {
+        let zero = frame.at(frame.x.low, 0.0).1;
+        let _ = write!(text, "<path class=\"axis\" d=\"M{:.1} {zero:.1}H{:.1}\"/>", frame.left, WIDTH - RIGHT);
+    }
     rules(&mut text, plot, &frame);
     text.push_str("</svg></div>");
     text
