@@ -11,7 +11,9 @@ use lucerna_samples::{
     devices,
     experiment::command::{self as experiment, ReportArgs, ReproduceArgs},
     export_pov::{self, ExportPovArgs},
-    info, inspect, program, rerun,
+    info, inspect, program,
+    reference::{self, ReferenceArgs},
+    rerun,
     source::{self, SceneArgs},
     views::{self, command::ViewsArgs},
 };
@@ -46,6 +48,9 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Make a reference picture by path tracing: samples, time or an error decide when it is done
+    #[command(args_override_self = true)]
+    Reference(Box<ReferenceArgs>),
     /// Make a picture again from what it says about itself, and compare the bits
     Rerun {
         /// An image that `render` wrote
@@ -99,6 +104,7 @@ impl Command {
             Self::Reproduce(args) => args.talk.console(),
             Self::Report(args) => args.talk.console(),
             Self::Compare(args) => args.talk.console(),
+            Self::Reference(args) => args.talk.console(),
             Self::Inspect { talk, .. }
             | Self::Info { talk, .. }
             | Self::Rerun { talk, .. }
@@ -120,6 +126,7 @@ fn main() -> ExitCode {
         // Those that choose their exit code themselves.
         Command::Reproduce(args) => experiment::reproduce(args, console),
         Command::Compare(args) => compare::run(args, console),
+        Command::Reference(args) => reference::run(args, console),
         _ => serve(command, console).map(|()| ExitCode::SUCCESS),
     })
 }
@@ -158,6 +165,7 @@ fn serve(command: Command, console: Console) -> Result<()> {
             }
         }
         Command::Compare(args) => compare::run(&args, console).map(drop),
+        Command::Reference(args) => reference::run(&args, console).map(drop),
         Command::Views(args) => views::command::run(&args, console),
         // It chooses its exit code itself.
         Command::Reproduce(args) => experiment::reproduce(&args, console).map(|_| ()),

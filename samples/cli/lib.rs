@@ -20,6 +20,7 @@ pub mod pattern;
 pub mod program;
 pub mod progress;
 pub mod record;
+pub mod reference;
 pub mod render;
 pub mod report;
 pub mod rerun;

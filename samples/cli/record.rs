@@ -115,8 +115,12 @@ impl Record {
         if let Some(unit) = self.unit {
             add(&[&format!("--unit={unit}")]);
         }
-        add(&["--frames", &format!("{}..={}", self.first_frame, self.frame)]);
-        add(&[&format!("--time={}", self.time), &format!("--fps={}", self.fps)]);
+        // A reference is one picture in full precision.
+        let single = self.command.get(1).is_some_and(|verb| verb == "reference");
+        if !single {
+            add(&["--frames", &format!("{}..={}", self.first_frame, self.frame), &format!("--fps={}", self.fps)]);
+        }
+        add(&[&format!("--time={}", self.time)]);
         add(&[&format!("--exposure={}", self.exposure), &format!("--seed={}", self.seed)]);
         match self.default_light {
             DefaultLight::Auto => {}
@@ -128,7 +132,7 @@ impl Record {
                 add(&[&format!("--{option}={value}")]);
             }
         }
-        if self.f32 {
+        if self.f32 && !single {
             add(&["--f32"]);
         }
         add(&["--settings", &settings.to_string_lossy()]);

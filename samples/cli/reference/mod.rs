@@ -1,0 +1,302 @@
+//! `lucerna reference`: a picture by path tracing, better the longer it runs.
+
+mod checkpoint;
+mod meter;
+mod options;
+
+pub use options::{ReferenceArgs, Settings, Show};
+
+use std::{path::PathBuf, process::ExitCode, time::Instant};
+
+use lucerna::{
+    Error, Result,
+    gpu::Gpu,
+    image::{Layer, Layers, Metadata, WriteOptions},
+    reference::tracer::{Progress, Tracer},
+    scene::{NoteKind, View, builtin},
+};
+use serde_json::{Value, json};
+
+use crate::{
+    config,
+    console::{self, Console},
+    exposure,
+    outputs::Outputs,
+    pattern::Values,
+    program::{self, STOPPED_EARLY},
+    record::{Record, Source},
+    signals::Interrupt,
+    stage::{Asked, Stage},
+};
+use checkpoint::Checkpoint;
+use meter::Meter;
+
+/// Why the work ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum End {
+    Samples,
+    Error,
+    Time,
+    Interrupt,
+}
+
+impl End {
+    fn text(self) -> &'static str {
+        match self {
+            Self::Samples => "samples",
+            Self::Error => "error",
+            Self::Time => "time",
+            Self::Interrupt => "interrupt",
+        }
+    }
+
+    fn is_early(self) -> bool {
+        matches!(self, Self::Time | Self::Interrupt)
+    }
+}
+
+/// Seconds that finishing the current sample may take after a stop; a part of a sample is valid, but cannot be made again.
+const FINISH: f64 = 1.0;
+
+/// Runs the command.
+///
+/// # Errors
+/// Whatever fails, with the kind that decides the exit code.
+pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
+    let settings = args.effective()?;
+    if args.print_config {
+        console::print(config::to_toml(&settings)?.trim_end())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let interrupt = Interrupt::install();
+    let options = WriteOptions { overwrite: args.overwrite || args.resume, f32: true, ..WriteOptions::default() };
+    Outputs::new(&args.output, 1, options.clone())?;
+    let stage = Stage::of(&Asked {
+        scene: args.scene.as_deref(),
+        builtin: args.builtin.as_deref(),
+        unit: args.unit,
+        environment: args.environment.as_deref(),
+        light: &args.light,
+        sun: args.sun.as_ref(),
+        default_light: args.default_light,
+        camera: args.camera.as_deref(),
+        size: args.size,
+    })?;
+    let mut outputs = Outputs::new(&args.output, 1, options)?;
+    if outputs.uses_stdout() && args.json {
+        return Err(Error::usage("--json and an image both want standard output").help("Give the image a name"));
+    }
+    let names = (stage.scene.name.clone(), stage.camera_name.clone());
+    let values = Values { scene: &names.0, camera: &names.1, technique: "reference", frame: 0, layer: "" };
+    outputs.probe(&values, &["picture"])?;
+    for note in stage.notes().iter().filter(|n| n.kind != NoteKind::Repaired) {
+        console.info(&format!("note: {}: {}", note.place, note.text));
+    }
+    let gpu = Gpu::new(args.device.options()?)?;
+    console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
+    let (pose, view) = stage.at(args.time, args.size);
+    let mut tracer = Tracer::new(&gpu, &stage.scene, &pose)?;
+    tracer.start(&view, &settings.reference)?;
+    let first = args.output.first().filter(|name| *name != "-");
+    let path = match first {
+        Some(name) => Some(PathBuf::from(crate::pattern::Pattern::parse(name)?.fill(&values))),
+        None if args.output.is_empty() => Some(PathBuf::from(format!("{}-{}-reference.png", names.0, names.1))),
+        None => None,
+    };
+    let mut checkpoint = Checkpoint::new(path, about(args, &stage));
+    if args.resume && checkpoint.resume(&mut tracer)? {
+        console.info(&format!("goes on after {:.0} samples a pixel", tracer.progress()?.samples));
+    }
+
+    let mut meter = Meter::new(args.progress, console.is_quiet(), settings.samples, tracer.progress()?);
+    let end = work(args, &settings, &mut tracer, &mut checkpoint, &mut meter, &interrupt)?;
+    let done = tracer.progress()?;
+    if done.paths == 0 && end == End::Interrupt {
+        return Ok(ExitCode::from(interrupt.exit_code()));
+    }
+    let sums = tracer.sums()?;
+    meter.finish(&done, sums.relative_error());
+    if sums.lost() > 0 {
+        console.warning(&format!("{} paths gave no number and are left out", sums.lost()));
+    }
+    let mut layers = sums.layers();
+    args.show.apply(&mut layers);
+    let suits = match &stage.source {
+        Source::Builtin(name) => builtin::exposure(name).map(f64::from),
+        Source::File(_) => None,
+    };
+    let ev = args.exposure.or(suits).unwrap_or_else(|| exposure::fitting(&layers));
+    outputs.expose(ev);
+    // What a run with exactly these samples would say as well.
+    let made = Settings { samples: done.samples.floor() as u64, ..settings.clone() };
+    layers.metadata = metadata(args, &stage, &gpu, &tracer.view()?, &made, ev)?;
+    let whole = done.samples.fract() == 0.0;
+    if !whole {
+        layers.metadata.extra.insert("part of a sample".into(), format!("{:.6}", done.samples.fract()));
+    }
+    let written = outputs.write(&values, &layers)?;
+    let files: Vec<&str> = written.iter().map(|(name, _)| name.as_str()).collect();
+    console.info(&format!("wrote {}", files.join(" ")));
+    if end.is_early() {
+        if checkpoint.write(&tracer)? {
+            console.info(&format!("stopped by {}; --resume goes on", end.text()));
+        }
+    } else {
+        checkpoint.remove();
+    }
+    if args.json {
+        console::print_json(&report(&layers, &done, &meter, sums.relative_error(), end, &files))?;
+    }
+    Ok(if end.is_early() { ExitCode::from(STOPPED_EARLY) } else { ExitCode::SUCCESS })
+}
+
+fn work(
+    args: &ReferenceArgs,
+    settings: &Settings,
+    tracer: &mut Tracer<'_>,
+    checkpoint: &mut Checkpoint,
+    meter: &mut Meter,
+    interrupt: &Interrupt,
+) -> Result<End> {
+    let started = Instant::now();
+    // The error is looked at after so many samples, each time a little later: reading the sums takes time.
+    let mut look = 16.0f64.max(tracer.progress()?.samples);
+    loop {
+        let mut reason = None;
+        let mut stopped: Option<Instant> = None;
+        let save = &mut *checkpoint;
+        let shown = &mut *meter;
+        tracer.run(settings.samples, |progress: &Progress| {
+            shown.show(progress);
+            let whole = progress.samples.fract() == 0.0;
+            if reason.is_none() {
+                if interrupt.requested() {
+                    reason = Some(End::Interrupt);
+                } else if args.time_limit.is_some_and(|limit| started.elapsed() >= limit.0) {
+                    reason = Some(End::Time);
+                }
+            }
+            if reason.is_some() {
+                let since = stopped.get_or_insert_with(Instant::now);
+                return !whole && since.elapsed().as_secs_f64() < FINISH;
+            }
+            // Out of the loop to read the sums.
+            let looks = progress.samples >= look && (args.target_error.is_some() || shown.wants_error());
+            !looks && !save.is_due()
+        })?;
+        let progress = tracer.progress()?;
+        if let Some(end) = reason {
+            return Ok(if progress.samples >= settings.samples as f64 { End::Samples } else { end });
+        }
+        if progress.samples >= settings.samples as f64 {
+            return Ok(End::Samples);
+        }
+        if checkpoint.is_due() {
+            checkpoint.write(tracer)?;
+        }
+        if progress.samples >= look {
+            let error = tracer.sums()?.relative_error();
+            meter.error(error);
+            look = (progress.samples * 1.25).ceil();
+            if args.target_error.is_some_and(|target| error <= target) {
+                return Ok(End::Error);
+            }
+        }
+    }
+}
+
+/// What the bits of a picture depend on besides view and settings.
+fn about(args: &ReferenceArgs, stage: &Stage) -> Value {
+    json!({
+        "scene": stage.fingerprint,
+        "time": args.time,
+        "environment": args.environment,
+        "default_light": args.default_light,
+        "light": args.light,
+        "sun": args.sun,
+        "version": program::VERSION,
+        "revision": program::revision(),
+    })
+}
+
+fn metadata(
+    args: &ReferenceArgs,
+    stage: &Stage,
+    gpu: &Gpu,
+    view: &View,
+    settings: &Settings,
+    exposure: f64,
+) -> Result<Metadata> {
+    let about = gpu.describe();
+    let record = Record {
+        command: vec!["lucerna".into(), "reference".into()],
+        scene: stage.source.clone(),
+        unit: args.unit,
+        fingerprint: stage.fingerprint.clone(),
+        width: args.size.width,
+        height: args.size.height,
+        camera: stage.eye.clone(),
+        first_frame: 0,
+        frame: 0,
+        time: args.time,
+        fps: 30.0,
+        exposure,
+        environment: args.environment.as_ref().map(|path| path.to_string_lossy().into_owned()),
+        default_light: args.default_light,
+        light: args.light.clone(),
+        sun: args.sun,
+        seed: settings.reference.seed,
+        view: None,
+        mode: (args.show != Show::Total).then(|| args.show.name().to_owned()),
+        f32: true,
+        settings: config::to_value(settings)?,
+    };
+    Ok(Metadata {
+        program: "lucerna reference".into(),
+        version: program::VERSION.into(),
+        revision: program::revision().map(str::to_owned),
+        scene: stage.scene.name.clone(),
+        scene_hash: stage.fingerprint.clone(),
+        camera: stage.camera_name.clone(),
+        technique: "reference".into(),
+        seed: settings.reference.seed.into(),
+        device: about.device.clone(),
+        driver: format!("{} {}", about.driver, about.driver_info).trim().to_owned(),
+        config: config::to_value(&record)?,
+        world_to_camera: Some(view.view_from_world.to_cols_array()),
+        world_to_ndc: Some(view.clip_from_world.to_cols_array()),
+        ..Metadata::default()
+    })
+}
+
+fn report(layers: &Layers, done: &Progress, meter: &Meter, error: f64, end: End, files: &[&str]) -> Value {
+    json!({
+        "program": layers.metadata.program,
+        "version": layers.metadata.version,
+        "device": layers.metadata.device,
+        "driver": layers.metadata.driver,
+        "config": layers.metadata.config,
+        "samples": done.samples,
+        "paths": done.paths,
+        "paths_per_second": meter.rate(done),
+        "seconds": meter.seconds(),
+        "device_seconds": done.time.as_secs_f64(),
+        "relative_error": if error.is_finite() { json!(error) } else { Value::Null },
+        "ended_by": end.text(),
+        "complete": !end.is_early(),
+        "files": files,
+    })
+}
+
+impl Show {
+    /// Puts the layer in the place of the picture; the total stays as a layer.
+    fn apply(self, layers: &mut Layers) {
+        if self == Self::Total {
+            return;
+        }
+        let Some(chosen) = layers.layer(self.name()).cloned() else { return };
+        if let Some(picture) = layers.layers.iter_mut().find(|l| l.name.is_empty()) {
+            *picture = Layer { name: String::new(), ..chosen };
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! The command line of `lucerna reference`.
+
+use std::{path::PathBuf, str::FromStr, time::Duration};
+
+use clap::ValueEnum;
+use lucerna::{Result, reference::tracer};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    args::{DeviceArgs, Size, TalkArgs, finite, positive},
+    config,
+    framing::DefaultLight,
+    lights::{Point, Sun},
+    progress::ProgressMode,
+};
+
+/// Options of `lucerna reference`.
+#[derive(clap::Args, Clone, Debug)]
+pub struct ReferenceArgs {
+    /// Scene file: .gltf, .glb or .obj
+    #[arg(value_name = "SCENE", required_unless_present_any = ["builtin", "print_config"])]
+    pub scene: Option<PathBuf>,
+
+    /// A built-in scene instead of a file (`lucerna list` names them)
+    #[arg(long, value_name = "NAME", conflicts_with = "scene")]
+    pub builtin: Option<String>,
+
+    /// Metres that one unit of the scene file stands for, where the format leaves it open (OBJ) [default: 1]
+    #[arg(long, value_name = "METRES", value_parser = positive, conflicts_with = "builtin")]
+    pub unit: Option<f64>,
+
+    /// Image to write; may be given more than once: .exr (all layers), .png, .hdr, .pfm. Placeholders: {scene} {camera} {layer}
+    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
+    pub output: Vec<String>,
+
+    /// Replace images that exist
+    #[arg(long, help_heading = "Output")]
+    pub overwrite: bool,
+
+    /// What the picture is; .exr files have the other layers as well
+    #[arg(long, alias = "mode", value_enum, default_value_t, value_name = "LAYER", help_heading = "Output")]
+    pub show: Show,
+
+    /// Print one JSON document about the run on stdout
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+
+    /// Paths for each pixel [default: 256]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=u64::from(u32::MAX)), help_heading = "Quality")]
+    pub spp: Option<u64>,
+
+    /// Stop after this time with what is there: 90, 90s, 10m, 1h30m; exit code 8
+    #[arg(long, value_name = "TIME", help_heading = "Quality")]
+    pub time_limit: Option<Span>,
+
+    /// Stop when the estimated relative mean squared error of luminance is no more than this: 0.01
+    #[arg(long, value_name = "X", value_parser = positive, help_heading = "Quality")]
+    pub target_error: Option<f64>,
+
+    /// Scatterings after the first surface: 0 is direct light, 1 what one pass of isr models [default: 8]
+    #[arg(long, value_name = "N", help_heading = "Quality")]
+    pub bounces: Option<u32>,
+
+    /// Go on from the state that a run with the same options left beside the image
+    #[arg(long, help_heading = "Quality")]
+    pub resume: bool,
+
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", default_value = "1024x768", help_heading = "Picture")]
+    pub size: Size,
+
+    /// Camera by name, by index, from a .toml file, or from a list of views (LIST.toml#NAME); default: the scene's first one
+    #[arg(long, value_name = "NAME|INDEX|FILE", help_heading = "Picture")]
+    pub camera: Option<String>,
+
+    /// Time of an animated scene, seconds
+    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
+    pub time: f64,
+
+    /// Exposure: colours of .png files are multiplied by 2^EV [default: what suits the scene]
+    #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
+    pub exposure: Option<f64>,
+
+    /// Light the scene with this .hdr or .exr environment instead of its own
+    #[arg(long, alias = "env", value_name = "FILE", help_heading = "Picture")]
+    pub environment: Option<PathBuf>,
+
+    /// Add a white point light: place in metres, intensity in W/sr; may be given more than once
+    #[arg(long, value_name = "X,Y,Z,INTENSITY", allow_hyphen_values = true, help_heading = "Picture")]
+    pub light: Vec<Point>,
+
+    /// Add a white sun, and a sky if there is no environment: degrees (azimuth 0 is over +Z, 90 over +X), W/m² [default: 2]
+    #[arg(long, value_name = "AZIMUTH,ELEVATION[,IRRADIANCE]", allow_hyphen_values = true, help_heading = "Picture")]
+    pub sun: Option<Sun>,
+
+    /// Whether a sun and a sky are added
+    #[arg(long, value_enum, default_value_t, value_name = "WHEN", help_heading = "Picture")]
+    pub default_light: DefaultLight,
+
+    /// Seed of everything random [default: 0]
+    #[arg(long, value_name = "N", help_heading = "Picture")]
+    pub seed: Option<u32>,
+
+    /// Set one setting, for example reference.diffuse_only=true (`--print-config` shows all)
+    #[arg(short = 'D', value_name = "KEY=VALUE", help_heading = "Quality")]
+    pub define: Vec<String>,
+
+    /// Read settings from a TOML file; -D wins over it
+    #[arg(long, value_name = "FILE.toml", help_heading = "Quality")]
+    pub settings: Option<PathBuf>,
+
+    /// Print the settings in effect as TOML, then stop
+    #[arg(long, help_heading = "Quality")]
+    pub print_config: bool,
+
+    #[command(flatten)]
+    pub device: DeviceArgs,
+
+    #[command(flatten)]
+    pub talk: TalkArgs,
+
+    /// How progress is shown on stderr
+    #[arg(long, value_enum, default_value_t, value_name = "HOW", help_heading = "Messages")]
+    pub progress: ProgressMode,
+}
+
+/// Everything that can be set in a file or with `-D`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Paths for each pixel.
+    pub samples: u64,
+    pub reference: tracer::Settings,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { samples: 256, reference: tracer::Settings::default() }
+    }
+}
+
+impl ReferenceArgs {
+    /// The settings in effect: defaults, file, `-D`, then the options that have names of their own.
+    ///
+    /// # Errors
+    /// `Usage` or `Input`, naming the key.
+    pub fn effective(&self) -> Result<Settings> {
+        let mut settings = config::effective(&Settings::default(), self.settings.as_deref(), &self.define)?;
+        settings.samples = self.spp.unwrap_or(settings.samples).clamp(1, u32::MAX.into());
+        settings.reference.bounces = self.bounces.unwrap_or(settings.reference.bounces);
+        settings.reference.seed = self.seed.unwrap_or(settings.reference.seed);
+        settings.reference.validate().map_err(|error| error.at("reference"))?;
+        Ok(settings)
+    }
+}
+
+/// Which light the picture shows.
+#[derive(ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Show {
+    #[default]
+    Total,
+    /// What was scattered once
+    Direct,
+    /// What was scattered more often
+    Indirect,
+    /// What shines itself
+    Emission,
+}
+
+impl Show {
+    /// As the layer.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Total => "total",
+            Self::Direct => "direct",
+            Self::Indirect => "indirect",
+            Self::Emission => "emission",
+        }
+    }
+}
+
+/// A time as people write it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Span(pub Duration);
+
+impl FromStr for Span {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("{text:?} is no time; expected for example 90s, 10m or 1h30m");
+        let (mut total, mut digits) = (0.0, String::new());
+        for c in text.chars() {
+            let unit = match c {
+                'h' => 3600.0,
+                'm' => 60.0,
+                's' => 1.0,
+                c if c.is_ascii_digit() || c == '.' => {
+                    digits.push(c);
+                    continue;
+                }
+                _ => return Err(wrong()),
+            };
+            total += std::mem::take(&mut digits).parse::<f64>().map_err(|_| wrong())? * unit;
+        }
+        if !digits.is_empty() {
+            total += digits.parse::<f64>().map_err(|_| wrong())?;
+        }
+        match Duration::try_from_secs_f64(total) {
+            Ok(span) if total > 0.0 => Ok(Self(span)),
+            _ => Err(wrong()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times() {
+        for (text, seconds) in [("90", 90.0), ("1.5s", 1.5), ("10m", 600.0), ("1h30m", 5400.0), ("2m5", 125.0)] {
+            assert_eq!(text.parse::<Span>().unwrap().0.as_secs_f64(), seconds, "{text}");
+        }
+        for text in ["", "0", "-3s", "m", "1d", "1e999", "nan", "5.5.5s"] {
+            assert!(text.parse::<Span>().is_err(), "{text}");
+        }
+    }
+}
