@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use super::{Measured, Options, Pair, arithmetic, baseline, flip, pdiff, ssim};
+use super::{Measured, Options, Pair, arithmetic, baseline, flip, pdiff, ssim, vdp};
 use crate::{Error, Result};
 
 /// A measure. The formulas stand at the functions that compute them.
@@ -40,6 +40,8 @@ pub enum Measure {
     HdrFlip,
     /// On how many pixels an observer sees a difference ([`pdiff::pdiff`]).
     Pdiff,
+    /// On how many pixels a difference is detected ([`vdp::vdp`]).
+    Vdp,
 }
 
 /// What a user must know about a measure.
@@ -60,7 +62,7 @@ pub struct Info {
 
 impl Measure {
     /// In the order of the documentation.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Mae,
         Self::Rmse,
         Self::Nrmse,
@@ -77,6 +79,7 @@ impl Measure {
         Self::Flip,
         Self::HdrFlip,
         Self::Pdiff,
+        Self::Vdp,
     ];
 
     /// Name, direction, unit, source.
@@ -162,6 +165,12 @@ impl Measure {
                 unit: "%",
                 ..DISPLAY
             },
+            Self::Vdp => Info {
+                name: "vdp",
+                what: "share of pixels where a difference is detected, p > 0.75 (VDP, Daly 1993)",
+                unit: "%",
+                ..DISPLAY
+            },
         }
     }
 
@@ -193,6 +202,7 @@ impl Measure {
             Self::Flip => flip::flip(pair, options),
             Self::HdrFlip => flip::hdr_flip(pair, options),
             Self::Pdiff => pdiff::pdiff(pair, options),
+            Self::Vdp => vdp::vdp(pair, options),
         }
     }
 }

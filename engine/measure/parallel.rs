@@ -9,19 +9,54 @@ pub(super) fn threads(wanted: Option<usize>) -> usize {
 
 /// Fills `out` row by row: `row` gets the number of a row and its `stride` values.
 pub(super) fn rows<T: Send>(threads: usize, out: &mut [T], stride: usize, row: impl Fn(usize, &mut [T]) + Sync) {
+    rows_with(threads, out, stride, || (), |(), y, values| row(y, values));
+}
+
+/// As [`rows`], with something that each thread makes for itself, such as room to work in.
+pub(super) fn rows_with<T: Send, S>(
+    threads: usize,
+    out: &mut [T],
+    stride: usize,
+    start: impl Fn() -> S + Sync,
+    row: impl Fn(&mut S, usize, &mut [T]) + Sync,
+) {
     let stride = stride.max(1);
     let count = out.len() / stride;
     let each = count.div_ceil(threads.max(1)).max(1);
     std::thread::scope(|scope| {
         for (part, values) in out.chunks_mut(each * stride).enumerate() {
-            let row = &row;
+            let (start, row) = (&start, &row);
             let mut work = move || {
+                let mut own = start();
                 for (i, values) in values.chunks_exact_mut(stride).enumerate() {
-                    row(part * each + i, values);
+                    row(&mut own, part * each + i, values);
                 }
             };
             // The last part (or the only one) needs no thread of its own.
             if (part + 1) * each >= count { work() } else { drop(scope.spawn(work)) }
+        }
+    });
+}
+
+/// As [`rows`], `height` rows at a time (the last band may have fewer): `band` gets the number of its first row.
+pub(super) fn bands<T: Send>(
+    threads: usize,
+    out: &mut [T],
+    stride: usize,
+    height: usize,
+    band: impl Fn(usize, &mut [T]) + Sync,
+) {
+    let (stride, height) = (stride.max(1), height.max(1));
+    let count = (out.len() / stride).div_ceil(height);
+    let each = count.div_ceil(threads.max(1)).max(1) * height;
+    std::thread::scope(|scope| {
+        for (part, values) in out.chunks_mut(each * stride).enumerate() {
+            let band = &band;
+            scope.spawn(move || {
+                for (i, values) in values.chunks_mut(height * stride).enumerate() {
+                    band(part * each + i * height, values);
+                }
+            });
         }
     });
 }
