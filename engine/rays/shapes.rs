@@ -9,7 +9,7 @@ use crate::{
     shaders::consts::{TRACE_CUTOUT, TRACE_REVERSED, TRACE_SINGLE_SIDED, TRACE_UNLIT},
 };
 use glam::{Mat3, Mat4, Vec3};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 /// Shapes that stand in several places are put into one tree with everything that does not move while the scene has no more
 /// triangles than this that way.
@@ -199,6 +199,16 @@ pub struct Encoded {
 
 impl Encoded {
     fn add(&mut self, list: &[Record], merged: bool, deformed: bool) -> Shape {
+        let distinct: Vec<Record>;
+        let list = if deformed {
+            list
+        } else {
+            // Of equal triangles of an instance the first is the one that is hit.
+            let key = |r: &Record| (r.corners.map(|p| p.to_array().map(f32::to_bits)), r.instance, r.surface);
+            let mut seen = HashSet::with_capacity(list.len());
+            distinct = list.iter().filter(|r| r.surface & TRACE_CUTOUT != 0 || seen.insert(key(r))).copied().collect();
+            &distinct
+        };
         let around = |r: &Record| {
             let aabb = Aabb::of(r.corners.iter().filter(|p| p.is_finite()).copied());
             if aabb.is_empty() { Aabb::of([Vec3::ZERO]) } else { aabb }

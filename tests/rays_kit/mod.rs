@@ -72,7 +72,7 @@ impl<'a> Traceable<'a> {
         let count = rays.len() as u32;
         let list = graph.buffer_from("rays", rays);
         let [closest, any] = [0, 1].map(|any| {
-            let hits = graph.buffer("hits", size_of_val(rays) as u64);
+            let hits = graph.buffer("hits", (size_of::<types::Hit>() * rays.len()) as u64);
             let args = trace::Args {
                 rays: list,
                 hits,
