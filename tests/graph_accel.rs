@@ -6,8 +6,8 @@ use glam::{Mat4, Vec3};
 use lucerna::{
     ErrorKind,
     gpu::{
-        AccelLayout, AccelLevel, BottomDesc, Gpu, GpuOptions, OwnedAccel, OwnedBuffer, RayQuery,
-        testing::{with_gpu, with_gpu_options},
+        AccelLayout, AccelLevel, BottomDesc, GpuOptions, OwnedAccel, OwnedBuffer, RayQuery,
+        testing::{with_gpu_options, with_ray_query},
     },
     graph::{
         Accel, BottomBuild, Buffer, Graph, MistakeKind, Plan, Runner, TopInstance, testing::every_barrier_matters,
@@ -21,20 +21,6 @@ use lucerna::{
 /// A unit square in z = 0, front to +z: one triangle below the diagonal, one above.
 const SQUARE: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
 const INDICES: [u32; 6] = [0, 1, 2, 0, 2, 3];
-
-/// Whether the device has ray queries; says so if not. Under CI it must.
-fn has_ray_query(gpu: &Gpu) -> bool {
-    if !gpu.caps().ray_query {
-        assert!(std::env::var_os("LUCERNA_RAY_QUERY").is_some() || std::env::var_os("CI").is_none() || old(gpu));
-        eprintln!("SKIPPED: {} has no ray queries", gpu.describe());
-    }
-    gpu.caps().ray_query
-}
-
-/// CPU drivers before ray queries.
-fn old(gpu: &Gpu) -> bool {
-    gpu.facts().lacks_of_ray_query().iter().any(|l| l == "lacks VK_KHR_ray_query")
-}
 
 fn ray(x: f32, y: f32) -> QueryRay {
     QueryRay { origin: [x, y, 5.0], t_max: 100.0, direction: [0.0, 0.0, -1.0], mask: 0xff }
@@ -54,10 +40,7 @@ fn build(positions: Buffer, indices: Buffer, refit: bool) -> BottomBuild {
 
 #[test]
 fn queries_see_instances_sides_and_masks() {
-    with_gpu(|gpu| {
-        if !has_ray_query(gpu) {
-            return;
-        }
+    with_ray_query(|gpu| {
         let square = BottomDesc { triangles: 2, vertices: 4, deforms: false };
         let accel = OwnedAccel::new(gpu, "squares", &[square], 3).unwrap();
         let mirrored = Mat4::from_translation(Vec3::new(3.0, 0.0, 1.0)) * Mat4::from_scale(Vec3::new(-1.0, 2.0, 1.0));
@@ -104,10 +87,7 @@ fn queries_see_instances_sides_and_masks() {
 
 #[test]
 fn refits_and_rebuilds_follow_moving_vertices_and_instances() {
-    with_gpu(|gpu| {
-        if !has_ray_query(gpu) {
-            return;
-        }
+    with_ray_query(|gpu| {
         let moving = BottomDesc { triangles: 2, vertices: 4, deforms: true };
         let still = BottomDesc { deforms: false, ..moving };
         let accel = OwnedAccel::new(gpu, "moving", &[moving, still], 2).unwrap();
@@ -146,10 +126,7 @@ fn refits_and_rebuilds_follow_moving_vertices_and_instances() {
 
 #[test]
 fn nothing_to_trace_is_hit_by_nothing() {
-    with_gpu(|gpu| {
-        if !has_ray_query(gpu) {
-            return;
-        }
+    with_ray_query(|gpu| {
         let accel = OwnedAccel::new(gpu, "nothing", &[], 0).unwrap();
         let mut graph = Graph::new("nothing");
         let handle = graph.import_accel(&accel);

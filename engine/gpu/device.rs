@@ -288,7 +288,12 @@ fn list(instance: &Instance) -> Result<Vec<Candidate>> {
 
 impl Context {
     fn new(instance: Arc<Instance>, candidate: Candidate, options: &GpuOptions) -> Result<Self> {
-        let ray_query = options.ray_query != RayQuery::Off && candidate.facts.lacks_of_ray_query().is_empty();
+        let wanted = match options.ray_query {
+            RayQuery::Auto => candidate.facts.kind != DeviceKind::Cpu,
+            RayQuery::On => true,
+            RayQuery::Off => false,
+        };
+        let ray_query = wanted && candidate.facts.lacks_of_ray_query().is_empty();
         let caps = Caps::new(&candidate, &instance.raw, ray_query);
         let facts = &candidate.facts;
         let (queue_family, _) =

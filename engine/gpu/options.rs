@@ -73,10 +73,10 @@ impl FromStr for Validation {
 /// Whether shaders may trace by hardware ray queries.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RayQuery {
-    /// Where the device has them.
+    /// Where the device has them, and is no CPU driver: those emulate them, slower than our own traversal.
     #[default]
     Auto,
-    /// Refuse devices without them.
+    /// On every device, CPU drivers too; refuse devices without them.
     On,
     /// Never: rays are traced in compute on every device.
     Off,
@@ -139,7 +139,7 @@ pub const ENVIRONMENT: [(&str, &str); 6] = [
     ("LUCERNA_DEVICE", "auto, cpu, an index, or part of a device name or UUID"),
     ("LUCERNA_REQUIRE_GPU", "1: refuse CPU drivers"),
     ("LUCERNA_VALIDATION", "off, core, sync or gpu-assisted"),
-    ("LUCERNA_RAY_QUERY", "auto, on (refuse devices without) or off (trace rays in compute)"),
+    ("LUCERNA_RAY_QUERY", "auto (GPUs that have it), on (CPU drivers too; refuse devices without) or off"),
     ("LUCERNA_WAIT_LIMIT", "seconds after which a wait for the device gives up"),
     ("LUCERNA_POISON", "1: fill new device memory with NaN"),
 ];

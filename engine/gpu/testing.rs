@@ -27,6 +27,18 @@ pub fn with_gpu_options(options: GpuOptions, body: impl FnOnce(&Gpu)) {
     }
 }
 
+/// [`with_gpu`] on a device with ray queries, CPU drivers too ([`RayQuery::On`]). Skips loudly where no device has them; also
+/// under `CI`, for drivers that are older than ray queries are tested as well.
+#[track_caller]
+pub fn with_ray_query(body: impl FnOnce(&Gpu)) {
+    let lacks = |d: &super::Listed| !d.missing.is_empty() || !d.facts.lacks_of_ray_query().is_empty();
+    if super::list_devices().is_ok_and(|devices| devices.iter().all(lacks)) {
+        eprintln!("SKIPPED: this test needs a Vulkan device with ray queries");
+        return;
+    }
+    with_gpu_options(GpuOptions { poison: true, ray_query: RayQuery::On, ..GpuOptions::default() }, body);
+}
+
 /// As [`with_gpu_options`], but hands back what was wrong, so that the checks themselves can be tested.
 #[doc(hidden)]
 pub fn run(options: GpuOptions, body: impl FnOnce(&Gpu)) -> Result<(), String> {

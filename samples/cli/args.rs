@@ -145,7 +145,8 @@ pub struct DeviceArgs {
     #[arg(long, help_heading = "Device")]
     pub require_gpu: bool,
 
-    /// Hardware ray queries: auto, on (refuse devices without) or off (trace rays in compute) [default: auto]
+    /// Hardware ray queries: auto (GPUs that have them), on (CPU drivers too; refuse devices without) or off (trace in compute)
+    /// [default: auto]
     #[arg(long, value_name = "CHOICE", help_heading = "Device")]
     pub ray_query: Option<String>,
 }

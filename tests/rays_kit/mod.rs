@@ -48,6 +48,8 @@ pub fn random_rays(numbers: &mut Numbers, count: usize, low: Vec3, high: Vec3) -
 pub struct Traced {
     pub closest: Vec<types::Hit>,
     pub any: Vec<bool>,
+    /// Milliseconds of both on the device.
+    pub ms: [f64; 2],
 }
 
 /// A scene on the device, ready for rays.
@@ -62,6 +64,13 @@ impl<'a> Traceable<'a> {
     pub fn new(gpu: &Gpu, scene: &'a Scene) -> Self {
         let resident = Resident::new(gpu, scene).unwrap();
         let rays = Rays::in_compute(gpu, scene, &resident).unwrap();
+        Self { scene, resident, rays, runner: Runner::new(gpu) }
+    }
+
+    /// As the device traces by itself: by ray query where it has them.
+    pub fn as_caps_say(gpu: &Gpu, scene: &'a Scene) -> Self {
+        let resident = Resident::new(gpu, scene).unwrap();
+        let rays = Rays::new(gpu, scene, &resident).unwrap();
         Self { scene, resident, rays, runner: Runner::new(gpu) }
     }
 
@@ -93,7 +102,10 @@ impl<'a> Traceable<'a> {
             graph.read_buffer(hits)
         });
         let frame = self.runner.run(graph).unwrap();
+        let ms =
+            |name: &str| frame.report.passes.iter().filter(|p| p.name == name).find_map(|p| p.gpu_ms).unwrap_or(0.0);
         Traced {
+            ms: [ms("test.trace"), ms("test.trace#2")],
             closest: frame.buffer(closest),
             any: frame.buffer::<types::Hit>(any).iter().map(|h| h.instance != u32::MAX).collect(),
         }
