@@ -12,7 +12,7 @@ use lucerna::{
         gbuffer, shadow, skybox,
     },
     scene::resident::Resident,
-    techniques::isr::{self, PictureSettings},
+    techniques::isr::{self, PictureSettings, Preset},
 };
 use lucerna_samples::{
     args::RenderArgs,
@@ -41,6 +41,10 @@ struct Render {
     #[command(flatten)]
     common: RenderArgs,
 
+    /// Start from choices that go together: fast, balanced or best; -D and --settings win over it
+    #[arg(long, value_name = "NAME", help_heading = "Technique", conflicts_with = "paper")]
+    preset: Option<Preset>,
+
     /// What the picture shows
     #[arg(long, value_enum, default_value_t, help_heading = "Technique")]
     mode: Mode,
@@ -65,7 +69,11 @@ fn main() -> ExitCode {
 }
 
 fn run(render: &Render) -> Result<ExitCode> {
-    let base = if render.common.paper { PictureSettings::paper() } else { PictureSettings::default() };
+    let base = match render.preset {
+        _ if render.common.paper => PictureSettings::paper(),
+        Some(preset) => PictureSettings { isr: preset.settings(), ..PictureSettings::default() },
+        None => PictureSettings::default(),
+    };
     let mode = match render.mode {
         Mode::Isr => "isr",
         Mode::Direct => "direct",

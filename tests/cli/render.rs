@@ -86,10 +86,20 @@ fn no_device_is_exit_code_4_and_leaves_nothing() {
 #[test]
 fn settings_are_printed_and_read_back() {
     let folder = folder();
+    // Defaults < preset < file < -D.
+    let preset = isr(["render", "--print-config", "--preset", "best", "-D", "layers=2"]).expect(0, &[]).stdout;
+    assert!(
+        preset.contains("samples = 80") && preset.contains("cameras = 3") && preset.contains("layers = 2"),
+        "{preset}"
+    );
+    isr(["render", "--print-config", "--preset", "bets"]).expect(2, &["fast, balanced, best"]);
+    isr(["render", "--print-config", "--preset", "best", "--paper"]).expect(2, &["cannot be used with"]);
     let printed = isr(["render", "--print-config", "--paper", "-D", "samples=80"]).expect(0, &[]).stdout;
     assert!(printed.contains("samples = 80") && printed.contains("sender = \"albedo\""), "{printed}");
     let settings = path(&folder, "s.toml");
     fs::write(&settings, &printed).unwrap();
+    let over = isr(["render", "--print-config", "--preset", "fast", "--settings", &settings]).expect(0, &[]).stdout;
+    assert!(over.contains("samples = 80"), "{over}");
     let again = isr(["render", "--print-config", "--settings", &settings]).expect(0, &[]).stdout;
     assert_eq!(again, printed);
     // -D wins over the file, which wins over the defaults.

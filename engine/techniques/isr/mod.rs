@@ -26,7 +26,8 @@ mod settings;
 
 pub use picture::{Picture, PictureSettings, picture};
 pub use settings::{
-    Blur, Downsample, Estimator, LightLaw, Occlude, Patch, Pattern, Receiver, Resolution, Sender, Settings, Upsample,
+    Blur, Downsample, Estimator, LightLaw, Occlude, Patch, Pattern, Preset, Receiver, Resolution, Sender, Settings,
+    Upsample,
 };
 
 use crate::{

@@ -254,6 +254,54 @@ impl Default for Settings {
     }
 }
 
+/// Choices that go together, from cheap to near the reference. What each costs and gains: `samples/isr/README.md`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preset {
+    /// Half of the samples, and light passes through what stands between.
+    Fast,
+    /// With surfaces around the picture and behind the viewer.
+    Balanced,
+    /// With everything that senders can be found by.
+    Best,
+}
+
+impl Preset {
+    /// All, with the names that `FromStr` takes.
+    pub const ALL: [(&str, Self); 3] = [("fast", Self::Fast), ("balanced", Self::Balanced), ("best", Self::Best)];
+
+    /// The defaults with the choices of the preset.
+    pub fn settings(self) -> Settings {
+        let base = Settings::default();
+        match self {
+            Self::Fast => Settings { samples: 24, visibility_steps: 0, ..base },
+            Self::Balanced => Settings { border: 1.0, cameras: 1, sender_samples: 24, ..base },
+            Self::Best => Settings {
+                samples: 80,
+                visibility_steps: 8,
+                thickness: 0.3,
+                border: 1.0,
+                layers: 3,
+                cameras: 3,
+                sender_scale: 2,
+                sender_samples: 64,
+                ..base
+            },
+        }
+    }
+}
+
+impl std::str::FromStr for Preset {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        Self::ALL.iter().find(|(name, _)| *name == text).map(|(_, preset)| *preset).ok_or_else(|| {
+            let names: Vec<&str> = Self::ALL.iter().map(|(name, _)| *name).collect();
+            Error::usage(format!("no preset '{text}'; there are {}", names.join(", ")))
+        })
+    }
+}
+
 impl Settings {
     /// The dissertation's choices. It states neither the reach of its grid, nor dA, nor the radius of its occluders; taken
     /// here are 32 of its 1024 pixels, the cells of the grid, and spheres as wide as three cells.
@@ -349,6 +397,24 @@ mod tests {
     fn defaults_and_the_papers_choices_are_valid() {
         Settings::default().validate().unwrap();
         Settings::paper().validate().unwrap();
+        for (name, preset) in Preset::ALL {
+            preset.settings().validate().unwrap();
+            assert_eq!(name.parse::<Preset>().unwrap(), preset);
+        }
+        assert!("bets".parse::<Preset>().unwrap_err().to_string().contains("fast, balanced, best"));
+    }
+
+    #[test]
+    fn senders_out_of_range_are_refused() {
+        for wrong in [
+            Settings { border: 4.5, ..Settings::default() },
+            Settings { layers: 0, ..Settings::default() },
+            Settings { cameras: 5, ..Settings::default() },
+            Settings { sender_scale: 0, ..Settings::default() },
+            Settings { sender_samples: 97, ..Settings::default() },
+        ] {
+            assert_eq!(wrong.validate().unwrap_err().exit_code(), 2, "{wrong:?}");
+        }
     }
 
     #[test]

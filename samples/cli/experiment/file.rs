@@ -45,7 +45,8 @@ use crate::{
 };
 
 /// The experiments that come with the program: name and text.
-pub const BUILTIN: &[(&str, &str)] = &[("smoke", include_str!("../../experiments/smoke.toml"))];
+pub const BUILTIN: &[(&str, &str)] =
+    &[("isr", include_str!("../../experiments/isr.toml")), ("smoke", include_str!("../../experiments/smoke.toml"))];
 
 /// Settings that are changed, by their keys.
 pub type Changes = BTreeMap<String, Value>;
@@ -99,6 +100,9 @@ pub struct Scene {
     #[serde(default)]
     pub if_missing: IfMissing,
     pub environment: Option<String>,
+    /// Whether there is light from all around; `false` takes it away, and leaves the lights.
+    #[serde(default = "yes")]
+    pub sky: bool,
     #[serde(default)]
     pub light: Vec<Point>,
     pub sun: Option<Sun>,
@@ -125,6 +129,10 @@ pub struct Scene {
     /// In the file; 0 is unknown.
     #[serde(skip)]
     pub line: usize,
+}
+
+fn yes() -> bool {
+    true
 }
 
 fn one() -> u64 {

@@ -111,6 +111,9 @@ fn read(experiment: &Experiment, entry: &Entry, folders: &Folders) -> Result<Loa
     }
     lights::add(&mut scene, &entry.light, entry.sun.as_ref());
     framing::add_missing_light(&mut scene, entry.default_light);
+    if !entry.sky {
+        scene.environment = None;
+    }
     if !entry.cameras.is_empty() {
         framing::add_missing_camera(&mut scene, experiment.size.aspect());
     }

@@ -1,6 +1,7 @@
 //! What the results of an experiment mean: functions that turn them into tables, plots and images.
 
 mod compare;
+mod isr;
 
 use lucerna::{Error, Result};
 
@@ -11,7 +12,7 @@ use crate::{config, report::Page};
 pub type Analysis = fn(&Results, &mut Page) -> Result<()>;
 
 /// All analyses, by the name that a file gives.
-const ANALYSES: &[(&str, Analysis)] = &[("compare", compare::analyse)];
+const ANALYSES: &[(&str, Analysis)] = &[("compare", compare::analyse), ("isr", isr::analyse)];
 
 /// Finds an analysis.
 ///

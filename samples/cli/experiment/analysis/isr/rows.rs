@@ -1,0 +1,174 @@
+//! One row a view and technique, and what the rows say together. Nothing here knows where the numbers come from.
+
+/// Errors of direct light alone and of a technique on one view, against one reference.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    pub scene: String,
+    pub view: String,
+    /// More than 25,000 triangles.
+    pub complex: bool,
+    /// Mean absolute error over pixels and channels (equation 19), linear radiance, W/(sr·m²).
+    pub direct: f64,
+    pub technique: f64,
+    /// The same of 8-bit sRGB codes at the exposure that shows the reference.
+    pub direct_codes: f64,
+    pub technique_codes: f64,
+    /// Pearson's correlation with the reference.
+    pub direct_correlation: f64,
+    pub correlation: f64,
+    /// Pixels whose error the technique makes smaller, and larger; the rest is as it was.
+    pub better: usize,
+    pub worse: usize,
+    pub pixels: usize,
+    /// Share of the reference's indirect light that the technique finds, as means over the picture.
+    pub found: f64,
+    /// Error of direct light against the reference's direct light, as a share of its error against the whole: what no indirect
+    /// light can mend (shadow maps, filtered textures).
+    pub not_indirect: f64,
+}
+
+/// Percent of an error that is gone. NaN where there was none.
+pub fn gain(before: f64, after: f64) -> f64 {
+    if before > 0.0 { 100.0 * (before - after) / before } else { f64::NAN }
+}
+
+impl Row {
+    /// Figure 5.9.
+    pub fn gain(&self) -> f64 {
+        gain(self.direct, self.technique)
+    }
+
+    pub fn gain_codes(&self) -> f64 {
+        gain(self.direct_codes, self.technique_codes)
+    }
+
+    /// Figure 5.10.
+    pub fn correlation_gain(&self) -> f64 {
+        self.correlation - self.direct_correlation
+    }
+
+    /// What most stands in the way of a larger gain.
+    pub fn reason(&self) -> &'static str {
+        if !self.gain().is_finite() {
+            "direct light alone has no error"
+        } else if self.gain() > 20.0 {
+            ""
+        } else if self.not_indirect > 0.6 {
+            "most of the error is that of direct light itself: shadow edges, and textures that the reference does not filter"
+        } else if self.found < 0.15 {
+            "what lights these surfaces is not in the picture"
+        } else if self.found > 1.2 {
+            "light passes through what the picture does not show"
+        } else {
+            ""
+        }
+    }
+}
+
+/// Means and ends over a list.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    pub count: usize,
+    pub mean: f64,
+    /// Of an even number the mean of the middle two.
+    pub median: f64,
+    pub least: f64,
+    pub most: f64,
+    /// Percent above zero.
+    pub positive: f64,
+}
+
+impl Spread {
+    /// Of the finite values; `None` if there are none.
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
+        let mut list: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
+        list.sort_by(f64::total_cmp);
+        let (&least, &most) = (list.first()?, list.last()?);
+        let count = list.len();
+        let median = 0.5 * (list[(count - 1) / 2] + list[count / 2]);
+        let mean = list.iter().sum::<f64>() / count as f64;
+        let positive = 100.0 * list.iter().filter(|v| **v > 0.0).count() as f64 / count as f64;
+        Some(Self { count, mean, median, least, most, positive })
+    }
+}
+
+/// Percent of all pixels of all views that are nearer to the reference, and that are farther.
+pub fn improved(rows: &[Row]) -> (f64, f64) {
+    let sum = |of: fn(&Row) -> usize| rows.iter().map(of).sum::<usize>() as f64;
+    let all = sum(|row| row.pixels);
+    (100.0 * sum(|row| row.better) / all, 100.0 * sum(|row| row.worse) / all)
+}
+
+/// Factor that makes the codes of a picture fill an 8-bit image: its 95th percentile of the brightest channel becomes 0.8.
+pub fn exposure(pixels: &[[f32; 3]]) -> f32 {
+    let mut brightest: Vec<f32> =
+        pixels.iter().map(|p| p[0].max(p[1]).max(p[2])).filter(|l| l.is_finite() && *l > 0.0).collect();
+    if brightest.is_empty() {
+        return 1.0;
+    }
+    let place = (brightest.len() * 95 / 100).min(brightest.len() - 1);
+    0.8 / brightest.select_nth_unstable_by(place, f32::total_cmp).1.max(1e-20)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub fn row(direct: f64, technique: f64) -> Row {
+        Row {
+            scene: "s".into(),
+            view: "v".into(),
+            complex: false,
+            direct,
+            technique,
+            direct_codes: 10.0,
+            technique_codes: 9.0,
+            direct_correlation: 0.9,
+            correlation: 0.92,
+            better: 60,
+            worse: 30,
+            pixels: 100,
+            found: 0.5,
+            not_indirect: 0.1,
+        }
+    }
+
+    #[test]
+    fn gain_is_the_share_of_the_error_that_is_gone() {
+        assert_eq!(row(2.0, 1.5).gain(), 25.0);
+        assert_eq!(row(2.0, 3.0).gain(), -50.0);
+        assert!(row(0.0, 0.0).gain().is_nan());
+        assert_eq!(row(1.0, 1.0).gain_codes(), 10.0);
+        assert!((row(1.0, 1.0).correlation_gain() - 0.02).abs() < 1e-12);
+    }
+
+    #[test]
+    fn spreads_leave_out_what_is_not_a_number() {
+        let spread = Spread::of([3.0, f64::NAN, -1.0, 2.0, 8.0]).unwrap();
+        assert_eq!(spread, Spread { count: 4, mean: 3.0, median: 2.5, least: -1.0, most: 8.0, positive: 75.0 });
+        assert_eq!(Spread::of([f64::NAN]), None);
+    }
+
+    #[test]
+    fn pixels_count_over_all_views() {
+        let larger = Row { better: 300, worse: 0, pixels: 300, ..row(1.0, 1.0) };
+        assert_eq!(improved(&[row(1.0, 1.0), larger]), (90.0, 7.5));
+    }
+
+    #[test]
+    fn reasons_are_told_apart() {
+        assert_eq!(row(1.0, 0.5).reason(), "");
+        assert!(Row { not_indirect: 0.9, ..row(1.0, 0.99) }.reason().contains("direct light itself"));
+        assert!(Row { found: 0.02, ..row(1.0, 0.99) }.reason().contains("not in the picture"));
+        assert!(Row { found: 1.5, ..row(1.0, 1.1) }.reason().contains("passes through"));
+    }
+
+    #[test]
+    fn exposure_brings_bright_pixels_to_four_fifths() {
+        let mut pixels = vec![[0.0, 2.0, 1.0]; 100];
+        assert!((exposure(&pixels) - 0.4).abs() < 1e-6);
+        pixels[0] = [1e6; 3];
+        assert!((exposure(&pixels) - 0.4).abs() < 1e-6, "one highlight does not count");
+        assert_eq!(exposure(&[[0.0; 3]]), 1.0);
+    }
+}
