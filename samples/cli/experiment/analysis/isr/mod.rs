@@ -2,6 +2,8 @@
 
 mod page;
 mod rows;
+#[cfg(test)]
+mod tests;
 
 use lucerna::{Result, image::srgb, measure::Measure};
 
