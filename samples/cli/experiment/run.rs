@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, time::Instant};
 
 use lucerna::{
-    Error, Result,
+    Error, ErrorKind, Result,
     gpu::Gpu,
     image::{Layer, Layers, Metadata},
 };
@@ -87,7 +87,7 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
         gpu.describe()
     ));
     let mut progress = Progress::new(context.progress, console.is_quiet() || context.dry, counts);
-    let mut planned = Vec::new();
+    let (mut planned, mut failed) = (Vec::new(), 0);
     'all: for (entry, list) in &steps {
         let loaded = match first.take() {
             Some(loaded) => loaded,
@@ -113,11 +113,20 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
             let begun = Instant::now();
             let mut seconds = None;
             if !there && !context.dry {
-                if !one.render(&mut warm, context, &key).map_err(|error| error.at(&what))? {
-                    break 'all;
+                match one.render(&mut warm, context, &key) {
+                    Ok(true) => {
+                        there = true;
+                        seconds = Some(begun.elapsed().as_secs_f64());
+                    }
+                    Ok(false) => break 'all,
+                    // Hours of other work must not be lost with one picture of a program that may be missing anyway.
+                    Err(error) if method.if_missing == IfMissing::Skip && error.kind() != ErrorKind::DeviceLost => {
+                        console.warning(&format!("{what} is skipped: {error}"));
+                        skipped.push((what.clone(), error.to_string()));
+                        failed += 1;
+                    }
+                    Err(error) => return Err(error.at(&what)),
                 }
-                there = true;
-                seconds = Some(begun.elapsed().as_secs_f64());
             }
             progress.run(&method.name, &what, seconds);
             planned.push(Planned { done, there });
@@ -125,7 +134,7 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
     }
     progress.finish();
     let runs: Vec<Done> = planned.iter().filter(|run| run.there).map(|run| run.done.clone()).collect();
-    let missing = total - runs.len();
+    let missing = total - runs.len() - failed;
     let facts = facts(&experiment, context);
     Ok((Results { experiment, runs, skipped, missing, facts, cache: (*cache).clone() }, planned))
 }

@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// Longest side of an image in the page, pixels.
-const SIDE: u32 = 640;
+const SIDE: u32 = 512;
 
 pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
     let measures: Vec<Measure> =
