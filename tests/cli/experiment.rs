@@ -259,3 +259,36 @@ fn scenes_that_are_not_there_fail_or_are_skipped_by_name() {
     let page = fs::read_to_string(place.path("out/report.html")).unwrap();
     assert!(page.contains("Left out: scene hall"));
 }
+
+#[cfg(unix)]
+#[test]
+fn a_program_that_fails_or_is_not_there_can_be_left_out() {
+    use std::os::unix::fs::PermissionsExt;
+    let place = Place::new();
+    let pov = "\n[[technique]]\nname = \"pov\"\nkind = \"povray\"\nif_missing = \"skip\"\n";
+    let run = |path: &Path, text: &str| {
+        place.file(text);
+        let arguments = place.arguments("out", &["--quick"]);
+        support::ran(command(env!("CARGO_BIN_EXE_lucerna")).args(arguments).env("PATH", path))
+    };
+    let report = || -> Value { serde_json::from_slice(&fs::read(place.path("out/report.json")).unwrap()).unwrap() };
+    let empty = place.path("empty");
+    fs::create_dir(&empty).unwrap();
+    run(&empty, &format!("{EXPERIMENT}{pov}")).expect(0, &[]);
+    assert!(report()["warnings"][1].as_str().unwrap().contains("povray"), "{}", report()["warnings"]);
+    run(&empty, &format!("{EXPERIMENT}{}", pov.replace("skip", "fail"))).expect(3, &["povray", "'pov'"]);
+
+    let broken = place.path("broken");
+    fs::create_dir(&broken).unwrap();
+    let program = broken.join("povray");
+    fs::write(
+        &program,
+        "#!/bin/sh\n[ \"$1\" = --version ] && echo 'POV-Ray 0' && exit 0\necho 'Fatal error: broken' >&2\nexit 1\n",
+    )
+    .unwrap();
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+    run(&broken, &format!("{EXPERIMENT}{pov}")).expect(0, &["pov is skipped", "broken"]);
+    let json = report();
+    assert!(json["warnings"][1].as_str().unwrap().contains("cornell/front pov"), "{}", json["warnings"]);
+    run(&broken, &format!("{EXPERIMENT}{}", pov.replace("skip", "fail"))).expect(1, &["cornell/front pov", "broken"]);
+}
