@@ -26,7 +26,9 @@ struct PathSettings {
     uint roulette;             // scatterings before paths may be ended at random
     uint flags;                // PATH_
     uint seed;
-    uint slots;                // TEXTURE_SLOTS + 2; a number that compilers do not know, lest they unroll the loop
+    // Numbers that compilers must not know, lest they unroll loops and take minutes on CPU drivers.
+    uint slots;                // TEXTURE_SLOTS + 2
+    uint two;                  // 2
 };
 
 struct PathState {

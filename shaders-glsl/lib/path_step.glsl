@@ -38,53 +38,25 @@ float met_credit(PathState path, float density) {
     return power_heuristic(path.density, density);
 }
 
-// Where light may come from, chosen before the surface is known in full.
+// Where light may come from.
 struct LightSample {
-    vec3 target;     // place, or unit direction
-    bool far;        // target is a direction
-    vec3 radiance;   // arriving over probability or density; before visibility
-    float density;   // per steradian; 0: of no extent
-    uint material;   // of an emissive triangle, or NONE
-    uint instance;
-    SurfacePoint point;
+    vec3 target;       // place, or unit direction
+    bool far;          // target is a direction
+    bool sky;
+    float chosen;      // how probable this light was
+    float density;     // per steradian; 0: of no extent
+    vec3 radiance;     // arriving over probability or density; before visibility
 };
 
-LightSample sample_light(vec3 from, uvec4 which, uvec4 where) {
-    LightSample s;
-    s.far = false;
-    s.radiance = vec3(0.0);
-    s.density = 0.0;
-    s.material = NONE;
-    float chosen;
-    LightTarget to = light_targets[pick_light(settings.lights, which.x, unit_float(which.y), chosen)];
-    if (to.instance == TARGET_ENVIRONMENT) {
-        s.far = true;
-        s.target = environment_sample(settings.environment, which.z, unit_float(which.w), unit_floats(where.xy), s.density);
-        s.density *= chosen;
-        if (s.density > 0.0) s.radiance = environment_radiance(settings.environment, s.target) / s.density;
-    } else if (to.instance == TARGET_PUNCTUAL) {
-        Light one = light(to.index);
-        vec3 to_light;
-        s.radiance = light_irradiance(one, from, to_light) / chosen;
-        s.far = one.kind == LIGHT_DIRECTIONAL;
-        s.target = s.far ? to_light : one.position;
-    } else {
-        s.instance = to.instance;
-        s.point = surface_point(to.instance, to.index, sample_triangle(unit_floats(where.xy)));
-        vec3 away = from - s.point.position;
-        float distance2 = dot(away, away);
-        float twice_area = length(s.point.area);
-        float facing = dot(s.point.area, away);
-        uint material = surface_instances[to.instance].material;
-        bool lit = facing > 0.0 || (materials[material].flags & MATERIAL_DOUBLE_SIDED) != 0u;
-        if (lit && facing != 0.0 && distance2 > 0.0) {
-            s.material = material;
-            s.density = chosen * 2.0 * distance2 * sqrt(distance2) / abs(facing);
-            // A step towards the viewer: the triangle does not hide itself.
-            s.target = s.point.position + s.point.area * (sign(facing) * surface_gap(s.point) / twice_area);
-        }
-    }
-    return s;
+// Light of a triangle: its density, and the place of `point` a step towards the viewer, so that it does not hide itself.
+void sample_triangle_light(inout LightSample s, vec3 from, SurfacePoint point, bool double_sided) {
+    vec3 away = from - point.position;
+    float distance2 = dot(away, away);
+    float facing = dot(point.area, away);
+    bool lit = facing > 0.0 || (double_sided && facing < 0.0);
+    if (!lit || distance2 == 0.0) return;
+    s.density = s.chosen * 2.0 * distance2 * sqrt(distance2) / abs(facing);
+    s.target = point.position + point.area * (sign(facing) * surface_gap(point) / length(point.area));
 }
 
 // Either a light that waits for it, or the next surface: one place where rays are traced, so that their code exists once.
@@ -105,50 +77,94 @@ void path_step(uvec2 pixel, inout PathState path) {
         return;
     }
     vec3 toward = normalize(path.direction);
-    if (hit.instance == NONE) {
+    bool missed = hit.instance == NONE;
+    bool scatters = !missed && path.scattered <= settings.bounces;
+
+    // The surface and the triangle of a light, in one loop so that their code exists once.
+    LightTarget to = LightTarget(NONE, 0u);
+    LightSample sample_of;
+    sample_of.density = 0.0;
+    sample_of.radiance = vec3(0.0);
+    sample_of.far = false;
+    uvec4 which = random_words(pixel, sample_index, dimension + 1u, settings.seed);
+    uvec4 where = random_words(pixel, sample_index, dimension + 2u, settings.seed);
+    if (scatters && settings.lights > 0u) {
+        to = light_targets[pick_light(settings.lights, which.x, unit_float(which.y), sample_of.chosen)];
+    }
+    sample_of.sky = to.instance == TARGET_ENVIRONMENT;
+    bool punctual = to.instance == TARGET_PUNCTUAL;
+    bool shines = to.instance < TARGET_ENVIRONMENT;
+    uint instances[2] = uint[2](hit.instance, shines ? to.instance : NONE);
+    uint triangles[2] = uint[2](hit.triangle, to.index);
+    vec2 places[2] = vec2[2](hit.barycentrics, sample_triangle(unit_floats(where.xy)));
+    uint surfaces[2] = uint[2](NONE, NONE);
+    SurfacePoint points[2];
+    vec4 colors[2];
+    for (uint i = 0u; i < settings.two; ++i) {
+        if (instances[i] == NONE) continue;
+        points[i] = surface_point(instances[i], triangles[i], places[i]);
+        colors[i] = surface_color(instances[i], points[i]);
+        surfaces[i] = surface_instances[instances[i]].material;
+    }
+    vec4 texels[TEXTURE_SLOTS + 2u];
+    for (uint i = 0u; i < settings.slots; ++i) {
+        uint k = i / TEXTURE_SLOTS;
+        uint slot = k == 0u ? i : i == TEXTURE_SLOTS ? TEXTURE_BASE_COLOR : TEXTURE_EMISSIVE;
+        texels[i] = vec4(1.0);
+        if (surfaces[k] == NONE || !has_texture(materials[surfaces[k]].flags, slot)) continue;
+        TextureUse use = materials[surfaces[k]].textures[slot];
+        texels[i] = sample_texture(use, surface_uv(instances[k], points[k], use.uv_set), 0.0);
+    }
+
+    if (sample_of.sky) {
+        sample_of.far = true;
+        sample_of.target = environment_sample(settings.environment, which.z, unit_float(which.w), unit_floats(where.xy), sample_of.density);
+        sample_of.density *= sample_of.chosen;
+    }
+    vec3 sky = vec3(0.0);
+    if (missed || sample_of.sky) sky = environment_radiance(settings.environment, missed ? toward : sample_of.target);
+    if (missed) {
         path.alive = 0u;
         if ((settings.flags & PATH_SEES_ENVIRONMENT) != 0u) {
             float density = settings.environment_choice * environment_density(settings.environment, toward);
-            vec3 radiance = environment_radiance(settings.environment, toward);
-            add_radiance(path, path.scattered, path.throughput * radiance * met_credit(path, density));
+            add_radiance(path, path.scattered, path.throughput * sky * met_credit(path, density));
         }
         return;
     }
-    SurfacePoint point = surface_point(hit.instance, hit.triangle, hit.barycentrics);
-    uint material = surface_instances[hit.instance].material;
+
+    SurfacePoint point = points[0];
+    uint material = surfaces[0];
     uint flags = materials[material].flags;
     float twice_area = length(point.area);
     vec3 geometric = point.area / twice_area;
     bool front = dot(geometric, toward) < 0.0;
-
-    // All textures in one loop, so that their code exists once: those of the surface, then those of the light's triangle.
-    bool scatters = path.scattered <= settings.bounces;
-    float gap = surface_gap(point);
     vec3 side = front ? geometric : -geometric;
+    float gap = surface_gap(point);
     vec3 above = point.position + side * gap;
-    LightSample sample_of;
-    sample_of.material = NONE;
-    sample_of.radiance = vec3(0.0);
-    if (scatters && settings.lights > 0u) {
-        uvec4 which = random_words(pixel, sample_index, dimension + 1u, settings.seed);
-        uvec4 where = random_words(pixel, sample_index, dimension + 2u, settings.seed);
-        sample_of = sample_light(above, which, where);
+
+    if (shines) {
+        uint m = surfaces[1];
+        uint kind = materials[m].flags;
+        sample_triangle_light(sample_of, above, points[1], (kind & MATERIAL_DOUBLE_SIDED) != 0u);
+        float alpha = materials[m].base_color.a * texels[TEXTURE_SLOTS].a * colors[1].a;
+        float covers = (kind & MATERIAL_MASK) != 0u ? float(alpha >= materials[m].alpha_cutoff)
+            : (kind & MATERIAL_BLEND) != 0u ? clamp(alpha, 0.0, 1.0) : 1.0;
+        sample_of.radiance = materials[m].emissive * texels[TEXTURE_SLOTS + 1u].rgb * covers;
+    } else if (sample_of.sky) {
+        sample_of.radiance = sky;
+    } else if (punctual) {
+        Light one = light(to.index);
+        vec3 to_light;
+        sample_of.radiance = light_irradiance(one, above, to_light) / sample_of.chosen;
+        sample_of.far = one.kind == LIGHT_DIRECTIONAL;
+        sample_of.target = sample_of.far ? to_light : one.position;
     }
-    vec4 texels[TEXTURE_SLOTS + 2u];
-    for (uint i = 0u; i < settings.slots; ++i) {
-        bool of_light = i >= TEXTURE_SLOTS;
-        uint slot = of_light ? (i == TEXTURE_SLOTS ? TEXTURE_BASE_COLOR : TEXTURE_EMISSIVE) : i;
-        uint which = of_light ? sample_of.material : material;
-        texels[i] = vec4(1.0);
-        if (which == NONE || !has_texture(materials[which].flags, slot)) continue;
-        TextureUse use = materials[which].textures[slot];
-        vec2 uv;
-        if (of_light) uv = surface_uv(sample_of.instance, sample_of.point, use.uv_set);
-        else uv = surface_uv(hit.instance, point, use.uv_set);
-        texels[i] = sample_texture(use, uv, 0.0);
+    if (!punctual) {
+        bool wanted = sample_of.density > 0.0 && (settings.flags & PATH_NO_LIGHT_SAMPLES) == 0u;
+        sample_of.radiance = wanted ? sample_of.radiance / sample_of.density : vec3(0.0);
     }
 
-    vec4 base = materials[material].base_color * texels[TEXTURE_BASE_COLOR] * surface_color(hit.instance, point);
+    vec4 base = materials[material].base_color * texels[TEXTURE_BASE_COLOR] * colors[0];
     vec3 normal = normalize(surface_normal(hit.instance, point));
     if (has_texture(flags, TEXTURE_NORMAL)) {
         vec4 tangent = surface_tangent(hit.instance, point);
@@ -213,54 +229,48 @@ void path_step(uvec2 pixel, inout PathState path) {
     float go_sharp = path.specular < settings.specular_bounces ? b.glass + b.mirror : 0.0;
     float go = go_rough + go_sharp;
 
-    // Light from a light.
-    if (scatters && b.rough > 0.0 && settings.lights > 0u) {
-        bool wanted = sample_of.density == 0.0 || (settings.flags & PATH_NO_LIGHT_SAMPLES) == 0u;
-        if (sample_of.material != NONE) {
-            uint m = sample_of.material;
-            float alpha = materials[m].base_color.a * texels[TEXTURE_SLOTS].a * surface_color(sample_of.instance, sample_of.point).a;
-            uint kind = materials[m].flags;
-            float covers = (kind & MATERIAL_MASK) != 0u ? float(alpha >= materials[m].alpha_cutoff)
-                : (kind & MATERIAL_BLEND) != 0u ? clamp(alpha, 0.0, 1.0) : 1.0;
-            sample_of.radiance = materials[m].emissive * texels[TEXTURE_SLOTS + 1u].rgb * (covers / sample_of.density);
+    // The way to the light and the way on, again in one loop.
+    uvec4 ahead = random_words(pixel, sample_index, dimension + 3u, settings.seed);
+    float pick = unit_float(ahead.x) * go;
+    bool on = go > 0.0 && pick < go_rough;
+    vec3 to_lamp = sample_of.far ? sample_of.target : sample_of.target - above;
+    vec3 ways[2] = vec3[2](vec3(0.0), vec3(0.0));
+    if (sample_of.radiance != vec3(0.0) && b.rough > 0.0) ways[0] = normalize(to_lamp);
+    // The rest of the number chooses between the lobes.
+    if (on) ways[1] = bsdf_sample_rough(b, v, pick / go_rough, unit_floats(ahead.yz));
+    vec3 values[2] = vec3[2](vec3(0.0), vec3(0.0));
+    float densities[2] = float[2](0.0, 0.0);
+    for (uint i = 0u; i < settings.two; ++i) {
+        if (ways[i] == vec3(0.0)) continue;
+        float density;
+        values[i] = bsdf_rough(b, v, ways[i], density);
+        densities[i] = go > 0.0 ? density * (go_rough / go) : 0.0;
+    }
+
+    vec3 arrives = values[0] * sample_of.radiance;
+    if (arrives != vec3(0.0)) {
+        if (sample_of.density > 0.0 && (settings.flags & PATH_NO_BSDF_SAMPLES) == 0u) {
+            arrives *= power_heuristic(sample_of.density, densities[0]);
         }
-        if (wanted && sample_of.radiance != vec3(0.0)) {
-            vec3 to = sample_of.far ? sample_of.target : sample_of.target - above;
-            float density;
-            vec3 value = bsdf_rough(b, v, normalize(to), density) * sample_of.radiance;
-            if (sample_of.density > 0.0 && (settings.flags & PATH_NO_BSDF_SAMPLES) == 0u) {
-                density *= go > 0.0 ? go_rough / go : 0.0;
-                value *= power_heuristic(sample_of.density, density);
-            }
-            if (value != vec3(0.0)) {
-                // A lamp or a triangle itself must not be in the way.
-                float until = sample_of.far ? 1e30 : 0.99999;
-                path.waiting = 1u;
-                path.salt = salts.y;
-                path.light_origin = above;
-                path.light_limit = until;
-                path.light_direction = to;
-                path.light_scatterings = path.scattered + 1u;
-                path.light = path.throughput * b.rough * value;
-            }
-        }
+        path.waiting = 1u;
+        path.salt = salts.y;
+        path.light_origin = above;
+        // A lamp or a triangle itself must not be in the way.
+        path.light_limit = sample_of.far ? 1e30 : 0.99999;
+        path.light_direction = to_lamp;
+        path.light_scatterings = path.scattered + 1u;
+        path.light = path.throughput * b.rough * arrives;
     }
 
     if (go <= 0.0) {
         path.alive = 0u;
         return;
     }
-    uvec4 ahead = random_words(pixel, sample_index, dimension + 3u, settings.seed);
     path.limit = 1e30;
-    float pick = unit_float(ahead.x) * go;
-    if (pick < go_rough) {
-        // The rest of the number chooses between the lobes.
-        float share = go_rough / go;
-        path.direction = bsdf_sample_rough(b, v, pick / go_rough, unit_floats(ahead.yz));
-        float density;
-        vec3 value = bsdf_rough(b, v, path.direction, density);
-        path.density = density * share;
-        path.throughput *= path.density > 0.0 ? value * b.rough / path.density : vec3(0.0);
+    if (on) {
+        path.direction = ways[1];
+        path.density = densities[1];
+        path.throughput *= path.density > 0.0 ? values[1] * b.rough / path.density : vec3(0.0);
         path.origin = above;
         path.scattered += 1u;
         if (path.throughput == vec3(0.0)) path.alive = 0u;

@@ -255,5 +255,6 @@ fn path_settings(tracer: &Tracer<'_>, job: &Job, lights: &super::Lights) -> type
         flags,
         seed: settings.seed,
         slots: consts::TEXTURE_SLOTS + 2,
+        two: 2,
     }
 }

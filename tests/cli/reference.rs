@@ -1,0 +1,152 @@
+//! `lucerna reference` from the outside: exit codes, the same bytes whatever happens on the way. Needs a device.
+
+mod support;
+
+use std::{
+    fs,
+    path::Path,
+    process::{Child, Stdio},
+    time::{Duration, Instant},
+};
+
+use lucerna::{image, scene::Limits};
+use support::{Ran, command, device, files, lucerna};
+
+const SMALL: [&str; 6] = ["reference", "--builtin", "cornell-area", "--size", "48x40", "-q"];
+
+fn reference(more: &[&str]) -> Ran {
+    lucerna(SMALL.iter().chain(more))
+}
+
+fn path(folder: &tempfile::TempDir, name: &str) -> String {
+    folder.path().join(name).to_str().unwrap().to_owned()
+}
+
+#[test]
+fn wrong_usage_is_exit_code_2() {
+    lucerna(["reference"]).expect(2, &["SCENE"]);
+    for (arguments, part) in [
+        (&["--spp", "0"][..], "--spp"),
+        (&["--time-limit", "soon"], "10m"),
+        (&["--target-error", "-1"], "above zero"),
+        (&["--bounces", "1001"], "at most 1000"),
+        (&["-D", "reference.bouncs=1"], "reference.bounces"),
+        (&["-D", "reference.sources=moon"], "environment"),
+        (&["-o", "x.tga"], ".exr"),
+    ] {
+        reference(arguments).expect(2, &[part]);
+    }
+    let printed = reference(&["--print-config", "--bounces", "3", "-D", "reference.diffuse_only=true"]).expect(0, &[]);
+    for line in ["samples = 256", "bounces = 3", "diffuse_only = true", "strategy = \"mis\""] {
+        assert!(printed.stdout.contains(line), "{line} is not in {}", printed.stdout);
+    }
+}
+
+#[test]
+fn a_picture_says_how_it_was_made_and_is_made_again() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let (exr, indirect) = (path(&folder, "a.exr"), path(&folder, "b.exr"));
+    let run = reference(&["--spp", "6", "--bounces", "2", "--seed", "5", "-o", &exr, "--json"]).expect(0, &[]);
+    let json = run.json();
+    assert_eq!((json["samples"].as_f64(), json["ended_by"].as_str()), (Some(6.0), Some("samples")));
+    assert!(json["relative_error"].as_f64().is_some_and(|e| e > 0.0) && json["paths"] == 6 * 48 * 40);
+    assert_eq!(files(folder.path()), ["a.exr"], "no state is left of what is done");
+    let picture = image::read(&exr, &Limits::default()).unwrap();
+    let names: Vec<&str> = picture.layers.iter().map(|l| l.name.as_str()).collect();
+    for name in ["", "direct", "indirect", "emission", "albedo", "normal", "position", "depth", "samples", "variance"] {
+        assert!(names.contains(&name), "{name:?} is not in {names:?}");
+    }
+    let layer = |name: &str| &picture.layer(name).unwrap().data;
+    for i in 0..layer("").len() {
+        let sum = layer("direct")[i] + layer("indirect")[i] + layer("emission")[i];
+        assert!((layer("")[i] - sum).abs() <= 1e-5 * sum.abs() + 1e-7);
+    }
+    assert!(layer("samples").iter().all(|&n| n == 6.0));
+    lucerna(["rerun", &exr]).expect(0, &[]);
+    // Any layer can be the picture.
+    reference(&["--spp", "6", "--bounces", "2", "--seed", "5", "--show", "indirect", "-o", &indirect]).expect(0, &[]);
+    let shown = image::read(&indirect, &Limits::default()).unwrap();
+    assert!(shown.layer("").unwrap().data == *layer("indirect"));
+    lucerna(["rerun", &indirect]).expect(0, &[]);
+}
+
+#[test]
+fn time_and_error_end_it_with_a_picture() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let (exr, other) = (path(&folder, "a.exr"), path(&folder, "b.exr"));
+    let run = reference(&["--spp", "1000000", "--time-limit", "0.5s", "-o", &exr, "--json"]).expect(8, &[]);
+    assert_eq!(run.json()["ended_by"], "time");
+    assert_eq!(files(folder.path()), ["a.exr", "a.exr.state"]);
+    assert!(image::read(&exr, &Limits::default()).unwrap().layer("").unwrap().data.iter().all(|v| v.is_finite()));
+    let run = reference(&["--spp", "1000000", "--target-error", "0.5", "-o", &other, "--json"]).expect(0, &[]);
+    assert!(run.json()["ended_by"] == "error" && run.json()["relative_error"].as_f64().unwrap() <= 0.5);
+    // A state of other options is refused, and left alone.
+    let refused = reference(&["--resume", "--bounces", "3", "-o", &exr]).expect(3, &["bounces was 8, now is 3"]);
+    assert_eq!(refused.errors(), 1);
+    fs::write(path(&folder, "a.exr.state"), b"lucerna tracer 1 and nothing else").unwrap();
+    reference(&["--resume", "-o", &exr]).expect(3, &["a.exr.state", "checksum"]);
+}
+
+fn begin(output: &str, spp: &str) -> Child {
+    let mut command = command(env!("CARGO_BIN_EXE_lucerna"));
+    command.args(SMALL).args(["--spp", spp, "-o", output, "--resume"]).env("LUCERNA_CHECKPOINT_SECONDS", "0.02");
+    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+}
+
+fn wait_for(file: &str) {
+    let begun = Instant::now();
+    while !Path::new(file).exists() {
+        assert!(begun.elapsed() < Duration::from_secs(300), "{file} does not appear");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+#[test]
+fn killed_and_run_again_it_ends_with_the_same_bytes() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let (whole, broken) = (path(&folder, "whole.exr"), path(&folder, "broken.exr"));
+    let state = format!("{broken}.state");
+    reference(&["--spp", "200", "-o", &whole]).expect(0, &[]);
+    let mut killed = 0;
+    for _ in 0..3 {
+        let mut child = begin(&broken, "200");
+        wait_for(&state);
+        // Some way on from there.
+        std::thread::sleep(Duration::from_millis(30));
+        killed += u32::from(child.try_wait().unwrap().is_none());
+        let _ = child.kill();
+        child.wait().unwrap();
+        if !Path::new(&state).exists() {
+            break;
+        }
+    }
+    assert!(killed > 0, "it was always done before it could be killed");
+    reference(&["--spp", "200", "-o", &broken, "--resume"]).expect(0, &[]);
+    assert!(fs::read(&whole).unwrap() == fs::read(&broken).unwrap(), "not the same bytes");
+    assert!(!Path::new(&state).exists());
+}
+
+#[test]
+fn an_interrupt_leaves_a_picture_and_a_state() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let exr = path(&folder, "a.exr");
+    let mut child = begin(&exr, "100000");
+    wait_for(&format!("{exr}.state"));
+    assert!(command("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(8));
+    let picture = image::read(&exr, &Limits::default()).unwrap();
+    assert!(picture.layer("samples").unwrap().data.iter().all(|&n| n >= 1.0));
+    assert_eq!(files(folder.path()), ["a.exr", "a.exr.state"]);
+}
