@@ -62,7 +62,7 @@ fn twice_the_light_is_twice_the_picture_in_every_bit() {
             assert!(doubled == found, "layer {name:?}");
         }
         let (indirect, emission) = (mean(&one, "indirect"), mean(&one, "emission"));
-        assert!(indirect[0] > 0.01 && emission[2] > 0.01, "{indirect:?} {emission:?}");
+        assert!(indirect[0] > 0.002 && emission[2] > 0.01, "{indirect:?} {emission:?}");
     });
 }
 

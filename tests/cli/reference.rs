@@ -28,7 +28,7 @@ fn wrong_usage_is_exit_code_2() {
     for (arguments, part) in [
         (&["--spp", "0"][..], "--spp"),
         (&["--time-limit", "soon"], "10m"),
-        (&["--target-error", "-1"], "above zero"),
+        (&["--target-error", "0"], "above zero"),
         (&["--bounces", "1001"], "at most 1000"),
         (&["-D", "reference.bouncs=1"], "reference.bounces"),
         (&["-D", "reference.sources=moon"], "environment"),
