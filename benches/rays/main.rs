@@ -1,6 +1,7 @@
 //! Rays a second through Sponza and Conference: camera rays, shadow rays to a lamp and to the sun, and rays that leave the
 //! surfaces in all directions; nearest hit and any hit. Beside it the same rays through Embree on as many threads, where
-//! its development files and a C compiler are there.
+//! its development files and a C compiler are there, and through the device's ray queries where it has them: their last
+//! number is how many more rays hit something by our own traversal.
 //!
 //! `cargo bench --bench rays [-- [--assets DIR] [--size N] [--rounds N] [SCENE…]]`; `LUCERNA_DEVICE` chooses the device.
 
@@ -8,8 +9,8 @@ mod embree;
 mod sets;
 
 use lucerna::{
-    Result,
-    gpu::{Gpu, GpuOptions},
+    ErrorKind, Result,
+    gpu::{Gpu, GpuOptions, RayQuery},
     graph::{Graph, Runner},
     rays::Rays,
     scene::{self, LoadOptions, Pose, Scene, builtin, resident::Resident},
@@ -64,9 +65,21 @@ fn options() -> Result<Options> {
     Ok(out)
 }
 
+/// With ray queries, also where they are emulated, unless the environment chooses otherwise or the device has none.
+fn open() -> Result<Gpu> {
+    let options = GpuOptions::from_env()?;
+    if options.ray_query != RayQuery::Auto {
+        return Gpu::new(options);
+    }
+    match Gpu::new(GpuOptions { ray_query: RayQuery::On, ..options.clone() }) {
+        Err(error) if error.kind() == ErrorKind::NoDevice => Gpu::new(options),
+        opened => opened,
+    }
+}
+
 fn run() -> Result<()> {
     let options = options()?;
-    let gpu = Gpu::new(GpuOptions::from_env()?)?;
+    let gpu = open()?;
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     println!("{}, {threads} threads, best of {} runs, Mrays/s", gpu.describe(), options.rounds);
     let embree = embree::Program::build();
@@ -107,31 +120,33 @@ fn measure(
     let bvh = scene::bvh::Bvh::build(scene, &Pose::rest(scene));
     println!("\n{name}: {} triangles, built in {:.2} s", bvh.triangles().len(), built.as_secs_f64());
     let mut device = Device { scene, resident, rays, runner: Runner::new(gpu) };
+    let mut query = if gpu.caps().ray_query {
+        let resident = Resident::new(gpu, scene)?;
+        let rays = Rays::new(gpu, scene, &resident)?;
+        Some(Device { scene, resident, rays, runner: Runner::new(gpu) })
+    } else {
+        None
+    };
     let sets = sets::sets(&bvh, options.size);
     let theirs = embree.map(|e| e.run(threads, options.rounds, bvh.triangles(), &sets)).transpose()?;
     println!("by the processors' time (by the clock)");
     println!(
-        "{:<8} {:<8} {:>17} {:>17} {:>7} {:>7}  difference",
-        "rays", "hit", "lucerna", "Embree", "ratio", "hits %"
+        "{:<8} {:<8} {:>17} {:>17} {:>7} {:>7} {:>11}  {:>17}",
+        "rays", "hit", "lucerna", "Embree", "ratio", "hits %", "difference", "ray query"
     );
-    let idle = (0..5).map(|_| device.trace(&sets[0].rays, true, false)).collect::<Result<Vec<_>>>()?;
-    let idle = idle.iter().map(|t| t.busy / sets[0].rays.len() as f64).fold(f64::INFINITY, f64::min);
+    let idle = device.idle(&sets[0].rays)?;
+    let idle_query = query.as_mut().map(|q| q.idle(&sets[0].rays)).transpose()?.unwrap_or(0.0);
     for (index, set) in sets.iter().enumerate() {
         for any in [true, false] {
-            let mut ours = embree::Taken { seconds: f64::INFINITY, busy: f64::INFINITY, hits: 0 };
-            for _ in 0..=options.rounds {
-                let taken = device.trace(&set.rays, any, true)?;
-                ours.seconds = ours.seconds.min(taken.seconds);
-                // Without what moving the rays to the device and back takes.
-                ours.busy = ours.busy.min(taken.busy - idle * set.rays.len() as f64);
-                ours.hits = taken.hits;
-            }
+            let ours = device.best(&set.rays, any, idle, options.rounds)?;
+            // Drivers that emulate ray queries take long.
+            let queried = query.as_mut().map(|q| q.best(&set.rays, any, idle_query, 1)).transpose()?;
             let million = set.rays.len() as f64 / 1e6;
             let rates = |t: &embree::Taken| [million / t.busy * threads as f64, million / t.seconds];
             let text = |r: [f64; 2]| format!("{:.3} ({:.3})", r[0], r[1]);
             let other = theirs.as_ref().map(|t| t[index][usize::from(!any)]);
             println!(
-                "{:<8} {:<8} {:>17} {:>17} {:>7} {:>7.1}  {}",
+                "{:<8} {:<8} {:>17} {:>17} {:>7} {:>7.1} {:>11}  {:>17} {}",
                 set.name,
                 if any { "any" } else { "closest" },
                 text(rates(&ours)),
@@ -139,6 +154,8 @@ fn measure(
                 other.map_or_else(|| "-".into(), |o| format!("{:.3}", rates(&ours)[0] / rates(&o)[0])),
                 100.0 * ours.hits as f64 / set.rays.len() as f64,
                 other.map_or_else(String::new, |o| format!("{:+}", ours.hits as i64 - o.hits as i64)),
+                queried.as_ref().map_or_else(|| "-".into(), |q| text(rates(q))),
+                queried.map_or_else(String::new, |q| format!("{:+}", ours.hits as i64 - q.hits as i64)),
             );
         }
     }
@@ -161,6 +178,24 @@ struct Device<'a> {
 }
 
 impl Device<'_> {
+    /// Processor time of a ray that is only moved to the device and back; the first run also builds what there is to build.
+    fn idle(&mut self, rays: &[types::Ray]) -> Result<f64> {
+        let runs = (0..5).map(|_| self.trace(rays, true, false)).collect::<Result<Vec<_>>>()?;
+        Ok(runs.iter().map(|t| t.busy / rays.len() as f64).fold(f64::INFINITY, f64::min))
+    }
+
+    /// The best of the rounds, and one before them; without what moving the rays to the device and back takes.
+    fn best(&mut self, rays: &[types::Ray], any: bool, idle: f64, rounds: usize) -> Result<embree::Taken> {
+        let mut best = embree::Taken { seconds: f64::INFINITY, busy: f64::INFINITY, hits: 0 };
+        for _ in 0..=rounds {
+            let taken = self.trace(rays, any, true)?;
+            best.seconds = best.seconds.min(taken.seconds);
+            best.busy = best.busy.min(taken.busy - idle * rays.len() as f64);
+            best.hits = taken.hits;
+        }
+        Ok(best)
+    }
+
     /// One pass; with `trace` off, everything but that.
     fn trace(&mut self, rays: &[types::Ray], any: bool, trace: bool) -> Result<embree::Taken> {
         let mut graph = Graph::new("rays");
