@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use glam::{Mat4, Vec3};
 use lucerna::{
     gpu::{DeviceKind, Gpu, testing::with_ray_query},
-    graph::Graph,
+    graph::{Graph, testing::every_barrier_matters},
     scene::{self, Aabb, AlphaMode, LoadOptions, Pose, Scene, Transform, builtin, bvh::Bvh},
     shaders::types::{Hit, Ray},
 };
@@ -183,6 +183,12 @@ fn deforming_and_moving_scenes_over_time() {
         let scenes = [builtin::load("figure").ok()].into_iter().chain(files.map(asset)).flatten();
         for scene in scenes {
             let mut pair = Pair::new(gpu, &scene);
+            let mut graph = Graph::new("plan");
+            let pose = Pose::rest(&scene);
+            pair.query.trace(&pose, &[ray(Vec3::ZERO, Vec3::X)], 0, 0);
+            pair.query.declare(&mut graph, &pose, &[ray(Vec3::ZERO, Vec3::X)], 0, 0);
+            let plan = every_barrier_matters(&graph);
+            assert!(plan.passes.iter().any(|p| p.name.starts_with("refit rays.accel")), "{}", plan.list_passes());
             // Past the frame in which trees are built anew.
             for frame in 0..18 {
                 let pose = Pose::playing(&scene, frame as f32 * 0.13);

@@ -4,7 +4,7 @@
 use glam::Vec3;
 use lucerna::{
     gpu::Gpu,
-    graph::{Graph, Runner},
+    graph::{BufferRead, Graph, Runner},
     rays::Rays,
     scene::{Pose, Scene, bvh, resident::Resident},
     shaders::{test::trace, types},
@@ -74,13 +74,20 @@ impl<'a> Traceable<'a> {
         Self { scene, resident, rays, runner: Runner::new(gpu) }
     }
 
-    pub fn trace(&mut self, pose: &Pose, rays: &[types::Ray], mask: u32, salt: u32) -> Traced {
-        let mut graph = Graph::new("rays");
-        let handles = self.resident.frame_in(&mut graph, self.scene, pose);
-        let traced = self.rays.frame(&mut graph, &handles);
+    /// Passes for one pose: nearest and any hits of `rays`.
+    pub fn declare(
+        &mut self,
+        graph: &mut Graph,
+        pose: &Pose,
+        rays: &[types::Ray],
+        mask: u32,
+        salt: u32,
+    ) -> [BufferRead; 2] {
+        let handles = self.resident.frame_in(graph, self.scene, pose);
+        let traced = self.rays.frame(graph, &handles);
         let count = rays.len() as u32;
         let list = graph.buffer_from("rays", rays);
-        let [closest, any] = [0, 1].map(|any| {
+        [0, 1].map(|any| {
             let hits = graph.buffer("hits", (size_of::<types::Hit>() * rays.len()) as u64);
             let args = trace::Args {
                 rays: list,
@@ -100,7 +107,12 @@ impl<'a> Traceable<'a> {
             };
             graph.compute(args, count);
             graph.read_buffer(hits)
-        });
+        })
+    }
+
+    pub fn trace(&mut self, pose: &Pose, rays: &[types::Ray], mask: u32, salt: u32) -> Traced {
+        let mut graph = Graph::new("rays");
+        let [closest, any] = self.declare(&mut graph, pose, rays, mask, salt);
         let frame = self.runner.run(graph).unwrap();
         let ms =
             |name: &str| frame.report.passes.iter().filter(|p| p.name == name).find_map(|p| p.gpu_ms).unwrap_or(0.0);
