@@ -4,17 +4,19 @@
 //! (a shared edge, coplanar surfaces), of which each way of tracing may take either.
 
 mod rays_kit;
+mod scene_kit;
 
 use std::path::PathBuf;
 
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Vec3, Vec4};
 use lucerna::{
     gpu::{DeviceKind, Gpu, testing::with_ray_query},
     graph::{Graph, testing::every_barrier_matters},
-    scene::{self, Aabb, AlphaMode, LoadOptions, Pose, Scene, Transform, builtin, bvh::Bvh},
+    scene::{self, Aabb, AlphaMode, LoadOptions, Material, Node, Pose, Primitive, Scene, Transform, builtin, bvh::Bvh},
     shaders::types::{Hit, Ray},
 };
 use rays_kit::*;
+use scene_kit::mesh;
 
 const NONE: u32 = u32::MAX;
 /// Largest difference of places along the ray, as a part of the scene's extent.
@@ -284,6 +286,84 @@ fn intervals_and_lengths_of_directions() {
             println!("{kind}: {found:?}");
             assert_eq!(found.disagreements(), 0, "{kind}: {found:?}");
             assert_eq!(found.hits > 0, kind < 5, "{kind}: {found:?}");
+        }
+    });
+}
+
+/// A node with these triangles.
+fn add(scene: &mut Scene, triangles: &[[Vec3; 3]], material: Material) {
+    let positions: Vec<Vec3> = triangles.iter().flatten().copied().collect();
+    let primitive = Primitive {
+        normals: vec![Vec3::Y; positions.len()],
+        tangents: vec![Vec4::ZERO; positions.len()],
+        indices: (0..positions.len() as u32).collect(),
+        positions,
+        ..Primitive::default()
+    };
+    let index = mesh(scene, primitive, Material { double_sided: true, ..material });
+    scene.nodes.push(Node { mesh: Some(index), ..Node::default() });
+}
+
+#[test]
+fn random_degenerate_coplanar_and_axis_parallel_triangles() {
+    with_ray_query(|gpu| {
+        let mut numbers = Numbers(77);
+        let mut triangles = Vec::new();
+        for i in 0..2400 {
+            let (at, a, b) = (numbers.vector(), numbers.vector() * 0.2, numbers.vector() * 0.2);
+            triangles.push(match i % 6 {
+                // Of no area: a point, a line.
+                0 => [at, at, at],
+                1 => [at, at + a, at + a * 0.5],
+                // In planes of the axes, and several in one.
+                2 => {
+                    [Vec3::new(at.x, at.y, 0.25), Vec3::new(at.x + a.x, at.y, 0.25), Vec3::new(at.x, at.y + b.y, 0.25)]
+                }
+                3 => [at, at + Vec3::X * a.x, at + Vec3::Z * b.z],
+                _ => [at, at + a, at + b],
+            });
+        }
+        // Twice the same.
+        triangles.extend_from_within(..300);
+        let mut scene = Scene::default();
+        add(&mut scene, &triangles, Material::diffuse("", Vec3::ONE));
+        let mut rays = random_rays(&mut numbers, 4000, Vec3::NEG_ONE, Vec3::ONE);
+        for (i, ray) in rays.iter_mut().enumerate().filter(|(i, _)| i % 4 == 0) {
+            ray.direction = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]][i / 4 % 3];
+        }
+        let mut pair = Pair::new(gpu, &scene);
+        let (compute, query) = pair.trace(&Pose::rest(&scene), &rays, 0);
+        let found = agree(&rays, &compute, &query, 2.4);
+        println!("{found:?}");
+        assert!(found.hits > 1000 && found.disagreements() == 0, "{found:?}");
+    });
+}
+
+#[test]
+fn rays_pass_through_thousands_of_cut_out_layers() {
+    with_ray_query(|gpu| {
+        let layers: Vec<_> =
+            (1..=3000).map(|i| [Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p + Vec3::Z * i as f32)).collect();
+        let mut scene = Scene::default();
+        let mut nothing =
+            Material { alpha: AlphaMode::Mask { cutoff: 0.5 }, ..Material::diffuse("cut out", Vec3::ONE) };
+        nothing.base_color.w = 0.2;
+        add(&mut scene, &layers, nothing);
+        add(
+            &mut scene,
+            &[[Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p + Vec3::Z * 3001.0)],
+            Material::diffuse("", Vec3::ONE),
+        );
+        let mut pair = Pair::new(gpu, &scene);
+        let rays = vec![ray(Vec3::new(0.25, 0.25, 0.0), Vec3::Z); 64];
+        let (compute, query) = pair.trace(&Pose::rest(&scene), &rays, 0);
+        for traced in [&compute, &query] {
+            assert!(
+                traced.closest.iter().all(|h| (h.t, h.instance, h.triangle) == (3001.0, 1, 0)),
+                "{:?}",
+                traced.closest[0]
+            );
+            assert!(traced.any.iter().all(|any| *any));
         }
     });
 }
