@@ -86,6 +86,7 @@ fn time_and_error_end_it_with_a_picture() {
     assert!(image::read(&exr, &Limits::default()).unwrap().layer("").unwrap().data.iter().all(|v| v.is_finite()));
     let run = reference(&["--spp", "1000000", "--target-error", "0.5", "-o", &other, "--json"]).expect(0, &[]);
     assert!(run.json()["ended_by"] == "error" && run.json()["relative_error"].as_f64().unwrap() <= 0.5);
+    lucerna(["rerun", &other]).expect(0, &[]);
     // A state of other options is refused, and left alone.
     let refused = reference(&["--resume", "--bounces", "3", "-o", &exr]).expect(3, &["bounces was 8, now is 3"]);
     assert_eq!(refused.errors(), 1);

@@ -1,4 +1,4 @@
-//! All lights of a scene in one table, each as probable as its share of the power.
+//! All lights of a scene in one table, picked by their power.
 
 use super::{Sources, alias, environment::strength};
 use crate::{
@@ -32,6 +32,7 @@ pub struct LightTable {
 pub fn table(scene: &Scene, pose: &Pose, lights: &[Light], bounds: &Aabb, sources: Sources) -> LightTable {
     let mut targets = Vec::new();
     let mut powers = Vec::new();
+    let mut groups = Vec::new();
     // Disc that the whole scene covers, seen from afar.
     let radius = if bounds.is_finite() { f64::from(bounds.max.distance(bounds.min)) * 0.5 } else { 1.0 };
     let disc = PI * (radius * radius).max(1e-12);
@@ -46,6 +47,7 @@ pub fn table(scene: &Scene, pose: &Pose, lights: &[Light], bounds: &Aabb, source
                 _ => 4.0 * PI,
             };
             targets.push(LightTarget { instance: TARGET_PUNCTUAL, index: index as u32 });
+            groups.push(if light.kind == LIGHT_DIRECTIONAL { Group::Sun } else { Group::Local });
             powers.push(strength(light.intensity.into()) * spread);
         }
     }
@@ -53,6 +55,7 @@ pub fn table(scene: &Scene, pose: &Pose, lights: &[Light], bounds: &Aabb, source
     let sky = environment.map(|e| (targets.len(), strength(e.mean())));
     if let Some((_, mean)) = sky {
         targets.push(LightTarget { instance: TARGET_ENVIRONMENT, index: 0 });
+        groups.push(Group::Sky);
         powers.push(mean * PI * 4.0 * disc);
     }
     let mut instances = Vec::new();
@@ -72,11 +75,12 @@ pub fn table(scene: &Scene, pose: &Pose, lights: &[Light], bounds: &Aabb, source
             let area = 0.5 * (b - a).cross(c - a).length();
             let sides = if material.double_sided { 2.0 } else { 1.0 };
             targets.push(LightTarget { instance: number, index: index as u32 });
+            groups.push(Group::Local);
             powers.push(PI * sides * area * glow.of(primitive, triangle));
         }
     }
     let count = targets.len() as u32;
-    let columns = alias::table(&powers);
+    let columns = alias::table(&shares(&powers, &groups));
     // A sky of no power still counts as a light of the table, with probability 0 (or an even share, if nothing shines).
     let environment_choice = sky.map_or(0.0, |(at, _)| columns[at].probability);
     if targets.is_empty() {
@@ -86,6 +90,33 @@ pub fn table(scene: &Scene, pose: &Pose, lights: &[Light], bounds: &Aabb, source
         instances.push(NONE);
     }
     LightTable { count, columns, targets, instances, environment_choice }
+}
+
+/// Lights that reach the same places.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Group {
+    Sun,
+    Sky,
+    Local,
+}
+
+/// How often to pick each light: half by its power; half by its share of the power of its group, all groups alike. What the
+/// sun or the sky sends into the whole scene must not leave the lamps of a room unsampled.
+fn shares(powers: &[f64], groups: &[Group]) -> Vec<f64> {
+    let sum = |group: Option<Group>| -> f64 {
+        powers.iter().zip(groups).filter(|(_, g)| group.is_none_or(|only| **g == only)).map(|(p, _)| p).sum()
+    };
+    let all = [Group::Sun, Group::Sky, Group::Local];
+    let there = all.iter().filter(|g| sum(Some(**g)) > 0.0).count() as f64;
+    if there == 0.0 {
+        return powers.to_vec();
+    }
+    let (total, of_group) = (sum(None), all.map(|g| sum(Some(g))));
+    let share = |(power, group): (&f64, &Group)| {
+        let within = power / of_group[*group as usize];
+        0.5 * power / total + if *power > 0.0 { 0.5 * within / there } else { 0.0 }
+    };
+    powers.iter().zip(groups).map(share).collect()
 }
 
 /// Primitives with their nodes, in the order of the resident scene's instances.
@@ -169,6 +200,16 @@ fn linear([r, g, b, _]: [u8; 4]) -> Vec3 {
 mod tests {
     use super::*;
     use crate::scene::{Environment, builtin, resident};
+
+    #[test]
+    fn no_group_of_lights_is_left_out_for_another() {
+        let groups = [Group::Sun, Group::Local, Group::Local, Group::Local];
+        let found = shares(&[1e9, 3.0, 1.0, 0.0], &groups);
+        assert!((found.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        assert!((found[1] - 0.1875).abs() < 1e-6 && (found[2] - 0.0625).abs() < 1e-6 && found[3] == 0.0, "{found:?}");
+        assert_eq!(shares(&[0.0, 0.0], &groups[..2]), [0.0, 0.0]);
+        assert_eq!(shares(&[5.0], &groups[..1]), [1.0]);
+    }
 
     #[test]
     fn every_light_has_its_share_of_the_power() {

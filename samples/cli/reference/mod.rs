@@ -199,6 +199,8 @@ fn work(
             meter.error(error);
             look = (progress.samples * 1.25).ceil();
             if args.target_error.is_some_and(|target| error <= target) {
+                // To whole samples, so that the picture can be made again.
+                tracer.run(progress.samples.ceil() as u64, |_| !interrupt.requested())?;
                 return Ok(End::Error);
             }
         }
