@@ -468,3 +468,18 @@ fn check(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn variants_are_all_combinations_in_order() {
+        let text = "name = 'a'\nkind = 'isr'\nmatrix = { y = [1, 2], x = ['p', 'q'] }";
+        let method: Method = toml::from_str(text).unwrap();
+        let variants: Vec<_> = method.variants().iter().map(|v| (v["x"].clone(), v["y"].clone())).collect();
+        assert_eq!(variants, [("p", 1), ("p", 2), ("q", 1), ("q", 2)].map(|(x, y)| (json!(x), json!(y))));
+    }
+}

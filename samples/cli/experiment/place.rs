@@ -190,3 +190,15 @@ pub fn view_key(view: &View) -> Result<serde_json::Value> {
     let camera = [view.view_from_world, view.clip_from_view].map(|m| m.to_cols_array().to_vec());
     config::to_value(&(camera, view.extent))
 }
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn few_views_are_spread_over_all() {
+        let list: Vec<usize> = (0..10).collect();
+        assert_eq!(super::spread(&list, Some(4)), [&0, &2, &5, &7]);
+        assert_eq!(super::spread(&list, Some(1)), [&0]);
+        assert_eq!(super::spread(&list, Some(99)).len(), 10);
+        assert_eq!(super::spread(&list, None).len(), 10);
+    }
+}
