@@ -1,12 +1,12 @@
-//! Pictures of the Cornell box against one bounce of ray casting on the CPU.
+//! Pictures of the Cornell box against one bounce of path tracing on the CPU.
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::{Graph, Runner},
     passes::{ambient::Irradiance, shadow},
-    reference::one_bounce::{OneBounce, Surface},
-    scene::{Pose, Scene, View, builtin, resident::Resident},
+    reference::path,
+    scene::{Pose, Scene, View, builtin, bvh::Bvh, resident::Resident},
     techniques::isr::{Estimator, Pattern, PictureSettings, Resolution, Settings, picture},
 };
 
@@ -49,27 +49,28 @@ struct Truth {
 fn reference(scene: &Scene) -> Vec<Truth> {
     let pose = Pose::rest(scene);
     let view = first_view(scene, &pose);
-    let truth = OneBounce::new(scene, &pose);
-    let mut found = Vec::new();
-    for y in (3..EXTENT[1]).step_by(6) {
-        for x in (3..EXTENT[0]).step_by(6) {
-            let uv = (Vec2::new(x as f32, y as f32) + 0.5) / Vec2::new(EXTENT[0] as f32, EXTENT[1] as f32);
-            let direction = (view.world_from_depth(uv, 1.0) - view.position).normalize();
-            if let Some(surface) = truth.surface(view.position, direction).filter(|s| s.albedo != Vec3::ZERO) {
-                let visible = |other: &Surface| {
-                    let clip = view.clip_from_world * other.position.extend(1.0);
-                    clip.x.abs() < clip.w && clip.y.abs() < clip.w && truth.sees(view.position, other.position)
-                };
-                found.push(Truth {
-                    pixel: (y * EXTENT[0] + x) as usize,
-                    direct: truth.direct(&surface),
-                    indirect: surface.albedo * truth.gathered(&surface, 16, |_| true),
-                    from_visible: surface.albedo * truth.gathered(&surface, 16, visible),
-                });
-            }
-        }
-    }
-    found
+    let bvh = Bvh::build(scene, &pose);
+    let trace = |seen_senders_only| {
+        let settings = path::Settings {
+            samples: 500,
+            bounces: 1,
+            diffuse_only: true,
+            every: 6,
+            seen_senders_only,
+            ..Default::default()
+        };
+        path::trace(scene, &pose, &bvh, &view, &settings)
+    };
+    let (all, seen) = (trace(false), trace(true));
+    (0..all.albedo.len())
+        .filter(|&pixel| all.albedo[pixel] != Vec3::ZERO)
+        .map(|pixel| Truth {
+            pixel,
+            direct: all.direct[pixel],
+            indirect: all.indirect[pixel],
+            from_visible: seen.indirect[pixel],
+        })
+        .collect()
 }
 
 /// Mean over the reference's mean, mean absolute error over the reference's mean, and correlation, of luminance.

@@ -3,6 +3,5 @@
 
 pub mod isr;
 pub mod isr_scene;
-pub mod one_bounce;
 pub mod path;
 pub mod tracer;

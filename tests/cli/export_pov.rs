@@ -52,9 +52,9 @@ fn by_povray(scene: &Scene, settings: &Pov) -> Vec<Vec3> {
 }
 
 /// Ours: matt surfaces only.
-fn by_rays(scene: &Scene, samples: u32, bounces: u32) -> path::Layers {
+fn by_rays(scene: &Scene, samples: u32, bounces: u32, sources: path::Sources) -> path::Layers {
     let pose = Pose::rest(scene);
-    let settings = path::Settings { samples, bounces, specular: false, ..Default::default() };
+    let settings = path::Settings { samples, bounces, diffuse_only: true, sources, ..Default::default() };
     path::trace(scene, &pose, &Bvh::build(scene, &pose), &view_of(scene), &settings)
 }
 
@@ -127,7 +127,7 @@ fn lights_of_every_kind_give_the_same_light() {
             Mat4::from_translation(Vec3::new(0.1, 0.3, 0.0)) * Mat4::from_scale(Vec3::new(-1.0, 1.0, 1.0)),
         );
         scene.nodes.push(Node { mesh: Some(1), local, ..Node::default() });
-        let (theirs, ours) = (by_povray(&scene, &direct_only()), by_rays(&scene, 1, 0).direct);
+        let (theirs, ours) = (by_povray(&scene, &direct_only()), by_rays(&scene, 1, 0, path::Sources::PUNCTUAL).direct);
         let (ratio, wrong) = (mean(&theirs) / mean(&ours), off(&theirs, &ours, 5e-3));
         println!("{name}: ratio {ratio}, {:.2} % of pixels differ by more than 0.5 %", 100.0 * wrong);
         assert!((ratio - 1.0).abs().max_element() < 4e-3 && wrong < 0.01, "{name}");
@@ -141,8 +141,8 @@ fn the_cornell_box_has_our_direct_light() {
     }
     let scene = builtin::load("cornell").unwrap();
     let theirs = by_povray(&scene, &direct_only());
-    let ours = by_rays(&scene, 1, 0);
-    let shown: Vec<Vec3> = ours.direct.iter().zip(&ours.emitted).map(|(d, e)| *d + *e).collect();
+    let ours = by_rays(&scene, 1, 0, path::Sources::ALL);
+    let shown: Vec<Vec3> = ours.direct.iter().zip(&ours.emission).map(|(d, e)| *d + *e).collect();
     let (ratio, wrong) = (mean(&theirs) / mean(&shown), off(&theirs, &shown, 5e-3));
     println!("ratio {ratio}, {:.2} % of pixels differ by more than 0.5 %", 100.0 * wrong);
     assert!((ratio - 1.0).abs().max_element() < 5e-3 && wrong < 0.01);
@@ -159,7 +159,7 @@ fn the_cornell_box_has_our_bounces_where_brightness_is_one() {
         let settings = Pov { brightness, recursion_limit, ..Pov::default() };
         (mean(&by_povray(&scene, &settings)) - direct).element_sum()
     };
-    let ours = |bounces| mean(&by_rays(&scene, 64, bounces).indirect).element_sum();
+    let ours = |bounces| mean(&by_rays(&scene, 64, bounces, path::Sources::PUNCTUAL).indirect).element_sum();
     let (one, two) = (ours(1), ours(2));
     let (pov_one, pov_two) = (table_1(1.0, 1), table_1(1.0, 2));
     println!("brightness 1: one bounce {:.3} of ours, two bounces {:.3}", pov_one / one, pov_two / two);
@@ -190,7 +190,7 @@ fn the_sky_is_the_same_way_round() {
         let eye = Mat4::from_translation(Vec3::Y) * Mat4::from_rotation_y(yaw) * Mat4::from_rotation_x(pitch);
         scene.nodes[1].local = Transform::Matrix(eye);
         scene.environment = Some(environment.clone());
-        let (theirs, ours) = (by_povray(&scene, &direct_only()), by_rays(&scene, 1, 0).emitted);
+        let (theirs, ours) = (by_povray(&scene, &direct_only()), by_rays(&scene, 1, 0, path::Sources::ALL).emission);
         let seen: Vec<usize> = (0..ours.len()).filter(|&i| ours[i] != Vec3::ZERO).collect();
         let error: f32 =
             seen.iter().map(|&i| (theirs[i] - ours[i]).abs().max_element()).sum::<f32>() / seen.len() as f32;
@@ -211,13 +211,13 @@ fn emissive_surfaces_light_as_lamps() {
     let local = Transform::Matrix(Mat4::from_translation(Vec3::Y) * Mat4::from_rotation_x(std::f32::consts::PI));
     scene.nodes.push(Node { mesh: Some(1), local, ..Node::default() });
     let theirs = by_povray(&scene, &direct_only());
-    let ours = by_rays(&scene, 400, 1);
+    let ours = by_rays(&scene, 400, 0, path::Sources::EMISSIVE);
     let on_ground = |pixels: &[Vec3]| {
         let chosen: Vec<Vec3> =
-            (0..pixels.len()).filter(|&i| ours.emitted[i] == Vec3::ZERO).map(|i| pixels[i]).collect();
+            (0..pixels.len()).filter(|&i| ours.emission[i] == Vec3::ZERO).map(|i| pixels[i]).collect();
         mean(&chosen)
     };
-    let ratio = on_ground(&theirs) / on_ground(&ours.area);
+    let ratio = on_ground(&theirs) / on_ground(&ours.direct);
     println!("ratio {ratio}");
     assert!((ratio - 1.0).abs().max_element() < 0.03);
 }

@@ -1,84 +1,189 @@
-//! A plain CPU path tracer: the slow and obvious ground truth that GPU techniques are held against in tests.
+//! A plain CPU path tracer: the slow and obvious ground truth that GPU techniques and the GPU path tracer are held against.
 //!
-//! It knows what the real-time techniques know: Lambert reflection of punctual lights, emissive surfaces and the
-//! environment, with the light's way kept apart in [`Layers`]. Direct light has the GGX lobe too; bounces are diffuse.
+//! Transport: Lambert and GGX as `lib/brdf.glsl` has them, for direct light and at every bounce; mirrors
+//! (`roughness < 0.05 && metallic > 0.5`) and glass (`transmission`) are sharp; punctual lights, emissive surfaces, the
+//! environment. Light of an extent is found by scattered rays that happen to meet it; emissive surfaces can be sampled by their
+//! area instead ([`Settings::sample_lamps`]). There is no weighting between strategies, no roulette, no clamping.
+//! Unlit surfaces are seen, also in mirrors and through glass, and are not there for light.
 
+mod lights;
+mod random;
+mod scatter;
 mod surface;
 
-use crate::scene::{Light, LightKind, Pose, Scene, View, bvh::Bvh, bvh::Ray, bvh::Step};
+use crate::scene::{
+    Pose, Scene, View,
+    bvh::{Bvh, Hit, Ray, Step},
+};
 use glam::{Mat4, Vec3};
+use lights::{Lamps, Placed};
+use random::{Random, hash_to_unit};
+use scatter::Event;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use surface::{Face, Surfaces};
+
+/// Which lights there are. Those left out neither light nor show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sources {
+    /// Point, spot and directional lights.
+    pub punctual: bool,
+    /// Emissive surfaces, and unlit ones.
+    pub emissive: bool,
+    pub environment: bool,
+}
+
+impl Sources {
+    pub const ALL: Self = Self { punctual: true, emissive: true, environment: true };
+    pub const PUNCTUAL: Self = Self { punctual: true, emissive: false, environment: false };
+    pub const EMISSIVE: Self = Self { punctual: false, emissive: true, environment: false };
+    pub const ENVIRONMENT: Self = Self { punctual: false, emissive: false, environment: true };
+}
 
 /// What to trace.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
     /// Paths a pixel.
     pub samples: u32,
-    /// Diffuse bounces after the first surface: 0 gives direct light only, 1 is what one image-space pass models.
+    /// Scatterings after the first surface: 0 gives direct light only, 1 is what one image-space pass models.
     pub bounces: u32,
+    /// Mirrors and glass that a path may meet, beside `bounces`.
+    pub specular_bounces: u32,
     pub seed: u32,
-    /// Whether direct light has a specular lobe.
-    pub specular: bool,
+    /// Every surface reflects by Lambert's law alone: no gloss, no mirrors, no glass.
+    pub diffuse_only: bool,
     /// Whether rays go through random places of the pixel (box filter) or all through its centre, as a rasteriser's do.
     pub jitter: bool,
+    pub sources: Sources,
+    /// Direct light of emissive surfaces from points on them instead of from scattered rays: less noise with small lamps.
+    pub sample_lamps: bool,
+    /// Surfaces that the camera does not see send nothing: as much as a method can know that has only the picture.
+    pub seen_senders_only: bool,
+    /// Only the middle pixels of squares of this size are traced; the others stay black.
+    pub every: u32,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { samples: 64, bounces: 1, seed: 0, specular: true, jitter: false }
+        Self {
+            samples: 64,
+            bounces: 1,
+            specular_bounces: 8,
+            seed: 0,
+            diffuse_only: false,
+            jitter: false,
+            sources: Sources::ALL,
+            sample_lamps: false,
+            seen_senders_only: false,
+            every: 1,
+        }
     }
 }
 
-/// Radiance towards the camera, W/(sr·m²), by the way that the light took. Row by row, top row first.
+/// Radiance towards the camera, W/(sr·m²), by the way that the light took, and what is seen. Row by row, top row first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Layers {
-    /// Punctual lights → surface → camera.
+    /// Seen directly, in mirrors or through glass, with the environment behind everything.
+    pub emission: Vec<Vec3>,
+    /// Any light, scattered once.
     pub direct: Vec<Vec3>,
-    /// Punctual lights → surfaces → surface → camera: diffuse bounces of the lights that `direct` shows.
+    /// Any light, scattered more than once.
     pub indirect: Vec<Vec3>,
-    /// Emission of the surface itself, and of the environment where no surface is.
-    pub emitted: Vec<Vec3>,
-    /// Emissive surfaces → any number of bounces → camera.
-    pub area: Vec<Vec3>,
-    /// Environment → any number of bounces → camera.
-    pub sky: Vec<Vec3>,
-    /// Diffuse albedo at the first surface; zero where there is none.
+    /// Mean diffuse albedo at the first surface; zero where there is none.
     pub albedo: Vec<Vec3>,
-    /// Distance along the line of sight, metres; infinite where there is no surface.
+    /// Mean shading normal there, world space.
+    pub normal: Vec<Vec3>,
+    /// Mean place, metres.
+    pub position: Vec<Vec3>,
+    /// Mean distance along the line of sight, metres; infinite where there is no surface.
     pub depth: Vec<f32>,
+    /// Of each layer and of the total, by channel: variance of the mean.
+    pub variance: Variances,
+}
+
+/// Variance of the mean, estimated from the samples.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Variances {
+    pub emission: Vec<Vec3>,
+    pub direct: Vec<Vec3>,
+    pub indirect: Vec<Vec3>,
+    pub total: Vec<Vec3>,
 }
 
 impl Layers {
     /// Everything together.
     pub fn total(&self) -> Vec<Vec3> {
-        (0..self.direct.len())
-            .map(|i| self.direct[i] + self.indirect[i] + self.emitted[i] + self.area[i] + self.sky[i])
-            .collect()
+        (0..self.direct.len()).map(|i| self.emission[i] + self.direct[i] + self.indirect[i]).collect()
     }
 }
 
-/// One pixel's sums.
+/// What one path brought.
 #[derive(Clone, Copy, Debug, Default)]
-struct Pixel {
+struct Sample {
+    emission: Vec3,
     direct: Vec3,
     indirect: Vec3,
-    emitted: Vec3,
-    area: Vec3,
-    sky: Vec3,
     albedo: Vec3,
+    normal: Vec3,
+    position: Vec3,
     depth: f32,
+}
+
+impl Sample {
+    /// The layer of light that was scattered so often.
+    fn layer(&mut self, scatterings: u32) -> &mut Vec3 {
+        match scatterings {
+            0 => &mut self.emission,
+            1 => &mut self.direct,
+            _ => &mut self.indirect,
+        }
+    }
+}
+
+/// Sums over the samples of a pixel, and of their squares.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    sum: [glam::DVec3; 7],
+    squares: [glam::DVec3; 4],
+    depth: f64,
+    count: u32,
+}
+
+impl Sums {
+    fn add(&mut self, s: &Sample) {
+        let total = s.emission + s.direct + s.indirect;
+        let values = [s.emission, s.direct, s.indirect, total, s.albedo, s.normal, s.position].map(Vec3::as_dvec3);
+        for (sum, value) in self.sum.iter_mut().zip(values) {
+            *sum += value;
+        }
+        for (sum, value) in self.squares.iter_mut().zip(values) {
+            *sum += value * value;
+        }
+        self.depth += f64::from(s.depth);
+        self.count += 1;
+    }
+
+    fn mean(&self, i: usize) -> Vec3 {
+        (self.sum[i] / f64::from(self.count.max(1))).as_vec3()
+    }
+
+    fn variance(&self, i: usize) -> Vec3 {
+        let n = f64::from(self.count.max(1));
+        let mean = self.sum[i] / n;
+        ((self.squares[i] / n - mean * mean).max(glam::DVec3::ZERO) / (n - 1.0).max(1.0)).as_vec3()
+    }
 }
 
 /// Traces `scene` in `pose` through `view`, on all cores. `bvh` must have been built from both. The result depends only on
 /// the arguments, not on the number of cores.
 pub fn trace(scene: &Scene, pose: &Pose, bvh: &Bvh, view: &View, settings: &Settings) -> Layers {
     let [width, height] = view.extent.map(|e| e as usize);
+    let surfaces = Surfaces::new(scene, pose, bvh);
     let tracer = Tracer {
         bvh,
         scene,
-        surfaces: Surfaces::new(scene, pose, bvh),
-        lights: placed_lights(scene, pose),
+        lamps: Lamps::new(bvh, &surfaces),
+        surfaces,
+        lights: lights::placed(scene, pose),
         world_from_view: view.view_from_world.inverse(),
         view,
         settings,
@@ -92,64 +197,32 @@ pub fn trace(scene: &Scene, pose: &Pose, bvh: &Bvh, view: &View, settings: &Sett
             if y >= height {
                 return rows;
             }
-            rows.push((y, (0..width).map(|x| tracer.pixel(x, y)).collect::<Vec<Pixel>>()));
+            rows.push((y, (0..width).map(|x| tracer.pixel(x, y)).collect::<Vec<Sums>>()));
         }
     };
-    let mut rows: Vec<(usize, Vec<Pixel>)> = std::thread::scope(|scope| {
+    let mut rows: Vec<(usize, Vec<Sums>)> = std::thread::scope(|scope| {
         let threads: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
         // A worker that panicked has a bug; pass it on instead of hiding it.
         threads.into_iter().flat_map(|t| t.join().unwrap_or_else(|e| std::panic::resume_unwind(e))).collect()
     });
     rows.sort_by_key(|(y, _)| *y);
-    let mut layers = Layers::default();
-    for pixel in rows.into_iter().flat_map(|(_, row)| row) {
-        layers.direct.push(pixel.direct);
-        layers.indirect.push(pixel.indirect);
-        layers.emitted.push(pixel.emitted);
-        layers.area.push(pixel.area);
-        layers.sky.push(pixel.sky);
-        layers.albedo.push(pixel.albedo);
-        layers.depth.push(pixel.depth);
-    }
-    layers
-}
-
-/// A light in world space.
-struct Placed<'a> {
-    light: &'a Light,
-    position: Vec3,
-    direction: Vec3,
-}
-
-fn placed_lights<'a>(scene: &'a Scene, pose: &Pose) -> Vec<Placed<'a>> {
-    let place = |(node, world): (&crate::scene::Node, &Mat4)| {
-        Some(Placed {
-            light: &scene.lights[node.light? as usize],
-            position: world.w_axis.truncate(),
-            direction: world.transform_vector3(Vec3::NEG_Z).normalize_or(Vec3::NEG_Z),
-        })
-    };
-    scene.nodes.iter().zip(&pose.world).filter_map(place).collect()
-}
-
-impl Placed<'_> {
-    /// Direction to the light, distance, irradiance on a facing plane (KHR_lights_punctual).
-    fn at(&self, p: Vec3) -> (Vec3, f32, Vec3) {
-        let power = self.light.color * self.light.intensity;
-        let (range, cone) = match self.light.kind {
-            LightKind::Directional => return (-self.direction, f32::INFINITY, power),
-            LightKind::Point { range } => (range, None),
-            LightKind::Spot { range, inner, outer } => (range, Some((inner, outer))),
-        };
-        let to = self.position - p;
-        let distance = to.length().max(1e-4);
-        let to = to / distance;
-        let window = range.map_or(1.0, |r| (1.0 - (distance / r).powi(4)).clamp(0.0, 1.0));
-        let cone = cone.map_or(1.0, |(inner, outer)| {
-            let (cos, inner, outer) = (-to.dot(self.direction), inner.cos(), outer.cos());
-            ((cos - outer) / (inner - outer).max(1e-3)).clamp(0.0, 1.0).powi(2)
-        });
-        (to, distance, power * (window * cone / (distance * distance)))
+    let pixels: Vec<Sums> = rows.into_iter().flat_map(|(_, row)| row).collect();
+    let means = |i: usize| pixels.iter().map(|p| p.mean(i)).collect();
+    let variances = |i: usize| pixels.iter().map(|p| p.variance(i)).collect();
+    Layers {
+        emission: means(0),
+        direct: means(1),
+        indirect: means(2),
+        albedo: means(4),
+        normal: means(5),
+        position: means(6),
+        depth: pixels.iter().map(|p| (p.depth / f64::from(p.count.max(1))) as f32).collect(),
+        variance: Variances {
+            emission: variances(0),
+            direct: variances(1),
+            indirect: variances(2),
+            total: variances(3),
+        },
     }
 }
 
@@ -158,31 +231,26 @@ struct Tracer<'a> {
     scene: &'a Scene,
     surfaces: Surfaces<'a>,
     lights: Vec<Placed<'a>>,
+    lamps: Lamps,
     world_from_view: Mat4,
     view: &'a View,
     settings: &'a Settings,
 }
 
 impl Tracer<'_> {
-    fn pixel(&self, x: usize, y: usize) -> Pixel {
-        let mut sum = Pixel::default();
+    fn pixel(&self, x: usize, y: usize) -> Sums {
+        let mut sums = Sums::default();
+        let every = self.settings.every.max(1) as usize;
+        if [x, y].iter().any(|i| i % every != every / 2) {
+            return sums;
+        }
         let index = y as u32 * self.view.extent[0] + x as u32;
-        let samples = self.settings.samples.max(1);
         let mut random = Random::new(index, self.settings.seed);
-        for _ in 0..samples {
+        for _ in 0..self.settings.samples.max(1) {
             let place = if self.settings.jitter { (random.next(), random.next()) } else { (0.5, 0.5) };
-            self.path(&self.camera_ray(x as f32 + place.0, y as f32 + place.1), &mut random, &mut sum);
+            sums.add(&self.path(&self.camera_ray(x as f32 + place.0, y as f32 + place.1), &mut random));
         }
-        let n = 1.0 / samples as f32;
-        Pixel {
-            direct: sum.direct * n,
-            indirect: sum.indirect * n,
-            emitted: sum.emitted * n,
-            area: sum.area * n,
-            sky: sum.sky * n,
-            albedo: sum.albedo * n,
-            depth: sum.depth * n,
-        }
+        sums
     }
 
     /// Through image position (x, y) in pixels, y down.
@@ -206,80 +274,127 @@ impl Tracer<'_> {
         }
     }
 
-    fn path(&self, camera: &Ray, random: &mut Random, out: &mut Pixel) {
+    fn path(&self, camera: &Ray, random: &mut Random) -> Sample {
+        let Settings { bounces, specular_bounces, diffuse_only, sources, sample_lamps, .. } = *self.settings;
+        let mut out = Sample { depth: f32::INFINITY, ..Sample::default() };
         let mut ray = *camera;
         let mut throughput = Vec3::ONE;
-        for bounce in 0..=self.settings.bounces {
-            let Some(hit) = self.nearest(&ray, bounce == 0, random) else {
-                let sky = throughput * self.environment(ray.direction);
-                if bounce == 0 {
-                    out.emitted += sky;
-                    out.depth = f32::INFINITY;
-                } else {
-                    out.sky += sky;
+        let (mut scatterings, mut sharp_events) = (0, 0);
+        // Whether points on lamps were already asked for the light that this ray may meet.
+        let mut lamps_asked = false;
+        for event in 0.. {
+            let Some(hit) = self.nearest(&ray, event == 0, scatterings > 0, random) else {
+                if sources.environment {
+                    *out.layer(scatterings) += throughput * self.environment(ray.direction);
                 }
-                return;
+                return out;
             };
             let face = self.surfaces.at(hit.triangle, hit.u, hit.v, -ray.direction.normalize());
-            let direct = throughput * self.direct(&face, self.settings.specular && bounce == 0, random);
-            let emission = throughput * face.emission;
-            if bounce == 0 {
-                out.depth += hit.t;
-                out.albedo += face.albedo;
-                out.direct += direct;
-                out.emitted += emission;
-            } else {
-                out.indirect += direct;
-                out.area += emission;
+            if event == 0 {
+                (out.albedo, out.normal, out.position, out.depth) = (face.albedo, face.normal, face.position, hit.t);
             }
-            if face.unlit || bounce == self.settings.bounces {
-                return;
+            if scatterings > 0 && self.settings.seen_senders_only && !self.is_seen(&face, random) {
+                return out;
             }
-            // Cosine-distributed direction: albedo/π · cos / (cos/π) = albedo.
-            throughput *= face.albedo;
-            if throughput == Vec3::ZERO {
-                return;
+            if sources.emissive && !lamps_asked {
+                *out.layer(scatterings) += throughput * face.emission;
             }
-            let direction = cosine_direction(face.normal, random.next(), random.next());
-            if direction.dot(face.geometric) <= 0.0 {
-                // Below the true surface: a shading normal let it through, no light comes from there.
-                return;
+            if face.unlit {
+                return out;
             }
-            ray = Ray::new(face.lifted(), direction);
+            match face.event(diffuse_only, random) {
+                Event::None => return out,
+                Event::Sharp { origin, direction, share } => {
+                    if sharp_events == specular_bounces {
+                        return out;
+                    }
+                    sharp_events += 1;
+                    throughput *= share;
+                    ray = Ray::new(origin, direction);
+                    lamps_asked = false;
+                }
+                Event::Rough => {
+                    if scatterings > bounces {
+                        return out;
+                    }
+                    scatterings += 1;
+                    if sources.punctual {
+                        *out.layer(scatterings) += throughput * self.punctual(&face, random);
+                    }
+                    if sources.emissive && sample_lamps {
+                        *out.layer(scatterings) += throughput * self.lamp(&face, random);
+                        lamps_asked = true;
+                    }
+                    let Some((direction, weight)) = face.scatter(diffuse_only, random) else { return out };
+                    throughput *= weight;
+                    ray = Ray::new(face.lifted(), direction);
+                }
+            }
         }
+        out
     }
 
-    /// Reflected light of all punctual lights. With or without the specular lobe.
-    fn direct(&self, face: &Face, specular: bool, random: &mut Random) -> Vec3 {
-        if face.unlit {
-            return Vec3::ZERO;
-        }
+    /// Reflected light of all punctual lights.
+    fn punctual(&self, face: &Face, random: &mut Random) -> Vec3 {
         let mut sum = Vec3::ZERO;
         for light in &self.lights {
             let (to, distance, irradiance) = light.at(face.position);
-            let cosine = face.normal.dot(to);
-            if cosine <= 0.0 || irradiance == Vec3::ZERO || face.geometric.dot(to) <= 0.0 {
-                continue;
+            let reflected = face.rough(to, self.settings.diffuse_only) * irradiance;
+            if reflected != Vec3::ZERO && !self.blocked(face.lifted(), to, distance * (1.0 - 1e-4), random) {
+                sum += reflected;
             }
-            let origin = face.lifted();
-            let shadow = Ray { origin, direction: to, t_min: 0.0, t_max: distance * (1.0 - 1e-4) };
-            if self.blocked(&shadow, random) {
-                continue;
-            }
-            let lambert = face.albedo * (cosine / std::f32::consts::PI);
-            let lobe = if specular { face.specular(to) } else { Vec3::ZERO };
-            sum += irradiance * (lambert + lobe);
         }
         sum
     }
 
-    fn nearest(&self, ray: &Ray, primary: bool, random: &mut Random) -> Option<crate::scene::bvh::Hit> {
+    /// Reflected light of one point on all emissive surfaces.
+    fn lamp(&self, face: &Face, random: &mut Random) -> Vec3 {
+        let Some(point) = self.lamps.sample(self.bvh, [random.next(), random.next(), random.next()]) else {
+            return Vec3::ZERO;
+        };
+        let way = point.position - face.position;
+        let (distance, to) = (way.length(), way.normalize_or_zero());
+        let reflected = face.rough(to, self.settings.diffuse_only);
+        let source = self.surfaces.at(point.triangle, point.u, point.v, -to);
+        if reflected == Vec3::ZERO || source.emission == Vec3::ZERO {
+            return Vec3::ZERO;
+        }
+        if !self.surfaces.is_there(point.triangle, point.u, point.v, random.next()) {
+            return Vec3::ZERO;
+        }
+        // A whole triangle in front of itself is no shadow.
+        let end = distance - 1e-4 * (1.0 + distance);
+        if self.blocked(face.lifted(), to, end, random) {
+            return Vec3::ZERO;
+        }
+        // Density by area, turned into one by solid angle.
+        reflected * source.emission * (self.lamps.area() * point.normal.dot(to).abs() / (distance * distance))
+    }
+
+    /// Does the camera see this point?
+    fn is_seen(&self, face: &Face, random: &mut Random) -> bool {
+        let clip = self.view.clip_from_world * face.position.extend(1.0);
+        if clip.w <= 0.0 || clip.x.abs() > clip.w || clip.y.abs() > clip.w {
+            return false;
+        }
+        let [.., forward] = self.view.axes();
+        let from = match self.view.is_orthographic() {
+            true => face.position - forward * forward.dot(face.position - self.view.position),
+            false => self.view.position,
+        };
+        let ray = Ray { t_max: 1.0 - 1e-3, ..Ray::new(from, face.position - from) };
+        self.nearest(&ray, true, false, random).is_none()
+    }
+
+    /// The nearest surface. Camera rays do not see the backs of single-sided surfaces, light does not see unlit ones.
+    fn nearest(&self, ray: &Ray, camera: bool, light: bool, random: &mut Random) -> Option<Hit> {
         let mut best = None;
+        let salt = random.salt();
         self.bvh.walk(ray, |hit| {
-            if primary && self.surfaces.is_hidden_back(hit.triangle, ray.direction) {
-                return Step::Ignore;
-            }
-            if !self.surfaces.is_there(hit.triangle, hit.u, hit.v, random.hashed(hit.triangle)) {
+            let absent = (camera && self.surfaces.is_hidden_back(hit.triangle, ray.direction))
+                || (light && !self.surfaces.casts(hit.triangle))
+                || !self.surfaces.is_there(hit.triangle, hit.u, hit.v, hash_to_unit(hit.triangle, salt));
+            if absent {
                 return Step::Ignore;
             }
             best = Some(hit);
@@ -288,62 +403,13 @@ impl Tracer<'_> {
         best
     }
 
-    fn blocked(&self, ray: &Ray, random: &mut Random) -> bool {
-        let mut found = false;
-        let salt = random.next();
-        self.bvh.walk(ray, |hit| {
-            if self.surfaces.casts(hit.triangle)
-                && self.surfaces.is_there(hit.triangle, hit.u, hit.v, hash_to_unit(hit.triangle, salt.to_bits()))
-            {
-                found = true;
-                return Step::End;
-            }
-            Step::Ignore
-        });
-        found
+    fn blocked(&self, origin: Vec3, direction: Vec3, t_max: f32, random: &mut Random) -> bool {
+        self.nearest(&Ray { origin, direction, t_min: 0.0, t_max }, false, true, random).is_some()
     }
 
     fn environment(&self, direction: Vec3) -> Vec3 {
         self.scene.environment.as_ref().map_or(Vec3::ZERO, |e| surface::environment(e, direction.normalize()))
     }
-}
-
-/// A direction around `n` with density cos/π (Malley's method).
-fn cosine_direction(n: Vec3, a: f32, b: f32) -> Vec3 {
-    let (r, phi) = (a.sqrt(), std::f32::consts::TAU * b);
-    let (x, y) = n.any_orthonormal_pair();
-    (x * (r * phi.cos()) + y * (r * phi.sin()) + n * (1.0 - a).max(0.0).sqrt()).normalize()
-}
-
-/// PCG (O'Neill 2014), one stream a pixel.
-struct Random(u64);
-
-impl Random {
-    fn new(pixel: u32, seed: u32) -> Self {
-        let mut random = Self((u64::from(seed) << 32 | u64::from(pixel)).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        random.next();
-        random
-    }
-
-    /// In [0, 1).
-    fn next(&mut self) -> f32 {
-        let state = self.0;
-        self.0 = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        let word = (((state >> ((state >> 59) + 5)) ^ state).wrapping_mul(12_605_985_483_714_917_081) >> 32) as u32;
-        (word >> 8) as f32 / (1 << 24) as f32
-    }
-
-    /// In [0, 1), the same for one triangle along one ray.
-    fn hashed(&self, triangle: u32) -> f32 {
-        hash_to_unit(triangle, (self.0 >> 32) as u32)
-    }
-}
-
-fn hash_to_unit(a: u32, b: u32) -> f32 {
-    let mut h = a.wrapping_mul(0x85eb_ca6b) ^ b;
-    h = (h ^ h >> 16).wrapping_mul(0x7feb_352d);
-    h = (h ^ h >> 15).wrapping_mul(0x846c_a68b);
-    ((h ^ h >> 16) >> 8) as f32 / (1 << 24) as f32
 }
 
 #[cfg(test)]

@@ -21,25 +21,50 @@ pub struct Face {
     pub to_viewer: Vec3,
     /// Diffuse albedo.
     pub albedo: Vec3,
+    /// Base colour.
+    pub base: Vec3,
     pub f0: Vec3,
     pub roughness: f32,
+    /// Towards the viewer, W/(sr·m²).
     pub emission: Vec3,
     pub unlit: bool,
+    /// Whether the viewer is on the front side.
+    pub front: bool,
+    pub double_sided: bool,
+    /// Reflects sharply and does nothing else.
+    pub mirror: bool,
+    /// Share of the surface that is smooth glass.
+    pub transmission: f32,
+    pub ior: f32,
 }
 
 impl Face {
     /// A start for rays that leave the surface, off it by more than the rounding of the hit.
     pub fn lifted(&self) -> Vec3 {
-        self.position + self.geometric * (1e-5 * (1.0 + self.position.abs().max_element()))
+        self.position + self.geometric * self.offset()
+    }
+
+    /// The same for rays that go through it.
+    pub fn sunk(&self) -> Vec3 {
+        self.position - self.geometric * self.offset()
+    }
+
+    fn offset(&self) -> f32 {
+        1e-5 * (1.0 + self.position.abs().max_element())
+    }
+
+    /// α² of GGX: roughness no less than what a point light's highlight needs to cover a pixel.
+    pub fn alpha_squared(&self) -> f32 {
+        self.roughness.max(0.045).powi(4)
     }
 
     /// Specular BRDF · cosine: GGX with Smith's separable-by-height shadowing and Schlick's Fresnel term (glTF 2.0,
-    /// appendix B.3), roughness no less than what a point light's highlight needs to cover a pixel.
+    /// appendix B.3).
     pub fn specular(&self, to_light: Vec3) -> Vec3 {
         let half = (self.to_viewer + to_light).normalize_or(self.normal);
         let (nl, nv) = (self.normal.dot(to_light), self.normal.dot(self.to_viewer).max(1e-4));
         let (nh, vh) = (self.normal.dot(half).clamp(0.0, 1.0), self.to_viewer.dot(half).clamp(0.0, 1.0));
-        let a2 = self.roughness.max(0.045).powi(4);
+        let a2 = self.alpha_squared();
         let distribution = a2 / (std::f32::consts::PI * (nh * nh * (a2 - 1.0) + 1.0).powi(2));
         let lambda = |c: f32| (a2 + (1.0 - a2) * c * c).sqrt();
         let visibility = 0.5 / (nl * lambda(nv) + nv * lambda(nl));
@@ -92,10 +117,16 @@ impl<'a> Surfaces<'a> {
         !material.double_sided && self.front(triangle).dot(direction) > 0.0
     }
 
-    /// Whether this triangle casts shadows: unlit surfaces do not.
+    /// Whether this triangle stops light: unlit surfaces do not.
     pub fn casts(&self, triangle: u32) -> bool {
         let (.., material, _) = self.primitive(triangle);
         !material.unlit
+    }
+
+    /// Whether this triangle is a lamp.
+    pub fn emits(&self, triangle: u32) -> bool {
+        let (.., material, _) = self.primitive(triangle);
+        !material.unlit && material.emissive != Vec3::ZERO
     }
 
     /// Whether the surface is there, by its alpha; `random` in [0, 1) decides for blended surfaces.
@@ -145,12 +176,20 @@ impl<'a> Surfaces<'a> {
             normal = bumped.normalize_or(normal);
         }
         let mut geometric = self.front(triangle);
+        let front = geometric.dot(to_viewer) >= 0.0;
         if geometric.dot(to_viewer) < 0.0 {
             (geometric, normal) = (-geometric, -normal);
         }
         let base = color.truncate();
         let dielectric = ((material.ior - 1.0) / (material.ior + 1.0)).powi(2);
         let unlit = material.unlit;
+        let mut transmission = material.transmission;
+        if let Some(texture) = &material.transmission_texture {
+            transmission *= self.sample(texture, uv(primitive, texture, corners, w), false).x;
+        }
+        if !(front || material.double_sided) {
+            emission = Vec3::ZERO;
+        }
         Face {
             position: mix(corners.map(|i| vertices.positions[i]), w),
             normal,
@@ -158,9 +197,15 @@ impl<'a> Surfaces<'a> {
             to_viewer,
             albedo: if unlit { Vec3::ZERO } else { base * (1.0 - metallic) },
             f0: Vec3::splat(dielectric).lerp(base, metallic),
+            base,
             roughness,
             emission: if unlit { base } else { emission },
             unlit,
+            front,
+            double_sided: material.double_sided,
+            mirror: roughness < 0.05 && metallic > 0.5,
+            transmission: if unlit { 0.0 } else { transmission },
+            ior: material.ior.max(1.0),
         }
     }
 

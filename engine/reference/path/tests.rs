@@ -1,7 +1,7 @@
 //! Scenes whose light is known in closed form.
 
 use super::*;
-use crate::scene::{Camera, Environment, Material, Mesh, Node, Primitive, Projection, Transform};
+use crate::scene::{Camera, Environment, Light, LightKind, Material, Mesh, Node, Primitive, Projection, Transform};
 use std::f32::consts::PI;
 
 const ALBEDO: Vec3 = Vec3::new(0.8, 0.5, 0.2);
@@ -28,6 +28,12 @@ fn sphere(r: f32, inward: bool) -> Primitive {
     }
     p.tangents = vec![glam::Vec4::ZERO; p.positions.len()];
     p
+}
+
+/// With the normals of its triangles: no shading normal leads a path into the surface.
+fn flat(mut primitive: Primitive) -> Primitive {
+    primitive.make_flat();
+    primitive
 }
 
 /// A square of half-width `s` in the plane y = 0, facing up.
@@ -82,16 +88,16 @@ fn assert_close(got: Vec3, expected: Vec3, relative: f32) {
 }
 
 fn settings(samples: u32, bounces: u32) -> Settings {
-    Settings { samples, bounces, specular: false, ..Settings::default() }
+    Settings { samples, bounces, diffuse_only: true, ..Settings::default() }
 }
 
 #[test]
 fn a_furnace_sums_the_geometric_series() {
     let material = Material { emissive: Vec3::splat(2.0), ..Material::diffuse("", ALBEDO) };
-    let scene = scene(sphere(1.0, true), material);
+    let scene = scene(flat(sphere(1.0, true)), material);
     for bounces in [0, 1, 3, 8] {
         let layers = run(&scene, &view(Mat4::IDENTITY, 6), settings(2, bounces));
-        let series: Vec3 = (0..=bounces).map(|k| 2.0 * ALBEDO.powf(k as f32)).sum();
+        let series: Vec3 = (0..=bounces + 1).map(|k| 2.0 * ALBEDO.powf(k as f32)).sum();
         // Every path sees the same light: no noise, only rounding.
         for total in layers.total() {
             assert_close(total, series, 1e-4);
@@ -121,13 +127,13 @@ fn a_plane_under_an_even_sky_reflects_its_albedo() {
         rotation: 0.4,
         scale: 2.0,
     });
-    let layers = run(&scene, &from_above(5), settings(8, 1));
-    for sky in &layers.sky {
+    let layers = run(&scene, &from_above(5), settings(8, 0));
+    for sky in &layers.direct {
         assert_close(*sky, ALBEDO * 6.0, 1e-4);
     }
     let up = view(Mat4::from_translation(Vec3::Y) * Mat4::from_rotation_x(PI / 2.0), 3);
     let above = run(&scene, &up, settings(1, 1));
-    assert!(above.emitted.iter().all(|e| e.abs_diff_eq(Vec3::splat(6.0), 1e-4)));
+    assert!(above.emission.iter().all(|e| e.abs_diff_eq(Vec3::splat(6.0), 1e-4)));
     assert!(above.depth.iter().all(|d| d.is_infinite()));
 }
 
@@ -185,6 +191,27 @@ fn light_scales_and_repeats() {
     assert_ne!(one.indirect, other.indirect);
 }
 
+/// A black surface facing up, seen from above.
+fn blank() -> Face {
+    Face {
+        position: Vec3::ZERO,
+        normal: Vec3::Y,
+        geometric: Vec3::Y,
+        to_viewer: Vec3::Y,
+        albedo: Vec3::ZERO,
+        base: Vec3::ONE,
+        f0: Vec3::ZERO,
+        roughness: 1.0,
+        emission: Vec3::ZERO,
+        unlit: false,
+        front: true,
+        double_sided: false,
+        mirror: false,
+        transmission: 0.0,
+        ior: 1.5,
+    }
+}
+
 #[test]
 fn the_specular_lobe_reflects_no_more_than_it_gets() {
     // White metal under a sky of many directional lights would need an integral; one light, integrated over viewers:
@@ -199,16 +226,11 @@ fn the_specular_lobe_reflects_no_more_than_it_gets() {
                     let c = (i as f32 + 0.5) / n as f32;
                     let phi = (j as f32 + 0.5) / n as f32 * 2.0 * PI;
                     let s = (1.0 - c * c).sqrt();
-                    let face = surface::Face {
-                        position: Vec3::ZERO,
-                        normal: Vec3::Y,
-                        geometric: Vec3::Y,
+                    let face = Face {
                         to_viewer: Vec3::new(s * phi.cos(), c, s * phi.sin()),
-                        albedo: Vec3::ZERO,
                         f0: Vec3::ONE,
                         roughness,
-                        emission: Vec3::ZERO,
-                        unlit: false,
+                        ..blank()
                     };
                     // Specular BRDF · cos of the viewer instead of the light's.
                     sum += f64::from(face.specular(to_light).x / cosine * c) * f64::from(2.0 * PI) / f64::from(n * n);
@@ -217,5 +239,144 @@ fn the_specular_lobe_reflects_no_more_than_it_gets() {
             assert!(sum < 1.001, "roughness {roughness}, cosine {cosine}: {sum}");
             assert!(roughness > 0.3 || sum > 0.9, "roughness {roughness}, cosine {cosine}: {sum}");
         }
+    }
+}
+
+#[test]
+fn scattering_estimates_the_integral_of_what_it_samples() {
+    // The same albedo (share of light from everywhere that is reflected) by quadrature and by the sampler.
+    for (roughness, slant) in [(0.1f32, 0.3f32), (0.3, 0.9), (0.7, 0.5), (1.0, 0.2)] {
+        let face = Face {
+            to_viewer: Vec3::new((1.0 - slant * slant).sqrt(), slant, 0.0),
+            albedo: Vec3::splat(0.3),
+            f0: Vec3::splat(0.6),
+            roughness,
+            ..blank()
+        };
+        let (n, m) = (2000, 4000);
+        let mut wanted = 0.0f64;
+        for i in 0..n {
+            for j in 0..m {
+                let c = (i as f32 + 0.5) / n as f32;
+                let (s, phi) = ((1.0 - c * c).sqrt(), (j as f32 + 0.5) / m as f32 * 2.0 * PI);
+                wanted += f64::from(face.rough(Vec3::new(s * phi.cos(), c, s * phi.sin()), false).x);
+            }
+        }
+        wanted *= std::f64::consts::TAU / f64::from(n * m);
+        let mut random = Random::new(7, 3);
+        let count = 200_000;
+        let (mut sum, mut squares) = (0.0f64, 0.0f64);
+        for _ in 0..count {
+            let weight = face.scatter(false, &mut random).map_or(0.0, |(_, w)| f64::from(w.x));
+            (sum, squares) = (sum + weight, squares + weight * weight);
+        }
+        let mean = sum / f64::from(count);
+        let error = ((squares / f64::from(count) - mean * mean) / f64::from(count)).sqrt();
+        assert!((mean - wanted).abs() < 4.0 * error + 1e-4, "roughness {roughness}: {mean} ± {error}, not {wanted}");
+    }
+}
+
+#[test]
+fn fresnel_agrees_with_known_values() {
+    // Normal incidence ((n − 1) / (n + 1))², Brewster's angle, total reflection.
+    assert!((scatter::fresnel(1.0, 1.0 / 1.5).0 - 0.04).abs() < 1e-6);
+    let brewster = 1.5f32.atan();
+    let half_of_s = 0.5 * ((1.5f32.powi(2) - 1.0) / (1.5f32.powi(2) + 1.0)).powi(2);
+    assert!((scatter::fresnel(brewster.cos(), 1.0 / 1.5).0 - half_of_s).abs() < 1e-6);
+    assert_eq!(scatter::fresnel(0.5, 1.5).0, 1.0);
+}
+
+/// A cube from −1 to 1.
+fn cube() -> Primitive {
+    let mut p = Primitive::default();
+    for face in 0..6 {
+        let turn = match face {
+            0..4 => Mat4::from_rotation_x(face as f32 * PI / 2.0),
+            _ => Mat4::from_rotation_z((face as f32 - 4.5) * PI),
+        };
+        let first = p.positions.len() as u32;
+        let side = ground(1.0);
+        p.positions.extend(side.positions.iter().map(|q| turn.transform_point3(*q + Vec3::Y).round()));
+        p.normals.extend(side.normals.iter().map(|n| turn.transform_vector3(*n).round()));
+        p.tangents.extend(side.tangents);
+        p.indices.extend(side.indices.iter().map(|i| i + first));
+    }
+    p
+}
+
+/// Light of 5 W/(sr·m²) from everywhere; in it a body.
+fn body_in_a_furnace(material: Material) -> Scene {
+    let mut scene = scene(flat(sphere(4.0, true)), Material::emitter("", Vec3::splat(5.0)));
+    scene.meshes.push(Mesh { primitives: vec![Primitive { material: 1, ..cube() }], ..Mesh::default() });
+    let local = Transform::Matrix(Mat4::from_rotation_y(0.5) * Mat4::from_rotation_x(0.4));
+    scene.nodes.push(Node { mesh: Some(1), local, ..Node::default() });
+    scene.materials.push(material);
+    scene
+}
+
+#[test]
+fn clear_glass_and_white_mirrors_vanish_in_even_light() {
+    let glass = Material { transmission: 1.0, ..Material::diffuse("", Vec3::ONE) };
+    let thin = Material { double_sided: true, ..glass.clone() };
+    let mirror = Material { roughness: 0.0, ..Material::default() };
+    for material in [glass, thin, mirror] {
+        let scene = body_in_a_furnace(material);
+        let view = view(Mat4::from_translation(Vec3::Z * 3.0), 8);
+        let settings = Settings { samples: 16, bounces: 0, specular_bounces: 200, ..Settings::default() };
+        for emission in run(&scene, &view, settings).emission {
+            assert_close(emission, Vec3::splat(5.0), 1e-4);
+        }
+    }
+}
+
+#[test]
+fn a_pane_tints_and_does_not_bend() {
+    let tint = Vec3::new(0.9, 0.5, 0.25);
+    let pane = Material { transmission: 1.0, double_sided: true, ..Material::diffuse("", tint) };
+    let mut scene = scene(ground(50.0), pane);
+    let mut environment = Environment::constant(Vec3::ZERO);
+    // Bright above, dark below.
+    (environment.width, environment.height) = (2, 2);
+    environment.pixels = vec![Vec3::ZERO, Vec3::ZERO, Vec3::splat(2.0), Vec3::splat(2.0)];
+    scene.environment = Some(environment);
+    let layers = run(&scene, &from_above(1), Settings { samples: 60_000, bounces: 0, ..Settings::default() });
+    // 2R / (1 + R) is reflected in all.
+    let r = 2.0 * 0.04 / 1.04;
+    assert_close(layers.emission[0], tint * (1.0 - r) * 2.0, 0.01);
+}
+
+#[test]
+fn lamps_give_the_same_light_by_points_and_by_rays() {
+    let mut scene = scene(ground(5.0), Material { roughness: 0.4, metallic: 0.3, ..Material::diffuse("", ALBEDO) });
+    scene.meshes.push(Mesh { primitives: vec![Primitive { material: 1, ..ground(1.0) }], ..Mesh::default() });
+    scene.materials.push(Material::emitter("", Vec3::new(4.0, 5.0, 6.0)));
+    let over = Mat4::from_translation(Vec3::new(0.5, 2.0, 0.0)) * Mat4::from_rotation_x(PI);
+    scene.nodes.push(Node { mesh: Some(1), local: Transform::Matrix(over), ..Node::default() });
+    let view = view(Mat4::from_translation(Vec3::new(0.0, 1.5, 0.0)) * Mat4::from_rotation_x(-PI / 2.0), 8);
+    let rays = run(&scene, &view, Settings { samples: 4000, bounces: 0, ..Settings::default() });
+    let points = run(&scene, &view, Settings { samples: 500, bounces: 0, sample_lamps: true, ..Settings::default() });
+    let mut chi = 0.0;
+    for i in 0..64 {
+        let (d, v) = (rays.direct[i].y - points.direct[i].y, rays.variance.direct[i].y + points.variance.direct[i].y);
+        chi += d * d / v;
+        assert!(d.abs() < 5.0 * v.sqrt(), "pixel {i}: {d} with a deviation of {}", v.sqrt());
+    }
+    assert!((35.0..100.0).contains(&chi), "{chi}");
+}
+
+#[test]
+fn sources_add_up() {
+    let mut scene = with_light(
+        scene(ground(5.0), Material::diffuse("", ALBEDO)),
+        LightKind::Point { range: None },
+        3.0,
+        Mat4::from_translation(Vec3::Y),
+    );
+    scene.environment = Some(Environment::constant(Vec3::ONE));
+    scene.materials[0].emissive = Vec3::X;
+    let with = |sources| run(&scene, &from_above(4), Settings { sources, ..settings(16, 1) }).total();
+    let parts = [Sources::PUNCTUAL, Sources::EMISSIVE, Sources::ENVIRONMENT].map(with);
+    for (i, all) in with(Sources::ALL).iter().enumerate() {
+        assert_close(parts[0][i] + parts[1][i] + parts[2][i], *all, 1e-5);
     }
 }
