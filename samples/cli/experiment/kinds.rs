@@ -287,8 +287,8 @@ struct PathSettings {
 
 impl Default for PathSettings {
     fn default() -> Self {
-        let path::Settings { samples, bounces, specular, jitter, .. } = path::Settings::default();
-        Self { samples, bounces, specular, jitter }
+        let path::Settings { samples, bounces, diffuse_only, jitter, .. } = path::Settings::default();
+        Self { samples, bounces, specular: !diffuse_only, jitter }
     }
 }
 
@@ -297,17 +297,17 @@ fn path_picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> 
     let (scene, pose) = (warm.scene, warm.pose);
     let bvh: &mut Bvh = warm.keep("bvh", |_, scene, pose| Ok(Bvh::build(scene, pose)))?;
     let begun = Instant::now();
-    let settings = path::Settings { samples, bounces, specular, jitter, seed: job.seed };
+    let settings =
+        path::Settings { samples, bounces, diffuse_only: !specular, jitter, seed: job.seed, ..Default::default() };
     let traced = path::trace(scene, pose, bvh, job.view, &settings);
     let [width, height] = job.view.extent;
     let rgb = |pixels: &[glam::Vec3]| pixels.iter().map(|v| v.to_array()).collect::<Vec<[f32; 3]>>();
     let total = traced.total();
-    let indirect: Vec<glam::Vec3> = (0..total.len()).map(|i| total[i] - traced.direct[i] - traced.emitted[i]).collect();
-    let direct: Vec<glam::Vec3> = (0..total.len()).map(|i| traced.direct[i] + traced.emitted[i]).collect();
+    let direct: Vec<glam::Vec3> = (0..total.len()).map(|i| traced.direct[i] + traced.emission[i]).collect();
     let layers = Layers::new(width, height)
         .with(Layer::rgb("", &rgb(&total)))
         .with(Layer::rgb("direct", &rgb(&direct)))
-        .with(Layer::rgb("indirect", &rgb(&indirect)))
+        .with(Layer::rgb("indirect", &rgb(&traced.indirect)))
         .with(Layer::rgb("albedo", &rgb(&traced.albedo)));
     let times = Times { wall: vec![begun.elapsed().as_secs_f64() * 1e3], ..Times::default() };
     Ok(Some(Rendered { layers, times }))
