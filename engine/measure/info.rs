@@ -174,6 +174,15 @@ impl Measure {
         }
     }
 
+    /// The smallest side of images that the measure can compare, pixels.
+    pub const fn smallest_side(self) -> u32 {
+        match self {
+            Self::Ssim => ssim::SMALLEST,
+            Self::MsSsim => ssim::SMALLEST_MULTI_SCALE,
+            _ => 1,
+        }
+    }
+
     /// In kebab case.
     pub const fn name(self) -> &'static str {
         self.info().name

@@ -1,6 +1,6 @@
 //! Everything about measures that can be chosen.
 
-use super::Display;
+use super::{Display, Exposure};
 
 /// Settings of all measures; the defaults are those of the sources named at each.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,8 +86,6 @@ impl Options {
         };
         let positive = [
             ("rel_mse_epsilon", self.rel_mse_epsilon),
-            ("pixels_per_degree", self.pixels_per_degree),
-            ("white_luminance", self.white_luminance),
             ("vdp_psychometric_slope", self.vdp_psychometric_slope),
             ("pdiff_gamma", self.pdiff_gamma.unwrap_or(1.0)),
         ];
@@ -97,6 +95,9 @@ impl Options {
             }
         }
         let bounded = [
+            ("pixels_per_degree", self.pixels_per_degree, 0.1, 2000.0),
+            ("white_luminance", self.white_luminance, 1e-4, 1e6),
+            ("exposure", if let Exposure::Stops(stops) = self.display.exposure { stops } else { 0.0 }, -64.0, 64.0),
             ("pdiff_fov", self.pdiff_fov, 0.1, 89.9),
             ("pdiff_color", self.pdiff_color, 0.0, 1.0),
             ("vdp_masking_slope", self.vdp_masking_slope, 0.0, 1.0),

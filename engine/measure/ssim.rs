@@ -12,6 +12,11 @@ const C2: f64 = 9e-4;
 /// Weights of the scales (Wang, Simoncelli, Bovik 2003), the finest first.
 const SCALES: [f64; 5] = [0.0448, 0.2856, 0.3001, 0.2363, 0.1333];
 
+/// Smallest side for one scale: a window.
+pub(super) const SMALLEST: u32 = WINDOW as u32;
+/// Smallest side for five: a window at the coarsest.
+pub(super) const SMALLEST_MULTI_SCALE: u32 = SMALLEST << (SCALES.len() - 1);
+
 /// Luminance-and-structure maps of one plane.
 struct Maps {
     /// SSIM of every pixel.
@@ -32,7 +37,7 @@ type Planes = [Vec<f64>; 2];
 /// `Input` for images of fewer than 11 pixels on a side.
 pub fn ssim(pair: &Pair<'_>, options: &Options) -> Result<Measured> {
     let size = [pair.width(), pair.height()];
-    large_enough(Measure::Ssim, size, WINDOW)?;
+    large_enough(Measure::Ssim, pair)?;
     let threads = parallel::threads(options.threads);
     let (planes, stops) = planes(pair, options, threads);
     let mut map = vec![0.0; size[0] * size[1]];
@@ -59,7 +64,7 @@ pub fn ssim(pair: &Pair<'_>, options: &Options) -> Result<Measured> {
 /// `Input` for images of fewer than 176 pixels on a side: the coarsest scale must hold a window.
 pub fn ms_ssim(pair: &Pair<'_>, options: &Options) -> Result<Measured> {
     let size = [pair.width(), pair.height()];
-    large_enough(Measure::MsSsim, size, WINDOW << (SCALES.len() - 1))?;
+    large_enough(Measure::MsSsim, pair)?;
     let threads = parallel::threads(options.threads);
     let (planes, stops) = planes(pair, options, threads);
     let mut map = vec![0.0; size[0] * size[1]];
@@ -97,11 +102,11 @@ pub fn ms_ssim(pair: &Pair<'_>, options: &Options) -> Result<Measured> {
     Ok(Measured::new(Measure::MsSsim, value, map).with("exposure", stops))
 }
 
-fn large_enough(measure: Measure, size: [usize; 2], least: usize) -> Result<()> {
-    if size.iter().all(|&n| n >= least) {
+fn large_enough(measure: Measure, pair: &Pair<'_>) -> Result<()> {
+    let (w, h, least) = (pair.reference.width, pair.reference.height, measure.smallest_side());
+    if w.min(h) >= least {
         return Ok(());
     }
-    let [w, h] = size;
     Err(Error::input(format!("{w}×{h} pixels, {measure} needs at least {least} on each side")))
 }
 

@@ -26,7 +26,8 @@ pub struct CompareArgs {
     #[arg(required = true, value_name = "TEST")]
     pub tests: Vec<String>,
 
-    /// Measures, separated by commas; `all`, or `default`: mae, rmse, rel-mse, psnr, pearson, ssim and flip (hdr-flip for HDR)
+    /// Measures, separated by commas; `all` (that the images are large enough for), or `default`: mae, rmse, rel-mse, psnr, pearson,
+    /// ssim and flip (hdr-flip for HDR)
     #[arg(short, long, value_name = "NAME", value_delimiter = ',')]
     pub metric: Vec<String>,
 

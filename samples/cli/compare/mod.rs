@@ -134,9 +134,13 @@ fn pair(images: &Images, test: usize) -> Result<Pair<'_>, Stop> {
 fn chosen(args: &CompareArgs, images: &Images, fail: &[Threshold], warn: &[Threshold]) -> Result<Vec<Measure>> {
     let mut list: Vec<Measure> = Vec::new();
     let with_baseline = images.baseline.is_some();
+    let side = images.reference.picture.width.min(images.reference.picture.height);
     for name in &args.metric {
         match name.as_str() {
-            "all" => list.extend(Measure::ALL.iter().filter(|m| with_baseline || !m.info().needs_baseline)),
+            "all" => {
+                let fits = |m: &&Measure| m.smallest_side() <= side && (with_baseline || !m.info().needs_baseline);
+                list.extend(Measure::ALL.iter().filter(fits));
+            }
             "default" => list.extend(selection(images)),
             _ => list.push(name.parse()?),
         }
@@ -166,6 +170,8 @@ fn selection(images: &Images) -> Vec<Measure> {
     if images.baseline.is_some() {
         list.extend([Fq, Gain, Improved]);
     }
+    let side = images.reference.picture.width.min(images.reference.picture.height);
+    list.retain(|m| m.smallest_side() <= side);
     list
 }
 
