@@ -89,7 +89,10 @@ pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
     let names = (stage.scene.name.clone(), stage.camera_name.clone());
     let values = Values { scene: &names.0, camera: &names.1, technique: "reference", frame: 0, layer: "" };
     outputs.probe(&values, &["picture"])?;
-    for note in stage.notes().iter().filter(|n| n.kind != NoteKind::Repaired) {
+    // What techniques of the picture alone cannot do with emissive surfaces does not concern rays.
+    for note in
+        stage.notes().iter().filter(|n| n.kind != NoteKind::Repaired && !n.text.contains("only what the picture shows"))
+    {
         console.info(&format!("note: {}: {}", note.place, note.text));
     }
     let gpu = Gpu::new(args.device.options()?)?;
