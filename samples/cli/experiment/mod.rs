@@ -1,7 +1,7 @@
 //! Experiments: a TOML file names scenes, views, techniques with matrices of settings, references and measures; running it gives
 //! pictures, kept by what decided them, and a report.
 //!
-//! What is generic is here: reading the file ([`file`]), rendering what is not there yet ([`run`]), asking for pictures and
+//! What is generic is here: reading the file ([`mod@file`]), rendering what is not there yet ([`run`]), asking for pictures and
 //! measures ([`results`]). What the numbers of one experiment mean is a function in [`analysis`].
 //!
 //! To add an experiment: a file in `samples/experiments/`, named in [`file::BUILTIN`]; if the generic tables do not do, a function
