@@ -1,7 +1,6 @@
 //! Rays a second through Sponza and Conference: camera rays, shadow rays to a lamp and to the sun, and rays that leave the
 //! surfaces in all directions; nearest hit and any hit. Beside it the same rays through Embree on as many threads, where
-//! its development files and a C compiler are there, and through the device's ray queries where it has them: their last
-//! number is how many more rays hit something by our own traversal.
+//! its development files and a C compiler are there.
 //!
 //! `cargo bench --bench rays [-- [--assets DIR] [--size N] [--rounds N] [SCENE…]]`; `LUCERNA_DEVICE` chooses the device.
 
@@ -9,8 +8,8 @@ mod embree;
 mod sets;
 
 use lucerna::{
-    ErrorKind, Result,
-    gpu::{Gpu, GpuOptions, RayQuery},
+    Result,
+    gpu::{Gpu, GpuOptions},
     graph::{Graph, Runner},
     rays::Rays,
     scene::{self, LoadOptions, Pose, Scene, builtin, resident::Resident},
@@ -65,21 +64,9 @@ fn options() -> Result<Options> {
     Ok(out)
 }
 
-/// With ray queries, also where they are emulated, unless the environment chooses otherwise or the device has none.
-fn open() -> Result<Gpu> {
-    let options = GpuOptions::from_env()?;
-    if options.ray_query != RayQuery::Auto {
-        return Gpu::new(options);
-    }
-    match Gpu::new(GpuOptions { ray_query: RayQuery::On, ..options.clone() }) {
-        Err(error) if error.kind() == ErrorKind::NoDevice => Gpu::new(options),
-        opened => opened,
-    }
-}
-
 fn run() -> Result<()> {
     let options = options()?;
-    let gpu = open()?;
+    let gpu = Gpu::new(GpuOptions::from_env()?)?;
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     println!("{}, {threads} threads, best of {} runs, Mrays/s", gpu.describe(), options.rounds);
     let embree = embree::Program::build();
@@ -119,47 +106,68 @@ fn measure(
     let built = started.elapsed();
     let bvh = scene::bvh::Bvh::build(scene, &Pose::rest(scene));
     println!("\n{name}: {} triangles, built in {:.2} s", bvh.triangles().len(), built.as_secs_f64());
-    let mut device = Device { scene, resident, rays, runner: Runner::new(gpu) };
-    let mut query = if gpu.caps().ray_query {
-        let resident = Resident::new(gpu, scene)?;
-        let rays = Rays::new(gpu, scene, &resident)?;
-        Some(Device { scene, resident, rays, runner: Runner::new(gpu) })
-    } else {
-        None
-    };
+    let query = if gpu.caps().ray_query { Some(Rays::new(gpu, scene, &resident)?) } else { None };
+    let mut device = Device { scene, resident, rays, query, runner: Runner::new(gpu) };
     let sets = sets::sets(&bvh, options.size);
     let theirs = embree.map(|e| e.run(threads, options.rounds, bvh.triangles(), &sets)).transpose()?;
-    println!("by the processors' time (by the clock)");
+    println!("by the processors' time (by the clock); turns of the loops of one ray: mean, most");
     println!(
-        "{:<8} {:<8} {:>17} {:>17} {:>7} {:>7} {:>11}  {:>17}",
-        "rays", "hit", "lucerna", "Embree", "ratio", "hits %", "difference", "ray query"
+        "{:<7} {:<8} {:>16} {:>16} {:>16} {:>6} {:>6}  {:>11} {:>6}",
+        "rays", "hit", "compute", "ray query", "Embree", "ratio", "hits %", "differences", "turns"
     );
-    let idle = device.idle(&sets[0].rays)?;
-    let idle_query = query.as_mut().map(|q| q.idle(&sets[0].rays)).transpose()?.unwrap_or(0.0);
+    let first = &sets[0].rays;
+    let idle = (0..5).map(|_| device.trace(first, true, Mode::Idle)).collect::<Result<Vec<_>>>()?;
+    let idle = idle.iter().map(|t| t.0.busy / first.len() as f64).fold(f64::INFINITY, f64::min);
     for (index, set) in sets.iter().enumerate() {
         for any in [true, false] {
-            let ours = device.best(&set.rays, any, idle, options.rounds)?;
-            // Drivers that emulate ray queries take long.
-            let queried = query.as_mut().map(|q| q.best(&set.rays, any, idle_query, 1)).transpose()?;
+            let mut best = |mode: Mode| -> Result<embree::Taken> {
+                let mut best = embree::Taken { seconds: f64::INFINITY, busy: f64::INFINITY, hits: 0 };
+                for _ in 0..=options.rounds {
+                    let taken = device.trace(&set.rays, any, mode)?.0;
+                    best.seconds = best.seconds.min(taken.seconds);
+                    // Without what moving the rays to the device and back takes.
+                    best.busy = best.busy.min(taken.busy - idle * set.rays.len() as f64);
+                    best.hits = taken.hits;
+                }
+                Ok(best)
+            };
+            let ours = best(Mode::Compute)?;
+            let query = if gpu.caps().ray_query { Some(best(Mode::Query)?) } else { None };
+            let (_, mean, most) = device.trace(&set.rays, any, Mode::Count)?;
             let million = set.rays.len() as f64 / 1e6;
-            let rates = |t: &embree::Taken| [million / t.busy * threads as f64, million / t.seconds];
-            let text = |r: [f64; 2]| format!("{:.3} ({:.3})", r[0], r[1]);
+            let rate = |t: &embree::Taken| million / t.busy * threads as f64;
+            let text = |t: &embree::Taken| format!("{:.2} ({:.2})", rate(t), million / t.seconds);
+            let or_none = |t: Option<&embree::Taken>| t.map_or_else(|| "-".into(), text);
             let other = theirs.as_ref().map(|t| t[index][usize::from(!any)]);
+            let difference = |t: Option<&embree::Taken>| {
+                t.map_or_else(|| "-".into(), |t| format!("{:+}", ours.hits as i64 - t.hits as i64))
+            };
             println!(
-                "{:<8} {:<8} {:>17} {:>17} {:>7} {:>7.1} {:>11}  {:>17} {}",
+                "{:<7} {:<8} {:>16} {:>16} {:>16} {:>6} {:>6.1}  {:>5} {:>5} {mean:>6.1} {most}",
                 set.name,
                 if any { "any" } else { "closest" },
-                text(rates(&ours)),
-                other.map_or_else(|| "-".into(), |o| text(rates(&o))),
-                other.map_or_else(|| "-".into(), |o| format!("{:.3}", rates(&ours)[0] / rates(&o)[0])),
+                text(&ours),
+                or_none(query.as_ref()),
+                or_none(other.as_ref()),
+                other.map_or_else(|| "-".into(), |o| format!("{:.2}", rate(&ours) / rate(&o))),
                 100.0 * ours.hits as f64 / set.rays.len() as f64,
-                other.map_or_else(String::new, |o| format!("{:+}", ours.hits as i64 - o.hits as i64)),
-                queried.as_ref().map_or_else(|| "-".into(), |q| text(rates(q))),
-                queried.map_or_else(String::new, |q| format!("{:+}", ours.hits as i64 - q.hits as i64)),
+                difference(query.as_ref()),
+                difference(other.as_ref()),
             );
         }
     }
     Ok(())
+}
+
+/// How to trace.
+#[derive(Clone, Copy, PartialEq)]
+enum Mode {
+    /// Not at all: everything else of a pass.
+    Idle,
+    Compute,
+    /// Counting turns instead of triangles.
+    Count,
+    Query,
 }
 
 /// Seconds that all threads of this process, those that are alive, have had a processor.
@@ -174,33 +182,19 @@ struct Device<'a> {
     scene: &'a Scene,
     resident: Resident,
     rays: Rays,
+    query: Option<Rays>,
     runner: Runner,
 }
 
 impl Device<'_> {
-    /// Processor time of a ray that is only moved to the device and back; the first run also builds what there is to build.
-    fn idle(&mut self, rays: &[types::Ray]) -> Result<f64> {
-        let runs = (0..5).map(|_| self.trace(rays, true, false)).collect::<Result<Vec<_>>>()?;
-        Ok(runs.iter().map(|t| t.busy / rays.len() as f64).fold(f64::INFINITY, f64::min))
-    }
-
-    /// The best of the rounds, and one before them; without what moving the rays to the device and back takes.
-    fn best(&mut self, rays: &[types::Ray], any: bool, idle: f64, rounds: usize) -> Result<embree::Taken> {
-        let mut best = embree::Taken { seconds: f64::INFINITY, busy: f64::INFINITY, hits: 0 };
-        for _ in 0..=rounds {
-            let taken = self.trace(rays, any, true)?;
-            best.seconds = best.seconds.min(taken.seconds);
-            best.busy = best.busy.min(taken.busy - idle * rays.len() as f64);
-            best.hits = taken.hits;
-        }
-        Ok(best)
-    }
-
-    /// One pass; with `trace` off, everything but that.
-    fn trace(&mut self, rays: &[types::Ray], any: bool, trace: bool) -> Result<embree::Taken> {
+    /// One pass; then the mean and the most turns.
+    fn trace(&mut self, rays: &[types::Ray], any: bool, mode: Mode) -> Result<(embree::Taken, f64, u32)> {
         let mut graph = Graph::new("rays");
         let handles = self.resident.frame(&mut graph, self.scene, 0.0);
-        let traced = self.rays.frame(&mut graph, &handles);
+        let traced = match &mut self.query {
+            Some(query) if mode == Mode::Query => query.frame(&mut graph, &handles),
+            _ => self.rays.frame(&mut graph, &handles),
+        };
         let count = rays.len() as u32;
         let hits = graph.buffer("hits", u64::from(count) * size_of::<types::Hit>() as u64);
         let args = shader::Args {
@@ -216,8 +210,8 @@ impl Device<'_> {
             trace_accel: traced.trace_accel,
             materials: traced.materials,
             scene_textures: traced.scene_textures,
-            push: shader::Push { count: if trace { count } else { 0 }, mask: 0, salt: 0 },
-            spec: shader::Spec { any: u32::from(any) },
+            push: shader::Push { count: if mode == Mode::Idle { 0 } else { count }, mask: 0, salt: 0 },
+            spec: shader::Spec { any: u32::from(any), count: u32::from(mode == Mode::Count) },
         };
         graph.compute(args, count);
         let token = graph.read_buffer(hits);
@@ -226,7 +220,10 @@ impl Device<'_> {
         let busy = busy() - before;
         let pass = frame.report.passes.iter().find(|p| p.name.starts_with("test.trace"));
         let seconds = pass.and_then(|p| p.gpu_ms).map_or(f64::INFINITY, |ms| ms / 1000.0);
-        let hits = frame.buffer::<types::Hit>(token).iter().filter(|h| h.instance != u32::MAX).count();
-        Ok(embree::Taken { seconds, busy, hits })
+        let all = frame.buffer::<types::Hit>(token);
+        let hits = all.iter().filter(|h| h.instance != u32::MAX).count();
+        let sum: u64 = all.iter().map(|h| u64::from(h.triangle)).sum();
+        let most = all.iter().map(|h| h.triangle).max().unwrap_or(0);
+        Ok((embree::Taken { seconds, busy, hits }, sum as f64 / all.len() as f64, most))
     }
 }

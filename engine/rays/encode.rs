@@ -5,7 +5,7 @@ use crate::scene::Aabb;
 use glam::Vec3;
 
 /// Words of a node.
-pub const WORDS: usize = 18;
+pub const WORDS: usize = 20;
 
 /// Appends the nodes of `tree`, whose references count from `first_node` and `first_leaf`.
 pub fn encode(tree: &Tree, first_node: u32, first_leaf: u32, out: &mut Vec<u32>) {

@@ -214,7 +214,9 @@ impl Encoded {
             if aabb.is_empty() { Aabb::of([Vec3::ZERO]) } else { aabb }
         };
         let boxes: Vec<Aabb> = list.iter().map(around).collect();
-        let tree = Tree::build(&boxes);
+        // The parts of triangles that change would have to be cut anew.
+        let corners: Vec<[Vec3; 3]> = if deformed { Vec::new() } else { list.iter().map(|r| r.corners).collect() };
+        let tree = Tree::build(&boxes, &corners);
         let root = (self.nodes.len() / WORDS) as u32;
         let first_record = (self.records.len() / 3) as u32;
         encode(&tree, root, first_record, &mut self.nodes);

@@ -5,7 +5,10 @@
 
 use crate::scene::Aabb;
 use glam::Vec3;
-use obvhs::{Boundable, BvhBuildParams, bvh2::Bvh2, bvh2::reinsertion::ReinsertionOptimizer, ploc::PlocBuilder};
+use obvhs::{
+    Boundable, BvhBuildParams, bvh2::Bvh2, bvh2::reinsertion::ReinsertionOptimizer, ploc::PlocBuilder,
+    splits::split_aabbs_preset, triangle::Triangle,
+};
 
 /// Levels of a tree, at most: what the shaders' stack has room for, see [`Tree::build`].
 pub const DEPTH: u32 = 22;
@@ -54,17 +57,29 @@ impl Boundable for Boxed {
 }
 
 impl Tree {
-    /// A tree for many rays over `boxes`, which are finite and not empty. It has at most [`DEPTH`] levels.
-    pub fn build(boxes: &[Aabb]) -> Self {
+    /// A tree for many rays over `boxes`, which are finite and not empty. It has at most [`DEPTH`] levels. Where their
+    /// `triangles` are given as well, large ones are in several leaves, each with the box of a part.
+    pub fn build(boxes: &[Aabb], triangles: &[[Vec3; 3]]) -> Self {
         if boxes.len() <= 8 {
             return Self::eighths(boxes);
         }
         let boxed: Vec<Boxed> = boxes.iter().map(|b| Boxed(*b)).collect();
         let p = BvhBuildParams::medium_build();
-        let mut binary = PlocBuilder::with_capacity(boxed.len()).build(
+        let mut aabbs: Vec<obvhs::aabb::Aabb> = boxed.iter().map(Boundable::aabb).collect();
+        let mut indices: Vec<u32> = (0..boxed.len() as u32).collect();
+        if triangles.len() == boxed.len() {
+            let [mut sum, mut largest] = [0.0f32; 2];
+            for area in aabbs.iter().map(obvhs::aabb::Aabb::half_area) {
+                (sum, largest) = (sum + area, largest.max(area));
+            }
+            let corners: Vec<Triangle> =
+                triangles.iter().map(|t| Triangle { v0: t[0].into(), v1: t[1].into(), v2: t[2].into() }).collect();
+            split_aabbs_preset(&mut aabbs, &mut indices, &corners, sum / boxed.len() as f32, largest);
+        }
+        let mut binary = PlocBuilder::with_capacity(aabbs.len()).build(
             p.ploc_search_distance,
-            &boxed,
-            (0..boxed.len() as u32).collect(),
+            &aabbs,
+            indices,
             p.sort_precision,
             p.search_depth_threshold,
         );

@@ -19,6 +19,9 @@ struct Hit {
     uint triangle;     // of that instance: its indices start at first_index + 3 triangle
 };
 
+// Turns that the loops of the last compute traversal took, for tests and benchmarks.
+uint trace_turns = 0u;
+
 const uint TRACE_CAMERA = 1u; // back faces of single-sided surfaces are not there (as rasterised)
 const uint TRACE_SHADOW = 2u; // unlit surfaces do not stop light
 

@@ -3,7 +3,8 @@
 #define LIB_TRACE_COMPUTE
 #include "lib/trace_nodes.glsl"
 
-layout(binding = 40, scalar) readonly buffer TraceNodes { uint trace_nodes[]; };
+// Five vectors a node: CPU drivers load a vector as fast as a number.
+layout(binding = 40, scalar) readonly buffer TraceNodes { uvec4 trace_nodes[]; };
 // A record is three vectors: corners in xyz; in w the bits of surface (TRACE_SINGLE_SIDED …), instance, triangle.
 layout(binding = 41, scalar) readonly buffer TraceTriangles { vec4 trace_triangles[]; };
 // The first is the top tree itself, in world space.
@@ -46,19 +47,18 @@ uint trace_boxes(uvec3 near_words, uvec3 far_words, vec3 step_time, vec3 near_ti
     return uint(hit.x) | uint(hit.y) << 1u | uint(hit.z) << 2u | uint(hit.w) << 3u;
 }
 
-// Slots of a node that the ray meets, as bits.
-uint trace_node(uint node, TraceSlabs slabs, float t_min, float t_max) {
-    uint w = TRACE_NODE_WORDS * node;
-    vec3 corner = vec3(uintBitsToFloat(trace_nodes[w]), uintBitsToFloat(trace_nodes[w + 1u]), uintBitsToFloat(trace_nodes[w + 2u]));
-    uint exponents = trace_nodes[w + 3u];
-    uvec3 steps = uvec3(exponents << 23u, exponents << 15u, exponents << 7u) & 0x7f800000u;
+// Slots of a node that the ray meets, as bits; also words 4 and 5 of the node.
+uint trace_node(uint node, TraceSlabs slabs, float t_min, float t_max, out uvec2 children) {
+    uint w = 5u * node;
+    uvec4 a = trace_nodes[w], b = trace_nodes[w + 1u], c = trace_nodes[w + 2u], d = trace_nodes[w + 3u];
+    uvec2 e = trace_nodes[w + 4u].xy;
+    children = b.xy;
+    uvec3 steps = uvec3(a.w << 23u, a.w << 15u, a.w << 7u) & 0x7f800000u;
     vec3 step_time = uintBitsToFloat(steps) * slabs.inverse;
-    vec3 time = (corner - slabs.origin) * slabs.inverse;
+    vec3 time = (uintBitsToFloat(a.xyz) - slabs.origin) * slabs.inverse;
     vec3 near_time = time - slabs.pad, far_time = time + slabs.pad;
-    uvec3 low0 = uvec3(trace_nodes[w + 6u], trace_nodes[w + 8u], trace_nodes[w + 10u]);
-    uvec3 low1 = uvec3(trace_nodes[w + 7u], trace_nodes[w + 9u], trace_nodes[w + 11u]);
-    uvec3 high0 = uvec3(trace_nodes[w + 12u], trace_nodes[w + 14u], trace_nodes[w + 16u]);
-    uvec3 high1 = uvec3(trace_nodes[w + 13u], trace_nodes[w + 15u], trace_nodes[w + 17u]);
+    uvec3 low0 = uvec3(b.z, c.x, c.z), low1 = uvec3(b.w, c.y, c.w);
+    uvec3 high0 = uvec3(d.x, d.z, e.x), high1 = uvec3(d.y, d.w, e.y);
     bvec3 backward = lessThan(slabs.inverse, vec3(0.0));
     return trace_boxes(mix(low0, high0, backward), mix(high0, low0, backward), step_time, near_time, far_time, t_min, t_max)
         | trace_boxes(mix(low1, high1, backward), mix(high1, low1, backward), step_time, near_time, far_time, t_min, t_max) << 4u;
@@ -94,13 +94,15 @@ Hit trace(Ray ray, uint mask, uint salt, bool any) {
         uint candidate = NONE;
         vec3 candidate_at = vec3(0.0);
         bool rare = false;
+        --left;
         while (!rare) {
+            --left;
             while (leaf_slots == 0u && next != NONE) {
-                uint w = TRACE_NODE_WORDS * next;
-                uint hits = trace_node(next, slabs, ray.t_min, hit.t);
-                leaves = trace_nodes[w + 5u];
+                uvec2 children;
+                uint hits = trace_node(next, slabs, ray.t_min, hit.t, children);
+                leaves = children.y;
                 leaf_slots = hits & leaves & 0xffu;
-                uint slots = trace_permuted(hits & trace_nodes[w + 4u] & 0xffu, slabs.octant);
+                uint slots = trace_permuted(hits & children.x & 0xffu, slabs.octant);
                 uint entry = next << 8u | slots;
                 if (slots == 0u) {
                     entry = stack[--height];
@@ -109,7 +111,7 @@ Hit trace(Ray ray, uint mask, uint salt, bool any) {
                     next = NONE;
                 } else {
                     uint slot = uint(findLSB(entry)) ^ slabs.octant;
-                    uint nodes = trace_nodes[TRACE_NODE_WORDS * (entry >> 8u) + 4u];
+                    uint nodes = trace_nodes[5u * (entry >> 8u) + 1u].x;
                     next = (nodes >> 8u) + uint(bitCount(nodes & ((1u << slot) - 1u)));
                     entry &= entry - 1u;
                     if ((entry & 0xffu) != 0u) {
@@ -192,11 +194,13 @@ Hit trace(Ray ray, uint mask, uint salt, bool any) {
             leaves = above;
             leaf_slots = above_slots;
             next = stack[--height];
-            done = left <= 0 || (next == NONE && leaf_slots == 0u);
+            done = next == NONE && leaf_slots == 0u;
         } else {
             done = true;
         }
+        done = done || left <= 0;
     }
+    trace_turns = TRACE_STEPS - uint(max(left, 0));
     if (best != NONE) {
         hit.instance += floatBitsToUint(trace_triangles[3u * best + 1u].w);
         hit.triangle = floatBitsToUint(trace_triangles[3u * best + 2u].w);

@@ -19,7 +19,8 @@ struct TraceInstance {
 //  5      slots that are leaves (8 bits), first of their records, or of their instances in the top tree
 //  6..11  lower bounds of the eight boxes in steps, a byte each: x of slots 0 to 3, of 4 to 7, then y, z
 // 12..17  upper bounds
-const uint TRACE_NODE_WORDS = 18u; // export
+// 18, 19  unused
+const uint TRACE_NODE_WORDS = 20u; // export
 
 // Nodes from the root to a leaf of both trees together, and two; lucerna::rays keeps to it.
 const uint TRACE_DEPTH = 32u; // export

@@ -103,7 +103,7 @@ impl<'a> Traceable<'a> {
                 materials: traced.materials,
                 scene_textures: traced.scene_textures,
                 push: trace::Push { count, mask, salt },
-                spec: trace::Spec { any },
+                spec: trace::Spec { any, ..Default::default() },
             };
             graph.compute(args, count);
             graph.read_buffer(hits)
