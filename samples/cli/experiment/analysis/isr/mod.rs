@@ -48,7 +48,10 @@ fn row(results: &Results, run: &Done) -> Result<Option<Row>> {
     // Pictures of the dissertation's light law have units of their own: one factor a view, from direct light alone.
     let own_law = results.experiment.methods.iter().any(|method| method.name == run.method && method.paper);
     let reference = results.picture(Layer(truth, ""))?.pixels;
-    let reference_direct = results.picture(Layer(truth, "direct"))?.pixels;
+    let bounced = results.picture(Layer(truth, "indirect"))?.pixels;
+    // What shines itself is direct light here, as in the pictures under test.
+    let reference_direct: Vec<[f32; 3]> =
+        reference.iter().zip(&bounced).map(|(all, indirect)| [0, 1, 2].map(|c| all[c] - indirect[c])).collect();
     let (mut total_px, mut direct_px) = (results.picture(total)?.pixels, results.picture(direct)?.pixels);
     let sum = |pixels: &[[f32; 3]]| pixels.iter().flatten().map(|v| f64::from(*v)).sum::<f64>();
     if own_law {
@@ -59,7 +62,7 @@ fn row(results: &Results, run: &Done) -> Result<Option<Row>> {
     let correlation = |test| results.measure(Measure::Pearson, Layer(truth, ""), test, None);
     let scale = exposure(&reference);
     let errors = Errors::of(&reference, &direct_px, &total_px, scale);
-    let indirect: f64 = sum(&reference) - sum(&reference_direct);
+    let indirect = sum(&bounced);
     let apart: f64 = direct_px.iter().zip(&reference_direct).map(|(a, b)| difference(a, b)).sum();
     Ok(Some(Row {
         scene: run.scene.clone(),

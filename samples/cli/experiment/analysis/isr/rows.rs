@@ -54,7 +54,7 @@ impl Row {
         } else if self.gain() > 20.0 {
             ""
         } else if self.not_indirect > 0.6 {
-            "most of the error is that of direct light itself: shadow edges, and textures that the reference does not filter"
+            "most of the error is that of direct light itself: shadow edges, emissive lamps out of the picture, textures that the reference does not filter"
         } else if self.found < 0.15 {
             "what lights these surfaces is not in the picture"
         } else if self.found > 1.2 {
