@@ -14,7 +14,7 @@ use lucerna_samples::{
     info, inspect, program,
     reference::{self, ReferenceArgs},
     rerun,
-    source::{self, SceneArgs},
+    source::SceneArgs,
     views::{self, command::ViewsArgs},
 };
 
@@ -134,7 +134,7 @@ fn main() -> ExitCode {
 fn serve(command: Command, console: Console) -> Result<()> {
     match command {
         Command::Inspect { scene, json, .. } => {
-            let (scene, _) = source::open(scene.scene.as_deref(), scene.builtin.as_deref(), &Default::default())?;
+            let (scene, _) = scene.open()?;
             let summary = inspect::summary(&scene);
             match json {
                 true => console::print_json(&console::to_json(&summary)?),

@@ -15,22 +15,8 @@ use lucerna::{
 
 /// Floor and wall seen from above; 160 × 120. The floor reflects half, the wall nothing.
 fn corner() -> (Eye, Vec<Patch>) {
-    let floor = Patch {
-        corner: dvec3(-1.0, 0.0, 0.0),
-        a: dvec3(2.0, 0.0, 0.0),
-        b: dvec3(0.0, 0.0, -2.0),
-        albedo: DVec3::splat(0.5),
-        radiance: DVec3::ZERO,
-    };
-    let wall = Patch {
-        corner: dvec3(-1.0, 0.0, -2.0),
-        a: dvec3(2.0, 0.0, 0.0),
-        b: dvec3(0.0, 1.0, 0.0),
-        albedo: DVec3::ZERO,
-        radiance: dvec3(1.0, 0.5, 0.25),
-    };
     let eye = Eye::look_at(dvec3(0.3, 1.8, 2.2), dvec3(0.0, 0.3, -1.3), 0.9, 10.0, 160, 120);
-    (eye, vec![floor, wall])
+    (eye, isr_lab::floor_and_wall(0.5))
 }
 
 fn declare(graph: &mut Graph, eye: &Eye, buffers: &Buffers, lamp: Vec3, settings: &Settings) -> Outputs {

@@ -20,22 +20,8 @@ use scene_kit::{mesh, square};
 
 /// A floor that reflects everything, and behind it a wall that glows. The camera looks down: the frame shows no wall.
 fn floor_and_wall(width: usize, height: usize, yfov: f64) -> (Eye, Vec<Patch>) {
-    let floor = Patch {
-        corner: dvec3(-1.0, 0.0, 0.0),
-        a: dvec3(2.0, 0.0, 0.0),
-        b: dvec3(0.0, 0.0, -2.0),
-        albedo: DVec3::ONE,
-        radiance: DVec3::ZERO,
-    };
-    let wall = Patch {
-        corner: dvec3(-1.0, 0.0, -2.0),
-        a: dvec3(2.0, 0.0, 0.0),
-        b: dvec3(0.0, 1.0, 0.0),
-        albedo: DVec3::ZERO,
-        radiance: dvec3(1.0, 0.5, 0.25),
-    };
     let eye = Eye::look_at(dvec3(0.0, 2.2, 0.6), dvec3(0.0, 0.0, -0.55), yfov, 10.0, width, height);
-    (eye, vec![floor, wall])
+    (eye, isr_lab::floor_and_wall(1.0))
 }
 
 /// Twice as wide by its tangents.

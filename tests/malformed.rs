@@ -1,7 +1,7 @@
 //! Every malformed, hostile and odd file of the asset collection, and scene files made here to do harm: the outcome that
 //! `tests/malformed.tsv` says, without panic, in under five seconds, with under one GiB of memory at any time.
 //!
-//! A line of the table: file, outcome (`ok` or the kind of the error), and part of the message, or of a note where the
+//! A line of the table: folder, file, outcome (`ok` or the kind of the error), and part of the message, or of a note where the
 //! file is read.
 
 mod common;
@@ -174,9 +174,10 @@ fn table() -> BTreeMap<String, (String, String)> {
     let lines = include_str!("malformed.tsv").lines().filter(|line| !line.starts_with('#') && !line.is_empty());
     lines
         .map(|line| {
-            let mut cells = line.splitn(3, '\t').map(str::to_owned);
+            let mut cells = line.splitn(4, '\t');
             let mut next = || cells.next().unwrap_or_default();
-            (next(), (next(), next()))
+            let file = Path::new(next()).join(next()).to_string_lossy().into_owned();
+            (file, (next().to_owned(), next().to_owned()))
         })
         .collect()
 }

@@ -121,40 +121,28 @@ fn layer(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, n
                 batch.map_or_else(|| crate::graph::Draw::indexed(scene.indices, Vec::new()), |batch| batch.draw(scene));
             let targets = targets(&gbuffer, index == 0);
             let state = Raster::new().stencil(Stencil::write(1));
+            // The same arguments, of two generated types.
+            macro_rules! args {
+                ($shader:ident $(, $more:ident)?) => {
+                    $shader::Args {
+                        view: gbuffer.view,
+                        instances: scene.instances,
+                        visible,
+                        positions: scene.positions,
+                        normals: scene.normals,
+                        tangents: scene.tangents,
+                        uvs: scene.uvs,
+                        colors: scene.colors,
+                        $($more,)?
+                        materials: scene.materials,
+                        scene_textures: scene.textures,
+                        spec: $shader::Spec { cutout, octahedral },
+                    }
+                };
+            }
             let pass = match nearer {
-                None => {
-                    let args = shader::Args {
-                        view: gbuffer.view,
-                        instances: scene.instances,
-                        visible,
-                        positions: scene.positions,
-                        normals: scene.normals,
-                        tangents: scene.tangents,
-                        uvs: scene.uvs,
-                        colors: scene.colors,
-                        materials: scene.materials,
-                        scene_textures: scene.textures,
-                        spec: shader::Spec { cutout, octahedral },
-                    };
-                    graph.raster(targets, state.cull(sided), args, draw)
-                }
-                Some(nearer) => {
-                    let args = behind_shader::Args {
-                        view: gbuffer.view,
-                        instances: scene.instances,
-                        visible,
-                        positions: scene.positions,
-                        normals: scene.normals,
-                        tangents: scene.tangents,
-                        uvs: scene.uvs,
-                        colors: scene.colors,
-                        nearer,
-                        materials: scene.materials,
-                        scene_textures: scene.textures,
-                        spec: behind_shader::Spec { cutout, octahedral },
-                    };
-                    graph.raster(targets, state.cull(Cull::None), args, draw)
-                }
+                None => graph.raster(targets, state.cull(sided), args!(shader), draw),
+                Some(nearer) => graph.raster(targets, state.cull(Cull::None), args!(behind_shader, nearer), draw),
             };
             if let Some(batch) = batch {
                 pass.named(format!("passes.gbuffer.{:?}.{:?}", batch.cutout, batch.sided).to_lowercase());

@@ -4,27 +4,13 @@ use std::{ops::Range, path::PathBuf, str::FromStr};
 
 use clap::{ArgAction, Args};
 
-use crate::{
-    console::Console,
-    framing::DefaultLight,
-    lights::{Point, Sun},
-    progress::ProgressMode,
-};
+use crate::{config::SettingsArgs, console::Console, progress::ProgressMode, stage::StageArgs};
 
 /// Options of `render`, the same for every technique.
 #[derive(Args, Clone, Debug)]
 pub struct RenderArgs {
-    /// Scene file: .gltf, .glb or .obj
-    #[arg(value_name = "SCENE")]
-    pub scene: Option<PathBuf>,
-
-    /// A built-in scene instead of a file (`lucerna list` names them)
-    #[arg(long, value_name = "NAME", conflicts_with = "scene")]
-    pub builtin: Option<String>,
-
-    /// Metres that one unit of the scene file stands for, where the format leaves it open (OBJ, C arrays) [default: 1]
-    #[arg(long, value_name = "METRES", value_parser = positive, conflicts_with = "builtin")]
-    pub unit: Option<f64>,
+    #[command(flatten)]
+    pub stage: StageArgs,
 
     /// Image to write; may be given more than once. The ending chooses the format: .exr (all layers), .png, .hdr, .pfm.
     /// Placeholders: {scene} {camera} {technique} {frame:04} {layer}. [default: {scene}-{camera}-{technique}.png]
@@ -63,21 +49,9 @@ pub struct RenderArgs {
     #[arg(long, help_heading = "Output")]
     pub json: bool,
 
-    /// Width and height in pixels
-    #[arg(long, value_name = "WxH", default_value = "1024x768", help_heading = "Picture")]
-    pub size: Size,
-
-    /// Camera by name, by index, from a .toml file, or from a list of views (LIST.toml#NAME); default: the scene's first one
-    #[arg(long, value_name = "NAME|INDEX|FILE", help_heading = "Picture")]
-    pub camera: Option<String>,
-
     /// Render frames A to B−1 (A..=B: to B)
     #[arg(long, value_name = "A..B", help_heading = "Picture")]
     pub frames: Option<Frames>,
-
-    /// Time of frame 0, seconds
-    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
-    pub time: f64,
 
     /// Frames per second of a sequence
     #[arg(long, default_value_t = 30.0, value_parser = positive, help_heading = "Picture")]
@@ -87,41 +61,16 @@ pub struct RenderArgs {
     #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
     pub exposure: Option<f64>,
 
-    /// Light the scene with this .hdr or .exr environment instead of its own
-    #[arg(long, alias = "env", value_name = "FILE", help_heading = "Picture")]
-    pub environment: Option<PathBuf>,
-
-    /// Add a white point light: place in metres, intensity in W/sr; may be given more than once
-    #[arg(long, value_name = "X,Y,Z,INTENSITY", allow_hyphen_values = true, help_heading = "Picture")]
-    pub light: Vec<Point>,
-
-    /// Add a white sun, and a sky if there is no environment: degrees (azimuth 0 is over +Z, 90 over +X), W/m² [default: 2]
-    #[arg(long, value_name = "AZIMUTH,ELEVATION[,IRRADIANCE]", allow_hyphen_values = true, help_heading = "Picture")]
-    pub sun: Option<Sun>,
-
-    /// Whether a sun and a sky are added
-    #[arg(long, value_enum, default_value_t, value_name = "WHEN", help_heading = "Picture")]
-    pub default_light: DefaultLight,
-
     /// Seed of everything random
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Picture")]
     pub seed: u32,
 
-    /// Set one setting of the technique (`--print-config` shows all)
-    #[arg(short = 'D', value_name = "KEY=VALUE", help_heading = "Technique")]
-    pub define: Vec<String>,
-
-    /// Read settings from a TOML file; -D wins over it
-    #[arg(long, value_name = "FILE.toml", help_heading = "Technique")]
-    pub settings: Option<PathBuf>,
+    #[command(flatten)]
+    pub settings: SettingsArgs,
 
     /// Start from the choices of the paper instead of our defaults
-    #[arg(long, help_heading = "Technique")]
+    #[arg(long, help_heading = "Settings")]
     pub paper: bool,
-
-    /// Print the settings in effect as TOML, then stop
-    #[arg(long, help_heading = "Technique")]
-    pub print_config: bool,
 
     #[command(flatten)]
     pub device: DeviceArgs,

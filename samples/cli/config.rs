@@ -2,11 +2,37 @@
 //!
 //! Works for any serde struct: a key exists if the effective settings, written out again, contain it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use lucerna::{Error, ErrorKind, Result};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::Value;
+
+/// The options that set settings.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub struct SettingsArgs {
+    /// Set one setting (`--print-config` shows all)
+    #[arg(short = 'D', value_name = "KEY=VALUE", help_heading = "Settings")]
+    pub define: Vec<String>,
+
+    /// Read settings from a TOML file; -D wins over it
+    #[arg(long = "settings", value_name = "FILE.toml", help_heading = "Settings")]
+    pub file: Option<PathBuf>,
+
+    /// Print the settings in effect as TOML, then stop
+    #[arg(long, help_heading = "Settings")]
+    pub print_config: bool,
+}
+
+impl SettingsArgs {
+    /// The settings in effect over `base`.
+    ///
+    /// # Errors
+    /// `Usage` or `Input`, naming the key.
+    pub fn effective<S: Serialize + DeserializeOwned>(&self, base: &S) -> Result<S> {
+        effective(base, self.file.as_deref(), &self.define)
+    }
+}
 
 /// Largest settings file that is read, bytes.
 const MAX_FILE: u64 = 1 << 20;

@@ -12,6 +12,7 @@ use crate::{
     config,
     framing::DefaultLight,
     lights::{Point, Sun},
+    stage::{Stage, StageArgs},
 };
 
 /// The `config` of a picture's metadata.
@@ -75,6 +76,33 @@ pub enum View {
 }
 
 impl Record {
+    /// What `args` decided, for one picture without settings; the rest is the caller's.
+    pub fn new(command: &[&str], args: &StageArgs, stage: &Stage) -> Self {
+        Self {
+            command: command.iter().map(|&word| word.to_owned()).collect(),
+            scene: stage.source.clone(),
+            unit: args.scene.unit,
+            fingerprint: stage.fingerprint.clone(),
+            width: args.size.width,
+            height: args.size.height,
+            camera: stage.eye.clone(),
+            first_frame: 0,
+            frame: 0,
+            time: args.time,
+            fps: 30.0,
+            exposure: 0.0,
+            environment: args.environment.as_ref().map(|path| path.to_string_lossy().into_owned()),
+            default_light: args.default_light,
+            light: args.light.clone(),
+            sun: args.sun,
+            seed: 0,
+            view: None,
+            mode: None,
+            f32: false,
+            settings: Value::Null,
+        }
+    }
+
     /// From the metadata of a picture.
     ///
     /// # Errors

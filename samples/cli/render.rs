@@ -59,8 +59,8 @@ pub fn render<S: Serialize + DeserializeOwned, R>(
 ) -> Result<ExitCode> {
     let started = Instant::now();
     let console = args.talk.console();
-    let settings = config::effective(base, args.settings.as_deref(), &args.define)?;
-    if args.print_config {
+    let settings = args.settings.effective(base)?;
+    if args.settings.print_config {
         console::print(config::to_toml(&settings)?.trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
@@ -82,8 +82,8 @@ pub fn render<S: Serialize + DeserializeOwned, R>(
             break;
         }
         let begun = Instant::now();
-        let seconds = args.time + f64::from(frame) / args.fps;
-        let (pose, view) = run.stage.at(seconds, args.size);
+        let seconds = args.stage.time + f64::from(frame) / args.fps;
+        let (pose, view) = run.stage.at(seconds, args.stage.size);
         let mut graph = Graph::new(technique.name);
         (graph.frame, graph.seed) = (frame, args.seed);
         let input = Input { gpu: &gpu, scene: &run.stage.scene, pose: &pose, view: &view, frame, seconds };

@@ -77,7 +77,7 @@ impl<'a> Run<'a> {
         // Names before scenes: a wrong name shows at once.
         let mut options = WriteOptions { overwrite: args.overwrite, f32: args.f32, ..WriteOptions::default() };
         Outputs::new(&args.output, frames.len(), options.clone())?;
-        let stage = Stage::open(args)?;
+        let stage = Stage::open(&args.stage)?;
         let suits = match &stage.source {
             Source::Builtin(name) => builtin::exposure(name).map(f64::from),
             Source::File(_) => None,
@@ -94,27 +94,16 @@ impl<'a> Run<'a> {
             _ => technique.name.to_owned(),
         };
         let record = Record {
-            command: vec![technique.name.into(), "render".into()],
-            scene: stage.source.clone(),
-            unit: args.unit,
-            fingerprint: stage.fingerprint.clone(),
-            width: args.size.width,
-            height: args.size.height,
-            camera: stage.eye.clone(),
             first_frame: frames.start,
             frame: frames.start,
-            time: args.time,
             fps: args.fps,
             exposure: exposure.unwrap_or(0.0),
-            environment: args.environment.as_ref().map(|path| path.to_string_lossy().into_owned()),
-            default_light: args.default_light,
-            light: args.light.clone(),
-            sun: args.sun,
             seed: args.seed,
             view: args.view.clone(),
             mode: technique.mode.map(str::to_owned),
             f32: args.f32,
             settings: config::to_value(settings)?,
+            ..Record::new(&[technique.name, "render"], &args.stage, &stage)
         };
         let run = Self {
             args,

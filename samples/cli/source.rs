@@ -7,19 +7,32 @@ use lucerna::{
     scene::{self, LoadOptions, Scene, builtin},
 };
 
-use crate::record::Source;
+use crate::{args::positive, record::Source};
 
-/// `SCENE | --builtin NAME`.
-#[derive(clap::Args, Clone, Debug)]
-#[group(required = true, multiple = false)]
+/// `SCENE | --builtin NAME`, `--unit`.
+#[derive(clap::Args, Clone, Debug, Default)]
 pub struct SceneArgs {
     /// Scene file: .gltf, .glb or .obj
     #[arg(value_name = "SCENE")]
     pub scene: Option<PathBuf>,
 
     /// A built-in scene instead of a file (`lucerna list` names them)
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", conflicts_with = "scene")]
     pub builtin: Option<String>,
+
+    /// Metres that one unit of the scene file stands for, where the format leaves it open (OBJ, C arrays) [default: 1]
+    #[arg(long, value_name = "METRES", value_parser = positive, conflicts_with = "builtin")]
+    pub unit: Option<f64>,
+}
+
+impl SceneArgs {
+    /// Reads the scene.
+    ///
+    /// # Errors
+    /// As [`open`].
+    pub fn open(&self) -> Result<(Scene, Source)> {
+        open(self.scene.as_deref(), self.builtin.as_deref(), &in_unit(self.unit))
+    }
 }
 
 /// Options for reading a scene whose unit stands for `unit` metres.

@@ -1,6 +1,6 @@
 //! The scene and the camera of a run.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::Mat4;
 use lucerna::{
@@ -9,11 +9,13 @@ use lucerna::{
 };
 
 use crate::{
-    args::{RenderArgs, Size},
+    args::{Size, finite},
     camera::{self, Choice},
-    fingerprint, framing, lights,
+    fingerprint,
+    framing::{self, DefaultLight},
+    lights::{self, Point, Sun},
     record::{self, Source},
-    source,
+    source::SceneArgs,
 };
 
 /// What is rendered, and from where.
@@ -31,19 +33,39 @@ pub struct Stage {
     world_from_camera: Mat4,
 }
 
-/// What of a scene's options decides what is rendered.
-#[derive(Clone, Copy, Debug)]
-pub struct Asked<'a> {
-    pub scene: Option<&'a Path>,
-    pub builtin: Option<&'a str>,
-    /// Metres that one unit of the file stands for.
-    pub unit: Option<f64>,
-    pub environment: Option<&'a Path>,
-    pub light: &'a [lights::Point],
-    pub sun: Option<&'a lights::Sun>,
-    pub default_light: framing::DefaultLight,
-    pub camera: Option<&'a str>,
+/// The options that decide what is seen: the scene, its lights, camera, size and time.
+#[derive(clap::Args, Clone, Debug)]
+pub struct StageArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", default_value = "1024x768", help_heading = "Picture")]
     pub size: Size,
+
+    /// Camera by name, by index, from a .toml file, or from a list of views (LIST.toml#NAME); default: the scene's first one
+    #[arg(long, value_name = "NAME|INDEX|FILE", help_heading = "Picture")]
+    pub camera: Option<String>,
+
+    /// Time of an animated scene (of frame 0, where there are frames), seconds
+    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
+    pub time: f64,
+
+    /// Light the scene with this .hdr or .exr environment instead of its own
+    #[arg(long, alias = "env", value_name = "FILE", help_heading = "Picture")]
+    pub environment: Option<PathBuf>,
+
+    /// Add a white point light: place in metres, intensity in W/sr; may be given more than once
+    #[arg(long, value_name = "X,Y,Z,INTENSITY", allow_hyphen_values = true, help_heading = "Picture")]
+    pub light: Vec<Point>,
+
+    /// Add a white sun, and a sky if there is no environment: degrees (azimuth 0 is over +Z, 90 over +X), W/m² [default: 2]
+    #[arg(long, value_name = "AZIMUTH,ELEVATION[,IRRADIANCE]", allow_hyphen_values = true, help_heading = "Picture")]
+    pub sun: Option<Sun>,
+
+    /// Whether a sun and a sky are added
+    #[arg(long, value_enum, default_value_t, value_name = "WHEN", help_heading = "Picture")]
+    pub default_light: DefaultLight,
 }
 
 impl Stage {
@@ -51,45 +73,27 @@ impl Stage {
     ///
     /// # Errors
     /// `Input` for files that cannot be served, `Usage` for names that do not exist.
-    pub fn open(args: &RenderArgs) -> Result<Self> {
-        Self::of(&Asked {
-            scene: args.scene.as_deref(),
-            builtin: args.builtin.as_deref(),
-            unit: args.unit,
-            environment: args.environment.as_deref(),
-            light: &args.light,
-            sun: args.sun.as_ref(),
-            default_light: args.default_light,
-            camera: args.camera.as_deref(),
-            size: args.size,
-        })
-    }
-
-    /// As [`Stage::open`], for programs with other options than `render`.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn of(args: &Asked<'_>) -> Result<Self> {
-        let (mut scene, source) = source::open(args.scene, args.builtin, &source::in_unit(args.unit))?;
+    pub fn open(args: &StageArgs) -> Result<Self> {
+        let (mut scene, source) = args.scene.open()?;
         if scene.name.is_empty() {
             scene.name = "scene".into();
         }
-        if let Some(path) = args.environment {
+        if let Some(path) = &args.environment {
             let (environment, notes) = environment::load(path, &Limits::default())?;
             scene.environment = Some(environment);
             scene.notes.extend(notes);
         }
         let fingerprint = fingerprint::scene(&scene);
-        lights::add(&mut scene, args.light, args.sun);
+        lights::add(&mut scene, &args.light, args.sun.as_ref());
         framing::add_missing_light(&mut scene, args.default_light);
-        let from_file = args.camera.is_some_and(|asked| {
+        let from_file = args.camera.as_deref().is_some_and(|asked| {
             Path::new(asked).is_file() || camera::in_list(asked).is_some_and(|(file, _)| Path::new(file).is_file())
         });
         if !from_file {
             framing::add_missing_camera(&mut scene, args.size.aspect());
         }
         let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
-        let choice = match args.camera {
+        let choice = match &args.camera {
             Some(asked) => camera::choose(asked, &names)?,
             None => Choice::Scene(first_placed(&scene)),
         };
@@ -103,7 +107,7 @@ impl Stage {
             }
             Choice::File(file) => {
                 let world_from_camera = file.world_from_view();
-                let camera_name = name_of(args.camera.unwrap_or_default());
+                let camera_name = name_of(args.camera.as_deref().unwrap_or_default());
                 let camera = Camera { name: camera_name.clone(), projection: file.projection() };
                 let eye = record::View::File(file);
                 Self { source, fingerprint, camera_name, eye, camera, node: None, world_from_camera, scene }

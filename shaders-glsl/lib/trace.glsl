@@ -8,4 +8,15 @@
 #else
 #include "lib/trace_compute.glsl"
 #endif
+
+// The nearest hit. `salt` decides where blended surfaces are there.
+Hit trace_closest(Ray ray, uint mask, uint salt) {
+    return trace(ray, mask, salt, false);
+}
+
+// Whether anything lies in the ray's segment.
+bool trace_any(Ray ray, uint mask, uint salt) {
+    return trace(ray, mask, salt, true).instance != NONE;
+}
+
 #endif

@@ -208,14 +208,4 @@ Hit trace(Ray ray, uint mask, uint salt, bool any) {
     return hit;
 }
 
-// The nearest hit. `salt` decides where blended surfaces are there.
-Hit trace_closest(Ray ray, uint mask, uint salt) {
-    return trace(ray, mask, salt, false);
-}
-
-// Whether anything lies in the ray's segment.
-bool trace_any(Ray ray, uint mask, uint salt) {
-    return trace(ray, mask, salt, true).instance != NONE;
-}
-
 #endif

@@ -161,3 +161,23 @@ pub fn close(
         }
     }
 }
+
+/// A floor of that albedo from (-1, 0, -2) to (1, 0, 0), and behind it a wall that glows and reflects nothing.
+pub fn floor_and_wall(albedo: f64) -> Vec<Patch> {
+    let corner = dvec3(-1.0, 0.0, 0.0);
+    let floor = Patch {
+        corner,
+        a: dvec3(2.0, 0.0, 0.0),
+        b: dvec3(0.0, 0.0, -2.0),
+        albedo: DVec3::splat(albedo),
+        radiance: DVec3::ZERO,
+    };
+    let wall = Patch {
+        corner: dvec3(-1.0, 0.0, -2.0),
+        b: dvec3(0.0, 1.0, 0.0),
+        albedo: DVec3::ZERO,
+        radiance: dvec3(1.0, 0.5, 0.25),
+        ..floor
+    };
+    vec![floor, wall]
+}

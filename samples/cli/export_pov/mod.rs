@@ -19,12 +19,10 @@ use lucerna::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    args::{Size, TalkArgs, finite, positive},
-    config, console,
-    framing::DefaultLight,
-    lights::{Point, Sun},
-    program,
-    stage::{Asked, Stage},
+    args::{TalkArgs, positive},
+    config::{self, SettingsArgs},
+    console, program,
+    stage::{Stage, StageArgs},
 };
 
 /// What is written beside the scene. The defaults of the radiosity block are table 1 of the dissertation.
@@ -173,51 +171,16 @@ impl Export {
 /// Options of `lucerna export-pov`.
 #[derive(clap::Args, Clone, Debug)]
 pub struct ExportPovArgs {
-    /// Scene file: .gltf, .glb or .obj
-    #[arg(value_name = "SCENE", required_unless_present_any = ["builtin", "print_config"])]
-    pub scene: Option<PathBuf>,
-    /// A built-in scene instead of a file (`lucerna list` names them)
-    #[arg(long, value_name = "NAME", conflicts_with = "scene")]
-    pub builtin: Option<String>,
-    /// Metres that one unit of the scene file stands for, where the format leaves it open (OBJ, C arrays) [default: 1]
-    #[arg(long, value_name = "METRES", value_parser = positive, conflicts_with = "builtin")]
-    pub unit: Option<f64>,
+    #[command(flatten)]
+    pub stage: StageArgs,
     /// File to write, ending in .pov; images that it needs are written beside it
     #[arg(short, long, value_name = "FILE.pov")]
     pub output: Option<PathBuf>,
     /// Replace files that exist
     #[arg(long)]
     pub overwrite: bool,
-    /// Width and height in pixels that the picture will have
-    #[arg(long, value_name = "WxH", default_value = "1024x768")]
-    pub size: Size,
-    /// Camera by name, by index, or from a .toml file; default: the scene's first one
-    #[arg(long, value_name = "NAME|INDEX|FILE")]
-    pub camera: Option<String>,
-    /// Time of the picture, seconds
-    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
-    pub time: f64,
-    /// Light the scene with this .hdr or .exr environment instead of its own
-    #[arg(long, alias = "env", value_name = "FILE")]
-    pub environment: Option<PathBuf>,
-    /// Add a white point light: place in metres, intensity in W/sr; may be given more than once
-    #[arg(long, value_name = "X,Y,Z,INTENSITY", allow_hyphen_values = true)]
-    pub light: Vec<Point>,
-    /// Add a white sun, and a sky if there is no environment: degrees, W/m² [default: 2]
-    #[arg(long, value_name = "AZIMUTH,ELEVATION[,IRRADIANCE]", allow_hyphen_values = true)]
-    pub sun: Option<Sun>,
-    /// Whether a sun and a sky are added
-    #[arg(long, value_enum, default_value_t, value_name = "WHEN")]
-    pub default_light: DefaultLight,
-    /// Set one setting, like pov.brightness=1 (`--print-config` shows all)
-    #[arg(short = 'D', value_name = "KEY=VALUE")]
-    pub define: Vec<String>,
-    /// Read settings from a TOML file; -D wins over it
-    #[arg(long, value_name = "FILE.toml")]
-    pub settings: Option<PathBuf>,
-    /// Print the settings in effect as TOML, then stop
-    #[arg(long)]
-    pub print_config: bool,
+    #[command(flatten)]
+    pub settings: SettingsArgs,
     /// Also render it: runs `povray` and writes the linear picture to this .exr, .hdr, .pfm or .png file
     #[arg(long, value_name = "FILE")]
     pub render: Option<PathBuf>,
@@ -234,9 +197,9 @@ pub struct ExportPovArgs {
 /// Whatever fails, with the kind that decides the exit code.
 pub fn run(args: &ExportPovArgs) -> Result<()> {
     let console = args.talk.console();
-    let settings: Settings = config::effective(&Settings::default(), args.settings.as_deref(), &args.define)?;
+    let settings: Settings = args.settings.effective(&Settings::default())?;
     settings.pov.check()?;
-    if args.print_config {
+    if args.settings.print_config {
         return console::print(config::to_toml(&settings)?.trim_end());
     }
     let output = match (&args.output, &args.render) {
@@ -253,19 +216,9 @@ pub fn run(args: &ExportPovArgs) -> Result<()> {
         image::probe_output(picture, args.overwrite)?;
         povray::find()?;
     }
-    let stage = Stage::of(&Asked {
-        scene: args.scene.as_deref(),
-        builtin: args.builtin.as_deref(),
-        unit: args.unit,
-        environment: args.environment.as_deref(),
-        light: &args.light,
-        sun: args.sun.as_ref(),
-        default_light: args.default_light,
-        camera: args.camera.as_deref(),
-        size: args.size,
-    })?;
+    let stage = Stage::open(&args.stage)?;
     stage.notes().iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
-    let (pose, view) = stage.at(args.time, args.size);
+    let (pose, view) = stage.at(args.stage.time, args.stage.size);
     let stem = output.and_then(Path::file_stem).map_or("scene".into(), |s| s.to_string_lossy().into_owned());
     let exported = export(&stage.scene, &pose, &view, &settings.pov, &stem)?;
     exported.notes.iter().for_each(|note| console.info(&format!("note: {note}")));
@@ -278,7 +231,7 @@ pub fn run(args: &ExportPovArgs) -> Result<()> {
             time_limit: std::time::Duration::from_secs_f64(args.time_limit.min(1e9)),
             ..Default::default()
         };
-        let rendered = povray::render(&exported, args.size, &options)?;
+        let rendered = povray::render(&exported, args.stage.size, &options)?;
         let options = image::WriteOptions { overwrite: args.overwrite, ..Default::default() };
         image::write(picture, &rendered.picture, &options)?;
         console.info(&format!("{}: {:.1} s by {}", picture.display(), rendered.seconds, rendered.version));

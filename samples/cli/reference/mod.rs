@@ -26,7 +26,7 @@ use crate::{
     program::{self, STOPPED_EARLY},
     record::{Record, Source},
     signals::Interrupt,
-    stage::{Asked, Stage},
+    stage::Stage,
 };
 use checkpoint::Checkpoint;
 use meter::Meter;
@@ -64,24 +64,14 @@ const FINISH: f64 = 1.0;
 /// Whatever fails, with the kind that decides the exit code.
 pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
     let settings = args.effective()?;
-    if args.print_config {
+    if args.settings.print_config {
         console::print(config::to_toml(&settings)?.trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
     let interrupt = Interrupt::install();
     let options = WriteOptions { overwrite: args.overwrite || args.resume, f32: true, ..WriteOptions::default() };
     Outputs::new(&args.output, 1, options.clone())?;
-    let stage = Stage::of(&Asked {
-        scene: args.scene.as_deref(),
-        builtin: args.builtin.as_deref(),
-        unit: args.unit,
-        environment: args.environment.as_deref(),
-        light: &args.light,
-        sun: args.sun.as_ref(),
-        default_light: args.default_light,
-        camera: args.camera.as_deref(),
-        size: args.size,
-    })?;
+    let stage = Stage::open(&args.stage)?;
     let mut outputs = Outputs::new(&args.output, 1, options)?;
     if outputs.uses_stdout() && args.json {
         return Err(Error::usage("--json and an image both want standard output").help("Give the image a name"));
@@ -97,7 +87,7 @@ pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
     }
     let gpu = Gpu::new(args.device.options()?)?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
-    let (pose, view) = stage.at(args.time, args.size);
+    let (pose, view) = stage.at(args.stage.time, args.stage.size);
     let mut tracer = Tracer::new(&gpu, &stage.scene, &pose)?;
     tracer.start(&view, &settings.reference)?;
     let first = args.output.first().filter(|name| *name != "-");
@@ -214,11 +204,11 @@ fn work(
 fn about(args: &ReferenceArgs, stage: &Stage) -> Value {
     json!({
         "scene": stage.fingerprint,
-        "time": args.time,
-        "environment": args.environment,
-        "default_light": args.default_light,
-        "light": args.light,
-        "sun": args.sun,
+        "time": args.stage.time,
+        "environment": args.stage.environment,
+        "default_light": args.stage.default_light,
+        "light": args.stage.light,
+        "sun": args.stage.sun,
         "version": program::VERSION,
         "revision": program::revision(),
     })
@@ -234,27 +224,12 @@ fn metadata(
 ) -> Result<Metadata> {
     let about = gpu.describe();
     let record = Record {
-        command: vec!["lucerna".into(), "reference".into()],
-        scene: stage.source.clone(),
-        unit: args.unit,
-        fingerprint: stage.fingerprint.clone(),
-        width: args.size.width,
-        height: args.size.height,
-        camera: stage.eye.clone(),
-        first_frame: 0,
-        frame: 0,
-        time: args.time,
-        fps: 30.0,
         exposure,
-        environment: args.environment.as_ref().map(|path| path.to_string_lossy().into_owned()),
-        default_light: args.default_light,
-        light: args.light.clone(),
-        sun: args.sun,
         seed: settings.reference.seed,
-        view: None,
         mode: (args.show != Show::Total).then(|| args.show.name().to_owned()),
         f32: true,
         settings: config::to_value(settings)?,
+        ..Record::new(&["lucerna", "reference"], &args.stage, stage)
     };
     Ok(Metadata {
         program: "lucerna reference".into(),

@@ -1,33 +1,23 @@
 //! The command line of `lucerna reference`.
 
-use std::{path::PathBuf, str::FromStr, time::Duration};
+use std::{str::FromStr, time::Duration};
 
 use clap::ValueEnum;
 use lucerna::{Result, reference::tracer};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    args::{DeviceArgs, Size, TalkArgs, finite, positive},
-    config,
-    framing::DefaultLight,
-    lights::{Point, Sun},
+    args::{DeviceArgs, TalkArgs, finite, positive},
+    config::SettingsArgs,
     progress::ProgressMode,
+    stage::StageArgs,
 };
 
 /// Options of `lucerna reference`.
 #[derive(clap::Args, Clone, Debug)]
 pub struct ReferenceArgs {
-    /// Scene file: .gltf, .glb or .obj
-    #[arg(value_name = "SCENE", required_unless_present_any = ["builtin", "print_config"])]
-    pub scene: Option<PathBuf>,
-
-    /// A built-in scene instead of a file (`lucerna list` names them)
-    #[arg(long, value_name = "NAME", conflicts_with = "scene")]
-    pub builtin: Option<String>,
-
-    /// Metres that one unit of the scene file stands for, where the format leaves it open (OBJ) [default: 1]
-    #[arg(long, value_name = "METRES", value_parser = positive, conflicts_with = "builtin")]
-    pub unit: Option<f64>,
+    #[command(flatten)]
+    pub stage: StageArgs,
 
     /// Image to write; may be given more than once: .exr (all layers), .png, .hdr, .pfm. Placeholders: {scene} {camera} {layer}
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
@@ -65,53 +55,16 @@ pub struct ReferenceArgs {
     #[arg(long, help_heading = "Quality")]
     pub resume: bool,
 
-    /// Width and height in pixels
-    #[arg(long, value_name = "WxH", default_value = "1024x768", help_heading = "Picture")]
-    pub size: Size,
-
-    /// Camera by name, by index, from a .toml file, or from a list of views (LIST.toml#NAME); default: the scene's first one
-    #[arg(long, value_name = "NAME|INDEX|FILE", help_heading = "Picture")]
-    pub camera: Option<String>,
-
-    /// Time of an animated scene, seconds
-    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
-    pub time: f64,
-
     /// Exposure: colours of .png files are multiplied by 2^EV [default: what suits the scene]
     #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
     pub exposure: Option<f64>,
-
-    /// Light the scene with this .hdr or .exr environment instead of its own
-    #[arg(long, alias = "env", value_name = "FILE", help_heading = "Picture")]
-    pub environment: Option<PathBuf>,
-
-    /// Add a white point light: place in metres, intensity in W/sr; may be given more than once
-    #[arg(long, value_name = "X,Y,Z,INTENSITY", allow_hyphen_values = true, help_heading = "Picture")]
-    pub light: Vec<Point>,
-
-    /// Add a white sun, and a sky if there is no environment: degrees (azimuth 0 is over +Z, 90 over +X), W/m² [default: 2]
-    #[arg(long, value_name = "AZIMUTH,ELEVATION[,IRRADIANCE]", allow_hyphen_values = true, help_heading = "Picture")]
-    pub sun: Option<Sun>,
-
-    /// Whether a sun and a sky are added
-    #[arg(long, value_enum, default_value_t, value_name = "WHEN", help_heading = "Picture")]
-    pub default_light: DefaultLight,
 
     /// Seed of everything random [default: 0]
     #[arg(long, value_name = "N", help_heading = "Picture")]
     pub seed: Option<u32>,
 
-    /// Set one setting, for example reference.diffuse_only=true (`--print-config` shows all)
-    #[arg(short = 'D', value_name = "KEY=VALUE", help_heading = "Quality")]
-    pub define: Vec<String>,
-
-    /// Read settings from a TOML file; -D wins over it
-    #[arg(long, value_name = "FILE.toml", help_heading = "Quality")]
-    pub settings: Option<PathBuf>,
-
-    /// Print the settings in effect as TOML, then stop
-    #[arg(long, help_heading = "Quality")]
-    pub print_config: bool,
+    #[command(flatten)]
+    pub settings: SettingsArgs,
 
     #[command(flatten)]
     pub device: DeviceArgs,
@@ -145,7 +98,7 @@ impl ReferenceArgs {
     /// # Errors
     /// `Usage` or `Input`, naming the key.
     pub fn effective(&self) -> Result<Settings> {
-        let mut settings = config::effective(&Settings::default(), self.settings.as_deref(), &self.define)?;
+        let mut settings = self.settings.effective(&Settings::default())?;
         settings.samples = self.spp.unwrap_or(settings.samples).clamp(1, u32::MAX.into());
         settings.reference.bounces = self.bounces.unwrap_or(settings.reference.bounces);
         settings.reference.seed = self.seed.unwrap_or(settings.reference.seed);

@@ -11,7 +11,7 @@ use crate::{
     config,
     console::{self, Console},
     framing::{self, DefaultLight},
-    source::{self, SceneArgs},
+    source::SceneArgs,
 };
 
 /// Options of `lucerna views`.
@@ -19,10 +19,6 @@ use crate::{
 pub struct ViewsArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
-
-    /// Metres that one unit of the scene file stands for, where the format leaves it open [default: 1]
-    #[arg(long, value_name = "METRES", value_parser = crate::args::positive, conflicts_with = "builtin")]
-    pub unit: Option<f64>,
 
     /// How many views in all; recorded ones come first, the rest is drawn
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=10_000))]
@@ -60,8 +56,7 @@ pub fn run(args: &ViewsArgs, console: Console) -> Result<()> {
     if let Some(path) = &args.output {
         image::probe_output(path, args.overwrite)?;
     }
-    let options = source::in_unit(args.unit);
-    let (mut scene, _) = source::open(args.scene.scene.as_deref(), args.scene.builtin.as_deref(), &options)?;
+    let (mut scene, _) = args.scene.open()?;
     // The light that `render` adds to dark scenes, as it decides what is seen.
     framing::add_missing_light(&mut scene, DefaultLight::Auto);
     let list = list(&scene, args)?;
