@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write};
 
-use lucerna::scene::Scene;
+use lucerna::{image::Layers, scene::Scene};
 
 /// 64 bits over everything of the scene that can reach a picture. For finding out that a file was edited, not for security.
 pub fn scene(scene: &Scene) -> String {
@@ -29,6 +29,17 @@ pub fn scene(scene: &Scene) -> String {
     if let Some(environment) = &scene.environment {
         environment.pixels.iter().for_each(|v| mixer.floats(&v.to_array()));
         mixer.floats(&[environment.rotation, environment.scale, environment.width as f32]);
+    }
+    format!("{:016x}", mixer.0)
+}
+
+/// The same of a picture.
+pub fn image(image: &Layers) -> String {
+    let mut mixer = Mixer(0x9E37_79B9_7F4A_7C15);
+    mixer.word(u64::from(image.width) << 32 | u64::from(image.height));
+    for layer in &image.layers {
+        let _ = write!(mixer, "{:?}{:?}", layer.name, layer.channels);
+        mixer.floats(&layer.data);
     }
     format!("{:016x}", mixer.0)
 }

@@ -15,7 +15,10 @@ use lucerna::{
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
 
-use super::file::{Changes, Method};
+use super::{
+    file::{Changes, Method},
+    place::Loaded,
+};
 use crate::{
     args::Size,
     config,
@@ -31,6 +34,8 @@ pub struct Kind {
     pub description: &'static str,
     /// Its pictures depend on device and driver.
     pub on_device: bool,
+    /// It also takes pictures in place of scenes.
+    pub of_images: bool,
     /// Folders of the source tree that decide its pictures; when one changes, pictures are made again.
     pub sources: &'static [&'static str],
     settings: fn(paper: bool, changes: &Changes) -> Result<Value>,
@@ -103,6 +108,8 @@ pub struct Warm<'a> {
     pub gpu: &'a Gpu,
     pub scene: &'a Scene,
     pub pose: &'a Pose,
+    /// A picture in place of a scene.
+    pub image: Option<&'a Layers>,
     /// Of this scene.
     kept: HashMap<&'static str, Box<dyn Any>>,
     /// Borrows the scene, so it cannot be among these.
@@ -110,8 +117,9 @@ pub struct Warm<'a> {
 }
 
 impl<'a> Warm<'a> {
-    pub fn new(gpu: &'a Gpu, scene: &'a Scene, pose: &'a Pose) -> Self {
-        Self { gpu, scene, pose, kept: HashMap::new(), tracer: None }
+    pub fn new(gpu: &'a Gpu, loaded: &'a Loaded) -> Self {
+        let Loaded { scene, pose, image, .. } = loaded;
+        Self { gpu, scene, pose, image: image.as_ref(), kept: HashMap::new(), tracer: None }
     }
 
     /// Something made once for the scene.
@@ -137,6 +145,7 @@ pub const KINDS: &[Kind] = &[
         name: "isr",
         description: "image-space radiosity; layers direct, indirect, occlusion, albedo, normal, depth",
         on_device: true,
+        of_images: false,
         sources: &[
             "engine/techniques/isr",
             "engine/passes",
@@ -160,6 +169,7 @@ pub const KINDS: &[Kind] = &[
         name: "tracer",
         description: "path tracer on the device; layers emission, direct, indirect, albedo, normal, depth, samples, variance",
         on_device: true,
+        of_images: false,
         sources: &[
             "engine/reference/tracer",
             "engine/rays",
@@ -183,6 +193,7 @@ pub const KINDS: &[Kind] = &[
         name: "povray",
         description: "the program povray, with radiosity as the dissertation has it; the picture alone",
         on_device: false,
+        of_images: false,
         sources: &["samples/cli/export_pov"],
         settings: |_, changes| config::to_value(&config::with::<PovSettings>(&PovSettings::default(), changes)?),
         render: by_povray,
@@ -195,6 +206,7 @@ pub const KINDS: &[Kind] = &[
         name: "path",
         description: "path tracer on the CPU; layers direct, indirect, albedo",
         on_device: false,
+        of_images: false,
         sources: &["engine/reference/path"],
         settings: |_, changes| config::to_value(&config::with::<PathSettings>(&PathSettings::default(), changes)?),
         render: path_picture,

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use glam::Mat4;
 use lucerna::{
     Error, ErrorKind, Result,
-    scene::{self, Camera, Limits, Pose, View, builtin, environment},
+    image::{self, Layers},
+    scene::{self, Camera, Limits, Pose, Projection, View, builtin, environment},
 };
 
 use super::file::{Experiment, IfMissing, Scene as Entry};
@@ -45,6 +46,8 @@ impl Folders {
 #[derive(Clone, Debug)]
 pub struct Placed {
     pub name: String,
+    /// Instead of the experiment's.
+    size: Option<Size>,
     camera: Camera,
     /// The node that carries the camera, or where it stands.
     node: Option<usize>,
@@ -54,11 +57,20 @@ pub struct Placed {
 impl Placed {
     fn from_file(name: String, file: &CameraFile) -> Self {
         let camera = Camera { name: name.clone(), projection: file.projection() };
-        Self { name, camera, node: None, world_from_camera: file.world_from_view() }
+        Self { name, size: None, camera, node: None, world_from_camera: file.world_from_view() }
     }
 
-    /// What it sees.
+    /// A whole picture, which no camera sees.
+    fn still(image: &Layers) -> Self {
+        let projection = Projection::Orthographic { xmag: 1.0, ymag: 1.0, znear: 0.0, zfar: 1.0 };
+        let camera = Camera { name: STILL.into(), projection };
+        let size = Some(Size { width: image.width, height: image.height });
+        Self { name: STILL.into(), size, camera, node: None, world_from_camera: Mat4::IDENTITY }
+    }
+
+    /// What it sees; `size` unless it has one of its own.
     pub fn view(&self, pose: &Pose, size: Size) -> View {
+        let size = self.size.unwrap_or(size);
         let world = self.node.map_or(self.world_from_camera, |node| pose.world[node]);
         View::new(&self.camera, world, [size.width, size.height])
     }
@@ -67,8 +79,10 @@ impl Placed {
 /// A scene in memory.
 #[derive(Debug)]
 pub struct Loaded {
+    /// Empty if it is a picture.
     pub scene: scene::Scene,
     pub pose: Pose,
+    pub image: Option<Layers>,
     pub fingerprint: String,
     pub triangles: usize,
     pub views: Vec<Placed>,
@@ -90,7 +104,7 @@ pub fn load(experiment: &Experiment, entry: &Entry, folders: &Folders) -> Result
             None => error.at(place).in_file(file),
         }
     };
-    let missing = [&entry.file, &entry.environment, &entry.list].into_iter().flatten();
+    let missing = [&entry.file, &entry.image, &entry.environment, &entry.list].into_iter().flatten();
     let missing = missing.chain(entry.cameras.iter().filter(|camera| camera.ends_with(".toml")));
     if let Some(name) = missing.into_iter().find(|name| folders.find(name).is_none()) {
         return match entry.if_missing {
@@ -103,6 +117,9 @@ pub fn load(experiment: &Experiment, entry: &Entry, folders: &Folders) -> Result
 
 fn read(experiment: &Experiment, entry: &Entry, folders: &Folders) -> Result<Loaded> {
     let found = |name: &String| folders.find(name).ok_or_else(|| folders.missing(name));
+    if let Some(name) = &entry.image {
+        return still(&found(name)?, entry);
+    }
     let path = entry.file.as_ref().map(found).transpose()?;
     let (mut scene, _) = source::open(path.as_deref(), entry.builtin.as_deref(), &source::in_unit(entry.unit))?;
     scene.name.clone_from(&entry.name);
@@ -118,11 +135,39 @@ fn read(experiment: &Experiment, entry: &Entry, folders: &Folders) -> Result<Loa
         framing::add_missing_camera(&mut scene, experiment.size.aspect());
     }
     let pose = Pose::playing(&scene, 0.0);
-    let views = all_views(entry, &scene, &pose, folders)?;
+    let views = sized(all_views(entry, &scene, &pose, folders)?, entry)?;
     let triangles =
         scene.meshes.iter().flat_map(|mesh| &mesh.primitives).map(|primitive| primitive.indices.len() / 3).sum();
     let exposure = entry.exposure.or_else(|| entry.builtin.as_deref().and_then(builtin::exposure).map(f64::from));
-    Ok(Loaded { fingerprint: fingerprint::scene(&scene), scene, pose, triangles, views, exposure })
+    Ok(Loaded { fingerprint: fingerprint::scene(&scene), scene, pose, image: None, triangles, views, exposure })
+}
+
+/// Name of the only view of a picture.
+const STILL: &str = "still";
+
+fn still(path: &Path, entry: &Entry) -> Result<Loaded> {
+    let image = image::read(path, &Limits::default())?;
+    let scene = scene::Scene { name: entry.name.clone(), ..Default::default() };
+    Ok(Loaded {
+        fingerprint: fingerprint::image(&image),
+        pose: Pose::rest(&scene),
+        scene,
+        triangles: 0,
+        views: vec![Placed::still(&image)],
+        exposure: entry.exposure,
+        image: Some(image),
+    })
+}
+
+/// Every view at every size.
+fn sized(views: Vec<Placed>, entry: &Entry) -> Result<Vec<Placed>> {
+    if entry.sizes.is_empty() {
+        return Ok(views);
+    }
+    let sizes: Vec<Size> = entry.sizes.iter().map(|size| size.parse().map_err(Error::input)).collect::<Result<_>>()?;
+    let at =
+        |view: &Placed, size: Size| Placed { name: format!("{} {size}", view.name), size: Some(size), ..view.clone() };
+    Ok(views.iter().flat_map(|view| sizes.iter().map(move |&size| at(view, size))).collect())
 }
 
 fn all_views(entry: &Entry, scene: &scene::Scene, pose: &Pose, folders: &Folders) -> Result<Vec<Placed>> {
@@ -171,7 +216,7 @@ fn one(asked: &str, scene: &scene::Scene, folders: &Folders) -> Result<Placed> {
             let camera = scene.cameras[index].clone();
             let node = scene.nodes.iter().position(|node| node.camera == Some(index as u32));
             let name = if camera.name.is_empty() { format!("camera{index}") } else { camera.name.clone() };
-            Placed { name, camera, node, world_from_camera: Mat4::IDENTITY }
+            Placed { name, size: None, camera, node, world_from_camera: Mat4::IDENTITY }
         }
         Choice::File(file) => Placed::from_file(asked.to_owned(), &file),
     })

@@ -1,0 +1,261 @@
+//! The file that describes an experiment.
+//!
+//! ```toml
+//! title = "Image-space radiosity beside a path tracer"
+//! analysis = "compare"           # the function that makes the report
+//! size = "64x48"
+//! measures = ["mae", "nrmse"]
+//!
+//! [[scene]]
+//! name = "cornell"
+//! builtin = "cornell"            # or file = "scenes/x.gltf", looked for beside this file and in the folder of assets;
+//!                                # or image = "x.exr", a picture that is only tone mapped
+//! group = "simple"
+//! cameras = ["0"]                # index, name, camera file, LIST.toml#NAME; with random = 20, seed = 1 drawn ones
+//!
+//! [[technique]]
+//! name = "isr"
+//! kind = "isr"
+//! settings = { "isr.sender" = "lit" }
+//! matrix = { "isr.samples" = [24, 48] }
+//!
+//! [[reference]]
+//! name = "path"
+//! kind = "path"
+//! settings = { samples = 16, bounces = 1 }
+//!
+//! [quick]
+//! size = "32x24"
+//! ```
+
+mod read;
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+pub use read::parse;
+
+use lucerna::{Error, Result};
+use serde::Deserialize;
+use serde_json::Value;
+
+use crate::{
+    args::Size,
+    config,
+    framing::DefaultLight,
+    lights::{Point, Sun},
+};
+
+/// The experiments that come with the program: name and text.
+pub const BUILTIN: &[(&str, &str)] = &[
+    ("isr", include_str!("../../../experiments/isr.toml")),
+    ("smoke", include_str!("../../../experiments/smoke.toml")),
+];
+
+/// Settings that are changed, by their keys.
+pub type Changes = BTreeMap<String, Value>;
+
+/// An experiment, checked, with the overrides of quick mode applied where asked for.
+#[derive(Clone, Debug)]
+pub struct Experiment {
+    pub name: String,
+    /// The file, for errors and for what lies beside it; `None`: comes with the program.
+    pub path: Option<PathBuf>,
+    pub quick: bool,
+    pub title: String,
+    pub summary: String,
+    pub analysis: String,
+    /// For the analysis.
+    pub parameters: serde_json::Map<String, Value>,
+    pub size: Size,
+    pub seed: u32,
+    pub measures: Vec<String>,
+    /// Views that the report shows as images.
+    pub images: usize,
+    pub scenes: Vec<Scene>,
+    /// Techniques, then references.
+    pub methods: Vec<Method>,
+    /// The text, so that the report can be made again.
+    pub text: String,
+}
+
+/// What to do about a file that is not there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum IfMissing {
+    #[default]
+    Fail,
+    /// Go on without, and say so in the report.
+    Skip,
+}
+
+/// A scene and its views.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    pub name: String,
+    pub builtin: Option<String>,
+    pub file: Option<String>,
+    /// A picture in place of a scene, for what works on pictures.
+    pub image: Option<String>,
+    /// Metres of one unit of the file.
+    pub unit: Option<f64>,
+    /// For tables: `simple`, `complex`…
+    #[serde(default)]
+    pub group: String,
+    #[serde(default)]
+    pub if_missing: IfMissing,
+    pub environment: Option<String>,
+    /// Whether there is light from all around; `false` takes it away, and leaves the lights.
+    #[serde(default = "yes")]
+    pub sky: bool,
+    #[serde(default)]
+    pub light: Vec<Point>,
+    pub sun: Option<Sun>,
+    #[serde(default)]
+    pub default_light: DefaultLight,
+    /// Of images in the report, EV; default: what suits the scene.
+    pub exposure: Option<f64>,
+    /// Cameras by index, name, file, or view of a list (`LIST.toml#NAME`).
+    #[serde(default)]
+    pub cameras: Vec<String>,
+    /// All views of this list.
+    pub list: Option<String>,
+    /// All cameras that stand in the scene.
+    #[serde(default)]
+    pub recorded: bool,
+    /// Number of views drawn at random.
+    #[serde(default)]
+    pub random: usize,
+    /// Seed of these.
+    #[serde(default = "one")]
+    pub seed: u64,
+    /// Every view at each of these sizes, instead of the experiment's.
+    #[serde(default)]
+    pub sizes: Vec<String>,
+    /// Only so many views, spread evenly.
+    pub most_views: Option<usize>,
+    /// In the file; 0 is unknown.
+    #[serde(skip)]
+    pub line: usize,
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn one() -> u64 {
+    1
+}
+
+/// Techniques are what is examined, references what they are held against.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Role {
+    #[default]
+    Technique,
+    Reference,
+}
+
+/// A technique or a reference with its settings.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Method {
+    pub name: String,
+    /// How it is rendered ([`super::kinds`]).
+    pub kind: String,
+    /// Starts from the paper's settings.
+    #[serde(default)]
+    pub paper: bool,
+    #[serde(default)]
+    pub settings: Changes,
+    /// Every combination of these values is a variant.
+    #[serde(default)]
+    pub matrix: BTreeMap<String, Vec<Value>>,
+    /// How often a frame is rendered, for its time.
+    #[serde(default = "once")]
+    pub repeat: u32,
+    /// Layers that are kept beside the picture; default: direct and indirect.
+    #[serde(default = "kept_layers")]
+    pub layers: Vec<String>,
+    /// Only these scenes.
+    pub scenes: Option<Vec<String>>,
+    /// Only so many views of each scene, spread evenly.
+    pub most_views: Option<usize>,
+    /// Where the program that it needs is not installed.
+    #[serde(default)]
+    pub if_missing: IfMissing,
+    #[serde(skip)]
+    pub role: Role,
+    #[serde(skip)]
+    pub line: usize,
+}
+
+fn once() -> u32 {
+    1
+}
+
+fn kept_layers() -> Vec<String> {
+    vec!["direct".into(), "indirect".into()]
+}
+
+impl Method {
+    /// Every combination of the matrix, the last key changing fastest; one without entries if there is no matrix.
+    pub fn variants(&self) -> Vec<Changes> {
+        self.matrix.iter().fold(vec![Changes::new()], |variants, (key, values)| {
+            let extended = |variant: &Changes| {
+                values
+                    .iter()
+                    .map(|value| {
+                        variant
+                            .iter()
+                            .map(|(k, v)| (k.clone(), v.clone()))
+                            .chain([(key.clone(), value.clone())])
+                            .collect()
+                    })
+                    .collect::<Vec<Changes>>()
+            };
+            variants.iter().flat_map(extended).collect()
+        })
+    }
+
+    /// Whether it is run on a scene.
+    pub fn takes(&self, scene: &str) -> bool {
+        self.scenes.as_ref().is_none_or(|scenes| scenes.iter().any(|name| name == scene))
+    }
+}
+
+/// Finds an experiment by the name of one that comes with the program, or by its file.
+///
+/// # Errors
+/// `Usage` if there is no such name, `Input` if the file has a mistake; the message names the line.
+pub fn open(asked: &str, quick: bool) -> Result<Experiment> {
+    if let Some((name, text)) = BUILTIN.iter().find(|(name, _)| *name == asked) {
+        return parse(name, None, text, quick);
+    }
+    let path = Path::new(asked);
+    if path.extension().is_some_and(|e| e == "toml") || path.is_file() {
+        let name = path.file_stem().map_or("experiment".into(), |stem| stem.to_string_lossy());
+        return parse(&name, Some(path), &config::read_text(path)?, quick);
+    }
+    let names: Vec<&str> = BUILTIN.iter().map(|(name, _)| *name).collect();
+    let hint = config::nearest(asked, names.iter().copied()).map(|name| format!(" (did you mean '{name}'?)"));
+    Err(Error::usage(format!("no experiment '{asked}'{}; there are {}", hint.unwrap_or_default(), names.join(", ")))
+        .help("Name one of these, or a .toml file"))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn variants_are_all_combinations_in_order() {
+        let text = "name = 'a'\nkind = 'isr'\nmatrix = { y = [1, 2], x = ['p', 'q'] }";
+        let method: Method = toml::from_str(text).unwrap();
+        let variants: Vec<_> = method.variants().iter().map(|v| (v["x"].clone(), v["y"].clone())).collect();
+        assert_eq!(variants, [("p", 1), ("p", 2), ("q", 1), ("q", 2)].map(|(x, y)| (json!(x), json!(y))));
+    }
+}
