@@ -222,7 +222,12 @@ fn mistakes_name_the_line() {
         ("builtin = \"cornell\"", "", scene, "one of builtin, file and image"),
         ("cameras = [\"0\"]", "", scene, "has no views"),
         ("builtin = \"cornell\"", "image = \"x.exr\"", scene, "is an image, which has its own"),
-        ("builtin = \"cornell\"\ncameras = [\"0\"]", "image = \"x.exr\"", technique, "'isr' renders scenes, and 'cornell'"),
+        (
+            "builtin = \"cornell\"\ncameras = [\"0\"]",
+            "image = \"x.exr\"\ngroup = \"g\"",
+            technique,
+            "'isr' renders scenes, and 'cornell'",
+        ),
         ("cameras = [\"0\"]", "cameras = [\"0\"]\nsizes = [\"4by3\"]", scene, "sizes: expected WIDTHxHEIGHT"),
         ("cameras = [\"0\"]", "cameras = [\"7\"]", scene, "7"),
         ("builtin = \"cornell\"", "builtin = \"cornel\"", scene, "cornell"),
