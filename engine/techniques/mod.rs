@@ -1,3 +1,4 @@
 //! The papers' methods, one module each.
 
 pub mod isr;
+pub mod tonemap;

@@ -1,0 +1,178 @@
+//! Tone mapping: from scene luminances to what a display can show.
+//!
+//! Three local operators (Ashikhmin 2002, Reinhard 2002, a bilateral one after Durand and Dorsey 2002), each global, local or selective
+//! (Michael 2010, chapter 4), and the curves that programs offer beside them. [`Operator`] and [`Settings`] hold the definitions.
+//!
+//! Every local operator is in two parts, which is what makes it fit for selection: **local adaptation** L_a of each pixel, an average of
+//! luminances around it ([`local`]), and a **curve** from L and L_a to display luminance, with statistics of the whole picture
+//! ([`statistics`]). Global is L_a = L; selective is L_a = L where a pixel is not important.
+//!
+//! | want | use |
+//! |---|---|
+//! | tone mapping as the last passes of a frame | [`Tonemap::frame`] |
+//! | pictures in main memory, of any size, one or many | [`Still`] |
+//! | one picture | [`apply`] |
+//!
+//! The result is display-referred linear Rec. 709 relative to the display's white; encoding (sRGB or a gamma) is left to where it is
+//! written. Shaders never spread NaN: they take it, infinity and negative values for 0; [`clean()`] offers other policies before.
+
+mod clean;
+mod local;
+mod settings;
+pub mod statistics;
+mod still;
+
+pub use clean::{BadCounts, clean};
+pub use settings::{BadValues, Identify, Local, Mark, Mode, Operator, Settings};
+pub use still::{Mapped, Still, apply};
+
+use crate::{
+    Result,
+    gpu::{Gpu, OwnedBuffer},
+    graph::{Buffer, Extent, Format, Graph, Image},
+    shaders::{consts, tonemap::curve, types},
+};
+
+/// What a frame starts from.
+#[derive(Clone, Copy, Debug)]
+pub struct Input {
+    /// Linear Rec. 709, RGBA32F or RGBA16F, premultiplied.
+    pub color: Image,
+    /// Pixels that are important whatever their luminance: red over 0.5. Same extent as `color`.
+    pub mask: Option<Image>,
+}
+
+impl From<Image> for Input {
+    fn from(color: Image) -> Self {
+        Self { color, mask: None }
+    }
+}
+
+/// What a frame gives, all of the extent of the input.
+#[derive(Clone, Copy, Debug)]
+pub struct Output {
+    /// RGBA32F: display-referred linear Rec. 709, 1 is the display's white; alpha is that of the input.
+    pub mapped: Image,
+    /// R32F: luminance after the exposure.
+    pub luminance: Image,
+    /// R32F: local adaptation, in the same unit; of the bilateral operator log₁₀ of the base. Global: `luminance`.
+    pub adaptation: Image,
+    /// One `types::TonemapStatistics`.
+    pub statistics: Buffer,
+    /// Selective: R8, 1 where a pixel is important.
+    pub important: Option<Image>,
+}
+
+/// Tone mapping with its adaptation, which goes on from frame to frame.
+#[derive(Debug)]
+pub struct Tonemap {
+    gpu: Gpu,
+    settings: Settings,
+    /// `types::TonemapStatistics` of the last frame.
+    statistics: OwnedBuffer,
+}
+
+impl Tonemap {
+    /// Not adapted to anything yet.
+    ///
+    /// # Errors
+    /// `Usage` if a setting is out of its range, `OutOfMemory`.
+    pub fn new(gpu: &Gpu, settings: &Settings) -> Result<Self> {
+        settings.validate()?;
+        Ok(Self { gpu: gpu.clone(), settings: settings.clone(), statistics: no_statistics(gpu)? })
+    }
+
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Goes on with other settings, without forgetting to what it is adapted.
+    ///
+    /// # Errors
+    /// `Usage` if a setting is out of its range; then nothing has changed.
+    pub fn set(&mut self, settings: &Settings) -> Result<()> {
+        settings.validate()?;
+        self.settings = settings.clone();
+        Ok(())
+    }
+
+    /// Forgets to what it is adapted: for cuts. Frames already declared are not touched.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`.
+    pub fn reset(&mut self) -> Result<()> {
+        self.statistics = no_statistics(&self.gpu)?;
+        Ok(())
+    }
+
+    /// Declares all passes. `dt`: seconds since the frame before, for adaptation in time; `None`: the picture stands for itself.
+    ///
+    /// # Errors
+    /// `Usage` if the input asks for what the settings cannot serve.
+    pub fn frame(&mut self, graph: &mut Graph, input: impl Into<Input>, dt: Option<f32>) -> Result<Output> {
+        let input = input.into();
+        let statistics = graph.import_buffer(&self.statistics);
+        graph.scope("tonemap", |graph| {
+            let luminance = statistics::whole(graph, input.color, statistics, dt, &self.settings);
+            let picture = graph.extent(input.color);
+            map(graph, &input, luminance, statistics, picture, &self.settings)
+        })
+    }
+}
+
+/// Adaptation and curve. `picture`: extent of the whole picture, of which the input may be a part.
+fn map(
+    graph: &mut Graph,
+    input: &Input,
+    luminance: Image,
+    statistics: Buffer,
+    picture: Extent,
+    settings: &Settings,
+) -> Result<Output> {
+    let adaptation = match settings.mode() {
+        Mode::Global => luminance,
+        Mode::Local | Mode::Selective => local::adaptation(graph, luminance, statistics, picture, settings)?,
+    };
+    let mapped = curve(graph, input.color, luminance, adaptation, statistics, settings);
+    Ok(Output { mapped, luminance, adaptation, statistics, important: None })
+}
+
+/// The curve of the operator for every pixel.
+pub fn curve(
+    graph: &mut Graph,
+    color: Image,
+    luminance: Image,
+    adaptation: Image,
+    statistics: Buffer,
+    settings: &Settings,
+) -> Image {
+    let extent = graph.extent(color);
+    let mapped = graph.image("tonemap.mapped", Format::RGBA32F, extent);
+    let operator = match settings.operator {
+        Operator::Ashikhmin => consts::TONEMAP_ASHIKHMIN,
+        Operator::Reinhard => consts::TONEMAP_REINHARD,
+        Operator::Bilateral => consts::TONEMAP_BILATERAL,
+        Operator::Linear => consts::TONEMAP_LINEAR,
+        Operator::ReinhardGlobal => consts::TONEMAP_REINHARD_GLOBAL,
+        Operator::Aces => consts::TONEMAP_ACES,
+        Operator::Agx => consts::TONEMAP_AGX,
+        Operator::Neutral => consts::TONEMAP_NEUTRAL,
+    };
+    let push = curve::Push {
+        exposure: settings.exposure.exp2(),
+        display: settings.display,
+        key: settings.key,
+        white: settings.white,
+        log_contrast: settings.base_contrast.log10(),
+        detail: settings.detail,
+        saturation: settings.saturation,
+    };
+    let spec = curve::Spec { operator, global: (settings.mode() == Mode::Global).into() };
+    let args = curve::Args { color, luminance, adaptation, statistics, mapped, push, spec };
+    graph.compute(args, extent);
+    mapped
+}
+
+fn no_statistics(gpu: &Gpu) -> Result<OwnedBuffer> {
+    OwnedBuffer::with_contents(gpu, "tonemap.statistics", bytemuck::bytes_of(&types::TonemapStatistics::default()))
+}

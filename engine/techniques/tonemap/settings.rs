@@ -1,0 +1,326 @@
+//! What can be chosen in tone mapping.
+
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// How luminances become display luminances. L is the luminance of a pixel after [`Settings::exposure`], L_a its local adaptation,
+/// which is L itself in [`Mode::Global`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Operator {
+    /// Ashikhmin, "A tone mapping algorithm for high contrast images", 2002: L_d = TM(L_a) + TVI(TM(L_a)) / TVI(L_a) · (L − L_a),
+    /// TM(L) = L_dmax · (C(L) − C(L_min)) / (C(L_max) − C(L_min)). Luminances are taken as cd/m².
+    Ashikhmin,
+    /// Reinhard, Stark, Shirley, Ferwerda, "Photographic tone reproduction for digital images", 2002. With l = key · L / log-average:
+    /// global l (1 + l / white²) / (1 + l) (equation 4), local l / (1 + l_a) (equation 9), l_a by dodging and burning.
+    Reinhard,
+    /// Durand, Dorsey, "Fast bilateral filtering for the display of high-dynamic-range images", 2002. With B the base, the bilateral
+    /// filter of log₁₀ L, and D = log₁₀ L − B the detail: log₁₀ L_d = γ (B − log₁₀ L_max) + `detail` · D,
+    /// γ = log₁₀(`base_contrast`) / (log₁₀ L_max − log₁₀ L_min), at most 1. L is taken as at least 10⁻⁴ L_max. Global: B = log₁₀ L.
+    Bilateral,
+    /// The values as they are, times 2^exposure.
+    Linear,
+    /// Extended Reinhard without a key: L (1 + L / white²) / (1 + L); `white` 0 is L_max.
+    ReinhardGlobal,
+    /// Stephen Hill's fit of the ACES reference rendering and output transforms for sRGB displays (BakingLab, 2015), per channel
+    /// between its two matrices. No exposure factor is hidden in it.
+    Aces,
+    /// Troy Sobotka's AgX (2022), base look: inset matrix, log₂ from −12.47393 to 4.026069 onto 0 to 1, the sigmoid
+    /// y = 1/2 + 2 (x − t) (1 + (4^p − |T|^−p) |x − t|^p)^(−1/p) with t = 20/33, p = 3 and T = t below t, p = 3.25 and T = 1 − t above,
+    /// outset matrix (the inverse of the inset), and the power 2.2, which makes it linear.
+    Agx,
+    /// Khronos PBR Neutral (specification of 2024): colours below 0.76 keep hue and saturation.
+    Neutral,
+}
+
+impl Operator {
+    /// All, with the names that settings have for them.
+    pub const ALL: [(&'static str, Self); 8] = [
+        ("ashikhmin", Self::Ashikhmin),
+        ("reinhard", Self::Reinhard),
+        ("bilateral", Self::Bilateral),
+        ("linear", Self::Linear),
+        ("reinhard-global", Self::ReinhardGlobal),
+        ("aces", Self::Aces),
+        ("agx", Self::Agx),
+        ("neutral", Self::Neutral),
+    ];
+
+    /// The name that settings have for it.
+    pub fn name(self) -> &'static str {
+        Self::ALL.iter().find(|(_, o)| *o == self).map_or("", |(name, _)| name)
+    }
+
+    /// It has a local component, and so the modes local and selective.
+    pub fn has_local(self) -> bool {
+        matches!(self, Self::Ashikhmin | Self::Reinhard | Self::Bilateral)
+    }
+
+    /// What it does depends on the luminances of the whole picture.
+    pub fn needs_statistics(self, settings: &Settings) -> bool {
+        self.has_local() || (self == Self::ReinhardGlobal && settings.white == 0.0) || settings.normalize
+    }
+}
+
+/// Which pixels get local adaptation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mode {
+    /// None: every pixel adapts to itself.
+    Global,
+    /// All.
+    Local,
+    /// The important ones (Michael 2010, section 4.4); the others adapt to themselves.
+    Selective,
+}
+
+/// How local adaptation is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Local {
+    /// Ashikhmin, Reinhard: the averages along rows and then along columns, which is the same sum in another order (relative difference of
+    /// an average under 10⁻⁵). Bilateral: the base from averages of blocks, `fast` of it in [`Settings::spatial`].
+    Fast,
+    /// The definition: every sample of every neighbourhood of every pixel.
+    Literal,
+}
+
+/// What makes a pixel important.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Identify {
+    /// Magnitude of the Sobel gradient √(Gx² + Gy²) of L, weights 1 2 1 unscaled.
+    Sobel,
+    /// Centre against surround at several scales.
+    Saliency,
+}
+
+/// How the work on unimportant pixels is avoided. All give the same picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mark {
+    /// A branch in the fragment shader.
+    Branch,
+    /// Tiles without important pixels are not drawn.
+    Tiles,
+    /// The map as depth, and early depth tests.
+    EarlyZ,
+    /// A list of the important pixels, dispatched indirectly.
+    Compact,
+}
+
+/// What becomes of NaN, infinite and negative values before anything else.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BadValues {
+    /// NaN and infinity become 0, negative values 0.
+    Zero,
+    /// NaN becomes 0, infinity the largest finite value of its channel in the picture, negative values 0.
+    Clamp,
+    /// A pixel with NaN or infinity becomes the mean of the good ones among its 8 neighbours (0 without any), negative values 0.
+    Neighbour,
+    /// They are an error.
+    Error,
+}
+
+/// All choices.
+///
+/// Definitions that all operators share: luminance is 0.2126 R + 0.7152 G + 0.0722 B of linear Rec. 709, after the exposure; below 10⁻³⁰ it is
+/// 0, above 10¹⁸ it is 10¹⁸. Colour is scaled by L_d / L; alpha is kept. Samples outside of the image are those of its edge.
+/// The log-average is exp of the mean of ln(10⁻⁶ + L). A display luminance below 0 is 0; the result is relative to the display's white, and may be over 1.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    pub operator: Operator,
+    /// None: local if the operator has a local component, else global.
+    pub mode: Option<Mode>,
+    /// Stops (EV) before the operator: values are multiplied by 2^exposure.
+    pub exposure: f32,
+    /// Divides luminance by its log-average before the exposure, for pictures in no known unit.
+    pub normalize: bool,
+    /// Percent of the pixels left out at each end when L_min and L_max are looked for; 0: the true minimum and maximum. Otherwise, of n
+    /// luminances in ascending order, L_min is number ⌈n · percentile/100⌉ (at least 1) and L_max number n + 1 − that.
+    pub percentile: f32,
+    /// Ashikhmin: luminance of the display's white L_dmax, cd/m².
+    pub display: f32,
+    /// Ashikhmin: largest radius s of the averages G_s, pixels, 1 to 16. G_s: weights exp(−d² / 2σ²) with σ = s/2 along each axis, s pixels
+    /// to each side, divided by their sum.
+    pub radius: u32,
+    /// Ashikhmin: s grows from 1 as long as |G_s − G_2s| < contrast · G_s; L_a is the last G_s for which that held, or G_1.
+    pub contrast: f32,
+    /// Reinhard: what the log-average becomes.
+    pub key: f32,
+    /// Reinhard (in units of l) and extended Reinhard (in units of L): the smallest luminance that becomes white; 0: the largest of the
+    /// picture ([`Settings::percentile`]).
+    pub white: f32,
+    /// Reinhard: scales s of dodging and burning, 1 to 8. s = 1.6^i for i = 0, 1, …; V_i is the Gaussian average of σ = s/4, ⌈3σ⌉ pixels
+    /// to each side, of l. l_a is V_i of the largest i < scales before |V_i − V_(i+1)| / (2^phi · key / s² + V_i) ≥ epsilon, or V_0.
+    pub scales: u32,
+    /// Reinhard: sharpening φ.
+    pub phi: f32,
+    /// Reinhard: largest activity ε.
+    pub epsilon: f32,
+    /// Bilateral: σ in space, share of the longer side; at least half a pixel. The filter reaches ⌈2σ⌉ pixels. Literal: at most 80 pixels.
+    /// Fast: L's logarithms are averaged in blocks of ⌈σ/4⌉² pixels, and the filter takes the blocks' averages at their centres.
+    pub spatial: f32,
+    /// Bilateral: σ of log₁₀ L.
+    pub range: f32,
+    /// Bilateral: contrast of the base on the display.
+    pub base_contrast: f32,
+    /// Bilateral: factor of the detail.
+    pub detail: f32,
+    /// Exponent of the ratios of colour to luminance; 1: as the papers.
+    pub saturation: f32,
+    pub local: Local,
+    /// Selective: what makes a pixel important.
+    pub identify: Identify,
+    /// Selective: a pixel is important above this.
+    pub threshold: f32,
+    /// Selective: identification on the picture reduced so many times: 1, 2 or 4.
+    pub identify_scale: u32,
+    /// Selective: how the important ones are marked.
+    pub mark: Mark,
+    pub bad_values: BadValues,
+    /// Seconds in which adaptation to a brighter picture comes within 1/e, in sequences; 0: at once.
+    pub adapt_up: f32,
+    /// The same to a darker one.
+    pub adapt_down: f32,
+    /// Adaptation changes by at most so many stops a second; 0: no limit.
+    pub adapt_limit: f32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            operator: Operator::Ashikhmin,
+            mode: None,
+            exposure: 0.0,
+            normalize: false,
+            percentile: 0.0,
+            display: 100.0,
+            radius: 10,
+            contrast: 0.5,
+            key: 0.18,
+            white: 0.0,
+            scales: 8,
+            phi: 8.0,
+            epsilon: 0.05,
+            spatial: 0.02,
+            range: 0.4,
+            base_contrast: 5.0,
+            detail: 1.0,
+            saturation: 1.0,
+            local: Local::Fast,
+            identify: Identify::Sobel,
+            threshold: 0.1,
+            identify_scale: 1,
+            mark: Mark::EarlyZ,
+            bad_values: BadValues::Zero,
+            adapt_up: 0.4,
+            adapt_down: 1.2,
+            adapt_limit: 6.0,
+        }
+    }
+}
+
+impl Settings {
+    /// The mode that is used.
+    pub fn mode(&self) -> Mode {
+        self.mode.unwrap_or(if self.operator.has_local() { Mode::Local } else { Mode::Global })
+    }
+
+    /// σ in pixels and reach to each side of the bilateral filter of a picture.
+    pub fn bilateral(&self, width: u32, height: u32) -> (f32, u32) {
+        let sigma = (self.spatial * width.max(height) as f32).max(0.5);
+        (sigma, (2.0 * sigma).ceil() as u32)
+    }
+
+    /// Pixels around a pixel that its result depends on, beside the statistics.
+    pub fn reach(&self, width: u32, height: u32) -> u32 {
+        match (self.mode(), self.operator) {
+            (Mode::Global, _) => 0,
+            (_, Operator::Ashikhmin) => 2 * self.radius,
+            (_, Operator::Reinhard) => (0.75 * 1.6f32.powi(self.scales as i32)).ceil() as u32,
+            (_, Operator::Bilateral) => self.bilateral(width, height).1,
+            _ => 0,
+        }
+    }
+
+    /// # Errors
+    /// `Usage`, naming the key, the value found and the values allowed.
+    pub fn validate(&self) -> Result<()> {
+        let wrong = |key: &str, found: String, allowed: &str| {
+            Err(Error::usage(format!("{found} is not allowed; allowed: {allowed}")).at(key))
+        };
+        if let Some(mode) = self.mode.filter(|m| *m != Mode::Global && !self.operator.has_local()) {
+            let mode = if mode == Mode::Local { "local" } else { "selective" };
+            let allowed =
+                format!("global, for the operator {} is a curve without local component", self.operator.name());
+            return wrong("mode", mode.into(), &allowed);
+        }
+        if ![1, 2, 4].contains(&self.identify_scale) {
+            return wrong("identify_scale", self.identify_scale.to_string(), "1, 2, 4");
+        }
+        for (key, value, least, most) in [("radius", self.radius, 1, 16), ("scales", self.scales, 1, 8)] {
+            if !(least..=most).contains(&value) {
+                return wrong(key, value.to_string(), &format!("{least} to {most}"));
+            }
+        }
+        for (key, value, least, most) in [
+            ("exposure", self.exposure, -40.0, 40.0),
+            ("percentile", self.percentile, 0.0, 49.0),
+            ("display", self.display, 1.0, 1e5),
+            ("contrast", self.contrast, 0.0, 1e6),
+            ("key", self.key, 1e-6, 1e6),
+            ("white", self.white, 0.0, 1e18),
+            ("phi", self.phi, 0.0, 32.0),
+            ("epsilon", self.epsilon, 0.0, 1e6),
+            ("spatial", self.spatial, 0.0, 0.25),
+            ("range", self.range, 1e-3, 1e3),
+            ("base_contrast", self.base_contrast, 1.0, 1e6),
+            ("detail", self.detail, 0.0, 16.0),
+            ("saturation", self.saturation, 0.0, 4.0),
+            ("threshold", self.threshold, 0.0, 1e18),
+            ("adapt_up", self.adapt_up, 0.0, 3600.0),
+            ("adapt_down", self.adapt_down, 0.0, 3600.0),
+            ("adapt_limit", self.adapt_limit, 0.0, 1e6),
+        ] {
+            // Written so that a value that is not a number is refused.
+            if !(least..=most).contains(&value) {
+                return wrong(key, value.to_string(), &format!("{least} to {most}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_valid_and_curves_are_global() {
+        for (name, operator) in Operator::ALL {
+            let settings = Settings { operator, ..Settings::default() };
+            settings.validate().unwrap();
+            assert_eq!(operator.name(), name);
+            assert_eq!(settings.mode() == Mode::Global, !operator.has_local());
+            let parsed: Settings = toml::from_str(&format!("operator = \"{name}\"")).unwrap();
+            assert_eq!(parsed, settings);
+        }
+    }
+
+    #[test]
+    fn an_error_names_key_value_and_what_is_allowed() {
+        let message = |s: Settings| s.validate().unwrap_err().to_string();
+        let curve = Settings { operator: Operator::Aces, mode: Some(Mode::Local), ..Settings::default() };
+        let wanted =
+            "mode: local is not allowed; allowed: global, for the operator aces is a curve without local component";
+        assert_eq!(message(curve), wanted);
+        let wanted = "exposure: NaN is not allowed; allowed: -40 to 40";
+        assert_eq!(message(Settings { exposure: f32::NAN, ..Settings::default() }), wanted);
+        let wanted = "radius: 17 is not allowed; allowed: 1 to 16";
+        assert_eq!(message(Settings { radius: 17, ..Settings::default() }), wanted);
+        assert!(toml::from_str::<Settings>("radios = 3").unwrap_err().to_string().contains("radius"));
+    }
+}

@@ -1,0 +1,85 @@
+// From luminance and its local adaptation to display luminance, and from there to colour; curves of colour directly.
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "lib/tonemap.glsl"
+#include "lib/tonemap_ashikhmin.glsl"
+#include "lib/tonemap_curves.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(constant_id = 0) const uint OPERATOR = 0;
+layout(constant_id = 1) const uint GLOBAL = 0;
+
+layout(binding = 0) uniform sampler2D color;
+layout(binding = 1) uniform sampler2D luminance;
+layout(binding = 2) uniform sampler2D adaptation;  // local adaptation; of the bilateral operator, log10 of the base
+layout(binding = 3, scalar) readonly buffer Statistics { TonemapStatistics statistics; };
+layout(binding = 4, rgba32f) uniform writeonly image2D mapped;
+
+layout(push_constant, scalar) uniform Push {
+    float exposure;       // factor
+    float display;        // cd/m²
+    float key;
+    float white;          // 0: the largest luminance
+    float log_contrast;   // log10 of the contrast of the base
+    float detail;
+    float saturation;
+};
+
+float extended_reinhard(float l, float largest) {
+    // In this order no intermediate overflows.
+    return (1.0 + l / largest / largest) * l / (1.0 + l);
+}
+
+float display_luminance(float l, float a) {
+    TonemapStatistics s = statistics;
+    if (OPERATOR == TONEMAP_ASHIKHMIN) {
+        return ashikhmin_display(l * s.scale, a * s.scale, s.low * s.scale, s.high * s.scale, display) / display;
+    }
+    if (OPERATOR == TONEMAP_REINHARD) {
+        float factor = key / s.log_average;
+        if (GLOBAL != 0u) {
+            float largest = white > 0.0 ? white : s.high * factor;
+            return extended_reinhard(l * factor, max(largest, TONEMAP_SMALLEST));
+        }
+        return l * factor / (1.0 + a * factor);
+    }
+    if (OPERATOR == TONEMAP_BILATERAL) {
+        const float decade = 0.30102999566;  // log10(2)
+        float top = decade * log2(max(s.high, TONEMAP_SMALLEST));
+        float bottom = max(decade * log2(max(s.low, TONEMAP_SMALLEST)), top - 4.0);
+        float range = top - bottom;
+        float gamma = range > 0.0 ? min(log_contrast / range, 1.0) : 1.0;
+        float whole = decade * log2(max(l, max(1e-4 * s.high, TONEMAP_SMALLEST)));
+        float base = GLOBAL != 0u ? whole : a;
+        return exp2((gamma * (base - top) + detail * (whole - base)) / decade);
+    }
+    float largest = white > 0.0 ? white : s.high * s.scale;
+    return extended_reinhard(l * s.scale, max(largest, TONEMAP_SMALLEST));
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(pixel, imageSize(mapped)))) {
+        return;
+    }
+    vec4 texel = texelFetch(color, pixel, 0);
+    vec3 rgb = exposure * tonemap_clean(texel.rgb);
+    vec3 result;
+    if (OPERATOR == TONEMAP_LINEAR || OPERATOR >= TONEMAP_ACES) {
+        rgb *= statistics.scale;
+        result = OPERATOR == TONEMAP_LINEAR ? rgb
+               : OPERATOR == TONEMAP_ACES   ? tonemap_aces(rgb)
+               : OPERATOR == TONEMAP_AGX    ? tonemap_agx(rgb)
+                                            : tonemap_neutral(rgb);
+    } else {
+        float l = texelFetch(luminance, pixel, 0).r;
+        float a = texelFetch(adaptation, pixel, 0).r;
+        float shown = l > 0.0 ? max(display_luminance(l, a), 0.0) : 0.0;
+        // Ratios below 1e-30 in l were set to 0 above, so this is finite.
+        vec3 ratio = l > 0.0 ? rgb / l : vec3(0.0);
+        result = shown * (saturation == 1.0 ? ratio : pow(ratio, vec3(saturation)));
+    }
+    imageStore(mapped, pixel, vec4(result, texel.a));
+}

@@ -1,0 +1,79 @@
+// Luminance of every pixel, and minimum, maximum and sum of logarithms over those of a rectangle. The sums are of integers, so that
+// neither the order of work nor a division into tiles can change them.
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "lib/tonemap.glsl"
+
+// An invocation has a column of ROWS pixels.
+layout(local_size_x = 64) in;
+const int ROWS = 16;
+
+layout(binding = 0) uniform sampler2D color;
+layout(binding = 1, r32f) uniform writeonly image2D luminance;
+layout(binding = 2, scalar) buffer Sums {
+    uint least;        // bits of a float that is not negative: they are ordered as it is
+    uint largest;
+    uint log_low;      // sum of (152 + log2(1e-6 + L)) · 2^20, 64 bits
+    uint log_high;
+} sums;
+
+layout(push_constant, scalar) uniform Push {
+    ivec2 first;  // of the rectangle
+    ivec2 last;   // of the rectangle, inside
+    float exposure;  // factor
+};
+
+shared uint group_least[64];
+shared uint group_largest[64];
+shared uvec2 group_sum[64];
+
+uvec2 add64(uvec2 a, uvec2 b) {
+    uint carry;
+    uint low = uaddCarry(a.x, b.x, carry);
+    return uvec2(low, a.y + b.y + carry);
+}
+
+void main() {
+    ivec2 extent = imageSize(luminance);
+    uint lane = gl_LocalInvocationIndex;
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.x, gl_GlobalInvocationID.y * ROWS);
+    uint least = 0xFFFFFFFFu;
+    uint largest = 0u;
+    uvec2 sum = uvec2(0u);
+    if (pixel.x < extent.x) {
+        int end = min(pixel.y + ROWS, extent.y);
+        for (; pixel.y < end; ++pixel.y) {
+            precise vec3 exposed = exposure * tonemap_clean(texelFetch(color, pixel, 0).rgb);
+            float l = tonemap_luminance(exposed);
+            imageStore(luminance, pixel, vec4(l));
+            if (all(greaterThanEqual(pixel, first)) && all(lessThanEqual(pixel, last))) {
+                uint bits = floatBitsToUint(l);
+                least = min(least, bits);
+                largest = max(largest, bits);
+                int fixed_log = int(roundEven(log2(1e-6 + l) * 1048576.0));
+                sum = add64(sum, uvec2(uint(fixed_log + (152 << 20)), 0u));
+            }
+        }
+    }
+    group_least[lane] = least;
+    group_largest[lane] = largest;
+    group_sum[lane] = sum;
+    barrier();
+    for (uint half_size = 32u; half_size > 0u; half_size >>= 1) {
+        if (lane < half_size) {
+            group_least[lane] = min(group_least[lane], group_least[lane + half_size]);
+            group_largest[lane] = max(group_largest[lane], group_largest[lane + half_size]);
+            group_sum[lane] = add64(group_sum[lane], group_sum[lane + half_size]);
+        }
+        barrier();
+    }
+    if (lane == 0u && group_least[0] != 0xFFFFFFFFu) {
+        atomicMin(sums.least, group_least[0]);
+        atomicMax(sums.largest, group_largest[0]);
+        uint low = group_sum[0].x;
+        uint before = atomicAdd(sums.log_low, low);
+        uint carry = before + low < before ? 1u : 0u;
+        atomicAdd(sums.log_high, group_sum[0].y + carry);
+    }
+}
