@@ -300,7 +300,7 @@ fn exr_metadata_is_in_plain_attributes_too() {
 #[test]
 fn the_same_picture_gives_the_same_bytes() {
     let picture = Layers { metadata: metadata(), ..frame() };
-    for format in [Format::Exr, Format::Png, Format::Hdr, Format::Pfm] {
+    for format in [Format::Exr, Format::Png, Format::Hdr, Format::Pfm, Format::Jpeg] {
         let options = WriteOptions::default();
         assert_eq!(bytes(format, &picture, &options), bytes(format, &picture, &options), "{format:?}");
     }
@@ -329,7 +329,22 @@ fn pictures_that_cannot_be_written_are_named() {
     let options = WriteOptions { layer: Some("specular".into()), ..WriteOptions::default() };
     let error = image::encode(Format::Png, &frame(), &options).unwrap_err().to_string();
     assert!(error.contains("no layer \"specular\"") && error.contains("\"direct\""), "{error}");
-    let error = image::write(Path::new("x.jpg"), &frame(), &WriteOptions::default()).unwrap_err();
+    let error = image::write(Path::new("x.tga"), &frame(), &WriteOptions::default()).unwrap_err();
     assert_eq!(error.exit_code(), 2);
-    assert!(error.to_string().contains(".exr, .hdr, .pfm or .png"), "{error}");
+    assert!(error.to_string().contains(".exr, .hdr, .pfm, .png or .jpg"), "{error}");
+}
+
+/// Codes by a power instead of the sRGB curve: the PNG file says it, and so reads back as the light that went in.
+#[test]
+fn a_gamma_of_the_users_choice() {
+    let picture = Layers::rgb(5, 1, [0.0, 0.01, 0.18, 0.5, 1.0].iter().flat_map(|&v| [v; 3]).collect());
+    for gamma in [1.0, 1.8, 2.6] {
+        let options = WriteOptions { gamma: Some(gamma), png_bits: 16, ..WriteOptions::default() };
+        let back = round_trip(Format::Png, &picture, &options);
+        for (a, b) in picture.layers[0].data.iter().zip(&back.layers[0].data) {
+            assert!((a - b).abs() < 1e-3, "{gamma}: {a} {b}");
+        }
+        let srgb = bytes(Format::Png, &picture, &WriteOptions { png_bits: 16, ..WriteOptions::default() });
+        assert!(bytes(Format::Png, &picture, &options) != srgb);
+    }
 }

@@ -172,7 +172,7 @@ fn seeds() -> Vec<Vec<u8>> {
     let picture = Layers { metadata, ..Layers::rgba(24, 17, wave(24 * 17 * 4)) };
     let layered = picture.clone().with(Layer::new("depth", &["Z"], wave(24 * 17)));
     let mut seeds = Vec::new();
-    for format in [Format::Exr, Format::Hdr, Format::Png, Format::Pfm] {
+    for format in [Format::Exr, Format::Hdr, Format::Png, Format::Pfm, Format::Jpeg] {
         seeds.push(image::encode(format, &layered, &WriteOptions::default()).unwrap().0);
     }
     let wide = WriteOptions { png_bits: 16, f32: true, ..WriteOptions::default() };

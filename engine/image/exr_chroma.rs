@@ -5,9 +5,10 @@
 
 use exr::{
     block::{BlockIndex, UncompressedBlock, chunk::CompressedBlock, chunk::CompressedScanLineBlock},
+    math::Vec2,
     meta::BlockDescription,
     meta::{
-        attribute::{ChannelDescription, IntegerBounds},
+        attribute::{ChannelDescription, ChannelList, IntegerBounds, SampleType},
         header::Header,
     },
     prelude::Compression,
@@ -27,9 +28,8 @@ pub(super) fn check(header: &Header, parts: usize) -> Result<()> {
     if parts > 1 || header.blocks != BlockDescription::ScanLines {
         return Err(Error::input("subsampled channels in tiles or in one of several parts are not read"));
     }
-    // The crate's decoders of these leave the bounds of their buffers.
-    if matches!(header.compression, Compression::B44 | Compression::B44A | Compression::DWAA(_) | Compression::DWAB(_))
-    {
+    // The crate's decoder of these leaves the bounds of its buffers.
+    if matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) {
         let what = format!("subsampled channels in {:?} compression are not read", header.compression);
         return Err(Error::input(what).help("Convert the file to PIZ or ZIP, or to RGB"));
     }
@@ -81,6 +81,13 @@ fn decompress(block: CompressedScanLineBlock, header: &Header) -> Result<Uncompr
         header.channels.list.iter().map(bytes).sum()
     };
     let total: usize = lines.map(line_bytes).sum();
+    if let (Compression::B44 | Compression::B44A, CompressedBlock::ScanLine(block)) = (header.compression, &block)
+        && block.compressed_pixels_le.len() != total
+    {
+        let data = b44(&block.compressed_pixels_le, header, bounds)?;
+        let index = BlockIndex { layer: 0, pixel_position: position, pixel_size: bounds.size, level: tile.level_index };
+        return Ok(UncompressedBlock { index, data });
+    }
     let area = bounds.size.0 * bounds.size.1;
     if area == 0 || !total.is_multiple_of(area) {
         return Err(exr::error::Error::NotSupported("subsampled channels in a size that is not even".into()));
@@ -92,6 +99,61 @@ fn decompress(block: CompressedScanLineBlock, header: &Header) -> Result<Uncompr
     let data = compression.decompress_image_section_from_le(&header, block.compressed_pixels_le, bounds, false)?;
     let index = BlockIndex { layer: 0, pixel_position: position, pixel_size: bounds.size, level: tile.level_index };
     Ok(UncompressedBlock { index, data })
+}
+
+/// A chunk of B44 or B44A: a channel after the other in squares of 4×4 samples, each 14 bytes or (all the same) 3.
+///
+/// The crate unpacks only whole channels, so each is given to it as an image of one channel, padded to whole squares.
+fn b44(packed: &[u8], header: &Header, bounds: IntegerBounds) -> Result<Vec<u8>, exr::error::Error> {
+    let short = || exr::error::Error::Invalid("a chunk ends too early".into());
+    let top = bounds.position.to_usize("chunk position")?.1;
+    let mut rest = packed;
+    let mut planes = Vec::new();
+    for channel in &header.channels.list {
+        let rows: Vec<usize> =
+            (top..top + bounds.size.1).filter(|&y| samples_in_line(channel, bounds.size.0, y) > 0).collect();
+        let (width, height) = (bounds.size.0.div_ceil(channel.sampling.0), rows.len());
+        if channel.sample_type != SampleType::F16 {
+            let (plane, tail) = rest.split_at_checked(4 * width * height).ok_or_else(short)?;
+            planes.push((
+                plane.as_chunks::<4>().0.iter().flat_map(|v| u32::from_le_bytes(*v).to_ne_bytes()).collect(),
+                4 * width,
+                4 * width,
+            ));
+            rest = tail;
+            continue;
+        }
+        let padded = Vec2(width.next_multiple_of(4), height.next_multiple_of(4));
+        let mut bytes = 0;
+        for _ in 0..padded.area() / 16 {
+            // A shift of 13 and more stands for a square of one value.
+            bytes += if *rest.get(bytes + 2).ok_or_else(short)? >= 13 << 2 { 3 } else { 14 };
+        }
+        let (plane, tail) = rest.split_at_checked(bytes).ok_or_else(short)?;
+        rest = tail;
+        if bytes == 0 {
+            planes.push((Vec::new(), 0, 0));
+            continue;
+        }
+        let alone = ChannelDescription { sampling: Vec2(1, 1), ..channel.clone() };
+        let mut single = header.clone();
+        single.channels = ChannelList::new(std::iter::once(alone).collect());
+        single.layer_size = padded;
+        let section = IntegerBounds { position: Vec2(0, 0), size: padded };
+        let unpacked = header.compression.decompress_image_section_from_le(&single, plane.to_vec(), section, false)?;
+        planes.push((unpacked, 2 * padded.0, 2 * width));
+    }
+    let mut out = Vec::new();
+    let mut next = vec![0; planes.len()];
+    for y in top..top + bounds.size.1 {
+        for ((channel, (plane, stride, used)), next) in header.channels.list.iter().zip(&planes).zip(&mut next) {
+            if samples_in_line(channel, bounds.size.0, y) > 0 {
+                out.extend_from_slice(plane.get(*next..*next + used).ok_or_else(short)?);
+                *next += stride;
+            }
+        }
+    }
+    Ok(out)
 }
 
 /// Fills the pixels between samples that stand at even columns and rows, linearly; the last is repeated.

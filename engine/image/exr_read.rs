@@ -46,7 +46,15 @@ fn damaged(error: exr::error::Error) -> Error {
     Error::input("damaged or not served").caused_by(error)
 }
 
+/// Bit of the version field: some part holds a list of samples at each pixel.
+const DEEP: u32 = 1 << 11;
+
 fn headers(bytes: &[u8]) -> Result<Vec<Header>> {
+    if bytes.get(4..).and_then(<[u8]>::first_chunk).is_some_and(|flags| u32::from_le_bytes(*flags) & DEEP != 0) {
+        return Err(Error::input("deep pixels (a list of samples at each pixel) are not read").at("header").help(
+            "Flatten the image first, in the program that made it or with `oiiotool IN.exr --flatten -o OUT.exr`",
+        ));
+    }
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|error| damaged(error).at("header"))?;
     Ok(meta.headers.into_vec())
 }

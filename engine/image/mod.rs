@@ -1,13 +1,14 @@
 //! Linear images in and out, with the metadata that makes them reproducible.
 //!
-//! [`Layers`] are a stack of images of one size, each a [`Layer`]. Files: OpenEXR (all layers), Radiance .hdr, PFM and PNG (one layer);
-//! JPEG is read, not written.
-//! Pixels are linear Rec. 709, top row first; sRGB encoding ([`srgb`]) happens only in PNG files. Colour is
+//! [`Layers`] are a stack of images of one size, each a [`Layer`]. Files: OpenEXR (all layers), Radiance .hdr, PFM, PNG and JPEG (one layer).
+//!
+//! Pixels are linear Rec. 709, top row first; sRGB encoding ([`srgb`]) happens only in PNG and JPEG files. Colour is
 //! premultiplied by alpha, as in OpenEXR; PNG files hold it unassociated.
 //!
 //! Everything is encoded in memory and then written by [`write_atomic`]: a file is complete or not there.
 
 mod color;
+mod encoding;
 mod exr_chroma;
 mod exr_read;
 mod exr_write;
@@ -37,8 +38,12 @@ pub struct WriteOptions {
     pub overwrite: bool,
     /// 8 or 16 bits a channel in PNG files.
     pub png_bits: u8,
-    /// PNG files show the radiance times 2^EV.
+    /// 1 (small) to 100 (fine), for JPEG files.
+    pub jpeg_quality: u8,
+    /// PNG and JPEG files show the radiance times 2^EV.
     pub exposure_ev: f32,
+    /// Codes of PNG and JPEG files are light to the power of 1/gamma; `None`: the sRGB curve. PNG files say it.
+    pub gamma: Option<f32>,
     /// All layers of EXR files in 32 bits.
     pub f32: bool,
     /// The layer for formats that hold one; `None`: the picture ([`Layers::main`]).
@@ -47,12 +52,12 @@ pub struct WriteOptions {
 
 impl Default for WriteOptions {
     fn default() -> Self {
-        Self { overwrite: false, png_bits: 8, exposure_ev: 0.0, f32: false, layer: None }
+        Self { overwrite: false, png_bits: 8, jpeg_quality: 92, exposure_ev: 0.0, gamma: None, f32: false, layer: None }
     }
 }
 
 /// What was odd about the values of a written image. EXR and PFM files keep NaN, infinity and negative values; .hdr
-/// files write NaN and negative values as 0 and infinity as their largest value; PNG files clamp.
+/// files write NaN and negative values as 0 and infinity as their largest value; PNG and JPEG files clamp.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Report {
     /// Samples that are not a number.
@@ -102,6 +107,7 @@ pub enum Format {
     Hdr,
     Pfm,
     Png,
+    Jpeg,
 }
 
 impl Format {
@@ -113,9 +119,10 @@ impl Format {
             "hdr" | "pic" | "rgbe" => Ok(Self::Hdr),
             "pfm" => Ok(Self::Pfm),
             "png" => Ok(Self::Png),
+            "jpg" | "jpeg" => Ok(Self::Jpeg),
             _ => Err(Error::usage(format!("the extension {extension:?} names no image format"))
                 .in_file(path)
-                .help("Images are .exr, .hdr, .pfm or .png")),
+                .help("Images are .exr, .hdr, .pfm, .png or .jpg")),
         }
     }
 
@@ -125,6 +132,7 @@ impl Format {
             [0x76, 0x2f, 0x31, 0x01, ..] => Some(Self::Exr),
             [0x89, b'P', b'N', b'G', ..] => Some(Self::Png),
             [b'P', b'F' | b'f', b' ' | b'\n' | b'\r' | b'\t', ..] => Some(Self::Pfm),
+            _ if jpeg::sniff(bytes) => Some(Self::Jpeg),
             _ if radiance::sniff(bytes) => Some(Self::Hdr),
             _ => None,
         }
@@ -134,7 +142,7 @@ impl Format {
 /// Writes an image in the format of its extension, atomically ([`write_atomic`]).
 ///
 /// EXR files get all layers; the others one ([`WriteOptions::layer`]). The metadata goes into EXR attributes, a PNG text
-/// chunk, .hdr comments; PFM has no place for it, so it stands beside the file as `NAME.pfm.json` ([`metadata`]).
+/// chunk, comments of .hdr and JPEG files; PFM has no place for it, so it stands beside the file as `NAME.pfm.json` ([`metadata`]).
 /// Errors name the file; nothing is left behind.
 pub fn write(path: impl AsRef<Path>, picture: &Layers, options: &WriteOptions) -> Result<Report> {
     let path = path.as_ref();
@@ -172,6 +180,7 @@ pub fn encode(format: Format, picture: &Layers, options: &WriteOptions) -> Resul
         Format::Hdr => radiance::encode(picture, one)?,
         Format::Pfm => pfm::encode(picture, one)?,
         Format::Png => png_file::encode(picture, one, options)?,
+        Format::Jpeg => jpeg::encode(picture, one, options)?,
     };
     Ok((bytes, report))
 }
@@ -195,7 +204,7 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Layers> {
         Some(Format::Hdr) => radiance::decode(bytes, limits),
         Some(Format::Pfm) => pfm::decode(bytes, limits),
         Some(Format::Png) => png_file::decode(bytes, limits),
-        None if jpeg::sniff(bytes) => jpeg::decode(bytes, limits),
+        Some(Format::Jpeg) => jpeg::decode(bytes, limits),
         None => Err(unknown()),
     }
 }
@@ -209,7 +218,7 @@ pub fn metadata(path: impl AsRef<Path>) -> Result<Metadata> {
         Some(Format::Hdr) => radiance::metadata(&bytes),
         Some(Format::Png) => png_file::metadata(&bytes, &Limits::default()),
         Some(Format::Pfm) => return sidecar::read(path, &bytes),
-        None if jpeg::sniff(&bytes) => Ok(Metadata::default()),
+        Some(Format::Jpeg) => jpeg::metadata(&bytes),
         None => Err(unknown()),
     };
     metadata.map_err(|error| error.in_file(path))
@@ -221,7 +230,7 @@ fn unknown() -> Error {
 
 /// Whether the bytes of an image file hold codes of a screen (PNG, JPEG), in which white is 1; others hold light of any range.
 pub fn is_display_referred(bytes: &[u8]) -> bool {
-    Format::sniff(bytes) == Some(Format::Png) || jpeg::sniff(bytes)
+    matches!(Format::sniff(bytes), Some(Format::Png | Format::Jpeg))
 }
 
 /// Checks `width · height` pixels of `bytes_per_pixel` against the limits, before anything is allocated.

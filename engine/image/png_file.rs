@@ -2,7 +2,11 @@
 
 use std::io::Cursor;
 
-use super::{Layer, Layers, Metadata, WriteOptions, check_size, srgb, zeroed};
+use super::{
+    Layer, Layers, Metadata, WriteOptions, check_size,
+    encoding::{self, clamp},
+    srgb, zeroed,
+};
 use crate::{Error, ErrorKind, Result, scene::Limits};
 
 /// Keyword of the iTXt chunk with the metadata.
@@ -37,7 +41,7 @@ pub(super) fn encode(picture: &Layers, layer: &Layer, options: &WriteOptions) ->
         };
         for &value in &pixel[..if grey { 1 } else { 3 }] {
             push(match mapping {
-                Mapping::Colour => srgb::encode(clamp(value * unassociate)),
+                Mapping::Colour => encoding::encode(clamp(value * unassociate), options.gamma),
                 Mapping::Affine { black, white } => clamp((value - black) / (white - black)),
             });
         }
@@ -56,7 +60,10 @@ pub(super) fn encode(picture: &Layers, layer: &Layer, options: &WriteOptions) ->
     });
     encoder.set_depth(depth);
     match mapping {
-        Mapping::Colour => encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric),
+        Mapping::Colour => match options.gamma {
+            None => encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric),
+            Some(gamma) => encoder.set_source_gamma(png::ScaledFloat::new(1.0 / gamma)),
+        },
         // Numbers, not colours: without a statement about colour, but with one about the numbers.
         Mapping::Affine { black, white } => {
             let text = format!("{}: value = {black} + code * {}", layer.name, white - black);
@@ -74,11 +81,6 @@ pub(super) fn encode(picture: &Layers, layer: &Layer, options: &WriteOptions) ->
 
 /// Depth from here on is that of the background, and must not stretch the range. Metres.
 const SKY: f32 = 1e9;
-
-/// Into [0, 1]; NaN becomes 0.
-fn clamp(value: f32) -> f32 {
-    if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) }
-}
 
 /// How values become codes between 0 and 1.
 #[derive(Clone, Copy)]

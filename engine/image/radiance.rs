@@ -1,7 +1,7 @@
 //! Radiance .hdr (RGBE) files: all scan-line schemes, all orientations, the headers found in the wild.
 //!
-//! `PRIMARIES` lines are not applied: most say the same default with an equal-energy white, which no program honours,
-//! or zeros. XYZE files are converted.
+//! `PRIMARIES` are honoured, except the two that are written without a thought: Radiance's own default, whose equal-energy
+//! white no program honours (such pixels are taken as Rec. 709), and zeros. XYZE files are converted.
 
 use std::collections::BTreeMap;
 
@@ -117,6 +117,8 @@ struct Header<'a> {
     xyze: bool,
     /// What pixels are divided by to give radiance: EXPOSURE · COLORCORR, each the product of all its lines.
     exposure: [f32; 3],
+    /// Of the last `PRIMARIES` line, unless it says nothing.
+    primaries: Option<Chromaticities>,
     json: String,
     variables: BTreeMap<String, String>,
     /// File axes: the slow one, the fast one.
@@ -139,6 +141,7 @@ impl<'a> Header<'a> {
         let mut header = Self {
             xyze: false,
             exposure: [1.0; 3],
+            primaries: None,
             json: String::new(),
             variables: BTreeMap::new(),
             axes: [Axis { x: false, falling: true, size: 0 }; 2],
@@ -181,6 +184,12 @@ impl<'a> Header<'a> {
                 "32-bit_rle_xyze" => self.xyze = true,
                 _ => return Err(Error::input(format!("the format {value:?} is neither 32-bit_rle_rgbe nor _xyze"))),
             },
+            "PRIMARIES" => {
+                let eight = numbers().and_then(|n| <[f32; 8]>::try_from(n).ok()).ok_or_else(|| {
+                    Error::input(format!("{name}={value} must be 8 numbers: x and y of red, green, blue and white"))
+                })?;
+                self.primaries = primaries(eight);
+            }
             "EXPOSURE" => {
                 let factor = factors(1)?[0];
                 self.exposure = self.exposure.map(|e| e * factor);
@@ -204,6 +213,17 @@ impl<'a> Header<'a> {
             Metadata::from_json(&self.json)
         }
     }
+}
+
+/// Red, green, blue and white; `None` for Rec. 709, Radiance's default and zeros.
+fn primaries(numbers: [f32; 8]) -> Option<Chromaticities> {
+    const RADIANCE: [f32; 8] = [0.64, 0.33, 0.29, 0.6, 0.15, 0.06, 1.0 / 3.0, 1.0 / 3.0];
+    let is = |other: [f32; 8]| numbers.iter().zip(other).all(|(a, b)| (a - b).abs() < 2e-3);
+    if is(RADIANCE) || is([0.0; 8]) {
+        return None;
+    }
+    let [[red, green], [blue, white]] = bytemuck::cast::<_, [[[f32; 2]; 2]; 2]>(numbers);
+    Some(Chromaticities { red, green, blue, white })
 }
 
 /// `-Y 512 +X 768` and its seven siblings; `None` for other lines.
@@ -250,7 +270,8 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Layers> {
         let xyz = Chromaticities { red: [1.0, 0.0], green: [0.0, 1.0], blue: [0.0, 0.0], white: [1.0 / 3.0; 2] };
         xyz.rec709_from_rgb()?
     } else {
-        None
+        let matrix = header.primaries.map(|primaries| primaries.rec709_from_rgb());
+        matrix.transpose().map_err(|error| error.at("header.PRIMARIES"))?.flatten()
     };
     let mut data = zeroed(needed / 4)?;
     let mut line = vec![[0; 4]; fast.size as usize];
@@ -390,6 +411,29 @@ mod tests {
                     assert_eq!(p, expected, "pixel {i} of {slow_sign}{} {fast_sign}{}", slow.0, fast.0);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn primaries_are_honoured_unless_they_say_nothing() {
+        let pixel = |primaries: &str| {
+            let file = format!("#?RADIANCE\nPRIMARIES={primaries}\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n");
+            decode(&[file.as_bytes(), &[128, 64, 32, 128]].concat(), &Limits::default())
+                .map(|i| i.layers[0].data.clone())
+        };
+        let plain = [0.5, 0.25, 0.125];
+        assert_eq!(pixel("0.6400 0.3300 0.2900 0.6000 0.1500 0.0600 0.3333 0.3333").unwrap(), plain);
+        assert_eq!(pixel("0 0 0 0 0 0 0 0").unwrap(), plain);
+        assert_eq!(pixel("0.64 0.33 0.3 0.6 0.15 0.06 0.3127 0.329").unwrap(), plain);
+        // Rec. 2020 to Rec. 709 (ITU-R BT.2087, inverse of M2).
+        let wide = pixel("0.708 0.292 0.170 0.797 0.131 0.046 0.3127 0.329").unwrap();
+        let rows = [[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]];
+        for (value, row) in wide.iter().zip(rows) {
+            let expected: f32 = row.iter().zip(plain).map(|(a, b)| a * b).sum();
+            assert!((value - expected).abs() < 1e-3, "{wide:?}");
+        }
+        for bad in ["1 2 3", "a b c d e f g h", "0.1 0.1 0.2 0.2 0.3 0.3 0.3 0.3"] {
+            assert!(pixel(bad).unwrap_err().to_string().contains("PRIMARIES"), "{bad}");
         }
     }
 

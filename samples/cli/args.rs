@@ -12,7 +12,7 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub stage: StageArgs,
 
-    /// Image to write; may be given more than once. The ending chooses the format: .exr (all layers), .png, .hdr, .pfm.
+    /// Image to write; may be given more than once. The ending chooses the format: .exr (all layers), .png, .jpg, .hdr, .pfm.
     /// Placeholders: {scene} {camera} {technique} {frame:04} {layer}. [default: {scene}-{camera}-{technique}.png]
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     pub output: Vec<String>,

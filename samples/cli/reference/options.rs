@@ -19,7 +19,7 @@ pub struct ReferenceArgs {
     #[command(flatten)]
     pub stage: StageArgs,
 
-    /// Image to write; may be given more than once: .exr (all layers), .png, .hdr, .pfm. Placeholders: {scene} {camera} {layer}
+    /// Image to write; may be given more than once: .exr (all layers), .png, .jpg, .hdr, .pfm. Placeholders: {scene} {camera} {layer}
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     pub output: Vec<String>,
 
