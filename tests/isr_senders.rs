@@ -45,7 +45,7 @@ fn indirect(
             SenderView { gbuffer, color: gbuffer.emission, uniform: view(eye).uniform(), hole: *hole }
         })
         .collect();
-    let senders = Senders::pack(&mut graph, &views);
+    let senders = Senders::pack(&mut graph, &views, None);
     let lights = lights(&mut graph, &[]);
     let inputs = Inputs { gbuffer: own, lights, ambient: Irradiance::default(), senders };
     let out = frame(&mut graph, &inputs, settings).unwrap();

@@ -1,6 +1,6 @@
-// Adds the light of what one more view sees to the gathered light of the frame.
+// Adds the light of what one more view sees to the gathered light of the frame, or of another of these views.
 //
-// A surface counts once: not at all as far as the frame shows it, and in shares if several of the views show it, in proportion to
+// A surface counts once: not at all as far as the frame has gathered from what it shows itself, and in shares if several of the views show it, in proportion to
 // the number of texels that each has on it (the balance heuristic).
 #version 460
 #extension GL_EXT_scalar_block_layout : require
@@ -16,9 +16,11 @@ layout(constant_id = 0) const uint SAMPLES = 48;
 layout(constant_id = 1) const uint VISIBILITY_STEPS = 0;
 layout(constant_id = 2) const uint PREFILTER = 1;
 layout(constant_id = 3) const uint JITTER = 1;
+// Whether the receiving view has gathered from its own picture.
+layout(constant_id = 4) const uint GATHERED = 1;
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
-layout(binding = 1) uniform sampler2D albedo;  // coarse; a: radiation mask of the receiver
+layout(binding = 1) uniform sampler2D albedo;  // of the receiving view; a: radiation mask
 layout(binding = 2) uniform sampler2D normal;
 layout(binding = 3) uniform sampler2D depth;
 layout(binding = 4) uniform sampler2D before;  // gathered so far
@@ -39,6 +41,9 @@ const float MOST = 2.0;
 
 // Share of the surface at x that the frame's own gather does not count.
 float unseen(vec3 x, vec3 xn) {
+    if (GATHERED == 0) {
+        return 1.0;
+    }
     ivec2 texel = isr_texel(view, textureSize(depth, 0), x);
     if (texel.x < 0) {
         return 1.0;
@@ -94,7 +99,7 @@ void main() {
     if (any(greaterThanEqual(pixel, imageSize(gathered)))) {
         return;
     }
-    vec4 sum = texelFetch(before, pixel, 0);
+    vec4 sum = GATHERED != 0 || number > 0u ? texelFetch(before, pixel, 0) : vec4(0.0);
     float z = texelFetch(depth, pixel, 0).r;
     float mask = texelFetch(albedo, pixel, 0).a;
     vec3 n = texelFetch(normal, pixel, 0).xyz;

@@ -166,17 +166,26 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
         }
     };
 
+    let first = inputs.senders.filter(|_| settings.indirect);
+    let mut senders = first;
     let mut gathered = gather(graph, sender);
-    if let Some(senders) = inputs.senders.filter(|_| settings.indirect) {
+    if let Some(senders) = senders {
         gathered = senders.gather(graph, &g, &coarse, gathered, settings);
     }
     let mut blurred = filter(graph, gathered);
     for _ in 1..settings.bounces {
         let next = graph.image("isr.sender", Format::RGBA16F, graph.extent(coarse.depth));
-        let args = shaders::isr::bounce::Args { sender, albedo: coarse.albedo, gathered: blurred, next };
+        let args = shaders::isr::bounce::Args {
+            sender,
+            albedo: coarse.albedo,
+            gathered: blurred,
+            next,
+            spec: shaders::isr::bounce::Spec::default(),
+        };
         graph.compute(args, graph.extent(next));
         gathered = gather(graph, next);
-        if let Some(senders) = inputs.senders.filter(|_| settings.indirect) {
+        senders = senders.zip(first).map(|(senders, first)| senders.bounce(graph, &first, settings));
+        if let Some(senders) = senders {
             gathered = senders.gather(graph, &g, &coarse, gathered, settings);
         }
         blurred = filter(graph, gathered);

@@ -4,10 +4,12 @@
 //! the visible surfaces ([`Settings::layers`], depth peeling), and other cameras ([`Settings::cameras`]). Each pixel then gathers from
 //! them as from the frame. No surface counts twice: what the frame shows is the frame's, and what several of the others show is
 //! shared between them in proportion to their texels on it (the balance heuristic of Veach and Guibas 1995).
+//!
+//! For further bounces ([`Settings::bounces`]) these views gather too: each from all of them and from a small picture of the frame.
 
 use super::{Sender, Settings};
 use crate::{
-    graph::{Buffer, Extent, Format, Graph, Image, ImageDesc},
+    graph::{Buffer, Extent, Format, Graph, Image, ImageDesc, Uniform},
     passes::{
         direct::{self, Direct, Lights},
         downsample::Coarse,
@@ -21,6 +23,8 @@ use glam::{Mat4, Vec3};
 
 /// Vertical angle of view of the further cameras, radians.
 const YFOV: f32 = 1.75;
+/// Most views: one around the frame, three layers, four cameras, and the frame itself.
+const MOST: usize = 9;
 
 /// Views of one size in one set of array images, a layer each.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +36,11 @@ pub struct Senders {
     pub depth: Image,
     /// Block of `SenderView`.
     pub views: Buffer,
+    /// Views that the frame gathers from.
     pub count: u32,
+    /// What each view receives light with; after those that the frame gathers from, the frame's own small picture, if there are
+    /// further bounces.
+    receivers: [Option<Receiver>; MOST],
     /// Linear depth of the layers behind the visible one, for telling what hides senders; the picture of each is wider than the
     /// frame's by 1 + [`Settings::border`].
     pub behind: [Option<Image>; 3],
@@ -49,10 +57,33 @@ pub struct SenderView {
     pub hole: f32,
 }
 
+/// A view as a place where light arrives.
+#[derive(Clone, Copy, Debug)]
+struct Receiver {
+    view: Uniform<types::View>,
+    albedo: Image,
+}
+
+/// Buffers of the view that gathers.
+struct Gathering {
+    view: Uniform<types::View>,
+    factor: f32,
+    albedo: Image,
+    normal: Image,
+    depth: Image,
+    /// What it has gathered from its own picture; `None`: nothing, the views are all that it gathers from.
+    before: Option<Image>,
+    /// The first so many views send.
+    count: u32,
+}
+
 impl Senders {
-    /// Puts views of one extent together; `None` if there are none.
-    pub fn pack(graph: &mut Graph, views: &[SenderView]) -> Option<Self> {
+    /// Puts at most eight views of one extent together; `None` if there are none. `frame`: the frame's own picture in that extent, for
+    /// the light that the views get from it; needed where there are further bounces.
+    pub fn pack(graph: &mut Graph, views: &[SenderView], frame: Option<SenderView>) -> Option<Self> {
         let extent = graph.extent(views.first()?.gbuffer.depth);
+        let own = views.len().min(MOST - 1);
+        let views: Vec<SenderView> = views[..own].iter().copied().chain(frame).collect();
         let count = views.len() as u32;
         // Array images of one layer are no arrays.
         let layers = count.max(2);
@@ -65,9 +96,13 @@ impl Senders {
                 "isr.senders.views",
                 &views.iter().map(|v| types::SenderView { view: v.uniform, hole: v.hole }).collect::<Vec<_>>(),
             ),
-            count,
+            count: own as u32,
+            receivers: [None; MOST],
             behind: [None; 3],
         };
+        for (receiver, view) in senders.receivers.iter_mut().zip(&views) {
+            *receiver = Some(Receiver { view: view.gbuffer.view, albedo: view.gbuffer.albedo });
+        }
         for layer in 0..layers {
             let view = &views[layer.min(count - 1) as usize];
             let args = shaders::isr::pack::Args {
@@ -92,16 +127,64 @@ impl Senders {
         graph: &mut Graph,
         frame: &GBuffer,
         coarse: &Coarse,
-        mut gathered: Image,
+        gathered: Image,
         settings: &Settings,
     ) -> Image {
-        for number in 0..self.count {
-            let next = graph.image("isr.gathered.more", Format::RGBA16F, graph.extent(coarse.depth));
+        let frame = Gathering {
+            view: frame.view,
+            factor: settings.resolution.factor() as f32,
+            albedo: coarse.albedo,
+            normal: coarse.normal,
+            depth: coarse.depth,
+            before: Some(gathered),
+            count: self.count,
+        };
+        self.gather_in(graph, &frame, settings)
+    }
+
+    /// What the views send after one bounce more than `self`: `first` is what they sent before any.
+    pub(super) fn bounce(&self, graph: &mut Graph, first: &Self, settings: &Settings) -> Self {
+        let extent = graph.extent(self.depth);
+        let layers = graph.desc(self.radiance).layers;
+        let desc = ImageDesc::new(Format::RGBA16F, extent).layers(layers).all_mips();
+        let radiance = graph.image_with("isr.senders.bounced", desc);
+        let count = self.receivers.iter().flatten().count() as u32;
+        for layer in 0..layers {
+            let number = layer.min(count - 1);
+            let Some(receiver) = self.receivers[number as usize] else { continue };
+            let gathering = Gathering {
+                view: receiver.view,
+                factor: 1.0,
+                albedo: receiver.albedo,
+                normal: self.normal.layer(number),
+                depth: self.depth.layer(number),
+                before: None,
+                count,
+            };
+            let gathered = self.gather_in(graph, &gathering, settings);
+            let args = shaders::isr::bounce::Args {
+                sender: first.radiance.layer(number),
+                albedo: receiver.albedo,
+                gathered,
+                next: radiance.layer(layer).mip(0),
+                spec: shaders::isr::bounce::Spec { premultiplied: 1 },
+            };
+            graph.compute(args, extent);
+        }
+        graph.mips(radiance);
+        Self { radiance: radiance.trilinear(), ..*self }
+    }
+
+    fn gather_in(&self, graph: &mut Graph, receiver: &Gathering, settings: &Settings) -> Image {
+        let extent = graph.extent(receiver.depth);
+        let mut gathered = receiver.before.unwrap_or(receiver.depth);
+        for number in 0..receiver.count {
+            let next = graph.image("isr.gathered.more", Format::RGBA16F, extent);
             let args = shaders::isr::gather_view::Args {
-                view: frame.view,
-                albedo: coarse.albedo,
-                normal: coarse.normal,
-                depth: coarse.depth,
+                view: receiver.view,
+                albedo: receiver.albedo,
+                normal: receiver.normal,
+                depth: receiver.depth,
                 before: gathered,
                 sender_views: self.views,
                 their_radiance: self.radiance,
@@ -109,19 +192,20 @@ impl Senders {
                 their_depth: self.depth,
                 gathered: next,
                 push: shaders::isr::gather_view::Push {
-                    factor: settings.resolution.factor() as f32,
+                    factor: receiver.factor,
                     thickness: settings.thickness,
                     number,
-                    count: self.count,
+                    count: receiver.count,
                 },
                 spec: shaders::isr::gather_view::Spec {
                     samples: settings.sender_samples,
                     visibility_steps: settings.visibility_steps,
                     prefilter: settings.prefilter.into(),
                     jitter: settings.jitter.into(),
+                    gathered: receiver.before.is_some().into(),
                 },
             };
-            graph.compute(args, graph.extent(next));
+            graph.compute(args, extent);
             gathered = next;
         }
         gathered
@@ -172,7 +256,12 @@ pub fn draw(
         let seen = gbuffer::draw(graph, scene, &camera, gbuffers);
         views.push(lit(graph, seen, &camera, 0.0));
     }
-    Senders::pack(graph, &views).map(|senders| Senders { behind, ..senders })
+    let frame = (settings.bounces > 1).then(|| {
+        let small = view.wider(1.0, size);
+        let seen = gbuffer::draw(graph, scene, &small, gbuffers);
+        lit(graph, seen, &small, 0.0)
+    });
+    Senders::pack(graph, &views, frame).map(|senders| Senders { behind, ..senders })
 }
 
 /// The frame's lights; where one is directional, with shadow maps that reach over the whole scene instead of what the frame shows.

@@ -154,7 +154,8 @@ pub struct Settings {
     pub visibility_steps: u32,
     /// Thickness that a surface in the depth buffer is taken to have, relative to its depth, when `visibility_steps` > 0.
     pub thickness: f32,
-    /// Diffuse bounces after the direct light, 1 to 4. Each takes a gather.
+    /// Diffuse bounces after the direct light, 1 to 4. Each takes a gather, and the views of `border`, `layers` and `cameras` then gather
+    /// from each other and from the picture: their surfaces send on what they got.
     pub bounces: u32,
     /// A number of samples for each pixel by its depth: one step of 24, 48, 80 more where it is nearer than half the mean depth of the
     /// picture, one less where it is farther than one and a half of it.
