@@ -11,6 +11,7 @@
 //! | samplers | [`Gpu::sampler`] with the stock [`SamplerDesc`]s |
 //! | descriptor sets of one frame | [`DescriptorArena`] |
 //! | times of passes | [`Timestamps`] |
+//! | how often their shaders start | [`Statistics`] |
 //! | long work in short submissions | [`Tiles`] |
 //! | what the device can do | [`Gpu::caps`] |
 //! | tests | [`testing::with_gpu`] |
@@ -38,6 +39,7 @@ mod pipeline;
 mod poison;
 mod sampler;
 mod select;
+mod statistics;
 mod submit;
 pub mod testing;
 mod tiles;
@@ -56,6 +58,7 @@ pub use options::{DeviceChoice, ENVIRONMENT, GpuOptions, RayQuery, Validation};
 pub use pipeline::{Blend, Pipeline, RasterState, Stencil};
 pub use sampler::SamplerDesc;
 pub use select::{Choice, DeviceFacts, DeviceKind, Rejection, Requirements, Version, refusal, select};
+pub use statistics::{Started, Statistics};
 pub use submit::{Commands, Submission};
 pub use tiles::Tiles;
 pub use timestamps::Timestamps;

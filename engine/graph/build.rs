@@ -34,6 +34,13 @@ impl PassRef<'_> {
         self
     }
 
+    /// Counts how often its shaders start ([`PassTime::started`](super::PassTime::started)), where the device can
+    /// ([`crate::gpu::Caps::pipeline_statistics`]).
+    pub fn counted(self) -> Self {
+        self.graph.passes[self.index].counted = true;
+        self
+    }
+
     /// The name it has in reports and messages.
     pub fn name(&self) -> &str {
         &self.graph.passes[self.index].name
@@ -331,7 +338,7 @@ impl Graph {
 
     pub(super) fn pass(&mut self, name: impl Into<String>, work: Work) -> PassRef<'_> {
         let name = unique(name.into(), self.passes.iter().map(|p| p.name.as_str()));
-        self.passes.push(Pass { name, scope: self.scope.clone(), work });
+        self.passes.push(Pass { name, scope: self.scope.clone(), counted: false, work });
         let index = self.passes.len() - 1;
         PassRef { graph: self, index }
     }

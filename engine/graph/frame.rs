@@ -2,6 +2,8 @@
 
 use bytemuck::AnyBitPattern;
 
+use crate::gpu::Started;
+
 use super::{
     handles::{BufferRead, GraphId, ImageRead},
     pixels::Pixels,
@@ -84,6 +86,8 @@ pub struct PassTime {
     pub gpu_ms: Option<f64>,
     /// Milliseconds the CPU took to record it.
     pub cpu_ms: f64,
+    /// How often its shaders started; `None` unless the pass is [counted](super::PassRef::counted) and the device can count.
+    pub started: Option<Started>,
 }
 
 /// What one run of a graph cost.

@@ -149,6 +149,8 @@ pub(crate) struct Pass {
     pub name: String,
     /// Labels around it, outermost first.
     pub scope: Vec<String>,
+    /// Its shaders' starts are counted.
+    pub counted: bool,
     pub work: Work,
 }
 

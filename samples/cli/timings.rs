@@ -51,6 +51,7 @@ mod tests {
             launches: 1,
             gpu_ms,
             cpu_ms: 0.25,
+            started: None,
         };
         let report = Report { passes: vec![pass("x", Some(1.5)), pass("y, \"z\"", None)], ..Report::default() };
         let mut timings = Timings::default();

@@ -21,14 +21,14 @@ use super::{
     Graph,
     frame::{Frame, PassTime, Report},
     oracle,
-    pass::{ReadWhat, Work},
+    pass::{Pass, ReadWhat, Work},
     pixels::Pixels,
     plan::{Plan, Shape, Source},
     vocab::Resource,
 };
 use crate::{
     Error, ErrorKind, Result,
-    gpu::{BufferDesc, DescriptorArena, Gpu, OwnedBuffer, Timestamps},
+    gpu::{BufferDesc, DescriptorArena, Gpu, OwnedBuffer, Statistics, Timestamps},
 };
 
 /// Contents of uploaded buffers start at multiples of this in the staging buffer.
@@ -43,6 +43,7 @@ pub struct Runner {
     uniforms: Option<OwnedBuffer>,
     staging: Option<OwnedBuffer>,
     timestamps: Option<Timestamps>,
+    statistics: Option<Statistics>,
 }
 
 impl Runner {
@@ -55,6 +56,7 @@ impl Runner {
             uniforms: None,
             staging: None,
             timestamps: None,
+            statistics: None,
         }
     }
 
@@ -98,6 +100,10 @@ impl Runner {
         if self.timestamps.as_ref().is_none_or(|t| t.count() < stamps) {
             self.timestamps = Some(Timestamps::new(&self.gpu, stamps.next_power_of_two())?);
         }
+        let counted = graph.passes.iter().filter(|p| p.counted).count() as u32;
+        if counted > 0 && self.statistics.as_ref().is_none_or(|s| s.count() < counted) {
+            self.statistics = Some(Statistics::new(&self.gpu, counted.next_power_of_two())?);
+        }
         let mut commands = self.gpu.commands(graph.name())?;
         for memory in &memory {
             match memory {
@@ -115,6 +121,12 @@ impl Runner {
             timestamps.reset(&mut commands);
             timestamps.write(&mut commands, 0, end);
         }
+        let statistics = self.statistics.as_ref().filter(|_| counted > 0);
+        if let Some(statistics) = statistics {
+            statistics.reset(&mut commands);
+        }
+        // Of each pass, the query that counts it.
+        let mut queries = Vec::with_capacity(plan.passes.len());
         let mut times = Vec::with_capacity(plan.passes.len());
         let mut recorder = Recorder {
             gpu: &self.gpu,
@@ -126,21 +138,36 @@ impl Runner {
             sets: &mut self.sets,
             commands: &mut commands,
         };
-        let works = plan.upload.iter().chain(&graph.passes).map(|p| &p.work);
+        let declared = plan.upload.iter().chain(&graph.passes);
         let mut open: &[String] = &[];
-        for (index, (pass, work)) in plan.passes.iter().zip(works).enumerate() {
+        for (index, (pass, Pass { work, counted, .. })) in plan.passes.iter().zip(declared).enumerate() {
             let begun = Instant::now();
             open = labels(recorder.commands, open, &pass.scope);
             recorder.barriers(plan.barriers_before(index));
             recorder.commands.begin_pass(&pass.name);
+            let query = counted.then(|| queries.iter().flatten().count() as u32);
+            queries.push(query);
+            if let (Some(statistics), Some(query)) = (statistics, query) {
+                statistics.begin(recorder.commands, query);
+            }
             let recorded = recorder.work(index, work);
+            if let (Some(statistics), Some(query)) = (statistics, query) {
+                statistics.end(recorder.commands, query);
+            }
             recorder.commands.end_pass();
             recorded.map_err(|e| e.at(&pass.name))?;
             if let Some(timestamps) = &self.timestamps {
                 timestamps.write(recorder.commands, index as u32 + 1, end);
             }
             let (name, scope) = (pass.name.clone(), pass.scope.clone());
-            times.push(PassTime { name, scope, launches: work.launches(), gpu_ms: None, cpu_ms: milliseconds(begun) });
+            times.push(PassTime {
+                name,
+                scope,
+                launches: work.launches(),
+                gpu_ms: None,
+                cpu_ms: milliseconds(begun),
+                started: None,
+            });
         }
         labels(recorder.commands, open, &[]);
         recorder.barriers(plan.barriers_before(plan.passes.len()));
@@ -162,6 +189,12 @@ impl Runner {
                 if let (Some(Some(from)), Some(Some(to))) = (stamps.get(i), stamps.get(i + 1)) {
                     time.gpu_ms = Some(to - from);
                 }
+            }
+        }
+        if let Some(statistics) = statistics {
+            let started = statistics.read(counted)?;
+            for (time, query) in times.iter_mut().zip(queries) {
+                time.started = query.and_then(|q| started.get(q as usize).copied().flatten());
             }
         }
         let report = Report {

@@ -1,0 +1,12 @@
+// Counts its own starts by an atomic, with the depth test forced to come first.
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+
+layout(early_fragment_tests) in;
+layout(location = 0) out float color;
+layout(binding = 0, scalar) buffer Starts { uint starts; };
+
+void main() {
+    if (!gl_HelperInvocation) atomicAdd(starts, 1u);
+    color = 1.0;
+}
