@@ -2,9 +2,9 @@
 //! is exact.
 
 use lucerna::{
-    gpu::{Gpu, ImageDesc as OwnedDesc, OwnedImage, Region, Started, testing::with_gpu},
+    gpu::{DeviceKind, Gpu, ImageDesc as OwnedDesc, OwnedImage, Region, Started, testing::with_gpu},
     graph::*,
-    shaders::{test::*, types},
+    shaders::{test::*, tonemap, types},
     techniques::tonemap::{Identify, Mark, Settings, identify, mark},
 };
 
@@ -24,7 +24,8 @@ fn noise(seed: u32, count: usize) -> Vec<f32> {
 
 fn owned(gpu: &Gpu, name: &str, [width, height]: [u32; 2], values: &[f32]) -> OwnedImage {
     let desc = OwnedDesc::new(ash::vk::Format::R32_SFLOAT, width, height);
-    OwnedImage::with_contents(gpu, name, desc, &[Region { mip: 0, layer: 0, bytes: bytemuck::cast_slice(values) }]).unwrap()
+    OwnedImage::with_contents(gpu, name, desc, &[Region { mip: 0, layer: 0, bytes: bytemuck::cast_slice(values) }])
+        .unwrap()
 }
 
 fn run(gpu: &Gpu, graph: Graph) -> Frame {
@@ -59,8 +60,8 @@ fn adapt(gpu: &Gpu, size: [u32; 2], luminance: &[f32], importance: &[f32], mark:
     let mut graph = Graph::new("mark");
     let [image, importance] = images.map(|i| graph.import_image(&i));
     let settings = Settings { mark, radius: 3, ..Settings::default() };
-    let local = graph.uniform(&types::TonemapLocal { radius: 3, contrast: 0.5 });
-    let adapted = mark::adapt(&mut graph, image, importance, local, &settings);
+    let extent = graph.extent(image);
+    let adapted = mark::adapt(&mut graph, image, importance, extent, &settings);
     let token = graph.read_image(adapted);
     let frame = run(gpu, graph);
     let pass = frame.report.passes.iter().rev().find(|p| p.name.starts_with("tonemap.marked")).unwrap();
@@ -129,16 +130,13 @@ fn early_z_starts_exactly_the_marked_fragments_and_not_by_chance() {
                 let marked = importance.iter().sum::<f32>() as u32;
                 // Forced: the shader does not start where the test fails, store or no store.
                 let forced = starts(gpu, size, &importance, true, true);
-                println!("{size:?} marked {marked}: forced {forced:?}");
                 assert_eq!((forced.0, forced.2), (marked, marked), "forced early tests at {size:?}");
                 // Not forced: its store must happen everywhere, though the picture is the same. So the count above is not what
                 // any draw would give, and the qualifier is what makes it.
                 let late = starts(gpu, size, &importance, false, true);
-                println!("  late {late:?}");
                 assert_eq!((late.0, late.2), (count, marked), "tests after the shader at {size:?}");
                 // Forced, but the test lets all through: the counter counts.
                 let all = starts(gpu, size, &importance, true, false);
-                println!("  all {all:?}");
                 assert_eq!((all.0, all.2), (count, count), "no test at {size:?}");
             }
         }
@@ -146,18 +144,178 @@ fn early_z_starts_exactly_the_marked_fragments_and_not_by_chance() {
 }
 
 #[test]
-fn the_shipped_pass_starts_by_the_driver_s_count() {
+fn the_shipped_passes_start_what_they_should_by_the_driver_s_count() {
+    with_gpu(|gpu| {
+        if !gpu.caps().pipeline_statistics {
+            eprintln!("SKIPPED: {} has no pipeline statistics", gpu.describe());
+            return;
+        }
+        for (seed, [width, height]) in SIZES.into_iter().enumerate() {
+            let count = (width * height) as usize;
+            let luminance = noise(seed as u32, count);
+            let some: Vec<f32> = noise(9 + seed as u32, count).iter().map(|n| f32::from(u8::from(*n < 0.3))).collect();
+            for importance in [vec![0.0; count], vec![1.0; count], some] {
+                let blocks = |side: u32| {
+                    let blocks = (0..height)
+                        .step_by(side as usize)
+                        .flat_map(|y| (0..width).step_by(side as usize).map(move |x| (x, y)));
+                    let marked =
+                        |x: u32, y: u32| x < width && y < height && importance[(y * width + x) as usize] == 1.0;
+                    let busy = blocks.filter(|&(x, y)| (0..side * side).any(|i| marked(x + i % side, y + i / side)));
+                    busy.count() as u64 * u64::from(side * side)
+                };
+                let marked = blocks(1);
+                let started = |mark| adapt(gpu, [width, height], &luminance, &importance, mark).1.unwrap();
+                // A driver may count the lanes that fill up a quad of 2 x 2.
+                let early = started(Mark::EarlyZ);
+                assert!((marked..=blocks(2)).contains(&early.fragments), "{early:?} for {marked} marked");
+                if gpu.caps().kind == DeviceKind::Cpu {
+                    assert_eq!(early.fragments, marked);
+                }
+                assert_eq!(early.compute, 0);
+                let tiles = Started { compute: blocks(8), fragments: 0 };
+                assert_eq!(started(Mark::Tiles), tiles);
+                let compact = Started { compute: marked.next_multiple_of(64), fragments: 0 };
+                assert_eq!(started(Mark::Compact), compact);
+            }
+        }
+    });
+}
+
+/// Execution modes of the fragment stage, from its SPIR-V.
+fn modes(shader: &lucerna::shader::Shader) -> Vec<u32> {
+    let stage = shader.stages.iter().find(|s| s.stage == lucerna::shader::Stage::Fragment).unwrap();
+    let words: Vec<u32> = stage.spirv.chunks_exact(4).map(|w| u32::from_le_bytes(w.try_into().unwrap())).collect();
+    let (mut at, mut modes) = (5, Vec::new());
+    while at < words.len() {
+        let (length, operation) = ((words[at] >> 16) as usize, words[at] & 0xFFFF);
+        if operation == 16 {
+            modes.push(words[at + 2]); // OpExecutionMode
+        }
+        at += length.max(1);
+    }
+    modes
+}
+
+#[test]
+fn early_tests_are_forced_in_the_shader_and_depth_is_not_written() {
+    const EARLY_FRAGMENT_TESTS: u32 = 9;
+    use lucerna::shader::Args;
+    assert!(modes(tonemap::marked_early_z::Args::SHADER).contains(&EARLY_FRAGMENT_TESTS));
+    assert!(modes(tonemap_early::Args::SHADER).contains(&EARLY_FRAGMENT_TESTS));
+    assert!(!modes(tonemap_late::Args::SHADER).contains(&EARLY_FRAGMENT_TESTS));
+    assert!(!modes(tonemap::marked_branch::Args::SHADER).contains(&EARLY_FRAGMENT_TESTS));
+    let mut graph = Graph::new("state");
+    let depth = graph.image("depth", Format::D32F, Extent::new(4, 4));
+    let (targets, state) = mark::early_z(Targets::new(), depth);
+    assert_eq!((state.depth_write, state.depth_compare), (false, Compare::Greater));
+    assert_eq!(targets, Targets::new().depth(depth, Depth::ReadOnly));
+}
+
+#[test]
+fn sobel_marks_steps_by_their_height_and_not_by_chance() {
+    with_gpu(|gpu| {
+        let size = [13, 9];
+        let step = |low: f32, high: f32| -> Vec<f32> {
+            (0..size[0] * size[1]).map(|i| if i % size[0] < 6 { low } else { high }).collect()
+        };
+        let with = |threshold| Settings { threshold, ..Settings::default() };
+        // Along an edge of one pixel the kernels give four times the step, in the two columns beside it, also at the border.
+        let columns: Vec<bool> = (0..117).map(|i| [5, 6].contains(&(i % 13))).collect();
+        assert_eq!(map(gpu, size, &step(1.0, 1.5), None, &with(1.999)), columns);
+        assert_eq!(map(gpu, size, &step(1.5, 1.0), None, &with(1.999)), columns);
+        assert_eq!(map(gpu, size, &step(1.0, 1.5), None, &with(2.0)), vec![false; 117], "over, not at, the threshold");
+        assert_eq!(map(gpu, size, &[7.0; 117], None, &with(0.0)), vec![false; 117], "a constant image has no edge");
+        // Nothing overflows.
+        assert_eq!(map(gpu, size, &step(0.0, 1e18), None, &with(0.1)), columns);
+        assert_eq!(map(gpu, [1, 1], &[1e18], None, &with(0.0)), [false]);
+        // A slope of 1 along x and 2 along y: 8 times its length inside.
+        let slope: Vec<f32> = (0..117).map(|i| (i % 13 + 2 * (i / 13)) as f32).collect();
+        let length = 8.0 * 5.0_f32.sqrt();
+        let inside: Vec<bool> = (0..117).map(|i| (1..12).contains(&(i % 13)) && (1..8).contains(&(i / 13))).collect();
+        assert_eq!(map(gpu, size, &slope, None, &with(length * 0.9999)), inside);
+        assert_eq!(map(gpu, size, &slope, None, &with(length * 1.0001)), vec![false; 117]);
+    });
+}
+
+#[test]
+fn normalisation_acts_on_the_threshold_of_sobel() {
+    with_gpu(|gpu| {
+        let image = owned(gpu, "luminance", [4, 1], &[0.0, 0.0, 1.0, 1.0]);
+        for (scale, expected) in [(1.0, 2.0), (0.02, 0.0), (0.03, 2.0)] {
+            let mut graph = Graph::new("identify");
+            let image = graph.import_image(&image);
+            let statistics = statistics(&mut graph, scale);
+            let importance = identify::importance(&mut graph, image, statistics, None, &Settings::default());
+            let token = graph.read_image(importance);
+            assert_eq!(red(&run(gpu, graph).image(token)).iter().sum::<f32>(), expected, "factor {scale}");
+        }
+    });
+}
+
+#[test]
+fn a_mask_is_or_ed_in_at_full_size() {
     with_gpu(|gpu| {
         for (seed, size) in SIZES.into_iter().enumerate() {
             let count = (size[0] * size[1]) as usize;
             let luminance = noise(seed as u32, count);
-            let some: Vec<f32> = noise(9 + seed as u32, count).iter().map(|n| f32::from(u8::from(*n < 0.3))).collect();
-            for importance in [vec![0.0; count], vec![1.0; count], some] {
-                let marked = importance.iter().sum::<f32>() as u64;
-                for mark in MARKS {
-                    println!("{size:?} marked {marked} of {count}: {mark:?} {:?}", adapt(gpu, size, &luminance, &importance, mark).1);
+            let mask = noise(100 + seed as u32, count);
+            for identify in [Identify::Sobel, Identify::Saliency] {
+                for identify_scale in [1, 2, 4] {
+                    let settings = Settings { identify, identify_scale, threshold: 0.3, ..Settings::default() };
+                    let found = map(gpu, size, &luminance, None, &settings);
+                    let both = map(gpu, size, &luminance, Some(&mask), &settings);
+                    let expected: Vec<bool> = (0..count).map(|i| found[i] || mask[i] > 0.5).collect();
+                    assert_eq!(both, expected, "{identify:?} at 1/{identify_scale} of {size:?}");
                 }
             }
+        }
+    });
+}
+
+#[test]
+fn at_reduced_size_a_box_has_one_answer() {
+    with_gpu(|gpu| {
+        // A step inside of a box vanishes in its mean, a step between boxes stays.
+        let (width, height) = (21, 10);
+        let luminance: Vec<f32> = (0..width * height).map(|i| if i % width < 8 { 1.0 } else { 2.0 }).collect();
+        for (factor, columns) in [(1, 7..9), (2, 6..10), (4, 4..12)] {
+            let settings = Settings { identify_scale: factor, threshold: 3.99, ..Settings::default() };
+            let expected: Vec<bool> = (0..width * height).map(|i| columns.contains(&(i % width))).collect();
+            assert_eq!(map(gpu, [width, height], &luminance, None, &settings), expected, "reduced {factor} times");
+        }
+        // Boxes that the border cuts average what is inside: a constant image stays constant.
+        for size in SIZES {
+            let luminance = vec![0.7; (size[0] * size[1]) as usize];
+            let settings = Settings { identify_scale: 4, threshold: 1e-6, ..Settings::default() };
+            assert!(!map(gpu, size, &luminance, None, &settings).contains(&true), "{size:?}");
+        }
+    });
+}
+
+#[test]
+fn saliency_sees_what_stands_out_whatever_the_unit() {
+    with_gpu(|gpu| {
+        let size = [96, 64];
+        let settings = Settings { identify: Identify::Saliency, threshold: 0.1, ..Settings::default() };
+        let flat = map(gpu, size, &vec![0.3; 96 * 64], None, &settings);
+        assert!(!flat.contains(&true), "a constant image has nothing salient");
+        assert!(!map(gpu, size, &vec![0.0; 96 * 64], None, &settings).contains(&true), "nor has a black one");
+        let lamp = |scale: f32| -> Vec<f32> {
+            let inside = |i: i32| (30..36).contains(&(i % 96)) && (20..26).contains(&(i / 96));
+            (0..96 * 64).map(|i| scale * if inside(i) { 8.0 } else { 0.5 }).collect()
+        };
+        let found = map(gpu, size, &lamp(1.0), None, &settings);
+        assert!(found[23 * 96 + 33], "the lamp stands out");
+        assert!(!found[60 * 96 + 90], "what is far from it does not");
+        let share = found.iter().filter(|f| **f).count() as f32 / found.len() as f32;
+        assert!((0.006..0.3).contains(&share), "{share} salient");
+        for scale in [2.0_f32.powi(-20), 2.0_f32.powi(20)] {
+            assert_eq!(map(gpu, size, &lamp(scale), None, &settings), found, "times {scale}");
+        }
+        for size in SIZES {
+            let luminance = noise(3, (size[0] * size[1]) as usize);
+            map(gpu, size, &luminance, None, &settings);
         }
     });
 }

@@ -111,6 +111,9 @@ impl Statistics {
             Ok(()) | Err(vk::Result::NOT_READY) => {}
             Err(other) => self.context.check(Err(other), || "vkGetQueryPoolResults".into())?,
         }
-        Ok(raw.iter().map(|&[fragments, compute, ready]| (ready != 0).then_some(Started { fragments, compute })).collect())
+        Ok(raw
+            .iter()
+            .map(|&[fragments, compute, ready]| (ready != 0).then_some(Started { fragments, compute }))
+            .collect())
     }
 }

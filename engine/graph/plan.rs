@@ -404,7 +404,12 @@ fn part(region: &Region, buffer: bool) -> String {
 fn upload_pass(graph: &Graph) -> Option<Pass> {
     let filled = graph.buffers.iter().enumerate().filter(|(_, b)| b.contents.is_some());
     let buffers: Vec<_> = filled.map(|(i, _)| graph.whole_buffer(i as u32)).collect();
-    (!buffers.is_empty()).then(|| Pass { name: "upload".into(), scope: Vec::new(), counted: false, work: Work::Upload { buffers } })
+    (!buffers.is_empty()).then(|| Pass {
+        name: "upload".into(),
+        scope: Vec::new(),
+        counted: false,
+        work: Work::Upload { buffers },
+    })
 }
 
 /// Descriptions that no image can have.

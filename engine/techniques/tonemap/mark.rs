@@ -11,10 +11,11 @@
 
 use super::{Mark, Settings};
 use crate::{
-    graph::{Buffer, Compare, Depth, Draw, Format, Graph, Image, Load, Raster, Targets, Uniform},
+    graph::{Buffer, Compare, Depth, Draw, Extent, Format, Graph, Image, Load, Raster, Targets},
     shaders::{
         tonemap::{
-            list_groups, list_pixels, list_tiles, mark_depth, marked_branch, marked_compact, marked_early_z, marked_tiles,
+            list_groups, list_pixels, list_tiles, mark_depth, marked_branch, marked_compact, marked_early_z,
+            marked_tiles,
         },
         types::TonemapLocal,
     },
@@ -31,14 +32,9 @@ const DEPTH_DRAWN: f32 = 0.5;
 
 /// Adaptation luminance (R32F): by the operator's local component, computed literally, where `importance` is not 0;
 /// elsewhere the luminance itself, from which the operator's curve makes what its global mode shows.
-pub fn adapt(
-    graph: &mut Graph,
-    luminance: Image,
-    importance: Image,
-    local: Uniform<TonemapLocal>,
-    settings: &Settings,
-) -> Image {
+pub fn adapt(graph: &mut Graph, luminance: Image, importance: Image, _picture: Extent, settings: &Settings) -> Image {
     let extent = graph.extent(luminance);
+    let local = graph.uniform(&TonemapLocal { radius: settings.radius, contrast: settings.contrast });
     let adapted = graph.image("tonemap.adapted", Format::R32F, extent);
     graph.copy(luminance, adapted);
     let target = Targets::new().color(adapted, Load::Keep);

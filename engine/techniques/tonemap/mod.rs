@@ -17,7 +17,9 @@
 //! written. Shaders never spread NaN: they take it, infinity and negative values for 0; [`clean()`] offers other policies before.
 
 mod clean;
+pub mod identify;
 mod local;
+pub mod mark;
 mod settings;
 pub mod statistics;
 mod still;
@@ -59,7 +61,7 @@ pub struct Output {
     pub adaptation: Image,
     /// One `types::TonemapStatistics`.
     pub statistics: Buffer,
-    /// Selective: R8, 1 where a pixel is important.
+    /// Selective: R32F, 1 where a pixel is important, 0 elsewhere.
     pub important: Option<Image>,
 }
 
@@ -129,12 +131,18 @@ fn map(
     picture: Extent,
     settings: &Settings,
 ) -> Result<Output> {
+    let mut important = None;
     let adaptation = match settings.mode() {
         Mode::Global => luminance,
-        Mode::Local | Mode::Selective => local::adaptation(graph, luminance, statistics, picture, settings)?,
+        Mode::Local => local::adaptation(graph, luminance, statistics, picture, settings)?,
+        Mode::Selective => {
+            let importance = identify::importance(graph, luminance, statistics, input.mask, settings);
+            important = Some(importance);
+            mark::adapt(graph, luminance, importance, picture, settings)
+        }
     };
     let mapped = curve(graph, input.color, luminance, adaptation, statistics, settings);
-    Ok(Output { mapped, luminance, adaptation, statistics, important: None })
+    Ok(Output { mapped, luminance, adaptation, statistics, important })
 }
 
 /// The curve of the operator for every pixel.
