@@ -5,7 +5,7 @@ use lucerna::{
     gpu::{DeviceKind, Gpu, ImageDesc as OwnedDesc, OwnedImage, Region, Started, testing::with_gpu},
     graph::*,
     shaders::{test::*, tonemap, types},
-    techniques::tonemap::{Identify, Mark, Settings, identify, mark},
+    techniques::tonemap::{Identify, Mark, Mode, Settings, Still, identify, mark},
 };
 
 const MARKS: [Mark; 4] = [Mark::Branch, Mark::Tiles, Mark::EarlyZ, Mark::Compact];
@@ -316,6 +316,42 @@ fn saliency_sees_what_stands_out_whatever_the_unit() {
         for size in SIZES {
             let luminance = noise(3, (size[0] * size[1]) as usize);
             map(gpu, size, &luminance, None, &settings);
+        }
+    });
+}
+
+#[test]
+fn tiles_of_a_picture_have_the_map_of_the_whole() {
+    with_gpu(|gpu| {
+        let (width, height) = (301, 67);
+        let count = (width * height) as usize;
+        let mask: Vec<f32> = noise(2, count).iter().map(|n| f32::from(u8::from(*n > 0.99))).collect();
+        let grain = noise(1, count);
+        // Broad waves with grain, so that no map is empty or full.
+        let pixels: Vec<[f32; 4]> = (0..count)
+            .map(|i| {
+                let (x, y) = ((i as u32 % width) as f32, (i as u32 / width) as f32);
+                let l = ((x * 0.05).sin() * (y * 0.07).cos() * 2.0).exp2()
+                    * if x > 150.0 { 0.8 + 0.4 * grain[i] } else { 1.0 };
+                [l, l, l, 1.0]
+            })
+            .collect();
+        for (identify, identify_scale, threshold) in
+            [(Identify::Sobel, 1, 0.4), (Identify::Sobel, 4, 0.4), (Identify::Saliency, 1, 0.1)]
+        {
+            let settings = Settings {
+                mode: Some(Mode::Selective),
+                identify,
+                identify_scale,
+                threshold,
+                radius: 2,
+                mark: Mark::Compact,
+                ..Settings::default()
+            };
+            let map = |mut still: Still| still.map(width, height, pixels.clone(), Some(&mask), None).unwrap().pixels;
+            let whole = map(Still::new(gpu, &settings).unwrap());
+            let tiled = map(Still::new(gpu, &settings).unwrap().tiles(80));
+            assert!(whole == tiled, "{identify:?} at 1/{identify_scale}");
         }
     });
 }

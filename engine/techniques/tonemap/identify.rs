@@ -26,6 +26,26 @@ use crate::{
 /// Levels of the pyramid of saliency.
 const LEVELS: usize = 7;
 
+/// Pixels around a pixel on which its importance depends.
+pub fn reach(settings: &Settings) -> u32 {
+    let factor = settings.identify_scale.max(1);
+    match settings.identify {
+        // The next box.
+        Identify::Sobel => 2 * factor,
+        // 64 for two samples of level 6, 63 for the first of the pixels in it and 32 for half of a sample.
+        Identify::Saliency => 160 * factor,
+    }
+}
+
+/// A part of a picture has the same boxes and levels as the whole if it begins at multiples of this.
+pub fn grid(settings: &Settings) -> u32 {
+    let factor = settings.identify_scale.max(1);
+    match settings.identify {
+        Identify::Sobel => factor,
+        Identify::Saliency => factor << (LEVELS - 1),
+    }
+}
+
 /// The map of important pixels of `luminance` (R32F): 1 or 0, R32F, of the same size. `statistics` hold the factor of
 /// normalisation; `mask` has the size of `luminance` (others are cut or count as 0 outside).
 pub fn importance(

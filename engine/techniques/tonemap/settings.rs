@@ -1,5 +1,6 @@
 //! What can be chosen in tone mapping.
 
+use super::identify;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -237,13 +238,15 @@ impl Settings {
 
     /// Pixels around a pixel that its result depends on, beside the statistics.
     pub fn reach(&self, width: u32, height: u32) -> u32 {
-        match (self.mode(), self.operator) {
+        let identification = if self.mode() == Mode::Selective { identify::reach(self) } else { 0 };
+        let local = match (self.mode(), self.operator) {
             (Mode::Global, _) => 0,
             (_, Operator::Ashikhmin) => 2 * self.radius,
             (_, Operator::Reinhard) => (0.75 * 1.6f32.powi(self.scales as i32)).ceil() as u32,
             (_, Operator::Bilateral) => self.bilateral(width, height).1,
             _ => 0,
-        }
+        };
+        local.max(identification)
     }
 
     /// # Errors

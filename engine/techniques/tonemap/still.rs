@@ -1,7 +1,7 @@
 //! Pictures in main memory, of any size.
 
 use super::{
-    BadCounts, Input, Output, Settings, Tonemap, clean, map,
+    BadCounts, Input, Mode, Output, Settings, Tonemap, clean, identify, map,
     statistics::{self, Rectangle, Sums},
 };
 use crate::{
@@ -60,14 +60,15 @@ struct Tile {
 }
 
 impl Tile {
-    /// Tiles of `side`² pixels with `apron` more on each side where the picture has them.
-    fn all(width: u32, height: u32, side: u32, apron: u32) -> Vec<Self> {
+    /// Tiles of `side`² pixels with `apron` more on each side where the picture has them, and up to `grid` − 1 more to the left and
+    /// above, so that what goes in begins at a multiple of `grid`.
+    fn all(width: u32, height: u32, side: u32, apron: u32, grid: u32) -> Vec<Self> {
         let cuts = |size: u32| -> Vec<(u32, u32, u32, u32)> {
             let starts = (0..size).step_by(side.max(1) as usize);
             starts
                 .map(|first| {
                     let length = side.min(size - first);
-                    let from = first.saturating_sub(apron);
+                    let from = first.saturating_sub(apron) / grid.max(1) * grid.max(1);
                     let to = first.saturating_add(length).saturating_add(apron).min(size);
                     (first, length, from, to - from)
                 })
@@ -166,7 +167,8 @@ impl Still {
         let gpu = self.runner.gpu().clone();
         let picture = Extent::new(width, height);
         let apron = settings.reach(width, height);
-        let limit = gpu.caps().limits.image_2d.saturating_sub(2 * apron).max(1);
+        let grid = if settings.mode() == Mode::Selective { identify::grid(&settings) } else { 1 };
+        let limit = gpu.caps().limits.image_2d.saturating_sub(2 * apron + grid).max(1);
         let side = self.tile.unwrap_or(TILE).min(limit);
         let owned = |name: &str, bytes: u64| OwnedBuffer::with_contents(&gpu, name, &vec![0; bytes as usize]);
         let sums = owned("tonemap.sums", statistics::SUMS_BYTES)?;
@@ -174,7 +176,7 @@ impl Still {
         let bins = owned("tonemap.bins", statistics::BINS_BYTES)?;
         let result = &self.tonemap.statistics.clone();
 
-        let plain = Tile::all(width, height, side, 0);
+        let plain = Tile::all(width, height, side, 0, 1);
         // The first turn has no digit: it takes minimum, maximum and logarithms.
         let digits: &[u32] = if settings.percentile > 0.0 { &statistics::DIGITS } else { &[] };
         for (turn, digit) in std::iter::once(None).chain(digits.iter().copied().map(Some)).enumerate() {
@@ -208,7 +210,7 @@ impl Still {
 
         let mut pixels = vec![[0.0; 4]; picture.pixels() as usize];
         let mut statistics = TonemapStatistics::default();
-        for tile in Tile::all(width, height, side, apron) {
+        for tile in Tile::all(width, height, side, apron, grid) {
             let mut graph = Graph::new("tonemap tile");
             let input = self.input(&mut graph, source, &tile)?;
             let unused = scratch_sums(&mut graph);
@@ -292,10 +294,10 @@ mod tests {
 
     #[test]
     fn tiles_cover_each_pixel_once_and_know_their_surroundings() {
-        for (width, height, side, apron) in [(1, 1, 4, 3), (10, 7, 4, 3), (8, 8, 4, 0), (5, 9, 1, 2), (100, 3, 64, 20)]
-        {
+        let cases = [(1, 1, 4, 3, 1), (10, 7, 4, 3, 1), (8, 8, 4, 0, 1), (5, 9, 1, 2, 4), (100, 3, 64, 20, 8)];
+        for (width, height, side, apron, grid) in cases {
             let mut seen = vec![0; (width * height) as usize];
-            for tile in Tile::all(width, height, side, apron) {
+            for tile in Tile::all(width, height, side, apron, grid) {
                 let [x, y, w, h] = tile.core;
                 let [wx, wy, ww, wh] = tile.whole;
                 for row in y..y + h {
@@ -303,7 +305,9 @@ mod tests {
                         seen[(row * width + column) as usize] += 1;
                     }
                 }
-                assert_eq!((wx, wy), (x.saturating_sub(apron), y.saturating_sub(apron)));
+                let least = |first: u32| first.saturating_sub(apron);
+                assert!(wx <= least(x) && wx + grid > least(x) && wx.is_multiple_of(grid));
+                assert!(wy <= least(y) && wy + grid > least(y) && wy.is_multiple_of(grid));
                 assert_eq!((wx + ww, wy + wh), ((x + w + apron).min(width), (y + h + apron).min(height)));
                 let part = tile.part();
                 assert_eq!(part.last[0] - part.first[0] + 1, w as i32);
