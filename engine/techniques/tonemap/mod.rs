@@ -18,8 +18,9 @@
 
 mod clean;
 pub mod identify;
-mod local;
+pub mod local;
 pub mod mark;
+pub mod search;
 mod settings;
 pub mod statistics;
 mod still;

@@ -1,0 +1,146 @@
+//! Operators on the device: the fast way of local adaptation against its definition, images without anything to adapt to, closed forms.
+
+use lucerna::{
+    gpu::{Gpu, testing::with_gpu},
+    techniques::tonemap::{Local, Mode, Operator, Settings, apply},
+};
+
+fn noise(seed: u32) -> impl FnMut() -> f32 {
+    let mut state = seed.wrapping_mul(747_796_405).wrapping_add(1);
+    move || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32 / (1 << 24) as f32
+    }
+}
+
+/// Patches of very different light with texture, as photographs have them.
+fn picture(width: u32, height: u32, seed: u32) -> Vec<[f32; 4]> {
+    let mut next = noise(seed);
+    let patches: Vec<[f32; 4]> =
+        (0..64).map(|_| [10f32.powf(5.0 * next() - 3.0), 0.2 + 0.8 * next(), 0.2 + 0.8 * next(), next()]).collect();
+    (0..width * height)
+        .map(|i| {
+            let (x, y) = (i % width, i / width);
+            let [l, r, g, a] = patches[((x / 17 + 3 * (y / 23)) % 64) as usize];
+            let l = l * (0.8 + 0.4 * next());
+            [l * r, l * g, l, a]
+        })
+        .collect()
+}
+
+fn run(gpu: &Gpu, width: u32, height: u32, pixels: &[[f32; 4]], settings: &Settings) -> Vec<[f32; 4]> {
+    apply(gpu, width, height, pixels, None, settings).unwrap().pixels
+}
+
+fn with(operator: Operator, mode: Mode) -> Settings {
+    Settings { operator, mode: Some(mode), ..Settings::default() }
+}
+
+/// A pixel whose contrast is at the limit to the last bits may fall on either side: such pixels are counted, all others are near.
+#[test]
+fn fast_local_adaptation_is_the_definition() {
+    with_gpu(|gpu| {
+        for (operator, radius, scales) in [
+            (Operator::Ashikhmin, 10, 8),
+            (Operator::Ashikhmin, 1, 8),
+            (Operator::Ashikhmin, 16, 8),
+            (Operator::Reinhard, 10, 8),
+            (Operator::Reinhard, 10, 1),
+        ] {
+            let large = if radius == 10 && scales == 8 { (61, 43) } else { (17, 14) };
+            for (width, height) in [(1, 1), (1, 50), (40, 1), (9, 8), large] {
+                let pixels = picture(width, height, width);
+                let fast = Settings { radius, scales, ..with(operator, Mode::Local) };
+                let literal = Settings { local: Local::Literal, ..fast.clone() };
+                let fast = run(gpu, width, height, &pixels, &fast);
+                let literal = run(gpu, width, height, &pixels, &literal);
+                let far = fast
+                    .iter()
+                    .flatten()
+                    .zip(literal.iter().flatten())
+                    .filter(|(f, l)| (**f - **l).abs() > 2e-5 * l.abs() + 1e-7)
+                    .count();
+                assert!(far <= fast.len() / 1000, "{operator:?} {radius} {scales}, {width}×{height}: {far} values");
+            }
+        }
+    });
+}
+
+#[test]
+fn images_without_anything_to_adapt_to() {
+    with_gpu(|gpu| {
+        for (operator, mode) in [Operator::Ashikhmin, Operator::Reinhard]
+            .into_iter()
+            .flat_map(|o| [(o, Mode::Global), (o, Mode::Local)])
+            .chain(Operator::ALL[3..].iter().map(|(_, o)| (*o, Mode::Global)))
+        {
+            let ways = if mode == Mode::Global { &[Local::Fast][..] } else { &[Local::Fast, Local::Literal] };
+            for &local in ways {
+                let settings = Settings { local, ..with(operator, mode) };
+                let name = format!("{operator:?} {mode:?} {local:?}");
+                for (width, height) in [(1, 1), (5, 3)] {
+                    let count = (width * height) as usize;
+                    let black = run(gpu, width, height, &vec![[0.0, 0.0, 0.0, 0.5]; count], &settings);
+                    assert!(
+                        black.iter().all(|p| p[..3].iter().all(|v| v.abs() < 1e-3) && p[3] == 0.5),
+                        "{name}: {black:?}"
+                    );
+                    let even = run(gpu, width, height, &vec![[3.0, 3.0, 3.0, 1.0]; count], &settings);
+                    let first = even[0];
+                    assert!(first[0] > 0.0 && first.iter().all(|v| v.is_finite()), "{name}: {first:?}");
+                    assert!(even.iter().all(|p| (0..3).all(|c| (p[c] - first[c]).abs() < 1e-5)), "{name}: {even:?}");
+                }
+                let mut hot = vec![[0.01, 0.01, 0.01, 1.0]; 20 * 12];
+                hot[6 * 20 + 11] = [1e30, 1e30, 1e30, 1.0];
+                let hot = run(gpu, 20, 12, &hot, &settings);
+                assert!(hot.iter().flatten().all(|v| v.is_finite() && *v > -0.01), "{name}");
+                let spot = hot[6 * 20 + 11][1];
+                assert!(hot.iter().all(|p| p[1] <= spot), "{name}: nothing outshines the hot pixel");
+            }
+        }
+    });
+}
+
+/// A picture of one luminance L: Ashikhmin makes it white, Reinhard L key / L … of its closed forms.
+#[test]
+fn one_luminance_has_closed_forms() {
+    with_gpu(|gpu| {
+        let grey = vec![[4.0, 4.0, 4.0, 1.0]; 12];
+        let value = |settings: &Settings| run(gpu, 4, 3, &grey, settings)[5][1];
+        let near = |found: f32, wanted: f32| assert!((found - wanted).abs() < 2e-5, "{found} {wanted}");
+        for mode in [Mode::Global, Mode::Local] {
+            near(value(&with(Operator::Ashikhmin, mode)), 1.0);
+        }
+        near(value(&with(Operator::Reinhard, Mode::Global)), 1.0);
+        near(value(&with(Operator::Reinhard, Mode::Local)), 0.18 / 1.18);
+        near(value(&Settings { white: 3.0, ..with(Operator::Reinhard, Mode::Global) }), 0.18 * 1.02 / 1.18);
+        near(value(&Settings { exposure: -1.0, ..with(Operator::Linear, Mode::Global) }), 2.0);
+        near(value(&Settings { normalize: true, exposure: -1.0, ..with(Operator::Linear, Mode::Global) }), 0.5);
+        near(
+            value(&Settings { white: 8.0, ..with(Operator::ReinhardGlobal, Mode::Global) }),
+            4.0 * (1.0 + 4.0 / 64.0) / 5.0,
+        );
+        near(value(&with(Operator::ReinhardGlobal, Mode::Global)), 1.0);
+        // Middle grey of AgX is 1/2 before the power.
+        let middle = Settings { exposure: (0.18f32 / 4.0).log2(), ..with(Operator::Agx, Mode::Global) };
+        assert!((value(&middle) - 0.5f32.powf(2.2)).abs() < 1e-4, "{}", value(&middle));
+        // Khronos PBR Neutral: the Fresnel offset below 0.76.
+        near(value(&Settings { exposure: -3.0, ..with(Operator::Neutral, Mode::Global) }), 0.46);
+    });
+}
+
+#[test]
+fn tiles_change_no_bit_of_local_operators() {
+    with_gpu(|gpu| {
+        use lucerna::techniques::tonemap::Still;
+        let (width, height) = (120, 90);
+        let pixels = picture(width, height, 5);
+        for operator in [Operator::Ashikhmin, Operator::Reinhard] {
+            let settings = with(operator, Mode::Local);
+            let whole = Still::new(gpu, &settings).unwrap().map(width, height, pixels.clone(), None, None).unwrap();
+            let cut =
+                Still::new(gpu, &settings).unwrap().tiles(50).map(width, height, pixels.clone(), None, None).unwrap();
+            assert!(whole.pixels == cut.pixels, "{operator:?}");
+        }
+    });
+}
