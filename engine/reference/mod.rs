@@ -4,4 +4,5 @@
 pub mod isr;
 pub mod isr_scene;
 pub mod path;
+pub mod tonemap;
 pub mod tracer;

@@ -1,0 +1,92 @@
+//! Ashikhmin, "A tone mapping algorithm for high contrast images", 2002, as restated by Michael 2010, section 4.3.
+
+use super::plane::{Plane, gaussian};
+
+/// Perceptual capacity C of luminance in cd/m²: how many just noticeable differences lie below it. The integral of
+/// 1 / TVI, with the four pieces of the paper's threshold against intensity.
+pub fn capacity(luminance: f64) -> f64 {
+    if luminance < 0.0034 {
+        luminance / 0.0014
+    } else if luminance < 1.0 {
+        2.4483 + (luminance / 0.0034).ln() / 0.4027
+    } else if luminance < 7.2444 {
+        16.5630 + (luminance - 1.0) / 0.4027
+    } else {
+        32.0693 + (luminance / 7.2444).ln() / 0.0556
+    }
+}
+
+/// Threshold against intensity, the just noticeable difference at a luminance: 1 / C′.
+pub fn threshold(luminance: f64) -> f64 {
+    if luminance < 0.0034 {
+        0.0014
+    } else if luminance < 1.0 {
+        0.4027 * luminance
+    } else if luminance < 7.2444 {
+        0.4027
+    } else {
+        0.0556 * luminance
+    }
+}
+
+/// The global curve: world luminance [`Curve::low`] to [`Curve::high`] onto display luminance 0 to [`Curve::display`].
+#[derive(Clone, Copy, Debug)]
+pub struct Curve {
+    /// Luminance that becomes black, cd/m².
+    pub low: f64,
+    /// Luminance that becomes the display's largest, cd/m².
+    pub high: f64,
+    /// Largest luminance of the display, L_dmax, cd/m².
+    pub display: f64,
+}
+
+impl Curve {
+    /// TM: display luminance of an adaptation luminance.
+    pub fn map(&self, luminance: f64) -> f64 {
+        let (low, high) = (capacity(self.low), capacity(self.high));
+        self.display * (capacity(luminance) - low) / (high - low)
+    }
+
+    /// L_d: display luminance of a pixel of `luminance` seen at the adaptation `level`.
+    pub fn display(&self, luminance: f64, level: f64) -> f64 {
+        let mapped = self.map(level);
+        mapped + threshold(mapped) / threshold(level) * (luminance - level)
+    }
+}
+
+/// How local adaptation is found.
+#[derive(Clone, Copy, Debug)]
+pub struct Search {
+    /// Largest radius, pixels.
+    pub largest: usize,
+    /// Largest contrast |G_s − G_2s| / G_s of a neighbourhood that counts as even.
+    pub contrast: f64,
+    /// σ of the Gaussian of radius 1, pixels; that of radius s is s times as wide.
+    pub sigma: f64,
+    /// Pixels that the Gaussian of radius 1 reaches to each side; that of radius s reaches s times as far.
+    pub reach: usize,
+}
+
+impl Search {
+    fn weights(&self, radius: usize) -> Vec<f64> {
+        gaussian(self.sigma * radius as f64, self.reach * radius)
+    }
+
+    /// Local adaptation of every pixel: the average over the largest neighbourhood that is still even. A pixel whose
+    /// smallest neighbourhood is not even adapts to that smallest one.
+    pub fn adaptation(&self, luminance: &Plane) -> Plane {
+        let averages: Vec<Plane> = (1..=2 * self.largest).map(|s| luminance.averages(&self.weights(s))).collect();
+        let at = |s: usize, x: usize, y: usize| averages[s - 1][(x, y)];
+        Plane::from_fn(luminance.width, luminance.height, |x, y| {
+            let mut level = at(1, x, y);
+            for s in 1..=self.largest {
+                let (inner, outer) = (at(s, x, y), at(2 * s, x, y));
+                if (inner - outer).abs() >= self.contrast * inner {
+                    break;
+                }
+                level = inner;
+            }
+            level
+        })
+    }
+}
