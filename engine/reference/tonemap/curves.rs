@@ -52,3 +52,30 @@ pub fn neutral(pixel: [f32; 3]) -> Rgb {
         v + (compressed - v) * grey
     })
 }
+
+/// AgX (Troy Sobotka) in the form that Filament and three.js give it: Blender's working space of Rec. 2020 primaries, inset
+/// matrix, log2 from −12.47393 to 4.026069, the polynomial fit of the default contrast by Benjamin Wrensch, outset matrix, and
+/// its display encoding of 2.2 undone, so that the result is linear Rec. 709.
+pub fn agx(pixel: [f32; 3]) -> Rgb {
+    const REC2020: [Rgb; 3] = [[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0113], [0.0164, 0.0880, 0.8956]];
+    const REC709: [Rgb; 3] = [[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]];
+    const INSET: [Rgb; 3] = [
+        [0.856627153315983, 0.0951212405381588, 0.0482516061458583],
+        [0.137318972929847, 0.761241990602591, 0.101439036467562],
+        [0.11189821299995, 0.0767994186031903, 0.811302368396859],
+    ];
+    const OUTSET: [Rgb; 3] = [
+        [1.1271005818144368, -0.11060664309660323, -0.016493938717834573],
+        [-0.1413297634984383, 1.157823702216272, -0.016493938717834257],
+        [-0.14132976349843826, -0.11060664309660294, 1.2519364065950405],
+    ];
+    const LOW: f64 = -12.47393;
+    const HIGH: f64 = 4.026069;
+    let inset = multiply(&INSET, multiply(&REC2020, pixel.map(f64::from)));
+    let contrast = inset.map(|v| {
+        let x = ((v.max(1e-10).log2() - LOW) / (HIGH - LOW)).clamp(0.0, 1.0);
+        15.5 * x.powi(6) - 40.14 * x.powi(5) + 31.96 * x.powi(4) - 6.868 * x.powi(3) + 0.4298 * x * x + 0.1191 * x - 0.00232
+    });
+    let shown = multiply(&OUTSET, contrast).map(|v| v.max(0.0).powf(2.2));
+    multiply(&REC709, shown).map(|v| v.clamp(0.0, 1.0))
+}

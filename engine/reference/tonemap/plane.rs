@@ -11,8 +11,13 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// Computes each pixel by itself, rows shared out to all cores; the result does not depend on their number.
+    /// Computes each pixel by itself; the result does not depend on the number of cores.
     pub fn from_fn(width: usize, height: usize, pixel: impl Fn(usize, usize) -> f64 + Sync) -> Self {
+        Self::from_rows(width, height, |y, row| row.iter_mut().enumerate().for_each(|(x, value)| *value = pixel(x, y)))
+    }
+
+    /// Computes each row by itself, rows shared out to all cores in turn.
+    fn from_rows(width: usize, height: usize, row: impl Fn(usize, &mut [f64]) + Sync) -> Self {
         let mut values = vec![0.0; width * height];
         if values.is_empty() {
             return Self { width, height, values };
@@ -20,12 +25,10 @@ impl Plane {
         let cores = thread::available_parallelism().map_or(1, |n| n.get());
         let share = height.div_ceil(cores);
         thread::scope(|scope| {
-            for (part, chunk) in values.chunks_mut(share * width).enumerate() {
-                let pixel = &pixel;
+            for (part, rows) in values.chunks_mut(share * width).enumerate() {
+                let row = &row;
                 scope.spawn(move || {
-                    for (i, value) in chunk.iter_mut().enumerate() {
-                        *value = pixel(i % width, part * share + i / width);
-                    }
+                    rows.chunks_mut(width).enumerate().for_each(|(y, values)| row(part * share + y, values));
                 });
             }
         });
@@ -70,11 +73,20 @@ impl Plane {
     pub fn averages(&self, weights: &[f64]) -> Self {
         let radius = weights.len() as isize - 1;
         let total: f64 = (-radius..=radius).map(|i| weights[i.unsigned_abs()]).sum();
-        let mean = |at: &dyn Fn(isize) -> f64| {
-            (-radius..=radius).map(|i| weights[i.unsigned_abs()] * at(i)).sum::<f64>() / total
-        };
-        let rows = Self::from_fn(self.width, self.height, |x, y| mean(&|i| self.clamped(x as isize + i, y as isize)));
-        Self::from_fn(self.width, self.height, |x, y| mean(&|j| rows.clamped(x as isize, y as isize + j)))
+        let weights: Vec<f64> = (-radius..=radius).map(|i| weights[i.unsigned_abs()] / total).collect();
+        let rows = Self::from_rows(self.width, self.height, |y, row| {
+            let padded = -radius..self.width as isize + radius;
+            let line: Vec<f64> = padded.map(|x| self.clamped(x, y as isize)).collect();
+            for (value, window) in row.iter_mut().zip(line.windows(weights.len())) {
+                *value = window.iter().zip(&weights).map(|(v, w)| v * w).sum();
+            }
+        });
+        Self::from_rows(self.width, self.height, |y, row| {
+            for (weight, j) in weights.iter().zip(-radius..) {
+                let from = (y as isize + j).clamp(0, self.height as isize - 1) as usize * self.width;
+                row.iter_mut().zip(&rows.values[from..]).for_each(|(value, v)| *value += weight * v);
+            }
+        })
     }
 }
 
