@@ -1,6 +1,7 @@
 //! Ashikhmin, "A tone mapping algorithm for high contrast images", 2002, as restated by Michael 2010, section 4.3.
 
 use super::plane::{Plane, gaussian};
+use crate::techniques::tonemap::Settings;
 
 /// Perceptual capacity C of luminance in cd/m²: how many just noticeable differences lie below it. The integral of
 /// 1 / TVI, with the four pieces of the paper's threshold against intensity.
@@ -41,9 +42,12 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// TM: display luminance of an adaptation luminance.
+    /// TM: display luminance of an adaptation luminance. A picture of one luminance is as bright as the display can be.
     pub fn map(&self, luminance: f64) -> f64 {
         let (low, high) = (capacity(self.low), capacity(self.high));
+        if high <= low {
+            return self.display;
+        }
         self.display * (capacity(luminance) - low) / (high - low)
     }
 
@@ -61,21 +65,23 @@ pub struct Search {
     pub largest: usize,
     /// Largest contrast |G_s − G_2s| / G_s of a neighbourhood that counts as even.
     pub contrast: f64,
-    /// σ of the Gaussian of radius 1, pixels; that of radius s is s times as wide.
-    pub sigma: f64,
-    /// Pixels that the Gaussian of radius 1 reaches to each side; that of radius s reaches s times as far.
-    pub reach: usize,
 }
 
 impl Search {
-    fn weights(&self, radius: usize) -> Vec<f64> {
-        gaussian(self.sigma * radius as f64, self.reach * radius)
+    /// As the settings say.
+    pub fn of(settings: &Settings) -> Self {
+        Self { largest: settings.radius as usize, contrast: f64::from(settings.contrast) }
+    }
+
+    /// G_s: σ = s/2, s pixels to each side.
+    pub fn weights(radius: usize) -> Vec<f64> {
+        gaussian(radius as f64 / 2.0, radius)
     }
 
     /// Local adaptation of every pixel: the average over the largest neighbourhood that is still even. A pixel whose
     /// smallest neighbourhood is not even adapts to that smallest one.
     pub fn adaptation(&self, luminance: &Plane) -> Plane {
-        let averages: Vec<Plane> = (1..=2 * self.largest).map(|s| luminance.averages(&self.weights(s))).collect();
+        let averages: Vec<Plane> = (1..=2 * self.largest).map(|s| luminance.averages(&Self::weights(s))).collect();
         let at = |s: usize, x: usize, y: usize| averages[s - 1][(x, y)];
         Plane::from_fn(luminance.width, luminance.height, |x, y| {
             let mut level = at(1, x, y);

@@ -21,3 +21,28 @@ pub fn filter(values: &Plane, sigma: f64, radius: usize, range: f64) -> Plane {
         sum / total
     })
 }
+
+/// The smallest luminance that is told apart, as a share of the largest.
+pub const DARKEST: f64 = 1e-4;
+
+/// Compression of the base, in log₁₀.
+#[derive(Clone, Copy, Debug)]
+pub struct Base {
+    /// log₁₀ L_max, which becomes white.
+    pub white: f64,
+    /// Factor of the base's contrast, at most 1.
+    pub factor: f64,
+}
+
+impl Base {
+    /// From L_min and L_max and the contrast that shall remain.
+    pub fn new(min: f64, max: f64, contrast: f64) -> Self {
+        let range = max.log10() - min.max(DARKEST * max).log10();
+        Self { white: max.log10(), factor: (contrast.log10() / range).min(1.0) }
+    }
+
+    /// log₁₀ of the display luminance of a base.
+    pub fn map(&self, base: f64) -> f64 {
+        self.factor * (base - self.white)
+    }
+}
