@@ -98,7 +98,8 @@ fn ashikhmins_curve_maps_the_picture_onto_the_display_and_rises() {
 fn curves_have_their_published_points() {
     let grey = |curve: fn([f64; 3]) -> [f64; 3], v: f64| {
         let [r, g, b] = curve([v; 3]);
-        assert!((r - g).abs() < 2e-5 && (g - b).abs() < 2e-5, "grey {v} becomes {r} {g} {b}");
+        // The rows of AgX' matrix sum to 1.00014, 0.99996 and 0.99995, those of ACES' to 1 but for 10⁻⁵.
+        assert!((r - g).abs() < 5e-4 * g + 1e-5 && (g - b).abs() < 5e-4 * g + 1e-5, "grey {v} becomes {r} {g} {b}");
         g
     };
     let rises = |curve: fn([f64; 3]) -> [f64; 3], most: f64| {
@@ -106,9 +107,9 @@ fn curves_have_their_published_points() {
         assert!(shown.windows(2).all(|p| p[0] <= p[1]) && *shown.last().unwrap() <= most);
     };
     // AgX: middle grey is the pivot of the sigmoid, half of the encoded range; both ends of the log range are black and white.
-    assert!((grey(curves::agx, 0.18) - 0.5f64.powf(2.2)).abs() < 1e-6);
-    assert!(grey(curves::agx, 0.0) < 1e-12 && (grey(curves::agx, 1e6) - 1.0).abs() < 1e-9);
-    rises(curves::agx, 1.0 + 1e-9);
+    assert!((grey(curves::agx, 0.18) - 0.5f64.powf(2.2)).abs() < 1e-4);
+    assert!(grey(curves::agx, 0.0) < 1e-12 && (grey(curves::agx, 1e6) - 1.0).abs() < 1e-3);
+    rises(curves::agx, 1.001);
     // Neutral: an offset of 0.04 between 0.08 and 0.8, a square below, towards 1 above.
     assert!((grey(curves::neutral, 0.5) - 0.46).abs() < 1e-12);
     assert!((grey(curves::neutral, 0.04) - 6.25 * 0.04 * 0.04).abs() < 1e-12);
@@ -137,7 +138,7 @@ fn degenerate_pictures() {
             let pixel = [value, 0.5 * value, 0.25 * value];
             let one = tonemap(1, 1, &[pixel], &settings)[0];
             let even = tonemap(9, 7, &[pixel; 63], &settings);
-            assert!(even.iter().flatten().all(|v| v.is_finite() && *v >= 0.0), "{name}: {even:?}");
+            assert!(even.iter().flatten().all(|v| v.is_finite() && *v > -5e-4), "{name}: {:?}", even[0]);
             close(&even, &[one; 63], 1e-6, &name);
             if settings.operator.has_local() && settings.mode() == Mode::Global {
                 assert!((luminance_of(one) - 1.0).abs() < 1e-4, "{name}: the only luminance is white, not {one:?}");
@@ -146,7 +147,7 @@ fn degenerate_pictures() {
         let mut hot = vec![[0.01, 0.02, 0.03]; 35 * 31];
         hot[35 * 15 + 17] = [6e4, 5e4, 4e4];
         let shown = tonemap(35, 31, &hot, &settings);
-        assert!(shown.iter().flatten().all(|v| v.is_finite() && *v >= 0.0), "{name}");
+        assert!(shown.iter().flatten().all(|v| v.is_finite() && *v > -5e-4), "{name}");
         assert!(luminance_of(shown[35 * 15 + 17]) > luminance_of(shown[0]), "{name}: the hot pixel is the brightest");
     }
 }

@@ -1,0 +1,128 @@
+//! Tone mapping on the device against its CPU twin: RMS % and mean % of luminance (Michael 2010, equations 18 and 19).
+//!
+//! `cargo test --test tonemap_twin -- --nocapture` prints the table for parts of all images of the collection;
+//! `cargo test --release --test tonemap_twin -- --ignored --nocapture` for whole images.
+
+mod common;
+
+use std::path::Path;
+
+use lucerna::{
+    gpu::{Gpu, testing::with_gpu},
+    image,
+    reference::tonemap as twin,
+    scene::Limits,
+    techniques::tonemap::{self, Local, Mode, Operator, Settings},
+};
+
+/// Largest RMS % and mean %.
+const ALLOWED: [f64; 2] = [0.1, 0.01];
+
+/// Pixels of an image, or of a part.
+struct Picture {
+    name: String,
+    width: u32,
+    height: u32,
+    pixels: Vec<[f32; 3]>,
+}
+
+impl Picture {
+    fn read(path: &Path) -> Option<Self> {
+        let layers = image::read(path, &Limits::default()).ok()?;
+        let pixels = layers.main()?.rgb_pixels()?;
+        let name = path.file_stem()?.to_string_lossy().into_owned();
+        Some(Self { name, width: layers.width, height: layers.height, pixels })
+    }
+
+    /// The middle, of at most that extent.
+    fn middle(&self, width: u32, height: u32) -> Self {
+        let (width, height) = (width.min(self.width), height.min(self.height));
+        let (left, top) = ((self.width - width) / 2, (self.height - height) / 2);
+        let at = |i: u32| self.pixels[((top + i / width) * self.width + left + i % width) as usize];
+        Self { name: self.name.clone(), width, height, pixels: (0..width * height).map(at).collect() }
+    }
+}
+
+/// Every image of the collection that opens.
+fn pictures(assets: &Path) -> Vec<Picture> {
+    let mut paths: Vec<_> = ["hdr", "hdr/testimages", "environments"]
+        .iter()
+        .flat_map(|folder| assets.join(folder).read_dir().unwrap().map(|entry| entry.unwrap().path()))
+        .collect();
+    paths.sort();
+    paths.iter().filter_map(|path| Picture::read(path)).collect()
+}
+
+/// All operators in all modes; local ones in both ways of computing them, but for the bilateral operator, whose fast way is an
+/// approximation.
+fn all() -> Vec<Settings> {
+    let mut all = Vec::new();
+    for (_, operator) in Operator::ALL {
+        for mode in [Mode::Global, Mode::Local, Mode::Selective] {
+            for local in [Local::Fast, Local::Literal] {
+                let settings = Settings { operator, mode: Some(mode), local, ..Settings::default() };
+                let same = mode == Mode::Global && local == Local::Literal;
+                let approximate = operator == Operator::Bilateral && mode != Mode::Global && local == Local::Fast;
+                if settings.validate().is_ok() && !same && !approximate {
+                    all.push(settings);
+                }
+            }
+        }
+    }
+    all
+}
+
+/// RMS % and mean % of luminance, over pixels that are not black, and how many of them are not.
+fn errors(cpu: &[[f32; 3]], gpu: &[[f32; 4]]) -> [f64; 2] {
+    let (mut squares, mut sum, mut count) = (0.0, 0.0, 0.0);
+    for (cpu, gpu) in cpu.iter().zip(gpu) {
+        let [ours, theirs] = [*cpu, [gpu[0], gpu[1], gpu[2]]].map(twin::plane::luminance_of);
+        if ours == 0.0 {
+            assert!(theirs.abs() < 1e-6, "black is {theirs} on the device");
+            continue;
+        }
+        let error = (ours - theirs) / ours;
+        (squares, sum, count) = (squares + error * error, sum + error.abs(), count + 1.0);
+    }
+    [100.0 * f64::sqrt(squares / f64::max(count, 1.0)), 100.0 * sum / f64::max(count, 1.0)]
+}
+
+fn compare(gpu: &Gpu, pictures: &[Picture]) {
+    let mut wrong = Vec::new();
+    for settings in all() {
+        let name = format!("{} {:?} {:?}", settings.operator.name(), settings.mode(), settings.local).to_lowercase();
+        let mut worst = [0.0f64; 2];
+        for picture in pictures {
+            let Picture { width, height, ref pixels, .. } = *picture;
+            let cpu = twin::tonemap(width, height, pixels, &settings);
+            let with_alpha: Vec<[f32; 4]> = pixels.iter().map(|p| [p[0], p[1], p[2], 1.0]).collect();
+            let mapped = tonemap::apply(gpu, width, height, &with_alpha, None, &settings).unwrap();
+            let found = errors(&cpu, &mapped.pixels);
+            println!(
+                "{name:28} {:24} {width:4}×{height:<4} RMS {:.5} %  mean {:.5} %",
+                picture.name, found[0], found[1]
+            );
+            if !(found[0] <= ALLOWED[0] && found[1] <= ALLOWED[1]) {
+                wrong.push(format!("{name} {}: RMS {} %, mean {} %", picture.name, found[0], found[1]));
+            }
+            worst = [worst[0].max(found[0]), worst[1].max(found[1])];
+        }
+        println!("{name:28} worst of {} images: RMS {:.5} %, mean {:.5} %\n", pictures.len(), worst[0], worst[1]);
+    }
+    assert!(wrong.is_empty(), "over {ALLOWED:?}:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn agrees_on_parts_of_all_images() {
+    let Some(assets) = common::assets() else { return };
+    let pictures: Vec<Picture> = pictures(&assets).iter().map(|p| p.middle(96, 72)).collect();
+    assert!(pictures.len() >= 12, "only {} images open", pictures.len());
+    with_gpu(|gpu| compare(gpu, &pictures));
+}
+
+#[test]
+#[ignore = "whole images take minutes without optimisation"]
+fn agrees_on_whole_images() {
+    let Some(assets) = common::assets() else { return };
+    with_gpu(|gpu| compare(gpu, &pictures(&assets)));
+}
