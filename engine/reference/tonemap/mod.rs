@@ -46,7 +46,7 @@ pub fn tonemap_masked(
 #[derive(Clone, Debug)]
 pub struct Picture<'a> {
     settings: &'a Settings,
-    /// Cleaned of what is no colour, exposed.
+    /// Cleaned of what is no colour, exposed, at most 10¹⁸.
     pub pixels: Vec<[f32; 3]>,
     /// 0 below 10⁻³⁰, 10¹⁸ above that.
     pub luminance: Plane,
@@ -65,7 +65,8 @@ impl<'a> Picture<'a> {
             let before = plane::luminance(width, height, &cleaned).map(limited);
             factor /= statistics::log_average(&before.values, statistics::DELTA);
         }
-        let pixels: Vec<[f32; 3]> = cleaned.iter().map(|p| p.map(|v| (f64::from(v) * factor) as f32)).collect();
+        let pixels: Vec<[f32; 3]> =
+            cleaned.iter().map(|p| p.map(|v| (f64::from(v) * factor).min(1e18) as f32)).collect();
         let luminance = plane::luminance(width, height, &pixels).map(limited);
         let statistics = statistics::statistics(&luminance.values, f64::from(settings.percentile));
         Self { settings, pixels, luminance, statistics }
