@@ -275,6 +275,22 @@ fn sobel_of_a_ramp_is_eight_slopes() {
 }
 
 #[test]
+fn saliency_is_blind_to_scale_and_even_pictures() {
+    let even = Plane::from_fn(50, 37, |_, _| 0.3);
+    assert!(identify::saliency(&even).range().unwrap().1 < 1e-12);
+    let dot = Plane::from_fn(70, 66, |x, y| if (x, y) == (30, 31) { 9.0 } else { 0.0 });
+    let map = identify::saliency(&dot);
+    let doubled = identify::saliency(&dot.map(|v| 2.0 * v));
+    assert!(map.values.iter().zip(&doubled.values).all(|(a, b)| (a - b).abs() < 1e-12));
+    // Nothing but the pixel itself is in the finest centre; around it, centre and surround are the pyramid's weights.
+    assert!(map.range().unwrap().1 <= 1.0 && map[(30, 31)] > 0.9, "{}", map[(30, 31)]);
+    // Boxes of a ramp have its values at their centres.
+    let small = identify::shrink(&Plane::from_fn(10, 7, |x, y| x as f64 + 10.0 * y as f64), 4);
+    assert_eq!((small.width, small.height), (3, 2));
+    assert_eq!((small[(0, 0)], small[(2, 0)], small[(1, 1)]), (16.5, 23.5, 55.5));
+}
+
+#[test]
 fn statistics_of_counted_luminances() {
     let values: Vec<f64> = (1..=200).rev().map(f64::from).collect();
     let found = |percent| statistics::statistics(&values, percent);
