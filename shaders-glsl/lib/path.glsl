@@ -19,8 +19,8 @@ struct PathSettings {
     EnvironmentMap environment;
     uvec2 extent;              // pixels
     uint blocks;               // of 8 pixels in a row
-    uint lights;               // number of columns to pick from
-    float environment_choice;  // how probable the environment is to be picked
+    uint suns;                 // number of columns to pick from
+    uint tree;                 // 1: there are lights in the tree
     uint bounces;              // scatterings after the first surface
     uint specular_bounces;     // mirrors and glass along a path
     uint roulette;             // scatterings before paths may be ended at random
@@ -29,6 +29,14 @@ struct PathSettings {
     // Numbers that compilers must not know, lest they unroll loops and take minutes on CPU drivers.
     uint slots;                // TEXTURE_SLOTS + 2
     uint two;                  // 2
+    uint ways;                 // 4
+};
+
+// A light that counts if nothing is in the way.
+struct WaitingLight {
+    vec3 direction;    // of the ray
+    float limit;       // in lengths of direction
+    vec3 radiance;     // what it adds
 };
 
 struct PathState {
@@ -44,14 +52,12 @@ struct PathState {
     vec3 emission;     // no scattering
     vec3 direct;       // one
     vec3 indirect;     // more
-    // A light that counts if nothing is in the way.
-    uint waiting;      // 1: there is one
+    vec3 side;         // unit normal of the surface of the last scattering, where the path left it
+    uint waiting;      // how many lights still wait for their rays
     uint salt;         // for surfaces in the way that are blended
     vec3 light_origin;
-    float light_limit;
-    vec3 light_direction;
     uint light_scatterings;
-    vec3 light;
+    WaitingLight lights[3];
 };
 
 // Four independent random words: a pure function of seed, pixel, sample and dimension.

@@ -38,73 +38,87 @@ float met_credit(PathState path, float density) {
     return power_heuristic(path.density, density);
 }
 
-// Where light may come from.
-struct LightSample {
-    vec3 target;       // place, or unit direction
-    bool far;          // target is a direction
-    bool sky;
-    float chosen;      // how probable this light was
-    float density;     // per steradian; 0: of no extent
-    vec3 radiance;     // arriving over probability or density; before visibility
-};
-
-// Light of a triangle: its density, and the place of `point` a step towards the viewer, so that it does not hide itself.
-void sample_triangle_light(inout LightSample s, vec3 from, SurfacePoint point, bool double_sided) {
+// Light of a triangle that was chosen with probability `chosen`: its density per steradian (0: it does not shine here), and the
+// place of `point` a step towards the viewer, so that it does not hide itself.
+float sample_triangle_light(float chosen, vec3 from, SurfacePoint point, bool double_sided, out vec3 target) {
+    target = point.position;
     vec3 away = from - point.position;
     float distance2 = dot(away, away);
     float facing = dot(point.area, away);
     bool lit = facing > 0.0 || (double_sided && facing < 0.0);
-    if (!lit || distance2 == 0.0) return;
-    s.density = s.chosen * 2.0 * distance2 * sqrt(distance2) / abs(facing);
-    s.target = point.position + point.area * (sign(facing) * surface_gap(point) / length(point.area));
+    if (!lit || distance2 == 0.0) return 0.0;
+    target += point.area * (sign(facing) * surface_gap(point) / length(point.area));
+    return chosen * 2.0 * distance2 * sqrt(distance2) / abs(facing);
 }
 
-// Either a light that waits for it, or the next surface: one place where rays are traced, so that their code exists once.
+// Ways from a surface: to a light somewhere in the scene, to a sun, into the sky, and on.
+const uint TO_LIGHT = 0u;
+const uint TO_SUN = 1u;
+const uint TO_SKY = 2u;
+const uint ON = 3u;
+
+// Either to a light that waits for it, or to the next surface: one place where rays are traced, so that their code exists once.
 void path_step(uvec2 pixel, inout PathState path) {
     uint dimension = 1u + 4u * path.vertex;
     uvec4 salts = random_words(pixel, sample_index, dimension, settings.seed);
     bool to_light = path.waiting != 0u;
     Ray ray = Ray(path.origin, 0.0, path.direction, path.limit);
     uint mask = path.vertex == 0u ? TRACE_CAMERA : path.scattered > 0u ? TRACE_SHADOW : 0u;
+    WaitingLight waiting;
     if (to_light) {
-        ray = Ray(path.light_origin, 0.0, path.light_direction, path.light_limit);
+        path.waiting -= 1u;
+        waiting = path.lights[path.waiting];
+        ray = Ray(path.light_origin, 0.0, waiting.direction, waiting.limit);
         mask = TRACE_SHADOW;
     }
-    Hit hit = trace(ray, mask, to_light ? path.salt : salts.x, to_light);
+    Hit hit = trace(ray, mask, to_light ? path.salt + path.waiting : salts.x, to_light);
     if (to_light) {
-        path.waiting = 0u;
-        if (hit.instance == NONE) add_radiance(path, path.light_scatterings, path.light);
+        if (hit.instance == NONE) add_radiance(path, path.light_scatterings, waiting.radiance);
         return;
     }
     vec3 toward = normalize(path.direction);
     bool missed = hit.instance == NONE;
     bool scatters = !missed && path.scattered <= settings.bounces;
 
-    // The surface and the triangle of a light, in one loop so that their code exists once.
-    LightTarget to = LightTarget(NONE, 0u);
-    LightSample sample_of;
-    sample_of.density = 0.0;
-    sample_of.radiance = vec3(0.0);
-    sample_of.far = false;
+    // What the lights send: over their densities; before visibility.
+    vec3 arriving[3] = vec3[3](vec3(0.0), vec3(0.0), vec3(0.0));
+    // Per steradian; 0: of no extent.
+    float light_densities[3] = float[3](0.0, 0.0, 0.0);
+    vec3 ways[4] = vec3[4](vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
+    bool samples_extended = (settings.flags & PATH_NO_LIGHT_SAMPLES) == 0u;
     uvec4 which = random_words(pixel, sample_index, dimension + 1u, settings.seed);
     uvec4 where = random_words(pixel, sample_index, dimension + 2u, settings.seed);
-    if (scatters && settings.lights > 0u) {
-        to = light_targets[pick_light(settings.lights, which.x, unit_float(which.y), sample_of.chosen)];
-    }
-    sample_of.sky = to.instance == TARGET_ENVIRONMENT;
-    bool punctual = to.instance == TARGET_PUNCTUAL;
-    bool shines = to.instance < TARGET_ENVIRONMENT;
-    uint instances[2] = uint[2](hit.instance, shines ? to.instance : NONE);
-    uint triangles[2] = uint[2](hit.triangle, to.index);
+
+    // The surface and the triangle of a light, in one loop so that their code exists once.
+    LightTarget to = LightTarget(NONE, 0u, 0u);
+    float chosen = 0.0;
+    uint instances[2] = uint[2](hit.instance, NONE);
+    uint triangles[2] = uint[2](hit.triangle, 0u);
     vec2 places[2] = vec2[2](hit.barycentrics, sample_triangle(unit_floats(where.xy)));
     uint surfaces[2] = uint[2](NONE, NONE);
     SurfacePoint points[2];
     vec4 colors[2];
+    vec3 above = vec3(0.0);
+    vec3 side = vec3(0.0);
+    bool front = true;
     for (uint i = 0u; i < settings.two; ++i) {
+        if (i == 1u && scatters && settings.tree != 0u) {
+            to = light_targets[pick_light(above, side, which.xy, chosen)];
+            if (to.instance != TARGET_PUNCTUAL) {
+                instances[1] = to.instance;
+                triangles[1] = to.index;
+            }
+        }
         if (instances[i] == NONE) continue;
         points[i] = surface_point(instances[i], triangles[i], places[i]);
         colors[i] = surface_color(instances[i], points[i]);
         surfaces[i] = surface_instances[instances[i]].material;
+        if (i == 0u) {
+            vec3 geometric = normalize(points[0].area);
+            front = dot(geometric, toward) < 0.0;
+            side = front ? geometric : -geometric;
+            above = points[0].position + side * surface_gap(points[0]);
+        }
     }
     vec4 texels[TEXTURE_SLOTS + 2u];
     for (uint i = 0u; i < settings.slots; ++i) {
@@ -116,52 +130,56 @@ void path_step(uvec2 pixel, inout PathState path) {
         texels[i] = sample_texture(use, surface_uv(instances[k], points[k], use.uv_set), 0.0);
     }
 
-    if (sample_of.sky) {
-        sample_of.far = true;
-        sample_of.target = environment_sample(settings.environment, which.z, unit_float(which.w), unit_floats(where.xy), sample_of.density);
-        sample_of.density *= sample_of.chosen;
+    bool to_sky = scatters && samples_extended && (settings.flags & PATH_SEES_ENVIRONMENT) != 0u;
+    if (to_sky) {
+        ways[TO_SKY] = environment_sample(settings.environment, which.z, unit_float(which.w), unit_floats(where.zw), light_densities[TO_SKY]);
     }
     vec3 sky = vec3(0.0);
-    if (missed || sample_of.sky) sky = environment_radiance(settings.environment, missed ? toward : sample_of.target);
+    if (missed || to_sky) sky = environment_radiance(settings.environment, missed ? toward : ways[TO_SKY]);
     if (missed) {
         path.alive = 0u;
         if ((settings.flags & PATH_SEES_ENVIRONMENT) != 0u) {
-            float density = settings.environment_choice * environment_density(settings.environment, toward);
+            float density = environment_density(settings.environment, toward);
             add_radiance(path, path.scattered, path.throughput * sky * met_credit(path, density));
         }
         return;
     }
+    if (to_sky && light_densities[TO_SKY] > 0.0) arriving[TO_SKY] = sky / light_densities[TO_SKY];
 
     SurfacePoint point = points[0];
     uint material = surfaces[0];
     uint flags = materials[material].flags;
     float twice_area = length(point.area);
-    vec3 geometric = point.area / twice_area;
-    bool front = dot(geometric, toward) < 0.0;
-    vec3 side = front ? geometric : -geometric;
     float gap = surface_gap(point);
-    vec3 above = point.position + side * gap;
 
-    if (shines) {
+    if (instances[1] != NONE) {
         uint m = surfaces[1];
         uint kind = materials[m].flags;
-        sample_triangle_light(sample_of, above, points[1], (kind & MATERIAL_DOUBLE_SIDED) != 0u);
+        vec3 target;
+        float density = sample_triangle_light(chosen, above, points[1], (kind & MATERIAL_DOUBLE_SIDED) != 0u, target);
         float alpha = materials[m].base_color.a * texels[TEXTURE_SLOTS].a * colors[1].a;
         float covers = (kind & MATERIAL_MASK) != 0u ? float(alpha >= materials[m].alpha_cutoff)
             : (kind & MATERIAL_BLEND) != 0u ? clamp(alpha, 0.0, 1.0) : 1.0;
-        sample_of.radiance = materials[m].emissive * texels[TEXTURE_SLOTS + 1u].rgb * covers;
-    } else if (sample_of.sky) {
-        sample_of.radiance = sky;
-    } else if (punctual) {
-        Light one = light(to.index);
-        vec3 to_light;
-        sample_of.radiance = light_irradiance(one, above, to_light) / sample_of.chosen;
-        sample_of.far = one.kind == LIGHT_DIRECTIONAL;
-        sample_of.target = sample_of.far ? to_light : one.position;
+        if (density > 0.0 && samples_extended) {
+            arriving[TO_LIGHT] = materials[m].emissive * texels[TEXTURE_SLOTS + 1u].rgb * (covers / density);
+            light_densities[TO_LIGHT] = density;
+            ways[TO_LIGHT] = target - above;
+        }
     }
-    if (!punctual) {
-        bool wanted = sample_of.density > 0.0 && (settings.flags & PATH_NO_LIGHT_SAMPLES) == 0u;
-        sample_of.radiance = wanted ? sample_of.radiance / sample_of.density : vec3(0.0);
+    // A sun, and the point or spot light that the tree gave.
+    for (uint i = 0u; i < settings.two; ++i) {
+        uint number = to.index;
+        float probability = chosen;
+        if (i == TO_SUN) {
+            if (!scatters || settings.suns == 0u) continue;
+            number = light_targets[pick_sun(settings.suns, salts.z, unit_float(salts.w), probability)].index;
+        } else if (to.instance != TARGET_PUNCTUAL) {
+            continue;
+        }
+        Light one = light(number);
+        vec3 to_light;
+        arriving[i] = light_irradiance(one, above, to_light) / probability;
+        ways[i] = i == TO_SUN ? to_light : one.position - above;
     }
 
     vec4 base = materials[material].base_color * texels[TEXTURE_BASE_COLOR] * colors[0];
@@ -193,8 +211,9 @@ void path_step(uvec2 pixel, inout PathState path) {
             add_radiance(path, path.scattered, path.throughput * base.rgb);
         } else if (emitted != vec3(0.0) && (front || (flags & MATERIAL_DOUBLE_SIDED) != 0u)) {
             vec3 way = point.position - path.origin;
-            float facing = abs(dot(geometric, toward)) * twice_area;
-            float density = triangle_choice(hit.instance, hit.triangle) * 2.0 * dot(way, way) / facing;
+            float facing = abs(dot(side, toward)) * twice_area;
+            float chance = path.density > 0.0 ? triangle_choice(hit.instance, hit.triangle, path.origin, path.side) : 0.0;
+            float density = chance * 2.0 * dot(way, way) / facing;
             add_radiance(path, path.scattered, path.throughput * emitted * met_credit(path, density));
         }
     }
@@ -229,37 +248,38 @@ void path_step(uvec2 pixel, inout PathState path) {
     float go_sharp = path.specular < settings.specular_bounces ? b.glass + b.mirror : 0.0;
     float go = go_rough + go_sharp;
 
-    // The way to the light and the way on, again in one loop.
+    // The ways to the lights and the way on, again in one loop.
     uvec4 ahead = random_words(pixel, sample_index, dimension + 3u, settings.seed);
     float pick = unit_float(ahead.x) * go;
     bool on = go > 0.0 && pick < go_rough;
-    vec3 to_lamp = sample_of.far ? sample_of.target : sample_of.target - above;
-    vec3 ways[2] = vec3[2](vec3(0.0), vec3(0.0));
-    if (sample_of.radiance != vec3(0.0) && b.rough > 0.0) ways[0] = normalize(to_lamp);
     // The rest of the number chooses between the lobes.
-    if (on) ways[1] = bsdf_sample_rough(b, v, pick / go_rough, unit_floats(ahead.yz));
-    vec3 values[2] = vec3[2](vec3(0.0), vec3(0.0));
-    float densities[2] = float[2](0.0, 0.0);
-    for (uint i = 0u; i < settings.two; ++i) {
-        if (ways[i] == vec3(0.0)) continue;
+    if (on) ways[ON] = bsdf_sample_rough(b, v, pick / go_rough, unit_floats(ahead.yz));
+    vec3 onward = ways[ON];
+    vec3 value_on = vec3(0.0);
+    float density_on = 0.0;
+    path.waiting = 0u;
+    path.salt = salts.y;
+    path.light_origin = above;
+    path.light_scatterings = path.scattered + 1u;
+    for (uint i = 0u; i < settings.ways; ++i) {
+        bool to_lamp = i != ON;
+        if (ways[i] == vec3(0.0) || (to_lamp && (arriving[i] == vec3(0.0) || b.rough <= 0.0))) continue;
         float density;
-        values[i] = bsdf_rough(b, v, ways[i], density);
-        densities[i] = go > 0.0 ? density * (go_rough / go) : 0.0;
-    }
-
-    vec3 arrives = values[0] * sample_of.radiance;
-    if (arrives != vec3(0.0)) {
-        if (sample_of.density > 0.0 && (settings.flags & PATH_NO_BSDF_SAMPLES) == 0u) {
-            arrives *= power_heuristic(sample_of.density, densities[0]);
+        vec3 value = bsdf_rough(b, v, normalize(ways[i]), density);
+        density = go > 0.0 ? density * (go_rough / go) : 0.0;
+        if (!to_lamp) {
+            value_on = value;
+            density_on = density;
+            continue;
         }
-        path.waiting = 1u;
-        path.salt = salts.y;
-        path.light_origin = above;
+        vec3 arrives = value * arriving[i];
+        if (arrives == vec3(0.0)) continue;
+        if (light_densities[i] > 0.0 && (settings.flags & PATH_NO_BSDF_SAMPLES) == 0u) {
+            arrives *= power_heuristic(light_densities[i], density);
+        }
         // A lamp or a triangle itself must not be in the way.
-        path.light_limit = sample_of.far ? 1e30 : 0.99999;
-        path.light_direction = to_lamp;
-        path.light_scatterings = path.scattered + 1u;
-        path.light = path.throughput * b.rough * arrives;
+        path.lights[path.waiting] = WaitingLight(ways[i], i == TO_LIGHT ? 0.99999 : 1e30, path.throughput * b.rough * arrives);
+        path.waiting += 1u;
     }
 
     if (go <= 0.0) {
@@ -268,10 +288,11 @@ void path_step(uvec2 pixel, inout PathState path) {
     }
     path.limit = 1e30;
     if (on) {
-        path.direction = ways[1];
-        path.density = densities[1];
-        path.throughput *= path.density > 0.0 ? values[1] * b.rough / path.density : vec3(0.0);
+        path.direction = onward;
+        path.density = density_on;
+        path.throughput *= path.density > 0.0 ? value_on * b.rough / path.density : vec3(0.0);
         path.origin = above;
+        path.side = side;
         path.scattered += 1u;
         if (path.throughput == vec3(0.0)) path.alive = 0u;
         if (path.scattered > settings.roulette) {

@@ -9,3 +9,4 @@ const uint SAMPLER_BSDF = 6u; // export
 const uint SAMPLER_ENVIRONMENT = 7u; // export
 const uint SAMPLER_LIGHT = 8u; // export
 const uint SAMPLER_NUMBERS = 9u; // export
+const uint SAMPLER_SUN = 10u; // export

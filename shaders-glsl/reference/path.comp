@@ -16,6 +16,7 @@
 #define LIGHT_COLUMNS_BINDING 10
 #define LIGHT_TARGETS_BINDING 11
 #define INSTANCE_LIGHTS_BINDING 12
+#define LIGHT_NODES_BINDING 16
 #include "lib/light_sampling.glsl"
 #define SURFACE_BINDING 1
 #include "lib/hit_surface.glsl"

@@ -12,6 +12,7 @@
 #define LIGHT_COLUMNS_BINDING 2
 #define LIGHT_TARGETS_BINDING 3
 #define INSTANCE_LIGHTS_BINDING 4
+#define LIGHT_NODES_BINDING 8
 #include "lib/light_sampling.glsl"
 #include "lib/path.glsl"
 #include "lib/sampler_names.glsl"
@@ -69,7 +70,17 @@ void main() {
         found.xyz = environment_sample(settings.environment, words.z, unit_float(words.w), u, found.w);
         value = vec4(environment_radiance(settings.environment, found.xyz), environment_density(settings.environment, found.xyz));
     }
-    if (which == SAMPLER_LIGHT) found.x = float(pick_light(settings.lights, words.x, unit_float(words.y), found.w));
+    if (which == SAMPLER_SUN) found.x = float(pick_sun(settings.suns, words.x, unit_float(words.y), found.w));
+    if (which == SAMPLER_LIGHT) {
+        // At `albedo`, for a surface that looks along `view`.
+        uint number = pick_light(albedo, view, words.xy, found.w);
+        found.x = float(number);
+        value.x = light_choice(number, albedo, view);
+        // Of every light in turn, whichever is drawn.
+        uint other = i % max(settings.slots, 1u);
+        value.y = float(other);
+        value.z = light_choice(other, albedo, view);
+    }
     if (which == SAMPLER_NUMBERS) {
         found = vec4(unit_float(words.x), unit_float(words.y), unit_float(words.z), unit_float(words.w));
         value = vec4(float(pick_below(words.x, 1000u)), 0.0, 0.0, 0.0);

@@ -1,12 +1,16 @@
-//! All lights of a scene in one table, picked by their power.
+//! All lights of a scene, ready to be picked: suns by their power, the others by a tree.
 
-use super::{Sources, alias, environment::strength};
+use super::{
+    Sources, alias,
+    environment::strength,
+    light_tree::{self, Bounds},
+};
 use crate::{
     image::srgb,
     scene::{Aabb, AlphaMode, Material, Pose, Primitive, Scene, TextureRef, deform::world_vertices},
     shaders::{
-        consts::{LIGHT_DIRECTIONAL, LIGHT_SPOT, TARGET_ENVIRONMENT, TARGET_PUNCTUAL},
-        types::{AliasEntry, Light, LightTarget},
+        consts::{LIGHT_DIRECTIONAL, LIGHT_SPOT, TARGET_PUNCTUAL, TRAIL_NONE},
+        types::{AliasEntry, Light, LightNode, LightTarget},
     },
 };
 use glam::{DVec3, Vec2, Vec3};
@@ -18,45 +22,38 @@ const NONE: u32 = u32::MAX;
 /// What `lib/light_sampling.glsl` reads.
 #[derive(Debug)]
 pub struct LightTable {
-    /// How many lights there are; the lists have one entry even without any.
-    pub count: u32,
+    /// How many suns there are; the lists have one entry even without any.
+    pub suns: u32,
+    /// By which suns are picked.
     pub columns: Vec<AliasEntry>,
+    /// The suns, then everything else.
     pub targets: Vec<LightTarget>,
+    /// Bounds of everything else that shines, the root first.
+    pub nodes: Vec<LightNode>,
+    /// Whether there is anything in the tree.
+    pub tree: bool,
     /// For each instance, number of the light that is its first triangle, or `u32::MAX`.
     pub instances: Vec<u32>,
-    /// How probable the environment is to be picked.
-    pub environment_choice: f32,
 }
 
-/// The table of what `sources` leaves of the lights. `lights` are those of the pose, `bounds` is around everything.
-pub fn table(scene: &Scene, pose: &Pose, lights: &[Light], bounds: &Aabb, sources: Sources) -> LightTable {
-    let mut targets = Vec::new();
-    let mut powers = Vec::new();
-    let mut groups = Vec::new();
-    // Disc that the whole scene covers, seen from afar.
-    let radius = if bounds.is_finite() { f64::from(bounds.max.distance(bounds.min)) * 0.5 } else { 1.0 };
-    let disc = PI * (radius * radius).max(1e-12);
-    if sources.punctual() {
-        for (index, light) in lights.iter().enumerate() {
-            let spread = match light.kind {
-                LIGHT_DIRECTIONAL => disc,
-                // Solid angle between the cosines at which the cone begins and ends, in the middle.
-                LIGHT_SPOT => {
-                    2.0 * PI * (1.0 - f64::from((0.5 - light.spot_offset) / light.spot_scale)).clamp(1e-4, 2.0)
-                }
-                _ => 4.0 * PI,
-            };
-            targets.push(LightTarget { instance: TARGET_PUNCTUAL, index: index as u32 });
-            groups.push(if light.kind == LIGHT_DIRECTIONAL { Group::Sun } else { Group::Local });
-            powers.push(strength(light.intensity.into()) * spread);
+/// The table of what `sources` leaves of the lights. `lights` are those of the pose.
+pub fn table(scene: &Scene, pose: &Pose, lights: &[Light], sources: Sources) -> LightTable {
+    let target = |instance, index: usize| LightTarget { instance, index: index as u32, trail: TRAIL_NONE };
+    let punctual = if sources.punctual() { lights } else { &[] };
+    let is_sun = |light: &Light| light.kind == LIGHT_DIRECTIONAL;
+    let suns: Vec<(usize, &Light)> = punctual.iter().enumerate().filter(|(_, l)| is_sun(l)).collect();
+    let mut targets: Vec<LightTarget> = suns.iter().map(|(index, _)| target(TARGET_PUNCTUAL, *index)).collect();
+    let powers: Vec<f64> = suns.iter().map(|(_, light)| strength(light.intensity.into())).collect();
+    let mut bounds = Vec::new();
+    let mut add = |number: usize, light: Bounds| {
+        // Light of no power or no place is never picked.
+        if light.power > 0.0 && light.power.is_finite() && light.around.is_finite() {
+            bounds.push((number as u32, light));
         }
-    }
-    let environment = scene.environment.as_ref().filter(|_| sources.environment());
-    let sky = environment.map(|e| (targets.len(), strength(e.mean())));
-    if let Some((_, mean)) = sky {
-        targets.push(LightTarget { instance: TARGET_ENVIRONMENT, index: 0 });
-        groups.push(Group::Sky);
-        powers.push(mean * PI * 4.0 * disc);
+    };
+    for (index, light) in punctual.iter().enumerate().filter(|(_, l)| !is_sun(l)) {
+        add(targets.len(), punctual_bounds(light));
+        targets.push(target(TARGET_PUNCTUAL, index));
     }
     let mut instances = Vec::new();
     for (node, primitive) in placed_primitives(scene) {
@@ -68,55 +65,67 @@ pub fn table(scene: &Scene, pose: &Pose, lights: &[Light], bounds: &Aabb, source
         }
         instances.push(targets.len() as u32);
         let corners = world_vertices(scene, pose, node, primitive).positions;
+        // The order of the corners tells the front, unless the transform mirrors.
+        let skinned = scene.nodes[node].skin.is_some() && !primitive.joints.is_empty();
+        let mirrors = !skinned && pose.world.get(node).is_some_and(|m| m.determinant() < 0.0);
         let glow = Glow::new(scene, material);
         for (index, triangle) in primitive.indices.chunks_exact(3).enumerate() {
-            let corner = |i: usize| corners.get(triangle[i] as usize).map_or(DVec3::ZERO, |p| p.as_dvec3());
+            let corner = |i: usize| corners.get(triangle[i] as usize).copied().unwrap_or(Vec3::ZERO);
             let [a, b, c] = [0, 1, 2].map(corner);
-            let area = 0.5 * (b - a).cross(c - a).length();
-            let sides = if material.double_sided { 2.0 } else { 1.0 };
-            targets.push(LightTarget { instance: number, index: index as u32 });
-            groups.push(Group::Local);
-            powers.push(PI * sides * area * glow.of(primitive, triangle));
+            let cross = (b - a).as_dvec3().cross((c - a).as_dvec3());
+            let axis = if mirrors { -cross } else { cross };
+            add(
+                targets.len(),
+                Bounds {
+                    around: Aabb::of([a, b, c]),
+                    power: 0.5 * cross.length() * glow.of(primitive, triangle),
+                    reach: f32::INFINITY,
+                    axis: axis.normalize_or(DVec3::Y).as_vec3(),
+                    spread: 0.0,
+                    edge: 0.5 * PI,
+                    two_sided: material.double_sided,
+                },
+            );
+            targets.push(target(number, index));
         }
     }
-    let count = targets.len() as u32;
-    let columns = alias::table(&shares(&powers, &groups));
-    // A sky of no power still counts as a light of the table, with probability 0 (or an even share, if nothing shines).
-    let environment_choice = sky.map_or(0.0, |(at, _)| columns[at].probability);
+    let (nodes, trails) = light_tree::build(&bounds, targets.len());
+    targets.iter_mut().zip(&trails).for_each(|(target, trail)| target.trail = *trail);
     if targets.is_empty() {
-        targets.push(LightTarget { instance: TARGET_ENVIRONMENT, index: 0 });
+        targets.push(target(NONE, 0));
     }
     if instances.is_empty() {
         instances.push(NONE);
     }
-    LightTable { count, columns, targets, instances, environment_choice }
+    let tree = !bounds.is_empty();
+    LightTable { suns: suns.len() as u32, columns: alias::table(&powers), targets, nodes, tree, instances }
 }
 
-/// Lights that reach the same places.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Group {
-    Sun,
-    Sky,
-    Local,
-}
-
-/// How often to pick each light: half by its power; half by its share of the power of its group, all groups alike. What the
-/// sun or the sky sends into the whole scene must not leave the lamps of a room unsampled.
-fn shares(powers: &[f64], groups: &[Group]) -> Vec<f64> {
-    let sum = |group: Option<Group>| -> f64 {
-        powers.iter().zip(groups).filter(|(_, g)| group.is_none_or(|only| **g == only)).map(|(p, _)| p).sum()
+/// Bounds of a point or spot light.
+fn punctual_bounds(light: &Light) -> Bounds {
+    let at = Vec3::from(light.position);
+    let all = Bounds {
+        around: Aabb { min: at, max: at },
+        power: strength(light.intensity.into()),
+        // A little more: distances are rounded.
+        reach: if light.range > 0.0 { light.range * 1.001 } else { f32::INFINITY },
+        axis: Vec3::Y,
+        spread: PI,
+        edge: 0.5 * PI,
+        two_sided: false,
     };
-    let all = [Group::Sun, Group::Sky, Group::Local];
-    let there = all.iter().filter(|g| sum(Some(**g)) > 0.0).count() as f64;
-    if there == 0.0 {
-        return powers.to_vec();
+    if light.kind != LIGHT_SPOT {
+        return all;
     }
-    let (total, of_group) = (sum(None), all.map(|g| sum(Some(g))));
-    let share = |(power, group): (&f64, &Group)| {
-        let within = power / of_group[*group as usize];
-        0.5 * power / total + if *power > 0.0 { 0.5 * within / there } else { 0.0 }
-    };
-    powers.iter().zip(groups).map(share).collect()
+    // Cosines at which the cone begins and ends.
+    let angle = |at: f32| f64::from((at - light.spot_offset) / light.spot_scale).clamp(-1.0, 1.0).acos();
+    let (outer, inner) = (angle(0.0), angle(1.0));
+    Bounds {
+        axis: Vec3::from(light.direction).normalize_or(Vec3::NEG_Z),
+        spread: inner,
+        edge: (outer - inner).max(0.01),
+        ..all
+    }
 }
 
 /// Primitives with their nodes, in the order of the resident scene's instances.
@@ -200,16 +209,6 @@ fn linear([r, g, b, _]: [u8; 4]) -> Vec3 {
 mod tests {
     use super::*;
     use crate::scene::{Environment, builtin, resident};
-
-    #[test]
-    fn no_group_of_lights_is_left_out_for_another() {
-        let groups = [Group::Sun, Group::Local, Group::Local, Group::Local];
-        let found = shares(&[1e9, 3.0, 1.0, 0.0], &groups);
-        assert!((found.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-        assert!((found[1] - 0.1875).abs() < 1e-6 && (found[2] - 0.0625).abs() < 1e-6 && found[3] == 0.0, "{found:?}");
-        assert_eq!(shares(&[0.0, 0.0], &groups[..2]), [0.0, 0.0]);
-        assert_eq!(shares(&[5.0], &groups[..1]), [1.0]);
-    }
 
     #[test]
     fn every_light_has_its_share_of_the_power() {

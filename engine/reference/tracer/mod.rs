@@ -1,7 +1,7 @@
 //! Reference pictures: progressive path tracing on the device.
 //!
-//! Unbiased but for the limits on bounces: each sample of a pixel follows one path from the camera, samples one light at
-//! each surface, and weighs what it meets by chance against that (multiple importance sampling; Veach and Guibas, 1995).
+//! Unbiased but for the limits on bounces: each sample of a pixel follows one path from the camera, samples a lamp, a sun and the
+//! sky at each surface, and weighs what it meets by chance against that (multiple importance sampling; Veach and Guibas, 1995).
 //! Random numbers are a pure function of (seed, pixel, sample, dimension), and a pixel's samples are summed in order with
 //! their rounding errors, so the bits depend neither on how the work is cut nor on where it was interrupted.
 //!
@@ -22,6 +22,7 @@
 
 mod alias;
 mod environment;
+mod light_tree;
 mod lights;
 mod settings;
 mod state;
@@ -83,11 +84,12 @@ pub struct Tracer<'s> {
 #[derive(Debug)]
 struct Lights {
     sources: Sources,
-    count: u32,
-    environment_choice: f32,
+    suns: u32,
+    tree: bool,
     columns: OwnedBuffer,
     targets: OwnedBuffer,
     instances: OwnedBuffer,
+    nodes: OwnedBuffer,
 }
 
 /// How far a picture is.
@@ -261,15 +263,16 @@ impl<'s> Tracer<'s> {
         if self.lights.as_ref().is_some_and(|l| l.sources == sources) {
             return Ok(());
         }
-        let table = lights::table(self.scene, &self.pose, &self.punctual, &self.bounds, sources);
+        let table = lights::table(self.scene, &self.pose, &self.punctual, sources);
         let buffer = |name, bytes: &[u8]| OwnedBuffer::with_contents(&self.gpu, name, bytes);
         self.lights = Some(Lights {
             sources,
-            count: table.count,
-            environment_choice: table.environment_choice,
+            suns: table.suns,
+            tree: table.tree,
             columns: buffer("tracer.light columns", bytemuck::cast_slice(&table.columns))?,
             targets: buffer("tracer.light targets", bytemuck::cast_slice(&table.targets))?,
             instances: buffer("tracer.instance lights", bytemuck::cast_slice(&table.instances))?,
+            nodes: buffer("tracer.light tree", bytemuck::cast_slice(&table.nodes))?,
         });
         Ok(())
     }

@@ -115,8 +115,8 @@ impl Tracer<'_> {
         let total = samples.saturating_mul(slots).max(done);
         let limited = self.gpu.loop_limit()?.is_some();
         let rays = if limited { RAYS_LIMITED } else { RAYS };
-        // To each surface, and from it to a light.
-        let rounds = (2 * longest(self.scene, &job.settings)).div_ceil(rays);
+        // To each surface, and from it to a lamp, a sun and the sky.
+        let rounds = (4 * longest(self.scene, &job.settings)).div_ceil(rays);
         let capacity = MOST_SLOTS.min(slots);
         self.prepare_paths(capacity)?;
         // Also when a picture is small and its samples are many passes.
@@ -190,6 +190,7 @@ impl Tracer<'_> {
             light_columns: graph.import_buffer(&lights.columns),
             light_targets: graph.import_buffer(&lights.targets),
             instance_lights: graph.import_buffer(&lights.instances),
+            light_nodes: graph.import_buffer(&lights.nodes),
             settings,
             paths: graph.import_buffer(paths),
             sums,
@@ -247,8 +248,8 @@ fn path_settings(tracer: &Tracer<'_>, job: &Job, lights: &super::Lights) -> type
         },
         extent: job.view.extent,
         blocks: job.view.extent[0].div_ceil(BLOCK),
-        lights: lights.count,
-        environment_choice: lights.environment_choice,
+        suns: lights.suns,
+        tree: lights.tree.into(),
         bounces: settings.bounces,
         specular_bounces: settings.specular_bounces,
         roulette: settings.roulette,
@@ -256,5 +257,6 @@ fn path_settings(tracer: &Tracer<'_>, job: &Job, lights: &super::Lights) -> type
         seed: settings.seed,
         slots: consts::TEXTURE_SLOTS + 2,
         two: 2,
+        ways: 4,
     }
 }
