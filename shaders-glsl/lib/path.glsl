@@ -10,6 +10,12 @@ const uint PATH_SEES_ENVIRONMENT = 8u; // export
 const uint PATH_NO_LIGHT_SAMPLES = 16u; // export
 const uint PATH_NO_BSDF_SAMPLES = 32u; // export
 
+// Ways from a surface: to a light of the tree, to a sun, into the sky, and on to the next surface.
+const uint TO_LIGHT = 0u; // export
+const uint TO_SUN = 1u; // export
+const uint TO_SKY = 2u; // export
+const uint ON = 3u; // export
+
 // Layers of the sums; see lib/path_sums.glsl.
 const uint PATH_SUMS = 6u; // export
 // Of these, from the first on, the rounding errors are kept too.
@@ -30,6 +36,8 @@ struct PathSettings {
     uint slots;                // TEXTURE_SLOTS + 2
     uint two;                  // 2
     uint ways;                 // 4
+    uint turns;                // rays from one surface to the next
+    uint turn_ways[4];         // which way each of them goes; the first: ON
 };
 
 // A light that counts if nothing is in the way.
@@ -53,11 +61,11 @@ struct PathState {
     vec3 direct;       // one
     vec3 indirect;     // more
     vec3 side;         // unit normal of the surface of the last scattering, where the path left it
-    uint waiting;      // how many lights still wait for their rays
+    uint waiting;      // bit i: the light in way i waits for its ray
     uint salt;         // for surfaces in the way that are blended
     vec3 light_origin;
     uint light_scatterings;
-    WaitingLight lights[3];
+    WaitingLight lights[3]; // by way
 };
 
 // Four independent random words: a pure function of seed, pixel, sample and dimension.

@@ -51,27 +51,23 @@ float sample_triangle_light(float chosen, vec3 from, SurfacePoint point, bool do
     return chosen * 2.0 * distance2 * sqrt(distance2) / abs(facing);
 }
 
-// Ways from a surface: to a light somewhere in the scene, to a sun, into the sky, and on.
-const uint TO_LIGHT = 0u;
-const uint TO_SUN = 1u;
-const uint TO_SKY = 2u;
-const uint ON = 3u;
-
-// Either to a light that waits for it, or to the next surface: one place where rays are traced, so that their code exists once.
-void path_step(uvec2 pixel, inout PathState path) {
+// One ray: to the next surface (`way` is ON), or to the light that waits in that way; nothing if the path has no such ray. One
+// place where rays are traced, so that their code exists once, and all paths of a dispatch go the same way at the same time.
+void path_step(uvec2 pixel, uint way, inout PathState path) {
     uint dimension = 1u + 4u * path.vertex;
+    bool to_light = way != ON;
+    if (to_light ? (path.waiting >> way & 1u) == 0u : path.alive == 0u) return;
     uvec4 salts = random_words(pixel, sample_index, dimension, settings.seed);
-    bool to_light = path.waiting != 0u;
     Ray ray = Ray(path.origin, 0.0, path.direction, path.limit);
     uint mask = path.vertex == 0u ? TRACE_CAMERA : path.scattered > 0u ? TRACE_SHADOW : 0u;
     WaitingLight waiting;
     if (to_light) {
-        path.waiting -= 1u;
-        waiting = path.lights[path.waiting];
+        path.waiting &= ~(1u << way);
+        waiting = path.lights[way];
         ray = Ray(path.light_origin, 0.0, waiting.direction, waiting.limit);
         mask = TRACE_SHADOW;
     }
-    Hit hit = trace(ray, mask, to_light ? path.salt + path.waiting : salts.x, to_light);
+    Hit hit = trace(ray, mask, to_light ? path.salt + way : salts.x, to_light);
     if (to_light) {
         if (hit.instance == NONE) add_radiance(path, path.light_scatterings, waiting.radiance);
         return;
@@ -278,8 +274,8 @@ void path_step(uvec2 pixel, inout PathState path) {
             arrives *= power_heuristic(light_densities[i], density);
         }
         // A lamp or a triangle itself must not be in the way.
-        path.lights[path.waiting] = WaitingLight(ways[i], i == TO_LIGHT ? 0.99999 : 1e30, path.throughput * b.rough * arrives);
-        path.waiting += 1u;
+        path.lights[i] = WaitingLight(ways[i], i == TO_LIGHT ? 0.99999 : 1e30, path.throughput * b.rough * arrives);
+        path.waiting |= 1u << i;
     }
 
     if (go <= 0.0) {

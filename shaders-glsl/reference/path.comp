@@ -35,7 +35,7 @@ layout(push_constant, scalar) uniform Push {
     uint first;    // slot of the tile's first pixel, in blocks of 8 × 8
     uint count;    // slots
     uint sample_index;
-    uint begin;    // 1: new paths
+    uint turn;     // rays that each path may have traced before; 0: new paths
     uint rays;     // to trace
 };
 
@@ -56,14 +56,14 @@ void main() {
     uvec2 pixel = pixel_of(first + at);
     if (any(greaterThanEqual(pixel, settings.extent))) return;
     PathState path;
-    if (begin != 0u) {
+    if (turn == 0u) {
         path = camera_path(pixel);
     } else {
         path = paths[at];
         if ((path.alive | path.waiting) == 0u) return;
     }
     for (uint i = 0u; i < rays && (path.alive | path.waiting) != 0u; ++i) {
-        path_step(pixel, path);
+        path_step(pixel, settings.turn_ways[(turn + i) % settings.turns], path);
     }
     if ((path.alive | path.waiting) == 0u) add_light(pixel, path);
     paths[at] = path;

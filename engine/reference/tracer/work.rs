@@ -115,8 +115,8 @@ impl Tracer<'_> {
         let total = samples.saturating_mul(slots).max(done);
         let limited = self.gpu.loop_limit()?.is_some();
         let rays = if limited { RAYS_LIMITED } else { RAYS };
-        // To each surface, and from it to a lamp, a sun and the sky.
-        let rounds = (4 * longest(self.scene, &job.settings)).div_ceil(rays);
+        let (turns, _) = self.turns()?;
+        let rounds = (turns * longest(self.scene, &job.settings)).div_ceil(rays);
         let capacity = MOST_SLOTS.min(slots);
         self.prepare_paths(capacity)?;
         // Also when a picture is small and its samples are many passes.
@@ -148,6 +148,20 @@ impl Tracer<'_> {
         Ok(self.job()?.progress())
     }
 
+    /// How many rays a path may trace from one surface to the next, and which way each goes.
+    fn turns(&self) -> Result<(u32, [u32; 4])> {
+        let (Some(lights), Some(job)) = (&self.lights, &self.job) else { return Err(super::not_started()) };
+        let sky = job.settings.sources.environment() && self.scene.environment.is_some();
+        let there = [(true, consts::ON), (lights.tree, consts::TO_LIGHT), (lights.suns > 0, consts::TO_SUN), (sky, consts::TO_SKY)];
+        let mut ways = [consts::ON; 4];
+        let mut count = 0;
+        for (_, way) in there.iter().filter(|(there, _)| *there) {
+            ways[count] = *way;
+            count += 1;
+        }
+        Ok((count as u32, ways))
+    }
+
     fn prepare_paths(&mut self, slots: u64) -> Result<()> {
         let bytes = slots * size_of::<types::PathState>() as u64;
         if self.paths.as_ref().is_none_or(|p| p.size() < bytes) {
@@ -170,7 +184,7 @@ impl Tracer<'_> {
             return Err(super::not_started());
         };
         let slots = job.slots();
-        let settings = graph.uniform(&path_settings(self, job, lights));
+        let settings = graph.uniform(&path_settings(self, job, lights, self.turns()?));
         let view = graph.uniform(&job.view.uniform());
         let sums = graph.import_image(&job.sums);
         if job.done == 0 && tile.start == 0 {
@@ -216,7 +230,7 @@ impl Tracer<'_> {
                     first: first as u32,
                     count,
                     sample_index: sample as u32,
-                    begin: u32::from(round == 0),
+                    turn: round * rays_each,
                     rays: rays_each,
                 };
                 graph.compute(shader::Args { push, ..args }, count);
@@ -227,7 +241,12 @@ impl Tracer<'_> {
     }
 }
 
-fn path_settings(tracer: &Tracer<'_>, job: &Job, lights: &super::Lights) -> types::PathSettings {
+fn path_settings(
+    tracer: &Tracer<'_>,
+    job: &Job,
+    lights: &super::Lights,
+    (turns, turn_ways): (u32, [u32; 4]),
+) -> types::PathSettings {
     let settings = &job.settings;
     let environment = tracer.scene.environment.as_ref();
     let mut flags = 0;
@@ -258,5 +277,7 @@ fn path_settings(tracer: &Tracer<'_>, job: &Job, lights: &super::Lights) -> type
         slots: consts::TEXTURE_SLOTS + 2,
         two: 2,
         ways: 4,
+        turns,
+        turn_ways,
     }
 }
