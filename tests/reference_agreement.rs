@@ -9,7 +9,7 @@ use glam::{Mat4, Vec2, Vec3, Vec4};
 use lucerna::{
     gpu::testing::with_gpu,
     reference::tracer::Sources,
-    scene::{AlphaMode, Material, Pose, Texture, TextureRef, Transform, View, load},
+    scene::{AlphaMode, LightKind, Material, Pose, Texture, TextureRef, Transform, View, load},
 };
 use reference_kit::{Task, corner, disagreements, expect_agreement, eye, panel, point, sky, spot_and_sun};
 
@@ -36,6 +36,20 @@ fn lights_of_every_kind() {
     point(&mut everything);
     panel(&mut everything, Vec3::new(2.0, 3.0, 4.0));
     everything.scene.environment = Some(sky());
+    // Lamps of which each place sees another choice, behind a wall and in front of it.
+    let mut crowd = corner(gloss(0.5, 0.0));
+    for i in 0..30 {
+        let at = Vec3::new(-1.3 + 0.5 * (i % 6) as f32, 0.3 + 0.3 * (i / 6) as f32, -1.3 + 0.45 * (i * 7 % 6) as f32);
+        let color = Vec3::new(0.2 + 0.1 * (i % 3) as f32, 0.3, 0.1 * (i % 4) as f32);
+        let turned = Mat4::from_translation(at) * Mat4::from_rotation_x(-1.3) * Mat4::from_rotation_y(i as f32);
+        let range = (i % 3 == 0).then_some(0.9);
+        let kind =
+            if i % 2 == 0 { LightKind::Point { range } } else { LightKind::Spot { range, inner: 0.1, outer: 0.9 } };
+        crowd.light(kind, color, 0.4, turned);
+    }
+    let wall = crowd.material(matt());
+    crowd.cuboid(wall, Vec3::new(-0.2, 0.0, -1.5), Vec3::new(-0.1, 1.2, 0.4), false);
+    panel(&mut crowd, Vec3::new(2.0, 2.5, 3.0));
     let few = Task { samples: [1500, 24], ..Task::default() };
     with_gpu(|gpu| {
         let alone = |sources| Task { sources, diffuse_only: true, bounces: 1, samples: [800, 24], ..Task::default() };
@@ -47,6 +61,7 @@ fn lights_of_every_kind() {
                 ("panel, points on the CPU", &lamp.scene, eye(), Task { sample_lamps: true, ..Task::default() }),
                 ("sky", &open.scene, eye(), few),
                 ("everything", &everything.scene, eye(), Task { sample_lamps: true, ..few }),
+                ("a crowd of lamps", &crowd.scene, eye(), Task { sample_lamps: true, samples: [400, 48], ..few }),
                 ("everything, punctual alone", &everything.scene, eye(), alone(Sources::Punctual)),
                 ("everything, lamps alone", &everything.scene, eye(), alone(Sources::Emissive)),
                 ("everything, sky alone", &everything.scene, eye(), alone(Sources::Environment)),

@@ -2,16 +2,16 @@
 
 mod tracer_lab;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Mat4, Vec3};
 use lucerna::{
     gpu::{Gpu, ImageDesc, OwnedImage, Region, testing::with_gpu},
     graph::{Graph, Runner},
     reference::tracer::{Sources, tables},
-    scene::{Aabb, Environment, Pose, builtin, resident},
+    scene::{Environment, Light, LightKind, Material, Node, Pose, Scene, builtin, resident},
     shaders::{consts, test::samplers as shader, types},
 };
 use std::f64::consts::PI;
-use tracer_lab::{chi_square, chi_square_tail, sidak};
+use tracer_lab::{Stage, chi_square, chi_square_tail, sidak};
 
 const COUNT: u32 = 1 << 17;
 
@@ -41,7 +41,10 @@ fn draw(gpu: &Gpu, ask: Ask, environment: &Environment, lights: &tables::LightTa
             rotation: environment.rotation,
             scale: environment.scale,
         },
-        lights: lights.count,
+        suns: lights.suns,
+        tree: lights.tree.into(),
+        // Here: how many lights there are.
+        slots: lights.targets.len() as u32,
         seed: ask.seed,
         ..Default::default()
     };
@@ -53,6 +56,7 @@ fn draw(gpu: &Gpu, ask: Ask, environment: &Environment, lights: &tables::LightTa
         light_columns: graph.buffer_from("columns", &lights.columns),
         light_targets: graph.buffer_from("targets", &lights.targets),
         instance_lights: graph.buffer_from("instances", &lights.instances),
+        light_nodes: graph.buffer_from("nodes", &lights.nodes),
         settings: graph.uniform(&settings),
         drawn,
         values,
@@ -70,10 +74,17 @@ fn plain(gpu: &Gpu, ask: Ask) -> [Vec<[f32; 4]>; 2] {
 
 fn table(sources: Sources) -> tables::LightTable {
     let mut scene = builtin::load("cornell-area").unwrap();
-    scene.environment = Some(Environment::constant(Vec3::splat(0.1)));
-    let pose = Pose::rest(&scene);
-    let lights = resident::lights(&scene, &pose);
-    tables::lights(&scene, &pose, &lights, &Aabb { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) }, sources)
+    for (i, intensity) in [3.0, 1.0, 0.0].into_iter().enumerate() {
+        let kind = LightKind::Directional;
+        scene.lights.push(Light { name: format!("sun {i}"), kind, color: Vec3::ONE, intensity });
+        scene.nodes.push(Node { light: Some(scene.lights.len() as u32 - 1), ..Node::default() });
+    }
+    table_of(&scene, sources)
+}
+
+fn table_of(scene: &Scene, sources: Sources) -> tables::LightTable {
+    let pose = Pose::rest(scene);
+    tables::lights(scene, &pose, &resident::lights(scene, &pose), sources)
 }
 
 fn direction(sample: &[f32; 4]) -> DVec3 {
@@ -350,21 +361,116 @@ fn the_sky_is_sampled_by_its_light() {
 }
 
 #[test]
-fn lights_are_picked_by_their_power() {
+fn suns_are_picked_by_their_power() {
     with_gpu(|gpu| {
-        for sources in [Sources::All, Sources::Emissive] {
-            let lights = table(sources);
-            let [drawn, _] = draw(gpu, ask(consts::SAMPLER_LIGHT), &Environment::constant(Vec3::ONE), &lights);
-            let mut counts = vec![0.0; lights.columns.len()];
-            for d in &drawn {
+        let lights = table(Sources::All);
+        assert_eq!(lights.suns, 3);
+        let [drawn, _] = draw(gpu, ask(consts::SAMPLER_SUN), &Environment::constant(Vec3::ONE), &lights);
+        let mut counts = vec![0.0; 3];
+        for d in &drawn {
+            counts[d[0] as usize] += 1.0;
+            assert_eq!(d[3], lights.columns[d[0] as usize].probability);
+        }
+        let p = chi_square(&counts, &[0.75, 0.25, 0.0].map(|share| share * f64::from(COUNT)));
+        assert!(p > sidak(1), "p = {p:e}");
+        check_mean("number of suns", drawn.iter().map(|d| 1.0 / f64::from(d[3])), 2.0);
+    });
+}
+
+/// Lamps of every kind: points, spots, some with a range, a lit ball, a panel that shines to both sides, one that is black.
+fn many_lamps() -> Scene {
+    let mut stage = Stage::new();
+    for i in 0..40 {
+        let at = Vec3::new((i % 8) as f32, 1.0 + 0.1 * (i % 3) as f32, (i / 8) as f32);
+        let turned = Mat4::from_translation(at) * Mat4::from_rotation_x(-1.2) * Mat4::from_rotation_y(i as f32);
+        let kind = match i % 4 {
+            0 => LightKind::Point { range: None },
+            1 => LightKind::Point { range: Some(2.5) },
+            2 => LightKind::Spot { range: None, inner: 0.2, outer: 0.6 },
+            _ => LightKind::Spot { range: Some(4.0), inner: 0.0, outer: 1.2 },
+        };
+        stage.light(kind, Vec3::new(1.0, 0.5, 0.25), if i == 7 { 0.0 } else { 1.0 + (i % 5) as f32 }, turned);
+    }
+    let ball = stage.emitter(Vec3::new(2.0, 3.0, 4.0));
+    stage.sphere(ball, Vec3::new(2.0, 0.5, 7.0), 0.5, 6, false);
+    let panel = stage.material(Material { double_sided: true, ..Material::emitter("panel", Vec3::splat(3.0)) });
+    stage.quad(panel, Vec3::new(9.0, 0.0, 0.0), Vec3::Y, Vec3::Z);
+    let black = stage.emitter(Vec3::ZERO);
+    stage.quad(black, Vec3::new(9.0, 2.0, 0.0), Vec3::Y, Vec3::Z);
+    stage.scene
+}
+
+#[test]
+fn lamps_are_picked_as_often_as_stated_wherever_one_stands() {
+    with_gpu(|gpu| {
+        let scene = many_lamps();
+        let lights = table_of(&scene, Sources::All);
+        let count = lights.targets.len();
+        let places = [
+            (Vec3::new(3.2, 0.0, 2.1), Vec3::Y),
+            (Vec3::new(0.1, 0.9, 0.1), Vec3::new(0.6, 0.0, 0.8)),
+            (Vec3::new(8.9, 0.5, 0.5), Vec3::X),
+            // On a lamp, and far away.
+            (Vec3::new(0.0, 1.0, 0.0), Vec3::Y),
+            (Vec3::new(300.0, 20.0, -40.0), Vec3::NEG_X),
+            // Everything is behind.
+            (Vec3::new(0.0, -1.0, 0.0), Vec3::NEG_Y),
+        ];
+        for (at, normal) in places {
+            let mut here = ask(consts::SAMPLER_LIGHT);
+            (here.push.albedo, here.push.view) = (at.to_array(), normal.to_array());
+            let [drawn, values] = draw(gpu, here, &Environment::constant(Vec3::ONE), &lights);
+            let mut stated = vec![0.0; count];
+            values.iter().for_each(|v| stated[v[1] as usize] = f64::from(v[2]));
+            let sum: f64 = stated.iter().sum();
+            assert!((sum - 1.0).abs() < 1e-5, "densities sum to {sum} at {at}");
+            let mut counts = vec![0.0; count];
+            for (d, v) in drawn.iter().zip(&values) {
                 counts[d[0] as usize] += 1.0;
-                assert_eq!(d[3], lights.columns[d[0] as usize].probability);
+                // Drawn and looked up are the same function of the same numbers, up to how compilers round.
+                assert!((d[3] - v[0]).abs() <= 1e-4 * d[3], "{} drawn, {} looked up at {at}", d[3], v[0]);
             }
-            let wanted: Vec<f64> = lights.columns.iter().map(|c| f64::from(c.probability) * f64::from(COUNT)).collect();
-            let p = chi_square(&counts, &wanted);
-            assert!(p > sidak(2), "{sources:?}: p = {p:e}");
-            let support = lights.columns.iter().filter(|c| c.probability > 0.0).count() as f64;
-            check_mean("number of lights", drawn.iter().map(|d| 1.0 / f64::from(d[3])), support);
+            let p = chi_square(&counts, &stated.iter().map(|s| s * f64::from(COUNT)).collect::<Vec<_>>());
+            assert!(p > sidak(places.len() as u32), "p = {p:e} at {at}");
+            // Whatever sends light here can be drawn; what is black cannot.
+            for (number, target) in lights.targets.iter().enumerate() {
+                let sends = irradiance(&scene, target, at, normal);
+                assert!(sends == 0.0 || stated[number] > 0.0, "light {number} shines on {at} and is never drawn");
+            }
+            assert_eq!(stated[7], 0.0);
         }
     });
+}
+
+/// What a light sends to a surface, shadows aside, in double precision; triangles by their corners and centre.
+fn irradiance(scene: &Scene, target: &types::LightTarget, at: Vec3, normal: Vec3) -> f64 {
+    let (at, normal) = (at.as_dvec3(), normal.as_dvec3());
+    let pose = Pose::rest(scene);
+    if target.instance == consts::TARGET_PUNCTUAL {
+        let light = &resident::lights(scene, &pose)[target.index as usize];
+        let way = Vec3::from(light.position).as_dvec3() - at;
+        let (distance, to) = (way.length(), way.normalize_or_zero());
+        let outside = light.range > 0.0 && distance >= f64::from(light.range);
+        let cone = f64::from(light.spot_scale) * -to.dot(Vec3::from(light.direction).as_dvec3())
+            + f64::from(light.spot_offset);
+        let shines = !outside && light.intensity[0] > 0.0 && cone > 1e-6;
+        return if shines && distance > 0.0 { normal.dot(to).max(0.0) / (distance * distance) } else { 0.0 };
+    }
+    let primitive = &scene.meshes[target.instance as usize].primitives[0];
+    let material = &scene.materials[primitive.material as usize];
+    let corners =
+        [0, 1, 2].map(|i| primitive.positions[primitive.indices[3 * target.index as usize + i] as usize].as_dvec3());
+    let area = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+    let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+    if material.emissive == Vec3::ZERO {
+        return 0.0;
+    }
+    let each = corners.iter().chain([&middle]).map(|corner| {
+        let way = *corner - at;
+        let facing = -area.dot(way);
+        let facing = if material.double_sided { facing.abs() } else { facing.max(0.0) };
+        if way.length() > 1e-6 { normal.dot(way).max(0.0) * facing / way.length().powi(4) } else { 0.0 }
+    });
+    // Grazing light may be lost to rounding.
+    each.sum::<f64>().max(1e-9) - 1e-9
 }

@@ -35,7 +35,6 @@ struct PathSettings {
     // Numbers that compilers must not know, lest they unroll loops and take minutes on CPU drivers.
     uint slots;                // TEXTURE_SLOTS + 2
     uint two;                  // 2
-    uint ways;                 // 4
     uint turns;                // rays from one surface to the next
     uint turn_ways[4];         // which way each of them goes; the first: ON
 };
@@ -65,7 +64,9 @@ struct PathState {
     uint salt;         // for surfaces in the way that are blended
     vec3 light_origin;
     uint light_scatterings;
-    WaitingLight lights[3]; // by way
+    WaitingLight lamp; // not an array: compilers keep those in memory
+    WaitingLight sun;
+    WaitingLight sky;
 };
 
 // Four independent random words: a pure function of seed, pixel, sample and dimension.

@@ -63,7 +63,7 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
     WaitingLight waiting;
     if (to_light) {
         path.waiting &= ~(1u << way);
-        waiting = path.lights[way];
+        waiting = way == TO_LIGHT ? path.lamp : way == TO_SUN ? path.sun : path.sky;
         ray = Ray(path.light_origin, 0.0, waiting.direction, waiting.limit);
         mask = TRACE_SHADOW;
     }
@@ -163,11 +163,12 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
         }
     }
     // A sun, and the point or spot light that the tree gave.
-    for (uint i = 0u; i < settings.two; ++i) {
+    for (uint turn_of = 1u; turn_of < settings.turns; ++turn_of) {
+        uint i = settings.turn_ways[turn_of];
         uint number = to.index;
         float probability = chosen;
+        if (!scatters || i == TO_SKY) continue;
         if (i == TO_SUN) {
-            if (!scatters || settings.suns == 0u) continue;
             number = light_targets[pick_sun(settings.suns, salts.z, unit_float(salts.w), probability)].index;
         } else if (to.instance != TARGET_PUNCTUAL) {
             continue;
@@ -257,7 +258,8 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
     path.salt = salts.y;
     path.light_origin = above;
     path.light_scatterings = path.scattered + 1u;
-    for (uint i = 0u; i < settings.ways; ++i) {
+    for (uint turn_of = 0u; turn_of < settings.turns; ++turn_of) {
+        uint i = settings.turn_ways[turn_of];
         bool to_lamp = i != ON;
         if (ways[i] == vec3(0.0) || (to_lamp && (arriving[i] == vec3(0.0) || b.rough <= 0.0))) continue;
         float density;
@@ -274,7 +276,10 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
             arrives *= power_heuristic(light_densities[i], density);
         }
         // A lamp or a triangle itself must not be in the way.
-        path.lights[i] = WaitingLight(ways[i], i == TO_LIGHT ? 0.99999 : 1e30, path.throughput * b.rough * arrives);
+        WaitingLight waits = WaitingLight(ways[i], i == TO_LIGHT ? 0.99999 : 1e30, path.throughput * b.rough * arrives);
+        if (i == TO_LIGHT) path.lamp = waits;
+        else if (i == TO_SUN) path.sun = waits;
+        else path.sky = waits;
         path.waiting |= 1u << i;
     }
 

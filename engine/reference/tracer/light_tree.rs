@@ -148,7 +148,7 @@ fn split(lights: &mut [(u32, Bounds)], left: u32) -> usize {
     let mut best: Option<(f64, usize, f32)> = None;
     if even + 1 < left {
         for axis in 0..3 {
-            if !(size[axis] > 0.0) {
+            if size[axis] <= 0.0 {
                 continue;
             }
             let scale = BUCKETS as f32 / size[axis];
@@ -172,7 +172,8 @@ fn split(lights: &mut [(u32, Bounds)], left: u32) -> usize {
     }
     if let Some((_, axis, cut)) = best {
         let scale = BUCKETS as f32 / size[axis];
-        let first = |b: &Bounds| (((b.centre()[axis] - centres.min[axis]) * scale) as usize).min(BUCKETS - 1) < cut as usize;
+        let first =
+            |b: &Bounds| (((b.centre()[axis] - centres.min[axis]) * scale) as usize).min(BUCKETS - 1) < cut as usize;
         // Stable, so that the same lights give the same tree.
         lights.sort_by_key(|(_, bounds)| !first(bounds));
         let count = lights.iter().filter(|(_, bounds)| first(bounds)).count();
@@ -198,7 +199,9 @@ mod tests {
     fn any_light() -> impl Strategy<Value = Bounds> {
         let coordinate = || prop_oneof![Just(0.0f32), -10.0f32..10.0];
         ((coordinate(), coordinate(), coordinate()), (-1.0f32..1.0, -1.0f32..1.0, 0.01f32..1.0), 0.0..PI, 1e-6..1e6f64)
-            .prop_map(|((x, y, z), (a, b, c), spread, power)| light(Vec3::new(x, y, z), Vec3::new(a, b, c), spread, power))
+            .prop_map(|((x, y, z), (a, b, c), spread, power)| {
+                light(Vec3::new(x, y, z), Vec3::new(a, b, c), spread, power)
+            })
     }
 
     proptest! {

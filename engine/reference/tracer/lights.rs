@@ -208,23 +208,48 @@ fn linear([r, g, b, _]: [u8; 4]) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Environment, builtin, resident};
+    use crate::scene::{Environment, LightKind, Node, builtin, resident};
 
     #[test]
-    fn every_light_has_its_share_of_the_power() {
+    fn suns_come_first_and_everything_else_is_in_the_tree() {
         let mut scene = builtin::load("cornell-area").unwrap();
         scene.environment = Some(Environment::constant(Vec3::ONE));
+        for kind in [LightKind::Point { range: None }, LightKind::Directional] {
+            scene.lights.push(crate::scene::Light { name: String::new(), kind, color: Vec3::ONE, intensity: 1.0 });
+            scene.nodes.push(Node { light: Some(scene.lights.len() as u32 - 1), ..Node::default() });
+        }
         let pose = Pose::rest(&scene);
         let lights = resident::lights(&scene, &pose);
-        let bounds = Aabb { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) };
-        let all = table(&scene, &pose, &lights, &bounds, Sources::All);
-        let sum: f32 = all.columns.iter().map(|c| c.probability).sum();
-        assert!((sum - 1.0).abs() < 1e-5);
-        let emissive = table(&scene, &pose, &lights, &bounds, Sources::Emissive);
-        assert_eq!(emissive.environment_choice, 0.0);
-        assert_eq!((emissive.count, all.count), (2, 3));
+        let all = table(&scene, &pose, &lights, Sources::All);
+        assert_eq!((all.suns, all.targets.len(), all.nodes.len()), (1, 4, 5));
+        assert!(all.tree && all.targets[0].trail == TRAIL_NONE && all.targets[1..].iter().all(|t| t.trail < 8));
         assert_eq!(all.instances.iter().filter(|&&first| first != NONE).count(), 1);
-        let none = table(&Scene::default(), &Pose::rest(&Scene::default()), &[], &bounds, Sources::All);
-        assert_eq!((none.count, none.columns.len(), none.targets.len()), (0, 1, 1));
+        let emissive = table(&scene, &pose, &lights, Sources::Emissive);
+        assert_eq!((emissive.suns, emissive.targets.len()), (0, 2));
+        let none = table(&Scene::default(), &Pose::rest(&Scene::default()), &[], Sources::All);
+        assert_eq!((none.suns, none.tree, none.nodes.len(), none.targets.len()), (0, false, 1, 1));
+    }
+
+    #[test]
+    fn bounds_hold_the_cone_of_a_spot_light_and_the_front_of_a_mirrored_triangle() {
+        let kind = LightKind::Spot { range: Some(3.0), inner: 0.3, outer: 0.7 };
+        let mut scene = builtin::load("cornell-area").unwrap();
+        scene.lights = vec![crate::scene::Light { name: String::new(), kind, color: Vec3::ONE, intensity: 2.0 }];
+        scene.nodes.push(Node { light: Some(0), ..Node::default() });
+        let pose = Pose::rest(&scene);
+        let spot = punctual_bounds(&resident::lights(&scene, &pose)[0]);
+        assert!((spot.spread - 0.3).abs() < 1e-3 && (spot.spread + spot.edge - 0.7).abs() < 1e-3, "{spot:?}");
+        assert!(spot.reach > 3.0 && spot.axis.distance(Vec3::NEG_Z) < 1e-6 && (spot.power - 6.0).abs() < 1e-6);
+        let axis = |scene: &Scene| {
+            let all = table(scene, &Pose::rest(scene), &[], Sources::Emissive);
+            Vec3::from(all.nodes[0].axis)
+        };
+        assert!(axis(&scene).distance(Vec3::NEG_Y) < 1e-5);
+        for node in &mut scene.nodes {
+            let mirror = glam::Mat4::from_scale(Vec3::new(-1.0, 1.0, 1.0));
+            node.local = crate::scene::Transform::Matrix(mirror * node.local.matrix());
+        }
+        // The lamp still looks down.
+        assert!(axis(&scene).distance(Vec3::NEG_Y) < 1e-5);
     }
 }

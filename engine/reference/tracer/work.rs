@@ -152,7 +152,12 @@ impl Tracer<'_> {
     fn turns(&self) -> Result<(u32, [u32; 4])> {
         let (Some(lights), Some(job)) = (&self.lights, &self.job) else { return Err(super::not_started()) };
         let sky = job.settings.sources.environment() && self.scene.environment.is_some();
-        let there = [(true, consts::ON), (lights.tree, consts::TO_LIGHT), (lights.suns > 0, consts::TO_SUN), (sky, consts::TO_SKY)];
+        let there = [
+            (true, consts::ON),
+            (lights.tree, consts::TO_LIGHT),
+            (lights.suns > 0, consts::TO_SUN),
+            (sky, consts::TO_SKY),
+        ];
         let mut ways = [consts::ON; 4];
         let mut count = 0;
         for (_, way) in there.iter().filter(|(there, _)| *there) {
@@ -276,7 +281,6 @@ fn path_settings(
         seed: settings.seed,
         slots: consts::TEXTURE_SLOTS + 2,
         two: 2,
-        ways: 4,
         turns,
         turn_ways,
     }
