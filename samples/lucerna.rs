@@ -15,6 +15,7 @@ use lucerna_samples::{
     reference::{self, ReferenceArgs},
     rerun,
     source::SceneArgs,
+    tonemap::{self, TonemapArgs},
     views::{self, command::ViewsArgs},
 };
 
@@ -70,6 +71,9 @@ enum Command {
     ExportPov(Box<ExportPovArgs>),
     /// Measure how far images are from a reference
     Compare(Box<CompareArgs>),
+    /// Develop HDR pictures for a screen: EXR, .hdr, PFM to PNG, JPEG, EXR (also as the program `tonemap`)
+    #[command(args_override_self = true)]
+    Tonemap(Box<TonemapArgs>),
     /// List the Vulkan devices, and what the unsuitable ones lack
     Devices {
         /// Fail unless one of them is a usable GPU
@@ -104,6 +108,7 @@ impl Command {
             Self::Reproduce(args) => args.talk.console(),
             Self::Report(args) => args.talk.console(),
             Self::Compare(args) => args.talk.console(),
+            Self::Tonemap(args) => args.talk.console(),
             Self::Reference(args) => args.talk.console(),
             Self::Inspect { talk, .. }
             | Self::Info { talk, .. }
@@ -126,6 +131,7 @@ fn main() -> ExitCode {
         // Those that choose their exit code themselves.
         Command::Reproduce(args) => experiment::reproduce(args, console),
         Command::Compare(args) => compare::run(args, console),
+        Command::Tonemap(args) => tonemap::run(args, console),
         Command::Reference(args) => reference::run(args, console),
         _ => serve(command, console).map(|()| ExitCode::SUCCESS),
     })
@@ -165,6 +171,7 @@ fn serve(command: Command, console: Console) -> Result<()> {
             }
         }
         Command::Compare(args) => compare::run(&args, console).map(drop),
+        Command::Tonemap(args) => tonemap::run(&args, console).map(drop),
         Command::Reference(args) => reference::run(&args, console).map(drop),
         Command::Views(args) => views::command::run(&args, console),
         // It chooses its exit code itself.

@@ -31,5 +31,6 @@ pub mod signals;
 pub mod source;
 pub mod stage;
 pub mod timings;
+pub mod tonemap;
 pub mod views;
 pub mod world;

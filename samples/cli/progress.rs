@@ -2,6 +2,8 @@
 
 use std::io::{IsTerminal, Write};
 
+use serde_json::json;
+
 /// How progress is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum ProgressMode {
@@ -51,6 +53,10 @@ impl Progress {
 
     /// One more frame is done: its number, the milliseconds it took, and what was written.
     pub fn frame(&mut self, frame: u32, milliseconds: f64, files: &[String]) {
+        self.step(&format!("frame {frame}"), json!(frame), milliseconds, files);
+    }
+
+    fn step(&mut self, what: &str, frame: serde_json::Value, milliseconds: f64, files: &[String]) {
         self.done += 1;
         let mut err = std::io::stderr().lock();
         let _ = match self.mode {
@@ -63,7 +69,7 @@ impl Progress {
             }
             ProgressMode::Plain => writeln!(
                 err,
-                "frame {frame} ({}/{}): {milliseconds:.0} ms{}{}",
+                "{what} ({}/{}): {milliseconds:.0} ms{}{}",
                 self.done,
                 self.total,
                 if files.is_empty() { "" } else { ", wrote " },
@@ -72,10 +78,15 @@ impl Progress {
             ProgressMode::Json => writeln!(
                 err,
                 "{}",
-                serde_json::json!({ "frame": frame, "done": self.done, "total": self.total, "ms": milliseconds, "files": files })
+                json!({ "frame": frame, "done": self.done, "total": self.total, "ms": milliseconds, "files": files })
             ),
             ProgressMode::Auto | ProgressMode::None => Ok(()),
         };
+    }
+
+    /// One more picture is done, as [`Progress::frame`].
+    pub fn named(&mut self, name: &str, milliseconds: f64, files: &[String]) {
+        self.step(name, json!(name), milliseconds, files);
     }
 
     /// Ends the bar.

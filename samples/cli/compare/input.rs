@@ -109,7 +109,7 @@ fn image(name: &str, args: &CompareArgs, notes: &mut Vec<String>) -> Result<Imag
 }
 
 /// File and layer of `FILE:LAYER`; a file that is there with a colon in its name is a file.
-pub(super) fn split(name: &str) -> (&str, Option<&str>) {
+pub(crate) fn split(name: &str) -> (&str, Option<&str>) {
     if Path::new(name).exists() {
         return (name, None);
     }

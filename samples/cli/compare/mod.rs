@@ -14,6 +14,7 @@ use lucerna::{
 
 pub use args::CompareArgs;
 use args::Threshold;
+pub(crate) use input::split;
 use input::{Images, Stop};
 
 use crate::console::{self, Console};

@@ -1,0 +1,318 @@
+//! The command line of `tonemap`.
+
+use std::{path::PathBuf, str::FromStr};
+
+use clap::{Args, ValueEnum, builder::PossibleValuesParser};
+use lucerna::{
+    Error, Result,
+    image::Format,
+    techniques::tonemap::{BadValues, Identify, Local, Mark, Mode, Operator, Settings},
+};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    args::{DeviceArgs, Frames, TalkArgs, finite, positive},
+    config::{self, SettingsArgs},
+    progress::ProgressMode,
+};
+
+const LOOK: &str = "Look";
+const OUTPUT: &str = "Output";
+const INPUT: &str = "Input";
+const WORK: &str = "How local work is done";
+
+/// The arguments of `tonemap`.
+#[derive(Args, Clone, Debug)]
+#[command(after_help = HELP)]
+pub struct TonemapArgs {
+    /// Pictures: .exr .hdr .pfm (or .png .jpg); FILE:LAYER takes a layer of an EXR file; `-` is standard input;
+    /// shot-####.exr or shot-%04d.exr is a numbered sequence
+    #[arg(required = true, value_name = "IN")]
+    pub inputs: Vec<String>,
+
+    /// File to write; may be given more than once. The ending chooses the format: .png .jpg for screens, .exr .hdr .pfm for further work
+    /// (linear). A folder takes NAME.png. `-` is standard output. Placeholders: {name} {frame:04} {operator} {mode}
+    #[arg(short, long, value_name = "OUT", required_unless_present = "print_config", help_heading = OUTPUT)]
+    pub output: Vec<String>,
+
+    /// How light becomes what a screen shows
+    #[arg(long, value_name = "NAME", value_parser = operators(), help_heading = LOOK)]
+    pub operator: Option<String>,
+
+    /// global: one curve for the whole picture; local: shadows and lights are each developed for themselves; selective: local only where
+    /// there is detail [default: local if the operator can]
+    #[arg(long, value_enum, value_name = "MODE", help_heading = LOOK)]
+    pub mode: Option<ModeName>,
+
+    /// Brightness in stops: +1 is twice as much light; auto measures the picture (auto+0.5: half a stop more) [default: 0]
+    #[arg(long, value_name = "EV|auto", allow_hyphen_values = true, help_heading = LOOK)]
+    pub exposure: Option<Exposure>,
+
+    /// How codes of .png and .jpg are made of light: the sRGB curve of nearly all screens, or a power
+    #[arg(long, value_name = "G|srgb", default_value = "srgb", help_heading = LOOK)]
+    pub gamma: Gamma,
+
+    /// The light that becomes pure white; 0: the brightest of the picture (reinhard, reinhard-global)
+    #[arg(long, value_name = "L", value_parser = finite, help_heading = LOOK)]
+    pub white: Option<f64>,
+
+    /// Brightness of the middle: 0.18 is normal, 0.36 for bright scenes such as snow, 0.09 for dark ones (reinhard)
+    #[arg(long, value_name = "K", value_parser = finite, help_heading = LOOK)]
+    pub key: Option<f64>,
+
+    /// Strength of colours: 1 leaves them, 0 is grey (ashikhmin, reinhard, bilateral, reinhard-global)
+    #[arg(long, value_name = "S", value_parser = finite, help_heading = LOOK)]
+    pub saturation: Option<f64>,
+
+    /// Strength of fine detail: 1 leaves it (bilateral)
+    #[arg(long, value_name = "D", value_parser = finite, help_heading = LOOK)]
+    pub detail: Option<f64>,
+
+    /// White of the screen in cd/m² (ashikhmin)
+    #[arg(long, value_name = "CD", value_parser = finite, help_heading = LOOK)]
+    pub display: Option<f64>,
+
+    /// Percent of the darkest and of the brightest pixels that may be lost; 0: none, so that one hot pixel decides
+    #[arg(long, value_name = "P", value_parser = finite, help_heading = LOOK)]
+    pub percentile: Option<f64>,
+
+    /// Exact averages, or the literal definition, which is far slower
+    #[arg(long, value_enum, value_name = "HOW", help_heading = WORK)]
+    pub local: Option<LocalName>,
+
+    /// selective: what counts as detail
+    #[arg(long, value_enum, value_name = "WHAT", help_heading = WORK)]
+    pub identify: Option<IdentifyName>,
+
+    /// selective: how much of it counts
+    #[arg(long, value_name = "T", value_parser = finite, help_heading = WORK)]
+    pub threshold: Option<f64>,
+
+    /// selective: how unimportant pixels are left out; the picture is the same
+    #[arg(long, value_enum, value_name = "HOW", help_heading = WORK)]
+    pub mark: Option<MarkName>,
+
+    /// selective: a picture of the same size; pixels with red over one half are important whatever they look like
+    #[arg(long, value_name = "FILE", help_heading = WORK)]
+    pub mask: Option<PathBuf>,
+
+    /// What becomes of NaN, infinite and negative samples: zero; clamp (infinite: the brightest finite one); neighbour (the mean around
+    /// them); error (refuse the picture) [default: zero]
+    #[arg(long, value_enum, value_name = "POLICY", help_heading = INPUT)]
+    pub bad_values: Option<BadName>,
+
+    /// Layer of EXR files that do not name their own
+    #[arg(long, value_name = "NAME", help_heading = INPUT)]
+    pub layer: Option<String>,
+
+    /// All inputs are frames of one sequence, in this order
+    #[arg(long, help_heading = INPUT)]
+    pub sequence: bool,
+
+    /// Frames A to B−1 of numbered sequences (A..=B: to B) [default: all that are there]
+    #[arg(long, value_name = "A..B", help_heading = INPUT)]
+    pub frames: Option<Frames>,
+
+    /// Frames per second of sequences: how fast the eye adapts
+    #[arg(long, value_name = "N", default_value_t = 25.0, value_parser = positive, help_heading = INPUT)]
+    pub fps: f64,
+
+    /// Bits of each channel of .png files
+    #[arg(long, value_name = "N", default_value = "8", value_parser = PossibleValuesParser::new(["8", "16"]), help_heading = OUTPUT)]
+    pub bits: String,
+
+    /// Quality of .jpg files, 1 (small) to 100 (fine)
+    #[arg(long, value_name = "Q", default_value_t = 92, value_parser = clap::value_parser!(u8).range(1..=100), help_heading = OUTPUT)]
+    pub quality: u8,
+
+    /// Format of standard output
+    #[arg(long, value_enum, value_name = "FORMAT", default_value = "png", help_heading = OUTPUT)]
+    pub format: FormatName,
+
+    /// Write .exr files with 32 instead of 16 bits
+    #[arg(long, help_heading = OUTPUT)]
+    pub f32: bool,
+
+    /// Replace files that exist
+    #[arg(long, help_heading = OUTPUT)]
+    pub overwrite: bool,
+
+    /// Print one JSON document about all pictures on standard output
+    #[arg(long, help_heading = OUTPUT)]
+    pub json: bool,
+
+    #[command(flatten)]
+    pub settings: SettingsArgs,
+
+    #[command(flatten)]
+    pub device: DeviceArgs,
+
+    #[command(flatten)]
+    pub talk: TalkArgs,
+
+    /// How progress is shown on stderr
+    #[arg(long, value_enum, default_value_t, value_name = "HOW", help_heading = "Messages")]
+    pub progress: ProgressMode,
+}
+
+const HELP: &str = "\
+Operators:
+  ashikhmin        (default) keeps the contrast that the eye would see in the scene; light is taken as cd/m²
+  reinhard         as a photographer dodges and burns a print; needs no units: start here if a picture comes out too dark or too bright
+  bilateral        compresses large areas and keeps fine detail; needs no units
+  linear           nothing but exposure; what is over white is cut
+  reinhard-global  a soft shoulder: lights never cut off before --white
+  aces  agx        film-like curves of games and films; they expect a well exposed picture (--exposure auto)
+  neutral          Khronos PBR Neutral: colours of products stay as they are
+
+Colour: pictures are taken to linear Rec. 709 by what they say of themselves (EXR chromaticities, XYZ, luminance and chroma; .hdr
+PRIMARIES and XYZE; sRGB or gAMA of .png; .jpg as sRGB); without a word they are Rec. 709. Colours outside of it become negative and fall
+under --bad-values. .png and .jpg are written in sRGB, .exr .hdr .pfm as linear light relative to the screen's white. Alpha is
+kept in .png and .exr; .jpg shows the picture over black.
+
+Exit codes: 0 all done, 2 wrong usage, 3 a picture cannot be read, 1 a file cannot be written, 4 no device, 5 out of memory, 6 device lost,
+8 stopped early (what was written is complete). A picture that fails does not stop the ones after it; the first failure decides the code.
+
+Examples:
+  tonemap church.hdr -o church.png
+  tonemap church.hdr -o church.jpg --operator reinhard --exposure +1 --quality 95
+  tonemap photos/*.exr -o developed/                           a folder, one device for all
+  tonemap shot-####.exr -o out-####.png --fps 24               a sequence: the eye adapts from frame to frame
+  pfsin a.exr | pfsout b.pfm; tonemap - -o - < b.pfm > b.png   in a pipe
+  tonemap a.exr -o a.png -D tonemap.radius=6 --print-config    all settings";
+
+/// Settings as they stand in files and after `-D`: `tonemap.key`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    pub tonemap: Settings,
+}
+
+fn operators() -> PossibleValuesParser {
+    PossibleValuesParser::new(Operator::ALL.map(|(name, _)| name))
+}
+
+/// Gives names of the command line the values of a setting.
+macro_rules! names {
+    ($name:ident for $of:ty { $($variant:ident),* }) => {
+        #[doc = concat!("Names of [`", stringify!($of), "`].")]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+        pub enum $name { $($variant),* }
+
+        impl From<$name> for $of {
+            fn from(name: $name) -> Self {
+                match name { $($name::$variant => Self::$variant),* }
+            }
+        }
+    };
+}
+
+names!(ModeName for Mode { Global, Local, Selective });
+names!(LocalName for Local { Fast, Literal });
+names!(IdentifyName for Identify { Sobel, Saliency });
+names!(MarkName for Mark { Branch, Tiles, EarlyZ, Compact });
+names!(BadName for BadValues { Zero, Clamp, Neighbour, Error });
+
+/// `--format`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FormatName {
+    Png,
+    Jpg,
+    Exr,
+    Hdr,
+    Pfm,
+}
+
+impl From<FormatName> for Format {
+    fn from(name: FormatName) -> Self {
+        match name {
+            FormatName::Png => Self::Png,
+            FormatName::Jpg => Self::Jpeg,
+            FormatName::Exr => Self::Exr,
+            FormatName::Hdr => Self::Hdr,
+            FormatName::Pfm => Self::Pfm,
+        }
+    }
+}
+
+/// `--exposure`: stops, over what was measured if `auto`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Exposure {
+    pub auto: bool,
+    pub stops: f32,
+}
+
+impl FromStr for Exposure {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (auto, rest) = match text.strip_prefix("auto") {
+            Some("") => return Ok(Self { auto: true, stops: 0.0 }),
+            Some(rest) if rest.starts_with(['+', '-']) => (true, rest),
+            Some(_) => return Err("expected auto, auto+EV or auto-EV".into()),
+            None => (false, text),
+        };
+        let stops = rest.parse::<f32>().ok().filter(|stops| stops.is_finite());
+        Ok(Self { auto, stops: stops.ok_or("expected stops such as -1.5, or auto")? })
+    }
+}
+
+/// `--gamma`: `None` is the sRGB curve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gamma(pub Option<f32>);
+
+impl FromStr for Gamma {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "srgb" {
+            return Ok(Self(None));
+        }
+        let gamma = text.parse::<f32>().ok().filter(|gamma| (0.1..=10.0).contains(gamma));
+        gamma.map(|gamma| Self(Some(gamma))).ok_or_else(|| "expected srgb, or a number from 0.1 to 10".into())
+    }
+}
+
+/// What `--exposure auto` makes the log-average of the picture: middle grey, of 1 or of a screen of 100 cd/m².
+const MIDDLE_GREY: f32 = 0.18;
+
+impl TonemapArgs {
+    /// Defaults, then the file, then the options, then `-D`.
+    ///
+    /// # Errors
+    /// `Usage` or `Input`, naming the setting.
+    pub fn config(&self) -> Result<Config> {
+        let mut config = config::effective(&Config::default(), self.settings.file.as_deref(), &[])?;
+        let s = &mut config.tonemap;
+        if let Some(name) = &self.operator {
+            s.operator = Operator::ALL.iter().find(|(n, _)| n == name).map_or(s.operator, |(_, operator)| *operator);
+        }
+        s.mode = self.mode.map(Mode::from).or(s.mode);
+        for (option, value) in [
+            (self.white, &mut s.white),
+            (self.key, &mut s.key),
+            (self.saturation, &mut s.saturation),
+            (self.detail, &mut s.detail),
+            (self.display, &mut s.display),
+            (self.percentile, &mut s.percentile),
+            (self.threshold, &mut s.threshold),
+        ] {
+            *value = option.map_or(*value, |option| option as f32);
+        }
+        s.local = self.local.map_or(s.local, Local::from);
+        s.identify = self.identify.map_or(s.identify, Identify::from);
+        s.mark = self.mark.map_or(s.mark, Mark::from);
+        s.bad_values = self.bad_values.map_or(s.bad_values, BadValues::from);
+        if let Some(exposure) = self.exposure {
+            let unit = if s.operator == Operator::Ashikhmin { 100.0 } else { 1.0 };
+            s.normalize = exposure.auto;
+            s.exposure = exposure.stops + if exposure.auto { (MIDDLE_GREY * unit).log2() } else { 0.0 };
+        }
+        let config: Config = config::effective(&config, None, &self.settings.define)?;
+        config.tonemap.validate().map_err(|error| error.at("tonemap"))?;
+        if self.mask.is_some() && config.tonemap.mode() != Mode::Selective {
+            return Err(Error::usage("--mask names important pixels, which only --mode selective knows"));
+        }
+        Ok(config)
+    }
+}

@@ -1,0 +1,256 @@
+//! `tonemap`: pictures of light in, pictures for a screen out; one device for all of them.
+
+mod args;
+mod names;
+mod picture;
+
+use std::{
+    collections::HashSet,
+    io::Read,
+    path::Path,
+    process::ExitCode,
+    sync::mpsc,
+    time::{Duration, Instant},
+};
+
+use lucerna::{
+    Error, ErrorKind, Result,
+    gpu::{Description, Gpu},
+    image::{self, Format, Layers, WriteOptions},
+    scene::Limits,
+    techniques::tonemap::{Settings, Still},
+};
+use serde_json::{Value, json};
+
+pub use args::{Config, TonemapArgs};
+use names::{Input, OutputName, PIPE};
+use picture::Done;
+
+use crate::{
+    config,
+    console::{self, Console},
+    program::{self, STOPPED_EARLY},
+    progress::Progress,
+    signals::Interrupt,
+};
+
+/// Room for 16384×16384 pixels of colour and alpha.
+const LIMITS: Limits = Limits {
+    max_file: 8 << 30,
+    max_alloc: 8 << 30,
+    max_image_pixels: 1 << 28,
+    max_vertices: 0,
+    max_nodes: 0,
+    max_depth: 0,
+};
+
+/// What all pictures of a run share.
+struct Run<'a> {
+    args: &'a TonemapArgs,
+    console: Console,
+    config: Config,
+    outputs: Vec<(OutputName, Format)>,
+    mask: Option<Layers>,
+}
+
+/// A picture that was read, and how long that took.
+type Loaded = (Result<Layers>, Duration);
+
+/// Tone maps all pictures.
+///
+/// # Errors
+/// What concerns all of them: usage, the device, memory. A single picture that fails is told and decides the exit code.
+pub fn run(args: &TonemapArgs, console: Console) -> Result<ExitCode> {
+    let config = args.config()?;
+    if args.settings.print_config {
+        console::print(config::to_toml(&config)?.trim_end())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let (inputs, notes) = names::inputs(&args.inputs, args.layer.as_deref(), args.frames.as_ref(), args.sequence)?;
+    notes.iter().for_each(|note| console.warning(note));
+    let mut run = Run { args, console, config, outputs: outputs(args)?, mask: None };
+    run.probe(&inputs)?;
+    if let Some(path) = &args.mask {
+        run.mask = Some(image::read(path, &LIMITS)?);
+    }
+    let interrupt = Interrupt::install();
+    let gpu = Gpu::new(args.device.options()?)?;
+    let about = gpu.describe().clone();
+    console.info(&format!("lucerna {}, {about}", program::VERSION));
+    let mut still = Still::new(&gpu, &run.config.tonemap)?;
+    let mut progress = Progress::new(args.progress, console.is_quiet(), inputs.len() as u64);
+
+    let (mut done, mut failed): (Vec<Done>, Vec<(String, Error)>) = (Vec::new(), Vec::new());
+    std::thread::scope(|scope| -> Result<()> {
+        // The next picture is read while this one is worked on; no more, for memory's sake.
+        let (sender, pictures) = mpsc::sync_channel::<Loaded>(0);
+        let list = &inputs;
+        scope.spawn(move || {
+            for input in list {
+                let begun = Instant::now();
+                let picture = read(input);
+                // Nobody listens any more: the run has ended.
+                if sender.send((picture, begun.elapsed())).is_err() {
+                    return;
+                }
+            }
+        });
+        let mut lost = false;
+        for input in &inputs {
+            if interrupt.requested() {
+                break;
+            }
+            let Ok((picture, reading)) = pictures.recv() else { break };
+            // A sequence without one of its frames would adapt to what nobody sees.
+            lost &= input.sequence == Some(false);
+            if lost {
+                continue;
+            }
+            let begun = Instant::now();
+            let result = picture.and_then(|picture| {
+                if input.sequence == Some(true) {
+                    still.tonemap().reset()?;
+                }
+                run.develop(&mut still, &about, input, &picture)
+            });
+            match result {
+                Ok(mut one) => {
+                    one.reading = reading;
+                    let milliseconds = (begun.elapsed() + reading).as_secs_f64() * 1e3;
+                    progress.named(&input.name, milliseconds, &one.files);
+                    done.push(one);
+                }
+                Err(error) if matches!(error.kind(), ErrorKind::DeviceLost | ErrorKind::OutOfMemory) => {
+                    return Err(error.in_file(&input.name));
+                }
+                Err(error) => {
+                    let error = error.in_file(&input.name);
+                    console.error(&error);
+                    lost = input.sequence.is_some();
+                    failed.push((input.name.clone(), error));
+                }
+            }
+        }
+        Ok(())
+    })?;
+    progress.finish();
+    if args.json {
+        console::print_json(&json_of(&run, &about, &done, &failed, inputs.len())?)?;
+    }
+    Ok(match (failed.first(), done.len()) {
+        (Some((_, error)), _) => ExitCode::from(error.exit_code()),
+        (None, count) if count == inputs.len() => ExitCode::SUCCESS,
+        (None, 0) => ExitCode::from(interrupt.exit_code()),
+        (None, _) => ExitCode::from(STOPPED_EARLY),
+    })
+}
+
+fn outputs(args: &TonemapArgs) -> Result<Vec<(OutputName, Format)>> {
+    let pipes = args.output.iter().filter(|name| *name == PIPE).count();
+    if pipes > 1 {
+        return Err(Error::usage("standard output (-) is named twice"));
+    }
+    if pipes == 1 && args.json {
+        return Err(Error::usage("--json and a picture both want standard output").help("Give the picture a name"));
+    }
+    let each = args.output.iter().map(|text| {
+        let name = OutputName::parse(text)?;
+        let format = match text == PIPE {
+            true => args.format.into(),
+            false => Format::from_path(Path::new(name.text()))?,
+        };
+        Ok((name, format))
+    });
+    each.collect()
+}
+
+fn read(input: &Input) -> Result<Layers> {
+    let Some(path) = &input.path else {
+        let mut bytes = Vec::new();
+        std::io::stdin()
+            .lock()
+            .take(LIMITS.max_file + 1)
+            .read_to_end(&mut bytes)
+            .map_err(|error| Error::input("cannot be read").caused_by(error))?;
+        if bytes.len() as u64 > LIMITS.max_file {
+            return Err(Error::input(format!("more than {} bytes", LIMITS.max_file)));
+        }
+        return image::decode(&bytes, &LIMITS);
+    };
+    image::read(path, &LIMITS)
+}
+
+impl Run<'_> {
+    fn settings(&self) -> &Settings {
+        &self.config.tonemap
+    }
+
+    /// The files of a picture, in the order of `-o`.
+    fn files(&self, input: &Input) -> Vec<(String, Format)> {
+        let (operator, mode) = (self.settings().operator.name(), picture::mode_name(self.settings()));
+        self.outputs.iter().map(|(name, format)| (name.fill(input, operator, mode), *format)).collect()
+    }
+
+    /// Everything can be written, and nothing twice: before any work.
+    fn probe(&self, inputs: &[Input]) -> Result<()> {
+        let read: HashSet<_> = inputs.iter().filter_map(|input| input.path.as_ref()?.canonicalize().ok()).collect();
+        let mut seen = HashSet::new();
+        for input in inputs {
+            for (name, _) in self.files(input) {
+                if name == PIPE {
+                    if inputs.len() > 1 {
+                        return Err(Error::usage(format!("{} pictures do not fit into standard output", inputs.len()))
+                            .help("Give them names, such as -o out/"));
+                    }
+                    continue;
+                }
+                if !seen.insert(name.clone()) {
+                    return Err(Error::usage(format!("output '{name}' would be written for several pictures"))
+                        .help("Put {name} or {frame:04} into it, or name a folder"));
+                }
+                let path = Path::new(&name);
+                if path.canonicalize().is_ok_and(|path| read.contains(&path)) {
+                    return Err(Error::usage(format!("output '{name}' is one of the inputs")));
+                }
+                image::probe_output(path, self.args.overwrite)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn write_options(&self) -> WriteOptions {
+        WriteOptions {
+            overwrite: self.args.overwrite,
+            png_bits: if self.args.bits == "16" { 16 } else { 8 },
+            jpeg_quality: self.args.quality,
+            gamma: self.args.gamma.0,
+            f32: self.args.f32,
+            ..WriteOptions::default()
+        }
+    }
+}
+
+fn json_of(
+    run: &Run<'_>,
+    about: &Description,
+    done: &[Done],
+    failed: &[(String, Error)],
+    asked: usize,
+) -> Result<Value> {
+    let failed: Vec<Value> = failed
+        .iter()
+        .map(|(name, error)| json!({ "input": name, "error": error.to_string(), "exit_code": error.exit_code() }))
+        .collect();
+    Ok(json!({
+        "program": "tonemap",
+        "version": program::VERSION,
+        "revision": program::revision(),
+        "device": about.device,
+        "driver": format!("{} {}", about.driver, about.driver_info).trim(),
+        "settings": config::to_value(&run.config)?,
+        "mode": picture::mode_name(run.settings()),
+        "pictures": done.iter().map(Done::json).collect::<Vec<_>>(),
+        "failed": failed,
+        "complete": done.len() == asked,
+    }))
+}

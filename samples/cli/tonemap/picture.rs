@@ -1,0 +1,221 @@
+//! One picture: from its file's layer to the operator, and what comes out to files.
+
+use std::{
+    io::Write,
+    path::Path,
+    time::{Duration, Instant},
+};
+
+use lucerna::{
+    Error, ErrorKind, Result,
+    gpu::Description,
+    image::{self, Format, Layer, Layers, Metadata},
+    techniques::tonemap::{BadCounts, BadValues, Mapped, Mode, Settings, Still},
+};
+use serde_json::{Value, json};
+
+use super::{PIPE, Run, names::Input};
+use crate::{config, program};
+
+/// A picture that was written.
+#[derive(Debug)]
+pub(super) struct Done {
+    input: String,
+    frame: Option<u32>,
+    size: [u32; 2],
+    alpha: bool,
+    pub files: Vec<String>,
+    bad: BadCounts,
+    /// Darkest and brightest luminance and log-average after the exposure, as the operator used them.
+    light: [f32; 3],
+    /// Pixels with a channel over the screen's white, which .png and .jpg cut.
+    over_white: u64,
+    pub reading: Duration,
+    mapping: Duration,
+    writing: Duration,
+}
+
+/// As `--mode` takes it.
+pub(super) fn mode_name(settings: &Settings) -> &'static str {
+    match settings.mode() {
+        Mode::Global => "global",
+        Mode::Local => "local",
+        Mode::Selective => "selective",
+    }
+}
+
+/// The layer of a picture as RGBA, and whether its alpha is its own.
+fn pixels(picture: &Layers, asked: Option<&str>) -> Result<(Vec<[f32; 4]>, bool)> {
+    let names = || picture.layers.iter().map(|l| if l.name.is_empty() { "total" } else { &l.name }).collect::<Vec<_>>();
+    let layer = match asked {
+        None => picture.main(),
+        Some(name) => picture.layer(name),
+    };
+    let layer = layer.ok_or_else(|| {
+        Error::input(format!("no layer {:?}; there are {}", asked.unwrap_or_default(), names().join(", ")))
+    })?;
+    let colour = layer.rgb_pixels().ok_or_else(|| {
+        let channels = layer.channels.join(" ");
+        Error::input(format!("the channels {channels} are no colours"))
+            .help(format!("Name a layer of colours with --layer; there are {}", names().join(", ")))
+    })?;
+    let alpha = layer.channel("A").filter(|_| layer.channels.len() > 1);
+    let count = layer.channels.len();
+    let alpha_of = |i: usize| alpha.map_or(1.0, |a| layer.data[i * count + a]);
+    let rgba = colour.iter().enumerate().map(|(i, &[r, g, b])| [r, g, b, alpha_of(i)]).collect();
+    Ok((rgba, alpha.is_some()))
+}
+
+impl Run<'_> {
+    /// Maps a picture and writes its files.
+    pub(super) fn develop(
+        &self,
+        still: &mut Still,
+        about: &Description,
+        input: &Input,
+        picture: &Layers,
+    ) -> Result<Done> {
+        let begun = Instant::now();
+        let (width, height) = (picture.width, picture.height);
+        let (pixels, alpha) = pixels(picture, input.layer.as_deref())?;
+        let mask = self.mask(width, height)?;
+        let dt = input.sequence.map(|_| (1.0 / self.args.fps) as f32);
+        let mapped = still.map(width, height, pixels, mask.as_deref(), dt)?;
+        self.tell_bad(input, &mapped.bad);
+        let mapping = begun.elapsed();
+
+        let begun = Instant::now();
+        let layers = Layers {
+            metadata: self.metadata(about, input, picture)?,
+            ..Layers::new(width, height).with(layer_of(&mapped, alpha))
+        };
+        let over = |pixel: &&[f32; 4]| pixel[..3].iter().any(|&v| v > 1.0);
+        let over_white = mapped.pixels.iter().filter(over).count() as u64;
+        let mut files = Vec::new();
+        for (name, format) in self.files(input) {
+            if alpha && format == Format::Jpeg {
+                self.console.detail(&format!("{name}: .jpg holds no alpha; the picture is shown over black"));
+            }
+            self.write(&name, format, &layers)?;
+            files.push(name);
+        }
+        let s = &mapped.statistics;
+        Ok(Done {
+            input: input.name.clone(),
+            frame: input.sequence.map(|_| input.frame),
+            size: [width, height],
+            alpha,
+            files,
+            bad: mapped.bad,
+            light: [s.low, s.high, s.log_average],
+            over_white,
+            reading: Duration::ZERO,
+            mapping,
+            writing: begun.elapsed(),
+        })
+    }
+
+    fn write(&self, name: &str, format: Format, layers: &Layers) -> Result<()> {
+        let options = self.write_options();
+        if name == PIPE {
+            let (bytes, _) = image::encode(format, layers, &options)?;
+            let mut out = std::io::stdout().lock();
+            return out
+                .write_all(&bytes)
+                .and_then(|()| out.flush())
+                .map_err(|error| Error::new(ErrorKind::Output, "could not write to standard output").caused_by(error));
+        }
+        image::write(Path::new(name), layers, &options).map(drop)
+    }
+
+    fn mask(&self, width: u32, height: u32) -> Result<Option<Vec<f32>>> {
+        let (Some(mask), Some(path)) = (&self.mask, &self.args.mask) else { return Ok(None) };
+        if [mask.width, mask.height] != [width, height] {
+            let (w, h) = (mask.width, mask.height);
+            return Err(
+                Error::input(format!("the mask has {w}×{h} pixels, the picture {width}×{height}")).in_file(path)
+            );
+        }
+        let (pixels, _) = pixels(mask, None).map_err(|error| error.in_file(path))?;
+        Ok(Some(pixels.into_iter().map(|pixel| pixel[0]).collect()))
+    }
+
+    fn tell_bad(&self, input: &Input, bad: &BadCounts) {
+        let Some([x, y]) = bad.first else { return };
+        let mut parts = Vec::new();
+        for (count, what) in [(bad.nan, "NaN"), (bad.infinite, "infinite"), (bad.negative, "negative")] {
+            if count > 0 {
+                parts.push(format!("{count} {what}"));
+            }
+        }
+        let policy = match self.settings().bad_values {
+            BadValues::Zero => "taken as 0",
+            BadValues::Clamp => "NaN and negative taken as 0, infinite as the brightest",
+            BadValues::Neighbour => "replaced by their neighbours, negative taken as 0",
+            BadValues::Error => "refused",
+        };
+        let text = format!("{}: samples: {}; {policy}; the first at ({x}, {y})", input.name, parts.join(", "));
+        // Colours out of gamut are usual and harmless.
+        if bad.nan + bad.infinite > 0 { self.console.warning(&text) } else { self.console.detail(&text) }
+    }
+
+    fn metadata(&self, about: &Description, input: &Input, picture: &Layers) -> Result<Metadata> {
+        let source = &picture.metadata;
+        let gamma = self.args.gamma.0.map_or_else(|| json!("srgb"), |gamma| json!(gamma));
+        let mut config = json!({
+            "command": ["tonemap"],
+            "input": input.name,
+            "gamma": gamma,
+            "settings": config::to_value(&self.config)?,
+        });
+        if input.sequence.is_some() {
+            config["sequence"] = json!({ "frame": input.frame, "fps": self.args.fps });
+        }
+        if !source.config.is_null() {
+            config["source"] = source.config.clone();
+        }
+        Ok(Metadata {
+            program: "tonemap".into(),
+            version: program::VERSION.into(),
+            revision: program::revision().map(str::to_owned),
+            technique: format!("{}-{}", self.settings().operator.name(), mode_name(self.settings())),
+            device: about.device.clone(),
+            driver: format!("{} {}", about.driver, about.driver_info).trim().to_owned(),
+            config,
+            ..source.clone()
+        })
+    }
+}
+
+/// What is written: three channels, or four if the picture came with alpha.
+fn layer_of(mapped: &Mapped, alpha: bool) -> Layer {
+    if alpha { Layer::rgba("", &mapped.pixels) } else { Layer::rgb("", &mapped.pixels) }
+}
+
+impl Done {
+    pub(super) fn json(&self) -> Value {
+        let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
+        let finite = |value: f32| value.is_finite().then_some(value);
+        json!({
+            "input": self.input,
+            "frame": self.frame,
+            "files": self.files,
+            "width": self.size[0],
+            "height": self.size[1],
+            "alpha": self.alpha,
+            "bad_samples": {
+                "nan": self.bad.nan,
+                "infinite": self.bad.infinite,
+                "negative": self.bad.negative,
+                "first": self.bad.first,
+            },
+            "luminance": { "low": finite(self.light[0]), "high": finite(self.light[1]), "log_average": finite(self.light[2]) },
+            "pixels_over_white": self.over_white,
+            "milliseconds": {
+                "read": milliseconds(self.reading),
+                "map": milliseconds(self.mapping),
+                "write": milliseconds(self.writing),
+            },
+        })
+    }
+}
