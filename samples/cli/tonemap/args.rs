@@ -44,7 +44,8 @@ pub struct TonemapArgs {
     #[arg(long, value_enum, value_name = "MODE", help_heading = LOOK)]
     pub mode: Option<ModeName>,
 
-    /// Brightness in stops: +1 is twice as much light; auto measures the picture (auto+0.5: half a stop more) [default: 0]
+    /// Brightness in stops: +1 is twice as much light; auto measures the picture (auto+0.5: half a stop more), of a sequence its first frame
+    /// [default: 0]
     #[arg(long, value_name = "EV|auto", allow_hyphen_values = true, help_heading = LOOK)]
     pub exposure: Option<Exposure>,
 
@@ -273,9 +274,6 @@ impl FromStr for Gamma {
     }
 }
 
-/// What `--exposure auto` makes the log-average of the picture: middle grey, of 1 or of a screen of 100 cd/m².
-const MIDDLE_GREY: f32 = 0.18;
-
 impl TonemapArgs {
     /// Defaults, then the file, then the options, then `-D`.
     ///
@@ -304,9 +302,7 @@ impl TonemapArgs {
         s.mark = self.mark.map_or(s.mark, Mark::from);
         s.bad_values = self.bad_values.map_or(s.bad_values, BadValues::from);
         if let Some(exposure) = self.exposure {
-            let unit = if s.operator == Operator::Ashikhmin { 100.0 } else { 1.0 };
-            s.normalize = exposure.auto;
-            s.exposure = exposure.stops + if exposure.auto { (MIDDLE_GREY * unit).log2() } else { 0.0 };
+            s.exposure = exposure.stops;
         }
         let config: Config = config::effective(&config, None, &self.settings.define)?;
         config.tonemap.validate().map_err(|error| error.at("tonemap"))?;

@@ -1,6 +1,7 @@
 //! `tonemap`: pictures of light in, pictures for a screen out; one device for all of them.
 
 mod args;
+mod meter;
 mod names;
 mod picture;
 
@@ -51,6 +52,8 @@ struct Run<'a> {
     config: Config,
     outputs: Vec<(OutputName, Format)>,
     mask: Option<Layers>,
+    /// What `--exposure auto` found for the sequence that is being worked on, stops.
+    metered: Option<f32>,
 }
 
 /// A picture that was read, and how long that took.
@@ -68,7 +71,7 @@ pub fn run(args: &TonemapArgs, console: Console) -> Result<ExitCode> {
     }
     let (inputs, notes) = names::inputs(&args.inputs, args.layer.as_deref(), args.frames.as_ref(), args.sequence)?;
     notes.iter().for_each(|note| console.warning(note));
-    let mut run = Run { args, console, config, outputs: outputs(args)?, mask: None };
+    let mut run = Run { args, console, config, outputs: outputs(args)?, mask: None, metered: None };
     run.probe(&inputs)?;
     if let Some(path) = &args.mask {
         run.mask = Some(image::read(path, &LIMITS)?);

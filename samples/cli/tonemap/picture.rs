@@ -14,7 +14,7 @@ use lucerna::{
 };
 use serde_json::{Value, json};
 
-use super::{PIPE, Run, names::Input};
+use super::{Config, PIPE, Run, meter, names::Input};
 use crate::{config, program};
 
 /// A picture that was written.
@@ -26,6 +26,8 @@ pub(super) struct Done {
     alpha: bool,
     pub files: Vec<String>,
     bad: BadCounts,
+    /// Stops, as they were used.
+    exposure: f32,
     /// Darkest and brightest luminance and log-average after the exposure, as the operator used them.
     light: [f32; 3],
     /// Pixels with a channel over the screen's white, which .png and .jpg cut.
@@ -69,7 +71,7 @@ fn pixels(picture: &Layers, asked: Option<&str>) -> Result<(Vec<[f32; 4]>, bool)
 impl Run<'_> {
     /// Maps a picture and writes its files.
     pub(super) fn develop(
-        &self,
+        &mut self,
         still: &mut Still,
         about: &Description,
         input: &Input,
@@ -78,6 +80,8 @@ impl Run<'_> {
         let begun = Instant::now();
         let (width, height) = (picture.width, picture.height);
         let (pixels, alpha) = pixels(picture, input.layer.as_deref())?;
+        let settings = self.exposed(input, &pixels);
+        still.tonemap().set(&settings)?;
         let mask = self.mask(width, height)?;
         let dt = input.sequence.map(|_| (1.0 / self.args.fps) as f32);
         let mapped = still.map(width, height, pixels, mask.as_deref(), dt)?;
@@ -86,7 +90,7 @@ impl Run<'_> {
 
         let begun = Instant::now();
         let layers = Layers {
-            metadata: self.metadata(about, input, picture)?,
+            metadata: self.metadata(about, input, picture, &settings)?,
             ..Layers::new(width, height).with(layer_of(&mapped, alpha))
         };
         let over = |pixel: &&[f32; 4]| pixel[..3].iter().any(|&v| v > 1.0);
@@ -107,12 +111,29 @@ impl Run<'_> {
             alpha,
             files,
             bad: mapped.bad,
+            exposure: settings.exposure,
             light: [s.low, s.high, s.log_average],
             over_white,
             reading: Duration::ZERO,
             mapping,
             writing: begun.elapsed(),
         })
+    }
+
+    /// The settings of a picture: with the exposure that was measured, if that was asked for.
+    fn exposed(&mut self, input: &Input, pixels: &[[f32; 4]]) -> Settings {
+        let mut settings = self.settings().clone();
+        if !self.args.exposure.is_some_and(|exposure| exposure.auto) {
+            return settings;
+        }
+        let metered = match self.metered.filter(|_| input.sequence == Some(false)) {
+            Some(stops) => stops,
+            None => meter::stops(pixels, settings.operator),
+        };
+        self.metered = Some(metered);
+        self.console.detail(&format!("{}: measured exposure {metered:+.2} EV", input.name));
+        settings.exposure = (settings.exposure + metered).clamp(-40.0, 40.0);
+        settings
     }
 
     fn write(&self, name: &str, format: Format, layers: &Layers) -> Result<()> {
@@ -159,14 +180,14 @@ impl Run<'_> {
         if bad.nan + bad.infinite > 0 { self.console.warning(&text) } else { self.console.detail(&text) }
     }
 
-    fn metadata(&self, about: &Description, input: &Input, picture: &Layers) -> Result<Metadata> {
+    fn metadata(&self, about: &Description, input: &Input, picture: &Layers, settings: &Settings) -> Result<Metadata> {
         let source = &picture.metadata;
         let gamma = self.args.gamma.0.map_or_else(|| json!("srgb"), |gamma| json!(gamma));
         let mut config = json!({
             "command": ["tonemap"],
             "input": input.name,
             "gamma": gamma,
-            "settings": config::to_value(&self.config)?,
+            "settings": config::to_value(&Config { tonemap: settings.clone() })?,
         });
         if input.sequence.is_some() {
             config["sequence"] = json!({ "frame": input.frame, "fps": self.args.fps });
@@ -209,6 +230,7 @@ impl Done {
                 "negative": self.bad.negative,
                 "first": self.bad.first,
             },
+            "exposure": self.exposure,
             "luminance": { "low": finite(self.light[0]), "high": finite(self.light[1]), "log_average": finite(self.light[2]) },
             "pixels_over_white": self.over_white,
             "milliseconds": {
