@@ -5,7 +5,7 @@ use lucerna::{
     gpu::{DeviceKind, Gpu, ImageDesc as OwnedDesc, OwnedImage, Region, Started, testing::with_gpu},
     graph::*,
     shaders::{test::*, tonemap, types},
-    techniques::tonemap::{Identify, Mark, Mode, Settings, Still, identify, mark},
+    techniques::tonemap::{Identify, Local, Mark, Mode, Settings, Still, identify, mark},
 };
 
 const MARKS: [Mark; 4] = [Mark::Branch, Mark::Tiles, Mark::EarlyZ, Mark::Compact];
@@ -59,9 +59,10 @@ fn adapt(gpu: &Gpu, size: [u32; 2], luminance: &[f32], importance: &[f32], mark:
     let images = [owned(gpu, "luminance", size, luminance), owned(gpu, "importance", size, importance)];
     let mut graph = Graph::new("mark");
     let [image, importance] = images.map(|i| graph.import_image(&i));
-    let settings = Settings { mark, radius: 3, ..Settings::default() };
+    let settings = Settings { mark, radius: 3, local: Local::Literal, ..Settings::default() };
+    let statistics = statistics(&mut graph, 1.0);
     let extent = graph.extent(image);
-    let adapted = mark::adapt(&mut graph, image, importance, extent, &settings);
+    let adapted = mark::adapt(&mut graph, image, importance, statistics, extent, &settings).unwrap();
     let token = graph.read_image(adapted);
     let frame = run(gpu, graph);
     let pass = frame.report.passes.iter().rev().find(|p| p.name.starts_with("tonemap.marked")).unwrap();

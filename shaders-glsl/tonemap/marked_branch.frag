@@ -5,7 +5,6 @@
 
 layout(location = 0) out float adapted;
 layout(binding = 2) uniform sampler2D importance;
-layout(binding = 0) uniform sampler2D luminance;
 #include "lib/tonemap_local.glsl"
 
 void main() {

@@ -9,7 +9,6 @@ layout(binding = 2, scalar) readonly buffer Count { uint count; };
 layout(binding = 3, scalar) readonly buffer Pixels { uint pixels[]; };  // x in the low 16 bits, y in the high ones
 layout(binding = 4, r32f) uniform writeonly image2D adapted;
 #include "lib/tonemap_list.glsl"
-layout(binding = 0) uniform sampler2D luminance;
 #include "lib/tonemap_local.glsl"
 
 void main() {

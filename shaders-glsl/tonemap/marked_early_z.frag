@@ -6,7 +6,6 @@
 
 layout(early_fragment_tests) in;
 layout(location = 0) out float adapted;
-layout(binding = 0) uniform sampler2D luminance;
 #include "lib/tonemap_local.glsl"
 
 void main() {

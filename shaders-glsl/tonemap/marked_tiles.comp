@@ -10,7 +10,6 @@ layout(binding = 3, scalar) readonly buffer Count { uint count; };
 layout(binding = 4, scalar) readonly buffer Tiles { uint tiles[]; };
 layout(binding = 5, r32f) uniform writeonly image2D adapted;
 #include "lib/tonemap_list.glsl"
-layout(binding = 0) uniform sampler2D luminance;
 #include "lib/tonemap_local.glsl"
 
 void main() {

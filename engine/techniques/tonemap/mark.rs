@@ -9,15 +9,15 @@
 //!
 //! All give the same picture to the bit: they call the same function of the same texels.
 
-use super::{Mark, Settings};
+use super::{
+    Local, Mark, Settings, local,
+    search::{Search, Tables},
+};
 use crate::{
+    Result,
     graph::{Buffer, Compare, Depth, Draw, Extent, Format, Graph, Image, Load, Raster, Targets},
-    shaders::{
-        tonemap::{
-            list_groups, list_pixels, list_tiles, mark_depth, marked_branch, marked_compact, marked_early_z,
-            marked_tiles,
-        },
-        types::TonemapLocal,
+    shaders::tonemap::{
+        list_groups, list_pixels, list_tiles, mark_depth, marked_branch, marked_compact, marked_early_z, marked_tiles,
     },
 };
 
@@ -30,23 +30,58 @@ const DEPTH_IMPORTANT: f32 = 0.0;
 const DEPTH_OTHER: f32 = 1.0;
 const DEPTH_DRAWN: f32 = 0.5;
 
-/// Adaptation luminance (R32F): by the operator's local component, computed literally, where `importance` is not 0;
-/// elsewhere the luminance itself, from which the operator's curve makes what its global mode shows.
-pub fn adapt(graph: &mut Graph, luminance: Image, importance: Image, _picture: Extent, settings: &Settings) -> Image {
+/// Local adaptation where `importance` is not 0; elsewhere the luminance itself, from which the operator's curve makes what its global
+/// mode shows. `picture`: extent of the whole picture, of which `luminance` may be a part.
+///
+/// By definition ([`Local::Literal`]), it is computed for the important pixels alone. What [`Local::Fast`] saves, it saves by sharing work
+/// between neighbours; it is computed for all pixels, and then taken for the important ones.
+///
+/// # Errors
+/// `Usage` if the settings cannot serve a picture of this extent.
+pub fn adapt(
+    graph: &mut Graph,
+    luminance: Image,
+    importance: Image,
+    statistics: Buffer,
+    picture: Extent,
+    settings: &Settings,
+) -> Result<Image> {
     let extent = graph.extent(luminance);
-    let local = graph.uniform(&TonemapLocal { radius: settings.radius, contrast: settings.contrast });
+    let found = Search::new(settings).filter(|_| settings.local == Local::Literal);
+    let literal = found.is_some().into();
+    let (tables, adaptation) = match found {
+        // What the shaders do not read in one of the cases is bound to something of its kind.
+        Some(search) => (search.tables(graph), luminance),
+        None => (Tables::none(graph), local::adaptation(graph, luminance, statistics, picture, settings)?),
+    };
+    let Tables { search, weights } = tables;
     let adapted = graph.image("tonemap.adapted", Format::R32F, extent);
     graph.copy(luminance, adapted);
     let target = Targets::new().color(adapted, Load::Keep);
     match settings.mark {
         Mark::Branch => {
-            let args = marked_branch::Args { luminance, local, importance };
+            let args = marked_branch::Args {
+                luminance,
+                search,
+                weights,
+                statistics,
+                adaptation,
+                importance,
+                spec: marked_branch::Spec { literal },
+            };
             graph.raster(target, Raster::new(), args, Draw::fullscreen()).counted();
         }
         Mark::EarlyZ => {
             let depth = graph.image("tonemap.marked", Format::D32F, extent);
             mark_depth(graph, importance, depth);
-            let args = marked_early_z::Args { luminance, local };
+            let args = marked_early_z::Args {
+                luminance,
+                search,
+                weights,
+                statistics,
+                adaptation,
+                spec: marked_early_z::Spec { literal },
+            };
             let (target, state) = early_z(target, depth);
             graph.raster(target, state, args, Draw::fullscreen_at(DEPTH_DRAWN)).counted();
         }
@@ -57,7 +92,18 @@ pub fn adapt(graph: &mut Graph, luminance: Image, importance: Image, _picture: E
             graph.fill(count, 0);
             graph.compute(list_tiles::Args { importance, count, tiles }, extent);
             let groups = groups(graph, count, 1);
-            let args = marked_tiles::Args { luminance, local, importance, count, tiles, adapted };
+            let args = marked_tiles::Args {
+                luminance,
+                search,
+                weights,
+                statistics,
+                adaptation,
+                importance,
+                count,
+                tiles,
+                adapted,
+                spec: marked_tiles::Spec { literal },
+            };
             graph.compute_indirect(args, groups, 0).counted();
         }
         Mark::Compact => {
@@ -70,12 +116,22 @@ pub fn adapt(graph: &mut Graph, luminance: Image, importance: Image, _picture: E
                 let push = list_pixels::Push { first_row, rows };
                 graph.compute(list_pixels::Args { importance, count, pixels, push }, [extent.width, rows]);
                 let groups = groups(graph, count, 64);
-                let args = marked_compact::Args { luminance, local, count, pixels, adapted };
+                let args = marked_compact::Args {
+                    luminance,
+                    search,
+                    weights,
+                    statistics,
+                    adaptation,
+                    count,
+                    pixels,
+                    adapted,
+                    spec: marked_compact::Spec { literal },
+                };
                 graph.compute_indirect(args, groups, 0).counted();
             }
         }
     }
-    adapted
+    Ok(adapted)
 }
 
 /// Draws the map as depth.

@@ -136,14 +136,10 @@ fn map(
     let adaptation = match settings.mode() {
         Mode::Global => luminance,
         Mode::Local => local::adaptation(graph, luminance, statistics, picture, settings)?,
-        Mode::Selective if settings.operator != Operator::Ashikhmin => {
-            let what = format!("local adaptation of {} is not there yet", settings.operator.name());
-            return Err(crate::Error::usage(what).at("mode"));
-        }
         Mode::Selective => {
             let importance = identify::importance(graph, luminance, statistics, input.mask, settings);
             important = Some(importance);
-            mark::adapt(graph, luminance, importance, picture, settings)
+            mark::adapt(graph, luminance, importance, statistics, picture, settings)?
         }
     };
     let mapped = curve(graph, input.color, luminance, adaptation, statistics, settings);
