@@ -4,10 +4,11 @@
 use lucerna::{
     gpu::{DeviceKind, Gpu, ImageDesc as OwnedDesc, OwnedImage, Region, Started, testing::with_gpu},
     graph::*,
-    shaders::{test::*, tonemap, types},
-    techniques::tonemap::{Identify, Local, Mark, Mode, Settings, Still, identify, mark},
+    shaders::{self, test::*, types},
+    techniques::tonemap::{self, Identify, Local, Mark, Mode, Operator, Settings, Still, identify, mark},
 };
 
+const OPERATORS: [Operator; 2] = [Operator::Ashikhmin, Operator::Reinhard];
 const MARKS: [Mark; 4] = [Mark::Branch, Mark::Tiles, Mark::EarlyZ, Mark::Compact];
 /// One pixel, less than a tile, a tile, more than whole tiles, a line.
 const SIZES: [[u32; 2]; 6] = [[1, 1], [3, 5], [8, 8], [17, 9], [37, 29], [70, 1]];
@@ -202,10 +203,10 @@ fn modes(shader: &lucerna::shader::Shader) -> Vec<u32> {
 fn early_tests_are_forced_in_the_shader_and_depth_is_not_written() {
     const EARLY_FRAGMENT_TESTS: u32 = 9;
     use lucerna::shader::Args;
-    assert!(modes(tonemap::marked_early_z::Args::SHADER).contains(&EARLY_FRAGMENT_TESTS));
+    assert!(modes(shaders::tonemap::marked_early_z::Args::SHADER).contains(&EARLY_FRAGMENT_TESTS));
     assert!(modes(tonemap_early::Args::SHADER).contains(&EARLY_FRAGMENT_TESTS));
     assert!(!modes(tonemap_late::Args::SHADER).contains(&EARLY_FRAGMENT_TESTS));
-    assert!(!modes(tonemap::marked_branch::Args::SHADER).contains(&EARLY_FRAGMENT_TESTS));
+    assert!(!modes(shaders::tonemap::marked_branch::Args::SHADER).contains(&EARLY_FRAGMENT_TESTS));
     let mut graph = Graph::new("state");
     let depth = graph.image("depth", Format::D32F, Extent::new(4, 4));
     let (targets, state) = mark::early_z(Targets::new(), depth);
@@ -353,6 +354,50 @@ fn tiles_of_a_picture_have_the_map_of_the_whole() {
             let whole = map(Still::new(gpu, &settings).unwrap());
             let tiled = map(Still::new(gpu, &settings).unwrap().tiles(80));
             assert!(whole == tiled, "{identify:?} at 1/{identify_scale}");
+        }
+    });
+}
+
+#[test]
+fn selective_is_local_where_marked_and_global_elsewhere() {
+    with_gpu(|gpu| {
+        let (width, height) = (37, 19);
+        let count = (width * height) as usize;
+        let grain = noise(4, count);
+        let pixels: Vec<[f32; 4]> = grain.iter().map(|g| [g.exp2(), 2.0 * g, g * g, 1.0]).collect();
+        let mask: Vec<f32> = noise(8, count).iter().map(|n| f32::from(u8::from(*n < 0.4))).collect();
+        for operator in OPERATORS {
+            for local in [Local::Fast, Local::Literal] {
+                let with = |mode, mark, mask: &[f32]| {
+                    // Nothing is important but the mask.
+                    let settings = Settings {
+                        operator,
+                        local,
+                        mode: Some(mode),
+                        mark,
+                        threshold: 1e18,
+                        radius: 3,
+                        scales: 4,
+                        ..Settings::default()
+                    };
+                    tonemap::apply(gpu, width, height, &pixels, Some(mask), &settings).unwrap().pixels
+                };
+                let local_mode = with(Mode::Local, Mark::Branch, &mask);
+                let none = with(Mode::Selective, Mark::Branch, &vec![0.0; count]);
+                assert_ne!(local_mode, none, "{operator:?}");
+                if operator != Operator::Reinhard {
+                    // Its curve of the global mode has a white, that of the local one has none.
+                    assert_eq!(none, with(Mode::Global, Mark::Branch, &mask), "{operator:?}");
+                }
+                let all = with(Mode::Selective, Mark::Compact, &vec![1.0; count]);
+                assert_eq!(all, local_mode, "{operator:?}, {local:?}");
+                for mark in MARKS {
+                    let found = with(Mode::Selective, mark, &mask);
+                    let expected = |i: usize| if mask[i] == 1.0 { local_mode[i] } else { none[i] };
+                    let wrong = (0..count).filter(|&i| found[i] != expected(i)).count();
+                    assert_eq!(wrong, 0, "{operator:?}, {local:?}, {mark:?}");
+                }
+            }
         }
     });
 }

@@ -41,6 +41,16 @@ pub struct Tables {
     pub weights: Buffer,
 }
 
+impl Tables {
+    /// Of no averages.
+    pub fn none(graph: &mut Graph) -> Self {
+        Self {
+            search: graph.buffer_from("tonemap.search", &[TonemapSearch::default()]),
+            weights: graph.buffer_from("tonemap.weights", &[[0.0f32; 4]]),
+        }
+    }
+}
+
 impl Search {
     /// Of Ashikhmin and Reinhard; `None` for other operators.
     pub fn new(settings: &Settings) -> Option<Self> {
