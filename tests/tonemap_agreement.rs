@@ -4,6 +4,8 @@
 //! `cargo test --test tonemap_agreement -- --nocapture` prints how far they are apart.
 
 mod common;
+#[path = "agreement/pyramids.rs"]
+mod pyramids;
 
 use std::{collections::BTreeMap, fs, path::Path};
 
@@ -38,62 +40,79 @@ fn crop(assets: &Path, file: &str, left: usize, top: usize) -> Vec<[f32; 3]> {
     crop
 }
 
-/// What the program of the second column computes, by our twin, in the form that the program writes.
-fn ours(operator: &str, luminance: &Plane) -> Plane {
+/// Whose local adaptation goes into an operator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Adaptation {
+    /// The twin's, which is the paper's.
+    Ours,
+    /// What Luminance HDR has in its place.
+    Pyramids,
+}
+
+/// What `operator` computes, by our twin, in the form that the programs write.
+fn ours(operator: &str, luminance: &Plane, adaptation: Adaptation) -> Plane {
     let (low, high) = luminance.range().unwrap();
     let curve = ashikhmin::Curve { low, high, display: 100.0 };
     let search = ashikhmin::Search { largest: 10, contrast: 0.5 };
     let average = statistics::log_average(&luminance.values, 1e-5);
     let scales = reinhard::Scales { count: 8, key: 0.18, phi: 8.0, epsilon: 0.05 };
     let scaled = luminance.map(|l| l * scales.key / average);
-    let with = |level: &Plane, f: &(dyn Fn(f64, f64) -> f64 + Sync)| {
-        Plane::from_fn(luminance.width, luminance.height, |x, y| f(luminance[(x, y)], level[(x, y)]))
+    let with = |of: &Plane, level: &Plane, f: &(dyn Fn(f64, f64) -> f64 + Sync)| {
+        Plane::from_fn(luminance.width, luminance.height, |x, y| f(of[(x, y)], level[(x, y)]))
     };
-    // Luminance HDR divides by the largest value it finds.
+    let level = || match adaptation {
+        Adaptation::Ours => search.adaptation(luminance),
+        Adaptation::Pyramids => pyramids::ashikhmin(luminance, search.contrast),
+    };
+    // Luminance HDR takes 10⁻⁵ for black, and maps what it finds, and 0, onto 0 to 1.
+    let lifted = || level().map(|a| if a == 0.0 { 1e-5 } else { a });
     let normal = |plane: Plane| {
-        let largest = plane.range().unwrap().1;
-        plane.map(|v| v / largest)
+        let (low, high) = plane.range().unwrap();
+        let (low, high) = (low.min(0.0), high.max(0.0));
+        plane.map(|v| (v - low) / (high - low))
     };
     match operator {
         "luminance" => luminance.clone(),
         "ashikhmin-global" => luminance.map(|l| curve.display(l, l) / curve.display),
-        "ashikhmin-adaptation" => search.adaptation(luminance),
-        "ashikhmin-local" => with(&search.adaptation(luminance), &|l, a| curve.display(l, a) / curve.display),
-        "ashikhmin-eq2" => {
-            let level = search.adaptation(luminance).map(|a| if a == 0.0 { 1e-5 } else { a });
-            normal(with(&level, &|l, a| l * curve.map(a) / a))
-        }
+        "ashikhmin-adaptation" => level(),
+        "ashikhmin-local" => with(luminance, &level(), &|l, a| curve.display(l, a) / curve.display),
+        // The paper's equation 2, which keeps ratios instead of visible steps.
+        "ashikhmin-eq2" => normal(with(luminance, &lifted(), &|l, a| l * curve.map(a) / a)),
+        // What Luminance HDR has for equation 4: C where the paper has TVI, and its display is five times as bright.
         "ashikhmin-eq4" => {
-            let level = search.adaptation(luminance).map(|a| if a == 0.0 { 1e-5 } else { a });
-            let capacity = ashikhmin::capacity;
-            normal(with(&level, &|l, a| curve.map(a) + capacity(curve.map(a)) / capacity(a) * (l - a)))
+            let (capacity, curve) = (ashikhmin::capacity, ashikhmin::Curve { display: 500.0, ..curve });
+            let shown = |l: f64, a: f64| curve.map(a) + capacity(curve.map(a)) / capacity(a) * (l - a);
+            normal(with(luminance, &lifted(), &shown))
         }
         "reinhard-global" => {
             let white = scaled.range().unwrap().1;
             scaled.map(|l| reinhard::global(l, white))
         }
-        "reinhard-local" => {
-            let level = scales.adaptation(&scaled);
-            Plane::from_fn(scaled.width, scaled.height, |x, y| reinhard::local(scaled[(x, y)], level[(x, y)]))
-        }
+        "reinhard-local" => with(&scaled, &scales.adaptation(&scaled), &reinhard::local),
         _ => panic!("no operator is called {operator}"),
     }
 }
 
 /// Largest RMS % and mean % (Michael 2010, equations 18 and 19) that are accepted.
-fn tolerance(operator: &str, program: &str) -> [f64; 2] {
-    match (program.starts_with("Luminance"), operator) {
-        (false, _) => [1e-4, 1e-4],
-        (true, "ashikhmin-global" | "reinhard-global") => [1e-3, 1e-3],
-        _ => [1e9, 1e9],
+fn tolerance(operator: &str, program: &str, adaptation: Adaptation) -> [f64; 2] {
+    match (program.starts_with("Luminance"), operator, adaptation) {
+        (false, ..) => [1e-4, 1e-4],
+        (true, "ashikhmin-global" | "reinhard-global", _) | (_, _, Adaptation::Pyramids) => [1e-3, 1e-3],
+        // A pyramid is no Gaussian. Measured: 49 % and 48 % at most.
+        (true, "ashikhmin-eq2", _) => [60.0, 60.0],
+        (true, "ashikhmin-eq4", _) => [15.0, 15.0],
+        // Its local Reinhard gives 0.1713 for a picture of one luminance, where equation 9 leads to 0.18 / 1.18 = 0.1525.
+        (true, "reinhard-local", _) => [12.0, 12.0],
+        _ => [0.0; 2],
     }
 }
 
 #[test]
 fn agrees_with_independent_programs() {
     let Some(assets) = common::assets() else { return };
-    let crops: BTreeMap<&str, Vec<[f32; 3]>> =
+    let mut crops: BTreeMap<&str, Vec<[f32; 3]>> =
         CROPS.iter().map(|(name, file, left, top)| (*name, crop(&assets, file, *left, *top))).collect();
+    crops.insert("even", vec![[1.0; 3]; SIZE[0] * SIZE[1]]);
     if let Some(folder) = std::env::var_os("LUCERNA_WRITE_CROPS") {
         fs::create_dir_all(&folder).unwrap();
         for (name, pixels) in &crops {
@@ -104,25 +123,29 @@ fn agrees_with_independent_programs() {
         return;
     }
     let mut wrong = Vec::new();
-    let mut computed: BTreeMap<(&str, &str), Plane> = BTreeMap::new();
+    let mut computed: BTreeMap<(&str, &str, Adaptation), Plane> = BTreeMap::new();
     for line in include_str!("agreement/tonemap.tsv").lines().skip(1) {
         let columns: Vec<&str> = line.split('\t').collect();
         let [name, operator, _, program, values] = columns[..] else { panic!("{line}") };
-        let ours = computed
-            .entry((name, operator))
-            .or_insert_with(|| ours(operator, &plane::luminance(SIZE[0], SIZE[1], &crops[name])));
-        let places =
-            (STEP / 2..SIZE[1]).step_by(STEP).flat_map(|y| (STEP / 2..SIZE[0]).step_by(STEP).map(move |x| (x, y)));
-        let values: Vec<f64> = values.split(' ').map(|v| v.parse().unwrap()).collect();
-        let errors: Vec<f64> = places.zip(&values).map(|(at, theirs)| (ours[at] - theirs) / theirs).collect();
-        assert_eq!(errors.len(), values.len());
-        let n = errors.len() as f64;
-        let rms = 100.0 * (errors.iter().map(|e| e * e).sum::<f64>() / n).sqrt();
-        let mean = 100.0 * errors.iter().map(|e| e.abs()).sum::<f64>() / n;
-        println!("{name:10} {operator:22} {program:24} RMS {rms:9.5} %  mean {mean:9.5} %");
-        let most = tolerance(operator, program);
-        if !(rms <= most[0] && mean <= most[1]) {
-            wrong.push(format!("{name} {operator} {program}: RMS {rms} %, mean {mean} %, allowed {most:?}"));
+        let theirs: Vec<f64> = values.split(' ').map(|v| v.parse().unwrap()).collect();
+        let pyramids = operator.starts_with("ashikhmin-eq").then_some(Adaptation::Pyramids);
+        for adaptation in [Adaptation::Ours].into_iter().chain(pyramids) {
+            let ours = computed
+                .entry((name, operator, adaptation))
+                .or_insert_with(|| ours(operator, &plane::luminance(SIZE[0], SIZE[1], &crops[name]), adaptation));
+            let places = (STEP / 2..SIZE[1]).step_by(STEP);
+            let places = places.flat_map(|y| (STEP / 2..SIZE[0]).step_by(STEP).map(move |x| (x, y)));
+            let errors: Vec<f64> = places.zip(&theirs).map(|(at, theirs)| (ours[at] - theirs) / theirs).collect();
+            assert_eq!(errors.len(), theirs.len());
+            let n = errors.len() as f64;
+            let rms = 100.0 * (errors.iter().map(|e| e * e).sum::<f64>() / n).sqrt();
+            let mean = 100.0 * errors.iter().map(|e| e.abs()).sum::<f64>() / n;
+            let how = format!("{adaptation:?}").to_lowercase();
+            println!("{name:10} {operator:22} {program:24} {how:10} RMS {rms:9.5} %  mean {mean:9.5} %");
+            let most = tolerance(operator, program, adaptation);
+            if !(rms <= most[0] && mean <= most[1]) {
+                wrong.push(format!("{name} {operator} {program} {how}: RMS {rms} %, mean {mean} %, allowed {most:?}"));
+            }
         }
     }
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
