@@ -5,9 +5,9 @@ mod rows;
 #[cfg(test)]
 mod tests;
 
-use lucerna::{Result, image::srgb, measure::Measure};
+use lucerna::{Error, Result, image::srgb, measure::Measure};
 
-use self::rows::{Row, exposure};
+use self::rows::{Parts, Row, exposure};
 use crate::{
     experiment::{
         file::Role,
@@ -52,7 +52,11 @@ fn row(results: &Results, run: &Done) -> Result<Option<Row>> {
     // What shines itself is direct light here, as in the pictures under test.
     let reference_direct: Vec<[f32; 3]> =
         reference.iter().zip(&bounced).map(|(all, indirect)| [0, 1, 2].map(|c| all[c] - indirect[c])).collect();
-    let (mut total_px, mut direct_px) = (results.picture(total)?.pixels, results.picture(direct)?.pixels);
+    let shown = results.picture(total)?;
+    let (width, mut total_px, mut direct_px) = (shown.width as usize, shown.pixels, results.picture(direct)?.pixels);
+    if [bounced.len(), total_px.len(), direct_px.len()].iter().any(|pixels| *pixels != reference.len()) {
+        return Err(Error::input(format!("{}/{}: the pictures differ in size", run.scene, run.view)));
+    }
     let sum = |pixels: &[[f32; 3]]| pixels.iter().flatten().map(|v| f64::from(*v)).sum::<f64>();
     if own_law {
         let own = sum(&direct_px);
@@ -63,7 +67,15 @@ fn row(results: &Results, run: &Done) -> Result<Option<Row>> {
     let scale = exposure(&reference);
     let errors = Errors::of(&reference, &direct_px, &total_px, scale);
     let indirect = sum(&bounced);
-    let apart: f64 = direct_px.iter().zip(&reference_direct).map(|(a, b)| difference(a, b)).sum();
+    let added = |i: usize| [0, 1, 2].map(|c| total_px[i][c] - direct_px[i][c]);
+    let wide = |v: [f32; 3]| v.map(f64::from);
+    let parts = Parts::of(width, (&direct_px, &reference_direct), |i| (wide(added(i)), wide(bounced[i])));
+    let (mut indirect_better, mut indirect_worse) = (0, 0);
+    for (i, bounced) in bounced.iter().enumerate() {
+        let (before, after) = (difference(bounced, &[0.0; 3]), difference(bounced, &added(i)));
+        indirect_better += usize::from(after < before);
+        indirect_worse += usize::from(after > before);
+    }
     Ok(Some(Row {
         scene: run.scene.clone(),
         view: run.view.clone(),
@@ -78,7 +90,10 @@ fn row(results: &Results, run: &Done) -> Result<Option<Row>> {
         worse: errors.worse,
         pixels: reference.len(),
         found: (sum(&total_px) - sum(&direct_px)) / indirect.max(1e-20),
-        not_indirect: apart / (3.0 * reference.len() as f64) / errors.direct.max(1e-20),
+        indirect_better,
+        indirect_worse,
+        reached: bounced.iter().filter(|pixel| **pixel != [0.0; 3]).count(),
+        parts,
     }))
 }
 

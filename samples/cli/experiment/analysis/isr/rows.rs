@@ -22,9 +22,66 @@ pub struct Row {
     pub pixels: usize,
     /// Share of the reference's indirect light that the technique finds, as means over the picture.
     pub found: f64,
-    /// Error of direct light against the reference's direct light, as a share of its error against the whole: what no indirect
-    /// light can mend (shadow maps, filtered textures).
-    pub not_indirect: f64,
+    /// Pixels where the indirect light alone is nearer to the reference's than none is, where it is farther, and where the reference
+    /// has any.
+    pub indirect_better: usize,
+    pub indirect_worse: usize,
+    pub reached: usize,
+    /// What the error that is left consists of.
+    pub parts: Parts,
+}
+
+/// What an error that is left consists of, sums of |·| over pixels and channels.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Parts {
+    /// Of direct light against the reference's direct light: no indirect light can mend it (shadow maps, filtered textures).
+    pub direct: f64,
+    /// Indirect light of the reference that was not found, and light where the reference has less, as means over blocks of pixels, so
+    /// that the reference's noise averages out.
+    pub missing: f64,
+    pub excess: f64,
+    /// What is left of the indirect light's error within blocks: the reference's noise, and detail.
+    pub fine: f64,
+}
+
+/// Sides of the blocks, pixels.
+const BLOCK: usize = 8;
+
+impl Parts {
+    /// Of pictures `width` wide, row by row.
+    pub fn of(
+        width: usize,
+        direct: (&[[f32; 3]], &[[f32; 3]]),
+        indirect: impl Fn(usize) -> ([f64; 3], [f64; 3]),
+    ) -> Self {
+        let (mut out, width) = (Self::default(), width.max(1));
+        let columns = width.div_ceil(BLOCK).max(1);
+        let mut blocks = vec![[0.0; 3]; columns * direct.0.len().div_ceil(width * BLOCK)];
+        let mut whole = 0.0;
+        for (i, (found, reference)) in direct.0.iter().zip(direct.1).enumerate() {
+            let (found_indirect, true_indirect) = indirect(i);
+            let block = &mut blocks[i / width / BLOCK * columns + i % width / BLOCK];
+            for c in 0..3 {
+                out.direct += (f64::from(found[c]) - f64::from(reference[c])).abs();
+                let missing = true_indirect[c] - found_indirect[c];
+                whole += missing.abs();
+                block[c] += missing;
+            }
+        }
+        for missing in blocks.into_iter().flatten() {
+            out.missing += missing.max(0.0);
+            out.excess += (-missing).max(0.0);
+        }
+        out.fine = (whole - out.missing - out.excess).max(0.0);
+        out
+    }
+
+    /// Shares of the sum, in percent: direct, missing, excess, fine.
+    pub fn percent(&self) -> [f64; 4] {
+        let all = [self.direct, self.missing, self.excess, self.fine];
+        let sum: f64 = all.iter().sum();
+        all.map(|part| if sum > 0.0 { 100.0 * part / sum } else { 0.0 })
+    }
 }
 
 /// Percent of an error that is gone. NaN where there was none.
@@ -47,20 +104,24 @@ impl Row {
         self.correlation - self.direct_correlation
     }
 
-    /// What most stands in the way of a larger gain.
+    /// What most of the error that is left is; empty where little of it is left.
     pub fn reason(&self) -> &'static str {
         if !self.gain().is_finite() {
-            "direct light alone has no error"
-        } else if self.gain() > 20.0 {
-            ""
-        } else if self.not_indirect > 0.6 {
-            "most of the error is that of direct light itself: shadow edges, emissive lamps out of the picture, textures that the reference does not filter"
-        } else if self.found < 0.15 {
-            "what lights these surfaces is not in the picture"
-        } else if self.found > 1.2 {
+            return "direct light alone has no error";
+        }
+        if self.gain() > 20.0 {
+            return "";
+        }
+        let [direct, missing, excess, fine] = self.parts.percent();
+        let most = direct.max(missing).max(excess).max(fine);
+        if most == direct {
+            "direct light itself: shadow edges, emissive lamps out of the picture, textures that the reference does not filter"
+        } else if most == missing {
+            "light of surfaces that the picture does not show is missing"
+        } else if most == excess {
             "light passes through what the picture does not show"
         } else {
-            ""
+            "noise of the reference, or detail"
         }
     }
 }
@@ -129,7 +190,10 @@ mod tests {
             worse: 30,
             pixels: 100,
             found: 0.5,
-            not_indirect: 0.1,
+            indirect_better: 50,
+            indirect_worse: 5,
+            reached: 80,
+            parts: Parts { direct: 1.0, missing: 6.0, excess: 2.0, fine: 1.0 },
         }
     }
 
@@ -158,9 +222,27 @@ mod tests {
     #[test]
     fn reasons_are_told_apart() {
         assert_eq!(row(1.0, 0.5).reason(), "");
-        assert!(Row { not_indirect: 0.9, ..row(1.0, 0.99) }.reason().contains("direct light itself"));
-        assert!(Row { found: 0.02, ..row(1.0, 0.99) }.reason().contains("not in the picture"));
-        assert!(Row { found: 1.5, ..row(1.0, 1.1) }.reason().contains("passes through"));
+        let named = |parts| Row { parts, ..row(1.0, 0.99) }.reason();
+        let parts = row(1.0, 1.0).parts;
+        assert_eq!(parts.percent(), [10.0, 60.0, 20.0, 10.0]);
+        assert!(named(parts).contains("is missing"));
+        assert!(named(Parts { direct: 9.0, ..parts }).contains("direct light itself"));
+        assert!(named(Parts { excess: 9.0, ..parts }).contains("passes through"));
+        assert!(named(Parts { fine: 9.0, ..parts }).contains("noise"));
+    }
+
+    #[test]
+    fn errors_are_told_apart_from_noise_by_blocks() {
+        // Two blocks of 8 × 8: in the left one every other pixel of the reference has 2 where 1 was found; the right one misses 1.
+        let (width, height) = (16, 8);
+        let pixels = vec![[1.0f32; 3]; width * height];
+        let mut direct = pixels.clone();
+        direct[0] = [1.5, 1.0, 1.0];
+        let parts = Parts::of(width, (&direct, &pixels), |i| {
+            let reference = if i % width < 8 { 2.0 * (i % 2) as f64 } else { 2.0 };
+            ([1.0; 3], [reference; 3])
+        });
+        assert_eq!(parts, Parts { direct: 0.5, missing: 192.0, excess: 0.0, fine: 192.0 });
     }
 
     #[test]

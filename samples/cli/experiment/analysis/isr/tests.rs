@@ -3,7 +3,10 @@ use lucerna::{
     techniques::isr::{PictureSettings, Preset, Settings},
 };
 
-use super::{Errors, page, rows::Row};
+use super::{
+    Errors, page,
+    rows::{Parts, Row},
+};
 use crate::experiment::{file, kinds};
 
 #[test]
@@ -65,7 +68,10 @@ fn the_figures_stand_beside_the_dissertations() {
         worse: 1,
         pixels: 10,
         found: 0.4,
-        not_indirect: 0.0,
+        indirect_better: 6,
+        indirect_worse: 1,
+        reached: 8,
+        parts: Parts::default(),
     };
     let rows = [row("a", false, 1.0, 0.9), row("b", true, 1.0, 0.8), row("b", true, 1.0, 1.2)];
     let section = page::figures(&rows, &[], &[]);
@@ -92,6 +98,8 @@ fn the_figures_stand_beside_the_dissertations() {
         ("gain, simple scenes, most", 10.0),
         ("gain, complex scenes, least", -20.0),
         ("pixels improved", 90.0),
+        ("pixels whose indirect light alone is nearer than none", 60.0),
+        ("pixels that no indirect light reaches in the reference", 20.0),
     ] {
         assert!((ours(quantity) - expected).abs() < 1e-9, "{quantity}: {}", ours(quantity));
     }
