@@ -66,10 +66,30 @@ fn fast_local_adaptation_is_the_definition() {
     });
 }
 
+/// The blocks of the fast bilateral filter: exact where a block is a pixel, near the definition elsewhere.
+#[test]
+fn fast_bilateral_filter_is_near_its_definition() {
+    with_gpu(|gpu| {
+        for (spatial, mean, most) in [(0.03, 1e-6, 1e-5), (0.08, 0.006, 0.05)] {
+            let (width, height) = (90, 60);
+            let pixels = picture(width, height, 3);
+            let fast = Settings { spatial, ..with(Operator::Bilateral, Mode::Local) };
+            let literal = Settings { local: Local::Literal, ..fast.clone() };
+            let fast = run(gpu, width, height, &pixels, &fast);
+            let literal = run(gpu, width, height, &pixels, &literal);
+            let errors: Vec<f32> = fast.iter().zip(&literal).map(|(f, l)| (f[2] / l[2] - 1.0).abs()).collect();
+            let found = errors.iter().sum::<f32>() / errors.len() as f32;
+            let largest = errors.iter().copied().fold(0.0, f32::max);
+            println!("spatial {spatial}: mean {found}, largest {largest}");
+            assert!(found < mean && largest < most, "{spatial}: mean {found}, largest {largest}");
+        }
+    });
+}
+
 #[test]
 fn images_without_anything_to_adapt_to() {
     with_gpu(|gpu| {
-        for (operator, mode) in [Operator::Ashikhmin, Operator::Reinhard]
+        for (operator, mode) in [Operator::Ashikhmin, Operator::Reinhard, Operator::Bilateral]
             .into_iter()
             .flat_map(|o| [(o, Mode::Global), (o, Mode::Local)])
             .chain(Operator::ALL[3..].iter().map(|(_, o)| (*o, Mode::Global)))
@@ -135,8 +155,8 @@ fn tiles_change_no_bit_of_local_operators() {
         use lucerna::techniques::tonemap::Still;
         let (width, height) = (120, 90);
         let pixels = picture(width, height, 5);
-        for operator in [Operator::Ashikhmin, Operator::Reinhard] {
-            let settings = with(operator, Mode::Local);
+        for operator in [Operator::Ashikhmin, Operator::Reinhard, Operator::Bilateral] {
+            let settings = Settings { spatial: 0.05, ..with(operator, Mode::Local) };
             let whole = Still::new(gpu, &settings).unwrap().map(width, height, pixels.clone(), None, None).unwrap();
             let cut =
                 Still::new(gpu, &settings).unwrap().tiles(50).map(width, height, pixels.clone(), None, None).unwrap();

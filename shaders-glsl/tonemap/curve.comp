@@ -13,7 +13,7 @@ layout(constant_id = 1) const uint GLOBAL = 0;
 
 layout(binding = 0) uniform sampler2D color;
 layout(binding = 1) uniform sampler2D luminance;
-layout(binding = 2) uniform sampler2D adaptation;  // local adaptation; of the bilateral operator, log10 of the base
+layout(binding = 2) uniform sampler2D adaptation;  // local adaptation; of the bilateral operator, the base
 layout(binding = 3, scalar) readonly buffer Statistics { TonemapStatistics statistics; };
 layout(binding = 4, rgba32f) uniform writeonly image2D mapped;
 
@@ -52,7 +52,7 @@ float display_luminance(float l, float a) {
         float range = top - bottom;
         float gamma = range > 0.0 ? min(log_contrast / range, 1.0) : 1.0;
         float whole = decade * log2(max(l, max(1e-4 * s.high, TONEMAP_SMALLEST)));
-        float base = GLOBAL != 0u ? whole : a;
+        float base = GLOBAL != 0u ? whole : decade * log2(max(a, max(1e-4 * s.high, TONEMAP_SMALLEST)));
         return exp2((gamma * (base - top) + detail * (whole - base)) / decade);
     }
     float largest = white > 0.0 ? white : s.high * s.scale;

@@ -1,16 +1,16 @@
 //! Local adaptation.
 
 use super::{
-    Local, Operator, Settings,
+    Local, Settings, bilateral,
     search::{Search, Tables},
 };
 use crate::{
-    Error, Result,
+    Result,
     graph::{Buffer, Extent, Format, Graph, Image},
     shaders::tonemap::{columns, literal, rows},
 };
 
-/// Local adaptation of every pixel of `luminance`, R32F; of the bilateral operator, log₁₀ of the base. `picture`: extent of the whole
+/// Local adaptation of every pixel of `luminance`, R32F; of the bilateral operator, the luminance of the base. `picture`: extent of the whole
 /// picture, of which `luminance` may be a part.
 ///
 /// # Errors
@@ -19,14 +19,12 @@ pub fn adaptation(
     graph: &mut Graph,
     luminance: Image,
     statistics: Buffer,
-    _picture: Extent,
+    picture: Extent,
     settings: &Settings,
 ) -> Result<Image> {
     let Some(search) = Search::new(settings) else {
-        let what = format!("local adaptation of {} is not there yet", settings.operator.name());
-        return Err(Error::usage(what).at("mode"));
+        return bilateral::base(graph, luminance, statistics, picture, settings);
     };
-    debug_assert!(settings.operator != Operator::Bilateral);
     let adaptation = graph.image("tonemap.adaptation", Format::R32F, graph.extent(luminance));
     let tables = search.tables(graph);
     match settings.local {

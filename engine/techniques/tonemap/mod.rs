@@ -16,6 +16,7 @@
 //! The result is display-referred linear Rec. 709 relative to the display's white; encoding (sRGB or a gamma) is left to where it is
 //! written. Shaders never spread NaN: they take it, infinity and negative values for 0; [`clean()`] offers other policies before.
 
+pub mod bilateral;
 mod clean;
 pub mod identify;
 pub mod local;
@@ -58,7 +59,7 @@ pub struct Output {
     pub mapped: Image,
     /// R32F: luminance after the exposure.
     pub luminance: Image,
-    /// R32F: local adaptation, in the same unit; of the bilateral operator log₁₀ of the base. Global: `luminance`.
+    /// R32F: local adaptation, in the same unit; of the bilateral operator the luminance of the base. Global: `luminance`.
     pub adaptation: Image,
     /// One `types::TonemapStatistics`.
     pub statistics: Buffer,

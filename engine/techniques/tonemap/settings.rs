@@ -80,7 +80,7 @@ pub enum Mode {
 #[serde(rename_all = "kebab-case")]
 pub enum Local {
     /// Ashikhmin, Reinhard: the averages along rows and then along columns, which is the same sum in another order (relative difference of
-    /// an average under 10⁻⁵). Bilateral: the base from averages of blocks, `fast` of it in [`Settings::spatial`].
+    /// an average under 10⁻⁵). Bilateral: from blocks of pixels, as [`Settings::spatial`] says.
     Fast,
     /// The definition: every sample of every neighbourhood of every pixel.
     Literal,
@@ -161,8 +161,10 @@ pub struct Settings {
     pub phi: f32,
     /// Reinhard: largest activity ε.
     pub epsilon: f32,
-    /// Bilateral: σ in space, share of the longer side; at least half a pixel. The filter reaches ⌈2σ⌉ pixels. Literal: at most 80 pixels.
-    /// Fast: L's logarithms are averaged in blocks of ⌈σ/4⌉² pixels, and the filter takes the blocks' averages at their centres.
+    /// Bilateral: σ in space, share of the longer side; at least half a pixel. Weights are exp(−d² / 2σ²) of the distance, the filter
+    /// reaches ⌈2σ⌉ pixels along each axis; literal: at most 80 pixels. Fast: a block of ⌈σ/3⌉² pixels that the reach touches stands for
+    /// its pixels by two samples at its centre, the mean of the logarithms up to the block's mean and the mean of those above it, each
+    /// with the weight of the number of its pixels; the pixel itself is added once more. The same as literal up to σ = 3.
     pub spatial: f32,
     /// Bilateral: σ of log₁₀ L.
     pub range: f32,
@@ -243,7 +245,10 @@ impl Settings {
             (Mode::Global, _) => 0,
             (_, Operator::Ashikhmin) => 2 * self.radius,
             (_, Operator::Reinhard) => (0.75 * 1.6f32.powi(self.scales as i32)).ceil() as u32,
-            (_, Operator::Bilateral) => self.bilateral(width, height).1,
+            // Blocks that the filter touches are needed whole.
+            (_, Operator::Bilateral) => {
+                self.bilateral(width, height).1 + super::bilateral::block_side((width, height).into(), self)
+            }
             _ => 0,
         };
         local.max(identification)

@@ -1,7 +1,7 @@
 //! Pictures in main memory, of any size.
 
 use super::{
-    BadCounts, Input, Mode, Output, Settings, Tonemap, clean, identify, map,
+    BadCounts, Input, Mode, Output, Settings, Tonemap, bilateral, clean, identify, map,
     statistics::{self, Rectangle, Sums},
 };
 use crate::{
@@ -167,7 +167,10 @@ impl Still {
         let gpu = self.runner.gpu().clone();
         let picture = Extent::new(width, height);
         let apron = settings.reach(width, height);
-        let grid = if settings.mode() == Mode::Selective { identify::grid(&settings) } else { 1 };
+        let of_map = if settings.mode() == Mode::Selective { identify::grid(&settings) } else { 1 };
+        let of_blocks = if apron > 0 { bilateral::block_side_of(picture, &settings) } else { 1 };
+        // A multiple of both.
+        let grid = of_map * of_blocks;
         let limit = gpu.caps().limits.image_2d.saturating_sub(2 * apron + grid).max(1);
         let side = self.tile.unwrap_or(TILE).min(limit);
         let owned = |name: &str, bytes: u64| OwnedBuffer::with_contents(&gpu, name, &vec![0; bytes as usize]);
