@@ -18,9 +18,9 @@ use lucerna::{
 /// Largest RMS % and mean %.
 const ALLOWED: [f64; 2] = [0.1, 0.01];
 
-/// Charts of which most pixels lie within a thousandth of the smallest luminance: differences of C, which has an error of 2 · 10⁻⁶ in
-/// 32 bits, are as small as 10⁻³ there.
-const NARROW: [&str; 2] = ["WideColorGamut", "SquaresSwirls"];
+/// A chart most of whose pixels have the luminance 1 but for rounding, and hardly more than the smallest: there the pieces of C meet with a
+/// jump of 2.4 · 10⁻⁵ (the paper's constants have four places), and an average that rounds to the other side of it is 1 % off.
+const AT_A_JUMP: &str = "WideColorGamut";
 
 /// Pixels of an image, or of a part.
 struct Picture {
@@ -108,8 +108,8 @@ fn compare(gpu: &Gpu, pictures: &[Picture]) {
                 "{name:28} {:24} {width:4}×{height:<4} RMS {:.5} %  mean {:.5} %",
                 picture.name, found[0], found[1]
             );
-            let narrow = settings.operator == Operator::Ashikhmin && NARROW.contains(&picture.name.as_str());
-            let allowed = if narrow { ALLOWED.map(|v| 20.0 * v) } else { ALLOWED };
+            let jump = settings.operator == Operator::Ashikhmin && picture.name == AT_A_JUMP;
+            let allowed = if jump { [1.0, 0.5] } else { ALLOWED };
             if !(found[0] <= allowed[0] && found[1] <= allowed[1]) {
                 wrong.push(format!("{name} {}: RMS {} %, mean {} %", picture.name, found[0], found[1]));
             }

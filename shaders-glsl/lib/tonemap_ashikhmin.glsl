@@ -1,17 +1,33 @@
 // Ashikhmin 2002, as restated by Michael 2010, section 4.3. Luminances in cd/m².
 
-// Perceptual capacity C: just noticeable differences below a luminance.
-float ashikhmin_capacity(float l) {
-    if (l < 0.0034) {
-        return l / 0.0014;
+// ln(to / from) that keeps its digits where both are near each other.
+float ashikhmin_log_ratio(float from, float to) {
+    float d = (to - from) / from;
+    return d < 0.01 ? d * (1.0 - d * (0.5 - d * (1.0 / 3.0 - d * 0.25))) : log(to / from);
+}
+
+// C(to) − C(from) for 0 ≤ from ≤ to, where the perceptual capacity C of a luminance are the just noticeable differences below it:
+// l / 0.0014 below 0.0034, 2.4483 + ln(l / 0.0034) / 0.4027 to 1, 16.5630 + (l − 1) / 0.4027 to 7.2444, 32.0693 + ln(l / 7.2444) / 0.0556
+// above. Added up piece by piece, for C itself is too large for differences of near luminances in 32 bits. The constants of the sum are
+// what the paper's four digits leave between its pieces.
+float ashikhmin_steps(float from, float to) {
+    float steps = 0.0;
+    if (from < 0.0034) {
+        steps += (min(to, 0.0034) - from) / 0.0014;
+        steps += to >= 0.0034 ? 0.0197286 : 0.0;
     }
-    if (l < 1.0) {
-        return 2.4483 + log(l / 0.0034) / 0.4027;
+    if (from < 1.0 && to >= 0.0034) {
+        steps += ashikhmin_log_ratio(max(from, 0.0034), min(to, 1.0)) / 0.4027;
+        steps += to >= 1.0 ? 2.4442e-05 : 0.0;
     }
-    if (l < 7.2444) {
-        return 16.5630 + (l - 1.0) / 0.4027;
+    if (from < 7.2444 && to >= 1.0) {
+        steps += (min(to, 7.2444) - max(from, 1.0)) / 0.4027;
+        steps += to >= 7.2444 ? -3.2257e-05 : 0.0;
     }
-    return 32.0693 + log(l / 7.2444) / 0.0556;
+    if (to >= 7.2444) {
+        steps += ashikhmin_log_ratio(max(from, 7.2444), to) / 0.0556;
+    }
+    return steps;
 }
 
 // Threshold against intensity: 1 / C′.
@@ -30,12 +46,9 @@ float ashikhmin_threshold(float l) {
 
 // TM. Of a picture of one luminance, `low` is taken as 0.
 float ashikhmin_curve(float l, float low, float high, float display) {
-    float top = ashikhmin_capacity(high);
-    float bottom = ashikhmin_capacity(low);
-    if (!(top > bottom)) {
-        bottom = 0.0;
-    }
-    return top > 0.0 ? display * (ashikhmin_capacity(l) - bottom) / (top - bottom) : 0.0;
+    low = high > low ? low : 0.0;
+    float steps = l < low ? -ashikhmin_steps(l, low) : ashikhmin_steps(low, l);
+    return high > 0.0 ? display * steps / ashikhmin_steps(low, high) : 0.0;
 }
 
 // L_d.
