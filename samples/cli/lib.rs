@@ -14,6 +14,7 @@ pub mod framing;
 pub mod gbuffer_layers;
 pub mod info;
 pub mod inspect;
+pub mod last_stage;
 pub mod lights;
 pub mod outputs;
 pub mod pattern;

@@ -13,6 +13,7 @@ use serde::{Serialize, de::DeserializeOwned};
 use crate::{
     args::RenderArgs,
     config, console,
+    last_stage::{LastStage, Staged},
     program::{self, STOPPED_EARLY},
     progress::Progress,
     run::Run,
@@ -50,7 +51,7 @@ pub struct Input<'a> {
 ///
 /// # Errors
 /// Whatever fails, with the kind that decides the exit code.
-pub fn render<S: Serialize + DeserializeOwned, R>(
+pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
     technique: Technique,
     args: &RenderArgs,
     base: &S,
@@ -59,18 +60,20 @@ pub fn render<S: Serialize + DeserializeOwned, R>(
 ) -> Result<ExitCode> {
     let started = Instant::now();
     let console = args.talk.console();
-    let settings = args.settings.effective(base)?;
+    let staged = Staged::effective(&args.settings, base)?;
     if args.settings.print_config {
-        console::print(config::to_toml(&settings)?.trim_end())?;
+        console::print(config::to_toml(&staged)?.trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
     let interrupt = Interrupt::install();
-    let mut run = Run::new(technique, args, console, &settings)?;
+    let mut run = Run::new(technique, args, console, &staged)?;
     let loaded = started.elapsed();
 
     let gpu = Gpu::new(args.device.options()?)?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
     let opened = started.elapsed();
+    let settings = staged.technique;
+    let mut last = LastStage::new(&gpu, staged.tonemap.as_ref(), run.exposure())?;
     let mut resources = prepare(&gpu, &run.stage.scene, &settings)?;
     let uploaded = started.elapsed();
     run.phases = vec![("load", loaded), ("device", opened - loaded), ("upload", uploaded - opened)];
@@ -87,7 +90,8 @@ pub fn render<S: Serialize + DeserializeOwned, R>(
         let mut graph = Graph::new(technique.name);
         (graph.frame, graph.seed) = (frame, args.seed);
         let input = Input { gpu: &gpu, scene: &run.stage.scene, pose: &pose, view: &view, frame, seconds };
-        let shown = compose(&mut graph, &mut resources, &input, &settings)?;
+        let mut shown = compose(&mut graph, &mut resources, &input, &settings)?;
+        shown.develop(|picture| last.frame(&mut graph, picture, (1.0 / args.fps) as f32))?;
         if args.list_passes {
             console::print(graph.plan()?.list_passes().trim_end())?;
             return Ok(ExitCode::SUCCESS);
@@ -124,7 +128,9 @@ pub fn render<S: Serialize + DeserializeOwned, R>(
             let mut graph = Graph::new(technique.name);
             (graph.frame, graph.seed) = (frame, args.seed);
             let input = Input { gpu: &gpu, scene: &run.stage.scene, pose: &pose, view: &view, frame, seconds };
-            compose(&mut graph, &mut resources, &input, &settings)?;
+            let mut shown = compose(&mut graph, &mut resources, &input, &settings)?;
+            // No time passes, so that adaptation stays as it is.
+            shown.develop(|picture| last.frame(&mut graph, picture, 0.0))?;
             let report = runner.run(&graph)?.report;
             run.again(begun.elapsed().as_secs_f64() * 1e3, &report);
         }

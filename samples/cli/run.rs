@@ -17,6 +17,7 @@ use crate::{
     config,
     console::{self, Console},
     exposure,
+    last_stage::Staged,
     outputs::Outputs,
     pattern::Values,
     program,
@@ -71,7 +72,7 @@ impl<'a> Run<'a> {
         technique: Technique,
         args: &'a RenderArgs,
         console: Console,
-        settings: &S,
+        settings: &Staged<S>,
     ) -> Result<Self> {
         let frames = Frames::of(args.frames.as_ref());
         // Names before scenes: a wrong name shows at once.
@@ -82,9 +83,15 @@ impl<'a> Run<'a> {
             Source::Builtin(name) => builtin::exposure(name).map(f64::from),
             Source::File(_) => None,
         };
+        if settings.tonemap.is_some() && !technique.radiance {
+            let what = format!("the picture of this mode of {} is no light, which tone mapping needs", technique.name);
+            return Err(Error::usage(what).at("tonemap"));
+        }
         let radiance = technique.radiance && args.view.is_none();
+        let developed = settings.tonemap.is_some() && radiance;
         let exposure = args.exposure.or(suits.filter(|_| radiance));
-        options.exposure_ev = exposure.unwrap_or(0.0) as f32;
+        // Tone mapping takes the exposure itself; what it gives is for the screen.
+        options.exposure_ev = if developed { 0.0 } else { exposure.unwrap_or(0.0) as f32 };
         let outputs = Outputs::new(&args.output, frames.len(), options)?;
         if outputs.uses_stdout() && args.json {
             return Err(Error::usage("--json and an image both want standard output").help("Give the image a name"));
@@ -109,7 +116,7 @@ impl<'a> Run<'a> {
             args,
             console,
             label,
-            fit_exposure: exposure.is_none() && radiance,
+            fit_exposure: exposure.is_none() && radiance && !developed,
             stage,
             outputs,
             frames,
@@ -197,6 +204,11 @@ impl<'a> Run<'a> {
             world_to_ndc: Some(view.clip_from_world.to_cols_array()),
             ..Metadata::default()
         })
+    }
+
+    /// Stops that were asked for, or suit the scene.
+    pub fn exposure(&self) -> f64 {
+        self.record.exposure
     }
 
     /// Chooses the exposure by the first frame, if nobody did.

@@ -78,6 +78,20 @@ impl Shown {
         self
     }
 
+    /// Puts the picture through `stage`; if that changes it, its light stays as the layer `light`.
+    ///
+    /// # Errors
+    /// Those of `stage`.
+    pub fn develop(&mut self, stage: impl FnOnce(Image) -> Result<Image>) -> Result<()> {
+        let light = self.picture;
+        self.picture = stage(light)?;
+        if self.picture != light {
+            let decode: Decode = Box::new(|pixel| pixel);
+            self.layers.push(Source { name: "light", channels: &["R", "G", "B"], image: light, decode });
+        }
+        Ok(())
+    }
+
     /// Names of the layers, the picture first.
     pub fn names(&self) -> Vec<&'static str> {
         std::iter::once("picture").chain(self.layers.iter().map(|layer| layer.name)).collect()

@@ -374,3 +374,52 @@ fn the_collection_is_developed() {
     differences.sort_by(f32::total_cmp);
     assert!(differences[differences.len() / 2] < 0.01, "{}", differences[differences.len() / 2]);
 }
+
+/// The last stage of techniques is the same operator: the light that stays beside its picture gives it again.
+#[test]
+fn last_stage_of_every_technique() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let picture = name(folder, "a.exr");
+    let scene = ["--builtin", "cornell", "--size", "48x32", "-q", "--f32"];
+    let look = ["-D", "tonemap.operator=reinhard", "-D", "tonemap.mode=global", "-D", "tonemap.exposure=1"];
+    support::isr([&["render", "-o", &picture, "--exposure", "0.5"], &scene[..], &look].concat()).expect(0, &[]);
+    let reference = name(folder, "r.exr");
+    let arguments = [
+        "reference",
+        "--builtin",
+        "cornell",
+        "--size",
+        "48x32",
+        "-q",
+        "--spp",
+        "4",
+        "-o",
+        &reference,
+        "--exposure",
+        "0.5",
+    ];
+    support::lucerna([&arguments[..], &look].concat()).expect(0, &[]);
+    for file in [&picture, &reference] {
+        let (light, again) = (format!("{file}:light"), format!("{file}.again.exr"));
+        let same = ["--operator", "reinhard", "--mode", "global", "--exposure", "1.5", "--f32", "-q"];
+        tonemap(&[&[light.as_str(), "-o", &again], &same[..]].concat()).expect(0, &[]);
+        let (a, b) = (read(Path::new(file)), read(Path::new(&again)));
+        let (a, b) = (&a.layer("").unwrap().data, &b.layers[0].data);
+        assert!(a.iter().any(|&v| v > 0.05));
+        for (x, y) in a.iter().zip(b) {
+            // The light beside it may be in 16 bits.
+            assert!((x - y).abs() < 2e-3 * (y + 0.1), "{file}: {x} {y}");
+        }
+        // And the picture says enough to be made again, bit by bit.
+        support::lucerna(["rerun", file, "-q"]).expect(0, &[]);
+    }
+    let none = name(folder, "o.png");
+    let occlusion = [&["render", "-o", &none, "--mode", "occlusion"], &scene[..], &look].concat();
+    support::isr(occlusion).expect(2, &["tonemap: the picture of this mode of isr is no light"]);
+    support::isr(["render", "--builtin", "cornell", "-o", &none, "-D", "tonemap.operatr=agx"])
+        .expect(2, &["tonemap.operator"]);
+}

@@ -21,6 +21,7 @@ use crate::{
     config,
     console::{self, Console},
     exposure,
+    last_stage::{self, Staged},
     outputs::Outputs,
     pattern::Values,
     program::{self, STOPPED_EARLY},
@@ -63,9 +64,9 @@ const FINISH: f64 = 1.0;
 /// # Errors
 /// Whatever fails, with the kind that decides the exit code.
 pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
-    let settings = args.effective()?;
+    let Staged { technique: settings, tonemap } = args.effective()?;
     if args.settings.print_config {
-        console::print(config::to_toml(&settings)?.trim_end())?;
+        console::print(config::to_toml(&Staged { technique: settings, tonemap })?.trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
     let interrupt = Interrupt::install();
@@ -119,9 +120,14 @@ pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
         Source::File(_) => None,
     };
     let ev = args.exposure.or(suits).unwrap_or_else(|| exposure::fitting(&layers));
-    outputs.expose(ev);
+    // Tone mapping takes the exposure itself.
+    match &tonemap {
+        Some(tonemap) => last_stage::still(&gpu, tonemap, ev, &mut layers)?,
+        None => outputs.expose(ev),
+    }
     // What a run with exactly these samples would say as well.
     let made = Settings { samples: done.samples.floor() as u64, ..settings.clone() };
+    let made = Staged { technique: made, tonemap };
     layers.metadata = metadata(args, &stage, &gpu, &tracer.view()?, &made, ev)?;
     let whole = done.samples.fract() == 0.0;
     if !whole {
@@ -219,13 +225,13 @@ fn metadata(
     stage: &Stage,
     gpu: &Gpu,
     view: &View,
-    settings: &Settings,
+    settings: &Staged<Settings>,
     exposure: f64,
 ) -> Result<Metadata> {
     let about = gpu.describe();
     let record = Record {
         exposure,
-        seed: settings.reference.seed,
+        seed: settings.technique.reference.seed,
         mode: (args.show != Show::Total).then(|| args.show.name().to_owned()),
         f32: true,
         settings: config::to_value(settings)?,
@@ -239,7 +245,7 @@ fn metadata(
         scene_hash: stage.fingerprint.clone(),
         camera: stage.camera_name.clone(),
         technique: "reference".into(),
-        seed: settings.reference.seed.into(),
+        seed: settings.technique.reference.seed.into(),
         device: about.device.clone(),
         driver: format!("{} {}", about.driver, about.driver_info).trim().to_owned(),
         config: config::to_value(&record)?,

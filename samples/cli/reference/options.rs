@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     args::{DeviceArgs, TalkArgs, finite, positive},
     config::SettingsArgs,
+    last_stage::Staged,
     progress::ProgressMode,
     stage::StageArgs,
 };
@@ -97,13 +98,13 @@ impl ReferenceArgs {
     ///
     /// # Errors
     /// `Usage` or `Input`, naming the key.
-    pub fn effective(&self) -> Result<Settings> {
-        let mut settings = self.settings.effective(&Settings::default())?;
+    pub fn effective(&self) -> Result<Staged<Settings>> {
+        let Staged { technique: mut settings, tonemap } = Staged::effective(&self.settings, &Settings::default())?;
         settings.samples = self.spp.unwrap_or(settings.samples).clamp(1, u32::MAX.into());
         settings.reference.bounces = self.bounces.unwrap_or(settings.reference.bounces);
         settings.reference.seed = self.seed.unwrap_or(settings.reference.seed);
         settings.reference.validate().map_err(|error| error.at("reference"))?;
-        Ok(settings)
+        Ok(Staged { technique: settings, tonemap })
     }
 }
 

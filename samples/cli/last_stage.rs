@@ -1,0 +1,127 @@
+//! Tone mapping as the last stage of every technique: `-D tonemap.operator=reinhard`.
+//!
+//! Without any setting of the group `tonemap` pictures stay light, as before.
+
+use lucerna::{
+    Result,
+    gpu::Gpu,
+    graph::{Graph, Image},
+    image::{Layer, Layers},
+    techniques::tonemap::{self, Still, Tonemap},
+};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+use crate::config::{self, SettingsArgs};
+
+/// Settings of a technique and, if asked for, of the tone mapping after it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Staged<S> {
+    #[serde(flatten)]
+    pub technique: S,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tonemap: Option<tonemap::Settings>,
+}
+
+/// The group of settings.
+const GROUP: &str = "tonemap";
+
+impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
+    /// The settings in effect over `base`.
+    ///
+    /// # Errors
+    /// `Usage` or `Input`, naming the key.
+    pub fn effective(args: &SettingsArgs, base: &S) -> Result<Self> {
+        let asked = args.define.iter().any(|define| define.starts_with("tonemap."));
+        let in_file = |text: String| text.parse::<toml::Table>().is_ok_and(|table| table.contains_key(GROUP));
+        // What is wrong with the file is told below, with its name.
+        let wanted = asked || args.file.as_deref().is_some_and(|file| config::read_text(file).is_ok_and(in_file));
+        let base = Self { technique: base.clone(), tonemap: wanted.then(tonemap::Settings::default) };
+        let settings: Self = args.effective(&base)?;
+        if let Some(tonemap) = &settings.tonemap {
+            tonemap.validate().map_err(|error| error.at(GROUP))?;
+        }
+        Ok(settings)
+    }
+}
+
+/// The stage of a run over frames.
+#[derive(Debug)]
+pub struct LastStage(Option<Tonemap>);
+
+impl LastStage {
+    /// `ev`: stops before those of the settings.
+    ///
+    /// # Errors
+    /// `OutOfMemory`; `Usage` if the stops are too many.
+    pub fn new(gpu: &Gpu, settings: Option<&tonemap::Settings>, ev: f64) -> Result<Self> {
+        let exposed = settings.map(|settings| exposed(settings, ev));
+        exposed.map(|settings| Tonemap::new(gpu, &settings)).transpose().map(Self)
+    }
+
+    /// The picture after the stage. `dt`: seconds since the frame before.
+    ///
+    /// # Errors
+    /// `Usage` if the picture cannot be tone mapped as the settings ask.
+    pub fn frame(&mut self, graph: &mut Graph, picture: Image, dt: f32) -> Result<Image> {
+        match &mut self.0 {
+            Some(tonemap) => Ok(tonemap.frame(graph, picture, Some(dt))?.mapped),
+            None => Ok(picture),
+        }
+    }
+}
+
+fn exposed(settings: &tonemap::Settings, ev: f64) -> tonemap::Settings {
+    tonemap::Settings { exposure: settings.exposure + ev as f32, ..settings.clone() }
+}
+
+/// The stage for one picture in main memory: its light stays as the layer `light`.
+///
+/// # Errors
+/// `Input` for bad values if the settings refuse them; `OutOfMemory`, `DeviceLost`.
+pub fn still(gpu: &Gpu, settings: &tonemap::Settings, ev: f64, layers: &mut Layers) -> Result<()> {
+    let Some(main) = layers.layers.iter().position(|layer| layer.name.is_empty()) else { return Ok(()) };
+    let Some(pixels) = layers.layers[main].rgb_pixels() else { return Ok(()) };
+    let pixels = pixels.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect();
+    let mapped = Still::new(gpu, &exposed(settings, ev))?.map(layers.width, layers.height, pixels, None, None)?;
+    let light = Layer { name: "light".into(), ..layers.layers[main].clone() };
+    layers.layers[main] = Layer::rgb("", &mapped.pixels);
+    layers.layers.push(light);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use lucerna::techniques::{isr::PictureSettings, tonemap::Operator};
+
+    use super::*;
+
+    fn with(defines: &[&str]) -> Result<Staged<PictureSettings>> {
+        let define = defines.iter().map(|&d| d.to_owned()).collect();
+        Staged::effective(&SettingsArgs { define, ..SettingsArgs::default() }, &PictureSettings::default())
+    }
+
+    #[test]
+    fn only_if_asked_for_and_both_groups_are_checked() {
+        let plain = with(&["isr.samples=24"]).unwrap();
+        assert!(plain.tonemap.is_none() && plain.technique.isr.samples == 24);
+        assert!(!config::to_toml(&plain).unwrap().contains("tonemap"));
+        let both = with(&["tonemap.operator=agx", "tonemap.exposure=0.1", "isr.samples=24"]).unwrap();
+        let tonemap = both.tonemap.as_ref().unwrap();
+        assert_eq!((tonemap.operator, tonemap.exposure, both.technique.isr.samples), (Operator::Agx, 0.1, 24));
+        for bad in ["tonemap.operater=agx", "tonemap.operator=fattal", "isr.sampels=3", "tonemap.radius=99"] {
+            let error = with(&[bad]).unwrap_err();
+            assert_eq!(error.exit_code(), 2, "{bad}: {error}");
+        }
+        assert!(with(&["isr.sampels=3"]).unwrap_err().to_string().contains("isr.samples"));
+    }
+
+    #[test]
+    fn printed_settings_read_back_the_same() {
+        let settings = with(&["tonemap.operator=reinhard", "isr.samples=24"]).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("s.toml");
+        std::fs::write(&file, config::to_toml(&settings).unwrap()).unwrap();
+        let args = SettingsArgs { file: Some(file), ..SettingsArgs::default() };
+        assert_eq!(Staged::effective(&args, &PictureSettings::default()).unwrap(), settings);
+    }
+}
