@@ -1,5 +1,7 @@
 //! How pictures are made: the techniques and references that experiments can name.
 
+mod tonemap;
+
 use std::{any::Any, collections::HashMap, time::Instant};
 
 use lucerna::{
@@ -210,6 +212,26 @@ pub const KINDS: &[Kind] = &[
         sources: &["engine/reference/path"],
         settings: |_, changes| config::to_value(&config::with::<PathSettings>(&PathSettings::default(), changes)?),
         render: path_picture,
+        available: || Ok(String::new()),
+    },
+    Kind {
+        name: "tonemap",
+        description: "tone mapping of a picture, or of a frame by image-space radiosity, on the device; layer important",
+        on_device: true,
+        of_images: true,
+        sources: &["engine/techniques", "engine/passes", "engine/scene", "shaders-glsl"],
+        settings: tonemap::settings,
+        render: tonemap::on_gpu,
+        available: || Ok(String::new()),
+    },
+    Kind {
+        name: "tonemap-cpu",
+        description: "the same by the slow program that it is held against",
+        on_device: true,
+        of_images: true,
+        sources: &["engine/techniques", "engine/passes", "engine/scene", "engine/reference/tonemap", "shaders-glsl"],
+        settings: tonemap::settings,
+        render: tonemap::on_cpu,
         available: || Ok(String::new()),
     },
 ];

@@ -2,6 +2,7 @@
 
 mod compare;
 mod isr;
+mod tonemap;
 
 use lucerna::{Error, Result};
 
@@ -12,7 +13,8 @@ use crate::{config, report::Page};
 pub type Analysis = fn(&Results, &mut Page) -> Result<()>;
 
 /// All analyses, by the name that a file gives.
-const ANALYSES: &[(&str, Analysis)] = &[("compare", compare::analyse), ("isr", isr::analyse)];
+const ANALYSES: &[(&str, Analysis)] =
+    &[("compare", compare::analyse), ("isr", isr::analyse), ("tonemap", tonemap::analyse)];
 
 /// Finds an analysis.
 ///

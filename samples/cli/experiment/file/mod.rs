@@ -52,6 +52,7 @@ use crate::{
 pub const BUILTIN: &[(&str, &str)] = &[
     ("isr", include_str!("../../../experiments/isr.toml")),
     ("smoke", include_str!("../../../experiments/smoke.toml")),
+    ("tonemap", include_str!("../../../experiments/tonemap.toml")),
 ];
 
 /// Settings that are changed, by their keys.

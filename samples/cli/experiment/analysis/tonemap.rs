@@ -1,0 +1,138 @@
+//! Tone mapping: the tables of Michael's thesis (section 5.3), and what a better local operator leaves of selection.
+//!
+//! Techniques are known by their names: `gtm`, `ltm`, `stm` (global, local and selective tone mapping by the literal operator; `stm` with
+//! a matrix of `tonemap.mark`), `ltm-fast`, `stm-fast`, `stm-threshold` (a matrix of `tonemap.threshold`), `stm-saliency`, `stm-half`; and the
+//! reference `cpu`. Scenes of the group `still` are pictures, all others frames.
+
+mod tables;
+
+use lucerna::{Result, measure::Measure};
+
+use crate::{
+    experiment::{
+        place::spread,
+        results::{Done, Layer, Results},
+    },
+    report::{Comparison, Page, Section},
+};
+
+/// The thesis' threshold.
+const THRESHOLD: f64 = 0.1;
+/// Group of pictures.
+const STILL: &str = "still";
+/// Longest side of an image in the page, pixels.
+const SIDE: u32 = 640;
+
+pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
+    let views: Vec<View<'_>> = results.views().into_iter().map(|of| View { results, of }).collect();
+    page.add(tables::payoff(&views)?);
+    page.add(tables::agreement(&views)?);
+    page.add(tables::frames(&views)?);
+    page.add(tables::stills(&views)?);
+    page.add(tables::quality(&views)?);
+    page.add(tables::operators(&views)?);
+    page.add(images(results, &views)?);
+    Ok(())
+}
+
+/// A picture or a frame with everything that was made of it.
+#[derive(Clone, Copy)]
+struct View<'a> {
+    results: &'a Results,
+    of: (&'a str, &'a str),
+}
+
+impl<'a> View<'a> {
+    fn name(&self) -> String {
+        let (scene, view) = self.of;
+        if self.is_still() { scene.to_owned() } else { format!("{scene}, {view}") }
+    }
+
+    fn is_still(&self) -> bool {
+        self.results.at(self.of).any(|run| run.group == STILL)
+    }
+
+    /// A run by the name of its technique, and a value of its matrix.
+    fn run(&self, method: &str, value: Option<(&str, &str)>) -> Option<&'a Done> {
+        self.results.at(self.of).find(|run| {
+            run.method == method && value.is_none_or(|(key, value)| run.value(key).as_deref() == Some(value))
+        })
+    }
+
+    /// Milliseconds of tone mapping.
+    fn time(&self, run: Option<&Done>) -> Result<Option<f64>> {
+        Ok(match run {
+            Some(run) => self.results.times(run)?.frame(),
+            None => None,
+        })
+    }
+
+    fn ms(&self, method: &str) -> Result<Option<f64>> {
+        self.time(self.run(method, None))
+    }
+
+    fn ms_marked(&self, mark: &str) -> Result<Option<f64>> {
+        self.time(self.run("stm", Some(("tonemap.mark", mark))))
+    }
+
+    /// The fastest way to mark, with its time.
+    fn best_mark(&self) -> Result<Option<(String, f64)>> {
+        let mut best: Option<(String, f64)> = None;
+        for run in self.results.at(self.of).filter(|run| run.method == "stm") {
+            let Some((mark, ms)) = run.value("tonemap.mark").zip(self.time(Some(run))?) else { continue };
+            if best.as_ref().is_none_or(|(_, least)| ms < *least) {
+                best = Some((mark, ms));
+            }
+        }
+        Ok(best)
+    }
+
+    /// Share of important pixels.
+    fn important(&self, run: Option<&Done>) -> Result<Option<f64>> {
+        let Some(run) = run else { return Ok(None) };
+        let map = self.results.picture(Layer(run, "important"))?.pixels;
+        Ok(Some(map.iter().filter(|pixel| pixel[0] > 0.5).count() as f64 / map.len() as f64))
+    }
+
+    /// Measures of `test` against `truth`; NaN where one of them was not made.
+    fn measures<const N: usize>(
+        &self,
+        list: [Measure; N],
+        truth: Option<&Done>,
+        test: Option<&Done>,
+    ) -> Result<[f64; N]> {
+        let Some((truth, test)) = truth.zip(test) else { return Ok([f64::NAN; N]) };
+        let values = self.results.measures(&list, Layer(truth, ""), Layer(test, ""), None)?;
+        Ok(values.try_into().unwrap_or([f64::NAN; N]))
+    }
+}
+
+/// Two numbers' ratio.
+fn over(a: Option<f64>, b: Option<f64>) -> Option<f64> {
+    a.zip(b).map(|(a, b)| a / b).filter(|ratio| ratio.is_finite())
+}
+
+fn images(results: &Results, views: &[View<'_>]) -> Result<Section> {
+    let mut section = Section::new("Images");
+    section.text("Local tone mapping is what the others are held against; *important* is the map that selects.");
+    for view in spread(views, Some(results.experiment.images)) {
+        let Some(truth) = view.run("ltm", None) else { continue };
+        let local = results.picture(Layer(truth, ""))?;
+        let (scene, name) = view.of;
+        let mut set = Comparison::new(format!("{scene}-{name}"), view.name(), local.width, local.height)
+            .exposure(0.0)
+            .with("local", local.pixels);
+        for method in
+            ["stm", "stm-saliency", "gtm", "ltm-fast", "reinhard-ltm", "bilateral-ltm", "aces", "agx", "neutral"]
+        {
+            if let Some(run) = view.run(method, None) {
+                set = set.with(method, results.picture(Layer(run, ""))?.pixels);
+            }
+        }
+        if let Some(run) = view.run("stm", None) {
+            set = set.with("important", results.picture(Layer(run, "important"))?.pixels);
+        }
+        section.add(set.at_most(SIDE));
+    }
+    Ok(section)
+}

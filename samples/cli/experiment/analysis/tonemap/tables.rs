@@ -1,0 +1,319 @@
+//! The tables of the page.
+
+use lucerna::{Result, measure::Measure};
+
+use super::{THRESHOLD, View, over};
+use crate::{
+    experiment::results::Done,
+    report::{Axis, Cell, Plot, Section, Table},
+};
+
+const MARKS: [&str; 4] = ["branch", "tiles", "early-z", "compact"];
+
+/// Table 7 of the thesis: picture, RMS %, mean %.
+const TABLE_7: [(&str, f64, f64); 2] = [("memorial", 0.041, 0.025), ("stilllife", 0.074, 0.051)];
+/// Tables 9 and 10: size, STM/LTM, on GeForce 6600 and 8800 GTX.
+const TABLES_9_10: [(&str, f64); 8] = [
+    ("320x240", 1.68),
+    ("640x480", 2.79),
+    ("800x600", 2.89),
+    ("1024x768", 3.08),
+    ("512x512", 1.40),
+    ("1024x1024", 1.65),
+    ("2048x2048", 2.00),
+    ("4096x4096", 2.22),
+];
+/// Tables 12 and 13: picture, STM/LTM on both.
+const TABLES_12_13: [(&str, f64, f64); 2] = [("memorial", 3.28, 2.48), ("desk", 1.7, 1.63)];
+/// Tables 14 to 16: picture, VDP % with Sobel, with saliency, SSIM, VDP % of the global operator.
+const TABLES_14_16: [(&str, f64, f64, f64, f64); 2] =
+    [("memorial", 2.41, 3.62, 0.9876, 5.44), ("desk", 2.72, 2.05, 0.9925, 17.66)];
+
+/// Where selection pays today.
+pub(super) fn payoff(views: &[View<'_>]) -> Result<Section> {
+    let mut section = Section::new("Does selection still pay?");
+    section.text(
+        "The local operator as it is defined averages every neighbourhood of every pixel anew (*literal*). Then doing it only where it \
+         matters saves what it does not do. Computed along rows and columns (*fast*) the same averages cost so little that there is \
+         less to save: the last column says what selection gains over the fast local operator. Above 1 it pays.",
+    );
+    let mut table = Table::new(
+        "payoff",
+        "Time of local tone mapping over that of another way",
+        [
+            "picture",
+            "important (%)",
+            "literal (ms)",
+            "literal / selective",
+            "marked by",
+            "literal / fast",
+            "fast / selective fast",
+        ],
+    )
+    .timed();
+    let mut points = (Vec::new(), Vec::new());
+    for view in views {
+        let (literal, fast) = (view.ms("ltm")?, view.ms("ltm-fast")?);
+        let best = view.best_mark()?;
+        let important = view.important(view.run("stm", None))?.map(|share| share * 100.0);
+        let selective = over(literal, best.as_ref().map(|(_, ms)| *ms));
+        let selective_fast = over(fast, view.ms("stm-fast")?);
+        table.push([
+            view.name().into(),
+            important.into(),
+            literal.into(),
+            selective.into(),
+            best.map_or(Cell::Empty, |(mark, _)| mark.into()),
+            over(literal, fast).into(),
+            selective_fast.into(),
+        ]);
+        points.0.extend(important.zip(selective));
+        points.1.extend(important.zip(selective_fast));
+    }
+    section.add(table);
+    let plot = Plot::new(
+        "payoff-plot",
+        "Gain against the share of important pixels",
+        Axis::new("important (%)"),
+        Axis::new("times"),
+    );
+    section.add(plot.points("literal / selective", points.0).points("fast / selective fast", points.1).timed());
+    Ok(section)
+}
+
+/// Table 7.
+pub(super) fn agreement(views: &[View<'_>]) -> Result<Section> {
+    let mut section = Section::new("Table 7: the device against the CPU");
+    section.text("Errors of display luminance (equations 18 and 19), the slow program on the CPU being the truth.");
+    let columns = ["picture", "RMS % (thesis)", "mean % (thesis)", "RMS %", "mean %", "fast: RMS %", "fast: mean %"];
+    let mut table = Table::new("table-7", "Table 7", columns);
+    for view in views {
+        let truth = view.run("cpu", None);
+        if truth.is_none() {
+            continue;
+        }
+        let paper = TABLE_7.iter().find(|(name, ..)| *name == view.of.0);
+        let list = [Measure::RmsPercent, Measure::MeanPercent];
+        let literal = view.measures(list, truth, view.run("ltm", None))?;
+        let fast = view.measures(list, truth, view.run("ltm-fast", None))?;
+        table.push([
+            view.name().into(),
+            paper.map(|p| p.1).into(),
+            paper.map(|p| p.2).into(),
+            literal[0].into(),
+            literal[1].into(),
+            fast[0].into(),
+            fast[1].into(),
+        ]);
+    }
+    section.add(table);
+    Ok(section)
+}
+
+fn rate(ms: Option<f64>) -> Cell {
+    ms.map(|ms| 1e3 / ms).into()
+}
+
+/// Tables 5 and 8 to 10.
+pub(super) fn frames(views: &[View<'_>]) -> Result<Section> {
+    let mut section = Section::new("Tables 5 and 8 to 10: frames by size");
+    section.text(
+        "Frames a second of tone mapping alone on the device named at the end of the page; the thesis' are of a GeForce 6600 (4:3) and an \
+         8800 GTX (squares). Only ratios between columns mean something.",
+    );
+    let columns = [
+        "frame",
+        "GTM (1/s)",
+        "LTM (1/s)",
+        "STM (1/s)",
+        "STM/LTM (thesis)",
+        "STM/LTM",
+        "LTM fast (1/s)",
+        "STM fast (1/s)",
+    ];
+    let mut table = Table::new("table-9", "Tables 9 and 10", columns).timed();
+    let mut thresholds: Vec<String> = Vec::new();
+    let frames = || views.iter().filter(|view| !view.is_still());
+    for view in frames() {
+        let size = view.of.1.rsplit(' ').next().unwrap_or_default();
+        let paper = TABLES_9_10.iter().find(|(name, _)| *name == size).map(|(_, ratio)| *ratio);
+        let (local, selective) = (view.ms("ltm")?, view.ms_marked("early-z")?);
+        table.push([
+            view.name().into(),
+            rate(view.ms("gtm")?),
+            rate(local),
+            rate(selective),
+            paper.into(),
+            over(local, selective).into(),
+            rate(view.ms("ltm-fast")?),
+            rate(view.ms("stm-fast")?),
+        ]);
+        thresholds.extend(of_thresholds(view).filter_map(|run| run.value("tonemap.threshold")));
+    }
+    section.add(table);
+    thresholds.sort_by(|a, b| number(a).total_cmp(&number(b)));
+    thresholds.dedup();
+    let each = |thresholds: &[String], what: &str| -> Vec<String> {
+        std::iter::once("frame".to_owned()).chain(thresholds.iter().map(|t| format!("{t} {what}"))).collect()
+    };
+    let mut times = Table::new("table-8", "Table 8: selective, by threshold", each(&thresholds, "(1/s)")).timed();
+    let mut shares = Table::new("important", "Important pixels by threshold", each(&thresholds, "(%)"));
+    for view in frames() {
+        let (mut rates, mut parts) = (vec![Cell::from(view.name())], vec![Cell::from(view.name())]);
+        for threshold in &thresholds {
+            let run = of_thresholds(view).find(|run| run.value("tonemap.threshold").as_ref() == Some(threshold));
+            rates.push(rate(view.time(run)?));
+            parts.push(view.important(run)?.map(|share| share * 100.0).into());
+        }
+        times.push(rates);
+        shares.push(parts);
+    }
+    section.add(times);
+    section.add(shares);
+    Ok(section)
+}
+
+fn of_thresholds<'a>(view: &View<'a>) -> impl Iterator<Item = &'a Done> {
+    view.results.at(view.of).filter(|run| run.method == "stm-threshold")
+}
+
+fn number(text: &str) -> f64 {
+    text.parse().unwrap_or(f64::NAN)
+}
+
+/// Tables 11 to 13.
+pub(super) fn stills(views: &[View<'_>]) -> Result<Section> {
+    let mut section = Section::new("Tables 11 to 13: pictures");
+    section.text(format!("Threshold {THRESHOLD}. STM/LTM is how many times faster selective tone mapping is, each way to mark for itself."));
+    let mut table = Table::new("table-11", "Table 11", ["picture", "pixels", "dynamic range (log₁₀)", "important (%)"]);
+    let heads = ["picture", "GTM (ms)", "LTM (ms)", "fast LTM (ms)"].map(str::to_owned);
+    let marks = MARKS.iter().map(|mark| format!("STM/LTM {mark}"));
+    let paper = ["thesis: 6600", "thesis: 8800 GTX"].map(str::to_owned);
+    let mut times = Table::new("table-12", "Tables 12 and 13", heads.into_iter().chain(marks).chain(paper)).timed();
+    for view in views.iter().filter(|view| view.is_still()) {
+        let global = view.run("gtm", None);
+        let mut size = Cell::Empty;
+        let mut range = None;
+        if let Some(run) = global {
+            let luminance = view.results.picture(super::Layer(run, "luminance"))?;
+            size = format!("{} × {}", luminance.width, luminance.height).into();
+            let lit = luminance.pixels.iter().map(|p| f64::from(p[0])).filter(|l| *l > 0.0);
+            let (low, high) = lit.fold((f64::INFINITY, 0.0f64), |(low, high), l| (low.min(l), high.max(l)));
+            range = Some((high / low).log10()).filter(|range| range.is_finite());
+        }
+        let important = view.important(view.run("stm", None))?.map(|share| share * 100.0);
+        table.push([view.name().into(), size, range.into(), important.into()]);
+        let local = view.ms("ltm")?;
+        let mut cells = vec![view.name().into(), view.ms("gtm")?.into(), local.into(), view.ms("ltm-fast")?.into()];
+        for mark in MARKS {
+            cells.push(over(local, view.ms_marked(mark)?).into());
+        }
+        let paper = TABLES_12_13.iter().find(|(name, ..)| *name == view.of.0);
+        cells.extend([paper.map(|p| p.1).into(), paper.map(|p| p.2).into()]);
+        times.push(cells);
+    }
+    section.add(table);
+    section.add(times);
+    Ok(section)
+}
+
+/// Tables 14 to 16.
+pub(super) fn quality(views: &[View<'_>]) -> Result<Section> {
+    let mut section = Section::new("Tables 14 to 16: what selection loses");
+    section.text(
+        "Against local tone mapping by the literal operator. VDP %: pixels that are seen to differ (lower is better); gain: frames a second \
+         over VDP % (equations 20, 21; higher is better), with early-z. The thesis' figures are of other prints of the same pictures and of its \
+         version of the VDP.",
+    );
+    let names = [
+        "picture",
+        "VDP % global (thesis)",
+        "VDP % global",
+        "VDP % Sobel (thesis)",
+        "VDP % Sobel",
+        "VDP % saliency (thesis)",
+        "VDP % saliency",
+        "VDP % half size",
+        "SSIM Sobel (thesis)",
+        "SSIM Sobel",
+        "FLIP Sobel",
+    ];
+    let mut table = Table::new("table-14", "Tables 14 and 15", names);
+    let mut gains =
+        Table::new("table-16", "Table 16: gain", ["picture", "GTM (1/s)", "STM (1/s)", "gain GTM", "gain STM"]).timed();
+    for view in views.iter().filter(|view| view.is_still()) {
+        let truth = view.run("ltm", None);
+        let sobel = view.run("stm", Some(("tonemap.mark", "early-z")));
+        let vdp = |run| view.measures([Measure::Vdp], truth, run).map(|[vdp]| vdp);
+        let [seen, ssim, flip] = view.measures([Measure::Vdp, Measure::Ssim, Measure::Flip], truth, sobel)?;
+        let global = vdp(view.run("gtm", None))?;
+        let paper = TABLES_14_16.iter().find(|(name, ..)| *name == view.of.0);
+        table.push([
+            view.name().into(),
+            paper.map(|p| p.4).into(),
+            global.into(),
+            paper.map(|p| p.1).into(),
+            seen.into(),
+            paper.map(|p| p.2).into(),
+            vdp(view.run("stm-saliency", None))?.into(),
+            vdp(view.run("stm-half", None))?.into(),
+            paper.map(|p| p.3).into(),
+            ssim.into(),
+            flip.into(),
+        ]);
+        let (fast, selective) = (view.ms("gtm")?, view.time(sobel)?);
+        let gain = |ms: Option<f64>, vdp: f64| ms.map(|ms| 1e3 / ms / vdp).filter(|gain| gain.is_finite());
+        gains.push([
+            view.name().into(),
+            rate(fast),
+            rate(selective),
+            gain(fast, global).into(),
+            gain(selective, seen).into(),
+        ]);
+    }
+    section.add(table);
+    section.add(gains);
+    Ok(section)
+}
+
+/// The same for the other operators.
+pub(super) fn operators(views: &[View<'_>]) -> Result<Section> {
+    let mut section = Section::new("Other operators in the same framework");
+    let columns = [
+        "picture",
+        "operator",
+        "GTM (ms)",
+        "LTM (ms)",
+        "STM (ms)",
+        "STM/LTM",
+        "VDP % global",
+        "VDP % selective",
+        "SSIM selective",
+    ];
+    let mut table = Table::new("operators", "Reinhard 2002 and the bilateral operator, fast", columns).timed();
+    for view in views {
+        for operator in ["reinhard", "bilateral"] {
+            let run = |mode: &str| view.run(&format!("{operator}-{mode}"), None);
+            let (global, local, selective) = (run("gtm"), run("ltm"), run("stm"));
+            if local.is_none() {
+                continue;
+            }
+            let [worst] = view.measures([Measure::Vdp], local, global)?;
+            let [seen, ssim] = view.measures([Measure::Vdp, Measure::Ssim], local, selective)?;
+            let times = [view.time(global)?, view.time(local)?, view.time(selective)?];
+            table.push([
+                view.name().into(),
+                operator.into(),
+                times[0].into(),
+                times[1].into(),
+                times[2].into(),
+                over(times[1], times[2]).into(),
+                worst.into(),
+                seen.into(),
+                ssim.into(),
+            ]);
+        }
+    }
+    section.add(table);
+    Ok(section)
+}
