@@ -27,9 +27,13 @@ pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
     let views: Vec<View<'_>> = results.views().into_iter().map(|of| View { results, of }).collect();
     page.add(tables::payoff(&views)?);
     page.add(tables::agreement(&views)?);
-    page.add(tables::frames(&views)?);
-    page.add(tables::stills(&views)?);
-    page.add(tables::quality(&views)?);
+    if views.iter().any(|view| !view.is_still()) {
+        page.add(tables::frames(&views)?);
+    }
+    if views.iter().any(View::is_still) {
+        page.add(tables::stills(&views)?);
+        page.add(tables::quality(&views)?);
+    }
     page.add(tables::operators(&views)?);
     page.add(images(results, &views)?);
     Ok(())
