@@ -9,21 +9,52 @@ use lucerna::reference::tracer::Progress;
 
 use crate::progress::ProgressMode;
 
+/// What ends a run, whichever comes first.
+#[derive(Clone, Copy, Debug)]
+pub struct Goals {
+    /// Paths for each pixel.
+    pub samples: u64,
+    /// Estimated relative mean squared error.
+    pub error: Option<f64>,
+    /// Of this run.
+    pub time: Option<Duration>,
+}
+
+impl Goals {
+    /// Seconds that are left, and which goal will be met first. `samples` of which `done` are of this run, which took `seconds`;
+    /// `error`: the last one that was estimated, and after how many samples. The error is a variance and falls as one over the
+    /// number of samples.
+    fn left(&self, samples: f64, done: f64, seconds: f64, error: Option<(f64, f64)>) -> (f64, &'static str) {
+        let each = seconds / done.max(1e-12);
+        let mut first = ((self.samples as f64 - samples).max(0.0) * each, "samples");
+        if let (Some(goal), Some((error, at))) = (self.error, error.filter(|(e, _)| e.is_finite())) {
+            let left = (at * error / goal - samples).max(0.0) * each;
+            first = if left < first.0 { (left, "error") } else { first };
+        }
+        if let Some(limit) = self.time {
+            let left = (limit.as_secs_f64() - seconds).max(0.0);
+            first = if left < first.0 { (left, "time") } else { first };
+        }
+        first
+    }
+}
+
 /// Shows progress from time to time.
 #[derive(Debug)]
 pub struct Meter {
     mode: ProgressMode,
-    target: u64,
+    goals: Goals,
     started: Instant,
     /// Before this run.
     before: Progress,
     shown: Option<Instant>,
-    error: Option<f64>,
+    /// The last estimate, and after how many samples.
+    error: Option<(f64, f64)>,
 }
 
 impl Meter {
-    /// Towards `target` samples.
-    pub fn new(mode: ProgressMode, quiet: bool, target: u64, before: Progress) -> Self {
+    /// Towards `goals`.
+    pub fn new(mode: ProgressMode, quiet: bool, goals: Goals, before: Progress) -> Self {
         let terminal = std::io::stderr().is_terminal();
         let mode = match mode {
             ProgressMode::Auto if quiet => ProgressMode::None,
@@ -31,7 +62,7 @@ impl Meter {
             ProgressMode::Auto | ProgressMode::Bar => ProgressMode::Plain,
             mode => mode,
         };
-        Self { mode, target, started: Instant::now(), before, shown: None, error: None }
+        Self { mode, goals, started: Instant::now(), before, shown: None, error: None }
     }
 
     /// Whether the error is shown to anybody.
@@ -40,8 +71,8 @@ impl Meter {
     }
 
     /// The estimated error was looked at.
-    pub fn error(&mut self, error: f64) {
-        self.error = Some(error);
+    pub fn error(&mut self, now: &Progress, error: f64) {
+        self.error = Some((error, now.samples));
     }
 
     /// Seconds of this run.
@@ -74,7 +105,7 @@ impl Meter {
 
     /// The last line.
     pub fn finish(&mut self, now: &Progress, error: f64) {
-        self.error = Some(error);
+        self.error(now, error);
         if self.mode != ProgressMode::None {
             self.line(now, true);
         }
@@ -82,21 +113,25 @@ impl Meter {
 
     fn line(&self, now: &Progress, last: bool) {
         let done = now.samples - self.before.samples;
-        let left = (self.target as f64 - now.samples).max(0.0) / (done / self.seconds().max(1e-9)).max(1e-12);
-        let error = self.error.filter(|e| e.is_finite());
+        let (left, by) = self.goals.left(now.samples, done, self.seconds(), self.error);
+        let error = self.error.map(|(error, _)| error).filter(|e| e.is_finite());
         let mut err = std::io::stderr().lock();
         if self.mode == ProgressMode::Json {
             let text = serde_json::json!({
-                "samples": now.samples, "target": self.target, "paths_per_second": self.rate(now),
-                "relative_error": error, "seconds_left": if last { 0.0 } else { left }, "done": last,
+                "samples": now.samples, "target": self.goals.samples, "paths_per_second": self.rate(now),
+                "relative_error": error, "target_error": self.goals.error,
+                "seconds_left": if last { 0.0 } else { left }, "ends_by": by, "done": last,
             });
             let _ = writeln!(err, "{text}");
             return;
         }
         let samples = if now.samples < 10.0 { format!("{:.1}", now.samples) } else { format!("{:.0}", now.samples) };
-        let mut text = format!("{samples}/{} samples, {} samples/s", self.target, count(self.rate(now)));
+        let mut text = format!("{samples}/{} samples, {} samples/s", self.goals.samples, count(self.rate(now)));
         if let Some(error) = error {
             text += &format!(", relative error {error:.2e}");
+            if let Some(goal) = self.goals.error {
+                text += &format!(" of {goal:.2e}");
+            }
         }
         match last {
             true => text += &format!(", {:.1} s", self.seconds()),
@@ -123,5 +158,30 @@ fn span(seconds: f64) -> String {
         s if s >= 36_000.0 => format!("{:.0} h", s / 3600.0),
         s if s >= 600.0 => format!("{:.0} min", s / 60.0),
         s => format!("{s:.0} s"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_goal_that_comes_first_tells_the_time_left() {
+        let goals = Goals { samples: 1_000_000, error: None, time: None };
+        // 100 samples in ten seconds.
+        assert_eq!(goals.left(100.0, 100.0, 10.0, Some((0.5, 80.0))), (99_990.0, "samples"));
+        // An error of 0.04 after 80 samples is one of 0.01 after 320: 220 more.
+        let goals = Goals { error: Some(0.01), ..goals };
+        let (left, by) = goals.left(100.0, 100.0, 10.0, Some((0.04, 80.0)));
+        assert!((left - 22.0).abs() < 1e-9 && by == "error", "{left} {by}");
+        assert_eq!(goals.left(100.0, 100.0, 10.0, None).1, "samples");
+        assert_eq!(goals.left(100.0, 100.0, 10.0, Some((f64::INFINITY, 1.0))).1, "samples");
+        // Already better than asked for: done at the next look.
+        assert_eq!(goals.left(100.0, 100.0, 10.0, Some((0.001, 80.0))), (0.0, "error"));
+        let goals = Goals { time: Some(Duration::from_secs(15)), ..goals };
+        assert_eq!(goals.left(100.0, 100.0, 10.0, Some((0.04, 80.0))), (5.0, "time"));
+        // Samples of an earlier run count for the goals, but not for the speed.
+        let (left, _) = Goals { time: None, ..goals }.left(100.0, 50.0, 10.0, Some((0.04, 80.0)));
+        assert!((left - 44.0).abs() < 1e-9);
     }
 }

@@ -30,7 +30,7 @@ use crate::{
     stage::Stage,
 };
 use checkpoint::Checkpoint;
-use meter::Meter;
+use meter::{Goals, Meter};
 
 /// Why the work ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,7 +102,9 @@ pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
         console.info(&format!("goes on after {:.0} samples a pixel", tracer.progress()?.samples));
     }
 
-    let mut meter = Meter::new(args.progress, console.is_quiet(), settings.samples, tracer.progress()?);
+    let goals =
+        Goals { samples: settings.samples, error: args.target_error, time: args.time_limit.map(|limit| limit.0) };
+    let mut meter = Meter::new(args.progress, console.is_quiet(), goals, tracer.progress()?);
     let end = work(args, &settings, &mut tracer, &mut checkpoint, &mut meter, &interrupt)?;
     let done = tracer.progress()?;
     if done.paths == 0 && end == End::Interrupt {
@@ -195,7 +197,7 @@ fn work(
         }
         if progress.samples >= look {
             let error = tracer.sums()?.relative_error();
-            meter.error(error);
+            meter.error(&progress, error);
             look = (progress.samples * 1.25).ceil();
             if args.target_error.is_some_and(|target| error <= target) {
                 // To whole samples, so that the picture can be made again.
