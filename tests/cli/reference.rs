@@ -94,6 +94,25 @@ fn time_and_error_end_it_with_a_picture() {
     reference(&["--resume", "-o", &exr]).expect(3, &["a.exr.state", "checksum"]);
 }
 
+#[test]
+fn a_picture_is_not_gone_on_with_by_another_way_to_trace_rays() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let (exr, probe) = (path(&folder, "a.exr"), path(&folder, "probe.exr"));
+    if reference(&["--spp", "1", "--ray-query", "on", "-o", &probe]).code != 0 {
+        eprintln!("SKIPPED: the device has no ray queries");
+        return;
+    }
+    reference(&["--spp", "1000000", "--time-limit", "0.2s", "--ray-query", "off", "-o", &exr]).expect(8, &[]);
+    let state = fs::read(path(&folder, "a.exr.state")).unwrap();
+    reference(&["--resume", "--ray-query", "on", "-o", &exr]).expect(3, &["ray_query was false, now is true"]);
+    assert!(fs::read(path(&folder, "a.exr.state")).unwrap() == state, "the state is left alone");
+    let more = ["--spp", "1000000", "--time-limit", "0.2s", "--resume", "--ray-query", "off", "-o", &exr];
+    reference(&more).expect(8, &[]);
+}
+
 fn begin(output: &str, spp: &str) -> Child {
     let mut command = command(env!("CARGO_BIN_EXE_lucerna"));
     command.args(SMALL).args(["--spp", spp, "-o", output, "--resume"]).env("LUCERNA_CHECKPOINT_SECONDS", "0.02");

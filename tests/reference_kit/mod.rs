@@ -4,6 +4,7 @@
 use glam::{DVec3, Mat4, Vec3};
 use lucerna::{
     gpu::Gpu,
+    image::Layers,
     reference::{
         path,
         tracer::{self, Filter, Tracer},
@@ -60,6 +61,17 @@ struct Estimate {
 /// The layers direct, indirect, emission and their sum are compared over squares of 8 × 8 pixels and over the picture by Welch's t,
 /// the device's variance from independent pictures; single pixels of the sum by z, with the variances of the samples.
 pub fn disagreements(gpu: &Gpu, scene: &Scene, view: &View, task: &Task) -> Vec<String> {
+    disagreements_after(gpu, scene, view, task, &[&|_| {}]).remove(0)
+}
+
+/// The same once for each of `changes`, which is made to the device's pictures before they are compared.
+pub fn disagreements_after(
+    gpu: &Gpu,
+    scene: &Scene,
+    view: &View,
+    task: &Task,
+    changes: &[&dyn Fn(&mut Layers)],
+) -> Vec<Vec<String>> {
     let pose = Pose::rest(scene);
     let bvh = Bvh::build(scene, &pose);
     let ours = path::trace(
@@ -85,7 +97,7 @@ pub fn disagreements(gpu: &Gpu, scene: &Scene, view: &View, task: &Task) -> Vec<
         },
     );
     let mut tracer = Tracer::new(gpu, scene, &pose).unwrap();
-    let pictures: Vec<_> = (0..PICTURES)
+    let pictures: Vec<Layers> = (0..PICTURES)
         .map(|seed| {
             let settings = tracer::Settings {
                 bounces: task.bounces,
@@ -101,8 +113,17 @@ pub fn disagreements(gpu: &Gpu, scene: &Scene, view: &View, task: &Task) -> Vec<
             layers
         })
         .collect();
+    let compared = |change: &&dyn Fn(&mut Layers)| {
+        let mut pictures = pictures.clone();
+        pictures.iter_mut().for_each(change);
+        compare(&ours, &pictures, view, task)
+    };
+    changes.iter().map(compared).collect()
+}
+
+fn compare(ours: &path::Layers, pictures: &[Layers], view: &View, task: &Task) -> Vec<String> {
     let device = |name: &str| -> Vec<Vec<DVec3>> {
-        let pixels = |p: &lucerna::image::Layers| {
+        let pixels = |p: &Layers| {
             let data = &p.layer(name).unwrap().data;
             data.chunks(3).map(|c| Vec3::new(c[0], c[1], c[2]).as_dvec3()).collect()
         };

@@ -91,6 +91,8 @@ impl Job {
             "camera": self.view.clip_from_world.to_cols_array().map(f32::to_bits),
             "device": device.device,
             "driver": format!("{} {}", device.driver, device.driver_info).trim(),
+            // Hits at edges differ in their last bits.
+            "ray_query": gpu.caps().ray_query,
         }))
     }
 
