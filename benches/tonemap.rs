@@ -77,7 +77,7 @@ struct Picture {
 /// `from` repeated to `width × height`, mirrored at its edges, no luminance at 0 or below (which makes Luminance HDR abort).
 fn repeated(from: &Layers, width: u32, height: u32, file: PathBuf) -> Result<Picture> {
     let pixels = from.main().and_then(image::Layer::rgb_pixels).ok_or_else(|| Error::input("no colour"))?;
-    let mirrored = |p: u32, size: u32| if p / size % 2 == 0 { p % size } else { size - 1 - p % size };
+    let mirrored = |p: u32, size: u32| if (p / size).is_multiple_of(2) { p % size } else { size - 1 - p % size };
     let at = |i: u32| {
         let (x, y) = (mirrored(i % width, from.width), mirrored(i / width, from.height));
         pixels[(y * from.width + x) as usize].map(|v| v.max(1e-6))
