@@ -26,99 +26,88 @@ pub fn adaptation(
         return bilateral::base(graph, luminance, statistics, picture, settings);
     };
     let adaptation = graph.image("tonemap.adaptation", Format::R32F, graph.extent(luminance));
-    let tables = search.tables(graph);
     match settings.local {
         Local::Literal => {
-            let Tables { search, weights } = tables;
+            let Tables { search, weights } = search.tables(graph);
             let args = literal::Args { luminance, search, weights, statistics, adaptation };
             graph.compute(args, graph.extent(luminance));
         }
-        Local::Fast => {
-            for band in bands(graph, luminance, &search) {
-                let rows = row_averages(graph, luminance, &search, tables, &band);
-                column_averages(graph, luminance, &search, tables, rows, &band, statistics, adaptation);
-            }
-        }
+        Local::Fast => fast(graph, luminance, statistics, &search, adaptation),
     }
     Ok(adaptation)
 }
 
 /// Rows of an image that are done together, so that what lies between rows and columns stays small.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Band {
+struct Band {
     /// First row whose averages along rows are needed.
-    pub first: u32,
+    first: u32,
     /// Rows whose averages along rows are needed.
-    pub count: u32,
+    count: u32,
     /// First row that comes out.
-    pub begin: u32,
+    begin: u32,
     /// Row after the last that comes out.
-    pub end: u32,
-    /// Where the averages along rows lie.
-    pub rows: Buffer,
+    end: u32,
 }
 
-/// Bytes of averages along rows that are there at a time, unless a row has more.
+/// Bytes of averages along rows that are there at a time, unless a few rows have more.
 const BAND_BYTES: u64 = 32 << 20;
+/// Rows of an image that every device can have.
+const IMAGE_ROWS: u32 = 4096;
+/// Pixels that one invocation has: `SPAN` of lib/tonemap_span.glsl.
+const SPAN: u32 = 8;
 
-/// Bands of rows, which share one buffer.
-pub fn bands(graph: &mut Graph, luminance: Image, search: &Search) -> Vec<Band> {
-    let extent = graph.extent(luminance);
-    let reach = search.reach() as u32;
-    let row_bytes = u64::from(extent.width) * 16 * search.groups() as u64;
-    let fits = (BAND_BYTES / row_bytes.max(1)).min(1 << 20) as u32;
-    // At least as much comes out as goes in beside it.
-    let height = fits.saturating_sub(2 * reach).max(2 * reach).next_multiple_of(8);
-    let most = extent.height.min(height + 2 * reach);
-    let rows = graph.buffer("tonemap.rows", row_bytes * u64::from(most));
+/// Bands of an image of `extent`, of which each needs `reach` rows more on either side, for so many groups of Gaussians.
+fn bands(extent: Extent, reach: u32, groups: u32) -> Vec<Band> {
+    let row_bytes = u64::from(extent.width.max(1)) * 16 * u64::from(groups);
+    let fits = (BAND_BYTES / row_bytes).min(u64::from(IMAGE_ROWS / groups)) as u32;
+    // At least about as much comes out as goes in beside it.
+    let height = (fits.saturating_sub(2 * reach).max(2 * reach) / SPAN * SPAN).max(SPAN);
     let band = |begin: u32| {
         let end = (begin + height).min(extent.height);
         let first = begin.saturating_sub(reach);
-        Band { first, count: (end + reach).min(extent.height) - first, begin, end, rows }
+        Band { first, count: (end + reach).min(extent.height) - first, begin, end }
     };
     (0..extent.height).step_by(height as usize).map(band).collect()
 }
 
-fn radii(search: &Search) -> [u32; 6] {
-    let mut radii = [0; 6];
-    radii.iter_mut().zip(search.group_radii()).for_each(|(to, from)| *to = from);
-    radii
+/// Averages along rows, then along columns, band by band.
+fn fast(graph: &mut Graph, luminance: Image, statistics: Buffer, search: &Search, adaptation: Image) {
+    let extent = graph.extent(luminance);
+    let (groups, radius) = (search.groups() as u32, search.group_radii());
+    let bands = bands(extent, search.reach() as u32, groups);
+    let most = bands.iter().map(|band| band.count).max().unwrap_or(1);
+    let rows = graph.image("tonemap.rows", Format::RGBA32F, Extent::new(extent.width, most * groups));
+    let kernels = graph.uniform(&search.kernels());
+    let search = search.tables(graph).search;
+    for band in bands {
+        let [first, count, begin, end] = [band.first, band.count, band.begin, band.end].map(|row| row as i32);
+        let push = rows::Push { first, count, groups, radius };
+        graph.compute(rows::Args { luminance, kernels, rows, push }, [extent.width.div_ceil(SPAN), band.count]);
+        let push = columns::Push { first, count, begin, end, groups, radius };
+        let args = columns::Args { luminance, search, kernels, rows, statistics, adaptation, push };
+        graph.compute(args, [extent.width, (band.end - band.begin).div_ceil(SPAN)]);
+    }
 }
 
-/// Averages along the rows of a band, of all Gaussians: vec4 `[group][row][column]`.
-pub fn row_averages(graph: &mut Graph, luminance: Image, search: &Search, tables: Tables, band: &Band) -> Buffer {
-    let width = graph.extent(luminance).width;
-    let [radius_0, radius_1, radius_2, radius_3, radius_4, radius_5] = radii(search);
-    let groups = search.groups() as u32;
-    let spec = rows::Spec { groups, radius_0, radius_1, radius_2, radius_3, radius_4, radius_5 };
-    let push = rows::Push { first: band.first as i32, count: band.count as i32 };
-    let args = rows::Args { luminance, weights: tables.weights, rows: band.rows, push, spec };
-    graph.compute(args, [width.div_ceil(8), band.count]);
-    band.rows
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-#[expect(clippy::too_many_arguments)]
-fn column_averages(
-    graph: &mut Graph,
-    luminance: Image,
-    search: &Search,
-    tables: Tables,
-    rows: Buffer,
-    band: &Band,
-    statistics: Buffer,
-    adaptation: Image,
-) {
-    let width = graph.extent(luminance).width;
-    let [radius_0, radius_1, radius_2, radius_3, radius_4, radius_5] = radii(search);
-    let groups = search.groups() as u32;
-    let spec = columns::Spec { groups, radius_0, radius_1, radius_2, radius_3, radius_4, radius_5 };
-    let push = columns::Push {
-        first: band.first as i32,
-        count: band.count as i32,
-        begin: band.begin as i32,
-        end: band.end as i32,
-    };
-    let Tables { search, weights } = tables;
-    let args = columns::Args { luminance, search, weights, rows, statistics, adaptation, push, spec };
-    graph.compute(args, [width, (band.end - band.begin).div_ceil(8)]);
+    #[test]
+    fn bands_cover_each_row_once_with_what_they_need() {
+        for (width, height, reach, groups) in
+            [(1, 1, 20, 4), (1, 16384, 33, 3), (16384, 16384, 32, 6), (512, 768, 20, 4)]
+        {
+            let bands = bands(Extent::new(width, height), reach, groups);
+            let mut next = 0;
+            for band in &bands {
+                assert_eq!((band.begin, band.first), (next, next.saturating_sub(reach)));
+                assert_eq!(band.first + band.count, (band.end + reach).min(height));
+                assert!(band.count * groups <= IMAGE_ROWS, "{band:?}");
+                next = band.end;
+            }
+            assert_eq!(next, height);
+        }
+    }
 }

@@ -3,7 +3,10 @@
 use super::{Operator, Settings};
 use crate::{
     graph::{Buffer, Graph},
-    shaders::{consts, types::TonemapSearch},
+    shaders::{
+        consts,
+        types::{TonemapKernels, TonemapSearch},
+    },
 };
 
 /// One step of the search: the average of `centre` counts as even if it differs from that of `surround` by less than
@@ -131,9 +134,26 @@ impl Search {
         }
     }
 
-    /// Largest radius of each group of four.
-    pub fn group_radii(&self) -> Vec<u32> {
-        self.gaussians.chunks(4).map(|g| g.iter().map(|w| w.len() as u32 - 1).max().unwrap_or(0)).collect()
+    /// Largest radius of each group of four; 0 for groups that are not there.
+    pub fn group_radii(&self) -> [i32; 6] {
+        let mut radii = [0; 6];
+        for (radius, group) in radii.iter_mut().zip(self.gaussians.chunks(4)) {
+            *radius = group.iter().map(|w| w.len() as i32 - 1).max().unwrap_or(0);
+        }
+        radii
+    }
+
+    /// Weights of the fast way: by signed distance from −48, four Gaussians together.
+    pub fn kernels(&self) -> TonemapKernels {
+        let mut kernels = TonemapKernels::default();
+        for (i, gaussian) in self.gaussians.iter().enumerate() {
+            for (d, weight) in gaussian.iter().enumerate() {
+                for at in [48 - d, 48 + d] {
+                    kernels.part[i / 4 * 3 + at / 32].at[at % 32][i % 4] = *weight as f32;
+                }
+            }
+        }
+        kernels
     }
 }
 
