@@ -100,7 +100,7 @@ mod tests {
             [(1, 1, 20, 4), (1, 16384, 33, 3), (16384, 16384, 32, 6), (512, 768, 20, 4)]
         {
             let bands = bands(Extent::new(width, height), reach, groups);
-            let mut next = 0;
+            let mut next = 0u32;
             for band in &bands {
                 assert_eq!((band.begin, band.first), (next, next.saturating_sub(reach)));
                 assert_eq!(band.first + band.count, (band.end + reach).min(height));
