@@ -142,18 +142,20 @@ fn run() -> Result<()> {
             all.extend(MARKS.map(|(_, mark)| in_mode(Mode::Selective, mark)));
             let mut times = vec![vec![]; all.len()];
             let mut started = vec![Started::default(); all.len()];
+            let mut results = vec![];
             // Alternating, so that what else the machine does falls on all; the first round makes pipelines and memory.
             for round in 0..=rounds {
                 for (i, settings) in all.iter().enumerate() {
-                    let once = once(&mut runner, &color, settings, false)?;
-                    if round > 0 {
+                    let once = once(&mut runner, &color, settings, round == 0)?;
+                    started[i] = once.started;
+                    if round == 0 {
+                        results.push(once);
+                    } else {
                         times[i].push(once.ms);
                     }
-                    started[i] = once.started;
                 }
             }
             let times: Vec<f64> = times.into_iter().map(median).collect();
-            let results = all.iter().map(|s| once(&mut runner, &color, s, true)).collect::<Result<Vec<_>>>()?;
             let map = results[2].map.clone().unwrap_or_default();
             let marked = f64::from(map.iter().sum::<f32>()) / map.len().max(1) as f64;
             if results[3..].iter().any(|r| r.mapped != results[2].mapped) {
