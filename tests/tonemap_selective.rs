@@ -8,7 +8,7 @@ use lucerna::{
     techniques::tonemap::{self, Identify, Local, Mark, Mode, Operator, Settings, Still, identify, mark},
 };
 
-const OPERATORS: [Operator; 2] = [Operator::Ashikhmin, Operator::Reinhard];
+const OPERATORS: [Operator; 3] = [Operator::Ashikhmin, Operator::Reinhard, Operator::Bilateral];
 const MARKS: [Mark; 4] = [Mark::Branch, Mark::Tiles, Mark::EarlyZ, Mark::Compact];
 /// One pixel, less than a tile, a tile, more than whole tiles, a line.
 const SIZES: [[u32; 2]; 6] = [[1, 1], [3, 5], [8, 8], [17, 9], [37, 29], [70, 1]];
@@ -387,7 +387,10 @@ fn selective_is_local_where_marked_and_global_elsewhere() {
                 assert_ne!(local_mode, none, "{operator:?}");
                 if operator != Operator::Reinhard {
                     // Its curve of the global mode has a white, that of the local one has none.
-                    assert_eq!(none, with(Mode::Global, Mark::Branch, &mask), "{operator:?}");
+                    // Two specialisations of one shader may round differently.
+                    let global = with(Mode::Global, Mark::Branch, &mask);
+                    let near = |(a, b): (&f32, &f32)| (a - b).abs() <= 1e-6 * a.abs().max(b.abs());
+                    assert!(none.as_flattened().iter().zip(global.as_flattened()).all(near), "{operator:?}");
                 }
                 let all = with(Mode::Selective, Mark::Compact, &vec![1.0; count]);
                 assert_eq!(all, local_mode, "{operator:?}, {local:?}");

@@ -41,6 +41,28 @@ pub fn base(
     settings: &Settings,
 ) -> Result<Image> {
     let extent = graph.extent(luminance);
+    let Source { logarithm, blocks, bilateral } = source(graph, luminance, statistics, picture, settings)?;
+    let base = graph.image("tonemap.base", Format::R32F, extent);
+    graph.compute(base::Args { logarithm, blocks, base, push: base::Push { bilateral } }, extent);
+    Ok(base)
+}
+
+/// What the filter reads.
+pub(super) struct Source {
+    pub logarithm: Image,
+    pub blocks: Image,
+    pub bilateral: TonemapBilateral,
+}
+
+/// Everything before the filter, as [`base`].
+pub(super) fn source(
+    graph: &mut Graph,
+    luminance: Image,
+    statistics: Buffer,
+    picture: Extent,
+    settings: &Settings,
+) -> Result<Source> {
+    let extent = graph.extent(luminance);
     let (sigma, reach) = settings.bilateral(picture.width, picture.height);
     if settings.local == Local::Literal && reach > LITERAL_REACH {
         let what =
@@ -67,7 +89,5 @@ pub fn base(
         reach: reach as i32,
         side: side as i32,
     };
-    let base = graph.image("tonemap.base", Format::R32F, extent);
-    graph.compute(base::Args { logarithm, blocks, base, push: base::Push { bilateral } }, extent);
-    Ok(base)
+    Ok(Source { logarithm, blocks, bilateral })
 }

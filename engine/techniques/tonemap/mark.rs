@@ -10,14 +10,19 @@
 //! All give the same picture to the bit: they call the same function of the same texels.
 
 use super::{
-    Local, Mark, Settings, local,
+    Local, Mark, Settings, bilateral, local,
     search::{Search, Tables},
 };
 use crate::{
     Result,
-    graph::{Buffer, Compare, Depth, Draw, Extent, Format, Graph, Image, Load, Raster, Targets},
-    shaders::tonemap::{
-        list_groups, list_pixels, list_tiles, mark_depth, marked_branch, marked_compact, marked_early_z, marked_tiles,
+    graph::{Buffer, Compare, Depth, Draw, Extent, Format, Graph, Image, Load, Raster, Targets, Uniform},
+    shaders::{
+        consts,
+        tonemap::{
+            list_groups, list_pixels, list_tiles, mark_depth, marked_branch, marked_compact, marked_early_z,
+            marked_tiles,
+        },
+        types::TonemapBilateral,
     },
 };
 
@@ -33,8 +38,8 @@ const DEPTH_DRAWN: f32 = 0.5;
 /// Local adaptation where `importance` is not 0; elsewhere the luminance itself, from which the operator's curve makes what its global
 /// mode shows. `picture`: extent of the whole picture, of which `luminance` may be a part.
 ///
-/// By definition ([`Local::Literal`]), it is computed for the important pixels alone. What [`Local::Fast`] saves, it saves by sharing work
-/// between neighbours; it is computed for all pixels, and then taken for the important ones.
+/// By definition, Gaussian averages are computed for the important pixels alone, and so is the bilateral filter both ways. Averages along
+/// rows and columns ([`Local::Fast`]) share work between neighbours: they are computed for all pixels, and taken for the important ones.
 ///
 /// # Errors
 /// `Usage` if the settings cannot serve a picture of this extent.
@@ -47,14 +52,8 @@ pub fn adapt(
     settings: &Settings,
 ) -> Result<Image> {
     let extent = graph.extent(luminance);
-    let found = Search::new(settings).filter(|_| settings.local == Local::Literal);
-    let literal = found.is_some().into();
-    let (tables, adaptation) = match found {
-        // What the shaders do not read in one of the cases is bound to something of its kind.
-        Some(search) => (search.tables(graph), luminance),
-        None => (Tables::none(graph), local::adaptation(graph, luminance, statistics, picture, settings)?),
-    };
-    let Tables { search, weights } = tables;
+    let LocalPasses { local, tables: Tables { search, weights }, adaptation, logarithm, blocks, bilateral } =
+        prepare(graph, luminance, importance, statistics, picture, settings)?;
     let adapted = graph.image("tonemap.adapted", Format::R32F, extent);
     graph.copy(luminance, adapted);
     let target = Targets::new().color(adapted, Load::Keep);
@@ -66,8 +65,11 @@ pub fn adapt(
                 weights,
                 statistics,
                 adaptation,
+                logarithm,
+                blocks,
+                bilateral,
                 importance,
-                spec: marked_branch::Spec { literal },
+                spec: marked_branch::Spec { local },
             };
             graph.raster(target, Raster::new(), args, Draw::fullscreen()).counted();
         }
@@ -80,7 +82,10 @@ pub fn adapt(
                 weights,
                 statistics,
                 adaptation,
-                spec: marked_early_z::Spec { literal },
+                logarithm,
+                blocks,
+                bilateral,
+                spec: marked_early_z::Spec { local },
             };
             let (target, state) = early_z(target, depth);
             graph.raster(target, state, args, Draw::fullscreen_at(DEPTH_DRAWN)).counted();
@@ -98,11 +103,14 @@ pub fn adapt(
                 weights,
                 statistics,
                 adaptation,
+                logarithm,
+                blocks,
+                bilateral,
                 importance,
                 count,
                 tiles,
                 adapted,
-                spec: marked_tiles::Spec { literal },
+                spec: marked_tiles::Spec { local },
             };
             graph.compute_indirect(args, groups, 0).counted();
         }
@@ -122,16 +130,63 @@ pub fn adapt(
                     weights,
                     statistics,
                     adaptation,
+                    logarithm,
+                    blocks,
+                    bilateral,
                     count,
                     pixels,
                     adapted,
-                    spec: marked_compact::Spec { literal },
+                    spec: marked_compact::Spec { local },
                 };
                 graph.compute_indirect(args, groups, 0).counted();
             }
         }
     }
     Ok(adapted)
+}
+
+/// What the local component of a pixel reads; what it does not read is bound to something of its kind.
+struct LocalPasses {
+    /// One of the constants `LOCAL_…`.
+    local: u32,
+    tables: Tables,
+    adaptation: Image,
+    logarithm: Image,
+    blocks: Image,
+    bilateral: Uniform<TonemapBilateral>,
+}
+
+/// Declares what has to be computed before.
+fn prepare(
+    graph: &mut Graph,
+    luminance: Image,
+    importance: Image,
+    statistics: Buffer,
+    picture: Extent,
+    settings: &Settings,
+) -> Result<LocalPasses> {
+    let (mut local, mut adaptation, mut logarithm, mut blocks) =
+        (consts::LOCAL_LOOKUP, luminance, luminance, luminance);
+    let mut bilateral = TonemapBilateral::default();
+    let search = Search::new(settings);
+    let tables = match (&search, settings.local) {
+        (Some(search), Local::Literal) => {
+            local = consts::LOCAL_LITERAL;
+            search.tables(graph)
+        }
+        (Some(_), Local::Fast) => {
+            adaptation = local::adaptation(graph, luminance, statistics, picture, settings)?;
+            Tables::none(graph)
+        }
+        (None, _) => {
+            local = consts::LOCAL_BILATERAL;
+            let source = bilateral::source(graph, luminance, statistics, picture, settings)?;
+            (logarithm, blocks, bilateral) = (source.logarithm, source.blocks, source.bilateral);
+            Tables::none(graph)
+        }
+    };
+    let bilateral = graph.uniform(&bilateral);
+    Ok(LocalPasses { local, tables, adaptation, logarithm, blocks, bilateral })
 }
 
 /// Draws the map as depth.
