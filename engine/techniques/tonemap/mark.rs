@@ -53,7 +53,7 @@ pub fn adapt(
 ) -> Result<Image> {
     let extent = graph.extent(luminance);
     let LocalPasses { local, tables: Tables { search, weights }, adaptation, logarithm, blocks, bilateral } =
-        prepare(graph, luminance, importance, statistics, picture, settings)?;
+        prepare(graph, luminance, statistics, picture, settings)?;
     let adapted = graph.image("tonemap.adapted", Format::R32F, extent);
     graph.copy(luminance, adapted);
     let target = Targets::new().color(adapted, Load::Keep);
@@ -160,7 +160,6 @@ struct LocalPasses {
 fn prepare(
     graph: &mut Graph,
     luminance: Image,
-    importance: Image,
     statistics: Buffer,
     picture: Extent,
     settings: &Settings,
