@@ -54,7 +54,9 @@ fn ours(operator: &str, luminance: &Plane, adaptation: Adaptation) -> Plane {
     let (low, high) = luminance.range().unwrap();
     let curve = ashikhmin::Curve { low, high, display: 100.0 };
     let search = ashikhmin::Search { largest: 10, contrast: 0.5 };
-    let average = statistics::log_average(&luminance.values, 1e-5);
+    // The programs count black pixels too, as the paper.
+    let logs: f64 = luminance.values.iter().map(|l| (1e-5 + l).ln()).sum();
+    let average = (logs / luminance.values.len() as f64).exp();
     let scales = reinhard::Scales { count: 8, key: 0.18, phi: 8.0, epsilon: 0.05 };
     let scaled = luminance.map(|l| l * scales.key / average);
     let with = |of: &Plane, level: &Plane, f: &(dyn Fn(f64, f64) -> f64 + Sync)| {

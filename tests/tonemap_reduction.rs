@@ -27,7 +27,13 @@ fn picture(count: usize, seed: u32) -> Vec<[f32; 4]> {
     (0..count)
         .map(|i| {
             let l = if i % 13 == 5 { 0.0 } else { 10f32.powf(12.0 * next() - 6.0) };
-            if i % 7 == 3 { [0.25; 4] } else { [l * next(), l * next(), l, 1.0] }
+            if i % 7 == 3 {
+                [0.25; 4]
+            } else if i % 11 == 5 {
+                [0.0; 4]
+            } else {
+                [l * next(), l * next(), l, 1.0]
+            }
         })
         .collect()
 }
@@ -35,9 +41,10 @@ fn picture(count: usize, seed: u32) -> Vec<[f32; 4]> {
 fn expected(pixels: &[[f32; 4]], percentile: f32) -> (f32, f32, f64) {
     let mut sorted: Vec<f32> = pixels.iter().map(luminance).collect();
     sorted.sort_by(f32::total_cmp);
-    let logs: f64 = sorted.iter().map(|l| (1e-6 + f64::from(*l)).ln()).sum();
+    let lit = sorted.iter().filter(|l| **l > 0.0);
+    let logs: f64 = lit.clone().map(|l| (1e-6 + f64::from(*l)).ln()).sum();
     let [low, high] = ranks(sorted.len() as u64, percentile);
-    (sorted[low as usize], sorted[high as usize], (logs / sorted.len() as f64).exp())
+    (sorted[low as usize], sorted[high as usize], (logs / lit.count() as f64).exp())
 }
 
 fn settings(percentile: f32) -> Settings {

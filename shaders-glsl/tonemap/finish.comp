@@ -11,6 +11,7 @@ layout(binding = 0, scalar) readonly buffer Sums {
     uint largest;
     uint log_low;
     uint log_high;
+    uint lit;
 } sums;
 layout(binding = 1, scalar) readonly buffer Found {
     uint value[2];  // bits of both percentiles
@@ -19,7 +20,6 @@ layout(binding = 1, scalar) readonly buffer Found {
 layout(binding = 2, scalar) buffer Statistics { TonemapStatistics statistics; };
 
 layout(push_constant, scalar) uniform Push {
-    uint pixels;
     uint percentiles;  // 1: `found` counts
     uint normalize;
     uint adapt;        // 1: go on from the last frame
@@ -50,7 +50,7 @@ float adapted(float before, float now) {
 }
 
 void main() {
-    // Mean of the logarithms: 64 bits by 32, bit by bit; the quotient has 32.
+    // Mean of the logarithms, without black pixels: 64 bits by 32, bit by bit; the quotient has 32.
     uint remainder = 0u;
     uint quotient = 0u;
     for (int bit = 63; bit >= 0; --bit) {
@@ -58,17 +58,17 @@ void main() {
         bool over = (remainder & 0x80000000u) != 0u;
         remainder = remainder << 1 | next;
         quotient <<= 1;
-        if (over || remainder >= pixels) {
-            remainder -= pixels;
+        if (over || remainder >= sums.lit) {
+            remainder -= sums.lit;
             quotient |= 1u;
         }
     }
-    float mean = (float(int(quotient) - (152 << 20)) + float(remainder) / float(pixels)) / 1048576.0;
+    float mean = (float(int(quotient) - (152 << 20)) + float(remainder) / float(sums.lit)) / 1048576.0;
 
     TonemapStatistics next = statistics;
     float low = uintBitsToFloat(percentiles != 0u ? found.value[0] : sums.least);
     float high = uintBitsToFloat(percentiles != 0u ? found.value[1] : sums.largest);
-    float log_average = exp2(mean);
+    float log_average = sums.lit > 0u ? exp2(mean) : 1e-6;
     next.frame_low = low;
     next.frame_high = high;
     next.frame_log_average = log_average;

@@ -14,8 +14,9 @@ layout(binding = 1, r32f) uniform writeonly image2D luminance;
 layout(binding = 2, scalar) buffer Sums {
     uint least;        // bits of a float that is not negative: they are ordered as it is
     uint largest;
-    uint log_low;      // sum of (152 + log2(1e-6 + L)) · 2^20, 64 bits
+    uint log_low;      // sum of (152 + log2(1e-6 + L)) · 2^20 over pixels that are not black, 64 bits
     uint log_high;
+    uint lit;          // their number
 } sums;
 
 layout(push_constant, scalar) uniform Push {
@@ -27,6 +28,7 @@ layout(push_constant, scalar) uniform Push {
 shared uint group_least[64];
 shared uint group_largest[64];
 shared uvec2 group_sum[64];
+shared uint group_lit[64];
 
 uvec2 add64(uvec2 a, uvec2 b) {
     uint carry;
@@ -41,6 +43,7 @@ void main() {
     uint least = 0xFFFFFFFFu;
     uint largest = 0u;
     uvec2 sum = uvec2(0u);
+    uint lit = 0u;
     if (pixel.x < extent.x) {
         int end = min(pixel.y + ROWS, extent.y);
         for (; pixel.y < end; ++pixel.y) {
@@ -51,20 +54,25 @@ void main() {
                 uint bits = floatBitsToUint(l);
                 least = min(least, bits);
                 largest = max(largest, bits);
-                int fixed_log = int(roundEven(log2(1e-6 + l) * 1048576.0));
-                sum = add64(sum, uvec2(uint(fixed_log + (152 << 20)), 0u));
+                if (bits != 0u) {
+                    int fixed_log = int(roundEven(log2(1e-6 + l) * 1048576.0));
+                    sum = add64(sum, uvec2(uint(fixed_log + (152 << 20)), 0u));
+                    ++lit;
+                }
             }
         }
     }
     group_least[lane] = least;
     group_largest[lane] = largest;
     group_sum[lane] = sum;
+    group_lit[lane] = lit;
     barrier();
     for (uint half_size = 32u; half_size > 0u; half_size >>= 1) {
         if (lane < half_size) {
             group_least[lane] = min(group_least[lane], group_least[lane + half_size]);
             group_largest[lane] = max(group_largest[lane], group_largest[lane + half_size]);
             group_sum[lane] = add64(group_sum[lane], group_sum[lane + half_size]);
+            group_lit[lane] += group_lit[lane + half_size];
         }
         barrier();
     }
@@ -75,5 +83,6 @@ void main() {
         uint before = atomicAdd(sums.log_low, low);
         uint carry = before + low < before ? 1u : 0u;
         atomicAdd(sums.log_high, group_sum[0].y + carry);
+        atomicAdd(sums.lit, group_lit[0]);
     }
 }

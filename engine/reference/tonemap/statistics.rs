@@ -25,8 +25,8 @@ pub fn statistics(luminance: &[f64], percent: f64) -> Statistics {
     Statistics { min: sorted[rank - 1], max: sorted[n - rank], log_average: log_average(luminance, DELTA) }
 }
 
-/// exp of the mean of ln(δ + L); δ keeps the logarithm of black finite.
+/// exp of the mean of ln(δ + L) over what is not black; δ if all is.
 pub fn log_average(luminance: &[f64], delta: f64) -> f64 {
-    let sum: f64 = luminance.iter().map(|l| (delta + l).ln()).sum();
-    (sum / luminance.len() as f64).exp()
+    let logs: Vec<f64> = luminance.iter().filter(|l| **l > 0.0).map(|l| (delta + l).ln()).collect();
+    if logs.is_empty() { delta } else { (logs.iter().sum::<f64>() / logs.len() as f64).exp() }
 }

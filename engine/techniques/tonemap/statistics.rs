@@ -26,7 +26,7 @@ impl Rectangle {
 }
 
 /// Bytes of the sums that [`luminance()`] adds to.
-pub const SUMS_BYTES: u64 = 16;
+pub const SUMS_BYTES: u64 = 20;
 /// Bytes of what is known of two percentiles.
 pub const FOUND_BYTES: u64 = 16;
 /// Bytes of the bins of one digit.
@@ -76,7 +76,6 @@ pub fn ranks(pixels: u64, percentile: f32) -> [u32; 2] {
 pub struct Sums {
     pub sums: Buffer,
     pub found: Buffer,
-    pub pixels: u64,
 }
 
 /// Turns sums into statistics. `dt`: seconds since the last frame, whose adaptation `statistics` holds; `None`: none.
@@ -91,7 +90,6 @@ pub fn finish(graph: &mut Graph, from: Sums, statistics: Buffer, dt: Option<f32>
         _ => f32::MAX,
     };
     let push = finish::Push {
-        pixels: from.pixels as u32,
         percentiles: (settings.percentile > 0.0).into(),
         normalize: settings.normalize.into(),
         adapt: dt.is_some().into(),
@@ -120,6 +118,6 @@ pub fn whole(graph: &mut Graph, color: Image, statistics: Buffer, dt: Option<f32
             select_digit(graph, found, bins, pixels, shift, settings);
         }
     }
-    finish(graph, Sums { sums, found, pixels }, statistics, dt, settings);
+    finish(graph, Sums { sums, found }, statistics, dt, settings);
     luminance
 }

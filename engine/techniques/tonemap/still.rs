@@ -203,7 +203,7 @@ impl Still {
                 }
                 if last && turn == digits.len() {
                     let found = graph.import_buffer(&found);
-                    let from = Sums { sums, found, pixels: picture.pixels() };
+                    let from = Sums { sums, found };
                     let statistics = graph.import_buffer(result);
                     statistics::finish(&mut graph, from, statistics, dt, &settings);
                 }
