@@ -11,7 +11,7 @@ use std::{collections::BTreeMap, fs, path::Path};
 
 use lucerna::{
     image::{self, Layers},
-    reference::tonemap::{ashikhmin, plane, plane::Plane, reinhard, statistics},
+    reference::tonemap::{ashikhmin, plane, plane::Plane, reinhard},
     scene::Limits,
 };
 
