@@ -51,8 +51,8 @@ float display_luminance(float l, float a) {
         float bottom = max(decade * log2(max(s.low, TONEMAP_SMALLEST)), top - 4.0);
         float range = top - bottom;
         float gamma = range > 0.0 ? min(log_contrast / range, 1.0) : 1.0;
-        float whole = decade * log2(max(l, max(1e-4 * s.high, TONEMAP_SMALLEST)));
-        float base = GLOBAL != 0u ? whole : decade * log2(max(a, max(1e-4 * s.high, TONEMAP_SMALLEST)));
+        float whole = decade * log2(max(l, max(1e-6 * s.high, TONEMAP_SMALLEST)));
+        float base = GLOBAL != 0u ? whole : decade * log2(max(a, max(1e-6 * s.high, TONEMAP_SMALLEST)));
         return exp2((gamma * (base - top) + detail * (whole - base)) / decade);
     }
     float largest = white > 0.0 ? white : s.high * s.scale;

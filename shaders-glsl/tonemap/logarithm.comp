@@ -15,6 +15,6 @@ void main() {
     if (any(greaterThanEqual(pixel, imageSize(logarithm)))) {
         return;
     }
-    float least = max(1e-4 * statistics.high, TONEMAP_SMALLEST);
+    float least = max(1e-6 * statistics.high, TONEMAP_SMALLEST);
     imageStore(logarithm, pixel, vec4(0.30102999566 * log2(max(texelFetch(luminance, pixel, 0).r, least))));
 }

@@ -23,7 +23,9 @@ pub fn filter(values: &Plane, sigma: f64, radius: usize, range: f64) -> Plane {
 }
 
 /// The smallest luminance that is told apart, as a share of the largest.
-pub const DARKEST: f64 = 1e-4;
+pub const DARKEST: f64 = 1e-6;
+/// The least share of the largest luminance that counts when the range is looked for.
+pub const DEEPEST: f64 = 1e-4;
 
 /// Compression of the base, in log₁₀.
 #[derive(Clone, Copy, Debug)]
@@ -37,7 +39,7 @@ pub struct Base {
 impl Base {
     /// From L_min and L_max and the contrast that shall remain.
     pub fn new(min: f64, max: f64, contrast: f64) -> Self {
-        let range = max.log10() - min.max(DARKEST * max).log10();
+        let range = max.log10() - min.max(DEEPEST * max).log10();
         Self { white: max.log10(), factor: (contrast.log10() / range).min(1.0) }
     }
 

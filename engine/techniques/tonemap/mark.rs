@@ -195,7 +195,7 @@ pub fn mark_depth(graph: &mut Graph, importance: Image, depth: Image) {
     graph.raster(target, state, mark_depth::Args { importance }, Draw::fullscreen_at(DEPTH_IMPORTANT));
 }
 
-/// Targets and state with which [`Draw::fullscreen_at`] 0.5 reaches only what [`mark_depth`] marked. Nothing writes depth.
+/// Targets and state with which [`Draw::fullscreen_at`] 0.5 reaches only what [`mark_depth()`] marked. Nothing writes depth.
 pub fn early_z(targets: Targets, depth: Image) -> (Targets, Raster) {
     (targets.depth(depth, Depth::ReadOnly), Raster::new().depth_write(false).depth_compare(Compare::Greater))
 }

@@ -17,7 +17,8 @@ pub enum Operator {
     Reinhard,
     /// Durand, Dorsey, "Fast bilateral filtering for the display of high-dynamic-range images", 2002. With B the base, the bilateral
     /// filter of log₁₀ L, and D = log₁₀ L − B the detail: log₁₀ L_d = γ (B − log₁₀ L_max) + `detail` · D,
-    /// γ = log₁₀(`base_contrast`) / (log₁₀ L_max − log₁₀ L_min), at most 1. L is taken as at least 10⁻⁴ L_max. Global: B = log₁₀ L.
+    /// γ = log₁₀(`base_contrast`) / (log₁₀ L_max − log₁₀ L_min), at most 1, L_min
+    /// being at least 10⁻⁴ L_max. L is taken as at least 10⁻⁶ L_max. Global: B = log₁₀ L.
     Bilateral,
     /// The values as they are, times 2^exposure.
     Linear,

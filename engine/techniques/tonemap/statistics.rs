@@ -71,7 +71,7 @@ pub fn ranks(pixels: u64, percentile: f32) -> [u32; 2] {
     [least - 1, pixels.saturating_sub(least)].map(|rank| rank.min(pixels.saturating_sub(1)) as u32)
 }
 
-/// What [`finish`] starts from.
+/// What [`finish()`] starts from.
 #[derive(Clone, Copy, Debug)]
 pub struct Sums {
     pub sums: Buffer,
