@@ -152,6 +152,12 @@ fn the_shipped_passes_start_what_they_should_by_the_driver_s_count() {
             eprintln!("SKIPPED: {} has no pipeline statistics", gpu.describe());
             return;
         }
+        // The atomic counter of the test above says 0 here; Mesa 22.3 counts the blocks that it rasterises.
+        let (by_atomics, by_query, _) = starts(gpu, [8, 8], &[0.0; 64], true, true);
+        let honest = by_atomics == 0 && by_query.is_some_and(|started| started.fragments == 0);
+        if !honest {
+            eprintln!("SKIPPED: {} counts fragments that it does not start", gpu.describe());
+        }
         for (seed, [width, height]) in SIZES.into_iter().enumerate() {
             let count = (width * height) as usize;
             let luminance = noise(seed as u32, count);
@@ -170,9 +176,11 @@ fn the_shipped_passes_start_what_they_should_by_the_driver_s_count() {
                 let started = |mark| adapt(gpu, [width, height], &luminance, &importance, mark).1.unwrap();
                 // A driver may count the lanes that fill up a quad of 2 x 2.
                 let early = started(Mark::EarlyZ);
-                assert!((marked..=blocks(2)).contains(&early.fragments), "{early:?} for {marked} marked");
-                if gpu.caps().kind == DeviceKind::Cpu {
-                    assert_eq!(early.fragments, marked);
+                if honest {
+                    assert!((marked..=blocks(2)).contains(&early.fragments), "{early:?} for {marked} marked");
+                    if gpu.caps().kind == DeviceKind::Cpu {
+                        assert_eq!(early.fragments, marked);
+                    }
                 }
                 assert_eq!(early.compute, 0);
                 let tiles = Started { compute: blocks(8), fragments: 0 };
