@@ -206,8 +206,8 @@ fn eight_threads_may_use_one_device() {
         std::thread::scope(|scope| {
             for thread in 0..8_u8 {
                 scope.spawn(move || {
-                    for round in 0..8_u8 {
-                        let bytes = vec![thread * 16 + round; 777];
+                    for round in 0..64_u8 {
+                        let bytes = vec![thread * 32 + round % 32; 777];
                         let buffer = OwnedBuffer::with_contents(gpu, "mine", &bytes).unwrap();
                         let desc = ImageDesc::new(vk::Format::R8_UNORM, 21, 37);
                         let region = Region { mip: 0, layer: 0, bytes: &bytes };

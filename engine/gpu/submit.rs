@@ -17,6 +17,7 @@ use super::{
     Gpu,
     device::{Context, lock},
     memory::Owner,
+    options::Validation,
     select::DeviceKind,
 };
 use crate::{Error, Result};
@@ -355,10 +356,18 @@ impl Submission {
         loop {
             let waited = begun.elapsed();
             let left = context.hard_limit.saturating_sub(waited).min(warn_at.saturating_sub(waited));
-            let slice = left.max(Duration::from_millis(1));
+            let mut slice = left.max(Duration::from_millis(1));
             let slice_begun = Instant::now();
+            // Synchronisation validation (seen in 1.3.239) forgets a wait that ends while another thread submits, and then
+            // takes later commands for unsynchronised. Under it, waits and submissions take turns.
+            let queue = (context.options.validation == Validation::Sync).then(|| {
+                slice = slice.min(Duration::from_millis(10));
+                lock(&context.queue)
+            });
             // SAFETY: the fence is alive and was submitted.
-            match unsafe { context.device.wait_for_fences(&[shell.fence], true, slice.as_nanos() as u64) } {
+            let waited_for = unsafe { context.device.wait_for_fences(&[shell.fence], true, slice.as_nanos() as u64) };
+            drop(queue);
+            match waited_for {
                 Ok(()) => return Ok(()),
                 Err(vk::Result::TIMEOUT) => {}
                 Err(result) => return Err(self.failed(shell, "vkWaitForFences", result)),
