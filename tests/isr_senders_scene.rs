@@ -161,3 +161,23 @@ fn light_that_returns_by_a_wall_out_of_the_picture_counts_in_the_second_bounce()
         }
     });
 }
+
+#[test]
+fn coarse_views_of_cameras_err_both_ways_by_the_size_of_their_texels() {
+    with_gpu(|gpu| {
+        let (eye, patches) = wall_behind_the_viewer(1.0);
+        let exact = |p| patches[1].reflected_by_white(p, DVec3::Y).x;
+        for cameras in [1, 3] {
+            let shares = [1, 2, 3, 4, 6, 8].map(|sender_scale| {
+                let settings = Settings { cameras, sender_samples: 24, sender_scale, ..Settings::default() };
+                let (found, exact) = on_the_floor(&indirect(gpu, &patches, &eye, settings), &eye, &patches, exact);
+                found / exact
+            });
+            println!("{cameras} cameras, scales 1 to 8: {shares:.3?} of the closed form");
+            // The wall is 10 to 80 texels wide: a texel more or less on each side.
+            assert!(shares.iter().all(|share| (share - 1.0).abs() < 0.12), "{shares:?}");
+            let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+            assert!((mean - 1.0).abs() < 0.04, "{shares:?}: not by chance");
+        }
+    });
+}
