@@ -6,10 +6,10 @@ use lucerna::{
     techniques::tonemap::{Mode, Settings, Still, statistics::ranks},
 };
 
-/// What the shaders call luminance, with the same roundings.
+/// What the shaders call luminance, rounded once.
 fn luminance(p: &[f32; 4]) -> f32 {
-    let clean = |v: f32| if v > 0.0 { v.min(1e18) } else { 0.0 };
-    let l = 0.2126f32 * clean(p[0]) + 0.7152 * clean(p[1]) + 0.0722 * clean(p[2]);
+    let clean = |v: f32| f64::from(if v > 0.0 { v.min(1e18) } else { 0.0 });
+    let l = (0.2126 * clean(p[0]) + 0.7152 * clean(p[1]) + 0.0722 * clean(p[2])) as f32;
     if l < 1e-30 { 0.0 } else { l.min(1e18) }
 }
 

@@ -18,13 +18,6 @@ use lucerna::{
 /// Largest RMS % and mean %.
 const ALLOWED: [f64; 2] = [0.1, 0.01];
 
-/// A chart most of whose pixels have the luminance 1 but for rounding, and hardly more than the smallest: there the pieces of C meet with a
-/// jump of 2.4 · 10⁻⁵ (the paper's constants have four places), and an average that rounds to the other side of it is 1 % off.
-const AT_A_JUMP: &str = "WideColorGamut";
-
-/// A chart of all floats: at 10¹⁸ the rounding of an average is over any threshold.
-const ALL_FLOATS: &str = "WideFloatRange";
-
 /// Pixels of an image, or of a part.
 struct Picture {
     name: String,
@@ -116,15 +109,7 @@ fn compare(gpu: &Gpu, pictures: &[Picture]) {
                 "{name:28} {:24} {width:4}×{height:<4} RMS {:.5} %  mean {:.5} %",
                 picture.name, found[0], found[1]
             );
-            let jump = settings.operator == Operator::Ashikhmin && picture.name == AT_A_JUMP;
-            let allowed = if jump {
-                [1.0, 0.5]
-            } else if settings.identify_scale > 1 && picture.name == ALL_FLOATS {
-                [5.0, 1.0]
-            } else {
-                ALLOWED
-            };
-            if !(found[0] <= allowed[0] && found[1] <= allowed[1]) {
+            if !(found[0] <= ALLOWED[0] && found[1] <= ALLOWED[1]) {
                 wrong.push(format!("{name} {}: RMS {} %, mean {} %", picture.name, found[0], found[1]));
             }
             worst = [worst[0].max(found[0]), worst[1].max(found[1])];

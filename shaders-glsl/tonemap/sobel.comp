@@ -1,5 +1,5 @@
 // Important pixels by the Sobel operator (thesis 4.4.2.2): where the magnitude of the gradient of the luminance is over a
-// threshold. The kernels are not normalised. Beyond the border the border repeats.
+// threshold, and over 1e-4 of the mean luminance around. The kernels are not normalised. Beyond the border the border repeats.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -29,8 +29,14 @@ float row(ivec2 p) {
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(importance)))) return;
-    precise float x = column(pixel + ivec2(1, 0)) - column(pixel - ivec2(1, 0));
-    precise float y = row(pixel + ivec2(0, 1)) - row(pixel - ivec2(0, 1));
-    precise float magnitude = 4.0 * sqrt(x * x + y * y) * statistics.scale;
-    store_importance(pixel, magnitude > threshold);
+    float left = column(pixel - ivec2(1, 0));
+    float right = column(pixel + ivec2(1, 0));
+    float above = row(pixel - ivec2(0, 1));
+    float below = row(pixel + ivec2(0, 1));
+    precise float x = right - left;
+    precise float y = below - above;
+    precise float magnitude = 4.0 * sqrt(x * x + y * y);
+    // Of very bright pixels, rounding alone would be over any threshold.
+    float mean = 0.25 * left + 0.25 * right + 0.25 * above + 0.25 * below;
+    store_importance(pixel, magnitude * statistics.scale > threshold && magnitude > 1e-4 * mean);
 }

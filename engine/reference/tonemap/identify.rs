@@ -25,13 +25,19 @@ pub fn shrink(values: &Plane, factor: usize) -> Plane {
     })
 }
 
-/// Magnitude of the Sobel gradient, √(Gx² + Gy²), with the weights 1 2 1 unscaled.
+/// Least Sobel magnitude of a step, as a share of the mean luminance around.
+pub const LEAST_STEP: f64 = 1e-4;
+
+/// Magnitude of the Sobel gradient, √(Gx² + Gy²), with the weights 1 2 1 unscaled; 0 up to [`LEAST_STEP`] of the mean of the four filtered
+/// neighbours, for that is rounding.
 pub fn sobel(values: &Plane) -> Plane {
     Plane::from_fn(values.width, values.height, |x, y| {
         let at = |i: isize, j: isize| values.clamped(x as isize + i, y as isize + j);
         let gx = at(1, -1) + 2.0 * at(1, 0) + at(1, 1) - at(-1, -1) - 2.0 * at(-1, 0) - at(-1, 1);
         let gy = at(-1, 1) + 2.0 * at(0, 1) + at(1, 1) - at(-1, -1) - 2.0 * at(0, -1) - at(1, -1);
-        gx.hypot(gy)
+        let ends = [(1, 0), (-1, 0), (0, 1), (0, -1)].map(|(i, j)| at(i + j, j + i) + 2.0 * at(i, j) + at(i - j, j - i));
+        let (magnitude, mean) = (gx.hypot(gy), ends.iter().sum::<f64>() / 16.0);
+        if magnitude > LEAST_STEP * mean { magnitude } else { 0.0 }
     })
 }
 

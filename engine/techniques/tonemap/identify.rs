@@ -2,7 +2,7 @@
 //!
 //! | [`Identify`] | a pixel is important where |
 //! |---|---|
-//! | `sobel` | √(x² + y²) > threshold; x and y are the luminance filtered by the kernels (1 2 1)ᵀ (−1 0 1) and their transpose, not normalised |
+//! | `sobel` | √(x² + y²) > threshold; x and y are the luminance filtered by the kernels (1 2 1)ᵀ (−1 0 1) and their transpose, not normalised; and over 10⁻⁴ of the mean luminance of the pixels that they weigh, below which a step of a bright place would be rounding |
 //! | `saliency` | the mean of \|C − S\| / (C + S) (0 where both are 0) over the six pairs of a centre level c = 0, 1, 2 and a surround level c + 3, c + 4 is > threshold |
 //! | a mask | its red channel is over 0.5, whatever else is found (objects that matter by what they are, thesis 6.3.2) |
 //!
