@@ -74,7 +74,7 @@ fn options() -> Result<Options> {
         }
     }
     if options.thresholds.is_empty() {
-        options.thresholds.push(options.settings.threshold);
+        options.thresholds.push(options.settings.threshold());
     }
     Ok(options)
 }
@@ -137,7 +137,8 @@ fn run() -> Result<()> {
         let color = OwnedImage::with_contents(&gpu, "color", desc, &[region])?;
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         for &threshold in &thresholds {
-            let in_mode = |mode, mark| Settings { mode: Some(mode), mark, threshold, ..settings.clone() };
+            let in_mode =
+                |mode, mark| Settings { mode: Some(mode), mark, threshold: Some(threshold), ..settings.clone() };
             let mut all: Vec<Settings> = [Mode::Global, Mode::Local].map(|m| in_mode(m, Mark::Branch)).into();
             all.extend(MARKS.map(|(_, mark)| in_mode(Mode::Selective, mark)));
             let mut times = vec![vec![]; all.len()];

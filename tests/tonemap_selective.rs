@@ -1,9 +1,14 @@
 //! Selective tone mapping: which pixels are important, and is the local component spent on those alone? On a device; every value
 //! is exact.
 
+mod common;
+
 use lucerna::{
     gpu::{DeviceKind, Gpu, ImageDesc as OwnedDesc, OwnedImage, Region, Started, testing::with_gpu},
     graph::*,
+    image,
+    reference::tonemap::plane::luminance_of,
+    scene::Limits,
     shaders::{self, test::*, types},
     techniques::tonemap::{self, Identify, Local, Mark, Mode, Operator, Settings, Still, identify, mark},
 };
@@ -229,7 +234,7 @@ fn sobel_marks_steps_by_their_height_and_not_by_chance() {
         let step = |low: f32, high: f32| -> Vec<f32> {
             (0..size[0] * size[1]).map(|i| if i % size[0] < 6 { low } else { high }).collect()
         };
-        let with = |threshold| Settings { threshold, ..Settings::default() };
+        let with = |threshold| Settings { threshold: Some(threshold), ..Settings::default() };
         // Along an edge of one pixel the kernels give four times the step, in the two columns beside it, also at the border.
         let columns: Vec<bool> = (0..117).map(|i| [5, 6].contains(&(i % 13))).collect();
         assert_eq!(map(gpu, size, &step(1.0, 1.5), None, &with(1.999)), columns);
@@ -272,7 +277,7 @@ fn a_mask_is_or_ed_in_at_full_size() {
             let mask = noise(100 + seed as u32, count);
             for identify in [Identify::Sobel, Identify::Saliency] {
                 for identify_scale in [1, 2, 4] {
-                    let settings = Settings { identify, identify_scale, threshold: 0.3, ..Settings::default() };
+                    let settings = Settings { identify, identify_scale, threshold: Some(0.3), ..Settings::default() };
                     let found = map(gpu, size, &luminance, None, &settings);
                     let both = map(gpu, size, &luminance, Some(&mask), &settings);
                     let expected: Vec<bool> = (0..count).map(|i| found[i] || mask[i] > 0.5).collect();
@@ -290,14 +295,14 @@ fn at_reduced_size_a_box_has_one_answer() {
         let (width, height) = (21, 10);
         let luminance: Vec<f32> = (0..width * height).map(|i| if i % width < 8 { 1.0 } else { 2.0 }).collect();
         for (factor, columns) in [(1, 7..9), (2, 6..10), (4, 4..12)] {
-            let settings = Settings { identify_scale: factor, threshold: 3.99, ..Settings::default() };
+            let settings = Settings { identify_scale: factor, threshold: Some(3.99), ..Settings::default() };
             let expected: Vec<bool> = (0..width * height).map(|i| columns.contains(&(i % width))).collect();
             assert_eq!(map(gpu, [width, height], &luminance, None, &settings), expected, "reduced {factor} times");
         }
         // Boxes that the border cuts average what is inside: a constant image stays constant.
         for size in SIZES {
             let luminance = vec![0.7; (size[0] * size[1]) as usize];
-            let settings = Settings { identify_scale: 4, threshold: 1e-6, ..Settings::default() };
+            let settings = Settings { identify_scale: 4, threshold: Some(1e-6), ..Settings::default() };
             assert!(!map(gpu, size, &luminance, None, &settings).contains(&true), "{size:?}");
         }
     });
@@ -307,7 +312,7 @@ fn at_reduced_size_a_box_has_one_answer() {
 fn saliency_sees_what_stands_out_whatever_the_unit() {
     with_gpu(|gpu| {
         let size = [96, 64];
-        let settings = Settings { identify: Identify::Saliency, threshold: 0.1, ..Settings::default() };
+        let settings = Settings { identify: Identify::Saliency, threshold: Some(0.1), ..Settings::default() };
         let flat = map(gpu, size, &vec![0.3; 96 * 64], None, &settings);
         assert!(!flat.contains(&true), "a constant image has nothing salient");
         assert!(!map(gpu, size, &vec![0.0; 96 * 64], None, &settings).contains(&true), "nor has a black one");
@@ -326,6 +331,24 @@ fn saliency_sees_what_stands_out_whatever_the_unit() {
         for size in SIZES {
             let luminance = noise(3, (size[0] * size[1]) as usize);
             map(gpu, size, &luminance, None, &settings);
+        }
+    });
+}
+
+/// The thesis' threshold for Sobel would mark four fifths of a photograph by saliency.
+#[test]
+fn saliency_by_default_marks_a_part_of_a_photograph() {
+    let Some(assets) = common::assets() else { return };
+    with_gpu(|gpu| {
+        for name in ["memorial_o876.hdr", "StillLife.exr", "Desk.exr"] {
+            let layers = image::read(assets.join("hdr").join(name), &Limits::default()).unwrap();
+            let pixels = layers.main().unwrap().rgb_pixels().unwrap();
+            let luminance: Vec<f32> = pixels.iter().map(|p| luminance_of(p.map(|v| v.max(0.0))) as f32).collect();
+            let settings = Settings { identify: Identify::Saliency, ..Settings::default() };
+            let found = map(gpu, [layers.width, layers.height], &luminance, None, &settings);
+            let share = found.iter().filter(|f| **f).count() as f32 / found.len() as f32;
+            println!("{name}: {:.1} % salient", 100.0 * share);
+            assert!((0.1..0.4).contains(&share), "{name}: {share}");
         }
     });
 }
@@ -353,7 +376,7 @@ fn tiles_of_a_picture_have_the_map_of_the_whole() {
                 mode: Some(Mode::Selective),
                 identify,
                 identify_scale,
-                threshold,
+                threshold: Some(threshold),
                 radius: 2,
                 mark: Mark::Compact,
                 ..Settings::default()
@@ -383,7 +406,7 @@ fn selective_is_local_where_marked_and_global_elsewhere() {
                         local,
                         mode: Some(mode),
                         mark,
-                        threshold: 1e18,
+                        threshold: Some(1e18),
                         radius: 3,
                         scales: 4,
                         ..Settings::default()

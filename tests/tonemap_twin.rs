@@ -72,8 +72,8 @@ fn all() -> Vec<Settings> {
     }
     let selective = Settings { mode: Some(Mode::Selective), ..Settings::default() };
     all.push(Settings { identify: Identify::Saliency, ..selective.clone() });
-    all.push(Settings { identify: Identify::Saliency, identify_scale: 2, threshold: 0.3, ..selective.clone() });
-    all.push(Settings { identify_scale: 4, threshold: 1.0, ..selective });
+    all.push(Settings { identify: Identify::Saliency, identify_scale: 2, threshold: Some(0.3), ..selective.clone() });
+    all.push(Settings { identify_scale: 4, threshold: Some(1.0), ..selective });
     all
 }
 

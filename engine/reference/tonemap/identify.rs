@@ -12,7 +12,7 @@ pub fn important(luminance: &Plane, settings: &Settings) -> Vec<bool> {
         Identify::Saliency => saliency(&small),
     };
     let at = |i: usize| map[(i % luminance.width / factor, i / luminance.width / factor)];
-    (0..luminance.values.len()).map(|i| at(i) > f64::from(settings.threshold)).collect()
+    (0..luminance.values.len()).map(|i| at(i) > f64::from(settings.threshold())).collect()
 }
 
 /// Averages over boxes of `factor`² pixels; those at the right and lower border average what lies inside.
@@ -35,7 +35,8 @@ pub fn sobel(values: &Plane) -> Plane {
         let at = |i: isize, j: isize| values.clamped(x as isize + i, y as isize + j);
         let gx = at(1, -1) + 2.0 * at(1, 0) + at(1, 1) - at(-1, -1) - 2.0 * at(-1, 0) - at(-1, 1);
         let gy = at(-1, 1) + 2.0 * at(0, 1) + at(1, 1) - at(-1, -1) - 2.0 * at(0, -1) - at(1, -1);
-        let ends = [(1, 0), (-1, 0), (0, 1), (0, -1)].map(|(i, j)| at(i + j, j + i) + 2.0 * at(i, j) + at(i - j, j - i));
+        let ends =
+            [(1, 0), (-1, 0), (0, 1), (0, -1)].map(|(i, j)| at(i + j, j + i) + 2.0 * at(i, j) + at(i - j, j - i));
         let (magnitude, mean) = (gx.hypot(gy), ends.iter().sum::<f64>() / 16.0);
         if magnitude > LEAST_STEP * mean { magnitude } else { 0.0 }
     })

@@ -247,7 +247,12 @@ fn selection_goes_from_global_to_local() {
     let (width, height) = (48, 40);
     let pixels = picture(width, height);
     for operator in [Operator::Ashikhmin, Operator::Reinhard, Operator::Bilateral] {
-        let with = |mode, threshold| Settings { operator, mode: Some(mode), threshold, ..Settings::default() };
+        let with = |mode, threshold| Settings {
+            operator,
+            mode: Some(mode),
+            threshold: Some(threshold),
+            ..Settings::default()
+        };
         let adapted = |s: &Settings, mask: Option<&[bool]>| Picture::new(width, height, &pixels, s).adaptation(mask);
         let [global, local] = [Mode::Global, Mode::Local].map(|m| adapted(&with(m, 0.1), None));
         assert_eq!(adapted(&with(Mode::Selective, 1e18), None), global);

@@ -11,8 +11,9 @@
 //!
 //! The levels of saliency: G₀ is the luminance, G₍ₖ₊₁₎ is Gₖ filtered by (1 3 3 1) / 8 in both directions between its pixels, every
 //! second sample, sizes halved and rounded up; read bilinearly at ((x + ½) / 2ᵏ − ½). This is the intensity channel of Itti and
-//! Koch (Vision Research 40, 2000), with relative contrast in place of their normalisation of maps, which needs the whole picture
-//! and would see only the sun of an HDR one.
+//! Koch (Vision Research 40, 2000) as the thesis cites it, with relative contrast in place of their normalisation of maps, which needs the whole picture
+//! and would see only the sun of an HDR one. The thesis says neither which program made its saliency maps nor over which value they count;
+//! [`Settings::threshold`] for saliency is ours.
 //!
 //! At reduced size f, both work on the luminance averaged over boxes of f × f pixels (those at the right and lower border average what lies
 //! inside), and pixel (x, y) takes the answer of (⌊x / f⌋, ⌊y / f⌋). The mask stays at full size.
@@ -79,7 +80,7 @@ pub fn importance(
 /// The map at the size of `luminance`.
 fn found(graph: &mut Graph, luminance: Image, statistics: Buffer, mask: Option<Image>, settings: &Settings) -> Image {
     let extent = graph.extent(luminance);
-    let threshold = settings.threshold;
+    let threshold = settings.threshold();
     let has_mask = mask.is_some().into();
     let mask = mask.unwrap_or(luminance);
     match settings.identify {

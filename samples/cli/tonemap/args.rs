@@ -85,7 +85,7 @@ pub struct TonemapArgs {
     #[arg(long, value_enum, value_name = "WHAT", help_heading = WORK)]
     pub identify: Option<IdentifyName>,
 
-    /// selective: how much of it counts
+    /// selective: how much of it counts; less marks more [default: 0.1 for sobel (luminance), 0.4 for saliency (0 to 1)]
     #[arg(long, value_name = "T", value_parser = finite, help_heading = WORK)]
     pub threshold: Option<f64>,
 
@@ -294,10 +294,10 @@ impl TonemapArgs {
             (self.detail, &mut s.detail),
             (self.display, &mut s.display),
             (self.percentile, &mut s.percentile),
-            (self.threshold, &mut s.threshold),
         ] {
             *value = option.map_or(*value, |option| option as f32);
         }
+        s.threshold = self.threshold.map(|t| t as f32).or(s.threshold);
         s.local = self.local.map_or(s.local, Local::from);
         s.identify = self.identify.map_or(s.identify, Identify::from);
         s.mark = self.mark.map_or(s.mark, Mark::from);
