@@ -22,6 +22,12 @@ struct Hit {
 // Turns that the loops of the last compute traversal took, for tests and benchmarks.
 uint trace_turns = 0u;
 
+#ifdef TRACE_BOXES
+// Boxes of triangles stand for them: of any hit, in compute (Marques and Santos, section 4.1). A box that holds an end of the ray
+// says nothing; its triangle is tested. What is in the way is then in the way too, and more.
+bool trace_imperfect = false;
+#endif
+
 const uint TRACE_CAMERA = 1u; // back faces of single-sided surfaces are not there (as rasterised)
 const uint TRACE_SHADOW = 2u; // unlit surfaces do not stop light
 

@@ -37,6 +37,11 @@ vec4 trace_bytes(uint word) {
     return vec4(ivec4(word & 0xffu, word >> 8u & 0xffu, word >> 16u & 0xffu, word >> 24u));
 }
 
+#ifdef TRACE_BOXES
+// Boxes of the last node that the ray enters and leaves between its ends.
+uint trace_between = 0u;
+#endif
+
 // Which of four boxes the ray meets between t_min and t_max: bounds in steps, near ones first.
 uint trace_boxes(uvec3 near_words, uvec3 far_words, vec3 step_time, vec3 near_time, vec3 far_time, float t_min, float t_max) {
     vec4 near = max(trace_bytes(near_words.x) * step_time.x + near_time.x, trace_bytes(near_words.y) * step_time.y + near_time.y);
@@ -44,6 +49,11 @@ uint trace_boxes(uvec3 near_words, uvec3 far_words, vec3 step_time, vec3 near_ti
     vec4 far = min(trace_bytes(far_words.x) * step_time.x + far_time.x, trace_bytes(far_words.y) * step_time.y + far_time.y);
     far = min(min(far, trace_bytes(far_words.z) * step_time.z + far_time.z), t_max);
     bvec4 hit = lessThanEqual(near, far);
+#ifdef TRACE_BOXES
+    bvec4 past = greaterThan(near, vec4(t_min)), before = lessThan(far, vec4(t_max));
+    trace_between = uint(past.x && before.x) | uint(past.y && before.y) << 1u | uint(past.z && before.z) << 2u
+        | uint(past.w && before.w) << 3u;
+#endif
     return uint(hit.x) | uint(hit.y) << 1u | uint(hit.z) << 2u | uint(hit.w) << 3u;
 }
 
@@ -60,8 +70,16 @@ uint trace_node(uint node, TraceSlabs slabs, float t_min, float t_max, out uvec2
     uvec3 low0 = uvec3(b.z, c.x, c.z), low1 = uvec3(b.w, c.y, c.w);
     uvec3 high0 = uvec3(d.x, d.z, e.x), high1 = uvec3(d.y, d.w, e.y);
     bvec3 backward = lessThan(slabs.inverse, vec3(0.0));
+#ifdef TRACE_BOXES
+    uint first = trace_boxes(mix(low0, high0, backward), mix(high0, low0, backward), step_time, near_time, far_time, t_min, t_max);
+    uint first_between = trace_between;
+    uint second = trace_boxes(mix(low1, high1, backward), mix(high1, low1, backward), step_time, near_time, far_time, t_min, t_max);
+    trace_between = first_between | trace_between << 4u;
+    return first | second << 4u;
+#else
     return trace_boxes(mix(low0, high0, backward), mix(high0, low0, backward), step_time, near_time, far_time, t_min, t_max)
         | trace_boxes(mix(low1, high1, backward), mix(high1, low1, backward), step_time, near_time, far_time, t_min, t_max) << 4u;
+#endif
 }
 
 // Moves bit i of a byte to bit i ^ octant.
@@ -85,6 +103,9 @@ Hit trace(Ray ray, uint mask, uint salt, bool any) {
     uint next = trace_instances[0].root; // node to visit, NONE: the tree is done
     uint leaves = 0u;                    // first record and the slots that were hit and not yet looked at
     uint leaf_slots = 0u;
+#ifdef TRACE_BOXES
+    uint boxes = 0u;                     // of these slots, those whose boxes stand for their triangles
+#endif
     uint above = 0u, above_slots = 0u;   // the same of the top tree while inside
     int left = int(TRACE_STEPS);
     bool done = false;
@@ -102,6 +123,9 @@ Hit trace(Ray ray, uint mask, uint salt, bool any) {
                 uint hits = trace_node(next, slabs, ray.t_min, hit.t, children);
                 leaves = children.y;
                 leaf_slots = hits & leaves & 0xffu;
+#ifdef TRACE_BOXES
+                boxes = trace_imperfect && any ? trace_between & leaf_slots : 0u;
+#endif
                 uint slots = trace_permuted(hits & children.x & 0xffu, slabs.octant);
                 uint entry = next << 8u | slots;
                 if (slots == 0u) {
@@ -125,15 +149,32 @@ Hit trace(Ray ray, uint mask, uint salt, bool any) {
             }
             rare = !inside || leaf_slots == 0u;
             while (!rare && leaf_slots != 0u) {
+#ifdef TRACE_BOXES
+                // These first: most of them end the ray.
+                uint slot = uint(findLSB(boxes != 0u ? boxes : leaf_slots));
+                bool boxed = boxes != 0u;
+                boxes &= boxes - 1u;
+                leaf_slots &= ~(1u << slot);
+                uint record = (leaves >> 8u) + uint(bitCount(leaves & ((1u << slot) - 1u)));
+#else
                 uint slot = uint(findLSB(leaf_slots));
                 uint record = (leaves >> 8u) + uint(bitCount(leaves & ((1u << slot) - 1u)));
                 leaf_slots &= leaf_slots - 1u;
+#endif
                 --left;
                 vec4 a = trace_triangles[3u * record];
                 vec3 b = trace_triangles[3u * record + 1u].xyz, c = trace_triangles[3u * record + 2u].xyz;
                 vec3 at;
                 float side = trace_triangle(a.xyz, b, c, slabs.origin, shear, at);
                 uint surface = floatBitsToUint(a.w);
+#ifdef TRACE_BOXES
+                if (boxed) {
+                    // Whatever side is seen and whatever is cut out of it.
+                    at = vec3(ray.t_min, 0.0, 0.0);
+                    side = 1.0;
+                    surface &= TRACE_UNLIT;
+                }
+#endif
                 if (at.x >= ray.t_min && at.x <= hit.t && trace_counts(surface, side, mask)) {
                     bool equal = at.x == hit.t;
                     if ((surface & TRACE_CUTOUT) != 0u || equal) {

@@ -1,0 +1,343 @@
+//! Instant global illumination with ray-traced virtual point lights (Marques and Santos 2010, after Keller 1997 and Wald et al. 2002).
+//!
+//! Paths of light leave a virtual point light at every surface with a diffuse part that they meet; every visible point then
+//! gathers from all of them, a shadow ray each. Further light is direct, by shadow rays too.
+//!
+//! [`Igi`] holds what lives as long as a scene; [`Igi::picture`] declares a frame, with paths of light shot anew.
+//!
+//! Where this differs from the paper, and why:
+//! - Every kind of light sends paths: point, spot and directional lights, emissive surfaces, the environment. The paper has points.
+//! - 1/π is explicit: a virtual light has a flux Φ and sends Φ cos θ / π W/sr; the paper's L is Φ/π, its ρ our ρ/π.
+//! - Light is received by shading normals and sent on by the triangle's, which is what a path tracer sees from the other end.
+//! - The table's first two dimensions are the directions of paths from near lights, and the places of paths from far ones.
+
+pub mod halton;
+mod picture;
+mod settings;
+pub mod starts;
+
+pub use picture::{Picture, PictureSettings};
+pub use settings::Settings;
+
+use crate::{
+    Error, ErrorKind, Result,
+    gpu::{Gpu, ImageDesc as GpuImageDesc, OwnedBuffer, OwnedImage, Region},
+    graph::{Buffer, Extent, Format, Graph, Image, Uniform},
+    passes::gbuffer::GBuffer,
+    rays::{RayHandles, Rays},
+    reference::tracer::{
+        Sources,
+        tables::{self, LightTable},
+    },
+    scene::{Environment, Pose, Scene, resident::Handles, resident::Resident},
+    shaders::{self, consts, types},
+};
+use ash::vk;
+
+/// Rays that one dispatch traces at most, about: some milliseconds on a GPU.
+const MOST_RAYS: u64 = 1 << 22;
+/// Rays that one invocation traces where a driver ends loops early: two of at most 30,000 steps stay below its limit.
+const RAYS_LIMITED: u64 = 2;
+
+/// What instant global illumination keeps of a scene.
+#[derive(Debug)]
+pub struct Igi {
+    rays: Rays,
+    environment: OwnedImage,
+    environment_columns: OwnedBuffer,
+    cells: [u32; 2],
+    /// Of the environment: what it sends through a box.
+    moments: Option<[f64; 3]>,
+    /// Of each instance of the scene.
+    double_sided: Vec<bool>,
+    /// Emissive triangles as they stood in a pose.
+    lights: Option<(Pose, LightTable)>,
+    /// Rays of an invocation.
+    most_rays: u64,
+}
+
+/// What the passes of a frame share.
+#[derive(Clone, Copy, Debug)]
+struct Shared {
+    settings: Uniform<types::IgiSettings>,
+    rays: RayHandles,
+    environment: Image,
+    environment_columns: Buffer,
+    light_columns: Buffer,
+    light_targets: Buffer,
+    instance_lights: Buffer,
+    light_nodes: Buffer,
+    /// Shadow rays of a point.
+    direct_rays: u32,
+    /// Metres.
+    least: f32,
+    seed: u32,
+}
+
+/// Virtual lights of a frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Vpls {
+    /// `types::Vpl`: the first ones of all paths, then the second ones, ….
+    pub buffer: Buffer,
+    /// Places in the buffer; some may be empty.
+    pub count: u32,
+}
+
+/// Images of a frame, at full resolution unless stated.
+#[derive(Clone, Copy, Debug)]
+pub struct Outputs {
+    /// Sum of all light, W/(sr·m²); alpha 1 on geometry, 0 on background, where rgb is 0 until a sky is drawn.
+    pub total: Image,
+    /// Direct light with emission.
+    pub direct: Image,
+    /// Indirect light as it enters the sum.
+    pub indirect: Image,
+    /// Irradiance from virtual lights, W/m², as gathered: of the size of `extent / downsample`; alpha: shadow rays.
+    pub gathered: Image,
+    pub vpls: Vpls,
+}
+
+impl Igi {
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
+    pub fn new(gpu: &Gpu, scene: &Scene, resident: &Resident) -> Result<Self> {
+        let importance = tables::importance(scene.environment.as_ref());
+        let columns = bytemuck::cast_slice(&importance.columns);
+        let double_sided = |primitive: &crate::scene::Primitive| {
+            scene.materials.get(primitive.material as usize).is_some_and(|material| material.double_sided)
+        };
+        let meshes = scene.nodes.iter().filter_map(|node| scene.meshes.get(node.mesh? as usize));
+        Ok(Self {
+            rays: Rays::in_compute(gpu, scene, resident)?,
+            environment: radiance_map(gpu, scene.environment.as_ref())?,
+            environment_columns: OwnedBuffer::with_contents(gpu, "igi.environment", columns)?,
+            cells: importance.cells,
+            moments: scene.environment.as_ref().filter(|e| !e.pixels.is_empty()).map(starts::sky_moments),
+            double_sided: meshes.flat_map(|mesh| mesh.primitives.iter().map(double_sided)).collect(),
+            lights: None,
+            most_rays: if gpu.loop_limit()?.is_some() { RAYS_LIMITED } else { u64::MAX },
+        })
+    }
+
+    /// Tables and trees of the frame.
+    fn shared(&mut self, graph: &mut Graph, scene: &Scene, pose: &Pose, handles: &Handles, settings: &Settings) -> Shared {
+        let rays = self.rays.frame(graph, handles);
+        if self.lights.as_ref().is_none_or(|(of, _)| of != pose) {
+            self.lights = Some((pose.clone(), tables::lights(scene, pose, &[], Sources::Emissive)));
+        }
+        let empty = LightTable {
+            suns: 0,
+            columns: vec![types::AliasEntry::default()],
+            targets: vec![types::LightTarget::default()],
+            nodes: vec![types::LightNode::default()],
+            tree: false,
+            instances: vec![u32::MAX],
+        };
+        let table = self.lights.as_ref().map_or(&empty, |(_, table)| table);
+        let bounds = handles.bounds();
+        let (low, high) = if bounds.is_empty() { Default::default() } else { (bounds.min, bounds.max) };
+        let sky = self.moments.is_some();
+        let environment = scene.environment.as_ref();
+        let block = types::IgiSettings {
+            environment: types::EnvironmentMap {
+                size: environment.map_or([1, 1], |e| [e.width as i32, e.height as i32]),
+                cells: self.cells,
+                rotation: environment.map_or(0.0, |e| e.rotation),
+                scale: environment.map_or(0.0, |e| e.scale),
+            },
+            low: low.to_array(),
+            high: high.to_array(),
+            paths: settings.paths(),
+            bounces: settings.bounces,
+            specular_depth: settings.specular_depth,
+            diffuse_only: (!settings.specular).into(),
+            seed: graph.seed,
+            samples: settings.direct_samples,
+            tree: table.tree.into(),
+            sky: sky.into(),
+            slots: consts::TEXTURE_SLOTS,
+            two: 2,
+        };
+        let lights = handles.moment.lights.len() as u32;
+        Shared {
+            settings: graph.uniform(&block),
+            rays,
+            environment: graph.import_image(&self.environment),
+            environment_columns: graph.import_buffer(&self.environment_columns),
+            light_columns: graph.buffer_from("igi.light-columns", &table.columns),
+            light_targets: graph.buffer_from("igi.light-targets", &table.targets),
+            instance_lights: graph.buffer_from("igi.instance-lights", &table.instances),
+            light_nodes: graph.buffer_from("igi.light-nodes", &table.nodes),
+            direct_rays: lights + (u32::from(table.tree) + u32::from(sky)) * settings.direct_samples,
+            least: settings.bound * (high - low).length(),
+            seed: graph.seed,
+        }
+    }
+
+    /// Shoots the paths of light of a frame.
+    fn shoot(&self, graph: &mut Graph, handles: &Handles, shared: &Shared, settings: &Settings) -> Vpls {
+        let paths = settings.paths();
+        let table = self.lights.as_ref().map(|(_, table)| table);
+        let sided = |target: &types::LightTarget| self.double_sided.get(target.instance as usize).copied().unwrap_or(false);
+        let emissive = table.filter(|table| table.tree);
+        let triangles = emissive.map_or((&[][..], &[][..]), |table| (&table.targets[..], &table.nodes[..]));
+        let bounds = handles.bounds();
+        let sources = starts::sources(&handles.moment.lights, triangles, sided, self.moments, &bounds);
+        let starts = starts::starts(&sources, paths, shared.seed);
+        let dimensions = (consts::VPL_FIRST_NUMBERS + 2 * settings.bounces) as usize;
+        let numbers = halton::table(paths, dimensions, shared.seed);
+        let count = paths * settings.bounces;
+        let vpls = Vpls {
+            buffer: graph.buffer("igi.vpls", u64::from(count) * size_of::<types::Vpl>() as u64),
+            count,
+        };
+        let states = graph.buffer("igi.paths", u64::from(paths) * size_of::<types::VplPath>() as u64);
+        graph.fill(vpls.buffer, 0);
+        graph.fill(states, 0);
+        let args = shaders::igi::shoot::Args {
+            surface_instances: handles.instances,
+            surface_indices: handles.indices,
+            surface_positions: handles.positions,
+            surface_normals: handles.normals,
+            surface_tangents: handles.tangents,
+            surface_uvs: handles.uvs,
+            surface_colors: handles.colors,
+            environment_radiance_map: shared.environment,
+            environment_columns: shared.environment_columns,
+            settings: shared.settings,
+            starts: graph.buffer_from("igi.starts", &starts),
+            numbers: graph.buffer_from("igi.numbers", &numbers),
+            paths: states,
+            vpls: vpls.buffer,
+            lights: handles.lights,
+            materials: handles.materials,
+            scene_textures: handles.textures,
+            trace_nodes: shared.rays.trace_nodes,
+            trace_triangles: shared.rays.trace_triangles,
+            trace_instances: shared.rays.trace_instances,
+            trace_indices: shared.rays.trace_indices,
+            trace_uvs: shared.rays.trace_uvs,
+            trace_colors: shared.rays.trace_colors,
+            trace_scene: shared.rays.trace_scene,
+            trace_accel: shared.rays.trace_accel,
+            push: shaders::igi::shoot::Push::default(),
+        };
+        let segments = settings.bounces + if settings.specular { settings.specular_depth } else { 0 };
+        for turn in 0..segments {
+            graph.compute(shaders::igi::shoot::Args { push: shaders::igi::shoot::Push { turn }, ..args }, paths);
+        }
+        vpls
+    }
+
+    /// Irradiance from the virtual lights at the visible surfaces.
+    fn gather(&self, graph: &mut Graph, g: &GBuffer, shared: &Shared, vpls: Vpls, settings: &Settings) -> Image {
+        let extent = graph.extent(g.depth).div_ceil(settings.downsample);
+        let irradiance = graph.image("igi.irradiance", Format::RGBA32F, extent);
+        graph.clear(irradiance, [0.0; 4]);
+        let subsets = settings.interleave * settings.interleave;
+        let own = vpls.count.div_ceil(subsets);
+        for (first, count) in self.batches(extent, own) {
+            let args = shaders::igi::gather::Args {
+                view: g.view,
+                normal: g.normal,
+                depth: g.depth,
+                vpls: vpls.buffer,
+                irradiance,
+                materials: shared.rays.materials,
+                scene_textures: shared.rays.scene_textures,
+                trace_nodes: shared.rays.trace_nodes,
+                trace_triangles: shared.rays.trace_triangles,
+                trace_instances: shared.rays.trace_instances,
+                trace_indices: shared.rays.trace_indices,
+                trace_uvs: shared.rays.trace_uvs,
+                trace_colors: shared.rays.trace_colors,
+                trace_scene: shared.rays.trace_scene,
+                trace_accel: shared.rays.trace_accel,
+                push: shaders::igi::gather::Push {
+                    first,
+                    count,
+                    total: vpls.count,
+                    tile: settings.interleave,
+                    factor: settings.downsample,
+                    least: shared.least,
+                    imperfect: settings.imperfect.into(),
+                    seed: shared.seed,
+                },
+            };
+            graph.compute(args, extent);
+        }
+        irradiance
+    }
+
+    /// Direct light of the visible surfaces, with what they emit.
+    fn direct(&self, graph: &mut Graph, handles: &Handles, g: &GBuffer, shared: &Shared) -> Image {
+        let extent = graph.extent(g.depth);
+        let direct = graph.image("igi.direct", Format::RGBA32F, extent);
+        graph.clear(direct, [0.0; 4]);
+        for (first, count) in self.batches(extent, shared.direct_rays) {
+            let args = shaders::igi::direct::Args {
+                view: g.view,
+                albedo: g.albedo,
+                normal: g.normal,
+                depth: g.depth,
+                specular: g.specular,
+                emission: g.emission,
+                direct,
+                environment_radiance_map: shared.environment,
+                environment_columns: shared.environment_columns,
+                light_columns: shared.light_columns,
+                light_targets: shared.light_targets,
+                instance_lights: shared.instance_lights,
+                settings: shared.settings,
+                light_nodes: shared.light_nodes,
+                lights: handles.lights,
+                materials: handles.materials,
+                scene_textures: handles.textures,
+                surface_instances: handles.instances,
+                surface_indices: handles.indices,
+                surface_positions: handles.positions,
+                surface_normals: handles.normals,
+                surface_tangents: handles.tangents,
+                surface_uvs: handles.uvs,
+                surface_colors: handles.colors,
+                trace_nodes: shared.rays.trace_nodes,
+                trace_triangles: shared.rays.trace_triangles,
+                trace_instances: shared.rays.trace_instances,
+                trace_indices: shared.rays.trace_indices,
+                trace_uvs: shared.rays.trace_uvs,
+                trace_colors: shared.rays.trace_colors,
+                trace_scene: shared.rays.trace_scene,
+                trace_accel: shared.rays.trace_accel,
+                push: shaders::igi::direct::Push { first, count },
+            };
+            graph.compute(args, extent);
+        }
+        direct
+    }
+
+    /// Ranges of `rays` rays for the dispatches of an image: short enough for watchdogs and for limits on loops. One even
+    /// without rays.
+    fn batches(&self, extent: Extent, rays: u32) -> Vec<(u32, u32)> {
+        let pixels = u64::from(extent.width) * u64::from(extent.height);
+        let each = (MOST_RAYS / pixels.max(1)).clamp(1, self.most_rays) as u32;
+        (0..rays.max(1)).step_by(each as usize).map(|first| (first, each.min(rays.max(1) - first))).collect()
+    }
+}
+
+/// The environment's radiance in full precision; black without one.
+fn radiance_map(gpu: &Gpu, environment: Option<&Environment>) -> Result<OwnedImage> {
+    let (name, format) = ("igi.environment radiance", vk::Format::R32G32B32A32_SFLOAT);
+    let upload = |width, height, texels: &[[f32; 4]]| {
+        let bytes = bytemuck::cast_slice(texels);
+        let desc = GpuImageDesc::new(format, width, height);
+        OwnedImage::with_contents(gpu, name, desc, &[Region { mip: 0, layer: 0, bytes }])
+    };
+    let Some(env) = environment.filter(|e| !e.pixels.is_empty()) else { return upload(1, 1, &[[0.0; 4]]) };
+    let most = gpu.caps().limits.image_2d;
+    if env.width > most || env.height > most {
+        let what = format!("environment is {}×{}; the device allows sides of {most}", env.width, env.height);
+        return Err(Error::new(ErrorKind::Runtime, what).at(format!("environment `{}`", env.name)));
+    }
+    let texels: Vec<[f32; 4]> = env.pixels.iter().map(|p| p.extend(1.0).to_array()).collect();
+    upload(env.width, env.height, &texels)
+}

@@ -1,0 +1,82 @@
+//! Everything from a scene on the device to the final picture.
+
+use super::{Igi, Outputs, Settings};
+use crate::{
+    Result,
+    graph::{Format, Graph},
+    passes::{
+        gbuffer::{self, GBuffer},
+        skybox,
+    },
+    scene::{Pose, Scene, View, resident::Handles},
+    shaders,
+};
+use serde::{Deserialize, Serialize};
+
+/// Settings of all stages.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PictureSettings {
+    pub igi: Settings,
+    pub gbuffer: gbuffer::Settings,
+    /// Radiance behind everything in scenes without an environment, linear RGB.
+    pub background: [f32; 3],
+}
+
+impl PictureSettings {
+    /// The paper's: [`Settings::paper`].
+    pub fn paper() -> Self {
+        Self { igi: Settings::paper(), ..Self::default() }
+    }
+}
+
+/// A picture and the stages before it.
+#[derive(Clone, Copy, Debug)]
+pub struct Picture {
+    pub gbuffer: GBuffer,
+    pub outputs: Outputs,
+}
+
+impl Igi {
+    /// Declares a frame: G-buffer, paths of light, direct and indirect light, sum and sky. `handles` are of this graph, for `pose`.
+    /// `graph.seed` is the seed of the paths; with 0 they are the paper's Halton points as they are.
+    ///
+    /// # Errors
+    /// `Usage` if a setting is out of its range.
+    pub fn picture(
+        &mut self,
+        graph: &mut Graph,
+        scene: &Scene,
+        pose: &Pose,
+        handles: &Handles,
+        view: &View,
+        settings: &PictureSettings,
+    ) -> Result<Picture> {
+        let igi = &settings.igi;
+        igi.validate().map_err(|error| error.at("igi"))?;
+        let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
+        let outputs = graph.scope("igi", |graph| {
+            let shared = self.shared(graph, scene, pose, handles, igi);
+            let vpls = self.shoot(graph, handles, &shared, igi);
+            let direct = self.direct(graph, handles, &gbuffer, &shared);
+            let gathered = self.gather(graph, &gbuffer, &shared, vpls, igi);
+            let extent = graph.extent(gbuffer.depth);
+            let total = graph.image("igi.total", Format::RGBA32F, extent);
+            let indirect = graph.image("igi.indirect", Format::RGBA32F, extent);
+            let args = shaders::igi::compose::Args {
+                albedo: gbuffer.albedo,
+                depth: gbuffer.depth,
+                direct,
+                irradiance: gathered,
+                sharp: direct,
+                total,
+                indirect,
+                spec: shaders::igi::compose::Spec { sharp: 0 },
+            };
+            graph.compute(args, extent);
+            Outputs { total, direct, indirect, gathered, vpls }
+        });
+        skybox::draw(graph, handles, &gbuffer, settings.background.into(), outputs.total);
+        Ok(Picture { gbuffer, outputs })
+    }
+}

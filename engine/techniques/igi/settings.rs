@@ -1,0 +1,119 @@
+//! What can be chosen in instant global illumination, and what the paper chose.
+
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// Settings of the technique.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Virtual point lights at most, 1 to 10,000. There are ⌈vpls / bounces⌉ paths of light; those that leave the scene, or end on
+    /// something black, leave fewer.
+    pub vpls: u32,
+    /// Virtual lights along a path at most, 1 to 8: bounces of indirect light.
+    pub bounces: u32,
+    /// Bounding distance min_d of the geometry term, as share of the diagonal of the scene's box; 0 switches the bound off. Virtual
+    /// lights nearer than 0.8 of it give nothing, from 1.2 of it on they give everything.
+    pub bound: f32,
+    /// Shadow rays of virtual lights test the boxes of triangles instead of triangles.
+    pub imperfect: bool,
+    /// Pixels along the side of a texel on which indirect light is gathered, 1 to 4.
+    pub downsample: u32,
+    /// Side of the tiles of pixels that share the virtual lights, 1 to 4: each pixel gathers from one of side² subsets.
+    pub interleave: u32,
+    /// Gather indirect light.
+    pub indirect: bool,
+    /// Mirrors, glass, and GGX highlights of direct light. Without, every surface reflects its diffuse part alone.
+    pub specular: bool,
+    /// Mirrors and glass one behind the other, 0 to 16, seen by the camera and passed by light.
+    pub specular_depth: u32,
+    /// Shadow rays a pixel for emissive surfaces, and as many for the environment, 1 to 4096. Other lights have one each.
+    pub direct_samples: u32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            vpls: 180,
+            bounces: 2,
+            bound: 0.02,
+            imperfect: false,
+            downsample: 1,
+            interleave: 1,
+            indirect: true,
+            specular: true,
+            specular_depth: 6,
+            direct_samples: 16,
+        }
+    }
+}
+
+impl Settings {
+    /// The paper's fastest variant: 180 virtual lights, boxes, a quarter of the resolution, tiles of 3×3. It states neither the
+    /// bounces of a path nor min_d; taken here are the defaults.
+    pub fn paper() -> Self {
+        Self { imperfect: true, downsample: 4, interleave: 3, ..Self::default() }
+    }
+
+    /// Paths of light.
+    pub fn paths(&self) -> u32 {
+        self.vpls.div_ceil(self.bounces.max(1))
+    }
+
+    /// # Errors
+    /// `Usage`, naming the key, the value found and the values allowed.
+    pub fn validate(&self) -> Result<()> {
+        let wrong = |key: &str, found: String, allowed: &str| {
+            Err(Error::usage(format!("{found} is not allowed; allowed: {allowed}")).at(key))
+        };
+        for (key, value, least, most) in [
+            ("vpls", self.vpls, 1, 10_000),
+            ("bounces", self.bounces, 1, 8),
+            ("downsample", self.downsample, 1, 4),
+            ("interleave", self.interleave, 1, 4),
+            ("specular_depth", self.specular_depth, 0, 16),
+            ("direct_samples", self.direct_samples, 1, 4096),
+        ] {
+            if !(least..=most).contains(&value) {
+                return wrong(key, value.to_string(), &format!("{least} to {most}"));
+            }
+        }
+        for (key, value, least, most) in [("bound", self.bound, 0.0, 1.0)] {
+            // Written so that a value that is not a number is refused.
+            if !(least..=most).contains(&value) {
+                return wrong(key, value.to_string(), &format!("{least} to {most}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_and_the_papers_choices_are_valid() {
+        Settings::default().validate().unwrap();
+        Settings::paper().validate().unwrap();
+        assert_eq!(Settings { vpls: 181, bounces: 2, ..Settings::default() }.paths(), 91);
+    }
+
+    #[test]
+    fn an_error_names_key_value_and_what_is_allowed() {
+        let message = |s: Settings| s.validate().unwrap_err().to_string();
+        let error = message(Settings { vpls: 0, ..Settings::default() });
+        assert_eq!(error, "vpls: 0 is not allowed; allowed: 1 to 10000");
+        let error = message(Settings { bound: f32::NAN, ..Settings::default() });
+        assert_eq!(error, "bound: NaN is not allowed; allowed: 0 to 1");
+        for wrong in [
+            Settings { bounces: 9, ..Settings::default() },
+            Settings { downsample: 0, ..Settings::default() },
+            Settings { interleave: 5, ..Settings::default() },
+            Settings { specular_depth: 17, ..Settings::default() },
+            Settings { direct_samples: 0, ..Settings::default() },
+        ] {
+            assert_eq!(wrong.validate().unwrap_err().exit_code(), 2, "{wrong:?}");
+        }
+    }
+}

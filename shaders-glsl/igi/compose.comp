@@ -1,0 +1,30 @@
+// The sum of all light: what is reflected of the irradiance, direct light, and what mirrors and glass show.
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(constant_id = 0) const uint SHARP = 0; // 1: there are mirrors or glass
+
+layout(binding = 0) uniform sampler2D albedo;
+layout(binding = 1) uniform sampler2D depth;
+layout(binding = 2) uniform sampler2D direct;
+layout(binding = 3) uniform sampler2D irradiance;
+layout(binding = 4) uniform sampler2D sharp; // rgb: radiance of the trees; a: share of the surface that is mirror or glass
+layout(binding = 5, rgba32f) uniform writeonly image2D total;
+layout(binding = 6, rgba32f) uniform writeonly image2D indirect;
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(pixel, imageSize(total)))) return;
+    if (texelFetch(depth, pixel, 0).r >= 1.0) {
+        imageStore(total, pixel, vec4(0.0));
+        imageStore(indirect, pixel, vec4(0.0));
+        return;
+    }
+    vec4 color = texelFetch(albedo, pixel, 0);
+    vec4 tree = SHARP != 0u ? texelFetch(sharp, pixel, 0) : vec4(0.0);
+    vec3 bounced = color.a * color.rgb * texelFetch(irradiance, pixel, 0).rgb * ((1.0 - tree.a) / 3.14159265358979);
+    imageStore(indirect, pixel, vec4(bounced, 1.0));
+    imageStore(total, pixel, vec4(bounced + texelFetch(direct, pixel, 0).rgb * (1.0 - tree.a) + tree.rgb, 1.0));
+}

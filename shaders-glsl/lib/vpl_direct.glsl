@@ -1,0 +1,73 @@
+// Direct light by shadow rays: every point, spot and directional light, and samples of emissive surfaces and of the sky.
+// Before including: lib/lights.glsl, lib/light_sampling.glsl, lib/hit_surface.glsl, lib/vpl.glsl, lib/vpl_surface.glsl, lib/brdf.glsl;
+// and `settings`.
+#ifndef LIB_VPL_DIRECT
+#define LIB_VPL_DIRECT
+
+// A point that is lit.
+struct LitPoint {
+    vec3 position; // metres
+    vec3 above;    // the same a step off the surface
+    vec3 normal;   // unit
+    vec3 viewer;   // unit, towards where it is seen from
+    vec3 f0;
+    float roughness;
+    vec3 albedo;
+};
+
+// Shadow rays of a point.
+uint direct_rays() {
+    return light_count + (settings.tree + settings.sky) * settings.samples;
+}
+
+// Shadow ray number i, and the radiance (W/(sr·m²)) that leaves towards the viewer if nothing is in its way.
+vec3 direct_ray(uint i, LitPoint p, uvec2 place, out Ray ray) {
+    ray = Ray(p.above, 0.0, vec3(0.0, 1.0, 0.0), 0.99999);
+    vec3 arrives = vec3(0.0); // irradiance on a plane that faces the light
+    vec3 to_light = p.normal;
+    if (i < light_count) {
+        Light one = light(i);
+        arrives = light_irradiance(one, p.position, to_light);
+        ray.direction = one.kind == LIGHT_DIRECTIONAL ? to_light : one.position - p.above;
+        ray.t_max = one.kind == LIGHT_DIRECTIONAL ? 1e30 : 0.99999;
+    } else {
+        uint j = i - light_count;
+        uvec4 turn = pcg4d(uvec4(place, settings.seed, 0xd12ecu));
+        uvec4 words = pcg4d(uvec4(place, settings.seed, i));
+        uint number = j % settings.samples;
+        // Even sequences, turned for each pixel: the samples of a pixel keep apart (Roberts' R2).
+        vec2 u = fract(unit_floats(turn.xy) + float(number) * vec2(0.75487767, 0.56984029));
+        float strata = fract((float(number) + unit_float(words.w)) / float(settings.samples));
+        if (settings.tree != 0u && j < settings.samples) {
+            float chosen;
+            LightTarget to = light_targets[pick_light(p.above, p.normal, words.xy, chosen)];
+            SurfacePoint point = surface_point(to.instance, to.index, sample_triangle(u));
+            bool both = (materials[surface_instances[to.instance].material].flags & MATERIAL_DOUBLE_SIDED) != 0u;
+            vec3 away = p.position - point.position;
+            float facing = dot(point.area, away);
+            float d2 = dot(away, away);
+            if ((facing > 0.0 || (both && facing < 0.0)) && d2 > 0.0 && chosen > 0.0) {
+                // The area vector is twice as long as the triangle is large.
+                float angle = 0.5 * abs(facing) / (d2 * sqrt(d2));
+                arrives = triangle_radiance(to.instance, point, settings.two) * (angle / (chosen * float(settings.samples)));
+                vec3 target = point.position + point.area * (sign(facing) * surface_gap(point) / length(point.area));
+                ray.direction = target - p.above;
+                to_light = -away * inversesqrt(d2);
+            }
+        } else {
+            float density;
+            uint bits = uint(strata * 16777216.0) << 8u;
+            to_light = environment_sample(settings.environment, bits, unit_float(words.z), u, density);
+            if (density > 0.0) arrives = environment_radiance(settings.environment, to_light) / (density * float(settings.samples));
+            ray.direction = to_light;
+            ray.t_max = 1e30;
+        }
+    }
+    float cosine = dot(p.normal, to_light);
+    if (cosine <= 0.0 || arrives == vec3(0.0)) return vec3(0.0);
+    vec3 reflected = p.albedo * (cosine / BRDF_PI);
+    if (settings.diffuse_only == 0u) reflected += brdf_specular_cosine(p.normal, p.viewer, to_light, p.f0, p.roughness);
+    return arrives * reflected;
+}
+
+#endif
