@@ -1,8 +1,7 @@
 //! The quasi-random numbers that light paths are built from (Halton 1960, as the paper has them), made on the host.
 
 /// Bases of the sequence, one a dimension.
-const PRIMES: [u32; 24] =
-    [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71, 73, 79, 83, 89];
+const PRIMES: [u32; 24] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71, 73, 79, 83, 89];
 
 /// Dimensions there are.
 pub const DIMENSIONS: usize = PRIMES.len();

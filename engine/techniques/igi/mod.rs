@@ -120,7 +120,14 @@ impl Igi {
     }
 
     /// Tables and trees of the frame.
-    fn shared(&mut self, graph: &mut Graph, scene: &Scene, pose: &Pose, handles: &Handles, settings: &Settings) -> Shared {
+    fn shared(
+        &mut self,
+        graph: &mut Graph,
+        scene: &Scene,
+        pose: &Pose,
+        handles: &Handles,
+        settings: &Settings,
+    ) -> Shared {
         let rays = self.rays.frame(graph, handles);
         if self.lights.as_ref().is_none_or(|(of, _)| of != pose) {
             self.lights = Some((pose.clone(), tables::lights(scene, pose, &[], Sources::Emissive)));
@@ -178,7 +185,8 @@ impl Igi {
     fn shoot(&self, graph: &mut Graph, handles: &Handles, shared: &Shared, settings: &Settings) -> Vpls {
         let paths = settings.paths();
         let table = self.lights.as_ref().map(|(_, table)| table);
-        let sided = |target: &types::LightTarget| self.double_sided.get(target.instance as usize).copied().unwrap_or(false);
+        let sided =
+            |target: &types::LightTarget| self.double_sided.get(target.instance as usize).copied().unwrap_or(false);
         let emissive = table.filter(|table| table.tree);
         let triangles = emissive.map_or((&[][..], &[][..]), |table| (&table.targets[..], &table.nodes[..]));
         let bounds = handles.bounds();
@@ -187,10 +195,7 @@ impl Igi {
         let dimensions = (consts::VPL_FIRST_NUMBERS + 2 * settings.bounces) as usize;
         let numbers = halton::table(paths, dimensions, shared.seed);
         let count = paths * settings.bounces;
-        let vpls = Vpls {
-            buffer: graph.buffer("igi.vpls", u64::from(count) * size_of::<types::Vpl>() as u64),
-            count,
-        };
+        let vpls = Vpls { buffer: graph.buffer("igi.vpls", u64::from(count) * size_of::<types::Vpl>() as u64), count };
         let states = graph.buffer("igi.paths", u64::from(paths) * size_of::<types::VplPath>() as u64);
         graph.fill(vpls.buffer, 0);
         graph.fill(states, 0);

@@ -177,7 +177,12 @@ mod tests {
     #[test]
     fn an_even_sky_sends_pi_times_half_the_surface() {
         // Mean cross-section of a convex body is a quarter of its surface (Cauchy): power 4π L S/4.
-        let sky = Environment { width: 64, height: 32, pixels: vec![Vec3::splat(2.0); 64 * 32], ..Environment::constant(Vec3::ONE) };
+        let sky = Environment {
+            width: 64,
+            height: 32,
+            pixels: vec![Vec3::splat(2.0); 64 * 32],
+            ..Environment::constant(Vec3::ONE)
+        };
         for moment in sky_moments(&sky) {
             assert!((moment / (6.0 * 2.0 * PI) - 1.0).abs() < 2e-3, "{moment}");
         }
