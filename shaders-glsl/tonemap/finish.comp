@@ -1,4 +1,4 @@
-// From sums to statistics, and their adaptation in time: exponential in stops, with a limit to its speed.
+// From sums to statistics, and their adaptation in time: exponential in stops, with a limit to its speed; the same in one step or in many.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -23,9 +23,10 @@ layout(push_constant, scalar) uniform Push {
     uint percentiles;  // 1: `found` counts
     uint normalize;
     uint adapt;        // 1: go on from the last frame
-    float up;          // share of the way to a brighter value in this frame, 1: all of it
+    float dt;          // seconds since the last frame
+    float up;          // time constant to a brighter value, s; 0: at once
     float down;
-    float limit;       // most stops in this frame
+    float limit;       // most stops a second
     float exposure;    // factor
 };
 
@@ -42,11 +43,20 @@ float adapted(float before, float now) {
     float from = stops(before);
     float to = stops(now);
     float way = to - from;
-    float along = clamp(way * (way > 0.0 ? up : down), -limit, limit);
-    if (abs(way - along) <= REST) {
+    if (dt == 0.0) {
+        return before;
+    }
+    float tau = way > 0.0 ? up : down;
+    // As long as the exponential would be faster than the limit, that is the speed: until limit * tau stops are left.
+    float steady = clamp((abs(way) - limit * tau) / limit, 0.0, dt);
+    float rest = abs(way) - limit * steady;
+    if (steady < dt) {
+        rest *= tau > 0.0 ? exp((steady - dt) / tau) : 0.0;
+    }
+    if (rest <= REST) {
         return now;
     }
-    return exp2(from + along);
+    return exp2(to - sign(way) * rest);
 }
 
 void main() {

@@ -191,7 +191,8 @@ pub struct Settings {
     pub adapt_up: f32,
     /// The same to a darker one.
     pub adapt_down: f32,
-    /// Adaptation changes by at most so many stops a second; 0: no limit.
+    /// Adaptation changes by at most so many stops a second; 0: no limit. What is left of a way of w stops after t seconds does not depend
+    /// on the number of frames: dw/dt = −min(w / adapt_…, adapt_limit).
     pub adapt_limit: f32,
 }
 

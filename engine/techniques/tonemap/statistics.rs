@@ -81,21 +81,15 @@ pub struct Sums {
 /// Turns sums into statistics. `dt`: seconds since the last frame, whose adaptation `statistics` holds; `None`: none.
 pub fn finish(graph: &mut Graph, from: Sums, statistics: Buffer, dt: Option<f32>, settings: &Settings) {
     let dt = dt.filter(|dt| dt.is_finite()).map(|dt| dt.max(0.0));
-    let share = |tau: f32| match dt {
-        Some(dt) if tau > 0.0 => -(-dt / tau).exp_m1(),
-        _ => 1.0,
-    };
-    let limit = match dt {
-        Some(dt) if settings.adapt_limit > 0.0 => settings.adapt_limit * dt,
-        _ => f32::MAX,
-    };
     let push = finish::Push {
         percentiles: (settings.percentile > 0.0).into(),
         normalize: settings.normalize.into(),
         adapt: dt.is_some().into(),
-        up: share(settings.adapt_up),
-        down: share(settings.adapt_down),
-        limit,
+        dt: dt.unwrap_or(0.0),
+        up: settings.adapt_up,
+        down: settings.adapt_down,
+        // None at all would be a division by zero.
+        limit: if settings.adapt_limit > 0.0 { settings.adapt_limit } else { 1e9 },
         exposure: settings.exposure.exp2(),
     };
     graph.compute(finish::Args { sums: from.sums, found: from.found, statistics, push }, 1);
