@@ -1,13 +1,16 @@
 //! Tone mapping as the last stage of every technique: `-D tonemap.operator=reinhard`.
 //!
 //! Without any setting of the group `tonemap` pictures stay light, as before.
+//!
+//! Ashikhmin's operator takes light as cd/m², which a render is not: unless `tonemap.exposure` or `tonemap.normalize` say otherwise, the
+//! log-average of its picture becomes [`GREY`] cd/m² (`normalize`, and the exposure that leads there), and in sequences follows the adaptation.
 
 use lucerna::{
     Result,
     gpu::Gpu,
     graph::{Graph, Image},
     image::{Layer, Layers},
-    techniques::tonemap::{self, Still, Tonemap},
+    techniques::tonemap::{self, Operator, Still, Tonemap},
 };
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
@@ -22,6 +25,9 @@ pub struct Staged<S> {
     pub tonemap: Option<tonemap::Settings>,
 }
 
+/// Luminance that the log-average becomes for an operator that works in cd/m²: 18 % of a screen's white of 100.
+const GREY: f32 = 18.0;
+
 /// The group of settings.
 const GROUP: &str = "tonemap";
 
@@ -35,8 +41,21 @@ impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
         let in_file = |text: String| text.parse::<toml::Table>().is_ok_and(|table| table.contains_key(GROUP));
         // What is wrong with the file is told below, with its name.
         let wanted = asked || args.file.as_deref().is_some_and(|file| config::read_text(file).is_ok_and(in_file));
-        let base = Self { technique: base.clone(), tonemap: wanted.then(tonemap::Settings::default) };
-        let settings: Self = args.effective(&base)?;
+        let over = |settings: tonemap::Settings| -> Result<Self> {
+            args.effective(&Self { technique: base.clone(), tonemap: wanted.then_some(settings) })
+        };
+        let plain = tonemap::Settings::default();
+        let grey = tonemap::Settings { normalize: true, exposure: GREY.log2(), ..plain.clone() };
+        let mut settings = over(plain.clone())?;
+        if settings.tonemap.as_ref().is_some_and(|s| s.operator == Operator::Ashikhmin) {
+            // What nobody has set is as it was before, whatever that is.
+            let (other, unit) = (over(grey.clone())?, |s: &tonemap::Settings| (s.normalize, s.exposure));
+            if settings.tonemap.as_ref().map(unit) == Some(unit(&plain))
+                && other.tonemap.as_ref().map(unit) == Some(unit(&grey))
+            {
+                settings = other;
+            }
+        }
         if let Some(tonemap) = &settings.tonemap {
             tonemap.validate().map_err(|error| error.at(GROUP))?;
         }
@@ -113,6 +132,21 @@ mod tests {
             assert_eq!(error.exit_code(), 2, "{bad}: {error}");
         }
         assert!(with(&["isr.sampels=3"]).unwrap_err().to_string().contains("isr.samples"));
+    }
+
+    #[test]
+    fn ashikhmin_gets_light_in_its_unit_unless_told_otherwise() {
+        let unit = |defines: &[&str]| {
+            let s = with(defines).unwrap().tonemap.unwrap();
+            (s.normalize, s.exposure)
+        };
+        assert_eq!(unit(&["tonemap.operator=ashikhmin"]), (true, GREY.log2()));
+        assert_eq!(unit(&["tonemap.mode=global"]), (true, GREY.log2()));
+        assert_eq!(unit(&["tonemap.exposure=0", "tonemap.mode=global"]), (false, 0.0));
+        assert_eq!(unit(&["tonemap.exposure=2"]), (false, 2.0));
+        assert_eq!(unit(&["tonemap.normalize=true"]), (true, 0.0));
+        assert_eq!(unit(&["tonemap.normalize=false"]), (false, 0.0));
+        assert_eq!(unit(&["tonemap.operator=aces"]), (false, 0.0));
     }
 
     #[test]

@@ -89,7 +89,9 @@ impl<'a> Run<'a> {
         }
         let radiance = technique.radiance && args.view.is_none();
         let developed = settings.tonemap.is_some() && radiance;
-        let exposure = args.exposure.or(suits.filter(|_| radiance));
+        // What suits the scene means nothing to a picture that is normalised.
+        let normal = settings.tonemap.as_ref().is_some_and(|tonemap| tonemap.normalize);
+        let exposure = args.exposure.or(suits.filter(|_| radiance && !normal));
         // Tone mapping takes the exposure itself; what it gives is for the screen.
         options.exposure_ev = if developed { 0.0 } else { exposure.unwrap_or(0.0) as f32 };
         let outputs = Outputs::new(&args.output, frames.len(), options)?;

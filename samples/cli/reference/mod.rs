@@ -121,7 +121,10 @@ pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
         Source::Builtin(name) => builtin::exposure(name).map(f64::from),
         Source::File(_) => None,
     };
-    let ev = args.exposure.or(suits).unwrap_or_else(|| exposure::fitting(&layers));
+    let fitting = || suits.unwrap_or_else(|| exposure::fitting(&layers));
+    // What suits the scene means nothing to a picture that is normalised.
+    let normal = tonemap.as_ref().is_some_and(|tonemap| tonemap.normalize);
+    let ev = args.exposure.unwrap_or_else(|| if normal { 0.0 } else { fitting() });
     // Tone mapping takes the exposure itself.
     match &tonemap {
         Some(tonemap) => last_stage::still(&gpu, tonemap, ev, &mut layers)?,
