@@ -131,6 +131,19 @@ fn decode_unguarded(bytes: &[u8], limits: &Limits) -> Result<Layers> {
     if let Some(matrix) = primaries.rec709_from_rgb().map_err(|error| error.at("header"))? {
         layers.iter_mut().for_each(|layer| convert(layer, matrix));
     }
+    let inside = |header: &Header| {
+        let ([x, y], size) = (offset_of(header), header.layer_size);
+        x < width as i64 && y < height as i64 && x + size.0 as i64 > 0 && y + size.1 as i64 > 0
+    };
+    if !headers.iter().any(inside) {
+        picture
+            .warnings
+            .push("the data window lies outside of the display window, in which nothing is to be seen".into());
+    }
+    if headers[0].shared_attributes.pixel_aspect != 1.0 {
+        let aspect = headers[0].shared_attributes.pixel_aspect;
+        picture.warnings.push(format!("its pixels are {aspect} times as wide as high, and are taken as squares"));
+    }
     picture.layers = layers;
     Ok(picture)
 }

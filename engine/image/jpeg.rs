@@ -85,6 +85,21 @@ pub(super) fn metadata(bytes: &[u8]) -> Result<Metadata> {
     Metadata::from_json(&String::from_utf8_lossy(&json)).map_err(|error| error.at("comment"))
 }
 
+/// There is no end mark after the start of the first scan. Bytes 255 of pixels are followed by 0, so that they are no mark.
+fn is_cut(bytes: &[u8]) -> bool {
+    let mut rest = bytes.get(2..).unwrap_or_default();
+    while let [0xff, kind, high, low, after @ ..] = rest {
+        if *kind == 0xda {
+            return !after.windows(2).any(|mark| mark == [0xff, 0xd9]);
+        }
+        let length = usize::from(u16::from_be_bytes([*high, *low]));
+        let Some(tail) = length.checked_sub(2).and_then(|length| after.get(length..)) else { return true };
+        rest = tail;
+    }
+    // Fill bytes or segments that are not known here: the decoder knows them better.
+    false
+}
+
 pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Layers> {
     let damaged = |error: image::ImageError| Error::input("damaged or not served").caused_by(error);
     let decoder = JpegDecoder::new(Cursor::new(bytes)).map_err(damaged)?;
@@ -95,7 +110,12 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Layers> {
     let data = codes.into_raw().into_iter().map(srgb::decode_u8).collect();
     // Text that is damaged does not make the picture unreadable; `metadata` says what is wrong with it.
     let metadata = metadata(bytes).unwrap_or_default();
-    Ok(Layers { metadata, ..Layers::new(width, height).with(Layer::new("", &["R", "G", "B"], data)) })
+    let warnings = if is_cut(bytes) {
+        vec!["the file ends before its picture does; what is missing is grey".into()]
+    } else {
+        vec![]
+    };
+    Ok(Layers { metadata, warnings, ..Layers::new(width, height).with(Layer::new("", &["R", "G", "B"], data)) })
 }
 
 #[cfg(test)]
@@ -105,6 +125,17 @@ mod tests {
     fn wave(side: u32) -> Layers {
         let value = |i: u32| 0.5 + 0.4 * (i as f32 * 0.01).sin();
         Layers::rgb(side, side, (0..side * side * 3).map(value).collect())
+    }
+
+    #[test]
+    fn a_file_that_ends_early_is_told() {
+        let (file, _) = crate::image::encode(crate::image::Format::Jpeg, &wave(64), &WriteOptions::default()).unwrap();
+        let whole = decode(&file, &Limits::default()).unwrap();
+        assert!(whole.warnings.is_empty());
+        let more = decode(&[&file[..], b"maker's notes"].concat(), &Limits::default()).unwrap();
+        assert_eq!(more, whole);
+        let cut = decode(&file[..file.len() * 3 / 4], &Limits::default()).unwrap();
+        assert_eq!(cut.warnings, ["the file ends before its picture does; what is missing is grey"]);
     }
 
     #[test]

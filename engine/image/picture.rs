@@ -10,6 +10,8 @@ pub struct Layers {
     pub height: u32,
     pub layers: Vec<Layer>,
     pub metadata: Metadata,
+    /// What is wrong with the file that was read, though a picture could be made of it. Not written.
+    pub warnings: Vec<String>,
 }
 
 /// One named image of some channels.
@@ -79,13 +81,17 @@ impl Layer {
 
     /// Three values a pixel: R G B, or X Y Z, or a single channel three times. `None` for anything else.
     pub fn rgb_pixels(&self) -> Option<Vec<[f32; 3]>> {
+        let [r, g, b] = self.colours()?;
+        Some(self.data.chunks_exact(self.channels.len()).map(|p| [p[r], p[g], p[b]]).collect())
+    }
+
+    /// Positions of the channels of [`Layer::rgb_pixels`].
+    pub fn colours(&self) -> Option<[usize; 3]> {
         let find = |names: [&str; 3]| -> Option<[usize; 3]> {
             Some([self.channel(names[0])?, self.channel(names[1])?, self.channel(names[2])?])
         };
         let single = || (self.channels.len() == 1).then_some([0; 3]);
-        let [r, g, b] =
-            find(["R", "G", "B"]).or_else(|| find(["X", "Y", "Z"])).or_else(single).or_else(|| self.luminance())?;
-        Some(self.data.chunks_exact(self.channels.len()).map(|p| [p[r], p[g], p[b]]).collect())
+        find(["R", "G", "B"]).or_else(|| find(["X", "Y", "Z"])).or_else(single).or_else(|| self.luminance())
     }
 
     /// Luminance with alpha, as grey.

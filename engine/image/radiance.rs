@@ -174,9 +174,12 @@ impl<'a> Header<'a> {
     fn variable(&mut self, name: &str, value: &str) -> Result<()> {
         let numbers = || -> Option<Vec<f32>> { value.split_whitespace().map(|word| word.parse().ok()).collect() };
         let factors = |count: usize| {
-            numbers()
-                .filter(|n| n.len() == count && n.iter().all(|f| f.is_normal() && *f > 0.0))
-                .ok_or_else(|| Error::input(format!("{name}={value} must be {count} positive numbers")))
+            numbers().filter(|n| n.len() == count && n.iter().all(|f| f.is_normal() && *f > 0.0)).ok_or_else(|| {
+                Error::input(format!(
+                    "{name}={value} must be {}",
+                    if count == 1 { "a positive number" } else { "three positive numbers" }
+                ))
+            })
         };
         match name {
             "FORMAT" => match value {

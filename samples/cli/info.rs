@@ -70,12 +70,15 @@ pub fn json(layers: &Layers) -> Value {
             json!({ "name": layer.name, "channels": channels })
         })
         .collect();
-    json!({ "width": layers.width, "height": layers.height, "layers": list, "metadata": layers.metadata })
+    json!({ "width": layers.width, "height": layers.height, "layers": list, "metadata": layers.metadata, "warnings": layers.warnings })
 }
 
 /// For people.
 pub fn text(path: &Path, layers: &Layers) -> String {
     let mut out = format!("{}\n  {}×{}", path.display(), layers.width, layers.height);
+    for warning in &layers.warnings {
+        let _ = write!(out, "\n  warning: {warning}");
+    }
     for layer in &layers.layers {
         let name = if layer.name.is_empty() { "picture" } else { &layer.name };
         for (channel, s) in channels(layer) {

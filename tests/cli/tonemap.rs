@@ -323,12 +323,62 @@ fn smallest_and_emptiest_pictures() {
             // What is all the same stays so.
             assert!(file == "hot" || data.chunks(3).all(|p| p == &data[..3]), "{operator} {file}");
         }
+        if ["ashikhmin", "reinhard", "bilateral", "reinhard-global"].contains(&operator) {
+            // The brightest luminance is white, also if it is the only one.
+            let white = |file: &str| result(file).iter().all(|v| (v - 1.0).abs() < 1e-3);
+            assert!(white("one") && white("flat") && white("row"), "{operator}: {:?}", &result("flat")[..3]);
+        }
         assert!(result("black").iter().all(|v| *v <= 1e-3), "{operator}: {:?}", &result("black")[..3]);
     }
     fs::write(folder.join("none.hdr"), b"#?RADIANCE\n\n-Y 0 +X 4\n").unwrap();
     let (none, out) = (name(folder, "none.hdr"), name(folder, "none.png"));
     tonemap(&[&none, "-o", &out]).expect(3, &["none.hdr: an image of 4×0 pixels"]);
     assert!(!Path::new(&out).exists());
+}
+
+/// Files of which a picture can be made, but not the one that was meant.
+#[test]
+fn what_is_odd_about_a_file_is_told() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let jpeg = image::encode(Format::Jpeg, &ramp(64, 64, false), &WriteOptions::default()).unwrap().0;
+    let cut = name(folder, "cut ü 1.jpg");
+    fs::write(&cut, &jpeg[..jpeg.len() * 3 / 4]).unwrap();
+    let dark = write(folder, "dark.pfm", &Layers::rgb(4, 3, vec![-1.0; 36]));
+    let out = name(folder, "out/");
+    fs::create_dir(&out).unwrap();
+    let told = tonemap(&[&cut, &dark, "-o", &out, "--operator", "linear"]);
+    told.expect(
+        0,
+        &["cut ü 1.jpg: the file ends before its picture does", "dark.pfm: nothing in the picture is brighter"],
+    );
+    assert_eq!(files(Path::new(&out)), ["cut ü 1.png", "dark.png"]);
+}
+
+/// A frame that is missing takes its time all the same.
+#[test]
+fn a_sequence_with_a_gap_goes_on_adapting_meanwhile() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for (file, scale) in [("a-1", 1.0), ("a-2", 9.0), ("a-3", 9.0), ("b-1", 1.0), ("b-3", 9.0)] {
+        let mut picture = ramp(16, 4, false);
+        picture.layers[0].data.iter_mut().for_each(|v| *v *= scale);
+        write(folder, &format!("{file}.exr"), &picture);
+    }
+    let last = |series: &str, messages: &[&str]| {
+        let (input, out) = (name(folder, &format!("{series}-#.exr")), name(folder, &format!("{series}#.png")));
+        let ran = tonemap(&[&input, "-o", &out, "--operator", "reinhard", "--mode", "global", "--json"]);
+        let json = ran.expect(0, messages).json();
+        json["pictures"].as_array().unwrap().last().unwrap()["luminance"]["log_average"].as_f64().unwrap()
+    };
+    let (whole, gap) = (last("a", &[]), last("b", &["1 numbers between 1 and 3 are missing"]));
+    assert!((whole / gap - 1.0).abs() < 1e-4, "{whole} {gap}");
 }
 
 /// Every HDR image of the collection is developed.

@@ -54,6 +54,8 @@ struct Run<'a> {
     mask: Option<Layers>,
     /// What `--exposure auto` found for the sequence that is being worked on, stops.
     metered: Option<f32>,
+    /// Number of the frame before.
+    before: Option<u32>,
 }
 
 /// A picture that was read, and how long that took.
@@ -71,7 +73,7 @@ pub fn run(args: &TonemapArgs, console: Console) -> Result<ExitCode> {
     }
     let (inputs, notes) = names::inputs(&args.inputs, args.layer.as_deref(), args.frames.as_ref(), args.sequence)?;
     notes.iter().for_each(|note| console.warning(note));
-    let mut run = Run { args, console, config, outputs: outputs(args)?, mask: None, metered: None };
+    let mut run = Run { args, console, config, outputs: outputs(args)?, mask: None, metered: None, before: None };
     run.probe(&inputs)?;
     if let Some(path) = &args.mask {
         run.mask = Some(image::read(path, &LIMITS)?);
@@ -114,7 +116,7 @@ pub fn run(args: &TonemapArgs, console: Console) -> Result<ExitCode> {
                 if input.sequence == Some(true) {
                     still.tonemap().reset()?;
                 }
-                run.develop(&mut still, &about, input, &picture)
+                run.develop(&mut still, &about, input, picture)
             });
             match result {
                 Ok(mut one) => {

@@ -2,9 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::{args::Frames, compare::split};
 use lucerna::{Error, Result};
-
-use crate::{args::Frames, compare::split, pattern::file_part};
 
 /// Standard input or output.
 pub const PIPE: &str = "-";
@@ -187,11 +186,13 @@ impl OutputName {
     /// The name for a picture. Names of inputs never add a folder.
     pub fn fill(&self, input: &Input, operator: &str, mode: &str) -> String {
         let numbered = Numbered::parse(&self.0).map_or_else(|| self.0.clone(), |pattern| pattern.fill(input.frame));
+        // As it is: two inputs of different names have different outputs.
+        let stem = input.stem.replace(['/', '\\', '\0'], "-");
         numbered
             .replace("{operator}", operator)
             .replace("{mode}", mode)
             // Last, for a file may be called anything.
-            .replace("{name}", &file_part(&input.stem))
+            .replace("{name}", &stem)
     }
 }
 

@@ -47,7 +47,7 @@ pub(super) fn mode_name(settings: &Settings) -> &'static str {
 }
 
 /// The layer of a picture as RGBA, and whether its alpha is its own.
-fn pixels(picture: &Layers, asked: Option<&str>) -> Result<(Vec<[f32; 4]>, bool)> {
+pub(super) fn pixels(picture: &Layers, asked: Option<&str>) -> Result<(Vec<[f32; 4]>, bool)> {
     let names = || picture.layers.iter().map(|l| if l.name.is_empty() { "total" } else { &l.name }).collect::<Vec<_>>();
     let layer = match asked {
         None => picture.main(),
@@ -56,16 +56,15 @@ fn pixels(picture: &Layers, asked: Option<&str>) -> Result<(Vec<[f32; 4]>, bool)
     let layer = layer.ok_or_else(|| {
         Error::input(format!("no layer {:?}; there are {}", asked.unwrap_or_default(), names().join(", ")))
     })?;
-    let colour = layer.rgb_pixels().ok_or_else(|| {
+    let [r, g, b] = layer.colours().ok_or_else(|| {
         let channels = layer.channels.join(" ");
         Error::input(format!("the channels {channels} are no colours"))
             .help(format!("Name a layer of colours with --layer; there are {}", names().join(", ")))
     })?;
     let alpha = layer.channel("A").filter(|_| layer.channels.len() > 1);
     let count = layer.channels.len();
-    let alpha_of = |i: usize| alpha.map_or(1.0, |a| layer.data[i * count + a]);
-    let rgba = colour.iter().enumerate().map(|(i, &[r, g, b])| [r, g, b, alpha_of(i)]).collect();
-    Ok((rgba, alpha.is_some()))
+    let rgba = |p: &[f32]| [p[r], p[g], p[b], alpha.map_or(1.0, |a| p[a])];
+    Ok((layer.data.chunks_exact(count).map(rgba).collect(), alpha.is_some()))
 }
 
 impl Run<'_> {
@@ -75,26 +74,38 @@ impl Run<'_> {
         still: &mut Still,
         about: &Description,
         input: &Input,
-        picture: &Layers,
+        mut picture: Layers,
     ) -> Result<Done> {
         let begun = Instant::now();
         let (width, height) = (picture.width, picture.height);
-        let (pixels, alpha) = pixels(picture, input.layer.as_deref())?;
+        let (pixels, alpha) = pixels(&picture, input.layer.as_deref())?;
+        picture.warnings.iter().for_each(|what| self.console.warning(&format!("{}: {what}", input.name)));
+        // Pictures can be as large as memory.
+        picture.layers.clear();
         let settings = self.exposed(input, &pixels);
         still.tonemap().set(&settings)?;
         let mask = self.mask(width, height)?;
-        let dt = input.sequence.map(|_| (1.0 / self.args.fps) as f32);
+        let dt = input.sequence.map(|_| {
+            let frames =
+                self.before.filter(|_| input.sequence == Some(false)).map_or(1, |b| input.frame.abs_diff(b).max(1));
+            (f64::from(frames) / self.args.fps) as f32
+        });
+        self.before = Some(input.frame);
         let mapped = still.map(width, height, pixels, mask.as_deref(), dt)?;
         self.tell_bad(input, &mapped.bad);
+        if mapped.statistics.frame_high == 0.0 {
+            self.console.warning(&format!("{}: nothing in the picture is brighter than black", input.name));
+        }
         let mapping = begun.elapsed();
 
         let begun = Instant::now();
-        let layers = Layers {
-            metadata: self.metadata(about, input, picture, &settings)?,
-            ..Layers::new(width, height).with(layer_of(&mapped, alpha))
-        };
         let over = |pixel: &&[f32; 4]| pixel[..3].iter().any(|&v| v > 1.0);
         let over_white = mapped.pixels.iter().filter(over).count() as u64;
+        let (bad, s) = (mapped.bad, mapped.statistics);
+        let layers = Layers {
+            metadata: self.metadata(about, input, &picture, &settings)?,
+            ..Layers::new(width, height).with(layer_of(mapped, alpha))
+        };
         let mut files = Vec::new();
         for (name, format) in self.files(input) {
             if alpha && format == Format::Jpeg {
@@ -103,14 +114,13 @@ impl Run<'_> {
             self.write(&name, format, &layers)?;
             files.push(name);
         }
-        let s = &mapped.statistics;
         Ok(Done {
             input: input.name.clone(),
             frame: input.sequence.map(|_| input.frame),
             size: [width, height],
             alpha,
             files,
-            bad: mapped.bad,
+            bad,
             exposure: settings.exposure,
             light: [s.low, s.high, s.log_average],
             over_white,
@@ -209,7 +219,7 @@ impl Run<'_> {
 }
 
 /// What is written: three channels, or four if the picture came with alpha.
-fn layer_of(mapped: &Mapped, alpha: bool) -> Layer {
+fn layer_of(mapped: Mapped, alpha: bool) -> Layer {
     if alpha { Layer::rgba("", &mapped.pixels) } else { Layer::rgb("", &mapped.pixels) }
 }
 
