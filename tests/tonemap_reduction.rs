@@ -3,7 +3,7 @@
 
 use lucerna::{
     gpu::testing::with_gpu,
-    techniques::tonemap::{Mode, Settings, Still, statistics::ranks},
+    techniques::tonemap::{Mode, Operator, Settings, Still, statistics::ranks},
 };
 
 /// What the shaders call luminance, rounded once.
@@ -136,4 +136,32 @@ fn gpu_image(gpu: &lucerna::gpu::Gpu, pixels: &[[f32; 4]]) -> lucerna::gpu::Owne
     let desc = ImageDesc::new(ash::vk::Format::R32G32B32A32_SFLOAT, pixels.len() as u32, 1);
     let bytes = bytemuck::cast_slice(pixels);
     OwnedImage::with_contents(gpu, "bad", desc, &[Region { mip: 0, layer: 0, bytes }]).unwrap()
+}
+
+/// More pixels than a float can count, in tiles: not one is lost.
+#[test]
+fn more_than_two_to_the_24_pixels_are_all_counted() {
+    with_gpu(|gpu| {
+        let (width, height) = (16384u32, 1025u32);
+        let count = (width * height) as usize;
+        assert!(count > 1 << 24);
+        // One pixel less than half of 1, one more of 4; the last is the only one of 16 and the first the only one of 1/4.
+        let mut pixels = vec![[1.0f32, 1.0, 1.0, 1.0]; count];
+        pixels[count / 2..].fill([4.0, 4.0, 4.0, 1.0]);
+        (pixels[0], pixels[count - 1]) = ([0.25; 4], [16.0; 4]);
+        // Two pixels are the least that leaves one out at each end.
+        for (percentile, least, most) in [(0.0, 0.25, 16.0), (100.0 * 2.0 / count as f32, 1.0, 4.0)] {
+            let settings =
+                Settings { operator: Operator::Linear, mode: Some(Mode::Global), percentile, ..Settings::default() };
+            let found = Still::new(gpu, &settings).unwrap().map(width, height, pixels.clone(), None, None).unwrap();
+            let s = found.statistics;
+            assert_eq!((s.frame_low, s.frame_high), (least, most), "{percentile}");
+            let logs = -2.0 + 4.0 + 2.0 * (count - count / 2 - 1) as f64;
+            let wanted = (logs / count as f64).exp2();
+            assert!((f64::from(s.frame_log_average) / wanted - 1.0).abs() < 1e-6, "{} {wanted}", s.frame_log_average);
+            if percentile == 0.0 {
+                assert!(found.pixels == pixels);
+            }
+        }
+    });
 }

@@ -99,6 +99,24 @@ fn the_ways_of_marking_give_the_same_bits_and_touch_nothing_else() {
     });
 }
 
+/// The list of `compact` has room for 2²⁴ pixels: more are done in bands of rows.
+#[test]
+fn a_list_longer_than_its_room_is_done_in_bands() {
+    with_gpu(|gpu| {
+        let size = [gpu.caps().limits.image_2d.min(16384), 1 + (1 << 24) / 16384 + 5];
+        let count = (size[0] * size[1]) as usize;
+        let luminance: Vec<f32> = (0..count).map(|i| 1.0 + (i % 97) as f32).collect();
+        // Few, but on both sides of the border between the bands.
+        let marked = |i: usize| i % 4099 == 0 || (i / size[0] as usize).abs_diff(1024) < 2 && i % 13 == 0;
+        let importance: Vec<f32> = (0..count).map(|i| f32::from(u8::from(marked(i)))).collect();
+        let (one, _) = adapt(gpu, size, &luminance, &importance, Mark::Compact);
+        let (other, _) = adapt(gpu, size, &luminance, &importance, Mark::Branch);
+        let wrong = (0..count).find(|&i| one[i].to_bits() != other[i].to_bits());
+        assert_eq!(wrong, None);
+        assert!(one[size[0] as usize * 1025..].iter().zip(&luminance[size[0] as usize * 1025..]).any(|(a, b)| a != b));
+    });
+}
+
 /// Draws one of the two counting shaders over what `importance` marked; returns its count by atomics and the driver's.
 fn starts(gpu: &Gpu, size: [u32; 2], importance: &[f32], early: bool, tested: bool) -> (u32, Option<Started>, u32) {
     let owned = owned(gpu, "importance", size, importance);

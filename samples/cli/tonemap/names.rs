@@ -249,8 +249,8 @@ mod tests {
     fn output_names() {
         let (list, _) = inputs(&strings(&["x/church {mode}.hdr"]), None, None, false).unwrap();
         let fill = |text: &str| OutputName::parse(text).unwrap().fill(&list[0], "agx", "global");
-        assert_eq!(fill("o/{name}-{operator}-{mode}-%03d.png"), "o/church--mode-agx-global-000.png");
-        assert_eq!(fill("out/"), "out/church--mode.png");
+        assert_eq!(fill("o/{name}-{operator}-{mode}-%03d.png"), "o/church {mode}-agx-global-000.png");
+        assert_eq!(fill("out/"), "out/church {mode}.png");
         assert_eq!(fill("-"), "-");
         assert_eq!(OutputName::parse("{nmae}.png").unwrap_err().exit_code(), 2);
     }
