@@ -163,13 +163,20 @@ impl Bvh {
         let frame = Frame::new(ray);
         let inverse = ray.direction.recip();
         let mut t_max = ray.t_max;
-        let mut stack = vec![0u32];
-        while let Some(index) = stack.pop() {
-            let node = &self.tree.nodes[index as usize];
-            let (min, max) = (node.aabb().min.into(), node.aabb().max.into());
-            if enter(min, max, ray, inverse, t_max).is_none() {
+        let enters = |index: u32, t_max: f32| {
+            let aabb = self.tree.nodes[index as usize].aabb();
+            enter(aabb.min.into(), aabb.max.into(), ray, inverse, t_max)
+        };
+        let mut stack = Stack::default();
+        if let Some(near) = enters(0, t_max) {
+            stack.push((0, near));
+        }
+        while let Some((index, near)) = stack.pop() {
+            // Something nearer may have been found since.
+            if near > t_max {
                 continue;
             }
+            let node = &self.tree.nodes[index as usize];
             if node.is_leaf() {
                 for slot in node.first_index..node.first_index + node.prim_count {
                     let triangle = self.tree.primitive_indices[slot as usize];
@@ -183,16 +190,18 @@ impl Bvh {
                     }
                 }
             } else {
-                let distance = |child: u32| {
-                    let aabb = self.tree.nodes[child as usize].aabb();
-                    enter(aabb.min.into(), aabb.max.into(), ray, inverse, t_max)
-                };
                 let (left, right) = (node.first_index, node.first_index + 1);
-                match (distance(left), distance(right)) {
-                    (Some(a), Some(b)) if a <= b => stack.extend([right, left]),
-                    (Some(_), Some(_)) => stack.extend([left, right]),
-                    (Some(_), None) => stack.push(left),
-                    (None, Some(_)) => stack.push(right),
+                match (enters(left, t_max), enters(right, t_max)) {
+                    (Some(a), Some(b)) if a <= b => {
+                        stack.push((right, b));
+                        stack.push((left, a));
+                    }
+                    (Some(a), Some(b)) => {
+                        stack.push((left, a));
+                        stack.push((right, b));
+                    }
+                    (Some(a), None) => stack.push((left, a)),
+                    (None, Some(b)) => stack.push((right, b)),
                     (None, None) => {}
                 }
             }
@@ -235,6 +244,38 @@ impl Bvh {
             Some(triangle) => Err(format!("triangle {triangle} stands in {} leaves", seen[triangle])),
             None => Ok(()),
         }
+    }
+}
+
+/// Nodes that wait, with where the ray enters them. Trees of any depth, but those of usual depth take no memory from the heap.
+struct Stack {
+    low: [(u32, f32); 64],
+    used: usize,
+    high: Vec<(u32, f32)>,
+}
+
+impl Default for Stack {
+    fn default() -> Self {
+        Self { low: [(0, 0.0); 64], used: 0, high: Vec::new() }
+    }
+}
+
+impl Stack {
+    fn push(&mut self, node: (u32, f32)) {
+        match self.low.get_mut(self.used) {
+            Some(slot) => {
+                *slot = node;
+                self.used += 1;
+            }
+            None => self.high.push(node),
+        }
+    }
+
+    fn pop(&mut self) -> Option<(u32, f32)> {
+        self.high.pop().or_else(|| {
+            self.used = self.used.checked_sub(1)?;
+            Some(self.low[self.used])
+        })
     }
 }
 

@@ -178,10 +178,15 @@ impl Sums {
 pub fn trace(scene: &Scene, pose: &Pose, bvh: &Bvh, view: &View, settings: &Settings) -> Layers {
     let [width, height] = view.extent.map(|e| e as usize);
     let surfaces = Surfaces::new(scene, pose, bvh);
+    let lamps = Lamps::new(bvh, &surfaces);
+    let Settings { jitter, diffuse_only, sources, seen_senders_only, .. } = *settings;
+    let shining = (sources.environment && scene.environment.is_some()) || (sources.emissive && lamps.area() > 0.0);
     let tracer = Tracer {
         bvh,
         scene,
-        lamps: Lamps::new(bvh, &surfaces),
+        fixed_start: !jitter && surfaces.is_certain(),
+        last_ray_meets_nothing: diffuse_only && !seen_senders_only && !shining,
+        lamps,
         surfaces,
         lights: lights::placed(scene, pose),
         world_from_view: view.view_from_world.inverse(),
@@ -226,9 +231,29 @@ pub fn trace(scene: &Scene, pose: &Pose, bvh: &Bvh, view: &View, settings: &Sett
     }
 }
 
+/// The start of a path.
+struct First {
+    ray: Ray,
+    /// What all paths of a pixel have in common, where they have.
+    known: Option<Known>,
+}
+
+/// What a ray through a pixel finds, if neither the ray nor what is there depends on chance. Paths take as many random numbers with it
+/// as without.
+struct Known {
+    found: Option<(Face, f32)>,
+    /// Light that punctual lights send by that place, and the rays that were asked for it.
+    punctual: Vec3,
+    rays: u32,
+}
+
 struct Tracer<'a> {
     bvh: &'a Bvh,
     scene: &'a Scene,
+    /// All paths of a pixel begin alike.
+    fixed_start: bool,
+    /// Nothing shines that the ray after the last scattering could meet.
+    last_ray_meets_nothing: bool,
     surfaces: Surfaces<'a>,
     lights: Vec<Placed<'a>>,
     lamps: Lamps,
@@ -246,11 +271,27 @@ impl Tracer<'_> {
         }
         let index = y as u32 * self.view.extent[0] + x as u32;
         let mut random = Random::new(index, self.settings.seed);
+        let (x, y) = (x as f32, y as f32);
+        let fixed = self.fixed_start.then(|| self.first(self.camera_ray(x + 0.5, y + 0.5)));
         for _ in 0..self.settings.samples.max(1) {
-            let place = if self.settings.jitter { (random.next(), random.next()) } else { (0.5, 0.5) };
-            sums.add(&self.path(&self.camera_ray(x as f32 + place.0, y as f32 + place.1), &mut random));
+            let sample = match &fixed {
+                Some(first) => self.path(first, &mut random),
+                None => {
+                    let (a, b) = if self.settings.jitter { (random.next(), random.next()) } else { (0.5, 0.5) };
+                    self.path(&First { ray: self.camera_ray(x + a, y + b), known: None }, &mut random)
+                }
+            };
+            sums.add(&sample);
         }
         sums
+    }
+
+    /// What all paths of a pixel begin with; only if nothing there depends on chance.
+    fn first(&self, ray: Ray) -> First {
+        let mut unused = Random::new(0, 0);
+        let found = self.found(&ray, true, false, &mut unused);
+        let (punctual, rays) = found.as_ref().map_or((Vec3::ZERO, 0), |(face, _)| self.punctual(face, &mut unused));
+        First { ray, known: Some(Known { found, punctual, rays }) }
     }
 
     /// Through image position (x, y) in pixels, y down.
@@ -274,24 +315,31 @@ impl Tracer<'_> {
         }
     }
 
-    fn path(&self, camera: &Ray, random: &mut Random) -> Sample {
+    fn path(&self, first: &First, random: &mut Random) -> Sample {
         let Settings { bounces, specular_bounces, diffuse_only, sources, sample_lamps, .. } = *self.settings;
         let mut out = Sample { depth: f32::INFINITY, ..Sample::default() };
-        let mut ray = *camera;
+        let mut ray = first.ray;
         let mut throughput = Vec3::ONE;
         let (mut scatterings, mut sharp_events) = (0, 0);
         // Whether points on lamps were already asked for the light that this ray may meet.
         let mut lamps_asked = false;
         for event in 0.. {
-            let Some(hit) = self.nearest(&ray, event == 0, scatterings > 0, random) else {
+            let known = first.known.as_ref().filter(|_| event == 0);
+            let found = match known {
+                Some(known) => {
+                    random.skip(1);
+                    known.found
+                }
+                None => self.found(&ray, event == 0, scatterings > 0, random),
+            };
+            let Some((face, distance)) = found else {
                 if sources.environment {
                     *out.layer(scatterings) += throughput * self.environment(ray.direction);
                 }
                 return out;
             };
-            let face = self.surfaces.at(hit.triangle, hit.u, hit.v, -ray.direction.normalize());
             if event == 0 {
-                (out.albedo, out.normal, out.position, out.depth) = (face.albedo, face.normal, face.position, hit.t);
+                (out.albedo, out.normal, out.position, out.depth) = (face.albedo, face.normal, face.position, distance);
             }
             if scatterings > 0 && self.settings.seen_senders_only && !self.is_seen(&face, random) {
                 return out;
@@ -319,7 +367,14 @@ impl Tracer<'_> {
                     }
                     scatterings += 1;
                     if sources.punctual {
-                        *out.layer(scatterings) += throughput * self.punctual(&face, random);
+                        let light = match known {
+                            Some(known) => {
+                                random.skip(known.rays);
+                                known.punctual
+                            }
+                            None => self.punctual(&face, random).0,
+                        };
+                        *out.layer(scatterings) += throughput * light;
                     }
                     if sources.emissive && sample_lamps {
                         *out.layer(scatterings) += throughput * self.lamp(&face, random);
@@ -328,23 +383,37 @@ impl Tracer<'_> {
                     let Some((direction, weight)) = face.scatter(diffuse_only, random) else { return out };
                     throughput *= weight;
                     ray = Ray::new(face.lifted(), direction);
+                    if scatterings > bounces && self.last_ray_meets_nothing {
+                        random.skip(1);
+                        return out;
+                    }
                 }
             }
         }
         out
     }
 
-    /// Reflected light of all punctual lights.
-    fn punctual(&self, face: &Face, random: &mut Random) -> Vec3 {
-        let mut sum = Vec3::ZERO;
+    /// The nearest surface, and how far away in lengths of the ray's direction.
+    fn found(&self, ray: &Ray, camera: bool, light: bool, random: &mut Random) -> Option<(Face, f32)> {
+        let hit = self.nearest(ray, camera, light, random)?;
+        Some((self.surfaces.at(hit.triangle, hit.u, hit.v, -ray.direction.normalize()), hit.t))
+    }
+
+    /// Reflected light of all punctual lights, and how many rays it took.
+    fn punctual(&self, face: &Face, random: &mut Random) -> (Vec3, u32) {
+        let (mut sum, mut rays) = (Vec3::ZERO, 0);
         for light in &self.lights {
             let (to, distance, irradiance) = light.at(face.position);
             let reflected = face.rough(to, self.settings.diffuse_only) * irradiance;
-            if reflected != Vec3::ZERO && !self.blocked(face.lifted(), to, distance * (1.0 - 1e-4), random) {
+            if reflected == Vec3::ZERO {
+                continue;
+            }
+            rays += 1;
+            if !self.blocked(face.lifted(), to, distance * (1.0 - 1e-4), random) {
                 sum += reflected;
             }
         }
-        sum
+        (sum, rays)
     }
 
     /// Reflected light of one point on all emissive surfaces.

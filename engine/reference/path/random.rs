@@ -20,6 +20,13 @@ impl Random {
         (word >> 8) as f32 / (1 << 24) as f32
     }
 
+    /// Leaves out so many numbers.
+    pub fn skip(&mut self, count: u32) {
+        for _ in 0..count {
+            self.next();
+        }
+    }
+
     /// Number for [`hash_to_unit`], the same for all triangles along one ray.
     pub fn salt(&mut self) -> u32 {
         self.next().to_bits()

@@ -9,9 +9,9 @@ use crate::{
     },
 };
 use glam::{Vec2, Vec3, Vec4};
-use std::collections::HashMap;
 
 /// A point on a surface, turned towards the viewer.
+#[derive(Clone, Copy)]
 pub struct Face {
     pub position: Vec3,
     /// Shading normal, with the normal map.
@@ -76,56 +76,85 @@ impl Face {
 /// The deformed geometry and materials behind the triangles of a [`Bvh`].
 pub struct Surfaces<'a> {
     scene: &'a Scene,
-    bvh: &'a Bvh,
-    vertices: HashMap<(u32, u32), Vertices>,
+    /// Of each mesh primitive in each place.
+    vertices: Vec<Vertices>,
+    triangles: Vec<Triangle<'a>>,
+}
+
+/// What is looked up for each hit.
+struct Triangle<'a> {
+    primitive: &'a Primitive,
+    material: &'a Material,
+    /// Index into the vertices, and into one of them.
+    vertices: u32,
+    corners: [u32; 3],
+    /// Geometric normal on the front side.
+    front: Vec3,
 }
 
 impl<'a> Surfaces<'a> {
-    pub fn new(scene: &'a Scene, pose: &Pose, bvh: &'a Bvh) -> Self {
-        let mut vertices = HashMap::new();
+    pub fn new(scene: &'a Scene, pose: &Pose, bvh: &Bvh) -> Self {
+        let mut vertices = Vec::new();
+        // First of each node.
+        let mut first = Vec::with_capacity(scene.nodes.len());
         for (index, node) in scene.nodes.iter().enumerate() {
+            first.push(vertices.len() as u32);
             let Some(mesh) = node.mesh else { continue };
-            for (p, primitive) in scene.meshes[mesh as usize].primitives.iter().enumerate() {
-                vertices.insert((index as u32, p as u32), world_vertices(scene, pose, index, primitive));
+            for primitive in &scene.meshes[mesh as usize].primitives {
+                vertices.push(world_vertices(scene, pose, index, primitive));
             }
         }
-        Self { scene, bvh, vertices }
+        let triangle = |index: u32| {
+            let id = bvh.id(index);
+            let mesh = scene.nodes[id.node as usize].mesh.unwrap_or(0);
+            let primitive = &scene.meshes[mesh as usize].primitives[id.primitive as usize];
+            let at = 3 * id.triangle as usize;
+            let corners = [0, 1, 2].map(|i| primitive.indices[at + i]);
+            let place = first[id.node as usize] + id.primitive;
+            let [a, b, c] = bvh.triangles()[index as usize];
+            let n = (b - a).cross(c - a).normalize_or(Vec3::Y);
+            // A mirroring transform keeps the front where the shading normals are.
+            let shading: Vec3 = corners.iter().map(|&i| vertices[place as usize].normals[i as usize]).sum();
+            Triangle {
+                primitive,
+                material: &scene.materials[primitive.material as usize],
+                vertices: place,
+                corners,
+                front: if n.dot(shading) < 0.0 { -n } else { n },
+            }
+        };
+        let triangles = (0..bvh.triangles().len() as u32).map(triangle).collect();
+        Self { scene, vertices, triangles }
     }
 
     fn primitive(&self, triangle: u32) -> (&Primitive, &Vertices, &Material, [usize; 3]) {
-        let id = self.bvh.id(triangle);
-        let mesh = self.scene.nodes[id.node as usize].mesh.unwrap_or(0);
-        let primitive = &self.scene.meshes[mesh as usize].primitives[id.primitive as usize];
-        let first = 3 * id.triangle as usize;
-        let corners = [0, 1, 2].map(|i| primitive.indices[first + i] as usize);
-        let material = &self.scene.materials[primitive.material as usize];
-        (primitive, &self.vertices[&(id.node, id.primitive)], material, corners)
+        let Triangle { primitive, material, vertices, corners, .. } = &self.triangles[triangle as usize];
+        (primitive, &self.vertices[*vertices as usize], material, corners.map(|i| i as usize))
     }
 
-    /// Geometric normal on the front side. A mirroring transform keeps the front where the shading normals are.
+    /// Geometric normal on the front side.
     fn front(&self, triangle: u32) -> Vec3 {
-        let [a, b, c] = self.bvh.triangles()[triangle as usize];
-        let n = (b - a).cross(c - a).normalize_or(Vec3::Y);
-        let (_, vertices, _, corners) = self.primitive(triangle);
-        let shading: Vec3 = corners.iter().map(|&i| vertices.normals[i]).sum();
-        if n.dot(shading) < 0.0 { -n } else { n }
+        self.triangles[triangle as usize].front
+    }
+
+    /// Whether what is there depends on chance.
+    pub fn is_certain(&self) -> bool {
+        self.triangles.iter().all(|t| t.material.alpha != AlphaMode::Blend)
     }
 
     /// Whether a camera ray sees the back of a single-sided triangle, which a rasteriser culls.
     pub fn is_hidden_back(&self, triangle: u32, direction: Vec3) -> bool {
-        let (.., material, _) = self.primitive(triangle);
-        !material.double_sided && self.front(triangle).dot(direction) > 0.0
+        !self.triangles[triangle as usize].material.double_sided && self.front(triangle).dot(direction) > 0.0
     }
 
     /// Whether this triangle stops light: unlit surfaces do not.
     pub fn casts(&self, triangle: u32) -> bool {
-        let (.., material, _) = self.primitive(triangle);
-        !material.unlit
+        !self.triangles[triangle as usize].material.unlit
     }
 
     /// Whether this triangle is a lamp.
     pub fn emits(&self, triangle: u32) -> bool {
-        let (.., material, _) = self.primitive(triangle);
+        let material = self.triangles[triangle as usize].material;
         !material.unlit && material.emissive != Vec3::ZERO
     }
 
