@@ -11,6 +11,7 @@
 //! - Light is received by shading normals and sent on by the triangle's, which is what a path tracer sees from the other end.
 //! - The table's first two dimensions are the directions of paths from near lights, and the places of paths from far ones.
 
+pub mod filters;
 pub mod halton;
 mod picture;
 mod settings;
@@ -92,7 +93,9 @@ pub struct Outputs {
     pub direct: Image,
     /// Indirect light as it enters the sum.
     pub indirect: Image,
-    /// Irradiance from virtual lights, W/m², as gathered: of the size of `extent / downsample`; alpha: shadow rays.
+    /// Irradiance from virtual lights, W/m², of every pixel.
+    pub irradiance: Image,
+    /// The same as gathered: of the size of `extent / downsample`; alpha: shadow rays.
     pub gathered: Image,
     pub vpls: Vpls,
 }

@@ -1,6 +1,6 @@
 //! Everything from a scene on the device to the final picture.
 
-use super::{Igi, Outputs, Settings};
+use super::{Igi, Outputs, Settings, filters};
 use crate::{
     Result,
     graph::{Format, Graph},
@@ -60,6 +60,8 @@ impl Igi {
             let vpls = self.shoot(graph, handles, &shared, igi);
             let direct = self.direct(graph, handles, &gbuffer, &shared);
             let gathered = self.gather(graph, &gbuffer, &shared, vpls, igi);
+            let joined = if igi.interleave > 1 { filters::join(graph, &gbuffer, gathered, igi) } else { gathered };
+            let irradiance = if igi.downsample > 1 { filters::upsample(graph, &gbuffer, joined, igi) } else { joined };
             let extent = graph.extent(gbuffer.depth);
             let total = graph.image("igi.total", Format::RGBA32F, extent);
             let indirect = graph.image("igi.indirect", Format::RGBA32F, extent);
@@ -67,14 +69,14 @@ impl Igi {
                 albedo: gbuffer.albedo,
                 depth: gbuffer.depth,
                 direct,
-                irradiance: gathered,
+                irradiance,
                 sharp: direct,
                 total,
                 indirect,
                 spec: shaders::igi::compose::Spec { sharp: 0 },
             };
             graph.compute(args, extent);
-            Outputs { total, direct, indirect, gathered, vpls }
+            Outputs { total, direct, indirect, irradiance, gathered, vpls }
         });
         skybox::draw(graph, handles, &gbuffer, settings.background.into(), outputs.total);
         Ok(Picture { gbuffer, outputs })

@@ -21,6 +21,16 @@ pub struct Settings {
     pub downsample: u32,
     /// Side of the tiles of pixels that share the virtual lights, 1 to 4: each pixel gathers from one of side² subsets.
     pub interleave: u32,
+    /// Standard deviation of the Gaussian of upsampling, texels of the coarse picture, 0.1 to 4.
+    pub upsample_sigma: f32,
+    /// Exponent of the cosine between normals in upsampling, 0 to 64; the paper has 1.
+    pub upsample_normal: f32,
+    /// Distance from the pixel's plane, relative to its depth, at which a coarse texel weighs 0.6; 0: depth does not count (paper).
+    pub upsample_range: f32,
+    /// Most difference of depth, relative to the texel's, over which interleaved texels are joined.
+    pub discontinuity_depth: f32,
+    /// Least cosine between their normals.
+    pub discontinuity_normal: f32,
     /// Gather indirect light.
     pub indirect: bool,
     /// Mirrors, glass, and GGX highlights of direct light. Without, every surface reflects its diffuse part alone.
@@ -40,6 +50,11 @@ impl Default for Settings {
             imperfect: false,
             downsample: 1,
             interleave: 1,
+            upsample_sigma: 0.8,
+            upsample_normal: 8.0,
+            upsample_range: 0.01,
+            discontinuity_depth: 0.05,
+            discontinuity_normal: 0.9,
             indirect: true,
             specular: true,
             specular_depth: 6,
@@ -52,7 +67,7 @@ impl Settings {
     /// The paper's fastest variant: 180 virtual lights, boxes, a quarter of the resolution, tiles of 3×3. It states neither the
     /// bounces of a path nor min_d; taken here are the defaults.
     pub fn paper() -> Self {
-        Self { imperfect: true, downsample: 4, interleave: 3, ..Self::default() }
+        Self { imperfect: true, downsample: 4, interleave: 3, upsample_normal: 1.0, upsample_range: 0.0, ..Self::default() }
     }
 
     /// Paths of light.
@@ -78,7 +93,14 @@ impl Settings {
                 return wrong(key, value.to_string(), &format!("{least} to {most}"));
             }
         }
-        for (key, value, least, most) in [("bound", self.bound, 0.0, 1.0)] {
+        for (key, value, least, most) in [
+            ("bound", self.bound, 0.0, 1.0),
+            ("upsample_sigma", self.upsample_sigma, 0.1, 4.0),
+            ("upsample_normal", self.upsample_normal, 0.0, 64.0),
+            ("upsample_range", self.upsample_range, 0.0, 1e6),
+            ("discontinuity_depth", self.discontinuity_depth, 0.0, 1e6),
+            ("discontinuity_normal", self.discontinuity_normal, -1.0, 1.0),
+        ] {
             // Written so that a value that is not a number is refused.
             if !(least..=most).contains(&value) {
                 return wrong(key, value.to_string(), &format!("{least} to {most}"));

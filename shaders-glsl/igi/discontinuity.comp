@@ -1,0 +1,52 @@
+// The discontinuity buffer: mean irradiance of the tile around a texel, over those on the same surface (Wald et al. 2002; Marques and
+// Santos, section 4.3). Each of the tile has gathered from another subset of the virtual lights.
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "lib/gbuffer.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(binding = 0) uniform sampler2D normal;
+layout(binding = 1) uniform sampler2D depth;
+layout(binding = 2) uniform sampler2D interleaved;
+layout(binding = 3, rgba32f) uniform writeonly image2D irradiance;
+
+layout(push_constant, scalar) uniform Push {
+    uint factor;    // pixels along the side of a texel
+    uint tile;      // texels along the side of a tile
+    float nearness; // most difference of depth relative to the texel's
+    float likeness; // least cosine between normals
+};
+
+void main() {
+    ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 size = textureSize(interleaved, 0);
+    if (any(greaterThanEqual(texel, size))) return;
+    ivec2 last = textureSize(depth, 0) - 1;
+    ivec2 pixel = min(texel * int(factor) + int(factor) / 2, last);
+    float z = texelFetch(depth, pixel, 0).r;
+    if (z >= 1.0) {
+        imageStore(irradiance, texel, vec4(0.0));
+        return;
+    }
+    vec3 n = decode_normal(texelFetch(normal, pixel, 0));
+    vec4 sum = vec4(0.0);
+    float count = 0.0;
+    // As many texels as a tile has, so that each subset comes once.
+    int from = -(int(tile) - 1) / 2, to = int(tile) / 2;
+    for (int y = from; y <= to; ++y) {
+        for (int x = from; x <= to; ++x) {
+            ivec2 other = texel + ivec2(x, y);
+            if (any(lessThan(other, ivec2(0))) || any(greaterThanEqual(other, size))) continue;
+            ivec2 there = min(other * int(factor) + int(factor) / 2, last);
+            float there_z = texelFetch(depth, there, 0).r;
+            float cosine = dot(n, decode_normal(texelFetch(normal, there, 0)));
+            if (there_z >= 1.0 || abs(there_z - z) > nearness * z || cosine < likeness) continue;
+            sum += texelFetch(interleaved, other, 0);
+            count += 1.0;
+        }
+    }
+    // The texel itself always counts, but for rounding of its own normal.
+    imageStore(irradiance, texel, count > 0.0 ? sum / count : texelFetch(interleaved, texel, 0));
+}
