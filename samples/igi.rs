@@ -97,5 +97,10 @@ fn compose(
         Mode::Indirect => Shown::new(out.indirect),
     };
     let shown = shown.color("direct", out.direct).color("indirect", out.indirect);
+    // What mirrors and glass show.
+    let shown = match out.sharp {
+        Some(sharp) => shown.color("specular", sharp),
+        None => shown,
+    };
     Ok(gbuffer_layers::add(shown, &picture.gbuffer, &view).seen_by(view).noting(resident.notes().to_vec()))
 }

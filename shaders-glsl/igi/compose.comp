@@ -8,7 +8,7 @@ layout(constant_id = 0) const uint SHARP = 0; // 1: there are mirrors or glass
 
 layout(binding = 0) uniform sampler2D albedo;
 layout(binding = 1) uniform sampler2D depth;
-layout(binding = 2) uniform sampler2D direct;
+layout(binding = 2, rgba32f) uniform image2D direct; // becomes what of it enters the sum
 layout(binding = 3) uniform sampler2D irradiance;
 layout(binding = 4) uniform sampler2D sharp; // rgb: radiance of the trees; a: share of the surface that is mirror or glass
 layout(binding = 5, rgba32f) uniform writeonly image2D total;
@@ -25,6 +25,8 @@ void main() {
     vec4 color = texelFetch(albedo, pixel, 0);
     vec4 tree = SHARP != 0u ? texelFetch(sharp, pixel, 0) : vec4(0.0);
     vec3 bounced = color.a * color.rgb * texelFetch(irradiance, pixel, 0).rgb * ((1.0 - tree.a) / 3.14159265358979);
+    vec3 rough = imageLoad(direct, pixel).rgb * (1.0 - tree.a);
+    imageStore(direct, pixel, vec4(rough, 1.0));
     imageStore(indirect, pixel, vec4(bounced, 1.0));
-    imageStore(total, pixel, vec4(bounced + texelFetch(direct, pixel, 0).rgb * (1.0 - tree.a) + tree.rgb, 1.0));
+    imageStore(total, pixel, vec4(bounced + rough + tree.rgb, 1.0));
 }

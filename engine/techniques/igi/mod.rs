@@ -16,6 +16,7 @@ pub mod halton;
 mod picture;
 mod settings;
 pub mod starts;
+mod tree;
 
 pub use picture::{Picture, PictureSettings};
 pub use settings::Settings;
@@ -53,6 +54,8 @@ pub struct Igi {
     double_sided: Vec<bool>,
     /// Emissive triangles as they stood in a pose.
     lights: Option<(Pose, LightTable)>,
+    /// There may be mirrors or glass.
+    sharp: bool,
     /// Rays of an invocation.
     most_rays: u64,
 }
@@ -93,11 +96,14 @@ pub struct Outputs {
     pub direct: Image,
     /// Indirect light as it enters the sum.
     pub indirect: Image,
+    /// What mirrors and glass show; alpha: the share of the surface that they are. `None`: the scene has none, or they are off.
+    pub sharp: Option<Image>,
     /// Irradiance from virtual lights, W/m², of every pixel.
     pub irradiance: Image,
     /// The same as gathered: of the size of `extent / downsample`; alpha: shadow rays.
     pub gathered: Image,
-    pub vpls: Vpls,
+    /// `None`: indirect light is off.
+    pub vpls: Option<Vpls>,
 }
 
 impl Igi {
@@ -118,6 +124,7 @@ impl Igi {
             moments: scene.environment.as_ref().filter(|e| !e.pixels.is_empty()).map(starts::sky_moments),
             double_sided: meshes.flat_map(|mesh| mesh.primitives.iter().map(double_sided)).collect(),
             lights: None,
+            sharp: tree::has_sharp(scene),
             most_rays: if gpu.loop_limit()?.is_some() { RAYS_LIMITED } else { u64::MAX },
         })
     }
@@ -238,10 +245,11 @@ impl Igi {
     }
 
     /// Irradiance from the virtual lights at the visible surfaces.
-    fn gather(&self, graph: &mut Graph, g: &GBuffer, shared: &Shared, vpls: Vpls, settings: &Settings) -> Image {
+    fn gather(&self, graph: &mut Graph, g: &GBuffer, shared: &Shared, vpls: Option<Vpls>, settings: &Settings) -> Image {
         let extent = graph.extent(g.depth).div_ceil(settings.downsample);
         let irradiance = graph.image("igi.irradiance", Format::RGBA32F, extent);
         graph.clear(irradiance, [0.0; 4]);
+        let Some(vpls) = vpls else { return irradiance };
         let subsets = settings.interleave * settings.interleave;
         let own = vpls.count.div_ceil(subsets);
         for (first, count) in self.batches(extent, own) {

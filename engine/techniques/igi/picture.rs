@@ -57,11 +57,13 @@ impl Igi {
         let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
         let outputs = graph.scope("igi", |graph| {
             let shared = self.shared(graph, scene, pose, handles, igi);
-            let vpls = self.shoot(graph, handles, &shared, igi);
+            let vpls = igi.indirect.then(|| self.shoot(graph, handles, &shared, igi));
             let direct = self.direct(graph, handles, &gbuffer, &shared);
             let gathered = self.gather(graph, &gbuffer, &shared, vpls, igi);
             let joined = if igi.interleave > 1 { filters::join(graph, &gbuffer, gathered, igi) } else { gathered };
             let irradiance = if igi.downsample > 1 { filters::upsample(graph, &gbuffer, joined, igi) } else { joined };
+            let sharp = (self.sharp && igi.specular)
+                .then(|| self.trees(graph, handles, &gbuffer, &shared, (vpls, settings.background), igi));
             let extent = graph.extent(gbuffer.depth);
             let total = graph.image("igi.total", Format::RGBA32F, extent);
             let indirect = graph.image("igi.indirect", Format::RGBA32F, extent);
@@ -70,13 +72,13 @@ impl Igi {
                 depth: gbuffer.depth,
                 direct,
                 irradiance,
-                sharp: direct,
+                sharp: sharp.unwrap_or(gathered),
                 total,
                 indirect,
-                spec: shaders::igi::compose::Spec { sharp: 0 },
+                spec: shaders::igi::compose::Spec { sharp: sharp.is_some().into() },
             };
             graph.compute(args, extent);
-            Outputs { total, direct, indirect, irradiance, gathered, vpls }
+            Outputs { total, direct, indirect, sharp, irradiance, gathered, vpls }
         });
         skybox::draw(graph, handles, &gbuffer, settings.background.into(), outputs.total);
         Ok(Picture { gbuffer, outputs })

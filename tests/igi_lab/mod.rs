@@ -1,0 +1,72 @@
+//! Pictures of instant global illumination with what lies behind them, for its tests.
+#![allow(dead_code)]
+
+use glam::Vec3;
+use lucerna::{
+    gpu::Gpu,
+    graph::{Graph, Runner},
+    scene::{Pose, Scene, View, resident::Resident},
+    shaders::types,
+    techniques::igi::{Igi, PictureSettings, Settings},
+};
+
+/// A picture, pixel by pixel.
+pub struct Shown {
+    pub total: Vec<[f32; 4]>,
+    pub direct: Vec<[f32; 4]>,
+    pub indirect: Vec<[f32; 4]>,
+    pub irradiance: Vec<[f32; 4]>,
+    pub vpls: Vec<types::Vpl>,
+}
+
+/// A scene that stays on the device for many pictures.
+pub struct Studio<'a> {
+    scene: &'a Scene,
+    pose: Pose,
+    resident: Resident,
+    igi: Igi,
+    runner: Runner,
+}
+
+impl<'a> Studio<'a> {
+    pub fn new(gpu: &Gpu, scene: &'a Scene) -> Self {
+        let resident = Resident::new(gpu, scene).unwrap();
+        let igi = Igi::new(gpu, scene, &resident).unwrap();
+        Self { scene, pose: Pose::rest(scene), resident, igi, runner: Runner::new(gpu) }
+    }
+
+    pub fn render(&mut self, view: &View, settings: &Settings, seed: u32) -> Shown {
+        let mut graph = Graph::new("igi");
+        graph.seed = seed;
+        let handles = self.resident.frame_in(&mut graph, self.scene, &self.pose);
+        let view = view.fit_far(&handles.bounds());
+        let all = PictureSettings { igi: settings.clone(), ..Default::default() };
+        let picture = self.igi.picture(&mut graph, self.scene, &self.pose, &handles, &view, &all).unwrap();
+        let out = picture.outputs;
+        let images = [out.total, out.direct, out.indirect, out.irradiance].map(|image| graph.read_image(image));
+        let vpls = out.vpls.map(|vpls| graph.read_buffer(vpls.buffer));
+        let frame = self.runner.run(&graph).unwrap_or_else(|error| panic!("{error}"));
+        let [total, direct, indirect, irradiance] = images.map(|token| frame.image(token).to_f32());
+        for pixel in total.iter().chain(&irradiance).flatten() {
+            assert!(pixel.is_finite() && *pixel >= 0.0, "{pixel}");
+        }
+        Shown { total, direct, indirect, irradiance, vpls: vpls.map(|token| frame.buffer(token)).unwrap_or_default() }
+    }
+}
+
+/// Diffuse light alone, no bound, one bounce.
+pub fn plain(vpls: u32) -> Settings {
+    Settings { vpls, bounces: 1, bound: 0.0, specular: false, direct_samples: 4, ..Settings::default() }
+}
+
+/// Mean of red, green and blue over the picture.
+pub fn mean(pixels: &[[f32; 4]]) -> f64 {
+    pixels.iter().map(|p| f64::from(p[0]) + f64::from(p[1]) + f64::from(p[2])).sum::<f64>() / (3 * pixels.len()) as f64
+}
+
+/// Sum of the flux of virtual lights of one depth.
+pub fn flux(vpls: &[types::Vpl], depth: u32) -> Vec3 {
+    let sum: glam::DVec3 =
+        vpls.iter().filter(|v| v.depth == depth).map(|v| Vec3::from(v.flux).as_dvec3()).sum();
+    sum.as_vec3()
+}
