@@ -47,12 +47,18 @@ void main() {
     TreeNode node;
     float near = view.near / view.far;
     if (level == 0u) {
+        if (branch != 0u) return;
         uvec2 pixel = pixel_of(first + slot, extent);
         bool inside = all(lessThan(pixel, extent));
         vec2 uv = (vec2(pixel) + 0.5) / vec2(extent);
         vec3 direction = view_ray(view, uv);
-        node = TreeNode(view_base(view, uv) + near * direction, inside && branch == 0u ? TREE_RAY : TREE_EMPTY, direction, 0.0,
+        node = TreeNode(view_base(view, uv) + near * direction, inside ? TREE_RAY : TREE_EMPTY, direction, 0.0,
             vec3(1.0), 1.0, vec3(0.0, 1.0, 0.0), pixel.x | pixel.y << 16u, vec3(0.0), vec3(0.0), vec3(0.0));
+        // Whatever the trees before left in the others.
+        for (uint other = 1u; other < TREE_WIDTH; ++other) {
+            tree_nodes[at + other].state = TREE_EMPTY;
+            tree_nodes[at + other].light = vec3(0.0);
+        }
     } else {
         // Nodes that an earlier level may have filled.
         if (branch % max(TREE_WIDTH >> level, 1u) != 0u) return;
@@ -117,7 +123,7 @@ void main() {
             }
         }
     }
-    if (level == 0u && branch == 0u && all(lessThan(pixel, extent))) {
+    if (level == 0u && all(lessThan(pixel, extent))) {
         imageStore(sharp, ivec2(pixel), vec4(0.0, 0.0, 0.0, share));
     }
     tree_nodes[at] = node;

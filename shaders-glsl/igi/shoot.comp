@@ -51,7 +51,9 @@ vec3 entry(vec3 direction, vec2 u) {
     float v = clamp((pick - before) / max(areas[axis], 1e-30), 0.0, 1.0);
     vec3 place = axis == 0u ? vec3(0.0, v, u.y) : axis == 1u ? vec3(v, 0.0, u.y) : vec3(v, u.y, 0.0);
     place[axis] = direction[axis] > 0.0 ? 0.0 : 1.0;
-    return settings.low + place * (settings.high - settings.low);
+    vec3 size = settings.high - settings.low;
+    // A little before it, so that what lies in the face itself is hit.
+    return settings.low + place * size - direction * (1e-3 * length(size));
 }
 
 VplPath begun(uint at) {

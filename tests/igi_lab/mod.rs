@@ -66,7 +66,6 @@ pub fn mean(pixels: &[[f32; 4]]) -> f64 {
 
 /// Sum of the flux of virtual lights of one depth.
 pub fn flux(vpls: &[types::Vpl], depth: u32) -> Vec3 {
-    let sum: glam::DVec3 =
-        vpls.iter().filter(|v| v.depth == depth).map(|v| Vec3::from(v.flux).as_dvec3()).sum();
+    let sum: glam::DVec3 = vpls.iter().filter(|v| v.depth == depth).map(|v| Vec3::from(v.flux).as_dvec3()).sum();
     sum.as_vec3()
 }

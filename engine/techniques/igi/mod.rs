@@ -245,7 +245,14 @@ impl Igi {
     }
 
     /// Irradiance from the virtual lights at the visible surfaces.
-    fn gather(&self, graph: &mut Graph, g: &GBuffer, shared: &Shared, vpls: Option<Vpls>, settings: &Settings) -> Image {
+    fn gather(
+        &self,
+        graph: &mut Graph,
+        g: &GBuffer,
+        shared: &Shared,
+        vpls: Option<Vpls>,
+        settings: &Settings,
+    ) -> Image {
         let extent = graph.extent(g.depth).div_ceil(settings.downsample);
         let irradiance = graph.image("igi.irradiance", Format::RGBA32F, extent);
         graph.clear(irradiance, [0.0; 4]);

@@ -67,7 +67,14 @@ impl Settings {
     /// The paper's fastest variant: 180 virtual lights, boxes, a quarter of the resolution, tiles of 3×3. It states neither the
     /// bounces of a path nor min_d; taken here are the defaults.
     pub fn paper() -> Self {
-        Self { imperfect: true, downsample: 4, interleave: 3, upsample_normal: 1.0, upsample_range: 0.0, ..Self::default() }
+        Self {
+            imperfect: true,
+            downsample: 4,
+            interleave: 3,
+            upsample_normal: 1.0,
+            upsample_range: 0.0,
+            ..Self::default()
+        }
     }
 
     /// Paths of light.

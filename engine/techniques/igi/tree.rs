@@ -108,7 +108,9 @@ impl Igi {
                 graph.compute(args, nodes);
             }
             let ranges = vpls.map(|vpls| (vpls.buffer, self.batches(lit, vpls.count)));
-            for (buffer, (first, count)) in ranges.into_iter().flat_map(|(b, list)| list.into_iter().map(move |r| (b, r))) {
+            for (buffer, (first, count)) in
+                ranges.into_iter().flat_map(|(b, list)| list.into_iter().map(move |r| (b, r)))
+            {
                 let args = gather_tree::Args {
                     vpls: buffer,
                     materials: handles.materials,

@@ -1,0 +1,185 @@
+//! Upsampling and the discontinuity buffer on known texels, interleaving as a whole, and the graphs of the program.
+
+mod igi_lab;
+mod isr_lab;
+mod tracer_lab;
+
+use glam::{DVec3, Vec3, dvec3, vec3};
+use igi_lab::{Studio, plain};
+use isr_lab::{Random, gbuffer, image, read};
+use lucerna::{
+    gpu::testing::with_gpu,
+    graph::{Extent, Graph, Runner, testing::every_barrier_matters},
+    reference::isr_scene::{Buffers, Eye, Patch},
+    scene::{Material, Pose, View, builtin, resident::Resident},
+    techniques::igi::{Igi, PictureSettings, Settings, filters},
+};
+use tracer_lab::{Stage, flat_view};
+
+fn patch(corner: DVec3, a: DVec3, b: DVec3) -> Patch {
+    Patch { corner, a, b, albedo: DVec3::splat(0.5), radiance: DVec3::ZERO }
+}
+
+/// A wall, and before its left half another one that faces the camera as well: a step of depth without a change of normal.
+fn step(width: usize, height: usize) -> (Eye, Buffers) {
+    let eye = Eye::look_at(dvec3(0.0, 0.0, 3.0), DVec3::ZERO, 0.9, 10.0, width, height);
+    let far = patch(dvec3(-9.0, -9.0, -1.0), dvec3(18.0, 0.0, 0.0), dvec3(0.0, 18.0, 0.0));
+    let near = patch(dvec3(-9.0, -9.0, 1.0), dvec3(9.0, 0.0, 0.0), dvec3(0.0, 18.0, 0.0));
+    let buffers = Buffers::cast(&eye, &[far, near], 1);
+    (eye, buffers)
+}
+
+#[test]
+fn upsampling_is_a_partition_of_unity_within_bounds_and_does_not_leak() {
+    with_gpu(|gpu| {
+        let (width, height) = (50, 37);
+        let (eye, buffers) = step(width, height);
+        let mut random = Random(4);
+        for (factor, range, sharpness) in [(2, 0.01, 8.0), (3, 0.0, 1.0), (4, 0.01, 1.0), (4, 0.0, 0.0)] {
+            let settings = Settings {
+                downsample: factor,
+                upsample_range: range,
+                upsample_normal: sharpness,
+                ..Settings::default()
+            };
+            let small = Extent::new(width as u32, height as u32).div_ceil(factor);
+            let mut graph = Graph::new("upsample");
+            let g = gbuffer(&mut graph, &eye, &buffers);
+            let even = vec![[2.5, 0.25, 7.0, 1.0]; small.pixels() as usize];
+            let noise: Vec<[f32; 4]> = (0..small.pixels()).map(|_| random.texel()).collect();
+            // Light on the nearer wall only.
+            let pixel_of = |i: u64| {
+                let middle = |k: u64, most: usize| (k as usize * factor as usize + factor as usize / 2).min(most - 1);
+                (middle(i % u64::from(small.width), width), middle(i / u64::from(small.width), height))
+            };
+            let near = |x: usize, y: usize| buffers.depth[y * width + x] < 0.3;
+            let lit: Vec<[f32; 4]> = (0..small.pixels())
+                .map(|i| {
+                    [f32::from(u8::from({
+                        let (x, y) = pixel_of(i);
+                        near(x, y)
+                    })); 4]
+                })
+                .collect();
+            let made = [("even", &even), ("noise", &noise), ("lit", &lit)].map(|(name, texels)| {
+                let coarse = image(&mut graph, name, small, texels);
+                filters::upsample(&mut graph, &g, coarse, &settings)
+            });
+            let [flat, mixed, parted] = read(gpu, graph, made);
+            let (low, high) = noise.iter().fold((f32::MAX, f32::MIN), |(l, h), t| (l.min(t[0]), h.max(t[0])));
+            let mut mixed_up = 0;
+            for i in 0..width * height {
+                for c in 0..3 {
+                    assert!((flat[i][c] / even[0][c] - 1.0).abs() < 1e-5, "pixel {i}: {:?}", flat[i]);
+                }
+                assert!((low * 0.9999..=high * 1.0001).contains(&mixed[i][0]), "pixel {i}: {}", mixed[i][0]);
+                let own = f32::from(u8::from(near(i % width, i / width)));
+                mixed_up += usize::from((parted[i][0] - own).abs() > 1e-3);
+            }
+            // Without the term of depth the walls are one, as in the paper.
+            assert_eq!(
+                range > 0.0,
+                mixed_up == 0,
+                "factor {factor}, range {range}: {mixed_up} pixels see the other wall"
+            );
+        }
+    });
+}
+
+#[test]
+fn the_discontinuity_buffer_is_the_mean_of_the_tile_on_one_surface() {
+    with_gpu(|gpu| {
+        let (width, height) = (40, 24);
+        let (eye, buffers) = step(width, height);
+        let mut random = Random(8);
+        for tile in [2u32, 3, 4] {
+            let settings = Settings { interleave: tile, ..Settings::default() };
+            let noise: Vec<[f32; 4]> = (0..width * height).map(|_| random.texel()).collect();
+            let mut graph = Graph::new("join");
+            let g = gbuffer(&mut graph, &eye, &buffers);
+            let texels = image(&mut graph, "noise", Extent::new(width as u32, height as u32), &noise);
+            let joined = filters::join(&mut graph, &g, texels, &settings);
+            let [found] = read(gpu, graph, [joined]);
+            let tile = i64::from(tile);
+            for y in 0..height as i64 {
+                for x in 0..width as i64 {
+                    let at = |x: i64, y: i64| (y * width as i64 + x) as usize;
+                    let (mut sum, mut count) = (0.0, 0.0);
+                    for v in y - (tile - 1) / 2..=y + tile / 2 {
+                        for u in x - (tile - 1) / 2..=x + tile / 2 {
+                            let inside = (0..width as i64).contains(&u) && (0..height as i64).contains(&v);
+                            if inside && buffers.depth[at(u, v)] == buffers.depth[at(x, y)] {
+                                sum += noise[at(u, v)][1];
+                                count += 1.0;
+                            }
+                        }
+                    }
+                    let (found, expected) = (found[at(x, y)][1], sum / count);
+                    assert!((found - expected).abs() < 1e-5, "tile {tile}, {x} {y}: {found} instead of {expected}");
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn subsets_of_a_tile_sum_to_all_virtual_lights() {
+    with_gpu(|gpu| {
+        // A wall so small that all pixels stand at the same place, far from the lit surfaces: each has the mean of the subsets.
+        let mut stage = Stage::new();
+        let white = stage.material(Material::diffuse("white", Vec3::splat(0.8)));
+        stage.cuboid(white, Vec3::splat(-1.0), Vec3::ONE, true);
+        stage.point(vec3(0.2, 0.1, 0.4), Vec3::splat(2.0));
+        let mut studio = Studio::new(gpu, &stage.scene);
+        let seen = flat_view(vec3(0.1, 0.2, 0.0), vec3(0.1, 0.2, -1.0), 1e-4, [24, 24]);
+        let all = studio.render(&seen, &plain(181), 3).irradiance;
+        for interleave in [2, 3, 4] {
+            let found = studio.render(&seen, &Settings { interleave, ..plain(181) }, 3).irradiance;
+            let mut apart = 0;
+            // Those whose tile is whole.
+            for i in (0..24 * 24).filter(|i| (2..22).contains(&(i % 24)) && (2..22).contains(&(i / 24))) {
+                for c in 0..3 {
+                    let off = (found[i][c] / all[i][c] - 1.0).abs();
+                    assert!(off < 2e-3, "interleave {interleave}, pixel {i}: {} instead of {}", found[i][c], all[i][c]);
+                    apart += usize::from(off > 0.0);
+                }
+            }
+            assert!(apart > 0, "nothing was interleaved");
+        }
+    });
+}
+
+#[test]
+fn every_barrier_of_the_graphs_matters_and_two_runs_are_the_same() {
+    with_gpu(|gpu| {
+        let mut runner = Runner::new(gpu);
+        for (name, settings) in [
+            ("cornell-area", Settings { vpls: 12, direct_samples: 2, ..Settings::default() }),
+            ("office", Settings { vpls: 24, direct_samples: 2, ..Settings::paper() }),
+            ("figure", Settings { vpls: 24, direct_samples: 1, indirect: false, ..Settings::default() }),
+        ] {
+            let scene = builtin::load(name).unwrap();
+            let mut resident = Resident::new(gpu, &scene).unwrap();
+            let mut igi = Igi::new(gpu, &scene, &resident).unwrap();
+            let mut pictures = Vec::new();
+            for _ in 0..2 {
+                let mut graph = Graph::new("igi");
+                let pose = Pose::playing(&scene, 0.25);
+                let handles = resident.frame_in(&mut graph, &scene, &pose);
+                let view = View::of_camera(&scene, &pose, 0, [32, 24]).unwrap().fit_far(&handles.bounds());
+                let all = PictureSettings { igi: settings.clone(), ..Default::default() };
+                let out = igi.picture(&mut graph, &scene, &pose, &handles, &view, &all).unwrap();
+                let total = graph.read_image(out.outputs.total);
+                if pictures.is_empty() {
+                    let plan = every_barrier_matters(&graph);
+                    assert!(plan.barriers.len() > 10, "{name}: {}", plan.list_passes());
+                }
+                let frame = runner.run(&graph).unwrap_or_else(|e| panic!("{name}: {e}"));
+                let pixels = frame.image(total);
+                assert!(pixels.to_f32().iter().flatten().all(|v| v.is_finite()), "{name}");
+                pictures.push(pixels.bytes);
+            }
+            assert_eq!(pictures[0], pictures[1], "{name}: two runs differ");
+        }
+    });
+}

@@ -1,0 +1,101 @@
+//! Mirrors and glass of instant global illumination beside the path tracer.
+
+mod igi_lab;
+mod tracer_lab;
+
+use glam::{Vec3, vec3};
+use igi_lab::{Studio, mean};
+use lucerna::{
+    gpu::testing::with_gpu,
+    reference::tracer::{Filter, Settings as Tracing},
+    scene::Material,
+    techniques::igi::Settings,
+};
+use tracer_lab::{Stage, render, view};
+
+/// Without gloss: F0 of an index of 1 is 0.
+fn matt(albedo: Vec3) -> Material {
+    Material { ior: 1.0, ..Material::diffuse("matt", albedo) }
+}
+
+fn mirror() -> Material {
+    Material { metallic: 1.0, roughness: 0.0, ..Material::diffuse("mirror", vec3(0.9, 0.8, 0.7)) }
+}
+
+fn glass(double_sided: bool) -> Material {
+    Material { transmission: 1.0, roughness: 0.0, double_sided, ..Material::diffuse("glass", vec3(0.9, 1.0, 0.95)) }
+}
+
+fn blocks(pixels: impl Iterator<Item = f64> + Clone, width: usize, side: usize) -> Vec<f64> {
+    let mut sums = vec![0.0; (width / side).pow(2)];
+    for (i, value) in pixels.enumerate() {
+        sums[i / width / side * (width / side) + i % width / side] += value / (side * side) as f64;
+    }
+    sums
+}
+
+#[test]
+fn mirrors_and_glass_show_what_the_path_tracer_shows() {
+    with_gpu(|gpu| {
+        // Direct light only: seen in mirrors behind each other, through a ball of glass and through a pane.
+        let mut stage = Stage::new();
+        let (red, white) = (stage.material(matt(vec3(0.8, 0.2, 0.1))), stage.material(matt(Vec3::splat(0.7))));
+        let (shine, pane, ball) = (stage.material(mirror()), stage.material(glass(true)), stage.material(glass(false)));
+        stage.quad(white, vec3(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0);
+        stage.quad(red, vec3(-2.0, 0.0, -2.0), Vec3::X * 4.0, Vec3::Y * 2.0);
+        stage.quad(shine, vec3(-1.2, 0.0, 1.0), Vec3::Z * -2.6, Vec3::Y * 1.5);
+        stage.quad(shine, vec3(1.5, 0.0, -1.6), Vec3::Z * 2.6, Vec3::Y * 1.5);
+        stage.quad(pane, vec3(0.3, 0.1, 0.2), Vec3::X * 0.9, Vec3::Y * 0.9);
+        stage.sphere(ball, vec3(-0.3, 0.45, -0.3), 0.4, 24, false);
+        stage.point(vec3(0.4, 1.9, 1.2), Vec3::splat(6.0));
+        const SIDE: usize = 40;
+        let seen = view(vec3(0.3, 0.9, 2.6), vec3(0.0, 0.5, 0.0), 50.0, [SIDE as u32; 2]);
+        let truth = Tracing { bounces: 0, specular_bounces: 8, filter: Filter::Centre, ..Tracing::default() };
+        let expected = render(gpu, &stage.scene, &seen, &truth, 96);
+        let picture = &expected.layer("").unwrap().data;
+        let settings = Settings { indirect: false, specular_depth: 8, direct_samples: 32, ..Settings::default() };
+        let mut studio = Studio::new(gpu, &stage.scene);
+        let mut sum = vec![0.0; SIDE * SIDE];
+        // Trees deeper than their nodes choose at random.
+        for seed in 0..8 {
+            let shown = studio.render(&seen, &settings, seed);
+            sum.iter_mut().zip(&shown.total).for_each(|(sum, p)| *sum += f64::from(p[0] + p[1] + p[2]) / 8.0);
+        }
+        let found = blocks(sum.iter().copied(), SIDE, 8);
+        let theirs = blocks(picture.chunks_exact(3).map(|p| f64::from(p[0] + p[1] + p[2])), SIDE, 8);
+        for (i, (found, expected)) in found.iter().zip(&theirs).enumerate() {
+            println!("block {i}: {found:.4} and {expected:.4}");
+            assert!((found - expected).abs() < 0.04 * expected + 0.004, "block {i}: {found} instead of {expected}");
+        }
+    });
+}
+
+#[test]
+fn a_mirror_shows_indirect_light() {
+    with_gpu(|gpu| {
+        // A wall that only virtual lights reach, seen directly and in a mirror of reflectance 1.
+        let mut stage = Stage::new();
+        let white = stage.material(matt(Vec3::splat(0.8)));
+        let shine =
+            stage.material(Material { metallic: 1.0, roughness: 0.0, ..Material::diffuse("mirror", Vec3::ONE) });
+        stage.cuboid(white, Vec3::splat(-1.0), Vec3::ONE, true);
+        stage.point(vec3(0.0, 0.0, 0.9), Vec3::ONE);
+        let settings = Settings { vpls: 64, bounces: 1, bound: 0.05, ..Settings::default() };
+        let direct = view(vec3(0.0, 0.0, 0.3), vec3(-1.0, 0.0, -0.7), 20.0, [16, 16]);
+        let plain = Studio::new(gpu, &stage.scene).render(&direct, &settings, 0);
+        // The mirror hangs where it takes no light from the wall, and turns the view by its normal.
+        stage.quad(shine, vec3(0.5, -0.02, -0.02), Vec3::Z * 0.04, Vec3::Y * 0.04);
+        let (at, towards) = (vec3(0.0, 0.0, 0.3), vec3(0.5, 0.0, 0.0));
+        let mirrored = view(at, towards, 1.0, [16, 16]);
+        let shown = Studio::new(gpu, &stage.scene).render(&mirrored, &settings, 0);
+        assert!(mean(&shown.indirect) == 0.0, "a mirror has no diffuse part");
+        // The same point of the wall: the ray goes on from the mirror to x = -1.
+        let reflected = vec3(-0.5, 0.0, -0.3);
+        let wall = towards + reflected * 3.0;
+        let same = view(vec3(0.3, 0.0, -0.12), wall, 1.0, [16, 16]);
+        let plain_there = Studio::new(gpu, &stage.scene).render(&same, &settings, 0);
+        let (a, b) = (mean(&shown.total), mean(&plain_there.total));
+        assert!((a / b - 1.0).abs() < 0.03, "in the mirror {a}, directly {b}");
+        assert!(mean(&plain.total) > 0.0 && mean(&plain_there.indirect) > 0.05 * b);
+    });
+}
