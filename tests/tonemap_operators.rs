@@ -94,7 +94,7 @@ fn images_without_anything_to_adapt_to() {
             .flat_map(|o| [(o, Mode::Global), (o, Mode::Local)])
             .chain(Operator::ALL[3..].iter().map(|(_, o)| (*o, Mode::Global)))
         {
-            let ways = if mode == Mode::Global { &[Local::Fast][..] } else { &[Local::Fast, Local::Literal] };
+            let ways = if mode == Mode::Global { &[Local::Fast][..] } else { &[Local::Fast, Local::Literal, Local::Pyramid] };
             for &local in ways {
                 let settings = Settings { local, ..with(operator, mode) };
                 let name = format!("{operator:?} {mode:?} {local:?}");

@@ -17,12 +17,4 @@ float search_clamped(ivec2 at) {
     return texelFetch(luminance, clamp(at, ivec2(0), textureSize(luminance, 0) - 1), 0).r;
 }
 
-// Weights of the fast way, at signed distances −48 to 47: [group][distance / 32][distance % 32], zero beyond the radii. Four Gaussians
-// lie in each vec4.
-struct TonemapWeights {
-    vec4 at[32];
-};
-
-struct TonemapKernels {
-    TonemapWeights part[18];
-};
+#include "lib/tonemap_kernels.glsl"

@@ -1,6 +1,6 @@
 //! Ashikhmin, "A tone mapping algorithm for high contrast images", 2002, as restated by Michael 2010, section 4.3.
 
-use super::plane::{Plane, gaussian};
+use super::plane::{Average, Plane, gaussian};
 use crate::techniques::tonemap::Settings;
 
 /// Perceptual capacity C of luminance in cd/m²: how many just noticeable differences lie below it. The integral of
@@ -83,9 +83,10 @@ impl Search {
     }
 
     /// Local adaptation of every pixel: the average over the largest neighbourhood that is still even. A pixel whose
-    /// smallest neighbourhood is not even adapts to that smallest one.
-    pub fn adaptation(&self, luminance: &Plane) -> Plane {
-        let averages: Vec<Plane> = (1..=2 * self.largest).map(|s| luminance.averages(&Self::weights(s))).collect();
+    /// smallest neighbourhood is not even adapts to that smallest one. `average` computes the averages.
+    pub fn adaptation(&self, luminance: &Plane, average: Average) -> Plane {
+        let of = |s| average(luminance, s as f64 / 2.0, &Self::weights(s));
+        let averages: Vec<Plane> = (1..=2 * self.largest).map(of).collect();
         let at = |s: usize, x: usize, y: usize| averages[s - 1][(x, y)];
         Plane::from_fn(luminance.width, luminance.height, |x, y| {
             let mut level = at(1, x, y);

@@ -6,18 +6,20 @@ pub mod bilateral;
 pub mod curves;
 pub mod identify;
 pub mod plane;
+pub mod pyramid;
 pub mod reinhard;
 pub mod statistics;
 
 #[cfg(test)]
 mod tests;
 
-use crate::techniques::tonemap::{BadValues, Mode, Operator, Settings};
+use crate::techniques::tonemap::{BadValues, Local, Mode, Operator, Settings};
 use plane::Plane;
 use statistics::Statistics;
 
 /// Tone maps linear Rec. 709 pixels, `width · height` of them, top row first. The result is linear and relative to the display's
-/// white. What [`Settings`] say about speed ([`Settings::local`], [`Settings::mark`]) and about time means nothing here.
+/// white. Of what [`Settings`] say about speed, [`Local::Pyramid`] is
+/// followed, for it has a definition of its own; the rest, and what they say about time, means nothing here.
 pub fn tonemap(width: u32, height: u32, pixels: &[[f32; 3]], settings: &Settings) -> Vec<[f32; 3]> {
     tonemap_masked(width, height, pixels, None, settings)
 }
@@ -84,9 +86,13 @@ impl<'a> Picture<'a> {
         if mode == Mode::Global {
             return own;
         }
+        let average = match self.settings.local {
+            Local::Pyramid => pyramid::averages,
+            Local::Fast | Local::Literal => |plane: &Plane, _: f64, weights: &[f64]| plane.averages(weights),
+        };
         let local = match self.settings.operator {
-            Operator::Ashikhmin => ashikhmin::Search::of(self.settings).adaptation(&own),
-            Operator::Reinhard => reinhard::Scales::of(self.settings).adaptation(&own),
+            Operator::Ashikhmin => ashikhmin::Search::of(self.settings).adaptation(&own, average),
+            Operator::Reinhard => reinhard::Scales::of(self.settings).adaptation(&own, average),
             Operator::Bilateral => {
                 let (sigma, radius) = self.settings.bilateral(own.width as u32, own.height as u32);
                 bilateral::filter(&own, f64::from(sigma), radius.min(80) as usize, f64::from(self.settings.range))

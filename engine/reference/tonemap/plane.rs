@@ -90,6 +90,9 @@ impl Plane {
     }
 }
 
+/// Averages of every pixel with a Gaussian: its σ, and its weights of the distances 0 to its radius.
+pub type Average = fn(&Plane, f64, &[f64]) -> Plane;
+
 impl Index<(usize, usize)> for Plane {
     type Output = f64;
 

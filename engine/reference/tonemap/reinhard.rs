@@ -1,6 +1,6 @@
 //! Reinhard, Stark, Shirley and Ferwerda, "Photographic tone reproduction for digital images", 2002.
 
-use super::plane::{Plane, gaussian};
+use super::plane::{Average, Plane, gaussian};
 use crate::techniques::tonemap::Settings;
 
 /// The paper's equation 4: luminance scaled by key / log-average, to a value of which `white` and more becomes 1.
@@ -39,10 +39,10 @@ impl Scales {
         gaussian(sigma, (3.0 * sigma).ceil() as usize)
     }
 
-    /// V1 at the largest scale whose activity stays under ε, of each pixel of scaled luminance.
-    pub fn adaptation(&self, scaled: &Plane) -> Plane {
-        let blurred: Vec<Plane> =
-            (0..=self.count).map(|step| scaled.averages(&Self::weights(Self::scale(step)))).collect();
+    /// V1 at the largest scale whose activity stays under ε, of each pixel of scaled luminance. `average` computes the averages.
+    pub fn adaptation(&self, scaled: &Plane, average: Average) -> Plane {
+        let of = |step| average(scaled, Self::scale(step) / 4.0, &Self::weights(Self::scale(step)));
+        let blurred: Vec<Plane> = (0..=self.count).map(of).collect();
         Plane::from_fn(scaled.width, scaled.height, |x, y| {
             let mut level = blurred[0][(x, y)];
             for step in 0..self.count {

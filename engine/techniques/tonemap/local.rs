@@ -1,7 +1,7 @@
 //! Local adaptation.
 
 use super::{
-    Local, Settings, bilateral,
+    Local, Settings, bilateral, pyramid,
     search::{Search, Tables},
 };
 use crate::{
@@ -11,13 +11,14 @@ use crate::{
 };
 
 /// Local adaptation of every pixel of `luminance`, R32F; of the bilateral operator, the luminance of the base. `picture`: extent of the whole
-/// picture, of which `luminance` may be a part.
+/// picture, of which `luminance` may be a part. `importance`: what is 0 there need not be computed.
 ///
 /// # Errors
 /// `Usage` if the settings cannot serve a picture of this extent.
 pub fn adaptation(
     graph: &mut Graph,
     luminance: Image,
+    importance: Option<Image>,
     statistics: Buffer,
     picture: Extent,
     settings: &Settings,
@@ -33,6 +34,7 @@ pub fn adaptation(
             graph.compute(args, graph.extent(luminance));
         }
         Local::Fast => fast(graph, luminance, statistics, &search, adaptation),
+        Local::Pyramid => pyramid::adapt(graph, luminance, importance, statistics, settings, &search, adaptation)?,
     }
     Ok(adaptation)
 }

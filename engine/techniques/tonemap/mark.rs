@@ -53,7 +53,7 @@ pub fn adapt(
 ) -> Result<Image> {
     let extent = graph.extent(luminance);
     let LocalPasses { local, tables: Tables { search, weights }, adaptation, logarithm, blocks, bilateral } =
-        prepare(graph, luminance, statistics, picture, settings)?;
+        prepare(graph, luminance, importance, statistics, picture, settings)?;
     let adapted = graph.image("tonemap.adapted", Format::R32F, extent);
     graph.copy(luminance, adapted);
     let target = Targets::new().color(adapted, Load::Keep);
@@ -160,6 +160,7 @@ struct LocalPasses {
 fn prepare(
     graph: &mut Graph,
     luminance: Image,
+    importance: Image,
     statistics: Buffer,
     picture: Extent,
     settings: &Settings,
@@ -173,8 +174,8 @@ fn prepare(
             local = consts::LOCAL_LITERAL;
             search.tables(graph)
         }
-        (Some(_), Local::Fast) => {
-            adaptation = local::adaptation(graph, luminance, statistics, picture, settings)?;
+        (Some(_), Local::Fast | Local::Pyramid) => {
+            adaptation = local::adaptation(graph, luminance, Some(importance), statistics, picture, settings)?;
             Tables::none(graph)
         }
         (None, _) => {

@@ -21,6 +21,7 @@ mod clean;
 pub mod identify;
 pub mod local;
 pub mod mark;
+pub mod pyramid;
 pub mod search;
 mod settings;
 pub mod statistics;
@@ -136,7 +137,7 @@ fn map(
     let mut important = None;
     let adaptation = match settings.mode() {
         Mode::Global => luminance,
-        Mode::Local => local::adaptation(graph, luminance, statistics, picture, settings)?,
+        Mode::Local => local::adaptation(graph, luminance, None, statistics, picture, settings)?,
         Mode::Selective => {
             let importance = identify::importance(graph, luminance, statistics, input.mask, settings);
             important = Some(importance);

@@ -20,11 +20,16 @@ pub struct Step {
     pub offset: f64,
 }
 
+/// Weights of distances 0 to a radius along one axis, those of both sides together 1.
+pub type Kernel = Vec<f64>;
+
 /// Gaussian averages of growing extent, and the search among them ([`Settings::contrast`], [`Settings::scales`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Search {
-    /// Weights of distances 0 to the radius along one axis, those of both sides together 1; in ascending order of radius.
-    pub gaussians: Vec<Vec<f64>>,
+    /// In ascending order of radius.
+    pub gaussians: Vec<Kernel>,
+    /// Of each Gaussian, in pixels.
+    pub sigmas: Vec<f64>,
     pub steps: Vec<Step>,
     pub slope: f64,
 }
@@ -66,6 +71,7 @@ impl Search {
                 let index = |radius: usize| radii.partition_point(|r| *r < radius);
                 let step = |s: usize| Step { centre: index(s), surround: index(2 * s), offset: 0.0 };
                 Some(Self {
+                    sigmas: radii.iter().map(|&r| r as f64 / 2.0).collect(),
                     gaussians: radii.iter().map(|&r| gaussian(r as f64 / 2.0, r)).collect(),
                     steps: (1..=largest).map(step).collect(),
                     slope: settings.contrast.into(),
@@ -78,6 +84,7 @@ impl Search {
                 let sharp = f64::from(settings.phi).exp2();
                 let step = |i: usize| Step { centre: i, surround: i + 1, offset: epsilon * sharp / scale(i).powi(2) };
                 Some(Self {
+                    sigmas: (0..=count).map(|i| scale(i) / 4.0).collect(),
                     gaussians: (0..=count)
                         .map(|i| gaussian(scale(i) / 4.0, (3.0 * scale(i) / 4.0).ceil() as usize))
                         .collect(),
@@ -136,8 +143,12 @@ impl Search {
 
     /// Largest radius of each group of four; 0 for groups that are not there.
     pub fn group_radii(&self) -> [i32; 6] {
+        Self::group_radii_of(&self.gaussians)
+    }
+
+    pub(super) fn group_radii_of(kernels: &[Kernel]) -> [i32; 6] {
         let mut radii = [0; 6];
-        for (radius, group) in radii.iter_mut().zip(self.gaussians.chunks(4)) {
+        for (radius, group) in radii.iter_mut().zip(kernels.chunks(4)) {
             *radius = group.iter().map(|w| w.len() as i32 - 1).max().unwrap_or(0);
         }
         radii
@@ -145,8 +156,12 @@ impl Search {
 
     /// Weights of the fast way: by signed distance from −48, four Gaussians together.
     pub fn kernels(&self) -> TonemapKernels {
+        Self::kernels_of(&self.gaussians)
+    }
+
+    pub(super) fn kernels_of(gaussians: &[Kernel]) -> TonemapKernels {
         let mut kernels = TonemapKernels::default();
-        for (i, gaussian) in self.gaussians.iter().enumerate() {
+        for (i, gaussian) in gaussians.iter().enumerate() {
             for (d, weight) in gaussian.iter().enumerate() {
                 for at in [48 - d, 48 + d] {
                     kernels.part[i / 4 * 3 + at / 32].at[at % 32][i % 4] = *weight as f32;

@@ -83,6 +83,20 @@ pub enum Local {
     /// Ashikhmin, Reinhard: the averages along rows and then along columns, which is the same sum in another order (relative difference of
     /// an average under 10⁻⁵). Bilateral: from blocks of pixels, as [`Settings::spatial`] says.
     Fast,
+    /// Ashikhmin, Reinhard: small averages as [`Local::Fast`], large ones from halved pictures. An approximation; the search among the
+    /// averages is that of the definition, at every pixel. Bilateral: as [`Local::Fast`].
+    ///
+    /// Level 0 is L. A pixel of level l + 1 is the mean of 2 × 2 of level l; sizes are halved and rounded up, and what is missing at the end is
+    /// the last row or column once more. With w_d the weights of a Gaussian along one axis at d = −r, …, r, divided by their sum, and
+    /// v = Σ w_d d² pixels², its average comes from level 0 for v < 1.5, from level 1 for v < 9, else from level 2. From level 0 it is the
+    /// definition's. From level l = 1, 2 it is as follows.
+    /// * Means and reading have a variance of their own: a_1 = 1/4 + 3/4, a_2 = 5/4 + 11/4. The rest is a Gaussian narrowed by
+    ///   q = √((v − a_l) / v): g(x) = exp(−x² / 2(qσ)²) for |x| ≤ q (r + 1/2), else 0.
+    /// * Its weight at D pixels of the level is the mean of g at the 64 places x = 2^l (D − 1/2 + (i + 1/2) / 64), i = 0, …, 63,
+    ///   divided by the sum over all D.
+    /// * The level is averaged with these along rows and columns, its edges repeated.
+    /// * The pixel at x reads that at (x + 1/2) / 2^l − 1/2, bilinearly between pixels of the level, its edges repeated.
+    Pyramid,
     /// The definition: every sample of every neighbourhood of every pixel.
     Literal,
 }
@@ -255,6 +269,11 @@ impl Settings {
         let identification = if self.mode() == Mode::Selective { identify::reach(self) } else { 0 };
         let local = match (self.mode(), self.operator) {
             (Mode::Global, _) => 0,
+            (_, Operator::Ashikhmin | Operator::Reinhard) if self.local == Local::Pyramid => {
+                let search = super::search::Search::new(self);
+                let averages = search.as_ref().map(super::pyramid::averages).unwrap_or_default();
+                averages.iter().map(|average| average.reach() as u32).max().unwrap_or(0)
+            }
             (_, Operator::Ashikhmin) => 2 * self.radius,
             (_, Operator::Reinhard) => (0.75 * 1.6f32.powi(self.scales as i32)).ceil() as u32,
             // Blocks that the filter touches are needed whole.

@@ -1,7 +1,7 @@
 //! Pictures in main memory, of any size.
 
 use super::{
-    BadCounts, Input, Mode, Output, Settings, Tonemap, bilateral, clean, identify, map,
+    BadCounts, Input, Local, Mode, Output, Settings, Tonemap, bilateral, clean, identify, map, pyramid,
     statistics::{self, Rectangle, Sums},
 };
 use crate::{
@@ -169,8 +169,8 @@ impl Still {
         let apron = settings.reach(width, height);
         let of_map = if settings.mode() == Mode::Selective { identify::grid(&settings) } else { 1 };
         let of_blocks = if apron > 0 { bilateral::block_side_of(picture, &settings) } else { 1 };
-        // A multiple of both.
-        let grid = of_map * of_blocks;
+        // A multiple of all.
+        let grid = of_map * of_blocks * if settings.local == Local::Pyramid { pyramid::GRID } else { 1 };
         let limit = gpu.caps().limits.image_2d.saturating_sub(2 * apron + grid).max(1);
         let side = self.tile.unwrap_or(TILE).min(limit);
         let owned = |name: &str, bytes: u64| OwnedBuffer::with_contents(&gpu, name, &vec![0; bytes as usize]);

@@ -210,7 +210,7 @@ macro_rules! names {
 }
 
 names!(ModeName for Mode { Global, Local, Selective });
-names!(LocalName for Local { Fast, Literal });
+names!(LocalName for Local { Fast, Pyramid, Literal });
 names!(IdentifyName for Identify { Sobel, Saliency });
 names!(MarkName for Mark { Branch, Tiles, EarlyZ, Compact });
 names!(BadName for BadValues { Zero, Clamp, Neighbour, Error });

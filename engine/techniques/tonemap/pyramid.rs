@@ -1,0 +1,156 @@
+//! Local adaptation from averages of halved pictures ([`Local::Pyramid`](super::Local::Pyramid)).
+
+use super::{
+    Operator, Settings,
+    search::{Kernel, Search},
+};
+use crate::{
+    Error, Result,
+    graph::{Extent, Graph, Image},
+    shaders::{
+        tonemap::{halve, level_columns, level_rows, pyramid},
+        types::TonemapChoice,
+    },
+};
+
+/// Smallest variance, in pixels², of a Gaussian whose average comes from level 1 and from level 2.
+pub const VARIANCE: [f64; 2] = [1.5, 9.0];
+/// Variance that means of 2^l × 2^l pixels add, and that reading them bilinearly adds at the mean over the pixels of one of theirs.
+const ADDED: [f64; 2] = [0.25 + 0.75, 1.25 + 2.75];
+/// Places at which a Gaussian is looked at across one pixel of a level.
+const PLACES: i32 = 64;
+/// Pixels that one invocation of levels' passes has.
+const SPAN: u32 = 8;
+/// A tile has the same levels and the same blocks as the whole picture if it begins at multiples of this.
+pub const GRID: u32 = 8;
+/// Bytes of a buffer that every device can bind.
+const BUFFER_BYTES: u64 = 1 << 27;
+
+/// A Gaussian average as the pyramid has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Average {
+    /// 0: full size; 1, 2: halved so many times.
+    pub level: usize,
+    /// Weights on the level of distances 0 to the radius, in pixels of the level; those of both sides together 1.
+    pub weights: Kernel,
+}
+
+impl Average {
+    /// Of a Gaussian of `sigma` whose weights at full size are `weights`.
+    pub fn new(sigma: f64, weights: &Kernel) -> Self {
+        let variance = 2.0 * weights.iter().enumerate().map(|(d, w)| (d * d) as f64 * w).sum::<f64>();
+        let level = VARIANCE.iter().filter(|least| variance >= **least).count();
+        if level == 0 {
+            return Self { level, weights: weights.clone() };
+        }
+        let side = f64::from(1 << level);
+        let narrowed = ((variance - ADDED[level - 1]) / variance).sqrt();
+        let (sigma, reach) = (sigma * narrowed, (weights.len() as f64 - 0.5) * narrowed);
+        let share = |d: usize| -> f64 {
+            let place = |i: i32| (d as f64 - 0.5 + (f64::from(i) + 0.5) / f64::from(PLACES)) * side;
+            let weight = |x: f64| if x.abs() <= reach { (-x * x / (2.0 * sigma * sigma)).exp() } else { 0.0 };
+            (0..PLACES).map(place).map(weight).sum()
+        };
+        let mut weights: Kernel = (0..).map(share).take_while(|w| *w > 0.0).collect();
+        let sum = 2.0 * weights.iter().sum::<f64>() - weights[0];
+        weights.iter_mut().for_each(|w| *w /= sum);
+        Self { level, weights }
+    }
+
+    /// Pixels to each side on which the average of a pixel depends.
+    pub fn reach(&self) -> usize {
+        let radius = self.weights.len() - 1;
+        if self.level == 0 { radius } else { (radius + 2) << self.level }
+    }
+}
+
+/// All averages of a search, in the order of its Gaussians.
+pub fn averages(search: &Search) -> Vec<Average> {
+    search.gaussians.iter().zip(&search.sigmas).map(|(weights, sigma)| Average::new(*sigma, weights)).collect()
+}
+
+/// Samples that one pixel takes: products of weight and sample along rows and columns, those of halved pictures shared out among the pixels
+/// of one of theirs, and four for reading one of those.
+pub fn samples(search: &Search) -> f64 {
+    let of = |a: &Average| {
+        let taps = 2.0 * (2 * a.weights.len() - 1) as f64;
+        if a.level == 0 { taps } else { taps / f64::from(1 << (2 * a.level)) + 4.0 }
+    };
+    averages(search).iter().map(of).sum()
+}
+
+/// Writes local adaptation of every pixel to `adaptation`, with `importance` at least of those blocks in which that has a pixel that is not 0.
+///
+/// # Errors
+/// `Usage` if the picture is larger than devices must be able to serve in one piece.
+pub(super) fn adapt(
+    graph: &mut Graph,
+    luminance: Image,
+    importance: Option<Image>,
+    statistics: crate::graph::Buffer,
+    settings: &Settings,
+    search: &Search,
+    adaptation: Image,
+) -> Result<()> {
+    let extent = graph.extent(luminance);
+    let sizes = [extent.div_ceil(2), extent.div_ceil(2).div_ceil(2)];
+    let averages = averages(search);
+    let of_level = |level: usize| -> Vec<Kernel> {
+        averages.iter().filter(|a| a.level == level).map(|a| a.weights.clone()).collect()
+    };
+    let kernels = [of_level(0), of_level(1), of_level(2)];
+    let bytes = |i: usize| 16 * sizes[i].pixels() * kernels[i + 1].len().div_ceil(4).max(1) as u64;
+    if bytes(0).max(bytes(1)).max(4 * extent.pixels()) > BUFFER_BYTES {
+        let (w, h) = (extent.width, extent.height);
+        return Err(Error::usage(format!("a picture of {w}×{h} pixels in one piece; allowed: about 33 million pixels"))
+            .at("local = \"pyramid\"")
+            .help("Use local = \"fast\""));
+    }
+    let levels = [0, 1].map(|i| graph.buffer(format!("tonemap.level{}", i + 1), 4 * sizes[i].pixels()));
+    let full = graph.buffer("tonemap.level0", 4 * extent.pixels());
+    let args = halve::Args { luminance, full, half: levels[0], quarter: levels[1] };
+    graph.compute(args, [sizes[1].width, sizes[1].height]);
+    let planes = [0, 1].map(|i| {
+        let kernels = &kernels[i + 1];
+        let name = |what: &str| format!("tonemap.level{}.{what}", i + 1);
+        let averages = graph.buffer(name("averages"), bytes(i));
+        if !kernels.is_empty() {
+            let rows = graph.buffer(name("rows"), bytes(i));
+            let size = [sizes[i].width as i32, sizes[i].height as i32];
+            let (groups, radius) = (kernels.len().div_ceil(4) as u32, Search::group_radii_of(kernels));
+            let weights = graph.uniform(&Search::kernels_of(kernels));
+            let push = level_rows::Push { size, groups, radius };
+            let args = level_rows::Args { level: levels[i], kernels: weights, rows, push };
+            graph.compute(args, [sizes[i].width.div_ceil(SPAN), sizes[i].height]);
+            let push = level_columns::Push { size, groups, radius };
+            let args = level_columns::Args { rows, kernels: weights, averages, push };
+            graph.compute(args, [sizes[i].width, sizes[i].height.div_ceil(SPAN)]);
+        }
+        averages
+    });
+    let mut choice = TonemapChoice { slope: search.slope as f32, ..TonemapChoice::default() };
+    for (offset, step) in choice.offset.iter_mut().zip(&search.steps) {
+        *offset = step.offset as f32;
+    }
+    let spec = pyramid::Spec {
+        full: kernels[0].len() as u32,
+        halved: kernels[1].len() as u32,
+        radius: kernels[0].iter().map(|k| k.len() as i32 - 1).max().unwrap_or(0),
+        steps: search.steps.len() as u32,
+        next: (settings.operator == Operator::Reinhard).into(),
+        has_map: importance.is_some().into(),
+    };
+    let args = pyramid::Args {
+        full,
+        kernels: graph.uniform(&Search::kernels_of(&kernels[0])),
+        half: planes[0],
+        quarter: planes[1],
+        choice: graph.uniform(&choice),
+        statistics,
+        importance: importance.unwrap_or(luminance),
+        adaptation,
+        spec,
+    };
+    graph.compute(args, Extent::new(extent.width.div_ceil(8), extent.height.div_ceil(2)));
+    Ok(())
+}
