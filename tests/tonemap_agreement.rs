@@ -63,7 +63,7 @@ fn ours(operator: &str, luminance: &Plane, adaptation: Adaptation) -> Plane {
         Plane::from_fn(luminance.width, luminance.height, |x, y| f(of[(x, y)], level[(x, y)]))
     };
     let level = || match adaptation {
-        Adaptation::Ours => search.adaptation(luminance, averages),
+        Adaptation::Ours => search.adaptation(luminance, |plane, _, weights| plane.averages(weights)),
         Adaptation::Pyramids => pyramids::ashikhmin(luminance, search.contrast),
     };
     // Luminance HDR takes 10⁻⁵ for black, and maps what it finds, and 0, onto 0 to 1.
@@ -90,7 +90,9 @@ fn ours(operator: &str, luminance: &Plane, adaptation: Adaptation) -> Plane {
             let white = scaled.range().unwrap().1;
             scaled.map(|l| reinhard::global(l, white))
         }
-        "reinhard-local" => with(&scaled, &scales.adaptation(&scaled, averages), &reinhard::local),
+        "reinhard-local" => {
+            with(&scaled, &scales.adaptation(&scaled, |plane, _, weights| plane.averages(weights)), &reinhard::local)
+        }
         _ => panic!("no operator is called {operator}"),
     }
 }

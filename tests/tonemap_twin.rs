@@ -54,16 +54,16 @@ fn pictures(assets: &Path) -> Vec<Picture> {
     paths.iter().filter_map(|path| Picture::read(path)).collect()
 }
 
-/// All operators in all modes; local ones in both ways of computing them, but for the bilateral operator, whose fast way is an
+/// All operators in all modes; local ones in all ways of computing them, but for the bilateral operator, whose fast way is an
 /// approximation.
 fn all() -> Vec<Settings> {
     let mut all = Vec::new();
     for (_, operator) in Operator::ALL {
         for mode in [Mode::Global, Mode::Local, Mode::Selective] {
-            for local in [Local::Fast, Local::Literal] {
+            for local in [Local::Fast, Local::Pyramid, Local::Literal] {
                 let settings = Settings { operator, mode: Some(mode), local, ..Settings::default() };
-                let same = mode == Mode::Global && local == Local::Literal;
-                let approximate = operator == Operator::Bilateral && mode != Mode::Global && local == Local::Fast;
+                let same = mode == Mode::Global && local != Local::Fast;
+                let approximate = operator == Operator::Bilateral && mode != Mode::Global && local != Local::Literal;
                 if settings.validate().is_ok() && !same && !approximate {
                     all.push(settings);
                 }

@@ -21,7 +21,8 @@ pub fn averages(plane: &Plane, sigma: f64, weights: &[f64]) -> Plane {
         _ => (2, 1.25 + 2.75),
     };
     let q = ((variance - added) / variance).sqrt();
-    let g = |x: f64| if x.abs() <= q * (radius as f64 + 0.5) { (-x * x / (2.0 * (q * sigma).powi(2))).exp() } else { 0.0 };
+    let g =
+        |x: f64| if x.abs() <= q * (radius as f64 + 0.5) { (-x * x / (2.0 * (q * sigma).powi(2))).exp() } else { 0.0 };
     let size = f64::from(1 << level);
     let mean = |d: usize| (0..64).map(|i| g(size * (d as f64 - 0.5 + (f64::from(i) + 0.5) / 64.0))).sum::<f64>() / 64.0;
     let narrowed: Vec<f64> = (0..weights.len()).map(mean).take_while(|w| *w > 0.0).collect();

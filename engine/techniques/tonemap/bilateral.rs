@@ -19,7 +19,9 @@ const BLOCK_SAMPLES: u32 = 64;
 pub fn block_side(picture: Extent, settings: &Settings) -> u32 {
     match settings.local {
         Local::Literal => 1,
-        Local::Fast | Local::Pyramid => (settings.bilateral(picture.width, picture.height).0 / 3.0).ceil().max(1.0) as u32,
+        Local::Fast | Local::Pyramid => {
+            (settings.bilateral(picture.width, picture.height).0 / 3.0).ceil().max(1.0) as u32
+        }
     }
 }
 

@@ -102,9 +102,11 @@ pub(super) fn adapt(
     let bytes = |i: usize| 16 * sizes[i].pixels() * kernels[i + 1].len().div_ceil(4).max(1) as u64;
     if bytes(0).max(bytes(1)).max(4 * extent.pixels()) > BUFFER_BYTES {
         let (w, h) = (extent.width, extent.height);
-        return Err(Error::usage(format!("a picture of {w}×{h} pixels in one piece; allowed: about 33 million pixels"))
-            .at("local = \"pyramid\"")
-            .help("Use local = \"fast\""));
+        return Err(Error::usage(format!(
+            "a picture of {w}×{h} pixels in one piece; allowed: about 33 million pixels"
+        ))
+        .at("local = \"pyramid\"")
+        .help("Use local = \"fast\""));
     }
     let levels = [0, 1].map(|i| graph.buffer(format!("tonemap.level{}", i + 1), 4 * sizes[i].pixels()));
     let full = graph.buffer("tonemap.level0", 4 * extent.pixels());
@@ -113,19 +115,20 @@ pub(super) fn adapt(
     let planes = [0, 1].map(|i| {
         let kernels = &kernels[i + 1];
         let name = |what: &str| format!("tonemap.level{}.{what}", i + 1);
-        let averages = graph.buffer(name("averages"), bytes(i));
-        if !kernels.is_empty() {
-            let rows = graph.buffer(name("rows"), bytes(i));
-            let size = [sizes[i].width as i32, sizes[i].height as i32];
-            let (groups, radius) = (kernels.len().div_ceil(4) as u32, Search::group_radii_of(kernels));
-            let weights = graph.uniform(&Search::kernels_of(kernels));
-            let push = level_rows::Push { size, groups, radius };
-            let args = level_rows::Args { level: levels[i], kernels: weights, rows, push };
-            graph.compute(args, [sizes[i].width.div_ceil(SPAN), sizes[i].height]);
-            let push = level_columns::Push { size, groups, radius };
-            let args = level_columns::Args { rows, kernels: weights, averages, push };
-            graph.compute(args, [sizes[i].width, sizes[i].height.div_ceil(SPAN)]);
+        if kernels.is_empty() {
+            // Nothing is read from it.
+            return levels[i];
         }
+        let (rows, averages) = (graph.buffer(name("rows"), bytes(i)), graph.buffer(name("averages"), bytes(i)));
+        let size = [sizes[i].width as i32, sizes[i].height as i32];
+        let (groups, radius) = (kernels.len().div_ceil(4) as u32, Search::group_radii_of(kernels));
+        let weights = graph.uniform(&Search::kernels_of(kernels));
+        let push = level_rows::Push { size, groups, radius };
+        let args = level_rows::Args { level: levels[i], kernels: weights, rows, push };
+        graph.compute(args, [sizes[i].width.div_ceil(SPAN), sizes[i].height]);
+        let push = level_columns::Push { size, groups, radius };
+        let args = level_columns::Args { rows, kernels: weights, averages, push };
+        graph.compute(args, [sizes[i].width, sizes[i].height.div_ceil(SPAN)]);
         averages
     });
     let mut choice = TonemapChoice { slope: search.slope as f32, ..TonemapChoice::default() };
@@ -153,4 +156,50 @@ pub(super) fn adapt(
     };
     graph.compute(args, Extent::new(extent.width.div_ceil(8), extent.height.div_ceil(2)));
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn search(operator: Operator, radius: u32) -> Search {
+        Search::new(&Settings { operator, radius, ..Settings::default() }).unwrap()
+    }
+
+    #[test]
+    fn work_does_not_grow_with_the_radius_as_that_of_the_exact_ways() {
+        for radius in 1..=16 {
+            let search = search(Operator::Ashikhmin, radius);
+            assert!(samples(&search) <= 210.0, "{radius}: {}", samples(&search));
+            // Each average has at most a dozen samples and what reading it takes, whatever its radius.
+            for (average, weights) in averages(&search).iter().zip(&search.gaussians) {
+                let taps = 2 * average.weights.len() - 1;
+                assert!(taps <= [5, 9, 19][average.level], "{} of {}: {taps}", weights.len() - 1, average.level);
+            }
+        }
+        let of = |radius| samples(&search(Operator::Ashikhmin, radius));
+        assert!(of(16) < 2.0 * of(8), "{} {}", of(16), of(8));
+    }
+
+    #[test]
+    fn averages_keep_their_mean_and_variance() {
+        for search in [search(Operator::Ashikhmin, 16), search(Operator::Reinhard, 1)] {
+            let mut levels = Vec::new();
+            for (average, weights) in averages(&search).iter().zip(&search.gaussians) {
+                let sum = |w: &Kernel| 2.0 * w.iter().sum::<f64>() - w[0];
+                assert!((sum(&average.weights) - 1.0).abs() < 1e-12);
+                let variance = |w: &Kernel| 2.0 * w.iter().enumerate().map(|(d, w)| (d * d) as f64 * w).sum::<f64>();
+                let wanted = variance(weights);
+                let (side, added) = (f64::from(1 << average.level), [0.0, 1.0, 4.0][average.level]);
+                let found = side * side * variance(&average.weights) + added;
+                // A pixel's own extent, side² / 12, is in its weights.
+                let most = 0.02 * wanted + if average.level > 0 { side * side / 12.0 } else { 0.0 };
+                assert!((found - wanted).abs() <= most, "{wanted}: {found}");
+                levels.push(average.level);
+            }
+            assert!(levels.is_sorted() && levels.last() == Some(&2), "{levels:?}");
+            // What the shader of the search is made for.
+            assert!(levels.iter().filter(|l| **l == 0).count() <= 4);
+        }
+    }
 }

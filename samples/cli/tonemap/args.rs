@@ -77,7 +77,7 @@ pub struct TonemapArgs {
     #[arg(long, value_name = "P", value_parser = finite, help_heading = LOOK)]
     pub percentile: Option<f64>,
 
-    /// Exact averages, or the literal definition, which is far slower
+    /// fast: exact averages; pyramid: several times faster, hardly to be told apart; literal: the definition as it stands, far slower
     #[arg(long, value_enum, value_name = "HOW", help_heading = WORK)]
     pub local: Option<LocalName>,
 
