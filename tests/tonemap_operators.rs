@@ -170,3 +170,35 @@ fn tiles_change_no_bit_of_local_operators() {
         }
     });
 }
+
+/// Hue and saturation: operators that scale luminance change the ratios of red, green and blue by nothing but rounding, in any mode. The
+/// curves of colours change them by definition: bright colours go to white.
+#[test]
+fn operators_that_scale_luminance_keep_the_ratios_of_colours() {
+    with_gpu(|gpu| {
+        let (width, height) = (61, 43);
+        let pixels = picture(width, height, 11);
+        for (_, operator) in Operator::ALL {
+            for mode in [Mode::Global, Mode::Local, Mode::Selective] {
+                let settings = Settings { threshold: Some(1.0), ..with(operator, mode) };
+                if settings.validate().is_err() {
+                    continue;
+                }
+                let shown = run(gpu, width, height, &pixels, &settings);
+                let mut most = 0.0f32;
+                for (before, after) in pixels.iter().zip(&shown) {
+                    let largest = |p: &[f32; 4]| p[0].max(p[1]).max(p[2]);
+                    // What became black has no hue.
+                    if largest(after) > 1e-6 {
+                        let ratios = |p: &[f32; 4]| [0, 1, 2].map(|c| p[c] / largest(p));
+                        let apart = ratios(before).into_iter().zip(ratios(after)).map(|(a, b)| (a - b).abs());
+                        most = most.max(apart.fold(0.0, f32::max));
+                    }
+                }
+                println!("{operator:?} {mode:?}: ratios change by at most {most}");
+                let changes = matches!(operator, Operator::Aces | Operator::Agx | Operator::Neutral);
+                assert!(if changes { most > 0.05 } else { most < 1e-6 }, "{operator:?} {mode:?}: {most}");
+            }
+        }
+    });
+}
