@@ -210,11 +210,29 @@ impl Results {
         test: Layer<'_>,
         baseline: Option<Layer<'_>>,
     ) -> Result<Vec<f64>> {
+        self.measures_as(&Options::default(), measures, reference, test, baseline)
+    }
+
+    /// As [`measures`](Self::measures), with other options than the defaults.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn measures_as(
+        &self,
+        options: &Options,
+        measures: &[Measure],
+        reference: Layer<'_>,
+        test: Layer<'_>,
+        baseline: Option<Layer<'_>>,
+    ) -> Result<Vec<f64>> {
         let name = |Layer(run, layer): Layer<'_>| {
             let content = self.cache.content(&run.key).unwrap_or_else(|| run.key.clone());
             json!([content, layer])
         };
-        let which = json!([name(reference), name(test), baseline.map(name), Cache::measuring()]);
+        let mut which = json!([name(reference), name(test), baseline.map(name), Cache::measuring()]);
+        if let Some(list) = which.as_array_mut().filter(|_| *options != Options::default()) {
+            list.push(json!(format!("{options:?}")));
+        }
         let which = Digest::of(which.to_string().as_bytes()).hex();
         let mut known: Map<String, Value> = self.cache.measures(&which);
         let unknown: Vec<Measure> = measures.iter().copied().filter(|m| !known.contains_key(m.name())).collect();
@@ -228,7 +246,7 @@ impl Results {
                 pair = pair.with_baseline(base).map_err(named)?;
             }
             for measure in unknown {
-                let value = measure.of(&pair, &Options::default()).map_err(named)?.value;
+                let value = measure.of(&pair, options).map_err(named)?.value;
                 // JSON has no infinity: its text.
                 known.insert(
                     measure.name().into(),

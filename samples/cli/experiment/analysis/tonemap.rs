@@ -6,7 +6,10 @@
 
 mod tables;
 
-use lucerna::{Result, measure::Measure};
+use lucerna::{
+    Result,
+    measure::{Display, Exposure, Measure, Options, ToneCurve},
+};
 
 use crate::{
     experiment::{
@@ -20,6 +23,20 @@ use crate::{
 const THRESHOLD: f64 = 0.1;
 /// Group of pictures.
 const STILL: &str = "still";
+/// Pixels of the largest frame whose losses are measured.
+const MEASURED: usize = 1 << 20;
+
+/// Who looks at the pictures, on a screen as they are. The thesis names neither the program that computed its VDP nor its settings. An
+/// observer who does not know what to look for (slope of masking 1), and only what he is all but sure to see (p > 0.95).
+fn casual() -> Options {
+    Options { vdp_masking_slope: 1.0, vdp_threshold: 0.95, ..practised() }
+}
+
+/// Daly's practised observer, and what he sees more often than not.
+fn practised() -> Options {
+    Options { display: Display { exposure: Exposure::Stops(0.0), curve: ToneCurve::Clip }, ..Options::default() }
+}
+
 /// Longest side of an image in the page, pixels.
 const SIDE: u32 = 640;
 
@@ -32,8 +49,8 @@ pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
     }
     if views.iter().any(View::is_still) {
         page.add(tables::stills(&views)?);
-        page.add(tables::quality(&views)?);
     }
+    page.add(tables::quality(&views)?);
     page.add(tables::operators(&views)?);
     page.add(images(results, &views)?);
     Ok(())
@@ -54,6 +71,12 @@ impl<'a> View<'a> {
 
     fn is_still(&self) -> bool {
         self.results.at(self.of).any(|run| run.group == STILL)
+    }
+
+    /// Pixels of a frame, by the name of its view; `None` for pictures.
+    fn pixels(&self) -> Option<usize> {
+        let (width, height) = self.of.1.rsplit(' ').next()?.split_once('x')?;
+        Some(width.parse::<usize>().ok()? * height.parse::<usize>().ok()?)
     }
 
     /// A run by the name of its technique, and a value of its matrix.
@@ -98,15 +121,16 @@ impl<'a> View<'a> {
         Ok(Some(map.iter().filter(|pixel| pixel[0] > 0.5).count() as f64 / map.len() as f64))
     }
 
-    /// Measures of `test` against `truth`; NaN where one of them was not made.
+    /// Measures of `test` against `truth` by an observer; NaN where one of them was not made.
     fn measures<const N: usize>(
         &self,
+        observer: &Options,
         list: [Measure; N],
         truth: Option<&Done>,
         test: Option<&Done>,
     ) -> Result<[f64; N]> {
         let Some((truth, test)) = truth.zip(test) else { return Ok([f64::NAN; N]) };
-        let values = self.results.measures(&list, Layer(truth, ""), Layer(test, ""), None)?;
+        let values = self.results.measures_as(observer, &list, Layer(truth, ""), Layer(test, ""), None)?;
         Ok(values.try_into().unwrap_or([f64::NAN; N]))
     }
 }
