@@ -166,7 +166,7 @@ fn comparison(out: &mut String, set: &Comparison) -> Result<()> {
     if factor > 1 {
         let _ = write!(out, ", each the average of {factor}×{factor}");
     }
-    out.push_str(". Values are linear radiance, W/(sr·m²), kept to 0.4 %.</p></figure>\n");
+    let _ = writeln!(out, ". Values are {}, kept to 0.4 %.</p></figure>", escape(set.values));
     Ok(())
 }
 

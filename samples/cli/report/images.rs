@@ -32,6 +32,8 @@ pub struct Comparison {
     pub images: Vec<Image>,
     /// Exposure at the beginning: what is shown is multiplied by 2^EV.
     pub exposure: f64,
+    /// What the values are, for the caption.
+    pub values: &'static str,
     /// How often each side was halved ([`Comparison::at_most`]).
     halved: u32,
 }
@@ -39,7 +41,8 @@ pub struct Comparison {
 impl Comparison {
     pub fn new(id: impl Into<String>, caption: impl Into<String>, width: u32, height: u32) -> Self {
         let (id, caption) = (id.into(), caption.into());
-        Self { id, caption, width, height, images: Vec::new(), exposure: 0.0, halved: 0 }
+        let values = "linear radiance, W/(sr·m²)";
+        Self { id, caption, width, height, images: Vec::new(), exposure: 0.0, values, halved: 0 }
     }
 
     /// With one more image. It is left out if it does not have the size of the others.
@@ -55,6 +58,12 @@ impl Comparison {
     #[must_use]
     pub fn exposure(self, exposure: f64) -> Self {
         Self { exposure, ..self }
+    }
+
+    /// Of other values than radiance.
+    #[must_use]
+    pub fn values(self, values: &'static str) -> Self {
+        Self { values, ..self }
     }
 
     /// Halves the size, averaging 2×2 pixels, until no side is longer than `side` pixels. The page says so.

@@ -38,7 +38,7 @@ fn practised() -> Options {
 }
 
 /// Longest side of an image in the page, pixels.
-const SIDE: u32 = 640;
+const SIDE: u32 = 768;
 
 pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
     let views: Vec<View<'_>> = results.views().into_iter().map(|of| View { results, of }).collect();
@@ -149,6 +149,7 @@ fn images(results: &Results, views: &[View<'_>]) -> Result<Section> {
         let (scene, name) = view.of;
         let mut set = Comparison::new(format!("{scene}-{name}"), view.name(), local.width, local.height)
             .exposure(0.0)
+            .values("linear light of a screen, whose white is 1")
             .with("local", local.pixels);
         for method in
             ["stm", "stm-saliency", "gtm", "ltm-fast", "reinhard-ltm", "bilateral-ltm", "aces", "agx", "neutral"]

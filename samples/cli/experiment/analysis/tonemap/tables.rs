@@ -124,21 +124,14 @@ pub(super) fn frames(views: &[View<'_>]) -> Result<Section> {
         "Frames a second of tone mapping alone on the device named at the end of the page; the thesis' are of a GeForce 6600 (4:3) and an \
          8800 GTX (squares). Only ratios between columns mean something.",
     );
-    let columns = [
-        "frame",
-        "rendering (thesis, 1/s)",
-        "with LTM (thesis, 1/s)",
-        "rendering (1/s)",
-        "with LTM (1/s)",
-        "with LTM fast (1/s)",
-    ];
-    let mut whole = Table::new("table-5", "Table 5: rendering, and rendering with tone mapping", columns).timed();
-    let heads =
-        ["frame", "important (%)", "GTM (1/s)", "LTM (1/s)", "STM (1/s)", "STM/LTM (thesis)"].map(str::to_owned);
-    let marks = MARKS.iter().map(|mark| format!("STM/LTM {mark}"));
-    let fast = ["LTM fast (1/s)", "STM fast (1/s)"].map(str::to_owned);
-    let mut table =
-        Table::new("table-9", "Tables 9 and 10 (STM: early-z)", heads.into_iter().chain(marks).chain(fast)).timed();
+    let columns = ["frame", "thesis", "thesis, with LTM", "rendering", "with LTM", "with LTM fast"];
+    let title = "Table 5: frames a second of rendering, and of rendering with tone mapping";
+    let mut whole = Table::new("table-5", title, columns).timed();
+    let heads = ["frame", "important (%)", "GTM", "LTM", "STM", "thesis"].map(str::to_owned);
+    let marks = MARKS.iter().map(|mark| (*mark).to_owned());
+    let fast = ["LTM fast", "STM fast"].map(str::to_owned);
+    let title = "Tables 9 and 10: frames a second (STM by early-z), and STM/LTM by way to mark";
+    let mut table = Table::new("table-9", title, heads.into_iter().chain(marks).chain(fast)).timed();
     let frames = || views.iter().filter(|view| !view.is_still());
     for view in frames() {
         let size = view.of.1.rsplit(' ').next().unwrap_or_default();
@@ -216,9 +209,10 @@ pub(super) fn stills(views: &[View<'_>]) -> Result<Section> {
     section.text(format!("Threshold {THRESHOLD}. STM/LTM is how many times faster selective tone mapping is, each way to mark for itself."));
     let mut table = Table::new("table-11", "Table 11", ["picture", "pixels", "dynamic range (log₁₀)", "important (%)"]);
     let heads = ["picture", "GTM (ms)", "LTM (ms)", "fast LTM (ms)"].map(str::to_owned);
-    let marks = MARKS.iter().map(|mark| format!("STM/LTM {mark}"));
-    let paper = ["thesis: 6600", "thesis: 8800 GTX"].map(str::to_owned);
-    let mut times = Table::new("table-12", "Tables 12 and 13", heads.into_iter().chain(marks).chain(paper)).timed();
+    let marks = MARKS.iter().map(|mark| (*mark).to_owned());
+    let paper = ["thesis, 6600", "thesis, 8800"].map(str::to_owned);
+    let title = "Tables 12 and 13: times, and STM/LTM by way to mark";
+    let mut times = Table::new("table-12", title, heads.into_iter().chain(marks).chain(paper)).timed();
     for view in views.iter().filter(|view| view.is_still()) {
         let global = view.run("gtm", None);
         let mut size = Cell::Empty;
@@ -263,20 +257,19 @@ pub(super) fn quality(views: &[View<'_>]) -> Result<Section> {
     );
     let names = [
         "picture",
-        "VDP % global (thesis)",
-        "VDP % global",
-        "VDP % Sobel (thesis)",
-        "VDP % Sobel",
-        "VDP % saliency (thesis)",
-        "VDP % saliency",
-        "VDP % half size",
-        "SSIM Sobel (thesis)",
-        "SSIM Sobel",
-        "FLIP Sobel",
+        "global (thesis)",
+        "global",
+        "Sobel (thesis)",
+        "Sobel",
+        "saliency (thesis)",
+        "saliency",
+        "Sobel, half size",
     ];
-    let mut table = Table::new("table-14", "Tables 14 and 15", names);
-    let columns = ["picture", "VDP % global", "VDP % Sobel", "VDP % saliency"];
-    let mut sharp = Table::new("vdp-practised", "The same for the practised observer", columns);
+    let mut table = Table::new("table-14", "Table 14: VDP %", names);
+    let columns = ["picture", "global", "Sobel", "saliency"];
+    let mut sharp = Table::new("vdp-practised", "VDP % of the practised observer", columns);
+    let columns = ["picture", "SSIM (thesis)", "SSIM", "FLIP"];
+    let mut alike = Table::new("table-15", "Table 15: SSIM, and FLIP (Sobel)", columns);
     let mut gains =
         Table::new("table-16", "Table 16: gain", ["picture", "GTM (1/s)", "STM (1/s)", "gain GTM", "gain STM"]).timed();
     for view in views.iter().filter(|view| view.pixels().is_none_or(|pixels| pixels <= MEASURED)) {
@@ -297,10 +290,8 @@ pub(super) fn quality(views: &[View<'_>]) -> Result<Section> {
             paper.map(|p| p.2).into(),
             vdp(view.run("stm-saliency", None))?.into(),
             vdp(view.run("stm-half", None))?.into(),
-            paper.map(|p| p.3).into(),
-            ssim.into(),
-            flip.into(),
         ]);
+        alike.push([view.name().into(), paper.map(|p| p.3).into(), ssim.into(), flip.into()]);
         sharp.push([
             view.name().into(),
             seen_by_practised(view.run("gtm", None))?.into(),
@@ -319,6 +310,7 @@ pub(super) fn quality(views: &[View<'_>]) -> Result<Section> {
     }
     section.add(table);
     section.add(sharp);
+    section.add(alike);
     section.add(gains);
     Ok(section)
 }
