@@ -69,9 +69,9 @@ fn run(render: &Render) -> Result<ExitCode> {
         technique,
         &render.common,
         &base,
-        |gpu, scene, _| {
+        |gpu, scene, settings| {
             let resident = Resident::new(gpu, scene)?;
-            let igi = Igi::new(gpu, scene, &resident)?;
+            let igi = Igi::new(gpu, scene, &resident, &settings.igi)?;
             Ok((resident, igi))
         },
         |graph, (resident, igi), input, settings| compose(graph, resident, igi, input, settings, render.mode),

@@ -160,7 +160,7 @@ fn every_barrier_of_the_graphs_matters_and_two_runs_are_the_same() {
         ] {
             let scene = builtin::load(name).unwrap();
             let mut resident = Resident::new(gpu, &scene).unwrap();
-            let mut igi = Igi::new(gpu, &scene, &resident).unwrap();
+            let mut igi = Igi::new(gpu, &scene, &resident, &settings).unwrap();
             let mut pictures = Vec::new();
             for _ in 0..2 {
                 let mut graph = Graph::new("igi");

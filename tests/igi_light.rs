@@ -6,11 +6,11 @@ mod tracer_lab;
 use glam::{DVec3, Mat4, Quat, Vec3, vec3};
 use igi_lab::{Studio, flux, mean, plain};
 use lucerna::{
-    gpu::testing::with_gpu,
+    gpu::testing::{with_gpu, with_ray_query},
     reference::tracer::{self, Tracer},
     scene::{Environment, LightKind, Material, Pose, Scene, builtin},
     shaders::types,
-    techniques::igi::Settings,
+    techniques::igi::{Settings, Visibility},
 };
 use std::f64::consts::PI;
 use tracer_lab::{Stage, flat_view, matt, view};
@@ -330,5 +330,27 @@ fn scenes_with_next_to_nothing() {
         stage.point(vec3(0.3, 0.2, 0.1), Vec3::ONE);
         let shown = Studio::new(gpu, &stage.scene).render(&view(Vec3::ZERO, Vec3::X, 60.0, [8, 8]), &every, 0);
         assert!(shown.vpls.iter().all(|v: &types::Vpl| v.flux == [0.0; 3]) && mean(&shown.indirect) == 0.0);
+    });
+}
+
+#[test]
+fn ray_queries_show_the_same() {
+    with_ray_query(|gpu| {
+        let scene = builtin::load("teapot").unwrap();
+        let seen = lucerna::scene::View::of_camera(&scene, &Pose::rest(&scene), 0, [24, 18]).unwrap();
+        let base = Settings { bounces: 2, vpls: 24, direct_samples: 2, ..Settings::default() };
+        for imperfect in [false, true] {
+            let shown = [Visibility::Compute, Visibility::Query].map(|visibility| {
+                let settings = Settings { visibility, imperfect, ..base.clone() };
+                Studio::with(gpu, &scene, &settings).render(&seen, &settings, 0)
+            });
+            // A ray along an edge may go either way.
+            let differ = |a: &[f32; 4], b: &[f32; 4]| (0..3).any(|c| (a[c] - b[c]).abs() > 1e-3 * b[c].abs() + 1e-5);
+            let [compute, query] = &shown;
+            let other = compute.total.iter().zip(&query.total).filter(|(a, b)| differ(a, b)).count();
+            println!("imperfect {imperfect}: {other} of {} pixels differ", compute.total.len());
+            assert!(other * 50 <= compute.total.len(), "{other} pixels differ");
+            assert!((mean(&compute.total) / mean(&query.total) - 1.0).abs() < 2e-3);
+        }
     });
 }

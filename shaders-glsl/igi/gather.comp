@@ -26,6 +26,7 @@ layout(push_constant, scalar) uniform Push {
     uint factor;     // pixels along the side of a texel
     float least;     // min_d of the bounded geometry term, metres; 0: none
     uint imperfect;  // 1: boxes of triangles stand for them
+    uint irregular;  // 1: tiles have their subsets in different orders
     uint seed;
 };
 
@@ -41,7 +42,15 @@ void main() {
         float gap = surface_step(view, p, z);
         vec3 origin = p + n * gap;
         uint subsets = tile * tile;
-        uint subset = uint(texel.y) % tile * tile + uint(texel.x) % tile;
+        uvec2 place = uvec2(texel) % tile;
+        uint subset = place.y * tile + place.x;
+        if (irregular != 0u) {
+            // Turned by a number of its own: still each subset once in a tile.
+            uvec4 words = pcg4d(uvec4(uvec2(texel) / tile, seed, 0x1a7e1u));
+            if ((words.y & 1u) != 0u) place = place.yx;
+            if ((words.z & 1u) != 0u) place.x = tile - 1u - place.x;
+            subset = (place.y * tile + place.x + words.x % subsets) % subsets;
+        }
         trace_imperfect = imperfect != 0u;
         for (uint i = 0u; i < count; ++i) {
             uint k = (first + i) * subsets + subset;

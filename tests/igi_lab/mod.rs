@@ -30,8 +30,13 @@ pub struct Studio<'a> {
 
 impl<'a> Studio<'a> {
     pub fn new(gpu: &Gpu, scene: &'a Scene) -> Self {
+        Self::with(gpu, scene, &Settings::default())
+    }
+
+    /// For settings that choose how rays are traced.
+    pub fn with(gpu: &Gpu, scene: &'a Scene, settings: &Settings) -> Self {
         let resident = Resident::new(gpu, scene).unwrap();
-        let igi = Igi::new(gpu, scene, &resident).unwrap();
+        let igi = Igi::new(gpu, scene, &resident, settings).unwrap();
         Self { scene, pose: Pose::rest(scene), resident, igi, runner: Runner::new(gpu) }
     }
 

@@ -19,7 +19,7 @@ pub mod starts;
 mod tree;
 
 pub use picture::{Picture, PictureSettings};
-pub use settings::Settings;
+pub use settings::{Pattern, Settings, Visibility};
 
 use crate::{
     Error, ErrorKind, Result,
@@ -45,6 +45,10 @@ const RAYS_LIMITED: u64 = 2;
 #[derive(Debug)]
 pub struct Igi {
     rays: Rays,
+    /// Trees of our own for imperfect visibility, where `rays` are ray queries.
+    boxes: Option<Rays>,
+    /// `rays` are traced in compute.
+    in_compute: bool,
     environment: OwnedImage,
     environment_columns: OwnedBuffer,
     cells: [u32; 2],
@@ -65,6 +69,8 @@ pub struct Igi {
 struct Shared {
     settings: Uniform<types::IgiSettings>,
     rays: RayHandles,
+    /// For the shadow rays of virtual lights.
+    hidden_by: RayHandles,
     environment: Image,
     environment_columns: Buffer,
     light_columns: Buffer,
@@ -107,9 +113,24 @@ pub struct Outputs {
 }
 
 impl Igi {
+    /// `settings` decide how rays are traced ([`Settings::visibility`], [`Settings::imperfect`]).
+    ///
     /// # Errors
-    /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
-    pub fn new(gpu: &Gpu, scene: &Scene, resident: &Resident) -> Result<Self> {
+    /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits; `Usage` if ray queries are asked for
+    /// that the device does not have.
+    pub fn new(gpu: &Gpu, scene: &Scene, resident: &Resident, settings: &Settings) -> Result<Self> {
+        let in_compute = match settings.visibility {
+            Visibility::Auto => !gpu.caps().ray_query,
+            Visibility::Compute => true,
+            Visibility::Query if gpu.caps().ray_query => false,
+            Visibility::Query => {
+                return Err(Error::usage("the device has no ray queries, or they are switched off")
+                    .at("igi.visibility")
+                    .help(
+                        "Choose visibility = \"compute\"; CPU drivers use ray queries only with LUCERNA_RAY_QUERY=on",
+                    ));
+            }
+        };
         let importance = tables::importance(scene.environment.as_ref());
         let columns = bytemuck::cast_slice(&importance.columns);
         let double_sided = |primitive: &crate::scene::Primitive| {
@@ -117,7 +138,9 @@ impl Igi {
         };
         let meshes = scene.nodes.iter().filter_map(|node| scene.meshes.get(node.mesh? as usize));
         Ok(Self {
-            rays: Rays::in_compute(gpu, scene, resident)?,
+            rays: if in_compute { Rays::in_compute(gpu, scene, resident)? } else { Rays::new(gpu, scene, resident)? },
+            boxes: (!in_compute && settings.imperfect).then(|| Rays::in_compute(gpu, scene, resident)).transpose()?,
+            in_compute,
             environment: radiance_map(gpu, scene.environment.as_ref())?,
             environment_columns: OwnedBuffer::with_contents(gpu, "igi.environment", columns)?,
             cells: importance.cells,
@@ -139,6 +162,10 @@ impl Igi {
         settings: &Settings,
     ) -> Shared {
         let rays = self.rays.frame(graph, handles);
+        let hidden_by = match &mut self.boxes {
+            Some(boxes) if settings.imperfect => boxes.frame(graph, handles),
+            _ => rays,
+        };
         if self.lights.as_ref().is_none_or(|(of, _)| of != pose) {
             self.lights = Some((pose.clone(), tables::lights(scene, pose, &[], Sources::Emissive)));
         }
@@ -179,6 +206,7 @@ impl Igi {
         Shared {
             settings: graph.uniform(&block),
             rays,
+            hidden_by,
             environment: graph.import_image(&self.environment),
             environment_columns: graph.import_buffer(&self.environment_columns),
             light_columns: graph.buffer_from("igi.light-columns", &table.columns),
@@ -266,16 +294,16 @@ impl Igi {
                 depth: g.depth,
                 vpls: vpls.buffer,
                 irradiance,
-                materials: shared.rays.materials,
-                scene_textures: shared.rays.scene_textures,
-                trace_nodes: shared.rays.trace_nodes,
-                trace_triangles: shared.rays.trace_triangles,
-                trace_instances: shared.rays.trace_instances,
-                trace_indices: shared.rays.trace_indices,
-                trace_uvs: shared.rays.trace_uvs,
-                trace_colors: shared.rays.trace_colors,
-                trace_scene: shared.rays.trace_scene,
-                trace_accel: shared.rays.trace_accel,
+                materials: shared.hidden_by.materials,
+                scene_textures: shared.hidden_by.scene_textures,
+                trace_nodes: shared.hidden_by.trace_nodes,
+                trace_triangles: shared.hidden_by.trace_triangles,
+                trace_instances: shared.hidden_by.trace_instances,
+                trace_indices: shared.hidden_by.trace_indices,
+                trace_uvs: shared.hidden_by.trace_uvs,
+                trace_colors: shared.hidden_by.trace_colors,
+                trace_scene: shared.hidden_by.trace_scene,
+                trace_accel: shared.hidden_by.trace_accel,
                 push: shaders::igi::gather::Push {
                     first,
                     count,
@@ -284,6 +312,7 @@ impl Igi {
                     factor: settings.downsample,
                     least: shared.least,
                     imperfect: settings.imperfect.into(),
+                    irregular: (settings.pattern == Pattern::Irregular).into(),
                     seed: shared.seed,
                 },
             };

@@ -2,7 +2,7 @@
 
 use super::{Igi, Outputs, Settings, filters};
 use crate::{
-    Result,
+    Error, Result,
     graph::{Format, Graph},
     passes::{
         gbuffer::{self, GBuffer},
@@ -42,7 +42,7 @@ impl Igi {
     /// `graph.seed` is the seed of the paths; with 0 they are the paper's Halton points as they are.
     ///
     /// # Errors
-    /// `Usage` if a setting is out of its range.
+    /// `Usage` if a setting is out of its range, or asks for boxes that [`Igi::new`] was not told of.
     pub fn picture(
         &mut self,
         graph: &mut Graph,
@@ -54,14 +54,23 @@ impl Igi {
     ) -> Result<Picture> {
         let igi = &settings.igi;
         igi.validate().map_err(|error| error.at("igi"))?;
+        if igi.imperfect && !self.in_compute && self.boxes.is_none() {
+            let what = "there are no boxes: the scene was prepared for exact ray queries";
+            return Err(Error::usage(what).at("igi.imperfect").help("Give Igi::new the same settings"));
+        }
         let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
         let outputs = graph.scope("igi", |graph| {
             let shared = self.shared(graph, scene, pose, handles, igi);
             let vpls = igi.indirect.then(|| self.shoot(graph, handles, &shared, igi));
             let direct = self.direct(graph, handles, &gbuffer, &shared);
             let gathered = self.gather(graph, &gbuffer, &shared, vpls, igi);
-            let joined = if igi.interleave > 1 { filters::join(graph, &gbuffer, gathered, igi) } else { gathered };
-            let irradiance = if igi.downsample > 1 { filters::upsample(graph, &gbuffer, joined, igi) } else { joined };
+            let joined =
+                if igi.interleave > 1 && !igi.fused { filters::join(graph, &gbuffer, gathered, igi) } else { gathered };
+            let irradiance = if igi.downsample > 1 || (igi.fused && igi.interleave > 1) {
+                filters::upsample(graph, &gbuffer, joined, igi)
+            } else {
+                joined
+            };
             let sharp = (self.sharp && igi.specular)
                 .then(|| self.trees(graph, handles, &gbuffer, &shared, (vpls, settings.background), igi));
             let extent = graph.extent(gbuffer.depth);

@@ -3,6 +3,30 @@
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
+/// How rays are traced.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Visibility {
+    /// By ray queries where the device has them and is no CPU driver (there: where they are asked for), else in compute.
+    #[default]
+    Auto,
+    /// Through our own trees in a compute shader, on any device.
+    Compute,
+    /// By ray queries; refused where the device has none.
+    Query,
+}
+
+/// Where the subsets of interleaved sampling lie.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Pattern {
+    /// The same in every tile (paper).
+    #[default]
+    Regular,
+    /// In another order in every tile, so that no pattern repeats. The tile around a pixel may then have a subset twice.
+    Irregular,
+}
+
 /// Settings of the technique.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -21,6 +45,9 @@ pub struct Settings {
     pub downsample: u32,
     /// Side of the tiles of pixels that share the virtual lights, 1 to 4: each pixel gathers from one of side² subsets.
     pub interleave: u32,
+    pub pattern: Pattern,
+    /// One filter instead of two: upsampling reads the interleaved texels themselves.
+    pub fused: bool,
     /// Standard deviation of the Gaussian of upsampling, texels of the coarse picture, 0.1 to 4.
     pub upsample_sigma: f32,
     /// Exponent of the cosine between normals in upsampling, 0 to 64; the paper has 1.
@@ -31,6 +58,8 @@ pub struct Settings {
     pub discontinuity_depth: f32,
     /// Least cosine between their normals.
     pub discontinuity_normal: f32,
+    /// For the shadow rays of virtual lights with `imperfect` always in compute.
+    pub visibility: Visibility,
     /// Gather indirect light.
     pub indirect: bool,
     /// Mirrors, glass, and GGX highlights of direct light. Without, every surface reflects its diffuse part alone.
@@ -50,11 +79,14 @@ impl Default for Settings {
             imperfect: false,
             downsample: 1,
             interleave: 1,
+            pattern: Pattern::Regular,
+            fused: false,
             upsample_sigma: 0.8,
             upsample_normal: 8.0,
             upsample_range: 0.01,
             discontinuity_depth: 0.05,
             discontinuity_normal: 0.9,
+            visibility: Visibility::Auto,
             indirect: true,
             specular: true,
             specular_depth: 6,

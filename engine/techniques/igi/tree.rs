@@ -41,7 +41,7 @@ impl Igi {
         let tree_nodes = graph.buffer("igi.trees", u64::from(held * TREE_WIDTH) * size_of::<types::TreeNode>() as u64);
         graph.fill(tree_nodes, 0);
         graph.clear(sharp, [0.0; 4]);
-        let rays = &shared.rays;
+        let (rays, hidden_by) = (&shared.rays, &shared.hidden_by);
         for first in (0..slots).step_by(held as usize) {
             let count = held.min(slots - first);
             let nodes = count * TREE_WIDTH;
@@ -115,14 +115,14 @@ impl Igi {
                     vpls: buffer,
                     materials: handles.materials,
                     scene_textures: handles.textures,
-                    trace_nodes: rays.trace_nodes,
-                    trace_triangles: rays.trace_triangles,
-                    trace_instances: rays.trace_instances,
-                    trace_indices: rays.trace_indices,
-                    trace_uvs: rays.trace_uvs,
-                    trace_colors: rays.trace_colors,
-                    trace_scene: rays.trace_scene,
-                    trace_accel: rays.trace_accel,
+                    trace_nodes: hidden_by.trace_nodes,
+                    trace_triangles: hidden_by.trace_triangles,
+                    trace_instances: hidden_by.trace_instances,
+                    trace_indices: hidden_by.trace_indices,
+                    trace_uvs: hidden_by.trace_uvs,
+                    trace_colors: hidden_by.trace_colors,
+                    trace_scene: hidden_by.trace_scene,
+                    trace_accel: hidden_by.trace_accel,
                     tree_nodes,
                     push: gather_tree::Push {
                         first,
