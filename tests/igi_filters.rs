@@ -61,9 +61,10 @@ fn upsampling_is_a_partition_of_unity_within_bounds_and_does_not_leak() {
                     })); 4]
                 })
                 .collect();
+            let guide = filters::guide(&mut graph, &g, factor);
             let made = [("even", &even), ("noise", &noise), ("lit", &lit)].map(|(name, texels)| {
                 let coarse = image(&mut graph, name, small, texels);
-                filters::upsample(&mut graph, &g, coarse, &settings)
+                filters::upsample(&mut graph, &g, guide, coarse, &settings)
             });
             let [flat, mixed, parted] = read(gpu, graph, made);
             let (low, high) = noise.iter().fold((f32::MAX, f32::MIN), |(l, h), t| (l.min(t[0]), h.max(t[0])));
@@ -97,8 +98,9 @@ fn the_discontinuity_buffer_is_the_mean_of_the_tile_on_one_surface() {
             let noise: Vec<[f32; 4]> = (0..width * height).map(|_| random.texel()).collect();
             let mut graph = Graph::new("join");
             let g = gbuffer(&mut graph, &eye, &buffers);
+            let guide = filters::guide(&mut graph, &g, 1);
             let texels = image(&mut graph, "noise", Extent::new(width as u32, height as u32), &noise);
-            let joined = filters::join(&mut graph, &g, texels, &settings);
+            let joined = filters::join(&mut graph, guide, texels, &settings);
             let [found] = read(gpu, graph, [joined]);
             let tile = i64::from(tile);
             for y in 0..height as i64 {

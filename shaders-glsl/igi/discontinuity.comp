@@ -2,18 +2,14 @@
 // Santos, section 4.3). Each of the tile has gathered from another subset of the virtual lights.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
-#extension GL_GOOGLE_include_directive : require
-#include "lib/gbuffer.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-layout(binding = 0) uniform sampler2D normal;
-layout(binding = 1) uniform sampler2D depth;
-layout(binding = 2) uniform sampler2D interleaved;
-layout(binding = 3, rgba32f) uniform writeonly image2D irradiance;
+layout(binding = 0) uniform sampler2D guide; // of igi/guide.comp
+layout(binding = 1) uniform sampler2D interleaved;
+layout(binding = 2, rgba32f) uniform writeonly image2D irradiance;
 
 layout(push_constant, scalar) uniform Push {
-    uint factor;    // pixels along the side of a texel
     uint tile;      // texels along the side of a tile
     float nearness; // most difference of depth relative to the texel's
     float likeness; // least cosine between normals
@@ -23,14 +19,12 @@ void main() {
     ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
     ivec2 size = textureSize(interleaved, 0);
     if (any(greaterThanEqual(texel, size))) return;
-    ivec2 last = textureSize(depth, 0) - 1;
-    ivec2 pixel = min(texel * int(factor) + int(factor) / 2, last);
-    float z = texelFetch(depth, pixel, 0).r;
+    vec4 own = texelFetch(guide, texel, 0);
+    float z = own.w;
     if (z >= 1.0) {
         imageStore(irradiance, texel, vec4(0.0));
         return;
     }
-    vec3 n = decode_normal(texelFetch(normal, pixel, 0));
     vec4 sum = vec4(0.0);
     float count = 0.0;
     // As many texels as a tile has, so that each subset comes once.
@@ -39,10 +33,8 @@ void main() {
         for (int x = from; x <= to; ++x) {
             ivec2 other = texel + ivec2(x, y);
             if (any(lessThan(other, ivec2(0))) || any(greaterThanEqual(other, size))) continue;
-            ivec2 there = min(other * int(factor) + int(factor) / 2, last);
-            float there_z = texelFetch(depth, there, 0).r;
-            float cosine = dot(n, decode_normal(texelFetch(normal, there, 0)));
-            if (there_z >= 1.0 || abs(there_z - z) > nearness * z || cosine < likeness) continue;
+            vec4 there = texelFetch(guide, other, 0);
+            if (there.w >= 1.0 || abs(there.w - z) > nearness * z || dot(own.xyz, there.xyz) < likeness) continue;
             sum += texelFetch(interleaved, other, 0);
             count += 1.0;
         }

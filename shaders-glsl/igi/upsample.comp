@@ -5,15 +5,17 @@
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
 #include "lib/gbuffer.glsl"
-#include "lib/bilateral.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(constant_id = 0) const uint REACH = 1; // coarse texels to each side
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D normal;
 layout(binding = 2) uniform sampler2D depth;
-layout(binding = 3) uniform sampler2D coarse;  // irradiance of every factor-th pixel
-layout(binding = 4, rgba32f) uniform writeonly image2D irradiance;
+layout(binding = 3) uniform sampler2D guide;   // of igi/guide.comp
+layout(binding = 4) uniform sampler2D coarse;  // irradiance of every factor-th pixel
+layout(binding = 5, rgba32f) uniform writeonly image2D irradiance;
 
 layout(push_constant, scalar) uniform Push {
     uint factor;
@@ -22,9 +24,8 @@ layout(push_constant, scalar) uniform Push {
     float range;     // distance from the pixel's plane relative to its depth that weighs 0.6; 0: depth does not count (paper)
 };
 
-// Below this share of the largest possible weight no coarse texel matches, and the likest is taken.
+// Below this weight no coarse texel matches, and the likest is taken.
 const float NO_MATCH = 1e-4;
-const int REACH = 2;
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
@@ -37,29 +38,34 @@ void main() {
     }
     vec3 n = decode_normal(texelFetch(normal, pixel, 0));
     vec3 p = screen_position(view, pixel, 1.0, z);
+    // n · (X - P) / (z range) of a texel at uv and depth w is base + b uv + (ray + r uv) w.
+    float scale = range > 0.0 ? 1.0 / (z * view.far * range) : 0.0;
+    float base = dot(n, view.base_o - p) * scale, ray = dot(n, view.frustum_o) * scale;
+    vec2 b = vec2(dot(n, view.base_u), dot(n, view.base_v)) * scale;
+    vec2 r = vec2(dot(n, view.frustum_u), dot(n, view.frustum_v)) * scale;
     ivec2 last = textureSize(coarse, 0) - 1;
     // A coarse texel holds the light of the pixel in the middle of those it stands for.
     vec2 at = vec2(pixel - int(factor) / 2) / float(factor);
     ivec2 middle = ivec2(floor(at + 0.5));
+    float fall = 0.72134752 / (sigma * sigma); // in powers of 2
+    int reach = int(REACH);
     vec4 sum = vec4(0.0), likest = vec4(0.0);
     float weights = 0.0, most = -1e30;
-    for (int y = -REACH; y <= REACH; ++y) {
-        for (int x = -REACH; x <= REACH; ++x) {
-            ivec2 texel = middle + ivec2(x, y);
-            if (any(lessThan(texel, ivec2(0))) || any(greaterThan(texel, last))) continue;
-            ivec2 there = min(texel * int(factor) + int(factor) / 2, full - 1);
-            float there_z = texelFetch(depth, there, 0).r;
-            if (there_z >= 1.0) continue;
+    for (int y = max(middle.y - reach, 0); y <= min(middle.y + reach, last.y); ++y) {
+        for (int x = max(middle.x - reach, 0); x <= min(middle.x + reach, last.x); ++x) {
+            ivec2 texel = ivec2(x, y);
+            vec4 there = texelFetch(guide, texel, 0);
+            if (there.w >= 1.0) continue;
             vec4 value = texelFetch(coarse, texel, 0);
-            float likeness = dot(n, decode_normal(texelFetch(normal, there, 0)));
-            float off = 0.0;
-            if (range > 0.0) off = bilateral_plane_distance(p, n, screen_position(view, there, 1.0, there_z), z * view.far) / range;
+            vec2 uv = (min(vec2(texel * int(factor) + int(factor) / 2), vec2(full - 1)) + 0.5) / view.extent;
+            float off = base + dot(b, uv) + (ray + dot(r, uv)) * there.w;
+            float likeness = max(dot(n, there.xyz), 1e-12);
             vec2 apart = vec2(texel) - at;
-            float w = exp(-0.5 * dot(apart, apart) / (sigma * sigma)) * pow(max(likeness, 0.0), sharpness) * exp(-0.5 * off * off);
+            float w = exp2(sharpness * log2(likeness) - fall * dot(apart, apart) - 0.72134752 * off * off);
             sum += w * value;
             weights += w;
-            if (likeness - off > most) {
-                most = likeness - off;
+            if (likeness - abs(off) > most) {
+                most = likeness - abs(off);
                 likest = value;
             }
         }

@@ -148,33 +148,34 @@ Hit trace(Ray ray, uint mask, uint salt, bool any) {
                 }
             }
             rare = !inside || leaf_slots == 0u;
-            while (!rare && leaf_slots != 0u) {
 #ifdef TRACE_BOXES
-                // These first: most of them end the ray.
-                uint slot = uint(findLSB(boxes != 0u ? boxes : leaf_slots));
-                bool boxed = boxes != 0u;
+            // Whatever side is seen and whatever is cut out of it. Nearly always the first one ends the ray.
+            leaf_slots &= inside ? ~boxes : ~0u;
+            while (inside && boxes != 0u) {
+                uint slot = uint(findLSB(boxes));
                 boxes &= boxes - 1u;
-                leaf_slots &= ~(1u << slot);
+                --left;
                 uint record = (leaves >> 8u) + uint(bitCount(leaves & ((1u << slot) - 1u)));
-#else
+                uint surface = floatBitsToUint(trace_triangles[3u * record].w);
+                if (trace_counts(surface & TRACE_UNLIT, 1.0, mask)) {
+                    hit.t = ray.t_min;
+                    hit.instance = first_instance;
+                    boxes = 0u;
+                    done = true;
+                    rare = true;
+                }
+            }
+#endif
+            while (!rare && leaf_slots != 0u) {
                 uint slot = uint(findLSB(leaf_slots));
                 uint record = (leaves >> 8u) + uint(bitCount(leaves & ((1u << slot) - 1u)));
                 leaf_slots &= leaf_slots - 1u;
-#endif
                 --left;
                 vec4 a = trace_triangles[3u * record];
                 vec3 b = trace_triangles[3u * record + 1u].xyz, c = trace_triangles[3u * record + 2u].xyz;
                 vec3 at;
                 float side = trace_triangle(a.xyz, b, c, slabs.origin, shear, at);
                 uint surface = floatBitsToUint(a.w);
-#ifdef TRACE_BOXES
-                if (boxed) {
-                    // Whatever side is seen and whatever is cut out of it.
-                    at = vec3(ray.t_min, 0.0, 0.0);
-                    side = 1.0;
-                    surface &= TRACE_UNLIT;
-                }
-#endif
                 if (at.x >= ray.t_min && at.x <= hit.t && trace_counts(surface, side, mask)) {
                     bool equal = at.x == hit.t;
                     if ((surface & TRACE_CUTOUT) != 0u || equal) {

@@ -64,13 +64,18 @@ impl Igi {
             let vpls = igi.indirect.then(|| self.shoot(graph, handles, &shared, igi));
             let direct = self.direct(graph, handles, &gbuffer, &shared);
             let gathered = self.gather(graph, &gbuffer, &shared, vpls, igi);
-            let joined =
-                if igi.interleave > 1 && !igi.fused { filters::join(graph, &gbuffer, gathered, igi) } else { gathered };
-            let irradiance = if igi.downsample > 1 || (igi.fused && igi.interleave > 1) {
-                filters::upsample(graph, &gbuffer, joined, igi)
-            } else {
-                joined
-            };
+            let (joins, upsamples) =
+                (igi.interleave > 1 && !igi.fused, igi.downsample > 1 || (igi.fused && igi.interleave > 1));
+            let mut irradiance = gathered;
+            if joins || upsamples {
+                let guide = filters::guide(graph, &gbuffer, igi.downsample);
+                if joins {
+                    irradiance = filters::join(graph, guide, irradiance, igi);
+                }
+                if upsamples {
+                    irradiance = filters::upsample(graph, &gbuffer, guide, irradiance, igi);
+                }
+            }
             let sharp = (self.sharp && igi.specular)
                 .then(|| self.trees(graph, handles, &gbuffer, &shared, (vpls, settings.background), igi));
             let extent = graph.extent(gbuffer.depth);

@@ -81,7 +81,7 @@ impl Default for Settings {
             interleave: 1,
             pattern: Pattern::Regular,
             fused: false,
-            upsample_sigma: 0.8,
+            upsample_sigma: 0.6,
             upsample_normal: 8.0,
             upsample_range: 0.01,
             discontinuity_depth: 0.05,
