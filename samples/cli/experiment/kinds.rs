@@ -1,5 +1,6 @@
 //! How pictures are made: the techniques and references that experiments can name.
 
+mod igi;
 mod tonemap;
 
 use std::{any::Any, collections::HashMap, time::Instant};
@@ -124,6 +125,11 @@ impl<'a> Warm<'a> {
         Self { gpu, scene, pose, image: image.as_ref(), kept: HashMap::new(), tracer: None }
     }
 
+    /// Drops what was made for the scene under this name.
+    pub fn forget(&mut self, name: &'static str) {
+        self.kept.remove(name);
+    }
+
     /// Something made once for the scene.
     ///
     /// # Errors
@@ -165,6 +171,28 @@ pub const KINDS: &[Kind] = &[
             config::to_value(&settings)
         },
         render: isr_picture,
+        available: || Ok(String::new()),
+    },
+    Kind {
+        name: "igi",
+        description: "instant global illumination; layers direct, indirect, albedo, normal, depth",
+        on_device: true,
+        of_images: false,
+        sources: &[
+            "engine/techniques/igi",
+            "engine/passes",
+            "engine/rays",
+            "engine/reference/tracer",
+            "engine/scene",
+            "shaders-glsl/common",
+            "shaders-glsl/igi",
+            "shaders-glsl/lib",
+            "shaders-glsl/passes",
+            "shaders-glsl/rays",
+            "shaders-glsl/scene",
+        ],
+        settings: igi::settings,
+        render: igi::picture,
         available: || Ok(String::new()),
     },
     Kind {

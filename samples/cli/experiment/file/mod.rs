@@ -50,6 +50,7 @@ use crate::{
 
 /// The experiments that come with the program: name and text.
 pub const BUILTIN: &[(&str, &str)] = &[
+    ("igi", include_str!("../../../experiments/igi.toml")),
     ("isr", include_str!("../../../experiments/isr.toml")),
     ("smoke", include_str!("../../../experiments/smoke.toml")),
     ("tonemap", include_str!("../../../experiments/tonemap.toml")),

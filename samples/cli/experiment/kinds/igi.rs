@@ -1,0 +1,54 @@
+//! Instant global illumination.
+
+use lucerna::{
+    Result,
+    graph::Runner,
+    scene::resident::Resident,
+    techniques::igi::{Igi, PictureSettings},
+};
+use serde_json::Value;
+
+use super::{Job, Rendered, Warm, on_device, read};
+use crate::{config, experiment::file::Changes, gbuffer_layers, shown::Shown};
+
+pub(super) fn settings(paper: bool, changes: &Changes) -> Result<Value> {
+    let base = if paper { PictureSettings::paper() } else { PictureSettings::default() };
+    let settings: PictureSettings = config::with(&base, changes)?;
+    settings.igi.validate()?;
+    config::to_value(&settings)
+}
+
+/// What is kept of a scene, for one way to trace rays.
+struct Kept {
+    resident: Resident,
+    igi: Igi,
+    runner: Runner,
+}
+
+pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
+    let settings: PictureSettings = read(job.settings)?;
+    let (scene, pose) = (warm.scene, warm.pose);
+    // Boxes and rays of another kind need trees of their own.
+    let name = if settings.igi.imperfect { "igi, imperfect" } else { "igi" };
+    let name = match settings.igi.visibility {
+        lucerna::techniques::igi::Visibility::Auto => name,
+        _ => "igi, chosen rays",
+    };
+    if name == "igi, chosen rays" {
+        // Not kept: the next one may choose others.
+        warm.forget(name);
+    }
+    let Kept { resident, igi, runner } = warm.keep(name, |gpu, scene, _| {
+        let resident = Resident::new(gpu, scene)?;
+        let igi = Igi::new(gpu, scene, &resident, &settings.igi)?;
+        Ok(Kept { resident, igi, runner: Runner::new(gpu) })
+    })?;
+    on_device(runner, job, "igi", |graph| {
+        let handles = resident.frame_in(graph, scene, pose);
+        let view = job.view.fit_far(&handles.bounds());
+        let picture = igi.picture(graph, scene, pose, &handles, &view, &settings)?;
+        let out = picture.outputs;
+        let shown = Shown::new(out.total).color("direct", out.direct).color("indirect", out.indirect);
+        Ok(gbuffer_layers::add(shown, &picture.gbuffer, &view))
+    })
+}
