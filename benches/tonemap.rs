@@ -154,9 +154,21 @@ fn rows(literal: bool) -> Vec<Row> {
             Some(FULL),
         ),
         row(
+            "ashikhmin local pyramid",
+            of(ashikhmin, Mode::Local, Local::Pyramid),
+            &["--operator", "ashikhmin", "--mode", "local", "--local", "pyramid"],
+            Some(FULL),
+        ),
+        row(
             "ashikhmin selective fast",
             of(ashikhmin, Mode::Selective, Local::Fast),
             &["--operator", "ashikhmin", "--mode", "selective", "--local", "fast"],
+            None,
+        ),
+        row(
+            "ashikhmin selective pyramid",
+            of(ashikhmin, Mode::Selective, Local::Pyramid),
+            &["--operator", "ashikhmin", "--mode", "selective", "--local", "pyramid"],
             None,
         ),
         row(
@@ -169,6 +181,12 @@ fn rows(literal: bool) -> Vec<Row> {
             "reinhard local fast",
             of(reinhard, Mode::Local, Local::Fast),
             &["--operator", "reinhard", "--mode", "local", "--local", "fast"],
+            Some(DODGE),
+        ),
+        row(
+            "reinhard local pyramid",
+            of(reinhard, Mode::Local, Local::Pyramid),
+            &["--operator", "reinhard", "--mode", "local", "--local", "pyramid"],
             Some(DODGE),
         ),
     ];
@@ -241,7 +259,7 @@ fn run() -> Result<()> {
             let operator = theirs.zip(reading).map(|(all, reading)| all - reading);
             // The twin has one way to compute local adaptation, and no marking: selective is local with a map.
             let begun = Instant::now();
-            let twin = (row.settings.local == Local::Fast && row.settings.mode() != Mode::Selective).then(|| {
+            let twin = (row.settings.local != Local::Literal && row.settings.mode() != Mode::Selective).then(|| {
                 twin::tonemap(width, height, &picture.pixels, &row.settings);
                 1e3 * begun.elapsed().as_secs_f64()
             });

@@ -61,6 +61,19 @@ impl Frame {
         }
     }
 
+    /// [`Frame::image`] without a copy; what is left for the token has no bytes.
+    ///
+    /// # Panics
+    /// If the token is of another graph.
+    #[track_caller]
+    pub fn take_image(&mut self, token: ImageRead) -> Pixels {
+        let _ = self.read(token.graph, token.index);
+        match &mut self.reads[token.index as usize] {
+            Read::Image(pixels) => Pixels { bytes: std::mem::take(&mut pixels.bytes), ..pixels.clone() },
+            Read::Buffer(_) => unreachable!("image tokens stand for images"),
+        }
+    }
+
     /// The contents promised by [`Graph::read_buffer`](super::Graph::read_buffer); bytes after the last whole `T` are left out.
     ///
     /// # Panics

@@ -29,6 +29,9 @@ impl Pixels {
         if size == 0 {
             return Vec::new();
         }
+        if self.format == Format::RGBA32F {
+            return bytemuck::pod_collect_to_vec(&self.bytes[..self.bytes.len() / size * size]);
+        }
         self.bytes.chunks_exact(size).map(|p| decode(self.format, p)).collect()
     }
 

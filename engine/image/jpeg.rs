@@ -35,8 +35,13 @@ pub(super) fn encode(picture: &Layers, layer: &Layer, options: &WriteOptions) ->
         Error::usage(format!("layer {:?} has the channels {channels}; JPEG files hold RGB or one channel", layer.name))
     })?;
     let scale = options.exposure_ev.exp2();
-    let code = |value: &f32| (encoding::encode(encoding::clamp(value * scale), options.gamma) * 255.0 + 0.5) as u8;
-    let codes: Vec<u8> = pixels.as_flattened().iter().map(code).collect();
+    let (codes_of, values) = (encoding::Codes::new(options.gamma), pixels.as_flattened());
+    let mut codes = vec![0; values.len()];
+    encoding::in_parts(&mut codes, 3, |first, part| {
+        for (code, value) in part.iter_mut().zip(&values[3 * first..]) {
+            *code = codes_of.of(encoding::clamp(value * scale));
+        }
+    });
     let mut out = Vec::new();
     JpegEncoder::new_with_quality(&mut out, quality)
         .encode(&codes, width, height, ExtendedColorType::Rgb8)

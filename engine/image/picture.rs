@@ -66,7 +66,8 @@ impl Layer {
     /// A colour layer from pixels of three or more values, of which the first three are taken.
     pub fn rgb<const N: usize>(name: impl Into<String>, pixels: &[[f32; N]]) -> Self {
         const { assert!(N >= 3) };
-        Self::new(name, &["R", "G", "B"], pixels.iter().flat_map(|p| [p[0], p[1], p[2]]).collect())
+        let colours: Vec<[f32; 3]> = pixels.iter().map(|p| [p[0], p[1], p[2]]).collect();
+        Self::new(name, &["R", "G", "B"], colours.into_flattened())
     }
 
     /// A colour layer with alpha.

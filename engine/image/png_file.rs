@@ -16,7 +16,7 @@ const MAPPING: &str = "lucerna mapping";
 
 pub(super) fn encode(picture: &Layers, layer: &Layer, options: &WriteOptions) -> Result<Vec<u8>> {
     let alpha = layer.channel("A").filter(|_| layer.channels.len() > 1);
-    let pixels = layer.rgb_pixels().ok_or_else(|| {
+    let colours = layer.colours().ok_or_else(|| {
         let channels = layer.channels.join(" ");
         Error::usage(format!("layer {:?} has the channels {channels}; PNG files hold RGB or one channel", layer.name))
     })?;
@@ -27,28 +27,8 @@ pub(super) fn encode(picture: &Layers, layer: &Layer, options: &WriteOptions) ->
         bits => return Err(Error::usage(format!("{bits} bits a channel: PNG files are written with 8 or 16"))),
     };
     let mapping = Mapping::of(layer);
-    let scale = options.exposure_ev.exp2();
-    let mut samples = Vec::with_capacity(pixels.len() * 8);
-    let mut push = |encoded: f32| match depth {
-        png::BitDepth::Sixteen => samples.extend(((encoded * 65535.0 + 0.5) as u16).to_be_bytes()),
-        _ => samples.push((encoded * 255.0 + 0.5) as u8),
-    };
-    for (i, pixel) in pixels.iter().enumerate() {
-        let a = alpha.map(|a| layer.data[i * layer.channels.len() + a].clamp(0.0, 1.0));
-        let unassociate = match a {
-            Some(a) if a > 0.0 && a < 1.0 => scale / a,
-            _ => scale,
-        };
-        for &value in &pixel[..if grey { 1 } else { 3 }] {
-            push(match mapping {
-                Mapping::Colour => encoding::encode(clamp(value * unassociate), options.gamma),
-                Mapping::Affine { black, white } => clamp((value - black) / (white - black)),
-            });
-        }
-        if let Some(a) = a {
-            push(clamp(a));
-        }
-    }
+    let source = Samples { layer, colours: &colours[..if grey { 1 } else { 3 }], alpha, mapping, options };
+    let samples = if depth == png::BitDepth::Eight { source.eight_bits() } else { source.sixteen_bits() };
     let fail = |error: png::EncodingError| Error::new(ErrorKind::Runtime, "PNG encoding failed").caused_by(error);
     let mut out = Vec::new();
     let mut encoder = png::Encoder::new(&mut out, picture.width, picture.height);
@@ -79,6 +59,64 @@ pub(super) fn encode(picture: &Layers, layer: &Layer, options: &WriteOptions) ->
     writer.write_image_data(&samples).map_err(fail)?;
     writer.finish().map_err(fail)?;
     Ok(out)
+}
+
+/// Where the samples of a file come from.
+struct Samples<'a> {
+    layer: &'a Layer,
+    /// Positions of one or three channels.
+    colours: &'a [usize],
+    alpha: Option<usize>,
+    mapping: Mapping,
+    options: &'a WriteOptions,
+}
+
+impl Samples<'_> {
+    /// Samples of a pixel.
+    fn count(&self) -> usize {
+        self.colours.len() + usize::from(self.alpha.is_some())
+    }
+
+    /// Each sample by `colour` from light in [0, 1], or by `number` from a code in [0, 1].
+    fn fill<T: Copy + Default + Send>(
+        &self,
+        colour: impl Fn(f32) -> T + Sync,
+        number: impl Fn(f32) -> T + Sync,
+    ) -> Vec<T> {
+        let scale = self.options.exposure_ev.exp2();
+        let (channels, count) = (self.layer.channels.len(), self.count());
+        let mut samples = vec![T::default(); self.layer.data.len() / channels * count];
+        encoding::in_parts(&mut samples, count, |first, part| {
+            let pixels = self.layer.data[first * channels..].chunks_exact(channels);
+            for (out, pixel) in part.chunks_exact_mut(count).zip(pixels) {
+                let alpha = self.alpha.map(|a| pixel[a].clamp(0.0, 1.0));
+                let unassociate = match alpha {
+                    Some(a) if a > 0.0 && a < 1.0 => scale / a,
+                    _ => scale,
+                };
+                for (out, &c) in out.iter_mut().zip(self.colours) {
+                    *out = match self.mapping {
+                        Mapping::Colour => colour(clamp(pixel[c] * unassociate)),
+                        Mapping::Affine { black, white } => number(clamp((pixel[c] - black) / (white - black))),
+                    };
+                }
+                if let Some(a) = alpha {
+                    out[count - 1] = number(clamp(a));
+                }
+            }
+        });
+        samples
+    }
+
+    fn eight_bits(&self) -> Vec<u8> {
+        let codes = encoding::Codes::new(self.options.gamma);
+        self.fill(|light| codes.of(light), encoding::eight_bits)
+    }
+
+    fn sixteen_bits(&self) -> Vec<u8> {
+        let code = |code: f32| ((code * 65535.0 + 0.5) as u16).to_be_bytes();
+        self.fill(|light| code(encoding::encode(light, self.options.gamma)), code).into_flattened()
+    }
 }
 
 /// Depth from here on is that of the background, and must not stretch the range. Metres.

@@ -22,6 +22,10 @@ struct TonemapStatistics {
     float scale;        // factor of luminance and colour after the exposure: 1, or 1 / log-average of the picture as it came
 };
 
+// Pixels of a column that one invocation has, where each is little work.
+const uint TONEMAP_ROWS = 64;  // export
+const uint TONEMAP_CURVE_ROWS = 4;  // export
+
 const float TONEMAP_SMALLEST = 1e-30;
 const float TONEMAP_LARGEST = 1e18;
 

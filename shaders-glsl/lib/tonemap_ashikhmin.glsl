@@ -41,15 +41,20 @@ float ashikhmin_threshold(float l) {
     return 0.0556 * l;
 }
 
-// TM. Of a picture of one luminance, `low` is taken as 0.
-float ashikhmin_curve(float l, float low, float high, float display) {
+// C(high) − C(low) of a whole picture. Of a picture of one luminance, `low` is taken as 0.
+float ashikhmin_range(float low, float high) {
+    return ashikhmin_steps(high > low ? low : 0.0, high);
+}
+
+// TM. `range`: ashikhmin_range(low, high).
+float ashikhmin_curve(float l, float low, float high, float range, float display) {
     low = high > low ? low : 0.0;
-    float steps = l < low ? -ashikhmin_steps(l, low) : ashikhmin_steps(low, l);
-    return high > 0.0 ? display * steps / ashikhmin_steps(low, high) : 0.0;
+    float steps = ashikhmin_steps(min(l, low), max(l, low));
+    return high > 0.0 ? display * (l < low ? -steps : steps) / range : 0.0;
 }
 
 // L_d.
-float ashikhmin_display(float l, float adaptation, float low, float high, float display) {
-    float mapped = ashikhmin_curve(adaptation, low, high, display);
+float ashikhmin_display(float l, float adaptation, float low, float high, float range, float display) {
+    float mapped = ashikhmin_curve(adaptation, low, high, range, display);
     return mapped + ashikhmin_threshold(mapped) / ashikhmin_threshold(adaptation) * (l - adaptation);
 }

@@ -7,6 +7,9 @@
 
 layout(local_size_x = 64) in;
 
+// 1: only spans with an important pixel are worked on.
+layout(constant_id = 0) const uint HAS_MAP = 0;
+
 layout(binding = 0) uniform sampler2D luminance;
 #include "lib/tonemap_search.glsl"
 layout(binding = 1, scalar) readonly buffer Search { TonemapSearch search; };
@@ -14,6 +17,7 @@ layout(binding = 2, scalar) uniform Kernels { TonemapKernels kernels; };
 layout(binding = 3) uniform sampler2D rows;
 layout(binding = 4, scalar) readonly buffer Statistics { TonemapStatistics statistics; };
 layout(binding = 5, r32f) uniform writeonly image2D adaptation;
+layout(binding = 6) uniform sampler2D importance;
 #include "lib/tonemap_span.glsl"
 
 layout(push_constant, scalar) uniform Push {
@@ -30,6 +34,15 @@ void main() {
     ivec2 pixel = ivec2(int(gl_GlobalInvocationID.x), int(gl_GlobalInvocationID.y) * SPAN + begin);
     if (pixel.x >= extent.x || pixel.y >= end) {
         return;
+    }
+    if (HAS_MAP != 0u) {
+        float most = 0.0;
+        for (int y = pixel.y; y < min(pixel.y + SPAN, end); ++y) {
+            most = max(most, texelFetch(importance, ivec2(pixel.x, y), 0).r);
+        }
+        if (most == 0.0) {
+            return;
+        }
     }
     float found[4 * TONEMAP_GROUPS][SPAN];
     for (uint group = 0u; group < groups; ++group) {

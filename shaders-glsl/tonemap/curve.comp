@@ -6,14 +6,14 @@
 #include "lib/tonemap_ashikhmin.glsl"
 #include "lib/tonemap_curves.glsl"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+// An invocation has a column of TONEMAP_CURVE_ROWS pixels.
+layout(local_size_x = 64) in;
 
 layout(constant_id = 0) const uint OPERATOR = 0;
 layout(constant_id = 1) const uint GLOBAL = 0;
 
 layout(binding = 0) uniform sampler2D color;
-layout(binding = 1) uniform sampler2D luminance;
-layout(binding = 2) uniform sampler2D adaptation;  // local adaptation; of the bilateral operator, the base
+layout(binding = 2) uniform sampler2D adaptation;  // local adaptation; of the bilateral operator, the base; not read where GLOBAL
 layout(binding = 3, scalar) readonly buffer Statistics { TonemapStatistics statistics; };
 layout(binding = 4, rgba32f) uniform writeonly image2D mapped;
 
@@ -32,10 +32,11 @@ float extended_reinhard(float l, float largest) {
     return (1.0 + l / largest / largest) * l / (1.0 + l);
 }
 
-float display_luminance(float l, float a) {
+// `range`: Ashikhmin, of the whole picture.
+float display_luminance(float l, float a, float range) {
     TonemapStatistics s = statistics;
     if (OPERATOR == TONEMAP_ASHIKHMIN) {
-        return ashikhmin_display(l * s.scale, a * s.scale, s.low * s.scale, s.high * s.scale, display) / display;
+        return ashikhmin_display(l * s.scale, a * s.scale, s.low * s.scale, s.high * s.scale, range, display) / display;
     }
     if (OPERATOR == TONEMAP_REINHARD) {
         float factor = key / s.log_average;
@@ -49,8 +50,8 @@ float display_luminance(float l, float a) {
         const float decade = 0.30102999566;  // log10(2)
         float top = decade * log2(max(s.high, TONEMAP_SMALLEST));
         float bottom = max(decade * log2(max(s.low, TONEMAP_SMALLEST)), top - 4.0);
-        float range = top - bottom;
-        float gamma = range > 0.0 ? min(log_contrast / range, 1.0) : 1.0;
+        float decades = top - bottom;
+        float gamma = decades > 0.0 ? min(log_contrast / decades, 1.0) : 1.0;
         float whole = decade * log2(max(l, max(1e-6 * s.high, TONEMAP_SMALLEST)));
         float base = GLOBAL != 0u ? whole : decade * log2(max(a, max(1e-6 * s.high, TONEMAP_SMALLEST)));
         return exp2((gamma * (base - top) + detail * (whole - base)) / decade);
@@ -59,13 +60,9 @@ float display_luminance(float l, float a) {
     return extended_reinhard(l * s.scale, max(largest, TONEMAP_SMALLEST));
 }
 
-void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(pixel, imageSize(mapped)))) {
-        return;
-    }
+void shade(ivec2 pixel, float range) {
     vec4 texel = texelFetch(color, pixel, 0);
-    vec3 rgb = exposure * tonemap_clean(texel.rgb);
+    precise vec3 rgb = exposure * tonemap_clean(texel.rgb);
     vec3 result;
     if (OPERATOR == TONEMAP_LINEAR || OPERATOR >= TONEMAP_ACES) {
         rgb *= statistics.scale;
@@ -74,12 +71,28 @@ void main() {
                : OPERATOR == TONEMAP_AGX    ? tonemap_agx(rgb)
                                             : tonemap_neutral(rgb);
     } else {
-        float l = texelFetch(luminance, pixel, 0).r;
-        float a = texelFetch(adaptation, pixel, 0).r;
-        float shown = l > 0.0 ? max(display_luminance(l, a), 0.0) : 0.0;
+        float l = tonemap_luminance(rgb);
+        float a = GLOBAL != 0u ? l : texelFetch(adaptation, pixel, 0).r;
+        float shown = l > 0.0 ? max(display_luminance(l, a, range), 0.0) : 0.0;
         // Ratios below 1e-30 in l were set to 0 above, so this is finite.
         vec3 ratio = l > 0.0 ? rgb / l : vec3(0.0);
         result = shown * (saturation == 1.0 ? ratio : pow(ratio, vec3(saturation)));
     }
     imageStore(mapped, pixel, vec4(result, texel.a));
+}
+
+void main() {
+    ivec2 extent = imageSize(mapped);
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.x, gl_GlobalInvocationID.y * TONEMAP_CURVE_ROWS);
+    if (any(greaterThanEqual(pixel, extent))) {
+        return;
+    }
+    float range = 0.0;
+    if (OPERATOR == TONEMAP_ASHIKHMIN) {
+        range = ashikhmin_range(statistics.low * statistics.scale, statistics.high * statistics.scale);
+    }
+    int end = min(pixel.y + int(TONEMAP_CURVE_ROWS), extent.y);
+    for (; pixel.y < end; ++pixel.y) {
+        shade(pixel, range);
+    }
 }

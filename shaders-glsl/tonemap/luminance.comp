@@ -5,9 +5,10 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/tonemap.glsl"
 
-// An invocation has a column of ROWS pixels.
+// An invocation has a column of TONEMAP_ROWS pixels.
 layout(local_size_x = 64) in;
-const int ROWS = 16;
+// The logarithms of so many pixels have a sum of 32 bits.
+const int PART = 16;
 
 layout(binding = 0) uniform sampler2D color;
 layout(binding = 1, r32f) uniform writeonly image2D luminance;
@@ -39,14 +40,19 @@ uvec2 add64(uvec2 a, uvec2 b) {
 void main() {
     ivec2 extent = imageSize(luminance);
     uint lane = gl_LocalInvocationIndex;
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.x, gl_GlobalInvocationID.y * ROWS);
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.x, gl_GlobalInvocationID.y * TONEMAP_ROWS);
     uint least = 0xFFFFFFFFu;
     uint largest = 0u;
     uvec2 sum = uvec2(0u);
     uint lit = 0u;
     if (pixel.x < extent.x) {
-        int end = min(pixel.y + ROWS, extent.y);
+        int end = min(pixel.y + int(TONEMAP_ROWS), extent.y);
+        uint part = 0u;
         for (; pixel.y < end; ++pixel.y) {
+            if (pixel.y % PART == 0) {
+                sum = add64(sum, uvec2(part, 0u));
+                part = 0u;
+            }
             precise vec3 exposed = exposure * tonemap_clean(texelFetch(color, pixel, 0).rgb);
             float l = tonemap_luminance(exposed);
             imageStore(luminance, pixel, vec4(l));
@@ -56,23 +62,27 @@ void main() {
                 largest = max(largest, bits);
                 if (bits != 0u) {
                     int fixed_log = int(roundEven(log2(1e-6 + l) * 1048576.0));
-                    sum = add64(sum, uvec2(uint(fixed_log + (152 << 20)), 0u));
+                    part += uint(fixed_log + (152 << 20));
                     ++lit;
                 }
             }
         }
+        sum = add64(sum, uvec2(part, 0u));
     }
     group_least[lane] = least;
     group_largest[lane] = largest;
     group_sum[lane] = sum;
     group_lit[lane] = lit;
     barrier();
-    for (uint half_size = 32u; half_size > 0u; half_size >>= 1) {
-        if (lane < half_size) {
-            group_least[lane] = min(group_least[lane], group_least[lane + half_size]);
-            group_largest[lane] = max(group_largest[lane], group_largest[lane + half_size]);
-            group_sum[lane] = add64(group_sum[lane], group_sum[lane + half_size]);
-            group_lit[lane] += group_lit[lane + half_size];
+    // Eight by eight: few barriers, which CPUs wait long at.
+    for (uint step = 1u; step < 64u; step *= 8u) {
+        if (lane % (8u * step) == 0u) {
+            for (uint i = lane + step; i < lane + 8u * step; i += step) {
+                group_least[lane] = min(group_least[lane], group_least[i]);
+                group_largest[lane] = max(group_largest[lane], group_largest[i]);
+                group_sum[lane] = add64(group_sum[lane], group_sum[i]);
+                group_lit[lane] += group_lit[i];
+            }
         }
         barrier();
     }

@@ -33,7 +33,7 @@ pub fn adaptation(
             let args = literal::Args { luminance, search, weights, statistics, adaptation };
             graph.compute(args, graph.extent(luminance));
         }
-        Local::Fast => fast(graph, luminance, statistics, &search, adaptation),
+        Local::Fast => fast(graph, luminance, importance, statistics, &search, adaptation),
         Local::Pyramid => pyramid::adapt(graph, luminance, importance, statistics, settings, &search, adaptation)?,
     }
     Ok(adaptation)
@@ -74,7 +74,14 @@ fn bands(extent: Extent, reach: u32, groups: u32) -> Vec<Band> {
 }
 
 /// Averages along rows, then along columns, band by band.
-fn fast(graph: &mut Graph, luminance: Image, statistics: Buffer, search: &Search, adaptation: Image) {
+fn fast(
+    graph: &mut Graph,
+    luminance: Image,
+    importance: Option<Image>,
+    statistics: Buffer,
+    search: &Search,
+    adaptation: Image,
+) {
     let extent = graph.extent(luminance);
     let (groups, radius) = (search.groups() as u32, search.group_radii());
     let bands = bands(extent, search.reach() as u32, groups);
@@ -87,7 +94,17 @@ fn fast(graph: &mut Graph, luminance: Image, statistics: Buffer, search: &Search
         let push = rows::Push { first, count, groups, radius };
         graph.compute(rows::Args { luminance, kernels, rows, push }, [extent.width.div_ceil(SPAN), band.count]);
         let push = columns::Push { first, count, begin, end, groups, radius };
-        let args = columns::Args { luminance, search, kernels, rows, statistics, adaptation, push };
+        let args = columns::Args {
+            luminance,
+            search,
+            kernels,
+            rows,
+            statistics,
+            importance: importance.unwrap_or(luminance),
+            adaptation,
+            push,
+            spec: columns::Spec { has_map: importance.is_some().into() },
+        };
         graph.compute(args, [extent.width, (band.end - band.begin).div_ceil(SPAN)]);
     }
 }

@@ -39,7 +39,8 @@ const DEPTH_DRAWN: f32 = 0.5;
 /// mode shows. `picture`: extent of the whole picture, of which `luminance` may be a part.
 ///
 /// By definition, Gaussian averages are computed for the important pixels alone, and so is the bilateral filter both ways. Averages along
-/// rows and columns ([`Local::Fast`]) share work between neighbours: they are computed for all pixels, and taken for the important ones.
+/// rows ([`Local::Fast`]) and of halved pictures ([`Local::Pyramid`]) share work between neighbours: they are computed for all pixels; what
+/// follows from them, in blocks that have an important one.
 ///
 /// # Errors
 /// `Usage` if the settings cannot serve a picture of this extent.

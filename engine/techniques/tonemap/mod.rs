@@ -144,19 +144,12 @@ fn map(
             mark::adapt(graph, luminance, importance, statistics, picture, settings)?
         }
     };
-    let mapped = curve(graph, input.color, luminance, adaptation, statistics, settings);
+    let mapped = curve(graph, input.color, adaptation, statistics, settings);
     Ok(Output { mapped, luminance, adaptation, statistics, important })
 }
 
 /// The curve of the operator for every pixel.
-pub fn curve(
-    graph: &mut Graph,
-    color: Image,
-    luminance: Image,
-    adaptation: Image,
-    statistics: Buffer,
-    settings: &Settings,
-) -> Image {
+pub fn curve(graph: &mut Graph, color: Image, adaptation: Image, statistics: Buffer, settings: &Settings) -> Image {
     let extent = graph.extent(color);
     let mapped = graph.image("tonemap.mapped", Format::RGBA32F, extent);
     let operator = match settings.operator {
@@ -179,8 +172,8 @@ pub fn curve(
         saturation: settings.saturation,
     };
     let spec = curve::Spec { operator, global: (settings.mode() == Mode::Global).into() };
-    let args = curve::Args { color, luminance, adaptation, statistics, mapped, push, spec };
-    graph.compute(args, extent);
+    let args = curve::Args { color, adaptation, statistics, mapped, push, spec };
+    graph.compute(args, [extent.width, extent.height.div_ceil(consts::TONEMAP_CURVE_ROWS)]);
     mapped
 }
 

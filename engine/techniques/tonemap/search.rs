@@ -143,12 +143,8 @@ impl Search {
 
     /// Largest radius of each group of four; 0 for groups that are not there.
     pub fn group_radii(&self) -> [i32; 6] {
-        Self::group_radii_of(&self.gaussians)
-    }
-
-    pub(super) fn group_radii_of(kernels: &[Kernel]) -> [i32; 6] {
         let mut radii = [0; 6];
-        for (radius, group) in radii.iter_mut().zip(kernels.chunks(4)) {
+        for (radius, group) in radii.iter_mut().zip(self.gaussians.chunks(4)) {
             *radius = group.iter().map(|w| w.len() as i32 - 1).max().unwrap_or(0);
         }
         radii

@@ -3,7 +3,10 @@
 use super::Settings;
 use crate::{
     graph::{Buffer, Extent, Format, Graph, Image},
-    shaders::tonemap::{finish, histogram, luminance, select},
+    shaders::{
+        consts,
+        tonemap::{finish, histogram, luminance, select},
+    },
 };
 
 /// A part of an image: first pixel, and last pixel inside.
@@ -45,7 +48,10 @@ pub fn luminance(graph: &mut Graph, color: Image, part: Rectangle, sums: Buffer,
     let extent = graph.extent(color);
     let luminance = graph.image("tonemap.luminance", Format::R32F, extent);
     let push = luminance::Push { first: part.first, last: part.last, exposure: settings.exposure.exp2() };
-    graph.compute(luminance::Args { color, luminance, sums, push }, [extent.width, extent.height.div_ceil(16)]);
+    graph.compute(
+        luminance::Args { color, luminance, sums, push },
+        [extent.width, extent.height.div_ceil(consts::TONEMAP_ROWS)],
+    );
     luminance
 }
 

@@ -147,8 +147,8 @@ impl Still {
             let input = self.input(&mut graph, &source, &tile)?;
             let output = self.tonemap.frame(&mut graph, input, dt)?;
             let (mapped, found) = (graph.read_image(output.mapped), graph.read_buffer(output.statistics));
-            let frame = self.runner.run(&graph)?;
-            (frame.image(mapped).to_f32(), statistics_of(&frame.buffer(found)))
+            let mut frame = self.runner.run(&graph)?;
+            (frame.take_image(mapped).to_f32(), statistics_of(&frame.buffer(found)))
         } else {
             self.tiled(width, height, &source, dt)?
         };
@@ -221,9 +221,9 @@ impl Still {
             let imported = graph.import_buffer(result);
             let output: Output = map(&mut graph, &input, luminance, imported, picture, &settings)?;
             let (mapped, found) = (graph.read_image(output.mapped), graph.read_buffer(output.statistics));
-            let frame: Frame = self.runner.run(&graph)?;
+            let mut frame: Frame = self.runner.run(&graph)?;
             statistics = statistics_of(&frame.buffer(found));
-            let mapped = frame.image(mapped).to_f32();
+            let mapped = frame.take_image(mapped).to_f32();
             let [x, y, w, h] = tile.core.map(|v| v as usize);
             let [from_x, from_y, stride, _] = tile.whole.map(|v| v as usize);
             for row in 0..h {

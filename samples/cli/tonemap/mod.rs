@@ -61,6 +61,51 @@ struct Run<'a> {
 /// A picture that was read, and how long that took.
 type Loaded = (Result<Layers>, Duration);
 
+/// What writes the files of a picture.
+type Writer<'scope> = std::thread::ScopedJoinHandle<'scope, Result<(Vec<String>, Duration)>>;
+
+fn join(writer: Writer<'_>) -> Result<(Vec<String>, Duration)> {
+    writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+}
+
+/// What became of the pictures.
+struct Results {
+    console: Console,
+    progress: Progress,
+    done: Vec<Done>,
+    failed: Vec<(String, Error)>,
+    /// The sequence that is being worked on lacks a frame.
+    lost: bool,
+}
+
+impl Results {
+    fn new(args: &TonemapArgs, console: Console, count: usize) -> Self {
+        let progress = Progress::new(args.progress, console.is_quiet(), count as u64);
+        Self { console, progress, done: Vec::new(), failed: Vec::new(), lost: false }
+    }
+
+    /// # Errors
+    /// What concerns all pictures.
+    fn take(&mut self, input: &Input, result: Result<Done>) -> Result<()> {
+        match result {
+            Ok(done) => {
+                self.progress.named(&input.name, done.milliseconds(), &done.files);
+                self.done.push(done);
+            }
+            Err(error) if matches!(error.kind(), ErrorKind::DeviceLost | ErrorKind::OutOfMemory) => {
+                return Err(error.in_file(&input.name));
+            }
+            Err(error) => {
+                let error = error.in_file(&input.name);
+                self.console.error(&error);
+                self.lost = input.sequence.is_some();
+                self.failed.push((input.name.clone(), error));
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Tone maps all pictures.
 ///
 /// # Errors
@@ -79,15 +124,9 @@ pub fn run(args: &TonemapArgs, console: Console) -> Result<ExitCode> {
         run.mask = Some(image::read(path, &LIMITS)?);
     }
     let interrupt = Interrupt::install();
-    let gpu = Gpu::new(args.device.options()?)?;
-    let about = gpu.describe().clone();
-    console.info(&format!("lucerna {}, {about}", program::VERSION));
-    let mut still = Still::new(&gpu, &run.config.tonemap)?;
-    let mut progress = Progress::new(args.progress, console.is_quiet(), inputs.len() as u64);
-
-    let (mut done, mut failed): (Vec<Done>, Vec<(String, Error)>) = (Vec::new(), Vec::new());
-    std::thread::scope(|scope| -> Result<()> {
-        // The next picture is read while this one is worked on; no more, for memory's sake.
+    let mut results = Results::new(args, console, inputs.len());
+    let about = std::thread::scope(|scope| -> Result<Description> {
+        // The next picture is read while this one is worked on; no more, for memory's sake. The first is read while the device starts.
         let (sender, pictures) = mpsc::sync_channel::<Loaded>(0);
         let list = &inputs;
         scope.spawn(move || {
@@ -100,44 +139,52 @@ pub fn run(args: &TonemapArgs, console: Console) -> Result<ExitCode> {
                 }
             }
         });
-        let mut lost = false;
+        let gpu = Gpu::new(args.device.options()?)?;
+        let about = gpu.describe().clone();
+        console.info(&format!("lucerna {}, {about}", program::VERSION));
+        let mut still = Still::new(&gpu, &run.config.tonemap)?;
+        // The picture before, whose files are written while this one is worked on.
+        let mut writing: Option<(&Input, Done, Writer<'_>)> = None;
         for input in &inputs {
             if interrupt.requested() {
                 break;
             }
             let Ok((picture, reading)) = pictures.recv() else { break };
             // A sequence without one of its frames would adapt to what nobody sees.
-            lost &= input.sequence == Some(false);
-            if lost {
+            results.lost &= input.sequence == Some(false);
+            if results.lost {
                 continue;
             }
             let begun = Instant::now();
-            let result = picture.and_then(|picture| {
+            let mapped = picture.and_then(|picture| {
                 if input.sequence == Some(true) {
                     still.tonemap().reset()?;
                 }
                 run.develop(&mut still, &about, input, picture)
             });
-            match result {
-                Ok(mut one) => {
-                    one.reading = reading;
-                    let milliseconds = (begun.elapsed() + reading).as_secs_f64() * 1e3;
-                    progress.named(&input.name, milliseconds, &one.files);
-                    done.push(one);
+            if let Some((before, done, writer)) = writing.take() {
+                results.take(before, join(writer).map(|written| done.with(written)))?;
+                // What failed may be of another sequence.
+                results.lost &= input.sequence == Some(false);
+            }
+            match mapped {
+                Ok((mut done, unwritten)) => {
+                    (done.reading, done.working) = (reading, begun.elapsed());
+                    if unwritten.is_small() {
+                        writing = Some((input, done, scope.spawn(move || unwritten.write())));
+                    } else {
+                        results.take(input, unwritten.write().map(|written| done.with(written)))?;
+                    }
                 }
-                Err(error) if matches!(error.kind(), ErrorKind::DeviceLost | ErrorKind::OutOfMemory) => {
-                    return Err(error.in_file(&input.name));
-                }
-                Err(error) => {
-                    let error = error.in_file(&input.name);
-                    console.error(&error);
-                    lost = input.sequence.is_some();
-                    failed.push((input.name.clone(), error));
-                }
+                Err(error) => results.take(input, Err(error))?,
             }
         }
-        Ok(())
+        if let Some((input, done, writer)) = writing {
+            results.take(input, join(writer).map(|written| done.with(written)))?;
+        }
+        Ok(about)
     })?;
+    let Results { progress, done, failed, .. } = results;
     progress.finish();
     if args.json {
         console::print_json(&json_of(&run, &about, &done, &failed, inputs.len())?)?;

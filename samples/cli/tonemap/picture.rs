@@ -9,7 +9,7 @@ use std::{
 use lucerna::{
     Error, ErrorKind, Result,
     gpu::Description,
-    image::{self, Format, Layer, Layers, Metadata},
+    image::{self, Format, Layer, Layers, Metadata, WriteOptions},
     techniques::tonemap::{BadCounts, BadValues, Mapped, Mode, Settings, Still},
 };
 use serde_json::{Value, json};
@@ -34,8 +34,45 @@ pub(super) struct Done {
     over_white: u64,
     pub reading: Duration,
     mapping: Duration,
-    writing: Duration,
+    /// All of it but reading and writing.
+    pub working: Duration,
+    pub writing: Duration,
 }
+
+/// A mapped picture, and the files that it goes to.
+#[derive(Debug)]
+pub(super) struct Unwritten {
+    files: Vec<(String, Format)>,
+    layers: Layers,
+    options: WriteOptions,
+}
+
+impl Unwritten {
+    /// Writes all files. What was written, and how long that took.
+    pub(super) fn write(self) -> Result<(Vec<String>, Duration)> {
+        let begun = Instant::now();
+        for (name, format) in &self.files {
+            if name == PIPE {
+                let (bytes, _) = image::encode(*format, &self.layers, &self.options)?;
+                let mut out = std::io::stdout().lock();
+                out.write_all(&bytes).and_then(|()| out.flush()).map_err(|error| {
+                    Error::new(ErrorKind::Output, "could not write to standard output").caused_by(error)
+                })?;
+            } else {
+                image::write(Path::new(name), &self.layers, &self.options)?;
+            }
+        }
+        Ok((self.files.into_iter().map(|(name, _)| name).collect(), begun.elapsed()))
+    }
+
+    /// Small enough to be kept while the next picture is worked on.
+    pub(super) fn is_small(&self) -> bool {
+        u64::from(self.layers.width) * u64::from(self.layers.height) <= KEPT_PIXELS
+    }
+}
+
+/// Pixels of the largest picture that is written while the next one is worked on.
+const KEPT_PIXELS: u64 = 1 << 25;
 
 /// As `--mode` takes it.
 pub(super) fn mode_name(settings: &Settings) -> &'static str {
@@ -68,14 +105,14 @@ pub(super) fn pixels(picture: &Layers, asked: Option<&str>) -> Result<(Vec<[f32;
 }
 
 impl Run<'_> {
-    /// Maps a picture and writes its files.
+    /// Maps a picture; what is left is to write its files.
     pub(super) fn develop(
         &mut self,
         still: &mut Still,
         about: &Description,
         input: &Input,
         mut picture: Layers,
-    ) -> Result<Done> {
+    ) -> Result<(Done, Unwritten)> {
         let begun = Instant::now();
         let (width, height) = (picture.width, picture.height);
         let (pixels, alpha) = pixels(&picture, input.layer.as_deref())?;
@@ -98,7 +135,6 @@ impl Run<'_> {
         }
         let mapping = begun.elapsed();
 
-        let begun = Instant::now();
         let over = |pixel: &&[f32; 4]| pixel[..3].iter().any(|&v| v > 1.0);
         let over_white = mapped.pixels.iter().filter(over).count() as u64;
         let (bad, s) = (mapped.bad, mapped.statistics);
@@ -106,28 +142,26 @@ impl Run<'_> {
             metadata: self.metadata(about, input, &picture, &settings)?,
             ..Layers::new(width, height).with(layer_of(mapped, alpha))
         };
-        let mut files = Vec::new();
-        for (name, format) in self.files(input) {
-            if alpha && format == Format::Jpeg {
-                self.console.detail(&format!("{name}: .jpg holds no alpha; the picture is shown over black"));
-            }
-            self.write(&name, format, &layers)?;
-            files.push(name);
+        let files = self.files(input);
+        for (name, _) in files.iter().filter(|(_, format)| alpha && *format == Format::Jpeg) {
+            self.console.detail(&format!("{name}: .jpg holds no alpha; the picture is shown over black"));
         }
-        Ok(Done {
+        let done = Done {
             input: input.name.clone(),
             frame: input.sequence.map(|_| input.frame),
             size: [width, height],
             alpha,
-            files,
+            files: Vec::new(),
             bad,
             exposure: settings.exposure,
             light: [s.low, s.high, s.log_average],
             over_white,
             reading: Duration::ZERO,
             mapping,
-            writing: begun.elapsed(),
-        })
+            working: Duration::ZERO,
+            writing: Duration::ZERO,
+        };
+        Ok((done, Unwritten { files, layers, options: self.write_options() }))
     }
 
     /// The settings of a picture: with the exposure that was measured, if that was asked for.
@@ -144,19 +178,6 @@ impl Run<'_> {
         self.console.detail(&format!("{}: measured exposure {metered:+.2} EV", input.name));
         settings.exposure = (settings.exposure + metered).clamp(-40.0, 40.0);
         settings
-    }
-
-    fn write(&self, name: &str, format: Format, layers: &Layers) -> Result<()> {
-        let options = self.write_options();
-        if name == PIPE {
-            let (bytes, _) = image::encode(format, layers, &options)?;
-            let mut out = std::io::stdout().lock();
-            return out
-                .write_all(&bytes)
-                .and_then(|()| out.flush())
-                .map_err(|error| Error::new(ErrorKind::Output, "could not write to standard output").caused_by(error));
-        }
-        image::write(Path::new(name), layers, &options).map(drop)
     }
 
     fn mask(&self, width: u32, height: u32) -> Result<Option<Vec<f32>>> {
@@ -224,6 +245,16 @@ fn layer_of(mapped: Mapped, alpha: bool) -> Layer {
 }
 
 impl Done {
+    /// With the files that were written, and how long that took.
+    pub(super) fn with(self, (files, writing): (Vec<String>, Duration)) -> Self {
+        Self { files, writing, ..self }
+    }
+
+    /// From the file to the files, on whatever thread.
+    pub(super) fn milliseconds(&self) -> f64 {
+        (self.reading + self.working + self.writing).as_secs_f64() * 1e3
+    }
+
     pub(super) fn json(&self) -> Value {
         let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
         let finite = |value: f32| value.is_finite().then_some(value);
