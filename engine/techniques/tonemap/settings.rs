@@ -144,7 +144,9 @@ pub enum BadValues {
 /// Definitions that all operators share: luminance is 0.2126 R + 0.7152 G + 0.0722 B of linear Rec. 709, after the exposure; below 10⁻³⁰ it is
 /// 0, above 10¹⁸ it is 10¹⁸. Colour is scaled by L_d / L; alpha is kept. Samples outside of the image are those of its edge.
 /// The log-average is exp of the mean of ln(10⁻⁶ + L) over the pixels that are not black (the papers count them: a black background then
-/// makes everything else too bright); 10⁻⁶ if all are. A display luminance below 0 is 0; the result is relative to the display's white, and may be over 1.
+/// makes everything else too bright); 10⁻⁶ if all are. The brightest luminance of a picture is white to the global operators, also where it
+/// is the only one: a picture of one luminance is white by Ashikhmin's and the bilateral operator (0 counts as its L_min) and by Reinhard's
+/// global curve without [`Settings::white`]; by Reinhard's local one it is key / (1 + key). A black picture stays black. A display luminance below 0 is 0; the result is relative to the display's white, and may be over 1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
