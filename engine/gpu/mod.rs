@@ -37,6 +37,7 @@ mod memory;
 mod options;
 mod pipeline;
 mod poison;
+mod queries;
 mod sampler;
 mod select;
 mod statistics;

@@ -5,7 +5,7 @@
 //! "Watertight Ray/Triangle Intersection", JCGT 2013, with box tests padded as in Ize, "Robust BVH Ray Traversal", JCGT 2013.
 
 use super::{Pose, Scene, deform::world_vertices};
-use glam::{DVec3, Vec3};
+use glam::{BVec3A, DVec3, Vec3, Vec3A};
 use obvhs::{Boundable, BvhBuildParams, aabb::Aabb, bvh2::Bvh2, bvh2::builder::build_bvh2};
 use std::time::Duration;
 
@@ -161,12 +161,9 @@ impl Bvh {
             return;
         }
         let frame = Frame::new(ray);
-        let inverse = ray.direction.recip();
+        let slabs = Slabs::new(ray);
         let mut t_max = ray.t_max;
-        let enters = |index: u32, t_max: f32| {
-            let aabb = self.tree.nodes[index as usize].aabb();
-            enter(aabb.min.into(), aabb.max.into(), ray, inverse, t_max)
-        };
+        let enters = |index: u32, t_max: f32| slabs.enter(self.tree.nodes[index as usize].aabb(), t_max);
         let mut stack = Stack::default();
         if let Some(near) = enters(0, t_max) {
             stack.push((0, near));
@@ -279,18 +276,32 @@ impl Stack {
     }
 }
 
-/// Where the ray enters a box, or nothing when it misses it. A NaN (the ray lies in a face: 0 · ∞) keeps the other bound.
-fn enter(min: Vec3, max: Vec3, ray: &Ray, inverse: Vec3, t_max: f32) -> Option<f32> {
-    let (a, b) = ((min - ray.origin) * inverse, (max - ray.origin) * inverse);
-    let (mut near, mut far) = (ray.t_min, t_max);
-    for axis in 0..3 {
-        let (lo, hi) = if inverse[axis] < 0.0 { (b[axis], a[axis]) } else { (a[axis], b[axis]) };
-        near = if lo > near { lo } else { near };
-        // Ize: two units in the last place more make the far bound safe against rounding.
-        let hi = hi * (1.0 + 4.0 * f32::EPSILON);
-        far = if hi < far { hi } else { far };
+/// A ray as boxes are tested with it.
+struct Slabs {
+    origin: Vec3A,
+    inverse: Vec3A,
+    backwards: BVec3A,
+    t_min: Vec3A,
+}
+
+impl Slabs {
+    fn new(ray: &Ray) -> Self {
+        let inverse = Vec3A::from(ray.direction.recip());
+        let backwards = inverse.cmplt(Vec3A::ZERO);
+        Self { origin: ray.origin.into(), inverse, backwards, t_min: Vec3A::splat(ray.t_min) }
     }
-    (near <= far).then_some(near)
+
+    /// Where the ray enters a box, or nothing when it misses it. A NaN (the ray lies in a face: 0 · ∞) keeps the other bound, as
+    /// comparisons do; what minimum and maximum do, processors do not agree on.
+    fn enter(&self, aabb: &Aabb, t_max: f32) -> Option<f32> {
+        let (a, b) = ((aabb.min - self.origin) * self.inverse, (aabb.max - self.origin) * self.inverse);
+        let (lo, hi) = (Vec3A::select(self.backwards, b, a), Vec3A::select(self.backwards, a, b));
+        let near = Vec3A::select(lo.cmpgt(self.t_min), lo, self.t_min).max_element();
+        // Ize: two units in the last place more make the far bound safe against rounding.
+        let (hi, t_max) = (hi * (1.0 + 4.0 * f32::EPSILON), Vec3A::splat(t_max));
+        let far = Vec3A::select(hi.cmplt(t_max), hi, t_max).min_element();
+        (near <= far).then_some(near)
+    }
 }
 
 /// The ray's shear to the +z axis (Woop, Benthin and Wald 2013).

@@ -1,5 +1,6 @@
 //! The papers' methods, one module each.
 
+pub(crate) mod allowed;
 pub mod igi;
 pub mod isr;
 pub mod tonemap;

@@ -1,6 +1,7 @@
 //! What can be chosen in instant global illumination, and what the paper chose.
 
-use crate::{Error, Result};
+use super::super::allowed::within;
+use crate::Result;
 use serde::{Deserialize, Serialize};
 
 /// How rays are traced.
@@ -117,35 +118,22 @@ impl Settings {
     /// # Errors
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
-        let wrong = |key: &str, found: String, allowed: &str| {
-            Err(Error::usage(format!("{found} is not allowed; allowed: {allowed}")).at(key))
-        };
-        for (key, value, least, most) in [
+        within([
             ("vpls", self.vpls, 1, 10_000),
             ("bounces", self.bounces, 1, 8),
             ("downsample", self.downsample, 1, 4),
             ("interleave", self.interleave, 1, 4),
             ("specular_depth", self.specular_depth, 0, 16),
             ("direct_samples", self.direct_samples, 1, 4096),
-        ] {
-            if !(least..=most).contains(&value) {
-                return wrong(key, value.to_string(), &format!("{least} to {most}"));
-            }
-        }
-        for (key, value, least, most) in [
+        ])?;
+        within([
             ("bound", self.bound, 0.0, 1.0),
             ("upsample_sigma", self.upsample_sigma, 0.1, 4.0),
             ("upsample_normal", self.upsample_normal, 0.0, 64.0),
             ("upsample_range", self.upsample_range, 0.0, 1e6),
             ("discontinuity_depth", self.discontinuity_depth, 0.0, 1e6),
             ("discontinuity_normal", self.discontinuity_normal, -1.0, 1.0),
-        ] {
-            // Written so that a value that is not a number is refused.
-            if !(least..=most).contains(&value) {
-                return wrong(key, value.to_string(), &format!("{least} to {most}"));
-            }
-        }
-        Ok(())
+        ])
     }
 }
 

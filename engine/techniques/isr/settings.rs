@@ -1,5 +1,6 @@
 //! What can be chosen in image-space radiosity, and what the dissertation chose.
 
+use super::super::allowed::{within, wrong};
 use crate::{Error, Result, passes::direct::Direct};
 use serde::{Deserialize, Serialize};
 
@@ -347,13 +348,10 @@ impl Settings {
     /// # Errors
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
-        let wrong = |key: &str, found: String, allowed: &str| {
-            Err(Error::usage(format!("{found} is not allowed; allowed: {allowed}")).at(key))
-        };
         if ![24, 48, 80].contains(&self.samples) {
-            return wrong("samples", self.samples.to_string(), "24, 48, 80");
+            return wrong("samples", self.samples, "24, 48, 80");
         }
-        for (key, value, least, most) in [
+        within([
             ("bounces", self.bounces, 1, 4),
             ("layers", self.layers, 1, 4),
             ("cameras", self.cameras, 0, 4),
@@ -361,12 +359,8 @@ impl Settings {
             ("sender_samples", self.sender_samples, 8, 96),
             ("visibility_steps", self.visibility_steps, 0, 16),
             ("blur_radius", self.blur_radius, 0, 16),
-        ] {
-            if !(least..=most).contains(&value) {
-                return wrong(key, value.to_string(), &format!("{least} to {most}"));
-            }
-        }
-        for (key, value, least, most) in [
+        ])?;
+        within([
             ("reach", self.reach, 0.0, 16384.0),
             ("border", self.border, 0.0, 4.0),
             ("spread", self.spread, 1.0, 4.0),
@@ -380,12 +374,7 @@ impl Settings {
             ("k_ssao", self.k_ssao, 0.0, 1.0),
             ("light_radius", self.light_radius, 0.0, 1e9),
             ("light_power", self.light_power, 0.0, 1e9),
-        ] {
-            // Written so that a value that is not a number is refused.
-            if !(least..=most).contains(&value) {
-                return wrong(key, value.to_string(), &format!("{least} to {most}"));
-            }
-        }
+        ])?;
         Ok(())
     }
 }

@@ -1,7 +1,8 @@
 //! What can be chosen in tone mapping.
 
+use super::super::allowed::{within, wrong};
 use super::identify;
-use crate::{Error, Result};
+use crate::Result;
 use serde::{Deserialize, Serialize};
 
 /// How luminances become display luminances. L is the luminance of a pixel after [`Settings::exposure`], L_a its local adaptation,
@@ -290,24 +291,17 @@ impl Settings {
     /// # Errors
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
-        let wrong = |key: &str, found: String, allowed: &str| {
-            Err(Error::usage(format!("{found} is not allowed; allowed: {allowed}")).at(key))
-        };
         if let Some(mode) = self.mode.filter(|m| *m != Mode::Global && !self.operator.has_local()) {
             let mode = if mode == Mode::Local { "local" } else { "selective" };
             let allowed =
                 format!("global, for the operator {} is a curve without local component", self.operator.name());
-            return wrong("mode", mode.into(), &allowed);
+            return wrong("mode", mode, &allowed);
         }
         if ![1, 2, 4].contains(&self.identify_scale) {
-            return wrong("identify_scale", self.identify_scale.to_string(), "1, 2, 4");
+            return wrong("identify_scale", self.identify_scale, "1, 2, 4");
         }
-        for (key, value, least, most) in [("radius", self.radius, 1, 16), ("scales", self.scales, 1, 8)] {
-            if !(least..=most).contains(&value) {
-                return wrong(key, value.to_string(), &format!("{least} to {most}"));
-            }
-        }
-        for (key, value, least, most) in [
+        within([("radius", self.radius, 1, 16), ("scales", self.scales, 1, 8)])?;
+        within([
             ("exposure", self.exposure, -40.0, 40.0),
             ("percentile", self.percentile, 0.0, 49.0),
             ("display", self.display, 1.0, 1e5),
@@ -325,12 +319,7 @@ impl Settings {
             ("adapt_up", self.adapt_up, 0.0, 3600.0),
             ("adapt_down", self.adapt_down, 0.0, 3600.0),
             ("adapt_limit", self.adapt_limit, 0.0, 1e6),
-        ] {
-            // Written so that a value that is not a number is refused.
-            if !(least..=most).contains(&value) {
-                return wrong(key, value.to_string(), &format!("{least} to {most}"));
-            }
-        }
+        ])?;
         Ok(())
     }
 }
