@@ -40,6 +40,14 @@ struct Vpl {
     uint path;
 };
 
+// A visible surface that candidates for virtual lights are judged by.
+struct SeenPoint {
+    vec3 position; // metres
+    float gap;     // step off the surface, metres
+    vec3 normal;
+    float weight;  // 0: nothing is seen there
+};
+
 // Smooth step of Marques and Santos, section 4: 0 up to 0.8 least, 1 from 1.2 least on.
 float vpl_bound(float least, float distance) {
     if (least <= 0.0) return 1.0;

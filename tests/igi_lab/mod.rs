@@ -61,7 +61,7 @@ impl<'a> Studio<'a> {
 
 /// Diffuse light alone, no bound, one bounce.
 pub fn plain(vpls: u32) -> Settings {
-    Settings { vpls, bounces: 1, bound: 0.0, specular: false, direct_samples: 4, ..Settings::default() }
+    Settings { vpls, candidates: 1, bounces: 1, bound: 0.0, specular: false, direct_samples: 4, ..Settings::default() }
 }
 
 /// Mean of red, green and blue over the picture.

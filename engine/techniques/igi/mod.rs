@@ -13,6 +13,7 @@
 
 pub mod filters;
 pub mod halton;
+mod importance;
 mod picture;
 mod settings;
 pub mod starts;
@@ -79,8 +80,10 @@ struct Shared {
     light_nodes: Buffer,
     /// Shadow rays of a point.
     direct_rays: u32,
-    /// Metres.
+    /// min_d, metres.
     least: f32,
+    /// Of the scene's box, metres.
+    diagonal: f32,
     seed: u32,
 }
 
@@ -191,7 +194,7 @@ impl Igi {
             },
             low: low.to_array(),
             high: high.to_array(),
-            paths: settings.paths(),
+            paths: settings.paths() * settings.candidates,
             bounces: settings.bounces,
             specular_depth: settings.specular_depth,
             diffuse_only: (!settings.specular).into(),
@@ -215,13 +218,14 @@ impl Igi {
             light_nodes: graph.buffer_from("igi.light-nodes", &table.nodes),
             direct_rays: lights + (u32::from(table.tree) + u32::from(sky)) * settings.direct_samples,
             least: settings.bound * (high - low).length(),
+            diagonal: (high - low).length(),
             seed: graph.seed,
         }
     }
 
     /// Shoots the paths of light of a frame.
     fn shoot(&self, graph: &mut Graph, handles: &Handles, shared: &Shared, settings: &Settings) -> Vpls {
-        let paths = settings.paths();
+        let paths = settings.paths() * settings.candidates;
         let table = self.lights.as_ref().map(|(_, table)| table);
         let sided =
             |target: &types::LightTarget| self.double_sided.get(target.instance as usize).copied().unwrap_or(false);
@@ -233,7 +237,7 @@ impl Igi {
         let dimensions = (consts::VPL_FIRST_NUMBERS + 2 * settings.bounces) as usize;
         let numbers = halton::table(paths, dimensions, shared.seed);
         let count = paths * settings.bounces;
-        let vpls = Vpls { buffer: graph.buffer("igi.vpls", u64::from(count) * size_of::<types::Vpl>() as u64), count };
+        let vpls = Vpls { buffer: graph.buffer("igi.candidates", u64::from(count) * size_of::<types::Vpl>() as u64), count };
         let states = graph.buffer("igi.paths", u64::from(paths) * size_of::<types::VplPath>() as u64);
         graph.fill(vpls.buffer, 0);
         graph.fill(states, 0);

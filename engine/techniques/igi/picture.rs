@@ -62,6 +62,10 @@ impl Igi {
         let outputs = graph.scope("igi", |graph| {
             let shared = self.shared(graph, scene, pose, handles, igi);
             let vpls = igi.indirect.then(|| self.shoot(graph, handles, &shared, igi));
+            let vpls = match vpls {
+                Some(all) if igi.candidates > 1 => Some(self.choose(graph, &gbuffer, &shared, all, igi)),
+                _ => vpls,
+            };
             let direct = self.direct(graph, handles, &gbuffer, &shared);
             let gathered = self.gather(graph, &gbuffer, &shared, vpls, igi);
             let (joins, upsamples) =

@@ -35,6 +35,9 @@ pub struct Settings {
     /// Virtual point lights at most, 1 to 10,000. There are ⌈vpls / bounces⌉ paths of light; those that leave the scene, or end on
     /// something black, leave fewer.
     pub vpls: u32,
+    /// Paths that are shot for each that virtual lights are kept of, 1 to 64: of what they leave, that is kept which matters to the view.
+    /// 1: whatever they leave, as in the paper.
+    pub candidates: u32,
     /// Virtual lights along a path at most, 1 to 8: bounces of indirect light.
     pub bounces: u32,
     /// Bounding distance min_d of the geometry term, as share of the diagonal of the scene's box; 0 switches the bound off. Virtual
@@ -75,6 +78,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             vpls: 180,
+            candidates: 8,
             bounces: 2,
             bound: 0.02,
             imperfect: false,
@@ -120,6 +124,7 @@ impl Settings {
     pub fn validate(&self) -> Result<()> {
         within([
             ("vpls", self.vpls, 1, 10_000),
+            ("candidates", self.candidates, 1, 64),
             ("bounces", self.bounces, 1, 8),
             ("downsample", self.downsample, 1, 4),
             ("interleave", self.interleave, 1, 4),

@@ -1,0 +1,79 @@
+//! More paths of light than there will be virtual lights, and of what they leave that which matters to the view (after Georgiev and
+//! Slusallek 2010, who reject candidates; here they are drawn in equal steps through the sum of their weights).
+
+use super::{Igi, Settings, Shared, Vpls, halton};
+use crate::{
+    graph::{Extent, Graph},
+    passes::gbuffer::GBuffer,
+    shaders::{
+        igi::{cumulate, importance, points, resample},
+        types,
+    },
+};
+
+/// Seen points that candidates are judged by.
+const POINTS: u32 = 192;
+/// Distance within which light on a point grows no more, of the scene's diagonal: a candidate next to a point is not all that matters.
+const NEAR: f32 = 0.03;
+
+impl Igi {
+    /// Draws virtual lights from candidates: unbiased, for each is stronger by as much as it is rarer.
+    pub(super) fn choose(
+        &self,
+        graph: &mut Graph,
+        g: &GBuffer,
+        shared: &Shared,
+        candidates: Vpls,
+        settings: &Settings,
+    ) -> Vpls {
+        let count = settings.paths() * settings.bounces;
+        let seen = graph.buffer("igi.points", u64::from(POINTS) * size_of::<types::SeenPoint>() as u64);
+        let args = points::Args {
+            view: g.view,
+            albedo: g.albedo,
+            normal: g.normal,
+            depth: g.depth,
+            points: seen,
+            push: points::Push { count: POINTS },
+        };
+        graph.compute(args, POINTS);
+        let total = candidates.count;
+        let floats = 4 * u64::from(total);
+        let importances = graph.buffer("igi.importances", floats);
+        graph.fill(importances, 0);
+        let rays = &shared.rays;
+        for (first, points) in self.batches(Extent::new(total, 1), POINTS) {
+            let args = importance::Args {
+                candidates: candidates.buffer,
+                points: seen,
+                importances,
+                materials: rays.materials,
+                scene_textures: rays.scene_textures,
+                trace_nodes: rays.trace_nodes,
+                trace_triangles: rays.trace_triangles,
+                trace_instances: rays.trace_instances,
+                trace_indices: rays.trace_indices,
+                trace_uvs: rays.trace_uvs,
+                trace_colors: rays.trace_colors,
+                trace_scene: rays.trace_scene,
+                trace_accel: rays.trace_accel,
+                push: importance::Push {
+                    total,
+                    first,
+                    count: points,
+                    near: NEAR * shared.diagonal,
+                    seed: shared.seed,
+                },
+            };
+            graph.compute(args, total);
+        }
+        let (weights, sums) = (graph.buffer("igi.weights", floats), graph.buffer("igi.sums", floats));
+        let push = cumulate::Push { total };
+        graph.compute(cumulate::Args { candidates: candidates.buffer, importances, weights, sums, push }, 1);
+        let vpls = graph.buffer("igi.vpls", u64::from(count) * size_of::<types::Vpl>() as u64);
+        let offset = if shared.seed == 0 { 0.5 } else { halton::shift(shared.seed, u32::MAX - 1) as f32 };
+        let push = resample::Push { total, count, offset };
+        graph.compute(resample::Args { candidates: candidates.buffer, weights, sums, vpls, push }, count);
+        Vpls { buffer: vpls, count }
+    }
+}

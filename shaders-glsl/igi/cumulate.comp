@@ -1,0 +1,60 @@
+// Weights of the candidates and their running sum, by one workgroup: equal ranges, then the sums of the ranges before.
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "lib/vpl.glsl"
+
+layout(local_size_x = 256) in;
+
+layout(binding = 0, scalar) readonly buffer Candidates { Vpl candidates[]; };
+layout(binding = 1, scalar) readonly buffer Importances { float importances[]; };
+layout(binding = 2, scalar) writeonly buffer Weights { float weights[]; };
+layout(binding = 3, scalar) writeonly buffer Sums { float sums[]; };
+
+layout(push_constant, scalar) uniform Push {
+    uint total;
+};
+
+// Share that goes by flux alone: the seen points are few, and what none of them sees may still matter.
+const float BY_FLUX = 0.2;
+
+shared float important[256];
+shared float flux[256];
+
+float strength(uint i) {
+    return dot(candidates[i].flux, vec3(1.0));
+}
+
+void main() {
+    uint lane = gl_LocalInvocationID.x;
+    uint each = (total + 255u) / 256u;
+    uint begin = min(lane * each, total), end = min(begin + each, total);
+    float a = 0.0, b = 0.0;
+    for (uint i = begin; i < end; ++i) {
+        a += importances[i];
+        b += strength(i);
+    }
+    important[lane] = a;
+    flux[lane] = b;
+    barrier();
+    float all_important = 0.0, all_flux = 0.0, before_important = 0.0, before_flux = 0.0;
+    for (uint i = 0u; i < 256u; ++i) {
+        if (i == lane) {
+            before_important = all_important;
+            before_flux = all_flux;
+        }
+        all_important += important[i];
+        all_flux += flux[i];
+    }
+    float by_flux = all_important > 0.0 ? BY_FLUX : 1.0;
+    float k_important = all_important > 0.0 ? (1.0 - by_flux) / all_important : 0.0;
+    float k_flux = all_flux > 0.0 ? by_flux / all_flux : 0.0;
+    a = before_important;
+    b = before_flux;
+    for (uint i = begin; i < end; ++i) {
+        a += importances[i];
+        b += strength(i);
+        weights[i] = k_important * importances[i] + k_flux * strength(i);
+        sums[i] = k_important * a + k_flux * b;
+    }
+}
