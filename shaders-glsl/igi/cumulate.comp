@@ -16,7 +16,7 @@ layout(push_constant, scalar) uniform Push {
 };
 
 // Share that goes by flux alone: the seen points are few, and what none of them sees may still matter.
-const float BY_FLUX = 0.2;
+const float BY_FLUX = 0.5;
 
 shared float important[256];
 shared float flux[256];

@@ -57,13 +57,7 @@ impl Igi {
                 trace_colors: rays.trace_colors,
                 trace_scene: rays.trace_scene,
                 trace_accel: rays.trace_accel,
-                push: importance::Push {
-                    total,
-                    first,
-                    count: points,
-                    near: NEAR * shared.diagonal,
-                    seed: shared.seed,
-                },
+                push: importance::Push { total, first, count: points, near: NEAR * shared.diagonal, seed: shared.seed },
             };
             graph.compute(args, total);
         }

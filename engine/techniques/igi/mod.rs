@@ -237,7 +237,8 @@ impl Igi {
         let dimensions = (consts::VPL_FIRST_NUMBERS + 2 * settings.bounces) as usize;
         let numbers = halton::table(paths, dimensions, shared.seed);
         let count = paths * settings.bounces;
-        let vpls = Vpls { buffer: graph.buffer("igi.candidates", u64::from(count) * size_of::<types::Vpl>() as u64), count };
+        let vpls =
+            Vpls { buffer: graph.buffer("igi.candidates", u64::from(count) * size_of::<types::Vpl>() as u64), count };
         let states = graph.buffer("igi.paths", u64::from(paths) * size_of::<types::VplPath>() as u64);
         graph.fill(vpls.buffer, 0);
         graph.fill(states, 0);

@@ -21,7 +21,7 @@ const SIDE: u32 = 640;
 
 /// Stages of figures 4 and 5, by the beginnings of the names of their passes.
 const STAGES: [(&str, &[&str]); 4] = [
-    ("shooting (%)", &["igi.shoot", "igi.importance", "igi.cumulate", "igi.resample"]),
+    ("shooting (%)", &["igi.shoot", "igi.points", "igi.importance", "igi.cumulate", "igi.resample"]),
     ("direct and specular (%)", &["passes.gbuffer", "igi.direct", "igi.grow", "igi.gather_tree", "igi.reap"]),
     ("indirect (%)", &["igi.gather"]),
     ("filters (%)", &["igi.guide", "igi.discontinuity", "igi.upsample"]),
