@@ -165,3 +165,31 @@ fn more_than_two_to_the_24_pixels_are_all_counted() {
         }
     });
 }
+
+/// `cargo test --release --test tonemap_reduction -- --ignored`: 10 GiB of memory, minutes on a CPU driver.
+#[test]
+#[ignore = "takes 10 GiB and minutes"]
+fn the_largest_picture() {
+    with_gpu(|gpu| {
+        let side = 16384u32;
+        let count = side as usize * side as usize;
+        // Powers of two, so that every pixel is exact; a quarter of each.
+        let light = |i: usize| ((i + i / side as usize) % 4) as f32;
+        let pixels: Vec<[f32; 4]> =
+            (0..count).map(|i| [light(i).exp2(), light(i).exp2(), light(i).exp2(), 1.0]).collect();
+        let settings = Settings { operator: Operator::ReinhardGlobal, white: 8.0, ..Settings::default() };
+        let found = Still::new(gpu, &settings).unwrap().map(side, side, pixels, None, None).unwrap();
+        let s = found.statistics;
+        assert_eq!((s.frame_low, s.frame_high), (1.0, 8.0));
+        assert!((f64::from(s.frame_log_average).log2() - 1.5).abs() < 1e-6, "{}", s.frame_log_average);
+        let shown = [0, 1, 2, 3].map(|stops| {
+            let l = 2f32.powi(stops);
+            l * (1.0 + l / 64.0) / (1.0 + l)
+        });
+        let wrong = (0..count).find(|&i| {
+            let wanted = shown[(i + i / side as usize) % 4];
+            found.pixels[i][..3].iter().any(|v| (v - wanted).abs() > 1e-6 * wanted) || found.pixels[i][3] != 1.0
+        });
+        assert_eq!(wrong.map(|i| (i % side as usize, i / side as usize, found.pixels[i])), None);
+    });
+}

@@ -297,7 +297,7 @@
     }
 
     read() {
-      if (!this.state.pixel) { this.readout.replaceChildren(element("span", {}, "Values of the pixel under the cursor stand here: linear R G B, W/(sr·m²).")); return; }
+      if (!this.state.pixel) { this.readout.replaceChildren(element("span", {}, "Values of the pixel under the cursor stand here: linear R G B.")); return; }
       const [x, y] = this.state.pixel, at = (y * this.width + x) * 3, lut = table(2 ** (this.base + this.state.ev));
       this.readout.replaceChildren(...this.lines().map((line, i) => {
         if (!i) return element("span", {}, line);
