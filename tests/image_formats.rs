@@ -348,3 +348,20 @@ fn a_gamma_of_the_users_choice() {
         assert!(bytes(Format::Png, &picture, &options) != srgb);
     }
 }
+
+#[test]
+fn colours_by_other_names_are_colours() {
+    let values: Vec<f32> = (0..24).map(|i| i as f32 / 8.0).collect();
+    for names in [["r", "g", "b", "a"], ["red", "green", "blue", "alpha"]] {
+        let picture = Layers::new(3, 2).with(Layer::new("beauty", &names, values.clone()));
+        let (file, _) = image::encode(Format::Exr, &picture, &WriteOptions::default()).unwrap();
+        let read = image::decode(&file, &lucerna::scene::Limits::default()).unwrap();
+        let layer = read.main().unwrap();
+        assert_eq!(layer.channels, ["R", "G", "B", "A"]);
+        assert_eq!(layer.data, values);
+    }
+    // What is no three colours keeps its names.
+    let picture = Layers::new(3, 2).with(Layer::new("uv", &["r", "g"], values[..12].to_vec()));
+    let (file, _) = image::encode(Format::Exr, &picture, &WriteOptions::default()).unwrap();
+    assert_eq!(image::decode(&file, &lucerna::scene::Limits::default()).unwrap().layers[0].channels, ["g", "r"]);
+}

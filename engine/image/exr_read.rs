@@ -284,6 +284,7 @@ fn lay_out(headers: &[Header]) -> (Vec<Layer>, Vec<Vec<Slot>>) {
         }
         slots.push(part_slots);
     }
+    layers.iter_mut().for_each(|layer| standard_names(&mut layer.channels));
     // The file has channels by the alphabet: A B G R becomes R G B A; X Y Z and U V stay in that order.
     let rank = |name: &str| ["R", "RY", "G", "B", "BY", "A"].iter().position(|&c| c == name).unwrap_or(9);
     let mut places: Vec<Vec<usize>> = Vec::new();
@@ -304,6 +305,23 @@ fn lay_out(headers: &[Header]) -> (Vec<Layer>, Vec<Vec<Slot>>) {
         *slot = Slot { layer: moved[slot.layer], channel: places[slot.layer][slot.channel] };
     }
     (layers, slots)
+}
+
+/// Some programs call the colours of a layer `red green blue alpha` or `r g b a`.
+fn standard_names(channels: &mut [String]) {
+    const STANDARD: [&str; 4] = ["R", "G", "B", "A"];
+    for names in [["red", "green", "blue", "alpha"], ["r", "g", "b", "a"]] {
+        let place = |channel: &String| names.iter().position(|name| channel.eq_ignore_ascii_case(name));
+        let colours = channels.iter().filter_map(place).filter(|&i| i < 3).count();
+        if colours == 3 && !channels.iter().any(|channel| STANDARD.contains(&channel.as_str())) {
+            for channel in channels {
+                if let Some(i) = place(channel) {
+                    *channel = STANDARD[i].into();
+                }
+            }
+            return;
+        }
+    }
 }
 
 fn convert(layer: &mut Layer, matrix: glam::Mat3) {
