@@ -204,17 +204,25 @@ impl OwnedBuffer {
     /// # Errors
     /// `Runtime` if the buffer is not in [`Place::Readback`] or the range is outside.
     pub fn mapped_bytes(&self, offset: u64, size: usize) -> Result<Vec<u8>> {
-        let source = self.mapped(Place::Readback, offset, size)?;
-        let mut bytes = Vec::new();
-        bytes
-            .try_reserve_exact(size)
+        self.mapped_values(offset, size)
+    }
+
+    /// `count` values from `offset` bytes on, as [`OwnedBuffer::mapped_bytes`].
+    ///
+    /// # Errors
+    /// As [`OwnedBuffer::mapped_bytes`].
+    pub fn mapped_values<T: bytemuck::AnyBitPattern>(&self, offset: u64, count: usize) -> Result<Vec<T>> {
+        let source = self.mapped(Place::Readback, offset, count.saturating_mul(size_of::<T>()))?;
+        let mut values: Vec<T> = Vec::new();
+        values
+            .try_reserve_exact(count)
             .map_err(|_| Error::new(ErrorKind::OutOfMemory, format!("no host memory to read `{}`", self.0.name)))?;
-        // SAFETY: `mapped` checked the range, the vector has room for `size` bytes, all of which are written.
+        // SAFETY: `mapped` checked the range; the vector has room for `count` values, of which every byte is written; any bits are a value.
         unsafe {
-            std::ptr::copy_nonoverlapping(source, bytes.as_mut_ptr(), size);
-            bytes.set_len(size);
+            std::ptr::copy_nonoverlapping(source, values.as_mut_ptr().cast(), count * size_of::<T>());
+            values.set_len(count);
         }
-        Ok(bytes)
+        Ok(values)
     }
 
     /// All contents, whatever the place; copies through a staging buffer if needed, and waits.

@@ -22,6 +22,8 @@ pub struct Frame {
 #[derive(Debug)]
 enum Read {
     Image(Pixels),
+    /// RGBA32F; the pixels without their bytes.
+    Floats(Pixels, Vec<[f32; 4]>),
     Buffer(Vec<u8>),
 }
 
@@ -32,6 +34,10 @@ impl Frame {
 
     pub(super) fn push_image(&mut self, pixels: Pixels) {
         self.reads.push(Read::Image(pixels));
+    }
+
+    pub(super) fn push_floats(&mut self, pixels: Pixels, values: Vec<[f32; 4]>) {
+        self.reads.push(Read::Floats(pixels, values));
     }
 
     pub(super) fn push_buffer(&mut self, bytes: Vec<u8>) {
@@ -57,19 +63,25 @@ impl Frame {
     pub fn image(&self, token: ImageRead) -> Pixels {
         match self.read(token.graph, token.index) {
             Read::Image(pixels) => pixels.clone(),
+            Read::Floats(pixels, values) => Pixels { bytes: bytemuck::cast_slice(values).to_vec(), ..pixels.clone() },
             Read::Buffer(_) => unreachable!("image tokens stand for images"),
         }
     }
 
-    /// [`Frame::image`] without a copy; what is left for the token has no bytes.
+    /// The values of [`Frame::image`] as [`Pixels::to_f32`], once: what is left for the token is empty.
     ///
     /// # Panics
     /// If the token is of another graph.
     #[track_caller]
-    pub fn take_image(&mut self, token: ImageRead) -> Pixels {
+    pub fn take_floats(&mut self, token: ImageRead) -> Vec<[f32; 4]> {
         let _ = self.read(token.graph, token.index);
         match &mut self.reads[token.index as usize] {
-            Read::Image(pixels) => Pixels { bytes: std::mem::take(&mut pixels.bytes), ..pixels.clone() },
+            Read::Floats(_, values) => std::mem::take(values),
+            Read::Image(pixels) => {
+                let values = pixels.to_f32();
+                pixels.bytes.clear();
+                values
+            }
             Read::Buffer(_) => unreachable!("image tokens stand for images"),
         }
     }

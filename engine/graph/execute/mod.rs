@@ -248,18 +248,23 @@ impl Runner {
         let mut frame = Frame::new(graph.id, report);
         for read in &graph.reads {
             let physical = plan.physical_of(Resource::Buffer(read.to.index));
-            let bytes = match physical.and_then(|p| memory.get(p)) {
-                Some(Memory::Buffer(buffer)) => buffer.mapped_bytes(0, read.to.size as usize)?,
+            let buffer = match physical.and_then(|p| memory.get(p)) {
+                Some(Memory::Buffer(buffer)) => buffer,
                 _ => return Err(Error::new(ErrorKind::Runtime, "a read without memory")),
             };
             match &read.what {
-                ReadWhat::Buffer => frame.push_buffer(bytes),
+                ReadWhat::Buffer => frame.push_buffer(buffer.mapped_bytes(0, read.to.size as usize)?),
                 ReadWhat::Image { name, desc, format } => {
                     let format = device_format(&self.gpu, *format);
                     let layers = desc.layers * desc.depth;
-                    let mut bytes = bytes;
-                    bytes.truncate(desc.extent.pixels() as usize * layers as usize * format.bytes() as usize);
-                    frame.push_image(Pixels { name: name.clone(), extent: desc.extent, format, layers, bytes });
+                    let count = desc.extent.pixels() as usize * layers as usize;
+                    let pixels = Pixels { name: name.clone(), extent: desc.extent, format, layers, bytes: Vec::new() };
+                    if format == crate::graph::Format::RGBA32F {
+                        frame.push_floats(pixels, buffer.mapped_values(0, count)?);
+                    } else {
+                        let bytes = buffer.mapped_bytes(0, count * format.bytes() as usize)?;
+                        frame.push_image(Pixels { bytes, ..pixels });
+                    }
                 }
             }
         }

@@ -148,7 +148,7 @@ impl Still {
             let output = self.tonemap.frame(&mut graph, input, dt)?;
             let (mapped, found) = (graph.read_image(output.mapped), graph.read_buffer(output.statistics));
             let mut frame = self.runner.run(&graph)?;
-            (frame.take_image(mapped).to_f32(), statistics_of(&frame.buffer(found)))
+            (frame.take_floats(mapped), statistics_of(&frame.buffer(found)))
         } else {
             self.tiled(width, height, &source, dt)?
         };
@@ -223,7 +223,7 @@ impl Still {
             let (mapped, found) = (graph.read_image(output.mapped), graph.read_buffer(output.statistics));
             let mut frame: Frame = self.runner.run(&graph)?;
             statistics = statistics_of(&frame.buffer(found));
-            let mapped = frame.take_image(mapped).to_f32();
+            let mapped = frame.take_floats(mapped);
             let [x, y, w, h] = tile.core.map(|v| v as usize);
             let [from_x, from_y, stride, _] = tile.whole.map(|v| v as usize);
             for row in 0..h {

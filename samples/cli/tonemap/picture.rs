@@ -241,7 +241,17 @@ impl Run<'_> {
 
 /// What is written: three channels, or four if the picture came with alpha.
 fn layer_of(mapped: Mapped, alpha: bool) -> Layer {
-    if alpha { Layer::rgba("", &mapped.pixels) } else { Layer::rgb("", &mapped.pixels) }
+    let mut data = mapped.pixels.into_flattened();
+    if alpha {
+        return Layer::new("", &["R", "G", "B", "A"], data);
+    }
+    // In place: pictures can be as large as memory.
+    let count = data.len() / 4;
+    for i in 1..count {
+        data.copy_within(4 * i..4 * i + 3, 3 * i);
+    }
+    data.truncate(3 * count);
+    Layer::new("", &["R", "G", "B"], data)
 }
 
 impl Done {
