@@ -97,6 +97,9 @@ pub enum Local {
     ///   divided by the sum over all D.
     /// * The level is averaged with these along rows and columns, its edges repeated.
     /// * The pixel at x reads that at (x + 1/2) / 2^l − 1/2, bilinearly between pixels of the level, its edges repeated.
+    ///
+    /// On photographs the averages differ from the definition's by up to 4 % at the mean, and pictures by 0.4 to 5 % RMS, 0.1 to 1.2 % at the
+    /// mean and a FLIP of 0.003 to 0.016: single pixels beside edges, for which another average is chosen, without halos or blocks.
     Pyramid,
     /// The definition: every sample of every neighbourhood of every pixel.
     Literal,
