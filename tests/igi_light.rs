@@ -356,3 +356,32 @@ fn ray_queries_show_the_same() {
         }
     });
 }
+
+#[test]
+fn virtual_lights_go_where_they_are_seen() {
+    with_gpu(|gpu| {
+        // Two closed rooms alike, the viewer in one of them.
+        let mut stage = room(Vec3::splat(0.6));
+        let wall = stage.material(Material::diffuse("wall", Vec3::splat(0.6)));
+        stage.cuboid(wall, vec3(3.0, -1.0, -1.0), vec3(5.0, 1.0, 1.0), true);
+        stage.point(vec3(0.2, 0.3, 0.4), Vec3::ONE);
+        stage.point(vec3(4.2, 0.3, 0.4), Vec3::ONE);
+        let mut studio = Studio::new(gpu, &stage.scene);
+        let seen = view(vec3(0.0, 0.0, 0.9), vec3(0.2, -0.1, -1.0), 80.0, [24, 24]);
+        let here = |vpls: &[types::Vpl]| vpls.iter().filter(|v| v.position[0] < 2.0).count() as f64 / vpls.len() as f64;
+        let settings = Settings { bound: 0.05, ..plain(200) };
+        let truth = mean(&studio.render(&seen, &Settings { vpls: 10_000, ..settings.clone() }, 0).irradiance);
+        let (mut error, mut share) = ([0.0; 2], [0.0; 2]);
+        for seed in 1..=6 {
+            for (k, candidates) in [1, 8].into_iter().enumerate() {
+                let shown = studio.render(&seen, &Settings { candidates, ..settings.clone() }, seed);
+                error[k] += mean(&shown.irradiance) / truth / 6.0 - 1.0 / 6.0;
+                share[k] += here(&shown.vpls) / 6.0;
+            }
+        }
+        println!("shares {share:?}, errors of the mean {error:?}");
+        // Half of them go by flux alone, wherever they are.
+        assert!((share[0] - 0.5).abs() < 0.02 && (share[1] - 0.75).abs() < 0.02, "{share:?}");
+        assert!(error.iter().all(|e| e.abs() < 0.02), "{error:?}");
+    });
+}

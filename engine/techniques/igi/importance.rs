@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// Seen points that candidates are judged by.
-const POINTS: u32 = 192;
+const POINTS: u32 = 96;
 /// Distance within which light on a point grows no more, of the scene's diagonal: a candidate next to a point is not all that matters.
 const NEAR: f32 = 0.03;
 

@@ -6,6 +6,7 @@
 //! [`Igi`] holds what lives as long as a scene; [`Igi::picture`] declares a frame, with paths of light shot anew.
 //!
 //! Where this differs from the paper, and why:
+//! - More paths are shot than needed, and of what they leave that is drawn which matters to the view ([`Settings::candidates`]).
 //! - Every kind of light sends paths: point, spot and directional lights, emissive surfaces, the environment. The paper has points.
 //! - 1/π is explicit: a virtual light has a flux Φ and sends Φ cos θ / π W/sr; the paper's L is Φ/π, its ρ our ρ/π.
 //! - Light is received by shading normals and sent on by the triangle's, which is what a path tracer sees from the other end.

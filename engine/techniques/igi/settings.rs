@@ -105,6 +105,7 @@ impl Settings {
     /// bounces of a path nor min_d; taken here are the defaults.
     pub fn paper() -> Self {
         Self {
+            candidates: 1,
             imperfect: true,
             downsample: 4,
             interleave: 3,
