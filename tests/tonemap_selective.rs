@@ -107,7 +107,8 @@ fn a_list_longer_than_its_room_is_done_in_bands() {
         let count = (size[0] * size[1]) as usize;
         let luminance: Vec<f32> = (0..count).map(|i| 1.0 + (i % 97) as f32).collect();
         // Few, but on both sides of the border between the bands.
-        let marked = |i: usize| i % 4099 == 0 || (i / size[0] as usize).abs_diff(1024) < 2 && i % 13 == 0;
+        let marked =
+            |i: usize| i.is_multiple_of(4099) || (i / size[0] as usize).abs_diff(1024) < 2 && i.is_multiple_of(13);
         let importance: Vec<f32> = (0..count).map(|i| f32::from(u8::from(marked(i)))).collect();
         let (one, _) = adapt(gpu, size, &luminance, &importance, Mark::Compact);
         let (other, _) = adapt(gpu, size, &luminance, &importance, Mark::Branch);
