@@ -30,7 +30,7 @@ use crate::{
         resident::{Handles, Resident},
     },
     shaders::{
-        consts::{MAX_TEXTURE_ARRAYS, TRACE_DEPTH, TRACE_NODE_WORDS},
+        consts::{MAX_TEXTURE_ARRAYS, TRACE_DEPTH, TRACE_NODE_WORDS, TRACE_STEPS},
         types,
     },
 };
@@ -132,6 +132,14 @@ impl Rays {
             disturbed: false,
             top_nodes,
         })
+    }
+
+    /// Turns of all loops of a ray at most. CPU drivers run eight invocations together, through each turn that one of them needs; scenes
+    /// of more triangles than some hundred get [`TRACE_STEPS`], at which traversal ends.
+    pub fn most_turns(&self) -> u64 {
+        let of = |usage: &Use| self.shapes.get(usage.shape).map_or(0, Shape::most_turns);
+        let one = u64::from(self.top_nodes) + self.uses.iter().map(of).sum::<u64>();
+        (8 * one).min(TRACE_STEPS.into())
     }
 
     /// The trees as the scene stands in `scene`, for its graph.

@@ -179,6 +179,12 @@ fn records(piece: &Piece<'_>, instance: u32, world: Mat4, placed: bool) -> Vec<R
 }
 
 impl Shape {
+    /// Turns of the loops of one ray through it: one for each node and triangle, two more for each triangle that is looked at again because it is
+    /// cut out or as near as another, and for going in and out.
+    pub fn most_turns(&self) -> u64 {
+        u64::from(self.levels.last().copied().unwrap_or(0)) + 4 * u64::from(self.records) + 8
+    }
+
     /// Nodes of the tree.
     pub fn node_count(&self) -> usize {
         self.levels.last().map_or(0, |n| *n as usize)

@@ -40,8 +40,8 @@ use ash::vk;
 
 /// Rays that one dispatch traces at most, about: some milliseconds on a GPU.
 const MOST_RAYS: u64 = 1 << 22;
-/// Rays that one invocation traces where a driver ends loops early: two of at most 30,000 steps stay below its limit.
-const RAYS_LIMITED: u64 = 2;
+/// Turns of loops of one invocation where a driver ends loops early: two rays of the longest.
+const TURNS_LIMITED: u64 = 60_000;
 
 /// What instant global illumination keeps of a scene.
 #[derive(Debug)]
@@ -141,8 +141,13 @@ impl Igi {
             scene.materials.get(primitive.material as usize).is_some_and(|material| material.double_sided)
         };
         let meshes = scene.nodes.iter().filter_map(|node| scene.meshes.get(node.mesh? as usize));
+        let rays = if in_compute { Rays::in_compute(gpu, scene, resident)? } else { Rays::new(gpu, scene, resident)? };
+        let most_rays = match gpu.loop_limit()? {
+            Some(_) => (TURNS_LIMITED / rays.most_turns().max(1)).max(1),
+            None => u64::MAX,
+        };
         Ok(Self {
-            rays: if in_compute { Rays::in_compute(gpu, scene, resident)? } else { Rays::new(gpu, scene, resident)? },
+            rays,
             boxes: (!in_compute && settings.imperfect).then(|| Rays::in_compute(gpu, scene, resident)).transpose()?,
             in_compute,
             environment: radiance_map(gpu, scene.environment.as_ref())?,
@@ -152,7 +157,7 @@ impl Igi {
             double_sided: meshes.flat_map(|mesh| mesh.primitives.iter().map(double_sided)).collect(),
             lights: None,
             sharp: tree::has_sharp(scene),
-            most_rays: if gpu.loop_limit()?.is_some() { RAYS_LIMITED } else { u64::MAX },
+            most_rays,
         })
     }
 
