@@ -3,7 +3,7 @@
 //! Without any setting of the group `tonemap` pictures stay light, as before.
 //!
 //! Ashikhmin's operator takes light as cd/m², which a render is not: unless `tonemap.exposure` or `tonemap.normalize` say otherwise, the
-//! log-average of its picture becomes [`GREY`] cd/m² (`normalize`, and the exposure that leads there), and in sequences follows the adaptation.
+//! log-average of its picture becomes 18 cd/m² (`normalize`, and the exposure that leads there), and in sequences follows the adaptation.
 
 use lucerna::{
     Result,

@@ -1,8 +1,11 @@
-// Luminance as a buffer, which is read faster than an image on CPUs, and the first two levels of the pyramid of `local = "pyramid"`: means of 2 × 2 pixels, and of 2 × 2 of those. Sizes are halved and rounded
-// up; what a level lacks at its end is its last row or column once more.
+// Luminance as a buffer, which is read faster than an image on CPUs, and the first two levels of the pyramid of `local = "pyramid"`: means
+// of 2 × 2 pixels, and of 2 × 2 of those. Sizes are halved and rounded up; what a level lacks at its end is its last row or column once more.
+// All is less L_min, which the search adds again: so averages are as exact as the range of a picture needs, however narrow it is.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+#include "lib/tonemap.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -10,6 +13,7 @@ layout(binding = 0) uniform sampler2D luminance;
 layout(binding = 3, scalar) writeonly buffer Full { float level0[]; };
 layout(binding = 1, scalar) writeonly buffer Half { float level1[]; };
 layout(binding = 2, scalar) writeonly buffer Quarter { float level2[]; };
+layout(binding = 4, scalar) readonly buffer Statistics { TonemapStatistics statistics; };
 
 // An invocation has a pixel of the second level.
 void main() {
@@ -29,6 +33,7 @@ void main() {
             ivec2 b = min(a + 1, last);
             vec4 v = vec4(texelFetch(luminance, a, 0).r, texelFetch(luminance, ivec2(b.x, a.y), 0).r,
                           texelFetch(luminance, ivec2(a.x, b.y), 0).r, texelFetch(luminance, b, 0).r);
+            v -= statistics.low;
             level0[a.y * width + a.x] = v.x;
             level0[a.y * width + b.x] = v.y;
             level0[b.y * width + a.x] = v.z;

@@ -20,7 +20,7 @@ layout(constant_id = 4) const uint NEXT = 0;
 // 1: only blocks with an important pixel are worked on.
 layout(constant_id = 5) const uint HAS_MAP = 0;
 
-layout(binding = 0, scalar) readonly buffer Full { float luminance[]; };
+layout(binding = 0, scalar) readonly buffer Full { float luminance[]; };  // less L_min, as the averages
 layout(binding = 1, scalar) uniform Kernels { TonemapKernels kernels; };  // of the Gaussians at full size
 layout(binding = 2, scalar) readonly buffer Half { float averages1[]; };  // a plane for each Gaussian
 layout(binding = 3, scalar) readonly buffer Quarter { float averages2[]; };
@@ -98,7 +98,7 @@ void main() {
     float around[2][WIDE];
     [[unroll]] for (int y = 0; y < 2; ++y) {
         [[unroll]] for (int k = 0; k < WIDE; ++k) {
-            level[y][k] = full[0][y][k];
+            level[y][k] = statistics.low + full[0][y][k];
             even[y][k] = true;
             centre[y][k] = full[0][y][k];
             around[y][k] = full[0][y][k];
@@ -182,8 +182,8 @@ void main() {
         float offset = choice.offset[i] * statistics.log_average;
         [[unroll]] for (int y = 0; y < 2; ++y) {
             [[unroll]] for (int k = 0; k < WIDE; ++k) {
-                float c = centre[y][k];
-                even[y][k] = even[y][k] && abs(c - around[y][k]) < choice.slope * c + offset;
+                float c = statistics.low + centre[y][k];
+                even[y][k] = even[y][k] && abs(centre[y][k] - around[y][k]) < choice.slope * c + offset;
                 level[y][k] = even[y][k] ? c : level[y][k];
             }
         }

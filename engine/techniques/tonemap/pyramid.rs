@@ -112,7 +112,7 @@ pub(super) fn adapt(
     }
     let levels = [0, 1].map(|i| graph.buffer(format!("tonemap.level{}", i + 1), 4 * sizes[i].pixels()));
     let full = graph.buffer("tonemap.level0", 4 * extent.pixels());
-    let args = halve::Args { luminance, full, half: levels[0], quarter: levels[1] };
+    let args = halve::Args { luminance, full, half: levels[0], quarter: levels[1], statistics };
     graph.compute(args, [sizes[1].width, sizes[1].height]);
     let planes = [0, 1].map(|i| {
         let kernels = &kernels[i + 1];
