@@ -136,3 +136,20 @@ fn large_files_of_nothing_are_refused_unread() {
         assert!(error.contains("is neither text nor a GLB container") || error.contains("is no scene file"), "{error}");
     }
 }
+
+#[test]
+fn a_cut_jpeg_is_told_of() {
+    let mut jpeg = vec![];
+    let grey: Vec<u8> = (0..64 * 64).map(|i| (i * 37 % 251) as u8).collect();
+    image::codecs::jpeg::JpegEncoder::new(&mut jpeg).encode(&grey, 64, 64, image::ExtendedColorType::L8).unwrap();
+    let text = format!("mtllib a.mtl\n{SQUARE}usemtl m\nf 1/1 2/2 3/3 4/4\n");
+    let notes = |bytes: &[u8]| {
+        let scene = read(&text, &[("a.mtl", b"newmtl m\nmap_Kd a.jpg\n"), ("a.jpg", bytes)]).unwrap();
+        assert_eq!(scene.textures.len(), 1);
+        let of_textures = |note: &lucerna::scene::Note| note.place.starts_with("texture");
+        scene.notes.into_iter().filter(of_textures).map(|note| (note.place, note.text)).collect::<Vec<_>>()
+    };
+    let cut = "the JPEG ends before its picture does; what is missing is grey";
+    assert_eq!(notes(&jpeg), []);
+    assert_eq!(notes(&jpeg[..2 * jpeg.len() / 3]), [(r#"texture "a.jpg""#.to_owned(), cut.to_owned())]);
+}

@@ -90,8 +90,9 @@ pub(super) fn metadata(bytes: &[u8]) -> Result<Metadata> {
     Metadata::from_json(&String::from_utf8_lossy(&json)).map_err(|error| error.at("comment"))
 }
 
-/// There is no end mark after the start of the first scan. Bytes 255 of pixels are followed by 0, so that they are no mark.
-fn is_cut(bytes: &[u8]) -> bool {
+/// Whether a JPEG file ends before its picture does, in whose place decoders put grey: there is no end mark after the start of the first
+/// scan. Bytes 255 of pixels are followed by 0, so that they are no mark.
+pub fn is_cut(bytes: &[u8]) -> bool {
     let mut rest = bytes.get(2..).unwrap_or_default();
     while let [0xff, kind, high, low, after @ ..] = rest {
         if *kind == 0xda {

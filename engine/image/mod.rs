@@ -13,7 +13,7 @@ mod exr_chroma;
 mod exr_read;
 mod exr_write;
 mod file;
-mod jpeg;
+pub(crate) mod jpeg;
 mod metadata;
 mod pfm;
 mod picture;

@@ -117,6 +117,8 @@ struct Header<'a> {
     xyze: bool,
     /// What pixels are divided by to give radiance: EXPOSURE · COLORCORR, each the product of all its lines.
     exposure: [f32; 3],
+    /// Height of a pixel over its width, the product of all its lines.
+    aspect: f32,
     /// Of the last `PRIMARIES` line, unless it says nothing.
     primaries: Option<Chromaticities>,
     json: String,
@@ -141,6 +143,7 @@ impl<'a> Header<'a> {
         let mut header = Self {
             xyze: false,
             exposure: [1.0; 3],
+            aspect: 1.0,
             primaries: None,
             json: String::new(),
             variables: BTreeMap::new(),
@@ -197,6 +200,7 @@ impl<'a> Header<'a> {
                 let factor = factors(1)?[0];
                 self.exposure = self.exposure.map(|e| e * factor);
             }
+            "PIXASPECT" => self.aspect *= factors(1)?[0],
             "COLORCORR" => {
                 let factors = factors(3)?;
                 self.exposure = std::array::from_fn(|i| self.exposure[i] * factors[i]);
@@ -297,7 +301,13 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Layers> {
         }
     }
     let layer = Layer { precision: super::Precision::Full, ..Layer::new("", &["R", "G", "B"], data) };
-    Ok(Layers { metadata: header.metadata()?, ..Layers::new(width, height).with(layer) })
+    let mut picture = Layers { metadata: header.metadata()?, ..Layers::new(width, height).with(layer) };
+    // Two factors that cancel each other may leave a rounding.
+    if (header.aspect - 1.0).abs() > 1e-5 {
+        let aspect = header.aspect;
+        picture.warnings.push(format!("its pixels are {aspect} times as high as wide, and are taken as squares"));
+    }
+    Ok(picture)
 }
 
 fn short(line: u32, lines: u32) -> Error {
@@ -447,5 +457,22 @@ mod tests {
         assert_eq!(image.layers[0].data, [1.0, 0.5, 0.25]);
         let error = decode(b"#?RGBE\nEXPOSURE=0\n\n-Y 1 +X 1\n\x80\x80\x80\x84", &Limits::default()).unwrap_err();
         assert!(error.to_string().starts_with("line 2: EXPOSURE=0"), "{error}");
+    }
+
+    #[test]
+    fn pixels_that_are_no_squares_are_told_of() {
+        let warnings = |lines: &str| {
+            let file = [format!("#?RADIANCE\n{lines}\n-Y 1 +X 1\n").as_bytes(), b"\x80\x80\x80\x84"].concat();
+            decode(&file, &Limits::default()).map(|picture| picture.warnings)
+        };
+        assert_eq!(
+            warnings("PIXASPECT=2\n").unwrap(),
+            ["its pixels are 2 times as high as wide, and are taken as squares"]
+        );
+        assert!(
+            warnings("PIXASPECT=1\n").unwrap().is_empty()
+                && warnings("PIXASPECT=2\nPIXASPECT=0.5\n").unwrap().is_empty()
+        );
+        assert!(warnings("PIXASPECT=0\n").unwrap_err().to_string().contains("PIXASPECT=0"));
     }
 }

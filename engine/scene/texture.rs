@@ -41,6 +41,12 @@ pub fn decode(bytes: &[u8], mime_hint: Option<&str>, limits: &Limits) -> Result<
     }
 }
 
+/// What is missing from an image that [`decode`] reads nevertheless.
+pub(crate) fn missing(bytes: &[u8]) -> Option<&'static str> {
+    (Format::sniff(bytes) == Some(Format::Jpeg) && crate::image::jpeg::is_cut(bytes))
+        .then_some("the JPEG ends before its picture does; what is missing is grey")
+}
+
 /// Bytes that a texture takes on the device as 8-bit RGBA: the base level and, with `mips`, all levels below it.
 pub fn device_bytes(width: u32, height: u32, mips: bool) -> u64 {
     let (mut w, mut h) = (u64::from(width), u64::from(height));

@@ -144,7 +144,8 @@ impl<'a> Picture<'a> {
         };
         match settings.operator {
             Operator::Ashikhmin => {
-                let curve = ashikhmin::Curve { low: min, high: max, display: f64::from(settings.display) };
+                let (display, capacity) = (f64::from(settings.display), ashikhmin::capacity);
+                let curve = ashikhmin::Curve { low: min, high: max, display, capacity };
                 both(&|l, level| curve.display(l, level) / curve.display)
             }
             Operator::Reinhard if settings.mode() == Mode::Global => both(&|l, _| reinhard::global(l, white)),

@@ -83,7 +83,7 @@ fn capacity_is_continuous_and_the_integral_of_one_over_the_threshold() {
 #[test]
 fn ashikhmins_curve_maps_the_picture_onto_the_display_and_rises() {
     for (low, high) in [(0.0, 1e5), (1e-3, 2e-3), (0.5, 30.0), (1e-6, 1e6)] {
-        let curve = ashikhmin::Curve { low, high, display: 80.0 };
+        let curve = ashikhmin::Curve { low, high, display: 80.0, capacity: ashikhmin::capacity };
         assert_eq!((curve.map(low), curve.map(high)), (0.0, 80.0));
         let inside: Vec<f64> = luminances().into_iter().filter(|l| (low..=high).contains(l)).collect();
         assert!(inside.windows(2).all(|p| curve.map(p[0]) < curve.map(p[1])));

@@ -170,7 +170,10 @@ impl Materials<'_> {
             Some(texture) => texture,
             None => {
                 let here = format!("images[{image}]");
-                let decoded = self.decode(&document.images[image as usize], &here)?;
+                let (decoded, missing) = self.decode(&document.images[image as usize], &here)?;
+                if let Some(missing) = missing {
+                    self.notes.repaired(&here, missing);
+                }
                 self.budget.texture(decoded.rgba.len() as u64).map_err(|error| error.at(&here))?;
                 self.textures.push(decoded);
                 *self.of_image[image as usize].insert(self.textures.len() as u32 - 1)
@@ -192,7 +195,8 @@ impl Materials<'_> {
         Ok(source)
     }
 
-    fn decode(&self, image: &types::Image, here: &str) -> Result<Texture> {
+    /// The picture, and what is missing from it.
+    fn decode(&self, image: &types::Image, here: &str) -> Result<(Texture, Option<&'static str>)> {
         let mut mime = image.mime_type.clone();
         let mut name = image.name.clone();
         let bytes: Cow<[u8]> = match (&image.uri, image.buffer_view) {
@@ -219,7 +223,7 @@ impl Materials<'_> {
         let limits = Limits { max_image_pixels: self.budget.texels_left(), ..self.limits.clone() };
         let mut decoded = texture::decode(&bytes, mime.as_deref(), &limits).map_err(|error| error.at(here))?;
         decoded.name = name.unwrap_or_else(|| here.to_owned());
-        Ok(decoded)
+        Ok((decoded, texture::missing(&bytes)))
     }
 }
 
