@@ -137,6 +137,10 @@ impl Rays {
     /// Turns of all loops of a ray at most. CPU drivers run eight invocations together, through each turn that one of them needs; scenes
     /// of more triangles than some hundred get [`TRACE_STEPS`], at which traversal ends.
     pub fn most_turns(&self) -> u64 {
+        if self.query.is_some() {
+            // Its trees are the driver's.
+            return TRACE_STEPS.into();
+        }
         let of = |usage: &Use| self.shapes.get(usage.shape).map_or(0, Shape::most_turns);
         let one = u64::from(self.top_nodes) + self.uses.iter().map(of).sum::<u64>();
         (8 * one).min(TRACE_STEPS.into())

@@ -1,9 +1,12 @@
 //! The environment for sampling: where its light comes from, as a table over cells of exactly known solid angle.
 
 use crate::{
+    Error, ErrorKind, Result,
+    gpu::{Gpu, ImageDesc, OwnedImage, Region},
     scene::{Environment, environment::solid_angle},
     shaders::types::AliasEntry,
 };
+use ash::vk;
 use glam::Vec3;
 
 /// At most this many cells; larger maps are grouped.
@@ -49,6 +52,31 @@ pub fn importance(environment: Option<&Environment>) -> Importance {
         }
     }
     Importance { cells, columns: super::alias::table(&weights) }
+}
+
+/// The environment's radiance in full precision; black without one.
+///
+/// # Errors
+/// `Runtime` if the map is larger than the device's images; `OutOfMemory`, `DeviceLost`.
+pub fn radiance_map(gpu: &Gpu, environment: Option<&Environment>) -> Result<OwnedImage> {
+    let (name, format) = ("environment radiance", vk::Format::R32G32B32A32_SFLOAT);
+    let upload = |width, height, texels: &[[f32; 4]]| {
+        let bytes = bytemuck::cast_slice(texels);
+        OwnedImage::with_contents(
+            gpu,
+            name,
+            ImageDesc::new(format, width, height),
+            &[Region { mip: 0, layer: 0, bytes }],
+        )
+    };
+    let Some(env) = environment.filter(|e| !e.pixels.is_empty()) else { return upload(1, 1, &[[0.0; 4]]) };
+    let most = gpu.caps().limits.image_2d;
+    if env.width > most || env.height > most {
+        let what = format!("environment is {}×{}; the device allows sides of {most}", env.width, env.height);
+        return Err(Error::new(ErrorKind::Runtime, what).at(format!("environment `{}`", env.name)));
+    }
+    let texels: Vec<[f32; 4]> = env.pixels.iter().map(|p| p.extend(1.0).to_array()).collect();
+    upload(env.width, env.height, &texels)
 }
 
 /// One number for a colour, the same whatever the order of its channels.

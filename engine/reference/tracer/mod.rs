@@ -37,21 +37,21 @@ pub use sums::Sums;
 #[doc(hidden)]
 pub mod tables {
     pub use super::{
-        environment::{Importance, importance},
+        environment::{Importance, importance, radiance_map},
         lights::{LightTable, table as lights},
+        work::has_sharp,
     };
 }
 
 use crate::{
-    Error, ErrorKind, Result,
-    gpu::{Gpu, ImageDesc, OwnedBuffer, OwnedImage, Region},
+    Error, Result,
+    gpu::{Gpu, OwnedBuffer, OwnedImage},
     graph::{Graph, Runner},
     image::Layers,
     rays::Rays,
-    scene::{Aabb, Environment, Note, Pose, Scene, View, resident::Resident},
+    scene::{Aabb, Note, Pose, Scene, View, resident::Resident},
     shaders::types,
 };
-use ash::vk;
 use std::time::Duration;
 use work::Job;
 
@@ -120,7 +120,7 @@ impl<'s> Tracer<'s> {
             rays: Rays::new(gpu, scene, &resident)?,
             resident,
             runner: Runner::new(gpu),
-            environment: radiance_map(gpu, scene.environment.as_ref())?,
+            environment: tables::radiance_map(gpu, scene.environment.as_ref())?,
             environment_columns,
             cells: importance.cells,
             bounds: Aabb::EMPTY,
@@ -280,26 +280,4 @@ impl<'s> Tracer<'s> {
 
 fn not_started() -> Error {
     Error::usage("no picture was started")
-}
-
-/// The environment's radiance in full precision; black without one.
-fn radiance_map(gpu: &Gpu, environment: Option<&Environment>) -> Result<OwnedImage> {
-    let (name, format) = ("tracer.environment radiance", vk::Format::R32G32B32A32_SFLOAT);
-    let upload = |width, height, texels: &[[f32; 4]]| {
-        let bytes = bytemuck::cast_slice(texels);
-        OwnedImage::with_contents(
-            gpu,
-            name,
-            ImageDesc::new(format, width, height),
-            &[Region { mip: 0, layer: 0, bytes }],
-        )
-    };
-    let Some(env) = environment.filter(|e| !e.pixels.is_empty()) else { return upload(1, 1, &[[0.0; 4]]) };
-    let most = gpu.caps().limits.image_2d;
-    if env.width > most || env.height > most {
-        let what = format!("environment is {}×{}; the device allows sides of {most}", env.width, env.height);
-        return Err(Error::new(ErrorKind::Runtime, what).at(format!("environment `{}`", env.name)));
-    }
-    let texels: Vec<[f32; 4]> = env.pixels.iter().map(|p| p.extend(1.0).to_array()).collect();
-    upload(env.width, env.height, &texels)
 }

@@ -96,12 +96,16 @@ impl Job {
     }
 }
 
+/// Whether any surface of the scene may be a mirror or glass.
+pub fn has_sharp(scene: &Scene) -> bool {
+    scene.materials.iter().any(|m| {
+        m.transmission > 0.0 || (m.metallic > 0.5 && (m.roughness < 0.05 || m.metallic_roughness_texture.is_some()))
+    })
+}
+
 /// Surfaces that the longest path may visit.
 fn longest(scene: &Scene, settings: &Settings) -> u32 {
-    let sharp = !settings.diffuse_only
-        && scene.materials.iter().any(|m| {
-            m.transmission > 0.0 || (m.metallic > 0.5 && (m.roughness < 0.05 || m.metallic_roughness_texture.is_some()))
-        });
+    let sharp = !settings.diffuse_only && has_sharp(scene);
     settings.bounces + 3 + if sharp { settings.specular_bounces } else { 0 }
 }
 

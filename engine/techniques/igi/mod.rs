@@ -24,8 +24,8 @@ pub use picture::{Picture, PictureSettings};
 pub use settings::{Pattern, Settings, Visibility};
 
 use crate::{
-    Error, ErrorKind, Result,
-    gpu::{Gpu, ImageDesc as GpuImageDesc, OwnedBuffer, OwnedImage, Region},
+    Error, Result,
+    gpu::{Gpu, OwnedBuffer, OwnedImage},
     graph::{Buffer, Extent, Format, Graph, Image, Uniform},
     passes::gbuffer::GBuffer,
     rays::{RayHandles, Rays},
@@ -33,10 +33,9 @@ use crate::{
         Sources,
         tables::{self, LightTable},
     },
-    scene::{Environment, Pose, Scene, resident::Handles, resident::Resident},
+    scene::{Pose, Scene, resident::Handles, resident::Resident},
     shaders::{self, consts, types},
 };
-use ash::vk;
 
 /// Rays that one dispatch traces at most, about: some milliseconds on a GPU.
 const MOST_RAYS: u64 = 1 << 22;
@@ -150,13 +149,13 @@ impl Igi {
             rays,
             boxes: (!in_compute && settings.imperfect).then(|| Rays::in_compute(gpu, scene, resident)).transpose()?,
             in_compute,
-            environment: radiance_map(gpu, scene.environment.as_ref())?,
+            environment: tables::radiance_map(gpu, scene.environment.as_ref())?,
             environment_columns: OwnedBuffer::with_contents(gpu, "igi.environment", columns)?,
             cells: importance.cells,
             moments: scene.environment.as_ref().filter(|e| !e.pixels.is_empty()).map(starts::sky_moments),
             double_sided: meshes.flat_map(|mesh| mesh.primitives.iter().map(double_sided)).collect(),
             lights: None,
-            sharp: tree::has_sharp(scene),
+            sharp: tables::has_sharp(scene),
             most_rays,
         })
     }
@@ -385,22 +384,4 @@ impl Igi {
         let each = (MOST_RAYS / pixels.max(1)).clamp(1, self.most_rays) as u32;
         (0..rays.max(1)).step_by(each as usize).map(|first| (first, each.min(rays.max(1) - first))).collect()
     }
-}
-
-/// The environment's radiance in full precision; black without one.
-fn radiance_map(gpu: &Gpu, environment: Option<&Environment>) -> Result<OwnedImage> {
-    let (name, format) = ("igi.environment radiance", vk::Format::R32G32B32A32_SFLOAT);
-    let upload = |width, height, texels: &[[f32; 4]]| {
-        let bytes = bytemuck::cast_slice(texels);
-        let desc = GpuImageDesc::new(format, width, height);
-        OwnedImage::with_contents(gpu, name, desc, &[Region { mip: 0, layer: 0, bytes }])
-    };
-    let Some(env) = environment.filter(|e| !e.pixels.is_empty()) else { return upload(1, 1, &[[0.0; 4]]) };
-    let most = gpu.caps().limits.image_2d;
-    if env.width > most || env.height > most {
-        let what = format!("environment is {}×{}; the device allows sides of {most}", env.width, env.height);
-        return Err(Error::new(ErrorKind::Runtime, what).at(format!("environment `{}`", env.name)));
-    }
-    let texels: Vec<[f32; 4]> = env.pixels.iter().map(|p| p.extend(1.0).to_array()).collect();
-    upload(env.width, env.height, &texels)
 }

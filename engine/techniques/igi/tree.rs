@@ -4,7 +4,7 @@ use super::{Igi, Settings, Shared, Vpls};
 use crate::{
     graph::{Extent, Format, Graph, Image},
     passes::gbuffer::GBuffer,
-    scene::{Scene, resident::Handles},
+    scene::resident::Handles,
     shaders::{
         consts::TREE_WIDTH,
         igi::{direct_tree, gather_tree, grow, reap},
@@ -14,13 +14,6 @@ use crate::{
 
 /// Pixels whose trees are held at once.
 const SLOTS: u32 = 1 << 16;
-
-/// Whether any surface of the scene may be a mirror or glass.
-pub(super) fn has_sharp(scene: &Scene) -> bool {
-    scene.materials.iter().any(|m| {
-        m.transmission > 0.0 || (m.metallic > 0.5 && (m.roughness < 0.05 || m.metallic_roughness_texture.is_some()))
-    })
-}
 
 impl Igi {
     /// Radiance that mirrors and glass show, and in alpha the share of each pixel's surface that they are.
