@@ -1,8 +1,8 @@
 //! Tone mapping: the tables of Michael's thesis (section 5.3), and what a better local operator leaves of selection.
 //!
 //! Techniques are known by their names: `gtm`, `ltm`, `stm` (global, local and selective tone mapping by the literal operator; `stm` with
-//! a matrix of `tonemap.mark`), `ltm-fast`, `stm-fast`, `stm-threshold` (a matrix of `tonemap.threshold`), `stm-saliency`, `stm-half`; and the
-//! reference `cpu`. Scenes of the group `still` are pictures, all others frames.
+//! a matrix of `tonemap.mark`), `ltm-fast`, `stm-fast`, `ltm-pyramid`, `stm-pyramid`,
+//! `stm-threshold` (a matrix of `tonemap.threshold`), `stm-saliency`, `stm-half`; and the reference `cpu`. Scenes of the group `still` are pictures, all others frames.
 
 mod tables;
 
@@ -79,6 +79,11 @@ impl<'a> View<'a> {
         Some(width.parse::<usize>().ok()? * height.parse::<usize>().ok()?)
     }
 
+    /// Whether its losses are measured: frames of many pixels would take too long.
+    fn is_measured(&self) -> bool {
+        self.pixels().is_none_or(|pixels| pixels <= MEASURED)
+    }
+
     /// A run by the name of its technique, and a value of its matrix.
     fn run(&self, method: &str, value: Option<(&str, &str)>) -> Option<&'a Done> {
         self.results.at(self.of).find(|run| {
@@ -151,9 +156,18 @@ fn images(results: &Results, views: &[View<'_>]) -> Result<Section> {
             .exposure(0.0)
             .values("linear light of a screen, whose white is 1")
             .with("local", local.pixels);
-        for method in
-            ["stm", "stm-saliency", "gtm", "ltm-fast", "reinhard-ltm", "bilateral-ltm", "aces", "agx", "neutral"]
-        {
+        for method in [
+            "stm",
+            "stm-saliency",
+            "gtm",
+            "ltm-fast",
+            "ltm-pyramid",
+            "reinhard-ltm",
+            "bilateral-ltm",
+            "aces",
+            "agx",
+            "neutral",
+        ] {
             if let Some(run) = view.run(method, None) {
                 set = set.with(method, results.picture(Layer(run, ""))?.pixels);
             }

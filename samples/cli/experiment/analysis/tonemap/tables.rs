@@ -2,7 +2,7 @@
 
 use lucerna::{Result, measure::Measure};
 
-use super::{MEASURED, THRESHOLD, View, casual, over, practised};
+use super::{THRESHOLD, View, casual, over, practised};
 use crate::{
     experiment::results::Done,
     report::{Axis, Cell, Plot, Section, Table},
@@ -38,49 +38,59 @@ pub(super) fn payoff(views: &[View<'_>]) -> Result<Section> {
     section.text(
         "The local operator as it is defined averages every neighbourhood of every pixel anew (*literal*). Then doing it only where it \
          matters saves what it does not do. Computed along rows and columns (*fast*) the same averages cost so little that there is \
-         less to save: the last column says what selection gains over the fast local operator. Above 1 it pays.",
+         less to save, and with large averages from halved pictures (*pyramid*, not quite the same: FLIP against the literal operator) still \
+         less. The first table has the time of local over that of selective tone mapping, both averaging in the same way: above 1 \
+         selection pays.",
     );
-    let mut table = Table::new(
-        "payoff",
-        "Time of local tone mapping over that of another way",
-        [
-            "picture",
-            "important (%)",
-            "literal (ms)",
-            "literal / selective",
-            "marked by",
-            "literal / fast",
-            "fast / selective fast",
-        ],
-    )
-    .timed();
-    let mut points = (Vec::new(), Vec::new());
+    let title = "What selection gains over local tone mapping, by way to average";
+    let columns = ["picture", "important (%)", "literal", "marked by", "fast", "pyramid"];
+    let mut gains = Table::new("payoff", title, columns).timed();
+    let title = "Local tone mapping: what a better way to average gains";
+    let columns = ["picture", "literal (ms)", "literal / fast", "literal / pyramid", "FLIP of pyramid"];
+    let mut ways = Table::new("payoff-ways", title, columns).timed();
+    let mut points = [const { Vec::new() }; 3];
     for view in views {
-        let (literal, fast) = (view.ms("ltm")?, view.ms("ltm-fast")?);
+        let (literal, fast, pyramid) = (view.ms("ltm")?, view.ms("ltm-fast")?, view.ms("ltm-pyramid")?);
         let best = view.best_mark()?;
         let important = view.important(view.run("stm", None))?.map(|share| share * 100.0);
         let selective = over(literal, best.as_ref().map(|(_, ms)| *ms));
         let selective_fast = over(fast, view.ms("stm-fast")?);
-        table.push([
+        let selective_pyramid = over(pyramid, view.ms("stm-pyramid")?);
+        let flip = if view.is_measured() {
+            Some(view.measures(&casual(), [Measure::Flip], view.run("ltm", None), view.run("ltm-pyramid", None))?[0])
+        } else {
+            None
+        };
+        gains.push([
             view.name().into(),
             important.into(),
-            literal.into(),
             selective.into(),
             best.map_or(Cell::Empty, |(mark, _)| mark.into()),
-            over(literal, fast).into(),
             selective_fast.into(),
+            selective_pyramid.into(),
         ]);
-        points.0.extend(important.zip(selective));
-        points.1.extend(important.zip(selective_fast));
+        ways.push([
+            view.name().into(),
+            literal.into(),
+            over(literal, fast).into(),
+            over(literal, pyramid).into(),
+            flip.into(),
+        ]);
+        for (points, gain) in points.iter_mut().zip([selective, selective_fast, selective_pyramid]) {
+            points.extend(important.zip(gain));
+        }
     }
-    section.add(table);
+    section.add(gains);
+    section.add(ways);
     let plot = Plot::new(
         "payoff-plot",
         "Gain against the share of important pixels",
         Axis::new("important (%)"),
         Axis::new("times"),
     );
-    section.add(plot.points("literal / selective", points.0).points("fast / selective fast", points.1).timed());
+    let [literal, fast, pyramid] = points;
+    let plot = plot.points("literal / selective", literal).points("fast / selective fast", fast);
+    section.add(plot.points("pyramid / selective pyramid", pyramid).timed());
     Ok(section)
 }
 
@@ -124,12 +134,12 @@ pub(super) fn frames(views: &[View<'_>]) -> Result<Section> {
         "Frames a second of tone mapping alone on the device named at the end of the page; the thesis' are of a GeForce 6600 (4:3) and an \
          8800 GTX (squares). Only ratios between columns mean something.",
     );
-    let columns = ["frame", "thesis", "thesis, with LTM", "rendering", "with LTM", "with LTM fast"];
+    let columns = ["frame", "thesis", "thesis, with LTM", "rendering", "with LTM", "with LTM fast", "with LTM pyramid"];
     let title = "Table 5: frames a second of rendering, and of rendering with tone mapping";
     let mut whole = Table::new("table-5", title, columns).timed();
     let heads = ["frame", "GTM", "LTM", "STM", "thesis"].map(str::to_owned);
     let marks = MARKS.iter().map(|mark| (*mark).to_owned());
-    let fast = ["LTM fast", "STM fast"].map(str::to_owned);
+    let fast = ["LTM fast", "STM fast", "LTM pyramid", "STM pyramid"].map(str::to_owned);
     let title = "Tables 9 and 10: frames a second (STM by early-z), and STM/LTM by way to mark";
     let mut table = Table::new("table-9", title, heads.into_iter().chain(marks).chain(fast)).timed();
     let frames = || views.iter().filter(|view| !view.is_still());
@@ -141,7 +151,9 @@ pub(super) fn frames(views: &[View<'_>]) -> Result<Section> {
         for mark in MARKS {
             row.push(over(local, view.ms_marked(mark)?).into());
         }
-        row.extend([rate(view.ms("ltm-fast")?), rate(view.ms("stm-fast")?)]);
+        for way in ["ltm-fast", "stm-fast", "ltm-pyramid", "stm-pyramid"] {
+            row.push(rate(view.ms(way)?));
+        }
         table.push(row);
         let paper = TABLE_5.iter().find(|(name, ..)| *name == size);
         let render = view.ms("frame")?;
@@ -153,6 +165,7 @@ pub(super) fn frames(views: &[View<'_>]) -> Result<Section> {
             rate(render),
             both(local),
             both(view.ms("ltm-fast")?),
+            both(view.ms("ltm-pyramid")?),
         ]);
     }
     section.add(whole);
@@ -200,7 +213,7 @@ pub(super) fn stills(views: &[View<'_>]) -> Result<Section> {
     let mut section = Section::new("Tables 11 to 13: pictures");
     section.text(format!("Threshold {THRESHOLD}. STM/LTM is how many times faster selective tone mapping is, each way to mark for itself."));
     let mut table = Table::new("table-11", "Table 11", ["picture", "pixels", "dynamic range (log₁₀)", "important (%)"]);
-    let heads = ["picture", "GTM (ms)", "LTM (ms)", "fast LTM (ms)"].map(str::to_owned);
+    let heads = ["picture", "GTM (ms)", "LTM (ms)", "fast LTM (ms)", "pyramid LTM (ms)"].map(str::to_owned);
     let marks = MARKS.iter().map(|mark| (*mark).to_owned());
     let paper = ["thesis, 6600", "thesis, 8800"].map(str::to_owned);
     let title = "Tables 12 and 13: times, and STM/LTM by way to mark";
@@ -219,7 +232,8 @@ pub(super) fn stills(views: &[View<'_>]) -> Result<Section> {
         let important = view.important(view.run("stm", None))?.map(|share| share * 100.0);
         table.push([view.name().into(), size, range.into(), important.into()]);
         let local = view.ms("ltm")?;
-        let mut cells = vec![view.name().into(), view.ms("gtm")?.into(), local.into(), view.ms("ltm-fast")?.into()];
+        let mut cells = vec![view.name().into(), view.ms("gtm")?.into(), local.into()];
+        cells.extend([view.ms("ltm-fast")?.into(), view.ms("ltm-pyramid")?.into()]);
         for mark in MARKS {
             cells.push(over(local, view.ms_marked(mark)?).into());
         }
@@ -264,7 +278,7 @@ pub(super) fn quality(views: &[View<'_>]) -> Result<Section> {
     let mut alike = Table::new("table-15", "Table 15: SSIM, and FLIP (Sobel)", columns);
     let mut gains =
         Table::new("table-16", "Table 16: gain", ["picture", "GTM (1/s)", "STM (1/s)", "gain GTM", "gain STM"]).timed();
-    for view in views.iter().filter(|view| view.pixels().is_none_or(|pixels| pixels <= MEASURED)) {
+    for view in views.iter().filter(|view| view.is_measured()) {
         let truth = view.run("ltm", None);
         let sobel = view.run("stm", Some(("tonemap.mark", "early-z")));
         let vdp = |run| view.measures(&casual(), [Measure::Vdp], truth, run).map(|[vdp]| vdp);
