@@ -158,6 +158,7 @@ fn every_barrier_of_the_graphs_matters_and_two_runs_are_the_same() {
         for (name, settings) in [
             ("cornell-area", Settings { vpls: 12, direct_samples: 2, ..Settings::default() }),
             ("office", Settings { vpls: 24, direct_samples: 2, ..Settings::paper() }),
+            ("figure", Settings { vpls: 24, direct_samples: 1, candidates: 2, history: 8, ..Settings::default() }),
             ("figure", Settings { vpls: 24, direct_samples: 1, indirect: false, ..Settings::default() }),
         ] {
             let scene = builtin::load(name).unwrap();

@@ -4,7 +4,7 @@ use std::{ops::Range, path::PathBuf, str::FromStr};
 
 use clap::{ArgAction, Args};
 
-use crate::{config::SettingsArgs, console::Console, progress::ProgressMode, stage::StageArgs};
+use crate::{config::SettingsArgs, console::Console, progress::ProgressMode, reference::Span, stage::StageArgs};
 
 /// Options of `render`, the same for every technique.
 #[derive(Args, Clone, Debug)]
@@ -56,6 +56,10 @@ pub struct RenderArgs {
     /// Frames per second of a sequence
     #[arg(long, default_value_t = 30.0, value_parser = positive, help_heading = "Picture")]
     pub fps: f64,
+
+    /// Begin no frame after this time: 90, 90s, 10m, 1h30m; the first is always made; exit code 8 if some are missing
+    #[arg(long, value_name = "TIME", help_heading = "Picture")]
+    pub time_limit: Option<Span>,
 
     /// Exposure: colours of .png files are multiplied by 2^EV [default: 0, or what suits the scene]
     #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]

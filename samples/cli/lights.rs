@@ -3,7 +3,7 @@
 use std::{fmt, str::FromStr};
 
 use glam::{Mat4, Quat, Vec3};
-use lucerna::scene::{Light, LightKind, Scene};
+use lucerna::scene::{Animation, Channel, Interpolation, Keys, Light, LightKind, Scene, Transform};
 use serde::{Deserialize, Serialize};
 
 use crate::framing;
@@ -11,12 +11,15 @@ use crate::framing;
 /// Irradiance of a sun without a stated one, W/m².
 const SUN: f32 = 2.0;
 
-/// A white point light: `X,Y,Z,INTENSITY`, metres and W/sr.
+/// A white point light: `X,Y,Z,INTENSITY`, metres and W/sr; with `,X2,Y2,Z2,SECONDS` behind it, it moves there in a straight line, and
+/// back, once in so many seconds, again and again.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub struct Point {
     position: Vec3,
     intensity: f32,
+    /// Where it turns round, and the seconds of a whole turn.
+    to: Option<(Vec3, f32)>,
 }
 
 /// A white sun: `AZIMUTH,ELEVATION[,IRRADIANCE]`, degrees and W/m². Azimuth 0 stands over +Z, 90 over +X.
@@ -32,10 +35,16 @@ impl FromStr for Point {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match numbers(text)?[..] {
-            [x, y, z, intensity] if intensity > 0.0 => Ok(Self { position: Vec3::new(x, y, z), intensity }),
-            _ => Err("expected X,Y,Z,INTENSITY with an intensity above 0, like 0,2.5,0,10".into()),
-        }
+        let wrong = "expected X,Y,Z,INTENSITY or X,Y,Z,INTENSITY,X2,Y2,Z2,SECONDS with intensity and seconds above 0, like 0,2.5,0,10";
+        let (from, to) = match numbers(text)?[..] {
+            [x, y, z, intensity] => ([x, y, z, intensity], None),
+            [x, y, z, intensity, x2, y2, z2, seconds] if seconds > 0.0 => {
+                ([x, y, z, intensity], Some((Vec3::new(x2, y2, z2), seconds)))
+            }
+            _ => return Err(wrong.into()),
+        };
+        let [x, y, z, intensity] = from;
+        if intensity > 0.0 { Ok(Self { position: Vec3::new(x, y, z), intensity, to }) } else { Err(wrong.into()) }
     }
 }
 
@@ -63,7 +72,9 @@ fn numbers(text: &str) -> Result<Vec<f32>, String> {
 impl fmt::Display for Point {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Vec3 { x, y, z } = self.position;
-        write!(f, "{x},{y},{z},{}", self.intensity)
+        write!(f, "{x},{y},{z},{}", self.intensity)?;
+        let Some((Vec3 { x, y, z }, seconds)) = self.to else { return Ok(()) };
+        write!(f, ",{x},{y},{z},{seconds}")
     }
 }
 
@@ -116,6 +127,16 @@ pub fn add(scene: &mut Scene, points: &[Point], sun: Option<&Sun>) {
         let kind = LightKind::Point { range: None };
         let light = Light { name, kind, color: Vec3::ONE, intensity: point.intensity };
         framing::add_light(scene, light, Mat4::from_translation(point.position));
+        if let (Some((to, seconds)), Some(node)) = (point.to, scene.nodes.last_mut()) {
+            node.local = Transform::Trs { translation: point.position, rotation: Quat::IDENTITY, scale: Vec3::ONE };
+            let channel = Channel {
+                node: scene.nodes.len() as u32 - 1,
+                interpolation: Interpolation::Linear,
+                times: vec![0.0, 0.5 * seconds, seconds],
+                values: Keys::Translation(vec![point.position, to, point.position]),
+            };
+            scene.animations.push(Animation { name: format!("light {i}"), channels: vec![channel] });
+        }
     }
     if let Some(sun) = sun {
         let light =
@@ -133,16 +154,29 @@ mod tests {
     #[test]
     fn lights_are_read_and_written() {
         let point: Point = "1, -2.5,3,10".parse().unwrap();
-        assert_eq!(point, Point { position: Vec3::new(1.0, -2.5, 3.0), intensity: 10.0 });
+        assert_eq!(point, Point { position: Vec3::new(1.0, -2.5, 3.0), intensity: 10.0, to: None });
         assert_eq!(point.to_string().parse(), Ok(point));
         let sun: Sun = "90,30".parse().unwrap();
         assert_eq!(sun, Sun { azimuth: 90.0, elevation: 30.0, irradiance: SUN });
         assert_eq!(sun.to_string().parse(), Ok(sun));
-        for wrong in ["", "1,2,3", "1,2,3,0", "1,2,3,x", "1,2,3,inf", "1,2,3,4,5"] {
+        let moving: Point = "1,2,3,10,4,5,6,2.5".parse().unwrap();
+        assert_eq!(moving.to, Some((Vec3::new(4.0, 5.0, 6.0), 2.5)));
+        assert_eq!(moving.to_string().parse(), Ok(moving));
+        for wrong in ["", "1,2,3", "1,2,3,0", "1,2,3,x", "1,2,3,inf", "1,2,3,4,5", "1,2,3,4,5,6,7", "1,2,3,4,5,6,7,0"] {
             assert!(wrong.parse::<Point>().is_err(), "{wrong}");
         }
         for wrong in ["90", "0,91", "0,45,-1", "0,nan"] {
             assert!(wrong.parse::<Sun>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_moving_lamp_goes_there_and_back() {
+        let mut scene = Scene::default();
+        add(&mut scene, &["9,9,9,1".parse().unwrap(), "0,2,0,5,4,2,0,2".parse().unwrap()], None);
+        let at = |seconds: f32| lucerna::scene::Pose::playing(&scene, seconds).world[1].w_axis.truncate();
+        for (seconds, x) in [(0.0, 0.0), (0.5, 2.0), (1.0, 4.0), (1.75, 1.0), (2.5, 2.0)] {
+            assert!(at(seconds).abs_diff_eq(Vec3::new(x, 2.0, 0.0), 1e-5), "{seconds}: {}", at(seconds));
         }
     }
 

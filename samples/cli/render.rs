@@ -81,7 +81,9 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
     let mut runner = Runner::new(&gpu);
     let mut progress = Progress::new(args.progress, console.is_quiet(), run.frames.len() as u64);
     for frame in run.frames.clone() {
-        if interrupt.requested() {
+        let late = args.time_limit.is_some_and(|limit| started.elapsed() >= limit.0);
+        // One frame there will be, or the next run would get no further.
+        if interrupt.requested() || (late && run.progress().0 > 0) {
             break;
         }
         let begun = Instant::now();
@@ -103,7 +105,8 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
             None => shown.read(&mut graph, run.outputs.wants_layers()),
         };
         let dump = args.dump.as_ref().map(|folder| (folder, graph.dump()));
-        let result = runner.run(&graph)?;
+        // The frame after this one builds on it once, however often it is repeated.
+        let result = if args.repeat > 1 { runner.run_held(&graph)? } else { runner.run(&graph)? };
         // What was asked to stop is not written, unless it is all there.
         if interrupt.requested() {
             break;
@@ -120,7 +123,7 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
         }
         progress.frame(frame, milliseconds, &files);
         run.done(frame, seconds, milliseconds, files, &result.report);
-        for _ in 1..args.repeat {
+        for repeat in 1..args.repeat {
             if interrupt.requested() {
                 break;
             }
@@ -131,7 +134,8 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
             let mut shown = compose(&mut graph, &mut resources, &input, &settings)?;
             // No time passes, so that adaptation stays as it is.
             shown.develop(|picture| last.frame(&mut graph, picture, 0.0))?;
-            let report = runner.run(&graph)?.report;
+            let last = repeat + 1 == args.repeat;
+            let report = if last { runner.run(&graph)? } else { runner.run_held(&graph)? }.report;
             run.again(begun.elapsed().as_secs_f64() * 1e3, &report);
         }
     }

@@ -55,7 +55,8 @@ pub struct StageArgs {
     #[arg(long, alias = "env", value_name = "FILE", help_heading = "Picture")]
     pub environment: Option<PathBuf>,
 
-    /// Add a white point light: place in metres, intensity in W/sr; may be given more than once
+    /// Add a white point light: place in metres, intensity in W/sr; with ,X2,Y2,Z2,SECONDS it goes there and back in so many seconds;
+    /// may be given more than once
     #[arg(long, value_name = "X,Y,Z,INTENSITY", allow_hyphen_values = true, help_heading = "Picture")]
     pub light: Vec<Point>,
 

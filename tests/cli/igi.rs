@@ -4,7 +4,7 @@
 mod support;
 
 use lucerna::{image, scene::Limits};
-use support::{command, device, lucerna, ran};
+use support::{command, device, files, lucerna, ran};
 
 const SMALL: [&str; 6] = ["render", "--builtin", "cornell", "--size", "32x24", "-q"];
 
@@ -19,6 +19,8 @@ fn wrong_settings_are_refused_and_named() {
         (&["-D", "igi.bounces=9"], "1 to 8"),
         (&["-D", "igi.downsample=5"], "1 to 4"),
         (&["-D", "igi.bound=-1"], "0 to 1"),
+        (&["-D", "igi.history=10001"], "0 to 10000"),
+        (&["-D", "igi.history_lag=0"], "0.001 to 10"),
         (&["-D", "igi.visibility=\"rays\""], "compute"),
         (&["-D", "igi.vlps=4"], "did you mean 'igi.vpls'"),
         (&["--mode", "occlusion"], "indirect"),
@@ -48,4 +50,36 @@ fn layers_sum_to_the_picture_and_it_can_be_made_again() {
         assert!((total - direct - indirect).abs() <= 1e-5 * total.abs() + 1e-7, "{total} {direct} {indirect}");
     }
     lucerna(["rerun", name]).expect(0, &[]);
+}
+
+#[test]
+fn a_sequence_with_a_moving_lamp_is_numbered_and_each_frame_can_be_made_again() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let pattern = folder.path().join("lamp-{frame:03}.exr").to_string_lossy().into_owned();
+    let film = ["--frames", "0..4", "--fps", "10", "--light", "-0.5,0.6,0.3,3,0.5,0.6,0.3,1"];
+    let settings = ["-D", "igi.vpls=24", "-D", "igi.direct_samples=1", "-D", "igi.history=8"];
+    igi(&[&film[..], &settings, &["-o", &pattern]].concat()).expect(0, &[]);
+    assert_eq!(files(folder.path()), ["lamp-000.exr", "lamp-001.exr", "lamp-002.exr", "lamp-003.exr"]);
+    let frame = |number: u32| folder.path().join(format!("lamp-{number:03}.exr"));
+    let light = |number: u32| image::read(&frame(number), &Limits::default()).unwrap().layer("").unwrap().data.clone();
+    assert_ne!(light(0), light(3));
+    // With all frames before it, on which it builds.
+    lucerna(["rerun", frame(2).to_str().unwrap()]).expect(0, &[]);
+
+    // Frames that run more than once change nothing.
+    let pattern = folder.path().join("again-{frame}.exr").to_string_lossy().into_owned();
+    igi(&[&film[..], &settings, &["--repeat", "2", "-o", &pattern]].concat()).expect(0, &[]);
+    let again = image::read(&folder.path().join("again-3.exr"), &Limits::default()).unwrap();
+    assert_eq!(again.layer("").unwrap().data, light(3));
+
+    // Time that is over after the first frame: what is there is whole, and the code says that some are missing.
+    let late = tempfile::tempdir().unwrap();
+    let pattern = late.path().join("{frame}.png").to_string_lossy().into_owned();
+    let ran = igi(&[&film[..], &settings, &["--time-limit", "0.001s", "--json", "-o", &pattern]].concat()).expect(8, &[]);
+    assert_eq!(files(late.path()), ["0.png"]);
+    assert_eq!(ran.json()["complete"], false);
+    igi(&["--time-limit", "soon"]).expect(2, &["10m"]);
 }

@@ -1,6 +1,8 @@
 //! Pictures of instant global illumination with what lies behind them, for its tests.
 #![allow(dead_code)]
 
+pub mod twins;
+
 use glam::Vec3;
 use lucerna::{
     gpu::Gpu,

@@ -76,7 +76,18 @@ impl Runner {
     /// `Runtime` with every mistake of the graph, or a limit of the device that a pass is over; `OutOfMemory`;
     /// `DeviceLost`, naming the pass.
     pub fn run(&mut self, graph: impl Borrow<Graph>) -> Result<Frame> {
-        let graph = graph.borrow();
+        self.run_then(graph.borrow(), true)
+    }
+
+    /// As [`Runner::run`], but the history stays that of the frame before: the same frame can run again.
+    ///
+    /// # Errors
+    /// As [`Runner::run`].
+    pub fn run_held(&mut self, graph: impl Borrow<Graph>) -> Result<Frame> {
+        self.run_then(graph.borrow(), false)
+    }
+
+    fn run_then(&mut self, graph: &Graph, turn: bool) -> Result<Frame> {
         let begun = Instant::now();
         let plan = graph.plan()?;
         let plan_ms = milliseconds(begun);
@@ -87,10 +98,10 @@ impl Runner {
                 return Err(Error::new(ErrorKind::Runtime, what));
             }
         }
-        self.execute(graph, &plan, plan_ms).map_err(|e| e.at(graph.name()))
+        self.execute(graph, &plan, plan_ms, turn).map_err(|e| e.at(graph.name()))
     }
 
-    fn execute(&mut self, graph: &Graph, plan: &Plan, plan_ms: f64) -> Result<Frame> {
+    fn execute(&mut self, graph: &Graph, plan: &Plan, plan_ms: f64, turn: bool) -> Result<Frame> {
         let begun = Instant::now();
         let (memory, fresh) = self.pool.acquire(&self.gpu, graph, plan)?;
         self.sets.reset()?;
@@ -177,7 +188,9 @@ impl Runner {
         let wait_ms = milliseconds(submitted);
 
         accel::remember_built(graph);
-        self.pool.turn(graph);
+        if turn {
+            self.pool.turn(graph);
+        }
         for (physical, memory) in plan.physical.iter().zip(&memory) {
             if let (Source::Imported(_), Some(rest), Memory::Image(image)) = (&physical.source, physical.rest, memory) {
                 image.set_layout(rest.to_vk());

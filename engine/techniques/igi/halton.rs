@@ -26,12 +26,20 @@ pub fn radical_inverse(base: u32, index: u32) -> f64 {
 /// # Panics
 /// Never; dimensions beyond [`DIMENSIONS`] repeat the last base.
 pub fn table(paths: u32, dimensions: usize, seed: u32) -> Vec<f32> {
+    table_from(0, paths, dimensions, seed)
+}
+
+/// As [`table`], from point `first` on; past the end of 32 bits the points begin anew.
+///
+/// # Panics
+/// Never.
+pub fn table_from(first: u32, paths: u32, dimensions: usize, seed: u32) -> Vec<f32> {
     let shifts: Vec<f64> = (0..dimensions).map(|dimension| shift(seed, dimension as u32)).collect();
     let mut out = Vec::with_capacity(paths as usize * dimensions);
     for path in 0..paths {
         for (dimension, shift) in shifts.iter().enumerate() {
             let base = PRIMES[dimension.min(DIMENSIONS - 1)];
-            let value = (radical_inverse(base, path.saturating_add(1)) + shift).fract() as f32;
+            let value = (radical_inverse(base, first.wrapping_add(path).saturating_add(1)) + shift).fract() as f32;
             // Rounding to 32 bits may reach 1.
             out.push(value.min(1.0 - f32::EPSILON / 2.0));
         }
@@ -111,5 +119,7 @@ mod tests {
             assert!(!(1e-6..=1.0 - 1e-6).contains(&apart), "{apart}");
         }
         assert_ne!(table(4, 2, 1), table(4, 2, 2));
+        // One frame after the other takes the row of numbers in pieces.
+        assert_eq!([table_from(0, 3, 4, 5), table_from(3, 7, 4, 5)].concat(), table(10, 4, 5));
     }
 }

@@ -14,6 +14,7 @@
 
 pub mod filters;
 pub mod halton;
+pub mod history;
 mod importance;
 mod picture;
 mod settings;
@@ -69,6 +70,8 @@ pub struct Igi {
 #[derive(Clone, Copy, Debug)]
 struct Shared {
     settings: Uniform<types::IgiSettings>,
+    /// Contents of `settings`.
+    block: types::IgiSettings,
     rays: RayHandles,
     /// For the shadow rays of virtual lights.
     hidden_by: RayHandles,
@@ -84,7 +87,12 @@ struct Shared {
     least: f32,
     /// Of the scene's box, metres.
     diagonal: f32,
+    /// Of random choices.
     seed: u32,
+    /// By which the Halton points are turned.
+    turn: u32,
+    /// Of the Halton points, that of the first path.
+    first: u32,
 }
 
 /// Virtual lights of a frame.
@@ -213,6 +221,7 @@ impl Igi {
         let lights = handles.moment.lights.len() as u32;
         Shared {
             settings: graph.uniform(&block),
+            block,
             rays,
             hidden_by,
             environment: graph.import_image(&self.environment),
@@ -225,6 +234,8 @@ impl Igi {
             least: settings.bound * (high - low).length(),
             diagonal: (high - low).length(),
             seed: graph.seed,
+            turn: graph.seed,
+            first: 0,
         }
     }
 
@@ -240,7 +251,7 @@ impl Igi {
         let sources = starts::sources(&handles.moment.lights, triangles, sided, self.moments, &bounds);
         let starts = starts::starts(&sources, paths, shared.seed);
         let dimensions = (consts::VPL_FIRST_NUMBERS + 2 * settings.bounces) as usize;
-        let numbers = halton::table(paths, dimensions, shared.seed);
+        let numbers = halton::table_from(shared.first, paths, dimensions, shared.turn);
         let count = paths * settings.bounces;
         let vpls =
             Vpls { buffer: graph.buffer("igi.candidates", u64::from(count) * size_of::<types::Vpl>() as u64), count };

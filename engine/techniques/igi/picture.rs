@@ -1,6 +1,6 @@
 //! Everything from a scene on the device to the final picture.
 
-use super::{Igi, Outputs, Settings, filters};
+use super::{Igi, Outputs, Settings, Shared, Vpls, filters};
 use crate::{
     Error, Result,
     graph::{Format, Graph},
@@ -38,8 +38,24 @@ pub struct Picture {
 }
 
 impl Igi {
+    /// What paths leave, and what of it becomes virtual lights.
+    fn virtual_lights(
+        &self,
+        graph: &mut Graph,
+        handles: &Handles,
+        gbuffer: &GBuffer,
+        shared: &Shared,
+        settings: &Settings,
+    ) -> (Vpls, Vpls) {
+        let all = self.shoot(graph, handles, shared, settings);
+        let chosen =
+            if settings.candidates > 1 { self.choose(graph, gbuffer, shared, all, settings) } else { all };
+        (all, chosen)
+    }
+
     /// Declares a frame: G-buffer, paths of light, direct and indirect light, sum and sky. `handles` are of this graph, for `pose`.
-    /// `graph.seed` is the seed of the paths; with 0 they are the paper's Halton points as they are.
+    /// `graph.seed` is the seed of the paths; with 0 they are the paper's Halton points as they are. For [`Settings::history`] count
+    /// `graph.frame` up by one from frame to frame and run all frames with one `Runner`; `Runner::forget_history` starts anew.
     ///
     /// # Errors
     /// `Usage` if a setting is out of its range, or asks for boxes that [`Igi::new`] was not told of.
@@ -61,13 +77,13 @@ impl Igi {
         let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
         let outputs = graph.scope("igi", |graph| {
             let shared = self.shared(graph, scene, pose, handles, igi);
-            let vpls = igi.indirect.then(|| self.shoot(graph, handles, &shared, igi));
-            let vpls = match vpls {
-                Some(all) if igi.candidates > 1 => Some(self.choose(graph, &gbuffer, &shared, all, igi)),
-                _ => vpls,
-            };
+            // With a history every frame takes numbers of its own.
+            let frame = if igi.history > 0 { graph.frame } else { 0 };
+            let own = Self::numbered(graph, &shared, igi, frame);
+            let shot = igi.indirect.then(|| self.virtual_lights(graph, handles, &gbuffer, &own, igi));
+            let vpls = shot.map(|(_, vpls)| vpls);
             let direct = self.direct(graph, handles, &gbuffer, &shared);
-            let gathered = self.gather(graph, &gbuffer, &shared, vpls, igi);
+            let gathered = self.gather(graph, &gbuffer, &own, vpls, igi);
             let (joins, upsamples) =
                 (igi.interleave > 1 && !igi.fused, igi.downsample > 1 || (igi.fused && igi.interleave > 1));
             let mut irradiance = gathered;
@@ -80,8 +96,19 @@ impl Igi {
                     irradiance = filters::upsample(graph, &gbuffer, guide, irradiance, igi);
                 }
             }
-            let sharp = (self.sharp && igi.specular)
-                .then(|| self.trees(graph, handles, &gbuffer, &shared, (vpls, settings.background), igi));
+            if let Some((all, chosen)) = shot.filter(|_| igi.history > 1) {
+                let light = (all, chosen, irradiance);
+                irradiance = self.accumulate(graph, handles, (&gbuffer, view), &shared, light, igi);
+            }
+            let sharp = (self.sharp && igi.specular).then(|| {
+                // What mirrors show has no history: it takes the same numbers in each frame, lest it flickers.
+                let steady = if frame > 0 {
+                    shot.map(|_| self.virtual_lights(graph, handles, &gbuffer, &shared, igi).1)
+                } else {
+                    vpls
+                };
+                self.trees(graph, handles, &gbuffer, &shared, (steady, settings.background), igi)
+            });
             let extent = graph.extent(gbuffer.depth);
             let total = graph.image("igi.total", Format::RGBA32F, extent);
             let indirect = graph.image("igi.indirect", Format::RGBA32F, extent);

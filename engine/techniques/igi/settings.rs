@@ -62,6 +62,13 @@ pub struct Settings {
     pub discontinuity_depth: f32,
     /// Least cosine between their normals.
     pub discontinuity_normal: f32,
+    /// Frames of a sequence whose indirect light counts, 0 to 10,000; the virtual lights of each are others. 1: none but the frame's own.
+    /// 0: no history, and the same random numbers in every frame.
+    pub history: u32,
+    /// Relative error that indirect light may have because it changes faster than the history forgets, 0.001 to 10.
+    pub history_lag: f32,
+    /// Distance from a surface of the last frame, relative to its depth, within which it counts as the same.
+    pub history_range: f32,
     /// For the shadow rays of virtual lights with `imperfect` always in compute.
     pub visibility: Visibility,
     /// Gather indirect light.
@@ -91,6 +98,9 @@ impl Default for Settings {
             upsample_range: 0.01,
             discontinuity_depth: 0.05,
             discontinuity_normal: 0.9,
+            history: 0,
+            history_lag: 0.1,
+            history_range: 0.01,
             visibility: Visibility::Auto,
             indirect: true,
             specular: true,
@@ -129,6 +139,7 @@ impl Settings {
             ("bounces", self.bounces, 1, 8),
             ("downsample", self.downsample, 1, 4),
             ("interleave", self.interleave, 1, 4),
+            ("history", self.history, 0, 10_000),
             ("specular_depth", self.specular_depth, 0, 16),
             ("direct_samples", self.direct_samples, 1, 4096),
         ])?;
@@ -139,6 +150,8 @@ impl Settings {
             ("upsample_range", self.upsample_range, 0.0, 1e6),
             ("discontinuity_depth", self.discontinuity_depth, 0.0, 1e6),
             ("discontinuity_normal", self.discontinuity_normal, -1.0, 1.0),
+            ("history_lag", self.history_lag, 0.001, 10.0),
+            ("history_range", self.history_range, 0.0, 1e6),
         ])
     }
 }

@@ -4,7 +4,7 @@ mod checkpoint;
 mod meter;
 mod options;
 
-pub use options::{ReferenceArgs, Settings, Show};
+pub use options::{ReferenceArgs, Settings, Show, Span};
 
 use std::{path::PathBuf, process::ExitCode, time::Instant};
 

@@ -1,0 +1,47 @@
+// Irradiance at the probes from a range of virtual lights.
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#define TRACE_BOXES
+#include "lib/view.glsl"
+#include "lib/random.glsl"
+#include "lib/trace.glsl"
+#include "lib/vpl.glsl"
+#include "lib/igi_history.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(binding = 0, scalar) readonly buffer Probes { HistoryProbe probes[]; };
+layout(binding = 1, scalar) readonly buffer Vpls { Vpl vpls[]; };
+layout(binding = 2, scalar) buffer Lit { vec4 lit[]; }; // rgb: W/m²; the sum grows from dispatch to dispatch
+
+layout(push_constant, scalar) uniform Push {
+    uint probe_count;
+    uint first;
+    uint count;
+    uint stride;    // every so many virtual lights are looked at
+    uint total;     // virtual lights
+    float least;    // min_d, metres
+    uint imperfect; // 1: boxes of triangles stand for them
+    uint seed;
+};
+
+void main() {
+    uint at = gl_GlobalInvocationID.x;
+    if (at >= probe_count) return;
+    HistoryProbe probe = probes[at];
+    if (probe.there == 0u) return;
+    trace_imperfect = imperfect != 0u;
+    vec3 origin = probe.position + probe.normal * probe.gap;
+    vec3 sum = vec3(0.0);
+    for (uint i = first; i < first + count; ++i) {
+        uint k = i * stride;
+        if (k >= total) break;
+        Vpl vpl = vpls[k];
+        vec3 light = vpl_irradiance(vpl, probe.position, probe.normal, least);
+        if (light == vec3(0.0)) continue;
+        vec3 to = vpl.position + vpl.normal * vpl.gap - origin;
+        if (!trace_any(Ray(origin, 0.0, to, 0.99999), TRACE_SHADOW, pcg4d(uvec4(at, k, seed, 0x9b0be5u)).x)) sum += light;
+    }
+    lit[at] += vec4(sum, 0.0);
+}

@@ -1,0 +1,184 @@
+//! The filters of instant global illumination once more, slowly and in 64 bits, written from their descriptions.
+
+use glam::{DMat4, DVec3, DVec4, dvec2, dvec3};
+use lucerna::{
+    reference::isr_scene::{Buffers, Eye},
+    techniques::igi::Settings,
+};
+
+pub type Texels = Vec<[f32; 4]>;
+
+fn color(texel: [f32; 4]) -> DVec3 {
+    dvec3(texel[0].into(), texel[1].into(), texel[2].into())
+}
+
+/// The pixel in the middle of those that a coarse texel stands for.
+pub fn pixel_of(buffers: &Buffers, (x, y): (usize, usize), factor: usize) -> (usize, usize) {
+    ((x * factor + factor / 2).min(buffers.width - 1), (y * factor + factor / 2).min(buffers.height - 1))
+}
+
+fn place(eye: &Eye, buffers: &Buffers, (x, y): (usize, usize)) -> DVec3 {
+    let (u, v) = buffers.uv(eye, x, y);
+    eye.position_at(u, v, buffers.depth[buffers.at(x, y)])
+}
+
+/// Irradiance of a pixel by joint bilateral upsampling; `None` where no texel matches enough to have a mean, or on the background.
+pub fn upsampled(
+    eye: &Eye,
+    buffers: &Buffers,
+    coarse: &Texels,
+    s: &Settings,
+    (x, y): (usize, usize),
+) -> Option<DVec3> {
+    let factor = s.downsample as usize;
+    let (columns, rows) = (buffers.width.div_ceil(factor), buffers.height.div_ceil(factor));
+    let own = buffers.at(x, y);
+    let (z, n) = (buffers.depth[own], buffers.normal[own].normalize());
+    if z >= 1.0 {
+        return None;
+    }
+    let p = place(eye, buffers, (x, y));
+    let middle = |i: usize| (i as f64 - (factor / 2) as f64) / factor as f64;
+    let centre = dvec2(middle(x), middle(y));
+    let sigma = f64::from(s.upsample_sigma);
+    let reach = (2.2 * sigma - 0.5).ceil().max(1.0);
+    let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
+    for row in 0..rows {
+        for column in 0..columns {
+            let texel = dvec2(column as f64, row as f64);
+            if (texel - (centre + 0.5).floor()).abs().max_element() > reach {
+                continue;
+            }
+            let there = pixel_of(buffers, (column, row), factor);
+            let i = buffers.at(there.0, there.1);
+            if buffers.depth[i] >= 1.0 {
+                continue;
+            }
+            let cosine = n.dot(buffers.normal[i].normalize()).max(1e-12);
+            let mut weight = cosine.powf(f64::from(s.upsample_normal));
+            weight *= (-0.5 * (texel - centre).length_squared() / (sigma * sigma)).exp();
+            if s.upsample_range > 0.0 {
+                let off = n.dot(place(eye, buffers, there) - p) / (z * eye.far * f64::from(s.upsample_range));
+                weight *= (-0.5 * off * off).exp();
+            }
+            sum += weight * color(coarse[row * columns + column]);
+            weights += weight;
+        }
+    }
+    // Near the limit rounding decides.
+    (weights > 2e-4).then(|| sum / weights)
+}
+
+/// The discontinuity buffer at a texel of every `downsample`-th pixel.
+pub fn joined(buffers: &Buffers, interleaved: &Texels, s: &Settings, (x, y): (usize, usize)) -> DVec3 {
+    let factor = s.downsample as usize;
+    let (columns, rows) = (buffers.width.div_ceil(factor), buffers.height.div_ceil(factor));
+    let surface = |texel: (usize, usize)| {
+        let (u, v) = pixel_of(buffers, texel, factor);
+        let i = buffers.at(u, v);
+        (buffers.depth[i], buffers.normal[i])
+    };
+    let (z, n) = surface((x, y));
+    if z >= 1.0 {
+        return DVec3::ZERO;
+    }
+    let tile = s.interleave as i64;
+    let (mut sum, mut count) = (DVec3::ZERO, 0.0);
+    for v in (y as i64 - (tile - 1) / 2)..(y as i64 - (tile - 1) / 2 + tile) {
+        for u in (x as i64 - (tile - 1) / 2)..(x as i64 - (tile - 1) / 2 + tile) {
+            if !(0..columns as i64).contains(&u) || !(0..rows as i64).contains(&v) {
+                continue;
+            }
+            let (there, normal) = surface((u as usize, v as usize));
+            let near = there < 1.0 && (there - z).abs() <= f64::from(s.discontinuity_depth) * z;
+            if near && n.normalize().dot(normal.normalize()) >= f64::from(s.discontinuity_normal) {
+                sum += color(interleaved[v as usize * columns + u as usize]);
+                count += 1.0;
+            }
+        }
+    }
+    sum / count
+}
+
+/// What the history is made of, for [`blended`].
+pub struct Past<'a> {
+    pub eye: &'a Eye,
+    pub clip_from_world: DMat4,
+    pub buffers: &'a Buffers,
+    /// Alpha: frames.
+    pub irradiance: &'a Texels,
+    /// World position in the last frame, alpha 0: the surface rests.
+    pub motion: &'a Texels,
+    /// Normal of each probe, or none; light by the same paths then and now.
+    pub probes: Vec<(Option<DVec3>, DVec3, DVec3)>,
+    pub columns: usize,
+    pub side: usize,
+}
+
+/// This frame's irradiance of a pixel and that of the past, blended; and how many frames count.
+pub fn blended(
+    eye: &Eye,
+    buffers: &Buffers,
+    fresh: &Texels,
+    past: &Past<'_>,
+    s: &Settings,
+    (x, y): (usize, usize),
+) -> DVec4 {
+    let own = buffers.at(x, y);
+    if buffers.depth[own] >= 1.0 {
+        return DVec4::ZERO;
+    }
+    let n = buffers.normal[own].normalize();
+    let was = match past.motion[own] {
+        moved if moved[3] > 0.0 => color(moved),
+        _ => place(eye, buffers, (x, y)),
+    };
+    let fresh = color(fresh[own]);
+    let clip = past.clip_from_world * was.extend(1.0);
+    let then = past.buffers;
+    let at = dvec2(
+        (0.5 + 0.5 * clip.x / clip.w) * then.width as f64 - 0.5,
+        (0.5 - 0.5 * clip.y / clip.w) * then.height as f64 - 0.5,
+    );
+    let (mut sum, mut weights) = (DVec4::ZERO, 0.0);
+    if clip.w > 0.0 {
+        for v in 0..then.height {
+            for u in 0..then.width {
+                // The tent of bilinear interpolation.
+                let weight = (1.0 - (u as f64 - at.x).abs()).max(0.0) * (1.0 - (v as f64 - at.y).abs()).max(0.0);
+                let i = then.at(u, v);
+                if weight == 0.0 || then.depth[i] >= 1.0 || past.irradiance[i][3] <= 0.0 {
+                    continue;
+                }
+                let normal = then.normal[i].normalize();
+                let distance = past.eye.forward.dot(was - past.eye.position);
+                let off = normal.dot(place(past.eye, then, (u, v)) - was).abs();
+                if normal.dot(n) < 0.9 || off > f64::from(s.history_range) * distance {
+                    continue;
+                }
+                sum += weight * color(past.irradiance[i]).extend(past.irradiance[i][3].into());
+                weights += weight;
+            }
+        }
+    }
+    if weights <= 0.01 {
+        return fresh.extend(1.0);
+    }
+    let (old, count) = ((sum / weights).truncate(), sum.w / weights);
+    let (mut apart, mut light) = (0.0, 0.0);
+    let place = (at + 0.5) / past.side as f64 - 0.5;
+    for (i, (normal, was, is)) in past.probes.iter().enumerate() {
+        let probe = dvec2((i % past.columns) as f64, (i / past.columns) as f64);
+        let Some(normal) = normal else { continue };
+        if (probe - (place + 0.5).floor()).abs().max_element() > 2.0 {
+            continue;
+        }
+        let weight = (-0.5 * (probe - place).length_squared()).exp() * (0.1 + 0.9 * n.dot(*normal).max(0.0));
+        apart += weight * (*is - *was).abs().element_sum();
+        light += weight * is.max(*was).element_sum();
+    }
+    let drift = if light > 0.0 { apart / light } else { 0.0 };
+    let lag = f64::from(s.history_lag);
+    let share = (1.0 / (count + 1.0)).max(1.0 / f64::from(s.history)).max(drift / (drift + lag * (1.0 - drift)));
+    (old + (fresh - old) * share).extend((1.0 / share).min(f64::from(s.history)))
+}
