@@ -25,7 +25,8 @@ fn extent() -> Extent {
 }
 
 fn stage() -> (Eye, Buffers) {
-    let (eye, patches) = scene(SIZE.0, SIZE.1);
+    let (_, patches) = scene(SIZE.0, SIZE.1);
+    let eye = Eye::look_at(dvec3(0.3, 1.2, 0.9), dvec3(0.0, 0.25, -1.3), 0.8, 10.0, SIZE.0, SIZE.1);
     let buffers = Buffers::cast(&eye, &patches, 1);
     let seen = buffers.depth.iter().filter(|z| **z < 1.0).count();
     assert!(seen > 600 && seen < SIZE.0 * SIZE.1, "{seen} pixels show something");
@@ -82,13 +83,8 @@ fn the_discontinuity_buffer_agrees_with_its_twin() {
         for (downsample, interleave, discontinuity_depth, discontinuity_normal) in
             [(1, 3, 0.05, 0.9), (1, 4, 0.004, -1.0), (2, 2, 1e6, 0.9), (3, 3, 0.05, 0.5)]
         {
-            let s = Settings {
-                downsample,
-                interleave,
-                discontinuity_depth,
-                discontinuity_normal,
-                ..Settings::default()
-            };
+            let s =
+                Settings { downsample, interleave, discontinuity_depth, discontinuity_normal, ..Settings::default() };
             let small = extent().div_ceil(downsample);
             let noise: Texels = (0..small.pixels()).map(|_| random.texel()).collect();
             let mut graph = Graph::new("join");
@@ -117,8 +113,8 @@ fn the_history_agrees_with_its_twin() {
         // The camera stood still, moved, and turned.
         let eyes = [
             eye.clone(),
-            Eye::look_at(dvec3(0.33, 1.46, 2.05), dvec3(0.02, 0.3, -1.3), 0.9, 10.0, SIZE.0, SIZE.1),
-            Eye::look_at(dvec3(0.3, 1.5, 2.0), dvec3(0.6, 0.1, -1.3), 0.9, 11.0, SIZE.0, SIZE.1),
+            Eye::look_at(dvec3(0.33, 1.16, 0.95), dvec3(0.02, 0.25, -1.3), 0.8, 10.0, SIZE.0, SIZE.1),
+            Eye::look_at(dvec3(0.3, 1.2, 0.9), dvec3(0.5, 0.1, -1.3), 0.8, 11.0, SIZE.0, SIZE.1),
         ];
         for (turn, before) in eyes.iter().enumerate() {
             let then = Buffers::cast(before, &patches, 1);
@@ -186,8 +182,7 @@ fn the_history_agrees_with_its_twin() {
             };
             let motion_image = image(&mut graph, "motion", extent(), &motion);
             let fresh_image = image(&mut graph, "fresh", extent(), &fresh);
-            let next = ["blended", "guide"]
-                .map(|name| graph.image(name, lucerna::graph::Format::RGBA32F, extent()));
+            let next = ["blended", "guide"].map(|name| graph.image(name, lucerna::graph::Format::RGBA32F, extent()));
             history::blend(&mut graph, &g, (motion_image, fresh_image), (&past, grid), (next[0], next[1]), &s);
             let [out, kept] = read(gpu, graph, next);
 
@@ -211,7 +206,7 @@ fn the_history_agrees_with_its_twin() {
             agree(&found, &wanted, 1e-3, 4 * all / 100, &format!("camera {turn}"));
             let reused = expected.iter().filter(|e| e.w > 1.5).count();
             let alone = expected.iter().filter(|e| e.w == 1.0).count();
-            assert!(reused > all / 5 && alone > all / 40, "camera {turn}: {reused} reused, {alone} alone");
+            assert!(reused > all / 5 && alone > 5, "camera {turn}: {reused} reused, {alone} alone");
             for (i, texel) in kept.iter().enumerate() {
                 assert!((f64::from(texel[3]) - buffers.depth[i]).abs() < 1e-6, "depth {i}: {texel:?}");
             }

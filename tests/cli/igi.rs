@@ -78,7 +78,8 @@ fn a_sequence_with_a_moving_lamp_is_numbered_and_each_frame_can_be_made_again() 
     // Time that is over after the first frame: what is there is whole, and the code says that some are missing.
     let late = tempfile::tempdir().unwrap();
     let pattern = late.path().join("{frame}.png").to_string_lossy().into_owned();
-    let ran = igi(&[&film[..], &settings, &["--time-limit", "0.001s", "--json", "-o", &pattern]].concat()).expect(8, &[]);
+    let ran =
+        igi(&[&film[..], &settings, &["--time-limit", "0.001s", "--json", "-o", &pattern]].concat()).expect(8, &[]);
     assert_eq!(files(late.path()), ["0.png"]);
     assert_eq!(ran.json()["complete"], false);
     igi(&["--time-limit", "soon"]).expect(2, &["10m"]);

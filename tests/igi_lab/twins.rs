@@ -23,13 +23,7 @@ fn place(eye: &Eye, buffers: &Buffers, (x, y): (usize, usize)) -> DVec3 {
 }
 
 /// Irradiance of a pixel by joint bilateral upsampling; `None` where no texel matches enough to have a mean, or on the background.
-pub fn upsampled(
-    eye: &Eye,
-    buffers: &Buffers,
-    coarse: &Texels,
-    s: &Settings,
-    (x, y): (usize, usize),
-) -> Option<DVec3> {
+pub fn upsampled(eye: &Eye, buffers: &Buffers, coarse: &Texels, s: &Settings, (x, y): (usize, usize)) -> Option<DVec3> {
     let factor = s.downsample as usize;
     let (columns, rows) = (buffers.width.div_ceil(factor), buffers.height.div_ceil(factor));
     let own = buffers.at(x, y);

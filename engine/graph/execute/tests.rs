@@ -27,7 +27,7 @@ fn said(spoil: impl FnOnce(&mut Plan)) -> Option<Result<(), String>> {
     let options = GpuOptions { print_messages: false, ..GpuOptions::default() };
     let result = testing::run(options, |gpu| {
         if gpu.validation_active() {
-            ran = Some(Runner::new(gpu).execute(&graph, &plan, 0.0).map(|_| ()));
+            ran = Some(Runner::new(gpu).execute(&graph, &plan, 0.0, true).map(|_| ()));
         }
     });
     ran.map(|_| result)

@@ -48,8 +48,7 @@ impl Igi {
         settings: &Settings,
     ) -> (Vpls, Vpls) {
         let all = self.shoot(graph, handles, shared, settings);
-        let chosen =
-            if settings.candidates > 1 { self.choose(graph, gbuffer, shared, all, settings) } else { all };
+        let chosen = if settings.candidates > 1 { self.choose(graph, gbuffer, shared, all, settings) } else { all };
         (all, chosen)
     }
 
