@@ -18,6 +18,9 @@ use lucerna::{
     },
 };
 
+/// Normal, or nothing there; light then and now.
+type Probe = (Option<DVec3>, DVec3, DVec3);
+
 const SIZE: (usize, usize) = (45, 34);
 
 fn extent() -> Extent {
@@ -63,9 +66,9 @@ fn upsampling_and_the_fused_filter_agree_with_their_twin() {
             let fine = filters::upsample(&mut graph, &g, guide, coarse, &s);
             let [fine] = read(gpu, graph, [fine]);
             let (mut found, mut expected) = (Vec::new(), Vec::new());
-            for i in 0..SIZE.0 * SIZE.1 {
+            for (i, fine) in fine.iter().enumerate() {
                 if let Some(color) = upsampled(&eye, &buffers, &noise, &s, (i % SIZE.0, i / SIZE.0)) {
-                    found.extend_from_slice(&fine[i][..3]);
+                    found.extend_from_slice(&fine[..3]);
                     expected.extend(color.to_array());
                 }
             }
@@ -112,7 +115,7 @@ fn the_history_agrees_with_its_twin() {
         let mut random = Random(13);
         // The camera stood still, moved, and turned.
         let eyes = [
-            eye.clone(),
+            eye,
             Eye::look_at(dvec3(0.33, 1.16, 0.95), dvec3(0.02, 0.25, -1.3), 0.8, 10.0, SIZE.0, SIZE.1),
             Eye::look_at(dvec3(0.3, 1.2, 0.9), dvec3(0.5, 0.1, -1.3), 0.8, 11.0, SIZE.0, SIZE.1),
         ];
@@ -162,7 +165,7 @@ fn the_history_agrees_with_its_twin() {
                     ..Default::default()
                 })
                 .collect();
-            let lights = |pick: &dyn Fn(&(Option<DVec3>, DVec3, DVec3)) -> DVec3| -> Vec<[f32; 4]> {
+            let lights = |pick: fn(&Probe) -> DVec3| -> Vec<[f32; 4]> {
                 probes.iter().map(|probe| pick(probe).as_vec3().extend(0.0).to_array()).collect()
             };
             let mut graph = Graph::new("history");
@@ -177,8 +180,8 @@ fn the_history_agrees_with_its_twin() {
                 irradiance: image(&mut graph, "old", extent(), &old),
                 guide: image(&mut graph, "old guide", extent(), &guides),
                 probes: graph.buffer_from("probes", &placed),
-                lit: graph.buffer_from("lit", &lights(&|p| p.1)),
-                relit: graph.buffer_from("relit", &lights(&|p| p.2)),
+                lit: graph.buffer_from("lit", &lights(|p| p.1)),
+                relit: graph.buffer_from("relit", &lights(|p| p.2)),
             };
             let motion_image = image(&mut graph, "motion", extent(), &motion);
             let fresh_image = image(&mut graph, "fresh", extent(), &fresh);

@@ -64,7 +64,7 @@ fn a_sequence_with_a_moving_lamp_is_numbered_and_each_frame_can_be_made_again() 
     igi(&[&film[..], &settings, &["-o", &pattern]].concat()).expect(0, &[]);
     assert_eq!(files(folder.path()), ["lamp-000.exr", "lamp-001.exr", "lamp-002.exr", "lamp-003.exr"]);
     let frame = |number: u32| folder.path().join(format!("lamp-{number:03}.exr"));
-    let light = |number: u32| image::read(&frame(number), &Limits::default()).unwrap().layer("").unwrap().data.clone();
+    let light = |number: u32| image::read(frame(number), &Limits::default()).unwrap().layer("").unwrap().data.clone();
     assert_ne!(light(0), light(3));
     // With all frames before it, on which it builds.
     lucerna(["rerun", frame(2).to_str().unwrap()]).expect(0, &[]);
@@ -72,7 +72,7 @@ fn a_sequence_with_a_moving_lamp_is_numbered_and_each_frame_can_be_made_again() 
     // Frames that run more than once change nothing.
     let pattern = folder.path().join("again-{frame}.exr").to_string_lossy().into_owned();
     igi(&[&film[..], &settings, &["--repeat", "2", "-o", &pattern]].concat()).expect(0, &[]);
-    let again = image::read(&folder.path().join("again-3.exr"), &Limits::default()).unwrap();
+    let again = image::read(folder.path().join("again-3.exr"), &Limits::default()).unwrap();
     assert_eq!(again.layer("").unwrap().data, light(3));
 
     // Time that is over after the first frame: what is there is whole, and the code says that some are missing.
