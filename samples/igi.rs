@@ -7,7 +7,7 @@ use lucerna::{
     Result,
     graph::Graph,
     scene::resident::Resident,
-    techniques::igi::{Igi, PictureSettings},
+    techniques::igi::{self, Igi, PictureSettings},
 };
 use lucerna_samples::{
     args::RenderArgs,
@@ -102,5 +102,9 @@ fn compose(
         Some(sharp) => shown.color("specular", sharp),
         None => shown,
     };
-    Ok(gbuffer_layers::add(shown, &picture.gbuffer, &view).seen_by(view).noting(resident.notes().to_vec()))
+    Ok(gbuffer_layers::add(shown, &picture.gbuffer, &view).seen_by(view).noting(igi::notes(
+        input.scene,
+        resident.notes(),
+        &settings.igi,
+    )))
 }

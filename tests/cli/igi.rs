@@ -22,6 +22,7 @@ fn wrong_settings_are_refused_and_named() {
         (&["-D", "igi.history=10001"], "0 to 10000"),
         (&["-D", "igi.history_lag=0"], "0.001 to 10"),
         (&["-D", "igi.visibility=\"rays\""], "compute"),
+        (&["-D", "igi.visibility=raster", "-D", "igi.raster_size=8"], "16 to 1024"),
         (&["-D", "igi.vlps=4"], "did you mean 'igi.vpls'"),
         (&["--mode", "occlusion"], "indirect"),
     ] {
@@ -83,4 +84,27 @@ fn a_sequence_with_a_moving_lamp_is_numbered_and_each_frame_can_be_made_again() 
     assert_eq!(files(late.path()), ["0.png"]);
     assert_eq!(ran.json()["complete"], false);
     igi(&["--time-limit", "soon"]).expect(2, &["10m"]);
+}
+
+#[test]
+fn what_is_not_shown_is_said() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let name = folder.path().join("picture.png");
+    let small = ["render", "--builtin", "conference", "--size", "8x6", "-D", "igi.vpls=2", "-D", "igi.candidates=1"];
+    let ran = ran(command(env!("CARGO_BIN_EXE_igi")).args(small).arg("-o").arg(&name)).expect(0, &[]);
+    for part in ["\"glass\": lamps do not shine through glass", "caustics of lamps are missing"] {
+        assert!(ran.stderr.contains(part), "{part} is not in {}", ran.stderr);
+    }
+    // Not of glass alone, which is shown as glass.
+    assert!(!ran.stderr.contains("drawn opaque"), "{}", ran.stderr);
+}
+
+#[test]
+fn too_many_lights_for_maps_are_refused_and_the_most_named() {
+    if device() {
+        igi(&["-D", "igi.visibility=raster", "-D", "igi.vpls=5000"]).expect(2, &["igi.vpls", "at most 2048"]);
+    }
 }

@@ -18,6 +18,8 @@ pub struct Shown {
     pub direct: Vec<[f32; 4]>,
     pub indirect: Vec<[f32; 4]>,
     pub irradiance: Vec<[f32; 4]>,
+    /// Before the filters, and in alpha the rays traced.
+    pub gathered: Vec<[f32; 4]>,
     pub vpls: Vec<types::Vpl>,
 }
 
@@ -50,14 +52,22 @@ impl<'a> Studio<'a> {
         let all = PictureSettings { igi: settings.clone(), ..Default::default() };
         let picture = self.igi.picture(&mut graph, self.scene, &self.pose, &handles, &view, &all).unwrap();
         let out = picture.outputs;
-        let images = [out.total, out.direct, out.indirect, out.irradiance].map(|image| graph.read_image(image));
+        let images =
+            [out.total, out.direct, out.indirect, out.irradiance, out.gathered].map(|image| graph.read_image(image));
         let vpls = out.vpls.map(|vpls| graph.read_buffer(vpls.buffer));
         let frame = self.runner.run(&graph).unwrap_or_else(|error| panic!("{error}"));
-        let [total, direct, indirect, irradiance] = images.map(|token| frame.image(token).to_f32());
+        let [total, direct, indirect, irradiance, gathered] = images.map(|token| frame.image(token).to_f32());
         for pixel in total.iter().chain(&irradiance).flatten() {
             assert!(pixel.is_finite() && *pixel >= 0.0, "{pixel}");
         }
-        Shown { total, direct, indirect, irradiance, vpls: vpls.map(|token| frame.buffer(token)).unwrap_or_default() }
+        Shown {
+            total,
+            direct,
+            indirect,
+            irradiance,
+            gathered,
+            vpls: vpls.map(|token| frame.buffer(token)).unwrap_or_default(),
+        }
     }
 }
 

@@ -10,6 +10,7 @@
 //! normals. Each scene comes with the exposure ([`exposure`]) at which direct light with one bounce fills an 8-bit
 //! picture well.
 
+mod conference;
 pub mod cornell;
 mod figure;
 pub mod furnace;
@@ -74,6 +75,12 @@ const ENTRIES: &[Entry] = &[
         description: "Office for four: sun through blinds and a lamp, about 21 000 triangles",
         exposure: 1.3,
         build: office::build,
+    },
+    Entry {
+        name: "conference",
+        description: "Conference room for eighteen: four lamps, a mirror, chrome, glass, about 190 000 triangles",
+        exposure: 0.3,
+        build: conference::build,
     },
     Entry {
         name: "garage",

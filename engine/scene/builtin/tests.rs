@@ -27,6 +27,8 @@ const TRIANGLES: &[(&str, std::ops::RangeInclusive<usize>)] = &[
     ("primitives", 10_000..=25_000),
     ("teapot", 15_000..=40_000),
     ("office", 20_000..=22_000),
+    // 190 000 to within a twentieth.
+    ("conference", 180_500..=199_500),
     ("garage", 50_000..=150_000),
     ("street", 150_000..=300_000),
     ("figure", 20_000..=60_000),
@@ -338,6 +340,29 @@ fn furnaces_state_their_answers() {
     let sphere = load("furnace-sphere").unwrap();
     let sky = sphere.environment.unwrap();
     assert!(sky.pixels.iter().all(|p| *p * sky.scale == Vec3::splat(furnace::RADIANCE)));
+}
+
+#[test]
+fn the_conference_room_is_closed_and_has_what_it_is_for() {
+    let scene = load("conference").unwrap();
+    let lamps: Vec<_> = scene.lights.iter().map(|light| light.kind).collect();
+    assert!(lamps.len() == 4 && lamps.iter().all(|kind| matches!(kind, crate::scene::LightKind::Point { .. })));
+    // Mirrors and glass are a good part of it.
+    let sharp = |p: &Primitive| {
+        let material = &scene.materials[p.material as usize];
+        material.is_mirror() || material.transmission > 0.0
+    };
+    let triangles = triangles(&scene);
+    let share = triangles.iter().filter(|(_, p)| sharp(p)).count() as f32 / triangles.len() as f32;
+    assert!((0.1..0.6).contains(&share), "{share}");
+    // Nothing leads out: from between the lamps a ray in any direction meets something.
+    for i in 0..200 {
+        let y = 1.0 - (i as f32 + 0.5) / 100.0;
+        let (sin, cos) = (2.4 * i as f32).sin_cos();
+        let r = (1.0 - y * y).sqrt();
+        let hit = cast(&triangles, Vec3::new(0.0, 1.9, 0.05), Vec3::new(r * cos, y, r * sin));
+        assert!(hit.is_some_and(|t| t < 7.0), "ray {i}: {hit:?}");
+    }
 }
 
 #[test]

@@ -16,11 +16,14 @@ pub mod filters;
 pub mod halton;
 pub mod history;
 mod importance;
+mod notes;
 mod picture;
+mod raster;
 mod settings;
 pub mod starts;
 mod tree;
 
+pub use notes::notes;
 pub use picture::{Picture, PictureSettings};
 pub use settings::{Pattern, Settings, Visibility};
 
@@ -64,6 +67,8 @@ pub struct Igi {
     sharp: bool,
     /// Rays of an invocation.
     most_rays: u64,
+    /// Of an image.
+    most_layers: u32,
 }
 
 /// What the passes of a frame share.
@@ -131,7 +136,7 @@ impl Igi {
     /// that the device does not have.
     pub fn new(gpu: &Gpu, scene: &Scene, resident: &Resident, settings: &Settings) -> Result<Self> {
         let in_compute = match settings.visibility {
-            Visibility::Auto => !gpu.caps().ray_query,
+            Visibility::Auto | Visibility::Raster => !gpu.caps().ray_query,
             Visibility::Compute => true,
             Visibility::Query if gpu.caps().ray_query => false,
             Visibility::Query => {
@@ -165,6 +170,7 @@ impl Igi {
             lights: None,
             sharp: tables::has_sharp(scene),
             most_rays,
+            most_layers: gpu.caps().limits.array_layers,
         })
     }
 

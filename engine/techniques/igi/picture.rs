@@ -1,6 +1,6 @@
 //! Everything from a scene on the device to the final picture.
 
-use super::{Igi, Outputs, Settings, Shared, Vpls, filters};
+use super::{Igi, Outputs, Settings, Shared, Visibility, Vpls, filters};
 use crate::{
     Error, Result,
     graph::{Format, Graph},
@@ -82,7 +82,12 @@ impl Igi {
             let shot = igi.indirect.then(|| self.virtual_lights(graph, handles, &gbuffer, &own, igi));
             let vpls = shot.map(|(_, vpls)| vpls);
             let direct = self.direct(graph, handles, &gbuffer, &shared);
-            let gathered = self.gather(graph, &gbuffer, &own, vpls, igi);
+            let gathered = match vpls {
+                Some(vpls) if igi.visibility == Visibility::Raster => {
+                    self.gather_raster(graph, handles, &gbuffer, &own, vpls, igi)
+                }
+                _ => self.gather(graph, &gbuffer, &own, vpls, igi),
+            };
             let (joins, upsamples) =
                 (igi.interleave > 1 && !igi.fused, igi.downsample > 1 || (igi.fused && igi.interleave > 1));
             let mut irradiance = gathered;

@@ -15,6 +15,9 @@ pub enum Visibility {
     Compute,
     /// By ray queries; refused where the device has none.
     Query,
+    /// Virtual lights by shadow maps that the rasteriser draws, three each. Everything else (paths of light, direct light, what mirrors
+    /// and glass show) as with `Auto`.
+    Raster,
 }
 
 /// Where the subsets of interleaved sampling lie.
@@ -71,6 +74,8 @@ pub struct Settings {
     pub history_range: f32,
     /// For the shadow rays of virtual lights with `imperfect` always in compute.
     pub visibility: Visibility,
+    /// Texels of a side of the shadow maps of virtual lights with `visibility` `raster`, 16 to 1024.
+    pub raster_size: u32,
     /// Gather indirect light.
     pub indirect: bool,
     /// Mirrors, glass, and GGX highlights of direct light. Without, every surface reflects its diffuse part alone.
@@ -102,6 +107,7 @@ impl Default for Settings {
             history_lag: 0.1,
             history_range: 0.01,
             visibility: Visibility::Auto,
+            raster_size: 256,
             indirect: true,
             specular: true,
             specular_depth: 6,
@@ -142,7 +148,11 @@ impl Settings {
             ("history", self.history, 0, 10_000),
             ("specular_depth", self.specular_depth, 0, 16),
             ("direct_samples", self.direct_samples, 1, 4096),
+            ("raster_size", self.raster_size, 16, 1024),
         ])?;
+        if self.visibility == Visibility::Raster {
+            super::raster::validate(self)?;
+        }
         within([
             ("bound", self.bound, 0.0, 1.0),
             ("upsample_sigma", self.upsample_sigma, 0.1, 4.0),

@@ -1,0 +1,162 @@
+//! Visibility of virtual lights by shadow maps instead of rays.
+//!
+//! Each virtual light has three maps ([`consts::VPL_MAPS`]), drawn by the rasteriser from where the light stands, which only the device
+//! knows. Maps are drawn for as many lights at once as [`MOST_BYTES`] holds; what they hide is summed, and the next lights take their
+//! place. Paraboloid maps (Brabec et al. 2002) need one or two maps a light and bend edges, so that a wall of two triangles would end up
+//! somewhere else; imperfect shadow maps (Ritschel et al. 2008) need points on all surfaces. Three flat views hold the hemisphere, too.
+
+use super::{Igi, Pattern, Settings, Shared, Vpls};
+use crate::{
+    Error, Result,
+    graph::{Depth, Draw, Extent, Format, Graph, Image, ImageDesc, IndexedCall, Raster, Targets},
+    passes::gbuffer::GBuffer,
+    scene::resident::{Batches, Cutout, Handles},
+    shaders::{
+        consts::VPL_MAPS,
+        igi::{gather_raster, raster as opaque, raster_cutout as cutout},
+    },
+};
+use glam::Vec3;
+
+/// Bytes of all maps that are there at once.
+const MOST_BYTES: u64 = 384 << 20;
+/// Virtual lights of a frame: each takes three passes over the scene.
+pub const MOST_LIGHTS: u32 = 2048;
+/// Factor on a caster's own slope that it moves away by: the four texels around a place lie within one texel of it in both axes.
+const SLOPE: f32 = 2.0;
+/// Nearest depth of a map, of the scene's diagonal. Depth of a triangle that reaches from there to the far end is interpolated to within
+/// a few ten-thousandths there.
+const NEAREST: f32 = 2e-4;
+
+/// Refuses what maps cannot serve.
+pub(super) fn validate(settings: &Settings) -> Result<()> {
+    let lights = settings.paths() * settings.bounces;
+    if lights > MOST_LIGHTS {
+        let what = format!(
+            "{lights} virtual lights are not allowed with visibility = \"raster\"; allowed: at most {MOST_LIGHTS}"
+        );
+        return Err(Error::usage(what).at("vpls").help("Each takes three passes over the scene; rays serve more"));
+    }
+    if settings.imperfect {
+        let what = "boxes of triangles need rays, and visibility is \"raster\"";
+        return Err(Error::usage(what).at("imperfect").help("Choose imperfect = false or visibility = \"compute\""));
+    }
+    Ok(())
+}
+
+/// Lights whose maps of `size`² are there at once: a multiple of `subsets`, whatever fits.
+fn at_once(size: u32, layers: u32, subsets: u32) -> u32 {
+    let each = u64::from(VPL_MAPS) * u64::from(size) * u64::from(size) * 4;
+    let most = (MOST_BYTES / each).min(u64::from(layers / VPL_MAPS)) as u32;
+    (most / subsets * subsets).max(subsets)
+}
+
+impl Igi {
+    /// Irradiance from the virtual lights at the visible surfaces, hidden by what their maps show.
+    pub(super) fn gather_raster(
+        &self,
+        graph: &mut Graph,
+        handles: &Handles,
+        g: &GBuffer,
+        shared: &Shared,
+        vpls: Vpls,
+        settings: &Settings,
+    ) -> Image {
+        let extent = graph.extent(g.depth).div_ceil(settings.downsample);
+        let irradiance = graph.image("igi.irradiance", Format::RGBA32F, extent);
+        graph.clear(irradiance, [0.0; 4]);
+        let subsets = settings.interleave * settings.interleave;
+        let size = settings.raster_size;
+        let batch = at_once(size, self.most_layers, subsets).min(vpls.count.next_multiple_of(subsets));
+        let desc = ImageDesc::new(Format::D32F, Extent::square(size)).layers(batch * VPL_MAPS);
+        let maps = graph.image_with("igi.maps", desc);
+        let batches = Batches::of_casters(&handles.moment, None, Vec3::ZERO);
+        let visible = batches.visible_buffer(graph, "igi.casters");
+        let calls = |holed: bool| -> Vec<IndexedCall> {
+            let of = batches.list.iter().filter(|b| (b.cutout != Cutout::Opaque) == holed);
+            of.flat_map(|b| b.calls.iter().copied()).collect()
+        };
+        let (solid, holed) = (calls(false), calls(true));
+        let nearest = (NEAREST * shared.diagonal).max(f32::MIN_POSITIVE);
+        let state = Raster::new().depth_bias(0.0, -SLOPE);
+        for first in (0..vpls.count).step_by(batch as usize) {
+            let count = batch.min(vpls.count - first);
+            for map in 0..count * VPL_MAPS {
+                let (light, face) = (first + map / VPL_MAPS, map % VPL_MAPS);
+                let targets = |load| Targets::new().depth(maps.layer(map), load);
+                let args = opaque::Args {
+                    instances: handles.instances,
+                    visible,
+                    positions: handles.positions,
+                    vpls: vpls.buffer,
+                    push: opaque::Push { light, face, nearest },
+                };
+                let draw = Draw::indexed(handles.indices, solid.clone());
+                // Names of their own: giving thousands one name takes longer than drawing.
+                graph.raster(targets(Depth::Clear(0.0)), state, args, draw).named(format!("igi.raster.{light}.{face}"));
+                if holed.is_empty() {
+                    continue;
+                }
+                let args = cutout::Args {
+                    instances: handles.instances,
+                    visible,
+                    positions: handles.positions,
+                    vpls: vpls.buffer,
+                    uvs: handles.uvs,
+                    colors: handles.colors,
+                    materials: handles.materials,
+                    scene_textures: handles.textures,
+                    push: cutout::Push { light, face, nearest },
+                };
+                let draw = Draw::indexed(handles.indices, holed.clone());
+                let name = format!("igi.raster_cutout.{light}.{face}");
+                graph.raster(targets(Depth::Keep), state, args, draw).named(name);
+            }
+            let args = gather_raster::Args {
+                view: g.view,
+                normal: g.normal,
+                depth: g.depth,
+                vpls: vpls.buffer,
+                irradiance,
+                maps: maps.nearest(),
+                push: gather_raster::Push {
+                    first,
+                    count,
+                    tile: settings.interleave,
+                    factor: settings.downsample,
+                    least: shared.least,
+                    irregular: (settings.pattern == Pattern::Irregular).into(),
+                    seed: shared.seed,
+                    nearest,
+                },
+            };
+            graph.compute(args, extent);
+        }
+        irradiance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::techniques::igi::Visibility;
+
+    #[test]
+    fn as_many_lights_at_once_as_fit() {
+        assert_eq!(at_once(256, 2048, 1), 512);
+        assert_eq!(at_once(64, 2048, 1), 682);
+        assert_eq!(at_once(256, 2048, 9), 504);
+        // One of each subset even where that is more than was meant.
+        assert_eq!(at_once(2048, 2048, 16), 16);
+    }
+
+    #[test]
+    fn too_many_lights_and_boxes_are_refused_by_name() {
+        let raster = Settings { visibility: Visibility::Raster, ..Settings::default() };
+        raster.validate().unwrap();
+        let error = Settings { vpls: 2049, bounces: 1, ..raster.clone() }.validate().unwrap_err().to_string();
+        assert!(error.contains("vpls") && error.contains("at most 2048"), "{error}");
+        let error = Settings { imperfect: true, ..raster }.validate().unwrap_err();
+        assert!(error.exit_code() == 2 && error.to_string().contains("imperfect"), "{error}");
+    }
+}

@@ -1,0 +1,81 @@
+// As igi/gather.comp, with shadow maps of a range of virtual lights in place of rays.
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "lib/view.glsl"
+#include "lib/screen.glsl"
+#include "lib/gbuffer.glsl"
+#include "lib/random.glsl"
+#include "lib/vpl.glsl"
+#include "lib/sampling.glsl"
+#include "lib/vpl_map.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(binding = 0, scalar) uniform ViewBlock { View view; };
+layout(binding = 1) uniform sampler2D normal;
+layout(binding = 2) uniform sampler2D depth;
+layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; };
+layout(binding = 4, rgba32f) uniform image2D irradiance; // rgb of a white surface's, W/m²; a: looked up
+layout(binding = 5) uniform sampler2DArray maps; // VPL_MAPS of each, from light `first` on
+
+layout(push_constant, scalar) uniform Push {
+    uint first;      // virtual light, a multiple of tile²
+    uint count;
+    uint tile;       // side of the tiles of pixels that share the lights
+    uint factor;     // pixels along the side of a texel
+    float least;     // min_d of the bounded geometry term, metres; 0: none
+    uint irregular;  // 1: tiles have their subsets in different orders
+    uint seed;
+    float nearest;   // depth of the maps, metres
+};
+
+// Depth of a receiver, relative, that rounding may add.
+const float SLACK = 1e-3;
+
+// Share of the map's texels around a place that see it.
+float unhidden(Vpl vpl, uint number, vec3 place) {
+    vec3 from = vpl.position + vpl.normal * vpl.gap;
+    vec3 d = transpose(vpl_map_axes(vpl.normal)) * (place - from);
+    uint face = vpl_map_face(d);
+    vec3 v = vpl_map_turned(d, face);
+    // Nearer than the map begins.
+    if (v.z <= nearest) return 1.0;
+    vec2 ndc = (v.xy / v.z + 0.5) / 1.5;
+    vec2 uv = vec2(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y);
+    float own = nearest / v.z * (1.0 + SLACK);
+    vec4 stored = textureGather(maps, vec3(uv, float(VPL_MAPS * number + face)));
+    vec4 seen = vec4(lessThanEqual(stored, vec4(own)));
+    vec2 f = fract(uv * vec2(textureSize(maps, 0).xy) - 0.5);
+    return mix(mix(seen.w, seen.z, f.x), mix(seen.x, seen.y, f.x), f.y);
+}
+
+void main() {
+    ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(texel, imageSize(irradiance)))) return;
+    ivec2 pixel = min(texel * int(factor) + int(factor) / 2, textureSize(depth, 0) - 1);
+    vec4 sum = first == 0u ? vec4(0.0) : imageLoad(irradiance, texel);
+    float z = texelFetch(depth, pixel, 0).r;
+    if (z < 1.0) {
+        vec3 p = screen_position(view, pixel, 1.0, z);
+        vec3 n = decode_normal(texelFetch(normal, pixel, 0));
+        vec3 place = p + n * surface_step(view, p, z);
+        uint subsets = tile * tile;
+        uvec2 cell = uvec2(texel) % tile;
+        uint subset = cell.y * tile + cell.x;
+        if (irregular != 0u) {
+            // The same order as in igi/gather.comp.
+            uvec4 words = pcg4d(uvec4(uvec2(texel) / tile, seed, 0x1a7e1u));
+            if ((words.y & 1u) != 0u) cell = cell.yx;
+            if ((words.z & 1u) != 0u) cell.x = tile - 1u - cell.x;
+            subset = (cell.y * tile + cell.x + words.x % subsets) % subsets;
+        }
+        for (uint i = subset; i < count; i += subsets) {
+            Vpl vpl = vpls[first + i];
+            vec3 light = vpl_irradiance(vpl, p, n, least) * float(subsets);
+            if (light == vec3(0.0)) continue;
+            sum += vec4(light * unhidden(vpl, i, place), 1.0);
+        }
+    }
+    imageStore(irradiance, texel, sum);
+}

@@ -1,0 +1,256 @@
+//! Instant global illumination of scenes that are hard to serve: every picture is finite (the studio checks each pixel) and, where
+//! something exact is known, it.
+
+mod igi_lab;
+mod tracer_lab;
+
+use glam::{Mat4, Vec3, vec3};
+use igi_lab::{Studio, mean, plain};
+use lucerna::{
+    gpu::testing::with_gpu,
+    scene::{Environment, LightKind, Material, Pose, Scene, Transform, View, builtin},
+    techniques::igi::Settings,
+};
+use tracer_lab::{Stage, view};
+
+/// All that is on by default, in little.
+fn small() -> Settings {
+    Settings { vpls: 40, candidates: 2, direct_samples: 4, ..Settings::default() }
+}
+
+fn fast() -> Settings {
+    Settings { imperfect: true, downsample: 4, interleave: 3, bounces: 3, ..small() }
+}
+
+fn room(albedo: Vec3) -> Stage {
+    let mut stage = Stage::new();
+    let wall = stage.material(Material::diffuse("wall", albedo));
+    stage.cuboid(wall, Vec3::splat(-1.0), Vec3::ONE, true);
+    stage
+}
+
+#[test]
+fn an_environment_alone_lights_what_it_reaches() {
+    with_gpu(|gpu| {
+        // A convex body under an even sky shows ρ L everywhere and throws no light on itself.
+        let mut stage = Stage::new();
+        let matt = stage.material(Material { ior: 1.0, ..Material::diffuse("matt", vec3(0.5, 0.25, 0.1)) });
+        stage.sphere(matt, Vec3::ZERO, 1.0, 24, false);
+        stage.scene.environment = Some(Environment::constant(Vec3::splat(2.0)));
+        let seen = view(vec3(0.0, 0.2, 1.6), Vec3::ZERO, 20.0, [12, 12]);
+        for settings in [small(), fast()] {
+            let settings = Settings { direct_samples: 256, specular: false, ..settings };
+            let shown = Studio::new(gpu, &stage.scene).render(&seen, &settings, 0);
+            for channel in 0..3 {
+                let sum: f32 = shown.direct.iter().map(|p| p[channel]).sum::<f32>() / shown.direct.len() as f32;
+                let exact = [1.0, 0.5, 0.2][channel];
+                assert!((sum / exact - 1.0).abs() < 0.02, "channel {channel}: {sum} instead of {exact}");
+            }
+            assert!(mean(&shown.indirect) < 1e-3 * mean(&shown.direct), "a ball lights itself");
+        }
+        // A closed box keeps it out.
+        let mut dark = room(Vec3::splat(0.8));
+        dark.scene.environment = Some(Environment::constant(Vec3::splat(2.0)));
+        let shown = Studio::new(gpu, &dark.scene).render(&view(Vec3::ZERO, Vec3::X, 60.0, [12, 12]), &small(), 0);
+        assert_eq!(mean(&shown.total), 0.0);
+    });
+}
+
+#[test]
+fn emissive_surfaces_alone_light_a_room() {
+    with_gpu(|gpu| {
+        // Closed and even: radiance L / (1 - ρ) after all bounces; after two L (1 + ρ + ρ²), from virtual lights all but the first two terms.
+        let (radiance, rho) = (1.5f32, 0.5f32);
+        let mut stage = Stage::new();
+        let glow =
+            Material { emissive: Vec3::splat(radiance), ior: 1.0, ..Material::diffuse("glow", Vec3::splat(rho)) };
+        let glow = stage.material(glow);
+        stage.sphere(glow, Vec3::ZERO, 1.0, 20, true);
+        let seen = view(vec3(0.2, 0.1, 0.0), Vec3::X, 90.0, [16, 16]);
+        let settings = Settings { vpls: 4000, candidates: 1, bounces: 1, bound: 0.0, ..small() };
+        let settings = Settings { direct_samples: 64, specular: false, ..settings };
+        let shown = Studio::new(gpu, &stage.scene).render(&seen, &settings, 0);
+        let (direct, indirect) = (mean(&shown.direct), mean(&shown.indirect));
+        let (l, r) = (f64::from(radiance), f64::from(rho));
+        println!("direct {direct}, indirect {indirect}");
+        assert!((direct / (l * (1.0 + r)) - 1.0).abs() < 0.02, "{direct} instead of {}", l * (1.0 + r));
+        assert!((indirect / (l * r * r) - 1.0).abs() < 0.03, "{indirect} instead of {}", l * r * r);
+    });
+}
+
+/// The scene `scale` times as large, with lamps that light it as before, and the view of its first camera.
+fn scaled(scene: &Scene, scale: f32) -> (Scene, View) {
+    let mut scene = scene.clone();
+    for node in &mut scene.nodes {
+        // Sizes go into the meshes, for cameras and lamps must keep theirs.
+        let matrix = node.local.matrix();
+        node.local = Transform::Matrix(Mat4::from_cols(
+            matrix.x_axis,
+            matrix.y_axis,
+            matrix.z_axis,
+            (matrix.w_axis.truncate() * scale).extend(1.0),
+        ));
+    }
+    for primitive in scene.meshes.iter_mut().flat_map(|mesh| &mut mesh.primitives) {
+        primitive.positions.iter_mut().for_each(|p| *p *= scale);
+    }
+    for light in &mut scene.lights {
+        // W/sr: at twice the distance four times as much.
+        light.intensity *= scale * scale;
+    }
+    let pose = Pose::rest(&scene);
+    let mut camera = scene.cameras[0].clone();
+    if let lucerna::scene::Projection::Perspective { znear, zfar, .. } = &mut camera.projection {
+        *znear *= scale;
+        *zfar = zfar.map(|far| far * scale);
+    }
+    let node = scene.nodes.iter().position(|node| node.camera == Some(0)).unwrap();
+    let view = View::new(&camera, pose.world[node], [32, 32]);
+    (scene, view)
+}
+
+#[test]
+fn a_room_looks_the_same_at_every_size() {
+    with_gpu(|gpu| {
+        let cornell = builtin::load("cornell").unwrap();
+        let mut pictures = Vec::new();
+        for scale in [1.0, 1e-3, 1e4] {
+            let (scene, view) = scaled(&cornell, scale);
+            let mut studio = Studio::new(gpu, &scene);
+            pictures.push((scale, studio.render(&view, &small(), 0), studio.render(&view, &fast(), 0)));
+        }
+        let (_, plain, quick) = &pictures[0];
+        assert!(mean(&plain.indirect) > 0.02 * mean(&plain.total));
+        for (scale, other, other_quick) in &pictures[1..] {
+            for (one, other, most) in [(plain, other, 50), (quick, other_quick, 8)] {
+                let differ =
+                    |a: &[f32; 4], b: &[f32; 4]| (0..3).any(|c| (a[c] - b[c]).abs() > 0.01 * b[c].abs() + 1e-4);
+                let count = one.total.iter().zip(&other.total).filter(|(a, b)| differ(a, b)).count();
+                let ratio = mean(&other.total) / mean(&one.total);
+                println!("scale {scale}: {count} of {} pixels differ, ratio {ratio:.5}", one.total.len());
+                // Rays along edges, and the boxes of triangles of rounded size.
+                assert!(count * most <= one.total.len(), "scale {scale}: {count} pixels differ");
+                assert!((ratio - 1.0).abs() < 0.01, "scale {scale}: {ratio}");
+            }
+        }
+    });
+}
+
+#[test]
+fn triangles_without_area_change_nothing() {
+    with_gpu(|gpu| {
+        let build = |degenerate: bool| {
+            let mut stage = room(vec3(0.7, 0.6, 0.5));
+            let glow = stage.emitter(Vec3::splat(3.0));
+            stage.quad(glow, vec3(-0.2, 0.9, -0.2), Vec3::X * 0.4, Vec3::Z * 0.4);
+            stage.point(vec3(0.3, 0.2, 0.1), Vec3::ONE);
+            if degenerate {
+                let at = vec3(0.1, -0.2, 0.3);
+                for material in [0, glow] {
+                    // A point, a line there and back, and three places in a row.
+                    stage.mesh(material, vec![at; 3], vec![Vec3::Y; 3], vec![0, 1, 2]);
+                    stage.mesh(material, vec![at, at + Vec3::X, at], vec![Vec3::Y; 3], vec![0, 1, 2]);
+                    stage.mesh(material, vec![at, at + Vec3::X, at + 0.5 * Vec3::X], vec![Vec3::Y; 3], vec![0, 1, 2]);
+                }
+            }
+            stage.scene
+        };
+        let seen = view(vec3(0.0, 0.0, 0.9), Vec3::NEG_Z, 80.0, [24, 24]);
+        let settings = Settings { direct_samples: 64, ..small() };
+        let [without, with] = [false, true].map(|degenerate| {
+            let scene = build(degenerate);
+            Studio::new(gpu, &scene).render(&seen, &settings, 0)
+        });
+        // The tree of lamps may be another: direct light is sampled anew.
+        let ratio = mean(&with.total) / mean(&without.total);
+        assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
+        let ratio = mean(&with.indirect) / mean(&without.indirect);
+        assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
+    });
+}
+
+#[test]
+fn a_lamp_in_a_closed_box_lights_nothing_outside() {
+    with_gpu(|gpu| {
+        let mut stage = room(Vec3::splat(0.7));
+        let card = stage.material(Material::diffuse("card", Vec3::splat(0.7)));
+        stage.cuboid(card, Vec3::splat(-0.3), Vec3::splat(0.3), false);
+        stage.point(vec3(0.05, 0.1, -0.05), Vec3::ONE);
+        let out = view(vec3(0.0, 0.0, 0.95), vec3(0.2, 0.1, -1.0), 80.0, [24, 24]);
+        let within = view(vec3(-0.2, 0.0, 0.2), vec3(0.3, 0.0, -0.3), 80.0, [16, 16]);
+        let mut studio = Studio::new(gpu, &stage.scene);
+        for settings in [small(), fast(), Settings { bounces: 8, vpls: 400, ..small() }] {
+            let shown = studio.render(&out, &settings, 0);
+            assert_eq!((mean(&shown.direct), mean(&shown.indirect)), (0.0, 0.0), "light through walls: {settings:?}");
+        }
+        // The inner faces are backs, which a camera does not see but light does.
+        assert!(studio.render(&within, &small(), 0).vpls.iter().any(|vpl| vpl.flux[0] > 0.0));
+    });
+}
+
+#[test]
+fn lamps_in_walls_and_in_corners_give_numbers() {
+    with_gpu(|gpu| {
+        // On a wall, in an edge, in a corner, outside, where the camera is; strong and weak; of no strength at all.
+        for at in [vec3(0.0, 1.0, 0.0), vec3(1.0, 1.0, 0.2), Vec3::ONE, vec3(3.0, 0.0, 0.0), vec3(0.0, 0.0, 0.5)] {
+            for strength in [1e-12, 1.0, 1e9] {
+                let mut stage = room(vec3(0.9, 0.5, 1.0));
+                stage.point(at, Vec3::splat(strength));
+                stage.point(vec3(0.2, 0.2, 0.2), Vec3::ZERO);
+                let seen = view(vec3(0.0, 0.0, 0.5), vec3(0.3, 0.2, -1.0), 80.0, [9, 7]);
+                Studio::new(gpu, &stage.scene).render(&seen, &small(), 0);
+            }
+        }
+        // A spot without width, and one all around.
+        for (inner, outer) in [(0.0, 0.0), (0.0, 1e-4), (1.5, 1.57)] {
+            let mut stage = room(Vec3::splat(0.5));
+            stage.light(LightKind::Spot { range: None, inner, outer }, Vec3::ONE, 2.0, Mat4::IDENTITY);
+            let seen = view(vec3(0.0, 0.0, 0.5), Vec3::NEG_Z, 80.0, [9, 7]);
+            Studio::new(gpu, &stage.scene).render(&seen, &fast(), 0);
+        }
+    });
+}
+
+#[test]
+fn pictures_smaller_than_tiles_and_few_lights() {
+    with_gpu(|gpu| {
+        let scene = builtin::load("cornell").unwrap();
+        let pose = Pose::rest(&scene);
+        let mut studio = Studio::new(gpu, &scene);
+        let whole = View::of_camera(&scene, &pose, 0, [24, 24]).unwrap();
+        let all = mean(&studio.render(&whole, &Settings { vpls: 64, ..small() }, 0).total);
+        for extent in [[1, 1], [2, 1], [3, 5], [17, 9]] {
+            let seen = View::of_camera(&scene, &pose, 0, extent).unwrap();
+            for (vpls, bounces) in [(1, 1), (1, 8), (7, 3)] {
+                for (downsample, interleave, fused) in [(4, 4, false), (4, 4, true), (3, 2, false)] {
+                    let settings = Settings { vpls, bounces, downsample, interleave, fused, ..small() };
+                    let found = mean(&studio.render(&seen, &settings, 0).total);
+                    assert!(found < 20.0 * all, "{extent:?}, {vpls} virtual lights: {found} beside {all}");
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn nothing_but_glass_and_mirrors() {
+    with_gpu(|gpu| {
+        // Light goes round and finds no diffuse surface: no virtual light, no indirect light, and an end.
+        let mut stage = Stage::new();
+        let mirror =
+            stage.material(Material { metallic: 1.0, roughness: 0.0, ..Material::diffuse("mirror", Vec3::ONE) });
+        let glass =
+            stage.material(Material { transmission: 1.0, roughness: 0.0, ..Material::diffuse("glass", Vec3::ONE) });
+        stage.cuboid(mirror, Vec3::splat(-1.0), Vec3::ONE, true);
+        stage.sphere(glass, vec3(0.2, 0.0, -0.3), 0.4, 12, false);
+        stage.point(vec3(-0.5, 0.4, 0.3), Vec3::ONE);
+        let seen = view(vec3(0.0, 0.0, 0.8), Vec3::NEG_Z, 80.0, [16, 16]);
+        for settings in [Settings { specular_depth: 16, ..small() }, fast(), Settings { specular: false, ..plain(20) }]
+        {
+            let shown = Studio::new(gpu, &stage.scene).render(&seen, &settings, 0);
+            if settings.specular {
+                assert!(shown.vpls.iter().all(|vpl| vpl.flux == [0.0; 3]) && mean(&shown.indirect) == 0.0);
+            }
+        }
+    });
+}

@@ -1,0 +1,336 @@
+//! Shooting and gathering of virtual lights against slow programs that share nothing with the shaders: other formulas, double
+//! precision, every triangle tried for every ray.
+
+mod igi_lab;
+mod tracer_lab;
+
+use glam::{DMat3, DVec3, Mat4, Quat, Vec3, vec3};
+use igi_lab::{Studio, plain};
+use lucerna::{
+    gpu::testing::with_gpu,
+    scene::{LightKind, Material, Scene, View},
+    shaders::types,
+    techniques::igi::Settings,
+};
+use std::f64::consts::PI;
+use tracer_lab::{Stage, view};
+
+/// A triangle in world space with what it reflects.
+struct Triangle {
+    corners: [DVec3; 3],
+    normals: [DVec3; 3],
+    albedo: DVec3,
+}
+
+/// Distance (in lengths of `direction`) and barycentric coordinates.
+fn meet(triangle: &Triangle, origin: DVec3, direction: DVec3) -> Option<(f64, f64, f64)> {
+    let [a, b, c] = triangle.corners;
+    // Cramer's rule.
+    let matrix = DMat3::from_cols(b - a, c - a, -direction);
+    let determinant = matrix.determinant();
+    if determinant.abs() < 1e-18 {
+        return None;
+    }
+    let s = matrix.inverse() * (origin - a);
+    (s.x >= 0.0 && s.y >= 0.0 && s.x + s.y <= 1.0 && s.z > 0.0).then_some((s.z, s.x, s.y))
+}
+
+fn triangles(scene: &Scene) -> Vec<Triangle> {
+    let mut out = Vec::new();
+    for node in &scene.nodes {
+        let Some(mesh) = node.mesh else { continue };
+        for primitive in &scene.meshes[mesh as usize].primitives {
+            let albedo = scene.materials[primitive.material as usize].base_color.truncate().as_dvec3();
+            for c in primitive.indices.chunks_exact(3) {
+                let corners = [0, 1, 2].map(|k| primitive.positions[c[k] as usize].as_dvec3());
+                let normals = [0, 1, 2].map(|k| primitive.normals[c[k] as usize].as_dvec3());
+                out.push(Triangle { corners, normals, albedo });
+            }
+        }
+    }
+    out
+}
+
+/// Digits of a number in a base, mirrored at the point.
+fn mirrored(base: u64, mut number: u64) -> f64 {
+    let (mut out, mut place) = (0.0, 1.0 / base as f64);
+    while number > 0 {
+        out += (number % base) as f64 * place;
+        place /= base as f64;
+        number /= base;
+    }
+    out
+}
+
+/// Two axes across a unit vector as the engine chooses them: the limit of turning +z (or -z) into it by the shortest way.
+fn across(n: DVec3) -> (DVec3, DVec3) {
+    let pole = if n.z >= 0.0 { DVec3::Z } else { DVec3::NEG_Z };
+    let turn = glam::DQuat::from_rotation_arc(pole, n);
+    let sign = pole.z;
+    (turn * DVec3::X, turn * DVec3::Y * sign)
+}
+
+/// A cosine-distributed direction about n from two numbers, by squares that become discs.
+fn cosine_direction(n: DVec3, [u, v]: [f64; 2]) -> DVec3 {
+    let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
+    let (radius, angle) = if a.abs() > b.abs() {
+        (a, PI / 4.0 * b / a)
+    } else if b != 0.0 {
+        (b, PI / 2.0 - PI / 4.0 * a / b)
+    } else {
+        (0.0, 0.0)
+    };
+    let (x, y) = (radius * angle.cos(), radius * angle.sin());
+    let (s, t) = across(n);
+    s * x + t * y + n * (1.0 - x * x - y * y).max(0.0).sqrt()
+}
+
+/// A lamp: where, along what, its strength along that, and the angles of its cone (none: all around).
+struct Lamp {
+    at: DVec3,
+    along: DVec3,
+    intensity: DVec3,
+    cone: Option<(f64, f64)>,
+}
+
+impl Lamp {
+    /// Share of the axial intensity at a cosine from the axis.
+    fn fall(&self, cosine: f64) -> f64 {
+        self.cone.map_or(1.0, |(inner, outer)| {
+            ((cosine - outer.cos()) / (inner.cos() - outer.cos())).clamp(0.0, 1.0).powi(2)
+        })
+    }
+
+    /// Integral over directions whose cosine with the axis is at most `cosine`, by Simpson's rule.
+    fn flux_up_to(&self, cosine: f64) -> f64 {
+        let steps = 2000;
+        let h = (cosine + 1.0) / f64::from(steps);
+        let at = |i: i32| self.fall(-1.0 + h * f64::from(i));
+        let inner: f64 = (1..steps).map(|i| at(i) * if i % 2 == 1 { 4.0 } else { 2.0 }).sum();
+        2.0 * PI * h / 3.0 * (at(0) + inner + at(steps))
+    }
+
+    fn power(&self) -> f64 {
+        self.flux_up_to(1.0) * self.intensity.element_sum()
+    }
+
+    fn direction(&self, [u, v]: [f64; 2]) -> DVec3 {
+        let Some(_) = self.cone else {
+            let z = 1.0 - 2.0 * u;
+            let r = (1.0 - z * z).max(0.0).sqrt();
+            return DVec3::new(r * (2.0 * PI * v).cos(), r * (2.0 * PI * v).sin(), z);
+        };
+        // The cosine below which the share u of all lies, by halving.
+        let (mut low, mut high) = (-1.0, 1.0);
+        let wanted = u * self.flux_up_to(1.0);
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            if self.flux_up_to(middle) < wanted { low = middle } else { high = middle }
+        }
+        let (s, t) = across(self.along);
+        let r = (1.0 - low * low).max(0.0).sqrt();
+        s * (r * (2.0 * PI * v).cos()) + t * (r * (2.0 * PI * v).sin()) + self.along * low
+    }
+}
+
+struct Shot {
+    position: DVec3,
+    normal: DVec3,
+    flux: DVec3,
+}
+
+/// Virtual lights of `paths` paths, the first ones of all paths, then the second ones.
+fn shoot(world: &[Triangle], lamps: &[Lamp], paths: usize, bounces: usize) -> Vec<Option<Shot>> {
+    const PRIMES: [u64; 12] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
+    let total: f64 = lamps.iter().map(Lamp::power).sum();
+    let mut out: Vec<Option<Shot>> = (0..paths * bounces).map(|_| None).collect();
+    for path in 0..paths {
+        let pair = |k: usize| [0, 1].map(|i| mirrored(PRIMES[2 * k + i], path as u64 + 1));
+        // Equal steps through the powers, from the middle of the first.
+        let mut left = (path as f64 + 0.5) / paths as f64 * total;
+        let mut lamp = &lamps[0];
+        for one in lamps {
+            lamp = one;
+            if left < one.power() {
+                break;
+            }
+            left -= one.power();
+        }
+        // Each path of a lamp carries the same part of its power.
+        let mut flux = lamp.intensity / lamp.intensity.element_sum() * total / paths as f64;
+        let (mut origin, mut direction) = (lamp.at, lamp.direction(pair(0)));
+        for bounce in 0..bounces {
+            let hit = world.iter().filter_map(|t| meet(t, origin, direction).map(|m| (m, t)));
+            let Some(((t, u, v), triangle)) = hit.min_by(|a, b| a.0.0.total_cmp(&b.0.0)) else { break };
+            let [a, b, c] = triangle.corners;
+            let mut side = (b - a).cross(c - a).normalize();
+            let mut normal =
+                (triangle.normals[0] * (1.0 - u - v) + triangle.normals[1] * u + triangle.normals[2] * v).normalize();
+            if side.dot(direction) > 0.0 {
+                (side, normal) = (-side, -normal);
+            }
+            let slant = normal.dot(-direction).max(0.0) / side.dot(-direction);
+            flux *= triangle.albedo * slant.min(4.0);
+            let position = origin + direction * t;
+            out[bounce * paths + path] = Some(Shot { position, normal: side, flux });
+            origin = position + side * 1e-6;
+            direction = cosine_direction(side, pair(2 + bounce));
+        }
+    }
+    out
+}
+
+/// A room with a block, a ball and two lamps.
+fn room() -> (Scene, Vec<Lamp>) {
+    let mut stage = Stage::new();
+    let white = stage.material(Material::diffuse("white", vec3(0.8, 0.7, 0.6)));
+    let red = stage.material(Material::diffuse("red", vec3(0.7, 0.2, 0.1)));
+    stage.cuboid(white, vec3(-1.0, -0.8, -1.2), vec3(1.0, 0.9, 1.0), true);
+    stage.cuboid(red, vec3(-0.7, -0.8, -0.6), vec3(-0.1, 0.1, -0.1), false);
+    stage.sphere(red, vec3(0.45, -0.45, 0.1), 0.3, 12, false);
+    stage.point(vec3(0.21, 0.52, 0.33), vec3(1.0, 2.0, 3.0));
+    let at = vec3(-0.4, 0.7, 0.5);
+    let (inner, outer) = (0.35f32, 0.9f32);
+    let turn = Quat::from_rotation_arc(Vec3::NEG_Z, vec3(0.3, -0.8, -0.4).normalize());
+    let kind = LightKind::Spot { range: None, inner, outer };
+    stage.light(kind, vec3(1.0, 0.5, 0.25), 9.0, Mat4::from_rotation_translation(turn, at));
+    let lamps = vec![
+        Lamp { at: DVec3::new(0.21, 0.52, 0.33), along: DVec3::Z, intensity: DVec3::new(1.0, 2.0, 3.0), cone: None },
+        Lamp {
+            at: at.as_dvec3(),
+            along: DVec3::new(0.3, -0.8, -0.4).normalize(),
+            intensity: DVec3::new(9.0, 4.5, 2.25),
+            cone: Some((f64::from(inner), f64::from(outer))),
+        },
+    ];
+    (stage.scene, lamps)
+}
+
+fn near(found: [f32; 3], expected: DVec3, slack: f64) -> bool {
+    (Vec3::from(found).as_dvec3() - expected).length() <= slack
+}
+
+#[test]
+fn paths_of_light_leave_virtual_lights_where_a_slow_program_does() {
+    with_gpu(|gpu| {
+        let (scene, lamps) = room();
+        let world = triangles(&scene);
+        let (paths, bounces) = (400usize, 3usize);
+        let settings = Settings { bounces: bounces as u32, ..plain((paths * bounces) as u32) };
+        let seen = view(vec3(0.0, 0.0, 0.9), Vec3::NEG_Z, 60.0, [4, 4]);
+        let found = Studio::new(gpu, &scene).render(&seen, &settings, 0).vpls;
+        let expected = shoot(&world, &lamps, paths, bounces);
+        assert_eq!(found.len(), expected.len());
+        let mut others = [0; 3];
+        for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
+            let expected = expected.as_ref().expect("the room is closed");
+            // A ray along an edge may go either way, and all that follows with it.
+            let same = near(found.position, expected.position, 3e-4)
+                && near(found.normal, expected.normal, 1e-4)
+                && near(found.flux, expected.flux, 2e-4 * expected.flux.length());
+            if !same {
+                others[i / paths] += 1;
+                println!("{i}: {found:?} instead of {} {} {}", expected.position, expected.normal, expected.flux);
+            }
+            assert_eq!((found.depth as usize, found.path as usize), (i / paths, i % paths));
+        }
+        println!("{others:?} of {paths} paths went another way at the first, second and third surface");
+        assert!(others[0] <= 1 && others[1] <= 3 && others[2] <= 8, "{others:?}");
+        // The twin itself keeps the power.
+        let total: f64 = lamps.iter().map(Lamp::power).sum();
+        assert!((lamps[0].power() - 4.0 * PI * 6.0).abs() < 1e-6 && total > lamps[0].power());
+    });
+}
+
+/// Irradiance of a point from virtual lights, nothing taken from the engine but the list.
+fn gathered(world: &[Triangle], vpls: &[&types::Vpl], x: DVec3, n: DVec3, least: f64) -> DVec3 {
+    let mut sum = DVec3::ZERO;
+    for vpl in vpls {
+        let (place, sends) = (Vec3::from(vpl.position).as_dvec3(), Vec3::from(vpl.normal).as_dvec3());
+        let way = place - x;
+        let distance = way.length();
+        let (here, there) = (n.dot(way) / distance, -sends.dot(way) / distance);
+        if here <= 0.0 || there <= 0.0 {
+            continue;
+        }
+        // Both ends lifted off their surfaces.
+        let (from, to) = (x + n * 2e-5, place + sends * 2e-5);
+        if world.iter().any(|t| meet(t, from, to - from).is_some_and(|(at, ..)| at < 1.0)) {
+            continue;
+        }
+        let t = ((distance - 0.8 * least) / (0.4 * least)).clamp(0.0, 1.0);
+        let smooth = if least > 0.0 { t * t * (3.0 - 2.0 * t) } else { 1.0 };
+        sum += Vec3::from(vpl.flux).as_dvec3() / PI * (here * there / (distance * distance) * smooth);
+    }
+    sum
+}
+
+/// Where the ray through a pixel first meets something, and the normal there.
+fn seen_at(world: &[Triangle], view: &View, pixel: [u32; 2]) -> (DVec3, DVec3) {
+    let uv =
+        (glam::vec2(pixel[0] as f32, pixel[1] as f32) + 0.5) / glam::vec2(view.extent[0] as f32, view.extent[1] as f32);
+    let from = view.position.as_dvec3();
+    let direction = view.world_from_depth(uv, 1.0).as_dvec3() - from;
+    let hits = world.iter().filter_map(|t| meet(t, from, direction).map(|m| (m, t)));
+    let ((t, u, v), triangle) = hits.min_by(|a, b| a.0.0.total_cmp(&b.0.0)).expect("the room is closed");
+    let normal = triangle.normals[0] * (1.0 - u - v) + triangle.normals[1] * u + triangle.normals[2] * v;
+    (from + direction * t, normal.normalize())
+}
+
+#[test]
+fn pixels_gather_what_a_slow_program_does() {
+    with_gpu(|gpu| {
+        let (scene, _) = room();
+        let world = triangles(&scene);
+        let seen = view(vec3(0.1, 0.3, 0.9), vec3(-0.1, -0.4, -0.6), 75.0, [20, 15]);
+        let mut studio = Studio::new(gpu, &scene);
+        let diagonal = DVec3::new(2.0, 1.7, 2.2).length();
+        for bound in [0.0f32, 0.05] {
+            let settings = Settings { bounces: 2, bound, ..plain(120) };
+            let shown = studio.render(&seen, &settings, 0);
+            let vpls: Vec<&types::Vpl> = shown.vpls.iter().collect();
+            let (mut others, mut ours, mut theirs) = (0, 0.0, 0.0);
+            for (i, pixel) in shown.irradiance.iter().enumerate() {
+                let (x, n) = seen_at(&world, &seen, [i as u32 % 20, i as u32 / 20]);
+                let expected = gathered(&world, &vpls, x, n, f64::from(bound) * diagonal);
+                let found = Vec3::new(pixel[0], pixel[1], pixel[2]).as_dvec3();
+                ours += found.element_sum();
+                theirs += expected.element_sum();
+                // Normals are stored in 32 bits, depth in 32: a virtual light on the horizon or behind an edge may be seen or not.
+                if (found - expected).length() > 3e-3 * expected.length() + 1e-6 {
+                    others += 1;
+                }
+            }
+            println!(
+                "bound {bound}: {others} of {} pixels differ, sums {ours:.5} and {theirs:.5}",
+                shown.irradiance.len()
+            );
+            assert!(others * 50 <= shown.irradiance.len(), "{others} pixels differ");
+            assert!((ours / theirs - 1.0).abs() < 1e-3, "{ours} instead of {theirs}");
+        }
+    });
+}
+
+#[test]
+fn a_pixel_of_a_tile_gathers_its_own_lights_alone() {
+    with_gpu(|gpu| {
+        let (scene, _) = room();
+        let world = triangles(&scene);
+        let seen = view(vec3(0.1, 0.3, 0.9), vec3(-0.1, -0.4, -0.6), 75.0, [18, 12]);
+        let settings = Settings { interleave: 3, ..plain(90) };
+        let shown = Studio::new(gpu, &scene).render(&seen, &settings, 0);
+        let (mut others, mut all) = (0, 0);
+        for (i, pixel) in shown.gathered.iter().enumerate() {
+            let at = [i as u32 % 18, i as u32 / 18];
+            let subset = (at[1] % 3 * 3 + at[0] % 3) as usize;
+            let own: Vec<&types::Vpl> = shown.vpls.iter().skip(subset).step_by(9).collect();
+            let (x, n) = seen_at(&world, &seen, at);
+            let expected = gathered(&world, &own, x, n, 0.0) * 9.0;
+            let found = Vec3::new(pixel[0], pixel[1], pixel[2]).as_dvec3();
+            all += 1;
+            others += usize::from((found - expected).length() > 3e-3 * expected.length() + 1e-6);
+        }
+        println!("{others} of {all} pixels differ");
+        assert!(others * 40 <= all, "{others} of {all} pixels differ");
+    });
+}
