@@ -9,6 +9,7 @@
 #include "lib/random.glsl"
 #include "lib/trace.glsl"
 #include "lib/vpl.glsl"
+#include "lib/vpl_subset.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -42,15 +43,7 @@ void main() {
         float gap = surface_step(view, p, z);
         vec3 origin = p + n * gap;
         uint subsets = tile * tile;
-        uvec2 place = uvec2(texel) % tile;
-        uint subset = place.y * tile + place.x;
-        if (irregular != 0u) {
-            // Turned by a number of its own: still each subset once in a tile.
-            uvec4 words = pcg4d(uvec4(uvec2(texel) / tile, seed, 0x1a7e1u));
-            if ((words.y & 1u) != 0u) place = place.yx;
-            if ((words.z & 1u) != 0u) place.x = tile - 1u - place.x;
-            subset = (place.y * tile + place.x + words.x % subsets) % subsets;
-        }
+        uint subset = vpl_subset(uvec2(texel), tile, irregular != 0u, seed);
         trace_imperfect = imperfect != 0u;
         for (uint i = 0u; i < count; ++i) {
             uint k = (first + i) * subsets + subset;

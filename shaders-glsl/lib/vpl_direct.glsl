@@ -4,6 +4,9 @@
 #ifndef LIB_VPL_DIRECT
 #define LIB_VPL_DIRECT
 
+// LitPoint.roughness of what has no gloss at all.
+const float LIT_MATT = 2.0;
+
 // A point that is lit.
 struct LitPoint {
     vec3 position; // metres
@@ -66,7 +69,7 @@ vec3 direct_ray(uint i, LitPoint p, uvec2 place, out Ray ray) {
     float cosine = dot(p.normal, to_light);
     if (cosine <= 0.0 || arrives == vec3(0.0)) return vec3(0.0);
     vec3 reflected = p.albedo * (cosine / BRDF_PI);
-    if (settings.diffuse_only == 0u) reflected += brdf_specular_cosine(p.normal, p.viewer, to_light, p.f0, p.roughness);
+    if (settings.diffuse_only == 0u && p.roughness < LIT_MATT) reflected += brdf_specular_cosine(p.normal, p.viewer, to_light, p.f0, p.roughness);
     return arrives * reflected;
 }
 

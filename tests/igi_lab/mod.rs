@@ -20,7 +20,12 @@ pub struct Shown {
     pub irradiance: Vec<[f32; 4]>,
     /// Before the filters, and in alpha the rays traced.
     pub gathered: Vec<[f32; 4]>,
+    pub albedo: Vec<[f32; 4]>,
     pub vpls: Vec<types::Vpl>,
+    /// Of the tree over the virtual lights, where there is one.
+    pub nodes: Vec<types::VplNode>,
+    /// Of the cache behind mirrors and glass, where there is one.
+    pub cells: u32,
 }
 
 /// A scene that stays on the device for many pictures.
@@ -52,11 +57,15 @@ impl<'a> Studio<'a> {
         let all = PictureSettings { igi: settings.clone(), ..Default::default() };
         let picture = self.igi.picture(&mut graph, self.scene, &self.pose, &handles, &view, &all).unwrap();
         let out = picture.outputs;
-        let images =
-            [out.total, out.direct, out.indirect, out.irradiance, out.gathered].map(|image| graph.read_image(image));
+        let albedo = picture.gbuffer.albedo;
+        let images = [out.total, out.direct, out.indirect, out.irradiance, out.gathered, albedo]
+            .map(|image| graph.read_image(image));
         let vpls = out.vpls.map(|vpls| graph.read_buffer(vpls.buffer));
+        let nodes = out.vpls.and_then(|vpls| vpls.tree).map(|tree| graph.read_buffer(tree.nodes));
+        let cells = out.cache.map(|cache| graph.read_buffer(cache.list));
         let frame = self.runner.run(&graph).unwrap_or_else(|error| panic!("{error}"));
-        let [total, direct, indirect, irradiance, gathered] = images.map(|token| frame.image(token).to_f32());
+        let [total, direct, indirect, irradiance, gathered, albedo] =
+            images.map(|token| frame.image(token).to_f32());
         for pixel in total.iter().chain(&irradiance).flatten() {
             assert!(pixel.is_finite() && *pixel >= 0.0, "{pixel}");
         }
@@ -66,7 +75,10 @@ impl<'a> Studio<'a> {
             indirect,
             irradiance,
             gathered,
+            albedo,
             vpls: vpls.map(|token| frame.buffer(token)).unwrap_or_default(),
+            nodes: nodes.map(|token| frame.buffer(token)).unwrap_or_default(),
+            cells: cells.map_or(0, |token| frame.buffer::<u32>(token)[0]),
         }
     }
 }

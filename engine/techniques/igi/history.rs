@@ -187,6 +187,7 @@ impl Igi {
             let recalled = Vpls {
                 buffer: graph.buffer("igi.history.recalled", u64::from(count) * size_of::<types::Vpl>() as u64),
                 count,
+                tree: None,
             };
             let args = recall::Args {
                 candidates: again.buffer,

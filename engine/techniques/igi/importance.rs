@@ -41,24 +41,13 @@ impl Igi {
         let floats = 4 * u64::from(total);
         let importances = graph.buffer("igi.importances", floats);
         graph.fill(importances, 0);
-        let rays = &shared.rays;
         for (first, points) in self.batches(Extent::new(total, 1), POINTS) {
-            let args = importance::Args {
-                candidates: candidates.buffer,
-                points: seen,
-                importances,
-                materials: rays.materials,
-                scene_textures: rays.scene_textures,
-                trace_nodes: rays.trace_nodes,
-                trace_triangles: rays.trace_triangles,
-                trace_instances: rays.trace_instances,
-                trace_indices: rays.trace_indices,
-                trace_uvs: rays.trace_uvs,
-                trace_colors: rays.trace_colors,
-                trace_scene: rays.trace_scene,
-                trace_accel: rays.trace_accel,
-                push: importance::Push { total, first, count: points, near: NEAR * shared.diagonal, seed: shared.seed },
-            };
+            let push =
+                importance::Push { total, first, count: points, near: NEAR * shared.diagonal, seed: shared.seed };
+            let args = traced!(
+                importance::Args { candidates: candidates.buffer, points: seen, importances, push },
+                shared.rays
+            );
             graph.compute(args, total);
         }
         let (weights, sums) = (graph.buffer("igi.weights", floats), graph.buffer("igi.sums", floats));
@@ -68,6 +57,6 @@ impl Igi {
         let offset = if shared.seed == 0 { 0.5 } else { halton::shift(shared.seed, u32::MAX - 1) as f32 };
         let push = resample::Push { total, count, offset };
         graph.compute(resample::Args { candidates: candidates.buffer, weights, sums, vpls, push }, count);
-        Vpls { buffer: vpls, count }
+        Vpls { buffer: vpls, count, tree: None }
     }
 }

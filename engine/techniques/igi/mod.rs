@@ -6,17 +6,26 @@
 //! [`Igi`] holds what lives as long as a scene; [`Igi::picture`] declares a frame, with paths of light shot anew.
 //!
 //! Where this differs from the paper, and why:
+//! - Beside the sum over all virtual lights there are picks by a tree over them ([`Settings::picks`]); what the bound takes can be put
+//!   back ([`Settings::compensation`]).
 //! - More paths are shot than needed, and of what they leave that is drawn which matters to the view ([`Settings::candidates`]).
 //! - Every kind of light sends paths: point, spot and directional lights, emissive surfaces, the environment. The paper has points.
 //! - 1/π is explicit: a virtual light has a flux Φ and sends Φ cos θ / π W/sr; the paper's L is Φ/π, its ρ our ρ/π.
 //! - Light is received by shading normals and sent on by the triangle's, which is what a path tracer sees from the other end.
 //! - The table's first two dimensions are the directions of paths from near lights, and the places of paths from far ones.
 
+#[macro_use]
+mod traced;
+
+mod cache;
+mod compensation;
 pub mod filters;
+mod gather;
 pub mod halton;
 pub mod history;
 mod importance;
 mod notes;
+mod order;
 mod picture;
 mod raster;
 mod settings;
@@ -24,6 +33,8 @@ pub mod starts;
 mod tree;
 
 pub use notes::notes;
+pub use cache::Cache;
+pub use order::LightTree;
 pub use picture::{Picture, PictureSettings};
 pub use settings::{Pattern, Settings, Visibility};
 
@@ -107,6 +118,8 @@ pub struct Vpls {
     pub buffer: Buffer,
     /// Places in the buffer; some may be empty.
     pub count: u32,
+    /// Over the virtual lights, which are then in its order. `None`: nothing picks from them.
+    pub tree: Option<LightTree>,
 }
 
 /// Images of a frame, at full resolution unless stated.
@@ -126,6 +139,8 @@ pub struct Outputs {
     pub gathered: Image,
     /// `None`: indirect light is off.
     pub vpls: Option<Vpls>,
+    /// Cells of irradiance behind mirrors and glass; `None`: there are none.
+    pub cache: Option<Cache>,
 }
 
 impl Igi {
@@ -259,93 +274,29 @@ impl Igi {
         let dimensions = (consts::VPL_FIRST_NUMBERS + 2 * settings.bounces) as usize;
         let numbers = halton::table_from(shared.first, paths, dimensions, shared.turn);
         let count = paths * settings.bounces;
-        let vpls =
-            Vpls { buffer: graph.buffer("igi.candidates", u64::from(count) * size_of::<types::Vpl>() as u64), count };
+        let buffer = graph.buffer("igi.candidates", u64::from(count) * size_of::<types::Vpl>() as u64);
+        let vpls = Vpls { buffer, count, tree: None };
         let states = graph.buffer("igi.paths", u64::from(paths) * size_of::<types::VplPath>() as u64);
         graph.fill(vpls.buffer, 0);
         graph.fill(states, 0);
-        let args = shaders::igi::shoot::Args {
-            surface_instances: handles.instances,
-            surface_indices: handles.indices,
-            surface_positions: handles.positions,
-            surface_normals: handles.normals,
-            surface_tangents: handles.tangents,
-            surface_uvs: handles.uvs,
-            surface_colors: handles.colors,
-            environment_radiance_map: shared.environment,
-            environment_columns: shared.environment_columns,
-            settings: shared.settings,
-            starts: graph.buffer_from("igi.starts", &starts),
-            numbers: graph.buffer_from("igi.numbers", &numbers),
-            paths: states,
-            vpls: vpls.buffer,
-            lights: handles.lights,
-            materials: handles.materials,
-            scene_textures: handles.textures,
-            trace_nodes: shared.rays.trace_nodes,
-            trace_triangles: shared.rays.trace_triangles,
-            trace_instances: shared.rays.trace_instances,
-            trace_indices: shared.rays.trace_indices,
-            trace_uvs: shared.rays.trace_uvs,
-            trace_colors: shared.rays.trace_colors,
-            trace_scene: shared.rays.trace_scene,
-            trace_accel: shared.rays.trace_accel,
-            push: shaders::igi::shoot::Push::default(),
-        };
+        let args = traced!(
+            shaders::igi::shoot::Args {
+                starts: graph.buffer_from("igi.starts", &starts),
+                numbers: graph.buffer_from("igi.numbers", &numbers),
+                paths: states,
+                vpls: vpls.buffer,
+                lights: handles.lights,
+                push: shaders::igi::shoot::Push::default(),
+            },
+            shared.rays,
+            handles,
+            shared
+        );
         let segments = settings.bounces + if settings.specular { settings.specular_depth } else { 0 };
         for turn in 0..segments {
             graph.compute(shaders::igi::shoot::Args { push: shaders::igi::shoot::Push { turn }, ..args }, paths);
         }
         vpls
-    }
-
-    /// Irradiance from the virtual lights at the visible surfaces.
-    fn gather(
-        &self,
-        graph: &mut Graph,
-        g: &GBuffer,
-        shared: &Shared,
-        vpls: Option<Vpls>,
-        settings: &Settings,
-    ) -> Image {
-        let extent = graph.extent(g.depth).div_ceil(settings.downsample);
-        let irradiance = graph.image("igi.irradiance", Format::RGBA32F, extent);
-        graph.clear(irradiance, [0.0; 4]);
-        let Some(vpls) = vpls else { return irradiance };
-        let subsets = settings.interleave * settings.interleave;
-        let own = vpls.count.div_ceil(subsets);
-        for (first, count) in self.batches(extent, own) {
-            let args = shaders::igi::gather::Args {
-                view: g.view,
-                normal: g.normal,
-                depth: g.depth,
-                vpls: vpls.buffer,
-                irradiance,
-                materials: shared.hidden_by.materials,
-                scene_textures: shared.hidden_by.scene_textures,
-                trace_nodes: shared.hidden_by.trace_nodes,
-                trace_triangles: shared.hidden_by.trace_triangles,
-                trace_instances: shared.hidden_by.trace_instances,
-                trace_indices: shared.hidden_by.trace_indices,
-                trace_uvs: shared.hidden_by.trace_uvs,
-                trace_colors: shared.hidden_by.trace_colors,
-                trace_scene: shared.hidden_by.trace_scene,
-                trace_accel: shared.hidden_by.trace_accel,
-                push: shaders::igi::gather::Push {
-                    first,
-                    count,
-                    total: vpls.count,
-                    tile: settings.interleave,
-                    factor: settings.downsample,
-                    least: shared.least,
-                    imperfect: settings.imperfect.into(),
-                    irregular: (settings.pattern == Pattern::Irregular).into(),
-                    seed: shared.seed,
-                },
-            };
-            graph.compute(args, extent);
-        }
-        irradiance
     }
 
     /// Direct light of the visible surfaces, with what they emit.
@@ -354,41 +305,22 @@ impl Igi {
         let direct = graph.image("igi.direct", Format::RGBA32F, extent);
         graph.clear(direct, [0.0; 4]);
         for (first, count) in self.batches(extent, shared.direct_rays) {
-            let args = shaders::igi::direct::Args {
-                view: g.view,
-                albedo: g.albedo,
-                normal: g.normal,
-                depth: g.depth,
-                specular: g.specular,
-                emission: g.emission,
-                direct,
-                environment_radiance_map: shared.environment,
-                environment_columns: shared.environment_columns,
-                light_columns: shared.light_columns,
-                light_targets: shared.light_targets,
-                instance_lights: shared.instance_lights,
-                settings: shared.settings,
-                light_nodes: shared.light_nodes,
-                lights: handles.lights,
-                materials: handles.materials,
-                scene_textures: handles.textures,
-                surface_instances: handles.instances,
-                surface_indices: handles.indices,
-                surface_positions: handles.positions,
-                surface_normals: handles.normals,
-                surface_tangents: handles.tangents,
-                surface_uvs: handles.uvs,
-                surface_colors: handles.colors,
-                trace_nodes: shared.rays.trace_nodes,
-                trace_triangles: shared.rays.trace_triangles,
-                trace_instances: shared.rays.trace_instances,
-                trace_indices: shared.rays.trace_indices,
-                trace_uvs: shared.rays.trace_uvs,
-                trace_colors: shared.rays.trace_colors,
-                trace_scene: shared.rays.trace_scene,
-                trace_accel: shared.rays.trace_accel,
-                push: shaders::igi::direct::Push { first, count },
-            };
+            let args = traced!(
+                shaders::igi::direct::Args {
+                    view: g.view,
+                    albedo: g.albedo,
+                    normal: g.normal,
+                    depth: g.depth,
+                    specular: g.specular,
+                    emission: g.emission,
+                    direct,
+                    push: shaders::igi::direct::Push { first, count },
+                },
+                shared.rays,
+                handles,
+                shared,
+                lamps
+            );
             graph.compute(args, extent);
         }
         direct

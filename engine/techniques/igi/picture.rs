@@ -1,6 +1,6 @@
 //! Everything from a scene on the device to the final picture.
 
-use super::{Igi, Outputs, Settings, Shared, Visibility, Vpls, filters};
+use super::{Igi, Outputs, Settings, Shared, Visibility, Vpls, filters, order};
 use crate::{
     Error, Result,
     graph::{Format, Graph},
@@ -80,7 +80,7 @@ impl Igi {
             let frame = if igi.history > 0 { graph.frame } else { 0 };
             let own = Self::numbered(graph, &shared, igi, frame);
             let shot = igi.indirect.then(|| self.virtual_lights(graph, handles, &gbuffer, &own, igi));
-            let vpls = shot.map(|(_, vpls)| vpls);
+            let vpls = shot.map(|(_, chosen)| order::ordered_if_picked(graph, chosen, igi));
             let direct = self.direct(graph, handles, &gbuffer, &shared);
             let gathered = match vpls {
                 Some(vpls) if igi.visibility == Visibility::Raster => {
@@ -88,6 +88,9 @@ impl Igi {
                 }
                 _ => self.gather(graph, &gbuffer, &own, vpls, igi),
             };
+            if let Some(vpls) = vpls.filter(|_| igi.compensates()) {
+                self.compensate(graph, handles, &gbuffer, &own, vpls, igi, gathered);
+            }
             let (joins, upsamples) =
                 (igi.interleave > 1 && !igi.fused, igi.downsample > 1 || (igi.fused && igi.interleave > 1));
             let mut irradiance = gathered;
@@ -104,15 +107,19 @@ impl Igi {
                 let light = (all, chosen, irradiance);
                 irradiance = self.accumulate(graph, handles, (&gbuffer, view), &shared, light, igi);
             }
-            let sharp = (self.sharp && igi.specular).then(|| {
+            let trees = (self.sharp && igi.specular).then(|| {
                 // What mirrors show has no history: it takes the same numbers in each frame, lest it flickers.
                 let steady = if frame > 0 {
-                    shot.map(|_| self.virtual_lights(graph, handles, &gbuffer, &shared, igi).1)
+                    shot.map(|_| {
+                        let (_, chosen) = self.virtual_lights(graph, handles, &gbuffer, &shared, igi);
+                        order::ordered_if_picked(graph, chosen, igi)
+                    })
                 } else {
                     vpls
                 };
                 self.trees(graph, handles, &gbuffer, &shared, (steady, settings.background), igi)
             });
+            let (sharp, cache) = (trees.map(|t| t.sharp), trees.and_then(|t| t.cache));
             let extent = graph.extent(gbuffer.depth);
             let total = graph.image("igi.total", Format::RGBA32F, extent);
             let indirect = graph.image("igi.indirect", Format::RGBA32F, extent);
@@ -127,7 +134,7 @@ impl Igi {
                 spec: shaders::igi::compose::Spec { sharp: sharp.is_some().into() },
             };
             graph.compute(args, extent);
-            Outputs { total, direct, indirect, sharp, irradiance, gathered, vpls }
+            Outputs { total, direct, indirect, sharp, irradiance, gathered, vpls, cache }
         });
         skybox::draw(graph, handles, &gbuffer, settings.background.into(), outputs.total);
         Ok(Picture { gbuffer, outputs })

@@ -1,8 +1,11 @@
 //! What can be chosen in instant global illumination, and what the paper chose.
 
-use super::super::allowed::within;
-use crate::Result;
+use super::super::allowed::{within, wrong};
+use crate::{Error, Result, shaders::consts::CACHE_CELLS};
 use serde::{Deserialize, Serialize};
+
+/// Least side of a cell: keys have nine bits an axis.
+const LEAST_CELL: f32 = 0.002;
 
 /// How rays are traced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -46,6 +49,16 @@ pub struct Settings {
     /// Bounding distance min_d of the geometry term, as share of the diagonal of the scene's box; 0 switches the bound off. Virtual
     /// lights nearer than 0.8 of it give nothing, from 1.2 of it on they give everything.
     pub bound: f32,
+    /// Virtual lights that each pixel picks by what they may send to it, 1 to 1024, instead of gathering from all: cost grows with the
+    /// logarithm of their number, for noise. Tiles of interleaved pixels share the picks. 0: all, no picks.
+    pub picks: u32,
+    /// Short rays of each gathered pixel that put back the light which the bound takes, 0 to 64. 0: it is lost.
+    pub compensation: u32,
+    /// Side of the cells in which the light of virtual lights on what mirrors and glass show is kept, as share of the diagonal of the
+    /// scene's box, 0.002 to 0.2; 0: every surface that they show gathers for itself.
+    pub cache: f32,
+    /// Such cells at most, 1 to 131,072. With more, every surface gathers for itself.
+    pub cache_cells: u32,
     /// Shadow rays of virtual lights test the boxes of triangles instead of triangles.
     pub imperfect: bool,
     /// Pixels along the side of a texel on which indirect light is gathered, 1 to 4.
@@ -93,6 +106,10 @@ impl Default for Settings {
             candidates: 8,
             bounces: 2,
             bound: 0.02,
+            picks: 0,
+            compensation: 0,
+            cache: 0.0,
+            cache_cells: CACHE_CELLS,
             imperfect: false,
             downsample: 1,
             interleave: 1,
@@ -136,6 +153,16 @@ impl Settings {
         self.vpls.div_ceil(self.bounces.max(1))
     }
 
+    /// Picks of a texel: pixels of a tile share them.
+    pub fn texel_picks(&self) -> u32 {
+        self.picks.div_ceil(self.interleave.max(1).pow(2))
+    }
+
+    /// Short rays put light back: there is a bound that takes some.
+    pub fn compensates(&self) -> bool {
+        self.compensation > 0 && self.bound > 0.0
+    }
+
     /// # Errors
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
@@ -143,6 +170,9 @@ impl Settings {
             ("vpls", self.vpls, 1, 10_000),
             ("candidates", self.candidates, 1, 64),
             ("bounces", self.bounces, 1, 8),
+            ("picks", self.picks, 0, 1024),
+            ("compensation", self.compensation, 0, 64),
+            ("cache_cells", self.cache_cells, 1, CACHE_CELLS),
             ("downsample", self.downsample, 1, 4),
             ("interleave", self.interleave, 1, 4),
             ("history", self.history, 0, 10_000),
@@ -152,8 +182,16 @@ impl Settings {
         ])?;
         if self.visibility == Visibility::Raster {
             super::raster::validate(self)?;
+            if self.picks > 0 {
+                let what = "picks need rays, and visibility is \"raster\"";
+                return Err(Error::usage(what).at("picks").help("Choose picks = 0 or visibility = \"compute\""));
+            }
+        }
+        if self.cache > 0.0 && self.cache < LEAST_CELL {
+            return wrong("cache", self.cache, &format!("0, or {LEAST_CELL} to 0.2"));
         }
         within([
+            ("cache", self.cache, 0.0, 0.2),
             ("bound", self.bound, 0.0, 1.0),
             ("upsample_sigma", self.upsample_sigma, 0.1, 4.0),
             ("upsample_normal", self.upsample_normal, 0.0, 64.0),
@@ -187,6 +225,12 @@ mod tests {
         for wrong in [
             Settings { bounces: 9, ..Settings::default() },
             Settings { downsample: 0, ..Settings::default() },
+            Settings { picks: 1025, ..Settings::default() },
+            Settings { compensation: 65, ..Settings::default() },
+            Settings { cache: 0.001, ..Settings::default() },
+            Settings { cache: f32::NAN, ..Settings::default() },
+            Settings { cache_cells: 0, ..Settings::default() },
+            Settings { visibility: Visibility::Raster, picks: 4, ..Settings::default() },
             Settings { interleave: 5, ..Settings::default() },
             Settings { specular_depth: 17, ..Settings::default() },
             Settings { direct_samples: 0, ..Settings::default() },

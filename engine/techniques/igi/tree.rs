@@ -1,13 +1,13 @@
 //! Mirrors and glass: a tree of rays for each pixel that sees some (Whitted 1980).
 
-use super::{Igi, Settings, Shared, Vpls};
+use super::{Igi, Settings, Shared, Vpls, cache::Cache};
 use crate::{
-    graph::{Extent, Format, Graph, Image},
+    graph::{Buffer, Extent, Format, Graph, Image},
     passes::gbuffer::GBuffer,
     scene::resident::Handles,
     shaders::{
         consts::TREE_WIDTH,
-        igi::{direct_tree, gather_tree, grow, reap},
+        igi::{direct_tree, gather_tree, gather_tree_picks, grow, reap},
         types,
     },
 };
@@ -15,8 +15,37 @@ use crate::{
 /// Pixels whose trees are held at once.
 const SLOTS: u32 = 1 << 16;
 
+/// What mirrors and glass show.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Trees {
+    /// Radiance, and in alpha the share of each pixel's surface that is mirror or glass.
+    pub sharp: Image,
+    /// `None`: there is no cache.
+    pub cache: Option<Cache>,
+}
+
+/// Trees of a range of pixels.
+#[derive(Clone, Copy, Debug)]
+struct Range {
+    sharp: Image,
+    tree_nodes: Buffer,
+    /// Slot of the first pixel.
+    first: u32,
+    slots: u32,
+}
+
+impl Range {
+    fn nodes(&self) -> u32 {
+        self.slots * TREE_WIDTH
+    }
+
+    fn lit(&self) -> Extent {
+        Extent::new(self.nodes(), 1)
+    }
+}
+
 impl Igi {
-    /// Radiance that mirrors and glass show, and in alpha the share of each pixel's surface that they are.
+    /// Grows the trees of all pixels, a range after the other, and lights their ends.
     pub(super) fn trees(
         &self,
         graph: &mut Graph,
@@ -25,7 +54,7 @@ impl Igi {
         shared: &Shared,
         (vpls, background): (Option<Vpls>, [f32; 3]),
         settings: &Settings,
-    ) -> Image {
+    ) -> Trees {
         let extent = graph.extent(g.depth);
         let sharp = graph.image("igi.sharp", Format::RGBA32F, extent);
         // Whole blocks of 8 × 8 pixels.
@@ -34,102 +63,106 @@ impl Igi {
         let tree_nodes = graph.buffer("igi.trees", u64::from(held * TREE_WIDTH) * size_of::<types::TreeNode>() as u64);
         graph.fill(tree_nodes, 0);
         graph.clear(sharp, [0.0; 4]);
-        let (rays, hidden_by) = (&shared.rays, &shared.hidden_by);
-        for first in (0..slots).step_by(held as usize) {
-            let count = held.min(slots - first);
-            let nodes = count * TREE_WIDTH;
-            for level in 0..=settings.specular_depth {
-                let args = grow::Args {
-                    view: g.view,
-                    environment_radiance_map: shared.environment,
-                    environment_columns: shared.environment_columns,
-                    settings: shared.settings,
-                    sharp,
-                    materials: handles.materials,
-                    scene_textures: handles.textures,
-                    surface_instances: handles.instances,
-                    surface_indices: handles.indices,
-                    surface_positions: handles.positions,
-                    surface_normals: handles.normals,
-                    surface_tangents: handles.tangents,
-                    surface_uvs: handles.uvs,
-                    surface_colors: handles.colors,
-                    trace_nodes: rays.trace_nodes,
-                    trace_triangles: rays.trace_triangles,
-                    trace_instances: rays.trace_instances,
-                    trace_indices: rays.trace_indices,
-                    trace_uvs: rays.trace_uvs,
-                    trace_colors: rays.trace_colors,
-                    trace_scene: rays.trace_scene,
-                    trace_accel: rays.trace_accel,
-                    tree_nodes,
-                    push: grow::Push { first, count, level, background },
-                };
-                graph.compute(args, nodes);
+        let ranges: Vec<_> = (0..slots)
+            .step_by(held as usize)
+            .map(|first| Range { sharp, tree_nodes, first, slots: held.min(slots - first) })
+            .collect();
+        let cache = vpls.filter(|_| settings.cache > 0.0).map(|vpls| {
+            // Cells first, for all ranges: neighbours in different ones must see the same.
+            let cache = Cache::new(graph, shared, settings);
+            for range in &ranges {
+                self.grow(graph, handles, g, shared, background, settings, range);
+                cache.claim(graph, tree_nodes, range.first * TREE_WIDTH, range.nodes());
             }
-            let lit = Extent::new(nodes, 1);
-            for (first, count) in self.batches(lit, shared.direct_rays) {
-                let args = direct_tree::Args {
-                    environment_radiance_map: shared.environment,
-                    environment_columns: shared.environment_columns,
-                    light_columns: shared.light_columns,
-                    light_targets: shared.light_targets,
-                    instance_lights: shared.instance_lights,
-                    settings: shared.settings,
-                    light_nodes: shared.light_nodes,
-                    lights: handles.lights,
-                    materials: handles.materials,
-                    scene_textures: handles.textures,
-                    surface_instances: handles.instances,
-                    surface_indices: handles.indices,
-                    surface_positions: handles.positions,
-                    surface_normals: handles.normals,
-                    surface_tangents: handles.tangents,
-                    surface_uvs: handles.uvs,
-                    surface_colors: handles.colors,
-                    trace_nodes: rays.trace_nodes,
-                    trace_triangles: rays.trace_triangles,
-                    trace_instances: rays.trace_instances,
-                    trace_indices: rays.trace_indices,
-                    trace_uvs: rays.trace_uvs,
-                    trace_colors: rays.trace_colors,
-                    trace_scene: rays.trace_scene,
-                    trace_accel: rays.trace_accel,
-                    tree_nodes,
-                    push: direct_tree::Push { first, count, nodes },
-                };
-                graph.compute(args, nodes);
+            self.fill(graph, shared, vpls, settings, &cache, slots * TREE_WIDTH);
+            cache
+        });
+        for range in &ranges {
+            if cache.is_none() || ranges.len() > 1 {
+                self.grow(graph, handles, g, shared, background, settings, range);
             }
-            let ranges = vpls.map(|vpls| (vpls.buffer, self.batches(lit, vpls.count)));
-            for (buffer, (first, count)) in
-                ranges.into_iter().flat_map(|(b, list)| list.into_iter().map(move |r| (b, r)))
-            {
-                let args = gather_tree::Args {
-                    vpls: buffer,
-                    materials: handles.materials,
-                    scene_textures: handles.textures,
-                    trace_nodes: hidden_by.trace_nodes,
-                    trace_triangles: hidden_by.trace_triangles,
-                    trace_instances: hidden_by.trace_instances,
-                    trace_indices: hidden_by.trace_indices,
-                    trace_uvs: hidden_by.trace_uvs,
-                    trace_colors: hidden_by.trace_colors,
-                    trace_scene: hidden_by.trace_scene,
-                    trace_accel: hidden_by.trace_accel,
-                    tree_nodes,
-                    push: gather_tree::Push {
-                        first,
-                        count,
-                        nodes,
-                        least: shared.least,
-                        imperfect: settings.imperfect.into(),
-                        seed: shared.seed,
-                    },
-                };
-                graph.compute(args, nodes);
+            self.direct_of_trees(graph, handles, shared, range);
+            if let Some(vpls) = vpls {
+                let groups = cache.as_ref().map(|cache| {
+                    cache.read(graph, tree_nodes, range.nodes());
+                    cache.otherwise(graph, range.nodes())
+                });
+                self.gather_of_trees(graph, shared, vpls, settings, range, groups);
+                if settings.compensates() {
+                    self.compensate_trees(graph, handles, shared, vpls, settings, (tree_nodes, range.nodes()));
+                }
             }
-            graph.compute(reap::Args { sharp, tree_nodes, push: reap::Push { first, count } }, count);
+            let push = reap::Push { first: range.first, count: range.slots };
+            graph.compute(reap::Args { sharp, tree_nodes, push }, range.slots);
         }
-        sharp
+        Trees { sharp, cache }
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn grow(
+        &self,
+        graph: &mut Graph,
+        handles: &Handles,
+        g: &GBuffer,
+        shared: &Shared,
+        background: [f32; 3],
+        settings: &Settings,
+        range: &Range,
+    ) {
+        for level in 0..=settings.specular_depth {
+            let push = grow::Push { first: range.first, count: range.slots, level, background };
+            let args = traced!(
+                grow::Args { view: g.view, sharp: range.sharp, tree_nodes: range.tree_nodes, push },
+                shared.rays,
+                handles,
+                shared
+            );
+            graph.compute(args, range.nodes());
+        }
+    }
+
+    /// Direct light.
+    fn direct_of_trees(&self, graph: &mut Graph, handles: &Handles, shared: &Shared, range: &Range) {
+        for (first, count) in self.batches(range.lit(), shared.direct_rays) {
+            let push = direct_tree::Push { first, count, nodes: range.nodes() };
+            let args =
+                traced!(direct_tree::Args { tree_nodes: range.tree_nodes, push }, shared.rays, handles, shared, lamps);
+            graph.compute(args, range.nodes());
+        }
+    }
+
+    /// Light of the virtual lights. `groups`: size of the dispatches.
+    fn gather_of_trees(
+        &self,
+        graph: &mut Graph,
+        shared: &Shared,
+        vpls: Vpls,
+        settings: &Settings,
+        range: &Range,
+        groups: Option<Buffer>,
+    ) {
+        let (nodes, tree_nodes) = (range.nodes(), range.tree_nodes);
+        let (least, imperfect, seed) = (shared.least, settings.imperfect.into(), shared.seed);
+        if let (Some(tree), true, None) = (vpls.tree, settings.picks > 0, groups) {
+            let picks = settings.picks;
+            for (first, count) in self.batches(range.lit(), picks) {
+                let push =
+                    gather_tree_picks::Push { first, count, picks, leaves: tree.leaves, nodes, least, imperfect, seed };
+                let args = traced!(
+                    gather_tree_picks::Args { vpls: vpls.buffer, vpl_nodes: tree.nodes, tree_nodes, push },
+                    shared.hidden_by
+                );
+                graph.compute(args, nodes);
+            }
+            return;
+        }
+        for (first, count) in self.batches(range.lit(), vpls.count) {
+            let push = gather_tree::Push { first, count, nodes, least, imperfect, seed };
+            let args = traced!(gather_tree::Args { vpls: vpls.buffer, tree_nodes, push }, shared.hidden_by);
+            match groups {
+                Some(groups) => graph.compute_indirect(args, groups, 0),
+                None => graph.compute(args, nodes),
+            };
+        }
     }
 }

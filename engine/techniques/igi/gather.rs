@@ -1,0 +1,101 @@
+//! Irradiance from virtual lights at the visible surfaces: from all of them, or from a few picked by the tree over them.
+
+use super::{Igi, LightTree, Pattern, Settings, Shared, Vpls};
+use crate::{
+    graph::{Extent, Format, Graph, Image},
+    passes::gbuffer::GBuffer,
+    shaders::igi::{gather, gather_picks},
+};
+
+impl Igi {
+    /// Irradiance of every [`Settings::downsample`]-th pixel; alpha: shadow rays.
+    pub(super) fn gather(
+        &self,
+        graph: &mut Graph,
+        g: &GBuffer,
+        shared: &Shared,
+        vpls: Option<Vpls>,
+        settings: &Settings,
+    ) -> Image {
+        let extent = graph.extent(g.depth).div_ceil(settings.downsample);
+        let irradiance = graph.image("igi.irradiance", Format::RGBA32F, extent);
+        graph.clear(irradiance, [0.0; 4]);
+        let Some(vpls) = vpls else { return irradiance };
+        match vpls.tree {
+            Some(tree) if settings.picks > 0 => self.gather_picks(graph, g, shared, (vpls, tree), settings, irradiance),
+            _ => self.gather_all(graph, g, shared, vpls, settings, irradiance),
+        }
+        irradiance
+    }
+
+    fn gather_all(
+        &self,
+        graph: &mut Graph,
+        g: &GBuffer,
+        shared: &Shared,
+        vpls: Vpls,
+        settings: &Settings,
+        irradiance: Image,
+    ) {
+        let extent = graph.extent(irradiance);
+        let own = vpls.count.div_ceil(settings.interleave * settings.interleave);
+        for (first, count) in self.batches(extent, own) {
+            let push = gather::Push {
+                first,
+                count,
+                total: vpls.count,
+                tile: settings.interleave,
+                factor: settings.downsample,
+                least: shared.least,
+                imperfect: settings.imperfect.into(),
+                irregular: (settings.pattern == Pattern::Irregular).into(),
+                seed: shared.seed,
+            };
+            let args = traced!(
+                gather::Args { view: g.view, normal: g.normal, depth: g.depth, vpls: vpls.buffer, irradiance, push },
+                shared.hidden_by
+            );
+            graph.compute(args, extent);
+        }
+    }
+
+    fn gather_picks(
+        &self,
+        graph: &mut Graph,
+        g: &GBuffer,
+        shared: &Shared,
+        (vpls, tree): (Vpls, LightTree),
+        settings: &Settings,
+        irradiance: Image,
+    ) {
+        let extent: Extent = graph.extent(irradiance);
+        let picks = settings.texel_picks();
+        for (first, count) in self.batches(extent, picks) {
+            let push = gather_picks::Push {
+                first,
+                count,
+                picks,
+                leaves: tree.leaves,
+                tile: settings.interleave,
+                factor: settings.downsample,
+                least: shared.least,
+                imperfect: settings.imperfect.into(),
+                irregular: (settings.pattern == Pattern::Irregular).into(),
+                seed: shared.seed,
+            };
+            let args = traced!(
+                gather_picks::Args {
+                    view: g.view,
+                    normal: g.normal,
+                    depth: g.depth,
+                    vpls: vpls.buffer,
+                    irradiance,
+                    vpl_nodes: tree.nodes,
+                    push,
+                },
+                shared.hidden_by
+            );
+            graph.compute(args, extent);
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! A tree over the virtual lights of a frame, so that a surface can pick those that matter to it. Built on the device: sorted by a radix
+//! sort, then joined two by two.
+
+use super::{Settings, Vpls};
+use crate::{
+    graph::{Buffer, Graph},
+    shaders::{
+        consts::VPL_TREE_MOST,
+        igi::{order_join, order_keys, order_leaves, order_sort},
+        types,
+    },
+};
+
+/// A perfectly balanced tree over virtual lights.
+#[derive(Clone, Copy, Debug)]
+pub struct LightTree {
+    /// `types::VplNode`: the root is number 1, below node i are 2 i and 2 i + 1.
+    pub nodes: Buffer,
+    /// A power of two; leaf i is node `leaves` + i and stands for virtual light i, or for none.
+    pub leaves: u32,
+}
+
+/// The same virtual lights, with a tree over them if something picks from it.
+pub(super) fn ordered_if_picked(graph: &mut Graph, vpls: Vpls, settings: &Settings) -> Vpls {
+    if settings.picks > 0 || settings.compensates() { ordered(graph, vpls) } else { vpls }
+}
+
+/// The same virtual lights, sorted, with a tree over them.
+fn ordered(graph: &mut Graph, vpls: Vpls) -> Vpls {
+    let total = vpls.count;
+    debug_assert!(total <= VPL_TREE_MOST);
+    let leaves = total.max(1).next_power_of_two();
+    let keys = [(); 2].map(|()| graph.buffer("igi.order", 8 * u64::from(total.max(1))));
+    graph.compute(order_keys::Args { vpls: vpls.buffer, keys: keys[0], push: order_keys::Push { total } }, 1);
+    // An even number of turns, back into the first.
+    for turn in 0..8 {
+        let (from, to) = if turn % 2 == 0 { (keys[0], keys[1]) } else { (keys[1], keys[0]) };
+        let push = order_sort::Push { total, shift: 4 * turn };
+        graph.compute(order_sort::Args { keys: from, sorted: to, push }, 1);
+    }
+    let ordered = graph.buffer("igi.ordered", u64::from(total.max(1)) * size_of::<types::Vpl>() as u64);
+    let nodes = graph.buffer("igi.light-tree", 2 * u64::from(leaves) * size_of::<types::VplNode>() as u64);
+    let push = order_leaves::Push { total, leaves };
+    graph.compute(order_leaves::Args { keys: keys[0], vpls: vpls.buffer, ordered, nodes, push }, leaves);
+    let mut first = leaves / 2;
+    while first > 0 {
+        graph.compute(order_join::Args { nodes, push: order_join::Push { first } }, first);
+        first /= 2;
+    }
+    Vpls { buffer: ordered, count: total, tree: Some(LightTree { nodes, leaves }) }
+}

@@ -1,0 +1,73 @@
+// Irradiance at the visible surfaces from a few virtual lights picked by a tree, each as much stronger as it is rarely picked: the mean
+// over seeds is the sum over all of them.
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#define TRACE_BOXES
+#include "lib/view.glsl"
+#include "lib/screen.glsl"
+#include "lib/gbuffer.glsl"
+#include "lib/random.glsl"
+#include "lib/trace.glsl"
+#include "lib/vpl.glsl"
+#include "lib/vpl_subset.glsl"
+#define VPL_NODES_BINDING 5
+#include "lib/vpl_tree.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(binding = 0, scalar) uniform ViewBlock { View view; };
+layout(binding = 1) uniform sampler2D normal;
+layout(binding = 2) uniform sampler2D depth;
+layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; }; // in the order of the leaves
+layout(binding = 4, rgba32f) uniform image2D irradiance; // rgb of a white surface's, W/m²; a: rays traced
+
+layout(push_constant, scalar) uniform Push {
+    uint first;      // pick
+    uint count;
+    uint picks;      // of a texel
+    uint leaves;     // of the tree
+    uint tile;       // side of the tiles of texels whose picks lie between each other
+    uint factor;     // pixels along the side of a texel
+    float least;     // min_d of the bounded geometry term, metres; 0: none
+    uint imperfect;  // 1: boxes of triangles stand for them
+    uint irregular;  // 1: tiles have their subsets in different orders
+    uint seed;
+};
+
+void main() {
+    ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(texel, imageSize(irradiance)))) return;
+    ivec2 pixel = min(texel * int(factor) + int(factor) / 2, textureSize(depth, 0) - 1);
+    vec4 sum = first == 0u ? vec4(0.0) : imageLoad(irradiance, texel);
+    float z = texelFetch(depth, pixel, 0).r;
+    if (z < 1.0) {
+        vec3 p = screen_position(view, pixel, 1.0, z);
+        vec3 n = decode_normal(texelFetch(normal, pixel, 0));
+        float gap = surface_step(view, p, z);
+        vec3 origin = p + n * gap;
+        uint subset = vpl_subset(uvec2(texel), tile, irregular != 0u, seed);
+        float offset = vpl_offset(uvec2(texel) / tile, subset, tile * tile, seed);
+        trace_imperfect = imperfect != 0u;
+        uint last = VPL_NO_PICK;
+        vec3 seen = vec3(0.0);
+        for (uint i = first; i < first + count; ++i) {
+            float probability;
+            uint k = vpl_pick(min((float(i) + offset) / float(picks), 0.99999994), p, n, least, leaves, probability);
+            if (k == VPL_NO_PICK) continue;
+            // Picks run through the tree from left to right: equal ones follow each other.
+            if (k != last) {
+                last = k;
+                Vpl vpl = vpls[k];
+                seen = vpl_irradiance(vpl, p, n, least) / (probability * float(picks));
+                if (seen != vec3(0.0)) {
+                    vec3 to = vpl.position + vpl.normal * vpl.gap - origin;
+                    sum.a += 1.0;
+                    if (trace_any(Ray(origin, 0.0, to, 0.99999), TRACE_SHADOW, pcg4d(uvec4(pixel, k, seed)).x)) seen = vec3(0.0);
+                }
+            }
+            sum.rgb += seen;
+        }
+    }
+    imageStore(irradiance, texel, sum);
+}

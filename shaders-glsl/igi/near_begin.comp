@@ -1,0 +1,42 @@
+// Short paths begin at the visible surfaces.
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "lib/view.glsl"
+#include "lib/screen.glsl"
+#include "lib/gbuffer.glsl"
+#include "lib/vpl.glsl"
+#include "lib/igi_near.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(binding = 0, scalar) uniform ViewBlock { View view; };
+layout(binding = 1) uniform sampler2D normal;
+layout(binding = 2) uniform sampler2D depth;
+
+layout(push_constant, scalar) uniform Push {
+    uvec2 extent; // texels
+    uint first;   // texel
+    uint count;   // texels
+    uint number;  // of the path
+    uint paths;   // of a texel
+    uint factor;  // pixels along the side of a texel
+};
+
+void main() {
+    uint slot = gl_GlobalInvocationID.x;
+    if (slot >= count) return;
+    uvec2 texel = uvec2((first + slot) % extent.x, (first + slot) / extent.x);
+    ivec2 pixel = min(ivec2(texel * factor + factor / 2u), textureSize(depth, 0) - 1);
+    float z = texelFetch(depth, pixel, 0).r;
+    NearPath path;
+    path.position = screen_position(view, pixel, 1.0, z);
+    path.alive = z < 1.0 ? 1u : 0u;
+    path.normal = decode_normal(texelFetch(normal, pixel, 0));
+    path.salt = texel.x | texel.y << 16u;
+    path.side = path.normal;
+    path.gap = surface_step(view, path.position, z);
+    path.weight = vec3(1.0 / float(paths));
+    path.light = number == 0u ? vec3(0.0) : near_paths[slot].light;
+    near_paths[slot] = path;
+}
