@@ -64,8 +64,7 @@ impl<'a> Studio<'a> {
         let nodes = out.vpls.and_then(|vpls| vpls.tree).map(|tree| graph.read_buffer(tree.nodes));
         let cells = out.cache.map(|cache| graph.read_buffer(cache.list));
         let frame = self.runner.run(&graph).unwrap_or_else(|error| panic!("{error}"));
-        let [total, direct, indirect, irradiance, gathered, albedo] =
-            images.map(|token| frame.image(token).to_f32());
+        let [total, direct, indirect, irradiance, gathered, albedo] = images.map(|token| frame.image(token).to_f32());
         for pixel in total.iter().chain(&irradiance).flatten() {
             assert!(pixel.is_finite() && *pixel >= 0.0, "{pixel}");
         }

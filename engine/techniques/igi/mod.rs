@@ -32,8 +32,8 @@ mod settings;
 pub mod starts;
 mod tree;
 
-pub use notes::notes;
 pub use cache::Cache;
+pub use notes::notes;
 pub use order::LightTree;
 pub use picture::{Picture, PictureSettings};
 pub use settings::{Pattern, Settings, Visibility};
