@@ -167,6 +167,8 @@ fn every_barrier_of_the_graphs_matters_and_two_runs_are_the_same() {
             let mut pictures = Vec::new();
             for _ in 0..2 {
                 let mut graph = Graph::new("igi");
+                // With a history: one in which the paths of the last frame are shot again.
+                graph.frame = 1;
                 let pose = Pose::playing(&scene, 0.25);
                 let handles = resident.frame_in(&mut graph, &scene, &pose);
                 let view = View::of_camera(&scene, &pose, 0, [32, 24]).unwrap().fit_far(&handles.bounds());
