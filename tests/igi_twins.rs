@@ -131,6 +131,9 @@ fn the_history_agrees_with_its_twin() {
                     [r, g, b, if a < 0.1 { 0.0 } else { 1.0 + 11.0 * a }]
                 })
                 .collect();
+            // Light that grew, shrank or rested.
+            let trend: Texels =
+                (0..all).map(|_| random.texel().map(|v| v - 0.5)).map(|[r, g, b, a]| [r, g, b, a + 0.5]).collect();
             // A quarter moved, some of it along its own plane.
             let motion: Texels = (0..all)
                 .map(|i| {
@@ -179,15 +182,17 @@ fn the_history_agrees_with_its_twin() {
                 frame: graph.buffer_from("frame", &[types::HistoryFrame { view: seen.uniform(), next: 7 }]),
                 irradiance: image(&mut graph, "old", extent(), &old),
                 guide: image(&mut graph, "old guide", extent(), &guides),
+                trend: image(&mut graph, "old trend", extent(), &trend),
                 probes: graph.buffer_from("probes", &placed),
                 lit: graph.buffer_from("lit", &lights(|p| p.1)),
                 relit: graph.buffer_from("relit", &lights(|p| p.2)),
             };
             let motion_image = image(&mut graph, "motion", extent(), &motion);
             let fresh_image = image(&mut graph, "fresh", extent(), &fresh);
-            let next = ["blended", "guide"].map(|name| graph.image(name, lucerna::graph::Format::RGBA32F, extent()));
-            history::blend(&mut graph, &g, (motion_image, fresh_image), (&past, grid), (next[0], next[1]), &s);
-            let [out, kept] = read(gpu, graph, next);
+            let next =
+                ["blended", "guide", "trend"].map(|name| graph.image(name, lucerna::graph::Format::RGBA32F, extent()));
+            history::blend(&mut graph, &g, (motion_image, fresh_image), (&past, grid), next, &s);
+            let [out, kept, goes] = read(gpu, graph, next);
 
             let clip_from_world = seen.clip_from_world.as_dmat4();
             let columns = grid.columns as usize;
@@ -196,6 +201,7 @@ fn the_history_agrees_with_its_twin() {
                 clip_from_world,
                 buffers: &then,
                 irradiance: &old,
+                trend: &trend,
                 motion: &motion,
                 probes,
                 columns,
@@ -204,11 +210,14 @@ fn the_history_agrees_with_its_twin() {
             let expected: Vec<_> =
                 (0..all).map(|i| blended(&eye, &buffers, &fresh, &past, &s, (i % SIZE.0, i / SIZE.0))).collect();
             let found: Vec<f32> = out.iter().flatten().copied().collect();
-            let wanted: Vec<f64> = expected.iter().flat_map(|e| e.to_array()).collect();
+            let wanted: Vec<f64> = expected.iter().flat_map(|(e, _)| e.to_array()).collect();
             // Surfaces at the very limit of what is the same may fall to either side.
             agree(&found, &wanted, 1e-3, 4 * all / 100, &format!("camera {turn}"));
-            let reused = expected.iter().filter(|e| e.w > 1.5).count();
-            let alone = expected.iter().filter(|e| e.w == 1.0).count();
+            let found: Vec<f32> = goes.iter().flatten().copied().collect();
+            let wanted: Vec<f64> = expected.iter().flat_map(|(_, t)| t.to_array()).collect();
+            agree(&found, &wanted, 1e-3, 4 * all / 100, &format!("trend, camera {turn}"));
+            let reused = expected.iter().filter(|(e, _)| e.w > 1.5).count();
+            let alone = expected.iter().filter(|(e, _)| e.w == 1.0).count();
             assert!(reused > all / 5 && alone > 5, "camera {turn}: {reused} reused, {alone} alone");
             for (i, texel) in kept.iter().enumerate() {
                 assert!((f64::from(texel[3]) - buffers.depth[i]).abs() < 1e-6, "depth {i}: {texel:?}");

@@ -101,6 +101,8 @@ pub struct Past<'a> {
     pub buffers: &'a Buffers,
     /// Alpha: frames.
     pub irradiance: &'a Texels,
+    /// Relative change a frame; alpha: its size.
+    pub trend: &'a Texels,
     /// World position in the last frame, alpha 0: the surface rests.
     pub motion: &'a Texels,
     /// Normal of each probe, or none; light by the same paths then and now.
@@ -109,7 +111,7 @@ pub struct Past<'a> {
     pub side: usize,
 }
 
-/// This frame's irradiance of a pixel and that of the past, blended; and how many frames count.
+/// This frame's irradiance of a pixel and that of the past, blended, and how many frames count; and the trend of the light.
 pub fn blended(
     eye: &Eye,
     buffers: &Buffers,
@@ -117,10 +119,10 @@ pub fn blended(
     past: &Past<'_>,
     s: &Settings,
     (x, y): (usize, usize),
-) -> DVec4 {
+) -> (DVec4, DVec4) {
     let own = buffers.at(x, y);
     if buffers.depth[own] >= 1.0 {
-        return DVec4::ZERO;
+        return Default::default();
     }
     let n = buffers.normal[own].normalize();
     let was = match past.motion[own] {
@@ -134,7 +136,7 @@ pub fn blended(
         (0.5 + 0.5 * clip.x / clip.w) * then.width as f64 - 0.5,
         (0.5 - 0.5 * clip.y / clip.w) * then.height as f64 - 0.5,
     );
-    let (mut sum, mut weights) = (DVec4::ZERO, 0.0);
+    let (mut sum, mut trend, mut weights) = (DVec4::ZERO, DVec4::ZERO, 0.0);
     if clip.w > 0.0 {
         for v in 0..then.height {
             for u in 0..then.width {
@@ -151,15 +153,17 @@ pub fn blended(
                     continue;
                 }
                 sum += weight * color(past.irradiance[i]).extend(past.irradiance[i][3].into());
+                trend += weight * color(past.trend[i]).extend(past.trend[i][3].into());
                 weights += weight;
             }
         }
     }
     if weights <= 0.01 {
-        return fresh.extend(1.0);
+        return (fresh.extend(1.0), DVec4::ZERO);
     }
-    let (old, count) = ((sum / weights).truncate(), sum.w / weights);
-    let (mut apart, mut light) = (0.0, 0.0);
+    let trend = trend / weights;
+    let (mut old, count) = ((sum / weights).truncate(), sum.w / weights);
+    let (mut apart, mut growth, mut light) = (0.0, DVec3::ZERO, DVec3::ZERO);
     let place = (at + 0.5) / past.side as f64 - 0.5;
     for (i, (normal, was, is)) in past.probes.iter().enumerate() {
         let probe = dvec2((i % past.columns) as f64, (i / past.columns) as f64);
@@ -169,10 +173,24 @@ pub fn blended(
         }
         let weight = (-0.5 * (probe - place).length_squared()).exp() * (0.1 + 0.9 * n.dot(*normal).max(0.0));
         apart += weight * (*is - *was).abs().element_sum();
-        light += weight * is.max(*was).element_sum();
+        growth += weight * (*is - *was);
+        light += weight * is.max(*was);
     }
-    let drift = if light > 0.0 { apart / light } else { 0.0 };
-    let lag = f64::from(s.history_lag);
-    let share = (1.0 / (count + 1.0)).max(1.0 / f64::from(s.history)).max(drift / (drift + lag * (1.0 - drift)));
-    (old + (fresh - old) * share).extend((1.0 / share).min(f64::from(s.history)))
+    let mut share = (1.0 / (count + 1.0)).max(1.0 / f64::from(s.history));
+    let size = apart / light.element_sum();
+    let mut next = DVec4::ZERO;
+    if light.element_sum() > 0.0 && size > 1e-4 {
+        next = trend + ((growth / light).extend(size) - trend) / 8.0;
+        let mut drift = size;
+        if size <= 3.0 * trend.w {
+            let step = next.truncate().clamp(DVec3::splat(-0.5), DVec3::splat(0.5));
+            // Of the larger of both moments: growth divides, loss multiplies.
+            let along = |x: f64, g: f64| if g > 0.0 { x / (1.0 - g) } else { x * (1.0 + g) };
+            old = dvec3(along(old.x, step.x), along(old.y, step.y), along(old.z, step.z));
+            drift = 0.35 * step.abs().max_element();
+        }
+        let lag = f64::from(s.history_lag);
+        share = share.max(drift / (drift + lag * (1.0 - drift)));
+    }
+    ((old + (fresh - old) * share).extend((1.0 / share).min(f64::from(s.history))), next)
 }

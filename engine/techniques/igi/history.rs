@@ -6,7 +6,8 @@
 //!   skins, morph targets), and takes from there only what lay in the same plane with a like normal.
 //! - The last frame's paths are shot again in this frame's scene, and at one pixel of each square of pixels their light is gathered
 //!   again. What differs from what they gave in the last frame has changed: it is no chance, for the numbers are the same. The more
-//!   has changed the fewer frames count, so that the average lags by no more than [`Settings::history_lag`].
+//!   has changed the fewer frames count, so that the average lags by about [`Settings::history_lag`] at most; change that goes on for
+//!   some frames is smoothed, and the average carried along with it.
 //! - With the scene at rest the average goes over [`Settings::history`] frames, and the frames together are as many virtual lights.
 //!
 //! Nothing is kept on the host: what a frame leaves to the next one is [`Graph::history`] of the runner. The frames must follow each
@@ -28,7 +29,7 @@ use crate::{
 };
 
 /// Virtual lights that a probe looks at, at most.
-const PROBE_LIGHTS: u32 = 64;
+const PROBE_LIGHTS: u32 = 256;
 /// Bytes of a position.
 const POSITION: u64 = 12;
 
@@ -41,6 +42,8 @@ pub struct Past {
     pub irradiance: Image,
     /// Normal, and linear depth / far in alpha.
     pub guide: Image,
+    /// Relative change of irradiance a frame, smoothed over time; alpha: how large it has been, without sign.
+    pub trend: Image,
     /// `types::HistoryProbe`, row by row.
     pub probes: Buffer,
     /// Light at the probes by the last frame's paths in the last frame, W/m², alpha unused.
@@ -72,14 +75,14 @@ impl Grid {
 }
 
 /// Blends `fresh`, this frame's irradiance, with that of the `past` into `blended` (alpha: how many frames count), and keeps normals
-/// and depths in `guide`: the two images that the next frame's `past` holds. `motion`: world position in the last frame of what moved,
+/// and depths in `guide`, and how light changes in `trend`: the three images that the next frame's `past` holds. `motion`: world position in the last frame of what moved,
 /// alpha 0 elsewhere.
 pub fn blend(
     graph: &mut Graph,
     g: &GBuffer,
     (motion, fresh): (Image, Image),
     (past, grid): (&Past, Grid),
-    (blended, guide): (Image, Image),
+    [blended, guide, trend]: [Image; 3],
     settings: &Settings,
 ) {
     let args = history::Args {
@@ -91,11 +94,13 @@ pub fn blend(
         irradiance: fresh,
         old: past.irradiance,
         old_guide: past.guide,
+        old_trend: past.trend,
         probes: past.probes,
         lit: past.lit,
         relit: past.relit,
         blended,
         guide,
+        trend,
         push: history::Push {
             frame: graph.frame,
             columns: grid.columns,
@@ -203,15 +208,17 @@ impl Igi {
 
         let (old, blended) = graph.history("igi.history.irradiance", Format::RGBA32F, extent);
         let (old_guide, guide) = graph.history("igi.history.guide", Format::RGBA32F, extent);
+        let (old_trend, trend) = graph.history("igi.history.trend", Format::RGBA32F, extent);
         let past = Past {
             frame: frame_before,
             irradiance: old.nearest(),
             guide: old_guide.nearest(),
+            trend: old_trend.nearest(),
             probes: probes_before,
             lit: lit_before,
             relit,
         };
-        blend(graph, g, (motion, fresh), (&past, grid), (blended, guide), settings);
+        blend(graph, g, (motion, fresh), (&past, grid), [blended, guide, trend], settings);
         blended
     }
 
