@@ -1,7 +1,9 @@
 //! Instant global illumination: figures 4 to 7 of Marques and Santos, with the errors that the paper does not give.
 //!
 //! Techniques are known by their names: `exact` with a matrix of `igi.vpls`, and the variants, whatever they are called, with the number of
-//! virtual lights that [`COUNT`] states; the reference is the first one.
+//! virtual lights that [`COUNT`] states; the reference is the first one. What came after the paper: [`beyond`].
+
+mod beyond;
 
 use lucerna::{Result, measure::Measure};
 
@@ -21,15 +23,21 @@ const SIDE: u32 = 640;
 
 /// Stages of figures 4 and 5, by the beginnings of the names of their passes.
 const STAGES: [(&str, &[&str]); 4] = [
-    ("shooting (%)", &["igi.shoot", "igi.points", "igi.importance", "igi.cumulate", "igi.resample"]),
-    ("direct and specular (%)", &["passes.gbuffer", "igi.direct", "igi.grow", "igi.gather_tree", "igi.reap"]),
-    ("indirect (%)", &["igi.gather"]),
+    ("shooting (%)", &["igi.shoot", "igi.points", "igi.importance", "igi.cumulate", "igi.resample", "igi.order"]),
+    (
+        "direct and specular (%)",
+        &["passes.gbuffer", "igi.direct", "igi.grow", "igi.gather_tree", "igi.cache", "igi.reap"],
+    ),
+    ("indirect (%)", &["igi.gather", "igi.near", "igi.raster"]),
     ("filters (%)", &["igi.guide", "igi.discontinuity", "igi.upsample"]),
 ];
 
 pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
     page.add(counts(results)?);
     page.add(variants(results)?);
+    page.add(beyond::successors(results)?);
+    page.add(beyond::many(results)?);
+    page.add(beyond::cached(results)?);
     page.add(images(results)?);
     Ok(())
 }
@@ -91,7 +99,8 @@ fn exact<'a>(results: &'a Results, view: (&'a str, &'a str)) -> Option<&'a Done>
 /// What is held against the exact variant, that one first.
 fn others<'a>(results: &'a Results, view: (&'a str, &'a str)) -> Vec<&'a Done> {
     let technique = |run: &&Done| results.with_role(Role::Technique).any(|known| known.key == run.key);
-    let others = results.at(view).filter(technique).filter(|run| run.method != "exact");
+    let others = results.at(view).filter(technique);
+    let others = others.filter(|run| run.method != "exact" && !beyond::OWN.contains(&run.method.as_str()));
     exact(results, view).into_iter().chain(others).collect()
 }
 

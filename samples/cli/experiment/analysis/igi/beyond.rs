@@ -1,0 +1,152 @@
+//! What came after Marques and Santos: each idea beside what it is meant to improve on.
+//!
+//! Techniques are known by their names: the table `beside` of the experiment's parameters names pairs of them; `all` and `picked` have a matrix of
+//! `igi.vpls`; `mirrors` and `mirrors, cache` have specular surfaces.
+
+use lucerna::{Result, measure::Measure};
+
+use super::{mean, name, reference, stages};
+use crate::{
+    experiment::results::{Done, Layer, Results},
+    report::{Axis, Plot, Section, Table},
+};
+
+/// Techniques that have a section of their own.
+pub(super) const OWN: [&str; 4] = [ALL, PICKED, MIRRORS, CACHE];
+const ALL: &str = "all";
+const PICKED: &str = "picked";
+const MIRRORS: &str = "mirrors";
+const CACHE: &str = "mirrors, cache";
+
+/// Of the variants by name: the one with the number of virtual lights that all have.
+fn run<'a>(results: &'a Results, view: (&'a str, &'a str), method: &str) -> Option<&'a Done> {
+    match method {
+        "exact" => super::exact(results, view),
+        _ => results.at(view).find(|run| run.method == method),
+    }
+}
+
+/// Milliseconds of gathering and filters.
+fn indirect(results: &Results, run: &Done) -> Result<f64> {
+    let (_, sums) = stages(results, run)?;
+    Ok(sums[2] + sums[3])
+}
+
+fn error(results: &Results, truth: &Done, layer: &'static str, run: &Done) -> Result<Option<f64>> {
+    let values = results.measures(&[Measure::RelMse], Layer(truth, layer), Layer(run, layer), None)?;
+    Ok(values.first().copied())
+}
+
+/// A ratio that is a number.
+fn over(a: Option<f64>, b: Option<f64>) -> Option<f64> {
+    a.zip(b).map(|(a, b)| a / b).filter(|ratio| ratio.is_finite())
+}
+
+/// What each idea buys.
+pub(super) fn successors(results: &Results) -> Result<Section> {
+    let mut section = Section::new("What the ideas after the paper buy");
+    section.text(
+        "Each beside what it improves on. *Error*: relative mean squared error of the indirect light against the path tracer, over that of the \
+         other; below 1 is better. *Time*: of gathering and filters, and of the whole frame, over the other's. *Light*: mean of the indirect light \
+         over the reference's, of the other and of the idea.",
+    );
+    let columns = ["scene", "idea", "beside", "error", "light before", "light"];
+    let mut errors = Table::new("successors", "Errors", columns);
+    let mut times = Table::new("successors-times", "Times", ["scene", "idea", "beside", "indirect", "frame"]).timed();
+    let pairs = results.experiment.parameters.get("beside").and_then(serde_json::Value::as_object);
+    for view in results.views() {
+        for (idea, other) in pairs.into_iter().flatten() {
+            let other = other.as_str().unwrap_or_default();
+            let Some((new, old)) = run(results, view, idea).zip(run(results, view, other)) else { continue };
+            let (mut ratio, mut light) = (None, [None; 2]);
+            if let Some(truth) = reference(results, view) {
+                ratio = over(error(results, truth, "indirect", new)?, error(results, truth, "indirect", old)?);
+                let whole = mean(results, truth, "indirect")?;
+                light = [
+                    over(Some(mean(results, old, "indirect")?), Some(whole)),
+                    over(Some(mean(results, new, "indirect")?), Some(whole)),
+                ];
+            }
+            let names = [name(view).into(), idea.as_str().into(), other.into()];
+            errors.push(names.clone().into_iter().chain([ratio.into(), light[0].into(), light[1].into()]));
+            let gathering = over(Some(indirect(results, new)?), Some(indirect(results, old)?));
+            let frame = over(stages(results, new)?.0, stages(results, old)?.0);
+            times.push(names.into_iter().chain([gathering.into(), frame.into()]));
+        }
+    }
+    section.add(errors);
+    section.add(times);
+    Ok(section)
+}
+
+/// Cost and error against the number of virtual lights.
+pub(super) fn many(results: &Results) -> Result<Section> {
+    let mut section = Section::new("Many virtual lights");
+    section.text(
+        "*All*: a shadow ray to each. *Picked*: a fixed number of picks in each pixel, by a tree over the virtual lights. Both against the path tracer \
+         (relative mean squared error of the indirect light), no downsampling or interleaving. *Exponent*: of the growth of the time since the row above; 1 is linear.",
+    );
+    let columns = ["scene", "way", "virtual lights", "gathering (ms)", "exponent"];
+    let mut times = Table::new("many-times", "Time against the number of virtual lights", columns).timed();
+    let columns = ["scene", "way", "virtual lights", "error", "light"];
+    let mut errors = Table::new("many", "Error against the number of virtual lights", columns);
+    let axis = || Axis::new("virtual lights").log();
+    let mut time_plot = Plot::new("many-times-plot", "Time of gathering", axis(), Axis::new("ms").log());
+    let mut error_plot = Plot::new("many-plot", "Error of the indirect light", axis(), Axis::new("relative MSE").log());
+    for view in results.views() {
+        for method in [ALL, PICKED] {
+            let (mut time_line, mut error_line): (Vec<(f64, f64)>, Vec<(f64, f64)>) = Default::default();
+            for run in results.at(view).filter(|run| run.method == method) {
+                let Some(count) = run.value("igi.vpls").and_then(|count| count.parse::<f64>().ok()) else { continue };
+                let (_, sums) = stages(results, run)?;
+                let ms = sums[2];
+                let exponent = time_line.last().map(|(before, of)| (ms / of).ln() / (count / before).ln());
+                times.push([name(view).into(), method.into(), count.into(), ms.into(), exponent.into()]);
+                time_line.push((count, ms));
+                let Some(truth) = reference(results, view) else { continue };
+                let error = error(results, truth, "indirect", run)?;
+                let light = over(Some(mean(results, run, "indirect")?), Some(mean(results, truth, "indirect")?));
+                errors.push([name(view).into(), method.into(), count.into(), error.into(), light.into()]);
+                error_line.extend(error.map(|error| (count, error)));
+            }
+            let label = format!("{}, {method}", name(view));
+            if !time_line.is_empty() {
+                time_plot = time_plot.line(label.clone(), time_line);
+            }
+            if !error_line.is_empty() {
+                error_plot = error_plot.line(label, error_line);
+            }
+        }
+    }
+    section.add(times);
+    section.add(time_plot.timed());
+    section.add(errors);
+    section.add(error_plot);
+    Ok(section)
+}
+
+/// Light behind mirrors and glass, kept in cells.
+pub(super) fn cached(results: &Results) -> Result<Section> {
+    let mut section = Section::new("Behind mirrors and glass");
+    section.text(
+        "What mirrors and glass show gathers from all virtual lights too; kept in cells in space it costs less. Time of the stage *direct and specular* \
+         and of the frame, over those without the cache; errors of the whole picture against that without.",
+    );
+    let columns = ["scene", "direct and specular", "frame"];
+    let mut times = Table::new("cache-times", "Time with the cache over time without", columns).timed();
+    let columns = ["scene", "rel. MSE", "FLIP", "PDiff"];
+    let mut errors = Table::new("cache", "Errors of the cache", columns);
+    for view in results.views() {
+        let Some((without, with)) = run(results, view, MIRRORS).zip(run(results, view, CACHE)) else { continue };
+        let ((whole, sums), (whole_cached, cached)) = (stages(results, without)?, stages(results, with)?);
+        let ratio = over(Some(cached[1]), Some(sums[1]));
+        times.push([name(view).into(), ratio.into(), over(whole_cached, whole).into()]);
+        let list = [Measure::RelMse, Measure::Flip, Measure::Pdiff];
+        let values = results.measures(&list, Layer(without, ""), Layer(with, ""), None)?;
+        let values = (0..list.len()).map(|i| values.get(i).copied().into());
+        errors.push(std::iter::once(name(view).into()).chain(values));
+    }
+    section.add(times);
+    section.add(errors);
+    Ok(section)
+}
