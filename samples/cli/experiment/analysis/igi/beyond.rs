@@ -95,7 +95,7 @@ pub(super) fn many(results: &Results) -> Result<Section> {
     let mut error_plot = Plot::new("many-plot", "Error of the indirect light", axis(), Axis::new("relative MSE").log());
     for view in results.views() {
         for method in [ALL, PICKED] {
-            let (mut time_line, mut error_line): (Vec<(f64, f64)>, Vec<(f64, f64)>) = Default::default();
+            let [mut time_line, mut error_line] = [const { Vec::<(f64, f64)>::new() }; 2];
             for run in results.at(view).filter(|run| run.method == method) {
                 let Some(count) = run.value("igi.vpls").and_then(|count| count.parse::<f64>().ok()) else { continue };
                 let (_, sums) = stages(results, run)?;
