@@ -220,23 +220,25 @@ pub(super) fn frame(size: Vec2, width: f32, depth: f32) -> Geometry {
     out
 }
 
-/// A pendant lamp under y = 0: the middle of its globe `drop` below, a dish above the globe.
+/// A pendant lamp under y = 0: the middle of its globe `drop` below, a dish above the globe. Nothing that light meets is nearer to the
+/// middle than 14 cm, for there it would be as bright as a lamp itself.
 pub(super) fn lamp(palette: &Palette, drop: f32) -> Model {
     let mut brass = cylinder(0.055, 0.03, 24).at(0.0, -0.03, 0.0);
-    brass.append(&cylinder(0.006, drop - 0.17, 10).at(0.0, -(drop - 0.15), 0.0));
-    brass.append(&cylinder(0.022, 0.1, 20).at(0.0, -drop + 0.07, 0.0));
+    brass.append(&cylinder(0.006, drop - 0.21, 10).at(0.0, -(drop - 0.19), 0.0));
+    brass.append(&cylinder(0.024, 0.07, 20).at(0.0, -drop + 0.145, 0.0));
     let mut model = Model::of(palette.brass, brass);
-    // White below, brass above.
-    let rise = |r: f32| -drop + 0.17 - 0.11 * (r / 0.24f32).powf(1.6);
-    let radii: Vec<f32> = (0..=10).map(|i| 0.022 + 0.218 * i as f32 / 10.0).collect();
+    let rise = |r: f32| -drop + 0.205 - 0.1 * (r / 0.25f32).powf(1.6);
+    let radii: Vec<f32> = (0..=10).map(|i| 0.024 + 0.226 * i as f32 / 10.0).collect();
     // The profile's right is outside: outwards along the bottom it faces down, inwards along the top up.
     let under: Vec<Vec2> = radii.iter().map(|&r| vec2(r, rise(r) - 0.004)).collect();
     let over: Vec<Vec2> = radii.iter().rev().map(|&r| vec2(r, rise(r))).collect();
-    model.add(palette.white, lathe(&under, 48, 40.0));
+    model.add(palette.brass, lathe(&under, 48, 40.0));
     model.add(palette.brass, lathe(&over, 48, 40.0));
-    let rim = [vec2(0.24, rise(0.24) - 0.004), vec2(0.24, rise(0.24))];
+    let rim = [vec2(0.25, rise(0.25) - 0.004), vec2(0.25, rise(0.25))];
     model.add(palette.brass, lathe(&rim, 48, 40.0));
+    // The neck shines as the globe does, and lets light pass as it does.
     model.add(palette.bulb, sphere(0.062, 32, 16).at(0.0, -drop, 0.0));
+    model.add(palette.bulb, cylinder(0.019, 0.1, 20).at(0.0, -drop + 0.05, 0.0));
     model
 }
 
