@@ -358,6 +358,9 @@ fn a_resting_scene_does_not_flicker() {
     });
 }
 
+/// The same of what a picture changes besides the light's own change, while a lamp crosses the room within half a second.
+const MOVING: f64 = 0.16;
+
 #[test]
 fn moving_lights_leave_no_ghosts() {
     with_gpu(|gpu| {
@@ -393,7 +396,7 @@ fn moving_lights_leave_no_ghosts() {
         assert!(long_error < 0.75 * fresh_error, "{long_error} {fresh_error}");
         let after = [&long, &deaf].map(|c| mean(&c.errors[20..]));
         assert!(long_error < deaf_error && after[0] < 0.65 * after[1], "{long_error} {deaf_error} {after:?}");
-        assert!(long.flicker < 0.5 * fresh.flicker, "{} {}", long.flicker, fresh.flicker);
+        assert!(long.flicker < MOVING && long.flicker < 0.5 * fresh.flicker, "{} {}", long.flicker, fresh.flicker);
     });
 }
 
