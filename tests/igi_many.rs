@@ -156,10 +156,10 @@ fn the_device_picks_what_its_twin_picks() {
         // In a convex room nothing is hidden.
         let stage = room();
         let mut studio = Studio::new(gpu, &stage.scene);
-        for (vpls, bounces, bound, picks, interleave) in
-            [(1, 1, 0.0, 1, 1), (300, 2, 0.0, 6, 1), (300, 2, 0.1, 16, 1), (4000, 2, 0.1, 27, 3)]
+        for (vpls, bound, picks, proposals, interleave) in
+            [(1, 0.0, 1, 4, 1), (300, 0.0, 6, 1, 1), (300, 0.1, 8, 4, 1), (4000, 0.1, 18, 3, 3)]
         {
-            let settings = Settings { bounces, bound, picks, interleave, fused: true, ..plain(vpls) };
+            let settings = Settings { bounces: 2, bound, picks, proposals, interleave, fused: true, ..plain(vpls) };
             let shown = studio.render(&wall_view(), &settings, 7);
             let least = f64::from(bound) * 12f64.sqrt();
             let each = settings.texel_picks();
@@ -170,12 +170,8 @@ fn the_device_picks_what_its_twin_picks() {
                 let (x, y) = (i as u32 % 16, i as u32 / 16);
                 let subset = y % interleave * interleave + x % interleave;
                 let start = offset([x / interleave, y / interleave], subset, interleave * interleave, 7);
-                let mut sum = DVec3::ZERO;
-                for j in 0..each {
-                    if let Some((k, p)) = chooser.pick((f64::from(j) + start) / f64::from(each)) {
-                        sum += irradiance(&shown.vpls[k], point, normal, least) / (p * f64::from(each));
-                    }
-                }
+                let picking = (each, settings.proposals);
+                let sum = chooser.picked(&shown.vpls, picking, start, [x, y], 7);
                 assert!(pixel[3] <= each as f32, "{} rays for {each} picks", pixel[3]);
                 other += usize::from((0..3).any(|c| (f64::from(pixel[c]) - sum[c]).abs() > 2e-3 * sum[c] + 1e-6));
             }

@@ -22,10 +22,13 @@ layout(binding = 2) uniform sampler2D depth;
 layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; }; // in the order of the leaves
 layout(binding = 4, rgba32f) uniform image2D irradiance; // rgb of a white surface's, W/m²; a: rays traced
 
+#include "lib/vpl_picked.glsl"
+
 layout(push_constant, scalar) uniform Push {
     uint first;      // pick
     uint count;
     uint picks;      // of a texel
+    uint proposals;  // for each pick
     uint leaves;     // of the tree
     uint tile;       // side of the tiles of texels whose picks lie between each other
     uint factor;     // pixels along the side of a texel
@@ -45,29 +48,11 @@ void main() {
         vec3 p = screen_position(view, pixel, 1.0, z);
         vec3 n = decode_normal(texelFetch(normal, pixel, 0));
         float gap = surface_step(view, p, z);
-        vec3 origin = p + n * gap;
         uint subset = vpl_subset(uvec2(texel), tile, irregular != 0u, seed);
         float offset = vpl_offset(uvec2(texel) / tile, subset, tile * tile, seed);
         trace_imperfect = imperfect != 0u;
-        uint last = VPL_NO_PICK;
-        vec3 seen = vec3(0.0);
-        for (uint i = first; i < first + count; ++i) {
-            float probability;
-            uint k = vpl_pick(min((float(i) + offset) / float(picks), 0.99999994), p, n, least, leaves, probability);
-            if (k == VPL_NO_PICK) continue;
-            // Picks run through the tree from left to right: equal ones follow each other.
-            if (k != last) {
-                last = k;
-                Vpl vpl = vpls[k];
-                seen = vpl_irradiance(vpl, p, n, least) / (probability * float(picks));
-                if (seen != vec3(0.0)) {
-                    vec3 to = vpl.position + vpl.normal * vpl.gap - origin;
-                    sum.a += 1.0;
-                    if (trace_any(Ray(origin, 0.0, to, 0.99999), TRACE_SHADOW, pcg4d(uvec4(pixel, k, seed)).x)) seen = vec3(0.0);
-                }
-            }
-            sum.rgb += seen;
-        }
+        Receiver receiver = Receiver(p, n, p + n * gap, offset, uvec2(pixel));
+        sum += vpl_picked(receiver, Picking(picks, proposals, leaves, least, seed), first, count);
     }
     imageStore(irradiance, texel, sum);
 }

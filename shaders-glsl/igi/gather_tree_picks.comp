@@ -14,10 +14,13 @@ layout(local_size_x = 64) in;
 
 layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; };
 
+#include "lib/vpl_picked.glsl"
+
 layout(push_constant, scalar) uniform Push {
     uint first;      // pick
     uint count;
     uint picks;
+    uint proposals;  // for each pick
     uint leaves;     // of the tree over the virtual lights
     uint nodes;
     float least;     // min_d of the bounded geometry term, metres; 0: none
@@ -31,23 +34,8 @@ void main() {
     TreeNode node = tree_nodes[at];
     vec3 origin = node.position + node.normal * node.gap;
     float offset = vpl_offset(uvec2(node.pixel & 0xffffu, node.pixel >> 16u), at % TREE_WIDTH, TREE_WIDTH, seed);
-    vec3 sum = vec3(0.0), seen = vec3(0.0);
-    uint last = VPL_NO_PICK;
     trace_imperfect = imperfect != 0u;
-    for (uint i = first; i < first + count; ++i) {
-        float probability;
-        float u = min((float(i) + offset) / float(picks), 0.99999994);
-        uint k = vpl_pick(u, node.position, node.normal, least, leaves, probability);
-        if (k == VPL_NO_PICK) continue;
-        if (k != last) {
-            last = k;
-            Vpl vpl = vpls[k];
-            seen = vpl_irradiance(vpl, node.position, node.normal, least) / (probability * float(picks));
-            vec3 to = vpl.position + vpl.normal * vpl.gap - origin;
-            uint salt = pcg4d(uvec4(node.pixel, at % TREE_WIDTH, k, seed)).x;
-            if (seen != vec3(0.0) && trace_any(Ray(origin, 0.0, to, 0.99999), TRACE_SHADOW, salt)) seen = vec3(0.0);
-        }
-        sum += seen;
-    }
+    Receiver receiver = Receiver(node.position, node.normal, origin, offset, uvec2(node.pixel, at % TREE_WIDTH));
+    vec3 sum = vpl_picked(receiver, Picking(picks, proposals, leaves, least, seed), first, count).rgb;
     tree_nodes[at].light = node.light + node.weight * node.albedo * (sum / 3.14159265358979);
 }

@@ -96,6 +96,30 @@ impl Chooser<'_> {
         Some((node - leaves, probability))
     }
 
+    /// Irradiance by picks if nothing is hidden.
+    pub fn picked(&self, vpls: &[Vpl], (picks, proposals): (u32, u32), start: f64, salt: [u32; 2], seed: u32) -> DVec3 {
+        let all = f64::from(picks * proposals);
+        let mut sum = DVec3::ZERO;
+        for i in 0..picks {
+            let (mut taken, mut strengths) = (DVec3::ZERO, 0.0);
+            let mut u = unit(pcg4d([salt[0], salt[1], i, seed ^ 0x91c5])[0]);
+            for j in 0..proposals {
+                let Some((k, p)) = self.pick((f64::from(i * proposals + j) + start) / all) else { continue };
+                let sent = irradiance(&vpls[k], self.point, self.normal, self.least) / (p * all);
+                let weight = sent.element_sum();
+                if weight > 0.0 {
+                    strengths += weight;
+                    let share = weight / strengths;
+                    (taken, u) = if u < share { (sent, u / share) } else { (taken, (u - share) / (1.0 - share)) };
+                }
+            }
+            if strengths > 0.0 {
+                sum += taken * (strengths / taken.element_sum());
+            }
+        }
+        sum
+    }
+
     /// Probability of every leaf, and of picking none.
     pub fn probabilities(&self) -> (Vec<f64>, f64) {
         let leaves = self.nodes.len() / 2;
@@ -117,6 +141,11 @@ impl Chooser<'_> {
     }
 }
 
+/// In [0, 1).
+fn unit(bits: u32) -> f64 {
+    f64::from(bits >> 8) / 16_777_216.0
+}
+
 fn pcg4d(mut v: [u32; 4]) -> [u32; 4] {
     let mix = |v: &mut [u32; 4]| {
         for (to, a, b) in [(0, 1, 3), (1, 2, 0), (2, 0, 1), (3, 1, 2)] {
@@ -132,7 +161,6 @@ fn pcg4d(mut v: [u32; 4]) -> [u32; 4] {
 
 /// Where the numbers of a texel's picks start.
 pub fn offset(tile: [u32; 2], subset: u32, subsets: u32, seed: u32) -> f64 {
-    let unit = |bits: u32| f64::from(bits >> 8) / 16_777_216.0;
     let turn = unit(pcg4d([seed, 0x9e3, 0x51, 0x7c1])[0]);
     let place = tile[0].wrapping_mul(3_242_174_889).wrapping_add(tile[1].wrapping_mul(2_447_445_414));
     (unit(place) + turn + f64::from(subset) / f64::from(subsets)).fract()

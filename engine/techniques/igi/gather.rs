@@ -75,6 +75,7 @@ impl Igi {
                 first,
                 count,
                 picks,
+                proposals: settings.proposals,
                 leaves: tree.leaves,
                 tile: settings.interleave,
                 factor: settings.downsample,

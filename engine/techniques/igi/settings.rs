@@ -52,6 +52,8 @@ pub struct Settings {
     /// Virtual lights that each pixel picks by what they may send to it, 1 to 1024, instead of gathering from all: cost grows with the
     /// logarithm of their number, for noise. Tiles of interleaved pixels share the picks. 0: all, no picks.
     pub picks: u32,
+    /// Virtual lights proposed for each pick, 1 to 16: of these that is taken, at random, which sends more if nothing is in the way.
+    pub proposals: u32,
     /// Short rays of each gathered pixel that put back the light which the bound takes, 0 to 64. 0: it is lost.
     pub compensation: u32,
     /// Side of the cells in which the light of virtual lights on what mirrors and glass show is kept, as share of the diagonal of the
@@ -107,6 +109,7 @@ impl Default for Settings {
             bounces: 2,
             bound: 0.02,
             picks: 0,
+            proposals: 4,
             compensation: 0,
             cache: 0.0,
             cache_cells: CACHE_CELLS,
@@ -171,6 +174,7 @@ impl Settings {
             ("candidates", self.candidates, 1, 64),
             ("bounces", self.bounces, 1, 8),
             ("picks", self.picks, 0, 1024),
+            ("proposals", self.proposals, 1, 16),
             ("compensation", self.compensation, 0, 64),
             ("cache_cells", self.cache_cells, 1, CACHE_CELLS),
             ("downsample", self.downsample, 1, 4),

@@ -144,10 +144,10 @@ impl Igi {
         let (nodes, tree_nodes) = (range.nodes(), range.tree_nodes);
         let (least, imperfect, seed) = (shared.least, settings.imperfect.into(), shared.seed);
         if let (Some(tree), true, None) = (vpls.tree, settings.picks > 0, groups) {
-            let picks = settings.picks;
+            let (picks, proposals, leaves) = (settings.picks, settings.proposals, tree.leaves);
             for (first, count) in self.batches(range.lit(), picks) {
                 let push =
-                    gather_tree_picks::Push { first, count, picks, leaves: tree.leaves, nodes, least, imperfect, seed };
+                    gather_tree_picks::Push { first, count, picks, proposals, leaves, nodes, least, imperfect, seed };
                 let args = traced!(
                     gather_tree_picks::Args { vpls: vpls.buffer, vpl_nodes: tree.nodes, tree_nodes, push },
                     shared.hidden_by
