@@ -407,7 +407,7 @@ fn picks_behind_a_mirror_have_the_full_sums_mean() {
         let mut studio = Studio::new(gpu, &stage.scene);
         let settings = Settings { bounces: 2, vpls: 200, candidates: 1, bound: 0.05, ..Settings::default() };
         let mut off = Vec::new();
-        for seed in 1..=8 {
+        for seed in 1..=16 {
             let full = mean(&studio.render(&seen, &settings, seed).total);
             off.push(mean(&studio.render(&seen, &Settings { picks: 4, ..settings.clone() }, seed).total) / full - 1.0);
         }
