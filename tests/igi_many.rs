@@ -120,7 +120,7 @@ fn probabilities_sum_to_one_and_reach_all_that_shines() {
             let shown = studio.render(&seen, &Settings { picks: 1, bound, bounces: 2, ..plain(vpls) }, 1);
             let least = f64::from(bound);
             // Places beside surfaces and in the air, facing anywhere.
-            for i in 0..200u32 {
+            for i in 0..50u32 {
                 let number = |k: u32| f64::from((i * 7 + k).wrapping_mul(2_654_435_769) >> 8) / 16_777_216.0;
                 let vpl = &shown.vpls[(number(0) * shown.vpls.len() as f64) as usize];
                 let normal = DVec3::new(number(1) - 0.5, number(2) - 0.5, number(3) - 0.5).normalize();

@@ -22,7 +22,9 @@ impl Igi {
         graph.clear(irradiance, [0.0; 4]);
         let Some(vpls) = vpls else { return irradiance };
         match vpls.tree {
-            Some(tree) if settings.picks > 0 => self.gather_picks(graph, g, shared, (vpls, tree), settings, irradiance),
+            Some(tree) if settings.picks_from(vpls.count) => {
+                self.gather_picks(graph, g, shared, (vpls, tree), settings, irradiance)
+            }
             _ => self.gather_all(graph, g, shared, vpls, settings, irradiance),
         }
         irradiance

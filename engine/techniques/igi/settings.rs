@@ -50,7 +50,8 @@ pub struct Settings {
     /// lights nearer than 0.8 of it give nothing, from 1.2 of it on they give everything.
     pub bound: f32,
     /// Virtual lights that each pixel picks by what they may send to it, 1 to 1024, instead of gathering from all: cost grows with the
-    /// logarithm of their number, for noise. Tiles of interleaved pixels share the picks. 0: all, no picks.
+    /// logarithm of their number, for noise. Tiles of interleaved pixels share the picks. Where there are no more than four virtual lights for
+    /// each pick, all are gathered. 0: all, no picks.
     pub picks: u32,
     /// Virtual lights proposed for each pick, 1 to 16: of these that is taken, at random, which sends more if nothing is in the way.
     pub proposals: u32,
@@ -154,6 +155,11 @@ impl Settings {
     /// Paths of light.
     pub fn paths(&self) -> u32 {
         self.vpls.div_ceil(self.bounces.max(1))
+    }
+
+    /// Surfaces pick from so many virtual lights. From few it costs less to gather from all, without noise.
+    pub fn picks_from(&self, vpls: u32) -> bool {
+        self.picks > 0 && vpls > 4 * self.picks
     }
 
     /// Picks of a texel: pixels of a tile share them.

@@ -143,7 +143,7 @@ impl Igi {
     ) {
         let (nodes, tree_nodes) = (range.nodes(), range.tree_nodes);
         let (least, imperfect, seed) = (shared.least, settings.imperfect.into(), shared.seed);
-        if let (Some(tree), true, None) = (vpls.tree, settings.picks > 0, groups) {
+        if let (Some(tree), true, None) = (vpls.tree, settings.picks_from(vpls.count), groups) {
             let (picks, proposals, leaves) = (settings.picks, settings.proposals, tree.leaves);
             for (first, count) in self.batches(range.lit(), picks) {
                 let push =
