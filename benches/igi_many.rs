@@ -1,7 +1,7 @@
 //! What picks from many virtual lights, light put back, and cells of irradiance cost and how far they are off: three tables.
 //!
-//! `cargo bench --bench igi_many [-- WIDTHxHEIGHT [MOST]]`; 96x72 by default; MOST: virtual lights up to which all are gathered, 10000 by
-//! default. `LUCERNA_DEVICE` chooses the device. Times are medians of three, of the passes named. Errors are relative
+//! `cargo bench --bench igi_many [-- WIDTHxHEIGHT [MOST [TABLE]]]`; 96x72 by default; MOST: virtual lights up to which all are gathered,
+//! 10000 by default; TABLE: `picks`, `compensation` or `cache` alone. `LUCERNA_DEVICE` chooses the device. Times are medians of three, of the passes named. Errors are relative
 //! mean squared errors of the indirect light against 10,000 virtual lights of another seed, or the path tracer.
 
 use lucerna::{
@@ -113,13 +113,15 @@ fn run() -> Result<()> {
     let most: u32 = arguments.next().and_then(|r| r.parse().ok()).unwrap_or(10_000);
     let gpu = Gpu::new(GpuOptions::from_env()?)?;
     println!("{} at {}x{}", gpu.describe(), extent[0], extent[1]);
-    for name in ["cornell", "office"] {
+    let table = arguments.next();
+    let wanted = |name: &str| table.as_deref().is_none_or(|table| table == name);
+    for name in ["cornell", "office"].into_iter().filter(|_| wanted("picks")) {
         picks(&gpu, name, extent, most)?;
     }
-    for name in ["cornell", "office"] {
+    for name in ["cornell", "office"].into_iter().filter(|_| wanted("compensation")) {
         compensation(&gpu, name, extent)?;
     }
-    cache(&gpu, extent)
+    if wanted("cache") { cache(&gpu, extent) } else { Ok(()) }
 }
 
 /// Cost and error against the number of virtual lights, of all and of picks.
