@@ -1,0 +1,135 @@
+//! Vectors of what an occluder hides, from many points at once, on the device.
+//!
+//! The mask of an occluder on the cube is made by rays through the middles of texels, which sets the same texels as rasterising its
+//! triangles does. A far occluder of a hundred thousand triangles covers a handful of texels: rays cost by texels, not by triangles.
+//! What is cut out of surfaces is cut out of the mask.
+
+use glam::Vec3;
+
+use super::{light::Light, occluder::Occluder};
+use crate::{
+    Result,
+    gpu::Gpu,
+    graph::{Buffer, Graph, Runner},
+    rays::Rays,
+    scene::{Pose, resident::Resident},
+    shaders::{
+        consts::{FIV_FLOATS, TRACE_STEPS},
+        fiv,
+    },
+};
+
+/// Points of a dispatch at most: a guaranteed count of work groups.
+const MOST_POINTS: u32 = 16_384;
+/// Rays of a dispatch, about: some milliseconds on a GPU.
+const MOST_RAYS: u64 = 1 << 22;
+/// Turns of loops of one invocation where a driver ends loops early: two rays of the longest.
+const TURNS_LIMITED: u64 = 2 * TRACE_STEPS as u64;
+/// Tiles of one invocation otherwise: a face of 32×32.
+const TILES: u64 = 16;
+/// A point from which more than this part of the sphere is hidden lies inside; scans have holes.
+const INSIDE: f32 = 0.95;
+
+/// An occluder on a device.
+#[derive(Debug)]
+pub struct Cover<'a> {
+    occluder: &'a Occluder,
+    resident: Resident,
+    rays: Rays,
+    pose: Pose,
+    tiles: u64,
+}
+
+/// What is hidden from some points, in their order.
+#[derive(Clone, Copy, Debug)]
+pub struct Covered {
+    /// Nine floats each: x.rgb, y.rgb, z.rgb, W/m²; `FIV_INSIDE` where the point lies inside.
+    pub fivs: Buffer,
+    /// Solid angle that is hidden, sr.
+    pub coverage: Buffer,
+}
+
+impl<'a> Cover<'a> {
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`; `Runtime` if the occluder is larger than the device's limits.
+    pub fn new(gpu: &Gpu, occluder: &'a Occluder) -> Result<Self> {
+        let resident = Resident::new(gpu, &occluder.scene)?;
+        let rays = Rays::new(gpu, &occluder.scene, &resident)?;
+        let tiles = match gpu.loop_limit()? {
+            Some(_) => (TURNS_LIMITED / rays.most_turns().max(1)).clamp(1, TILES),
+            None => TILES,
+        };
+        Ok(Self { occluder, resident, rays, pose: Pose::rest(&occluder.scene), tiles })
+    }
+
+    /// Declares the passes for `points`, seen from the centre of the occluder, metres. `split`: rays along the edge of a texel.
+    pub fn declare(&mut self, graph: &mut Graph, light: &Light, points: &[Vec3], split: u32) -> Covered {
+        let handles = self.resident.frame_in(graph, &self.occluder.scene, &self.pose);
+        let rays = self.rays.frame(graph, &handles);
+        let texels = graph.import_buffer(&light.texels);
+        let list: Vec<[f32; 3]> = points.iter().map(|p| p.to_array()).collect();
+        let list = graph.buffer_from("fiv.points", &list);
+        let total = points.len() as u32;
+        let covered = Covered {
+            fivs: graph.buffer("fiv.vectors", u64::from(total) * u64::from(FIV_FLOATS) * 4),
+            coverage: graph.buffer("fiv.coverage", u64::from(total) * 4),
+        };
+        let row = light.size * split / 8;
+        let all = 6 * row * row;
+        let chunks = all.div_ceil(self.tiles as u32);
+        // A tenth of the sphere from each point, about.
+        let each = (MOST_RAYS / (u64::from(all) * 64 / 10).max(1)).clamp(1, MOST_POINTS.into()) as u32;
+        let partials = graph.buffer("fiv.partials", u64::from(each.min(total)) * u64::from(chunks) * 40);
+        for first in (0..total).step_by(each as usize) {
+            let count = each.min(total - first);
+            let args = fiv::cover::Args {
+                texels,
+                points: list,
+                partials,
+                materials: rays.materials,
+                scene_textures: rays.scene_textures,
+                trace_nodes: rays.trace_nodes,
+                trace_triangles: rays.trace_triangles,
+                trace_instances: rays.trace_instances,
+                trace_indices: rays.trace_indices,
+                trace_uvs: rays.trace_uvs,
+                trace_colors: rays.trace_colors,
+                trace_scene: rays.trace_scene,
+                trace_accel: rays.trace_accel,
+                push: fiv::cover::Push {
+                    first,
+                    size: light.size,
+                    split,
+                    tiles: self.tiles as u32,
+                    radius: self.occluder.radius * 1.0001,
+                },
+            };
+            graph.compute(args, [64 * count, chunks, 1]);
+            let push = fiv::gather::Push { first, count, chunks, inside: INSIDE * 4.0 * std::f32::consts::PI };
+            let (fivs, coverage) = (covered.fivs, covered.coverage);
+            graph.compute(fiv::gather::Args { partials, fivs, coverage, push }, count);
+        }
+        covered
+    }
+
+    /// The vectors and the hidden solid angles (sr) of `points`, as [`Self::declare`], at once.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`.
+    pub fn run(
+        &mut self,
+        runner: &mut Runner,
+        light: &Light,
+        points: &[Vec3],
+        split: u32,
+    ) -> Result<(Vec<f32>, Vec<f32>)> {
+        if points.is_empty() {
+            return Ok(Default::default());
+        }
+        let mut graph = Graph::new("fiv vectors");
+        let covered = self.declare(&mut graph, light, points, split);
+        let tokens = [covered.fivs, covered.coverage].map(|buffer| graph.read_buffer(buffer));
+        let frame = runner.run(graph)?;
+        Ok((frame.buffer(tokens[0]), frame.buffer(tokens[1])))
+    }
+}

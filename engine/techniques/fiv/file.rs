@@ -1,0 +1,275 @@
+//! Files of vectors: `.fiv`.
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 8 | `lucfiv\r\n` |
+//! | 4 | version, 1 |
+//! | 4 | bytes of the header |
+//! | … | header: JSON, the [`Plan`] with the `range` of samples that are here |
+//! | … | the vectors of these samples: nine 32-bit floats each, x.rgb, y.rgb, z.rgb, W/m² |
+//! | 8 | checksum of everything before |
+//!
+//! Numbers have their low byte first. A part of the samples is a file of the same kind; [`merge`] joins parts.
+
+use std::{ops::Range, path::Path};
+
+use serde::{Deserialize, Serialize};
+
+use super::{hash::Hash, plan::Plan};
+use crate::{Error, Result, image, shaders::consts::FIV_FLOATS};
+
+const MAGIC: &[u8; 8] = b"lucfiv\r\n";
+const VERSION: u32 = 1;
+/// Bytes of a file that is read at most.
+const MOST_BYTES: u64 = 8 << 30;
+/// Bytes of a header that is read at most.
+const MOST_HEADER: usize = 16 << 20;
+/// Samples that a plan may have.
+const MOST_SAMPLES: u64 = 1 << 28;
+const FLOATS: u64 = FIV_FLOATS as u64;
+
+/// Vectors of a plan, or of a part of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stored {
+    pub plan: Plan,
+    /// Samples that are here.
+    pub range: Range<u64>,
+    /// Nine for each.
+    pub fivs: Vec<f32>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Header {
+    range: [u64; 2],
+    #[serde(flatten)]
+    plan: Plan,
+}
+
+impl Stored {
+    /// No samples yet, of those from `first` on.
+    pub fn empty(plan: Plan, first: u64) -> Self {
+        Self { plan, range: first..first, fivs: Vec::new() }
+    }
+
+    /// All samples of the plan are here.
+    pub fn is_complete(&self) -> bool {
+        self.range == (0..self.plan.samples())
+    }
+
+    /// Adds the samples that follow.
+    pub fn push(&mut self, fivs: &[f32]) {
+        self.fivs.extend_from_slice(fivs);
+        self.range.end = self.range.start + self.fivs.len() as u64 / FLOATS;
+    }
+
+    /// The same vectors always give the same bytes.
+    ///
+    /// # Errors
+    /// `Runtime` if the header cannot be written.
+    pub fn encode(&self) -> Result<Vec<u8>> {
+        let header = Header { range: [self.range.start, self.range.end], plan: self.plan.clone() };
+        let header = serde_json::to_vec(&header).map_err(|error| {
+            Error::new(crate::ErrorKind::Runtime, "the header of the vectors cannot be written").caused_by(error)
+        })?;
+        let mut out = Vec::with_capacity(24 + header.len() + 4 * self.fivs.len());
+        out.extend_from_slice(MAGIC);
+        out.extend_from_slice(&VERSION.to_le_bytes());
+        out.extend_from_slice(&(header.len() as u32).to_le_bytes());
+        out.extend_from_slice(&header);
+        self.fivs.iter().for_each(|f| out.extend_from_slice(&f.to_le_bytes()));
+        out.extend_from_slice(&checksum(&out).to_le_bytes());
+        Ok(out)
+    }
+
+    /// # Errors
+    /// `Input`, saying what is wrong.
+    pub fn decode(bytes: &[u8]) -> Result<Self> {
+        let again = "Compute it again with `fiv precompute`";
+        let damaged = |what: String| Error::input(what).help(again);
+        let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        if !bytes.starts_with(MAGIC) {
+            return Err(Error::input("is no file of irradiance vectors").help("`fiv precompute` writes such files"));
+        }
+        let (Some(version), Some(length)) = (word(8), word(12)) else {
+            return Err(damaged(format!("is cut off after {} bytes", bytes.len())));
+        };
+        if version != VERSION {
+            return Err(damaged(format!("has version {version}, version {VERSION} can be read")));
+        }
+        let length = length as usize;
+        let header = bytes.get(16..16 + length.min(MOST_HEADER)).filter(|h| h.len() == length);
+        let Some(header) = header else {
+            return Err(damaged(format!("is cut off: {} bytes, the header alone has {length}", bytes.len())));
+        };
+        let Header { range: [first, last], plan } = serde_json::from_slice(header)
+            .map_err(|error| damaged("has a header that cannot be read".into()).caused_by(error))?;
+        plan.grid.validate().map_err(|error| damaged(format!("has an impossible plan: {error}")))?;
+        let positive = |x: f32| x.is_finite() && x > 0.0;
+        if let Some(kind) = plan.occluders.iter().find(|k| {
+            !(positive(k.radius) && positive(k.shells.nearest) && positive(k.shells.farthest))
+                || k.shells.farthest <= k.shells.nearest
+        }) {
+            return Err(damaged(format!("has an impossible plan: radii of occluder `{}`", kind.name)));
+        }
+        let samples = plan.samples();
+        if samples > MOST_SAMPLES || first > last || last > samples {
+            return Err(damaged(format!("has an impossible plan: samples {first} to {last} of {samples}")));
+        }
+        let body = 16 + length;
+        let whole = body as u64 + 4 * FLOATS * (last - first) + 8;
+        if bytes.len() as u64 != whole {
+            let more = if (bytes.len() as u64) < whole { "is cut off" } else { "has something after its end" };
+            return Err(damaged(format!("{more}: {} bytes, by its header {whole}", bytes.len())));
+        }
+        let (front, end) = bytes.split_at(bytes.len() - 8);
+        if checksum(front).to_le_bytes() != *end {
+            return Err(damaged("is damaged: its checksum does not fit".into()));
+        }
+        let fivs = front[body..].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+        Ok(Self { plan, range: first..last, fivs })
+    }
+
+    /// # Errors
+    /// `Input` with the file, if it cannot be read or is not what it should be.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let bytes = image::read_file_checked(path, MOST_BYTES)?;
+        Self::decode(&bytes).map_err(|error| error.in_file(path))
+    }
+
+    /// The whole file or none.
+    ///
+    /// # Errors
+    /// `Output` if it cannot be written.
+    pub fn write(&self, path: impl AsRef<Path>, overwrite: bool) -> Result<()> {
+        image::write_atomic(path.as_ref(), &self.encode()?, overwrite)
+    }
+}
+
+fn checksum(bytes: &[u8]) -> u64 {
+    let mut hash = Hash::new();
+    hash.bytes(bytes);
+    hash.finish()
+}
+
+/// Joins parts of one plan, in any order.
+///
+/// # Errors
+/// `Input` if they are of different plans, if samples are missing, or if some are there twice.
+pub fn merge(mut parts: Vec<Stored>) -> Result<Stored> {
+    parts.sort_by_key(|part| (part.range.start, part.range.end));
+    let Some(first) = parts.first() else { return Err(Error::input("there are no parts")) };
+    let mut whole = Stored::empty(first.plan.clone(), 0);
+    for part in parts {
+        if let Some(difference) = whole.plan.difference(&part.plan) {
+            return Err(Error::input(format!("the parts belong to different wholes: {difference}")));
+        }
+        let end = whole.range.end;
+        if part.range.start != end {
+            let what = if part.range.start > end { "are missing" } else { "are there twice" };
+            let (low, high) = (part.range.start.min(end), part.range.start.max(end));
+            return Err(Error::input(format!("samples {low} to {high} {what}")));
+        }
+        whole.push(&part.fivs);
+    }
+    if !whole.is_complete() {
+        let (end, all) = (whole.range.end, whole.plan.samples());
+        return Err(Error::input(format!("samples {end} to {all} are missing")));
+    }
+    Ok(whole)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::techniques::fiv::{
+        Settings,
+        plan::Kind,
+        samples::{Grid, Shells},
+    };
+
+    fn stored() -> Stored {
+        let kind = |name: &str| Kind {
+            name: name.into(),
+            hash: "00ff".into(),
+            radius: 0.1,
+            shells: Shells { nearest: 0.012345678, farthest: 1.6 },
+            triangles: 12,
+        };
+        let plan = Plan {
+            grid: Grid::of(3, 2, 2),
+            occluders: vec![kind("queen"), kind("tree")],
+            ..Plan::new("grove", 77, &[], &Settings::default())
+        };
+        let mut out = Stored::empty(plan, 0);
+        out.push(&(0..24 * 9).map(|i| i as f32 * 0.37 - 3.0).collect::<Vec<_>>());
+        out
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let whole = stored();
+        assert!(whole.is_complete() && whole.range == (0..24));
+        let bytes = whole.encode().unwrap();
+        assert_eq!(Stored::decode(&bytes).unwrap(), whole);
+        assert_eq!(whole.encode().unwrap(), bytes);
+    }
+
+    #[test]
+    fn damage_of_any_kind_is_refused_with_a_reason() {
+        let bytes = stored().encode().unwrap();
+        let refused = |bytes: &[u8], part: &str| {
+            let error = Stored::decode(bytes).unwrap_err();
+            assert!(error.exit_code() == 3 && error.to_string().contains(part), "{error} without {part:?}");
+        };
+        for length in 0..bytes.len() {
+            refused(&bytes[..length], if length < 8 { "no file of irradiance" } else { "cut off" });
+        }
+        refused(&[&bytes[..], &[0]].concat(), "after its end");
+        refused(b"{}", "no file of irradiance vectors");
+        // Every byte counts.
+        for at in (0..bytes.len()).step_by(3) {
+            let mut wrong = bytes.clone();
+            wrong[at] ^= 4;
+            assert_eq!(Stored::decode(&wrong).unwrap_err().exit_code(), 3, "byte {at}");
+        }
+        let mut other = bytes.clone();
+        other[8] = 9;
+        refused(&other, "version 9");
+        let mut last = bytes.clone();
+        *last.last_mut().unwrap() ^= 1;
+        refused(&last, "checksum");
+        let mut huge = stored();
+        huge.plan.grid.azimuths = 100_000;
+        refused(&huge.encode().unwrap(), "azimuths");
+        let mut beyond = stored();
+        beyond.range = 20..44;
+        refused(&beyond.encode().unwrap(), "20 to 44 of 24");
+    }
+
+    #[test]
+    fn parts_join_to_the_same_bytes() {
+        let whole = stored();
+        let part = |first: u64, last: u64| {
+            let mut part = Stored::empty(whole.plan.clone(), first);
+            part.push(&whole.fivs[9 * first as usize..9 * last as usize]);
+            part
+        };
+        let joined = merge(vec![part(13, 24), part(0, 5), part(5, 13)]).unwrap();
+        assert_eq!(joined.encode().unwrap(), whole.encode().unwrap());
+        for (parts, text) in [
+            (vec![part(0, 5), part(6, 24)], "samples 5 to 6 are missing"),
+            (vec![part(0, 5), part(5, 20)], "samples 20 to 24 are missing"),
+            (vec![part(0, 8), part(5, 24)], "samples 5 to 8 are there twice"),
+            (vec![part(3, 24)], "samples 0 to 3 are missing"),
+            (vec![], "no parts"),
+        ] {
+            let error = merge(parts).unwrap_err();
+            assert!(error.to_string().contains(text), "{error}");
+        }
+        let mut other = part(5, 24);
+        other.plan.occluders[1].hash = "11".into();
+        let error = merge(vec![part(0, 5), other]).unwrap_err();
+        assert!(error.to_string().contains("different wholes") && error.to_string().contains("tree"), "{error}");
+    }
+}

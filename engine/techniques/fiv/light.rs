@@ -1,0 +1,61 @@
+//! The environment on the device: its texels, the irradiance for every normal, and its whole vector.
+
+use ash::vk;
+
+use super::sky::Sky;
+use crate::{
+    Result,
+    gpu::{Gpu, ImageDesc, OwnedBuffer, OwnedImage},
+    graph::{Graph, Runner},
+    shaders::{consts::FIV_FLOATS, fiv},
+};
+
+/// Texels that one invocation sums up at most.
+const MOST_TEXELS: u32 = 24_576;
+
+/// An environment on a device.
+#[derive(Debug)]
+pub struct Light {
+    /// Texels along an edge.
+    pub size: u32,
+    /// `types::FivTexel`
+    pub texels: OwnedBuffer,
+    /// Irradiance for the normal of each texel, W/m²: a cube, to be looked up by `cube_lookup` of lib/fiv.glsl.
+    pub difmap: OwnedImage,
+    /// The fullsphere irradiance vector of the whole environment: x.rgb, y.rgb, z.rgb, W/m².
+    pub total: [f32; FIV_FLOATS as usize],
+    /// Texels that are not black.
+    pub lit: Vec<u32>,
+    /// Of the environment.
+    pub hash: u64,
+}
+
+impl Light {
+    /// Uploads the environment and sums it up.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`.
+    pub fn new(gpu: &Gpu, sky: &Sky) -> Result<Self> {
+        let texels = sky.texels();
+        let buffer = OwnedBuffer::with_contents(gpu, "fiv.sky", bytemuck::cast_slice(&texels))?;
+        let desc = ImageDesc::new(vk::Format::R32G32B32A32_SFLOAT, sky.size, sky.size)
+            .cubes(1)
+            .also(vk::ImageUsageFlags::STORAGE);
+        let difmap = OwnedImage::new(gpu, "fiv.difmap", desc)?;
+        let mut graph = Graph::new("fiv environment");
+        let (handle, image) = (graph.import_buffer(&buffer), graph.import_image(&difmap));
+        let count = texels.len() as u32;
+        graph.clear(image, [0.0; 4]);
+        for first in (0..count).step_by(MOST_TEXELS as usize) {
+            let push = fiv::difmap::Push { first, count: MOST_TEXELS.min(count - first) };
+            graph.compute(fiv::difmap::Args { texels: handle, difmap: image, push }, [sky.size, sky.size, 6]);
+        }
+        let fivs = graph.buffer("fiv.total", 4 * u64::from(FIV_FLOATS));
+        graph.compute(fiv::total::Args { texels: handle, fivs, push: fiv::total::Push { count } }, 1);
+        let token = graph.read_buffer(fivs);
+        let sums: Vec<f32> = Runner::new(gpu).run(graph)?.buffer(token);
+        let mut total = [0.0; FIV_FLOATS as usize];
+        total.iter_mut().zip(sums).for_each(|(to, from)| *to = from);
+        Ok(Self { size: sky.size, texels: buffer, difmap, total, lit: sky.lit(), hash: sky.hash() })
+    }
+}

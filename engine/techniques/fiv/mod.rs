@@ -1,0 +1,37 @@
+//! Soft shadows under an environment from fullsphere irradiance vectors (Michael 2010, chapter 3).
+//!
+//! The irradiance of a surface is that of the whole environment, looked up by its normal, without what occluders hide. What an occluder
+//! hides is kept as one vector a colour channel, the sum of radiance × direction × solid angle over the part of the environment behind
+//! it, for many places of the occluder around the receiver; its dot product with the normal is the irradiance that is missing, if the
+//! occluder lies in front of the receiver's plane.
+//!
+//! [`Sky`] is the environment as a cube, [`Light`] the same on the device with its irradiance; [`Occluders`] finds what casts
+//! shadows in a scene; [`Plan`] computes vectors, [`Stored`] keeps them in files; [`Fiv`] draws.
+//!
+//! Where this differs from the thesis, and why:
+//! - Solid angles are exact: texels of a cube differ by a factor of five. The thesis writes none (eq. 10).
+//! - Masks are made by rays instead of rasterising ([`cover`]).
+//! - 1/π is explicit: a surface of albedo ρ reflects ρ/π · E; the thesis folds it into its factor (eq. 3).
+//! - The discs of the overlap correction have sin α = R / ρ as radius, so that they stay finite near an occluder.
+//! - More than two overlapping occluders: see [`crate::reference::fiv::shares`].
+
+pub mod cover;
+pub mod file;
+mod hash;
+pub mod light;
+pub mod occluder;
+mod picture;
+pub mod plan;
+pub mod samples;
+mod settings;
+pub mod sky;
+mod stage;
+
+pub use file::Stored;
+pub use light::Light;
+pub use occluder::{Occluder, Occluders, Placed};
+pub use picture::{Outputs, Picture, PictureSettings};
+pub use plan::Plan;
+pub use settings::{Method, Settings};
+pub use sky::Sky;
+pub use stage::Fiv;

@@ -1,0 +1,374 @@
+//! What casts shadows: the geometry of one node as it stands, around the origin.
+
+use std::collections::HashMap;
+
+use glam::{Mat4, Vec3, Vec4};
+
+use super::{hash::Hash, samples::Shells};
+use crate::scene::{AlphaMode, Material, Mesh, Node, Pose, Primitive, Scene, deform};
+
+/// The first sphere is at least this part of the bounding sphere.
+const LEAST_FIRST: f32 = 0.1;
+/// Geometry is flat if it reaches this part of its radius out of a plane at most.
+const FLAT: f32 = 1e-4;
+
+/// One kind of occluder: all that look the same but for where they stand share it.
+#[derive(Clone, Debug)]
+pub struct Occluder {
+    pub name: String,
+    /// Its geometry alone, the centre of its bounding sphere at the origin, with what is needed to know where it is cut out.
+    pub scene: Scene,
+    /// Of its bounding sphere, metres.
+    pub radius: f32,
+    /// From the centre to the nearest surface, metres.
+    pub inner: f32,
+    pub triangles: usize,
+    /// Changes with the geometry.
+    pub hash: u64,
+}
+
+/// An occluder of a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placed {
+    /// Into the scene's nodes.
+    pub node: u32,
+    /// Into the kinds.
+    pub kind: u32,
+    /// Centre of the bounding sphere, seen from the node's origin, metres in world axes.
+    pub centre: Vec3,
+}
+
+/// The occluders of a scene.
+#[derive(Clone, Debug, Default)]
+pub struct Occluders {
+    pub kinds: Vec<Occluder>,
+    pub placed: Vec<Placed>,
+    /// Nodes that only receive shadows, because they are flat or as large as the scene.
+    pub receivers: Vec<u32>,
+}
+
+impl Occluders {
+    /// Every node with a mesh is one, but for flat ones (a ground) unless `flat`, and, where there are several, those whose radius is more
+    /// than `largest` of the scene's (a room, a thick ground): they have no place from which to look at them that is far enough for their
+    /// size. Poses other than `pose` only move them.
+    pub fn of(scene: &Scene, pose: &Pose, flat: bool, largest: f32) -> Self {
+        let mut still = pose.clone();
+        let mut found = Vec::new();
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for (index, node) in scene.nodes.iter().enumerate() {
+            let Some(mesh) = node.mesh.and_then(|mesh| scene.meshes.get(mesh as usize)) else { continue };
+            let Some((occluder, centre)) = Occluder::of_node(scene, &mut still, index, mesh) else { continue };
+            let at = pose.world[index].w_axis.truncate() + centre;
+            (low, high) = (low.min(at - occluder.radius), high.max(at + occluder.radius));
+            let casts = flat || !occluder.is_flat();
+            found.push((index as u32, occluder, centre, casts));
+        }
+        let several = found.iter().filter(|(.., casts)| *casts).count() > 1;
+        let most = if several { largest * 0.5 * (high - low).length() } else { f32::INFINITY };
+        let mut out = Self::default();
+        let mut known = HashMap::new();
+        for (node, occluder, centre, casts) in found {
+            if !casts || occluder.radius > most {
+                out.receivers.push(node);
+                continue;
+            }
+            let kind = *known.entry(occluder.hash).or_insert_with(|| {
+                out.kinds.push(occluder);
+                out.kinds.len() as u32 - 1
+            });
+            out.placed.push(Placed { node, kind, centre });
+        }
+        out
+    }
+}
+
+impl Occluder {
+    /// The occluder and its centre seen from the node's origin; `None` without a triangle that could be seen.
+    fn of_node(scene: &Scene, pose: &mut Pose, node: usize, mesh: &Mesh) -> Option<(Self, Vec3)> {
+        let mut primitives: Vec<Primitive> = Vec::new();
+        for primitive in &mesh.primitives {
+            // Without its place, so that the same things in different places are the same to the last bit.
+            let place = std::mem::replace(&mut pose.world[node].w_axis, Vec4::W);
+            let mut positions = deform::world_vertices(scene, pose, node, primitive).positions;
+            pose.world[node].w_axis = place;
+            if scene.nodes[node].skin.is_some() && !primitive.joints.is_empty() {
+                positions.iter_mut().for_each(|p| *p -= place.truncate());
+            }
+            let good =
+                |corner: &[u32]| corner.iter().all(|&i| positions.get(i as usize).is_some_and(|p| p.is_finite()));
+            let indices: Vec<u32> = primitive.indices.chunks_exact(3).filter(|c| good(c)).flatten().copied().collect();
+            if !indices.is_empty() {
+                primitives.push(Primitive {
+                    normals: vec![Vec3::Y; positions.len()],
+                    tangents: vec![Vec4::ZERO; positions.len()],
+                    positions,
+                    uvs: primitive.uvs.clone(),
+                    colors: primitive.colors.clone(),
+                    indices,
+                    material: primitive.material,
+                    ..Primitive::default()
+                });
+            }
+        }
+        let centre = bounding_centre(&primitives)?;
+        let mut radius = 0f32;
+        for primitive in &mut primitives {
+            for position in &mut primitive.positions {
+                *position -= centre;
+            }
+            for &i in &primitive.indices {
+                radius = radius.max(primitive.positions[i as usize].length());
+            }
+        }
+        if !(radius.is_finite() && radius > 0.0) {
+            return None;
+        }
+        let triangles = primitives.iter().map(|p| p.indices.len() / 3).sum();
+        let inner = primitives.iter().flat_map(corners).map(nearest).fold(f32::INFINITY, f32::min);
+        let name = match scene.nodes[node].name.as_str() {
+            "" if mesh.name.is_empty() => format!("node {node}"),
+            "" => mesh.name.clone(),
+            name => name.to_owned(),
+        };
+        let scene = alone(scene, primitives, &name);
+        let hash = hash(&scene);
+        Some((Self { name, scene, radius, inner, triangles, hash }, centre))
+    }
+
+    /// All triangles lie in one plane, nearly.
+    pub fn is_flat(&self) -> bool {
+        let triangles = || self.scene.meshes[0].primitives.iter().flat_map(corners);
+        let normal = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a);
+        let Some(widest) = triangles().max_by(|a, b| normal(*a).length().total_cmp(&normal(*b).length())) else {
+            return true;
+        };
+        let across = normal(widest).normalize_or_zero();
+        triangles().flatten().all(|p| (p - widest[0]).dot(across).abs() <= FLAT * self.radius)
+    }
+
+    /// The spheres around it: the first one touches its surface from within, the last one has `reach` times its radius.
+    pub fn shells(&self, reach: f32) -> Shells {
+        let nearest = self.inner.max(LEAST_FIRST * self.radius);
+        Shells { nearest, farthest: (reach * self.radius).max(1.01 * nearest) }
+    }
+}
+
+fn corners(primitive: &Primitive) -> impl Iterator<Item = [Vec3; 3]> + '_ {
+    primitive.indices.chunks_exact(3).map(|c| [0, 1, 2].map(|k| primitive.positions[c[k] as usize]))
+}
+
+/// Centre of a small sphere around all corners: Ritter's, which is at most a few percent too large.
+fn bounding_centre(primitives: &[Primitive]) -> Option<Vec3> {
+    let points = || primitives.iter().flat_map(|p| p.indices.iter().map(|&i| p.positions[i as usize].as_dvec3()));
+    let farthest =
+        |from: glam::DVec3| points().max_by(|a, b| a.distance_squared(from).total_cmp(&b.distance_squared(from)));
+    let start = farthest(points().next()?)?;
+    let end = farthest(start)?;
+    let (mut centre, mut radius) = (0.5 * (start + end), 0.5 * start.distance(end));
+    for p in points() {
+        let distance = p.distance(centre);
+        if distance > radius {
+            radius = 0.5 * (radius + distance);
+            centre += (p - centre) * ((distance - radius) / distance);
+        }
+    }
+    Some(centre.as_vec3())
+}
+
+/// Distance of the origin from a triangle.
+fn nearest([a, b, c]: [Vec3; 3]) -> f32 {
+    let (ab, ac) = (b - a, c - a);
+    // Regions of corners and edges (Ericson, Real-Time Collision Detection, 5.1.5).
+    let (d1, d2) = (-ab.dot(a), -ac.dot(a));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return a.length();
+    }
+    let (d3, d4) = (-ab.dot(b), -ac.dot(b));
+    if d3 >= 0.0 && d4 <= d3 {
+        return b.length();
+    }
+    let (d5, d6) = (-ab.dot(c), -ac.dot(c));
+    if d6 >= 0.0 && d5 <= d6 {
+        return c.length();
+    }
+    let (vc, vb, va) = (d1 * d4 - d3 * d2, d5 * d2 - d1 * d6, d3 * d6 - d5 * d4);
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return (a + ab * (d1 / (d1 - d3))).length();
+    }
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return (a + ac * (d2 / (d2 - d6))).length();
+    }
+    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+        return (b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)))).length();
+    }
+    let whole = 1.0 / (va + vb + vc);
+    let inside = a + ab * (vb * whole) + ac * (vc * whole);
+    if inside.is_finite() { inside.length() } else { a.length().min(b.length()).min(c.length()) }
+}
+
+/// A scene of these primitives; of their materials only what stops rays is kept.
+fn alone(scene: &Scene, mut primitives: Vec<Primitive>, name: &str) -> Scene {
+    let mut out = Scene { name: name.to_owned(), ..Scene::default() };
+    let mut materials = HashMap::new();
+    let mut textures = HashMap::new();
+    for primitive in &mut primitives {
+        primitive.material = *materials.entry(primitive.material).or_insert_with(|| {
+            let from = scene.materials.get(primitive.material as usize).cloned().unwrap_or_default();
+            let cut = from.alpha != AlphaMode::Opaque;
+            let texture = from.base_color_texture.filter(|_| cut).and_then(|mut used| {
+                let texture = scene.textures.get(used.texture as usize)?;
+                used.texture = *textures.entry(used.texture).or_insert_with(|| {
+                    out.textures.push(texture.clone());
+                    out.textures.len() as u32 - 1
+                });
+                Some(used)
+            });
+            out.materials.push(Material {
+                base_color: if cut { Vec3::ONE.extend(from.base_color.w) } else { Vec4::ONE },
+                base_color_texture: texture,
+                alpha: from.alpha,
+                unlit: from.unlit,
+                double_sided: true,
+                ..Material::diffuse("", Vec3::ONE)
+            });
+            out.materials.len() as u32 - 1
+        });
+        if out.materials[primitive.material as usize].alpha == AlphaMode::Opaque {
+            primitive.uvs.clear();
+            primitive.colors.clear();
+        }
+    }
+    out.meshes.push(Mesh { primitives, ..Mesh::default() });
+    let local = crate::scene::Transform::Matrix(Mat4::IDENTITY);
+    out.nodes.push(Node { mesh: Some(0), local, ..Node::default() });
+    out
+}
+
+fn hash(alone: &Scene) -> u64 {
+    let mut hash = Hash::new();
+    for primitive in &alone.meshes[0].primitives {
+        hash.word(primitive.positions.len() as u64);
+        primitive.positions.iter().for_each(|p| hash.floats(&p.to_array()));
+        primitive.indices.iter().for_each(|i| hash.word((*i).into()));
+        let material = &alone.materials[primitive.material as usize];
+        hash.bytes(format!("{:?} {} {:?}", material.alpha, material.unlit, material.base_color_texture).as_bytes());
+        if material.alpha != AlphaMode::Opaque {
+            hash.floats(&[material.base_color.w]);
+            primitive.uvs.iter().flatten().for_each(|uv| hash.floats(&uv.to_array()));
+            primitive.colors.iter().for_each(|c| hash.floats(&[c.w]));
+        }
+    }
+    for texture in &alone.textures {
+        hash.bytes(texture.rgba.as_flattened());
+    }
+    hash.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::builtin;
+    use glam::Quat;
+
+    fn tetrahedron() -> Primitive {
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+        Primitive {
+            normals: vec![Vec3::Y; 4],
+            tangents: vec![Vec4::ZERO; 4],
+            positions,
+            indices: vec![0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3],
+            ..Primitive::default()
+        }
+    }
+
+    fn stage(at: &[Mat4]) -> Scene {
+        let nodes =
+            at.iter().map(|m| Node { mesh: Some(0), local: crate::scene::Transform::Matrix(*m), ..Node::default() });
+        Scene {
+            nodes: nodes.collect(),
+            meshes: vec![Mesh { primitives: vec![tetrahedron()], ..Mesh::default() }],
+            materials: vec![Material::default()],
+            ..Scene::default()
+        }
+    }
+
+    fn found(scene: &Scene) -> Occluders {
+        Occluders::of(scene, &Pose::rest(scene), false, 1.0)
+    }
+
+    #[test]
+    fn the_same_thing_in_other_places_is_one_kind_and_turned_or_scaled_it_is_another() {
+        let turned = Mat4::from_quat(Quat::from_rotation_y(1.0));
+        let at = |x: f32| Mat4::from_translation(Vec3::new(x, 0.3 * x, 0.1));
+        let scene = stage(&[
+            Mat4::IDENTITY,
+            at(3.7),
+            at(1000.3) * turned,
+            turned,
+            at(2.0) * Mat4::from_scale(Vec3::splat(2.0)),
+        ]);
+        let all = found(&scene);
+        assert_eq!(all.placed.iter().map(|p| p.kind).collect::<Vec<_>>(), [0, 0, 1, 1, 2]);
+        let [small, large] = [&all.kinds[0], &all.kinds[2]];
+        assert!((large.radius / small.radius - 2.0).abs() < 1e-5 && small.triangles == 4);
+        for kind in &all.kinds {
+            assert!(kind.radius < 1.1 * large.radius && kind.inner < kind.radius && kind.inner > 0.0);
+            let shells = kind.shells(16.0);
+            assert!(shells.nearest >= kind.inner && (shells.farthest / kind.radius - 16.0).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn grounds_only_receive() {
+        let mut scene = stage(&[Mat4::IDENTITY, Mat4::from_rotation_x(0.4)]);
+        scene.meshes[0].primitives[0].positions[3] = Vec3::new(1.0, 1.0, 0.0);
+        let all = found(&scene);
+        assert!(all.kinds.is_empty() && all.placed.is_empty());
+        assert_eq!(all.receivers, [0, 1]);
+        let with = Occluders::of(&scene, &Pose::rest(&scene), true, 1.0);
+        assert!(with.receivers.is_empty() && with.placed.len() == 2);
+    }
+
+    #[test]
+    fn what_holds_everything_else_only_receives() {
+        let at = |x: f32| Mat4::from_translation(Vec3::new(x, 0.0, 0.0));
+        let scene = stage(&[at(0.0), at(-3.0) * Mat4::from_scale(Vec3::splat(9.0)), at(1.5)]);
+        let all = Occluders::of(&scene, &Pose::rest(&scene), false, 0.5);
+        assert_eq!((all.receivers, all.placed.len(), all.kinds.len()), (vec![1], 2, 1));
+        // Alone it is no room.
+        let alone = stage(&[at(-3.0)]);
+        assert_eq!(Occluders::of(&alone, &Pose::rest(&alone), false, 0.5).placed.len(), 1);
+    }
+
+    #[test]
+    fn distances_from_triangles_are_those_of_the_nearest_point() {
+        let exact = |t: [Vec3; 3]| {
+            let at = |i: usize, j: usize| (i as f32 / 400.0, j as f32 / 400.0);
+            let inside = (0..=400).flat_map(|i| (0..=400 - i).map(move |j| at(i, j)));
+            inside.map(|(u, v)| (t[0] + (t[1] - t[0]) * u + (t[2] - t[0]) * v).length()).fold(f32::INFINITY, f32::min)
+        };
+        let v = Vec3::new;
+        for triangle in [
+            [v(1.0, 1.0, 1.0), v(2.0, 1.0, 1.0), v(1.0, 3.0, 1.0)],
+            [v(-1.0, -1.0, 1.0), v(2.0, -1.0, 1.0), v(-1.0, 3.0, 1.0)],
+            [v(-1.0, 0.5, 0.2), v(2.0, 0.6, 0.3), v(0.0, 3.0, 1.0)],
+            [v(-1.0, -2.5, 0.2), v(2.0, 0.6, 0.3), v(0.0, -3.0, 1.0)],
+            [v(3.0, 0.0, 0.2), v(0.5, 0.1, -0.4), v(4.0, -3.0, 1.0)],
+        ] {
+            for turned in [triangle, [triangle[1], triangle[2], triangle[0]], [triangle[2], triangle[0], triangle[1]]] {
+                assert!((nearest(turned) - exact(triangle)).abs() < 0.02, "{turned:?}");
+                assert!(nearest(turned) <= exact(triangle) + 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn built_in_scenes_have_occluders() {
+        let scene = builtin::load("primitives").unwrap();
+        let all = found(&scene);
+        assert!(all.placed.len() > 3 && all.kinds.iter().all(|k| k.radius.is_finite() && k.triangles > 0));
+        for kind in &all.kinds {
+            kind.scene.validate().unwrap();
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! Everything from a scene on the device to the final picture.
+
+use glam::Mat3;
+use serde::{Deserialize, Serialize};
+
+use super::{Fiv, Method, Settings};
+use crate::{
+    Error, Result,
+    graph::{Depth, Extent, Format, Graph, Image, Load, Raster, Targets},
+    passes::{
+        gbuffer::{self, GBuffer},
+        skybox,
+    },
+    scene::{
+        Note, NoteKind, Pose, Scene, View,
+        cull::Frustum,
+        resident::{Batches, Handles},
+    },
+    shaders::{self, consts::FIV_FLOATS, types},
+};
+
+/// Rays that one dispatch traces at most, about: some milliseconds on a GPU.
+const MOST_RAYS: u64 = 1 << 22;
+/// Turns of the loops over occluders of one invocation.
+const MOST_TURNS: u32 = 20_000;
+/// Difference of a node's turn and scale from those at rest that is told.
+const TURNED: f32 = 1e-4;
+
+/// Settings of all stages.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PictureSettings {
+    pub fiv: Settings,
+    pub gbuffer: gbuffer::Settings,
+}
+
+/// Images of a frame, at full resolution.
+#[derive(Clone, Copy, Debug)]
+pub struct Outputs {
+    /// Reflected and emitted light with the environment behind, W/(sr·m²).
+    pub total: Image,
+    /// Of the visible surfaces, W/m²; 0 on the background.
+    pub irradiance: Image,
+}
+
+/// A picture and the stages before it.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    pub gbuffer: GBuffer,
+    pub outputs: Outputs,
+    /// What is approximated in this frame.
+    pub notes: Vec<Note>,
+}
+
+impl Fiv {
+    /// Declares a frame: G-buffer, irradiance, reflected light, sky. `handles` are of this graph, for `pose`. The settings that decide
+    /// the vectors are those that [`Fiv::new`] was given.
+    ///
+    /// # Errors
+    /// `Usage` if a setting is out of its range, or asks for a method that [`Fiv::new`] was not told of.
+    pub fn picture(
+        &mut self,
+        graph: &mut Graph,
+        scene: &Scene,
+        pose: &Pose,
+        handles: &Handles,
+        view: &View,
+        settings: &PictureSettings,
+    ) -> Result<Picture> {
+        settings.fiv.validate().map_err(|error| error.at("fiv"))?;
+        if ![self.method, Method::Unshadowed].contains(&settings.fiv.method) {
+            let error = Error::usage("the scene was made ready for another method").at("fiv.method");
+            return Err(error.help("Give Fiv::new the same settings"));
+        }
+        let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
+        let extent = graph.extent(gbuffer.depth);
+        let outputs = graph.scope("fiv", |graph| {
+            let irradiance = match (settings.fiv.method, &self.rays) {
+                (Method::BruteForce, Some(_)) => self.truth(graph, handles, &gbuffer),
+                (method, _) => {
+                    let count = if method == Method::Vectors { self.occluders.placed.len() as u32 } else { 0 };
+                    self.irradiance(graph, (pose, handles), view, &gbuffer, count, &settings.fiv)
+                }
+            };
+            let total = graph.image("fiv.radiance", Format::RGBA32F, extent);
+            let (albedo, depth, emission) = (gbuffer.albedo, gbuffer.depth, gbuffer.emission);
+            graph.compute(shaders::fiv::compose::Args { albedo, depth, emission, irradiance, total }, extent);
+            Outputs { total, irradiance }
+        });
+        skybox::draw(graph, handles, &gbuffer, glam::Vec3::ZERO, outputs.total);
+        let notes = if settings.fiv.method == Method::Vectors { self.turned(scene, pose) } else { Vec::new() };
+        Ok(Picture { gbuffer, outputs, notes })
+    }
+
+    /// Irradiance without what the first `count` occluders hide.
+    fn irradiance(
+        &self,
+        graph: &mut Graph,
+        (pose, handles): (&Pose, &Handles),
+        view: &View,
+        gbuffer: &GBuffer,
+        count: u32,
+        settings: &Settings,
+    ) -> Image {
+        let extent = graph.extent(gbuffer.depth);
+        let irradiance = graph.image("fiv.irradiance", Format::RGBA32F, extent);
+        graph.clear(irradiance, [0.0; 4]);
+        let identity = self.identity(graph, handles, view, gbuffer, count > 0);
+        let placed = self.occluders.placed.iter().take(count as usize).map(|placed| {
+            let (grid, kind) = (self.plan.grid, &self.plan.occluders[placed.kind as usize]);
+            types::FivOccluder {
+                centre: (pose.world[placed.node as usize].w_axis.truncate() + placed.centre).to_array(),
+                radius: kind.radius,
+                first: placed.kind * grid.count() * FIV_FLOATS,
+                azimuths: grid.azimuths,
+                polars: grid.polars,
+                radii: grid.radii,
+                nearest: kind.shells.nearest,
+                farthest: kind.shells.farthest,
+                steps: kind.shells.steps(grid.radii) as f32,
+            }
+        });
+        let mut list: Vec<types::FivOccluder> = placed.collect();
+        list.resize(list.len().max(1), types::FivOccluder::default());
+        let total = self.light.total;
+        let whole = types::FivWhole {
+            x: [total[0], total[1], total[2]],
+            y: [total[3], total[4], total[5]],
+            z: [total[6], total[7], total[8]],
+            occluders: count,
+        };
+        let (occluders, whole) = (graph.buffer_from("fiv.occluders", &list), graph.uniform(&whole));
+        // With the correction each occluder looks at all others.
+        let turns = if settings.overlap { count + 8 } else { 8 };
+        let each = (MOST_TURNS / turns).max(1);
+        let (difmap, fivs) = (graph.import_image(&self.light.difmap), graph.import_buffer(&self.fivs));
+        for first in (0..count.max(1)).step_by(each as usize) {
+            let args = shaders::fiv::light::Args {
+                view: gbuffer.view,
+                normal: gbuffer.normal,
+                depth: gbuffer.depth,
+                identity,
+                difmap: difmap.as_cube(),
+                occluders,
+                fivs,
+                irradiance,
+                whole,
+                push: shaders::fiv::light::Push { first, count: each.min(count.saturating_sub(first)) },
+                spec: shaders::fiv::light::Spec {
+                    partial: settings.partial.into(),
+                    overlap: settings.overlap.into(),
+                    own: settings.self_shadow.into(),
+                    trilinear: settings.trilinear.into(),
+                },
+            };
+            graph.compute(args, extent);
+        }
+        irradiance
+    }
+
+    /// Which occluder each pixel shows (plus one; 0: none), with its linear depth. `any`: there are occluders.
+    fn identity(&self, graph: &mut Graph, handles: &Handles, view: &View, gbuffer: &GBuffer, any: bool) -> Image {
+        let extent = Extent::from(view.extent);
+        let identity = graph.image("fiv.identity", Format::RG32F, extent);
+        if !any {
+            graph.clear(identity, [0.0; 4]);
+            return identity;
+        }
+        let depth = graph.image("fiv.identity.depth", Format::D32F, extent);
+        let owner = |node: u32| {
+            let at = self.occluders.placed.iter().position(|placed| placed.node == node);
+            at.map_or(u32::MAX, |at| at as u32)
+        };
+        let mut last = (u32::MAX, u32::MAX);
+        let owners = handles.moment.instances.iter().map(|instance| {
+            // Primitives of a node stand next to each other.
+            if last.0 != instance.node {
+                last = (instance.node, owner(instance.node));
+            }
+            last.1
+        });
+        let mut owners: Vec<u32> = owners.collect();
+        owners.resize(owners.len().max(1), u32::MAX);
+        let owners = graph.buffer_from("fiv.owners", &owners);
+        let batches = Batches::new(&handles.moment, Some(&Frustum::new(view)), view.position);
+        let visible = batches.visible_buffer(graph, "fiv.visible");
+        for index in 0..batches.list.len().max(1) {
+            let batch = batches.list.get(index);
+            let first = index == 0;
+            let load = if first { Load::Clear([0.0; 4]) } else { Load::Keep };
+            let targets =
+                Targets::new().color(identity, load).depth(depth, if first { Depth::Clear(0.0) } else { Depth::Keep });
+            let args = shaders::fiv::identity::Args {
+                view: gbuffer.view,
+                instances: handles.instances,
+                visible,
+                positions: handles.positions,
+                owners,
+            };
+            let state = Raster::new().cull(batch.map_or_else(Default::default, |b| b.sided.cull()));
+            let none = || crate::graph::Draw::indexed(handles.indices, Vec::new());
+            graph.raster(targets, state, args, batch.map_or_else(none, |b| b.draw(handles)));
+        }
+        identity
+    }
+
+    /// Irradiance by a shadow ray to every texel that is not black.
+    fn truth(&mut self, graph: &mut Graph, handles: &Handles, gbuffer: &GBuffer) -> Image {
+        let extent = graph.extent(gbuffer.depth);
+        let irradiance = graph.image("fiv.truth", Format::RGBA32F, extent);
+        graph.clear(irradiance, [0.0; 4]);
+        let Some((rays, most)) = &mut self.rays else { return irradiance };
+        if self.light.lit.is_empty() {
+            return irradiance;
+        }
+        let rays_of = rays.frame(graph, handles);
+        let count = self.light.lit.len() as u64;
+        let each = (MOST_RAYS / extent.pixels().max(1)).clamp(1, (*most).min(u64::from(MOST_TURNS)));
+        let (texels, lit) = (graph.import_buffer(&self.light.texels), graph.buffer_from("fiv.lit", &self.light.lit));
+        for first in (0..count).step_by(each as usize) {
+            let args = shaders::fiv::truth::Args {
+                view: gbuffer.view,
+                normal: gbuffer.normal,
+                depth: gbuffer.depth,
+                texels,
+                lit,
+                irradiance,
+                materials: rays_of.materials,
+                scene_textures: rays_of.scene_textures,
+                trace_nodes: rays_of.trace_nodes,
+                trace_triangles: rays_of.trace_triangles,
+                trace_instances: rays_of.trace_instances,
+                trace_indices: rays_of.trace_indices,
+                trace_uvs: rays_of.trace_uvs,
+                trace_colors: rays_of.trace_colors,
+                trace_scene: rays_of.trace_scene,
+                trace_accel: rays_of.trace_accel,
+                push: shaders::fiv::truth::Push {
+                    first: first as u32,
+                    count: each.min(count - first) as u32,
+                    size: self.light.size,
+                },
+            };
+            graph.compute(args, extent);
+        }
+        irradiance
+    }
+
+    /// Occluders that do not stand as their vectors were computed.
+    fn turned(&self, scene: &Scene, pose: &Pose) -> Vec<Note> {
+        let turned = |node: u32| {
+            let now = pose.world.get(node as usize).map(|m| Mat3::from_mat4(*m));
+            let rest = self.rest.get(node as usize);
+            now.zip(rest).is_some_and(|(now, rest)| !now.abs_diff_eq(*rest, TURNED))
+        };
+        let moved = self.occluders.placed.iter().filter(|placed| turned(placed.node));
+        moved
+            .map(|placed| Note {
+                kind: NoteKind::Approximated,
+                place: format!("nodes[{}] ({})", placed.node, scene.nodes[placed.node as usize].name),
+                text: "turns; its shadow stays that of its pose at rest".into(),
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,114 @@
+//! What can be chosen, and what the thesis chose.
+
+use serde::{Deserialize, Serialize};
+
+use super::{super::allowed::within, samples::Grid, sky::SIDES};
+use crate::{Error, Result};
+
+/// How irradiance is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// From stored vectors.
+    #[default]
+    Vectors,
+    /// Without occluders.
+    Unshadowed,
+    /// By a shadow ray to every texel of the environment: slow, and what the others are measured against.
+    BruteForce,
+}
+
+/// Settings of the technique.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Texels along an edge of the environment's cube: multiples of 8, 8 to 128.
+    pub size: u32,
+    /// Samples around, 3 to 1024.
+    pub azimuths: u32,
+    /// Samples from pole to pole, 2 to 513.
+    pub polars: u32,
+    /// Spheres of samples, 2 to 128.
+    pub radii: u32,
+    /// Radius of the last sphere, in radii of the occluder's bounding sphere, 2 to 1000. Farther away what is hidden shrinks with the
+    /// solid angle.
+    pub reach: f32,
+    /// Rays along the edge of a texel of an occluder's mask, 1 to 4.
+    pub split: u32,
+    /// Flat occluders cast shadows too.
+    pub flat: bool,
+    /// Where there are several occluders, those of more than this share of the scene's radius only receive shadows, 0 to 1. One that holds
+    /// all others has 0.58.
+    pub largest: f32,
+    /// Vectors are interpolated between samples; without, the nearest is taken.
+    pub trilinear: bool,
+    /// Occluders cut by the receiver's plane count by the share in front of it.
+    pub partial: bool,
+    /// What several occluders hide is taken away once.
+    pub overlap: bool,
+    /// Occluders shadow themselves.
+    pub self_shadow: bool,
+    pub method: Method,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        let grid = Grid::of(64, 33, 30);
+        Self {
+            size: 32,
+            azimuths: grid.azimuths,
+            polars: grid.polars,
+            radii: grid.radii,
+            reach: 16.0,
+            split: 1,
+            flat: false,
+            largest: 0.5,
+            trilinear: true,
+            partial: true,
+            overlap: true,
+            self_shadow: true,
+            method: Method::Vectors,
+        }
+    }
+}
+
+impl Settings {
+    /// Where samples are taken.
+    pub fn grid(&self) -> Grid {
+        Grid { azimuths: self.azimuths, polars: self.polars, radii: self.radii }
+    }
+
+    /// # Errors
+    /// `Usage`, naming the key, the value found and the values allowed.
+    pub fn validate(&self) -> Result<()> {
+        if !SIDES.contains(&self.size) || !self.size.is_multiple_of(8) {
+            let (what, least, most) = (self.size, SIDES.start(), SIDES.end());
+            let what = format!("{what} is not allowed; allowed: multiples of 8 from {least} to {most}");
+            return Err(Error::usage(what).at("size"));
+        }
+        self.grid().validate()?;
+        within([("reach", self.reach, 2.0, 1000.0), ("largest", self.largest, 0.0, 1.0)])?;
+        within([("split", self.split, 1, 4)])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_names_key_value_and_what_is_allowed() {
+        Settings::default().validate().unwrap();
+        let good = Settings::default();
+        for (wrong, parts) in [
+            (Settings { size: 33, ..good.clone() }, ["size", "33", "multiples of 8"]),
+            (Settings { azimuths: 0, ..good.clone() }, ["azimuths", "0", "3 to 1024"]),
+            (Settings { reach: f32::NAN, ..good.clone() }, ["reach", "NaN", "2 to 1000"]),
+            (Settings { split: 5, ..good.clone() }, ["split", "5", "1 to 4"]),
+        ] {
+            let error = wrong.validate().unwrap_err();
+            assert_eq!(error.exit_code(), 2);
+            parts.iter().for_each(|part| assert!(error.to_string().contains(part), "{error}"));
+        }
+    }
+}

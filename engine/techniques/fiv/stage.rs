@@ -1,0 +1,215 @@
+//! What lives as long as a scene: its occluders with their vectors, and the environment on the device.
+
+use glam::Mat3;
+
+use super::{Light, Method, Occluders, Plan, Settings, Sky, Stored, plan::Kind};
+use crate::{
+    Error, ErrorKind, Result,
+    gpu::{Gpu, OwnedBuffer},
+    rays::Rays,
+    scene::{Note, NoteKind, Pose, Scene, resident::Resident},
+    shaders::consts::{FIV_FLOATS, TRACE_STEPS},
+};
+
+/// Turns of loops of one invocation where a driver ends loops early: two rays of the longest.
+const TURNS_LIMITED: u64 = 2 * TRACE_STEPS as u64;
+/// Occluders that the loops of a shader can go through.
+const MOST_OCCLUDERS: usize = 16_384;
+
+/// A scene whose shadows come from vectors.
+#[derive(Debug)]
+pub struct Fiv {
+    /// What it was made ready for.
+    pub(super) method: Method,
+    pub(super) light: Light,
+    pub(super) occluders: Occluders,
+    pub(super) plan: Plan,
+    /// Vectors of all kinds, one after the other.
+    pub(super) fivs: OwnedBuffer,
+    /// Turns and scales of the nodes at rest.
+    pub(super) rest: Vec<Mat3>,
+    pub(super) notes: Vec<Note>,
+    /// For brute force, with the rays of an invocation.
+    pub(super) rays: Option<(Rays, u64)>,
+}
+
+impl Fiv {
+    /// Makes a scene ready for [`Fiv::picture`]. Vectors come from `stored` as far as it has them, with its choice of samples instead
+    /// of that of `settings`; the others are computed. `told` hears how many of the samples to compute are done, and says whether to go
+    /// on; without vectors nothing is computed.
+    ///
+    /// # Errors
+    /// `Usage` if a setting is out of its range, if the scene has no environment, or has lights of other kinds; `Input` if `stored` is
+    /// for another environment; `Runtime` if told to stop, or if the scene is larger than the device's limits; `OutOfMemory`,
+    /// `DeviceLost`.
+    pub fn new(
+        gpu: &Gpu,
+        scene: &Scene,
+        resident: &Resident,
+        settings: &Settings,
+        stored: Option<&Stored>,
+        told: impl FnMut(u64, u64) -> bool,
+    ) -> Result<Self> {
+        settings.validate().map_err(|error| error.at("fiv"))?;
+        let settings = stored.map_or_else(|| settings.clone(), |stored| stored.plan.settings(settings));
+        let sky = lit_by(scene, settings.size)?;
+        let name = scene.environment.as_ref().map_or("", |e| e.name.as_str());
+        let light = Light::new(gpu, &sky)?;
+        let pose = Pose::rest(scene);
+        let occluders = Occluders::of(scene, &pose, settings.flat, settings.largest);
+        if occluders.placed.len() > MOST_OCCLUDERS {
+            let what = format!("{} occluders, at most {MOST_OCCLUDERS} can be drawn", occluders.placed.len());
+            return Err(Error::new(ErrorKind::Runtime, what).at("fiv").help("Join meshes into fewer nodes"));
+        }
+        let mut plan = Plan::new(name, light.hash, &occluders.kinds, &settings);
+        let fivs = match settings.method {
+            Method::Vectors => vectors(gpu, &light, &occluders, &mut plan, stored, told)?,
+            Method::Unshadowed | Method::BruteForce => Vec::new(),
+        };
+        let bytes = bytemuck::cast_slice::<f32, u8>(&fivs);
+        let limit = gpu.caps().limits.storage_range;
+        if bytes.len() as u64 > limit {
+            let what = format!("the vectors have {} bytes; the device allows {limit}", bytes.len());
+            return Err(Error::new(ErrorKind::Runtime, what)
+                .at("fiv")
+                .help("Take fewer samples (fiv.azimuths, fiv.polars, fiv.radii)"));
+        }
+        let rays = match settings.method {
+            Method::BruteForce => {
+                let rays = Rays::new(gpu, scene, resident)?;
+                let most = match gpu.loop_limit()? {
+                    Some(_) => (TURNS_LIMITED / rays.most_turns().max(1)).max(1),
+                    None => u64::MAX,
+                };
+                Some((rays, most))
+            }
+            _ => None,
+        };
+        Ok(Self {
+            fivs: OwnedBuffer::with_contents(gpu, "fiv.stored", if bytes.is_empty() { &[0; 4] } else { bytes })?,
+            notes: notes(scene, &occluders, sky.repaired),
+            rest: pose.world.iter().map(|m| Mat3::from_mat4(*m)).collect(),
+            method: settings.method,
+            light,
+            occluders,
+            plan,
+            rays,
+        })
+    }
+
+    /// What the user should know about how the scene is drawn.
+    pub fn notes(&self) -> &[Note] {
+        &self.notes
+    }
+
+    /// What was computed or read.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The environment on the device.
+    pub fn light(&self) -> &Light {
+        &self.light
+    }
+
+    /// What casts shadows.
+    pub fn occluders(&self) -> &Occluders {
+        &self.occluders
+    }
+
+    /// Bytes of the vectors on the device.
+    pub fn bytes(&self) -> u64 {
+        self.fivs.size()
+    }
+}
+
+/// The environment of a scene that has no other lights.
+fn lit_by(scene: &Scene, size: u32) -> Result<Sky> {
+    if let Some(light) = scene.nodes.iter().find_map(|node| scene.lights.get(node.light? as usize)) {
+        let kind = match light.kind {
+            crate::scene::LightKind::Directional => "directional",
+            crate::scene::LightKind::Point { .. } => "point",
+            crate::scene::LightKind::Spot { .. } => "spot",
+        };
+        let what = format!("light `{}` ({kind}) cannot be served: light comes from the environment alone", light.name);
+        return Err(Error::usage(what).at("fiv").help("Remove it, or use another technique"));
+    }
+    if scene.environment.as_ref().is_none_or(|e| e.pixels.is_empty()) {
+        let what = "there is no environment, and light comes from it alone";
+        return Err(Error::usage(what).at("fiv").help("Name one with --environment"));
+    }
+    Sky::new(scene.environment.as_ref(), size)
+}
+
+/// The vectors of all kinds: stored ones, and those that are missing.
+fn vectors(
+    gpu: &Gpu,
+    light: &Light,
+    occluders: &Occluders,
+    plan: &mut Plan,
+    stored: Option<&Stored>,
+    mut told: impl FnMut(u64, u64) -> bool,
+) -> Result<Vec<f32>> {
+    let each = plan.grid.count() as usize * FIV_FLOATS as usize;
+    let mut fivs = vec![0f32; each * plan.occluders.len()];
+    let mut missing: Vec<usize> = (0..plan.occluders.len()).collect();
+    if let Some(stored) = stored {
+        if stored.plan.environment_hash != plan.environment_hash {
+            let (theirs, ours) = (&stored.plan.environment, &plan.environment);
+            let what = format!(
+                "the vectors were computed for environment `{theirs}`, the scene has `{ours}` with other light"
+            );
+            return Err(Error::input(what).help("Compute them again with `fiv precompute`"));
+        }
+        if !stored.is_complete() {
+            let (range, all) = (&stored.range, stored.plan.samples());
+            let what = format!("only samples {} to {} of {all} are there", range.start, range.end);
+            return Err(Error::input(what).help("Join all parts with `fiv merge`"));
+        }
+        missing.retain(|&kind| {
+            let known = |k: &Kind| k.hash == plan.occluders[kind].hash;
+            let Some(at) = stored.plan.occluders.iter().position(known) else { return true };
+            fivs[each * kind..each * (kind + 1)].copy_from_slice(&stored.fivs[each * at..each * (at + 1)]);
+            plan.occluders[kind].shells = stored.plan.occluders[at].shells;
+            false
+        });
+    }
+    if missing.is_empty() {
+        return Ok(fivs);
+    }
+    let rest = Plan { occluders: missing.iter().map(|&k| plan.occluders[k].clone()).collect(), ..plan.clone() };
+    let kinds: Vec<_> = missing.iter().map(|&k| occluders.kinds[k].clone()).collect();
+    let (all, mut computed) = (rest.samples(), Vec::with_capacity(each * missing.len()));
+    rest.compute(gpu, light, &kinds, 0..all, |done, new| {
+        computed.extend_from_slice(new);
+        Ok(told(done, all))
+    })?;
+    if computed.len() < each * missing.len() {
+        return Err(Error::new(ErrorKind::Runtime, "stopped while computing vectors").at("fiv"));
+    }
+    for (part, &kind) in computed.chunks_exact(each).zip(&missing) {
+        fivs[each * kind..each * (kind + 1)].copy_from_slice(part);
+    }
+    Ok(fivs)
+}
+
+fn notes(scene: &Scene, occluders: &Occluders, repaired: u64) -> Vec<Note> {
+    let mut notes = Vec::new();
+    let mut note = |kind, place: &str, text: String| notes.push(Note { kind, place: place.into(), text });
+    if repaired > 0 {
+        let text = format!("{repaired} pixels of the environment are no radiance and count as black or as 65504");
+        note(NoteKind::Repaired, "environment", text);
+    }
+    if !occluders.receivers.is_empty() {
+        let names: Vec<_> = occluders.receivers.iter().map(|&n| scene.nodes[n as usize].name.as_str()).collect();
+        let (count, names) = (names.len(), names.join(", "));
+        let text = format!("{count} flat or large meshes only receive shadows (fiv.flat, fiv.largest): {names}");
+        note(NoteKind::Approximated, "fiv", text);
+    }
+    let emissive = |m: &crate::scene::Material| m.emissive != glam::Vec3::ZERO && !m.unlit;
+    if scene.materials.iter().any(emissive) {
+        let text = "emissive surfaces are shown and light nothing: light comes from the environment alone".into();
+        note(NoteKind::Approximated, "fiv", text);
+    }
+    notes
+}

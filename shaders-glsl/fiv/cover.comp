@@ -1,0 +1,66 @@
+// What an occluder hides of the environment from many points: its mask on the cube, a ray for each texel, and the sum of what the
+// mask lets through (Michael 2010, section 3.3.2). A workgroup has one point and some tiles of 8×8 texels.
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "lib/fiv.glsl"
+#include "lib/trace.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(binding = 0, scalar) readonly buffer Texels { FivTexel texels[]; };
+layout(binding = 1, scalar) readonly buffer Points { vec3 points[]; }; // seen from the centre of the occluder, metres
+layout(binding = 2, scalar) writeonly buffer Partials { float partials[]; }; // ten for each point and chunk
+
+layout(push_constant, scalar) uniform Push {
+    uint first;   // point
+    uint size;    // texels of the environment along an edge
+    uint split;   // rays along the edge of a texel
+    uint tiles;   // of a chunk
+    float radius; // of the bounding sphere around the origin, metres
+};
+
+shared vec3 sums[3][64];
+shared float covered[64];
+
+void main() {
+    uint lane = gl_LocalInvocationID.x;
+    uint side = size * split, row = side / 8u;
+    vec3 origin = points[first + gl_WorkGroupID.x];
+    float rho2 = dot(origin, origin), radius2 = radius * radius;
+    float share = 1.0 / float(split * split);
+    vec3 x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
+    float angle = 0.0;
+    uint begin = gl_WorkGroupID.y * tiles, end = min(begin + tiles, 6u * row * row);
+    for (uint tile = begin; tile < end; ++tile) {
+        uint face = tile / (row * row), place = tile % (row * row);
+        uvec2 at = 8u * uvec2(place % row, place / row) + uvec2(lane & 7u, lane >> 3u);
+        vec3 direction = cube_direction(face, (vec2(at) + 0.5) / float(side));
+        float along = -dot(origin, direction), squared = dot(direction, direction);
+        // Only what passes the bounding sphere.
+        bool near = rho2 <= radius2 || (along > 0.0 && along * along >= (rho2 - radius2) * squared);
+        if (!near) continue;
+        Ray ray = Ray(origin, 0.0, direction, 1.01 * (sqrt(rho2) + radius));
+        if (!trace_any(ray, TRACE_SHADOW, at.x + side * (at.y + side * face))) continue;
+        FivTexel t = texels[(face * size + at.y / split) * size + at.x / split];
+        x += t.radiance * (t.area.x * share);
+        y += t.radiance * (t.area.y * share);
+        z += t.radiance * (t.area.z * share);
+        angle += t.angle * share;
+    }
+    sums[0][lane] = x;
+    sums[1][lane] = y;
+    sums[2][lane] = z;
+    covered[lane] = angle;
+    barrier();
+    for (uint step = 32u; step > 0u; step >>= 1u) {
+        if (lane < step) {
+            for (uint k = 0u; k < 3u; ++k) sums[k][lane] += sums[k][lane + step];
+            covered[lane] += covered[lane + step];
+        }
+        barrier();
+    }
+    uint out_at = 10u * (gl_WorkGroupID.x * gl_NumWorkGroups.y + gl_WorkGroupID.y);
+    if (lane < 9u) partials[out_at + lane] = sums[lane / 3u][0][lane % 3u];
+    if (lane == 9u) partials[out_at + 9u] = covered[0];
+}

@@ -1,0 +1,49 @@
+// Fullsphere irradiance vectors (Michael 2010, chapter 3): cubes of light, stored vectors and how they are looked up.
+#ifndef LIB_FIV
+#define LIB_FIV
+
+// A texel of the environment.
+struct FivTexel {
+    vec3 radiance; // W/(sr·m²)
+    float angle;   // solid angle, sr
+    vec3 area;     // integral of the direction over the texel, sr
+};
+
+// An occluder that stands somewhere, with the place of its vectors.
+struct FivOccluder {
+    vec3 centre;    // of its bounding sphere, metres, world space
+    float radius;   // of its bounding sphere, metres
+    uint first;     // float of its first vector
+    uint azimuths;  // samples around +Y
+    uint polars;    // samples from +Y to -Y, both included
+    uint radii;     // spheres
+    float nearest;  // radius of the first sphere, metres
+    float farthest; // radius of the last sphere, metres
+    float steps;    // spheres for each factor of e of the radius
+};
+
+const uint FIV_FLOATS = 9u; // export
+// Stands in the first float of a vector whose sample lies inside the occluder.
+const float FIV_INSIDE = 1e38; // export
+
+const float FIV_PI = 3.14159265358979;
+
+// Direction (not normalised) of a point of a face, `st` in 0..1 from its top left corner; faces as scene::environment::Face.
+vec3 cube_direction(uint face, vec2 st) {
+    vec2 p = 2.0 * st - 1.0;
+    switch (face) {
+    case 0u: return vec3(1.0, -p.y, p.x);
+    case 1u: return vec3(-1.0, -p.y, -p.x);
+    case 2u: return vec3(p.x, 1.0, -p.y);
+    case 3u: return vec3(p.x, -1.0, p.y);
+    case 4u: return vec3(p.x, -p.y, -1.0);
+    default: return vec3(-p.x, -p.y, 1.0);
+    }
+}
+
+// The direction by which a samplerCube has these faces: theirs is a left-handed space.
+vec3 cube_lookup(vec3 direction) {
+    return vec3(direction.xy, -direction.z);
+}
+
+#endif

@@ -1,0 +1,249 @@
+//! The environment's sums and the vectors of occluders on the device, against closed forms and the slow twins.
+
+mod fiv_lab;
+
+use std::f64::consts::PI;
+
+use fiv_lab::{apart, ball, cap, colourful, hierarchy, length, occluder, one_ball, painted, thing, vectors};
+use glam::{DMat3, DVec2, DVec3, Mat4, Vec3, vec3};
+use lucerna::{
+    gpu::{Gpu, testing::with_gpu},
+    graph::Runner,
+    reference::fiv as twin,
+    scene::{Environment, Scene},
+    shaders::consts::FIV_INSIDE,
+    techniques::fiv::{Light, Occluder, Plan, Settings, Sky, cover::Cover, samples::Grid, sky},
+};
+
+fn sky(environment: &Environment, size: u32) -> Sky {
+    Sky::new(Some(environment), size).unwrap()
+}
+
+/// Irradiance for the normal of every texel, as the device has it.
+fn difmap(light: &Light) -> Vec<(DVec3, DVec3)> {
+    let mut out = vec![];
+    for face in 0..6 {
+        let bytes = light.difmap.read(0, face).unwrap();
+        for (i, texel) in bytes.chunks_exact(16).enumerate() {
+            let value = |k: usize| f64::from(f32::from_le_bytes(texel[4 * k..4 * k + 4].try_into().unwrap()));
+            let (_, x, y) = sky::place(light.size, i as u32);
+            let st = (DVec2::new(x.into(), y.into()) + 0.5) / f64::from(light.size);
+            out.push((sky::direction(face, st).normalize(), DVec3::new(value(0), value(1), value(2))));
+        }
+    }
+    out
+}
+
+#[test]
+fn irradiance_of_even_and_of_linear_light() {
+    with_gpu(|gpu| {
+        let light = Light::new(gpu, &sky(&Environment::constant(vec3(2.0, 1.0, 0.0)), 32)).unwrap();
+        for (n, e) in difmap(&light) {
+            assert!((e.x / (2.0 * PI) - 1.0).abs() < 7e-4 && (e.y / PI - 1.0).abs() < 7e-4 && e.z == 0.0, "{n}: {e}");
+        }
+        assert!(length(&vectors(&light.total)) < 1e-5);
+        // L = 1 + a·ω: E = π + 2π/3 a·n, FIV = 4π/3 a.
+        let slopes = [DVec3::new(0.6, 0.0, 0.0), DVec3::new(0.0, 0.8, 0.0), DVec3::new(0.3, -0.2, 0.5)];
+        let linear = painted(512, |d| Vec3::from_array(slopes.map(|a| (1.0 + a.dot(d)) as f32)));
+        let light = Light::new(gpu, &sky(&linear, 32)).unwrap();
+        for (n, e) in difmap(&light) {
+            for (found, a) in e.to_array().into_iter().zip(slopes) {
+                let exact = PI + 2.0 * PI / 3.0 * a.dot(n);
+                assert!((found - exact).abs() < 4e-3, "{n}: {found} instead of {exact}");
+            }
+        }
+        let total = vectors(&light.total);
+        for (axis, found) in total.iter().enumerate() {
+            let exact = DVec3::from_array(slopes.map(|a| 4.0 * PI / 3.0 * a[axis]));
+            assert!((*found - exact).length() < 4e-3, "{axis}: {found} instead of {exact}");
+        }
+    });
+}
+
+#[test]
+fn a_cap_of_light_has_its_closed_form() {
+    with_gpu(|gpu| {
+        for rows in [33, 114, 196] {
+            let (environment, alpha) = cap(rows, 3.0);
+            let light = Light::new(gpu, &sky(&environment, 64)).unwrap();
+            let total = vectors(&light.total);
+            let exact = 3.0 * PI * alpha.sin().powi(2);
+            assert!((total[1].x / exact - 1.0).abs() < 3e-3, "{alpha}: {} instead of {exact}", total[1].x);
+            assert!(total[0].length() + total[2].length() < 1e-4 * exact);
+        }
+    });
+}
+
+#[test]
+fn the_device_sums_as_the_twin_does() {
+    with_gpu(|gpu| {
+        for size in [8, 40] {
+            let sky = sky(&colourful(), size);
+            let light = Light::new(gpu, &sky).unwrap();
+            let whole = twin::total(&sky);
+            assert!(apart(&vectors(&light.total), &whole) < 2e-6 * length(&whole));
+            let map = difmap(&light);
+            for (n, e) in map.iter().step_by(7) {
+                let exact = twin::irradiance(&sky, *n);
+                assert!((*e - exact).length() < 3e-6 * exact.length(), "{n}: {e} instead of {exact}");
+                // Gershun: what is in front less what is behind.
+                let behind = twin::irradiance(&sky, -*n);
+                assert!((twin::dot(&whole, *n) - (*e - behind)).length() < 1e-5 * exact.length());
+            }
+        }
+    });
+}
+
+#[test]
+fn light_adds_scales_and_turns() {
+    with_gpu(|gpu| {
+        let total = |environment: &Environment| vectors(&Light::new(gpu, &sky(environment, 32)).unwrap().total);
+        let a = colourful();
+        let small = painted(128, |d| if d.y > 0.5f64.cos() { Vec3::splat(2.0) } else { Vec3::ZERO });
+        let both =
+            Environment { pixels: a.pixels.iter().zip(&small.pixels).map(|(p, q)| *p + *q).collect(), ..a.clone() };
+        let (of_a, of_b) = (total(&a), total(&small));
+        let sum = [0, 1, 2].map(|k| of_a[k] + of_b[k]);
+        assert!(apart(&total(&both), &sum) < 1e-5 * length(&sum));
+        let doubled = total(&Environment { scale: 2.0, ..a.clone() });
+        assert!(apart(&doubled, &of_a.map(|v| v * 2.0)) < 1e-5 * length(&doubled));
+        // By a quarter, texels fall on texels; by any other angle nearly so.
+        for (angle, slack) in [(0.5 * PI, 1e-5), (0.4, 3e-3)] {
+            let turned = total(&Environment { rotation: angle as f32, ..a.clone() });
+            // From colours of x, y, z to vectors of channels and back.
+            let turn = DMat3::from_rotation_y(angle) * DMat3::from_cols(of_a[0], of_a[1], of_a[2]).transpose();
+            let exact = turn.transpose();
+            let exact = [exact.x_axis, exact.y_axis, exact.z_axis];
+            assert!(apart(&turned, &exact) < slack * length(&exact), "{angle}: {turned:?} instead of {exact:?}");
+        }
+    });
+}
+
+#[test]
+fn odd_environments_give_numbers() {
+    with_gpu(|gpu| {
+        let mut odd = colourful();
+        odd.pixels[70] = Vec3::splat(f32::NAN);
+        odd.pixels[900] = vec3(f32::INFINITY, -1.0, 1.0);
+        let black = painted(16, |_| Vec3::ZERO);
+        let mut one = black.clone();
+        one.pixels[37] = vec3(9.0, 0.0, 1.0);
+        for environment in [&odd, &black, &one] {
+            let light = Light::new(gpu, &sky(environment, 16)).unwrap();
+            for (_, e) in difmap(&light) {
+                assert!(e.is_finite() && e.min_element() >= 0.0, "{e}");
+            }
+            assert!(vectors(&light.total).iter().all(|v| v.is_finite()));
+        }
+        let light = Light::new(gpu, &sky(&black, 16)).unwrap();
+        assert_eq!((light.total, light.lit.len()), ([0.0; 9], 0));
+    });
+}
+
+/// Vectors and solid angles of what an occluder hides from some points.
+fn covered(gpu: &Gpu, occluder: &Occluder, light: &Light, points: &[Vec3], split: u32) -> Vec<(twin::Vectors, f64)> {
+    let (fivs, coverage) = Cover::new(gpu, occluder).unwrap().run(&mut Runner::new(gpu), light, points, split).unwrap();
+    assert_eq!((fivs.len(), coverage.len()), (9 * points.len(), points.len()));
+    fivs.chunks_exact(9).zip(coverage).map(|(f, c)| (vectors(f), f64::from(c))).collect()
+}
+
+#[test]
+fn the_mask_of_a_sphere_is_its_cap() {
+    with_gpu(|gpu| {
+        let (sphere, _) = occluder(&one_ball(1.0, 40));
+        let light = Light::new(gpu, &sky(&Environment::constant(Vec3::ONE), 32)).unwrap();
+        // Seen under α: a solid angle of 2π(1 − cos α), a vector of π sin²α towards it. Texels count whole or not at all.
+        for (d, slack) in [(1.05, 0.01), (1.5, 0.02), (2.0, 0.03), (4.0, 0.06)] {
+            for direction in [DVec3::X, DVec3::NEG_Y, DVec3::new(1.0, 1.0, 1.0), DVec3::new(-0.3, 0.2, -0.9)] {
+                let direction = direction.normalize();
+                let (hidden, angle) = covered(gpu, &sphere, &light, &[(-direction * d).as_vec3()], 1)[0];
+                let sin = 1.0 / d;
+                let exact = 2.0 * PI * (1.0 - (1.0 - sin * sin).sqrt());
+                assert!((angle / exact - 1.0).abs() < slack, "{d} {direction}: {angle} instead of {exact}");
+                let exact = direction * (PI * sin * sin);
+                let found = DVec3::new(hidden[0].x, hidden[1].x, hidden[2].x);
+                assert!((found - exact).length() < slack * exact.length(), "{d}: {found} instead of {exact}");
+            }
+        }
+        // From within everything is hidden: such samples are left out.
+        let (inside, angle) = covered(gpu, &sphere, &light, &[vec3(0.2, 0.1, 0.0)], 1)[0];
+        assert!(inside[0].x >= f64::from(FIV_INSIDE) && (angle / (4.0 * PI) - 1.0).abs() < 1e-5);
+        // More rays, less of a staircase.
+        let far = |split| covered(gpu, &sphere, &light, &[vec3(0.0, 3.1, 5.2)], split)[0].1;
+        let exact = 2.0 * PI * (1.0 - (1.0 - 1.0 / (3.1f64.powi(2) + 5.2f64.powi(2))).sqrt());
+        assert!((far(4) / exact - 1.0).abs() < 0.02, "{} instead of {exact}", far(4));
+    });
+}
+
+#[test]
+fn masks_are_those_of_the_cpus_hierarchy_and_disjoint_occluders_add() {
+    with_gpu(|gpu| {
+        let (positions, indices) = ball(0.4, 6);
+        let alone = |x: f32| {
+            let mut scene = Scene::default();
+            let moved: Vec<Vec3> = positions.iter().map(|p| *p * vec3(1.0, 2.0, 1.0) + vec3(x, 0.0, 0.0)).collect();
+            thing(&mut scene, "one", moved, indices.clone(), Mat4::IDENTITY);
+            occluder(&scene)
+        };
+        // Two in one mesh, which do not hide each other from where they are looked at.
+        let mut scene = Scene::default();
+        let count = positions.len() as u32;
+        let side = |x: f32| positions.iter().map(move |p| *p * vec3(1.0, 2.0, 1.0) + vec3(x, 0.0, 0.0));
+        let pair: Vec<Vec3> = side(-1.0).chain(side(1.0)).collect();
+        let triangles = indices.iter().copied().chain(indices.iter().map(|i| i + count)).collect();
+        thing(&mut scene, "two", pair, triangles, Mat4::IDENTITY);
+        let ((both, middle), (one, own)) = (occluder(&scene), alone(0.0));
+        let sky = sky(&colourful(), 16);
+        let light = Light::new(gpu, &sky).unwrap();
+        let points = [vec3(0.1, 0.3, 2.5), vec3(0.0, -1.5, -3.0), vec3(0.3, 4.0, 0.1)];
+        for (occluder, points) in [(&both, &points[..]), (&one, &points[..2])] {
+            let tree = hierarchy(occluder);
+            for split in [1, 2] {
+                for (found, point) in covered(gpu, occluder, &light, points, split).iter().zip(points) {
+                    let exact = twin::hidden(&sky, &tree, *point, split);
+                    // An odd ray may pass an edge on the other side.
+                    assert!((found.1 - exact.angle).abs() < 0.01 * exact.angle, "{point}: {} {}", found.1, exact.angle);
+                    assert!(apart(&found.0, &exact.vectors) < 0.02 * length(&exact.vectors), "{point}");
+                }
+            }
+        }
+        let shift = |x: f32| points.map(|p| p + middle - own + vec3(x, 0.0, 0.0));
+        let together = covered(gpu, &both, &light, &points, 1);
+        let [left, right] = [shift(1.0), shift(-1.0)].map(|p| covered(gpu, &one, &light, &p, 1));
+        for ((whole, l), r) in together.iter().zip(&left).zip(&right) {
+            let sum = [0, 1, 2].map(|k| l.0[k] + r.0[k]);
+            assert!(apart(&whole.0, &sum) < 0.02 * length(&sum), "{whole:?} is not {l:?} and {r:?}");
+        }
+    });
+}
+
+#[test]
+fn each_sample_is_the_same_whatever_is_computed_with_it() {
+    with_gpu(|gpu| {
+        let kinds = [occluder(&one_ball(1.0, 5)).0, occluder(&one_ball(0.3, 4)).0];
+        let settings = Settings { size: 8, azimuths: 6, polars: 5, radii: 4, ..Settings::default() };
+        let sky = sky(&colourful(), 8);
+        let light = Light::new(gpu, &sky).unwrap();
+        let plan = Plan::new("colourful", light.hash, &kinds, &settings);
+        assert_eq!((plan.samples(), plan.grid), (240, Grid::of(6, 5, 4)));
+        let run = |range: std::ops::Range<u64>| {
+            let mut out = vec![];
+            plan.compute(gpu, &light, &kinds, range, |_, new| {
+                out.extend_from_slice(new);
+                Ok(true)
+            })
+            .unwrap();
+            out
+        };
+        let whole = run(0..240);
+        assert_eq!(whole.len(), 9 * 240);
+        let parts = [0..1, 1..77, 77..133, 133..240].map(run).concat();
+        let bits = |v: &[f32]| v.iter().map(|f| f.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&whole), bits(&parts));
+        // At the poles all azimuths are one place.
+        for azimuth in 1..6 {
+            let at = |a: u32| &whole[9 * plan.grid.index(a, 0, 3) as usize..][..9];
+            assert_eq!(at(0), at(azimuth));
+        }
+    });
+}
