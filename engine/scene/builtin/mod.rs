@@ -12,16 +12,20 @@
 
 mod conference;
 pub mod cornell;
+mod environments;
 mod figure;
 pub mod furnace;
 mod garage;
 mod kit;
 mod office;
 mod primitives;
+mod shadows;
 mod street;
 mod teapot;
 #[cfg(test)]
 mod tests;
+
+pub use environments::{ENVIRONMENTS, environment};
 
 use super::Scene;
 use crate::{Error, Result};
@@ -99,6 +103,12 @@ const ENTRIES: &[Entry] = &[
         description: "Animated court: a walking skinned figure, a morphing sculpture, turning rings, a bouncing ball",
         exposure: 0.5,
         build: figure::build,
+    },
+    Entry {
+        name: "shadows",
+        description: "A hare, a tree and a chess queen on a ground under a grove; light from the environment alone",
+        exposure: 0.0,
+        build: shadows::build,
     },
 ];
 

@@ -32,6 +32,7 @@ const TRIANGLES: &[(&str, std::ops::RangeInclusive<usize>)] = &[
     ("garage", 50_000..=150_000),
     ("street", 150_000..=300_000),
     ("figure", 20_000..=60_000),
+    ("shadows", 20_000..=60_000),
 ];
 
 fn world(scene: &Scene) -> Vec<Mat4> {
