@@ -107,7 +107,7 @@ const ENTRIES: &[Entry] = &[
     Entry {
         name: "shadows",
         description: "A hare, a tree and a chess queen on a ground under a grove; light from the environment alone",
-        exposure: 0.0,
+        exposure: -0.8,
         build: shadows::build,
     },
 ];
