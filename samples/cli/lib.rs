@@ -10,6 +10,7 @@ pub mod experiment;
 pub mod export_pov;
 pub mod exposure;
 pub mod fingerprint;
+pub mod fiv;
 pub mod framing;
 pub mod gbuffer_layers;
 pub mod info;

@@ -1,0 +1,216 @@
+//! `fiv precompute`: the vectors of occluders under an environment, into a file.
+
+use std::{
+    path::{Path, PathBuf},
+    process::ExitCode,
+    time::{Duration, Instant},
+};
+
+use lucerna::{
+    Error, Result,
+    gpu::Gpu,
+    image,
+    scene::{Environment, Limits, Pose, environment},
+    techniques::fiv::{Light, Occluder, Occluders, Plan, Settings, Sky, Stored},
+};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use super::{Meter, Shard, partial};
+use crate::{
+    args::{DeviceArgs, TalkArgs, positive},
+    config::{self, SettingsArgs},
+    console::{self, Console},
+    program::{self, STOPPED_EARLY},
+    progress::ProgressMode,
+    signals::Interrupt,
+    source,
+};
+
+/// Time between two writes of what is done.
+const CHECKPOINT: Duration = Duration::from_secs(10);
+
+/// Options of `fiv precompute`.
+#[derive(clap::Args, Clone, Debug)]
+pub struct PrecomputeArgs {
+    /// Scene files: .gltf, .glb or .obj. Every node with a mesh is an occluder, as it stands at rest; flat ones and those as
+    /// large as their scene are left out
+    #[arg(value_name = "MESH", required_unless_present = "builtin")]
+    pub meshes: Vec<PathBuf>,
+
+    /// The occluders of a built-in scene; may be given more than once
+    #[arg(long, value_name = "NAME")]
+    pub builtin: Vec<String>,
+
+    /// Metres that one unit of the files stands for, where the format leaves it open (OBJ, C arrays) [default: 1]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    pub unit: Option<f64>,
+
+    /// The .hdr or .exr environment [default: that of the first scene that has one]
+    #[arg(long, alias = "env", value_name = "FILE")]
+    pub environment: Option<PathBuf>,
+
+    /// File to write
+    #[arg(short, long, value_name = "FILE.fiv", help_heading = "Output")]
+    pub output: PathBuf,
+
+    /// Replace the file if it exists
+    #[arg(long, help_heading = "Output")]
+    pub overwrite: bool,
+
+    /// Compute only part I of N; `fiv merge` joins the parts
+    #[arg(long, value_name = "I/N", help_heading = "Output")]
+    pub shard: Option<Shard>,
+
+    /// Start anew, even if a stopped run has left FILE.part
+    #[arg(long, help_heading = "Output")]
+    pub restart: bool,
+
+    /// Print one JSON document about the run on stdout
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+
+    #[command(flatten)]
+    pub settings: SettingsArgs,
+
+    #[command(flatten)]
+    pub device: DeviceArgs,
+
+    #[command(flatten)]
+    pub talk: TalkArgs,
+
+    /// How progress is shown on stderr
+    #[arg(long, value_enum, default_value_t, value_name = "HOW", help_heading = "Messages")]
+    pub progress: ProgressMode,
+}
+
+/// The keys have the names that `fiv render` has.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Keys {
+    fiv: Settings,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Whatever fails, with the kind that decides the exit code.
+pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
+    let keys = args.settings.effective(&Keys::default())?;
+    keys.fiv.validate().map_err(|error| error.at("fiv"))?;
+    if args.settings.print_config {
+        console::print(config::to_toml(&keys)?.trim_end())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    image::probe_output(&args.output, args.overwrite)?;
+    let interrupt = Interrupt::install();
+    let (occluders, environment) = load(args, &keys.fiv, console)?;
+    let sky = Sky::new(Some(&environment), keys.fiv.size)?;
+    if sky.repaired > 0 {
+        console.info(&format!("note: {} pixels of the environment are no radiance", sky.repaired));
+    }
+    let plan = Plan::new(&environment.name, sky.hash(), &occluders, &keys.fiv);
+    let range = args.shard.map_or(0..plan.samples(), |shard| plan.part(shard.index, shard.count));
+    let part = partial(&args.output)?;
+    let mut stored = match resumed(&part, &plan, range.start, args.restart, console) {
+        Some(stored) if stored.range.end <= range.end => stored,
+        _ => Stored::empty(plan.clone(), range.start),
+    };
+    let total = range.end - range.start;
+    let before = stored.range.end - range.start;
+    if before > 0 {
+        console.info(&format!("{}: goes on after {before} of {total} samples", part.display()));
+    }
+
+    let gpu = Gpu::new(args.device.options()?)?;
+    console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
+    let names: Vec<&str> = plan.occluders.iter().map(|o| o.name.as_str()).collect();
+    console.info(&format!("{} samples of {} occluders: {}", plan.grid, names.len(), names.join(", ")));
+    let light = Light::new(&gpu, &sky)?;
+    let mut meter = Meter::new(args.progress, console.is_quiet(), before, total);
+    let mut saved = Instant::now();
+    plan.compute(&gpu, &light, &occluders, stored.range.end..range.end, |done, new| {
+        stored.push(new);
+        meter.show(done - range.start);
+        if saved.elapsed() >= CHECKPOINT {
+            stored.write(&part, true)?;
+            saved = Instant::now();
+        }
+        Ok(!interrupt.requested())
+    })?;
+    if stored.range.end < range.end {
+        stored.write(&part, true)?;
+        let done = stored.range.end - range.start;
+        console.info(&format!("stopped after {done} of {total} samples; the same command goes on"));
+        return Ok(ExitCode::from(STOPPED_EARLY));
+    }
+    stored.write(&args.output, args.overwrite)?;
+    let _ = std::fs::remove_file(&part);
+    let bytes = std::fs::metadata(&args.output).map_or(0, |m| m.len());
+    console.info(&format!("wrote {}: {bytes} bytes", args.output.display()));
+    if args.json {
+        console::print_json(&json!({
+            "file": args.output,
+            "bytes": bytes,
+            "samples": total,
+            "computed": total - before,
+            "seconds": meter.seconds(),
+            "environment": plan.environment,
+            "occluders": console::to_json(&plan.occluders)?,
+            "settings": config::to_value(&keys)?,
+        }))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The occluders of all files, those that look the same once, and the environment.
+fn load(args: &PrecomputeArgs, settings: &Settings, console: Console) -> Result<(Vec<Occluder>, Environment)> {
+    let options = source::in_unit(args.unit);
+    let mut environment = match &args.environment {
+        Some(path) => {
+            let (environment, notes) = environment::load(path, &Limits::default())?;
+            notes.iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
+            Some(environment)
+        }
+        None => None,
+    };
+    let mut kinds: Vec<Occluder> = Vec::new();
+    let files = args.meshes.iter().map(|path| (Some(path.as_path()), None));
+    for (file, name) in files.chain(args.builtin.iter().map(|name| (None, Some(name.as_str())))) {
+        let (scene, _) = source::open(file, name, &options)?;
+        let found = Occluders::of(&scene, &Pose::rest(&scene), settings.flat, settings.largest);
+        if found.kinds.is_empty() {
+            let error = Error::input("has no occluder: no mesh that is not flat");
+            let place = file.unwrap_or_else(|| Path::new(name.unwrap_or_default()));
+            return Err(error.in_file(place).help("Flat meshes are taken with -D fiv.flat=true"));
+        }
+        for kind in found.kinds {
+            if kinds.iter().all(|known| known.hash != kind.hash) {
+                kinds.push(kind);
+            }
+        }
+        environment = environment.or(scene.environment);
+    }
+    let environment = environment.ok_or_else(|| {
+        Error::usage("there is no environment").help("Name one with --environment; the scenes have none")
+    })?;
+    Ok((kinds, environment))
+}
+
+/// What an earlier run has left, if it fits.
+fn resumed(part: &Path, plan: &Plan, first: u64, restart: bool, console: Console) -> Option<Stored> {
+    if restart || !part.exists() {
+        return None;
+    }
+    match Stored::read(part) {
+        Ok(stored) if stored.range.start == first && plan.difference(&stored.plan).is_none() => Some(stored),
+        Ok(_) => {
+            console.info(&format!("{}: is of other work; starts anew", part.display()));
+            None
+        }
+        Err(error) => {
+            console.info(&format!("{error} Starts anew."));
+            None
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! `fiv` from the outside: files of vectors in parts and after a stop, what is wrong with them, pictures. Needs a device (each test
+//! says so when there is none).
+
+mod support;
+
+use std::{fs, path::Path};
+
+use lucerna::image::{self, Layers, WriteOptions};
+use support::{command, device, files, lucerna, ran};
+
+const SMALL: [&str; 8] = ["-D", "fiv.azimuths=6", "-D", "fiv.polars=5", "-D", "fiv.radii=4", "-D", "fiv.size=8"];
+
+fn fiv(arguments: &[&str]) -> support::Ran {
+    ran(command(env!("CARGO_BIN_EXE_fiv")).args(arguments))
+}
+
+fn environment(folder: &Path, name: &str, light: f32) -> String {
+    let path = folder.join(name);
+    let pixel = |i: usize| [light, 0.5, if i % 16 < 5 { 3.0 } else { 0.2 }];
+    let data = (0..128).flat_map(pixel).collect();
+    image::write(&path, &Layers::rgb(16, 8, data), &WriteOptions { f32: true, ..WriteOptions::default() }).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+/// `fiv precompute` of the built-in sphere.
+fn precompute(env: &str, out: &str, more: &[&str]) -> support::Ran {
+    let base = ["precompute", "--builtin", "furnace-sphere", "--env", env, "-o", out];
+    fiv(&[&base[..], &SMALL, more].concat())
+}
+
+#[test]
+fn wrong_calls_are_refused_and_named() {
+    fiv(&["precompute", "-o", "x.fiv"]).expect(2, &["MESH"]);
+    fiv(&["precompute", "missing.glb", "--env", "missing.exr", "-o", "x.fiv"]).expect(3, &["missing.exr"]);
+    let folder = tempfile::tempdir().unwrap();
+    let env = environment(folder.path(), "sky.exr", 1.0);
+    let out = folder.path().join("x.fiv");
+    let out = out.to_str().unwrap();
+    for (more, part) in [
+        (&["-D", "fiv.azimuths=2"][..], "3 to 1024"),
+        (&["-D", "fiv.size=12"], "multiples of 8"),
+        (&["-D", "fiv.azimut=2"], "fiv.azimuths"),
+        (&["--shard", "3/2"], "I/N"),
+    ] {
+        precompute(&env, out, more).expect(2, &[part]);
+    }
+    fiv(&["precompute", "--builtin", "cornell", "-o", out]).expect(2, &["--environment"]);
+    fiv(&["merge", &env, "-o", out]).expect(3, &["sky.exr", "no file of irradiance vectors"]);
+    assert_eq!(files(folder.path()), ["sky.exr"]);
+}
+
+#[test]
+fn parts_and_stopped_runs_give_the_same_bytes() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (env, whole) = (environment(folder.path(), "sky.exr", 1.0), at("whole.fiv"));
+    let told = precompute(&env, &whole, &["--json"]).expect(0, &["6×5×4"]).json();
+    assert_eq!(told["bytes"].as_u64(), fs::metadata(&whole).ok().map(|m| m.len()));
+    precompute(&env, &whole, &[]).expect(1, &["whole.fiv", "exists"]);
+    for part in 1..=3 {
+        precompute(&env, &at(&format!("{part}.fiv")), &["-q", "--shard", &format!("{part}/3")]).expect(0, &[]);
+    }
+    fiv(&["merge", &at("3.fiv"), &at("1.fiv"), "-o", &at("joined.fiv")]).expect(3, &["missing"]);
+    fiv(&["merge", &at("3.fiv"), &at("1.fiv"), &at("2.fiv"), "-o", &at("joined.fiv")]).expect(0, &[]);
+    let bytes = fs::read(&whole).unwrap();
+    assert!(fs::read(at("joined.fiv")).unwrap() == bytes);
+    // What a stopped run leaves is a part from the start.
+    fs::copy(at("1.fiv"), at("again.fiv.part")).unwrap();
+    precompute(&env, &at("again.fiv"), &[]).expect(0, &["goes on after"]);
+    assert!(fs::read(at("again.fiv")).unwrap() == bytes && !Path::new(&at("again.fiv.part")).exists());
+    // One of other work, or a damaged one, is not used.
+    fs::write(at("anew.fiv.part"), &bytes[..bytes.len() / 2]).unwrap();
+    precompute(&env, &at("anew.fiv"), &[]).expect(0, &["cut off", "tarts anew"]);
+    assert!(fs::read(at("anew.fiv")).unwrap() == bytes);
+}
+
+#[test]
+fn pictures_from_files_are_those_without_and_can_be_made_again() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (env, vectors) = (environment(folder.path(), "sky.exr", 1.0), at("v.fiv"));
+    precompute(&env, &vectors, &["-q"]).expect(0, &[]);
+    let picture = |env: &str, name: &str, more: &[&str]| {
+        let base = ["render", "--builtin", "furnace-sphere", "--env", env, "--size", "32x24", "-q", "-o", name];
+        fiv(&[&base[..], more].concat())
+    };
+    picture(&env, &at("a.exr"), &["--vectors", &vectors]).expect(0, &[]);
+    picture(&env, &at("b.exr"), &SMALL).expect(0, &[]);
+    let pixels = |name: &str| image::read(at(name), &Default::default()).unwrap().main().unwrap().data.clone();
+    assert!(pixels("a.exr") == pixels("b.exr"));
+    lucerna(["rerun", &at("a.exr")]).expect(0, &[]);
+    let other = environment(folder.path(), "other.exr", 2.0);
+    picture(&other, &at("c.exr"), &["--vectors", &vectors]).expect(3, &["v.fiv", "other light"]);
+}
