@@ -19,7 +19,10 @@ mod encode;
 mod query;
 mod refit;
 mod shapes;
+mod traced;
 mod tree;
+
+pub(crate) use traced::traced;
 
 use crate::{
     Error, ErrorKind, Result,

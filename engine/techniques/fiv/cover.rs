@@ -82,28 +82,21 @@ impl<'a> Cover<'a> {
         let partials = graph.buffer("fiv.partials", u64::from(each.min(total)) * u64::from(chunks) * 40);
         for first in (0..total).step_by(each as usize) {
             let count = each.min(total - first);
-            let args = fiv::cover::Args {
-                texels,
-                points: list,
-                partials,
-                materials: rays.materials,
-                scene_textures: rays.scene_textures,
-                trace_nodes: rays.trace_nodes,
-                trace_triangles: rays.trace_triangles,
-                trace_instances: rays.trace_instances,
-                trace_indices: rays.trace_indices,
-                trace_uvs: rays.trace_uvs,
-                trace_colors: rays.trace_colors,
-                trace_scene: rays.trace_scene,
-                trace_accel: rays.trace_accel,
-                push: fiv::cover::Push {
-                    first,
-                    size: light.size,
-                    split,
-                    tiles: self.tiles as u32,
-                    radius: self.occluder.radius * 1.0001,
+            let args = crate::rays::traced!(
+                fiv::cover::Args {
+                    texels,
+                    points: list,
+                    partials,
+                    push: fiv::cover::Push {
+                        first,
+                        size: light.size,
+                        split,
+                        tiles: self.tiles as u32,
+                        radius: self.occluder.radius * 1.0001,
+                    },
                 },
-            };
+                rays
+            );
             graph.compute(args, [64 * count, chunks, 1]);
             let push = fiv::gather::Push { first, count, chunks, inside: INSIDE * 4.0 * std::f32::consts::PI };
             let (fivs, coverage) = (covered.fivs, covered.coverage);

@@ -218,29 +218,22 @@ impl Fiv {
         let each = (MOST_RAYS / extent.pixels().max(1)).clamp(1, (*most).min(u64::from(MOST_TURNS)));
         let (texels, lit) = (graph.import_buffer(&self.light.texels), graph.buffer_from("fiv.lit", &self.light.lit));
         for first in (0..count).step_by(each as usize) {
-            let args = shaders::fiv::truth::Args {
-                view: gbuffer.view,
-                normal: gbuffer.normal,
-                depth: gbuffer.depth,
-                texels,
-                lit,
-                irradiance,
-                materials: rays_of.materials,
-                scene_textures: rays_of.scene_textures,
-                trace_nodes: rays_of.trace_nodes,
-                trace_triangles: rays_of.trace_triangles,
-                trace_instances: rays_of.trace_instances,
-                trace_indices: rays_of.trace_indices,
-                trace_uvs: rays_of.trace_uvs,
-                trace_colors: rays_of.trace_colors,
-                trace_scene: rays_of.trace_scene,
-                trace_accel: rays_of.trace_accel,
-                push: shaders::fiv::truth::Push {
-                    first: first as u32,
-                    count: each.min(count - first) as u32,
-                    size: self.light.size,
+            let args = crate::rays::traced!(
+                shaders::fiv::truth::Args {
+                    view: gbuffer.view,
+                    normal: gbuffer.normal,
+                    depth: gbuffer.depth,
+                    texels,
+                    lit,
+                    irradiance,
+                    push: shaders::fiv::truth::Push {
+                        first: first as u32,
+                        count: each.min(count - first) as u32,
+                        size: self.light.size,
+                    },
                 },
-            };
+                rays_of
+            );
             graph.compute(args, extent);
         }
         irradiance

@@ -90,7 +90,7 @@ impl Igi {
                 imperfect: settings.imperfect.into(),
                 seed: shared.seed,
             };
-            let args = traced!(
+            let args = crate::rays::traced!(
                 cache_fill::Args {
                     vpls: vpls.buffer,
                     cache_keys: cache.keys,

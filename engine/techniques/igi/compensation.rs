@@ -95,16 +95,16 @@ impl Igi {
         for turn in 0..settings.bounces {
             let diffuse_only = (!settings.specular).into();
             let push = near_trace::Push { count, turn, number, least, diffuse_only, slots: TEXTURE_SLOTS, seed };
-            let args = traced!(near_trace::Args { near_paths, push }, shared.rays, handles);
+            let args = crate::rays::traced!(near_trace::Args { near_paths, push }, shared.rays, handles);
             graph.compute(args, count);
             let push = near_direct::Push { count, turn, number };
-            let args = traced!(near_direct::Args { near_paths, push }, shared.rays, handles, shared, lamps);
+            let args = traced_lit!(near_direct::Args { near_paths, push }, shared.rays, handles, shared, lamps);
             graph.compute(args, count);
             // Light that has bounced less often than it may.
             if turn + 1 < settings.bounces {
                 let (leaves, bounces) = (tree.leaves, settings.bounces);
                 let push = near_pick::Push { count, turn, number, leaves, bounces, least, seed };
-                let args = traced!(
+                let args = crate::rays::traced!(
                     near_pick::Args { vpls: vpls.buffer, vpl_nodes: tree.nodes, near_paths, push },
                     shared.rays
                 );

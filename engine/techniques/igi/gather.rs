@@ -53,7 +53,7 @@ impl Igi {
                 irregular: (settings.pattern == Pattern::Irregular).into(),
                 seed: shared.seed,
             };
-            let args = traced!(
+            let args = crate::rays::traced!(
                 gather::Args { view: g.view, normal: g.normal, depth: g.depth, vpls: vpls.buffer, irradiance, push },
                 shared.hidden_by
             );
@@ -86,7 +86,7 @@ impl Igi {
                 irregular: (settings.pattern == Pattern::Irregular).into(),
                 seed: shared.seed,
             };
-            let args = traced!(
+            let args = crate::rays::traced!(
                 gather_picks::Args {
                     view: g.view,
                     normal: g.normal,

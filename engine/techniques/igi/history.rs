@@ -235,31 +235,24 @@ impl Igi {
         let stride = vpls.count.div_ceil(PROBE_LIGHTS).max(1);
         let rays = &shared.hidden_by;
         for (first, count) in self.batches(Extent::new(grid.count(), 1), vpls.count.div_ceil(stride)) {
-            let args = probe_light::Args {
-                probes,
-                vpls: vpls.buffer,
-                lit,
-                materials: rays.materials,
-                scene_textures: rays.scene_textures,
-                trace_nodes: rays.trace_nodes,
-                trace_triangles: rays.trace_triangles,
-                trace_instances: rays.trace_instances,
-                trace_indices: rays.trace_indices,
-                trace_uvs: rays.trace_uvs,
-                trace_colors: rays.trace_colors,
-                trace_scene: rays.trace_scene,
-                trace_accel: rays.trace_accel,
-                push: probe_light::Push {
-                    probe_count: grid.count(),
-                    first,
-                    count,
-                    stride,
-                    total: vpls.count,
-                    least: shared.least,
-                    imperfect: settings.imperfect.into(),
-                    seed,
+            let args = crate::rays::traced!(
+                probe_light::Args {
+                    probes,
+                    vpls: vpls.buffer,
+                    lit,
+                    push: probe_light::Push {
+                        probe_count: grid.count(),
+                        first,
+                        count,
+                        stride,
+                        total: vpls.count,
+                        least: shared.least,
+                        imperfect: settings.imperfect.into(),
+                        seed,
+                    },
                 },
-            };
+                *rays
+            );
             graph.compute(args, grid.count());
         }
     }

@@ -44,7 +44,7 @@ impl Igi {
         for (first, points) in self.batches(Extent::new(total, 1), POINTS) {
             let push =
                 importance::Push { total, first, count: points, near: NEAR * shared.diagonal, seed: shared.seed };
-            let args = traced!(
+            let args = crate::rays::traced!(
                 importance::Args { candidates: candidates.buffer, points: seen, importances, push },
                 shared.rays
             );

@@ -279,7 +279,7 @@ impl Igi {
         let states = graph.buffer("igi.paths", u64::from(paths) * size_of::<types::VplPath>() as u64);
         graph.fill(vpls.buffer, 0);
         graph.fill(states, 0);
-        let args = traced!(
+        let args = traced_lit!(
             shaders::igi::shoot::Args {
                 starts: graph.buffer_from("igi.starts", &starts),
                 numbers: graph.buffer_from("igi.numbers", &numbers),
@@ -305,7 +305,7 @@ impl Igi {
         let direct = graph.image("igi.direct", Format::RGBA32F, extent);
         graph.clear(direct, [0.0; 4]);
         for (first, count) in self.batches(extent, shared.direct_rays) {
-            let args = traced!(
+            let args = traced_lit!(
                 shaders::igi::direct::Args {
                     view: g.view,
                     albedo: g.albedo,

@@ -1,42 +1,10 @@
-//! `Args` of passes that trace rays, without a list of bindings at each.
+//! `Args` of passes that trace rays and light what they meet.
 
-/// `Args` with the fields given and those of `lib/trace.glsl` and `lib/material.glsl` from `rays` ([`crate::rays::RayHandles`]); also those
-/// of `lib/hit_surface.glsl` where the scene's `handles` are given; also the environment and the pass's settings where `shared` is;
-/// with `lamps` in the last place those of `lib/lights.glsl` and `lib/light_sampling.glsl`.
-macro_rules! traced {
-    ($($name:ident)::+ { $($fields:tt)* }, $rays:expr $(,)?) => {{
-        let rays: $crate::rays::RayHandles = $rays;
-        $($name)::+ {
-            materials: rays.materials,
-            scene_textures: rays.scene_textures,
-            trace_nodes: rays.trace_nodes,
-            trace_triangles: rays.trace_triangles,
-            trace_instances: rays.trace_instances,
-            trace_indices: rays.trace_indices,
-            trace_uvs: rays.trace_uvs,
-            trace_colors: rays.trace_colors,
-            trace_scene: rays.trace_scene,
-            trace_accel: rays.trace_accel,
-            $($fields)*
-        }
-    }};
-    ($($name:ident)::+ { $($fields:tt)* }, $rays:expr, $handles:expr $(,)?) => {
-        traced!(
-            $($name)::+ {
-                surface_instances: $handles.instances,
-                surface_indices: $handles.indices,
-                surface_positions: $handles.positions,
-                surface_normals: $handles.normals,
-                surface_tangents: $handles.tangents,
-                surface_uvs: $handles.uvs,
-                surface_colors: $handles.colors,
-                $($fields)*
-            },
-            $rays
-        )
-    };
+/// As [`traced!`](crate::rays::traced), with the environment and the pass's settings from `shared`; with `lamps` in the last place also the
+/// bindings of `lib/lights.glsl` and `lib/light_sampling.glsl`.
+macro_rules! traced_lit {
     ($($name:ident)::+ { $($fields:tt)* }, $rays:expr, $handles:expr, $shared:expr $(,)?) => {
-        traced!(
+        $crate::rays::traced!(
             $($name)::+ {
                 environment_radiance_map: $shared.environment,
                 environment_columns: $shared.environment_columns,
@@ -48,7 +16,7 @@ macro_rules! traced {
         )
     };
     ($($name:ident)::+ { $($fields:tt)* }, $rays:expr, $handles:expr, $shared:expr, lamps $(,)?) => {
-        traced!(
+        traced_lit!(
             $($name)::+ {
                 light_columns: $shared.light_columns,
                 light_targets: $shared.light_targets,

@@ -111,7 +111,7 @@ impl Igi {
     ) {
         for level in 0..=settings.specular_depth {
             let push = grow::Push { first: range.first, count: range.slots, level, background };
-            let args = traced!(
+            let args = traced_lit!(
                 grow::Args { view: g.view, sharp: range.sharp, tree_nodes: range.tree_nodes, push },
                 shared.rays,
                 handles,
@@ -125,8 +125,13 @@ impl Igi {
     fn direct_of_trees(&self, graph: &mut Graph, handles: &Handles, shared: &Shared, range: &Range) {
         for (first, count) in self.batches(range.lit(), shared.direct_rays) {
             let push = direct_tree::Push { first, count, nodes: range.nodes() };
-            let args =
-                traced!(direct_tree::Args { tree_nodes: range.tree_nodes, push }, shared.rays, handles, shared, lamps);
+            let args = traced_lit!(
+                direct_tree::Args { tree_nodes: range.tree_nodes, push },
+                shared.rays,
+                handles,
+                shared,
+                lamps
+            );
             graph.compute(args, range.nodes());
         }
     }
@@ -148,7 +153,7 @@ impl Igi {
             for (first, count) in self.batches(range.lit(), picks) {
                 let push =
                     gather_tree_picks::Push { first, count, picks, proposals, leaves, nodes, least, imperfect, seed };
-                let args = traced!(
+                let args = crate::rays::traced!(
                     gather_tree_picks::Args { vpls: vpls.buffer, vpl_nodes: tree.nodes, tree_nodes, push },
                     shared.hidden_by
                 );
@@ -158,7 +163,8 @@ impl Igi {
         }
         for (first, count) in self.batches(range.lit(), vpls.count) {
             let push = gather_tree::Push { first, count, nodes, least, imperfect, seed };
-            let args = traced!(gather_tree::Args { vpls: vpls.buffer, tree_nodes, push }, shared.hidden_by);
+            let args =
+                crate::rays::traced!(gather_tree::Args { vpls: vpls.buffer, tree_nodes, push }, shared.hidden_by);
             match groups {
                 Some(groups) => graph.compute_indirect(args, groups, 0),
                 None => graph.compute(args, nodes),
