@@ -14,7 +14,7 @@ use lucerna::{
         test::{trace, vpl_rays},
         types,
     },
-    techniques::igi::{Igi, PictureSettings, Settings},
+    techniques::igi::{Igi, PictureSettings, Settings, Visibility},
 };
 use std::{collections::BTreeMap, process::ExitCode};
 
@@ -102,7 +102,13 @@ fn stages(report: &Report) -> BTreeMap<&'static str, f64> {
 fn measure(gpu: &Gpu, name: &str, scene: &Scene, options: &Options) -> Result<()> {
     let pose = Pose::rest(scene);
     let view = View::of_camera(scene, &pose, 0, options.size)?;
-    let settings = Settings { vpls: options.vpls, bounces: 1, direct_samples: 4, ..Settings::default() };
+    let settings = Settings {
+        vpls: options.vpls,
+        bounces: 1,
+        direct_samples: 4,
+        visibility: Visibility::Compute,
+        ..Settings::default()
+    };
     let all = PictureSettings { igi: settings.clone(), ..PictureSettings::default() };
     let mut resident = Resident::new(gpu, scene)?;
     let mut igi = Igi::new(gpu, scene, &resident, &settings)?;

@@ -4,6 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
+#include "lib/spread.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/fiv.glsl"
 
@@ -69,7 +70,7 @@ float own_share(uint i, uint self, vec3 p, vec3 n) {
 }
 
 void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 pixel = spread_texel();
     if (any(greaterThanEqual(pixel, imageSize(irradiance)))) return;
     float z = texelFetch(depth, pixel, 0).r;
     if (z >= 1.0) {

@@ -5,6 +5,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
+#include "lib/spread.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/trace.glsl"
 #include "lib/fiv.glsl"
@@ -26,7 +27,7 @@ layout(push_constant, scalar) uniform Push {
 };
 
 void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 pixel = spread_texel();
     if (any(greaterThanEqual(pixel, imageSize(irradiance)))) return;
     float z = texelFetch(depth, pixel, 0).r;
     if (z >= 1.0) {

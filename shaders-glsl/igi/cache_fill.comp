@@ -17,7 +17,6 @@ layout(push_constant, scalar) uniform Push {
     uint count;
     uint most;       // cells
     float least;     // min_d of the bounded geometry term, metres; 0: none
-    uint imperfect;  // 1: boxes of triangles stand for them
     uint seed;
 };
 
@@ -28,7 +27,6 @@ void main() {
     CacheCell cell = cache_cells[slot];
     vec3 origin = cell.position + cell.normal * cell.gap;
     vec3 sum = vec3(0.0);
-    trace_imperfect = imperfect != 0u;
     for (uint k = first; k < first + count; ++k) {
         Vpl vpl = vpls[k];
         vec3 light = vpl_irradiance(vpl, cell.position, cell.normal, least);

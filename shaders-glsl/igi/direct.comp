@@ -4,6 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
+#include "lib/spread.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/scene.glsl"
 #include "lib/random.glsl"
@@ -45,7 +46,7 @@ layout(push_constant, scalar) uniform Push {
 #include "lib/vpl_direct.glsl"
 
 void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 pixel = spread_texel();
     if (any(greaterThanEqual(pixel, imageSize(direct)))) return;
     float z = texelFetch(depth, pixel, 0).r;
     vec3 sum = vec3(0.0);

@@ -5,6 +5,7 @@
 #define TRACE_BOXES
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
+#include "lib/spread.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "lib/trace.glsl"
@@ -26,13 +27,12 @@ layout(push_constant, scalar) uniform Push {
     uint tile;       // side of the tiles of pixels that share the lights
     uint factor;     // pixels along the side of a texel
     float least;     // min_d of the bounded geometry term, metres; 0: none
-    uint imperfect;  // 1: boxes of triangles stand for them
     uint irregular;  // 1: tiles have their subsets in different orders
     uint seed;
 };
 
 void main() {
-    ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 texel = spread_texel();
     if (any(greaterThanEqual(texel, imageSize(irradiance)))) return;
     ivec2 pixel = min(texel * int(factor) + int(factor) / 2, textureSize(depth, 0) - 1);
     vec4 sum = first == 0u ? vec4(0.0) : imageLoad(irradiance, texel);
@@ -44,7 +44,6 @@ void main() {
         vec3 origin = p + n * gap;
         uint subsets = tile * tile;
         uint subset = vpl_subset(uvec2(texel), tile, irregular != 0u, seed);
-        trace_imperfect = imperfect != 0u;
         for (uint i = 0u; i < count; ++i) {
             uint k = (first + i) * subsets + subset;
             if (k >= total) break;

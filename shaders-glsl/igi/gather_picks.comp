@@ -6,6 +6,7 @@
 #define TRACE_BOXES
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
+#include "lib/spread.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "lib/trace.glsl"
@@ -33,13 +34,12 @@ layout(push_constant, scalar) uniform Push {
     uint tile;       // side of the tiles of texels whose picks lie between each other
     uint factor;     // pixels along the side of a texel
     float least;     // min_d of the bounded geometry term, metres; 0: none
-    uint imperfect;  // 1: boxes of triangles stand for them
     uint irregular;  // 1: tiles have their subsets in different orders
     uint seed;
 };
 
 void main() {
-    ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 texel = spread_texel();
     if (any(greaterThanEqual(texel, imageSize(irradiance)))) return;
     ivec2 pixel = min(texel * int(factor) + int(factor) / 2, textureSize(depth, 0) - 1);
     vec4 sum = first == 0u ? vec4(0.0) : imageLoad(irradiance, texel);
@@ -50,7 +50,6 @@ void main() {
         float gap = surface_step(view, p, z);
         uint subset = vpl_subset(uvec2(texel), tile, irregular != 0u, seed);
         float offset = vpl_offset(uvec2(texel) / tile, subset, tile * tile, seed);
-        trace_imperfect = imperfect != 0u;
         Receiver receiver = Receiver(p, n, p + n * gap, offset, uvec2(pixel));
         sum += vpl_picked(receiver, Picking(picks, proposals, leaves, least, seed), first, count);
     }

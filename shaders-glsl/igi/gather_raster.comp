@@ -4,6 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
+#include "lib/spread.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "lib/vpl.glsl"
@@ -51,7 +52,7 @@ float unhidden(Vpl vpl, uint number, vec3 place) {
 }
 
 void main() {
-    ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 texel = spread_texel();
     if (any(greaterThanEqual(texel, imageSize(irradiance)))) return;
     ivec2 pixel = min(texel * int(factor) + int(factor) / 2, textureSize(depth, 0) - 1);
     vec4 sum = first == 0u ? vec4(0.0) : imageLoad(irradiance, texel);

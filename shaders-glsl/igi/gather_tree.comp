@@ -17,7 +17,6 @@ layout(push_constant, scalar) uniform Push {
     uint count;
     uint nodes;
     float least;     // min_d of the bounded geometry term, metres; 0: none
-    uint imperfect;  // 1: boxes of triangles stand for them
     uint seed;
 };
 
@@ -27,7 +26,6 @@ void main() {
     TreeNode node = tree_nodes[at];
     vec3 origin = node.position + node.normal * node.gap;
     vec3 sum = vec3(0.0);
-    trace_imperfect = imperfect != 0u;
     for (uint k = first; k < first + count; ++k) {
         Vpl vpl = vpls[k];
         vec3 light = vpl_irradiance(vpl, node.position, node.normal, least);

@@ -24,7 +24,6 @@ layout(push_constant, scalar) uniform Push {
     uint leaves;     // of the tree over the virtual lights
     uint nodes;
     float least;     // min_d of the bounded geometry term, metres; 0: none
-    uint imperfect;  // 1: boxes of triangles stand for them
     uint seed;
 };
 
@@ -34,7 +33,6 @@ void main() {
     TreeNode node = tree_nodes[at];
     vec3 origin = node.position + node.normal * node.gap;
     float offset = vpl_offset(uvec2(node.pixel & 0xffffu, node.pixel >> 16u), at % TREE_WIDTH, TREE_WIDTH, seed);
-    trace_imperfect = imperfect != 0u;
     Receiver receiver = Receiver(node.position, node.normal, origin, offset, uvec2(node.pixel, at % TREE_WIDTH));
     vec3 sum = vpl_picked(receiver, Picking(picks, proposals, leaves, least, seed), first, count).rgb;
     tree_nodes[at].light = node.light + node.weight * node.albedo * (sum / 3.14159265358979);

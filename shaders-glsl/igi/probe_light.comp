@@ -22,7 +22,6 @@ layout(push_constant, scalar) uniform Push {
     uint stride;    // every so many virtual lights are looked at
     uint total;     // virtual lights
     float least;    // min_d, metres
-    uint imperfect; // 1: boxes of triangles stand for them
     uint seed;
 };
 
@@ -31,7 +30,6 @@ void main() {
     if (at >= probe_count) return;
     HistoryProbe probe = probes[at];
     if (probe.there == 0u) return;
-    trace_imperfect = imperfect != 0u;
     vec3 origin = probe.position + probe.normal * probe.gap;
     vec3 sum = vec3(0.0);
     for (uint i = first; i < first + count; ++i) {

@@ -23,9 +23,9 @@ struct Hit {
 uint trace_turns = 0u;
 
 #ifdef TRACE_BOXES
-// Boxes of triangles stand for them: of any hit, in compute (Marques and Santos, section 4.1). A box that holds an end of the ray
+// 1: boxes of triangles stand for them: of any hit, in compute (Marques and Santos, section 4.1). A box that holds an end of the ray
 // says nothing; its triangle is tested. What is in the way is then in the way too, and more.
-bool trace_imperfect = false;
+layout(constant_id = 15) const uint IMPERFECT = 0u;
 #endif
 
 const uint TRACE_CAMERA = 1u; // back faces of single-sided surfaces are not there (as rasterised)

@@ -124,7 +124,7 @@ Hit trace(Ray ray, uint mask, uint salt, bool any) {
                 leaves = children.y;
                 leaf_slots = hits & leaves & 0xffu;
 #ifdef TRACE_BOXES
-                boxes = trace_imperfect && any ? trace_between & leaf_slots : 0u;
+                boxes = IMPERFECT != 0u && any ? trace_between & leaf_slots : 0u;
 #endif
                 uint slots = trace_permuted(hits & children.x & 0xffu, slabs.octant);
                 uint entry = next << 8u | slots;

@@ -82,14 +82,7 @@ impl Igi {
         let cells = cache.most.min(nodes);
         // Most of them will not be there.
         for (first, count) in self.batches(Extent::new(cells.div_ceil(4), 1), vpls.count) {
-            let push = cache_fill::Push {
-                first,
-                count,
-                most: cache.most,
-                least: shared.least,
-                imperfect: settings.imperfect.into(),
-                seed: shared.seed,
-            };
+            let push = cache_fill::Push { first, count, most: cache.most, least: shared.least, seed: shared.seed };
             let args = crate::rays::traced!(
                 cache_fill::Args {
                     vpls: vpls.buffer,
@@ -97,6 +90,7 @@ impl Igi {
                     cache_cells: cache.cells,
                     cache_list: cache.list,
                     push,
+                    spec: cache_fill::Spec { imperfect: settings.imperfect.into() },
                 },
                 shared.hidden_by
             );

@@ -49,12 +49,20 @@ impl Igi {
                 tile: settings.interleave,
                 factor: settings.downsample,
                 least: shared.least,
-                imperfect: settings.imperfect.into(),
                 irregular: (settings.pattern == Pattern::Irregular).into(),
                 seed: shared.seed,
             };
+            let spec = gather::Spec { imperfect: settings.imperfect.into() };
             let args = crate::rays::traced!(
-                gather::Args { view: g.view, normal: g.normal, depth: g.depth, vpls: vpls.buffer, irradiance, push },
+                gather::Args {
+                    view: g.view,
+                    normal: g.normal,
+                    depth: g.depth,
+                    vpls: vpls.buffer,
+                    irradiance,
+                    push,
+                    spec
+                },
                 shared.hidden_by
             );
             graph.compute(args, extent);
@@ -82,7 +90,6 @@ impl Igi {
                 tile: settings.interleave,
                 factor: settings.downsample,
                 least: shared.least,
-                imperfect: settings.imperfect.into(),
                 irregular: (settings.pattern == Pattern::Irregular).into(),
                 seed: shared.seed,
             };
@@ -95,6 +102,7 @@ impl Igi {
                     irradiance,
                     vpl_nodes: tree.nodes,
                     push,
+                    spec: gather_picks::Spec { imperfect: settings.imperfect.into() },
                 },
                 shared.hidden_by
             );

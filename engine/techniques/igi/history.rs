@@ -247,9 +247,9 @@ impl Igi {
                         stride,
                         total: vpls.count,
                         least: shared.least,
-                        imperfect: settings.imperfect.into(),
                         seed,
                     },
+                    spec: probe_light::Spec { imperfect: settings.imperfect.into() },
                 },
                 *rays
             );

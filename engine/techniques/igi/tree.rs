@@ -151,10 +151,10 @@ impl Igi {
         if let (Some(tree), true, None) = (vpls.tree, settings.picks_from(vpls.count), groups) {
             let (picks, proposals, leaves) = (settings.picks, settings.proposals, tree.leaves);
             for (first, count) in self.batches(range.lit(), picks) {
-                let push =
-                    gather_tree_picks::Push { first, count, picks, proposals, leaves, nodes, least, imperfect, seed };
+                let push = gather_tree_picks::Push { first, count, picks, proposals, leaves, nodes, least, seed };
+                let spec = gather_tree_picks::Spec { imperfect };
                 let args = crate::rays::traced!(
-                    gather_tree_picks::Args { vpls: vpls.buffer, vpl_nodes: tree.nodes, tree_nodes, push },
+                    gather_tree_picks::Args { vpls: vpls.buffer, vpl_nodes: tree.nodes, tree_nodes, push, spec },
                     shared.hidden_by
                 );
                 graph.compute(args, nodes);
@@ -162,9 +162,10 @@ impl Igi {
             return;
         }
         for (first, count) in self.batches(range.lit(), vpls.count) {
-            let push = gather_tree::Push { first, count, nodes, least, imperfect, seed };
+            let push = gather_tree::Push { first, count, nodes, least, seed };
+            let spec = gather_tree::Spec { imperfect };
             let args =
-                crate::rays::traced!(gather_tree::Args { vpls: vpls.buffer, tree_nodes, push }, shared.hidden_by);
+                crate::rays::traced!(gather_tree::Args { vpls: vpls.buffer, tree_nodes, push, spec }, shared.hidden_by);
             match groups {
                 Some(groups) => graph.compute_indirect(args, groups, 0),
                 None => graph.compute(args, nodes),
