@@ -91,7 +91,7 @@ enum Command {
     Reproduce(Box<ReproduceArgs>),
     /// Write the report of an experiment again, from the pictures that are there
     Report(ReportArgs),
-    /// List the built-in scenes
+    /// List the built-in scenes, and the things that can be put on a ground (--ground)
     List {
         #[command(flatten)]
         talk: TalkArgs,
@@ -178,11 +178,14 @@ fn serve(command: Command, console: Console) -> Result<()> {
         Command::Reproduce(args) => experiment::reproduce(&args, console).map(|_| ()),
         Command::Report(args) => experiment::report(&args, console),
         Command::List { json, .. } => {
+            let all = builtin::NAMES.iter().chain(builtin::THINGS);
             let list: Vec<(&str, &str)> =
-                builtin::NAMES.iter().map(|&name| (name, builtin::description(name).unwrap_or_default())).collect();
+                all.map(|&name| (name, builtin::description(name).unwrap_or_default())).collect();
             if json {
-                let json = list.iter().map(|(name, text)| serde_json::json!({ "name": name, "description": text }));
-                return console::print_json(&json.collect());
+                let kind = |name: &str| if builtin::THINGS.contains(&name) { "thing" } else { "scene" };
+                let entry =
+                    |(name, text): &(&str, &str)| serde_json::json!({ "name": name, "kind": kind(name), "description": text });
+                return console::print_json(&list.iter().map(entry).collect());
             }
             let width = list.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
             let lines: Vec<String> = list.iter().map(|(name, text)| format!("{name:width$}  {text}")).collect();

@@ -12,6 +12,7 @@ pub mod deform;
 pub mod environment;
 mod folder;
 pub mod gltf;
+pub mod ground;
 mod load;
 pub mod normals;
 mod notes;

@@ -13,6 +13,7 @@ pub mod fingerprint;
 pub mod fiv;
 pub mod framing;
 pub mod gbuffer_layers;
+pub mod ground;
 pub mod info;
 pub mod inspect;
 pub mod last_stage;

@@ -11,6 +11,7 @@ use crate::{
     camera::CameraFile,
     config,
     framing::DefaultLight,
+    ground::GroundOptions,
     lights::{Point, Sun},
     stage::{Stage, StageArgs},
 };
@@ -24,6 +25,9 @@ pub struct Record {
     /// Metres of one unit of the scene file, if it was given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<f64>,
+    /// What the scene stands on, if it was put there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ground: Option<GroundOptions>,
     /// Changes when the scene changes.
     pub fingerprint: String,
     pub width: u32,
@@ -82,6 +86,7 @@ impl Record {
             command: command.iter().map(|&word| word.to_owned()).collect(),
             scene: stage.source.clone(),
             unit: args.scene.unit,
+            ground: args.scene.ground.ground.then(|| args.scene.ground.options.clone()),
             fingerprint: stage.fingerprint.clone(),
             width: args.size.width,
             height: args.size.height,
@@ -143,6 +148,10 @@ impl Record {
         if let Some(unit) = self.unit {
             add(&[&format!("--unit={unit}")]);
         }
+        if let Some(ground) = &self.ground {
+            add(&["--ground"]);
+            ground.arguments().iter().for_each(|option| add(&[option]));
+        }
         // A reference is one picture in full precision.
         let single = self.command.get(1).is_some_and(|verb| verb == "reference");
         if !single {
@@ -203,6 +212,7 @@ mod tests {
             command: vec!["isr".into(), "render".into()],
             scene: Source::File("-odd.obj".into()),
             unit: Some(0.01),
+            ground: Some(GroundOptions { copies: Some(3), sunk: Some(-0.2), ..GroundOptions::default() }),
             fingerprint: "0".into(),
             width: 64,
             height: 48,
@@ -233,6 +243,7 @@ mod tests {
             "--frames 2..=5",
             "--time=-0.1",
             "--unit=0.01",
+            "--ground --copies=3 --sunk=-0.2",
             "--light=1,2,-3,4",
             "--sun=-10,20,2",
             "--mode=direct",

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use lucerna::{
     Error, Result,
-    scene::{self, LoadOptions, Scene, builtin},
+    scene::{self, Environment, Limits, LoadOptions, Note, Scene, builtin, environment},
 };
 
-use crate::{args::positive, record::Source};
+use crate::{args::positive, ground::GroundArgs, record::Source};
 
 /// `SCENE | --builtin NAME`, `--unit`.
 #[derive(clap::Args, Clone, Debug, Default)]
@@ -23,21 +23,41 @@ pub struct SceneArgs {
     /// Metres that one unit of the scene file stands for, where the format leaves it open (OBJ, C arrays) [default: 1]
     #[arg(long, value_name = "METRES", value_parser = positive, conflicts_with = "builtin")]
     pub unit: Option<f64>,
+
+    #[command(flatten)]
+    pub ground: GroundArgs,
 }
 
 impl SceneArgs {
     /// Reads the scene.
     ///
     /// # Errors
-    /// As [`open`].
+    /// As [`open`] and [`GroundArgs::place`].
     pub fn open(&self) -> Result<(Scene, Source)> {
-        open(self.scene.as_deref(), self.builtin.as_deref(), &in_unit(self.unit))
+        let (scene, source) = open(self.scene.as_deref(), self.builtin.as_deref(), &in_unit(self.unit))?;
+        Ok((self.ground.place(scene, self.unit)?, source))
     }
 }
 
 /// Options for reading a scene whose unit stands for `unit` metres.
 pub fn in_unit(unit: Option<f64>) -> LoadOptions {
     LoadOptions { unit: unit.map(|metres| metres as f32), ..LoadOptions::default() }
+}
+
+/// Whether this is the name of a built-in environment and not of a file.
+pub fn is_built_in_environment(path: &Path) -> bool {
+    path.to_str().is_some_and(|name| builtin::ENVIRONMENTS.contains(&name)) && !path.is_file()
+}
+
+/// Reads an environment, or makes a built-in one.
+///
+/// # Errors
+/// `Input` if the file cannot be served.
+pub fn environment(path: &Path) -> Result<(Environment, Vec<Note>)> {
+    match path.to_str() {
+        Some(name) if is_built_in_environment(path) => Ok((builtin::environment(name)?, Vec::new())),
+        _ => environment::load(path, &Limits::default()),
+    }
 }
 
 /// Reads a file or makes a built-in scene.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::Mat4;
 use lucerna::{
     Result,
-    scene::{Camera, Limits, Note, Pose, Scene, View, environment},
+    scene::{Camera, Note, Pose, Scene, View},
 };
 
 use crate::{
@@ -15,7 +15,7 @@ use crate::{
     framing::{self, DefaultLight},
     lights::{self, Point, Sun},
     record::{self, Source},
-    source::SceneArgs,
+    source::{self, SceneArgs},
 };
 
 /// What is rendered, and from where.
@@ -51,7 +51,7 @@ pub struct StageArgs {
     #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
     pub time: f64,
 
-    /// Light the scene with this .hdr or .exr environment instead of its own
+    /// Light the scene with this environment instead of its own: .hdr, .exr, or a built-in one (point, area, areas, grove)
     #[arg(long, alias = "env", value_name = "FILE", help_heading = "Picture")]
     pub environment: Option<PathBuf>,
 
@@ -80,7 +80,7 @@ impl Stage {
             scene.name = "scene".into();
         }
         if let Some(path) = &args.environment {
-            let (environment, notes) = environment::load(path, &Limits::default())?;
+            let (environment, notes) = source::environment(path)?;
             scene.environment = Some(environment);
             scene.notes.extend(notes);
         }

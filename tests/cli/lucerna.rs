@@ -46,9 +46,14 @@ fn every_built_in_scene_is_inspected() {
     let list = lucerna(["list", "--json"]).expect(0, &[]).json();
     let list = list.as_array().unwrap();
     assert!(list.len() >= 5);
+    assert!(list.iter().any(|entry| entry["kind"] == "thing"));
     for entry in list {
         let name = entry["name"].as_str().unwrap();
         assert!(!entry["description"].as_str().unwrap().is_empty());
+        if entry["kind"] == "thing" {
+            lucerna(["inspect", "--builtin", name, "--ground", "--copies", "3"]).expect(0, &["front", "ground"]);
+            continue;
+        }
         let summary = lucerna(["inspect", "--json", "--builtin", name]).expect(0, &[]).json();
         assert!(summary["counts"]["triangles"].as_u64() > Some(0), "{name}");
         let cameras = summary["cameras"].as_array().unwrap();

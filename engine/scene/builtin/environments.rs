@@ -6,9 +6,9 @@ use glam::{Vec2, Vec3, vec2, vec3};
 use std::f32::consts::{PI, TAU};
 
 /// Names of [`environment`].
-pub const ENVIRONMENTS: [&str; 3] = ["point", "areas", "grove"];
+pub const ENVIRONMENTS: [&str; 4] = ["point", "area", "areas", "grove"];
 
-/// An environment made by code: `point`, one small light; `areas`, a green and a red area light; `grove`, sun and sky through leaves,
+/// An environment made by code: `point`, one small light; `area`, a white area light; `areas`, a green and a red one; `grove`, sun and sky through leaves,
 /// with radiances of which the largest is more than 10,000 times the smallest.
 ///
 /// # Errors
@@ -16,6 +16,7 @@ pub const ENVIRONMENTS: [&str; 3] = ["point", "areas", "grove"];
 pub fn environment(name: &str) -> Result<Environment> {
     match name {
         "point" => Ok(point()),
+        "area" => Ok(area()),
         "areas" => Ok(areas()),
         "grove" => Ok(grove()),
         _ => {
@@ -52,6 +53,11 @@ fn inside(d: Vec3, middle: Vec3, half: Vec2) -> bool {
     let up = right.cross(axis);
     let along = d.dot(axis);
     along > 0.0 && (d.dot(right) / along).abs() < half.x && (d.dot(up) / along).abs() < half.y
+}
+
+/// A square light of 33° to the left, 3 W/m² on a plane that faces it.
+fn area() -> Environment {
+    painted("area", 512, |d| Vec3::splat(9.5) * f32::from(inside(d, vec3(-0.8, 0.75, -0.2), vec2(0.3, 0.3))))
 }
 
 fn areas() -> Environment {
@@ -99,11 +105,13 @@ mod tests {
             assert_eq!((env.name.as_str(), env.pixels.len() as u32), (name, env.width * env.height));
             assert!(env.pixels.iter().all(|p| p.is_finite() && p.min_element() >= 0.0), "{name}");
         }
-        assert!(environment("moon").unwrap_err().to_string().contains("point, areas, grove"));
+        assert!(environment("moon").unwrap_err().to_string().contains("point, area, areas, grove"));
         // Irradiance of the small light, facing it: radiance times solid angle.
         let point = environment("point").unwrap();
         let power = point.mean().y * 4.0 * PI;
         assert!((power / 3.0 - 1.0).abs() < 0.15, "{power}");
+        let area = environment("area").unwrap().mean().y * 4.0 * PI;
+        assert!((area / 3.0 - 1.0).abs() < 0.1, "{area}");
         let areas = environment("areas").unwrap().mean();
         assert!((areas.x / areas.y - 1.0).abs() < 0.1 && areas.z < 0.2 * areas.x, "{areas}");
         let grove = environment("grove").unwrap();

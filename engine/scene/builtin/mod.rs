@@ -123,9 +123,21 @@ pub const NAMES: &[&str] = &{
     names
 };
 
-/// One line about a built-in scene, if there is one of this name.
+/// Names of things that [`load`] makes too: one mesh without ground, light and camera, for [`super::ground::on_ground`].
+pub const THINGS: &[&str] = &{
+    let mut names = [""; shadows::THINGS.len()];
+    let mut i = 0;
+    while i < names.len() {
+        names[i] = shadows::THINGS[i].0;
+        i += 1;
+    }
+    names
+};
+
+/// One line about a built-in scene or thing, if there is one of this name.
 pub fn description(name: &str) -> Option<&'static str> {
-    entry(name).map(|entry| entry.description)
+    let thing = || shadows::THINGS.iter().find(|(known, ..)| *known == name).map(|(_, text, _)| *text);
+    entry(name).map(|entry| entry.description).or_else(thing)
 }
 
 /// Exposure (stops, 2^EV on the radiance) that suits a built-in scene, if there is one of this name.
@@ -133,7 +145,7 @@ pub fn exposure(name: &str) -> Option<f32> {
     entry(name).map(|entry| entry.exposure)
 }
 
-/// Builds a scene.
+/// Builds a scene, or a thing.
 ///
 /// # Errors
 /// [`crate::ErrorKind::Usage`] if there is no built-in scene of this name; the message lists those that exist and names
@@ -142,8 +154,11 @@ pub fn load(name: &str) -> Result<Scene> {
     if let Some(entry) = entry(name) {
         return Ok((entry.build)());
     }
-    let list = NAMES.join(", ");
-    let nearest = NAMES.iter().map(|known| (distance(name, known), known)).min();
+    if let Some(thing) = shadows::thing(name) {
+        return Ok(thing);
+    }
+    let list = [NAMES, THINGS].concat().join(", ");
+    let nearest = NAMES.iter().chain(THINGS).map(|known| (distance(name, known), known)).min();
     let help = match nearest {
         Some((off, known)) if off <= 1 + known.len() / 3 => format!("Did you mean {known:?}? Built-in scenes: {list}"),
         _ => format!("Built-in scenes: {list}"),

@@ -10,22 +10,51 @@ use super::{
 use crate::scene::{Material, Scene};
 use glam::{Vec2, Vec3, vec2, vec3};
 
-pub(super) fn build() -> Scene {
-    let mut stage = Stage::new("shadows");
-    let ground = stage.paint("ground", 0xd9d5cc, 1.0);
-    stage.add("ground", Model::of(ground, square(5.0)));
+/// Things that stand alone, without ground, light and camera.
+pub(super) const THINGS: [(&str, &str, fn(&mut Stage) -> u32); 3] = [
+    ("hare", "A sitting hare, 0.8 m high: about 10 000 vertices", add_hare),
+    ("queen", "A chess queen, 1 m high: a surface of revolution", add_queen),
+    ("tree", "A tree whose leaves are triangles, 1.7 m high: about 20 000 vertices", add_tree),
+];
+
+/// One of [`THINGS`] as a scene.
+pub(super) fn thing(name: &str) -> Option<Scene> {
+    let (name, _, add) = THINGS.iter().find(|(known, ..)| *known == name)?;
+    let mut stage = Stage::new(name);
+    let mesh = add(&mut stage);
+    stage.place(name, mesh, glam::Mat4::IDENTITY);
+    Some(stage.finish())
+}
+
+fn add_hare(stage: &mut Stage) -> u32 {
     let fur = stage.paint("fur", 0xc7b299, 0.9);
-    stage.add("hare", Model::of(fur, hare()));
+    stage.mesh("hare", Model::of(fur, hare()))
+}
+
+fn add_queen(stage: &mut Stage) -> u32 {
     let ivory = stage.paint("ivory", 0xe9e0cb, 0.6);
-    let queen = stage.mesh("queen", Model::of(ivory, queen()));
-    stage.place("queen", queen, super::kit::at(1.25, 0.0, 0.25));
+    stage.mesh("queen", Model::of(ivory, queen()))
+}
+
+fn add_tree(stage: &mut Stage) -> u32 {
     let bark = stage.paint("bark", 0x6d5a48, 0.95);
     let leaf = Material { double_sided: true, ..Material::diffuse("leaf", srgb(0x6f9a45)) };
     let leaf = stage.material(leaf);
     let (wood, leaves) = tree::tree();
     let mut model = Model::of(bark, wood);
     model.add(leaf, leaves);
-    let tree = stage.mesh("tree", model);
+    stage.mesh("tree", model)
+}
+
+pub(super) fn build() -> Scene {
+    let mut stage = Stage::new("shadows");
+    let ground = stage.paint("ground", 0xd9d5cc, 1.0);
+    stage.add("ground", Model::of(ground, square(5.0)));
+    let hare = add_hare(&mut stage);
+    stage.place("hare", hare, glam::Mat4::IDENTITY);
+    let queen = add_queen(&mut stage);
+    stage.place("queen", queen, super::kit::at(1.25, 0.0, 0.25));
+    let tree = add_tree(&mut stage);
     stage.place("tree", tree, super::kit::at(-1.4, 0.0, -0.35));
     stage.scene.environment = Some(environments::grove());
     stage.camera("front", [0.3, 1.7, 4.2], [0.0, 0.45, 0.0], 42.0);

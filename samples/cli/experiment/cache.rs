@@ -152,6 +152,16 @@ impl Cache {
         image::write_atomic(&path, format!("{:#}\n", Value::Object(values.clone())).as_bytes(), true)
     }
 
+    /// The folder of what scenes share; it need not exist.
+    pub fn shared(&self) -> PathBuf {
+        self.folder.join("shared")
+    }
+
+    /// Digest of source files in these folders.
+    pub fn sources_of(folders: &[&str]) -> String {
+        sources(folders)
+    }
+
     /// Version of the code that measures.
     pub fn measuring() -> String {
         sources(&["engine/measure"])

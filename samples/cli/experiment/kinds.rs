@@ -1,9 +1,10 @@
 //! How pictures are made: the techniques and references that experiments can name.
 
+mod fiv;
 mod igi;
 mod tonemap;
 
-use std::{any::Any, collections::HashMap, time::Instant};
+use std::{any::Any, collections::HashMap, path::PathBuf, time::Instant};
 
 use lucerna::{
     Error, Result,
@@ -86,6 +87,8 @@ pub struct Times {
     pub device: Vec<f64>,
     /// Passes by their names, median over repetitions (without the first, if there are more).
     pub passes: Vec<(String, f64)>,
+    /// What else is known of the run, by name: what was computed before, bytes, things.
+    pub facts: Vec<(String, f64)>,
 }
 
 fn median(mut values: Vec<f64>) -> Option<f64> {
@@ -98,6 +101,11 @@ impl Times {
     pub fn frame(&self) -> Option<f64> {
         let list = if self.device.is_empty() { &self.wall } else { &self.device };
         median(list.iter().skip(usize::from(list.len() > 1)).copied().collect())
+    }
+
+    /// A fact by its name.
+    pub fn fact(&self, name: &str) -> Option<f64> {
+        self.facts.iter().find(|(known, _)| known == name).map(|(_, value)| *value)
     }
 
     /// Sum of the passes whose names begin so.
@@ -113,6 +121,8 @@ pub struct Warm<'a> {
     pub pose: &'a Pose,
     /// A picture in place of a scene.
     pub image: Option<&'a Layers>,
+    /// For what scenes share, in the folder of the report; it need not exist.
+    pub folder: PathBuf,
     /// Of this scene.
     kept: HashMap<&'static str, Box<dyn Any>>,
     /// Borrows the scene, so it cannot be among these.
@@ -120,9 +130,9 @@ pub struct Warm<'a> {
 }
 
 impl<'a> Warm<'a> {
-    pub fn new(gpu: &'a Gpu, loaded: &'a Loaded) -> Self {
+    pub fn new(gpu: &'a Gpu, loaded: &'a Loaded, folder: PathBuf) -> Self {
         let Loaded { scene, pose, image, .. } = loaded;
-        Self { gpu, scene, pose, image: image.as_ref(), kept: HashMap::new(), tracer: None }
+        Self { gpu, scene, pose, image: image.as_ref(), folder, kept: HashMap::new(), tracer: None }
     }
 
     /// Drops what was made for the scene under this name.
@@ -193,6 +203,16 @@ pub const KINDS: &[Kind] = &[
         ],
         settings: igi::settings,
         render: igi::picture,
+        available: || Ok(String::new()),
+    },
+    Kind {
+        name: "fiv",
+        description: "shadows from fullsphere irradiance vectors, and by brute force; layer irradiance",
+        on_device: true,
+        of_images: false,
+        sources: fiv::SOURCES,
+        settings: fiv::settings,
+        render: fiv::picture,
         available: || Ok(String::new()),
     },
     Kind {

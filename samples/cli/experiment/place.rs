@@ -6,7 +6,7 @@ use glam::Mat4;
 use lucerna::{
     Error, ErrorKind, Result,
     image::{self, Layers},
-    scene::{self, Camera, Limits, Pose, Projection, View, builtin, environment},
+    scene::{self, Camera, Limits, Pose, Projection, View, builtin},
 };
 
 use super::file::{Experiment, IfMissing, Scene as Entry};
@@ -31,7 +31,7 @@ impl Folders {
     }
 
     /// The first that exists.
-    fn find(&self, name: &str) -> Option<PathBuf> {
+    pub fn find(&self, name: &str) -> Option<PathBuf> {
         self.0.iter().map(|folder| folder.join(name)).find(|path| path.is_file())
     }
 
@@ -104,12 +104,10 @@ pub fn load(experiment: &Experiment, entry: &Entry, folders: &Folders) -> Result
             None => error.at(place).in_file(file),
         }
     };
-    let missing = [&entry.file, &entry.image, &entry.environment, &entry.list].into_iter().flatten();
-    let missing = missing.chain(entry.cameras.iter().filter(|camera| camera.ends_with(".toml")));
-    if let Some(name) = missing.into_iter().find(|name| folders.find(name).is_none()) {
+    if let Some(name) = entry.files().find(|name| folders.find(name).is_none()) {
         return match entry.if_missing {
             IfMissing::Skip => Ok(None),
-            IfMissing::Fail => Err(named(folders.missing(name))),
+            IfMissing::Fail => Err(named(folders.missing(&name))),
         };
     }
     read(experiment, entry, folders).map(Some).map_err(named)
@@ -122,9 +120,14 @@ fn read(experiment: &Experiment, entry: &Entry, folders: &Folders) -> Result<Loa
     }
     let path = entry.file.as_ref().map(found).transpose()?;
     let (mut scene, _) = source::open(path.as_deref(), entry.builtin.as_deref(), &source::in_unit(entry.unit))?;
+    if let Some(ground) = &entry.ground {
+        scene = ground.place(scene, entry.unit, |path| found(&path.to_string_lossy().into_owned()))?;
+    }
     scene.name.clone_from(&entry.name);
     if let Some(name) = &entry.environment {
-        scene.environment = Some(environment::load(&found(name)?, &Limits::default())?.0);
+        let path = Path::new(name);
+        let path = if source::is_built_in_environment(path) { path.to_path_buf() } else { found(name)? };
+        scene.environment = Some(source::environment(&path)?.0);
     }
     lights::add(&mut scene, &entry.light, entry.sun.as_ref());
     framing::add_missing_light(&mut scene, entry.default_light);

@@ -64,7 +64,8 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
     let mut first = None;
     for entry in &experiment.scenes {
         let Some(loaded) = place::load(&experiment, entry, &context.folders)? else {
-            let file = entry.file.as_ref().or(entry.image.as_ref()).cloned().unwrap_or_default();
+            let files: Vec<String> = entry.files().filter(|name| context.folders.find(name).is_none()).collect();
+            let file = files.join(", ");
             console.warning(&format!("scene '{}' is skipped: {file} is not there", entry.name));
             skipped.push((format!("scene {}", entry.name), format!("a file is not there: {file}")));
             continue;
@@ -100,7 +101,7 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
                 }
             },
         };
-        let mut warm = Warm::new(gpu, &loaded);
+        let mut warm = Warm::new(gpu, &loaded, cache.shared());
         for step in list {
             if context.interrupt.requested() {
                 break 'all;

@@ -10,7 +10,7 @@ use lucerna::{
     Error, Result,
     gpu::Gpu,
     image,
-    scene::{Environment, Limits, Pose, environment},
+    scene::{Environment, Pose},
     techniques::fiv::{Light, Occluder, Occluders, Plan, Settings, Sky, Stored},
 };
 use serde::{Deserialize, Serialize};
@@ -46,7 +46,7 @@ pub struct PrecomputeArgs {
     #[arg(long, value_name = "METRES", value_parser = positive)]
     pub unit: Option<f64>,
 
-    /// The .hdr or .exr environment [default: that of the first scene that has one]
+    /// The .hdr or .exr environment, or a built-in one (point, area, areas, grove) [default: that of the first scene that has one]
     #[arg(long, alias = "env", value_name = "FILE")]
     pub environment: Option<PathBuf>,
 
@@ -168,7 +168,7 @@ fn load(args: &PrecomputeArgs, settings: &Settings, console: Console) -> Result<
     let options = source::in_unit(args.unit);
     let mut environment = match &args.environment {
         Some(path) => {
-            let (environment, notes) = environment::load(path, &Limits::default())?;
+            let (environment, notes) = source::environment(path)?;
             notes.iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
             Some(environment)
         }

@@ -5,7 +5,7 @@ use glam::{Quat, Vec2, Vec3, vec2, vec3};
 use std::f32::consts::TAU;
 
 /// Leaves around each tip.
-const LEAVES: usize = 24;
+const LEAVES: usize = 48;
 
 struct Limb {
     from: Vec3,

@@ -1,6 +1,7 @@
 //! What the results of an experiment mean: functions that turn them into tables, plots and images.
 
 mod compare;
+mod fiv;
 mod igi;
 mod isr;
 mod tonemap;
@@ -14,8 +15,13 @@ use crate::{config, report::Page};
 pub type Analysis = fn(&Results, &mut Page) -> Result<()>;
 
 /// All analyses, by the name that a file gives.
-const ANALYSES: &[(&str, Analysis)] =
-    &[("compare", compare::analyse), ("igi", igi::analyse), ("isr", isr::analyse), ("tonemap", tonemap::analyse)];
+const ANALYSES: &[(&str, Analysis)] = &[
+    ("compare", compare::analyse),
+    ("fiv", fiv::analyse),
+    ("igi", igi::analyse),
+    ("isr", isr::analyse),
+    ("tonemap", tonemap::analyse),
+];
 
 /// Finds an analysis.
 ///

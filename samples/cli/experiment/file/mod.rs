@@ -45,11 +45,14 @@ use crate::{
     args::Size,
     config,
     framing::DefaultLight,
+    ground::GroundOptions,
     lights::{Point, Sun},
+    source,
 };
 
 /// The experiments that come with the program: name and text.
 pub const BUILTIN: &[(&str, &str)] = &[
+    ("fiv", include_str!("../../../experiments/fiv.toml")),
     ("igi", include_str!("../../../experiments/igi.toml")),
     ("isr", include_str!("../../../experiments/isr.toml")),
     ("smoke", include_str!("../../../experiments/smoke.toml")),
@@ -109,7 +112,10 @@ pub struct Scene {
     pub group: String,
     #[serde(default)]
     pub if_missing: IfMissing,
+    /// A file, or the name of a built-in one.
     pub environment: Option<String>,
+    /// Puts the scene on a ground.
+    pub ground: Option<GroundOptions>,
     /// Whether there is light from all around; `false` takes it away, and leaves the lights.
     #[serde(default = "yes")]
     pub sky: bool,
@@ -150,6 +156,17 @@ fn yes() -> bool {
 
 fn one() -> u64 {
     1
+}
+
+impl Scene {
+    /// Files that must be there.
+    pub fn files(&self) -> impl Iterator<Item = String> {
+        let environment = self.environment.iter().filter(|name| !source::is_built_in_environment(Path::new(name)));
+        let files = [&self.file, &self.image, &self.list].into_iter().flatten().chain(environment);
+        let files = files.chain(self.cameras.iter().filter(|camera| camera.ends_with(".toml"))).cloned();
+        let beside = self.ground.iter().flat_map(GroundOptions::files).map(|path| path.to_string_lossy().into_owned());
+        files.chain(beside)
+    }
 }
 
 /// Techniques are what is examined, references what they are held against.

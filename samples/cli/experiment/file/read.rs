@@ -170,10 +170,11 @@ fn what_it_is(scene: &Scene) -> Result<()> {
     }
     let views = !scene.cameras.is_empty() || scene.list.is_some() || scene.random > 0 || scene.recorded;
     let lights = !scene.light.is_empty() || scene.sun.is_some() || scene.environment.is_some();
-    if scene.image.is_some() && (views || lights || scene.unit.is_some() || !scene.sizes.is_empty()) {
+    let changed = scene.unit.is_some() || scene.ground.is_some() || !scene.sizes.is_empty();
+    if scene.image.is_some() && (views || lights || changed) {
         let what = format!("scene '{name}' is an image, which has its own light, view and size");
         return Err(
-            Error::input(what).help("Leave out unit, cameras, list, recorded, random, light, sun, environment, sizes")
+            Error::input(what).help("Leave out unit, ground, cameras, list, recorded, random, light, sun, environment, sizes")
         );
     }
     for size in &scene.sizes {

@@ -1,0 +1,96 @@
+//! Fullsphere irradiance vectors: tables 2 to 4, 17, 18 and figures 18 to 27 of Michael's thesis (sections 5.2 and 5.4).
+//!
+//! Scenes and techniques are known by their names: [`paper`] says which of them stands for which figure. Techniques named
+//! `32x17x15` are sets of samples; the reference is `brute force`. Errors are those of the irradiance of the ground seen from straight above
+//! without what stands on it (view [`GROUND`]).
+
+mod images;
+mod paper;
+mod perceived;
+mod tables;
+
+use lucerna::{Result, measure::Measure};
+
+use crate::{
+    experiment::{
+        kinds::Times,
+        results::{Done, Layer, Results},
+    },
+    report::{Cell, Page},
+};
+
+/// The view of the ground without what stands on it.
+const GROUND: &str = "ground";
+/// The view with it.
+const FRONT: &str = "front";
+const TRUTH: &str = "brute force";
+const UNSHADOWED: &str = "unshadowed";
+/// The default set of samples.
+const DEFAULT: &str = "64x33x30";
+/// The set of table 3.
+const DENSE: &str = "128x65x30";
+/// Passes of the technique itself.
+const PASSES: &str = "fiv.";
+
+pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
+    let lab = Lab { results };
+    page.add(tables::errors(&lab)?);
+    page.add(images::figures(&lab)?);
+    page.add(tables::precompute(&lab)?);
+    page.add(tables::frames(&lab)?);
+    page.add(tables::independence(&lab)?);
+    page.add(perceived::tables(&lab)?);
+    page.add(tables::methods(&lab)?);
+    Ok(())
+}
+
+/// Results with what all parts ask of them.
+struct Lab<'a> {
+    results: &'a Results,
+}
+
+impl<'a> Lab<'a> {
+    fn run(&self, scene: &str, view: &str, method: &str) -> Option<&'a Done> {
+        self.results.runs.iter().find(|run| run.scene == scene && run.view == view && run.method == method)
+    }
+
+    /// The run of a technique in the first view of a scene that it has.
+    fn any(&self, scene: &str, method: &str) -> Option<&'a Done> {
+        self.results.runs.iter().find(|run| run.scene == scene && run.method == method)
+    }
+
+    fn times(&self, run: Option<&Done>) -> Result<Option<Times>> {
+        run.map(|run| self.results.times(run)).transpose()
+    }
+
+    /// NRMSE (eq. 17) of the irradiance of a view.
+    fn nrmse(&self, scene: &str, view: &str, method: &str) -> Result<Option<f64>> {
+        let Some((truth, run)) = self.run(scene, view, TRUTH).zip(self.run(scene, view, method)) else {
+            return Ok(None);
+        };
+        let value =
+            self.results.measure(Measure::Nrmse, Layer(truth, "irradiance"), Layer(run, "irradiance"), None)?;
+        Ok(Some(value).filter(|value| value.is_finite()))
+    }
+
+    /// Device and driver, for the captions of tables.
+    fn device(&self) -> String {
+        let fact = |name: &str| self.results.facts.iter().find(|(known, _)| known == name).map(|(_, value)| value.as_str());
+        format!("{}, {}", fact("Device").unwrap_or("unknown device"), fact("Driver").unwrap_or("unknown driver"))
+    }
+
+    fn caption(&self, text: &str) -> String {
+        format!("{text} ({}; {})", self.results.experiment.size, self.device())
+    }
+}
+
+/// Milliseconds of the technique's own passes; of the frame where passes have no clock.
+fn own(times: &Times) -> Option<f64> {
+    let sum = times.of_passes(PASSES);
+    if sum > 0.0 { Some(sum) } else { times.frame() }
+}
+
+/// Ours over theirs.
+fn over(ours: Option<f64>, paper: Option<f64>) -> Cell {
+    ours.zip(paper).map(|(ours, paper)| ours / paper).filter(|ratio| ratio.is_finite()).into()
+}

@@ -1,0 +1,185 @@
+//! Shadows from fullsphere irradiance vectors, and their brute force.
+
+use std::{path::PathBuf, time::Instant};
+
+use lucerna::{
+    Error, Result,
+    gpu::Gpu,
+    graph::Runner,
+    image::Precision,
+    scene::{Pose, Scene, resident::Resident},
+    techniques::fiv::{Fiv, Light, Method, Occluder, Occluders, PictureSettings, Plan, Settings, Sky, Stored},
+};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use super::{Job, Rendered, Warm, on_device, read};
+use crate::{
+    config,
+    experiment::{cache::Cache, digest::Digest, file::Changes},
+    shown::Shown,
+};
+
+/// What decides vectors.
+pub(super) const SOURCES: &[&str] = &[
+    "engine/techniques/fiv",
+    "engine/passes",
+    "engine/rays",
+    "engine/scene",
+    "shaders-glsl/common",
+    "shaders-glsl/fiv",
+    "shaders-glsl/lib",
+    "shaders-glsl/passes",
+    "shaders-glsl/rays",
+    "shaders-glsl/scene",
+];
+
+pub(super) fn settings(_paper: bool, changes: &Changes) -> Result<Value> {
+    let settings: PictureSettings = config::with(&PictureSettings::default(), changes)?;
+    settings.fiv.validate()?;
+    config::to_value(&settings)
+}
+
+/// What is kept of a scene for one set of vectors.
+struct Kept {
+    resident: Resident,
+    fiv: Fiv,
+    runner: Runner,
+    made: Settings,
+    facts: Vec<(String, f64)>,
+}
+
+/// Time of computing the vectors of one thing, beside their file.
+#[derive(Serialize, Deserialize)]
+struct Cost {
+    seconds: f64,
+}
+
+/// Settings without those that a picture can change.
+fn making(settings: &Settings) -> Settings {
+    let Settings { trilinear, partial, overlap, self_shadow, .. } = Settings::default();
+    Settings { trilinear, partial, overlap, self_shadow, ..settings.clone() }
+}
+
+pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
+    let settings: PictureSettings = read(job.settings)?;
+    let (scene, pose, folder) = (warm.scene, warm.pose, warm.folder.clone());
+    let making = making(&settings.fiv);
+    if warm.keep("fiv", |_, _, _| Ok(None::<Kept>))?.as_ref().is_none_or(|kept| kept.made != making) {
+        warm.forget("fiv");
+        let made = make(warm.gpu, scene, &making, folder, &|| job.interrupt.requested());
+        let made = match made {
+            Err(_) if job.interrupt.requested() => return Ok(None),
+            made => made?,
+        };
+        warm.keep("fiv", |_, _, _| Ok(Some(made)))?;
+    }
+    let Some(Kept { resident, fiv, runner, facts, .. }) = warm.keep("fiv", |_, _, _| Ok(None::<Kept>))? else {
+        return Ok(None);
+    };
+    let rendered = on_device(runner, job, "fiv", |graph| {
+        let handles = resident.frame_in(graph, scene, pose);
+        let view = job.view.fit_far(&handles.bounds());
+        let picture = fiv.picture(graph, scene, pose, &handles, &view, &settings)?;
+        Ok(Shown::new(picture.outputs.total).color("irradiance", picture.outputs.irradiance))
+    })?;
+    let facts = facts.clone();
+    Ok(rendered.map(|mut rendered| {
+        // Errors of a hundredth are looked at.
+        rendered.layers.layers.iter_mut().for_each(|layer| layer.precision = Precision::Full);
+        rendered.times.facts = facts;
+        rendered
+    }))
+}
+
+fn make(gpu: &Gpu, scene: &Scene, settings: &Settings, folder: PathBuf, stop: &dyn Fn() -> bool) -> Result<Kept> {
+    let resident = Resident::new(gpu, scene)?;
+    let (stored, seconds) = match settings.method {
+        Method::Vectors => vectors(gpu, scene, settings, folder, stop)?,
+        _ => (None, 0.0),
+    };
+    let fiv = Fiv::new(gpu, scene, &resident, settings, stored.as_ref(), |_, _| !stop())?;
+    let occluders = fiv.occluders();
+    let facts = vec![
+        ("seconds before".to_owned(), seconds),
+        ("bytes".to_owned(), if stored.is_some() { fiv.bytes() as f64 } else { 0.0 }),
+        ("things".to_owned(), occluders.placed.len() as f64),
+        ("kinds".to_owned(), occluders.kinds.len() as f64),
+        ("vertices".to_owned(), occluders.placed.iter().map(|p| vertices(scene, p.node)).sum::<usize>() as f64),
+        ("lights".to_owned(), fiv.light().lit.len() as f64),
+    ];
+    Ok(Kept { resident, fiv, runner: Runner::new(gpu), made: settings.clone(), facts })
+}
+
+fn vertices(scene: &Scene, node: u32) -> usize {
+    let mesh = scene.nodes[node as usize].mesh.and_then(|mesh| scene.meshes.get(mesh as usize));
+    mesh.map_or(0, |mesh| mesh.primitives.iter().map(|p| p.positions.len()).sum())
+}
+
+/// Vectors of all kinds, and the seconds that they cost when they were computed: each kind has a file in the folder of the report, so
+/// that scenes share them and a stopped experiment keeps them.
+fn vectors(
+    gpu: &Gpu,
+    scene: &Scene,
+    settings: &Settings,
+    folder: PathBuf,
+    stop: &dyn Fn() -> bool,
+) -> Result<(Option<Stored>, f64)> {
+    let Some(environment) = &scene.environment else { return Ok((None, 0.0)) };
+    let sky = Sky::new(Some(environment), settings.size)?;
+    let occluders = Occluders::of(scene, &Pose::rest(scene), settings.flat, settings.largest);
+    let plan = Plan::new(&environment.name, sky.hash(), &occluders.kinds, settings);
+    let mut whole = Stored::empty(plan.clone(), 0);
+    let (mut light, mut seconds) = (None, 0.0);
+    for (index, kind) in occluders.kinds.iter().enumerate() {
+        let alone = Plan { occluders: vec![plan.occluders[index].clone()], ..plan.clone() };
+        let name = name(gpu, &alone)?;
+        let (file, cost) = (folder.join(format!("{name}.fiv")), folder.join(format!("{name}.json")));
+        let (part, spent) = match known(&file, &cost, &alone) {
+            Some(known) => known,
+            None => {
+                let light = match &mut light {
+                    Some(light) => light,
+                    none => none.insert(Light::new(gpu, &sky)?),
+                };
+                let computed = compute(gpu, light, &alone, kind, stop)?;
+                std::fs::create_dir_all(&folder)
+                    .map_err(|e| Error::new(lucerna::ErrorKind::Output, "cannot be made").in_file(&folder).caused_by(e))?;
+                computed.0.write(&file, true)?;
+                let text = format!("{}\n", config::to_value(&Cost { seconds: computed.1 })?);
+                lucerna::image::write_atomic(&cost, text.as_bytes(), true)?;
+                computed
+            }
+        };
+        whole.push(&part.fivs);
+        seconds += spent;
+    }
+    Ok((Some(whole), seconds))
+}
+
+/// Of everything that decides vectors.
+fn name(gpu: &Gpu, plan: &Plan) -> Result<String> {
+    let about = gpu.describe();
+    let device = format!("{}, {} {}", about.device, about.driver, about.driver_info);
+    let text = json!([Cache::sources_of(SOURCES), device, config::to_value(plan)?]);
+    Ok(Digest::of(text.to_string().as_bytes()).hex())
+}
+
+fn known(file: &std::path::Path, cost: &std::path::Path, plan: &Plan) -> Option<(Stored, f64)> {
+    let cost: Cost = serde_json::from_str(&config::read_text(cost).ok()?).ok()?;
+    let stored = Stored::read(file).ok()?;
+    (stored.is_complete() && stored.plan.difference(plan).is_none()).then_some((stored, cost.seconds))
+}
+
+fn compute(gpu: &Gpu, light: &Light, plan: &Plan, kind: &Occluder, stop: &dyn Fn() -> bool) -> Result<(Stored, f64)> {
+    let begun = Instant::now();
+    let mut stored = Stored::empty(plan.clone(), 0);
+    plan.compute(gpu, light, std::slice::from_ref(kind), 0..plan.samples(), |_, new| {
+        stored.push(new);
+        Ok(!stop())
+    })?;
+    match stored.is_complete() {
+        true => Ok((stored, begun.elapsed().as_secs_f64())),
+        false => Err(Error::new(lucerna::ErrorKind::Runtime, "stopped while computing vectors")),
+    }
+}

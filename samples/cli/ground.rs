@@ -1,0 +1,151 @@
+//! `--ground`: the scene on a plain ground, as often as asked for, alone or in turns with others.
+
+use std::path::{Path, PathBuf};
+
+use lucerna::{
+    Result,
+    scene::{
+        Scene, builtin,
+        ground::{self, Ground},
+    },
+};
+use serde::{Deserialize, Serialize};
+
+use crate::{args::finite, args::positive, source};
+
+/// `--ground` and what belongs to it.
+#[derive(clap::Args, Clone, Debug, Default, PartialEq)]
+pub struct GroundArgs {
+    /// Put the scene on a plain ground, with cameras of its own: front, above, ground (which sees the ground alone)
+    #[arg(long, help_heading = "Ground")]
+    pub ground: bool,
+
+    #[command(flatten)]
+    pub options: GroundOptions,
+}
+
+/// How things stand on the ground, on a command line and in the file of an experiment.
+#[derive(clap::Args, Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GroundOptions {
+    /// So many of each [default: 1]
+    #[arg(long, value_name = "N", requires = "ground", help_heading = "Ground")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub copies: Option<u32>,
+
+    /// Another scene that stands there in turns with the first one: a file, or a built-in scene or thing (hare, queen, tree); may be given
+    /// more than once
+    #[arg(long, value_name = "SCENE", requires = "ground", help_heading = "Ground")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub beside: Vec<PathBuf>,
+
+    /// Make each thing so high, metres [default: as it is]
+    #[arg(long, value_name = "METRES", requires = "ground", value_parser = positive, help_heading = "Ground")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub height: Option<f64>,
+
+    /// The part of its height that is below the ground; below zero it floats [default: 0]
+    #[arg(long, value_name = "SHARE", requires = "ground", value_parser = finite, allow_negative_numbers = true, help_heading = "Ground")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sunk: Option<f64>,
+
+    /// Room between neighbours, in widths of the widest [default: 0.4]
+    #[arg(long, value_name = "WIDTHS", requires = "ground", value_parser = finite, allow_negative_numbers = true, help_heading = "Ground")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gap: Option<f64>,
+
+    /// Height of waves of the ground, in heights of the highest thing [default: 0]
+    #[arg(long, value_name = "HEIGHTS", requires = "ground", value_parser = finite, help_heading = "Ground")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub waves: Option<f64>,
+
+    /// Where the waves are in their period, 0 to 1 [default: 0]
+    #[arg(long, value_name = "SHARE", requires = "ground", value_parser = finite, help_heading = "Ground")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub phase: Option<f64>,
+}
+
+impl GroundArgs {
+    /// Puts a scene on the ground if asked to.
+    ///
+    /// # Errors
+    /// As [`GroundOptions::place`].
+    pub fn place(&self, scene: Scene, unit: Option<f64>) -> Result<Scene> {
+        if self.ground { self.options.place(scene, unit, |path| Ok(path.to_path_buf())) } else { Ok(scene) }
+    }
+}
+
+impl GroundOptions {
+    /// Puts a scene on the ground; `found` says where files are.
+    ///
+    /// # Errors
+    /// `Usage` for numbers out of range, `Input` for files that cannot be read and scenes without triangles.
+    pub fn place(&self, scene: Scene, unit: Option<f64>, found: impl Fn(&Path) -> Result<PathBuf>) -> Result<Scene> {
+        let defaults = Ground::default();
+        let number = |value: Option<f64>, default: f32| value.map_or(default, |value| value as f32);
+        let ground = Ground {
+            copies: self.copies.unwrap_or(defaults.copies),
+            height: self.height.map(|height| height as f32),
+            sunk: number(self.sunk, defaults.sunk),
+            gap: number(self.gap, defaults.gap),
+            waves: number(self.waves, defaults.waves),
+            phase: number(self.phase, defaults.phase),
+        };
+        let mut things = vec![scene];
+        for path in &self.beside {
+            let options = source::in_unit(unit);
+            let (thing, _) = match built_in(path) {
+                Some(name) => source::open(None, Some(name), &options)?,
+                None => source::open(Some(&found(path)?), None, &options)?,
+            };
+            things.push(thing);
+        }
+        ground::on_ground(&things, &ground)
+    }
+
+    /// Files that it needs.
+    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.beside.iter().filter(|path| built_in(path).is_none())
+    }
+
+    /// As options of a command line.
+    pub fn arguments(&self) -> Vec<String> {
+        let number = |name: &str, value: Option<f64>| value.map(|value| format!("--{name}={value}"));
+        let copies = self.copies.map(|copies| format!("--copies={copies}"));
+        let beside = self.beside.iter().map(|path| format!("--beside={}", path.display()));
+        let numbers = [
+            number("height", self.height),
+            number("sunk", self.sunk),
+            number("gap", self.gap),
+            number("waves", self.waves),
+            number("phase", self.phase),
+        ];
+        copies.into_iter().chain(beside).chain(numbers.into_iter().flatten()).collect()
+    }
+}
+
+/// The name of a built-in scene or thing.
+fn built_in(path: &Path) -> Option<&str> {
+    path.to_str().filter(|name| builtin::description(name).is_some())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn things_from_files_and_from_code_stand_in_turns() {
+        let options: GroundOptions =
+            serde_json::from_value(serde_json::json!({ "copies": 2, "beside": ["tree"], "height": 0.5 })).unwrap();
+        let hare = builtin::load("hare").unwrap();
+        let scene = options.place(hare, None, |path| Ok(path.to_path_buf())).unwrap();
+        let names: Vec<&str> = scene.nodes.iter().filter(|n| n.mesh.is_some()).map(|n| n.name.as_str()).collect();
+        assert_eq!(names, ["ground", "hare", "tree", "hare", "tree"]);
+        assert_eq!(options.arguments(), ["--copies=2", "--beside=tree", "--height=0.5"]);
+        assert_eq!(options.files().count(), 0);
+        let missing = GroundOptions { beside: vec!["no/such.obj".into()], ..options };
+        assert_eq!(missing.files().count(), 1);
+        let error = missing.place(builtin::load("hare").unwrap(), None, |p| Ok(p.to_path_buf())).unwrap_err();
+        assert_eq!(error.exit_code(), 3);
+    }
+}
