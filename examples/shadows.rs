@@ -7,7 +7,7 @@ use std::path::Path;
 use glam::Vec3;
 use lucerna::{
     Error, Result,
-    gpu::{Gpu, Options},
+    gpu::{Gpu, GpuOptions},
     graph::{Graph, Runner},
     image::{self, Layers, WriteOptions},
     scene::{Pose, View, builtin, ground, resident::Resident},
@@ -30,7 +30,7 @@ fn run() -> Result<()> {
     let mut scene = ground::on_ground(&things, &ground::Ground { copies: 2, ..Default::default() })?;
     scene.environment = Some(builtin::environment("area")?);
 
-    let gpu = Gpu::new(Options::default())?;
+    let gpu = Gpu::new(GpuOptions::default())?;
     let mut resident = Resident::new(&gpu, &scene)?;
     let settings = PictureSettings::default();
     // Computes the vectors. `Stored::read` takes them from a file instead.

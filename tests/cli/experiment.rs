@@ -300,3 +300,57 @@ fn a_program_that_fails_or_is_not_there_can_be_left_out() {
     assert!(json["warnings"][1].as_str().unwrap().contains("cornell/front pov"), "{}", json["warnings"]);
     run(&broken, &format!("{EXPERIMENT}{}", pov.replace("skip", "fail"))).expect(1, &["cornell/front pov", "broken"]);
 }
+
+#[test]
+fn vectors_are_computed_once_and_kept() {
+    let place = Place::new();
+    place.file(
+        r#"
+title = "Vectors"
+analysis = "fiv"
+size = "24x24"
+
+[[scene]]
+name = "1 bunny"
+builtin = "queen"
+ground = { height = 1.0 }
+environment = "area"
+cameras = ["ground"]
+
+[[scene]]
+name = "10 bunnies"
+builtin = "queen"
+ground = { height = 1.0, copies = 2, beside = ["hare"] }
+environment = "area"
+cameras = ["ground"]
+
+[[technique]]
+name = "32x17x15"
+kind = "fiv"
+settings = { "fiv.azimuths" = 8, "fiv.polars" = 5, "fiv.radii" = 4, "fiv.size" = 8 }
+layers = ["irradiance"]
+
+[[reference]]
+name = "brute force"
+kind = "fiv"
+settings = { "fiv.method" = "brute-force", "fiv.size" = 8 }
+layers = ["irradiance"]
+"#,
+    );
+    place.run("out", &[]).expect(0, &["wrote"]);
+    // Two kinds of things in both scenes: two files of vectors, each with its cost.
+    let mut kept = fs::read_dir(place.path("out/shared")).unwrap().map(|e| e.unwrap().path()).collect::<Vec<_>>();
+    kept.sort();
+    let ending = |end: &str| kept.iter().filter(|path| path.extension().is_some_and(|e| e == end)).count();
+    assert_eq!((ending("fiv"), ending("json")), (2, 2));
+    let report = fs::read_to_string(place.path("out/report.json")).unwrap();
+    assert!(report.contains("NRMSE") && report.contains("unshadowed"), "{report}");
+    // Without the pictures they are made from the same vectors, which are not written again.
+    let written = |path: &PathBuf| fs::metadata(path).unwrap().modified().unwrap();
+    let before: Vec<_> = kept.iter().map(written).collect();
+    let first = contents(&place.path("out"));
+    fs::remove_dir_all(place.path("out/runs")).unwrap();
+    place.run("out", &[]).expect(0, &["wrote"]);
+    assert_eq!(kept.iter().map(written).collect::<Vec<_>>(), before);
+    assert!(contents(&place.path("out")) == first);
+}

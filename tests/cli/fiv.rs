@@ -98,3 +98,23 @@ fn pictures_from_files_are_those_without_and_can_be_made_again() {
     let other = environment(folder.path(), "other.exr", 2.0);
     picture(&other, &at("c.exr"), &["--vectors", &vectors]).expect(3, &["v.fiv", "other light"]);
 }
+
+#[test]
+fn things_stand_on_a_ground_and_the_picture_can_be_made_again() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let base = ["render", "--builtin", "queen", "--environment", "area", "--size", "24x24", "-q"];
+    fiv(&[&base[..], &["--copies", "3", "-o", "x.exr"]].concat()).expect(2, &["--ground"]);
+    let ground = ["--ground", "--copies", "3", "--beside", "hare", "--height", "0.5", "--sunk=-0.1", "--gap=0.2"];
+    fiv(&[&base[..], &ground, &SMALL, &["-o", &at("a.exr")]].concat()).expect(0, &[]);
+    lucerna(["rerun", &at("a.exr")]).expect(0, &["identical"]);
+    fiv(&[&base[..], &["--ground", "--sunk=7", "-o", &at("b.exr")]].concat()).expect(2, &["ground.sunk", "7"]);
+    // The camera over the ground sees the ground alone: all of one colour without shadows.
+    let open = ["--camera", "ground", "-D", "fiv.method=unshadowed", "-o", &at("c.exr")];
+    fiv(&[&base[..], &ground, &open].concat()).expect(0, &[]);
+    let pixels = image::read(at("c.exr"), &Default::default()).unwrap().main().unwrap().rgb_pixels().unwrap();
+    assert!(pixels[0][1] > 0.0 && pixels.iter().all(|p| (p[1] - pixels[0][1]).abs() < 1e-3 * pixels[0][1]));
+}

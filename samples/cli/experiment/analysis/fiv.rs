@@ -29,6 +29,8 @@ const UNSHADOWED: &str = "unshadowed";
 const DEFAULT: &str = "64x33x30";
 /// The set of table 3.
 const DENSE: &str = "128x65x30";
+/// Sets of samples, the densest first.
+const SETS: [&str; 5] = [paper::DENSEST, DENSE, DEFAULT, "64x33x15", "32x17x15"];
 /// Passes of the technique itself.
 const PASSES: &str = "fiv.";
 
@@ -52,6 +54,13 @@ struct Lab<'a> {
 impl<'a> Lab<'a> {
     fn run(&self, scene: &str, view: &str, method: &str) -> Option<&'a Done> {
         self.results.runs.iter().find(|run| run.scene == scene && run.view == view && run.method == method)
+    }
+
+    /// The technique, or the next coarser set of samples that there is: quick mode leaves the finer ones out.
+    fn nearest(&self, scene: &str, view: &str, wanted: &'static str) -> &'static str {
+        let from = SETS.iter().position(|set| *set == wanted);
+        let coarser = from.into_iter().flat_map(|from| &SETS[from..]);
+        coarser.copied().find(|set| self.run(scene, view, set).is_some()).unwrap_or(wanted)
     }
 
     /// The run of a technique in the first view of a scene that it has.

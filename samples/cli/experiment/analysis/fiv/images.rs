@@ -68,7 +68,8 @@ pub(super) fn figures(lab: &Lab<'_>) -> Result<Section> {
 /// Figure 24: without, with, and the shadow alone.
 fn own_shadow(lab: &Lab<'_>) -> Result<Option<Comparison>> {
     let Some((scene, without, with)) = ["bunny", "hare"].into_iter().find_map(|scene| {
-        let (without, with) = lab.run(scene, FRONT, "no self-shadow").zip(lab.run(scene, FRONT, DEFAULT))?;
+        let with = lab.run(scene, FRONT, lab.nearest(scene, FRONT, DEFAULT));
+        let (without, with) = lab.run(scene, FRONT, "no self-shadow").zip(with)?;
         Some((scene, without, with))
     }) else {
         return Ok(None);

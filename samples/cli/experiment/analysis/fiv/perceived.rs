@@ -7,7 +7,7 @@ use lucerna::{
     techniques::tonemap::Settings,
 };
 
-use super::{DEFAULT, GROUND, Lab, TRUTH, paper};
+use super::{GROUND, Lab, TRUTH, paper};
 use crate::{
     experiment::results::{Done, Layer},
     report::{Section, Table},
@@ -36,7 +36,7 @@ pub(super) fn tables(lab: &Lab<'_>) -> Result<Section> {
     let columns = ["environment", "samples", "before (thesis)", "before", "after (thesis)", "after"];
     let mut table = Table::new("table-18", lab.caption("Table 18: VDP (%) by environment, a bunny"), columns);
     for (name, scene, before, after) in paper::TABLE_18 {
-        let samples = if lab.run(scene, GROUND, paper::DENSEST).is_some() { paper::DENSEST } else { DEFAULT };
+        let samples = lab.nearest(scene, GROUND, paper::DENSEST);
         if let Some([ours_before, ours_after]) = seen(lab, scene, samples)? {
             let ours = [ours_before.into(), after.into(), ours_after.into()];
             table.push([name.into(), samples.into(), before.into()].into_iter().chain(ours));
