@@ -51,6 +51,10 @@ fn run() -> Result<()> {
     let total = graph.read_image(picture.outputs.total);
     let pixels = Runner::new(&gpu).run(graph)?.image(total).to_f32();
     let data = pixels.into_iter().flat_map(|[r, g, b, _]| [r, g, b]).collect();
-    image::write(Path::new(&output), &Layers::rgb(640, 480, data), &WriteOptions { overwrite: true, ..Default::default() })?;
+    image::write(
+        Path::new(&output),
+        &Layers::rgb(640, 480, data),
+        &WriteOptions { overwrite: true, ..Default::default() },
+    )?;
     Ok(())
 }

@@ -183,8 +183,7 @@ fn serve(command: Command, console: Console) -> Result<()> {
                 all.map(|&name| (name, builtin::description(name).unwrap_or_default())).collect();
             if json {
                 let kind = |name: &str| if builtin::THINGS.contains(&name) { "thing" } else { "scene" };
-                let entry =
-                    |(name, text): &(&str, &str)| serde_json::json!({ "name": name, "kind": kind(name), "description": text });
+                let entry = |(name, text): &(&str, &str)| serde_json::json!({ "name": name, "kind": kind(name), "description": text });
                 return console::print_json(&list.iter().map(entry).collect());
             }
             let width = list.iter().map(|(name, _)| name.len()).max().unwrap_or(0);

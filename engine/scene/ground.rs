@@ -228,7 +228,8 @@ fn stand(out: &mut Scene, thing: &Scene, base: &Base, (number, first): (usize, b
 fn cameras(out: &mut Scene, spread: f32, height: f32, size: f32) {
     let mut camera = |name: &str, projection: Projection, eye: Vec3, back: Vec3, up: Vec3| {
         let right = up.cross(back).normalize();
-        let world = Mat4::from_cols(right.extend(0.0), back.cross(right).extend(0.0), back.extend(0.0), eye.extend(1.0));
+        let world =
+            Mat4::from_cols(right.extend(0.0), back.cross(right).extend(0.0), back.extend(0.0), eye.extend(1.0));
         out.cameras.push(Camera { name: name.into(), projection });
         let camera = Some(out.cameras.len() as u32 - 1);
         let (scale, rotation, translation) = world.to_scale_rotation_translation();

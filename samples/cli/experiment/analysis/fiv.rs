@@ -77,14 +77,14 @@ impl<'a> Lab<'a> {
         let Some((truth, run)) = self.run(scene, view, TRUTH).zip(self.run(scene, view, method)) else {
             return Ok(None);
         };
-        let value =
-            self.results.measure(Measure::Nrmse, Layer(truth, "irradiance"), Layer(run, "irradiance"), None)?;
+        let value = self.results.measure(Measure::Nrmse, Layer(truth, "irradiance"), Layer(run, "irradiance"), None)?;
         Ok(Some(value).filter(|value| value.is_finite()))
     }
 
     /// Device and driver, for the captions of tables.
     fn device(&self) -> String {
-        let fact = |name: &str| self.results.facts.iter().find(|(known, _)| known == name).map(|(_, value)| value.as_str());
+        let fact =
+            |name: &str| self.results.facts.iter().find(|(known, _)| known == name).map(|(_, value)| value.as_str());
         format!("{}, {}", fact("Device").unwrap_or("unknown device"), fact("Driver").unwrap_or("unknown driver"))
     }
 

@@ -173,9 +173,8 @@ fn what_it_is(scene: &Scene) -> Result<()> {
     let changed = scene.unit.is_some() || scene.ground.is_some() || !scene.sizes.is_empty();
     if scene.image.is_some() && (views || lights || changed) {
         let what = format!("scene '{name}' is an image, which has its own light, view and size");
-        return Err(
-            Error::input(what).help("Leave out unit, ground, cameras, list, recorded, random, light, sun, environment, sizes")
-        );
+        return Err(Error::input(what)
+            .help("Leave out unit, ground, cameras, list, recorded, random, light, sun, environment, sizes"));
     }
     for size in &scene.sizes {
         size.parse::<Size>().map_err(|what| Error::input(format!("scene '{name}': sizes: {what}")))?;

@@ -143,8 +143,9 @@ fn vectors(
                     none => none.insert(Light::new(gpu, &sky)?),
                 };
                 let computed = compute(gpu, light, &alone, kind, stop)?;
-                std::fs::create_dir_all(&folder)
-                    .map_err(|e| Error::new(lucerna::ErrorKind::Output, "cannot be made").in_file(&folder).caused_by(e))?;
+                std::fs::create_dir_all(&folder).map_err(|e| {
+                    Error::new(lucerna::ErrorKind::Output, "cannot be made").in_file(&folder).caused_by(e)
+                })?;
                 computed.0.write(&file, true)?;
                 let text = format!("{}\n", config::to_value(&Cost { seconds: computed.1 })?);
                 lucerna::image::write_atomic(&cost, text.as_bytes(), true)?;

@@ -51,9 +51,10 @@ pub(super) fn figures(lab: &Lab<'_>) -> Result<Section> {
         let runs: Vec<&Done> = lab.results.at((scene, view)).collect();
         let Some(first) = runs.iter().find(|run| run.method == TRUTH).or(runs.first()).copied() else { continue };
         let picture = lab.results.picture(Layer(first, ""))?;
-        let mut set = Comparison::new(format!("{scene}-{view}"), format!("{caption} ({view})"), picture.width, picture.height)
-            .exposure(lab.results.exposure(first)?)
-            .with(first.label(), picture.pixels);
+        let mut set =
+            Comparison::new(format!("{scene}-{view}"), format!("{caption} ({view})"), picture.width, picture.height)
+                .exposure(lab.results.exposure(first)?)
+                .with(first.label(), picture.pixels);
         for run in runs.iter().filter(|run| run.key != first.key) {
             set = set.with(run.label(), lab.results.picture(Layer(run, ""))?.pixels);
         }
@@ -75,7 +76,8 @@ fn own_shadow(lab: &Lab<'_>) -> Result<Option<Comparison>> {
         return Ok(None);
     };
     let (open, shaded) = (lab.results.picture(Layer(without, ""))?, lab.results.picture(Layer(with, ""))?);
-    let alone = open.pixels.iter().zip(&shaded.pixels).map(|(a, b)| [0, 1, 2].map(|c| (a[c] - b[c]).max(0.0))).collect();
+    let alone =
+        open.pixels.iter().zip(&shaded.pixels).map(|(a, b)| [0, 1, 2].map(|c| (a[c] - b[c]).max(0.0))).collect();
     let caption = format!("Figure 24: the shadow of the {scene} on itself");
     let mut set = Comparison::new("own-shadow", caption, open.width, open.height)
         .exposure(lab.results.exposure(with)?)

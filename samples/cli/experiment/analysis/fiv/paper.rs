@@ -83,8 +83,26 @@ pub(super) const TABLE_18: [(&str, &str, f64, f64); 4] = [
 
 /// Table 4: method, frequencies of the environment, what may move, memory, frames a second.
 pub(super) const TABLE_4: [[&str; 5]; 4] = [
-    ["precomputed radiance transfer (Sloan et al.)", "low", "rigid bodies", "above 1 GB", "about 100 for 40,000 vertices"],
-    ["precomputed shadow fields (Zhou et al.)", "low; high if nothing moves", "rigid bodies", "50 to 500 MB", "0.1 to 20"],
+    [
+        "precomputed radiance transfer (Sloan et al.)",
+        "low",
+        "rigid bodies",
+        "above 1 GB",
+        "about 100 for 40,000 vertices",
+    ],
+    [
+        "precomputed shadow fields (Zhou et al.)",
+        "low; high if nothing moves",
+        "rigid bodies",
+        "50 to 500 MB",
+        "0.1 to 20",
+    ],
     ["spheres in place of bodies (Ren et al.)", "low", "everything", "not said", "about 25 for 2, 12 for 8 bodies"],
-    ["irradiance vectors (the thesis)", "all", "receivers; occluders without turning", "below 1 to 10 MB", "112 for 1, 35 for 30 bodies"],
+    [
+        "irradiance vectors (the thesis)",
+        "all",
+        "receivers; occluders without turning",
+        "below 1 to 10 MB",
+        "112 for 1, 35 for 30 bodies",
+    ],
 ];

@@ -2,7 +2,7 @@
 
 use lucerna::Result;
 
-use super::{DEFAULT, DENSE, FRONT, GROUND, Lab, TRUTH, UNSHADOWED, own, over, paper};
+use super::{DEFAULT, DENSE, FRONT, GROUND, Lab, TRUTH, UNSHADOWED, over, own, paper};
 use crate::report::{Axis, Cell, Plot, Section, Table};
 
 /// Bytes of a megabyte, as the thesis counts.
@@ -18,10 +18,21 @@ pub(super) fn errors(lab: &Lab<'_>) -> Result<Section> {
          of leaving shadows out. The thesis says neither its views nor, but for figure 19, which environment was used; where its \
          Eucalyptus Grove is not at hand, a grove made by code and a photographed forest stand in.",
     );
-    let columns = ["figure", "case", "technique", "thesis", "ours", "ours / thesis", "verdict", "unshadowed", "with the things, from the front"];
+    let columns = [
+        "figure",
+        "case",
+        "technique",
+        "thesis",
+        "ours",
+        "ours / thesis",
+        "verdict",
+        "unshadowed",
+        "with the things, from the front",
+    ];
     let mut table = Table::new("errors", lab.caption("NRMSE against brute force"), columns);
     for case in paper::CASES {
-        let technique = if case.figure == "18" { case.technique } else { lab.nearest(case.scene, GROUND, case.technique) };
+        let technique =
+            if case.figure == "18" { case.technique } else { lab.nearest(case.scene, GROUND, case.technique) };
         let Some(ours) = lab.nrmse(case.scene, GROUND, technique)? else { continue };
         let why = paper::REASONS.iter().find(|(scene, _)| *scene == case.scene).map_or("above", |(_, why)| why);
         table.push([
@@ -37,7 +48,8 @@ pub(super) fn errors(lab: &Lab<'_>) -> Result<Section> {
         ]);
     }
     section.add(table);
-    let mut all = Table::new("errors-all", lab.caption("NRMSE of every technique"), ["scene", "view", "technique", "NRMSE"]);
+    let mut all =
+        Table::new("errors-all", lab.caption("NRMSE of every technique"), ["scene", "view", "technique", "NRMSE"]);
     for run in lab.results.runs.iter().filter(|run| run.method != TRUTH) {
         if let Some(value) = lab.nrmse(&run.scene, &run.view, &run.method)? {
             all.push([run.scene.clone().into(), run.view.clone().into(), run.label().into(), value.into()]);
@@ -166,7 +178,8 @@ pub(super) fn independence(lab: &Lab<'_>) -> Result<Section> {
 /// Table 4.
 pub(super) fn methods(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("Table 4: other methods");
-    section.text("As the thesis has them, with ours in the last row. Times of other machines are no measure of methods.");
+    section
+        .text("As the thesis has them, with ours in the last row. Times of other machines are no measure of methods.");
     let columns = ["method", "environment's frequencies", "what may move", "memory", "frames a second"];
     let mut table = Table::new("table-4", lab.caption("Table 4"), columns).timed();
     for row in paper::TABLE_4 {
@@ -180,7 +193,10 @@ pub(super) fn methods(lab: &Lab<'_>) -> Result<Section> {
         Ok(speed(scene)?.map(|fps| format!("{fps:.0} for {things}")))
     };
     let speeds: Vec<String> =
-        [said("1 bunny", 1)?, said("15 bunnies and trees", 30)?, said("30 bunnies and trees", 60)?].into_iter().flatten().collect();
+        [said("1 bunny", 1)?, said("15 bunnies and trees", 30)?, said("30 bunnies and trees", 60)?]
+            .into_iter()
+            .flatten()
+            .collect();
     table.push([
         "irradiance vectors (ours)".into(),
         "all".into(),
