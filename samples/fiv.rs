@@ -117,7 +117,8 @@ fn compose(
 ) -> Result<Shown> {
     let scene = resident.frame_in(graph, input.scene, input.pose);
     let view = input.view.fit_far(&scene.bounds());
-    let picture = fiv.picture(graph, input.scene, input.pose, &scene, &view, settings)?;
+    let settings = PictureSettings { fiv: settings.fiv.after(input.seconds), ..settings.clone() };
+    let picture = fiv.picture(graph, input.scene, input.pose, &scene, &view, &settings)?;
     let shown = Shown::new(picture.outputs.total).color("irradiance", picture.outputs.irradiance);
     let notes = [resident.notes(), fiv.notes(), &picture.notes].concat();
     Ok(gbuffer_layers::add(shown, &picture.gbuffer, &view).seen_by(view).noting(notes))

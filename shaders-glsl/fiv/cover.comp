@@ -9,15 +9,15 @@
 layout(local_size_x = 64) in;
 
 layout(binding = 0, scalar) readonly buffer Texels { FivTexel texels[]; };
-layout(binding = 1, scalar) readonly buffer Points { vec3 points[]; }; // seen from the centre of the occluder, metres
+layout(binding = 1, scalar) readonly buffer Points { FivPoint points[]; };
 layout(binding = 2, scalar) writeonly buffer Partials { float partials[]; }; // ten for each point and chunk
+layout(binding = 3, scalar) readonly buffer Turns { FivTurn turns[]; };
 
 layout(push_constant, scalar) uniform Push {
     uint first;   // point
     uint size;    // texels of the environment along an edge
     uint split;   // rays along the edge of a texel
     uint tiles;   // of a chunk
-    float radius; // of the bounding sphere around the origin, metres
 };
 
 shared vec3 sums[3][64];
@@ -26,7 +26,10 @@ shared float covered[64];
 void main() {
     uint lane = gl_LocalInvocationID.x;
     uint side = size * split, row = side / 8u;
-    vec3 origin = points[first + gl_WorkGroupID.x];
+    vec3 origin = points[first + gl_WorkGroupID.x].at;
+    FivTurn turn = turns[points[first + gl_WorkGroupID.x].turn];
+    float radius = turn.radius;
+    vec3 start = turn.centre + turn.geometry_from_world * origin;
     float rho2 = dot(origin, origin), radius2 = radius * radius;
     float share = 1.0 / float(split * split);
     vec3 x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
@@ -40,7 +43,7 @@ void main() {
         // Only what passes the bounding sphere.
         bool near = rho2 <= radius2 || (along > 0.0 && along * along >= (rho2 - radius2) * squared);
         if (!near) continue;
-        Ray ray = Ray(origin, 0.0, direction, 1.01 * (sqrt(rho2) + radius));
+        Ray ray = Ray(start, 0.0, turn.geometry_from_world * direction, 1.01 * (sqrt(rho2) + radius));
         if (!trace_any(ray, TRACE_SHADOW, at.x + side * (at.y + side * face))) continue;
         FivTexel t = texels[(face * size + at.y / split) * size + at.x / split];
         x += t.radiance * (t.area.x * share);

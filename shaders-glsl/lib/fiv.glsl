@@ -22,6 +22,19 @@ struct FivOccluder {
     float steps;    // spheres for each factor of e of the radius
 };
 
+// A place from which an occluder is looked at.
+struct FivPoint {
+    vec3 at;   // seen from the centre of the occluder, metres, world axes
+    uint turn; // number of its FivTurn
+};
+
+// How an occluder stands against the geometry that rays are traced through.
+struct FivTurn {
+    mat3 geometry_from_world;
+    vec3 centre;  // of the occluder in the geometry, metres
+    float radius; // of its bounding sphere, metres, world axes
+};
+
 const uint FIV_FLOATS = 9u; // export
 // Stands in the first float of a vector whose sample lies inside the occluder.
 const float FIV_INSIDE = 1e38; // export

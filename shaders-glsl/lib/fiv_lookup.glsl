@@ -1,32 +1,51 @@
-// Looking up stored vectors. Needs a buffer `float fivs[]`. Include lib/fiv.glsl before. Twin: reference::fiv::Set.
+// Looking up stored vectors. Needs a buffer `float fivs[]`, unless FIV_NO_VECTORS is defined. Include lib/fiv.glsl before. Twin:
+// reference::fiv::Set.
 #ifndef LIB_FIV_LOOKUP
 #define LIB_FIV_LOOKUP
 
-// normal · FIV of what occluder `o` hides, seen from where its centre lies at `offset` (metres): trilinear between the eight nearest
-// samples, or the nearest one. Those inside of the occluder are left out; w: the share of the weight that the others have.
-vec4 fiv_dot(FivOccluder o, vec3 offset, vec3 normal, bool trilinear) {
-    float rho = length(offset);
-    float azimuth = atan(offset.x, -offset.z) * (0.5 / FIV_PI);
-    float a = (azimuth - floor(azimuth)) * float(o.azimuths);
-    float p = atan(length(offset.xz), offset.y) * (float(o.polars - 1u) / FIV_PI);
-    float r = clamp(log(max(rho, o.nearest) / o.nearest) * o.steps, 0.0, float(o.radii - 1u));
+// The eight nearest samples of an occluder.
+struct FivCell {
+    uvec3 at;  // azimuth, polar angle and sphere of the first
+    vec3 part; // of the way to the next in each
+};
+
+// Where the centre of the occluder lies among its samples, `offset` (metres) from the receiver; not trilinear: at the nearest.
+FivCell fiv_cell(FivOccluder o, vec3 offset, bool trilinear) {
+    precise float azimuth = atan(offset.x, -offset.z) * (0.5 / FIV_PI);
+    precise float a = (azimuth - floor(azimuth)) * float(o.azimuths);
+    precise float p = atan(length(offset.xz), offset.y) * (float(o.polars - 1u) / FIV_PI);
+    precise float r = clamp(log(max(length(offset), o.nearest) / o.nearest) * o.steps, 0.0, float(o.radii - 1u));
     if (!trilinear) {
         a = floor(a + 0.5);
         p = floor(p + 0.5);
         r = floor(r + 0.5);
     }
-    uint a0 = min(uint(a), o.azimuths - 1u), p0 = min(uint(p), o.polars - 2u), r0 = min(uint(r), o.radii - 2u);
+    uvec3 at = uvec3(min(uint(a), o.azimuths - 1u), min(uint(p), o.polars - 2u), min(uint(r), o.radii - 2u));
     // Rounding up at the seam is the whole way to the next sample.
-    vec3 part = clamp(vec3(a - float(a0), p - float(p0), r - float(r0)), 0.0, 1.0);
+    return FivCell(at, clamp(vec3(a, p, r) - vec3(at), 0.0, 1.0));
+}
+
+// Weight of the k-th sample of the cell, and its number among those of the occluder.
+float fiv_corner(FivOccluder o, FivCell cell, uint k, out uint number) {
+    uvec3 step = uvec3(k & 1u, k >> 1u & 1u, k >> 2u);
+    vec3 weights = mix(1.0 - cell.part, cell.part, vec3(step));
+    uint column = cell.at.x + step.x;
+    if (column >= o.azimuths) column = 0u;
+    number = ((cell.at.z + step.z) * o.polars + cell.at.y + step.y) * o.azimuths + column;
+    return weights.x * weights.y * weights.z;
+}
+
+#ifndef FIV_NO_VECTORS
+// normal · FIV of what occluder `o` hides, seen from where its centre lies at `offset` (metres): trilinear between the eight nearest
+// samples, or the nearest one. Those inside of the occluder are left out; w: the share of the weight that the others have.
+vec4 fiv_dot(FivOccluder o, vec3 offset, vec3 normal, bool trilinear) {
+    FivCell cell = fiv_cell(o, offset, trilinear);
     vec4 sum = vec4(0.0);
     for (uint k = 0u; k < 8u; ++k) {
-        uvec3 step = uvec3(k & 1u, k >> 1u & 1u, k >> 2u);
-        vec3 weights = mix(1.0 - part, part, vec3(step));
-        float weight = weights.x * weights.y * weights.z;
+        uint number;
+        float weight = fiv_corner(o, cell, k, number);
         if (weight <= 0.0) continue;
-        uint column = a0 + step.x;
-        if (column >= o.azimuths) column = 0u;
-        uint at = o.first + FIV_FLOATS * (((r0 + step.z) * o.polars + p0 + step.y) * o.azimuths + column);
+        uint at = o.first + FIV_FLOATS * number;
         vec3 x = vec3(fivs[at], fivs[at + 1u], fivs[at + 2u]);
         if (x.x >= FIV_INSIDE) continue;
         vec3 y = vec3(fivs[at + 3u], fivs[at + 4u], fivs[at + 5u]);
@@ -35,9 +54,10 @@ vec4 fiv_dot(FivOccluder o, vec3 offset, vec3 normal, bool trilinear) {
     }
     if (sum.w > 0.0) sum.rgb /= sum.w;
     // Beyond the last sphere what is hidden shrinks with the solid angle.
-    float beyond = min(o.farthest / max(rho, 1e-30), 1.0);
+    float beyond = min(o.farthest / max(length(offset), 1e-30), 1.0);
     return vec4(sum.rgb * (beyond * beyond), sum.w);
 }
+#endif
 
 // Area that two discs have in common: radii and distance of the centres. Twin: reference::fiv::lens.
 float lens_area(float r1, float r2, float d) {

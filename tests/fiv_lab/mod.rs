@@ -158,6 +158,15 @@ impl<'a> Studio<'a> {
         (irradiance, total)
     }
 
+    /// Why a picture at rest is refused.
+    pub fn refused(&mut self, view: &View, settings: &Settings) -> lucerna::Error {
+        let mut graph = Graph::new("fiv");
+        let pose = Pose::rest(self.scene);
+        let handles = self.resident.frame_in(&mut graph, self.scene, &pose);
+        let all = PictureSettings { fiv: settings.clone(), ..Default::default() };
+        self.fiv.picture(&mut graph, self.scene, &pose, &handles, view, &all).unwrap_err()
+    }
+
     /// Irradiance of every pixel at rest.
     pub fn irradiance(&mut self, view: &View, settings: &Settings) -> Vec<Vec3> {
         self.shot(&Pose::rest(self.scene), view, settings).0

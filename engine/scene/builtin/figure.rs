@@ -122,7 +122,7 @@ fn spin(node: u32, (axis, start): (Vec3, f32), turns: i32, seconds: f32) -> Chan
 }
 
 /// The walking figure: a pivot that turns, the figure at its end, bones and skin.
-fn walker(stage: &mut Stage) {
+pub(super) fn walker(stage: &mut Stage) {
     let pivot = stage.node(Node { name: "path".to_owned(), ..Node::default() });
     // A turn about +Y carries +X to −Z: the figure, which faces +Z, is turned to face −Z.
     let local = super::kit::trs(placed(vec3(radius(), 0.0, 0.0), 180.0));
@@ -168,7 +168,7 @@ fn walker(stage: &mut Stage) {
 }
 
 /// A pedestal with a form that changes between ball, soft cube and star, inside three rings that turn in one another.
-fn sculpture(stage: &mut Stage) {
+pub(super) fn sculpture(stage: &mut Stage) {
     let stone = stage.paint("pedestal", 0x8d867b, 0.7);
     let mut pedestal = bevel_box(0.62, 0.12, 0.62, 0.02).at(0.0, 0.06, 0.0);
     pedestal.append(&bevel_box(0.46, 0.68, 0.46, 0.02).at(0.0, 0.46, 0.0));
@@ -236,7 +236,7 @@ fn form_place() -> Transform {
 }
 
 /// A ball that bounces on the spot, squashed where it lands.
-fn ball(stage: &mut Stage) {
+pub(super) fn ball(stage: &mut Stage) {
     let rubber = stage.paint("ball", 0x2f6fd0, 0.35);
     let mesh = stage.mesh("ball", Model::of(rubber, sphere(0.2, 48, 24)));
     let ball = stage.place("ball", mesh, at(2.3, 0.2, -2.0));

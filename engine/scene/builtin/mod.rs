@@ -17,6 +17,7 @@ mod figure;
 pub mod furnace;
 mod garage;
 mod kit;
+mod moving;
 mod office;
 mod primitives;
 mod shadows;
@@ -109,6 +110,12 @@ const ENTRIES: &[Entry] = &[
         description: "A hare, a tree and a chess queen on a ground under a grove; light from the environment alone",
         exposure: -0.8,
         build: shadows::build,
+    },
+    Entry {
+        name: "shadows-moving",
+        description: "Occluders that walk, tumble, change shape and sit still on a ground under a grove",
+        exposure: -0.8,
+        build: moving::build,
     },
 ];
 

@@ -33,6 +33,7 @@ const TRIANGLES: &[(&str, std::ops::RangeInclusive<usize>)] = &[
     ("street", 150_000..=300_000),
     ("figure", 20_000..=60_000),
     ("shadows", 20_000..=60_000),
+    ("shadows-moving", 20_000..=90_000),
 ];
 
 fn world(scene: &Scene) -> Vec<Mat4> {

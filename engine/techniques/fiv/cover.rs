@@ -4,7 +4,7 @@
 //! triangles does. A far occluder of a hundred thousand triangles covers a handful of texels: rays cost by texels, not by triangles.
 //! What is cut out of surfaces is cut out of the mask.
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 
 use super::{light::Light, occluder::Occluder};
 use crate::{
@@ -15,7 +15,7 @@ use crate::{
     scene::{Pose, resident::Resident},
     shaders::{
         consts::{FIV_FLOATS, TRACE_STEPS},
-        fiv,
+        fiv, types,
     },
 };
 
@@ -29,6 +29,24 @@ const TURNS_LIMITED: u64 = 2 * TRACE_STEPS as u64;
 const TILES: u64 = 16;
 /// A point from which more than this part of the sphere is hidden lies inside; scans have holes.
 const INSIDE: f32 = 0.95;
+
+/// Tiles that an invocation can go through.
+pub(super) fn tiles(gpu: &Gpu, rays: &Rays) -> Result<u64> {
+    Ok(match gpu.loop_limit()? {
+        Some(_) => (TURNS_LIMITED / rays.most_turns().max(1)).clamp(1, TILES),
+        None => TILES,
+    })
+}
+
+/// Radius of the sphere outside of which rays are not traced, metres: rounding must not lose what touches it.
+pub(super) fn reach(radius: f32) -> f32 {
+    radius * 1.0001
+}
+
+/// Solid angle from which on a point counts as inside, sr.
+pub(super) fn inside() -> f32 {
+    INSIDE * 4.0 * std::f32::consts::PI
+}
 
 /// An occluder on a device.
 #[derive(Debug)]
@@ -55,10 +73,7 @@ impl<'a> Cover<'a> {
     pub fn new(gpu: &Gpu, occluder: &'a Occluder) -> Result<Self> {
         let resident = Resident::new(gpu, &occluder.scene)?;
         let rays = Rays::new(gpu, &occluder.scene, &resident)?;
-        let tiles = match gpu.loop_limit()? {
-            Some(_) => (TURNS_LIMITED / rays.most_turns().max(1)).clamp(1, TILES),
-            None => TILES,
-        };
+        let tiles = tiles(gpu, &rays)?;
         Ok(Self { occluder, resident, rays, pose: Pose::rest(&occluder.scene), tiles })
     }
 
@@ -67,8 +82,14 @@ impl<'a> Cover<'a> {
         let handles = self.resident.frame_in(graph, &self.occluder.scene, &self.pose);
         let rays = self.rays.frame(graph, &handles);
         let texels = graph.import_buffer(&light.texels);
-        let list: Vec<[f32; 3]> = points.iter().map(|p| p.to_array()).collect();
+        let list: Vec<types::FivPoint> = points.iter().map(|p| types::FivPoint { at: p.to_array(), turn: 0 }).collect();
         let list = graph.buffer_from("fiv.points", &list);
+        let as_it_is = types::FivTurn {
+            geometry_from_world: Mat3::IDENTITY.to_cols_array_2d(),
+            centre: [0.0; 3],
+            radius: reach(self.occluder.radius),
+        };
+        let turns = graph.buffer_from("fiv.turns", &[as_it_is]);
         let total = points.len() as u32;
         let covered = Covered {
             fivs: graph.buffer("fiv.vectors", u64::from(total) * u64::from(FIV_FLOATS) * 4),
@@ -87,18 +108,13 @@ impl<'a> Cover<'a> {
                     texels,
                     points: list,
                     partials,
-                    push: fiv::cover::Push {
-                        first,
-                        size: light.size,
-                        split,
-                        tiles: self.tiles as u32,
-                        radius: self.occluder.radius * 1.0001,
-                    },
+                    turns,
+                    push: fiv::cover::Push { first, size: light.size, split, tiles: self.tiles as u32 },
                 },
                 rays
             );
             graph.compute(args, [64 * count, chunks, 1]);
-            let push = fiv::gather::Push { first, count, chunks, inside: INSIDE * 4.0 * std::f32::consts::PI };
+            let push = fiv::gather::Push { first, count, chunks, inside: inside() };
             let (fivs, coverage) = (covered.fivs, covered.coverage);
             graph.compute(fiv::gather::Args { partials, fivs, coverage, push }, count);
         }

@@ -20,6 +20,8 @@ pub mod file;
 mod hash;
 pub mod light;
 pub mod occluder;
+mod online;
+mod online_standing;
 mod picture;
 pub mod plan;
 pub mod samples;

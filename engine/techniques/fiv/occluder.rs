@@ -84,7 +84,7 @@ impl Occluders {
 
 impl Occluder {
     /// The occluder and its centre seen from the node's origin; `None` without a triangle that could be seen.
-    fn of_node(scene: &Scene, pose: &mut Pose, node: usize, mesh: &Mesh) -> Option<(Self, Vec3)> {
+    pub(super) fn of_node(scene: &Scene, pose: &mut Pose, node: usize, mesh: &Mesh) -> Option<(Self, Vec3)> {
         let mut primitives: Vec<Primitive> = Vec::new();
         for primitive in &mesh.primitives {
             // Without its place, so that the same things in different places are the same to the last bit.
@@ -209,9 +209,47 @@ fn nearest([a, b, c]: [Vec3; 3]) -> f32 {
 /// A scene of these primitives; of their materials only what stops rays is kept.
 fn alone(scene: &Scene, mut primitives: Vec<Primitive>, name: &str) -> Scene {
     let mut out = Scene { name: name.to_owned(), ..Scene::default() };
+    keep_cutouts(scene, &mut primitives, &mut out);
+    out.meshes.push(Mesh { primitives, ..Mesh::default() });
+    let local = crate::scene::Transform::Matrix(Mat4::IDENTITY);
+    out.nodes.push(Node { mesh: Some(0), local, ..Node::default() });
+    out
+}
+
+/// A scene in which of all meshes that of one node is left, with all that moves and deforms it; its poses are those of `scene`.
+pub(super) fn only(scene: &Scene, node: usize) -> Scene {
+    let mut mesh = scene.nodes[node].mesh.map(|mesh| scene.meshes[mesh as usize].clone()).unwrap_or_default();
+    let mut out = Scene {
+        name: scene.nodes[node].name.clone(),
+        skins: scene.skins.clone(),
+        animations: scene.animations.clone(),
+        ..Scene::default()
+    };
+    keep_cutouts(scene, &mut mesh.primitives, &mut out);
+    for primitive in mesh.primitives.iter_mut() {
+        let opaque = primitive.uvs.is_empty() && primitive.colors.is_empty();
+        for morph in primitive.morphs.iter_mut().filter(|_| opaque) {
+            morph.uvs.clear();
+            morph.colors.clear();
+        }
+    }
+    out.meshes.push(mesh);
+    let kept = |(index, from): (usize, &Node)| Node {
+        mesh: (index == node).then_some(0),
+        skin: from.skin.filter(|_| index == node),
+        light: None,
+        camera: None,
+        ..from.clone()
+    };
+    out.nodes = scene.nodes.iter().enumerate().map(kept).collect();
+    out
+}
+
+/// Gives `out` the materials of these primitives, of which only what stops rays is kept.
+fn keep_cutouts(scene: &Scene, primitives: &mut [Primitive], out: &mut Scene) {
     let mut materials = HashMap::new();
     let mut textures = HashMap::new();
-    for primitive in &mut primitives {
+    for primitive in primitives {
         primitive.material = *materials.entry(primitive.material).or_insert_with(|| {
             let from = scene.materials.get(primitive.material as usize).cloned().unwrap_or_default();
             let cut = from.alpha != AlphaMode::Opaque;
@@ -238,10 +276,6 @@ fn alone(scene: &Scene, mut primitives: Vec<Primitive>, name: &str) -> Scene {
             primitive.colors.clear();
         }
     }
-    out.meshes.push(Mesh { primitives, ..Mesh::default() });
-    let local = crate::scene::Transform::Matrix(Mat4::IDENTITY);
-    out.nodes.push(Node { mesh: Some(0), local, ..Node::default() });
-    out
 }
 
 fn hash(alone: &Scene) -> u64 {

@@ -1,9 +1,15 @@
 //! Everything from a scene on the device to the final picture.
 
+use std::sync::Arc;
+
 use glam::Mat3;
 use serde::{Deserialize, Serialize};
 
-use super::{Fiv, Method, Settings};
+use super::{
+    Fiv, Method, Settings,
+    online::Seen,
+    online_standing::Standing,
+};
 use crate::{
     Error, Result,
     graph::{Depth, Extent, Format, Graph, Image, Load, Raster, Targets},
@@ -72,56 +78,58 @@ impl Fiv {
             let error = Error::usage("the scene was made ready for another method").at("fiv.method");
             return Err(error.help("Give Fiv::new the same settings"));
         }
+        self.follow(scene, &settings.fiv)?;
         let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
         let extent = graph.extent(gbuffer.depth);
         let outputs = graph.scope("fiv", |graph| {
             let irradiance = match (settings.fiv.method, &self.rays) {
                 (Method::BruteForce, Some(_)) => self.truth(graph, handles, &gbuffer),
-                (method, _) => {
-                    let count = if method == Method::Vectors { self.occluders.placed.len() as u32 } else { 0 };
-                    self.irradiance(graph, (pose, handles), view, &gbuffer, count, &settings.fiv)
-                }
+                _ => self.irradiance(graph, (scene, pose, handles), view, &gbuffer, &settings.fiv)?,
             };
             let total = graph.image("fiv.radiance", Format::RGBA32F, extent);
             let (albedo, depth, emission) = (gbuffer.albedo, gbuffer.depth, gbuffer.emission);
             graph.compute(shaders::fiv::compose::Args { albedo, depth, emission, irradiance, total }, extent);
-            Outputs { total, irradiance }
-        });
-        skybox::draw(graph, handles, &gbuffer, glam::Vec3::ZERO, outputs.total);
+            Ok::<_, Error>(Outputs { total, irradiance })
+        })?;
+        let mut behind = handles.clone();
+        let moment = Arc::make_mut(&mut behind.moment);
+        let (turn, factor) = settings.fiv.light();
+        moment.environment_rotation += turn;
+        moment.environment_scale *= factor;
+        skybox::draw(graph, &behind, &gbuffer, glam::Vec3::ZERO, outputs.total);
         let notes = if settings.fiv.method == Method::Vectors { self.turned(scene, pose) } else { Vec::new() };
         Ok(Picture { gbuffer, outputs, notes })
     }
 
-    /// Irradiance without what the first `count` occluders hide.
+    /// Irradiance without what occluders hide.
     fn irradiance(
-        &self,
+        &mut self,
         graph: &mut Graph,
-        (pose, handles): (&Pose, &Handles),
+        (scene, pose, handles): (&Scene, &Pose, &Handles),
         view: &View,
         gbuffer: &GBuffer,
-        count: u32,
         settings: &Settings,
-    ) -> Image {
+    ) -> Result<Image> {
         let extent = graph.extent(gbuffer.depth);
         let irradiance = graph.image("fiv.irradiance", Format::RGBA32F, extent);
         graph.clear(irradiance, [0.0; 4]);
-        let identity = self.identity(graph, handles, view, gbuffer, count > 0);
-        let placed = self.occluders.placed.iter().take(count as usize).map(|placed| {
-            let (grid, kind) = (self.plan.grid, &self.plan.occluders[placed.kind as usize]);
-            types::FivOccluder {
-                centre: (pose.world[placed.node as usize].w_axis.truncate() + placed.centre).to_array(),
-                radius: kind.radius,
-                first: placed.kind * grid.count() * FIV_FLOATS,
-                azimuths: grid.azimuths,
-                polars: grid.polars,
-                radii: grid.radii,
-                nearest: kind.shells.nearest,
-                farthest: kind.shells.farthest,
-                steps: kind.shells.steps(grid.radii) as f32,
-            }
-        });
-        let mut list: Vec<types::FivOccluder> = placed.collect();
+        let standing = match (settings.method, &self.online) {
+            (Method::Online, Some(online)) => online.standing(scene, pose, &self.occluders),
+            (Method::Vectors, _) => self.stored(pose),
+            _ => Standing::default(),
+        };
+        let count = standing.list.len() as u32;
+        let identity = identity(graph, handles, view, gbuffer, &standing.nodes);
+        let mut list = standing.list.clone();
         list.resize(list.len().max(1), types::FivOccluder::default());
+        let occluders = graph.buffer_from("fiv.occluders", &list);
+        let fivs = match &mut self.online {
+            Some(online) if count > 0 => {
+                let seen = Seen { gbuffer, identity, occluders };
+                online.vectors(graph, (&self.occluders, pose), &standing, &self.light, &seen, settings)?
+            }
+            _ => graph.import_buffer(&self.fivs),
+        };
         let total = self.light.total;
         let whole = types::FivWhole {
             x: [total[0], total[1], total[2]],
@@ -129,11 +137,11 @@ impl Fiv {
             z: [total[6], total[7], total[8]],
             occluders: count,
         };
-        let (occluders, whole) = (graph.buffer_from("fiv.occluders", &list), graph.uniform(&whole));
+        let whole = graph.uniform(&whole);
         // With the correction each occluder looks at all others.
         let turns = if settings.overlap { count + 8 } else { 8 };
         let each = (MOST_TURNS / turns).max(1);
-        let (difmap, fivs) = (graph.import_image(&self.light.difmap), graph.import_buffer(&self.fivs));
+        let difmap = graph.import_image(&self.light.difmap);
         for first in (0..count.max(1)).step_by(each as usize) {
             let args = shaders::fiv::light::Args {
                 view: gbuffer.view,
@@ -155,53 +163,28 @@ impl Fiv {
             };
             graph.compute(args, extent);
         }
-        irradiance
+        Ok(irradiance)
     }
 
-    /// Which occluder each pixel shows (plus one; 0: none), with its linear depth. `any`: there are occluders.
-    fn identity(&self, graph: &mut Graph, handles: &Handles, view: &View, gbuffer: &GBuffer, any: bool) -> Image {
-        let extent = Extent::from(view.extent);
-        let identity = graph.image("fiv.identity", Format::RG32F, extent);
-        if !any {
-            graph.clear(identity, [0.0; 4]);
-            return identity;
-        }
-        let depth = graph.image("fiv.identity.depth", Format::D32F, extent);
-        let owner = |node: u32| {
-            let at = self.occluders.placed.iter().position(|placed| placed.node == node);
-            at.map_or(u32::MAX, |at| at as u32)
-        };
-        let mut last = (u32::MAX, u32::MAX);
-        let owners = handles.moment.instances.iter().map(|instance| {
-            // Primitives of a node stand next to each other.
-            if last.0 != instance.node {
-                last = (instance.node, owner(instance.node));
+    /// The occluders with their vectors that were computed beforehand.
+    fn stored(&self, pose: &Pose) -> Standing {
+        let grid = self.plan.grid;
+        let placed = self.occluders.placed.iter().map(|placed| {
+            let kind = &self.plan.occluders[placed.kind as usize];
+            types::FivOccluder {
+                centre: (pose.world[placed.node as usize].w_axis.truncate() + placed.centre).to_array(),
+                radius: kind.radius,
+                first: placed.kind * grid.count() * FIV_FLOATS,
+                azimuths: grid.azimuths,
+                polars: grid.polars,
+                radii: grid.radii,
+                nearest: kind.shells.nearest,
+                farthest: kind.shells.farthest,
+                steps: kind.shells.steps(grid.radii) as f32,
             }
-            last.1
         });
-        let mut owners: Vec<u32> = owners.collect();
-        owners.resize(owners.len().max(1), u32::MAX);
-        let owners = graph.buffer_from("fiv.owners", &owners);
-        let batches = Batches::new(&handles.moment, Some(&Frustum::new(view)), view.position);
-        let visible = batches.visible_buffer(graph, "fiv.visible");
-        for index in 0..batches.list.len().max(1) {
-            let batch = batches.list.get(index);
-            let first = index == 0;
-            let load = if first { Load::Clear([0.0; 4]) } else { Load::Keep };
-            let targets =
-                Targets::new().color(identity, load).depth(depth, if first { Depth::Clear(0.0) } else { Depth::Keep });
-            let args = shaders::fiv::identity::Args {
-                view: gbuffer.view,
-                instances: handles.instances,
-                visible,
-                positions: handles.positions,
-                owners,
-            };
-            let state = Raster::new().cull(batch.map_or_else(Default::default, |b| b.sided.cull()));
-            let none = || crate::graph::Draw::indexed(handles.indices, Vec::new());
-            graph.raster(targets, state, args, batch.map_or_else(none, |b| b.draw(handles)));
-        }
-        identity
+        let nodes = self.occluders.placed.iter().map(|placed| placed.node).collect();
+        Standing { list: placed.collect(), nodes, sets: Vec::new() }
     }
 
     /// Irradiance by a shadow ray to every texel that is not black.
@@ -255,4 +238,50 @@ impl Fiv {
             })
             .collect()
     }
+}
+
+/// Which occluder of `nodes` each pixel shows (plus one; 0: none), with its linear depth.
+fn identity(graph: &mut Graph, handles: &Handles, view: &View, gbuffer: &GBuffer, nodes: &[u32]) -> Image {
+    let extent = Extent::from(view.extent);
+    let identity = graph.image("fiv.identity", Format::RG32F, extent);
+    if nodes.is_empty() {
+        graph.clear(identity, [0.0; 4]);
+        return identity;
+    }
+    let depth = graph.image("fiv.identity.depth", Format::D32F, extent);
+    let owner = |node: u32| {
+        let at = nodes.iter().position(|other| *other == node);
+        at.map_or(u32::MAX, |at| at as u32)
+    };
+    let mut last = (u32::MAX, u32::MAX);
+    let owners = handles.moment.instances.iter().map(|instance| {
+        // Primitives of a node stand next to each other.
+        if last.0 != instance.node {
+            last = (instance.node, owner(instance.node));
+        }
+        last.1
+    });
+    let mut owners: Vec<u32> = owners.collect();
+    owners.resize(owners.len().max(1), u32::MAX);
+    let owners = graph.buffer_from("fiv.owners", &owners);
+    let batches = Batches::new(&handles.moment, Some(&Frustum::new(view)), view.position);
+    let visible = batches.visible_buffer(graph, "fiv.visible");
+    for index in 0..batches.list.len().max(1) {
+        let batch = batches.list.get(index);
+        let first = index == 0;
+        let load = if first { Load::Clear([0.0; 4]) } else { Load::Keep };
+        let targets =
+            Targets::new().color(identity, load).depth(depth, if first { Depth::Clear(0.0) } else { Depth::Keep });
+        let args = shaders::fiv::identity::Args {
+            view: gbuffer.view,
+            instances: handles.instances,
+            visible,
+            positions: handles.positions,
+            owners,
+        };
+        let state = Raster::new().cull(batch.map_or_else(Default::default, |b| b.sided.cull()));
+        let none = || crate::graph::Draw::indexed(handles.indices, Vec::new());
+        graph.raster(targets, state, args, batch.map_or_else(none, |b| b.draw(handles)));
+    }
+    identity
 }

@@ -132,7 +132,7 @@ impl Plan {
             let mut cover = Cover::new(gpu, occluder)?;
             for start in (first..last).step_by(BATCH as usize) {
                 let end = last.min(start + u64::from(BATCH));
-                let point = |sample: u64| -kind.shells.offset(&self.grid, (sample - begin) as u32).as_vec3();
+                let point = |sample: u64| -kind.shells.point(&self.grid, (sample - begin) as u32);
                 let points: Vec<Vec3> = (start..end).map(point).collect();
                 let (fivs, _) = cover.run(&mut runner, light, &points, self.split)?;
                 debug_assert_eq!(fivs.len(), points.len() * FIV_FLOATS as usize);

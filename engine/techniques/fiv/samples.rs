@@ -5,7 +5,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::super::allowed::within;
@@ -101,6 +101,12 @@ impl Shells {
     /// Spheres for each factor of e.
     pub fn steps(&self, count: u32) -> f64 {
         f64::from(count - 1) / (f64::from(self.farthest) / f64::from(self.nearest)).ln()
+    }
+
+    /// As [`Self::offset`], rounded as the device does it.
+    pub fn point(&self, grid: &Grid, index: u32) -> Vec3 {
+        let [azimuth, polar, sphere] = grid.place(index);
+        grid.direction(azimuth, polar).as_vec3() * self.radius(grid.radii, sphere) as f32
     }
 
     /// Place of the occluder's centre seen from the receiver, metres.

@@ -12,6 +12,8 @@ pub enum Method {
     /// From stored vectors.
     #[default]
     Vectors,
+    /// From vectors computed in each frame where pixels look them up: occluders may turn and deform, the environment may turn.
+    Online,
     /// Without occluders.
     Unshadowed,
     /// By a shadow ray to every texel of the environment: slow, and what the others are measured against.
@@ -49,6 +51,12 @@ pub struct Settings {
     /// Occluders shadow themselves.
     pub self_shadow: bool,
     pub method: Method,
+    /// The environment turns by this angle about +Y, degrees counter-clockwise seen from above, -36000 to 36000.
+    pub rotation: f32,
+    /// And by so much more each second of a sequence, degrees, -36000 to 36000.
+    pub turning: f32,
+    /// Factor on the environment's light as a power of two, -30 to 30.
+    pub exposure: f32,
 }
 
 impl Default for Settings {
@@ -68,6 +76,9 @@ impl Default for Settings {
             overlap: true,
             self_shadow: true,
             method: Method::Vectors,
+            rotation: 0.0,
+            turning: 0.0,
+            exposure: 0.0,
         }
     }
 }
@@ -76,6 +87,18 @@ impl Settings {
     /// Where samples are taken.
     pub fn grid(&self) -> Grid {
         Grid { azimuths: self.azimuths, polars: self.polars, radii: self.radii }
+    }
+
+    /// Turn (radians about +Y) and factor that the environment gets.
+    pub fn light(&self) -> (f32, f32) {
+        ((self.rotation % 360.0).to_radians(), self.exposure.exp2())
+    }
+
+    /// As they are `seconds` into a sequence.
+    #[must_use]
+    pub fn after(&self, seconds: f64) -> Self {
+        let rotation = f64::from(self.rotation) + f64::from(self.turning) * seconds;
+        Self { rotation: (rotation % 360.0) as f32, ..self.clone() }
     }
 
     /// # Errors
@@ -88,6 +111,8 @@ impl Settings {
         }
         self.grid().validate()?;
         within([("reach", self.reach, 2.0, 1000.0), ("largest", self.largest, 0.0, 1.0)])?;
+        within([("rotation", self.rotation, -36e3, 36e3), ("turning", self.turning, -36e3, 36e3)])?;
+        within([("exposure", self.exposure, -30.0, 30.0)])?;
         within([("split", self.split, 1, 4)])
     }
 }

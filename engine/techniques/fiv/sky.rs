@@ -79,6 +79,23 @@ impl Sky {
         Ok(Self { size, radiance: radiance.map(|r| r.as_vec3()).collect(), repaired })
     }
 
+    /// As [`Self::new`], with the size, turn and exposure of `settings`.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of(environment: Option<&Environment>, settings: &super::Settings) -> Result<Self> {
+        let (turn, factor) = settings.light();
+        if (turn, factor) == (0.0, 1.0) {
+            return Self::new(environment, settings.size);
+        }
+        let changed = environment.map(|e| Environment {
+            rotation: e.rotation + turn,
+            scale: e.scale * factor,
+            ..e.clone()
+        });
+        Self::new(changed.as_ref(), settings.size)
+    }
+
     /// As the shaders take it.
     pub fn texels(&self) -> Vec<types::FivTexel> {
         let texel = |(i, radiance): (usize, &Vec3)| {

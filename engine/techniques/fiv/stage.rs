@@ -2,7 +2,7 @@
 
 use glam::Mat3;
 
-use super::{Light, Method, Occluders, Plan, Settings, Sky, Stored, plan::Kind};
+use super::{Light, Method, Occluders, Plan, Settings, Sky, Stored, online::Online, plan::Kind};
 use crate::{
     Error, ErrorKind, Result,
     gpu::{Gpu, OwnedBuffer},
@@ -22,6 +22,9 @@ pub struct Fiv {
     /// What it was made ready for.
     pub(super) method: Method,
     pub(super) light: Light,
+    /// Turn and factor of the environment in it.
+    lit: (f32, f32),
+    gpu: Gpu,
     pub(super) occluders: Occluders,
     pub(super) plan: Plan,
     /// Vectors of all kinds, one after the other.
@@ -31,6 +34,8 @@ pub struct Fiv {
     pub(super) notes: Vec<Note>,
     /// For brute force, with the rays of an invocation.
     pub(super) rays: Option<(Rays, u64)>,
+    /// For vectors of each frame.
+    pub(super) online: Option<Online>,
 }
 
 impl Fiv {
@@ -52,7 +57,11 @@ impl Fiv {
     ) -> Result<Self> {
         settings.validate().map_err(|error| error.at("fiv"))?;
         let settings = stored.map_or_else(|| settings.clone(), |stored| stored.plan.settings(settings));
-        let sky = lit_by(scene, settings.size)?;
+        if settings.method == Method::Vectors && settings.turning != 0.0 {
+            let error = Error::usage("vectors are for an environment that stands still").at("fiv.turning");
+            return Err(error.help("Use fiv.method=online"));
+        }
+        let sky = lit_by(scene, &settings)?;
         let name = scene.environment.as_ref().map_or("", |e| e.name.as_str());
         let light = Light::new(gpu, &sky)?;
         let pose = Pose::rest(scene);
@@ -64,7 +73,11 @@ impl Fiv {
         let mut plan = Plan::new(name, light.hash, &occluders.kinds, &settings);
         let fivs = match settings.method {
             Method::Vectors => vectors(gpu, &light, &occluders, &mut plan, stored, told)?,
-            Method::Unshadowed | Method::BruteForce => Vec::new(),
+            Method::Online | Method::Unshadowed | Method::BruteForce => Vec::new(),
+        };
+        let online = match settings.method {
+            Method::Online => Some(Online::new(gpu, scene, &occluders, &settings)?),
+            _ => None,
         };
         let bytes = bytemuck::cast_slice::<f32, u8>(&fivs);
         let limit = gpu.caps().limits.storage_range;
@@ -90,10 +103,13 @@ impl Fiv {
             notes: notes(scene, &occluders, sky.repaired),
             rest: pose.world.iter().map(|m| Mat3::from_mat4(*m)).collect(),
             method: settings.method,
+            lit: lit(scene, &settings),
+            gpu: gpu.clone(),
             light,
             occluders,
             plan,
             rays,
+            online,
         })
     }
 
@@ -117,14 +133,38 @@ impl Fiv {
         &self.occluders
     }
 
+    /// Takes the environment as `settings` have it turned and scaled.
+    ///
+    /// # Errors
+    /// `Usage` if the vectors were computed for another one, or as [`Fiv::new`]; `OutOfMemory`, `DeviceLost`.
+    pub(super) fn follow(&mut self, scene: &Scene, settings: &Settings) -> Result<()> {
+        let wanted = lit(scene, settings);
+        if wanted == self.lit {
+            return Ok(());
+        }
+        if settings.method == Method::Vectors {
+            let error = Error::usage("the vectors were computed for another turn or scale of the environment");
+            return Err(error.at("fiv").help("Make the scene ready again, or use fiv.method=online"));
+        }
+        self.light = Light::new(&self.gpu, &lit_by(scene, &Settings { size: self.light.size, ..settings.clone() })?)?;
+        self.lit = wanted;
+        Ok(())
+    }
+
     /// Bytes of the vectors on the device.
     pub fn bytes(&self) -> u64 {
         self.fivs.size()
     }
 }
 
+/// Turn and factor of the environment.
+fn lit(scene: &Scene, settings: &Settings) -> (f32, f32) {
+    let (turn, factor) = settings.light();
+    scene.environment.as_ref().map_or((turn, factor), |e| (e.rotation + turn, e.scale * factor))
+}
+
 /// The environment of a scene that has no other lights.
-fn lit_by(scene: &Scene, size: u32) -> Result<Sky> {
+fn lit_by(scene: &Scene, settings: &Settings) -> Result<Sky> {
     if let Some(light) = scene.nodes.iter().find_map(|node| scene.lights.get(node.light? as usize)) {
         let kind = match light.kind {
             crate::scene::LightKind::Directional => "directional",
@@ -138,7 +178,7 @@ fn lit_by(scene: &Scene, size: u32) -> Result<Sky> {
         let what = "there is no environment, and light comes from it alone";
         return Err(Error::usage(what).at("fiv").help("Name one with --environment"));
     }
-    Sky::new(scene.environment.as_ref(), size)
+    Sky::of(scene.environment.as_ref(), settings)
 }
 
 /// The vectors of all kinds: stored ones, and those that are missing.

@@ -105,7 +105,7 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
     image::probe_output(&args.output, args.overwrite)?;
     let interrupt = Interrupt::install();
     let (occluders, environment) = load(args, &keys.fiv, console)?;
-    let sky = Sky::new(Some(&environment), keys.fiv.size)?;
+    let sky = Sky::of(Some(&environment), &keys.fiv)?;
     if sky.repaired > 0 {
         console.info(&format!("note: {} pixels of the environment are no radiance", sky.repaired));
     }

@@ -1,0 +1,409 @@
+//! Vectors of one frame: computed on the device for the samples that its pixels look up, and for no others.
+//!
+//! Four steps, in which the host never knows how many samples there are:
+//! 1. every pixel marks the samples of each occluder that its lookup reads, a bit each;
+//! 2. the marks of each geometry become a list in the order of their numbers, by sums over blocks: the same in every run;
+//! 3. vectors are computed for the list, as [`cover`](super::cover) does it beforehand;
+//! 4. they are brought to the places where the lookup expects them.
+//!
+//! Samples lie around an occluder as it stands, in world axes, so that the picture is that of vectors computed beforehand for this
+//! pose. Rays are carried into the geometry at rest; only what deforms has trees of its own that are brought to each pose.
+//! Occluders of one geometry that stand alike share their samples.
+
+use std::{collections::BTreeMap, ops::Range};
+
+use glam::Mat3;
+
+use super::{
+    Occluders, Settings,
+    cover::tiles,
+    light::Light,
+    occluder,
+    online_standing::{Set, Stage, Standing},
+    samples::Grid,
+};
+use crate::{
+    Error, ErrorKind, Result,
+    gpu::{Gpu, OwnedBuffer},
+    graph::{Buffer, Extent, Graph, Image},
+    passes::gbuffer::GBuffer,
+    rays::Rays,
+    scene::{
+        Pose, Scene,
+        resident::{Resident, deforms},
+    },
+    shaders::{
+        consts::{FIV_BLOCK_SAMPLES, FIV_BLOCK_WORDS, FIV_FLOATS, FIV_INSIDE, FIV_ROW},
+        fiv, types,
+    },
+};
+
+/// Points of a batch at most, and bytes of its partial sums, about.
+const MOST_POINTS: u64 = 32_768;
+const MOST_PARTIALS: u64 = 64 << 20;
+/// Occluders that one invocation goes through.
+const MOST_OCCLUDERS: u32 = 2_000;
+
+/// What outlives a frame: geometries with their trees.
+#[derive(Debug)]
+pub struct Online {
+    shapes: Vec<Shape>,
+    /// The geometry of each placed occluder, and whether it deforms.
+    of_placed: Vec<(usize, bool)>,
+    /// Turns and scales of the placed occluders at rest.
+    rest: Vec<Mat3>,
+    /// Of the samples of a sphere, from the receiver to the occluder.
+    directions: OwnedBuffer,
+    grid: Grid,
+    reach: f32,
+    split: u32,
+    /// Bytes of a buffer at most.
+    limit: u64,
+}
+
+/// A geometry that rays are traced through.
+#[derive(Debug)]
+struct Shape {
+    body: Body,
+    resident: Resident,
+    rays: Rays,
+    tiles: u64,
+}
+
+#[derive(Debug)]
+enum Body {
+    /// A kind of occluder at rest, its centre at the origin.
+    Still(usize),
+    /// One node of a scene, in world space.
+    Deforming(Box<Scene>),
+}
+
+/// What the pixels of a frame show.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<'a> {
+    pub gbuffer: &'a GBuffer,
+    /// Which occluder each pixel shows.
+    pub identity: Image,
+    /// [`Standing::list`] on the device.
+    pub occluders: Buffer,
+}
+
+/// Lists of points with their samples, on the device.
+#[derive(Clone, Copy, Debug)]
+struct Lists {
+    points: Buffer,
+    samples: Buffer,
+    groups: Buffer,
+    turns: Buffer,
+}
+
+impl Online {
+    /// Builds the trees of all geometries.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`; `Runtime` if an occluder is larger than the device's limits.
+    pub fn new(gpu: &Gpu, scene: &Scene, occluders: &Occluders, settings: &Settings) -> Result<Self> {
+        let mut shapes: Vec<Shape> = Vec::new();
+        let mut known = BTreeMap::new();
+        let mut of_placed = Vec::new();
+        for placed in &occluders.placed {
+            let (node, kind) = (placed.node as usize, placed.kind as usize);
+            let primitives = scene.nodes[node].mesh.map_or(&[][..], |mesh| &scene.meshes[mesh as usize].primitives);
+            let deforms = primitives.iter().any(|p| deforms(p, scene.nodes[node].skin.is_some()));
+            if let Some(&shape) = known.get(&kind).filter(|_| !deforms) {
+                of_placed.push((shape, false));
+                continue;
+            }
+            let body = match deforms {
+                true => Body::Deforming(Box::new(occluder::only(scene, node))),
+                false => Body::Still(kind),
+            };
+            of_placed.push((shapes.len(), deforms));
+            if !deforms {
+                known.insert(kind, shapes.len());
+            }
+            let geometry = body.scene(occluders);
+            let resident = Resident::new(gpu, geometry)?;
+            let rays = Rays::new(gpu, geometry, &resident)?;
+            let tiles = tiles(gpu, &rays)?;
+            shapes.push(Shape { body, resident, rays, tiles });
+        }
+        let grid = settings.grid();
+        let at = |ring: u32| grid.direction(ring % grid.azimuths, ring / grid.azimuths).as_vec3().to_array();
+        let directions: Vec<[f32; 3]> = (0..grid.azimuths * grid.polars).map(at).collect();
+        let pose = Pose::rest(scene);
+        Ok(Self {
+            shapes,
+            of_placed,
+            rest: occluders.placed.iter().map(|p| Mat3::from_mat4(pose.world[p.node as usize])).collect(),
+            directions: OwnedBuffer::with_contents(gpu, "fiv.directions", bytemuck::cast_slice(&directions))?,
+            grid,
+            reach: settings.reach,
+            split: settings.split,
+            limit: gpu.caps().limits.storage_range,
+        })
+    }
+
+    /// Blocks of marks of a set.
+    fn blocks(&self) -> u32 {
+        self.grid.count().div_ceil(FIV_BLOCK_SAMPLES)
+    }
+
+    /// How all occluders stand.
+    pub fn standing(&self, scene: &Scene, pose: &Pose, occluders: &Occluders) -> Standing {
+        let stage = Stage {
+            scene,
+            occluders,
+            shapes: &self.of_placed,
+            rest: &self.rest,
+            grid: self.grid,
+            reach: self.reach,
+            floats: self.blocks() * FIV_BLOCK_SAMPLES * FIV_FLOATS,
+        };
+        Standing::of(&stage, pose)
+    }
+
+    /// Declares the passes that compute the vectors that `seen` needs: a buffer in which each set has its place.
+    ///
+    /// # Errors
+    /// `Runtime` if the samples take more memory than the device allows for a buffer.
+    pub fn vectors(
+        &mut self,
+        graph: &mut Graph,
+        (occluders, pose): (&Occluders, &Pose),
+        standing: &Standing,
+        light: &Light,
+        seen: &Seen<'_>,
+        settings: &Settings,
+    ) -> Result<Buffer> {
+        let (blocks, count) = (self.blocks(), standing.sets.len() as u32);
+        let samples = u64::from(count) * u64::from(blocks * FIV_BLOCK_SAMPLES);
+        let bytes = 4 * u64::from(FIV_FLOATS) * samples;
+        if bytes > self.limit {
+            let what = format!("the samples of {count} occluders that stand differently have {bytes} bytes");
+            return Err(Error::new(ErrorKind::Runtime, format!("{what}; the device allows {}", self.limit))
+                .at("fiv")
+                .help("Take fewer samples (fiv.azimuths, fiv.polars, fiv.radii)"));
+        }
+        let extent = graph.extent(seen.gbuffer.depth);
+        let fivs = graph.buffer("fiv.online", bytes.max(4));
+        // What was not asked for counts for nothing, should rounding ask for it after all.
+        graph.fill(fivs, FIV_INSIDE.to_bits());
+        if count == 0 {
+            return Ok(fivs);
+        }
+        let marks = self.marks(graph, (standing, seen), samples, settings);
+        let jobs = self.jobs(standing, extent, light);
+        let lists = self.lists(graph, standing, marks, &jobs, samples);
+        let found = graph.buffer("fiv.found", bytes);
+        let coverage = graph.buffer("fiv.coverage", 4 * samples);
+        let texels = graph.import_buffer(&light.texels);
+        for job in &jobs.list {
+            let shape = &mut self.shapes[job.shape];
+            let scene = shape.body.scene(occluders);
+            let rest;
+            let pose = match &shape.body {
+                Body::Still(_) => {
+                    rest = Pose::rest(scene);
+                    &rest
+                }
+                Body::Deforming(_) => pose,
+            };
+            let handles = shape.resident.frame_in(graph, scene, pose);
+            let rays = shape.rays.frame(graph, &handles);
+            let partials = graph.buffer("fiv.partials", jobs.each * u64::from(jobs.chunks) * 40);
+            for batch in job.batches.clone() {
+                let first = (job.first + u64::from(batch - job.batches.start) * jobs.each) as u32;
+                let args = crate::rays::traced!(
+                    fiv::cover::Args {
+                        texels,
+                        points: lists.points,
+                        partials,
+                        turns: lists.turns,
+                        push: fiv::cover::Push { first, size: light.size, split: self.split, tiles: jobs.tiles },
+                    },
+                    rays
+                );
+                let groups = u64::from(batch) * 24;
+                graph.compute_indirect(args, lists.groups, groups);
+                let push = fiv::gather::Push {
+                    first,
+                    count: jobs.each as u32,
+                    chunks: jobs.chunks,
+                    inside: super::cover::inside(),
+                };
+                let args = fiv::gather::Args { partials, fivs: found, coverage, push };
+                graph.compute_indirect(args, lists.groups, groups + 12);
+                let push = fiv::online_scatter::Push { first, batch };
+                let (samples, counts) = (lists.samples, lists.groups);
+                let args = fiv::online_scatter::Args { found, samples, groups: counts, fivs, push };
+                graph.compute_indirect(args, lists.groups, groups + 12);
+            }
+        }
+        Ok(fivs)
+    }
+
+    /// A bit for each sample that is looked up.
+    fn marks(
+        &self,
+        graph: &mut Graph,
+        (standing, seen): (&Standing, &Seen<'_>),
+        samples: u64,
+        settings: &Settings,
+    ) -> Buffer {
+        let marks = graph.buffer("fiv.marks", samples / 8);
+        graph.fill(marks, 0);
+        let (extent, count) = (graph.extent(seen.gbuffer.depth), standing.list.len() as u32);
+        for first in (0..count).step_by(MOST_OCCLUDERS as usize) {
+            let args = fiv::online_mark::Args {
+                view: seen.gbuffer.view,
+                normal: seen.gbuffer.normal,
+                depth: seen.gbuffer.depth,
+                identity: seen.identity,
+                occluders: seen.occluders,
+                marks,
+                push: fiv::online_mark::Push { first, count: MOST_OCCLUDERS.min(count - first) },
+                spec: fiv::online_mark::Spec {
+                    partial: settings.partial.into(),
+                    own: settings.self_shadow.into(),
+                    trilinear: settings.trilinear.into(),
+                },
+            };
+            graph.compute(args, extent);
+        }
+        marks
+    }
+
+    /// The work that each geometry can have at most.
+    fn jobs(&self, standing: &Standing, extent: Extent, light: &Light) -> Jobs {
+        let row = light.size * self.split / 8;
+        let all = 6 * row * row;
+        let used = || standing.sets.iter().map(|set| self.shapes[set.shape].tiles);
+        let tiles = used().min().unwrap_or(1).min(all.into()) as u32;
+        let chunks = all.div_ceil(tiles);
+        let samples = u64::from(self.blocks() * FIV_BLOCK_SAMPLES);
+        let set_of = |first: u32| (first / (self.blocks() * FIV_BLOCK_SAMPLES * FIV_FLOATS)) as usize;
+        let shape_of = |first: u32| standing.sets[set_of(first)].shape;
+        let most = |shape: usize, sets: u64| {
+            // Eight samples for each pixel and occluder.
+            let occluders = standing.list.iter().filter(|o| shape_of(o.first) == shape).count() as u64;
+            (8 * extent.pixels() * occluders).min(sets * samples)
+        };
+        let mut list: Vec<Job> = Vec::new();
+        for (number, set) in standing.sets.iter().enumerate() {
+            match list.last_mut() {
+                Some(job) if job.shape == set.shape => job.sets.end += 1,
+                _ => list.push(Job {
+                    shape: set.shape,
+                    sets: number..number + 1,
+                    first: number as u64 * samples,
+                    batches: 0..0,
+                }),
+            }
+        }
+        let largest = list.iter().map(|job| most(job.shape, job.sets.len() as u64)).max().unwrap_or(1);
+        let each = (MOST_PARTIALS / (u64::from(chunks) * 40)).clamp(64, MOST_POINTS).min(largest.max(1));
+        // What lies behind the last point of a batch must not be that of another.
+        let each = each.next_multiple_of(64);
+        let mut batch = 0;
+        for job in &mut list {
+            let end = batch + most(job.shape, job.sets.len() as u64).div_ceil(each) as u32;
+            job.batches = batch..end;
+            batch = end;
+        }
+        Jobs { list, each, tiles, chunks, batches: batch }
+    }
+
+    /// The marked samples of each geometry in a row, and the workgroups of each batch.
+    fn lists(&self, graph: &mut Graph, standing: &Standing, marks: Buffer, jobs: &Jobs, samples: u64) -> Lists {
+        let of_set = self.blocks();
+        let blocks = standing.sets.len() as u32 * of_set;
+        let counts = graph.buffer("fiv.counts", 4 * u64::from(blocks));
+        let starts = graph.buffer("fiv.starts", 4 * u64::from(blocks));
+        let groups = graph.buffer("fiv.groups", 24 * u64::from(jobs.batches));
+        let threads = [FIV_BLOCK_WORDS * blocks.min(FIV_ROW), blocks.div_ceil(FIV_ROW), 1];
+        graph.compute(fiv::online_count::Args { marks, counts, push: fiv::online_count::Push { blocks } }, threads);
+        let job = |job: &Job| types::FivJob {
+            block: job.sets.start as u32 * of_set,
+            blocks: job.sets.len() as u32 * of_set,
+            batch: job.batches.start,
+            batches: job.batches.len() as u32,
+        };
+        let list: Vec<types::FivJob> = jobs.list.iter().map(job).collect();
+        let push = fiv::online_starts::Push { each: jobs.each as u32, chunks: jobs.chunks };
+        let args =
+            fiv::online_starts::Args { jobs: graph.buffer_from("fiv.jobs", &list), counts, starts, groups, push };
+        graph.compute(args, 64 * list.len() as u32);
+
+        let base = |number: usize| {
+            let of = |job: &&Job| job.sets.contains(&number);
+            jobs.list.iter().find(of).map_or(0, |job| job.first as u32)
+        };
+        let radii = self.grid.radii;
+        let sets: Vec<types::FivSet> = (0..standing.sets.len())
+            .map(|number| types::FivSet { base: base(number), radii_at: number as u32 * radii })
+            .collect();
+        let spheres = |set: &Set| (0..radii).map(move |r| set.shells.radius(radii, r) as f32).collect::<Vec<f32>>();
+        let distances: Vec<f32> = standing.sets.iter().flat_map(spheres).collect();
+        let turns: Vec<types::FivTurn> = standing.sets.iter().map(turn).collect();
+        let lists = Lists {
+            points: graph.buffer("fiv.points", 16 * samples),
+            samples: graph.buffer("fiv.samples", 4 * samples),
+            groups,
+            turns: graph.buffer_from("fiv.turns", &turns),
+        };
+        let args = fiv::online_list::Args {
+            marks,
+            starts,
+            sets: graph.buffer_from("fiv.sets", &sets),
+            directions: graph.import_buffer(&self.directions),
+            radii: graph.buffer_from("fiv.radii", &distances),
+            points: lists.points,
+            samples: lists.samples,
+            push: fiv::online_list::Push { blocks, set_blocks: of_set, rings: self.grid.azimuths * self.grid.polars },
+        };
+        graph.compute(args, threads);
+        lists
+    }
+}
+
+/// The work of a frame.
+#[derive(Debug)]
+struct Jobs {
+    list: Vec<Job>,
+    /// Points of a batch at most.
+    each: u64,
+    /// Of an invocation.
+    tiles: u32,
+    /// Invocations for a texel's place in a tile.
+    chunks: u32,
+    /// In all.
+    batches: u32,
+}
+
+/// What one geometry has to do.
+#[derive(Debug)]
+struct Job {
+    shape: usize,
+    sets: Range<usize>,
+    /// First place in the lists.
+    first: u64,
+    batches: Range<u32>,
+}
+
+impl Body {
+    fn scene<'a>(&'a self, occluders: &'a Occluders) -> &'a Scene {
+        match self {
+            Self::Still(kind) => &occluders.kinds[*kind].scene,
+            Self::Deforming(scene) => scene,
+        }
+    }
+}
+
+fn turn(set: &Set) -> types::FivTurn {
+    types::FivTurn {
+        geometry_from_world: set.geometry_from_world.to_cols_array_2d(),
+        centre: set.centre.to_array(),
+        radius: super::cover::reach(set.radius),
+    }
+}

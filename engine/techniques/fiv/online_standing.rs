@@ -1,0 +1,207 @@
+//! How occluders stand in a frame, and which of them can share samples.
+
+use std::collections::BTreeMap;
+
+use glam::{Mat3, Vec3};
+
+use super::{
+    Occluder, Occluders,
+    samples::{Grid, Shells},
+};
+use crate::{
+    scene::{Pose, Scene},
+    shaders::types,
+};
+
+/// How far a matrix may be from one that turns and scales evenly.
+const EVEN: f32 = 1e-4;
+
+/// Samples around occluders that stand alike.
+#[derive(Clone, Copy, Debug)]
+pub struct Set {
+    /// Number of the geometry.
+    pub shape: usize,
+    /// From the occluder as it stands to the geometry that rays are traced through.
+    pub geometry_from_world: Mat3,
+    /// Of the occluder in the geometry, metres.
+    pub centre: Vec3,
+    /// Of the bounding sphere, metres.
+    pub radius: f32,
+    pub shells: Shells,
+}
+
+/// All occluders of a frame.
+#[derive(Clone, Debug, Default)]
+pub struct Standing {
+    /// In the order of the placed ones, without those that have no extent.
+    pub list: Vec<types::FivOccluder>,
+    /// The node of each.
+    pub nodes: Vec<u32>,
+    /// Those of one geometry lie next to each other.
+    pub sets: Vec<Set>,
+}
+
+/// What decides where occluders stand, beside the pose.
+#[derive(Clone, Copy, Debug)]
+pub struct Stage<'a> {
+    pub scene: &'a Scene,
+    pub occluders: &'a Occluders,
+    /// The geometry of each placed occluder, and whether it deforms.
+    pub shapes: &'a [(usize, bool)],
+    /// Turns and scales of the placed occluders at rest.
+    pub rest: &'a [Mat3],
+    pub grid: Grid,
+    /// Radius of the last sphere, in radii of the occluder.
+    pub reach: f32,
+    /// Floats from one set to the next.
+    pub floats: u32,
+}
+
+impl Standing {
+    /// As the occluders stand in `pose`.
+    pub fn of(stage: &Stage<'_>, pose: &Pose) -> Self {
+        let mut found = Vec::new();
+        let mut sets = BTreeMap::new();
+        for (index, placed) in stage.occluders.placed.iter().enumerate() {
+            let Some((set, centre, turn)) = stand(stage, pose, index) else { continue };
+            // What deforms shares with nothing.
+            let alone = if stage.shapes[index].1 { index } else { usize::MAX };
+            let key = (set.shape, alone, turn.to_cols_array().map(f32::to_bits));
+            sets.insert(key, set);
+            found.push((key, placed.node, centre, set));
+        }
+        let numbers: BTreeMap<_, u32> = sets.keys().copied().zip(0..).collect();
+        let Grid { azimuths, polars, radii } = stage.grid;
+        let list = found.iter().map(|(key, _, centre, set)| types::FivOccluder {
+            centre: centre.to_array(),
+            radius: set.radius,
+            first: numbers[key] * stage.floats,
+            azimuths,
+            polars,
+            radii,
+            nearest: set.shells.nearest,
+            farthest: set.shells.farthest,
+            steps: set.shells.steps(radii) as f32,
+        });
+        Self {
+            list: list.collect(),
+            nodes: found.iter().map(|(_, node, ..)| *node).collect(),
+            sets: sets.into_values().collect(),
+        }
+    }
+}
+
+/// Samples, centre (metres, world space) and turn of an occluder; `None` where it has no extent.
+fn stand(stage: &Stage<'_>, pose: &Pose, index: usize) -> Option<(Set, Vec3, Mat3)> {
+    let placed = stage.occluders.placed.get(index)?;
+    let (shape, deforms) = stage.shapes[index];
+    let node = placed.node as usize;
+    let world = pose.world.get(node)?;
+    let place = world.w_axis.truncate();
+    if deforms {
+        let (occluder, centre) = measured(stage.scene, pose, node)?;
+        let (radius, shells) = (occluder.radius, occluder.shells(stage.reach));
+        let set = Set { shape, geometry_from_world: Mat3::IDENTITY, centre: place + centre, radius, shells };
+        return Some((set, place + centre, Mat3::IDENTITY));
+    }
+    let kind = &stage.occluders.kinds[placed.kind as usize];
+    let (now, rest) = (Mat3::from_mat4(*world), stage.rest[index]);
+    // Without a rounding where nothing turned.
+    let turn = if now == rest { Mat3::IDENTITY } else { now * rest.inverse() };
+    let back = if now == rest { Mat3::IDENTITY } else { turn.inverse() };
+    if !(turn.is_finite() && back.is_finite() && place.is_finite()) {
+        return None;
+    }
+    let set = match even(&turn) {
+        Some(scale) => {
+            let Shells { nearest, farthest } = kind.shells(stage.reach);
+            Set {
+                shape,
+                geometry_from_world: back,
+                centre: Vec3::ZERO,
+                radius: kind.radius * scale,
+                shells: Shells { nearest: nearest * scale, farthest: farthest * scale },
+            }
+        }
+        None => {
+            let (occluder, centre) = measured(stage.scene, pose, node)?;
+            let set = Set {
+                shape,
+                geometry_from_world: back,
+                centre: back * centre - placed.centre,
+                radius: occluder.radius,
+                shells: occluder.shells(stage.reach),
+            };
+            return Some((set, place + centre, turn));
+        }
+    };
+    Some((set, place + turn * placed.centre, turn))
+}
+
+/// The occluder as a node has it in a pose, and its centre seen from the node's origin.
+fn measured(scene: &Scene, pose: &Pose, node: usize) -> Option<(Occluder, Vec3)> {
+    let mesh = scene.meshes.get(scene.nodes.get(node)?.mesh? as usize)?;
+    Occluder::of_node(scene, &mut pose.clone(), node, mesh)
+}
+
+/// The scale of a matrix that but turns, mirrors and scales evenly.
+fn even(turn: &Mat3) -> Option<f32> {
+    let scale = turn.determinant().abs().cbrt();
+    let square = (turn.transpose() * *turn) * (scale * scale).recip();
+    square.abs_diff_eq(Mat3::IDENTITY, EVEN).then_some(scale)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Mat4, Quat, vec3};
+
+    use super::*;
+    use crate::scene::builtin;
+
+    #[test]
+    fn a_turn_keeps_the_size_and_a_squeeze_is_measured() {
+        let turn = Mat3::from_quat(Quat::from_rotation_y(0.7) * Quat::from_rotation_x(0.3));
+        assert!((even(&turn).unwrap() - 1.0).abs() < 1e-5);
+        assert!((even(&(turn * -2.5)).unwrap() - 2.5).abs() < 1e-4);
+        assert_eq!(even(&Mat3::IDENTITY), Some(1.0));
+        assert_eq!(even(&(turn * Mat3::from_diagonal(vec3(1.0, 1.0, 1.2)))), None);
+        assert_eq!(even(&Mat3::ZERO), None);
+    }
+
+    #[test]
+    fn occluders_that_stand_alike_share_and_what_has_no_extent_is_left_out() {
+        let scene = builtin::load("primitives").unwrap();
+        let rest = Pose::rest(&scene);
+        let occluders = Occluders::of(&scene, &rest, false, 1.0);
+        let shapes: Vec<_> = occluders.placed.iter().map(|p| (p.kind as usize, false)).collect();
+        let linear: Vec<_> = occluders.placed.iter().map(|p| Mat3::from_mat4(rest.world[p.node as usize])).collect();
+        let stage = Stage {
+            scene: &scene,
+            occluders: &occluders,
+            shapes: &shapes,
+            rest: &linear,
+            grid: Grid::of(8, 5, 4),
+            reach: 16.0,
+            floats: 2048 * 9,
+        };
+        let still = Standing::of(&stage, &rest);
+        assert_eq!((still.list.len(), still.sets.len()), (occluders.placed.len(), occluders.kinds.len()));
+        for (found, placed) in still.list.iter().zip(&occluders.placed) {
+            assert_eq!(found.radius, occluders.kinds[placed.kind as usize].radius);
+            let set = &still.sets[(found.first / stage.floats) as usize];
+            assert_eq!((set.shape, set.geometry_from_world), (placed.kind as usize, Mat3::IDENTITY));
+        }
+        // The first turns and is squeezed, the second vanishes.
+        let mut pose = rest.clone();
+        let node = occluders.placed[0].node as usize;
+        pose.world[node] = pose.world[node] * Mat4::from_rotation_x(0.4) * Mat4::from_scale(vec3(1.0, 1.3, 1.0));
+        pose.world[occluders.placed[1].node as usize] *= Mat4::from_scale(Vec3::ZERO);
+        let moved = Standing::of(&stage, &pose);
+        assert_eq!(moved.list.len(), occluders.placed.len() - 1);
+        let set = &moved.sets[(moved.list[0].first / stage.floats) as usize];
+        // The middle of the sphere is where the geometry has it.
+        let world = Vec3::from(moved.list[0].centre) - pose.world[node].w_axis.truncate();
+        let there = set.geometry_from_world * world - occluders.placed[0].centre;
+        assert!((there - set.centre).length() < 1e-4 && set.radius > 0.0, "{there} {}", set.centre);
+    }
+}

@@ -1,0 +1,242 @@
+//! Vectors that are computed in the frame, where they are needed: the same picture as from vectors computed beforehand, and right where
+//! those cannot be, because occluders turn and deform and the environment changes.
+
+mod common;
+mod fiv_lab;
+mod tracer_lab;
+
+use fiv_lab::{Studio, ball, colourful, ground, nrmse, thing};
+use glam::{Mat4, Quat, Vec3, vec3};
+use lucerna::{
+    gpu::testing::with_gpu,
+    scene::{self, Environment, LoadOptions, Pose, Scene, Transform, View, builtin},
+    techniques::fiv::{Method, Settings},
+};
+use tracer_lab::{flat_view, view};
+
+fn few(method: Method) -> Settings {
+    Settings { size: 16, azimuths: 16, polars: 9, radii: 8, largest: 1.0, method, ..Settings::default() }
+}
+
+fn finer(method: Method) -> Settings {
+    Settings { azimuths: 32, polars: 17, radii: 15, ..few(method) }
+}
+
+fn bits(picture: &[Vec3]) -> Vec<[u32; 3]> {
+    picture.iter().map(|p| p.to_array().map(f32::to_bits)).collect()
+}
+
+/// The ground around the origin from close above, `size` metres of it.
+fn around(size: f32, extent: u32) -> View {
+    flat_view(vec3(0.0, 0.002, 0.0), Vec3::ZERO, size, [extent; 2])
+}
+
+/// A ground under colourful light with these bodies.
+fn stage(bodies: &[(Vec<Vec3>, Vec<u32>, Transform)]) -> Scene {
+    let mut scene = Scene { environment: Some(colourful()), ..Scene::default() };
+    ground(&mut scene, 20.0);
+    for (i, (positions, indices, local)) in bodies.iter().enumerate() {
+        let node = thing(&mut scene, &format!("body {i}"), positions.clone(), indices.clone(), Mat4::IDENTITY);
+        scene.nodes[node as usize].local = *local;
+    }
+    scene
+}
+
+/// Long, flat, and different from all sides.
+fn odd_body(turn: Quat, at: Vec3) -> (Vec<Vec3>, Vec<u32>, Transform) {
+    let (mut positions, indices) = ball(0.5, 10);
+    positions.iter_mut().for_each(|p| *p = *p * vec3(1.6, 0.35, 0.8) + vec3(0.2 * p.y * p.y, 0.3 * p.x * p.x, 0.0));
+    (positions, indices, Transform::Trs { translation: at, rotation: turn, scale: Vec3::ONE })
+}
+
+#[test]
+fn the_picture_is_bit_for_bit_that_of_vectors_computed_beforehand() {
+    with_gpu(|gpu| {
+        let scene = builtin::load("shadows").unwrap();
+        let pose = Pose::rest(&scene);
+        let eye = View::of_camera(&scene, &pose, 0, [40, 30]).unwrap();
+        let variants = [
+            Settings { largest: 0.5, ..few(Method::Vectors) },
+            Settings { largest: 0.5, trilinear: false, partial: false, size: 8, ..few(Method::Vectors) },
+        ];
+        for before in variants {
+            let online = Settings { method: Method::Online, ..before.clone() };
+            let exact = Studio::new(gpu, &scene, &before, None).irradiance(&eye, &before);
+            let mut studio = Studio::new(gpu, &scene, &online, None);
+            let found = studio.irradiance(&eye, &online);
+            assert_eq!(studio.fiv.occluders().placed.len(), 3);
+            assert!(bits(&found) == bits(&exact), "NRMSE {}", nrmse(&exact, &found));
+            // In the next frame too.
+            assert!(bits(&studio.irradiance(&eye, &online)) == bits(&exact));
+        }
+    });
+}
+
+#[test]
+fn a_turned_occluder_is_as_one_made_turned() {
+    with_gpu(|gpu| {
+        let turn = Quat::from_rotation_y(0.7) * Quat::from_rotation_x(1.1);
+        let at = vec3(0.1, 0.9, -0.2);
+        let (before, online) = (finer(Method::Vectors), finer(Method::Online));
+        let made = stage(&[odd_body(turn, at)]);
+        let exact = Studio::new(gpu, &made, &before, None).irradiance(&around(4.0, 20), &before);
+        // At rest it stands otherwise.
+        let scene = stage(&[odd_body(Quat::IDENTITY, at)]);
+        let mut studio = Studio::new(gpu, &scene, &online, None);
+        let still = studio.irradiance(&around(4.0, 20), &online);
+        let turned = studio.shot(&Pose::rest(&made), &around(4.0, 20), &online).0;
+        let (same, other) = (nrmse(&exact, &turned), nrmse(&exact, &still));
+        eprintln!("turned in the frame {same:.6}, not turned {other:.6}");
+        // A ray that touches an edge may pass on the other side of it.
+        assert!(same < 1e-3 && other > 0.05, "{same} {other}");
+        let mut pose = Pose::rest(&made);
+        let squeezed = Mat4::from_scale(vec3(1.0, 2.0, 0.6));
+        pose.world[1] *= squeezed;
+        let mut made = made;
+        made.nodes[1].local = Transform::Matrix(pose.world[1]);
+        let exact = Studio::new(gpu, &made, &before, None).irradiance(&around(4.0, 20), &before);
+        let found = studio.shot(&pose, &around(4.0, 20), &online).0;
+        assert!(nrmse(&exact, &found) < 1e-3, "squeezed: {}", nrmse(&exact, &found));
+    });
+}
+
+/// A scene of the asset collection, its first mesh `height` metres high over a ground under colourful light.
+fn posed(file: &str, height: f32) -> Option<Scene> {
+    let path = common::assets()?.join("gltf").join(file);
+    let mut scene = scene::load(&path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+    let bounds = extent_of(&scene);
+    let scale = height / (bounds.1.y - bounds.0.y);
+    let middle = 0.5 * (bounds.0 + bounds.1);
+    let lift = vec3(-middle.x, -bounds.0.y, -middle.z) * scale + vec3(0.0, 0.25, 0.0);
+    // Everything stands on one node more, which comes first.
+    let holder = scene::Node {
+        local: Transform::Trs { translation: lift, rotation: Quat::IDENTITY, scale: Vec3::splat(scale) },
+        ..scene::Node::default()
+    };
+    for node in &mut scene.nodes {
+        node.parent = Some(node.parent.map_or(0, |p| p + 1));
+    }
+    scene.nodes.insert(0, holder);
+    scene.skins.iter_mut().flat_map(|s| &mut s.joints).for_each(|joint| *joint += 1);
+    scene.animations.iter_mut().flat_map(|a| &mut a.channels).for_each(|channel| channel.node += 1);
+    scene.environment = Some(colourful());
+    ground(&mut scene, 20.0);
+    Some(scene)
+}
+
+/// The box around all geometry at rest.
+fn extent_of(scene: &Scene) -> (Vec3, Vec3) {
+    let pose = Pose::rest(scene);
+    let mut out = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for (index, node) in scene.nodes.iter().enumerate() {
+        for primitive in node.mesh.map_or(&[][..], |mesh| &scene.meshes[mesh as usize].primitives) {
+            for p in scene::deform::world_vertices(scene, &pose, index, primitive).positions {
+                out = (out.0.min(p), out.1.max(p));
+            }
+        }
+    }
+    out
+}
+
+#[test]
+fn what_deforms_casts_the_shadow_of_its_moment() {
+    with_gpu(|gpu| {
+        for (file, times) in
+            [("AnimatedMorphCube/AnimatedMorphCube.gltf", [0.0, 1.6]), ("RiggedSimple/RiggedSimple.gltf", [0.0, 1.0])]
+        {
+            let Some(scene) = posed(file, 1.2) else { return };
+            let (online, brute) = (finer(Method::Online), finer(Method::BruteForce));
+            let mut studio = Studio::new(gpu, &scene, &online, None);
+            let mut truth = Studio::new(gpu, &scene, &brute, None);
+            let pictures = times.map(|seconds| {
+                let pose = Pose::playing(&scene, seconds);
+                let exact = truth.shot(&pose, &around(3.0, 20), &brute).0;
+                (exact, studio.shot(&pose, &around(3.0, 20), &online).0)
+            });
+            let [(first, found), (second, later)] = &pictures;
+            let changed = nrmse(first, second);
+            let errors = [nrmse(first, found), nrmse(second, later)];
+            // The shadow of the other moment would be this far off.
+            let stale = nrmse(second, found);
+            eprintln!("{file}: the truth changes by {changed:.4}, errors {errors:.4?}, of the other moment {stale:.4}");
+            assert!(changed > 0.03, "{file}: nothing moves");
+            assert!(errors.iter().all(|e| *e < 0.06) && errors[1] < 0.7 * stale, "{file}: {errors:?} {stale}");
+        }
+    });
+}
+
+#[test]
+fn the_environment_turns_and_brightens_in_the_frame() {
+    with_gpu(|gpu| {
+        let scene = stage(&[odd_body(Quat::IDENTITY, vec3(0.0, 0.8, 0.0))]);
+        let online = finer(Method::Online);
+        let mut studio = Studio::new(gpu, &scene, &online, None);
+        let first = studio.irradiance(&around(4.0, 16), &online);
+        let turning = Settings { turning: 30.0, exposure: 1.0, ..online.clone() };
+        let found = studio.irradiance(&around(4.0, 16), &turning.after(4.0));
+        let turn = 120f32.to_radians();
+        let environment = Environment { rotation: turn, scale: 2.0, ..colourful() };
+        let made = Scene { environment: Some(environment), ..scene.clone() };
+        let before = finer(Method::Vectors);
+        let exact = Studio::new(gpu, &made, &before, None).irradiance(&around(4.0, 16), &before);
+        assert!(nrmse(&exact, &found) < 1e-5, "{}", nrmse(&exact, &found));
+        assert!(nrmse(&exact, &first) > 0.1);
+        // And back again, to the last bit.
+        assert!(bits(&studio.irradiance(&around(4.0, 16), &online)) == bits(&first));
+        // Vectors are for one light.
+        let mut studio = Studio::new(gpu, &scene, &before, None);
+        let refused = studio.refused(&around(4.0, 16), &Settings { rotation: 10.0, ..before.clone() });
+        assert!(refused.exit_code() == 2 && refused.to_string().contains("online"), "{refused}");
+    });
+}
+
+#[test]
+fn odd_numbers_of_occluders_and_odd_places() {
+    with_gpu(|gpu| {
+        let ball = |radius: f32, at: Vec3| {
+            let (positions, indices) = ball(radius, 6);
+            (positions, indices, Transform::Matrix(Mat4::from_translation(at)))
+        };
+        let same = |scene: &Scene, eye: &View| {
+            let (before, online) = (few(Method::Vectors), few(Method::Online));
+            let exact = Studio::new(gpu, scene, &before, None).irradiance(eye, &before);
+            let found = Studio::new(gpu, scene, &online, None).irradiance(eye, &online);
+            assert!(bits(&found) == bits(&exact), "NRMSE {}", nrmse(&exact, &found));
+            found
+        };
+        // None.
+        let open = same(&stage(&[]), &around(3.0, 8));
+        let unshadowed = few(Method::Unshadowed);
+        let plain = Studio::new(gpu, &stage(&[]), &unshadowed, None).irradiance(&around(3.0, 8), &unshadowed);
+        assert!(bits(&open) == bits(&plain));
+        // One around the receivers, which lie in the middle of it, and another larger than the scene.
+        let dark = same(&stage(&[ball(2.0, vec3(0.0, 0.1, 0.0))]), &around(1.0, 8));
+        assert!(dark.iter().zip(&open).all(|(d, o)| d.is_finite() && d.element_sum() < o.element_sum()));
+        same(&stage(&[ball(0.5, Vec3::Y), ball(90.0, vec3(0.0, 100.0, 0.0))]), &around(3.0, 8));
+        // A hundred, of which some look alike.
+        let many: Vec<_> = (0..100)
+            .map(|i| ball(if i % 3 == 0 { 0.3 } else { 0.2 }, vec3((i % 10) as f32 - 4.5, 0.6, (i / 10) as f32 - 4.5)))
+            .collect();
+        let shaded = same(&stage(&many), &around(9.0, 12));
+        assert!(shaded.iter().zip(&open).all(|(s, o)| s.element_sum() < o.element_sum()));
+    });
+}
+
+#[test]
+fn a_hundred_that_all_stand_differently() {
+    with_gpu(|gpu| {
+        let turn = |i: u32| Quat::from_rotation_y(0.31 * i as f32) * Quat::from_rotation_z(0.17 * i as f32);
+        let at = |i: u32| vec3((i % 10) as f32 - 4.5, 0.9, (i / 10) as f32 - 4.5);
+        let bodies = |turn: &dyn Fn(u32) -> Quat| (0..100).map(|i| odd_body(turn(i), at(i))).collect::<Vec<_>>();
+        let scene = stage(&bodies(&|_| Quat::IDENTITY));
+        let online = Settings { size: 8, ..few(Method::Online) };
+        let mut studio = Studio::new(gpu, &scene, &online, None);
+        assert_eq!(studio.fiv.occluders().kinds.len(), 1);
+        let turned = stage(&bodies(&turn));
+        let eye = view(vec3(0.0, 6.0, 8.0), Vec3::ZERO, 50.0, [16, 12]);
+        let found = studio.shot(&Pose::rest(&turned), &eye, &online).0;
+        let before = Settings { size: 8, ..few(Method::Vectors) };
+        let exact = Studio::new(gpu, &turned, &before, None).irradiance(&eye, &before);
+        assert!(nrmse(&exact, &found) < 3e-3, "{}", nrmse(&exact, &found));
+    });
+}
