@@ -11,7 +11,7 @@ use lucerna::{
 };
 use lucerna_samples::{
     args::RenderArgs,
-    fiv::{self, EnvironmentArgs, MergeArgs, Meter, PrecomputeArgs},
+    fiv::{self, EnvironmentArgs, MergeArgs, Meter, PrecomputeArgs, SteadyArgs},
     gbuffer_layers, program,
     render::{self, Input, Technique},
     shown::Shown,
@@ -35,6 +35,8 @@ enum Command {
     Merge(MergeArgs),
     /// Write a built-in environment into a file
     Environment(EnvironmentArgs),
+    /// How a sequence changes from frame to frame against one by brute force, where surfaces stand still
+    Steady(SteadyArgs),
     /// Render a scene into images
     #[command(args_override_self = true)]
     Render(Box<Render>),
@@ -63,6 +65,10 @@ fn main() -> ExitCode {
         Command::Environment(args) => {
             let console = args.talk.console();
             program::run(console, || fiv::environment(&args, console))
+        }
+        Command::Steady(args) => {
+            let console = args.talk.console();
+            program::run(console, || fiv::steady(&args, console))
         }
         Command::Render(args) => program::run(args.common.talk.console(), || run(&args)),
     }

@@ -9,6 +9,7 @@ use fiv_lab::{Studio, ball, colourful, ground, nrmse, thing};
 use glam::{Mat4, Quat, Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
+    measure::steady::{Frame, Steadiness},
     scene::{self, Environment, LoadOptions, Pose, Scene, Transform, View, builtin},
     techniques::fiv::{Method, Settings},
 };
@@ -238,5 +239,38 @@ fn a_hundred_that_all_stand_differently() {
         let before = Settings { size: 8, ..few(Method::Vectors) };
         let exact = Studio::new(gpu, &turned, &before, None).irradiance(&eye, &before);
         assert!(nrmse(&exact, &found) < 3e-3, "{}", nrmse(&exact, &found));
+    });
+}
+
+#[test]
+fn a_sequence_changes_as_the_truth_does_and_does_not_pop() {
+    with_gpu(|gpu| {
+        let scene = builtin::load("shadows-moving").unwrap();
+        let settings = |method| Settings { size: 8, azimuths: 32, polars: 17, radii: 15, method, ..Settings::default() };
+        let film = |settings: &Settings| {
+            let mut studio = Studio::new(gpu, &scene, settings, None);
+            let frame = |i: u32| {
+                let seconds = 1.0 + i as f32 / 12.0;
+                let pose = Pose::playing(&scene, seconds);
+                let eye = View::of_camera(&scene, &pose, 1, [48, 32]).unwrap();
+                studio.film(&pose, &eye, &settings.after(f64::from(seconds)))
+            };
+            (0..5).map(frame).collect::<Vec<_>>()
+        };
+        let measured = |turning: f32| {
+            let of = |method| Settings { turning, ..settings(method) };
+            let [truth, found] = [Method::BruteForce, Method::Online].map(|method| film(&of(method)));
+            fn frames(film: &[(Vec<[f32; 3]>, Vec<f32>)]) -> Vec<Frame<'_>> {
+                film.iter().map(|(light, depth)| Frame { light, depth }).collect()
+            }
+            Steadiness::of(48, &frames(&truth), &frames(&found))
+        };
+        for turning in [0.0, 40.0] {
+            let steady = measured(turning);
+            let largest = steady.largest();
+            eprintln!("environment at {turning} degrees a second: {} parts, {largest:.4?}", steady.parts);
+            assert!(steady.parts >= 6 && largest.truth > 0.01, "{steady:?}");
+            assert!(largest.found < 1.5 * largest.truth && largest.apart < 1.0 * largest.truth, "{steady:?}");
+        }
     });
 }

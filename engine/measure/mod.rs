@@ -32,6 +32,7 @@ mod parallel;
 pub mod pdiff;
 mod picture;
 pub mod ssim;
+pub mod steady;
 pub mod vdp;
 
 pub use display::{Display, Exposure, ToneCurve, develop};

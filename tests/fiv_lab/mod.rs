@@ -158,6 +158,20 @@ impl<'a> Studio<'a> {
         (irradiance, total)
     }
 
+    /// Irradiance and distance (metres; 1e10: nothing) of every pixel.
+    pub fn film(&mut self, pose: &Pose, view: &View, settings: &Settings) -> (Vec<[f32; 3]>, Vec<f32>) {
+        let mut graph = Graph::new("fiv");
+        let handles = self.resident.frame_in(&mut graph, self.scene, pose);
+        let view = view.fit_far(&handles.bounds());
+        let all = PictureSettings { fiv: settings.clone(), ..Default::default() };
+        let picture = self.fiv.picture(&mut graph, self.scene, pose, &handles, &view, &all).unwrap();
+        let tokens = [picture.outputs.irradiance, picture.gbuffer.depth].map(|image| graph.read_image(image));
+        let frame = self.runner.run(&graph).unwrap_or_else(|error| panic!("{error}"));
+        let [light, depth] = tokens.map(|token| frame.image(token).to_f32());
+        let metres = |[z, ..]: [f32; 4]| if z < 1.0 { z * view.far } else { 1e10 };
+        (light.into_iter().map(|[r, g, b, _]| [r, g, b]).collect(), depth.into_iter().map(metres).collect())
+    }
+
     /// Why a picture at rest is refused.
     pub fn refused(&mut self, view: &View, settings: &Settings) -> lucerna::Error {
         let mut graph = Graph::new("fiv");

@@ -1,7 +1,8 @@
-//! `fiv precompute`, `fiv merge` and `fiv environment`: what `fiv render` takes, as files.
+//! `fiv precompute`, `fiv merge` and `fiv environment`: what `fiv render` takes, as files; `fiv steady`: what is wrong with what it gives.
 
 mod meter;
 mod precompute;
+mod steady;
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -14,6 +15,7 @@ use lucerna::{
 
 pub use meter::Meter;
 pub use precompute::{PrecomputeArgs, precompute};
+pub use steady::{SteadyArgs, steady};
 
 use crate::{args::TalkArgs, console::Console};
 
