@@ -101,17 +101,17 @@ fn a_turned_occluder_is_as_one_made_turned() {
     });
 }
 
-/// A scene of the asset collection, its first mesh `height` metres high over a ground under colourful light.
-fn posed(file: &str, height: f32) -> Option<Scene> {
+/// A scene of the asset collection, lying 1.2 m long over a ground under colourful light.
+fn lying(file: &str) -> Option<Scene> {
     let path = common::assets()?.join("gltf").join(file);
     let mut scene = scene::load(&path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     let bounds = extent_of(&scene);
-    let scale = height / (bounds.1.y - bounds.0.y);
-    let middle = 0.5 * (bounds.0 + bounds.1);
-    let lift = vec3(-middle.x, -bounds.0.y, -middle.z) * scale + vec3(0.0, 0.25, 0.0);
+    let scale = 1.2 / (bounds.1.y - bounds.0.y);
+    let rotation = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
+    let translation = vec3(0.0, 0.7, 0.0) - rotation * (0.5 * scale * (bounds.0 + bounds.1));
     // Everything stands on one node more, which comes first.
     let holder = scene::Node {
-        local: Transform::Trs { translation: lift, rotation: Quat::IDENTITY, scale: Vec3::splat(scale) },
+        local: Transform::Trs { translation, rotation, scale: Vec3::splat(scale) },
         ..scene::Node::default()
     };
     for node in &mut scene.nodes {
@@ -139,20 +139,38 @@ fn extent_of(scene: &Scene) -> (Vec3, Vec3) {
     out
 }
 
+/// The scene with its meshes as they are in a pose, and nothing that could move them.
+fn frozen(scene: &Scene, pose: &Pose) -> Scene {
+    let mut out = Scene { environment: scene.environment.clone(), ..Scene::default() };
+    for (index, node) in scene.nodes.iter().enumerate() {
+        for primitive in node.mesh.map_or(&[][..], |mesh| &scene.meshes[mesh as usize].primitives) {
+            let positions = scene::deform::world_vertices(scene, pose, index, primitive).positions;
+            thing(&mut out, &node.name, positions, primitive.indices.clone(), Mat4::IDENTITY);
+        }
+    }
+    out
+}
+
 #[test]
 fn what_deforms_casts_the_shadow_of_its_moment() {
     with_gpu(|gpu| {
         for (file, times) in
             [("AnimatedMorphCube/AnimatedMorphCube.gltf", [0.0, 1.6]), ("RiggedSimple/RiggedSimple.gltf", [0.0, 1.0])]
         {
-            let Some(scene) = posed(file, 1.2) else { return };
+            let Some(scene) = lying(file) else { return };
             let (online, brute) = (finer(Method::Online), finer(Method::BruteForce));
             let mut studio = Studio::new(gpu, &scene, &online, None);
             let mut truth = Studio::new(gpu, &scene, &brute, None);
+            let before = finer(Method::Vectors);
             let pictures = times.map(|seconds| {
                 let pose = Pose::playing(&scene, seconds);
                 let exact = truth.shot(&pose, &around(3.0, 20), &brute).0;
-                (exact, studio.shot(&pose, &around(3.0, 20), &online).0)
+                let found = studio.shot(&pose, &around(3.0, 20), &online).0;
+                // As vectors of the mesh as it is now.
+                let frozen = frozen(&scene, &pose);
+                let same = Studio::new(gpu, &frozen, &before, None).irradiance(&around(3.0, 20), &before);
+                assert!(nrmse(&same, &found) < 2e-3, "{file}, {seconds} s: {}", nrmse(&same, &found));
+                (exact, found)
             });
             let [(first, found), (second, later)] = &pictures;
             let changed = nrmse(first, second);
@@ -161,7 +179,7 @@ fn what_deforms_casts_the_shadow_of_its_moment() {
             let stale = nrmse(second, found);
             eprintln!("{file}: the truth changes by {changed:.4}, errors {errors:.4?}, of the other moment {stale:.4}");
             assert!(changed > 0.03, "{file}: nothing moves");
-            assert!(errors.iter().all(|e| *e < 0.06) && errors[1] < 0.7 * stale, "{file}: {errors:?} {stale}");
+            assert!(errors.iter().all(|e| *e < 0.12) && errors[1] < 0.7 * stale, "{file}: {errors:?} {stale}");
         }
     });
 }
@@ -212,7 +230,7 @@ fn odd_numbers_of_occluders_and_odd_places() {
         assert!(bits(&open) == bits(&plain));
         // One around the receivers, which lie in the middle of it, and another larger than the scene.
         let dark = same(&stage(&[ball(2.0, vec3(0.0, 0.1, 0.0))]), &around(1.0, 8));
-        assert!(dark.iter().zip(&open).all(|(d, o)| d.is_finite() && d.element_sum() < o.element_sum()));
+        assert!(dark.iter().zip(&open).all(|(d, o)| d.is_finite() && d.element_sum() <= o.element_sum()));
         same(&stage(&[ball(0.5, Vec3::Y), ball(90.0, vec3(0.0, 100.0, 0.0))]), &around(3.0, 8));
         // A hundred, of which some look alike.
         let many: Vec<_> = (0..100)
@@ -246,7 +264,8 @@ fn a_hundred_that_all_stand_differently() {
 fn a_sequence_changes_as_the_truth_does_and_does_not_pop() {
     with_gpu(|gpu| {
         let scene = builtin::load("shadows-moving").unwrap();
-        let settings = |method| Settings { size: 8, azimuths: 32, polars: 17, radii: 15, method, ..Settings::default() };
+        let settings =
+            |method| Settings { size: 8, azimuths: 32, polars: 17, radii: 15, method, ..Settings::default() };
         let film = |settings: &Settings| {
             let mut studio = Studio::new(gpu, &scene, settings, None);
             let frame = |i: u32| {

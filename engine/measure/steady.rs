@@ -108,8 +108,10 @@ mod tests {
             }
         }
         let frames = |lights: &[Vec<[f32; 3]>]| {
-            let truth: Vec<Frame<'_>> = right.iter().zip(&depths).map(|(light, depth)| Frame { light, depth }).collect();
-            let found: Vec<Frame<'_>> = lights.iter().zip(&depths).map(|(light, depth)| Frame { light, depth }).collect();
+            let truth: Vec<Frame<'_>> =
+                right.iter().zip(&depths).map(|(light, depth)| Frame { light, depth }).collect();
+            let found: Vec<Frame<'_>> =
+                lights.iter().zip(&depths).map(|(light, depth)| Frame { light, depth }).collect();
             Steadiness::of(width, &truth, &found)
         };
         let same = frames(&right);

@@ -55,10 +55,10 @@ fn copied(stage: &mut Stage, from: &Scene, name: &str) -> u32 {
 fn tumble(stage: &mut Stage, node: u32) {
     let times: Vec<f32> = (0..=KEYS).map(|i| SECONDS * i as f32 / KEYS as f32).collect();
     let angle = |i: u32| TAU * (i % KEYS) as f32 / KEYS as f32;
-    let place = |i: u32| vec3(1.4 + 0.5 * angle(i).cos(), 0.75 + 0.2 * (2.0 * angle(i)).sin(), 1.2 + 0.5 * angle(i).sin());
+    let place =
+        |i: u32| vec3(1.4 + 0.5 * angle(i).cos(), 0.75 + 0.2 * (2.0 * angle(i)).sin(), 1.2 + 0.5 * angle(i).sin());
     let turn = |i: u32| Quat::from_rotation_y(angle(i)) * Quat::from_axis_angle(Vec3::X, 2.0 * angle(i));
-    let channel =
-        |values: Keys| Channel { node, interpolation: Interpolation::Linear, times: times.clone(), values };
+    let channel = |values: Keys| Channel { node, interpolation: Interpolation::Linear, times: times.clone(), values };
     let channels = vec![
         channel(Keys::Translation((0..=KEYS).map(place).collect())),
         channel(Keys::Rotation((0..=KEYS).map(turn).collect())),

@@ -5,11 +5,7 @@ use std::sync::Arc;
 use glam::Mat3;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Fiv, Method, Settings,
-    online::Seen,
-    online_standing::Standing,
-};
+use super::{Fiv, Method, Settings, online::Seen, online_standing::Standing};
 use crate::{
     Error, Result,
     graph::{Depth, Extent, Format, Graph, Image, Load, Raster, Targets},

@@ -88,11 +88,8 @@ impl Sky {
         if (turn, factor) == (0.0, 1.0) {
             return Self::new(environment, settings.size);
         }
-        let changed = environment.map(|e| Environment {
-            rotation: e.rotation + turn,
-            scale: e.scale * factor,
-            ..e.clone()
-        });
+        let changed =
+            environment.map(|e| Environment { rotation: e.rotation + turn, scale: e.scale * factor, ..e.clone() });
         Self::new(changed.as_ref(), settings.size)
     }
 
