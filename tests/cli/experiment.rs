@@ -334,7 +334,7 @@ layers = ["irradiance"]
 name = "brute force"
 kind = "fiv"
 settings = { "fiv.method" = "brute-force", "fiv.size" = 8 }
-layers = ["irradiance"]
+layers = ["irradiance", "covered"]
 "#,
     );
     place.run("out", &[]).expect(0, &["wrote"]);

@@ -2,14 +2,17 @@
 //!
 //! Scenes and techniques are known by their names: [`paper`] says which of them stands for which figure. Techniques named
 //! `32x17x15` are sets of samples; the reference is `brute force`. Errors are those of the irradiance of the ground seen from straight above
-//! without what stands on it (view [`GROUND`]).
+//! without what stands on it (view [`GROUND`]); ground that a thing covers from close above is never seen and left out.
 
 mod images;
 mod paper;
 mod perceived;
 mod tables;
 
-use lucerna::{Result, measure::Measure};
+use lucerna::{
+    Result,
+    measure::{Measure, Options, Pair, Picture},
+};
 
 use crate::{
     experiment::{
@@ -72,13 +75,31 @@ impl<'a> Lab<'a> {
         run.map(|run| self.results.times(run)).transpose()
     }
 
-    /// NRMSE (eq. 17) of the irradiance of a view.
+    /// NRMSE (eq. 17) of the irradiance of a view, over the pixels that are not covered.
     fn nrmse(&self, scene: &str, view: &str, method: &str) -> Result<Option<f64>> {
         let Some((truth, run)) = self.run(scene, view, TRUTH).zip(self.run(scene, view, method)) else {
             return Ok(None);
         };
-        let value = self.results.measure(Measure::Nrmse, Layer(truth, "irradiance"), Layer(run, "irradiance"), None)?;
+        let open = self.open(truth)?;
+        let picture = |run: &Done| -> Result<Picture> {
+            let picture = self.results.picture(Layer(run, "irradiance"))?;
+            let Some(open) = &open else { return Ok(picture) };
+            let pixels: Vec<[f32; 3]> = picture.pixels.iter().zip(open).filter(|(_, o)| **o).map(|(p, _)| *p).collect();
+            Picture::new(pixels.len() as u32, 1, pixels)
+        };
+        let (truth, test) = (picture(truth)?, picture(run)?);
+        let value = Measure::Nrmse.of(&Pair::new(&truth, &test)?, &Options::default())?.value;
         Ok(Some(value).filter(|value| value.is_finite()))
+    }
+
+    /// Which pixels are not covered by what stands on the ground; `None`: all, or it is not known.
+    fn open(&self, truth: &Done) -> Result<Option<Vec<bool>>> {
+        if truth.view != GROUND {
+            return Ok(None);
+        }
+        let covered = self.results.picture(Layer(truth, "covered"))?;
+        let open: Vec<bool> = covered.pixels.iter().map(|p| p[0] < 0.5).collect();
+        Ok(Some(open).filter(|open| open.iter().any(|o| *o)))
     }
 
     /// Device and driver, for the captions of tables.

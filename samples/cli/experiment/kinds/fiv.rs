@@ -2,12 +2,17 @@
 
 use std::{path::PathBuf, time::Instant};
 
+use glam::{Vec2, Vec3};
 use lucerna::{
     Error, Result,
     gpu::Gpu,
     graph::Runner,
-    image::Precision,
-    scene::{Pose, Scene, resident::Resident},
+    image::{Layer, Layers, Precision},
+    scene::{
+        Pose, Scene, View,
+        bvh::{Bvh, Ray, TriangleId},
+        resident::Resident,
+    },
     techniques::fiv::{Fiv, Light, Method, Occluder, Occluders, PictureSettings, Plan, Settings, Sky, Stored},
 };
 use serde::{Deserialize, Serialize};
@@ -39,6 +44,9 @@ pub(super) fn settings(_paper: bool, changes: &Changes) -> Result<Value> {
     settings.fiv.validate()?;
     config::to_value(&settings)
 }
+
+/// Height up to which a thing covers the ground below it, in radii of the largest: what is under it there is never seen.
+const COVERS: f32 = 0.1;
 
 /// What is kept of a scene for one set of vectors.
 struct Kept {
@@ -84,12 +92,49 @@ pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rende
         Ok(Shown::new(picture.outputs.total).color("irradiance", picture.outputs.irradiance))
     })?;
     let facts = facts.clone();
+    let radius = fiv.occluders().kinds.iter().map(|kind| kind.radius).fold(0f32, f32::max);
+    let covered = match &rendered {
+        Some(_) if making.method == Method::BruteForce && job.view.is_orthographic() => {
+            let bvh = warm.keep("fiv bvh", |_, scene, pose| Ok(Bvh::build(scene, pose)))?;
+            Some(covered(scene, bvh, job.view, COVERS * radius))
+        }
+        _ => None,
+    };
     Ok(rendered.map(|mut rendered| {
+        rendered.layers = match covered {
+            Some(data) => Layers { ..rendered.layers }.with(Layer::new("covered", &["Y"], data)),
+            None => rendered.layers,
+        };
         // Errors of a hundredth are looked at.
         rendered.layers.layers.iter_mut().for_each(|layer| layer.precision = Precision::Full);
         rendered.times.facts = facts;
         rendered
     }))
+}
+
+/// 1 for every pixel above which something is nearer than `height`, metres, or which lies inside of something; seen without perspective.
+fn covered(scene: &Scene, bvh: &Bvh, view: &View, height: f32) -> Vec<f32> {
+    let [width, rows] = view.extent;
+    let along = view.axes()[2];
+    let pixel = |x: u32, y: u32| {
+        let uv = (Vec2::new(x as f32, y as f32) + 0.5) / Vec2::new(width as f32, rows as f32);
+        let origin: Vec3 = view.world_from_depth(uv, 0.0);
+        let seen = Ray { t_min: view.near, ..Ray::new(origin, along) };
+        let Some(hit) = bvh.closest(&seen) else { return 0.0 };
+        let up = Ray { t_min: 1e-5 * height, ..Ray::new(origin + along * hit.t, -along) };
+        let Some(over) = bvh.closest(&up) else { return 0.0 };
+        let [a, b, c] = bvh.triangles()[over.triangle as usize];
+        let from_inside = (b - a).cross(c - a).dot(along) < 0.0 && !is_thin(scene, bvh.id(over.triangle));
+        f32::from(over.t < height || from_inside)
+    };
+    (0..rows).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect()
+}
+
+/// Seen from both sides: a leaf has no inside.
+fn is_thin(scene: &Scene, triangle: TriangleId) -> bool {
+    let mesh = scene.nodes[triangle.node as usize].mesh.map(|mesh| &scene.meshes[mesh as usize]);
+    let primitive = mesh.and_then(|mesh| mesh.primitives.get(triangle.primitive as usize));
+    primitive.is_some_and(|primitive| scene.materials[primitive.material as usize].double_sided)
 }
 
 fn make(gpu: &Gpu, scene: &Scene, settings: &Settings, folder: PathBuf, stop: &dyn Fn() -> bool) -> Result<Kept> {
@@ -126,7 +171,7 @@ fn vectors(
     stop: &dyn Fn() -> bool,
 ) -> Result<(Option<Stored>, f64)> {
     let Some(environment) = &scene.environment else { return Ok((None, 0.0)) };
-    let sky = Sky::new(Some(environment), settings.size)?;
+    let sky = Sky::of(Some(environment), settings)?;
     let occluders = Occluders::of(scene, &Pose::rest(scene), settings.flat, settings.largest);
     let plan = Plan::new(&environment.name, sky.hash(), &occluders.kinds, settings);
     let mut whole = Stored::empty(plan.clone(), 0);

@@ -13,7 +13,8 @@ pub(super) fn errors(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("Figures 18 to 23: errors against brute force");
     section.text(
         "NRMSE (eq. 17): for each channel the root of the mean squared difference of irradiance over the range of the reference, the mean of \
-         the three channels; over the ground seen from straight above without what stands on it, as the thesis' shadow images are. The \
+         the three channels; over the ground seen from straight above without what stands on it, as the thesis' shadow images are; ground that \
+         a thing covers from closer than a tenth of its radius or that lies inside of it is left out, for it is never seen. The \
          reference casts a shadow ray from every pixel to every texel of the environment that is not black. *Unshadowed* is the error \
          of leaving shadows out. The thesis says neither its views nor, but for figure 19, which environment was used; where its \
          Eucalyptus Grove is not at hand, a grove made by code and a photographed forest stand in.",
