@@ -28,6 +28,7 @@ const GROUND: &str = "ground";
 const FRONT: &str = "front";
 const TRUTH: &str = "brute force";
 const UNSHADOWED: &str = "unshadowed";
+const ONLINE: &str = "online";
 /// The default set of samples.
 const DEFAULT: &str = "64x33x30";
 /// The set of table 3.
@@ -44,6 +45,7 @@ pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
     page.add(tables::precompute(&lab)?);
     page.add(tables::frames(&lab)?);
     page.add(tables::independence(&lab)?);
+    page.add(tables::online(&lab)?);
     page.add(perceived::tables(&lab)?);
     page.add(tables::methods(&lab)?);
     Ok(())

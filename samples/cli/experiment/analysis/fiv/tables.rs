@@ -2,7 +2,7 @@
 
 use lucerna::Result;
 
-use super::{DEFAULT, DENSE, FRONT, GROUND, Lab, TRUTH, UNSHADOWED, over, own, paper};
+use super::{DEFAULT, DENSE, FRONT, GROUND, Lab, ONLINE, TRUTH, UNSHADOWED, over, own, paper};
 use crate::report::{Axis, Cell, Plot, Section, Table};
 
 /// Bytes of a megabyte, as the thesis counts.
@@ -170,6 +170,35 @@ pub(super) fn independence(lab: &Lab<'_>) -> Result<Section> {
             own(&times).into(),
             truth.into(),
             over(truth, own(&times)),
+        ]);
+    }
+    section.add(table);
+    Ok(section)
+}
+
+/// Beyond the thesis: no vectors beforehand.
+pub(super) fn online(lab: &Lab<'_>) -> Result<Section> {
+    let mut section = Section::new("Without computing beforehand");
+    section.text(
+        "The thesis' future work: vectors computed in each frame, where pixels look them up. Times are those of the illumination; where a \
+         scene stands still each of its frames costs as much, for nothing is kept.",
+    );
+    let columns =
+        ["scene", "view", "online (ms)", "vectors (ms)", "computing all vectors (s)", "NRMSE", "NRMSE of vectors"];
+    let mut table = Table::new("online", lab.caption("Vectors of each frame"), columns).timed();
+    for run in lab.results.of(ONLINE) {
+        let (scene, view) = (run.scene.as_str(), run.view.as_str());
+        let set = lab.nearest(scene, view, DEFAULT);
+        let beside = lab.run(scene, view, set);
+        let (ours, stored) = (lab.times(Some(run))?, lab.times(beside)?);
+        table.push([
+            scene.into(),
+            view.into(),
+            ours.as_ref().and_then(own).into(),
+            stored.as_ref().and_then(own).into(),
+            stored.as_ref().and_then(|times| times.fact("seconds before")).into(),
+            lab.nrmse(scene, view, ONLINE)?.into(),
+            lab.nrmse(scene, view, set)?.into(),
         ]);
     }
     section.add(table);

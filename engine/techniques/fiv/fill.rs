@@ -1,0 +1,89 @@
+//! How much of its bounding disc an occluder hides, on average: what the overlap correction must know of bodies that are no balls.
+
+use glam::Vec3;
+
+use super::Occluder;
+use crate::scene::{
+    Pose,
+    bvh::{Bvh, Ray},
+};
+
+/// Directions that it is looked at from, on half a sphere: the other half sees the same.
+const DIRECTIONS: u32 = 24;
+/// Rays along an edge of the square around the disc.
+const RAYS: u32 = 24;
+/// Turn from one direction to the next, radians: the golden angle.
+const TURN: f32 = 2.399_963;
+
+/// The mean of its silhouette's area over that of its bounding disc, above 0, at most 1.
+pub fn fill(occluder: &Occluder) -> f32 {
+    let bvh = Bvh::build(&occluder.scene, &Pose::rest(&occluder.scene));
+    let radius = occluder.radius;
+    let (mut met, mut all) = (0u32, 0u32);
+    for k in 0..DIRECTIONS {
+        let y = (k as f32 + 0.5) / DIRECTIONS as f32;
+        let (sin, cos) = (k as f32 * TURN).sin_cos();
+        let level = (1.0 - y * y).sqrt();
+        let along = Vec3::new(level * cos, y, level * sin);
+        let right = along.any_orthonormal_vector();
+        let up = along.cross(right);
+        for i in 0..RAYS * RAYS {
+            let place = |i: u32| 2.0 * (i as f32 + 0.5) / RAYS as f32 - 1.0;
+            let (u, v) = (place(i % RAYS), place(i / RAYS));
+            if u * u + v * v > 1.0 {
+                continue;
+            }
+            all += 1;
+            met += u32::from(bvh.any(&Ray::new((right * u + up * v - along * 1.5) * radius, along)));
+        }
+    }
+    met.max(1) as f32 / all.max(1) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec4;
+
+    use super::*;
+    use crate::{
+        scene::{Material, Mesh, Node, Primitive, Scene, builtin},
+        techniques::fiv::Occluders,
+    };
+
+    fn of(scene: &Scene) -> (f32, f32) {
+        let all = Occluders::of(scene, &Pose::rest(scene), false, 1.0);
+        (fill(&all.kinds[0]), all.kinds[0].radius)
+    }
+
+    /// A box around the origin.
+    fn cuboid(size: Vec3) -> Scene {
+        let corner = |i: u32| size * (Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) - 0.5);
+        let sides = [[0, 2, 6, 4], [1, 5, 7, 3], [0, 4, 5, 1], [2, 3, 7, 6], [0, 1, 3, 2], [4, 6, 7, 5]];
+        let primitive = Primitive {
+            positions: (0..8).map(corner).collect(),
+            normals: vec![Vec3::Y; 8],
+            tangents: vec![Vec4::ZERO; 8],
+            indices: sides.iter().flat_map(|[a, b, c, d]| [*a, *b, *c, *a, *c, *d]).collect(),
+            ..Primitive::default()
+        };
+        Scene {
+            nodes: vec![Node { mesh: Some(0), ..Node::default() }],
+            meshes: vec![Mesh { primitives: vec![primitive], ..Mesh::default() }],
+            materials: vec![Material::default()],
+            ..Scene::default()
+        }
+    }
+
+    #[test]
+    fn silhouettes_have_a_quarter_of_the_surface_of_convex_bodies() {
+        let (ball, _) = of(&builtin::load("furnace-sphere").unwrap());
+        assert!((0.97..=1.0).contains(&ball), "{ball}");
+        // Cauchy: exact for the mean over all directions.
+        for size in [Vec3::new(1.0, 2.0, 0.5), Vec3::new(100.0, 20.0, 30.0), Vec3::splat(0.01)] {
+            let (found, radius) = of(&cuboid(size));
+            let exact = (size.x * size.y + size.y * size.z + size.z * size.x) / 2.0;
+            let exact = exact / (std::f32::consts::PI * radius * radius);
+            assert!((found / exact - 1.0).abs() < 0.05, "{size}: {found} instead of {exact}");
+        }
+    }
+}
