@@ -11,12 +11,21 @@ use lucerna::{
     gpu::testing::with_gpu,
     measure::steady::{Frame, Steadiness},
     scene::{self, Environment, LoadOptions, Pose, Scene, Transform, View, builtin},
-    techniques::fiv::{Method, Settings},
+    techniques::fiv::{Method, SelfSamples, Settings},
 };
 use tracer_lab::{flat_view, view};
 
 fn few(method: Method) -> Settings {
-    Settings { size: 16, azimuths: 16, polars: 9, radii: 8, largest: 1.0, method, ..Settings::default() }
+    Settings {
+        size: 16,
+        azimuths: 16,
+        polars: 9,
+        radii: 8,
+        largest: 1.0,
+        self_samples: SelfSamples::Spheres,
+        method,
+        ..Settings::default()
+    }
 }
 
 fn finer(method: Method) -> Settings {

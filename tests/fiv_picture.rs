@@ -11,7 +11,7 @@ use lucerna::{
     gpu::testing::with_gpu,
     reference::fiv as twin,
     scene::{Environment, Light, LightKind, Node, Pose, Scene, View, resident::Resident},
-    techniques::fiv::{Fiv, Method, Settings, Sky},
+    techniques::fiv::{Extent, Fiv, Interpolation, Method, SelfSamples, Settings, Sky},
 };
 use tracer_lab::flat_view;
 
@@ -135,16 +135,22 @@ fn an_occluder_that_sinks_into_the_ground_fades_without_a_step() {
 }
 
 #[test]
-fn a_convex_body_alone_shadows_itself_less_the_closer_the_samples() {
+fn a_convex_body_does_not_shadow_itself() {
     with_gpu(|gpu| {
         let mut scene = stage(colourful(), &[Vec3::ZERO]);
         scene.nodes.remove(0);
         let view = flat_view(vec3(0.0, 3.0, 0.0), Vec3::ZERO, 0.7, [16, 16]);
         let picture = |settings: &Settings| Studio::new(gpu, &scene, settings, None).irradiance(&view, settings);
         let open = picture(&by(Method::Unshadowed));
-        // From a sample over the surface a little of what is behind it is seen, and taken away: of even light 1 - (R / ρ)².
+        for (e, o) in picture(&coarse()).iter().zip(&open) {
+            assert!(e.cmpge(*o * 0.97).all() && e.cmple(*o * 1.0001).all(), "{e} instead of {o}");
+        }
+        // The thesis' way: from a sample over the surface a little of what is behind it is seen, and taken away: of even light
+        // 1 - (R / ρ)².
+        let spheres = Settings { self_samples: SelfSamples::Spheres, ..coarse() };
         let mean = |p: &[Vec3]| p.iter().copied().sum::<Vec3>() / p.len() as f32;
-        let ratio = |radii: u32, reach: f32| mean(&picture(&Settings { radii, reach, ..coarse() })) / mean(&open);
+        let ratio =
+            |radii: u32, reach: f32| mean(&picture(&Settings { radii, reach, ..spheres.clone() })) / mean(&open);
         let (far, near) = (ratio(15, 16.0), ratio(60, 4.0));
         eprintln!("self-shadowed over unshadowed, a ball: {far}, with spheres closer together {near}");
         assert!(far.min_element() > 0.6 && near.min_element() > 0.9 && near.max_element() <= 1.0001, "{far} {near}");
@@ -152,6 +158,155 @@ fn a_convex_body_alone_shadows_itself_less_the_closer_the_samples() {
         let off = picture(&Settings { self_shadow: false, ..coarse() });
         for (a, b) in off.iter().zip(&open) {
             assert!((*a - *b).length() < 1e-5 * b.length(), "{a} {b}");
+        }
+    });
+}
+
+#[test]
+fn a_body_with_a_hollow_shadows_itself_as_by_brute_force() {
+    with_gpu(|gpu| {
+        // A ball over a wide bowl, one mesh.
+        let (mut positions, mut indices) = ball(0.25, 16);
+        positions.iter_mut().for_each(|p| p.y += 0.1);
+        let (bowl, triangles) = ball(0.6, 24);
+        let first = positions.len() as u32;
+        let low = |i: &u32| bowl[*i as usize].y < -0.02;
+        positions.extend(bowl.iter().copied());
+        for corner in triangles.chunks_exact(3).filter(|c| c.iter().all(low)) {
+            indices.extend(corner.iter().map(|i| i + first));
+        }
+        let mut scene = Scene { environment: Some(colourful()), ..Scene::default() };
+        thing(&mut scene, "bowl", positions, indices, Mat4::IDENTITY);
+        scene.materials[0].double_sided = true;
+        let view = flat_view(vec3(0.4, 2.0, 0.5), Vec3::ZERO, 1.3, [24, 24]);
+        let picture = |settings: &Settings| Studio::new(gpu, &scene, settings, None).irradiance(&view, settings);
+        let truth = picture(&by(Method::BruteForce));
+        let error = |settings: &Settings| nrmse(&truth, &picture(settings));
+        let surface = error(&coarse());
+        let spheres = error(&Settings { self_samples: SelfSamples::Spheres, ..coarse() });
+        let none = error(&Settings { self_shadow: false, ..coarse() });
+        eprintln!("NRMSE of a body's shadow on itself: {surface:.4}, from spheres {spheres:.4}, without {none:.4}");
+        assert!(surface < 0.05 && surface < 0.5 * spheres && surface < 0.5 * none);
+    });
+}
+
+#[test]
+fn what_stands_on_the_ground_is_not_cut_by_it() {
+    with_gpu(|gpu| {
+        // A cone on its base: its bounding sphere reaches far below the ground.
+        let mut scene = Scene { environment: Some(colourful()), ..Scene::default() };
+        ground(&mut scene, 20.0);
+        let ring =
+            |i: u32| Vec3::from(glam::Vec2::from_angle(i as f32 * std::f32::consts::TAU / 24.0).extend(0.0)) * 0.6;
+        let mut positions: Vec<Vec3> = (0..24).map(|i| vec3(ring(i).x, 0.001, ring(i).y)).collect();
+        positions.extend([vec3(0.0, 0.7, 0.0), vec3(0.0, 0.001, 0.0)]);
+        let indices = (0..24).flat_map(|i| [i, 24, (i + 1) % 24, (i + 1) % 24, 25, i]).collect();
+        thing(&mut scene, "cone", positions, indices, Mat4::IDENTITY);
+        scene.materials[1].double_sided = true;
+        let from = vec3(1.6, 1.2, 0.9);
+        let view = flat_view(from, vec3(1.0, 0.0, 0.4), 0.7, [20, 20]);
+        let picture = |settings: &Settings| Studio::new(gpu, &scene, settings, None).irradiance(&view, settings);
+        let truth = picture(&by(Method::BruteForce));
+        let error = |extent: Extent| {
+            let settings = Settings { azimuths: 64, polars: 33, radii: 30, extent, ..coarse() };
+            nrmse(&truth, &picture(&settings))
+        };
+        let (hull, sphere) = (error(Extent::Hull), error(Extent::Sphere));
+        eprintln!("NRMSE beside a cone on the ground: {hull:.4}, by its bounding sphere {sphere:.4}");
+        assert!(hull < 0.06 && hull < 0.6 * sphere);
+    });
+}
+
+#[test]
+fn pictures_are_what_the_twin_looks_up() {
+    with_gpu(|gpu| {
+        let places = [vec3(0.0, 1.6, 0.0), vec3(0.0, 1.6, 0.0), vec3(0.9, 0.8, 0.4), vec3(3.0, 0.2, 2.0)];
+        for interpolation in [Interpolation::SolidAngle, Interpolation::Linear] {
+            let scene = stage(colourful(), &places);
+            let adaptive = interpolation == Interpolation::SolidAngle;
+            let settings = Settings { interpolation, adaptive, extent: Extent::Sphere, ..coarse() };
+            let sky = Sky::new(scene.environment.as_ref(), 16).unwrap();
+            let mut studio = Studio::new(gpu, &scene, &settings, None);
+            let (plan, kinds) = (studio.fiv.plan().clone(), studio.fiv.occluders().kinds.clone());
+            let mut fivs = vec![];
+            let light = lucerna::techniques::fiv::Light::new(gpu, &sky).unwrap();
+            plan.compute(gpu, &light, &kinds, 0..plan.samples(), |_, new| {
+                fivs.extend_from_slice(new);
+                Ok(true)
+            })
+            .unwrap();
+            let kind = &plan.occluders[0];
+            let solid = (interpolation == Interpolation::SolidAngle).then_some(f64::from(kind.radius));
+            let set = twin::Set { grid: plan.grid, shells: kind.shells, paces: &kind.paces, solid, fivs: &fivs };
+            let up = glam::DVec3::Y;
+            let centres = studio.fiv.occluders().placed.iter().map(|p| p.centre).collect::<Vec<_>>();
+            // On both sides of the seam, straight below, and where the lower ball is cut by the ground.
+            for at in [
+                vec3(0.0, 0.0, 0.0),
+                vec3(1e-3, 0.0, 1.0),
+                vec3(-1e-3, 0.0, 1.0),
+                vec3(1.5, 0.0, 0.2),
+                vec3(-9.0, 0.0, 3.0),
+            ] {
+                let view = flat_view(at + vec3(0.0, 0.02, 0.0), at, 1e-3, [1, 1]);
+                let found = studio.irradiance(&view, &settings)[0].as_dvec3();
+                let seen: Vec<_> = places
+                    .iter()
+                    .zip(&centres)
+                    .map(|(place, centre)| ((*place + *centre - at).as_dvec3(), f64::from(kind.radius)))
+                    .collect();
+                let shares = twin::shares(up, &seen);
+                let mut exact = twin::irradiance(&sky, up);
+                for ((offset, radius), share) in seen.iter().zip(shares) {
+                    let hidden = twin::dot(&set.lookup(*offset).0, up).max(glam::DVec3::ZERO);
+                    exact -= hidden * share * twin::front(offset.y, *radius);
+                }
+                let exact = exact.max(glam::DVec3::ZERO);
+                assert!(
+                    (found - exact).length() < 0.01 * twin::irradiance(&sky, up).length(),
+                    "{at}: {found} instead of {exact}"
+                );
+            }
+        }
+    });
+}
+
+#[test]
+fn occluders_turn_between_samples_of_turns() {
+    with_gpu(|gpu| {
+        // A bar on a foot, away from its node's origin.
+        let body = |turn: f32, at: f32| {
+            let mut scene = Scene { environment: Some(colourful()), ..Scene::default() };
+            ground(&mut scene, 20.0);
+            let (mut positions, indices) = ball(0.5, 10);
+            let turned = glam::Mat3::from_rotation_y(turn);
+            positions.iter_mut().for_each(|p| *p = turned * (*p * vec3(1.2, 0.3, 0.25) + vec3(0.2, 0.9, 0.0)));
+            thing(&mut scene, "bar", positions, indices, Mat4::from_rotation_y(at));
+            scene
+        };
+        let from = vec3(0.8, 3.0, 0.6);
+        let view = flat_view(from, vec3(0.0, 0.3, 0.0), 3.0, [24, 24]);
+        let settings = Settings { turns: 8, extent: Extent::Hull, ..coarse() };
+        let still = body(0.0, 0.0);
+        let mut studio = Studio::new(gpu, &still, &settings, None);
+        let mut turned = |angle: f32| {
+            let mut pose = Pose::rest(&still);
+            pose.world[1] = Mat4::from_rotation_y(angle);
+            studio.shot(&pose, &view, &settings).0
+        };
+        let baked = |angle: f32, settings: &Settings| {
+            Studio::new(gpu, &body(angle, 0.0), settings, None).irradiance(&view, settings)
+        };
+        let one = Settings { turns: 1, adaptive: false, ..settings.clone() };
+        for (angle, slack) in [(PI as f32 * 0.75, 0.02), (-0.5 * PI as f32, 0.02), (1.2, 0.08)] {
+            let truth = baked(angle, &by(Method::BruteForce));
+            let (found, exact) = (turned(angle), baked(angle, &one));
+            let (apart, error) = (nrmse(&exact, &found), nrmse(&truth, &found));
+            let rest = nrmse(&truth, &turned(0.0));
+            eprintln!(
+                "turned by {angle}: {apart:.4} from a mesh that is turned, {error:.4} from brute force, {rest:.4} at rest"
+            );
+            assert!(apart < slack && error < 0.6 * rest, "{angle}");
         }
     });
 }

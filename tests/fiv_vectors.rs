@@ -217,6 +217,86 @@ fn masks_are_those_of_the_cpus_hierarchy_and_disjoint_occluders_add() {
     });
 }
 
+/// What is seen from the places on an occluder's surface, with the solid angles.
+fn seen(gpu: &Gpu, occluder: &Occluder, light: &Light, split: u32) -> Vec<(twin::Vectors, f64)> {
+    let (places, mut runner) = (occluder.places(), Runner::new(gpu));
+    let (fivs, angles) = Cover::new(gpu, occluder).unwrap().run_own(&mut runner, light, &places, split).unwrap();
+    assert_eq!(fivs.len(), 9 * places.len());
+    fivs.chunks_exact(9).zip(angles).map(|(f, a)| (vectors(f), f64::from(a))).collect()
+}
+
+#[test]
+fn a_convex_body_leaves_itself_all_that_is_before_it() {
+    with_gpu(|gpu| {
+        let (sphere, _) = occluder(&one_ball(2.0, 12));
+        let sky = sky(&colourful(), 16);
+        let light = Light::new(gpu, &sky).unwrap();
+        for split in [1, 2] {
+            for (place, (found, angle)) in sphere.places().iter().zip(seen(gpu, &sphere, &light, split)) {
+                let n = place.normal.as_dvec3();
+                let exact = twin::irradiance(&sky, n);
+                assert!((twin::dot(&found, n) - exact).length() < 1e-4 * exact.length(), "{n}");
+                assert!((angle / (2.0 * PI) - 1.0).abs() < 0.06, "{n}: {angle}");
+            }
+        }
+    });
+}
+
+#[test]
+fn a_leaf_has_two_sides_and_its_edges_see_only_what_is_before_them() {
+    with_gpu(|gpu| {
+        let mut scene = Scene::default();
+        let corners = vec![vec3(-1.0, 0.0, -1.0), vec3(-1.0, 0.0, 1.0), vec3(1.0, 0.0, 1.0), vec3(1.0, 0.0, -1.0)];
+        thing(&mut scene, "leaf", corners, vec![0, 1, 2, 0, 2, 3], Mat4::IDENTITY);
+        scene.materials[0].double_sided = true;
+        let mut all = lucerna::techniques::fiv::Occluders::of(&scene, &lucerna::scene::Pose::rest(&scene), true, 1.0);
+        let leaf = all.kinds.remove(0);
+        let sky = sky(&colourful(), 16);
+        let light = Light::new(gpu, &sky).unwrap();
+        let places = leaf.places();
+        assert_eq!(places.len(), 8);
+        for (place, (found, _)) in places.iter().zip(seen(gpu, &leaf, &light, 1)) {
+            let n = place.normal.as_dvec3();
+            let exact = twin::irradiance(&sky, n);
+            assert!(n.y.abs() > 0.999 && (twin::dot(&found, n) - exact).length() < 1e-4 * exact.length(), "{n}");
+        }
+    });
+}
+
+#[test]
+fn places_on_a_surface_are_those_of_the_cpus_hierarchy_and_buried_ones_are_told() {
+    with_gpu(|gpu| {
+        // Two balls that run into each other.
+        let (positions, indices) = ball(1.0, 10);
+        let mut scene = Scene::default();
+        let count = positions.len() as u32;
+        let pair: Vec<Vec3> =
+            [-0.6, 0.6].iter().flat_map(|x| positions.iter().map(move |p| *p + vec3(*x, 0.0, 0.0))).collect();
+        let triangles = indices.iter().copied().chain(indices.iter().map(|i| i + count)).collect();
+        thing(&mut scene, "pair", pair, triangles, Mat4::IDENTITY);
+        let (pair, _) = occluder(&scene);
+        let sky = sky(&colourful(), 16);
+        let (light, tree) = (Light::new(gpu, &sky).unwrap(), hierarchy(&pair));
+        let (mut buried, mut shaded) = (0, 0);
+        for (place, (found, angle)) in pair.places().iter().zip(seen(gpu, &pair, &light, 1)) {
+            let other = place.point - vec3(if place.point.x > 0.0 { -0.6 } else { 0.6 }, 0.0, 0.0);
+            let (exact, free) = twin::seen(&sky, &tree, *place, 1);
+            if found[0].x >= f64::from(FIV_INSIDE) {
+                buried += 1;
+                assert!(angle == 0.0 && free == 0.0, "{place:?}: {angle} {free}");
+                continue;
+            }
+            assert!(other.length() > 0.9, "{place:?}");
+            shaded += u32::from(angle < 0.9 * 2.0 * PI);
+            assert!(
+                (angle - free).abs() < 0.01 * 2.0 * PI && apart(&found, &exact) < 0.02 * length(&exact),
+                "{place:?}"
+            );
+        }
+        assert!(buried > 20 && shaded > 20, "{buried} {shaded}");
+    });
+}
+
 #[test]
 fn each_sample_is_the_same_whatever_is_computed_with_it() {
     with_gpu(|gpu| {
@@ -225,7 +305,9 @@ fn each_sample_is_the_same_whatever_is_computed_with_it() {
         let sky = sky(&colourful(), 8);
         let light = Light::new(gpu, &sky).unwrap();
         let plan = Plan::new("colourful", light.hash, &kinds, &settings);
-        assert_eq!((plan.samples(), plan.grid), (240, Grid::of(6, 5, 4)));
+        let on: Vec<u64> = kinds.iter().map(|k| k.places().len() as u64).collect();
+        let samples = 240 + on[0] + on[1];
+        assert_eq!((plan.samples(), plan.first(1), plan.grid), (samples, 120 + on[0], Grid::of(6, 5, 4)));
         let run = |range: std::ops::Range<u64>| {
             let mut out = vec![];
             plan.compute(gpu, &light, &kinds, range, |_, new| {
@@ -235,9 +317,9 @@ fn each_sample_is_the_same_whatever_is_computed_with_it() {
             .unwrap();
             out
         };
-        let whole = run(0..240);
-        assert_eq!(whole.len(), 9 * 240);
-        let parts = [0..1, 1..77, 77..133, 133..240].map(run).concat();
+        let whole = run(0..samples);
+        assert_eq!(whole.len() as u64, 9 * samples);
+        let parts = [0..1, 1..77, 77..133, 133..240, 240..samples].map(run).concat();
         let bits = |v: &[f32]| v.iter().map(|f| f.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(&whole), bits(&parts));
         // At the poles all azimuths are one place.

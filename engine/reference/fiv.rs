@@ -1,15 +1,17 @@
 //! Fullsphere irradiance vectors, slowly: sums over the texels of the environment in double precision, rays by the CPU's hierarchy,
 //! lookups and overlaps as the thesis has them (Michael 2010, chapter 3).
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::{
     scene::bvh::{Bvh, Ray},
     techniques::fiv::{
+        pace::Paces,
         samples::{Grid, Shells},
         sky::{self, Sky},
+        surface::Place,
     },
 };
 
@@ -73,11 +75,37 @@ pub fn hidden(sky: &Sky, geometry: &Bvh, point: Vec3, split: u32) -> Hidden {
     out
 }
 
+/// What geometry leaves of the environment in front of a place on it, and its solid angle in steradians.
+pub fn seen(sky: &Sky, geometry: &Bvh, place: Place, split: u32) -> (Vectors, f64) {
+    let side = sky.size * split;
+    let share = 1.0 / f64::from(split * split);
+    let mut out = (Vectors::default(), 0.0);
+    for ray in 0..6 * side * side {
+        let (face, x, y) = sky::place(side, ray);
+        let (tx, ty) = (x / split, y / split);
+        let area = sky::area(face, sky.size, tx, ty);
+        let st = (DVec2::new(x.into(), y.into()) + 0.5) / f64::from(side);
+        if area.dot(place.normal.as_dvec3()) <= 0.0
+            || geometry.any(&Ray::new(place.point, sky::direction(face, st).as_vec3()))
+        {
+            continue;
+        }
+        let radiance = sky.radiance[((face * sky.size + ty) * sky.size + tx) as usize].as_dvec3();
+        out.0 = add(out.0, radiance, area * share);
+        out.1 += sky::solid_angle(sky.size, tx, ty) * share;
+    }
+    out
+}
+
 /// Stored vectors of one occluder.
 #[derive(Clone, Copy, Debug)]
 pub struct Set<'a> {
     pub grid: Grid,
     pub shells: Shells,
+    /// How the samples lie.
+    pub paces: &'a Paces,
+    /// Radius of the bounding sphere, metres, if what is interpolated along the radius is free of its solid angle.
+    pub solid: Option<f64>,
     /// Nine for each sample.
     pub fivs: &'a [f32],
 }
@@ -94,11 +122,13 @@ impl Set<'_> {
     pub fn lookup(&self, offset: DVec3) -> (Vectors, f64) {
         let Grid { azimuths, polars, radii } = self.grid;
         let rho = offset.length();
-        let (near, far) = (f64::from(self.shells.nearest), f64::from(self.shells.farthest));
-        let a = (offset.x.atan2(-offset.z) / TAU).rem_euclid(1.0) * f64::from(azimuths);
-        let p = offset.x.hypot(offset.z).atan2(offset.y) / PI * f64::from(polars - 1);
-        let r = ((rho.max(near) / near).ln() * self.shells.steps(radii)).clamp(0.0, f64::from(radii - 1));
+        let far = f64::from(self.shells.farthest);
+        let [a, p, r] = self.paces.numbers(&self.grid, &self.shells, offset);
         let (a0, p0, r0) = ((a as u32).min(azimuths - 1), (p as u32).min(polars - 2), (r as u32).min(radii - 2));
+        let growth = |sphere: u32| {
+            let size = |rho: f64| self.solid.map_or(1.0, |radius| rho.max(radius).powi(2));
+            size(self.paces.radius(&self.grid, &self.shells, sphere)) / size(rho.min(far))
+        };
         let (mut sum, mut weights) = (Vectors::default(), 0.0);
         for (da, dp, dr) in (0..8).map(|k| (k & 1, k >> 1 & 1, k >> 2)) {
             let part = |at: f64, low: u32, step: u32| {
@@ -108,7 +138,8 @@ impl Set<'_> {
             let weight = part(a, a0, da) * part(p, p0, dp) * part(r, r0, dr);
             let sample = self.grid.index((a0 + da) % azimuths, p0 + dp, r0 + dr);
             if let Some(vectors) = self.at(sample).filter(|_| weight > 0.0) {
-                (0..3).for_each(|axis| sum[axis] += vectors[axis] * weight);
+                let grown = weight * growth(r0 + dr);
+                (0..3).for_each(|axis| sum[axis] += vectors[axis] * grown);
                 weights += weight;
             }
         }
@@ -171,6 +202,7 @@ pub fn shares(normal: DVec3, occluders: &[(DVec3, f64)]) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::scene::Environment;
+    use std::f64::consts::TAU;
 
     fn even(size: u32) -> Sky {
         Sky::new(Some(&Environment::constant(Vec3::new(1.0, 2.0, 0.5))), size).unwrap()
@@ -262,7 +294,7 @@ mod tests {
             let v = light(shells.offset(&grid, i));
             fivs.extend(v.iter().flat_map(|c| c.to_array()).map(|x| x as f32));
         }
-        let set = Set { grid, shells, fivs: &fivs };
+        let set = Set { grid, shells, paces: &Paces::default(), solid: None, fivs: &fivs };
         let close = |a: &Vectors, b: &Vectors, slack: f64| (0..3).all(|k| (a[k] - b[k]).length() < slack);
         for i in 0..grid.count() {
             let offset = shells.offset(&grid, i);
@@ -288,11 +320,25 @@ mod tests {
     }
 
     #[test]
+    fn what_falls_with_the_solid_angle_is_exact_between_spheres() {
+        let (grid, shells) = (Grid::of(12, 7, 4), Shells { nearest: 0.5, farthest: 8.0 });
+        let light = |d: DVec3| 3.0 / d.length_squared().max(1.0);
+        let fivs: Vec<f32> = (0..grid.count()).flat_map(|i| [light(shells.offset(&grid, i)) as f32; 9]).collect();
+        let set = |solid| Set { grid, shells, paces: &Paces::default(), solid, fivs: &fivs };
+        for rho in [0.2, 0.5, 0.7, 1.0, 1.3, 2.0, 3.1, 5.0, 7.9, 8.0, 13.0] {
+            let d = DVec3::new(0.48, -0.6, 0.64) * rho;
+            let error = |solid| (set(solid).lookup(d).0[1].x / light(d) - 1.0).abs();
+            assert!(error(Some(1.0)) < 1e-6, "{rho}: {}", error(Some(1.0)));
+            assert!(![1.3, 3.1, 5.0].contains(&rho) || error(None) > 0.1, "{rho}: {}", error(None));
+        }
+    }
+
+    #[test]
     fn samples_inside_are_left_out() {
         let (grid, shells) = (Grid::of(4, 3, 2), Shells { nearest: 1.0, farthest: 2.0 });
         let mut fivs = vec![2.0f32; 9 * grid.count() as usize];
         (0..grid.index(0, 0, 1) as usize).for_each(|i| fivs[9 * i] = 2e38);
-        let set = Set { grid, shells, fivs: &fivs };
+        let set = Set { grid, shells, paces: &Paces::default(), solid: None, fivs: &fivs };
         let (found, weight) = set.lookup(DVec3::X * 2f64.sqrt());
         assert!((found[0].x - 2.0).abs() < 1e-9 && (weight - 0.5).abs() < 1e-9);
         assert_eq!(set.lookup(DVec3::X), (Vectors::default(), 0.0));

@@ -1,5 +1,6 @@
 // What an occluder hides of the environment from many points: its mask on the cube, a ray for each texel, and the sum of what the
-// mask lets through (Michael 2010, section 3.3.2). A workgroup has one point and some tiles of 8×8 texels.
+// mask lets through (Michael 2010, section 3.3.2). Or what is left of the environment in front of places on the occluder itself.
+// A workgroup has one point and some tiles of 8×8 texels.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -12,12 +13,14 @@ layout(binding = 0, scalar) readonly buffer Texels { FivTexel texels[]; };
 layout(binding = 1, scalar) readonly buffer Points { FivPoint points[]; };
 layout(binding = 2, scalar) writeonly buffer Partials { float partials[]; }; // ten for each point and chunk
 layout(binding = 3, scalar) readonly buffer Turns { FivTurn turns[]; };
+layout(binding = 4, scalar) readonly buffer Normals { vec3 normals[]; }; // of the places on the occluder
 
 layout(push_constant, scalar) uniform Push {
     uint first;   // point
     uint size;    // texels of the environment along an edge
     uint split;   // rays along the edge of a texel
     uint tiles;   // of a chunk
+    uint own;     // 1: the points lie on the occluder, and what is seen from before them counts
 };
 
 shared vec3 sums[3][64];
@@ -25,11 +28,14 @@ shared float covered[64];
 
 void main() {
     uint lane = gl_LocalInvocationID.x;
+    // Eight neighbouring invocations make a block of 4 × 2 texels: CPU drivers run them together.
+    uvec2 within = uvec2(lane & 3u | (lane >> 3u & 1u) << 2u, lane >> 2u & 1u | (lane >> 4u & 3u) << 1u);
     uint side = size * split, row = side / 8u;
     vec3 origin = points[first + gl_WorkGroupID.x].at;
     FivTurn turn = turns[points[first + gl_WorkGroupID.x].turn];
     float radius = turn.radius;
     vec3 start = turn.centre + turn.geometry_from_world * origin;
+    vec3 normal = own != 0u ? normals[first + gl_WorkGroupID.x] : vec3(0.0);
     float rho2 = dot(origin, origin), radius2 = radius * radius;
     float share = 1.0 / float(split * split);
     vec3 x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
@@ -37,15 +43,17 @@ void main() {
     uint begin = gl_WorkGroupID.y * tiles, end = min(begin + tiles, 6u * row * row);
     for (uint tile = begin; tile < end; ++tile) {
         uint face = tile / (row * row), place = tile % (row * row);
-        uvec2 at = 8u * uvec2(place % row, place / row) + uvec2(lane & 7u, lane >> 3u);
+        uvec2 at = 8u * uvec2(place % row, place / row) + within;
         vec3 direction = cube_direction(face, (vec2(at) + 0.5) / float(side));
         float along = -dot(origin, direction), squared = dot(direction, direction);
         // Only what passes the bounding sphere.
         bool near = rho2 <= radius2 || (along > 0.0 && along * along >= (rho2 - radius2) * squared);
-        if (!near) continue;
-        Ray ray = Ray(start, 0.0, turn.geometry_from_world * direction, 1.01 * (sqrt(rho2) + radius));
-        if (!trace_any(ray, TRACE_SHADOW, at.x + side * (at.y + side * face))) continue;
         FivTexel t = texels[(face * size + at.y / split) * size + at.x / split];
+        if (own != 0u ? dot(t.area, normal) <= 0.0 : !near) continue;
+        if (near) {
+            Ray ray = Ray(start, 0.0, turn.geometry_from_world * direction, 1.01 * (sqrt(rho2) + radius));
+            if (trace_any(ray, TRACE_SHADOW, at.x + side * (at.y + side * face)) == (own != 0u)) continue;
+        }
         x += t.radiance * (t.area.x * share);
         y += t.radiance * (t.area.y * share);
         z += t.radiance * (t.area.z * share);

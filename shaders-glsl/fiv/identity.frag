@@ -1,16 +1,36 @@
-// Which occluder each pixel shows, and at which depth: where that is not the G-buffer's, something was cut out here.
+// Which occluder each pixel shows, and at which depth: where that is not the G-buffer's, something was cut out here. And the light
+// that this occluder leaves itself there (Michael 2010, eq. 13).
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
 #include "lib/view.glsl"
-#include "lib/scene.glsl"
+#include "lib/gbuffer.glsl"
+#include "lib/fiv.glsl"
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
+layout(binding = 4, scalar) readonly buffer Owners { FivOwner owners[]; }; // of each instance
+layout(binding = 6) uniform sampler2D normal;
 
 layout(location = 0) in float eye_z;
-layout(location = 1) flat in uint owner;
+layout(location = 1) flat in uint instance;
+layout(location = 2) in vec4 front_x;
+layout(location = 3) in vec3 front_y;
+layout(location = 4) in vec3 front_z;
+layout(location = 5) in vec4 back_x;
+layout(location = 6) in vec3 back_y;
+layout(location = 7) in vec3 back_z;
+
 layout(location = 0) out vec2 identity; // number of the occluder plus one, 0: none; linear depth
+layout(location = 1) out vec4 own;      // irradiance, W/m²; a: 1 where it is known
 
 void main() {
-    identity = vec2(owner == NONE ? 0.0 : float(owner + 1u), eye_z / view.far);
+    FivOwner owner = owners[instance];
+    identity = vec2(owner.occluder == FIV_NONE ? 0.0 : float(owner.occluder + 1u), eye_z / view.far);
+    bool front = gl_FrontFacing != (owner.flipped != 0u);
+    vec4 x = front ? front_x : back_x;
+    vec3 y = front ? front_y : back_y, z = front ? front_z : back_z;
+    vec3 n = decode_normal(texelFetch(normal, ivec2(gl_FragCoord.xy), 0));
+    // Corners inside of other parts are left out; where all are, nothing reaches.
+    vec3 light = x.w > 1e-6 ? max(n.x * x.rgb + n.y * y + n.z * z, vec3(0.0)) / x.w : vec3(0.0);
+    own = owner.front == FIV_NONE ? vec4(0.0) : vec4(light, 1.0);
 }

@@ -12,8 +12,9 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(constant_id = 0) const uint PARTIAL = 1;   // occluders cut by the receiver's plane count in part
 layout(constant_id = 1) const uint OVERLAP = 1;   // what several occluders hide is taken away once
-layout(constant_id = 2) const uint OWN = 1;       // occluders shadow themselves
+layout(constant_id = 2) const uint OWN = 1;       // occluders shadow themselves: 1 from the spheres' samples, 2 from their surface's
 layout(constant_id = 3) const uint TRILINEAR = 1; // between samples
+layout(constant_id = 4) const uint SCALED = 1;    // what is interpolated is free of the solid angle
 
 struct FivWhole {
     vec3 x; // of the whole environment, W/m²
@@ -31,6 +32,8 @@ layout(binding = 5, scalar) readonly buffer Occluders { FivOccluder occluders[];
 layout(binding = 6, scalar) readonly buffer Fivs { float fivs[]; };
 layout(binding = 7, rgba32f) uniform image2D irradiance; // W/m²; below zero where occluders took more than there was
 layout(binding = 8, scalar) uniform WholeBlock { FivWhole whole; };
+layout(binding = 9) uniform sampler2D own; // irradiance that the pixel's occluder leaves itself, W/m²; a: 1 where it is known
+layout(binding = 10, scalar) readonly buffer Reaches { float reaches[]; };
 
 layout(push_constant, scalar) uniform Push {
     uint first; // occluder
@@ -38,6 +41,7 @@ layout(push_constant, scalar) uniform Push {
 };
 
 #include "lib/fiv_lookup.glsl"
+#include "lib/fiv_reach.glsl"
 
 // Places where the mean over the unit interval is taken: Gauss-Legendre, exact for seven overlapping occluders.
 const vec4 NODES = vec4(0.0694318442, 0.3300094782, 0.6699905218, 0.9305681558);
@@ -46,7 +50,7 @@ const vec4 WEIGHTS = vec4(0.1739274226, 0.3260725774, 0.3260725774, 0.1739274226
 // The share of what occluder `i` hides that is to be taken away for it, so that what several hide is taken away once. For two it is
 // eq. 15. Where more overlap, the mean of 1 / (1 + number of others there), as if these lay there independently: the integral of
 // the product of 1 - g (1 - t) over t in 0..1.
-float own_share(uint i, uint self, vec3 p, vec3 n) {
+float own_share(uint i, uint self, vec3 p, vec3 n, FivAlong along) {
     vec3 to = occluders[i].centre - p;
     float rho = length(to);
     vec3 direction = to / max(rho, 1e-20);
@@ -57,13 +61,14 @@ float own_share(uint i, uint self, vec3 p, vec3 n) {
         vec3 other = occluders[j].centre - p;
         float radius = occluders[j].radius;
         float d = dot(other, n);
-        if (d <= (PARTIAL != 0u ? -radius : 0.0)) continue;
+        float front = PARTIAL != 0u ? fiv_front_share(occluders[j], d, n, along) : float(d > 0.0);
+        if (front <= 0.0) continue;
         float far = length(other);
         float s = min(radius / max(far, 1e-20), 1.0);
         float apart = length(other / max(far, 1e-20) - direction);
         if (apart >= r + s) continue;
         float g = 2.0 * lens_area(r, s, apart) / (FIV_PI * (r * r + s * s));
-        if (PARTIAL != 0u) g *= fiv_front(d, radius);
+        g *= front;
         product *= 1.0 - g * (1.0 - NODES);
     }
     return dot(product, WEIGHTS);
@@ -80,31 +85,37 @@ void main() {
     vec3 n = decode_normal(texelFetch(normal, pixel, 0));
     vec3 p = screen_position(view, pixel, 1.0, z);
     vec2 shown = texelFetch(identity, pixel, 0).rg;
-    uint self = 0xffffffffu;
+    uint self = FIV_NONE;
     if (shown.x > 0.5 && abs(shown.y - z) <= 1e-4 * z) self = uint(shown.x + 0.5) - 1u;
-    vec3 sum;
-    if (first == 0u) {
-        sum = textureLod(difmap, cube_lookup(n), 0.0).rgb;
-        if (OWN != 0u && self != 0xffffffffu) {
-            // Everything that is not hidden lies in front of the surface (eq. 13). Where all samples lie inside of it: unshadowed.
-            vec4 hidden = fiv_dot(occluders[self], occluders[self].centre - p, n, TRILINEAR != 0u);
-            vec3 seen = n.x * whole.x + n.y * whole.y + n.z * whole.z - hidden.rgb;
-            if (hidden.w > 0.0) sum = clamp(seen, vec3(0.0), sum);
+    vec3 open = textureLod(difmap, cube_lookup(n), 0.0).rgb;
+    vec3 lit = open;
+    // What others hide is hidden by itself already in part, as if both lay there independently.
+    vec3 seen = vec3(1.0);
+    if (OWN == 2u && self != FIV_NONE) {
+        vec4 left = texelFetch(own, pixel, 0);
+        if (left.a > 0.5) {
+            lit = min(left.rgb, open);
+            if (OVERLAP != 0u) seen = lit / max(open, vec3(1e-30));
         }
-    } else {
-        sum = imageLoad(irradiance, pixel).rgb;
+    } else if (OWN != 0u && self != FIV_NONE) {
+        // Everything that is not hidden lies in front of the surface (eq. 13). Where all samples lie inside of it: unshadowed.
+        vec4 hidden = fiv_dot(occluders[self], occluders[self].centre - p, n, TRILINEAR != 0u, SCALED != 0u);
+        vec3 left = n.x * whole.x + n.y * whole.y + n.z * whole.z - hidden.rgb;
+        if (hidden.w > 0.0) lit = clamp(left, vec3(0.0), open);
     }
+    vec3 sum = first == 0u ? lit : imageLoad(irradiance, pixel).rgb;
+    FivAlong along = fiv_along(n);
     for (uint i = first; i < first + count; ++i) {
         if (i == self) continue;
         vec3 offset = occluders[i].centre - p;
-        float radius = occluders[i].radius;
         float d = dot(offset, n);
         // Without the correction for partial occluders those count whose centre is in front.
-        if (d <= (PARTIAL != 0u ? -radius : 0.0)) continue;
-        vec3 hidden = max(fiv_dot(occluders[i], offset, n, TRILINEAR != 0u).rgb, vec3(0.0));
-        if (PARTIAL != 0u) hidden *= fiv_front(d, radius);
+        float front = PARTIAL != 0u ? fiv_front_share(occluders[i], d, n, along) : float(d > 0.0);
+        if (front <= 0.0) continue;
+        vec3 hidden = max(fiv_dot(occluders[i], offset, n, TRILINEAR != 0u, SCALED != 0u).rgb, vec3(0.0));
+        hidden *= front * seen;
         if (hidden == vec3(0.0)) continue;
-        if (OVERLAP != 0u && whole.occluders > 1u) hidden *= own_share(i, self, p, n);
+        if (OVERLAP != 0u && whole.occluders > 1u) hidden *= own_share(i, self, p, n, along);
         sum -= hidden;
     }
     imageStore(irradiance, pixel, vec4(sum, 1.0));

@@ -14,12 +14,18 @@ struct FivOccluder {
     vec3 centre;    // of its bounding sphere, metres, world space
     float radius;   // of its bounding sphere, metres
     uint first;     // float of its first vector
+    uint second;    // the same of the next turn
+    float blend;    // part of the way to the next turn
     uint azimuths;  // samples around +Y
     uint polars;    // samples from +Y to -Y, both included
     uint radii;     // spheres
     float nearest;  // radius of the first sphere, metres
     float farthest; // radius of the last sphere, metres
     float steps;    // spheres for each factor of e of the radius
+    uint pace;      // float of FIV_PACE_KNOTS numbers of samples at even steps of each coordinate, then the spheres' radii
+    uint reach;     // float of its table of how far it reaches (lib/fiv_reach.glsl), or FIV_NONE: as its bounding sphere
+    uint turned;    // 1: it does not stand as that table has it
+    mat3 to_rest;   // takes directions to it at rest: the transpose of what turned and scaled it
 };
 
 // A place from which an occluder is looked at.
@@ -34,6 +40,23 @@ struct FivTurn {
     vec3 centre;  // of the occluder in the geometry, metres
     float radius; // of its bounding sphere, metres, world axes
 };
+
+// What the surface of an instance needs to know of the occluder that it is of.
+struct FivOwner {
+    uint occluder; // FIV_NONE: of none
+    uint front;    // float of the vector of the front of the first corner, or FIV_NONE
+    uint back;     // as well for its back
+    uint front_next; // both for the next turn
+    uint back_next;
+    float blend;     // part of the way to the next turn
+    uint flipped;  // 1: the transform mirrors
+};
+
+const uint FIV_PACE_KNOTS = 33u; // export
+const uint FIV_NONE = 0xffffffffu;
+// Directions for which it is known how far an occluder reaches.
+const uint FIV_REACH_AZIMUTHS = 32u; // export
+const uint FIV_REACH_POLARS = 17u; // export
 
 const uint FIV_FLOATS = 9u; // export
 // Stands in the first float of a vector whose sample lies inside the occluder.

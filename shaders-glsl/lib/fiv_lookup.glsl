@@ -3,6 +3,15 @@
 #ifndef LIB_FIV_LOOKUP
 #define LIB_FIV_LOOKUP
 
+#ifndef FIV_NO_VECTORS
+// Number of the sample, with its fraction, at a part (0..1) of a coordinate; `knots`: float of its table.
+float fiv_number(uint knots, float part) {
+    float knot = clamp(part, 0.0, 1.0) * float(FIV_PACE_KNOTS - 1u);
+    uint low = min(uint(knot), FIV_PACE_KNOTS - 2u);
+    return mix(fivs[knots + low], fivs[knots + low + 1u], knot - float(low));
+}
+#endif
+
 // The eight nearest samples of an occluder.
 struct FivCell {
     uvec3 at;  // azimuth, polar angle and sphere of the first
@@ -15,6 +24,13 @@ FivCell fiv_cell(FivOccluder o, vec3 offset, bool trilinear) {
     precise float a = (azimuth - floor(azimuth)) * float(o.azimuths);
     precise float p = atan(length(offset.xz), offset.y) * (float(o.polars - 1u) / FIV_PI);
     precise float r = clamp(log(max(length(offset), o.nearest) / o.nearest) * o.steps, 0.0, float(o.radii - 1u));
+#ifndef FIV_NO_VECTORS
+    if (o.pace != FIV_NONE) {
+        a = fiv_number(o.pace, a / float(o.azimuths));
+        p = fiv_number(o.pace + FIV_PACE_KNOTS, p / float(o.polars - 1u));
+        r = fiv_number(o.pace + 2u * FIV_PACE_KNOTS, r / float(o.radii - 1u));
+    }
+#endif
     if (!trilinear) {
         a = floor(a + 0.5);
         p = floor(p + 0.5);
@@ -36,26 +52,47 @@ float fiv_corner(FivOccluder o, FivCell cell, uint k, out uint number) {
 }
 
 #ifndef FIV_NO_VECTORS
+// Radius of a sphere of samples, metres.
+float fiv_radius(FivOccluder o, uint sphere) {
+    return o.pace != FIV_NONE ? fivs[o.pace + 3u * FIV_PACE_KNOTS + sphere] : o.nearest * exp(float(sphere) / o.steps);
+}
+
 // normal · FIV of what occluder `o` hides, seen from where its centre lies at `offset` (metres): trilinear between the eight nearest
-// samples, or the nearest one. Those inside of the occluder are left out; w: the share of the weight that the others have.
-vec4 fiv_dot(FivOccluder o, vec3 offset, vec3 normal, bool trilinear) {
+// samples, or the nearest one, of those from the float `first` on. Those inside of the occluder are left out; w: the share of the weight
+// that the others have. `scaled`: what is interpolated along the radius is free of the solid angle of the bounding sphere, which falls
+// with its square.
+vec4 fiv_dot_turn(FivOccluder o, uint first, vec3 offset, vec3 normal, bool trilinear, bool scaled) {
     FivCell cell = fiv_cell(o, offset, trilinear);
+    vec2 growth = vec2(1.0);
+    if (scaled) {
+        vec2 radii = max(vec2(fiv_radius(o, cell.at.z), fiv_radius(o, cell.at.z + 1u)), o.radius);
+        growth = radii / max(min(length(offset), o.farthest), o.radius);
+        growth *= growth;
+    }
     vec4 sum = vec4(0.0);
     for (uint k = 0u; k < 8u; ++k) {
         uint number;
         float weight = fiv_corner(o, cell, k, number);
         if (weight <= 0.0) continue;
-        uint at = o.first + FIV_FLOATS * number;
+        uint at = first + FIV_FLOATS * number;
         vec3 x = vec3(fivs[at], fivs[at + 1u], fivs[at + 2u]);
         if (x.x >= FIV_INSIDE) continue;
         vec3 y = vec3(fivs[at + 3u], fivs[at + 4u], fivs[at + 5u]);
         vec3 z = vec3(fivs[at + 6u], fivs[at + 7u], fivs[at + 8u]);
-        sum += vec4(normal.x * x + normal.y * y + normal.z * z, 1.0) * weight;
+        float grown = (k & 4u) == 0u ? growth.x : growth.y;
+        sum += vec4((normal.x * x + normal.y * y + normal.z * z) * grown, 1.0) * weight;
     }
     if (sum.w > 0.0) sum.rgb /= sum.w;
     // Beyond the last sphere what is hidden shrinks with the solid angle.
     float beyond = min(o.farthest / max(length(offset), 1e-30), 1.0);
     return vec4(sum.rgb * (beyond * beyond), sum.w);
+}
+
+// As well between two turns.
+vec4 fiv_dot(FivOccluder o, vec3 offset, vec3 normal, bool trilinear, bool scaled) {
+    vec4 hidden = fiv_dot_turn(o, o.first, offset, normal, trilinear, scaled);
+    if (o.blend <= 0.0) return hidden;
+    return mix(hidden, fiv_dot_turn(o, o.second, offset, normal, trilinear, scaled), o.blend);
 }
 #endif
 

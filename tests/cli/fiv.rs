@@ -41,6 +41,8 @@ fn wrong_calls_are_refused_and_named() {
         (&["-D", "fiv.size=12"], "multiples of 8"),
         (&["-D", "fiv.azimut=2"], "fiv.azimuths"),
         (&["--shard", "3/2"], "I/N"),
+        (&["--checkpoint", "-1"], "0 to 86400"),
+        (&["-D", "fiv.self_samples=inside"], "surface"),
     ] {
         precompute(&env, out, more).expect(2, &[part]);
     }
@@ -75,6 +77,36 @@ fn parts_and_stopped_runs_give_the_same_bytes() {
     fs::write(at("anew.fiv.part"), &bytes[..bytes.len() / 2]).unwrap();
     precompute(&env, &at("anew.fiv"), &[]).expect(0, &["cut off", "tarts anew"]);
     assert!(fs::read(at("anew.fiv")).unwrap() == bytes);
+}
+
+#[test]
+fn a_killed_run_goes_on_to_the_same_bytes() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let env = environment(folder.path(), "sky.exr", 1.0);
+    let more = ["-D", "fiv.azimuths=64", "-D", "fiv.polars=33", "-D", "fiv.radii=12", "-D", "fiv.size=8", "-q"];
+    let arguments = |out: &str| {
+        let base = ["precompute", "--builtin", "furnace-sphere", "--env", &env, "--checkpoint", "0", "-o", out];
+        base.iter().chain(&more).map(|a| (*a).to_owned()).collect::<Vec<_>>()
+    };
+    let (whole, killed) = (at("whole.fiv"), at("killed.fiv"));
+    ran(command(env!("CARGO_BIN_EXE_fiv")).args(arguments(&whole))).expect(0, &[]);
+    let part = at("killed.fiv.part");
+    let mut child = command(env!("CARGO_BIN_EXE_fiv")).args(arguments(&killed)).spawn().unwrap();
+    while !Path::new(&part).exists() {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before anything was written");
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    // SIGKILL: nothing can be tidied up.
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(Path::new(&part).exists() && !Path::new(&killed).exists());
+    let told = ran(command(env!("CARGO_BIN_EXE_fiv")).args(arguments(&killed)).arg("--json")).expect(0, &[]).json();
+    assert!(told["computed"].as_u64() < told["samples"].as_u64(), "{told}");
+    assert!(fs::read(&killed).unwrap() == fs::read(&whole).unwrap() && !Path::new(&part).exists());
 }
 
 #[test]

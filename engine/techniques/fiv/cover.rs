@@ -6,7 +6,7 @@
 
 use glam::{Mat3, Vec3};
 
-use super::{light::Light, occluder::Occluder};
+use super::{light::Light, occluder::Occluder, surface::Place};
 use crate::{
     Result,
     gpu::Gpu,
@@ -56,6 +56,7 @@ pub struct Cover<'a> {
     rays: Rays,
     pose: Pose,
     tiles: u64,
+    turn: usize,
 }
 
 /// What is hidden from some points, in their order.
@@ -74,23 +75,44 @@ impl<'a> Cover<'a> {
         let resident = Resident::new(gpu, &occluder.scene)?;
         let rays = Rays::new(gpu, &occluder.scene, &resident)?;
         let tiles = tiles(gpu, &rays)?;
-        Ok(Self { occluder, resident, rays, pose: Pose::rest(&occluder.scene), tiles })
+        Ok(Self { occluder, resident, rays, pose: Pose::rest(&occluder.scene), tiles, turn: 0 })
+    }
+
+    /// From now on with the light that the occluder has around itself if it is turned; `turn`: of the samples that the light has.
+    pub fn turn(&mut self, turn: usize) {
+        self.turn = turn;
     }
 
     /// Declares the passes for `points`, seen from the centre of the occluder, metres. `split`: rays along the edge of a texel.
     pub fn declare(&mut self, graph: &mut Graph, light: &Light, points: &[Vec3], split: u32) -> Covered {
+        let places: Vec<Place> = points.iter().map(|p| Place { point: *p, normal: Vec3::ZERO }).collect();
+        self.passes(graph, light, &places, split, false)
+    }
+
+    /// Declares the passes for places on the occluder: what is *seen* from there of the environment in front of their planes, with its
+    /// solid angle. Where that is nothing, `FIV_INSIDE`: such a place lies inside of other parts.
+    pub fn declare_own(&mut self, graph: &mut Graph, light: &Light, places: &[Place], split: u32) -> Covered {
+        self.passes(graph, light, places, split, true)
+    }
+
+    fn passes(&mut self, graph: &mut Graph, light: &Light, places: &[Place], split: u32, own: bool) -> Covered {
         let handles = self.resident.frame_in(graph, &self.occluder.scene, &self.pose);
         let rays = self.rays.frame(graph, &handles);
-        let texels = graph.import_buffer(&light.texels);
-        let list: Vec<types::FivPoint> = points.iter().map(|p| types::FivPoint { at: p.to_array(), turn: 0 }).collect();
-        let list = graph.buffer_from("fiv.points", &list);
+        let texels = light.turned.get(self.turn.wrapping_sub(1)).unwrap_or(&light.texels);
+        let texels = graph.import_buffer(texels);
+        let point = |place: &Place| types::FivPoint { at: place.point.to_array(), turn: 0 };
+        let points: Vec<types::FivPoint> = places.iter().map(point).collect();
+        let list = graph.buffer_from("fiv.points", &points);
+        let normals: Vec<[f32; 3]> =
+            places.iter().take(if own { places.len() } else { 1 }).map(|p| p.normal.to_array()).collect();
+        let normals = graph.buffer_from("fiv.normals", &normals);
         let as_it_is = types::FivTurn {
             geometry_from_world: Mat3::IDENTITY.to_cols_array_2d(),
             centre: [0.0; 3],
             radius: reach(self.occluder.radius),
         };
         let turns = graph.buffer_from("fiv.turns", &[as_it_is]);
-        let total = points.len() as u32;
+        let total = places.len() as u32;
         let covered = Covered {
             fivs: graph.buffer("fiv.vectors", u64::from(total) * u64::from(FIV_FLOATS) * 4),
             coverage: graph.buffer("fiv.coverage", u64::from(total) * 4),
@@ -98,8 +120,9 @@ impl<'a> Cover<'a> {
         let row = light.size * split / 8;
         let all = 6 * row * row;
         let chunks = all.div_ceil(self.tiles as u32);
-        // A tenth of the sphere from each point, about.
-        let each = (MOST_RAYS / (u64::from(all) * 64 / 10).max(1)).clamp(1, MOST_POINTS.into()) as u32;
+        // A tenth of the sphere from each point, about; half of it from the surface.
+        let part = if own { 2 } else { 10 };
+        let each = (MOST_RAYS / (u64::from(all) * 64 / part).max(1)).clamp(1, MOST_POINTS.into()) as u32;
         let partials = graph.buffer("fiv.partials", u64::from(each.min(total)) * u64::from(chunks) * 40);
         for first in (0..total).step_by(each as usize) {
             let count = each.min(total - first);
@@ -109,12 +132,20 @@ impl<'a> Cover<'a> {
                     points: list,
                     partials,
                     turns,
-                    push: fiv::cover::Push { first, size: light.size, split, tiles: self.tiles as u32 },
+                    normals,
+                    push: fiv::cover::Push {
+                        first,
+                        size: light.size,
+                        split,
+                        tiles: self.tiles as u32,
+                        own: own.into(),
+                    },
                 },
                 rays
             );
             graph.compute(args, [64 * count, chunks, 1]);
-            let push = fiv::gather::Push { first, count, chunks, inside: inside() };
+            let inside = if own { 0.0 } else { inside() };
+            let push = fiv::gather::Push { first, count, chunks, inside, own: own.into() };
             let (fivs, coverage) = (covered.fivs, covered.coverage);
             graph.compute(fiv::gather::Args { partials, fivs, coverage, push }, count);
         }
@@ -137,8 +168,31 @@ impl<'a> Cover<'a> {
         }
         let mut graph = Graph::new("fiv vectors");
         let covered = self.declare(&mut graph, light, points, split);
-        let tokens = [covered.fivs, covered.coverage].map(|buffer| graph.read_buffer(buffer));
-        let frame = runner.run(graph)?;
-        Ok((frame.buffer(tokens[0]), frame.buffer(tokens[1])))
+        read(runner, graph, covered)
     }
+
+    /// The vectors and the seen solid angles (sr) of `places`, as [`Self::declare_own`], at once.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`.
+    pub fn run_own(
+        &mut self,
+        runner: &mut Runner,
+        light: &Light,
+        places: &[Place],
+        split: u32,
+    ) -> Result<(Vec<f32>, Vec<f32>)> {
+        if places.is_empty() {
+            return Ok(Default::default());
+        }
+        let mut graph = Graph::new("fiv own vectors");
+        let covered = self.declare_own(&mut graph, light, places, split);
+        read(runner, graph, covered)
+    }
+}
+
+fn read(runner: &mut Runner, mut graph: Graph, covered: Covered) -> Result<(Vec<f32>, Vec<f32>)> {
+    let tokens = [covered.fivs, covered.coverage].map(|buffer| graph.read_buffer(buffer));
+    let frame = runner.run(graph)?;
+    Ok((frame.buffer(tokens[0]), frame.buffer(tokens[1])))
 }

@@ -3,7 +3,7 @@
 //! | bytes | what |
 //! |---|---|
 //! | 8 | `lucfiv\r\n` |
-//! | 4 | version, 1 |
+//! | 4 | version, 2 |
 //! | 4 | bytes of the header |
 //! | … | header: JSON, the [`Plan`] with the `range` of samples that are here |
 //! | … | the vectors of these samples: nine 32-bit floats each, x.rgb, y.rgb, z.rgb, W/m² |
@@ -19,7 +19,7 @@ use super::{hash::Hash, plan::Plan};
 use crate::{Error, Result, image, shaders::consts::FIV_FLOATS};
 
 const MAGIC: &[u8; 8] = b"lucfiv\r\n";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Bytes of a file that is read at most.
 const MOST_BYTES: u64 = 8 << 30;
 /// Bytes of a header that is read at most.
@@ -103,11 +103,15 @@ impl Stored {
         };
         let Header { range: [first, last], plan } = serde_json::from_slice(header)
             .map_err(|error| damaged("has a header that cannot be read".into()).caused_by(error))?;
+        if !(1..=64).contains(&plan.turns) {
+            return Err(damaged(format!("has an impossible plan: {} turns", plan.turns)));
+        }
         plan.grid.validate().map_err(|error| damaged(format!("has an impossible plan: {error}")))?;
         let positive = |x: f32| x.is_finite() && x > 0.0;
         if let Some(kind) = plan.occluders.iter().find(|k| {
             !(positive(k.radius) && positive(k.shells.nearest) && positive(k.shells.farthest))
                 || k.shells.farthest <= k.shells.nearest
+                || !k.paces.fit(&plan.grid)
         }) {
             return Err(damaged(format!("has an impossible plan: radii of occluder `{}`", kind.name)));
         }
@@ -195,6 +199,8 @@ mod tests {
             radius: 0.1,
             shells: Shells { nearest: 0.012345678, farthest: 1.6 },
             triangles: 12,
+            surface: 0,
+            paces: Default::default(),
         };
         let plan = Plan {
             grid: Grid::of(3, 2, 2),

@@ -13,6 +13,11 @@
 //! - Masks are made by rays instead of rasterising ([`cover`]).
 //! - 1/π is explicit: a surface of albedo ρ reflects ρ/π · E; the thesis folds it into its factor (eq. 3).
 //! - The discs of the overlap correction have sin α = R / ρ as radius, so that they stay finite near an occluder.
+//! - How far an occluder reaches over the receiver's plane (cases A, B, C) is asked of its corners, not of its bounding sphere
+//!   ([`support`]); [`Extent::Sphere`] is the thesis' way.
+//! - An occluder's shadow on itself comes from samples on its surface ([`surface`]); [`SelfSamples::Spheres`] is the thesis' way.
+//! - Samples lie where what is hidden bends, if [`Settings::adaptive`] ([`pace`]).
+//! - Between spheres what is interpolated is free of the growth of the solid angle; [`Interpolation::Linear`] is the thesis' way.
 //! - More than two overlapping occluders: see [`crate::reference::fiv::shares`].
 
 pub mod cover;
@@ -22,18 +27,22 @@ pub mod light;
 pub mod occluder;
 mod online;
 mod online_standing;
+pub mod pace;
 mod picture;
 pub mod plan;
 pub mod samples;
 mod settings;
 pub mod sky;
 mod stage;
+pub mod support;
+pub mod surface;
+pub mod turn;
 
 pub use file::Stored;
 pub use light::Light;
 pub use occluder::{Occluder, Occluders, Placed};
 pub use picture::{Outputs, Picture, PictureSettings};
 pub use plan::Plan;
-pub use settings::{Method, Settings};
+pub use settings::{Extent, Interpolation, Method, SelfSamples, Settings};
 pub use sky::Sky;
 pub use stage::Fiv;

@@ -4,7 +4,12 @@ use std::collections::HashMap;
 
 use glam::{Mat4, Vec3, Vec4};
 
-use super::{hash::Hash, samples::Shells};
+use super::{
+    hash::Hash,
+    samples::Shells,
+    support::Support,
+    surface::{self, Own, Place},
+};
 use crate::scene::{AlphaMode, Material, Mesh, Node, Pose, Primitive, Scene, deform};
 
 /// The first sphere is at least this part of the bounding sphere.
@@ -23,6 +28,10 @@ pub struct Occluder {
     /// From the centre to the nearest surface, metres.
     pub inner: f32,
     pub triangles: usize,
+    /// How far it reaches along every direction.
+    pub support: Support,
+    /// Places on the surface of each primitive that has triangles.
+    pub own: Vec<Own>,
     /// Changes with the geometry.
     pub hash: u64,
 }
@@ -85,11 +94,11 @@ impl Occluders {
 impl Occluder {
     /// The occluder and its centre seen from the node's origin; `None` without a triangle that could be seen.
     pub(super) fn of_node(scene: &Scene, pose: &mut Pose, node: usize, mesh: &Mesh) -> Option<(Self, Vec3)> {
-        let mut primitives: Vec<Primitive> = Vec::new();
-        for primitive in &mesh.primitives {
+        let (mut primitives, mut own): (Vec<Primitive>, Vec<Own>) = Default::default();
+        for (slot, primitive) in mesh.primitives.iter().enumerate() {
             // Without its place, so that the same things in different places are the same to the last bit.
             let place = std::mem::replace(&mut pose.world[node].w_axis, Vec4::W);
-            let mut positions = deform::world_vertices(scene, pose, node, primitive).positions;
+            let deform::Vertices { mut positions, normals, .. } = deform::world_vertices(scene, pose, node, primitive);
             pose.world[node].w_axis = place;
             if scene.nodes[node].skin.is_some() && !primitive.joints.is_empty() {
                 positions.iter_mut().for_each(|p| *p -= place.truncate());
@@ -98,8 +107,10 @@ impl Occluder {
                 |corner: &[u32]| corner.iter().all(|&i| positions.get(i as usize).is_some_and(|p| p.is_finite()));
             let indices: Vec<u32> = primitive.indices.chunks_exact(3).filter(|c| good(c)).flatten().copied().collect();
             if !indices.is_empty() {
+                let backs = scene.materials.get(primitive.material as usize).is_some_and(|m| m.double_sided);
+                own.push(Own { slot: slot as u32, corners: positions.len() as u32, backs });
                 primitives.push(Primitive {
-                    normals: vec![Vec3::Y; positions.len()],
+                    normals,
                     tangents: vec![Vec4::ZERO; positions.len()],
                     positions,
                     uvs: primitive.uvs.clone(),
@@ -131,8 +142,22 @@ impl Occluder {
             name => name.to_owned(),
         };
         let scene = alone(scene, primitives, &name);
-        let hash = hash(&scene);
-        Some((Self { name, scene, radius, inner, triangles, hash }, centre))
+        let hash = hash(&scene, &own);
+        let used = |p: &Primitive| p.indices.iter().map(|&i| p.positions[i as usize]).collect::<Vec<_>>();
+        let mut points: Vec<Vec3> = scene.meshes[0].primitives.iter().flat_map(used).collect();
+        points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)));
+        points.dedup();
+        let support = Support::of(&points);
+        Some((Self { name, scene, radius, inner, triangles, support, own, hash }, centre))
+    }
+
+    /// Places on its surface, those of [`Self::own`] one after the other.
+    pub fn places(&self) -> Vec<Place> {
+        let mut out = Vec::new();
+        for (own, p) in self.own.iter().zip(&self.scene.meshes[0].primitives) {
+            surface::places(own, &p.positions, &p.normals, self.radius, &mut out);
+        }
+        out
     }
 
     /// All triangles lie in one plane, nearly.
@@ -278,11 +303,13 @@ fn keep_cutouts(scene: &Scene, primitives: &mut [Primitive], out: &mut Scene) {
     }
 }
 
-fn hash(alone: &Scene) -> u64 {
+fn hash(alone: &Scene, own: &[Own]) -> u64 {
     let mut hash = Hash::new();
-    for primitive in &alone.meshes[0].primitives {
+    for (primitive, own) in alone.meshes[0].primitives.iter().zip(own) {
         hash.word(primitive.positions.len() as u64);
+        hash.word(u64::from(own.slot) << 1 | u64::from(own.backs));
         primitive.positions.iter().for_each(|p| hash.floats(&p.to_array()));
+        primitive.normals.iter().for_each(|n| hash.floats(&n.to_array()));
         primitive.indices.iter().for_each(|i| hash.word((*i).into()));
         let material = &alone.materials[primitive.material as usize];
         hash.bytes(format!("{:?} {} {:?}", material.alpha, material.unlit, material.base_color_texture).as_bytes());

@@ -198,6 +198,7 @@ impl Online {
         let found = graph.buffer("fiv.found", bytes);
         let coverage = graph.buffer("fiv.coverage", 4 * samples);
         let texels = graph.import_buffer(&light.texels);
+        let normals = graph.buffer_from("fiv.normals", &[[0f32; 3]]);
         for job in &jobs.list {
             let shape = &mut self.shapes[job.shape];
             let scene = shape.body.scene(occluders);
@@ -220,7 +221,14 @@ impl Online {
                         points: lists.points,
                         partials,
                         turns: lists.turns,
-                        push: fiv::cover::Push { first, size: light.size, split: self.split, tiles: jobs.tiles },
+                        normals,
+                        push: fiv::cover::Push {
+                            first,
+                            size: light.size,
+                            split: self.split,
+                            tiles: jobs.tiles,
+                            own: 0
+                        },
                     },
                     rays
                 );
@@ -231,6 +239,7 @@ impl Online {
                     count: jobs.each as u32,
                     chunks: jobs.chunks,
                     inside: super::cover::inside(),
+                    own: 0,
                 };
                 let args = fiv::gather::Args { partials, fivs: found, coverage, push };
                 graph.compute_indirect(args, lists.groups, groups + 12);

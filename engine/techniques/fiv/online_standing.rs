@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use glam::{Mat3, Vec3};
 
 use super::{
-    Occluder, Occluders,
+    Occluder, Occluders, Placed,
     samples::{Grid, Shells},
+    support,
 };
 use crate::{
     scene::{Pose, Scene},
@@ -68,11 +69,11 @@ impl Standing {
             let alone = if stage.shapes[index].1 { index } else { usize::MAX };
             let key = (set.shape, alone, turn.to_cols_array().map(f32::to_bits));
             sets.insert(key, set);
-            found.push((key, placed.node, centre, set));
+            found.push((key, placed, centre, set, turn));
         }
         let numbers: BTreeMap<_, u32> = sets.keys().copied().zip(0..).collect();
         let Grid { azimuths, polars, radii } = stage.grid;
-        let list = found.iter().map(|(key, _, centre, set)| types::FivOccluder {
+        let list = found.iter().map(|(key, Placed { kind, .. }, centre, set, turn)| types::FivOccluder {
             centre: centre.to_array(),
             radius: set.radius,
             first: numbers[key] * stage.floats,
@@ -82,10 +83,15 @@ impl Standing {
             nearest: set.shells.nearest,
             farthest: set.shells.farthest,
             steps: set.shells.steps(radii) as f32,
+            pace: u32::MAX,
+            reach: if key.1 == usize::MAX { *kind * support::LENGTH as u32 } else { u32::MAX },
+            turned: (*turn != Mat3::IDENTITY).into(),
+            to_rest: turn.transpose().to_cols_array_2d(),
+            ..Default::default()
         });
         Self {
             list: list.collect(),
-            nodes: found.iter().map(|(_, node, ..)| *node).collect(),
+            nodes: found.iter().map(|(_, placed, ..)| placed.node).collect(),
             sets: sets.into_values().collect(),
         }
     }

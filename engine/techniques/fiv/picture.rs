@@ -5,10 +5,13 @@ use std::sync::Arc;
 use glam::Mat3;
 use serde::{Deserialize, Serialize};
 
-use super::{Fiv, Method, Settings, online::Seen, online_standing::Standing};
+use super::{
+    Extent as Reach, Fiv, Interpolation, Method, SelfSamples, Settings, online::Seen, online_standing::Standing,
+    pace::Paces, support, turn,
+};
 use crate::{
     Error, Result,
-    graph::{Depth, Extent, Format, Graph, Image, Load, Raster, Targets},
+    graph::{Buffer, Depth, Extent, Format, Graph, Image, Load, Raster, Targets},
     passes::{
         gbuffer::{self, GBuffer},
         skybox,
@@ -16,17 +19,21 @@ use crate::{
     scene::{
         Note, NoteKind, Pose, Scene, View,
         cull::Frustum,
-        resident::{Batches, Handles},
+        resident::{Batches, Handles, Instance},
     },
-    shaders::{self, consts::FIV_FLOATS, types},
+    shaders::{
+        self,
+        consts::{FIV_FLOATS, FIV_PACE_KNOTS},
+        types,
+    },
 };
 
 /// Rays that one dispatch traces at most, about: some milliseconds on a GPU.
 const MOST_RAYS: u64 = 1 << 22;
 /// Turns of the loops over occluders of one invocation.
 const MOST_TURNS: u32 = 20_000;
-/// Difference of a node's turn and scale from those at rest that is told.
-const TURNED: f32 = 1e-4;
+/// No occluder, vector or table.
+const NONE: u32 = u32::MAX;
 
 /// Settings of all stages.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -115,8 +122,14 @@ impl Fiv {
             _ => Standing::default(),
         };
         let count = standing.list.len() as u32;
-        let identity = identity(graph, handles, view, gbuffer, &standing.nodes);
+        let stored = graph.import_buffer(&self.fivs);
+        let owners = self.owners(pose, &standing.nodes, &handles.moment.instances, settings);
+        let any = !standing.nodes.is_empty();
+        let (identity, own) = identity(graph, handles, view, gbuffer, (&owners, stored, any));
         let mut list = standing.list.clone();
+        if settings.extent == Reach::Sphere {
+            list.iter_mut().for_each(|occluder| occluder.reach = NONE);
+        }
         list.resize(list.len().max(1), types::FivOccluder::default());
         let occluders = graph.buffer_from("fiv.occluders", &list);
         let fivs = match &mut self.online {
@@ -124,7 +137,7 @@ impl Fiv {
                 let seen = Seen { gbuffer, identity, occluders };
                 online.vectors(graph, (&self.occluders, pose), &standing, &self.light, &seen, settings)?
             }
-            _ => graph.import_buffer(&self.fivs),
+            _ => stored,
         };
         let total = self.light.total;
         let whole = types::FivWhole {
@@ -137,7 +150,13 @@ impl Fiv {
         // With the correction each occluder looks at all others.
         let turns = if settings.overlap { count + 8 } else { 8 };
         let each = (MOST_TURNS / turns).max(1);
-        let difmap = graph.import_image(&self.light.difmap);
+        let (difmap, reaches) = (graph.import_image(&self.light.difmap), graph.import_buffer(&self.reaches));
+        // Vectors of a frame are of spheres only.
+        let own_way = match (settings.self_shadow, settings.self_samples, settings.method) {
+            (false, ..) => 0,
+            (_, SelfSamples::Surface, Method::Vectors) => 2,
+            _ => 1,
+        };
         for first in (0..count.max(1)).step_by(each as usize) {
             let args = shaders::fiv::light::Args {
                 view: gbuffer.view,
@@ -149,12 +168,15 @@ impl Fiv {
                 fivs,
                 irradiance,
                 whole,
+                own,
+                reaches,
                 push: shaders::fiv::light::Push { first, count: each.min(count.saturating_sub(first)) },
                 spec: shaders::fiv::light::Spec {
                     partial: settings.partial.into(),
                     overlap: settings.overlap.into(),
-                    own: settings.self_shadow.into(),
+                    own: own_way,
                     trilinear: settings.trilinear.into(),
+                    scaled: (settings.trilinear && settings.interpolation == Interpolation::SolidAngle).into(),
                 },
             };
             graph.compute(args, extent);
@@ -167,20 +189,97 @@ impl Fiv {
         let grid = self.plan.grid;
         let placed = self.occluders.placed.iter().map(|placed| {
             let kind = &self.plan.occluders[placed.kind as usize];
+            let yaw = self.yaw(pose, placed.node);
+            let turned = Mat3::from_rotation_y(yaw.unwrap_or(0.0));
+            let (first, second, blend) = turn::between(yaw.unwrap_or(0.0), self.plan.turns);
+            let pace = self.plan.samples() as u32 * FIV_FLOATS + placed.kind * (3 * FIV_PACE_KNOTS + grid.radii);
             types::FivOccluder {
-                centre: (pose.world[placed.node as usize].w_axis.truncate() + placed.centre).to_array(),
+                centre: (pose.world[placed.node as usize].w_axis.truncate() + turned * placed.centre).to_array(),
                 radius: kind.radius,
-                first: placed.kind * grid.count() * FIV_FLOATS,
+                first: self.first_float(placed.kind, first, 0),
+                second: self.first_float(placed.kind, second, 0),
+                blend,
                 azimuths: grid.azimuths,
                 polars: grid.polars,
                 radii: grid.radii,
                 nearest: kind.shells.nearest,
                 farthest: kind.shells.farthest,
                 steps: kind.shells.steps(grid.radii) as f32,
+                pace: if kind.paces == Paces::default() { NONE } else { pace },
+                reach: if yaw.is_some() { placed.kind * support::LENGTH as u32 } else { NONE },
+                turned: yaw.is_some_and(|yaw| yaw != 0.0).into(),
+                to_rest: turned.transpose().to_cols_array_2d(),
             }
         });
         let nodes = self.occluders.placed.iter().map(|placed| placed.node).collect();
         Standing { list: placed.collect(), nodes, sets: Vec::new() }
+    }
+
+    /// Of each instance the occluder that it is of, and where the vectors of its corners are, as far as it stands as it did when they
+    /// were computed.
+    fn owners(&self, pose: &Pose, nodes: &[u32], instances: &[Instance], settings: &Settings) -> Vec<types::FivOwner> {
+        let none = types::FivOwner {
+            occluder: NONE,
+            front: NONE,
+            back: NONE,
+            front_next: NONE,
+            back_next: NONE,
+            ..Default::default()
+        };
+        let mut of_node = vec![NONE; self.at_rest.world.len()];
+        for (at, node) in nodes.iter().enumerate().rev() {
+            of_node[*node as usize] = at as u32;
+        }
+        let known = settings.method == Method::Vectors && self.plan.surface;
+        let (mut node, mut slot) = (NONE, 0);
+        let mut owners: Vec<_> = instances
+            .iter()
+            .map(|instance| {
+                // Primitives of a node stand next to each other, in their order.
+                slot = if instance.node == node { slot + 1 } else { 0 };
+                node = instance.node;
+                let occluder = of_node.get(node as usize).copied().unwrap_or(NONE);
+                let mut owner = types::FivOwner { occluder, ..none };
+                // Stored vectors have all occluders, in their order.
+                let placed = self.occluders.placed.get(occluder as usize).filter(|_| known);
+                let Some(placed) = placed else { return owner };
+                let yaw = self.yaw(pose, node).filter(|_| !instance.deformed || *pose == self.at_rest);
+                let Some(yaw) = yaw else {
+                    return owner;
+                };
+                let (turn, next, blend) = turn::between(yaw, self.plan.turns);
+                let mut first = self.plan.grid.count();
+                for own in &self.occluders.kinds[placed.kind as usize].own {
+                    if own.slot == slot {
+                        let at = |turn: u32, sample: u32| self.first_float(placed.kind, turn, sample);
+                        let back = first + own.corners;
+                        (owner.front, owner.front_next) = (at(turn, first), at(next, first));
+                        if own.backs {
+                            (owner.back, owner.back_next) = (at(turn, back), at(next, back));
+                        }
+                        owner.flipped = (instance.world_from_object.determinant() < 0.0).into();
+                        owner.blend = blend;
+                    }
+                    first += own.count();
+                }
+                owner
+            })
+            .collect();
+        owners.resize(owners.len().max(1), none);
+        owners
+    }
+
+    /// Where the vector of a sample of a turn of a kind begins.
+    fn first_float(&self, kind: u32, turn: u32, sample: u32) -> u32 {
+        let of_turn = self.plan.of_turn(&self.plan.occluders[kind as usize]) as u32;
+        (self.plan.first(kind as usize) as u32 + turn * of_turn + sample) * FIV_FLOATS
+    }
+
+    /// How far a node is turned about +Y, as far as there are vectors for it; `None`: it does something else, too.
+    fn yaw(&self, pose: &Pose, node: u32) -> Option<f32> {
+        let linear = |of: &Pose| of.world.get(node as usize).map(|m| Mat3::from_mat4(*m));
+        let (now, rest) = linear(pose).zip(linear(&self.at_rest))?;
+        turn::yaw(now, rest).filter(|yaw| *yaw == 0.0 || self.plan.turns > 1)
     }
 
     /// Irradiance by a shadow ray to every texel that is not black.
@@ -220,64 +319,58 @@ impl Fiv {
 
     /// Occluders that do not stand as their vectors were computed.
     fn turned(&self, scene: &Scene, pose: &Pose) -> Vec<Note> {
-        let turned = |node: u32| {
-            let now = pose.world.get(node as usize).map(|m| Mat3::from_mat4(*m));
-            let rest = self.rest.get(node as usize);
-            now.zip(rest).is_some_and(|(now, rest)| !now.abs_diff_eq(*rest, TURNED))
-        };
-        let moved = self.occluders.placed.iter().filter(|placed| turned(placed.node));
+        let moved = self.occluders.placed.iter().filter(|placed| self.yaw(pose, placed.node).is_none());
         moved
             .map(|placed| Note {
                 kind: NoteKind::Approximated,
                 place: format!("nodes[{}] ({})", placed.node, scene.nodes[placed.node as usize].name),
-                text: "turns; its shadow stays that of its pose at rest".into(),
+                text: "turns; its shadow on others stays that of its pose at rest, and it has none on itself".into(),
             })
             .collect()
     }
 }
 
-/// Which occluder of `nodes` each pixel shows (plus one; 0: none), with its linear depth.
-fn identity(graph: &mut Graph, handles: &Handles, view: &View, gbuffer: &GBuffer, nodes: &[u32]) -> Image {
+/// Which occluder each pixel shows (plus one; 0: none), with its linear depth; and the irradiance that this one leaves itself.
+/// `any`: there are occluders.
+fn identity(
+    graph: &mut Graph,
+    handles: &Handles,
+    view: &View,
+    gbuffer: &GBuffer,
+    (owners, fivs, any): (&[types::FivOwner], Buffer, bool),
+) -> (Image, Image) {
     let extent = Extent::from(view.extent);
     let identity = graph.image("fiv.identity", Format::RG32F, extent);
-    if nodes.is_empty() {
+    let own = graph.image("fiv.own", Format::RGBA32F, if any { extent } else { Extent::new(1, 1) });
+    if !any {
         graph.clear(identity, [0.0; 4]);
-        return identity;
+        graph.clear(own, [0.0; 4]);
+        return (identity, own);
     }
     let depth = graph.image("fiv.identity.depth", Format::D32F, extent);
-    let owner = |node: u32| {
-        let at = nodes.iter().position(|other| *other == node);
-        at.map_or(u32::MAX, |at| at as u32)
-    };
-    let mut last = (u32::MAX, u32::MAX);
-    let owners = handles.moment.instances.iter().map(|instance| {
-        // Primitives of a node stand next to each other.
-        if last.0 != instance.node {
-            last = (instance.node, owner(instance.node));
-        }
-        last.1
-    });
-    let mut owners: Vec<u32> = owners.collect();
-    owners.resize(owners.len().max(1), u32::MAX);
-    let owners = graph.buffer_from("fiv.owners", &owners);
+    let owners = graph.buffer_from("fiv.owners", owners);
     let batches = Batches::new(&handles.moment, Some(&Frustum::new(view)), view.position);
     let visible = batches.visible_buffer(graph, "fiv.visible");
     for index in 0..batches.list.len().max(1) {
         let batch = batches.list.get(index);
         let first = index == 0;
-        let load = if first { Load::Clear([0.0; 4]) } else { Load::Keep };
-        let targets =
-            Targets::new().color(identity, load).depth(depth, if first { Depth::Clear(0.0) } else { Depth::Keep });
+        let load = || if first { Load::Clear([0.0; 4]) } else { Load::Keep };
+        let targets = Targets::new()
+            .color(identity, load())
+            .color(own, load())
+            .depth(depth, if first { Depth::Clear(0.0) } else { Depth::Keep });
         let args = shaders::fiv::identity::Args {
             view: gbuffer.view,
             instances: handles.instances,
             visible,
             positions: handles.positions,
             owners,
+            fivs,
+            normal: gbuffer.normal,
         };
         let state = Raster::new().cull(batch.map_or_else(Default::default, |b| b.sided.cull()));
         let none = || crate::graph::Draw::indexed(handles.indices, Vec::new());
         graph.raster(targets, state, args, batch.map_or_else(none, |b| b.draw(handles)));
     }
-    identity
+    (identity, own)
 }

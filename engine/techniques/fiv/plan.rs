@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -10,9 +10,18 @@ use super::{
     cover::Cover,
     light::Light,
     occluder::Occluder,
+    pace::{self, Paces},
     samples::{Grid, Shells},
+    settings::{Interpolation, SelfSamples},
+    surface::Own,
+    turn,
 };
-use crate::{Result, gpu::Gpu, graph::Runner, shaders::consts::FIV_FLOATS};
+use crate::{
+    Error, ErrorKind, Result,
+    gpu::Gpu,
+    graph::Runner,
+    shaders::consts::{FIV_FLOATS, FIV_INSIDE},
+};
 
 /// Points of one run of the device: the finest grain of progress.
 const BATCH: u32 = 4096;
@@ -28,6 +37,18 @@ pub struct Kind {
     #[serde(flatten)]
     pub shells: Shells,
     pub triangles: u64,
+    /// Samples on its surface.
+    pub surface: u32,
+    /// How its samples lie.
+    #[serde(default)]
+    pub paces: Paces,
+}
+
+impl Kind {
+    /// Place of the occluder's centre seen from the receiver, metres.
+    pub fn offset(&self, grid: &Grid, index: u32) -> DVec3 {
+        self.paces.offset(grid, &self.shells, index)
+    }
 }
 
 /// What is to be computed. Everything that decides the numbers is in it.
@@ -45,6 +66,10 @@ pub struct Plan {
     pub reach: f32,
     #[serde(flatten)]
     pub grid: Grid,
+    /// Samples on surfaces follow those around.
+    pub surface: bool,
+    /// Samples of turns about +Y; all others are there for each.
+    pub turns: u32,
     pub occluders: Vec<Kind>,
 }
 
@@ -57,6 +82,8 @@ impl Plan {
             radius: o.radius,
             shells: o.shells(settings.reach),
             triangles: o.triangles as u64,
+            surface: if settings.on_surface() { o.own.iter().map(Own::count).sum() } else { 0 },
+            paces: Paces::default(),
         };
         Self {
             environment: environment.to_owned(),
@@ -65,22 +92,54 @@ impl Plan {
             split: settings.split,
             reach: settings.reach,
             grid: settings.grid(),
+            surface: settings.on_surface(),
+            turns: settings.turns,
             occluders: occluders.iter().map(kind).collect(),
         }
+    }
+
+    /// Looks at the occluders that `which` says, in the order of the plan, and chooses how their samples lie, if the settings ask for it.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`; `Runtime` if an occluder is larger than the device's limits.
+    pub fn adapt(
+        &mut self,
+        gpu: &Gpu,
+        light: &Light,
+        occluders: &[Occluder],
+        settings: &Settings,
+        which: impl Fn(usize) -> bool,
+    ) -> Result<()> {
+        if !settings.adaptive {
+            return Ok(());
+        }
+        let scaled = settings.interpolation == Interpolation::SolidAngle;
+        let mut runner = Runner::new(gpu);
+        for (number, (kind, occluder)) in self.occluders.iter_mut().zip(occluders).enumerate() {
+            if which(number) {
+                let mut cover = Cover::new(gpu, occluder)?;
+                let place = (&self.grid, &kind.shells);
+                kind.paces = pace::choose(&mut cover, &mut runner, light, place, (kind.radius, scaled))?;
+            }
+        }
+        Ok(())
     }
 
     /// These settings with what of them decides these numbers.
     pub fn settings(&self, over: &Settings) -> Settings {
         let Grid { azimuths, polars, radii } = self.grid;
-        let (size, split, reach) = (self.size, self.split, self.reach);
-        Settings { size, split, reach, azimuths, polars, radii, ..over.clone() }
+        let (size, split, reach, turns) = (self.size, self.split, self.reach, self.turns);
+        let self_samples = if self.surface { SelfSamples::Surface } else { SelfSamples::Spheres };
+        Settings { size, split, reach, azimuths, polars, radii, turns, self_samples, ..over.clone() }
     }
 
     /// How another plan differs in what decides the numbers, in words; `None`: it does not.
     pub fn difference(&self, other: &Self) -> Option<String> {
-        let plain = |of: &Self| (of.size, of.split, of.grid);
+        let plain = |of: &Self| (of.size, of.split, of.grid, of.turns);
         if plain(self) != plain(other) {
-            let say = |of: &Self| format!("{} samples, {} texels, {} rays along one", of.grid, of.size, of.split);
+            let say = |of: &Self| {
+                format!("{} samples, {} turns, {} texels, {} rays along one", of.grid, of.turns, of.size, of.split)
+            };
             return Some(format!("{} instead of {}", say(other), say(self)));
         }
         if self.environment_hash != other.environment_hash {
@@ -90,7 +149,13 @@ impl Plan {
         if self.occluders.len() != other.occluders.len() {
             return Some(format!("{} occluders instead of {}", other.occluders.len(), self.occluders.len()));
         }
-        let same = |(a, b): &(&Kind, &Kind)| a.hash == b.hash && a.shells == b.shells;
+        if self.surface != other.surface {
+            let say = |of: &Self| if of.surface { "with samples on surfaces" } else { "without samples on surfaces" };
+            return Some(format!("{} instead of {}", say(other), say(self)));
+        }
+        let same = |(a, b): &(&Kind, &Kind)| {
+            (&a.hash, &a.shells, a.surface, &a.paces) == (&b.hash, &b.shells, b.surface, &b.paces)
+        };
         let (a, b) = self.occluders.iter().zip(&other.occluders).find(|pair| !same(pair))?;
         let say =
             |k: &Kind| format!("occluder `{}` ({}, {} m to {} m)", k.name, k.hash, k.shells.nearest, k.shells.farthest);
@@ -99,7 +164,17 @@ impl Plan {
 
     /// Samples of all occluders.
     pub fn samples(&self) -> u64 {
-        self.occluders.len() as u64 * u64::from(self.grid.count())
+        self.first(self.occluders.len())
+    }
+
+    /// The first sample of an occluder. For each of its turns come first those around it, then those on its surface.
+    pub fn first(&self, occluder: usize) -> u64 {
+        self.occluders.iter().take(occluder).map(|kind| self.of_turn(kind) * u64::from(self.turns)).sum()
+    }
+
+    /// Samples of one turn of an occluder.
+    pub fn of_turn(&self, kind: &Kind) -> u64 {
+        u64::from(self.grid.count()) + u64::from(kind.surface)
     }
 
     /// The samples of part `index` of `count` even parts.
@@ -121,28 +196,66 @@ impl Plan {
         range: Range<u64>,
         mut done: impl FnMut(u64, &[f32]) -> Result<bool>,
     ) -> Result<()> {
-        let each = u64::from(self.grid.count());
+        if light.turned.len() + 1 < self.turns as usize {
+            return Err(Error::new(ErrorKind::Runtime, "the light was not turned").at("fiv.turns"));
+        }
         let mut runner = Runner::new(gpu);
         for (number, (occluder, kind)) in occluders.iter().zip(&self.occluders).enumerate() {
-            let begin = number as u64 * each;
-            let (first, last) = (range.start.max(begin), range.end.min(begin + each));
-            if first >= last {
+            let (mut at, last) = (range.start.max(self.first(number)), range.end.min(self.first(number + 1)));
+            if at >= last {
                 continue;
             }
             let mut cover = Cover::new(gpu, occluder)?;
-            for start in (first..last).step_by(BATCH as usize) {
-                let end = last.min(start + u64::from(BATCH));
-                let point = |sample: u64| -kind.shells.point(&self.grid, (sample - begin) as u32);
-                let points: Vec<Vec3> = (start..end).map(point).collect();
-                let (fivs, _) = cover.run(&mut runner, light, &points, self.split)?;
-                debug_assert_eq!(fivs.len(), points.len() * FIV_FLOATS as usize);
+            let places = occluder.places();
+            while at < last {
+                let of_turn = self.of_turn(kind);
+                let turn = (at - self.first(number)) / of_turn;
+                let begin = self.first(number) + turn * of_turn;
+                let border = begin + u64::from(self.grid.count());
+                let end = last.min(at + u64::from(BATCH)).min(if at < border { border } else { begin + of_turn });
+                let matrix = turn::matrix(turn as u32, self.turns);
+                cover.turn(turn as usize);
+                let mut fivs = if at < border {
+                    let point = |sample: u64| {
+                        let number = (sample - begin) as u32;
+                        match turn {
+                            0 if kind.paces == Paces::default() => -kind.shells.point(&self.grid, number),
+                            0 => -kind.offset(&self.grid, number).as_vec3(),
+                            _ => -(matrix.transpose() * kind.offset(&self.grid, number)).as_vec3(),
+                        }
+                    };
+                    let points: Vec<Vec3> = (at..end).map(point).collect();
+                    around(&mut cover, &mut runner, light, &points, self.split)?
+                } else {
+                    let places = places.get((at - border) as usize..(end - border) as usize).unwrap_or_default();
+                    cover.run_own(&mut runner, light, places, self.split)?.0
+                };
+                for sample in fivs.chunks_exact_mut(FIV_FLOATS as usize).filter(|s| turn > 0 && s[0] < FIV_INSIDE) {
+                    turn::vectors(sample, &matrix);
+                }
+                debug_assert_eq!(fivs.len() as u64, (end - at) * u64::from(FIV_FLOATS));
                 if !done(end, &fivs)? {
                     return Ok(());
                 }
+                at = end;
             }
         }
         Ok(())
     }
+}
+
+/// Vectors of what is hidden from `points`; neighbours in one place (all azimuths at the poles) are computed once.
+fn around(cover: &mut Cover, runner: &mut Runner, light: &Light, points: &[Vec3], split: u32) -> Result<Vec<f32>> {
+    let mut unique = points.to_vec();
+    unique.dedup();
+    let (fivs, _) = cover.run(runner, light, &unique, split)?;
+    let floats = FIV_FLOATS as usize;
+    let (mut out, mut at) = (Vec::with_capacity(points.len() * floats), 0);
+    for (i, point) in points.iter().enumerate() {
+        at += usize::from(i > 0 && points[i - 1] != *point);
+        out.extend_from_slice(&fivs[floats * at..floats * (at + 1)]);
+    }
+    Ok(out)
 }
 
 #[cfg(test)]
@@ -157,10 +270,12 @@ mod tests {
             radius: 1.0,
             shells: Shells { nearest: 1.0, farthest: 2.0 },
             triangles: 1,
+            surface: 100,
+            paces: Paces::default(),
         };
         let settings = Settings::default();
         let plan = Plan { occluders: vec![kind; 3], ..Plan::new("sky", 1, &[], &settings) };
-        assert_eq!(plan.samples(), 3 * 63_360);
+        assert_eq!((plan.samples(), plan.first(1)), (3 * 63_460, 63_460));
         for count in [1, 2, 7, 1000] {
             let parts: Vec<_> = (0..count).map(|i| plan.part(i, count)).collect();
             assert_eq!((parts[0].start, parts[count as usize - 1].end), (0, plan.samples()));

@@ -20,6 +20,39 @@ pub enum Method {
     BruteForce,
 }
 
+/// By what it is told how much of an occluder lies in front of a receiver's plane.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Extent {
+    /// By how far its corners reach along the normal.
+    #[default]
+    Hull,
+    /// By its bounding sphere, as in the thesis.
+    Sphere,
+}
+
+/// Where the vectors for an occluder's shadow on itself are taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SelfSamples {
+    /// On its surface: at the corners of its triangles.
+    #[default]
+    Surface,
+    /// On the spheres of all other shadows, as in the thesis.
+    Spheres,
+}
+
+/// What is interpolated between two spheres of samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Interpolation {
+    /// Vectors over the solid angle of the occluder's bounding sphere, nearly.
+    #[default]
+    SolidAngle,
+    /// Vectors, as in the thesis.
+    Linear,
+}
+
 /// Settings of the technique.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -32,9 +65,14 @@ pub struct Settings {
     pub polars: u32,
     /// Spheres of samples, 2 to 128.
     pub radii: u32,
+    /// Samples of turns about +Y, 1 to 64, for occluders that turn so; 1: those at rest only.
+    pub turns: u32,
     /// Radius of the last sphere, in radii of the occluder's bounding sphere, 2 to 1000. Farther away what is hidden shrinks with the
     /// solid angle.
     pub reach: f32,
+    /// Samples lie closer to each other where what is hidden bends; without, directions lie evenly and radii grow by a constant factor, as
+    /// in the thesis.
+    pub adaptive: bool,
     /// Rays along the edge of a texel of an occluder's mask, 1 to 4.
     pub split: u32,
     /// Flat occluders cast shadows too.
@@ -44,12 +82,15 @@ pub struct Settings {
     pub largest: f32,
     /// Vectors are interpolated between samples; without, the nearest is taken.
     pub trilinear: bool,
+    pub interpolation: Interpolation,
     /// Occluders cut by the receiver's plane count by the share in front of it.
     pub partial: bool,
+    pub extent: Extent,
     /// What several occluders hide is taken away once.
     pub overlap: bool,
     /// Occluders shadow themselves.
     pub self_shadow: bool,
+    pub self_samples: SelfSamples,
     pub method: Method,
     /// The environment turns by this angle about +Y, degrees counter-clockwise seen from above, -36000 to 36000.
     pub rotation: f32,
@@ -67,14 +108,19 @@ impl Default for Settings {
             azimuths: grid.azimuths,
             polars: grid.polars,
             radii: grid.radii,
+            turns: 1,
             reach: 16.0,
+            adaptive: false,
             split: 1,
             flat: false,
             largest: 0.5,
             trilinear: true,
+            interpolation: Interpolation::default(),
             partial: true,
+            extent: Extent::default(),
             overlap: true,
             self_shadow: true,
+            self_samples: SelfSamples::default(),
             method: Method::Vectors,
             rotation: 0.0,
             turning: 0.0,
@@ -101,6 +147,11 @@ impl Settings {
         Self { rotation: (rotation % 360.0) as f32, ..self.clone() }
     }
 
+    /// Samples on the occluders' surfaces are wanted.
+    pub fn on_surface(&self) -> bool {
+        self.self_samples == SelfSamples::Surface
+    }
+
     /// # Errors
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
@@ -113,7 +164,7 @@ impl Settings {
         within([("reach", self.reach, 2.0, 1000.0), ("largest", self.largest, 0.0, 1.0)])?;
         within([("rotation", self.rotation, -36e3, 36e3), ("turning", self.turning, -36e3, 36e3)])?;
         within([("exposure", self.exposure, -30.0, 30.0)])?;
-        within([("split", self.split, 1, 4)])
+        within([("split", self.split, 1, 4), ("turns", self.turns, 1, 64)])
     }
 }
 

@@ -1,7 +1,5 @@
 //! What lives as long as a scene: its occluders with their vectors, and the environment on the device.
 
-use glam::Mat3;
-
 use super::{Light, Method, Occluders, Plan, Settings, Sky, Stored, online::Online, plan::Kind};
 use crate::{
     Error, ErrorKind, Result,
@@ -29,8 +27,10 @@ pub struct Fiv {
     pub(super) plan: Plan,
     /// Vectors of all kinds, one after the other.
     pub(super) fivs: OwnedBuffer,
-    /// Turns and scales of the nodes at rest.
-    pub(super) rest: Vec<Mat3>,
+    /// How far all kinds reach ([`super::support`]), one after the other.
+    pub(super) reaches: OwnedBuffer,
+    /// As everything stood when the vectors were computed.
+    pub(super) at_rest: Pose,
     pub(super) notes: Vec<Note>,
     /// For brute force, with the rays of an invocation.
     pub(super) rays: Option<(Rays, u64)>,
@@ -63,7 +63,10 @@ impl Fiv {
         }
         let sky = lit_by(scene, &settings)?;
         let name = scene.environment.as_ref().map_or("", |e| e.name.as_str());
-        let light = Light::new(gpu, &sky)?;
+        let mut light = Light::new(gpu, &sky)?;
+        if let (Method::Vectors, Some(environment)) = (settings.method, &scene.environment) {
+            light.turn(gpu, environment, &settings)?;
+        }
         let pose = Pose::rest(scene);
         let occluders = Occluders::of(scene, &pose, settings.flat, settings.largest);
         if occluders.placed.len() > MOST_OCCLUDERS {
@@ -72,7 +75,11 @@ impl Fiv {
         }
         let mut plan = Plan::new(name, light.hash, &occluders.kinds, &settings);
         let fivs = match settings.method {
-            Method::Vectors => vectors(gpu, &light, &occluders, &mut plan, stored, told)?,
+            Method::Vectors => {
+                let mut fivs = vectors(gpu, &light, &occluders, (&mut plan, &settings), stored, told)?;
+                paces(&plan, &mut fivs);
+                fivs
+            }
             Method::Online | Method::Unshadowed | Method::BruteForce => Vec::new(),
         };
         let online = match settings.method {
@@ -101,7 +108,8 @@ impl Fiv {
         Ok(Self {
             fivs: OwnedBuffer::with_contents(gpu, "fiv.stored", if bytes.is_empty() { &[0; 4] } else { bytes })?,
             notes: notes(scene, &occluders, sky.repaired),
-            rest: pose.world.iter().map(|m| Mat3::from_mat4(*m)).collect(),
+            reaches: reaches(gpu, &occluders)?,
+            at_rest: pose,
             method: settings.method,
             lit: lit(scene, &settings),
             gpu: gpu.clone(),
@@ -157,6 +165,18 @@ impl Fiv {
     }
 }
 
+/// Appends how the samples of all kinds lie.
+fn paces(plan: &Plan, fivs: &mut Vec<f32>) {
+    plan.occluders.iter().for_each(|kind| fivs.extend(kind.paces.table(&plan.grid, &kind.shells)));
+}
+
+/// The tables of all kinds on the device.
+fn reaches(gpu: &Gpu, occluders: &Occluders) -> Result<OwnedBuffer> {
+    let mut all: Vec<f32> = occluders.kinds.iter().flat_map(|kind| kind.support.0.iter().copied()).collect();
+    all.resize(all.len().max(1), 0.0);
+    OwnedBuffer::with_contents(gpu, "fiv.reaches", bytemuck::cast_slice(&all))
+}
+
 /// Turn and factor of the environment.
 fn lit(scene: &Scene, settings: &Settings) -> (f32, f32) {
     let (turn, factor) = settings.light();
@@ -186,12 +206,15 @@ fn vectors(
     gpu: &Gpu,
     light: &Light,
     occluders: &Occluders,
-    plan: &mut Plan,
+    (plan, settings): (&mut Plan, &Settings),
     stored: Option<&Stored>,
     mut told: impl FnMut(u64, u64) -> bool,
 ) -> Result<Vec<f32>> {
-    let each = plan.grid.count() as usize * FIV_FLOATS as usize;
-    let mut fivs = vec![0f32; each * plan.occluders.len()];
+    let floats = |plan: &Plan, kind: usize| {
+        let at = |kind: usize| plan.first(kind) as usize * FIV_FLOATS as usize;
+        at(kind)..at(kind + 1)
+    };
+    let mut fivs = vec![0f32; plan.samples() as usize * FIV_FLOATS as usize];
     let mut missing: Vec<usize> = (0..plan.occluders.len()).collect();
     if let Some(stored) = stored {
         if stored.plan.environment_hash != plan.environment_hash {
@@ -207,28 +230,31 @@ fn vectors(
             return Err(Error::input(what).help("Join all parts with `fiv merge`"));
         }
         missing.retain(|&kind| {
-            let known = |k: &Kind| k.hash == plan.occluders[kind].hash;
+            let known = |k: &Kind| k.hash == plan.occluders[kind].hash && k.surface == plan.occluders[kind].surface;
             let Some(at) = stored.plan.occluders.iter().position(known) else { return true };
-            fivs[each * kind..each * (kind + 1)].copy_from_slice(&stored.fivs[each * at..each * (at + 1)]);
+            fivs[floats(plan, kind)].copy_from_slice(&stored.fivs[floats(&stored.plan, at)]);
             plan.occluders[kind].shells = stored.plan.occluders[at].shells;
+            plan.occluders[kind].paces = stored.plan.occluders[at].paces.clone();
             false
         });
     }
     if missing.is_empty() {
         return Ok(fivs);
     }
+    plan.adapt(gpu, light, &occluders.kinds, settings, |kind| missing.contains(&kind))?;
     let rest = Plan { occluders: missing.iter().map(|&k| plan.occluders[k].clone()).collect(), ..plan.clone() };
     let kinds: Vec<_> = missing.iter().map(|&k| occluders.kinds[k].clone()).collect();
-    let (all, mut computed) = (rest.samples(), Vec::with_capacity(each * missing.len()));
+    let all = rest.samples();
+    let mut computed = Vec::with_capacity(all as usize * FIV_FLOATS as usize);
     rest.compute(gpu, light, &kinds, 0..all, |done, new| {
         computed.extend_from_slice(new);
         Ok(told(done, all))
     })?;
-    if computed.len() < each * missing.len() {
+    if (computed.len() as u64) < all * u64::from(FIV_FLOATS) {
         return Err(Error::new(ErrorKind::Runtime, "stopped while computing vectors").at("fiv"));
     }
-    for (part, &kind) in computed.chunks_exact(each).zip(&missing) {
-        fivs[each * kind..each * (kind + 1)].copy_from_slice(part);
+    for (number, &kind) in missing.iter().enumerate() {
+        fivs[floats(plan, kind)].copy_from_slice(&computed[floats(&rest, number)]);
     }
     Ok(fivs)
 }

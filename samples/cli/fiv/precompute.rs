@@ -27,9 +27,6 @@ use crate::{
     source,
 };
 
-/// Time between two writes of what is done.
-const CHECKPOINT: Duration = Duration::from_secs(10);
-
 /// Options of `fiv precompute`.
 #[derive(clap::Args, Clone, Debug)]
 pub struct PrecomputeArgs {
@@ -66,6 +63,10 @@ pub struct PrecomputeArgs {
     #[arg(long, help_heading = "Output")]
     pub restart: bool,
 
+    /// Seconds after which what is done is written to FILE.part
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, help_heading = "Output")]
+    pub checkpoint: f64,
+
     /// Print one JSON document about the run on stdout
     #[arg(long, help_heading = "Output")]
     pub json: bool,
@@ -82,6 +83,11 @@ pub struct PrecomputeArgs {
     /// How progress is shown on stderr
     #[arg(long, value_enum, default_value_t, value_name = "HOW", help_heading = "Messages")]
     pub progress: ProgressMode,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let good = |s: &f64| (0.0..=86_400.0).contains(s);
+    text.parse().ok().filter(good).ok_or_else(|| "expected seconds from 0 to 86400".into())
 }
 
 /// The keys have the names that `fiv render` has.
@@ -109,7 +115,14 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
     if sky.repaired > 0 {
         console.info(&format!("note: {} pixels of the environment are no radiance", sky.repaired));
     }
-    let plan = Plan::new(&environment.name, sky.hash(), &occluders, &keys.fiv);
+    let mut plan = Plan::new(&environment.name, sky.hash(), &occluders, &keys.fiv);
+    let gpu = Gpu::new(args.device.options()?)?;
+    console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
+    let names: Vec<&str> = plan.occluders.iter().map(|o| o.name.as_str()).collect();
+    console.info(&format!("{} samples of {} occluders: {}", plan.grid, names.len(), names.join(", ")));
+    let mut light = Light::new(&gpu, &sky)?;
+    light.turn(&gpu, &environment, &keys.fiv)?;
+    plan.adapt(&gpu, &light, &occluders, &keys.fiv, |_| true)?;
     let range = args.shard.map_or(0..plan.samples(), |shard| plan.part(shard.index, shard.count));
     let part = partial(&args.output)?;
     let mut stored = match resumed(&part, &plan, range.start, args.restart, console) {
@@ -122,17 +135,12 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
         console.info(&format!("{}: goes on after {before} of {total} samples", part.display()));
     }
 
-    let gpu = Gpu::new(args.device.options()?)?;
-    console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
-    let names: Vec<&str> = plan.occluders.iter().map(|o| o.name.as_str()).collect();
-    console.info(&format!("{} samples of {} occluders: {}", plan.grid, names.len(), names.join(", ")));
-    let light = Light::new(&gpu, &sky)?;
     let mut meter = Meter::new(args.progress, console.is_quiet(), before, total);
     let mut saved = Instant::now();
     plan.compute(&gpu, &light, &occluders, stored.range.end..range.end, |done, new| {
         stored.push(new);
         meter.show(done - range.start);
-        if saved.elapsed() >= CHECKPOINT {
+        if saved.elapsed() >= Duration::from_secs_f64(args.checkpoint) {
             stored.write(&part, true)?;
             saved = Instant::now();
         }
