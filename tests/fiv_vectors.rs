@@ -231,14 +231,21 @@ fn a_convex_body_leaves_itself_all_that_is_before_it() {
         let (sphere, _) = occluder(&one_ball(2.0, 12));
         let sky = sky(&colourful(), 16);
         let light = Light::new(gpu, &sky).unwrap();
+        let mut even = 0;
         for split in [1, 2] {
             for (place, (found, angle)) in sphere.places().iter().zip(seen(gpu, &sphere, &light, split)) {
                 let n = place.normal.as_dvec3();
+                // At the seam and the poles of this mesh normals lean, and neighbours are before them.
+                if n.dot(place.point.normalize().as_dvec3()) < 0.9999 {
+                    continue;
+                }
+                even += 1;
                 let exact = twin::irradiance(&sky, n);
                 assert!((twin::dot(&found, n) - exact).length() < 1e-4 * exact.length(), "{n}");
                 assert!((angle / (2.0 * PI) - 1.0).abs() < 0.06, "{n}: {angle}");
             }
         }
+        assert!(even > 200, "{even}");
     });
 }
 

@@ -324,7 +324,8 @@ mod tests {
         let (grid, shells) = (Grid::of(12, 7, 4), Shells { nearest: 0.5, farthest: 8.0 });
         let light = |d: DVec3| 3.0 / d.length_squared().max(1.0);
         let fivs: Vec<f32> = (0..grid.count()).flat_map(|i| [light(shells.offset(&grid, i)) as f32; 9]).collect();
-        let set = |solid| Set { grid, shells, paces: &Paces::default(), solid, fivs: &fivs };
+        let paces = Paces::default();
+        let set = |solid| Set { grid, shells, paces: &paces, solid, fivs: &fivs };
         for rho in [0.2, 0.5, 0.7, 1.0, 1.3, 2.0, 3.1, 5.0, 7.9, 8.0, 13.0] {
             let d = DVec3::new(0.48, -0.6, 0.64) * rho;
             let error = |solid| (set(solid).lookup(d).0[1].x / light(d) - 1.0).abs();

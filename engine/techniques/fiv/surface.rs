@@ -39,9 +39,9 @@ impl Own {
 pub fn places(own: &Own, positions: &[Vec3], normals: &[Vec3], radius: f32, out: &mut Vec<Place>) {
     let sides: &[f32] = if own.backs { &[1.0, -1.0] } else { &[1.0] };
     for side in sides {
-        for i in 0..own.corners as usize {
+        for (i, position) in positions.iter().enumerate().take(own.corners as usize) {
             let normal = normals.get(i).copied().unwrap_or_default() * *side;
-            let point = positions[i] + normal * (OVER * radius);
+            let point = *position + normal * (OVER * radius);
             let good = point.is_finite() && normal.length_squared() > 0.5;
             out.push(if good { Place { point, normal } } else { Place { point: Vec3::ZERO, normal: Vec3::ZERO } });
         }
