@@ -28,8 +28,6 @@ pub struct Occluder {
     /// From the centre to the nearest surface, metres.
     pub inner: f32,
     pub triangles: usize,
-    /// How far it reaches along every direction.
-    pub support: Support,
     /// Places on the surface of each primitive that has triangles.
     pub own: Vec<Own>,
     /// Changes with the geometry.
@@ -143,12 +141,16 @@ impl Occluder {
         };
         let scene = alone(scene, primitives, &name);
         let hash = hash(&scene, &own);
+        Some((Self { name, scene, radius, inner, triangles, own, hash }, centre))
+    }
+
+    /// How far it reaches along every direction.
+    pub fn support(&self) -> Support {
         let used = |p: &Primitive| p.indices.iter().map(|&i| p.positions[i as usize]).collect::<Vec<_>>();
-        let mut points: Vec<Vec3> = scene.meshes[0].primitives.iter().flat_map(used).collect();
+        let mut points: Vec<Vec3> = self.scene.meshes[0].primitives.iter().flat_map(used).collect();
         points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)));
         points.dedup();
-        let support = Support::of(&points);
-        Some((Self { name, scene, radius, inner, triangles, support, own, hash }, centre))
+        Support::of(&points)
     }
 
     /// Places on its surface, those of [`Self::own`] one after the other.

@@ -172,7 +172,7 @@ fn paces(plan: &Plan, fivs: &mut Vec<f32>) {
 
 /// The tables of all kinds on the device.
 fn reaches(gpu: &Gpu, occluders: &Occluders) -> Result<OwnedBuffer> {
-    let mut all: Vec<f32> = occluders.kinds.iter().flat_map(|kind| kind.support.0.iter().copied()).collect();
+    let mut all: Vec<f32> = occluders.kinds.iter().flat_map(|kind| kind.support().0).collect();
     all.resize(all.len().max(1), 0.0);
     OwnedBuffer::with_contents(gpu, "fiv.reaches", bytemuck::cast_slice(&all))
 }
