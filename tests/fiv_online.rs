@@ -190,7 +190,7 @@ fn what_deforms_casts_the_shadow_of_its_moment() {
             let stale = nrmse(second, found);
             eprintln!("{file}: the truth changes by {changed:.4}, errors {errors:.4?}, of the other moment {stale:.4}");
             assert!(changed > 0.03, "{file}: nothing moves");
-            assert!(errors.iter().all(|e| *e < 0.12) && errors[1] < 0.7 * stale, "{file}: {errors:?} {stale}");
+            assert!(errors.iter().all(|e| *e < 0.12) && errors[1] < 0.9 * stale, "{file}: {errors:?} {stale}");
         }
     });
 }
@@ -302,5 +302,102 @@ fn a_sequence_changes_as_the_truth_does_and_does_not_pop() {
             assert!(steady.parts >= 6 && largest.truth > 0.01, "{steady:?}");
             assert!(largest.found < 1.5 * largest.truth && largest.apart < 1.0 * largest.truth, "{steady:?}");
         }
+    });
+}
+
+/// Balls around a camera that looks down at a ground: in front of surfaces, behind them, under the ground and far away.
+fn scattered() -> Vec<Vec3> {
+    let place = |i: u32| {
+        let (turn, far) = (2.399 * i as f32, 0.45 * (i as f32).sqrt());
+        vec3(far * turn.cos(), if i % 4 == 3 { -1.5 } else { 0.25 + 0.07 * (i % 7) as f32 }, far * turn.sin())
+    };
+    (0..40).map(place).collect()
+}
+
+#[test]
+fn lists_of_what_is_near_leave_out_nothing_that_matters() {
+    with_gpu(|gpu| {
+        let body = |at: Vec3| {
+            let (positions, indices) = ball(0.2, 6);
+            (positions, indices, Transform::Matrix(Mat4::from_translation(at)))
+        };
+        let eye = view(vec3(0.3, 2.0, 2.6), vec3(0.0, 0.1, 0.0), 60.0, [21, 19]);
+        let settings = Settings { overlap: false, self_shadow: false, ..few(Method::Vectors) };
+        let places = scattered();
+        let scene = stage(&places.iter().map(|at| body(*at)).collect::<Vec<_>>());
+        let all = Studio::new(gpu, &scene, &settings, None).film(&Pose::rest(&scene), &eye, &settings).0;
+        let open = Settings { method: Method::Unshadowed, ..settings.clone() };
+        let open = Studio::new(gpu, &scene, &open, None).film(&Pose::rest(&scene), &eye, &open).0;
+        // One after the other, with all others out of sight.
+        let mut studio = Studio::new(gpu, &scene, &settings, None);
+        let rest = Pose::rest(&scene);
+        let mut sum = vec![Vec3::ZERO; open.len()];
+        for index in 0..places.len() {
+            let mut pose = rest.clone();
+            for (other, world) in pose.world[1..].iter_mut().enumerate() {
+                if other != index {
+                    world.w_axis.y = -1e4;
+                }
+            }
+            let (alone, depth) = studio.film(&pose, &eye, &settings);
+            for ((sum, (light, open)), z) in sum.iter_mut().zip(alone.iter().zip(&open)).zip(&depth) {
+                *sum += if *z < 1e9 { Vec3::from(*open) - Vec3::from(*light) } else { Vec3::ZERO };
+            }
+        }
+        let mut away = rest.clone();
+        away.world[1..].iter_mut().for_each(|world| world.w_axis.y = -1e4);
+        let ground = studio.film(&away, &eye, &settings);
+        let shown = Studio::new(gpu, &scene, &settings, None).film(&rest, &eye, &settings).1;
+        let mut compared = 0;
+        for i in 0..all.len() {
+            // Where no ball is in front of the ground.
+            if (shown[i] - ground.1[i]).abs() > 1e-3 * shown[i] || shown[i] > 1e9 {
+                continue;
+            }
+            compared += 1;
+            let (found, exact) = (Vec3::from(all[i]), (Vec3::from(open[i]) - sum[i]).max(Vec3::ZERO));
+            assert!((found - exact).length() < 2e-3 * Vec3::from(open[i]).length(), "{i}: {found} instead of {exact}");
+        }
+        assert!(compared > 60, "{compared}");
+    });
+}
+
+#[test]
+fn what_is_negligible_is_left_out_without_a_step() {
+    with_gpu(|gpu| {
+        let body = |at: Vec3| {
+            let (positions, indices) = ball(0.2, 6);
+            (positions, indices, Transform::Matrix(Mat4::from_translation(at)))
+        };
+        let even = Environment::constant(Vec3::ONE);
+        let scene = Scene { environment: Some(even), ..stage(&scattered().into_iter().map(body).collect::<Vec<_>>()) };
+        let full = Settings { size: 8, ..few(Method::Online) };
+        let mut studio = Studio::new(gpu, &scene, &full, None);
+        let mut picture = |negligible: f32| {
+            let settings = Settings { negligible, ..full.clone() };
+            studio.irradiance(&around(4.0, 20), &settings)
+        };
+        let (all, most, none) = (picture(0.0), picture(0.2), picture(1.0));
+        let difference = |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).map(|(a, b)| b.x - a.x).fold(0f32, f32::max);
+        // Even light of radiance one has an irradiance of π.
+        let (some, much) = (difference(&all, &most), difference(&all, &none));
+        eprintln!("left out with 0.2: {some}, with 1: {much} of π");
+        assert!(some > 0.0 && some < much && most.iter().zip(&all).all(|(m, a)| m.x >= a.x - 1e-5));
+        // An occluder that comes closer fades in.
+        let settings = Settings { negligible: 0.2, ..full.clone() };
+        let mut pose = Pose::rest(&scene);
+        pose.world[1..].iter_mut().for_each(|world| world.w_axis.y = -1e4);
+        let mut last: Option<f32> = None;
+        let mut changed = 0f32;
+        for step in 0..30 {
+            pose.world[1].w_axis = Vec3::new(1.5 - 0.04 * step as f32, 0.2, 0.0).extend(1.0);
+            let light = studio.shot(&pose, &around(0.1, 1), &settings).0[0].x;
+            if let Some(last) = last {
+                assert!((light - last).abs() < 0.05 * std::f32::consts::PI, "{step}: {last} to {light}");
+                changed += (light - last).abs();
+            }
+            last = Some(light);
+        }
+        assert!(changed > 0.1, "{changed}");
     });
 }

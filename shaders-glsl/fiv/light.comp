@@ -35,13 +35,22 @@ layout(binding = 8, scalar) uniform WholeBlock { FivWhole whole; };
 layout(binding = 9) uniform sampler2D own; // irradiance that the pixel's occluder leaves itself, W/m²; a: 1 where it is known
 layout(binding = 10, scalar) readonly buffer Reaches { float reaches[]; };
 
+layout(binding = 11, scalar) readonly buffer Near { uint near[]; }; // occluders that may matter to a tile of pixels, a bit each
+
 layout(push_constant, scalar) uniform Push {
     uint first; // occluder
     uint count;
+    uint words; // of a tile
 };
 
 #include "lib/fiv_lookup.glsl"
 #include "lib/fiv_reach.glsl"
+
+// Goes on to the next word with an occluder in it, up to the word `last`; `tile`: first word of the tile.
+bool fiv_next(inout uint w, inout uint bits, uint tile, uint last) {
+    while (bits == 0u && ++w < last) bits = near[tile + w];
+    return bits != 0u;
+}
 
 // Places where the mean over the unit interval is taken: Gauss-Legendre, exact for seven overlapping occluders.
 const vec4 NODES = vec4(0.0694318442, 0.3300094782, 0.6699905218, 0.9305681558);
@@ -50,13 +59,16 @@ const vec4 WEIGHTS = vec4(0.1739274226, 0.3260725774, 0.3260725774, 0.1739274226
 // The share of what occluder `i` hides that is to be taken away for it, so that what several hide is taken away once. For two it is
 // eq. 15. Where more overlap, the mean of 1 / (1 + number of others there), as if these lay there independently: the integral of
 // the product of 1 - g (1 - t) over t in 0..1.
-float own_share(uint i, uint self, vec3 p, vec3 n, FivAlong along) {
+float own_share(uint i, uint self, vec3 p, vec3 n, FivAlong along, uint tile) {
     vec3 to = occluders[i].centre - p;
     float rho = length(to);
     vec3 direction = to / max(rho, 1e-20);
     float r = min(occluders[i].radius / max(rho, 1e-20), 1.0);
     vec4 product = vec4(1.0);
-    for (uint j = 0u; j < whole.occluders; ++j) {
+    uint w = 0u, bits = near[tile];
+    while (fiv_next(w, bits, tile, words)) {
+        uint j = 32u * w + uint(findLSB(bits));
+        bits &= bits - 1u;
         if (j == i || j == self) continue;
         vec3 other = occluders[j].centre - p;
         float radius = occluders[j].radius;
@@ -68,7 +80,7 @@ float own_share(uint i, uint self, vec3 p, vec3 n, FivAlong along) {
         float apart = length(other / max(far, 1e-20) - direction);
         if (apart >= r + s) continue;
         float g = 2.0 * lens_area(r, s, apart) / (FIV_PI * (r * r + s * s));
-        g *= front;
+        g *= front * fiv_near(occluders[j], far);
         product *= 1.0 - g * (1.0 - NODES);
     }
     return dot(product, WEIGHTS);
@@ -105,17 +117,23 @@ void main() {
     }
     vec3 sum = first == 0u ? lit : imageLoad(irradiance, pixel).rgb;
     FivAlong along = fiv_along(n);
-    for (uint i = first; i < first + count; ++i) {
-        if (i == self) continue;
+    uint tile = fiv_tile(pixel, imageSize(irradiance).x) * words;
+    uint last = min((first + count + 31u) / 32u, words);
+    uint w = first / 32u, bits = count > 0u ? near[tile + w] : 0u;
+    while (fiv_next(w, bits, tile, last)) {
+        uint i = 32u * w + uint(findLSB(bits));
+        bits &= bits - 1u;
+        if (i == self || i < first || i >= first + count) continue;
         vec3 offset = occluders[i].centre - p;
         float d = dot(offset, n);
         // Without the correction for partial occluders those count whose centre is in front.
         float front = PARTIAL != 0u ? fiv_front_share(occluders[i], d, n, along) : float(d > 0.0);
+        front *= fiv_near(occluders[i], length(offset));
         if (front <= 0.0) continue;
         vec3 hidden = max(fiv_dot(occluders[i], offset, n, TRILINEAR != 0u, SCALED != 0u).rgb, vec3(0.0));
         hidden *= front * seen;
         if (hidden == vec3(0.0)) continue;
-        if (OVERLAP != 0u && whole.occluders > 1u) hidden *= own_share(i, self, p, n, along);
+        if (OVERLAP != 0u && whole.occluders > 1u) hidden *= own_share(i, self, p, n, along, tile);
         sum -= hidden;
     }
     imageStore(irradiance, pixel, vec4(sum, 1.0));

@@ -22,9 +22,12 @@ layout(binding = 3) uniform sampler2D identity;
 layout(binding = 4, scalar) readonly buffer Occluders { FivOccluder occluders[]; };
 layout(binding = 5, scalar) buffer Marks { uint marks[]; }; // a bit for each sample
 
+layout(binding = 6, scalar) readonly buffer Near { uint near[]; }; // occluders that may matter to a tile of pixels, a bit each
+
 layout(push_constant, scalar) uniform Push {
-    uint first; // occluder
+    uint first; // word of them
     uint count;
+    uint words; // of a tile
 };
 
 void mark(FivOccluder o, vec3 offset) {
@@ -49,13 +52,19 @@ void main() {
     vec2 shown = texelFetch(identity, pixel, 0).rg;
     uint self = 0xffffffffu;
     if (shown.x > 0.5 && abs(shown.y - z) <= 1e-4 * z) self = uint(shown.x + 0.5) - 1u;
-    for (uint i = first; i < first + count; ++i) {
-        vec3 offset = occluders[i].centre - p;
-        if (i == self) {
-            if (OWN == 0u) continue;
-        } else if (dot(offset, n) <= (PARTIAL != 0u ? -occluders[i].radius : 0.0)) {
-            continue;
+    uint tile = fiv_tile(pixel, textureSize(depth, 0).x) * words;
+    for (uint w = first; w < first + count; ++w) {
+        for (uint bits = near[tile + w]; bits != 0u; bits &= bits - 1u) {
+            uint i = 32u * w + uint(findLSB(bits));
+            vec3 offset = occluders[i].centre - p;
+            if (i == self) {
+                if (OWN == 0u) continue;
+            } else if (dot(offset, n) <= (PARTIAL != 0u ? -occluders[i].radius : 0.0)) {
+                continue;
+            } else if (fiv_near(occluders[i], length(offset)) <= 0.0) {
+                continue;
+            }
+            mark(occluders[i], offset);
         }
-        mark(occluders[i], offset);
     }
 }

@@ -22,6 +22,7 @@ struct FivOccluder {
     float nearest;  // radius of the first sphere, metres
     float farthest; // radius of the last sphere, metres
     float steps;    // spheres for each factor of e of the radius
+    float limit;    // from this distance on it counts for nothing, metres
     uint pace;      // float of FIV_PACE_KNOTS numbers of samples at even steps of each coordinate, then the spheres' radii
     uint reach;     // float of its table of how far it reaches (lib/fiv_reach.glsl), or FIV_NONE: as its bounding sphere
     uint turned;    // 1: it does not stand as that table has it

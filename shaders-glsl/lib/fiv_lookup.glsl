@@ -109,6 +109,16 @@ float lens_area(float r1, float r2, float d) {
     return r1 * r1 * acos(a) + r2 * r2 * acos(b) - 0.5 * sqrt(kite);
 }
 
+// Number of the tile of 8×8 pixels that a pixel of an image of this width is in.
+uint fiv_tile(ivec2 pixel, int width) {
+    return uint(pixel.y >> 3) * uint((width + 7) >> 3) + uint(pixel.x >> 3);
+}
+
+// How much an occluder counts at a distance: nothing from its limit on, which it reaches without a step.
+float fiv_near(FivOccluder o, float rho) {
+    return clamp((o.limit - rho) / (0.2 * o.limit), 0.0, 1.0);
+}
+
 // Share of an occluder's bounding sphere in front of a plane at distance `d` of its centre (Michael, section 3.3.3.1).
 float fiv_front(float d, float radius) {
     return clamp((d + radius) / (2.0 * radius), 0.0, 1.0);

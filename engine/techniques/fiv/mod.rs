@@ -24,6 +24,7 @@ pub mod cover;
 pub mod file;
 mod hash;
 pub mod light;
+mod negligible;
 pub mod occluder;
 mod online;
 mod online_standing;

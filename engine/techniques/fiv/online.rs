@@ -41,8 +41,8 @@ use crate::{
 /// Points of a batch at most, and bytes of its partial sums, about.
 const MOST_POINTS: u64 = 32_768;
 const MOST_PARTIALS: u64 = 64 << 20;
-/// Occluders that one invocation goes through.
-const MOST_OCCLUDERS: u32 = 2_000;
+/// Words of 32 occluders that one invocation goes through.
+const MOST_WORDS: u32 = 64;
 
 /// What outlives a frame: geometries with their trees.
 #[derive(Debug)]
@@ -86,6 +86,8 @@ pub struct Seen<'a> {
     pub identity: Image,
     /// [`Standing::list`] on the device.
     pub occluders: Buffer,
+    /// Which of them may matter to a tile of pixels, a bit each, in so many words.
+    pub near: (Buffer, u32),
 }
 
 /// Lists of points with their samples, on the device.
@@ -192,7 +194,7 @@ impl Online {
         if count == 0 {
             return Ok(fivs);
         }
-        let marks = self.marks(graph, (standing, seen), samples, settings);
+        let marks = self.marks(graph, seen, samples, settings);
         let jobs = self.jobs(standing, extent, light);
         let lists = self.lists(graph, standing, marks, &jobs, samples);
         let found = graph.buffer("fiv.found", bytes);
@@ -253,17 +255,11 @@ impl Online {
     }
 
     /// A bit for each sample that is looked up.
-    fn marks(
-        &self,
-        graph: &mut Graph,
-        (standing, seen): (&Standing, &Seen<'_>),
-        samples: u64,
-        settings: &Settings,
-    ) -> Buffer {
+    fn marks(&self, graph: &mut Graph, seen: &Seen<'_>, samples: u64, settings: &Settings) -> Buffer {
         let marks = graph.buffer("fiv.marks", samples / 8);
         graph.fill(marks, 0);
-        let (extent, count) = (graph.extent(seen.gbuffer.depth), standing.list.len() as u32);
-        for first in (0..count).step_by(MOST_OCCLUDERS as usize) {
+        let (extent, (near, words)) = (graph.extent(seen.gbuffer.depth), seen.near);
+        for first in (0..words).step_by(MOST_WORDS as usize) {
             let args = fiv::online_mark::Args {
                 view: seen.gbuffer.view,
                 normal: seen.gbuffer.normal,
@@ -271,7 +267,8 @@ impl Online {
                 identity: seen.identity,
                 occluders: seen.occluders,
                 marks,
-                push: fiv::online_mark::Push { first, count: MOST_OCCLUDERS.min(count - first) },
+                near,
+                push: fiv::online_mark::Push { first, count: MOST_WORDS.min(words - first), words },
                 spec: fiv::online_mark::Spec {
                     partial: settings.partial.into(),
                     own: settings.self_shadow.into(),

@@ -32,6 +32,10 @@ use crate::{
 const MOST_RAYS: u64 = 1 << 22;
 /// Turns of the loops over occluders of one invocation.
 const MOST_TURNS: u32 = 20_000;
+/// Pixels along the edge of a tile of `near.comp`.
+const TILE: u32 = 8;
+/// Distance that nothing has, metres.
+const NEVER: f32 = 1e30;
 /// No occluder, vector or table.
 const NONE: u32 = u32::MAX;
 
@@ -130,11 +134,26 @@ impl Fiv {
         if settings.extent == Reach::Sphere {
             list.iter_mut().for_each(|occluder| occluder.reach = NONE);
         }
+        let widest = self.widest(scene, settings)?;
+        list.iter_mut().for_each(|o| o.limit = if widest > 0.0 { o.radius / widest } else { NEVER });
         list.resize(list.len().max(1), types::FivOccluder::default());
         let occluders = graph.buffer_from("fiv.occluders", &list);
+        let words = count.div_ceil(32).max(1);
+        let tiles = extent.width.div_ceil(TILE) * extent.height.div_ceil(TILE);
+        let near = graph.buffer("fiv.near", 4 * u64::from(tiles) * u64::from(words));
+        let args = shaders::fiv::near::Args {
+            view: gbuffer.view,
+            normal: gbuffer.normal,
+            depth: gbuffer.depth,
+            occluders,
+            near,
+            push: shaders::fiv::near::Push { count, words },
+            spec: shaders::fiv::near::Spec { partial: settings.partial.into() },
+        };
+        graph.compute(args, extent);
         let fivs = match &mut self.online {
             Some(online) if count > 0 => {
-                let seen = Seen { gbuffer, identity, occluders };
+                let seen = Seen { gbuffer, identity, occluders, near: (near, words) };
                 online.vectors(graph, (&self.occluders, pose), &standing, &self.light, &seen, settings)?
             }
             _ => stored,
@@ -170,7 +189,8 @@ impl Fiv {
                 whole,
                 own,
                 reaches,
-                push: shaders::fiv::light::Push { first, count: each.min(count.saturating_sub(first)) },
+                near,
+                push: shaders::fiv::light::Push { first, count: each.min(count.saturating_sub(first)), words },
                 spec: shaders::fiv::light::Spec {
                     partial: settings.partial.into(),
                     overlap: settings.overlap.into(),
@@ -209,6 +229,7 @@ impl Fiv {
                 reach: if yaw.is_some() { placed.kind * support::LENGTH as u32 } else { NONE },
                 turned: yaw.is_some_and(|yaw| yaw != 0.0).into(),
                 to_rest: turned.transpose().to_cols_array_2d(),
+                limit: NEVER,
             }
         });
         let nodes = self.occluders.placed.iter().map(|placed| placed.node).collect();

@@ -88,6 +88,8 @@ pub struct Settings {
     pub extent: Extent,
     /// What several occluders hide is taken away once.
     pub overlap: bool,
+    /// Occluders are left out where they cannot hide more than this share of the environment's mean irradiance, 0 to 1; 0: nowhere.
+    pub negligible: f32,
     /// Occluders shadow themselves.
     pub self_shadow: bool,
     pub self_samples: SelfSamples,
@@ -119,6 +121,7 @@ impl Default for Settings {
             partial: true,
             extent: Extent::default(),
             overlap: true,
+            negligible: 0.0,
             self_shadow: true,
             self_samples: SelfSamples::default(),
             method: Method::Vectors,
@@ -162,6 +165,7 @@ impl Settings {
         }
         self.grid().validate()?;
         within([("reach", self.reach, 2.0, 1000.0), ("largest", self.largest, 0.0, 1.0)])?;
+        within([("negligible", self.negligible, 0.0, 1.0)])?;
         within([("rotation", self.rotation, -36e3, 36e3), ("turning", self.turning, -36e3, 36e3)])?;
         within([("exposure", self.exposure, -30.0, 30.0)])?;
         within([("split", self.split, 1, 4), ("turns", self.turns, 1, 64)])

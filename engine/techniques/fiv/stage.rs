@@ -1,6 +1,6 @@
 //! What lives as long as a scene: its occluders with their vectors, and the environment on the device.
 
-use super::{Light, Method, Occluders, Plan, Settings, Sky, Stored, online::Online, plan::Kind};
+use super::{Light, Method, Occluders, Plan, Settings, Sky, Stored, negligible, online::Online, plan::Kind};
 use crate::{
     Error, ErrorKind, Result,
     gpu::{Gpu, OwnedBuffer},
@@ -36,6 +36,8 @@ pub struct Fiv {
     pub(super) rays: Option<(Rays, u64)>,
     /// For vectors of each frame.
     pub(super) online: Option<Online>,
+    /// Share, light, and the sine of the half angle under which an occluder hides no more than that.
+    widest: Option<(f32, (f32, f32), f32)>,
 }
 
 impl Fiv {
@@ -118,6 +120,7 @@ impl Fiv {
             plan,
             rays,
             online,
+            widest: None,
         })
     }
 
@@ -157,6 +160,26 @@ impl Fiv {
         self.light = Light::new(&self.gpu, &lit_by(scene, &Settings { size: self.light.size, ..settings.clone() })?)?;
         self.lit = wanted;
         Ok(())
+    }
+
+    /// Sine of the half angle under which an occluder is negligible; 0: none is.
+    ///
+    /// # Errors
+    /// As [`Sky::new`].
+    pub(super) fn widest(&mut self, scene: &Scene, settings: &Settings) -> Result<f32> {
+        if settings.negligible <= 0.0 {
+            return Ok(0.0);
+        }
+        let wanted = (settings.negligible, self.lit);
+        if let Some((share, lit, found)) = self.widest
+            && (share, lit) == wanted
+        {
+            return Ok(found);
+        }
+        let sky = lit_by(scene, &Settings { size: self.light.size, ..settings.clone() })?;
+        let found = negligible::widest(&sky, settings.negligible);
+        self.widest = Some((wanted.0, wanted.1, found));
+        Ok(found)
     }
 
     /// Bytes of the vectors on the device.
