@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use glam::{Mat3, Vec3};
 
 use super::{
-    Occluder, Occluders, Placed,
+    Occluder, Occluders,
     samples::{Grid, Shells},
-    support,
+    support::{self, Support},
 };
 use crate::{
     scene::{Pose, Scene},
@@ -40,6 +40,8 @@ pub struct Standing {
     pub nodes: Vec<u32>,
     /// Those of one geometry lie next to each other.
     pub sets: Vec<Set>,
+    /// How far those that deform reach, one after the other: to come behind the tables of all kinds.
+    pub reaches: Vec<f32>,
 }
 
 /// What decides where occluders stand, beside the pose.
@@ -62,18 +64,24 @@ impl Standing {
     /// As the occluders stand in `pose`.
     pub fn of(stage: &Stage<'_>, pose: &Pose) -> Self {
         let mut found = Vec::new();
-        let mut sets = BTreeMap::new();
+        let (mut sets, mut reaches) = (BTreeMap::new(), Vec::new());
         for (index, placed) in stage.occluders.placed.iter().enumerate() {
-            let Some((set, centre, turn)) = stand(stage, pose, index) else { continue };
+            let Some(Stand { set, centre, turn, support }) = stand(stage, pose, index) else { continue };
+            let kinds = stage.occluders.kinds.len() as u32;
+            let reach = match &support {
+                Some(_) => kinds + (reaches.len() / support::LENGTH) as u32,
+                None => placed.kind,
+            };
+            reaches.extend(support.into_iter().flat_map(|support| support.0));
             // What deforms shares with nothing.
             let alone = if stage.shapes[index].1 { index } else { usize::MAX };
             let key = (set.shape, alone, turn.to_cols_array().map(f32::to_bits));
             sets.insert(key, set);
-            found.push((key, placed, centre, set, turn));
+            found.push((key, placed.node, centre, set, turn, reach));
         }
         let numbers: BTreeMap<_, u32> = sets.keys().copied().zip(0..).collect();
         let Grid { azimuths, polars, radii } = stage.grid;
-        let list = found.iter().map(|(key, Placed { kind, .. }, centre, set, turn)| types::FivOccluder {
+        let list = found.iter().map(|(key, _, centre, set, turn, reach)| types::FivOccluder {
             centre: centre.to_array(),
             radius: set.radius,
             first: numbers[key] * stage.floats,
@@ -84,21 +92,33 @@ impl Standing {
             farthest: set.shells.farthest,
             steps: set.shells.steps(radii) as f32,
             pace: u32::MAX,
-            reach: if key.1 == usize::MAX { *kind * support::LENGTH as u32 } else { u32::MAX },
+            reach: reach * support::LENGTH as u32,
             turned: (*turn != Mat3::IDENTITY).into(),
             to_rest: turn.transpose().to_cols_array_2d(),
             ..Default::default()
         });
         Self {
             list: list.collect(),
-            nodes: found.iter().map(|(_, placed, ..)| placed.node).collect(),
+            nodes: found.iter().map(|(_, node, ..)| *node).collect(),
             sets: sets.into_values().collect(),
+            reaches,
         }
     }
 }
 
-/// Samples, centre (metres, world space) and turn of an occluder; `None` where it has no extent.
-fn stand(stage: &Stage<'_>, pose: &Pose, index: usize) -> Option<(Set, Vec3, Mat3)> {
+/// How one occluder stands.
+struct Stand {
+    set: Set,
+    /// Metres, world space.
+    centre: Vec3,
+    /// Turn and scale against it at rest.
+    turn: Mat3,
+    /// How far it reaches, if that is not that of its kind, turned.
+    support: Option<Support>,
+}
+
+/// `None` where the occluder has no extent.
+fn stand(stage: &Stage<'_>, pose: &Pose, index: usize) -> Option<Stand> {
     let placed = stage.occluders.placed.get(index)?;
     let (shape, deforms) = stage.shapes[index];
     let node = placed.node as usize;
@@ -108,7 +128,8 @@ fn stand(stage: &Stage<'_>, pose: &Pose, index: usize) -> Option<(Set, Vec3, Mat
         let (occluder, centre) = measured(stage.scene, pose, node)?;
         let (radius, shells) = (occluder.radius, occluder.shells(stage.reach));
         let set = Set { shape, geometry_from_world: Mat3::IDENTITY, centre: place + centre, radius, shells };
-        return Some((set, place + centre, Mat3::IDENTITY));
+        let support = Some(occluder.support());
+        return Some(Stand { set, centre: place + centre, turn: Mat3::IDENTITY, support });
     }
     let kind = &stage.occluders.kinds[placed.kind as usize];
     let (now, rest) = (Mat3::from_mat4(*world), stage.rest[index]);
@@ -138,10 +159,10 @@ fn stand(stage: &Stage<'_>, pose: &Pose, index: usize) -> Option<(Set, Vec3, Mat
                 radius: occluder.radius,
                 shells: occluder.shells(stage.reach),
             };
-            return Some((set, place + centre, turn));
+            return Some(Stand { set, centre: place + centre, turn, support: None });
         }
     };
-    Some((set, place + turn * placed.centre, turn))
+    Some(Stand { set, centre: place + turn * placed.centre, turn, support: None })
 }
 
 /// The occluder as a node has it in a pose, and its centre seen from the node's origin.

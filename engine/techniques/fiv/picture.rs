@@ -169,7 +169,15 @@ impl Fiv {
         // With the correction each occluder looks at all others.
         let turns = if settings.overlap { count + 8 } else { 8 };
         let each = (MOST_TURNS / turns).max(1);
-        let (difmap, reaches) = (graph.import_image(&self.light.difmap), graph.import_buffer(&self.reaches));
+        let difmap = graph.import_image(&self.light.difmap);
+        let mut reaches = graph.import_buffer(&self.reaches);
+        if !standing.reaches.is_empty() {
+            let moved = graph.buffer_from("fiv.reaches.moved", &standing.reaches);
+            let all = graph.buffer("fiv.reaches.all", reaches.size + moved.size);
+            graph.copy_buffer(reaches, all.range(0..reaches.size));
+            graph.copy_buffer(moved, all.range(reaches.size..all.size));
+            reaches = all;
+        }
         // Vectors of a frame are of spheres only.
         let own_way = match (settings.self_shadow, settings.self_samples, settings.method) {
             (false, ..) => 0,
@@ -233,7 +241,7 @@ impl Fiv {
             }
         });
         let nodes = self.occluders.placed.iter().map(|placed| placed.node).collect();
-        Standing { list: placed.collect(), nodes, sets: Vec::new() }
+        Standing { list: placed.collect(), nodes, ..Standing::default() }
     }
 
     /// Of each instance the occluder that it is of, and where the vectors of its corners are, as far as it stands as it did when they
