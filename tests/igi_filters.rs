@@ -12,7 +12,7 @@ use lucerna::{
     graph::{Extent, Graph, Runner, testing::every_barrier_matters},
     reference::isr_scene::{Buffers, Eye, Patch},
     scene::{Material, Pose, View, builtin, resident::Resident},
-    techniques::igi::{Igi, PictureSettings, Settings, filters},
+    techniques::igi::{Igi, Pattern, PictureSettings, Settings, filters},
 };
 use tracer_lab::{Stage, flat_view};
 
@@ -61,7 +61,7 @@ fn upsampling_is_a_partition_of_unity_within_bounds_and_does_not_leak() {
                     })); 4]
                 })
                 .collect();
-            let guide = filters::guide(&mut graph, &g, factor);
+            let guide = filters::guide(&mut graph, &g, &settings);
             let made = [("even", &even), ("noise", &noise), ("lit", &lit)].map(|(name, texels)| {
                 let coarse = image(&mut graph, name, small, texels);
                 filters::upsample(&mut graph, &g, guide, coarse, &settings)
@@ -98,7 +98,7 @@ fn the_discontinuity_buffer_is_the_mean_of_the_tile_on_one_surface() {
             let noise: Vec<[f32; 4]> = (0..width * height).map(|_| random.texel()).collect();
             let mut graph = Graph::new("join");
             let g = gbuffer(&mut graph, &eye, &buffers);
-            let guide = filters::guide(&mut graph, &g, 1);
+            let guide = filters::guide(&mut graph, &g, &settings);
             let texels = image(&mut graph, "noise", Extent::new(width as u32, height as u32), &noise);
             let joined = filters::join(&mut graph, guide, texels, &settings);
             let [found] = read(gpu, graph, [joined]);
@@ -152,12 +152,63 @@ fn subsets_of_a_tile_sum_to_all_virtual_lights() {
 }
 
 #[test]
+fn an_irregular_tile_has_each_virtual_light_once_and_each_of_its_texels_light_from_all_sides() {
+    with_gpu(|gpu| {
+        // As above: all pixels stand at the same place, so that a tile's mean is the sum over all virtual lights.
+        let mut stage = Stage::new();
+        let white = stage.material(Material::diffuse("white", Vec3::splat(0.8)));
+        stage.cuboid(white, Vec3::splat(-1.0), Vec3::ONE, true);
+        stage.point(vec3(0.2, 0.1, 0.4), Vec3::splat(2.0));
+        let mut studio = Studio::new(gpu, &stage.scene);
+        let side = 36;
+        let seen = flat_view(vec3(0.1, 0.2, 0.0), vec3(0.1, 0.2, -1.0), 1e-4, [side as u32, side as u32]);
+        let all = f64::from(studio.render(&seen, &plain(700), 3).irradiance[0][1]);
+        for tile in [2, 3, 4, 6, 9, 12] {
+            let settings = Settings { interleave: tile as u32, fused: true, ..plain(700) };
+            let spread = |texels: &[[f32; 4]]| {
+                let sum: f64 = texels.iter().map(|t| (f64::from(t[1]) / all - 1.0).powi(2)).sum();
+                (sum / texels.len() as f64).sqrt()
+            };
+            let regular = spread(&studio.render(&seen, &settings, 3).gathered);
+            let settings = Settings { pattern: Pattern::Irregular, ..settings };
+            let found = studio.render(&seen, &settings, 3).gathered;
+            for (left, top) in (0..side / tile).flat_map(|x| (0..side / tile).map(move |y| (x * tile, y * tile))) {
+                let of_tile = (0..tile * tile).map(|i| found[(top + i / tile) * side + left + i % tile][1]);
+                let mean = of_tile.map(f64::from).sum::<f64>() / (tile * tile) as f64;
+                assert!((mean / all - 1.0).abs() < 2e-3, "tile {tile} at {left} {top}: {mean} instead of {all}");
+            }
+            let irregular = spread(&found);
+            println!("tile {tile}: texels differ by {regular:.3} regular, {irregular:.3} irregular");
+            if tile % 3 == 0 {
+                assert!(irregular < 0.7 * regular, "tile {tile}: {irregular} beside {regular}");
+            }
+        }
+    });
+}
+
+#[test]
 fn every_barrier_of_the_graphs_matters_and_two_runs_are_the_same() {
     with_gpu(|gpu| {
         let mut runner = Runner::new(gpu);
         for (name, settings) in [
             ("cornell-area", Settings { vpls: 12, direct_samples: 2, ..Settings::default() }),
             ("office", Settings { vpls: 24, direct_samples: 2, ..Settings::paper() }),
+            (
+                "office",
+                Settings {
+                    vpls: 120,
+                    direct_samples: 1,
+                    candidates: 2,
+                    judges: 7,
+                    downsample: 2,
+                    scattered: true,
+                    interleave: 6,
+                    pattern: Pattern::Irregular,
+                    fused: true,
+                    smoothing: 2,
+                    ..Settings::default()
+                },
+            ),
             ("figure", Settings { vpls: 24, direct_samples: 1, candidates: 2, history: 8, ..Settings::default() }),
             ("figure", Settings { vpls: 24, direct_samples: 1, indirect: false, ..Settings::default() }),
         ] {

@@ -8,7 +8,7 @@ use igi_lab::{Studio, mean, plain};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::{AlphaMode, Material, Pose, Scene, View, builtin, resident::Resident},
-    techniques::igi::{Igi, PictureSettings, Settings, Visibility},
+    techniques::igi::{Igi, Pattern, PictureSettings, Settings, Visibility},
 };
 use tracer_lab::{Stage, view};
 
@@ -149,14 +149,21 @@ fn maps_in_several_batches_and_all_accelerations_of_pixels() {
         let scene = builtin::load("cornell").unwrap();
         let seen = View::of_camera(&scene, &Pose::rest(&scene), 0, [24, 24]).unwrap();
         let mut studio = Studio::new(gpu, &scene);
-        for (downsample, interleave) in [(1, 1), (2, 3)] {
-            let base = Settings { downsample, interleave, bound: 0.05, ..plain(40) };
+        for (downsample, interleave, pattern) in
+            [(1, 1, Pattern::Regular), (2, 3, Pattern::Regular), (2, 3, Pattern::Irregular)]
+        {
+            let scattered = pattern == Pattern::Irregular;
+            let base = Settings { downsample, interleave, pattern, scattered, bound: 0.05, ..plain(40) };
             // At 1024² no more than 32 lights are there at once.
             let large = studio.render(&seen, &raster(&base, 1024), 0);
             let rays = studio.render(&seen, &base, 0);
             let ratio = mean(&large.irradiance) / mean(&rays.irradiance);
             println!("downsample {downsample}, interleave {interleave}: ratio {ratio:.4}");
             assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
+            // Every texel has the lights that it has by rays.
+            let apart = large.gathered.iter().zip(&rays.gathered).filter(|(a, b)| (a[1] - b[1]).abs() > 0.1 * b[1]);
+            let apart = apart.count();
+            assert!(20 * apart <= rays.gathered.len(), "{apart} of {} texels have other lights", rays.gathered.len());
             assert_eq!(
                 large.irradiance,
                 studio.render(&seen, &raster(&base, 1024), 0).irradiance,

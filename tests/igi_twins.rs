@@ -5,7 +5,7 @@ mod igi_lab;
 mod isr_lab;
 
 use glam::{DVec3, dvec3};
-use igi_lab::twins::{self, Texels, blended, joined, upsampled};
+use igi_lab::twins::{self, Texels, blended, joined, smoothed, upsampled};
 use isr_lab::{Random, gbuffer, image, read, scene, view};
 use lucerna::{
     gpu::testing::with_gpu,
@@ -52,16 +52,28 @@ fn upsampling_and_the_fused_filter_agree_with_their_twin() {
         let (eye, buffers) = stage();
         let mut random = Random(11);
         // Factor 1 is the fused filter over interleaved texels at full resolution.
-        for (downsample, sigma, upsample_range, upsample_normal) in
-            [(1, 1.2, 0.01, 8.0), (2, 0.6, 0.01, 8.0), (3, 0.9, 0.0, 1.0), (4, 0.6, 0.05, 3.0), (4, 1.5, 0.01, 0.0)]
-        {
-            let s =
-                Settings { downsample, upsample_sigma: sigma, upsample_range, upsample_normal, ..Settings::default() };
+        for (downsample, sigma, upsample_range, upsample_normal, scattered) in [
+            (1, 1.2, 0.01, 8.0, false),
+            (2, 0.6, 0.01, 8.0, false),
+            (3, 0.9, 0.0, 1.0, false),
+            (4, 0.6, 0.05, 3.0, false),
+            (4, 1.5, 0.01, 0.0, false),
+            (3, 0.7, 0.01, 8.0, true),
+            (4, 1.1, 0.02, 2.0, true),
+        ] {
+            let s = Settings {
+                downsample,
+                upsample_sigma: sigma,
+                upsample_range,
+                upsample_normal,
+                scattered,
+                ..Settings::default()
+            };
             let small = extent().div_ceil(downsample);
             let noise: Texels = (0..small.pixels()).map(|_| random.texel()).collect();
             let mut graph = Graph::new("upsample");
             let g = gbuffer(&mut graph, &eye, &buffers);
-            let guide = filters::guide(&mut graph, &g, downsample);
+            let guide = filters::guide(&mut graph, &g, &s);
             let coarse = image(&mut graph, "noise", small, &noise);
             let fine = filters::upsample(&mut graph, &g, guide, coarse, &s);
             let [fine] = read(gpu, graph, [fine]);
@@ -74,6 +86,37 @@ fn upsampling_and_the_fused_filter_agree_with_their_twin() {
             }
             assert!(found.len() > 1500, "{} values", found.len());
             agree(&found, &expected, 2e-4, 0, &format!("factor {downsample}, sigma {sigma}"));
+        }
+    });
+}
+
+#[test]
+fn smoothing_agrees_with_its_twin() {
+    with_gpu(|gpu| {
+        let (eye, buffers) = stage();
+        let mut random = Random(14);
+        for (downsample, smoothing, upsample_range, upsample_normal, scattered) in
+            [(1, 1, 0.01, 8.0, false), (2, 3, 0.01, 8.0, true), (3, 2, 0.0, 1.0, false), (4, 1, 0.05, 3.0, true)]
+        {
+            let s =
+                Settings { downsample, smoothing, upsample_range, upsample_normal, scattered, ..Settings::default() };
+            let small = extent().div_ceil(downsample);
+            let noise: Texels = (0..small.pixels()).map(|_| random.texel()).collect();
+            let mut graph = Graph::new("smooth");
+            let g = gbuffer(&mut graph, &eye, &buffers);
+            let guide = filters::guide(&mut graph, &g, &s);
+            let texels = image(&mut graph, "noise", small, &noise);
+            let out = filters::smooth(&mut graph, &g, guide, texels, &s);
+            let [out] = read(gpu, graph, [out]);
+            let columns = small.width as usize;
+            let mut turned: Vec<DVec3> = noise.iter().map(|t| dvec3(t[0].into(), t[1].into(), t[2].into())).collect();
+            for turn in 0..smoothing {
+                let at = |i: usize| smoothed(&eye, &buffers, &turned, &s, 1 << turn, (i % columns, i / columns));
+                turned = (0..out.len()).map(at).collect();
+            }
+            let expected: Vec<f64> = turned.iter().flat_map(|color| color.to_array()).collect();
+            let found: Vec<f32> = out.iter().flat_map(|texel| [texel[0], texel[1], texel[2]]).collect();
+            agree(&found, &expected, 2e-4, 0, &format!("factor {downsample}, {smoothing} turns"));
         }
     });
 }
@@ -92,7 +135,7 @@ fn the_discontinuity_buffer_agrees_with_its_twin() {
             let noise: Texels = (0..small.pixels()).map(|_| random.texel()).collect();
             let mut graph = Graph::new("join");
             let g = gbuffer(&mut graph, &eye, &buffers);
-            let guide = filters::guide(&mut graph, &g, downsample);
+            let guide = filters::guide(&mut graph, &g, &s);
             let texels = image(&mut graph, "noise", small, &noise);
             let out = filters::join(&mut graph, guide, texels, &s);
             let [out] = read(gpu, graph, [out]);

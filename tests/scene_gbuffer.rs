@@ -7,7 +7,7 @@ use lucerna::{
     gpu::testing::with_gpu,
     graph::{Graph, Runner},
     passes::gbuffer::{Blended, Normals, Settings},
-    scene::{AlphaMode, Camera, Material, Projection, Scene, View},
+    scene::{AlphaMode, Camera, Material, Projection, Sampler, Scene, Texture, TextureRef, View},
     shaders::{test::view as view_shader, types},
 };
 use scene_kit::*;
@@ -265,5 +265,46 @@ fn an_empty_scene_is_all_background() {
     with_gpu(|gpu| {
         let got = surfaces(gpu, &Scene::default(), &view, Settings::default());
         assert!(got.depth.iter().all(|d| *d == 1.0));
+    });
+}
+
+#[test]
+fn textures_far_away_are_smooth_or_as_rays_see_them() {
+    // Every other texel is white, some eight texels a pixel.
+    let rgba = (0..256 * 256).map(|i| [if (i % 256 + i / 256) % 2 == 0 { 255 } else { 0 }; 4]).collect();
+    let sampler = Sampler { mag_linear: false, ..Sampler::default() };
+    let mut scene = Scene {
+        textures: vec![Texture { name: String::new(), width: 256, height: 256, rgba }],
+        ..Scene::default()
+    };
+    let used = Some(TextureRef { sampler, ..TextureRef::new(0) });
+    let white = Material { base_color_texture: used, ..Material::diffuse("", Vec3::ONE) };
+    let plane = mesh(&mut scene, square(), white);
+    place(&mut scene, plane, Mat4::IDENTITY);
+    let view = view(Vec3::new(0.0, 3.3, 0.01), Vec3::ZERO, EXTENT);
+    with_gpu(|gpu| {
+        let smooth = surfaces(gpu, &scene, &view, Settings::default());
+        let sharp = surfaces(gpu, &scene, &view, Settings { mips: false, ..Settings::default() });
+        let (mut seen, mut bright) = (0, 0);
+        for i in 0..smooth.depth.len() {
+            let (origin, direction) = ray(&view, i);
+            let hit = origin - direction * (origin.y / direction.y);
+            if hit.x.abs().max(hit.z.abs()) > 0.9 {
+                continue;
+            }
+            // Half of the light, which 8 bits of sRGB keep to half a percent.
+            assert!((smooth.albedo[i][1] - 0.5).abs() < 0.01, "{:?}", smooth.albedo[i]);
+            assert!(sharp.albedo[i][1] < 1e-3 || sharp.albedo[i][1] > 0.999, "{:?}", sharp.albedo[i]);
+            let place = (Vec2::new(hit.x, hit.z) * 0.5 + 0.5) * 256.0;
+            // On the border of two texels rounding decides.
+            if (place - place.round()).abs().min_element() > 0.02 {
+                let white = (place.x.floor() + place.y.floor()) as i32 % 2 == 0;
+                assert_eq!(sharp.albedo[i][1] > 0.5, white, "pixel {i} at {place}");
+            }
+            seen += 1;
+            bright += usize::from(sharp.albedo[i][1] > 0.5);
+        }
+        assert!(seen > 300 && bright > seen / 5 && bright < 4 * seen / 5, "{bright} of {seen}");
+        assert_eq!(smooth.depth, sharp.depth);
     });
 }

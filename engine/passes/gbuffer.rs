@@ -45,13 +45,16 @@ pub enum Blended {
 pub struct Settings {
     pub normals: Normals,
     pub blended: Blended,
+    /// Textures are read at the level that suits a pixel's size. Off: at their finest, as a ray through the middle of each pixel sees them,
+    /// for comparison with what traces such rays.
+    pub mips: bool,
     /// Leaves out what lies outside of the view. Off only to check that it changes nothing.
     pub culling: bool,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { normals: Normals::default(), blended: Blended::default(), culling: true }
+        Self { normals: Normals::default(), blended: Blended::default(), mips: true, culling: true }
     }
 }
 
@@ -116,6 +119,7 @@ fn layer(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, n
                 Some(Cutout::Blend) => 3,
             };
             let octahedral = u32::from(settings.normals == Normals::Octahedral);
+            let sharp = u32::from(!settings.mips);
             let sided = batch.map_or_else(Default::default, |b| b.sided.cull());
             let draw =
                 batch.map_or_else(|| crate::graph::Draw::indexed(scene.indices, Vec::new()), |batch| batch.draw(scene));
@@ -136,7 +140,7 @@ fn layer(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, n
                         $($more,)?
                         materials: scene.materials,
                         scene_textures: scene.textures,
-                        spec: $shader::Spec { cutout, octahedral },
+                        spec: $shader::Spec { cutout, octahedral, sharp },
                     }
                 };
             }

@@ -7,6 +7,7 @@
 #include "lib/screen.glsl"
 #include "lib/spread.glsl"
 #include "lib/gbuffer.glsl"
+#include "lib/igi_texel.glsl"
 #include "lib/random.glsl"
 #include "lib/trace.glsl"
 #include "lib/vpl.glsl"
@@ -18,6 +19,7 @@ layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D normal;
 layout(binding = 2) uniform sampler2D depth;
 layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; };
+#include "lib/vpl_gather.glsl"
 layout(binding = 4, rgba32f) uniform image2D irradiance; // rgb of a white surface's, W/m²; a: rays traced
 
 layout(push_constant, scalar) uniform Push {
@@ -26,6 +28,7 @@ layout(push_constant, scalar) uniform Push {
     uint total;      // virtual lights
     uint tile;       // side of the tiles of pixels that share the lights
     uint factor;     // pixels along the side of a texel
+    uint scattered;  // 1: its pixel is not the one in the middle
     float least;     // min_d of the bounded geometry term, metres; 0: none
     uint irregular;  // 1: tiles have their subsets in different orders
     uint seed;
@@ -34,26 +37,15 @@ layout(push_constant, scalar) uniform Push {
 void main() {
     ivec2 texel = spread_texel();
     if (any(greaterThanEqual(texel, imageSize(irradiance)))) return;
-    ivec2 pixel = min(texel * int(factor) + int(factor) / 2, textureSize(depth, 0) - 1);
+    ivec2 pixel = texel_pixel(texel, factor, scattered != 0u, textureSize(depth, 0));
     vec4 sum = first == 0u ? vec4(0.0) : imageLoad(irradiance, texel);
     float z = texelFetch(depth, pixel, 0).r;
     if (z < 1.0) {
         vec3 p = screen_position(view, pixel, 1.0, z);
         vec3 n = decode_normal(texelFetch(normal, pixel, 0));
-        float gap = surface_step(view, p, z);
-        vec3 origin = p + n * gap;
-        uint subsets = tile * tile;
         uint subset = vpl_subset(uvec2(texel), tile, irregular != 0u, seed);
-        for (uint i = 0u; i < count; ++i) {
-            uint k = (first + i) * subsets + subset;
-            if (k >= total) break;
-            Vpl vpl = vpls[k];
-            vec3 light = vpl_irradiance(vpl, p, n, least) * float(subsets);
-            if (light == vec3(0.0)) continue;
-            vec3 to = vpl.position + vpl.normal * vpl.gap - origin;
-            bool hidden = trace_any(Ray(origin, 0.0, to, 0.99999), TRACE_SHADOW, pcg4d(uvec4(pixel, k, seed)).x);
-            sum += vec4(hidden ? vec3(0.0) : light, 1.0);
-        }
+        Gathering how = Gathering(first, count, total, subset, tile * tile, irregular != 0u, least, seed);
+        vpl_gather(sum, p, n, surface_step(view, p, z), uvec2(pixel), how);
     }
     imageStore(irradiance, texel, sum);
 }

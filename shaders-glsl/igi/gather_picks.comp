@@ -8,6 +8,7 @@
 #include "lib/screen.glsl"
 #include "lib/spread.glsl"
 #include "lib/gbuffer.glsl"
+#include "lib/igi_texel.glsl"
 #include "lib/random.glsl"
 #include "lib/trace.glsl"
 #include "lib/vpl.glsl"
@@ -33,6 +34,7 @@ layout(push_constant, scalar) uniform Push {
     uint leaves;     // of the tree
     uint tile;       // side of the tiles of texels whose picks lie between each other
     uint factor;     // pixels along the side of a texel
+    uint scattered;  // 1: its pixel is not the one in the middle
     float least;     // min_d of the bounded geometry term, metres; 0: none
     uint irregular;  // 1: tiles have their subsets in different orders
     uint seed;
@@ -41,7 +43,7 @@ layout(push_constant, scalar) uniform Push {
 void main() {
     ivec2 texel = spread_texel();
     if (any(greaterThanEqual(texel, imageSize(irradiance)))) return;
-    ivec2 pixel = min(texel * int(factor) + int(factor) / 2, textureSize(depth, 0) - 1);
+    ivec2 pixel = texel_pixel(texel, factor, scattered != 0u, textureSize(depth, 0));
     vec4 sum = first == 0u ? vec4(0.0) : imageLoad(irradiance, texel);
     float z = texelFetch(depth, pixel, 0).r;
     if (z < 1.0) {

@@ -6,8 +6,10 @@
 #include "lib/screen.glsl"
 #include "lib/spread.glsl"
 #include "lib/gbuffer.glsl"
+#include "lib/igi_texel.glsl"
 #include "lib/random.glsl"
 #include "lib/vpl.glsl"
+#include "lib/vpl_subset.glsl"
 #include "lib/sampling.glsl"
 #include "lib/vpl_map.glsl"
 
@@ -25,6 +27,7 @@ layout(push_constant, scalar) uniform Push {
     uint count;
     uint tile;       // side of the tiles of pixels that share the lights
     uint factor;     // pixels along the side of a texel
+    uint scattered;  // 1: its pixel is not the one in the middle
     float least;     // min_d of the bounded geometry term, metres; 0: none
     uint irregular;  // 1: tiles have their subsets in different orders
     uint seed;
@@ -54,7 +57,7 @@ float unhidden(Vpl vpl, uint number, vec3 place) {
 void main() {
     ivec2 texel = spread_texel();
     if (any(greaterThanEqual(texel, imageSize(irradiance)))) return;
-    ivec2 pixel = min(texel * int(factor) + int(factor) / 2, textureSize(depth, 0) - 1);
+    ivec2 pixel = texel_pixel(texel, factor, scattered != 0u, textureSize(depth, 0));
     vec4 sum = first == 0u ? vec4(0.0) : imageLoad(irradiance, texel);
     float z = texelFetch(depth, pixel, 0).r;
     if (z < 1.0) {
@@ -62,16 +65,10 @@ void main() {
         vec3 n = decode_normal(texelFetch(normal, pixel, 0));
         vec3 place = p + n * surface_step(view, p, z);
         uint subsets = tile * tile;
-        uvec2 cell = uvec2(texel) % tile;
-        uint subset = cell.y * tile + cell.x;
-        if (irregular != 0u) {
-            // The same order as in igi/gather.comp.
-            uvec4 words = pcg4d(uvec4(uvec2(texel) / tile, seed, 0x1a7e1u));
-            if ((words.y & 1u) != 0u) cell = cell.yx;
-            if ((words.z & 1u) != 0u) cell.x = tile - 1u - cell.x;
-            subset = (cell.y * tile + cell.x + words.x % subsets) % subsets;
-        }
-        for (uint i = subset; i < count; i += subsets) {
+        uint subset = vpl_subset(uvec2(texel), tile, irregular != 0u, seed);
+        for (uint turn = 0u; turn * subsets < count; ++turn) {
+            uint i = vpl_of_subset(first / subsets + turn, subset, subsets, irregular != 0u) - first;
+            if (i >= count) continue;
             Vpl vpl = vpls[first + i];
             vec3 light = vpl_irradiance(vpl, p, n, least) * float(subsets);
             if (light == vec3(0.0)) continue;

@@ -3,6 +3,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
 #include "lib/gbuffer.glsl"
+#include "lib/igi_texel.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -11,12 +12,13 @@ layout(binding = 1) uniform sampler2D depth;
 layout(binding = 2, rgba32f) uniform writeonly image2D guide; // xyz: unit normal; w: linear depth / far
 
 layout(push_constant, scalar) uniform Push {
-    uint factor; // pixels along the side of a texel
+    uint factor;    // pixels along the side of a texel
+    uint scattered; // 1: its pixel is not the one in the middle
 };
 
 void main() {
     ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(texel, imageSize(guide)))) return;
-    ivec2 pixel = min(texel * int(factor) + int(factor) / 2, textureSize(depth, 0) - 1);
+    ivec2 pixel = texel_pixel(texel, factor, scattered != 0u, textureSize(depth, 0));
     imageStore(guide, texel, vec4(decode_normal(texelFetch(normal, pixel, 0)), texelFetch(depth, pixel, 0).r));
 }

@@ -5,6 +5,7 @@
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
 #include "lib/gbuffer.glsl"
+#include "lib/igi_texel.glsl"
 #include "lib/vpl.glsl"
 #include "lib/igi_near.glsl"
 
@@ -21,13 +22,14 @@ layout(push_constant, scalar) uniform Push {
     uint number;  // of the path
     uint paths;   // of a texel
     uint factor;  // pixels along the side of a texel
+    uint scattered; // 1: its pixel is not the one in the middle
 };
 
 void main() {
     uint slot = gl_GlobalInvocationID.x;
     if (slot >= count) return;
     uvec2 texel = uvec2((first + slot) % extent.x, (first + slot) / extent.x);
-    ivec2 pixel = min(ivec2(texel * factor + factor / 2u), textureSize(depth, 0) - 1);
+    ivec2 pixel = texel_pixel(ivec2(texel), factor, scattered != 0u, textureSize(depth, 0));
     float z = texelFetch(depth, pixel, 0).r;
     NearPath path;
     path.position = screen_position(view, pixel, 1.0, z);

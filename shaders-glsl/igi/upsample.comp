@@ -5,6 +5,8 @@
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
 #include "lib/gbuffer.glsl"
+#include "lib/igi_texel.glsl"
+#include "lib/igi_plane.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -15,13 +17,16 @@ layout(binding = 1) uniform sampler2D normal;
 layout(binding = 2) uniform sampler2D depth;
 layout(binding = 3) uniform sampler2D guide;   // of igi/guide.comp
 layout(binding = 4) uniform sampler2D coarse;  // irradiance of every factor-th pixel
-layout(binding = 5, rgba32f) uniform writeonly image2D irradiance;
+layout(binding = 5, rgba32f) uniform writeonly image2D irradiance; // a: luminance of the brightest coarse texel around
+layout(binding = 6, scalar) buffer Unmatched { uint unmatched_count; uint unmatched[]; }; // pixels, in any order: x, y << 16
 
 layout(push_constant, scalar) uniform Push {
     uint factor;
     float sigma;     // of the Gaussian, coarse texels
     float sharpness; // exponent of the cosine between normals; the paper's 1
     float range;     // distance from the pixel's plane relative to its depth that weighs 0.6; 0: depth does not count (paper)
+    uint scattered;  // 1: the pixel that a texel stands for is not the one in the middle
+    float least;     // share of coarse texels that match below which a pixel is listed; 0: none is
 };
 
 // Below this weight no coarse texel matches, and the likest is taken.
@@ -38,11 +43,7 @@ void main() {
     }
     vec3 n = decode_normal(texelFetch(normal, pixel, 0));
     vec3 p = screen_position(view, pixel, 1.0, z);
-    // n · (X - P) / (z range) of a texel at uv and depth w is base + b uv + (ray + r uv) w.
-    float scale = range > 0.0 ? 1.0 / (z * view.far * range) : 0.0;
-    float base = dot(n, view.base_o - p) * scale, ray = dot(n, view.frustum_o) * scale;
-    vec2 b = vec2(dot(n, view.base_u), dot(n, view.base_v)) * scale;
-    vec2 r = vec2(dot(n, view.frustum_u), dot(n, view.frustum_v)) * scale;
+    PixelPlane plane = pixel_plane(view, p, z, n, range);
     ivec2 last = textureSize(coarse, 0) - 1;
     // A coarse texel holds the light of the pixel in the middle of those it stands for.
     vec2 at = vec2(pixel - int(factor) / 2) / float(factor);
@@ -50,17 +51,19 @@ void main() {
     float fall = 0.72134752 / (sigma * sigma); // in powers of 2
     int reach = int(REACH);
     vec4 sum = vec4(0.0), likest = vec4(0.0);
-    float weights = 0.0, most = -1e30;
+    float weights = 0.0, all = 0.0, most = -1e30, brightest = 0.0;
     for (int y = max(middle.y - reach, 0); y <= min(middle.y + reach, last.y); ++y) {
         for (int x = max(middle.x - reach, 0); x <= min(middle.x + reach, last.x); ++x) {
             ivec2 texel = ivec2(x, y);
             vec4 there = texelFetch(guide, texel, 0);
             if (there.w >= 1.0) continue;
             vec4 value = texelFetch(coarse, texel, 0);
-            vec2 uv = (min(vec2(texel * int(factor) + int(factor) / 2), vec2(full - 1)) + 0.5) / view.extent;
-            float off = base + dot(b, uv) + (ray + dot(r, uv)) * there.w;
+            ivec2 place = texel_pixel(texel, factor, scattered != 0u, full);
+            float off = off_plane(plane, (vec2(place) + 0.5) / view.extent, there.w);
             float likeness = max(dot(n, there.xyz), 1e-12);
-            vec2 apart = vec2(texel) - at;
+            vec2 apart = scattered != 0u ? vec2(place - pixel) / float(factor) : vec2(texel) - at;
+            brightest = max(brightest, dot(value.rgb, vec3(0.2126, 0.7152, 0.0722)));
+            all += exp2(-fall * dot(apart, apart));
             float w = exp2(sharpness * log2(likeness) - fall * dot(apart, apart) - 0.72134752 * off * off);
             sum += w * value;
             weights += w;
@@ -70,5 +73,7 @@ void main() {
             }
         }
     }
-    imageStore(irradiance, pixel, weights < NO_MATCH ? likest : sum / weights);
+    if (weights < least * all) unmatched[atomicAdd(unmatched_count, 1u)] = uint(pixel.x) | uint(pixel.y) << 16u;
+    vec3 found = weights < NO_MATCH ? likest.rgb : sum.rgb / weights;
+    imageStore(irradiance, pixel, vec4(found, brightest));
 }

@@ -7,6 +7,7 @@
 
 layout(constant_id = 0) const uint CUTOUT = 0; // 0: all opaque; 1: alpha below the cutoff is cut out; 2: dithered; 3: cut at 0.5
 layout(constant_id = 1) const uint OCTAHEDRAL = 0; // 1: the normal attachment is RG16
+layout(constant_id = 2) const uint SHARP = 0; // 1: textures at their finest level
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1, scalar) readonly buffer Instances { Instance instances[]; };
@@ -52,7 +53,7 @@ void main() {
         texels[slot] = vec4(1.0);
         if (has_texture(flags, slot)) {
             TextureUse use = materials[m].textures[slot];
-            float lod = texture_lod(use, of_set(dx01, dx23, use.uv_set), of_set(dy01, dy23, use.uv_set));
+            float lod = SHARP != 0u ? 0.0 : texture_lod(use, of_set(dx01, dx23, use.uv_set), of_set(dy01, dy23, use.uv_set));
             texels[slot] = sample_texture(use, of_set(uv01, uv23, use.uv_set), lod);
         }
     }

@@ -10,7 +10,21 @@ uint vpl_subset(uvec2 texel, uint tile, bool irregular, uint seed) {
     uvec4 words = pcg4d(uvec4(texel / tile, seed, 0x1a7e1u));
     if ((words.y & 1u) != 0u) place = place.yx;
     if ((words.z & 1u) != 0u) place.x = tile - 1u - place.x;
-    return (place.y * tile + place.x + words.x % (tile * tile)) % (tile * tile);
+    // Any 3 × 3 (2 × 2) texels of a large tile have subsets far from each other and evenly between each other.
+    uint side = tile % 3u == 0u ? 3u : tile % 2u == 0u ? 2u : tile;
+    uint blocks = tile / side;
+    uvec2 block = place / side, inner = place % side;
+    uint order = block.x + blocks * (block.y + blocks * (inner.x + side * inner.y));
+    return (order + words.x % (tile * tile)) % (tile * tile);
+}
+
+// Number of the i-th virtual light of a subset; i / subsets, rounded down, is i.
+uint vpl_of_subset(uint i, uint subset, uint subsets, bool irregular) {
+    // Every subsets-th point of Halton's sequence has the same digits in each base that divides `subsets`: a ninth of the lights would lie
+    // in a ninth of all directions. A step on from each round to the next, of about the golden ratio, gives every subset all digits.
+    uint step = irregular ? 633u * subsets >> 10u : 0u;
+    if (subsets % 2u == 0u) step |= uint(irregular);
+    return i * subsets + (subset + i * step) % subsets;
 }
 
 #endif

@@ -12,9 +12,11 @@ fn color(texel: [f32; 4]) -> DVec3 {
     dvec3(texel[0].into(), texel[1].into(), texel[2].into())
 }
 
-/// The pixel in the middle of those that a coarse texel stands for.
-pub fn pixel_of(buffers: &Buffers, (x, y): (usize, usize), factor: usize) -> (usize, usize) {
-    ((x * factor + factor / 2).min(buffers.width - 1), (y * factor + factor / 2).min(buffers.height - 1))
+/// The pixel that a coarse texel stands for: in the middle, or scattered.
+pub fn pixel_of(buffers: &Buffers, (x, y): (usize, usize), s: &Settings) -> (usize, usize) {
+    let factor = s.downsample as usize;
+    let (a, b) = if s.scattered { ((y + 2 * x) % factor, (x + 2 * y) % factor) } else { (factor / 2, factor / 2) };
+    ((x * factor + a).min(buffers.width - 1), (y * factor + b).min(buffers.height - 1))
 }
 
 fn place(eye: &Eye, buffers: &Buffers, (x, y): (usize, usize)) -> DVec3 {
@@ -43,14 +45,19 @@ pub fn upsampled(eye: &Eye, buffers: &Buffers, coarse: &Texels, s: &Settings, (x
             if (texel - (centre + 0.5).floor()).abs().max_element() > reach {
                 continue;
             }
-            let there = pixel_of(buffers, (column, row), factor);
+            let there = pixel_of(buffers, (column, row), s);
             let i = buffers.at(there.0, there.1);
             if buffers.depth[i] >= 1.0 {
                 continue;
             }
             let cosine = n.dot(buffers.normal[i].normalize()).max(1e-12);
             let mut weight = cosine.powf(f64::from(s.upsample_normal));
-            weight *= (-0.5 * (texel - centre).length_squared() / (sigma * sigma)).exp();
+            // At the border the pixel in the middle may not be there; the texel stays where it is.
+            let apart = match s.scattered {
+                true => (dvec2(there.0 as f64, there.1 as f64) - dvec2(x as f64, y as f64)) / factor as f64,
+                false => texel - centre,
+            };
+            weight *= (-0.5 * apart.length_squared() / (sigma * sigma)).exp();
             if s.upsample_range > 0.0 {
                 let off = n.dot(place(eye, buffers, there) - p) / (z * eye.far * f64::from(s.upsample_range));
                 weight *= (-0.5 * off * off).exp();
@@ -68,7 +75,7 @@ pub fn joined(buffers: &Buffers, interleaved: &Texels, s: &Settings, (x, y): (us
     let factor = s.downsample as usize;
     let (columns, rows) = (buffers.width.div_ceil(factor), buffers.height.div_ceil(factor));
     let surface = |texel: (usize, usize)| {
-        let (u, v) = pixel_of(buffers, texel, factor);
+        let (u, v) = pixel_of(buffers, texel, s);
         let i = buffers.at(u, v);
         (buffers.depth[i], buffers.normal[i])
     };
@@ -92,6 +99,44 @@ pub fn joined(buffers: &Buffers, interleaved: &Texels, s: &Settings, (x, y): (us
         }
     }
     sum / count
+}
+
+/// One turn of smoothing at a texel of every `downsample`-th pixel, with texels `stride` apart.
+pub fn smoothed(
+    eye: &Eye,
+    buffers: &Buffers,
+    coarse: &[DVec3],
+    s: &Settings,
+    stride: i64,
+    (x, y): (usize, usize),
+) -> DVec3 {
+    let factor = s.downsample as usize;
+    let (columns, rows) = (buffers.width.div_ceil(factor) as i64, buffers.height.div_ceil(factor) as i64);
+    let seen = |x: i64, y: i64| {
+        let pixel = pixel_of(buffers, (x as usize, y as usize), s);
+        let i = buffers.at(pixel.0, pixel.1);
+        (buffers.depth[i] < 1.0).then(|| (place(eye, buffers, pixel), buffers.normal[i].normalize(), buffers.depth[i]))
+    };
+    let (x, y) = (x as i64, y as i64);
+    let Some((p, n, z)) = seen(x, y) else { return DVec3::ZERO };
+    let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
+    for (b, row) in [1.0, 4.0, 6.0, 4.0, 1.0].into_iter().enumerate() {
+        for (a, column) in [1.0, 4.0, 6.0, 4.0, 1.0].into_iter().enumerate() {
+            let (u, v) = (x + (a as i64 - 2) * stride, y + (b as i64 - 2) * stride);
+            if !(0..columns).contains(&u) || !(0..rows).contains(&v) {
+                continue;
+            }
+            let Some((at, normal, _)) = seen(u, v) else { continue };
+            let mut weight = row * column * n.dot(normal).max(1e-12).powf(f64::from(s.upsample_normal));
+            if s.upsample_range > 0.0 {
+                let off = n.dot(at - p) / (z * eye.far * f64::from(s.upsample_range));
+                weight *= (-0.5 * off * off).exp();
+            }
+            sum += weight * coarse[(v * columns + u) as usize];
+            weights += weight;
+        }
+    }
+    sum / weights
 }
 
 /// What the history is made of, for [`blended`].

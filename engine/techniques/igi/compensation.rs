@@ -50,6 +50,7 @@ impl Igi {
                     number,
                     paths: settings.compensation,
                     factor: settings.downsample,
+                    scattered: settings.scattered.into(),
                 };
                 let args = near_begin::Args { view: g.view, normal: g.normal, depth: g.depth, near_paths, push };
                 graph.compute(args, count);

@@ -2,9 +2,9 @@
 
 use super::{Igi, LightTree, Pattern, Settings, Shared, Vpls};
 use crate::{
-    graph::{Extent, Format, Graph, Image},
+    graph::{Buffer, Extent, Format, Graph, Image},
     passes::gbuffer::GBuffer,
-    shaders::igi::{gather, gather_picks},
+    shaders::igi::{gather, gather_picks, refine, refine_groups},
 };
 
 impl Igi {
@@ -48,6 +48,7 @@ impl Igi {
                 total: vpls.count,
                 tile: settings.interleave,
                 factor: settings.downsample,
+                scattered: settings.scattered.into(),
                 least: shared.least,
                 irregular: (settings.pattern == Pattern::Irregular).into(),
                 seed: shared.seed,
@@ -66,6 +67,51 @@ impl Igi {
                 shared.hidden_by
             );
             graph.compute(args, extent);
+        }
+    }
+
+    /// Gathers for the pixels that `unmatched` of [`filters::upsample`](super::filters::upsample) lists, each from a subset.
+    pub(super) fn refine(
+        &self,
+        graph: &mut Graph,
+        g: &GBuffer,
+        shared: &Shared,
+        vpls: Vpls,
+        settings: &Settings,
+        (irradiance, unmatched): (Image, Buffer),
+    ) {
+        let groups = graph.buffer("igi.refine-groups", 12);
+        graph.compute(refine_groups::Args { unmatched, groups }, 1);
+        let extent = graph.extent(irradiance);
+        let own = vpls.count.div_ceil(settings.interleave * settings.interleave);
+        // Most pixels will not be there.
+        let few = Extent::new(extent.width.div_ceil(8), extent.height.div_ceil(4));
+        for (first, count) in self.batches(few, own) {
+            let push = refine::Push {
+                first,
+                count,
+                total: vpls.count,
+                tile: settings.interleave,
+                least: shared.least,
+                irregular: (settings.pattern == Pattern::Irregular).into(),
+                seed: shared.seed,
+                own,
+                limit: settings.despeckle,
+            };
+            let args = crate::rays::traced!(
+                refine::Args {
+                    view: g.view,
+                    normal: g.normal,
+                    depth: g.depth,
+                    vpls: vpls.buffer,
+                    irradiance,
+                    unmatched,
+                    push,
+                    spec: refine::Spec { imperfect: settings.imperfect.into() },
+                },
+                shared.hidden_by
+            );
+            graph.compute_indirect(args, groups, 0);
         }
     }
 
@@ -89,6 +135,7 @@ impl Igi {
                 leaves: tree.leaves,
                 tile: settings.interleave,
                 factor: settings.downsample,
+                scattered: settings.scattered.into(),
                 least: shared.least,
                 irregular: (settings.pattern == Pattern::Irregular).into(),
                 seed: shared.seed,

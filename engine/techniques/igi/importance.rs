@@ -11,8 +11,6 @@ use crate::{
     },
 };
 
-/// Seen points that candidates are judged by.
-const POINTS: u32 = 96;
 /// Distance within which light on a point grows no more, of the scene's diagonal: a candidate next to a point is not all that matters.
 const NEAR: f32 = 0.03;
 
@@ -27,21 +25,21 @@ impl Igi {
         settings: &Settings,
     ) -> Vpls {
         let count = settings.paths() * settings.bounces;
-        let seen = graph.buffer("igi.points", u64::from(POINTS) * size_of::<types::SeenPoint>() as u64);
+        let seen = graph.buffer("igi.points", u64::from(settings.judges) * size_of::<types::SeenPoint>() as u64);
         let args = points::Args {
             view: g.view,
             albedo: g.albedo,
             normal: g.normal,
             depth: g.depth,
             points: seen,
-            push: points::Push { count: POINTS },
+            push: points::Push { count: settings.judges },
         };
-        graph.compute(args, POINTS);
+        graph.compute(args, settings.judges);
         let total = candidates.count;
         let floats = 4 * u64::from(total);
         let importances = graph.buffer("igi.importances", floats);
         graph.fill(importances, 0);
-        for (first, points) in self.batches(Extent::new(total, 1), POINTS) {
+        for (first, points) in self.batches(Extent::new(total, 1), settings.judges) {
             let push =
                 importance::Push { total, first, count: points, near: NEAR * shared.diagonal, seed: shared.seed };
             let args = crate::rays::traced!(

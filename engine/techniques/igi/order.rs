@@ -20,13 +20,14 @@ pub struct LightTree {
     pub leaves: u32,
 }
 
-/// The same virtual lights, with a tree over them if something picks from it.
-pub(super) fn ordered_if_picked(graph: &mut Graph, vpls: Vpls, settings: &Settings) -> Vpls {
-    if settings.picks > 0 || settings.compensates() { ordered(graph, vpls) } else { vpls }
+/// The same virtual lights, with a tree over them if something picks from it, sorted if that or their order is asked for.
+pub(super) fn ordered_if_asked(graph: &mut Graph, vpls: Vpls, settings: &Settings) -> Vpls {
+    let picked = settings.picks > 0 || settings.compensates();
+    if picked || settings.sorted { ordered(graph, vpls, picked) } else { vpls }
 }
 
-/// The same virtual lights, sorted, with a tree over them.
-fn ordered(graph: &mut Graph, vpls: Vpls) -> Vpls {
+/// The same virtual lights, sorted; with a tree over them if `picked`.
+fn ordered(graph: &mut Graph, vpls: Vpls, picked: bool) -> Vpls {
     let total = vpls.count;
     debug_assert!(total <= VPL_TREE_MOST);
     let leaves = total.max(1).next_power_of_two();
@@ -42,6 +43,9 @@ fn ordered(graph: &mut Graph, vpls: Vpls) -> Vpls {
     let nodes = graph.buffer("igi.light-tree", 2 * u64::from(leaves) * size_of::<types::VplNode>() as u64);
     let push = order_leaves::Push { total, leaves };
     graph.compute(order_leaves::Args { keys: keys[0], vpls: vpls.buffer, ordered, nodes, push }, leaves);
+    if !picked {
+        return Vpls { buffer: ordered, count: total, tree: None };
+    }
     let mut first = leaves / 2;
     while first > 0 {
         graph.compute(order_join::Args { nodes, push: order_join::Push { first } }, first);

@@ -80,7 +80,7 @@ impl Igi {
             let frame = if igi.history > 0 { graph.frame } else { 0 };
             let own = Self::numbered(graph, &shared, igi, frame);
             let shot = igi.indirect.then(|| self.virtual_lights(graph, handles, &gbuffer, &own, igi));
-            let vpls = shot.map(|(_, chosen)| order::ordered_if_picked(graph, chosen, igi));
+            let vpls = shot.map(|(_, chosen)| order::ordered_if_asked(graph, chosen, igi));
             let direct = self.direct(graph, handles, &gbuffer, &shared);
             let gathered = match vpls {
                 Some(vpls) if igi.visibility == Visibility::Raster => {
@@ -94,13 +94,21 @@ impl Igi {
             let (joins, upsamples) =
                 (igi.interleave > 1 && !igi.fused, igi.downsample > 1 || (igi.fused && igi.interleave > 1));
             let mut irradiance = gathered;
-            if joins || upsamples {
-                let guide = filters::guide(graph, &gbuffer, igi.downsample);
+            let smooths = igi.smoothing > 0 || igi.despeckle > 0.0;
+            if joins || upsamples || smooths {
+                let guide = filters::guide(graph, &gbuffer, igi);
                 if joins {
                     irradiance = filters::join(graph, guide, irradiance, igi);
                 }
+                if smooths {
+                    irradiance = filters::smooth(graph, &gbuffer, guide, irradiance, igi);
+                }
                 if upsamples {
-                    irradiance = filters::upsample(graph, &gbuffer, guide, irradiance, igi);
+                    let (upsampled, unmatched) = filters::upsample(graph, &gbuffer, guide, irradiance, igi);
+                    irradiance = upsampled;
+                    if let Some(vpls) = vpls.filter(|_| igi.refine > 0.0) {
+                        self.refine(graph, &gbuffer, &own, vpls, igi, (irradiance, unmatched));
+                    }
                 }
             }
             if let Some((all, chosen)) = shot.filter(|_| igi.history > 1) {
@@ -112,7 +120,7 @@ impl Igi {
                 let steady = if frame > 0 {
                     shot.map(|_| {
                         let (_, chosen) = self.virtual_lights(graph, handles, &gbuffer, &shared, igi);
-                        order::ordered_if_picked(graph, chosen, igi)
+                        order::ordered_if_asked(graph, chosen, igi)
                     })
                 } else {
                     vpls

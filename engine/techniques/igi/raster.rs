@@ -124,6 +124,7 @@ impl Igi {
                     count,
                     tile: settings.interleave,
                     factor: settings.downsample,
+                    scattered: settings.scattered.into(),
                     least: shared.least,
                     irregular: (settings.pattern == Pattern::Irregular).into(),
                     seed: shared.seed,

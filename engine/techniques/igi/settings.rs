@@ -30,7 +30,8 @@ pub enum Pattern {
     /// The same in every tile (paper).
     #[default]
     Regular,
-    /// In another order in every tile, so that no pattern repeats. The tile around a pixel may then have a subset twice.
+    /// In another order in every tile, so that no pattern repeats. The tile around a pixel may then have a subset twice. Each subset has
+    /// light from all directions, where in the regular pattern with 3 × 3 it has a ninth of them.
     Irregular,
 }
 
@@ -46,6 +47,9 @@ pub struct Settings {
     pub candidates: u32,
     /// Virtual lights along a path at most, 1 to 8: bounces of indirect light.
     pub bounces: u32,
+    /// Visible surfaces that candidates are judged by, 1 to 1024, a shadow ray for each from each. With few, what matters to a small part
+    /// of the view is missed and counts as rarely as is safe.
+    pub judges: u32,
     /// Bounding distance min_d of the geometry term, as share of the diagonal of the scene's box; 0 switches the bound off. Virtual
     /// lights nearer than 0.8 of it give nothing, from 1.2 of it on they give everything.
     pub bound: f32,
@@ -66,11 +70,27 @@ pub struct Settings {
     pub imperfect: bool,
     /// Pixels along the side of a texel on which indirect light is gathered, 1 to 4.
     pub downsample: u32,
-    /// Side of the tiles of pixels that share the virtual lights, 1 to 4: each pixel gathers from one of side² subsets.
+    /// The pixel that a texel stands for is not the one in the middle of those that it covers, but another one from texel to texel, so that
+    /// thin things are met by some.
+    pub scattered: bool,
+    /// Side of the tiles of pixels that share the virtual lights, 1 to 4, with `fused` to 32: each pixel gathers from one of side² subsets.
+    /// With more virtual lights in larger tiles each pixel has as many shadow rays as before, and its neighbours have others.
     pub interleave: u32,
     pub pattern: Pattern,
+    /// Virtual lights are sorted by place and normal before tiles of pixels share them, so that each subset has some from every part of
+    /// the scene. With `picks` and with `compensation` they are sorted anyway.
+    pub sorted: bool,
     /// One filter instead of two: upsampling reads the interleaved texels themselves.
     pub fused: bool,
+    /// Turns, 0 to 5, in which what was gathered is smoothed before it is upsampled, by the same weights for normals and distance from the
+    /// plane: n turns are about a Gaussian of standard deviation 1, 2.2, 4.6, 9.2, 18 texels of the coarse picture. 0: none.
+    pub smoothing: u32,
+    /// A texel brighter than the mean of its neighbours on the same surface by more than this factor is dimmed to it before smoothing, 1 to
+    /// 1000: few virtual lights near a surface make specks that no filter can hide. 0: none is.
+    pub despeckle: f32,
+    /// Pixels gather for themselves where less than this share of the Gaussian of upsampling falls on texels that match in normal and plane,
+    /// 0 to 1: thin things that no texel met. 0: none. Not with `picks`, nor with `visibility` `raster`.
+    pub refine: f32,
     /// Standard deviation of the Gaussian of upsampling, texels of the coarse picture, 0.1 to 4.
     pub upsample_sigma: f32,
     /// Exponent of the cosine between normals in upsampling, 0 to 64; the paper has 1.
@@ -108,6 +128,7 @@ impl Default for Settings {
             vpls: 180,
             candidates: 8,
             bounces: 2,
+            judges: 96,
             bound: 0.02,
             picks: 0,
             proposals: 4,
@@ -116,9 +137,14 @@ impl Default for Settings {
             cache_cells: CACHE_CELLS,
             imperfect: false,
             downsample: 1,
+            scattered: false,
             interleave: 1,
             pattern: Pattern::Regular,
+            sorted: false,
             fused: false,
+            smoothing: 0,
+            despeckle: 0.0,
+            refine: 0.0,
             upsample_sigma: 0.6,
             upsample_normal: 8.0,
             upsample_range: 0.01,
@@ -178,13 +204,15 @@ impl Settings {
         within([
             ("vpls", self.vpls, 1, 10_000),
             ("candidates", self.candidates, 1, 64),
+            ("judges", self.judges, 1, 1024),
             ("bounces", self.bounces, 1, 8),
             ("picks", self.picks, 0, 1024),
             ("proposals", self.proposals, 1, 16),
             ("compensation", self.compensation, 0, 64),
             ("cache_cells", self.cache_cells, 1, CACHE_CELLS),
             ("downsample", self.downsample, 1, 4),
-            ("interleave", self.interleave, 1, 4),
+            ("interleave", self.interleave, 1, 32),
+            ("smoothing", self.smoothing, 0, 5),
             ("history", self.history, 0, 10_000),
             ("specular_depth", self.specular_depth, 0, 16),
             ("direct_samples", self.direct_samples, 1, 4096),
@@ -197,12 +225,23 @@ impl Settings {
                 return Err(Error::usage(what).at("picks").help("Choose picks = 0 or visibility = \"compute\""));
             }
         }
+        if self.interleave > 4 && (!self.fused || self.visibility == Visibility::Raster) {
+            let allowed = "1 to 4, up to 32 with fused = true and virtual lights by rays";
+            return wrong("interleave", self.interleave, allowed);
+        }
+        if self.despeckle != 0.0 && !(1.0..=1000.0).contains(&self.despeckle) {
+            return wrong("despeckle", self.despeckle, "0, or 1 to 1000");
+        }
+        if self.refine > 0.0 && (self.picks > 0 || self.visibility == Visibility::Raster) {
+            return wrong("refine", self.refine, "0 with picks or visibility = \"raster\"");
+        }
         if self.cache > 0.0 && self.cache < LEAST_CELL {
             return wrong("cache", self.cache, &format!("0, or {LEAST_CELL} to 0.2"));
         }
         within([
             ("cache", self.cache, 0.0, 0.2),
             ("bound", self.bound, 0.0, 1.0),
+            ("refine", self.refine, 0.0, 1.0),
             ("upsample_sigma", self.upsample_sigma, 0.1, 4.0),
             ("upsample_normal", self.upsample_normal, 0.0, 64.0),
             ("upsample_range", self.upsample_range, 0.0, 1e6),
@@ -222,6 +261,7 @@ mod tests {
     fn defaults_and_the_papers_choices_are_valid() {
         Settings::default().validate().unwrap();
         Settings::paper().validate().unwrap();
+        Settings { interleave: 32, fused: true, smoothing: 5, ..Settings::default() }.validate().unwrap();
         assert_eq!(Settings { vpls: 181, bounces: 2, ..Settings::default() }.paths(), 91);
     }
 
@@ -242,6 +282,16 @@ mod tests {
             Settings { cache_cells: 0, ..Settings::default() },
             Settings { visibility: Visibility::Raster, picks: 4, ..Settings::default() },
             Settings { interleave: 5, ..Settings::default() },
+            Settings { interleave: 33, fused: true, ..Settings::default() },
+            Settings { interleave: 9, fused: true, visibility: Visibility::Raster, ..Settings::default() },
+            Settings { judges: 0, ..Settings::default() },
+            Settings { smoothing: 6, ..Settings::default() },
+            Settings { despeckle: 0.5, ..Settings::default() },
+            Settings { despeckle: f32::NAN, ..Settings::default() },
+            Settings { refine: 1.1, ..Settings::default() },
+            Settings { refine: f32::NAN, ..Settings::default() },
+            Settings { refine: 0.1, picks: 8, ..Settings::default() },
+            Settings { refine: 0.1, visibility: Visibility::Raster, ..Settings::default() },
             Settings { specular_depth: 17, ..Settings::default() },
             Settings { direct_samples: 0, ..Settings::default() },
         ] {

@@ -1,0 +1,52 @@
+// Irradiance of the pixels that no coarse texel matches, gathered for themselves.
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#define TRACE_BOXES
+#include "lib/view.glsl"
+#include "lib/screen.glsl"
+#include "lib/gbuffer.glsl"
+#include "lib/random.glsl"
+#include "lib/trace.glsl"
+#include "lib/vpl.glsl"
+#include "lib/vpl_subset.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(binding = 0, scalar) uniform ViewBlock { View view; };
+layout(binding = 1) uniform sampler2D normal;
+layout(binding = 2) uniform sampler2D depth;
+layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; };
+layout(binding = 4, rgba32f) uniform image2D irradiance; // a: luminance of the brightest coarse texel around
+layout(binding = 5, scalar) readonly buffer Unmatched { uint unmatched_count; uint unmatched[]; }; // x, y << 16
+#include "lib/vpl_gather.glsl"
+
+layout(push_constant, scalar) uniform Push {
+    uint first;      // of the pixel's own lights
+    uint count;
+    uint total;      // virtual lights
+    uint tile;       // side of the tiles of pixels that share the lights
+    float least;     // min_d of the bounded geometry term, metres; 0: none
+    uint irregular;  // 1: tiles have their subsets in different orders
+    uint seed;
+    uint own;        // lights of a subset
+    float limit;     // above 0: brighter than the brightest coarse texel around by this factor is dimmed to it
+};
+
+void main() {
+    uint at = gl_GlobalInvocationID.x;
+    if (at >= unmatched_count) return;
+    ivec2 pixel = ivec2(unmatched[at] & 0xffffu, unmatched[at] >> 16u);
+    vec4 before = imageLoad(irradiance, pixel);
+    vec4 sum = first == 0u ? vec4(0.0) : vec4(before.rgb, 0.0);
+    float z = texelFetch(depth, pixel, 0).r;
+    vec3 p = screen_position(view, pixel, 1.0, z);
+    vec3 n = decode_normal(texelFetch(normal, pixel, 0));
+    uint subset = vpl_subset(uvec2(pixel), tile, irregular != 0u, seed);
+    Gathering how = Gathering(first, count, total, subset, tile * tile, irregular != 0u, least, seed);
+    vpl_gather(sum, p, n, surface_step(view, p, z), uvec2(pixel), how);
+    const vec3 luminance = vec3(0.2126, 0.7152, 0.0722);
+    float most = limit * before.a, bright = dot(sum.rgb, luminance);
+    if (limit > 0.0 && first + count >= own && bright > most) sum.rgb *= most / bright;
+    imageStore(irradiance, pixel, vec4(sum.rgb, before.a));
+}

@@ -1,0 +1,72 @@
+// One turn of smoothing the coarse irradiance: 5 × 5 texels that lie further apart from turn to turn (Dammertz et al., Edge-Avoiding
+// À-Trous Wavelet Transform for fast Global Illumination Filtering, 2010), those in the same plane with a like normal.
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "lib/view.glsl"
+#include "lib/igi_texel.glsl"
+#include "lib/igi_plane.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(binding = 0, scalar) uniform ViewBlock { View view; };
+layout(binding = 1) uniform sampler2D guide;  // of igi/guide.comp
+layout(binding = 2) uniform sampler2D coarse; // irradiance of every factor-th pixel
+layout(binding = 3, rgba32f) uniform writeonly image2D irradiance;
+
+layout(push_constant, scalar) uniform Push {
+    uint factor;     // pixels along the side of a texel
+    uint scattered;  // 1: its pixel is not the one in the middle
+    uint stride;     // texels from one to the next
+    float sharpness; // exponent of the cosine between normals
+    float range;     // distance from the texel's plane relative to its depth that weighs 0.6; 0: depth does not count
+    float limit;     // above 0: nothing is smoothed, but what is brighter than its neighbours' mean by this factor is dimmed to it
+};
+
+// Weight of neighbours, the texel itself having 1, below which nothing can be said about what is usual.
+const float LEAST_NEIGHBOURS = 0.6;
+
+void main() {
+    ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 size = textureSize(coarse, 0);
+    if (any(greaterThanEqual(texel, size))) return;
+    vec4 own = texelFetch(guide, texel, 0);
+    if (own.w >= 1.0) {
+        imageStore(irradiance, texel, vec4(0.0));
+        return;
+    }
+    ivec2 full = ivec2(view.extent);
+    vec2 at = vec2(texel_pixel(texel, factor, scattered != 0u, full)) + 0.5;
+    vec3 p = world_from_depth(view, at / view.extent, own.w);
+    PixelPlane plane = pixel_plane(view, p, own.w, own.xyz, range);
+    vec4 sum = vec4(0.0);
+    float weights = 0.0;
+    for (int y = -2; y <= 2; ++y) {
+        for (int x = -2; x <= 2; ++x) {
+            ivec2 other = texel + ivec2(x, y) * int(stride);
+            if (any(lessThan(other, ivec2(0))) || any(greaterThanEqual(other, size))) continue;
+            if (limit > 0.0 && other == texel) continue;
+            vec4 there = texelFetch(guide, other, 0);
+            if (there.w >= 1.0) continue;
+            vec2 place = vec2(texel_pixel(other, factor, scattered != 0u, full)) + 0.5;
+            float off = off_plane(plane, place / view.extent, there.w);
+            float likeness = max(dot(own.xyz, there.xyz), 1e-12);
+            // 1 4 6 4 1 in both directions, in powers of 2.
+            vec2 steps = abs(vec2(x, y));
+            vec2 narrow = steps * (0.70751875 * steps - 0.12255625);
+            float w = exp2(sharpness * log2(likeness) - narrow.x - narrow.y - 0.72134752 * off * off);
+            sum += w * texelFetch(coarse, other, 0);
+            weights += w;
+        }
+    }
+    if (limit > 0.0) {
+        vec4 here = texelFetch(coarse, texel, 0);
+        const vec3 luminance = vec3(0.2126, 0.7152, 0.0722);
+        float most = limit * dot(sum.rgb, luminance) / max(weights, 1e-30), bright = dot(here.rgb, luminance);
+        if (weights > LEAST_NEIGHBOURS && bright > most) here.rgb *= most / bright;
+        imageStore(irradiance, texel, here);
+        return;
+    }
+    // The texel itself weighs 1, but for rounding of its normal.
+    imageStore(irradiance, texel, sum / weights);
+}

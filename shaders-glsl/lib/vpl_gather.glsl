@@ -1,0 +1,33 @@
+// Irradiance from a range of a subset of the virtual lights. Before including: lib/random.glsl, lib/trace.glsl, lib/vpl.glsl,
+// lib/vpl_subset.glsl, and `vpls`.
+#ifndef LIB_VPL_GATHER
+#define LIB_VPL_GATHER
+
+struct Gathering {
+    uint first;     // of the subset's lights
+    uint count;
+    uint total;     // virtual lights
+    uint subset;
+    uint subsets;
+    bool irregular;
+    float least;    // min_d of the bounded geometry term, metres; 0: none
+    uint seed;
+};
+
+// Adds, in rgb as if all lights were like those of the subset, in a the rays traced. `gap`: how far shadow rays begin above the surface,
+// metres.
+void vpl_gather(inout vec4 sum, vec3 position, vec3 normal, float gap, uvec2 pixel, Gathering how) {
+    vec3 origin = position + normal * gap;
+    for (uint i = how.first; i < how.first + how.count; ++i) {
+        uint k = vpl_of_subset(i, how.subset, how.subsets, how.irregular);
+        if (k >= how.total) break;
+        Vpl vpl = vpls[k];
+        vec3 light = vpl_irradiance(vpl, position, normal, how.least) * float(how.subsets);
+        if (light == vec3(0.0)) continue;
+        vec3 to = vpl.position + vpl.normal * vpl.gap - origin;
+        bool hidden = trace_any(Ray(origin, 0.0, to, 0.99999), TRACE_SHADOW, pcg4d(uvec4(pixel, k, how.seed)).x);
+        sum += vec4(hidden ? vec3(0.0) : light, 1.0);
+    }
+}
+
+#endif
