@@ -64,7 +64,7 @@ fn upsampling_is_a_partition_of_unity_within_bounds_and_does_not_leak() {
             let guide = filters::guide(&mut graph, &g, &settings);
             let made = [("even", &even), ("noise", &noise), ("lit", &lit)].map(|(name, texels)| {
                 let coarse = image(&mut graph, name, small, texels);
-                filters::upsample(&mut graph, &g, guide, coarse, &settings)
+                filters::upsample(&mut graph, &g, guide, coarse, &settings).0
             });
             let [flat, mixed, parted] = read(gpu, graph, made);
             let (low, high) = noise.iter().fold((f32::MAX, f32::MIN), |(l, h), t| (l.min(t[0]), h.max(t[0])));
@@ -187,6 +187,57 @@ fn an_irregular_tile_has_each_virtual_light_once_and_each_of_its_texels_light_fr
 }
 
 #[test]
+fn a_speck_is_dimmed_to_what_its_neighbours_allow_and_nothing_else_changes() {
+    with_gpu(|gpu| {
+        let (width, height) = (30, 20);
+        let (eye, buffers) = step(width, height);
+        let settings = Settings { despeckle: 3.0, ..Settings::default() };
+        let mut texels = vec![[1.0, 2.0, 0.5, 0.0]; width * height];
+        let speck = 9 * width + 22;
+        texels[speck] = [100.0, 200.0, 50.0, 0.0];
+        // Twice as bright as others is no speck.
+        texels[3 * width + 5] = [2.0, 4.0, 1.0, 0.0];
+        let mut graph = Graph::new("despeckle");
+        let g = gbuffer(&mut graph, &eye, &buffers);
+        let guide = filters::guide(&mut graph, &g, &settings);
+        let coarse = image(&mut graph, "specks", Extent::new(width as u32, height as u32), &texels);
+        let out = filters::smooth(&mut graph, &g, guide, coarse, &settings);
+        let [found] = read(gpu, graph, [out]);
+        for (i, (found, texel)) in found.iter().zip(&texels).enumerate() {
+            for c in 0..3 {
+                let expected = if i == speck { 3.0 * texels[0][c] } else { texel[c] };
+                assert!((found[c] / expected - 1.0).abs() < 1e-4, "texel {i}: {found:?} instead of {expected}");
+            }
+        }
+    });
+}
+
+#[test]
+fn pixels_that_gather_for_themselves_have_what_full_resolution_has() {
+    with_gpu(|gpu| {
+        let scene = builtin::load("cornell").unwrap();
+        let mut studio = Studio::new(gpu, &scene);
+        let seen = View::of_camera(&scene, &Pose::rest(&scene), 0, [45, 38]).unwrap();
+        let settings = Settings { bound: 0.02, ..plain(40) };
+        let exact = studio.render(&seen, &settings, 3).irradiance;
+        let mut same = |settings: Settings| {
+            let found = studio.render(&seen, &settings, 3).irradiance;
+            let like = |(a, b): &(&[f32; 4], &[f32; 4])| (0..3).all(|c| (a[c] - b[c]).abs() <= 1e-4 * b[c]);
+            found.iter().zip(&exact).filter(like).count() as f64 / exact.len() as f64
+        };
+        let coarse = Settings { downsample: 4, ..settings };
+        let (plain, some, all) = (
+            same(coarse.clone()),
+            same(Settings { refine: 0.2, ..coarse.clone() }),
+            same(Settings { refine: 1.0, ..coarse }),
+        );
+        println!("as at full resolution: {plain:.3} of the pixels, refined {some:.3}, all of them {all:.3}");
+        // Of a pixel in the middle of a wall every texel around may match to the last digit.
+        assert!(plain < 0.3 && some > plain + 0.02 && all > 0.7, "{plain} {some} {all}");
+    });
+}
+
+#[test]
 fn every_barrier_of_the_graphs_matters_and_two_runs_are_the_same() {
     with_gpu(|gpu| {
         let mut runner = Runner::new(gpu);
@@ -206,6 +257,8 @@ fn every_barrier_of_the_graphs_matters_and_two_runs_are_the_same() {
                     pattern: Pattern::Irregular,
                     fused: true,
                     smoothing: 2,
+                    despeckle: 3.0,
+                    refine: 0.05,
                     ..Settings::default()
                 },
             ),

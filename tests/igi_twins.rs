@@ -75,7 +75,7 @@ fn upsampling_and_the_fused_filter_agree_with_their_twin() {
             let g = gbuffer(&mut graph, &eye, &buffers);
             let guide = filters::guide(&mut graph, &g, &s);
             let coarse = image(&mut graph, "noise", small, &noise);
-            let fine = filters::upsample(&mut graph, &g, guide, coarse, &s);
+            let (fine, _) = filters::upsample(&mut graph, &g, guide, coarse, &s);
             let [fine] = read(gpu, graph, [fine]);
             let (mut found, mut expected) = (Vec::new(), Vec::new());
             for (i, fine) in fine.iter().enumerate() {

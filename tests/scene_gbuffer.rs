@@ -273,10 +273,8 @@ fn textures_far_away_are_smooth_or_as_rays_see_them() {
     // Every other texel is white, some eight texels a pixel.
     let rgba = (0..256 * 256).map(|i| [if (i % 256 + i / 256) % 2 == 0 { 255 } else { 0 }; 4]).collect();
     let sampler = Sampler { mag_linear: false, ..Sampler::default() };
-    let mut scene = Scene {
-        textures: vec![Texture { name: String::new(), width: 256, height: 256, rgba }],
-        ..Scene::default()
-    };
+    let mut scene =
+        Scene { textures: vec![Texture { name: String::new(), width: 256, height: 256, rgba }], ..Scene::default() };
     let used = Some(TextureRef { sampler, ..TextureRef::new(0) });
     let white = Material { base_color_texture: used, ..Material::diffuse("", Vec3::ONE) };
     let plane = mesh(&mut scene, square(), white);

@@ -23,7 +23,7 @@ layout(push_constant, scalar) uniform Push {
     float limit;     // above 0: nothing is smoothed, but what is brighter than its neighbours' mean by this factor is dimmed to it
 };
 
-// Weight of neighbours, the texel itself having 1, below which nothing can be said about what is usual.
+// Weight of neighbours on the same surface, the texel itself having 1, below which all around say what is usual.
 const float LEAST_NEIGHBOURS = 0.6;
 
 void main() {
@@ -41,6 +41,7 @@ void main() {
     PixelPlane plane = pixel_plane(view, p, own.w, own.xyz, range);
     vec4 sum = vec4(0.0);
     float weights = 0.0;
+    vec4 around = vec4(0.0); // on any surface
     for (int y = -2; y <= 2; ++y) {
         for (int x = -2; x <= 2; ++x) {
             ivec2 other = texel + ivec2(x, y) * int(stride);
@@ -55,18 +56,21 @@ void main() {
             vec2 steps = abs(vec2(x, y));
             vec2 narrow = steps * (0.70751875 * steps - 0.12255625);
             float w = exp2(sharpness * log2(likeness) - narrow.x - narrow.y - 0.72134752 * off * off);
-            sum += w * texelFetch(coarse, other, 0);
+            vec3 value = texelFetch(coarse, other, 0).rgb;
+            sum.rgb += w * value;
             weights += w;
+            if (limit > 0.0) around += exp2(-narrow.x - narrow.y) * vec4(value, 1.0);
         }
     }
     if (limit > 0.0) {
         vec4 here = texelFetch(coarse, texel, 0);
         const vec3 luminance = vec3(0.2126, 0.7152, 0.0722);
-        float most = limit * dot(sum.rgb, luminance) / max(weights, 1e-30), bright = dot(here.rgb, luminance);
-        if (weights > LEAST_NEIGHBOURS && bright > most) here.rgb *= most / bright;
+        vec3 usual = weights > LEAST_NEIGHBOURS ? sum.rgb / weights : around.rgb / max(around.a, 1e-30);
+        float most = limit * dot(usual, luminance), bright = dot(here.rgb, luminance);
+        if (around.a > 0.0 && bright > most) here.rgb *= most / bright;
         imageStore(irradiance, texel, here);
         return;
     }
     // The texel itself weighs 1, but for rounding of its normal.
-    imageStore(irradiance, texel, sum / weights);
+    imageStore(irradiance, texel, vec4(sum.rgb / weights, 0.0));
 }

@@ -26,11 +26,15 @@ layout(push_constant, scalar) uniform Push {
     float sharpness; // exponent of the cosine between normals; the paper's 1
     float range;     // distance from the pixel's plane relative to its depth that weighs 0.6; 0: depth does not count (paper)
     uint scattered;  // 1: the pixel that a texel stands for is not the one in the middle
-    float least;     // share of coarse texels that match below which a pixel is listed; 0: none is
+    float least;     // share of the Gaussian on coarse texels that match below which a wider one is tried, and then the pixel listed; 0: never
 };
 
 // Below this weight no coarse texel matches, and the likest is taken.
 const float NO_MATCH = 1e-4;
+
+// Where too few match a Gaussian so much wider is tried, over so many texels to each side.
+const float WIDER = 3.0;
+const int WIDE_REACH = 4;
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
@@ -52,28 +56,40 @@ void main() {
     int reach = int(REACH);
     vec4 sum = vec4(0.0), likest = vec4(0.0);
     float weights = 0.0, all = 0.0, most = -1e30, brightest = 0.0;
-    for (int y = max(middle.y - reach, 0); y <= min(middle.y + reach, last.y); ++y) {
-        for (int x = max(middle.x - reach, 0); x <= min(middle.x + reach, last.x); ++x) {
-            ivec2 texel = ivec2(x, y);
-            vec4 there = texelFetch(guide, texel, 0);
-            if (there.w >= 1.0) continue;
-            vec4 value = texelFetch(coarse, texel, 0);
-            ivec2 place = texel_pixel(texel, factor, scattered != 0u, full);
-            float off = off_plane(plane, (vec2(place) + 0.5) / view.extent, there.w);
-            float likeness = max(dot(n, there.xyz), 1e-12);
-            vec2 apart = scattered != 0u ? vec2(place - pixel) / float(factor) : vec2(texel) - at;
-            brightest = max(brightest, dot(value.rgb, vec3(0.2126, 0.7152, 0.0722)));
-            all += exp2(-fall * dot(apart, apart));
-            float w = exp2(sharpness * log2(likeness) - fall * dot(apart, apart) - 0.72134752 * off * off);
-            sum += w * value;
-            weights += w;
-            if (likeness - abs(off) > most) {
-                most = likeness - abs(off);
-                likest = value;
+    bool matched = false;
+    for (uint turn = 0u; turn < 2u && !matched; ++turn) {
+        for (int y = max(middle.y - reach, 0); y <= min(middle.y + reach, last.y); ++y) {
+            for (int x = max(middle.x - reach, 0); x <= min(middle.x + reach, last.x); ++x) {
+                ivec2 texel = ivec2(x, y);
+                vec4 there = texelFetch(guide, texel, 0);
+                if (there.w >= 1.0) continue;
+                vec4 value = texelFetch(coarse, texel, 0);
+                ivec2 place = texel_pixel(texel, factor, scattered != 0u, full);
+                float off = off_plane(plane, (vec2(place) + 0.5) / view.extent, there.w);
+                float likeness = max(dot(n, there.xyz), 1e-12);
+                vec2 apart = scattered != 0u ? vec2(place - pixel) / float(factor) : vec2(texel) - at;
+                if (least > 0.0) {
+                    brightest = max(brightest, dot(value.rgb, vec3(0.2126, 0.7152, 0.0722)));
+                    all += exp2(-fall * dot(apart, apart));
+                }
+                float w = exp2(sharpness * log2(likeness) - fall * dot(apart, apart) - 0.72134752 * off * off);
+                sum += w * value;
+                weights += w;
+                if (likeness - abs(off) > most) {
+                    most = likeness - abs(off);
+                    likest = value;
+                }
             }
         }
+        matched = weights >= least * all;
+        if (matched || turn > 0u) break;
+        // A thin thing may have been met further away.
+        sum = vec4(0.0);
+        weights = all = 0.0;
+        reach = WIDE_REACH;
+        fall *= 1.0 / (WIDER * WIDER);
     }
-    if (weights < least * all) unmatched[atomicAdd(unmatched_count, 1u)] = uint(pixel.x) | uint(pixel.y) << 16u;
+    if (!matched) unmatched[atomicAdd(unmatched_count, 1u)] = uint(pixel.x) | uint(pixel.y) << 16u;
     vec3 found = weights < NO_MATCH ? likest.rgb : sum.rgb / weights;
     imageStore(irradiance, pixel, vec4(found, brightest));
 }

@@ -88,8 +88,9 @@ pub struct Settings {
     /// A texel brighter than the mean of its neighbours on the same surface by more than this factor is dimmed to it before smoothing, 1 to
     /// 1000: few virtual lights near a surface make specks that no filter can hide. 0: none is.
     pub despeckle: f32,
-    /// Pixels gather for themselves where less than this share of the Gaussian of upsampling falls on texels that match in normal and plane,
-    /// 0 to 1: thin things that no texel met. 0: none. Not with `picks`, nor with `visibility` `raster`.
+    /// Where less than this share of the Gaussian of upsampling falls on texels that match in normal and plane one three times as wide is
+    /// tried, and where that fails too the pixel gathers for itself, from one subset: thin things that no texel met. 0 to 1; 0: nowhere. Not
+    /// with `picks`, nor with `visibility` `raster`.
     pub refine: f32,
     /// Standard deviation of the Gaussian of upsampling, texels of the coarse picture, 0.1 to 4.
     pub upsample_sigma: f32,
