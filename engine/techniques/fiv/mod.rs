@@ -17,7 +17,6 @@
 //!   ([`support`]); [`Extent::Sphere`] is the thesis' way.
 //! - An occluder's shadow on itself comes from samples on its surface ([`surface`]); [`SelfSamples::Spheres`] is the thesis' way.
 //! - Samples lie where what is hidden bends, if [`Settings::adaptive`] ([`pace`]).
-//! - Between spheres what is interpolated is free of the growth of the solid angle; [`Interpolation::Linear`] is the thesis' way.
 //! - More than two overlapping occluders: see [`crate::reference::fiv::shares`].
 
 pub mod cover;

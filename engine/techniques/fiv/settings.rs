@@ -46,11 +46,12 @@ pub enum SelfSamples {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Interpolation {
-    /// Vectors over the solid angle of the occluder's bounding sphere, nearly.
-    #[default]
-    SolidAngle,
     /// Vectors, as in the thesis.
+    #[default]
     Linear,
+    /// Vectors over the solid angle of the occluder's bounding sphere, nearly. Exact far away; near an occluder a small light may be
+    /// taken away more than once.
+    SolidAngle,
 }
 
 /// Settings of the technique.
