@@ -41,7 +41,7 @@ fn wrong_calls_are_refused_and_named() {
         (&["-D", "fiv.size=12"], "multiples of 8"),
         (&["-D", "fiv.azimut=2"], "fiv.azimuths"),
         (&["--shard", "3/2"], "I/N"),
-        (&["--checkpoint", "-1"], "0 to 86400"),
+        (&["--checkpoint", "99999"], "0 to 86400"),
         (&["-D", "fiv.self_samples=inside"], "surface"),
     ] {
         precompute(&env, out, more).expect(2, &[part]);
