@@ -24,7 +24,7 @@ pub enum Method {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Extent {
-    /// By how far its corners reach along the normal; what deforms by its bounding sphere.
+    /// By how far its corners reach along the normal.
     #[default]
     Hull,
     /// By its bounding sphere, as in the thesis.
