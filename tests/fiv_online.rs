@@ -401,3 +401,31 @@ fn what_is_negligible_is_left_out_without_a_step() {
         assert!(changed > 0.1, "{changed}");
     });
 }
+
+#[test]
+fn shadows_of_an_occluder_on_itself_are_those_of_brute_force() {
+    with_gpu(|gpu| {
+        // A turned body alone: all that hides light is itself.
+        let turn = Quat::from_rotation_y(0.7) * Quat::from_rotation_x(1.1);
+        let with = |turn: Quat| {
+            let mut scene = stage(&[odd_body(turn, Vec3::Y)]);
+            scene.nodes.remove(0);
+            scene
+        };
+        let (scene, turned) = (with(Quat::IDENTITY), with(turn));
+        let settings = |method| Settings { self_samples: SelfSamples::Surface, ..few(method) };
+        let eye = view(vec3(0.4, 2.2, 1.4), Vec3::Y, 45.0, [24, 20]);
+        let pose = Pose::rest(&turned);
+        let [found, exact] = [Method::Online, Method::BruteForce].map(|method| {
+            let settings = settings(method);
+            Studio::new(gpu, &scene, &settings, None).shot(&pose, &eye, &settings).0
+        });
+        let seen = exact.iter().filter(|e| **e != Vec3::ZERO).count();
+        assert!(seen > 100, "{seen}");
+        // A ray that touches an edge may pass on the other side of it.
+        assert!(nrmse(&exact, &found) < 3e-3, "{}", nrmse(&exact, &found));
+        let spheres = few(Method::Online);
+        let found = Studio::new(gpu, &scene, &spheres, None).shot(&pose, &eye, &spheres).0;
+        assert!(nrmse(&exact, &found) > 0.02, "spheres: {}", nrmse(&exact, &found));
+    });
+}

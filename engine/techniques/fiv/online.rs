@@ -9,6 +9,9 @@
 //! Samples lie around an occluder as it stands, in world axes, so that the picture is that of vectors computed beforehand for this
 //! pose. Rays are carried into the geometry at rest; only what deforms has trees of its own that are brought to each pose.
 //! Occluders of one geometry that stand alike share their samples.
+//!
+//! An occluder's shadow on itself needs no samples: its pixels are few, and each has the light that reaches it past its geometry summed
+//! up. [`SelfSamples::Spheres`](super::SelfSamples::Spheres) is the thesis' way.
 
 use std::{collections::BTreeMap, ops::Range};
 
@@ -27,13 +30,13 @@ use crate::{
     gpu::{Gpu, OwnedBuffer},
     graph::{Buffer, Extent, Graph, Image},
     passes::gbuffer::GBuffer,
-    rays::Rays,
+    rays::{RayHandles, Rays},
     scene::{
         Pose, Scene,
         resident::{Resident, deforms},
     },
     shaders::{
-        consts::{FIV_BLOCK_SAMPLES, FIV_BLOCK_WORDS, FIV_FLOATS, FIV_INSIDE, FIV_ROW},
+        consts::{FIV_BLOCK_SAMPLES, FIV_BLOCK_WORDS, FIV_FLOATS, FIV_INSIDE, FIV_ROW, TRACE_STEPS},
         fiv, types,
     },
 };
@@ -41,6 +44,11 @@ use crate::{
 /// Points of a batch at most, and bytes of its partial sums, about.
 const MOST_POINTS: u64 = 32_768;
 const MOST_PARTIALS: u64 = 64 << 20;
+/// Rays that one dispatch traces at most, about, if all pixels show occluders.
+const MOST_RAYS: u64 = 1 << 26;
+/// Turns of the loop over texels of one invocation; and of all loops where a driver ends them early: two rays of the longest.
+const MOST_TURNS: u64 = 20_000;
+const TURNS_LIMITED: u64 = 2 * TRACE_STEPS as u64;
 /// Words of 32 occluders that one invocation goes through.
 const MOST_WORDS: u32 = 64;
 
@@ -68,6 +76,8 @@ struct Shape {
     resident: Resident,
     rays: Rays,
     tiles: u64,
+    /// Rays of an invocation at most.
+    most: u64,
 }
 
 #[derive(Debug)]
@@ -86,6 +96,8 @@ pub struct Seen<'a> {
     pub identity: Image,
     /// [`Standing::list`] on the device.
     pub occluders: Buffer,
+    /// What the occluder of a pixel leaves itself; known after these passes, if asked for.
+    pub own: Image,
     /// Which of them may matter to a tile of pixels, a bit each, in so many words.
     pub near: (Buffer, u32),
 }
@@ -128,7 +140,11 @@ impl Online {
             let resident = Resident::new(gpu, geometry)?;
             let rays = Rays::new(gpu, geometry, &resident)?;
             let tiles = tiles(gpu, &rays)?;
-            shapes.push(Shape { body, resident, rays, tiles });
+            let most = match gpu.loop_limit()? {
+                Some(_) => (TURNS_LIMITED / rays.most_turns().max(1)).max(1),
+                None => MOST_TURNS,
+            };
+            shapes.push(Shape { body, resident, rays, tiles, most });
         }
         let grid = settings.grid();
         let at = |ring: u32| grid.direction(ring % grid.azimuths, ring / grid.azimuths).as_vec3().to_array();
@@ -214,6 +230,11 @@ impl Online {
             };
             let handles = shape.resident.frame_in(graph, scene, pose);
             let rays = shape.rays.frame(graph, &handles);
+            if settings.on_surface() {
+                let sets = (job.sets.start as u32, job.sets.len() as u32);
+                let floats = blocks * FIV_BLOCK_SAMPLES * FIV_FLOATS;
+                own(graph, seen, light, (texels, lists.turns, rays), (sets, floats), shape.most);
+            }
             let partials = graph.buffer("fiv.partials", jobs.each * u64::from(jobs.chunks) * 40);
             for batch in job.batches.clone() {
                 let first = (job.first + u64::from(batch - job.batches.start) * jobs.each) as u32;
@@ -271,7 +292,7 @@ impl Online {
                 push: fiv::online_mark::Push { first, count: MOST_WORDS.min(words - first), words },
                 spec: fiv::online_mark::Spec {
                     partial: settings.partial.into(),
-                    own: settings.self_shadow.into(),
+                    own: (settings.self_shadow && !settings.on_surface()).into(),
                     trilinear: settings.trilinear.into(),
                 },
             };
@@ -395,6 +416,47 @@ struct Job {
     /// First place in the lists.
     first: u64,
     batches: Range<u32>,
+}
+
+/// Light that reaches the pixels of the occluders of a geometry past that geometry.
+fn own(
+    graph: &mut Graph,
+    seen: &Seen<'_>,
+    light: &Light,
+    (texels, turns, rays): (Buffer, Buffer, RayHandles),
+    ((set, sets), set_floats): ((u32, u32), u32),
+    most: u64,
+) {
+    let extent = graph.extent(seen.gbuffer.depth);
+    let count = light.lit.len() as u64;
+    let lit = graph.buffer_from("fiv.lit", if count > 0 { &light.lit } else { &[0] });
+    let each = (MOST_RAYS / extent.pixels().max(1)).clamp(1, most);
+    // Under a black sky it is known, too.
+    for first in (0..count.max(1)).step_by(each as usize) {
+        let args = crate::rays::traced!(
+            fiv::online_own::Args {
+                view: seen.gbuffer.view,
+                normal: seen.gbuffer.normal,
+                depth: seen.gbuffer.depth,
+                identity: seen.identity,
+                occluders: seen.occluders,
+                texels,
+                lit,
+                turns,
+                own: seen.own,
+                push: fiv::online_own::Push {
+                    first: first as u32,
+                    count: each.min(count.saturating_sub(first)) as u32,
+                    size: light.size,
+                    set,
+                    sets,
+                    set_floats,
+                },
+            },
+            rays
+        );
+        graph.compute(args, extent);
+    }
 }
 
 impl Body {

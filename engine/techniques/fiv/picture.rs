@@ -153,7 +153,7 @@ impl Fiv {
         graph.compute(args, extent);
         let fivs = match &mut self.online {
             Some(online) if count > 0 => {
-                let seen = Seen { gbuffer, identity, occluders, near: (near, words) };
+                let seen = Seen { gbuffer, identity, occluders, own, near: (near, words) };
                 online.vectors(graph, (&self.occluders, pose), &standing, &self.light, &seen, settings)?
             }
             _ => stored,
@@ -178,11 +178,10 @@ impl Fiv {
             graph.copy_buffer(moved, all.range(reaches.size..all.size));
             reaches = all;
         }
-        // Vectors of a frame are of spheres only.
-        let own_way = match (settings.self_shadow, settings.self_samples, settings.method) {
-            (false, ..) => 0,
-            (_, SelfSamples::Surface, Method::Vectors) => 2,
-            _ => 1,
+        let own_way = match (settings.self_shadow, settings.self_samples) {
+            (false, _) => 0,
+            (_, SelfSamples::Spheres) => 1,
+            (_, SelfSamples::Surface) => 2,
         };
         for first in (0..count.max(1)).step_by(each as usize) {
             let args = shaders::fiv::light::Args {
