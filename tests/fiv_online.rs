@@ -23,6 +23,7 @@ fn few(method: Method) -> Settings {
         radii: 8,
         largest: 1.0,
         self_samples: SelfSamples::Spheres,
+        adaptive: false,
         method,
         ..Settings::default()
     }

@@ -113,7 +113,7 @@ impl Default for Settings {
             radii: grid.radii,
             turns: 1,
             reach: 16.0,
-            adaptive: false,
+            adaptive: true,
             split: 1,
             flat: false,
             largest: 0.5,
