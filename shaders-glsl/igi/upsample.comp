@@ -34,7 +34,7 @@ const float NO_MATCH = 1e-4;
 
 // Where too few match a Gaussian so much wider is tried, over so many texels to each side.
 const float WIDER = 3.0;
-const int WIDE_REACH = 4;
+const int WIDE_REACH = 3;
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
