@@ -307,7 +307,7 @@ mod tests {
         let pose = Pose::rest(scene);
         let nodes = scene.nodes.iter().enumerate().skip(1).filter_map(|(i, n)| Some((i, n.mesh?)));
         let all = nodes.map(|(i, mesh)| {
-            let of = |p: &Primitive| Aabb::of(deform::world_vertices(scene, &pose, i, p).positions.into_iter());
+            let of = |p: &Primitive| Aabb::of(deform::world_vertices(scene, &pose, i, p).positions);
             scene.meshes[mesh as usize].primitives.iter().map(of).reduce(Aabb::union).unwrap()
         });
         all.collect()

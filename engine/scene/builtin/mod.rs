@@ -135,7 +135,7 @@ pub const THINGS: &[&str] = &{
     let mut names = [""; shadows::THINGS.len()];
     let mut i = 0;
     while i < names.len() {
-        names[i] = shadows::THINGS[i].0;
+        names[i] = shadows::THINGS[i].name;
         i += 1;
     }
     names
@@ -143,7 +143,7 @@ pub const THINGS: &[&str] = &{
 
 /// One line about a built-in scene or thing, if there is one of this name.
 pub fn description(name: &str) -> Option<&'static str> {
-    let thing = || shadows::THINGS.iter().find(|(known, ..)| *known == name).map(|(_, text, _)| *text);
+    let thing = || shadows::THINGS.iter().find(|thing| thing.name == name).map(|thing| thing.description);
     entry(name).map(|entry| entry.description).or_else(thing)
 }
 

@@ -10,18 +10,28 @@ use super::{
 use crate::scene::{Material, Scene};
 use glam::{Vec2, Vec3, vec2, vec3};
 
-/// Things that stand alone, without ground, light and camera.
-pub(super) const THINGS: [(&str, &str, fn(&mut Stage) -> u32); 3] = [
-    ("hare", "A sitting hare, 0.8 m high: about 10 000 vertices", add_hare),
-    ("queen", "A chess queen, 1 m high: a surface of revolution", add_queen),
-    ("tree", "A tree whose leaves are triangles, 1.7 m high: about 20 000 vertices", add_tree),
+/// A mesh that stands alone, without ground, light and camera.
+pub(super) struct Thing {
+    pub name: &'static str,
+    pub description: &'static str,
+    add: fn(&mut Stage) -> u32,
+}
+
+pub(super) const THINGS: [Thing; 3] = [
+    Thing { name: "hare", description: "A sitting hare, 0.8 m high", add: add_hare },
+    Thing { name: "queen", description: "A chess queen, 1 m high: a surface of revolution", add: add_queen },
+    Thing {
+        name: "tree",
+        description: "A tree of about 20 000 vertices, 1.7 m high: leaves are triangles",
+        add: add_tree,
+    },
 ];
 
 /// One of [`THINGS`] as a scene.
 pub(super) fn thing(name: &str) -> Option<Scene> {
-    let (name, _, add) = THINGS.iter().find(|(known, ..)| *known == name)?;
+    let thing = THINGS.iter().find(|thing| thing.name == name)?;
     let mut stage = Stage::new(name);
-    let mesh = add(&mut stage);
+    let mesh = (thing.add)(&mut stage);
     stage.place(name, mesh, glam::Mat4::IDENTITY);
     Some(stage.finish())
 }
