@@ -79,7 +79,9 @@ float own_share(uint i, uint self, vec3 p, vec3 n, FivAlong along, uint tile) {
         float s = min(radius / max(far, 1e-20), 1.0);
         float apart = length(other / max(far, 1e-20) - direction);
         if (apart >= r + s) continue;
-        float g = 2.0 * lens_area(r, s, apart) / (FIV_PI * (r * r + s * s));
+        // Of the lens a body hides as much as of its whole disc; where both are full this is eq. 15.
+        vec2 fill = vec2(occluders[i].fill, occluders[j].fill);
+        float g = 2.0 * lens_area(r, s, apart) * fill.x * fill.y / (FIV_PI * (r * r * fill.x + s * s * fill.y));
         g *= front * fiv_near(occluders[j], far);
         product *= 1.0 - g * (1.0 - NODES);
     }

@@ -13,6 +13,7 @@ struct FivTexel {
 struct FivOccluder {
     vec3 centre;    // of its bounding sphere, metres, world space
     float radius;   // of its bounding sphere, metres
+    float fill;     // share of the bounding disc that it hides, on average
     uint first;     // float of its first vector
     uint second;    // the same of the next turn
     float blend;    // part of the way to the next turn

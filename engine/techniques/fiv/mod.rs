@@ -17,10 +17,12 @@
 //!   ([`support`]); [`Extent::Sphere`] is the thesis' way.
 //! - An occluder's shadow on itself comes from samples on its surface ([`surface`]); [`SelfSamples::Spheres`] is the thesis' way.
 //! - Samples lie where what is hidden bends, if [`Settings::adaptive`] ([`pace`]).
+//! - What overlapping occluders share is less where they do not fill their bounding discs ([`fill`]).
 //! - More than two overlapping occluders: see [`crate::reference::fiv::shares`].
 
 pub mod cover;
 pub mod file;
+pub mod fill;
 mod hash;
 pub mod light;
 mod negligible;
@@ -43,6 +45,6 @@ pub use light::Light;
 pub use occluder::{Occluder, Occluders, Placed};
 pub use picture::{Outputs, Picture, PictureSettings};
 pub use plan::Plan;
-pub use settings::{Extent, Interpolation, Method, SelfSamples, Settings};
+pub use settings::{Extent, Interpolation, Method, SelfSamples, Settings, Shared};
 pub use sky::Sky;
 pub use stage::Fiv;

@@ -136,6 +136,10 @@ impl Fiv {
         }
         let widest = self.widest(scene, settings)?;
         list.iter_mut().for_each(|o| o.limit = if widest > 0.0 { o.radius / widest } else { NEVER });
+        for (occluder, node) in list.iter_mut().zip(&standing.nodes) {
+            let placed = self.occluders.placed.iter().find(|placed| placed.node == *node);
+            occluder.fill = placed.map_or(1.0, |placed| self.fill(placed.kind));
+        }
         list.resize(list.len().max(1), types::FivOccluder::default());
         let occluders = graph.buffer_from("fiv.occluders", &list);
         let words = count.div_ceil(32).max(1);
@@ -237,6 +241,7 @@ impl Fiv {
                 turned: yaw.is_some_and(|yaw| yaw != 0.0).into(),
                 to_rest: turned.transpose().to_cols_array_2d(),
                 limit: NEVER,
+                ..Default::default()
             }
         });
         let nodes = self.occluders.placed.iter().map(|placed| placed.node).collect();

@@ -42,6 +42,17 @@ pub enum SelfSamples {
     Spheres,
 }
 
+/// What several occluders hide together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Shared {
+    /// What their bounding discs have in common, by how much each of them is filled on average.
+    #[default]
+    Filled,
+    /// What their bounding discs have in common, as in the thesis: too much for bodies that are no balls.
+    Discs,
+}
+
 /// What is interpolated between two spheres of samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -91,6 +102,7 @@ pub struct Settings {
     pub overlap: bool,
     /// Occluders are left out where they cannot hide more than this share of the environment's mean irradiance, 0 to 1; 0: nowhere.
     pub negligible: f32,
+    pub shared: Shared,
     /// Occluders shadow themselves.
     pub self_shadow: bool,
     pub self_samples: SelfSamples,
@@ -123,6 +135,7 @@ impl Default for Settings {
             extent: Extent::default(),
             overlap: true,
             negligible: 0.0,
+            shared: Shared::default(),
             self_shadow: true,
             self_samples: SelfSamples::default(),
             method: Method::Vectors,

@@ -1,6 +1,8 @@
 //! What lives as long as a scene: its occluders with their vectors, and the environment on the device.
 
-use super::{Light, Method, Occluders, Plan, Settings, Sky, Stored, negligible, online::Online, plan::Kind};
+use super::{
+    Light, Method, Occluders, Plan, Settings, Shared, Sky, Stored, fill::fill, negligible, online::Online, plan::Kind,
+};
 use crate::{
     Error, ErrorKind, Result,
     gpu::{Gpu, OwnedBuffer},
@@ -29,6 +31,8 @@ pub struct Fiv {
     pub(super) fivs: OwnedBuffer,
     /// How far all kinds reach ([`super::support`]), one after the other.
     pub(super) reaches: OwnedBuffer,
+    /// How much of their bounding discs all kinds fill; empty: all of them.
+    pub(super) fills: Vec<f32>,
     /// As everything stood when the vectors were computed.
     pub(super) at_rest: Pose,
     pub(super) notes: Vec<Note>,
@@ -111,6 +115,7 @@ impl Fiv {
             fivs: OwnedBuffer::with_contents(gpu, "fiv.stored", if bytes.is_empty() { &[0; 4] } else { bytes })?,
             notes: notes(scene, &occluders, sky.repaired),
             reaches: reaches(gpu, &occluders)?,
+            fills: fills(&occluders, &settings),
             at_rest: pose,
             method: settings.method,
             lit: lit(scene, &settings),
@@ -122,6 +127,11 @@ impl Fiv {
             online,
             widest: None,
         })
+    }
+
+    /// How much of its bounding disc a kind fills.
+    pub(super) fn fill(&self, kind: u32) -> f32 {
+        self.fills.get(kind as usize).copied().unwrap_or(1.0)
     }
 
     /// What the user should know about how the scene is drawn.
@@ -186,6 +196,12 @@ impl Fiv {
     pub fn bytes(&self) -> u64 {
         self.fivs.size()
     }
+}
+
+/// Of all kinds, where several occluders can hide the same.
+fn fills(occluders: &Occluders, settings: &Settings) -> Vec<f32> {
+    let asked = settings.shared == Shared::Filled && matches!(settings.method, Method::Vectors | Method::Online);
+    if asked && occluders.placed.len() > 1 { occluders.kinds.iter().map(fill).collect() } else { Vec::new() }
 }
 
 /// Appends how the samples of all kinds lie.

@@ -178,16 +178,20 @@ fn vectors(
     let (mut light, mut seconds) = (None, 0.0);
     for (index, kind) in occluders.kinds.iter().enumerate() {
         let alone = Plan { occluders: vec![plan.occluders[index].clone()], ..plan.clone() };
-        let name = name(gpu, &alone)?;
+        let name = name(gpu, &alone, settings)?;
         let (file, cost) = (folder.join(format!("{name}.fiv")), folder.join(format!("{name}.json")));
         let (part, spent) = match known(&file, &cost, &alone) {
             Some(known) => known,
             None => {
                 let light = match &mut light {
                     Some(light) => light,
-                    none => none.insert(Light::new(gpu, &sky)?),
+                    none => {
+                        let mut made = Light::new(gpu, &sky)?;
+                        made.turn(gpu, environment, settings)?;
+                        none.insert(made)
+                    }
                 };
-                let computed = compute(gpu, light, &alone, kind, stop)?;
+                let computed = compute(gpu, light, (&alone, settings), kind, stop)?;
                 std::fs::create_dir_all(&folder).map_err(|e| {
                     Error::new(lucerna::ErrorKind::Output, "cannot be made").in_file(&folder).caused_by(e)
                 })?;
@@ -197,6 +201,7 @@ fn vectors(
                 computed
             }
         };
+        whole.plan.occluders[index] = part.plan.occluders[0].clone();
         whole.push(&part.fivs);
         seconds += spent;
     }
@@ -204,23 +209,34 @@ fn vectors(
 }
 
 /// Of everything that decides vectors.
-fn name(gpu: &Gpu, plan: &Plan) -> Result<String> {
+fn name(gpu: &Gpu, plan: &Plan, settings: &Settings) -> Result<String> {
     let about = gpu.describe();
     let device = format!("{}, {} {}", about.device, about.driver, about.driver_info);
-    let text = json!([Cache::sources_of(SOURCES), device, config::to_value(plan)?]);
+    let text = json!([Cache::sources_of(SOURCES), device, config::to_value(plan)?, config::to_value(settings)?]);
     Ok(Digest::of(text.to_string().as_bytes()).hex())
 }
 
 fn known(file: &std::path::Path, cost: &std::path::Path, plan: &Plan) -> Option<(Stored, f64)> {
     let cost: Cost = serde_json::from_str(&config::read_text(cost).ok()?).ok()?;
     let stored = Stored::read(file).ok()?;
-    (stored.is_complete() && stored.plan.difference(plan).is_none()).then_some((stored, cost.seconds))
+    // Its name is that of everything else.
+    let hashes =
+        |of: &Plan| (of.environment_hash.clone(), of.occluders.iter().map(|k| k.hash.clone()).collect::<Vec<_>>());
+    (stored.is_complete() && hashes(&stored.plan) == hashes(plan)).then_some((stored, cost.seconds))
 }
 
-fn compute(gpu: &Gpu, light: &Light, plan: &Plan, kind: &Occluder, stop: &dyn Fn() -> bool) -> Result<(Stored, f64)> {
+fn compute(
+    gpu: &Gpu,
+    light: &Light,
+    (plan, settings): (&Plan, &Settings),
+    kind: &Occluder,
+    stop: &dyn Fn() -> bool,
+) -> Result<(Stored, f64)> {
     let begun = Instant::now();
+    let (mut plan, kinds) = (plan.clone(), std::slice::from_ref(kind));
+    plan.adapt(gpu, light, kinds, settings, |_| true)?;
     let mut stored = Stored::empty(plan.clone(), 0);
-    plan.compute(gpu, light, std::slice::from_ref(kind), 0..plan.samples(), |_, new| {
+    plan.compute(gpu, light, kinds, 0..plan.samples(), |_, new| {
         stored.push(new);
         Ok(!stop())
     })?;

@@ -13,8 +13,10 @@ const SIDE: u32 = 512;
 
 /// What a figure shows: caption, scene, view.
 const FIGURES: &[(&str, &str, &str)] = &[
-    ("Figure 18: the bunny's shadow at different samplings", "bunny", GROUND),
-    ("Figure 18: the bunny", "bunny", FRONT),
+    ("Figure 18: the bunny's shadow at different samplings", "bunny, area", GROUND),
+    ("Figure 18: the bunny", "bunny, area", FRONT),
+    ("Figure 19: the grove", "bunny", GROUND),
+    ("Figure 19: the grove", "bunny", FRONT),
     ("Figure 19: one point light", "bunny, point", GROUND),
     ("Figure 19: one point light", "bunny, point", FRONT),
     ("Figure 19: two area lights", "bunny, areas", GROUND),
@@ -68,7 +70,7 @@ pub(super) fn figures(lab: &Lab<'_>) -> Result<Section> {
 
 /// Figure 24: without, with, and the shadow alone.
 fn own_shadow(lab: &Lab<'_>) -> Result<Option<Comparison>> {
-    let Some((scene, without, with)) = ["bunny", "hare"].into_iter().find_map(|scene| {
+    let Some((scene, without, with)) = ["bunny, area", "bunny", "hare"].into_iter().find_map(|scene| {
         let with = lab.run(scene, FRONT, lab.nearest(scene, FRONT, DEFAULT));
         let (without, with) = lab.run(scene, FRONT, "no self-shadow").zip(with)?;
         Some((scene, without, with))

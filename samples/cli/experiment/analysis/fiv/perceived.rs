@@ -26,9 +26,10 @@ pub(super) fn tables(lab: &Lab<'_>) -> Result<Section> {
          the screen, and after Ashikhmin's local operator. The thesis names neither the program that computed its VDP nor its settings.",
     );
     let columns = ["samples", "before (thesis)", "before", "after (thesis)", "after"];
-    let mut table = Table::new("table-17", lab.caption("Table 17: VDP (%) by samples, bunny under the grove"), columns);
+    let mut table =
+        Table::new("table-17", lab.caption("Table 17: VDP (%) by samples, bunny under one area light"), columns);
     for (samples, before, after) in paper::TABLE_17 {
-        if let Some([ours_before, ours_after]) = seen(lab, "bunny", samples)? {
+        if let Some([ours_before, ours_after]) = seen(lab, "bunny, area", samples)? {
             table.push([samples.into(), before.into(), ours_before.into(), after.into(), ours_after.into()]);
         }
     }
