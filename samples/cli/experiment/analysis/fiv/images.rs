@@ -11,6 +11,9 @@ use crate::{
 /// Longest side of an image in the page, pixels.
 const SIDE: u32 = 512;
 
+/// The technique with samples on surfaces.
+const SURFACE: &str = "surface";
+
 /// What a figure shows: caption, scene, view.
 const FIGURES: &[(&str, &str, &str)] = &[
     ("Figure 18: the bunny's shadow at different samplings", "bunny, area", GROUND),
@@ -71,7 +74,7 @@ pub(super) fn figures(lab: &Lab<'_>) -> Result<Section> {
 /// Figure 24: without, with, and the shadow alone.
 fn own_shadow(lab: &Lab<'_>) -> Result<Option<Comparison>> {
     let Some((scene, without, with)) = ["bunny, area", "bunny", "hare"].into_iter().find_map(|scene| {
-        let with = lab.run(scene, FRONT, lab.nearest(scene, FRONT, DEFAULT));
+        let with = lab.run(scene, FRONT, DEFAULT).or_else(|| lab.run(scene, FRONT, SURFACE));
         let (without, with) = lab.run(scene, FRONT, "no self-shadow").zip(with)?;
         Some((scene, without, with))
     }) else {
