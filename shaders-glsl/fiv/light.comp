@@ -72,13 +72,14 @@ float own_share(uint i, uint self, vec3 p, vec3 n, FivAlong along, uint tile) {
         if (j == i || j == self) continue;
         vec3 other = occluders[j].centre - p;
         float radius = occluders[j].radius;
+        float far = length(other);
+        float s = min(radius / max(far, 1e-20), 1.0);
+        // Most are apart, which is quickly known.
+        float apart = length(other / max(far, 1e-20) - direction);
+        if (apart >= r + s) continue;
         float d = dot(other, n);
         float front = PARTIAL != 0u ? fiv_front_share(occluders[j], d, n, along) : float(d > 0.0);
         if (front <= 0.0) continue;
-        float far = length(other);
-        float s = min(radius / max(far, 1e-20), 1.0);
-        float apart = length(other / max(far, 1e-20) - direction);
-        if (apart >= r + s) continue;
         // Of the lens a body hides as much as of its whole disc; where both are full this is eq. 15.
         vec2 fill = vec2(occluders[i].fill, occluders[j].fill);
         float g = 2.0 * lens_area(r, s, apart) * fill.x * fill.y / (FIV_PI * (r * r * fill.x + s * s * fill.y));
