@@ -19,6 +19,41 @@ pub enum ProgressMode {
     None,
 }
 
+impl ProgressMode {
+    /// What to do here: never `Auto`. A bar is made of escape codes and goes to terminals alone; `few`: where one would show nothing.
+    pub fn here(self, quiet: bool, few: bool) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        match self {
+            Self::Auto if quiet => Self::None,
+            Self::Auto if terminal && !few => Self::Bar,
+            Self::Bar if terminal => Self::Bar,
+            Self::Auto | Self::Bar => Self::Plain,
+            mode => mode,
+        }
+    }
+
+    /// Writes a line of a meter, over the one before where that is a bar. `last`: none follows.
+    pub fn meter_line(self, text: &str, last: bool) {
+        let mut err = std::io::stderr().lock();
+        // Where nobody reads it there is nothing to be done.
+        let _ = match (self, last) {
+            (Self::None, _) => Ok(()),
+            (Self::Bar, false) => write!(err, "\r\x1b[K{text}").and_then(|()| err.flush()),
+            (Self::Bar, true) => writeln!(err, "\r\x1b[K{text}"),
+            _ => writeln!(err, "{text}"),
+        };
+    }
+}
+
+/// A time that is left, roughly: `59 s`, `12 min`, `20 h`.
+pub fn span(seconds: f64) -> String {
+    match seconds {
+        s if s >= 36_000.0 => format!("{:.0} h", s / 3600.0),
+        s if s >= 600.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{s:.0} s"),
+    }
+}
+
 /// Counts frames.
 #[derive(Debug)]
 pub struct Progress {
@@ -31,15 +66,7 @@ pub struct Progress {
 impl Progress {
     /// For `total` frames.
     pub fn new(mode: ProgressMode, quiet: bool, total: u64) -> Self {
-        let terminal = std::io::stderr().is_terminal();
-        let mode = match mode {
-            ProgressMode::Auto if quiet => ProgressMode::None,
-            ProgressMode::Auto if terminal && total > 1 => ProgressMode::Bar,
-            ProgressMode::Auto => ProgressMode::Plain,
-            // A bar is made of escape codes: never into a file.
-            ProgressMode::Bar if !terminal => ProgressMode::Plain,
-            mode => mode,
-        };
+        let mode = mode.here(quiet, total <= 1);
         let bar = (mode == ProgressMode::Bar).then(|| {
             let style = indicatif::ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left {msg}");
             let bar = indicatif::ProgressBar::new(total);
@@ -94,5 +121,23 @@ impl Progress {
         if let Some(bar) = self.bar {
             bar.finish_and_clear();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_left_is_told_roughly() {
+        assert_eq!((span(59.0).as_str(), span(720.0).as_str(), span(72_000.0).as_str()), ("59 s", "12 min", "20 h"));
+    }
+
+    #[test]
+    fn what_is_asked_for_is_kept_but_for_bars_in_files() {
+        for mode in [ProgressMode::Json, ProgressMode::None, ProgressMode::Plain] {
+            assert_eq!(mode.here(true, true), mode);
+        }
+        assert_eq!(ProgressMode::Auto.here(true, false), ProgressMode::None);
     }
 }

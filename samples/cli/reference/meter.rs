@@ -1,13 +1,10 @@
 //! How far a reference picture is, on stderr.
 
-use std::{
-    io::{IsTerminal, Write},
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 use lucerna::reference::tracer::Progress;
 
-use crate::progress::ProgressMode;
+use crate::progress::{ProgressMode, span};
 
 /// What ends a run, whichever comes first.
 #[derive(Clone, Copy, Debug)]
@@ -55,13 +52,7 @@ pub struct Meter {
 impl Meter {
     /// Towards `goals`.
     pub fn new(mode: ProgressMode, quiet: bool, goals: Goals, before: Progress) -> Self {
-        let terminal = std::io::stderr().is_terminal();
-        let mode = match mode {
-            ProgressMode::Auto if quiet => ProgressMode::None,
-            ProgressMode::Auto | ProgressMode::Bar if terminal => ProgressMode::Bar,
-            ProgressMode::Auto | ProgressMode::Bar => ProgressMode::Plain,
-            mode => mode,
-        };
+        let mode = mode.here(quiet, false);
         Self { mode, goals, started: Instant::now(), before, shown: None, error: None }
     }
 
@@ -115,14 +106,13 @@ impl Meter {
         let done = now.samples - self.before.samples;
         let (left, by) = self.goals.left(now.samples, done, self.seconds(), self.error);
         let error = self.error.map(|(error, _)| error).filter(|e| e.is_finite());
-        let mut err = std::io::stderr().lock();
         if self.mode == ProgressMode::Json {
             let text = serde_json::json!({
                 "samples": now.samples, "target": self.goals.samples, "paths_per_second": self.rate(now),
                 "relative_error": error, "target_error": self.goals.error,
                 "seconds_left": if last { 0.0 } else { left }, "ends_by": by, "done": last,
             });
-            let _ = writeln!(err, "{text}");
+            self.mode.meter_line(&text.to_string(), last);
             return;
         }
         let samples = if now.samples < 10.0 { format!("{:.1}", now.samples) } else { format!("{:.0}", now.samples) };
@@ -137,11 +127,7 @@ impl Meter {
             true => text += &format!(", {:.1} s", self.seconds()),
             false => text += &format!(", {} left", span(left)),
         }
-        let _ = match (self.mode, last) {
-            (ProgressMode::Bar, false) => write!(err, "\r\x1b[K{text}").and_then(|()| err.flush()),
-            (ProgressMode::Bar, true) => writeln!(err, "\r\x1b[K{text}"),
-            _ => writeln!(err, "{text}"),
-        };
+        self.mode.meter_line(&text, last);
     }
 }
 
@@ -150,14 +136,6 @@ fn count(rate: f64) -> String {
         r if r >= 1e6 => format!("{:.1} M", r * 1e-6),
         r if r >= 1e3 => format!("{:.0} k", r * 1e-3),
         r => format!("{r:.0}"),
-    }
-}
-
-fn span(seconds: f64) -> String {
-    match seconds {
-        s if s >= 36_000.0 => format!("{:.0} h", s / 3600.0),
-        s if s >= 600.0 => format!("{:.0} min", s / 60.0),
-        s => format!("{s:.0} s"),
     }
 }
 
