@@ -76,6 +76,10 @@ fn main() -> ExitCode {
 
 fn run(args: &Render) -> Result<ExitCode> {
     let stored = args.vectors.as_ref().map(Stored::read).transpose()?;
+    let by_file = |settings: &PictureSettings| match (&args.vectors, &stored) {
+        (Some(file), Some(stored)) => fiv::decided(file, stored, &settings.fiv),
+        _ => Ok(()),
+    };
     let mut base = PictureSettings::default();
     if let Some(stored) = &stored {
         // What is written about the picture is then enough to make it again.
@@ -89,6 +93,7 @@ fn run(args: &Render) -> Result<ExitCode> {
         &args.common,
         &base,
         |gpu, scene, settings| {
+            by_file(settings)?;
             let resident = Resident::new(gpu, scene)?;
             let mut meter = None;
             let told = |done: u64, total: u64| {

@@ -73,10 +73,16 @@ fn parts_and_stopped_runs_give_the_same_bytes() {
     fs::copy(at("1.fiv"), at("again.fiv.part")).unwrap();
     precompute(&env, &at("again.fiv"), &[]).expect(0, &["goes on after"]);
     assert!(fs::read(at("again.fiv")).unwrap() == bytes && !Path::new(&at("again.fiv.part")).exists());
-    // One of other work, or a damaged one, is not used.
-    fs::write(at("anew.fiv.part"), &bytes[..bytes.len() / 2]).unwrap();
-    precompute(&env, &at("anew.fiv"), &[]).expect(0, &["cut off", "tarts anew"]);
-    assert!(fs::read(at("anew.fiv")).unwrap() == bytes);
+    // One that is damaged or of other work may be worth hours: it is neither used nor replaced without being told to.
+    let (anew, part) = (at("anew.fiv"), at("anew.fiv.part"));
+    fs::write(&part, &bytes[..bytes.len() / 2]).unwrap();
+    precompute(&env, &anew, &[]).expect(3, &["anew.fiv.part", "cut off", "--restart"]);
+    fs::copy(at("1.fiv"), &part).unwrap();
+    precompute(&env, &anew, &["-D", "fiv.split=2"]).expect(1, &["anew.fiv.part", "other work", "--restart"]);
+    precompute(&env, &anew, &["--shard", "1/4"]).expect(1, &["samples 0 to"]);
+    assert!(fs::read(&part).unwrap() == fs::read(at("1.fiv")).unwrap());
+    precompute(&env, &anew, &["--restart"]).expect(0, &[]);
+    assert!(fs::read(&anew).unwrap() == bytes && !Path::new(&part).exists());
 }
 
 #[test]
@@ -127,6 +133,12 @@ fn pictures_from_files_are_those_without_and_can_be_made_again() {
     let pixels = |name: &str| image::read(at(name), &Default::default()).unwrap().main().unwrap().data.clone();
     assert!(pixels("a.exr") == pixels("b.exr"));
     lucerna(["rerun", &at("a.exr")]).expect(0, &[]);
+    // What the file has decided cannot be asked for otherwise.
+    let asked = |key: &str| picture(&env, &at("d.exr"), &["--vectors", &vectors, "-D", key]);
+    asked("fiv.azimuths=7").expect(2, &["v.fiv", "fiv.azimuths", "7", "6"]);
+    asked("fiv.method=brute-force").expect(2, &["v.fiv", "fiv.method", "--vectors"]);
+    asked("fiv.azimuths=6").expect(0, &[]);
+    precompute(&env, &at("idle.fiv"), &["-D", "fiv.turning=30"]).expect(0, &["do not depend on fiv.turning"]);
     let other = environment(folder.path(), "other.exr", 2.0);
     picture(&other, &at("c.exr"), &["--vectors", &vectors]).expect(3, &["v.fiv", "other light"]);
 }

@@ -15,7 +15,7 @@ use std::{ops::Range, path::Path};
 
 use serde::{Deserialize, Serialize};
 
-use super::{hash::Hash, plan::Plan};
+use super::{hash::Hash, plan::Plan, room::MOST_SAMPLES};
 use crate::{Error, Result, image, shaders::consts::FIV_FLOATS};
 
 const MAGIC: &[u8; 8] = b"lucfiv\r\n";
@@ -24,8 +24,6 @@ const VERSION: u32 = 2;
 const MOST_BYTES: u64 = 8 << 30;
 /// Bytes of a header that is read at most.
 const MOST_HEADER: usize = 16 << 20;
-/// Samples that a plan may have.
-const MOST_SAMPLES: u64 = 1 << 28;
 const FLOATS: u64 = FIV_FLOATS as u64;
 
 /// Vectors of a plan, or of a part of it.
@@ -103,10 +101,7 @@ impl Stored {
         };
         let Header { range: [first, last], plan } = serde_json::from_slice(header)
             .map_err(|error| damaged("has a header that cannot be read".into()).caused_by(error))?;
-        if !(1..=64).contains(&plan.turns) {
-            return Err(damaged(format!("has an impossible plan: {} turns", plan.turns)));
-        }
-        plan.grid.validate().map_err(|error| damaged(format!("has an impossible plan: {error}")))?;
+        plan.validate().map_err(|error| damaged(format!("has an impossible plan: {error}")))?;
         let positive = |x: f32| x.is_finite() && x > 0.0;
         if let Some(kind) = plan.occluders.iter().find(|k| {
             !(positive(k.radius) && positive(k.shells.nearest) && positive(k.shells.farthest))
@@ -248,6 +243,9 @@ mod tests {
         let mut huge = stored();
         huge.plan.grid.azimuths = 100_000;
         refused(&huge.encode().unwrap(), "azimuths");
+        let mut none = stored();
+        none.plan.split = 0;
+        refused(&none.encode().unwrap(), "split");
         let mut beyond = stored();
         beyond.range = 20..44;
         refused(&beyond.encode().unwrap(), "20 to 44 of 24");

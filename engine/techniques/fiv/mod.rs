@@ -32,6 +32,7 @@ mod online_standing;
 pub mod pace;
 mod picture;
 pub mod plan;
+mod room;
 pub mod samples;
 mod settings;
 pub mod sky;

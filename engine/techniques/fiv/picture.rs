@@ -81,10 +81,7 @@ impl Fiv {
         settings: &PictureSettings,
     ) -> Result<Picture> {
         settings.fiv.validate().map_err(|error| error.at("fiv"))?;
-        if ![self.method, Method::Unshadowed].contains(&settings.fiv.method) {
-            let error = Error::usage("the scene was made ready for another method").at("fiv.method");
-            return Err(error.help("Give Fiv::new the same settings"));
-        }
+        self.ready_for(&settings.fiv)?;
         self.follow(scene, &settings.fiv)?;
         let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
         let extent = graph.extent(gbuffer.depth);
@@ -104,7 +101,11 @@ impl Fiv {
         moment.environment_rotation += turn;
         moment.environment_scale *= factor;
         skybox::draw(graph, &behind, &gbuffer, glam::Vec3::ZERO, outputs.total);
-        let notes = if settings.fiv.method == Method::Vectors { self.turned(scene, pose) } else { Vec::new() };
+        let notes = if settings.fiv.method == Method::Vectors {
+            self.turned(scene, pose, &handles.moment.instances)
+        } else {
+            Vec::new()
+        };
         Ok(Picture { gbuffer, outputs, notes })
     }
 
@@ -351,13 +352,22 @@ impl Fiv {
     }
 
     /// Occluders that do not stand as their vectors were computed.
-    fn turned(&self, scene: &Scene, pose: &Pose) -> Vec<Note> {
-        let moved = self.occluders.placed.iter().filter(|placed| self.yaw(pose, placed.node).is_none());
-        moved
-            .map(|placed| Note {
+    fn turned(&self, scene: &Scene, pose: &Pose, instances: &[Instance]) -> Vec<Note> {
+        let deforms = |node: u32| *pose != self.at_rest && instances.iter().any(|i| i.node == node && i.deformed);
+        let what = |node: u32| match (self.yaw(pose, node), deforms(node)) {
+            (_, true) => Some("deforms"),
+            (None, _) => Some("turns or changes its size"),
+            _ => None,
+        };
+        let found = self.occluders.placed.iter().filter_map(|placed| Some((placed.node, what(placed.node)?)));
+        found
+            .map(|(node, what)| Note {
                 kind: NoteKind::Approximated,
-                place: format!("nodes[{}] ({})", placed.node, scene.nodes[placed.node as usize].name),
-                text: "turns; its shadow on others stays that of its pose at rest, and it has none on itself".into(),
+                place: format!("nodes[{node}] ({})", scene.nodes[node as usize].name),
+                text: format!(
+                    "{what}; its shadow on others stays that of its pose at rest, and it has none on itself \
+                     (fiv.method=online follows it)"
+                ),
             })
             .collect()
     }

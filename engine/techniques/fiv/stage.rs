@@ -7,7 +7,7 @@ use crate::{
     Error, ErrorKind, Result,
     gpu::{Gpu, OwnedBuffer},
     rays::Rays,
-    scene::{Note, NoteKind, Pose, Scene, resident::Resident},
+    scene::{Material, Note, NoteKind, Pose, Scene, resident::Resident},
     shaders::consts::{FIV_FLOATS, TRACE_STEPS},
 };
 
@@ -24,6 +24,10 @@ pub struct Fiv {
     pub(super) light: Light,
     /// Turn and factor of the environment in it.
     lit: (f32, f32),
+    /// And of that for which the vectors are.
+    made_for: (f32, f32),
+    /// The choices that cannot change from picture to picture.
+    fixed: Fixed,
     gpu: Gpu,
     pub(super) occluders: Occluders,
     pub(super) plan: Plan,
@@ -31,6 +35,7 @@ pub struct Fiv {
     pub(super) fivs: OwnedBuffer,
     /// How far all kinds reach ([`super::support`]), one after the other.
     pub(super) reaches: OwnedBuffer,
+    shared: Shared,
     /// How much of their bounding discs all kinds fill; empty: all of them.
     pub(super) fills: Vec<f32>,
     /// As everything stood when the vectors were computed.
@@ -42,6 +47,13 @@ pub struct Fiv {
     pub(super) online: Option<Online>,
     /// Share, light, and the sine of the half angle under which an occluder hides no more than that.
     widest: Option<(f32, (f32, f32), f32)>,
+}
+
+/// What decides vectors, tables and which meshes are occluders.
+type Fixed = (u32, bool, f32, super::SelfSamples);
+
+fn fixed(settings: &Settings) -> Fixed {
+    (settings.size, settings.flat, settings.largest, settings.self_samples)
 }
 
 impl Fiv {
@@ -70,9 +82,6 @@ impl Fiv {
         let sky = lit_by(scene, &settings)?;
         let name = scene.environment.as_ref().map_or("", |e| e.name.as_str());
         let mut light = Light::new(gpu, &sky)?;
-        if let (Method::Vectors, Some(environment)) = (settings.method, &scene.environment) {
-            light.turn(gpu, environment, &settings)?;
-        }
         let pose = Pose::rest(scene);
         let occluders = Occluders::of(scene, &pose, settings.flat, settings.largest);
         if occluders.placed.len() > MOST_OCCLUDERS {
@@ -80,8 +89,14 @@ impl Fiv {
             return Err(Error::new(ErrorKind::Runtime, what).at("fiv").help("Join meshes into fewer nodes"));
         }
         let mut plan = Plan::new(name, light.hash, &occluders.kinds, &settings);
+        let mut notes = notes(scene, &occluders, sky.repaired);
         let fivs = match settings.method {
             Method::Vectors => {
+                plan.fits(Some(gpu.caps().limits.storage_range))?;
+                if let Some(environment) = &scene.environment {
+                    light.turn(gpu, environment, &settings)?;
+                }
+                notes.extend(stored.and_then(|stored| computed(&plan, stored)));
                 let mut fivs = vectors(gpu, &light, &occluders, (&mut plan, &settings), stored, told)?;
                 paces(&plan, &mut fivs);
                 fivs
@@ -93,13 +108,6 @@ impl Fiv {
             _ => None,
         };
         let bytes = bytemuck::cast_slice::<f32, u8>(&fivs);
-        let limit = gpu.caps().limits.storage_range;
-        if bytes.len() as u64 > limit {
-            let what = format!("the vectors have {} bytes; the device allows {limit}", bytes.len());
-            return Err(Error::new(ErrorKind::Runtime, what)
-                .at("fiv")
-                .help("Take fewer samples (fiv.azimuths, fiv.polars, fiv.radii)"));
-        }
         let rays = match settings.method {
             Method::BruteForce => {
                 let rays = Rays::new(gpu, scene, resident)?;
@@ -113,12 +121,15 @@ impl Fiv {
         };
         Ok(Self {
             fivs: OwnedBuffer::with_contents(gpu, "fiv.stored", if bytes.is_empty() { &[0; 4] } else { bytes })?,
-            notes: notes(scene, &occluders, sky.repaired),
+            notes,
             reaches: reaches(gpu, &occluders)?,
+            shared: settings.shared,
             fills: fills(&occluders, &settings),
             at_rest: pose,
             method: settings.method,
             lit: lit(scene, &settings),
+            made_for: lit(scene, &settings),
+            fixed: fixed(&settings),
             gpu: gpu.clone(),
             light,
             occluders,
@@ -154,18 +165,46 @@ impl Fiv {
         &self.occluders
     }
 
+    /// Whether a picture asks for what the scene was made ready for.
+    ///
+    /// # Errors
+    /// `Usage`, naming the key.
+    pub(super) fn ready_for(&self, settings: &Settings) -> Result<()> {
+        let no = |key: &str| {
+            let error = Error::usage("the scene was made ready for another choice").at(format!("fiv.{key}"));
+            Err(error.help("Give Fiv::new the same settings"))
+        };
+        if ![self.method, Method::Unshadowed].contains(&settings.method) {
+            return no("method");
+        }
+        let ((size, flat, largest, own), asked) = (self.fixed, fixed(settings));
+        let filled = self.shared != Shared::Filled && settings.shared == Shared::Filled && settings.overlap;
+        for (key, differs) in [
+            ("size", size != asked.0),
+            ("flat", flat != asked.1),
+            ("largest", largest != asked.2),
+            ("self_samples", own != asked.3),
+            ("shared", filled),
+        ] {
+            if differs && settings.method == self.method {
+                return no(key);
+            }
+        }
+        Ok(())
+    }
+
     /// Takes the environment as `settings` have it turned and scaled.
     ///
     /// # Errors
     /// `Usage` if the vectors were computed for another one, or as [`Fiv::new`]; `OutOfMemory`, `DeviceLost`.
     pub(super) fn follow(&mut self, scene: &Scene, settings: &Settings) -> Result<()> {
         let wanted = lit(scene, settings);
-        if wanted == self.lit {
-            return Ok(());
-        }
-        if settings.method == Method::Vectors {
+        if settings.method == Method::Vectors && wanted != self.made_for {
             let error = Error::usage("the vectors were computed for another turn or scale of the environment");
             return Err(error.at("fiv").help("Make the scene ready again, or use fiv.method=online"));
+        }
+        if wanted == self.lit {
+            return Ok(());
         }
         self.light = Light::new(&self.gpu, &lit_by(scene, &Settings { size: self.light.size, ..settings.clone() })?)?;
         self.lit = wanted;
@@ -298,6 +337,19 @@ fn vectors(
     Ok(fivs)
 }
 
+/// What of a scene is not in a file of vectors.
+fn computed(plan: &Plan, stored: &Stored) -> Option<Note> {
+    let known =
+        |kind: &&Kind| !stored.plan.occluders.iter().any(|k| (&k.hash, k.surface) == (&kind.hash, kind.surface));
+    let named: Vec<_> = plan.occluders.iter().filter(known).map(|k| format!("`{}` ({})", k.name, k.hash)).collect();
+    let text = format!("not in the file, and computed: {}", named.join(", "));
+    (!named.is_empty()).then(|| Note { kind: NoteKind::Approximated, place: "vectors".into(), text })
+}
+
+fn emissive(material: &Material) -> bool {
+    material.emissive != glam::Vec3::ZERO && !material.unlit
+}
+
 fn notes(scene: &Scene, occluders: &Occluders, repaired: u64) -> Vec<Note> {
     let mut notes = Vec::new();
     let mut note = |kind, place: &str, text: String| notes.push(Note { kind, place: place.into(), text });
@@ -311,10 +363,16 @@ fn notes(scene: &Scene, occluders: &Occluders, repaired: u64) -> Vec<Note> {
         let text = format!("{count} flat or large meshes only receive shadows (fiv.flat, fiv.largest): {names}");
         note(NoteKind::Approximated, "fiv", text);
     }
-    let emissive = |m: &crate::scene::Material| m.emissive != glam::Vec3::ZERO && !m.unlit;
-    if scene.materials.iter().any(emissive) {
-        let text = "emissive surfaces are shown and light nothing: light comes from the environment alone".into();
-        note(NoteKind::Approximated, "fiv", text);
+    for (what, which) in [
+        ("are shown and light nothing: light comes from the environment alone", emissive as fn(&Material) -> bool),
+        ("reflect and pass light as if they were matt and opaque", |m| {
+            !m.unlit && (m.metallic > 0.0 || m.transmission > 0.0)
+        }),
+    ] {
+        let named: Vec<_> = scene.materials.iter().filter(|m| which(m)).map(|m| format!("`{}`", m.name)).collect();
+        if !named.is_empty() {
+            note(NoteKind::Approximated, "materials", format!("{} {what}", named.join(", ")));
+        }
     }
     notes
 }

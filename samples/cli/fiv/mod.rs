@@ -1,5 +1,6 @@
 //! `fiv precompute`, `fiv merge` and `fiv environment`: what `fiv render` takes, as files; `fiv steady`: what is wrong with what it gives.
 
+mod decided;
 mod meter;
 mod precompute;
 mod steady;
@@ -13,6 +14,7 @@ use lucerna::{
     techniques::fiv::{Stored, file},
 };
 
+pub use decided::decided;
 pub use meter::Meter;
 pub use precompute::{PrecomputeArgs, precompute};
 pub use steady::{SteadyArgs, steady};

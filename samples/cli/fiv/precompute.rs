@@ -1,13 +1,14 @@
 //! `fiv precompute`: the vectors of occluders under an environment, into a file.
 
 use std::{
+    ops::Range,
     path::{Path, PathBuf},
     process::ExitCode,
     time::{Duration, Instant},
 };
 
 use lucerna::{
-    Error, Result,
+    Error, ErrorKind, Result,
     gpu::Gpu,
     image,
     scene::{Environment, Pose},
@@ -16,11 +17,12 @@ use lucerna::{
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::{Meter, Shard, partial};
+use super::{Meter, Shard, decided, partial};
 use crate::{
     args::{DeviceArgs, TalkArgs, positive},
     config::{self, SettingsArgs},
     console::{self, Console},
+    ground::GroundArgs,
     program::{self, STOPPED_EARLY},
     progress::ProgressMode,
     signals::Interrupt,
@@ -42,6 +44,9 @@ pub struct PrecomputeArgs {
     /// Metres that one unit of the files stands for, where the format leaves it open (OBJ, C arrays) [default: 1]
     #[arg(long, value_name = "METRES", value_parser = positive)]
     pub unit: Option<f64>,
+
+    #[command(flatten)]
+    pub ground: GroundArgs,
 
     /// The .hdr or .exr environment, or a built-in one (point, area, areas, grove) [default: that of the first scene that has one]
     #[arg(long, alias = "env", value_name = "FILE")]
@@ -108,6 +113,10 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
         console::print(config::to_toml(&keys)?.trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
+    let idle = decided::idle(&keys.fiv)?;
+    if !idle.is_empty() {
+        console.info(&format!("note: vectors do not depend on {}", idle.join(", ")));
+    }
     image::probe_output(&args.output, args.overwrite)?;
     let interrupt = Interrupt::install();
     let (occluders, environment) = load(args, &keys.fiv, console)?;
@@ -120,14 +129,15 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
     let names: Vec<&str> = plan.occluders.iter().map(|o| o.name.as_str()).collect();
     console.info(&format!("{} samples of {} occluders: {}", plan.grid, names.len(), names.join(", ")));
+    plan.fits(None)?;
     let mut light = Light::new(&gpu, &sky)?;
     light.turn(&gpu, &environment, &keys.fiv)?;
     plan.adapt(&gpu, &light, &occluders, &keys.fiv, |_| true)?;
     let range = args.shard.map_or(0..plan.samples(), |shard| plan.part(shard.index, shard.count));
     let part = partial(&args.output)?;
-    let mut stored = match resumed(&part, &plan, range.start, args.restart, console) {
-        Some(stored) if stored.range.end <= range.end => stored,
-        _ => Stored::empty(plan.clone(), range.start),
+    let mut stored = match resumed(&part, &plan, &range, args.restart)? {
+        Some(stored) => stored,
+        None => Stored::empty(plan.clone(), range.start),
     };
     let total = range.end - range.start;
     let before = stored.range.end - range.start;
@@ -186,11 +196,20 @@ fn load(args: &PrecomputeArgs, settings: &Settings, console: Console) -> Result<
     let files = args.meshes.iter().map(|path| (Some(path.as_path()), None));
     for (file, name) in files.chain(args.builtin.iter().map(|name| (None, Some(name.as_str())))) {
         let (scene, _) = source::open(file, name, &options)?;
+        let scene = args.ground.place(scene, args.unit)?;
+        scene.notes.iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
         let found = Occluders::of(&scene, &Pose::rest(&scene), settings.flat, settings.largest);
         if found.kinds.is_empty() {
             let error = Error::input("has no occluder: no mesh that is not flat");
             let place = file.unwrap_or_else(|| Path::new(name.unwrap_or_default()));
             return Err(error.in_file(place).help("Flat meshes are taken with -D fiv.flat=true"));
+        }
+        if !found.receivers.is_empty() {
+            let names: Vec<_> = found.receivers.iter().map(|&n| scene.nodes[n as usize].name.as_str()).collect();
+            console.info(&format!(
+                "note: flat or large meshes are left out (fiv.flat, fiv.largest): {}",
+                names.join(", ")
+            ));
         }
         for kind in found.kinds {
             if kinds.iter().all(|known| known.hash != kind.hash) {
@@ -205,20 +224,26 @@ fn load(args: &PrecomputeArgs, settings: &Settings, console: Console) -> Result<
     Ok((kinds, environment))
 }
 
-/// What an earlier run has left, if it fits.
-fn resumed(part: &Path, plan: &Plan, first: u64, restart: bool, console: Console) -> Option<Stored> {
+/// What an earlier run has left.
+///
+/// # Errors
+/// `Output` if it is of other work or damaged: it may be worth hours.
+fn resumed(part: &Path, plan: &Plan, range: &Range<u64>, restart: bool) -> Result<Option<Stored>> {
     if restart || !part.exists() {
-        return None;
+        return Ok(None);
     }
-    match Stored::read(part) {
-        Ok(stored) if stored.range.start == first && plan.difference(&stored.plan).is_none() => Some(stored),
-        Ok(_) => {
-            console.info(&format!("{}: is of other work; starts anew", part.display()));
-            None
-        }
-        Err(error) => {
-            console.info(&format!("{error} Starts anew."));
-            None
+    let help = "Give --restart to start anew over it, or name another file with -o";
+    let stored = Stored::read(part).map_err(|error| error.help(help))?;
+    let difference = plan.difference(&stored.plan).or_else(|| {
+        let (first, last) = (stored.range.start, stored.range.end);
+        let fits = first == range.start && last <= range.end;
+        (!fits).then(|| format!("samples {first} to {last} instead of {} to {}", range.start, range.end))
+    });
+    match difference {
+        None => Ok(Some(stored)),
+        Some(difference) => {
+            let what = format!("a stopped run has left other work: {difference}");
+            Err(Error::new(ErrorKind::Output, what).in_file(part).help(help))
         }
     }
 }
