@@ -11,7 +11,7 @@ use lucerna::{
     gpu::testing::with_gpu,
     reference::fiv as twin,
     scene::{Environment, Light, LightKind, Node, Pose, Scene, View, resident::Resident},
-    techniques::fiv::{Extent, Fiv, Interpolation, Method, SelfSamples, Settings, Shared, Sky},
+    techniques::fiv::{Cut, Extent, Fiv, Interpolation, Method, SelfSamples, Settings, Shared, Sky},
 };
 use tracer_lab::flat_view;
 
@@ -228,7 +228,8 @@ fn pictures_are_what_the_twin_looks_up() {
         for interpolation in [Interpolation::SolidAngle, Interpolation::Linear] {
             let scene = stage(colourful(), &places);
             let adaptive = interpolation == Interpolation::SolidAngle;
-            let settings = Settings { interpolation, adaptive, extent: Extent::Sphere, ..coarse() };
+            let cut = if adaptive { Cut::Light } else { Cut::Height };
+            let settings = Settings { interpolation, adaptive, extent: Extent::Sphere, cut, ..coarse() };
             let sky = Sky::new(scene.environment.as_ref(), 16).unwrap();
             let mut studio = Studio::new(gpu, &scene, &settings, None);
             let (plan, kinds) = (studio.fiv.plan().clone(), studio.fiv.occluders().kinds.clone());
@@ -242,7 +243,7 @@ fn pictures_are_what_the_twin_looks_up() {
             let kind = &plan.occluders[0];
             let solid = (interpolation == Interpolation::SolidAngle).then_some(f64::from(kind.radius));
             let set = twin::Set { grid: plan.grid, shells: kind.shells, paces: &kind.paces, solid, fivs: &fivs };
-            let up = glam::DVec3::Y;
+            let (up, fill) = (glam::DVec3::Y, lucerna::techniques::fiv::fill::fill(&kinds[0]));
             let centres = studio.fiv.occluders().placed.iter().map(|p| p.centre).collect::<Vec<_>>();
             // On both sides of the seam, straight below, and where the lower ball is cut by the ground.
             for at in [
@@ -262,8 +263,17 @@ fn pictures_are_what_the_twin_looks_up() {
                 let shares = twin::shares(up, &seen);
                 let mut exact = twin::irradiance(&sky, up);
                 for ((offset, radius), share) in seen.iter().zip(shares) {
-                    let hidden = twin::dot(&set.lookup(*offset).0, up).max(glam::DVec3::ZERO);
-                    exact -= hidden * share * twin::front(offset.y, *radius);
+                    let along = twin::dot(&set.lookup(*offset).0, up);
+                    let hidden = match cut {
+                        Cut::Height => along * twin::front(offset.y, *radius),
+                        _ if offset.y >= *radius => along,
+                        _ if offset.y <= -*radius => glam::DVec3::ZERO,
+                        Cut::Light => {
+                            let open = (twin::irradiance(&sky, up), twin::irradiance(&sky, -up));
+                            twin::cut(along, open, (offset.y, offset.length(), *radius), fill.into())
+                        }
+                    };
+                    exact -= hidden.max(glam::DVec3::ZERO) * share;
                 }
                 let exact = exact.max(glam::DVec3::ZERO);
                 assert!(

@@ -169,6 +169,31 @@ pub fn front(d: f64, radius: f64) -> f64 {
     ((d + radius) / (2.0 * radius)).clamp(0.0, 1.0)
 }
 
+/// Share of the irradiance of even light that is hidden by the part of a ball in front of the plane through the receiver; its centre is
+/// `d` in front of the plane, `rho` from the receiver. In closed form (Snyder, Area Light Sources for Real-Time Graphics, 1996).
+pub fn ball(d: f64, rho: f64, radius: f64) -> f64 {
+    let h = (rho / radius).max(1.0001);
+    let c = (d / rho.max(1e-20)).clamp(-1.0, 1.0);
+    let squared = 1.0 - (h * c).powi(2);
+    if squared <= 0.0 {
+        return c.max(0.0) / (h * h);
+    }
+    let g = (h * h - 1.0).sqrt();
+    let side = (-c * g / (1.0 - c * c).max(1e-20).sqrt()).clamp(-1.0, 1.0).acos();
+    ((c * side - squared.sqrt() * g) / (h * h) + (squared.sqrt() / g).atan()) / PI
+}
+
+/// What a ball that the receiver's plane cuts hides in front of it, where normal · FIV is `hidden` and the environment's irradiance in
+/// front is `open`, `behind` for the opposite normal. normal · FIV is what is hidden in front less what is hidden behind; the one or the other
+/// is guessed as if light were even, the smaller the more. `fill`: share of the ball that is not hole.
+pub fn cut(hidden: DVec3, (open, behind): (DVec3, DVec3), (d, rho, radius): (f64, f64, f64), fill: f64) -> DVec3 {
+    let under = behind * (fill * ball(-d, rho, radius));
+    let over = open * (fill * ball(d, rho, radius));
+    let ratio = (under / over.max(DVec3::splat(1e-30))).min(DVec3::splat(1e15));
+    let weight = (1.0 + ratio * ratio).recip();
+    (over + (hidden + under - over) * weight).clamp(DVec3::ZERO, open)
+}
+
 /// For each occluder (centre seen from the receiver, radius) the share of what it hides that is taken away for it: eq. 15 for two,
 /// the mean of 1 / (1 + others there) for more, as if the others lay there independently.
 pub fn shares(normal: DVec3, occluders: &[(DVec3, f64)]) -> Vec<f64> {
@@ -279,6 +304,56 @@ mod tests {
         // What lies behind the receiver takes nothing away.
         assert_eq!(shares(up, &[at(0.0), (DVec3::new(0.0, -2.0, 0.0), 0.5)])[0], 1.0);
         assert_eq!((front(-1.0, 1.0), front(0.0, 1.0), front(1.0, 1.0), front(0.5, 1.0)), (0.0, 0.5, 1.0, 0.75));
+    }
+
+    #[test]
+    fn balls_that_are_cut_hide_what_counting_finds() {
+        let sum = |d: f64, rho: f64, radius: f64| {
+            let to = DVec3::new((rho * rho - d * d).sqrt(), d, 0.0);
+            let steps = 600;
+            // Even over the projected hemisphere.
+            let at = |i: i32| 2.0 * (f64::from(i) + 0.5) / f64::from(steps) - 1.0;
+            let (mut met, mut all) = (0, 0);
+            for (x, z) in (0..steps * steps).map(|k| (at(k % steps), at(k / steps))) {
+                let squared = 1.0 - x * x - z * z;
+                if squared > 0.0 {
+                    let along = to.dot(DVec3::new(x, squared.sqrt(), z));
+                    all += 1;
+                    met += i32::from(along > 0.0 && rho * rho - along * along < radius * radius);
+                }
+            }
+            f64::from(met) / f64::from(all)
+        };
+        for (d, rho, radius) in
+            [(0.0, 2.0, 1.0), (0.7, 1.2, 1.0), (-0.6, 1.5, 1.0), (-0.9, 1.01, 1.0), (3.0, 3.5, 1.0), (0.2, 9.0, 4.0)]
+        {
+            let (found, exact) = (ball(d, rho, radius), sum(d, rho, radius));
+            assert!((found - exact).abs() < 2e-3, "{d} {rho} {radius}: {found} instead of {exact}");
+        }
+        assert_eq!((ball(-1.0, 2.0, 1.0), ball(-2.0, 2.0, 1.0)), (0.0, 0.0));
+        assert!((ball(2.0, 2.0, 1.0) - 0.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn cut_balls_are_exact_in_even_light_and_in_light_from_one_side() {
+        let (front, back) = (DVec3::new(2.0, 1.0, 0.0), DVec3::new(0.5, 3.0, 1.0));
+        let (rho, radius) = (1.6, 1.0);
+        let vector = |d: f64, back: DVec3| front * ball(d, rho, radius) - back * ball(-d, rho, radius);
+        for step in -20..=20 {
+            let d = 0.06 * f64::from(step);
+            let exact = front * ball(d, rho, radius);
+            for behind in [back, DVec3::ZERO, 100.0 * back] {
+                let found = cut(vector(d, behind), (front, behind), (d, rho, radius), 1.0);
+                assert!((found - exact).length() < 1e-12, "{d}: {found} instead of {exact}");
+            }
+            // What lies in front or behind needs no guess: a wrong one does nothing.
+            let found = cut(vector(d, back), (front, back), (d, rho, radius), 0.1);
+            let apart = (found - exact).length();
+            assert!(if d.abs() >= radius { apart < 1e-12 } else { apart < 0.5 * front.length() }, "{d}: {found}");
+        }
+        // All light from in front: the vector is right already, whatever the occluder is like.
+        let hidden = DVec3::splat(0.3);
+        assert_eq!(cut(hidden, (front, DVec3::ZERO), (0.1, rho, radius), 0.7), hidden.min(front));
     }
 
     #[test]

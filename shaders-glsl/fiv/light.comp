@@ -10,7 +10,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-layout(constant_id = 0) const uint PARTIAL = 1;   // occluders cut by the receiver's plane count in part
+layout(constant_id = 0) const uint PARTIAL = 1;   // occluders cut by the receiver's plane: 0 whole, 1 by their height, 2 by the light
 layout(constant_id = 1) const uint OVERLAP = 1;   // what several occluders hide is taken away once
 layout(constant_id = 2) const uint OWN = 1;       // occluders shadow themselves: 1 from the spheres' samples, 2 from their surface's
 layout(constant_id = 3) const uint TRILINEAR = 1; // between samples
@@ -103,6 +103,7 @@ void main() {
     uint self = FIV_NONE;
     if (shown.x > 0.5 && abs(shown.y - z) <= 1e-4 * z) self = uint(shown.x + 0.5) - 1u;
     vec3 open = textureLod(difmap, cube_lookup(n), 0.0).rgb;
+    vec3 behind = PARTIAL == 2u ? textureLod(difmap, cube_lookup(-n), 0.0).rgb : vec3(0.0);
     vec3 lit = open;
     // What others hide is hidden by itself already in part, as if both lay there independently.
     vec3 seen = vec3(1.0);
@@ -131,10 +132,12 @@ void main() {
         float d = dot(offset, n);
         // Without the correction for partial occluders those count whose centre is in front.
         float front = PARTIAL != 0u ? fiv_front_share(occluders[i], d, n, along) : float(d > 0.0);
-        front *= fiv_near(occluders[i], length(offset));
-        if (front <= 0.0) continue;
-        vec3 hidden = max(fiv_dot(occluders[i], offset, n, TRILINEAR != 0u, SCALED != 0u).rgb, vec3(0.0));
-        hidden *= front * seen;
+        float counts = fiv_near(occluders[i], length(offset));
+        if (front * counts <= 0.0) continue;
+        vec3 hidden = fiv_dot(occluders[i], offset, n, TRILINEAR != 0u, SCALED != 0u).rgb;
+        if (PARTIAL == 2u && front < 1.0) hidden = fiv_cut(occluders[i], offset, n, along, hidden, open, behind);
+        if (PARTIAL == 1u) counts *= front;
+        hidden = max(hidden, vec3(0.0)) * (counts * seen);
         if (hidden == vec3(0.0)) continue;
         if (OVERLAP != 0u && whole.occluders > 1u) hidden *= own_share(i, self, p, n, along, tile);
         sum -= hidden;

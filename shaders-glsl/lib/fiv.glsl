@@ -13,7 +13,8 @@ struct FivTexel {
 struct FivOccluder {
     vec3 centre;    // of its bounding sphere, metres, world space
     float radius;   // of its bounding sphere, metres
-    float fill;     // share of the bounding disc that it hides, on average
+    float fill;     // share of the bounding disc that it hides, on average, as the correction for overlaps takes it
+    float body;     // the same, as the correction for partial occluders takes it
     uint first;     // float of its first vector
     uint second;    // the same of the next turn
     float blend;    // part of the way to the next turn
@@ -53,6 +54,26 @@ struct FivOwner {
     float blend;     // part of the way to the next turn
     uint flipped;  // 1: the transform mirrors
 };
+
+// A texel of the environment that is kept apart.
+struct FivSun {
+    vec3 radiance;  // W/(sr·m²)
+    vec3 area;      // integral of the direction over the texel, sr
+    vec3 direction; // of its middle
+    vec3 right;     // axes of the maps of what hides it
+    vec3 up;
+};
+
+// An occluder and its maps.
+struct FivShade {
+    uint map; // float of the first sun's
+    uint own; // 1: it stands as the maps have it, and shadows itself
+};
+
+// Texels along an edge of a map, which is as wide as the occluder's bounding sphere.
+const uint FIV_SUN_SIDE = 192u; // export
+// Stands where there is nothing of the occluder, metres.
+const float FIV_SUN_FREE = -1e30;
 
 const uint FIV_PACE_KNOTS = 33u; // export
 const uint FIV_NONE = 0xffffffffu;

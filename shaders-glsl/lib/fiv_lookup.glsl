@@ -119,9 +119,4 @@ float fiv_near(FivOccluder o, float rho) {
     return clamp((o.limit - rho) / (0.2 * o.limit), 0.0, 1.0);
 }
 
-// Share of an occluder's bounding sphere in front of a plane at distance `d` of its centre (Michael, section 3.3.3.1).
-float fiv_front(float d, float radius) {
-    return clamp((d + radius) / (2.0 * radius), 0.0, 1.0);
-}
-
 #endif

@@ -30,18 +30,52 @@ vec2 fiv_reach(uint first, FivAlong along) {
     return sum;
 }
 
-// Share of an occluder in front of a plane at distance `d` of its centre, by the height of what it is told by.
-float fiv_front_share(FivOccluder o, float d, vec3 n, FivAlong along) {
-    if (abs(d) >= o.radius) return d > 0.0 ? 1.0 : 0.0;
-    if (o.reach == FIV_NONE) return fiv_front(d, o.radius);
+// How far an occluder reaches from its centre along the normal (x) and against it (y), metres.
+vec2 fiv_extent(FivOccluder o, vec3 n, FivAlong along) {
+    if (o.reach == FIV_NONE) return vec2(o.radius);
     float scale = 1.0;
     if (o.turned != 0u) {
         vec3 rest = o.to_rest * n;
         scale = length(rest);
         along = fiv_along(rest / max(scale, 1e-20));
     }
-    vec2 reach = scale * fiv_reach(o.reach, along);
+    return scale * fiv_reach(o.reach, along);
+}
+
+// Share of an occluder in front of a plane at distance `d` of its centre, by the height of what it is told by: by its bounding sphere that
+// is (d + R) / 2R (Michael, section 3.3.3.1).
+float fiv_front_share(FivOccluder o, float d, vec3 n, FivAlong along) {
+    if (abs(d) >= o.radius) return d > 0.0 ? 1.0 : 0.0;
+    vec2 reach = fiv_extent(o, n, along);
     return clamp((d + reach.x) / max(reach.x + reach.y, 1e-20), 0.0, 1.0);
+}
+
+// Share of the irradiance of even light that is hidden by the part of a ball in front of the plane; its centre is `d` (metres) in front
+// of it, `rho` from the receiver. Exact. Twin: reference::fiv::ball.
+float fiv_ball(float d, float rho, float radius) {
+    float h = max(rho / radius, 1.0001);
+    float c = clamp(d / max(rho, 1e-20), -1.0, 1.0);
+    float squared = 1.0 - h * h * c * c;
+    if (squared <= 0.0) return max(c, 0.0) / (h * h);
+    float g = sqrt(h * h - 1.0);
+    float side = acos(clamp(-c * g / sqrt(max(1.0 - c * c, 1e-20)), -1.0, 1.0));
+    return ((c * side - sqrt(squared) * g) / (h * h) + atan(sqrt(squared) / g)) / FIV_PI;
+}
+
+// What an occluder that the receiver's plane cuts hides in front of it. normal · FIV, `hidden`, is that less what its part behind hides
+// of the light from behind. So either that is added, from the irradiance `behind`, or what its part in front hides is told by the
+// irradiance in front, `open`: both as if light were even and the occluder a ball of its height with holes. The smaller the one that is
+// guessed, the more that way counts. Twin: reference::fiv::cut.
+vec3 fiv_cut(FivOccluder o, vec3 offset, vec3 n, FivAlong along, vec3 hidden, vec3 open, vec3 behind) {
+    vec2 reach = fiv_extent(o, n, along);
+    float radius = max(0.5 * (reach.x + reach.y), 1e-20);
+    float d = dot(offset, n), middle = d + 0.5 * (reach.x - reach.y);
+    float rho = sqrt(max(dot(offset, offset) - d * d, 0.0) + middle * middle);
+    float body = min(o.body * o.radius * o.radius / (radius * radius), 1.0);
+    vec3 under = behind * (body * fiv_ball(-middle, rho, radius));
+    vec3 over = open * (body * fiv_ball(middle, rho, radius));
+    vec3 ratio = min(under / max(over, vec3(1e-30)), vec3(1e15));
+    return min(mix(over, hidden + under, 1.0 / (1.0 + ratio * ratio)), open);
 }
 
 #endif

@@ -8,7 +8,7 @@
 
 use glam::{Mat3, Vec3};
 
-use super::{light::Light, occluder::Occluder, surface::Place};
+use super::{light::Light, occluder::Occluder, suns, surface::Place};
 use crate::{
     Result,
     gpu::Gpu,
@@ -16,7 +16,7 @@ use crate::{
     rays::Rays,
     scene::{Pose, resident::Resident},
     shaders::{
-        consts::{FIV_FLOATS, TRACE_STEPS},
+        consts::{FIV_FLOATS, FIV_SUN_SIDE, TRACE_STEPS},
         fiv, types,
     },
 };
@@ -190,6 +190,27 @@ impl<'a> Cover<'a> {
         let mut graph = Graph::new("fiv own vectors");
         let covered = self.declare_own(&mut graph, light, places, split);
         read(runner, graph, covered)
+    }
+
+    /// How far the occluder reaches towards a light, metres from its centre, on a plane across it ([`super::suns`]). Unit vectors: to the
+    /// light, the map's axes.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`.
+    pub fn run_map(&mut self, runner: &mut Runner, [direction, right, up]: [Vec3; 3]) -> Result<Vec<f32>> {
+        let mut graph = Graph::new("fiv sun");
+        let handles = self.resident.frame_in(&mut graph, &self.occluder.scene, &self.pose);
+        let rays = self.rays.frame(&mut graph, &handles);
+        let depths = graph.buffer("fiv.depths", 4 * u64::from(suns::FLOATS));
+        let push = fiv::sun_map::Push {
+            direction: direction.to_array(),
+            right: right.to_array(),
+            up: up.to_array(),
+            radius: self.occluder.radius,
+        };
+        graph.compute(crate::rays::traced!(fiv::sun_map::Args { depths, push }, rays), [FIV_SUN_SIDE, FIV_SUN_SIDE]);
+        let token = graph.read_buffer(depths);
+        Ok(runner.run(graph)?.buffer(token))
     }
 }
 

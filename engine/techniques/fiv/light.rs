@@ -2,13 +2,13 @@
 
 use ash::vk;
 
-use super::{Settings, sky::Sky, turn};
+use super::{Settings, sky::Sky, suns, turn};
 use crate::{
     Result,
     gpu::{Gpu, ImageDesc, OwnedBuffer, OwnedImage},
     graph::{Graph, Runner},
     scene::Environment,
-    shaders::{consts::FIV_FLOATS, fiv},
+    shaders::{consts::FIV_FLOATS, fiv, types},
 };
 
 /// Texels that one invocation sums up at most.
@@ -27,8 +27,10 @@ pub struct Light {
     pub difmap: OwnedImage,
     /// The fullsphere irradiance vector of the whole environment: x.rgb, y.rgb, z.rgb, W/m².
     pub total: [f32; FIV_FLOATS as usize],
-    /// Texels that are not black.
+    /// Texels that are not black, without those kept apart.
     pub lit: Vec<u32>,
+    /// Texels that are kept apart: they are in nothing of the above.
+    pub suns: Vec<types::FivSun>,
     /// Of the environment.
     pub hash: u64,
 }
@@ -59,7 +61,8 @@ impl Light {
         let sums: Vec<f32> = Runner::new(gpu).run(graph)?.buffer(token);
         let mut total = [0.0; FIV_FLOATS as usize];
         total.iter_mut().zip(sums).for_each(|(to, from)| *to = from);
-        Ok(Self { size: sky.size, texels: buffer, turned: Vec::new(), difmap, total, lit: sky.lit(), hash: sky.hash() })
+        let (suns, lit, hash) = (suns::of(sky), sky.lit(), sky.hash());
+        Ok(Self { size: sky.size, texels: buffer, turned: Vec::new(), difmap, total, lit, suns, hash })
     }
 
     /// Uploads what occluders have around themselves that are turned.

@@ -15,9 +15,12 @@
 //! - The discs of the overlap correction have sin α = R / ρ as radius, so that they stay finite near an occluder.
 //! - How far an occluder reaches over the receiver's plane (cases A, B, C) is asked of its corners, not of its bounding sphere
 //!   ([`support`]); [`Extent::Sphere`] is the thesis' way.
+//! - What an occluder that the receiver's plane cuts hides is its vector and what the part behind hides of the light from behind
+//!   ([`Cut::Light`]). The thesis makes the vector smaller, though it is too small already: [`Cut::Height`].
 //! - An occluder's shadow on itself comes from samples on its surface ([`surface`]); [`SelfSamples::Spheres`] is the thesis' way.
 //! - Samples lie where what is hidden bends, if [`Settings::adaptive`] ([`pace`]).
 //! - What overlapping occluders share is less where they do not fill their bounding discs ([`fill`]).
+//! - The brightest texels can be kept out of the vectors and get hard shadows ([`suns`]).
 //! - More than two overlapping occluders: see [`crate::reference::fiv::shares`].
 
 pub mod cover;
@@ -37,6 +40,7 @@ pub mod samples;
 mod settings;
 pub mod sky;
 mod stage;
+pub mod suns;
 pub mod support;
 pub mod surface;
 pub mod turn;
@@ -46,6 +50,6 @@ pub use light::Light;
 pub use occluder::{Occluder, Occluders, Placed};
 pub use picture::{Outputs, Picture, PictureSettings};
 pub use plan::Plan;
-pub use settings::{Extent, Interpolation, Method, SelfSamples, Settings, Shared};
+pub use settings::{Cut, Extent, Interpolation, Method, SelfSamples, Settings, Shared};
 pub use sky::Sky;
 pub use stage::Fiv;

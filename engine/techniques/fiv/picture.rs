@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Extent as Reach, Fiv, Interpolation, Method, SelfSamples, Settings, online::Seen, online_standing::Standing,
-    pace::Paces, support, turn,
+    pace::Paces, suns, support, turn,
 };
 use crate::{
     Error, Result,
@@ -63,6 +63,16 @@ pub struct Picture {
     pub outputs: Outputs,
     /// What is approximated in this frame.
     pub notes: Vec<Note>,
+}
+
+/// What is known of the pixels of a frame.
+struct Pixels<'a> {
+    gbuffer: &'a GBuffer,
+    identity: Image,
+    occluders: Buffer,
+    /// Bits of tiles, and words of each.
+    near: (Buffer, u32),
+    irradiance: Image,
 }
 
 impl Fiv {
@@ -140,6 +150,7 @@ impl Fiv {
         for (occluder, node) in list.iter_mut().zip(&standing.nodes) {
             let placed = self.occluders.placed.iter().find(|placed| placed.node == *node);
             occluder.fill = placed.map_or(1.0, |placed| self.fill(placed.kind));
+            occluder.body = placed.map_or(1.0, |placed| self.body(placed.kind));
         }
         list.resize(list.len().max(1), types::FivOccluder::default());
         let occluders = graph.buffer_from("fiv.occluders", &list);
@@ -204,7 +215,7 @@ impl Fiv {
                 near,
                 push: shaders::fiv::light::Push { first, count: each.min(count.saturating_sub(first)), words },
                 spec: shaders::fiv::light::Spec {
-                    partial: settings.partial.into(),
+                    partial: settings.partial_way(),
                     overlap: settings.overlap.into(),
                     own: own_way,
                     trilinear: settings.trilinear.into(),
@@ -213,7 +224,45 @@ impl Fiv {
             };
             graph.compute(args, extent);
         }
+        let pixels = Pixels { gbuffer, identity, occluders, near: (near, words), irradiance };
+        self.suns(graph, pose, &standing.nodes, &pixels, settings.self_shadow);
         Ok(irradiance)
+    }
+
+    /// Adds the light of texels that are kept apart.
+    fn suns(&self, graph: &mut Graph, pose: &Pose, nodes: &[u32], pixels: &Pixels<'_>, own: bool) {
+        let count = self.light.suns.len() as u32;
+        if count == 0 {
+            return;
+        }
+        let shade = |node: &u32| {
+            let kind = self.occluders.placed.iter().find(|placed| placed.node == *node).map_or(0, |placed| placed.kind);
+            let own = own && self.yaw(pose, *node) == Some(0.0);
+            types::FivShade { map: kind * count * suns::FLOATS, own: own.into() }
+        };
+        let mut shades: Vec<_> = nodes.iter().map(shade).collect();
+        shades.resize(shades.len().max(1), types::FivShade::default());
+        let shades = graph.buffer_from("fiv.shades", &shades);
+        let suns = graph.buffer_from("fiv.sunlight", &self.light.suns);
+        let depths = graph.import_buffer(&self.maps);
+        let Pixels { gbuffer, identity, occluders, near: (near, words), irradiance } = *pixels;
+        // One after the other: each may go through all occluders.
+        for sun in 0..count {
+            let args = shaders::fiv::suns::Args {
+                view: gbuffer.view,
+                normal: gbuffer.normal,
+                depth: gbuffer.depth,
+                identity,
+                occluders,
+                shades,
+                depths,
+                suns,
+                near,
+                irradiance,
+                push: shaders::fiv::suns::Push { sun, words },
+            };
+            graph.compute(args, graph.extent(irradiance));
+        }
     }
 
     /// The occluders with their vectors that were computed beforehand.

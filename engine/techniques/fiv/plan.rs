@@ -70,6 +70,9 @@ pub struct Plan {
     pub surface: bool,
     /// Samples of turns about +Y; all others are there for each.
     pub turns: u32,
+    /// Bright texels that are kept apart, at most.
+    #[serde(default)]
+    pub suns: u32,
     pub occluders: Vec<Kind>,
 }
 
@@ -94,6 +97,7 @@ impl Plan {
             grid: settings.grid(),
             surface: settings.on_surface(),
             turns: settings.turns,
+            suns: settings.suns,
             occluders: occluders.iter().map(kind).collect(),
         }
     }
@@ -128,17 +132,18 @@ impl Plan {
     /// These settings with what of them decides these numbers.
     pub fn settings(&self, over: &Settings) -> Settings {
         let Grid { azimuths, polars, radii } = self.grid;
-        let (size, split, reach, turns) = (self.size, self.split, self.reach, self.turns);
+        let (size, split, reach, turns, suns) = (self.size, self.split, self.reach, self.turns, self.suns);
         let self_samples = if self.surface { SelfSamples::Surface } else { SelfSamples::Spheres };
-        Settings { size, split, reach, azimuths, polars, radii, turns, self_samples, ..over.clone() }
+        Settings { size, split, reach, azimuths, polars, radii, turns, suns, self_samples, ..over.clone() }
     }
 
     /// How another plan differs in what decides the numbers, in words; `None`: it does not.
     pub fn difference(&self, other: &Self) -> Option<String> {
-        let plain = |of: &Self| (of.size, of.split, of.grid, of.turns);
+        let plain = |of: &Self| (of.size, of.split, of.grid, of.turns, of.suns);
         if plain(self) != plain(other) {
             let say = |of: &Self| {
-                format!("{} samples, {} turns, {} texels, {} rays along one", of.grid, of.turns, of.size, of.split)
+                let Self { grid, turns, size, split, suns, .. } = of;
+                format!("{grid} samples, {turns} turns, {size} texels, {split} rays along one, {suns} lights apart")
             };
             return Some(format!("{} instead of {}", say(other), say(self)));
         }

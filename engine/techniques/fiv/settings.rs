@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{super::allowed::within, samples::Grid, sky::SIDES};
+use super::{super::allowed::within, samples::Grid, sky::SIDES, suns};
 use crate::{Error, Result};
 
 /// How irradiance is found.
@@ -29,6 +29,18 @@ pub enum Extent {
     Hull,
     /// By its bounding sphere, as in the thesis.
     Sphere,
+}
+
+/// What an occluder that the receiver's plane cuts hides.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cut {
+    /// Its vector along the normal, and what its part behind the plane hides of the light from behind, which the vector has
+    /// subtracted: nothing where no light comes from there.
+    #[default]
+    Light,
+    /// Of its vector the share of its height in front, as in the thesis.
+    Height,
 }
 
 /// Where the vectors for an occluder's shadow on itself are taken.
@@ -79,6 +91,10 @@ pub struct Settings {
     pub radii: u32,
     /// Samples of turns about +Y, 1 to 64, for occluders that turn so; 1: those at rest only.
     pub turns: u32,
+    /// The brightest texels of the environment are kept out of the vectors, so many at most, 0 to 16, of those of which each sends at least
+    /// a hundredth of all light: their shadows have hard edges, from a map of each occluder for each. Not for occluders that turn, and
+    /// only where vectors are computed beforehand.
+    pub suns: u32,
     /// Radius of the last sphere, in radii of the occluder's bounding sphere, 2 to 1000. Farther away what is hidden shrinks with the
     /// solid angle.
     pub reach: f32,
@@ -95,8 +111,9 @@ pub struct Settings {
     /// Vectors are interpolated between samples; without, the nearest is taken.
     pub trilinear: bool,
     pub interpolation: Interpolation,
-    /// Occluders cut by the receiver's plane count by the share in front of it.
+    /// Occluders cut by the receiver's plane are corrected for what lies behind it.
     pub partial: bool,
+    pub cut: Cut,
     pub extent: Extent,
     /// What several occluders hide is taken away once.
     pub overlap: bool,
@@ -124,6 +141,7 @@ impl Default for Settings {
             polars: grid.polars,
             radii: grid.radii,
             turns: 1,
+            suns: 0,
             reach: 16.0,
             adaptive: true,
             split: 1,
@@ -132,6 +150,7 @@ impl Default for Settings {
             trilinear: true,
             interpolation: Interpolation::default(),
             partial: true,
+            cut: Cut::default(),
             extent: Extent::default(),
             overlap: true,
             negligible: 0.0,
@@ -164,6 +183,15 @@ impl Settings {
         Self { rotation: (rotation % 360.0) as f32, ..self.clone() }
     }
 
+    /// How shaders know what is done with occluders that are cut.
+    pub(super) fn partial_way(&self) -> u32 {
+        match (self.partial, self.cut) {
+            (false, _) => 0,
+            (true, Cut::Height) => 1,
+            (true, Cut::Light) => 2,
+        }
+    }
+
     /// Samples on the occluders' surfaces are wanted.
     pub fn on_surface(&self) -> bool {
         self.self_samples == SelfSamples::Surface
@@ -182,7 +210,12 @@ impl Settings {
         within([("negligible", self.negligible, 0.0, 1.0)])?;
         within([("rotation", self.rotation, -36e3, 36e3), ("turning", self.turning, -36e3, 36e3)])?;
         within([("exposure", self.exposure, -30.0, 30.0)])?;
-        within([("split", self.split, 1, 4), ("turns", self.turns, 1, 64)])
+        within([("split", self.split, 1, 4), ("turns", self.turns, 1, 64), ("suns", self.suns, 0, suns::MOST)])?;
+        if self.suns > 0 && self.turns > 1 {
+            let error = Error::usage("lights can be kept apart for occluders at rest only").at("suns");
+            return Err(error.help("Set fiv.suns or fiv.turns to its default"));
+        }
+        Ok(())
     }
 }
 

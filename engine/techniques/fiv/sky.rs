@@ -9,12 +9,15 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3, Vec3};
 
+use super::Method;
 use crate::{Error, Result, scene::Environment, shaders::types};
 
 /// What stands for endless radiance.
 const LARGEST: f64 = 65504.0;
 /// Edges that an environment may have, texels.
 pub const SIDES: std::ops::RangeInclusive<u32> = 8..=128;
+/// Texels that are kept apart send at least this part of all light.
+const APART: f64 = 0.01;
 /// Wedges of azimuth around the axis at least, beside the edges of pixels and texels.
 const WEDGES: u32 = 1024;
 
@@ -25,8 +28,18 @@ pub struct Sky {
     pub size: u32,
     /// Mean radiance of each of 6·size² texels, W/(sr·m²).
     pub radiance: Vec<Vec3>,
+    /// Texels that are kept apart: they are black in `radiance`.
+    pub suns: Vec<Sun>,
     /// Pixels of the source that were no radiance.
     pub repaired: u64,
+}
+
+/// A bright texel that is kept apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sun {
+    pub texel: u32,
+    /// W/(sr·m²)
+    pub radiance: Vec3,
 }
 
 impl Sky {
@@ -43,7 +56,7 @@ impl Sky {
         }
         let texels = 6 * size as usize * size as usize;
         let Some(env) = environment.filter(|e| !e.pixels.is_empty()) else {
-            return Ok(Self { size, radiance: vec![Vec3::ZERO; texels], repaired: 0 });
+            return Ok(Self { size, radiance: vec![Vec3::ZERO; texels], suns: Vec::new(), repaired: 0 });
         };
         let place = |error: Error| error.at(format!("environment `{}`", env.name));
         if env.pixels.len() as u64 != u64::from(env.width) * u64::from(env.height) {
@@ -76,7 +89,7 @@ impl Sky {
         }
         let scale = f64::from(env.scale);
         let radiance = sums.iter().map(|(sum, weight)| (*sum * (scale / weight.max(1e-30))).min(DVec3::splat(1e30)));
-        Ok(Self { size, radiance: radiance.map(|r| r.as_vec3()).collect(), repaired })
+        Ok(Self { size, radiance: radiance.map(|r| r.as_vec3()).collect(), suns: Vec::new(), repaired })
     }
 
     /// As [`Self::new`], with the size, turn and exposure of `settings`.
@@ -85,12 +98,35 @@ impl Sky {
     /// As [`Self::new`].
     pub fn of(environment: Option<&Environment>, settings: &super::Settings) -> Result<Self> {
         let (turn, factor) = settings.light();
-        if (turn, factor) == (0.0, 1.0) {
-            return Self::new(environment, settings.size);
+        let sky = if (turn, factor) == (0.0, 1.0) {
+            Self::new(environment, settings.size)
+        } else {
+            let changed =
+                environment.map(|e| Environment { rotation: e.rotation + turn, scale: e.scale * factor, ..e.clone() });
+            Self::new(changed.as_ref(), settings.size)
+        }?;
+        Ok(sky.apart(if settings.method == Method::Vectors { settings.suns } else { 0 }))
+    }
+
+    /// With the brightest texels kept apart: `most` of those of which each sends at least a hundredth of all light.
+    #[must_use]
+    pub fn apart(mut self, most: u32) -> Self {
+        if most == 0 {
+            return self;
         }
-        let changed =
-            environment.map(|e| Environment { rotation: e.rotation + turn, scale: e.scale * factor, ..e.clone() });
-        Self::new(changed.as_ref(), settings.size)
+        let power = |i: u32| {
+            let (_, x, y) = place(self.size, i);
+            self.radiance[i as usize].as_dvec3().element_sum() * solid_angle(self.size, x, y)
+        };
+        let mut powers: Vec<(u32, f64)> = (0..self.radiance.len() as u32).map(|i| (i, power(i))).collect();
+        let least = APART * powers.iter().map(|p| p.1).sum::<f64>();
+        powers.retain(|p| p.1 > 0.0 && p.1 >= least);
+        powers.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        for (texel, _) in powers.into_iter().take(most as usize) {
+            let radiance = std::mem::take(&mut self.radiance[texel as usize]);
+            self.suns.push(Sun { texel, radiance });
+        }
+        self
     }
 
     /// As the shaders take it.
@@ -106,7 +142,7 @@ impl Sky {
         self.radiance.iter().enumerate().map(texel).collect()
     }
 
-    /// Numbers of the texels that are not black.
+    /// Numbers of the texels that are not black and not kept apart.
     pub fn lit(&self) -> Vec<u32> {
         (0..self.radiance.len() as u32).filter(|i| self.radiance[*i as usize] != Vec3::ZERO).collect()
     }
@@ -116,6 +152,10 @@ impl Sky {
         let mut hash = super::hash::Hash::new();
         hash.word(self.size.into());
         self.radiance.iter().for_each(|r| hash.floats(&r.to_array()));
+        for sun in &self.suns {
+            hash.word(sun.texel.into());
+            hash.floats(&sun.radiance.to_array());
+        }
         hash.finish()
     }
 }

@@ -1,7 +1,7 @@
 //! What lives as long as a scene: its occluders with their vectors, and the environment on the device.
 
 use super::{
-    Light, Method, Occluders, Plan, Settings, Shared, Sky, Stored, fill::fill, negligible, online::Online, plan::Kind,
+    Cut, Light, Method, Occluders, Plan, Settings, Shared, Sky, Stored, fill::fill, negligible, online::Online, plan::Kind, suns,
 };
 use crate::{
     Error, ErrorKind, Result,
@@ -36,8 +36,12 @@ pub struct Fiv {
     /// How far all kinds reach ([`super::support`]), one after the other.
     pub(super) reaches: OwnedBuffer,
     shared: Shared,
+    /// What hides lights that are kept apart ([`super::suns`]).
+    pub(super) maps: OwnedBuffer,
     /// How much of their bounding discs all kinds fill; empty: all of them.
     pub(super) fills: Vec<f32>,
+    /// The same for what is cut; empty: it is not asked for.
+    pub(super) bodies: Vec<f32>,
     /// As everything stood when the vectors were computed.
     pub(super) at_rest: Pose,
     pub(super) notes: Vec<Note>,
@@ -119,12 +123,15 @@ impl Fiv {
             }
             _ => None,
         };
+        let full = full(&occluders, &settings);
         Ok(Self {
             fivs: OwnedBuffer::with_contents(gpu, "fiv.stored", if bytes.is_empty() { &[0; 4] } else { bytes })?,
             notes,
             reaches: reaches(gpu, &occluders)?,
             shared: settings.shared,
-            fills: fills(&occluders, &settings),
+            fills: if overlapping(&occluders, &settings) { full.clone() } else { Vec::new() },
+            bodies: full,
+            maps: suns::maps(gpu, &light, &occluders.kinds)?,
             at_rest: pose,
             method: settings.method,
             lit: lit(scene, &settings),
@@ -143,6 +150,11 @@ impl Fiv {
     /// How much of its bounding disc a kind fills.
     pub(super) fn fill(&self, kind: u32) -> f32 {
         self.fills.get(kind as usize).copied().unwrap_or(1.0)
+    }
+
+    /// The same for occluders that are cut.
+    pub(super) fn body(&self, kind: u32) -> f32 {
+        self.bodies.get(kind as usize).copied().unwrap_or(1.0)
     }
 
     /// What the user should know about how the scene is drawn.
@@ -237,10 +249,16 @@ impl Fiv {
     }
 }
 
-/// Of all kinds, where several occluders can hide the same.
-fn fills(occluders: &Occluders, settings: &Settings) -> Vec<f32> {
-    let asked = settings.shared == Shared::Filled && matches!(settings.method, Method::Vectors | Method::Online);
-    if asked && occluders.placed.len() > 1 { occluders.kinds.iter().map(fill).collect() } else { Vec::new() }
+/// Several occluders can hide the same, and it is asked how much.
+fn overlapping(occluders: &Occluders, settings: &Settings) -> bool {
+    settings.shared == Shared::Filled && occluders.placed.len() > 1
+}
+
+/// How much of their bounding discs all kinds fill, where it is asked for.
+fn full(occluders: &Occluders, settings: &Settings) -> Vec<f32> {
+    let asked = settings.cut == Cut::Light || overlapping(occluders, settings);
+    let drawn = matches!(settings.method, Method::Vectors | Method::Online);
+    if asked && drawn { occluders.kinds.iter().map(fill).collect() } else { Vec::new() }
 }
 
 /// Appends how the samples of all kinds lie.

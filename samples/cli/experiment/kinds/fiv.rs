@@ -151,7 +151,7 @@ fn make(gpu: &Gpu, scene: &Scene, settings: &Settings, folder: PathBuf, stop: &d
         ("things".to_owned(), occluders.placed.len() as f64),
         ("kinds".to_owned(), occluders.kinds.len() as f64),
         ("vertices".to_owned(), occluders.placed.iter().map(|p| vertices(scene, p.node)).sum::<usize>() as f64),
-        ("lights".to_owned(), fiv.light().lit.len() as f64),
+        ("lights".to_owned(), (fiv.light().lit.len() + fiv.light().suns.len()) as f64),
     ];
     Ok(Kept { resident, fiv, runner: Runner::new(gpu), made: settings.clone(), facts })
 }
