@@ -13,7 +13,7 @@ use lucerna::{
 use tracer_lab::flat_view;
 
 fn base() -> Settings {
-    Settings { size: 16, azimuths: 32, polars: 17, radii: 15, ..Settings::default() }
+    Settings { size: 16, azimuths: 24, polars: 13, radii: 12, ..Settings::default() }
 }
 
 /// Balls of radius 0.5 on a ground.
@@ -43,22 +43,25 @@ fn what_lies_behind_the_plane_is_known_by_the_light_from_there() {
         let lamp = DVec3::new(-0.8, 0.75, -0.2).normalize();
         let from_above = painted(128, |d| if d.dot(lamp) > 0.95 { Vec3::splat(9.0) } else { Vec3::ZERO });
         for (name, environment) in [("even", even), ("bright below", bright_below), ("from above", from_above)] {
-            for height in [0.25, 0.0, -0.25] {
+            for height in [0.2, -0.15] {
                 let scene = stage(environment.clone(), &[vec3(0.0, height, 0.0)]);
                 // Beside the ball, on the side of its shadow.
                 let view = flat_view(vec3(1.3, 2.0, 0.2), vec3(1.3, 0.0, 0.2), 0.7, [12, 12]);
-                let reference = picture(gpu, &scene, &view, &truth(&base()));
-                let error = |settings: &Settings| {
-                    let found = picture(gpu, &scene, &view, settings);
+                let few = base();
+                let reference = picture(gpu, &scene, &view, &truth(&few));
+                let mut studio = Studio::new(gpu, &scene, &few, None);
+                let mut error = |settings: &Settings| {
+                    let found = studio.irradiance(&view, settings);
                     let squares = reference.iter().zip(&found).map(|(r, f)| (*r - *f).length_squared()).sum::<f32>();
                     (squares / reference.iter().map(|r| r.length_squared()).sum::<f32>()).sqrt()
                 };
-                let light = error(&base());
-                let by_height = error(&Settings { cut: Cut::Height, ..base() });
-                let off = error(&Settings { partial: false, ..base() });
+                let light = error(&few);
+                let by_height = error(&Settings { cut: Cut::Height, ..few.clone() });
+                let off = error(&Settings { partial: false, ..few.clone() });
                 eprintln!("{name}, centre at {height}: {light:.4}, by height {by_height:.4}, without {off:.4}");
-                assert!(light < 0.03, "{name} {height}: {light}");
-                assert!(light < 1.1 * by_height + 2e-3 && light < 1.1 * off + 2e-3, "{name} {height}");
+                assert!(light < 0.03 && light < 1.05 * off + 1e-3, "{name} {height}");
+                // Under light from above alone there is nothing to correct.
+                assert!(name == "from above" || (light < 0.7 * by_height && light < 0.9 * off), "{name} {height}");
             }
         }
     });
@@ -99,7 +102,7 @@ fn suns_have_hard_shadows_which_overlap_once() {
         for balls in [vec![vec3(0.0, 0.7, 0.0)], vec![vec3(0.0, 0.7, 0.0), toward * 1.6 + vec3(0.0, 0.6, 0.0), Vec3::Y]]
         {
             let scene = stage(sunny(), &balls);
-            let view = flat_view(vec3(-0.4, 0.15, 0.3), vec3(-0.4, 0.0, 0.3), 1.6, [40, 40]);
+            let view = flat_view(vec3(-0.4, 0.15, 0.3), vec3(-0.4, 0.0, 0.3), 1.6, [32, 32]);
             let reference = picture(gpu, &scene, &view, &truth(&base()));
             let error = |settings: &Settings| nrmse(&reference, &picture(gpu, &scene, &view, settings));
             let (without, with) = (error(&base()), error(&apart));
@@ -115,7 +118,7 @@ fn suns_have_hard_shadows_which_overlap_once() {
             nrmse(&reference, &picture(gpu, &scene, &view, &apart)),
         );
         eprintln!("NRMSE on the ball: {without:.4}, kept apart {with:.4}");
-        assert!(with < 0.05 && with < 1.05 * without);
+        assert!(with < 0.03 && with < 1.2 * without);
         // Nothing stands in the way: as much light as ever.
         let empty = stage(sunny(), &[]);
         let view = flat_view(Vec3::Y, Vec3::ZERO, 0.5, [2, 2]);

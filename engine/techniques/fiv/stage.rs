@@ -1,7 +1,8 @@
 //! What lives as long as a scene: its occluders with their vectors, and the environment on the device.
 
 use super::{
-    Cut, Light, Method, Occluders, Plan, Settings, Shared, Sky, Stored, fill::fill, negligible, online::Online, plan::Kind, suns,
+    Cut, Light, Method, Occluders, Plan, Settings, Shared, Sky, Stored, fill::fill, negligible, online::Online,
+    plan::Kind, suns,
 };
 use crate::{
     Error, ErrorKind, Result,
