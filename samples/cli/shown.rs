@@ -16,10 +16,18 @@ pub struct Shown {
     /// One channel, shown as grey.
     grey: bool,
     layers: Vec<Source>,
+    sums: Vec<Sum>,
     /// What the camera really saw, if the technique changed it (its far plane).
     pub view: Option<View>,
     /// What the technique could not serve in this frame.
     pub notes: Vec<Note>,
+}
+
+/// A number of the whole frame: a value of each pixel, added up.
+struct Sum {
+    name: &'static str,
+    image: Image,
+    of: fn([f32; 4]) -> f32,
 }
 
 struct Source {
@@ -39,7 +47,7 @@ impl std::fmt::Debug for Shown {
 impl Shown {
     /// Only the picture: its red, green and blue are radiance.
     pub fn new(picture: Image) -> Self {
-        Self { picture, grey: false, layers: Vec::new(), view: None, notes: Vec::new() }
+        Self { picture, grey: false, layers: Vec::new(), sums: Vec::new(), view: None, notes: Vec::new() }
     }
 
     /// Only the picture: the first channel of an image, as grey.
@@ -63,6 +71,13 @@ impl Shown {
     #[must_use]
     pub fn color(self, name: &'static str, image: Image) -> Self {
         self.layer(name, &["R", "G", "B"], image, |pixel| pixel)
+    }
+
+    /// With a number: the sum of a value of each pixel of an image, of whatever size.
+    #[must_use]
+    pub fn sum(mut self, name: &'static str, image: Image, of: fn([f32; 4]) -> f32) -> Self {
+        self.sums.push(Sum { name, image, of });
+        self
     }
 
     /// With a layer of other values.
@@ -100,9 +115,10 @@ impl Shown {
     /// Asks the graph for the pixels.
     pub fn read(self, graph: &mut Graph, with_layers: bool) -> Reading {
         let picture = graph.read_image(self.picture);
-        let layers = if with_layers { self.layers } else { Vec::new() };
+        let (layers, sums) = if with_layers { (self.layers, self.sums) } else { Default::default() };
         let layers = layers.into_iter().map(|layer| (graph.read_image(layer.image), layer)).collect();
-        Reading { picture, grey: self.grey, view: false, layers }
+        let sums = sums.into_iter().map(|sum| (graph.read_image(sum.image), sum)).collect();
+        Reading { picture, grey: self.grey, view: false, layers, sums }
     }
 }
 
@@ -113,6 +129,7 @@ pub struct Reading {
     /// Any image of the graph, to look at.
     view: bool,
     layers: Vec<(ImageRead, Source)>,
+    sums: Vec<(ImageRead, Sum)>,
 }
 
 impl std::fmt::Debug for Reading {
@@ -128,7 +145,16 @@ impl Reading {
     /// `Usage` if no pass writes it; the message lists the names.
     pub fn view(graph: &mut Graph, name: &str) -> Result<Self> {
         let picture = graph.view(name).map_err(|error| error.at("--view"))?;
-        Ok(Self { picture, grey: false, view: true, layers: Vec::new() })
+        Ok(Self { picture, grey: false, view: true, layers: Vec::new(), sums: Vec::new() })
+    }
+
+    /// The numbers that were asked for, once the graph has run.
+    pub fn sums(&self, frame: &Frame) -> Vec<(String, f64)> {
+        let of = |(token, sum): &(ImageRead, Sum)| {
+            let pixels = frame.image(*token).to_f32();
+            (sum.name.to_owned(), pixels.into_iter().map(|pixel| f64::from((sum.of)(pixel))).sum())
+        };
+        self.sums.iter().map(of).collect()
     }
 
     /// The picture with its layers, once the graph has run. Layers of another size are stretched to that of the picture.

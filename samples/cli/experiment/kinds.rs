@@ -185,7 +185,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "igi",
-        description: "instant global illumination; layers direct, indirect, albedo, normal, depth",
+        description: "instant global illumination; layers direct, indirect, specular, albedo, normal, depth",
         on_device: true,
         of_images: false,
         sources: &[
@@ -301,6 +301,9 @@ fn read<S: DeserializeOwned>(settings: &Value) -> Result<S> {
     serde_json::from_value(settings.clone()).map_err(|error| Error::input(format!("settings: {error}")))
 }
 
+/// Fact of a run: shadow rays from visible surfaces to virtual lights, as counted by the pass that gathers.
+pub const GATHERED: &str = "gathered rays";
+
 /// Renders `repeat` times what `compose` declares; the picture is the first one.
 pub fn on_device(
     runner: &mut Runner,
@@ -322,6 +325,7 @@ pub fn on_device(
         let frame = runner.run(&graph)?;
         if let Some(reading) = reading {
             layers = Some(reading.layers(&frame));
+            times.facts = reading.sums(&frame);
         }
         times.wall.push(begun.elapsed().as_secs_f64() * 1e3);
         reports.push(frame.report);

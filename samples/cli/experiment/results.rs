@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use glam::Vec3;
 use lucerna::{
     Error, Result,
     measure::{Measure, Options, Pair, Picture},
+    scene::{Primitive, Scene},
 };
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -17,6 +19,35 @@ use super::{
 };
 use crate::config;
 
+/// What lights a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shining {
+    /// Point, spot and directional lights that nodes carry.
+    pub lamps: u32,
+    /// Some surface emits light.
+    pub surfaces: bool,
+    pub sky: bool,
+}
+
+impl Shining {
+    pub fn of(scene: &Scene) -> Self {
+        let emits = |primitive: &Primitive| {
+            scene.materials.get(primitive.material as usize).is_some_and(|material| material.emissive != Vec3::ZERO)
+        };
+        let meshes = scene.nodes.iter().filter_map(|node| scene.meshes.get(node.mesh? as usize));
+        Self {
+            lamps: scene.nodes.iter().filter(|node| node.light.is_some()).count() as u32,
+            surfaces: meshes.flat_map(|mesh| &mesh.primitives).any(emits),
+            sky: scene.environment.as_ref().is_some_and(|sky| !sky.pixels.is_empty()),
+        }
+    }
+
+    /// Shadow rays of a point that takes `samples` of emissive surfaces and as many of the sky.
+    pub fn rays(self, samples: u32) -> u32 {
+        self.lamps + (u32::from(self.surfaces) + u32::from(self.sky)) * samples
+    }
+}
+
 /// A picture that is there.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Done {
@@ -28,6 +59,9 @@ pub struct Done {
     pub method: String,
     /// Values of the matrix.
     pub variant: Changes,
+    /// What lights the scene; not known of old results.
+    #[serde(default)]
+    pub shining: Option<Shining>,
     /// Name of its files.
     pub key: String,
     /// EV that suits the scene, if known.

@@ -15,7 +15,7 @@ use super::{
     kinds::{self, Job, Kind, Warm},
     place::{self, Folders, Loaded, Placed},
     progress::Progress,
-    results::{Done, Results, label},
+    results::{Done, Results, Shining, label},
 };
 use crate::{config, console::Console, program, progress::ProgressMode, signals::Interrupt};
 
@@ -208,6 +208,7 @@ impl One<'_> {
             scene: entry.name.clone(),
             group: entry.group.clone(),
             triangles: loaded.triangles,
+            shining: loaded.image.is_none().then(|| Shining::of(&loaded.scene)),
             view: self.placed().name.clone(),
             method: method.name.clone(),
             variant: step.variant.clone(),

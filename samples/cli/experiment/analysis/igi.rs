@@ -1,40 +1,42 @@
 //! Instant global illumination: figures 4 to 7 of Marques and Santos, with the errors that the paper does not give.
 //!
 //! Techniques are known by their names: `exact` with a matrix of `igi.vpls`, and the variants, whatever they are called, with the number of
-//! virtual lights that [`COUNT`] states; the reference is the first one. What came after the paper: [`beyond`].
+//! virtual lights that [`COUNT`] states; these have diffuse surfaces alone, as the reference has, which is the first one.
+//! `exact, specular` and `paper, specular` show mirrors, glass and highlights too, as the paper does: figures 4 to 7 have both.
+//! What came after the paper: [`beyond`].
 
 mod beyond;
+mod rays;
+mod stages;
 
-use lucerna::{Result, measure::Measure};
+use lucerna::{Error, Result, measure::Measure};
+use serde_json::Value;
 
 use crate::{
+    config,
     experiment::{
-        file::Role,
+        file::{Experiment, Role},
         place::spread,
         results::{Done, Layer, Results},
     },
     report::{Axis, Cell, Comparison, Page, Plot, Section, Table},
 };
+use stages::{STAGES, spent};
 
 /// Virtual lights of the variants.
 const COUNT: &str = "180";
 /// Longest side of an image in the page, pixels.
 const SIDE: u32 = 640;
-
-/// Stages of figures 4 and 5, by the beginnings of the names of their passes.
-const STAGES: [(&str, &[&str]); 4] = [
-    ("shooting (%)", &["igi.shoot", "igi.points", "igi.importance", "igi.cumulate", "igi.resample", "igi.order"]),
-    (
-        "direct and specular (%)",
-        &["passes.gbuffer", "igi.direct", "igi.grow", "igi.gather_tree", "igi.cache", "igi.reap"],
-    ),
-    ("indirect (%)", &["igi.gather", "igi.near", "igi.raster"]),
-    ("filters (%)", &["igi.guide", "igi.discontinuity", "igi.upsample"]),
-];
+const EXACT: &str = "exact";
+/// The same with all surfaces as they are.
+const EXACT_SPECULAR: &str = "exact, specular";
+const PAPER_SPECULAR: &str = "paper, specular";
+const SPECULAR: [&str; 2] = [EXACT_SPECULAR, PAPER_SPECULAR];
 
 pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
     page.add(counts(results)?);
     page.add(variants(results)?);
+    page.add(rays::rates(results)?);
     page.add(beyond::successors(results)?);
     page.add(beyond::many(results)?);
     page.add(beyond::cached(results)?);
@@ -42,45 +44,60 @@ pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// Milliseconds of a frame and of the four stages. What passes names begin twice counts for the longer beginning.
-fn stages(results: &Results, run: &Done) -> Result<(Option<f64>, [f64; 4])> {
-    let times = results.times(run)?;
-    let mut sums = [0.0; 4];
-    for (name, ms) in &times.passes {
-        let matching = STAGES.iter().enumerate().flat_map(|(stage, (_, list))| list.iter().map(move |l| (stage, l)));
-        let best = matching.filter(|(_, beginning)| name.starts_with(**beginning)).max_by_key(|(_, b)| b.len());
-        if let Some((stage, _)) = best {
-            sums[stage] += ms;
+/// The table `beside` of the parameters names techniques that there are.
+pub(super) fn check(experiment: &Experiment) -> Result<()> {
+    let techniques = experiment.methods.iter().filter(|method| method.role == Role::Technique);
+    let known: Vec<&str> = techniques.map(|method| method.name.as_str()).collect();
+    let Some(beside) = experiment.parameters.get("beside") else { return Ok(()) };
+    let Value::Object(pairs) = beside else {
+        let what = format!("{beside} is no table; allowed: \"technique\" = \"technique\"");
+        return Err(Error::input(what).at("parameters.beside"));
+    };
+    for (idea, other) in pairs {
+        let place = format!("parameters.beside.\"{idea}\"");
+        let Some(other) = other.as_str() else {
+            return Err(Error::input(format!("{other} is no text; allowed: the name of a technique")).at(place));
+        };
+        if let Some(name) = [idea.as_str(), other].into_iter().find(|name| !known.contains(name)) {
+            let hint = config::nearest(name, known.iter().copied()).map(|name| format!(" (did you mean '{name}'?)"));
+            let what = format!("no technique '{name}'{}; there are {}", hint.unwrap_or_default(), known.join(", "));
+            return Err(Error::input(what).at(place));
         }
     }
-    Ok((times.frame(), sums))
-}
-
-fn shares((frame, sums): (Option<f64>, [f64; 4])) -> [Cell; 4] {
-    sums.map(|ms| frame.map(|frame| 100.0 * ms / frame).into())
+    Ok(())
 }
 
 /// Figure 4.
 fn counts(results: &Results) -> Result<Section> {
     let mut section = Section::new("Figure 4: time against the number of virtual lights");
     section.text(
-        "Exact visibility at full resolution. The paper has 30, 90 and 180 virtual lights on a GTX 480: there too the indirect stage grows \
-         with their number, and the specular objects of the conference room put much of that growth into the stage *direct and specular*.",
+        "Exact visibility at full resolution. *All* surfaces: with mirrors, glass and highlights, as in the paper, where the specular objects of the \
+         conference room put much of the growth into the stage *direct and specular*; *diffuse*: without, as for the errors below. The paper has 30, \
+         90 and 180 virtual lights on a GTX 480: there too the indirect stage grows with their number.",
     );
-    let heads = ["scene", "virtual lights", "frames per second"].into_iter().chain(STAGES.map(|stage| stage.0));
+    section.text(
+        "Shares are of the time of all passes. *Shooting*: paths of light, and which of them become virtual lights. *Direct and specular*: visible \
+         surfaces, shadow rays to lights, and all light on what mirrors and glass show. *Indirect*: gathering by rays or maps, refinement, and light \
+         put back. *Filters*: of the picture, and over time. *Other*: the sum, the sky, uploads, memory that is cleared.",
+    );
+    let heads = ["scene", "surfaces", "virtual lights", "frames per second"].into_iter().chain(STAGES);
     let mut table = Table::new("figure-4", "Frames per second and shares of the time", heads).timed();
     let axis = Axis::new("virtual lights");
     let mut plot = Plot::new("figure-4-plot", "Time of the indirect stage", axis, Axis::new("ms"));
     for view in results.views() {
-        let mut line = Vec::new();
-        for run in results.at(view).filter(|run| run.method == "exact") {
-            let Some(count) = run.value("igi.vpls") else { continue };
-            let times = stages(results, run)?;
-            line.extend(count.parse().ok().map(|count: f64| (count, times.1[2])));
-            let cells = [name(view).into(), count.into(), times.0.map(|ms| 1e3 / ms).into()];
-            table.push(cells.into_iter().chain(shares(times)));
+        for (method, surfaces) in [(EXACT_SPECULAR, "all"), (EXACT, "diffuse")] {
+            let mut line = Vec::new();
+            for run in results.at(view).filter(|run| run.method == method) {
+                let Some(count) = run.value("igi.vpls") else { continue };
+                let spent = spent(results, run)?;
+                line.extend(count.parse().ok().map(|count: f64| (count, spent.indirect())));
+                let cells = [name(view).into(), surfaces.into(), count.into(), spent.frame.map(|ms| 1e3 / ms).into()];
+                table.push(cells.into_iter().chain(spent.shares()));
+            }
+            if !line.is_empty() {
+                plot = plot.line(format!("{}, {surfaces}", name(view)), line);
+            }
         }
-        plot = plot.line(name(view), line);
     }
     section.add(table);
     section.add(plot.timed());
@@ -91,17 +108,22 @@ fn name((scene, view): (&str, &str)) -> String {
     format!("{scene}, {view}")
 }
 
-/// The exact variant with [`COUNT`] virtual lights.
-fn exact<'a>(results: &'a Results, view: (&'a str, &'a str)) -> Option<&'a Done> {
-    results.at(view).find(|run| run.method == "exact" && run.value("igi.vpls").is_none_or(|count| count == COUNT))
+/// The run of a technique with [`COUNT`] virtual lights, or with none stated.
+fn counted<'a>(results: &'a Results, view: (&'a str, &'a str), method: &str) -> Option<&'a Done> {
+    results.at(view).find(|run| run.method == method && run.value("igi.vpls").is_none_or(|count| count == COUNT))
 }
 
 /// What is held against the exact variant, that one first.
 fn others<'a>(results: &'a Results, view: (&'a str, &'a str)) -> Vec<&'a Done> {
     let technique = |run: &&Done| results.with_role(Role::Technique).any(|known| known.key == run.key);
-    let others = results.at(view).filter(technique);
-    let others = others.filter(|run| run.method != "exact" && !beyond::OWN.contains(&run.method.as_str()));
-    exact(results, view).into_iter().chain(others).collect()
+    let own = |method: &str| method == EXACT || SPECULAR.contains(&method) || beyond::OWN.contains(&method);
+    let others = results.at(view).filter(technique).filter(|run| !own(&run.method));
+    counted(results, view, EXACT).into_iter().chain(others).collect()
+}
+
+/// The same with all surfaces as they are.
+fn specular<'a>(results: &'a Results, view: (&'a str, &'a str)) -> Vec<&'a Done> {
+    SPECULAR.iter().filter_map(|method| counted(results, view, method)).collect()
 }
 
 fn reference<'a>(results: &'a Results, view: (&'a str, &'a str)) -> Option<&'a Done> {
@@ -111,17 +133,19 @@ fn reference<'a>(results: &'a Results, view: (&'a str, &'a str)) -> Option<&'a D
 /// Figure 5 and what it costs.
 fn variants(results: &Results) -> Result<Section> {
     let mut section = Section::new("Figure 5: the accelerations");
-    section.text(
-        "180 virtual lights. *Speed* is the frame's, over the exact variant; *indirect* that of gathering and filters alone. The paper has \
-         1.5 to 2.0 for imperfect visibility, about 5 for downsampling, and 2.8 frames per second with all three.",
-    );
-    let heads = ["scene", "variant", "frames per second"].into_iter().chain(STAGES.map(|stage| stage.0));
+    section.text(format!(
+        "{COUNT} virtual lights, but where a variant has its own number. *Speed* is the frame's, over the exact variant with the same surfaces; \
+         *indirect* that of the stages indirect and filters together: gathering, refinement, light put back, despeckling, smoothing, upsampling. The paper \
+         has 1.5 to 2.0 for imperfect visibility, about 5 for downsampling, and 2.8 frames per second with all three. `{EXACT_SPECULAR}` and \
+         `{PAPER_SPECULAR}` show mirrors, glass and highlights; all others, and all errors, are of diffuse surfaces alone, for the reference has no more.",
+    ));
+    let heads = ["scene", "variant", "frames per second"].into_iter().chain(STAGES);
     let heads = heads.chain(["speed", "indirect, speed"]);
     let mut table = Table::new("figure-5", "Time of the variants", heads).timed();
     let columns = [
         "scene",
         "variant",
-        "light",
+        "indirect light / reference's",
         "rel. MSE to exact",
         "FLIP to exact",
         "PDiff to exact",
@@ -131,16 +155,30 @@ fn variants(results: &Results) -> Result<Section> {
     ];
     let mut errors = Table::new("errors", "Errors of the variants", columns);
     for view in results.views() {
-        let Some(exact) = exact(results, view) else { continue };
-        let base = stages(results, exact)?;
+        let Some(exact) = counted(results, view, EXACT) else {
+            let what =
+                format!("*{}* is left out: there is no run of `{EXACT}` with {COUNT} virtual lights.", name(view));
+            section.text(what);
+            continue;
+        };
+        for list in [specular(results, view), others(results, view)] {
+            // Relative to the first.
+            let Some(base) = list.first().map(|run| spent(results, run)).transpose()? else { continue };
+            for run in list {
+                let spent = spent(results, run)?;
+                let speed = base.frame.zip(spent.frame).map(|(base, ms)| base / ms);
+                let indirect = spent.gathering_and_filters();
+                let indirect = (indirect > 0.0).then(|| base.gathering_and_filters() / indirect);
+                let cells = [name(view).into(), run.label().into(), spent.frame.map(|ms| 1e3 / ms).into()];
+                table.push(cells.into_iter().chain(spent.shares()).chain([speed.into(), indirect.into()]));
+            }
+        }
         let truth = reference(results, view);
+        let light = match truth {
+            Some(truth) => Some(mean(results, truth, "indirect")?).filter(|m| *m > 0.0),
+            None => None,
+        };
         for run in others(results, view) {
-            let times = stages(results, run)?;
-            let indirect = |times: &(Option<f64>, [f64; 4])| times.1[2] + times.1[3];
-            let speed = base.0.zip(times.0).map(|(base, ms)| base / ms);
-            let indirect = (indirect(&times) > 0.0).then(|| indirect(&base) / indirect(&times));
-            let cells = [name(view).into(), run.label().into(), times.0.map(|ms| 1e3 / ms).into()];
-            table.push(cells.into_iter().chain(shares(times)).chain([speed.into(), indirect.into()]));
             let list = [Measure::RelMse, Measure::Flip, Measure::Pdiff];
             let against = |other: Option<&Done>| -> Result<[Cell; 3]> {
                 let Some(other) = other.filter(|other| other.key != run.key) else {
@@ -149,17 +187,17 @@ fn variants(results: &Results) -> Result<Section> {
                 let values = results.measures(&list, Layer(other, ""), Layer(run, ""), None)?;
                 Ok(std::array::from_fn(|i| values.get(i).copied().into()))
             };
-            let light = match truth {
-                Some(truth) => Some(mean(results, truth, "indirect")?).filter(|m| *m > 0.0),
-                None => None,
-            };
             let found = mean(results, run, "indirect")?;
             let cells = [name(view).into(), run.label().into(), light.map(|light| found / light).into()];
             errors.push(cells.into_iter().chain(against(Some(exact))?).chain(against(truth)?));
         }
     }
     section.add(table);
-    section.text("*Light* is the mean of the indirect light over that of the reference.");
+    section.text(
+        "Errors are of the whole picture; the reference traces paths with as many bounces and diffuse surfaces alone. *Indirect light / reference's* is the \
+         mean of the indirect light over that of the reference. One seed: where few virtual lights reach the view, as in the office with evenly shot paths, \
+         another seed gives other figures.",
+    );
     section.add(errors);
     Ok(section)
 }
@@ -174,21 +212,27 @@ fn mean(results: &Results, run: &Done, layer: &str) -> Result<f64> {
 /// Figures 6 and 7.
 fn images(results: &Results) -> Result<Section> {
     let mut section = Section::new("Figures 6 and 7: images");
+    section.text("First with mirrors, glass and highlights, as in the paper; then all variants with diffuse surfaces alone, beside the reference.");
     for view in spread(&results.views(), Some(results.experiment.images)) {
-        let mut set: Option<Comparison> = None;
-        for run in reference(results, *view).into_iter().chain(others(results, *view)) {
-            let picture = results.picture(Layer(run, ""))?;
-            let (scene, camera) = *view;
-            let id = format!("{scene}-{camera}");
-            let new = || Comparison::new(id, name(*view), picture.width, picture.height);
-            let current = match set.take() {
-                Some(set) => set,
-                None => new().exposure(results.exposure(run)?),
-            };
-            set = Some(current.with(run.label(), picture.pixels));
-        }
-        if let Some(set) = set {
-            section.add(set.at_most(SIDE));
+        let (scene, camera) = *view;
+        let diffuse = reference(results, *view).into_iter().chain(others(results, *view)).collect();
+        for (id, title, list) in [
+            (format!("{scene}-{camera}-specular"), format!("{}, all surfaces", name(*view)), specular(results, *view)),
+            (format!("{scene}-{camera}"), name(*view), diffuse),
+        ] {
+            let mut set: Option<Comparison> = None;
+            for run in list {
+                let picture = results.picture(Layer(run, ""))?;
+                let current = match set.take() {
+                    Some(set) => set,
+                    None => Comparison::new(id.clone(), title.clone(), picture.width, picture.height)
+                        .exposure(results.exposure(run)?),
+                };
+                set = Some(current.with(run.label(), picture.pixels));
+            }
+            if let Some(set) = set {
+                section.add(set.at_most(SIDE));
+            }
         }
     }
     Ok(section)

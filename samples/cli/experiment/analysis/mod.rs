@@ -8,7 +8,7 @@ mod tonemap;
 
 use lucerna::{Error, Result};
 
-use super::results::Results;
+use super::{file::Experiment, results::Results};
 use crate::{config, report::Page};
 
 /// Fills the page. Title, summary, warnings and facts are there already.
@@ -33,6 +33,14 @@ pub fn find(name: &str) -> Result<Analysis> {
         let hint = config::nearest(name, names.iter().copied()).map(|name| format!(" (did you mean '{name}'?)"));
         Error::input(format!("no analysis '{name}'{}; there are {}", hint.unwrap_or_default(), names.join(", ")))
     })
+}
+
+/// What an analysis asks of an experiment beyond what all do.
+///
+/// # Errors
+/// `Input`, naming the key.
+pub fn check(experiment: &Experiment) -> Result<()> {
+    if experiment.analysis == "igi" { igi::check(experiment) } else { Ok(()) }
 }
 
 /// The report of an experiment.

@@ -150,6 +150,8 @@ pub fn parse(name: &str, path: Option<&Path>, text: &str, quick: bool) -> Result
         let line = line_at(text, entry.span().start);
         experiment.methods.push(Method { role, line, ..entry.into_inner() });
     }
+    // Before quick mode leaves out any.
+    analysis::check(&experiment).map_err(|error| error.in_file(&shown))?;
     if let Some(changes) = raw.quick.filter(|_| quick) {
         let line = line_at(text, changes.span().start);
         let changes = changes.into_inner();

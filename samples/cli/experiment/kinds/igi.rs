@@ -4,17 +4,17 @@ use lucerna::{
     Result,
     graph::Runner,
     scene::resident::Resident,
-    techniques::igi::{Igi, PictureSettings},
+    techniques::igi::{Igi, PictureSettings, Visibility},
 };
 use serde_json::Value;
 
-use super::{Job, Rendered, Warm, on_device, read};
+use super::{GATHERED, Job, Rendered, Warm, on_device, read};
 use crate::{config, experiment::file::Changes, gbuffer_layers, shown::Shown};
 
 pub(super) fn settings(paper: bool, changes: &Changes) -> Result<Value> {
     let base = if paper { PictureSettings::paper() } else { PictureSettings::default() };
     let settings: PictureSettings = config::with(&base, changes)?;
-    settings.igi.validate()?;
+    settings.igi.validate().map_err(|error| error.at("igi"))?;
     config::to_value(&settings)
 }
 
@@ -31,7 +31,7 @@ pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rende
     // Boxes and rays of another kind need trees of their own.
     let name = if settings.igi.imperfect { "igi, imperfect" } else { "igi" };
     let name = match settings.igi.visibility {
-        lucerna::techniques::igi::Visibility::Auto => name,
+        Visibility::Auto => name,
         _ => "igi, chosen rays",
     };
     if name == "igi, chosen rays" {
@@ -48,7 +48,13 @@ pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rende
         let view = job.view.fit_far(&handles.bounds());
         let picture = igi.picture(graph, scene, pose, &handles, &view, &settings)?;
         let out = picture.outputs;
-        let shown = Shown::new(out.total).color("direct", out.direct).color("indirect", out.indirect);
+        let mut shown = Shown::new(out.total).color("direct", out.direct).color("indirect", out.indirect);
+        if let Some(sharp) = out.sharp {
+            shown = shown.color("specular", sharp);
+        }
+        if settings.igi.indirect && settings.igi.visibility != Visibility::Raster {
+            shown = shown.sum(GATHERED, out.gathered, |pixel| pixel[3]);
+        }
         Ok(gbuffer_layers::add(shown, &picture.gbuffer, &view))
     })
 }

@@ -5,7 +5,7 @@
 
 use lucerna::{Result, measure::Measure};
 
-use super::{mean, name, reference, stages};
+use super::{mean, name, reference, stages::spent};
 use crate::{
     experiment::results::{Done, Layer, Results},
     report::{Axis, Plot, Section, Table},
@@ -13,6 +13,8 @@ use crate::{
 
 /// Techniques that have a section of their own.
 pub(super) const OWN: [&str; 4] = [ALL, PICKED, MIRRORS, CACHE];
+/// Those of many virtual lights.
+pub(super) const MANY: [&str; 2] = [ALL, PICKED];
 const ALL: &str = "all";
 const PICKED: &str = "picked";
 const MIRRORS: &str = "mirrors";
@@ -21,15 +23,9 @@ const CACHE: &str = "mirrors, cache";
 /// Of the variants by name: the one with the number of virtual lights that all have.
 fn run<'a>(results: &'a Results, view: (&'a str, &'a str), method: &str) -> Option<&'a Done> {
     match method {
-        "exact" => super::exact(results, view),
+        super::EXACT | super::EXACT_SPECULAR => super::counted(results, view, method),
         _ => results.at(view).find(|run| run.method == method),
     }
-}
-
-/// Milliseconds of gathering and filters.
-fn indirect(results: &Results, run: &Done) -> Result<f64> {
-    let (_, sums) = stages(results, run)?;
-    Ok(sums[2] + sums[3])
 }
 
 fn error(results: &Results, truth: &Done, layer: &'static str, run: &Done) -> Result<Option<f64>> {
@@ -47,7 +43,8 @@ pub(super) fn successors(results: &Results) -> Result<Section> {
     let mut section = Section::new("What the ideas after the paper buy");
     section.text(
         "Each beside what it improves on. *Error*: relative mean squared error of the indirect light against the path tracer, over that of the \
-         other; below 1 is better. *Time*: of gathering and filters, and of the whole frame, over the other's. *Light*: mean of the indirect light \
+         other; below 1 is better. *Time*: of the stages indirect and filters (gathering, refinement, light put back, despeckling, smoothing, \
+         upsampling), and of the whole frame, over the other's. *Light*: mean of the indirect light \
          over the reference's, of the other and of the idea.",
     );
     let columns = ["scene", "idea", "beside", "error", "light before", "light"];
@@ -69,8 +66,9 @@ pub(super) fn successors(results: &Results) -> Result<Section> {
             }
             let names = [name(view).into(), idea.as_str().into(), other.into()];
             errors.push(names.clone().into_iter().chain([ratio.into(), light[0].into(), light[1].into()]));
-            let gathering = over(Some(indirect(results, new)?), Some(indirect(results, old)?));
-            let frame = over(stages(results, new)?.0, stages(results, old)?.0);
+            let (new, old) = (spent(results, new)?, spent(results, old)?);
+            let gathering = over(Some(new.gathering_and_filters()), Some(old.gathering_and_filters()));
+            let frame = over(new.frame, old.frame);
             times.push(names.into_iter().chain([gathering.into(), frame.into()]));
         }
     }
@@ -98,8 +96,7 @@ pub(super) fn many(results: &Results) -> Result<Section> {
             let [mut time_line, mut error_line] = [const { Vec::<(f64, f64)>::new() }; 2];
             for run in results.at(view).filter(|run| run.method == method) {
                 let Some(count) = run.value("igi.vpls").and_then(|count| count.parse::<f64>().ok()) else { continue };
-                let (_, sums) = stages(results, run)?;
-                let ms = sums[2];
+                let ms = spent(results, run)?.indirect();
                 let exponent = time_line.last().map(|(before, of)| (ms / of).ln() / (count / before).ln());
                 times.push([name(view).into(), method.into(), count.into(), ms.into(), exponent.into()]);
                 time_line.push((count, ms));
@@ -138,9 +135,9 @@ pub(super) fn cached(results: &Results) -> Result<Section> {
     let mut errors = Table::new("cache", "Errors of the cache", columns);
     for view in results.views() {
         let Some((without, with)) = run(results, view, MIRRORS).zip(run(results, view, CACHE)) else { continue };
-        let ((whole, sums), (whole_cached, cached)) = (stages(results, without)?, stages(results, with)?);
-        let ratio = over(Some(cached[1]), Some(sums[1]));
-        times.push([name(view).into(), ratio.into(), over(whole_cached, whole).into()]);
+        let (plain, cached) = (spent(results, without)?, spent(results, with)?);
+        let ratio = over(Some(cached.direct()), Some(plain.direct()));
+        times.push([name(view).into(), ratio.into(), over(cached.frame, plain.frame).into()]);
         let list = [Measure::RelMse, Measure::Flip, Measure::Pdiff];
         let values = results.measures(&list, Layer(without, ""), Layer(with, ""), None)?;
         let values = (0..list.len()).map(|i| values.get(i).copied().into());

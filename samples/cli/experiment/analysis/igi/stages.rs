@@ -1,0 +1,225 @@
+//! Which stage of the paper's figures a pass of a frame belongs to.
+
+use lucerna::Result;
+
+use crate::{
+    experiment::results::{Done, Results},
+    report::Cell,
+};
+
+/// Parts of a frame, finer than the paper's stages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Part {
+    Shooting,
+    /// Which of the candidates become virtual lights.
+    Choosing,
+    /// Virtual lights in the order of a tree over them.
+    Sorting,
+    Visible,
+    Direct,
+    /// What mirrors and glass show, its light included.
+    Trees,
+    Gathering,
+    /// Gathered once more where the coarse picture has nothing.
+    Refining,
+    /// What the bound takes, by short rays.
+    PutBack,
+    Filters,
+    History,
+    /// The sum, the sky, uploads and what clears memory.
+    Other,
+}
+
+/// Columns of figures 4 and 5.
+pub(super) const STAGES: [&str; 5] =
+    ["shooting (%)", "direct and specular (%)", "indirect (%)", "filters (%)", "other (%)"];
+
+impl Part {
+    /// Index into [`STAGES`].
+    fn stage(self) -> usize {
+        match self {
+            Self::Shooting | Self::Choosing | Self::Sorting => 0,
+            Self::Visible | Self::Direct | Self::Trees => 1,
+            Self::Gathering | Self::Refining | Self::PutBack => 2,
+            Self::Filters | Self::History => 3,
+            Self::Other => 4,
+        }
+    }
+}
+
+/// Names of passes, whole ones, or with a star beginnings.
+const PARTS: &[(Part, &[&str])] = &[
+    (Part::Shooting, &["igi.shoot", "fill igi.candidates", "fill igi.paths"]),
+    (Part::Choosing, &["igi.points", "igi.importance", "igi.cumulate", "igi.resample", "fill igi.importances"]),
+    (Part::Sorting, &["igi.order_*"]),
+    (Part::Visible, &["passes.gbuffer*"]),
+    (Part::Direct, &["igi.direct", "clear igi.direct"]),
+    (
+        Part::Trees,
+        &[
+            "igi.grow",
+            "igi.reap",
+            "igi.direct_tree",
+            "igi.gather_tree*",
+            "igi.cache*",
+            "igi.near_begin_tree",
+            "igi.near_end_tree",
+            "fill igi.trees",
+            "clear igi.sharp",
+            "fill igi.cache*",
+        ],
+    ),
+    (Part::Gathering, &["igi.gather", "igi.gather_picks", "igi.gather_raster", "igi.raster*", "clear igi.irradiance"]),
+    (Part::Refining, &["igi.refine*"]),
+    (Part::PutBack, &["igi.near*", "fill igi.near"]),
+    (Part::Filters, &["igi.guide", "igi.discontinuity", "igi.smooth", "igi.upsample", "fill igi.unmatched"]),
+    (
+        Part::History,
+        &[
+            "igi.history*",
+            "igi.motion",
+            "igi.probe*",
+            "igi.recall",
+            "igi.remember",
+            "copy igi.history*",
+            "fill igi.history*",
+        ],
+    ),
+    (Part::Other, &["igi.compose"]),
+];
+
+/// Part of a pass by its name, without its number; the longest name that fits counts. `None`: nothing is known of it.
+fn part_of(name: &str) -> Option<Part> {
+    let name = name.split('#').next().unwrap_or(name);
+    let fits = |pattern: &&str| match pattern.strip_suffix('*') {
+        Some(beginning) => name.starts_with(beginning),
+        None => name == *pattern,
+    };
+    let all = PARTS.iter().flat_map(|(part, patterns)| patterns.iter().map(move |pattern| (*part, *pattern)));
+    let best = all.filter(|(_, pattern)| fits(pattern)).max_by_key(|(_, pattern)| pattern.trim_end_matches('*').len());
+    best.map(|(part, _)| part)
+}
+
+/// Milliseconds of a frame by its parts.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Spent {
+    /// Of the whole frame; `None`: nothing was measured.
+    pub frame: Option<f64>,
+    parts: Vec<(Part, f64)>,
+}
+
+impl Spent {
+    /// From passes in the order in which they ran. Passes that serve both the picture and what mirrors show belong to that for
+    /// which they were begun.
+    fn of<'a>(frame: Option<f64>, passes: impl IntoIterator<Item = (&'a str, f64)>) -> Self {
+        let (mut parts, mut in_trees) = (Vec::<(Part, f64)>::new(), false);
+        for (name, ms) in passes {
+            let mut part = part_of(name).unwrap_or(Part::Other);
+            in_trees |= name.starts_with("igi.near_begin_tree");
+            if in_trees && part == Part::PutBack {
+                part = Part::Trees;
+            }
+            in_trees &= !name.starts_with("igi.near_end_tree");
+            match parts.iter_mut().find(|(known, _)| *known == part) {
+                Some((_, sum)) => *sum += ms,
+                None => parts.push((part, ms)),
+            }
+        }
+        Self { frame, parts }
+    }
+
+    /// Of one part.
+    pub fn part(&self, part: Part) -> f64 {
+        self.parts.iter().filter(|(known, _)| *known == part).map(|(_, ms)| ms).sum()
+    }
+
+    /// Of one of [`STAGES`].
+    fn stage(&self, stage: usize) -> f64 {
+        self.parts.iter().filter(|(part, _)| part.stage() == stage).map(|(_, ms)| ms).sum()
+    }
+
+    /// The paper's stage *direct and specular*.
+    pub fn direct(&self) -> f64 {
+        self.stage(1)
+    }
+
+    /// The paper's stage *indirect*, without filters.
+    pub fn indirect(&self) -> f64 {
+        self.stage(2)
+    }
+
+    /// Gathering with all that it needs to become a picture: refinement, what is put back, filters.
+    pub fn gathering_and_filters(&self) -> f64 {
+        self.stage(2) + self.stage(3)
+    }
+
+    /// Percent of the time of all passes, for [`STAGES`]; they add up to 100.
+    pub fn shares(&self) -> [Cell; STAGES.len()] {
+        let all: f64 = self.parts.iter().map(|(_, ms)| ms).sum();
+        std::array::from_fn(|stage| (all > 0.0).then(|| 100.0 * self.stage(stage) / all).into())
+    }
+}
+
+/// What a run spent its time on.
+pub(super) fn spent(results: &Results, run: &Done) -> Result<Spent> {
+    let times = results.times(run)?;
+    Ok(Spent::of(times.frame(), times.passes.iter().map(|(name, ms)| (name.as_str(), *ms))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_shader_of_the_technique_has_a_part() {
+        let own: Vec<&str> = lucerna::shaders::ALL.iter().map(|shader| shader.name).collect();
+        let own: Vec<&str> = own.into_iter().filter(|name| name.starts_with("igi.")).collect();
+        assert!(own.len() > 40, "{own:?}");
+        for name in own {
+            assert!(part_of(name).is_some(), "{name} belongs to no stage");
+            assert_eq!(part_of(name), part_of(&format!("{name}#17")), "{name}");
+        }
+        for (name, part) in [
+            ("igi.gather#3", Part::Gathering),
+            ("igi.gather_tree#3", Part::Trees),
+            ("igi.gather_tree_picks", Part::Trees),
+            ("igi.direct_tree", Part::Trees),
+            ("igi.raster.12.1", Part::Gathering),
+            ("igi.raster_cutout.12.1", Part::Gathering),
+            ("igi.refine#2", Part::Refining),
+            ("igi.refine_groups", Part::Refining),
+            ("igi.smooth#2", Part::Filters),
+            ("igi.probe_light", Part::History),
+            ("passes.gbuffer.opaque.both", Part::Visible),
+            ("igi.compose", Part::Other),
+        ] {
+            assert_eq!(part_of(name), Some(part), "{name}");
+        }
+        assert_eq!(part_of("passes.skybox"), None);
+    }
+
+    #[test]
+    fn shares_add_up_and_what_mirrors_show_counts_for_them() {
+        let passes = [
+            ("upload", 1.0),
+            ("igi.shoot", 2.0),
+            ("igi.near_begin", 3.0),
+            ("igi.near_trace", 4.0),
+            ("igi.near_begin_tree", 5.0),
+            ("igi.near_trace#2", 6.0),
+            ("igi.near_end_tree", 7.0),
+            ("igi.near_direct#9", 8.0),
+            ("igi.smooth", 9.0),
+            ("igi.refine", 10.0),
+            ("passes.skybox", 11.0),
+        ];
+        let spent = Spent::of(Some(70.0), passes);
+        assert_eq!(spent.part(Part::PutBack), 15.0);
+        assert_eq!(spent.direct(), 18.0);
+        assert_eq!(spent.indirect(), 25.0);
+        assert_eq!(spent.gathering_and_filters(), 34.0);
+        let sum: f64 = spent.shares().iter().map(|cell| if let Cell::Number(n) = cell { *n } else { 0.0 }).sum();
+        assert!((sum - 100.0).abs() < 1e-9, "{sum}");
+        assert!(Spent::of(None, []).shares().iter().all(|cell| *cell == Cell::Empty));
+    }
+}
