@@ -88,9 +88,11 @@ const PARTS: &[(Part, &[&str])] = &[
     (Part::Other, &["igi.compose"]),
 ];
 
-/// Part of a pass by its name, without its number; the longest name that fits counts. `None`: nothing is known of it.
+/// Part of a pass by its name, without its number and how its rays are traced; the longest name that fits counts. `None`: nothing is
+/// known of it.
 fn part_of(name: &str) -> Option<Part> {
     let name = name.split('#').next().unwrap_or(name);
+    let name = name.strip_suffix(" (ray query)").unwrap_or(name);
     let fits = |pattern: &&str| match pattern.strip_suffix('*') {
         Some(beginning) => name.starts_with(beginning),
         None => name == *pattern,
@@ -181,6 +183,7 @@ mod tests {
         }
         for (name, part) in [
             ("igi.gather#3", Part::Gathering),
+            ("igi.gather (ray query)#3", Part::Gathering),
             ("igi.gather_tree#3", Part::Trees),
             ("igi.gather_tree_picks", Part::Trees),
             ("igi.direct_tree", Part::Trees),
