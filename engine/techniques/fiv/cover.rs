@@ -8,7 +8,7 @@
 
 use glam::{Mat3, Vec3};
 
-use super::{light::Light, occluder::Occluder, suns, surface::Place};
+use super::{light::Light, occluder::Occluder, parallel::Parallel, suns, surface::Place};
 use crate::{
     Result,
     gpu::Gpu,
@@ -59,6 +59,7 @@ pub struct Cover<'a> {
     pose: Pose,
     tiles: u64,
     turn: usize,
+    parallel: Option<Parallel>,
 }
 
 /// What is hidden from some points, in their order.
@@ -77,7 +78,16 @@ impl<'a> Cover<'a> {
         let resident = Resident::new(gpu, &occluder.scene)?;
         let rays = Rays::new(gpu, &occluder.scene, &resident)?;
         let tiles = tiles(gpu, &rays)?;
-        Ok(Self { occluder, resident, rays, pose: Pose::rest(&occluder.scene), tiles, turn: 0 })
+        Ok(Self { occluder, resident, rays, pose: Pose::rest(&occluder.scene), tiles, turn: 0, parallel: None })
+    }
+
+    /// From now on points are looked up in pictures along the rays ([`super::parallel`]), where that is possible.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`.
+    pub fn look_up(&mut self, gpu: &Gpu, size: u32, split: u32) -> Result<()> {
+        self.parallel = Parallel::new(gpu, self.occluder, (&mut self.resident, &mut self.rays), (size, split))?;
+        Ok(())
     }
 
     /// From now on with the light that the occluder has around itself if it is turned; `turn`: of the samples that the light has.
@@ -121,13 +131,17 @@ impl<'a> Cover<'a> {
         };
         let row = light.size * split / 8;
         let all = 6 * row * row;
-        let chunks = all.div_ceil(self.tiles as u32);
+        let parallel = self.parallel.as_ref().filter(|parallel| !own && parallel.fits(light, split));
+        let chunks = parallel.map_or(all.div_ceil(self.tiles as u32), Parallel::chunks);
         // A tenth of the sphere from each point, about; half of it from the surface.
         let part = if own { 2 } else { 10 };
         let each = (MOST_RAYS / (u64::from(all) * 64 / part).max(1)).clamp(1, MOST_POINTS.into()) as u32;
         let partials = graph.buffer("fiv.partials", u64::from(each.min(total)) * u64::from(chunks) * 40);
         for first in (0..total).step_by(each as usize) {
             let count = each.min(total - first);
+            if let Some(parallel) = parallel {
+                parallel.declare(graph, (texels, list, partials), (first, count));
+            } else {
             let args = crate::rays::traced!(
                 fiv::cover::Args {
                     texels,
@@ -146,6 +160,7 @@ impl<'a> Cover<'a> {
                 rays
             );
             graph.compute(args, [64 * count, chunks, 1]);
+            }
             let inside = if own { 0.0 } else { inside() };
             let push = fiv::gather::Push { first, count, chunks, inside, own: own.into() };
             let (fivs, coverage) = (covered.fivs, covered.coverage);

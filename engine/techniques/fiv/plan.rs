@@ -12,7 +12,7 @@ use super::{
     occluder::Occluder,
     pace::{self, Paces},
     samples::{Grid, Shells},
-    settings::{Interpolation, SelfSamples},
+    settings::{Interpolation, Masks, SelfSamples},
     surface::Own,
     turn,
 };
@@ -62,6 +62,9 @@ pub struct Plan {
     pub size: u32,
     /// Rays along the edge of a texel.
     pub split: u32,
+    /// How masks are made.
+    #[serde(default)]
+    pub masks: Masks,
     /// Radius of the last spheres, in radii of the bounding spheres.
     pub reach: f32,
     #[serde(flatten)]
@@ -93,6 +96,7 @@ impl Plan {
             environment_hash: format!("{hash:016x}"),
             size: settings.size,
             split: settings.split,
+            masks: settings.masks,
             reach: settings.reach,
             grid: settings.grid(),
             surface: settings.on_surface(),
@@ -132,9 +136,10 @@ impl Plan {
     /// These settings with what of them decides these numbers.
     pub fn settings(&self, over: &Settings) -> Settings {
         let Grid { azimuths, polars, radii } = self.grid;
-        let (size, split, reach, turns, suns) = (self.size, self.split, self.reach, self.turns, self.suns);
+        let (size, split, masks, reach) = (self.size, self.split, self.masks, self.reach);
+        let (turns, suns) = (self.turns, self.suns);
         let self_samples = if self.surface { SelfSamples::Surface } else { SelfSamples::Spheres };
-        Settings { size, split, reach, azimuths, polars, radii, turns, suns, self_samples, ..over.clone() }
+        Settings { size, split, masks, reach, azimuths, polars, radii, turns, suns, self_samples, ..over.clone() }
     }
 
     /// How another plan differs in what decides the numbers, in words; `None`: it does not.
@@ -146,6 +151,9 @@ impl Plan {
                 format!("{grid} samples, {turns} turns, {size} texels, {split} rays along one, {suns} lights apart")
             };
             return Some(format!("{} instead of {}", say(other), say(self)));
+        }
+        if self.masks != other.masks {
+            return Some(format!("masks by {:?} instead of {:?}", other.masks, self.masks));
         }
         if self.environment_hash != other.environment_hash {
             let say = |of: &Self| format!("environment `{}` ({})", of.environment, of.environment_hash);
@@ -211,6 +219,9 @@ impl Plan {
                 continue;
             }
             let mut cover = Cover::new(gpu, occluder)?;
+            if self.masks == Masks::Parallel {
+                cover.look_up(gpu, self.size, self.split)?;
+            }
             let places = occluder.places();
             while at < last {
                 let of_turn = self.of_turn(kind);

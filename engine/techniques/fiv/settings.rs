@@ -54,6 +54,18 @@ pub enum SelfSamples {
     Spheres,
 }
 
+/// How it is found what an occluder hides from a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Masks {
+    /// By rays from the sample.
+    #[default]
+    Rays,
+    /// From pictures of the occluder along the directions of the rays: the cost of tracing is the same for any number of samples, edges of
+    /// masks are off by up to a 128th of the radius. Rays, where `size` · `split` is more than 44 or surfaces are blended.
+    Parallel,
+}
+
 /// What several occluders hide together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -103,6 +115,7 @@ pub struct Settings {
     pub adaptive: bool,
     /// Rays along the edge of a texel of an occluder's mask, 1 to 4.
     pub split: u32,
+    pub masks: Masks,
     /// Flat occluders cast shadows too.
     pub flat: bool,
     /// Where there are several occluders, those of more than this share of the scene's radius only receive shadows, 0 to 1. One that holds
@@ -145,6 +158,7 @@ impl Default for Settings {
             reach: 16.0,
             adaptive: true,
             split: 1,
+            masks: Masks::default(),
             flat: false,
             largest: 0.5,
             trilinear: true,

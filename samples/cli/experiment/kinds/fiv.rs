@@ -212,7 +212,9 @@ fn vectors(
 fn name(gpu: &Gpu, plan: &Plan, settings: &Settings) -> Result<String> {
     let about = gpu.describe();
     let device = format!("{}, {} {}", about.device, about.driver, about.driver_info);
-    let text = json!([Cache::sources_of(SOURCES), device, config::to_value(plan)?, config::to_value(settings)?]);
+    // How samples lie is chosen from these; all else that decides them is in the plan.
+    let paces = (settings.adaptive, settings.interpolation);
+    let text = json!([Cache::sources_of(SOURCES), device, config::to_value(plan)?, config::to_value(&paces)?]);
     Ok(Digest::of(text.to_string().as_bytes()).hex())
 }
 
