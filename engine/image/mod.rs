@@ -18,6 +18,7 @@ mod metadata;
 mod pfm;
 mod picture;
 mod png_file;
+mod probe;
 mod radiance;
 mod sidecar;
 pub mod srgb;
@@ -28,6 +29,7 @@ pub use color::{Chromaticities, REC_709};
 pub use file::{probe_output, read_file_checked, write_atomic};
 pub use metadata::Metadata;
 pub use picture::{Layer, Layers, Precision};
+pub use probe::from_angular_map;
 
 use crate::{Error, ErrorKind, Result, scene::Limits};
 

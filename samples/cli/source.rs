@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use lucerna::{
-    Error, Result,
+    Error, Result, image,
     scene::{self, Environment, Limits, LoadOptions, Note, Scene, builtin, environment},
 };
 
@@ -49,14 +49,25 @@ pub fn is_built_in_environment(path: &Path) -> bool {
     path.to_str().is_some_and(|name| builtin::ENVIRONMENTS.contains(&name)) && !path.is_file()
 }
 
-/// Reads an environment, or makes a built-in one.
+/// Reads an environment, or makes a built-in one. A square picture is a light probe, an angular map.
 ///
 /// # Errors
 /// `Input` if the file cannot be served.
 pub fn environment(path: &Path) -> Result<(Environment, Vec<Note>)> {
     match path.to_str() {
         Some(name) if is_built_in_environment(path) => Ok((builtin::environment(name)?, Vec::new())),
-        _ => environment::load(path, &Limits::default()),
+        _ if path.is_dir() => environment::load(path, &Limits::default()),
+        _ => {
+            // Its latitude-longitude picture is twice as large, and both stand side by side.
+            let limits = Limits::default();
+            let limits = Limits { max_alloc: limits.max_alloc / 4, ..limits };
+            let picture = image::read(path, &limits)?;
+            let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+            let plain = !picture.metadata.extra.contains_key("envmap");
+            let unfolded = plain.then(|| image::from_angular_map(&picture)).flatten();
+            let found = environment::from_picture(unfolded.as_ref().unwrap_or(&picture), name, &Limits::default());
+            found.map_err(|error| error.in_file(path))
+        }
     }
 }
 

@@ -19,12 +19,26 @@ layout(binding = 2) uniform sampler2D depth;
 layout(binding = 3, scalar) readonly buffer Texels { FivTexel texels[]; };
 layout(binding = 4, scalar) readonly buffer Lit { uint lit[]; }; // texels that are not black
 layout(binding = 5, rgba32f) uniform image2D irradiance;         // W/m²
+layout(binding = 6, scalar) readonly buffer Boxes { vec3 boxes[]; }; // least and greatest corners around all that stops light
 
 layout(push_constant, scalar) uniform Push {
     uint first; // of the lit texels
     uint count;
     uint size;  // texels of the environment along an edge
+    uint around; // boxes; 0: there are too many
 };
+
+// Whether anything may lie on a ray: where a few things stand on a ground most rays pass all of them.
+bool near_anything(vec3 origin, vec3 direction) {
+    if (around == 0u) return true;
+    vec3 each = 1.0 / mix(direction, vec3(1e-20), lessThan(abs(direction), vec3(1e-20)));
+    for (uint k = 0u; k < around; ++k) {
+        vec3 a = (boxes[2u * k] - origin) * each, b = (boxes[2u * k + 1u] - origin) * each;
+        vec3 enter = min(a, b), leave = max(a, b);
+        if (max(max(enter.x, enter.y), max(enter.z, 0.0)) <= min(leave.x, min(leave.y, leave.z))) return true;
+    }
+    return false;
+}
 
 void main() {
     ivec2 pixel = spread_texel();
@@ -44,7 +58,7 @@ void main() {
         if (cosine <= 0.0) continue;
         uint place = i % (size * size);
         vec3 direction = cube_direction(i / (size * size), (vec2(place % size, place / size) + 0.5) / float(size));
-        if (trace_any(Ray(origin, 0.0, direction, 1e30), TRACE_SHADOW, pcg4d(uvec4(pixel, i, 0u)).x)) continue;
+        if (near_anything(origin, direction) && trace_any(Ray(origin, 0.0, direction, 1e30), TRACE_SHADOW, pcg4d(uvec4(pixel, i, 0u)).x)) continue;
         sum += texels[i].radiance * cosine;
     }
     imageStore(irradiance, pixel, vec4(sum, 1.0));

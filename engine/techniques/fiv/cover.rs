@@ -142,24 +142,24 @@ impl<'a> Cover<'a> {
             if let Some(parallel) = parallel {
                 parallel.declare(graph, (texels, list, partials), (first, count));
             } else {
-            let args = crate::rays::traced!(
-                fiv::cover::Args {
-                    texels,
-                    points: list,
-                    partials,
-                    turns,
-                    normals,
-                    push: fiv::cover::Push {
-                        first,
-                        size: light.size,
-                        split,
-                        tiles: self.tiles as u32,
-                        own: own.into(),
+                let args = crate::rays::traced!(
+                    fiv::cover::Args {
+                        texels,
+                        points: list,
+                        partials,
+                        turns,
+                        normals,
+                        push: fiv::cover::Push {
+                            first,
+                            size: light.size,
+                            split,
+                            tiles: self.tiles as u32,
+                            own: own.into(),
+                        },
                     },
-                },
-                rays
-            );
-            graph.compute(args, [64 * count, chunks, 1]);
+                    rays
+                );
+                graph.compute(args, [64 * count, chunks, 1]);
             }
             let inside = if own { 0.0 } else { inside() };
             let push = fiv::gather::Push { first, count, chunks, inside, own: own.into() };

@@ -34,6 +34,8 @@ const MOST_RAYS: u64 = 1 << 22;
 const MOST_TURNS: u32 = 20_000;
 /// Pixels along the edge of a tile of `near.comp`.
 const TILE: u32 = 8;
+/// Boxes of instances that brute force looks at before it traces a ray; with more, a tree is faster.
+const MOST_BOXES: usize = 8;
 /// Distance that nothing has, metres.
 const NEVER: f32 = 1e30;
 /// No occluder, vector or table.
@@ -378,6 +380,9 @@ impl Fiv {
         let count = self.light.lit.len() as u64;
         let each = (MOST_RAYS / extent.pixels().max(1)).clamp(1, (*most).min(u64::from(MOST_TURNS)));
         let (texels, lit) = (graph.import_buffer(&self.light.texels), graph.buffer_from("fiv.lit", &self.light.lit));
+        let boxes = boxes(handles);
+        let around = boxes.len() as u32 / 2;
+        let boxes = graph.buffer_from("fiv.boxes", if boxes.is_empty() { &[[0.0; 3]] } else { &boxes[..] });
         for first in (0..count).step_by(each as usize) {
             let args = crate::rays::traced!(
                 shaders::fiv::truth::Args {
@@ -387,10 +392,12 @@ impl Fiv {
                     texels,
                     lit,
                     irradiance,
+                    boxes,
                     push: shaders::fiv::truth::Push {
                         first: first as u32,
                         count: each.min(count - first) as u32,
                         size: self.light.size,
+                        around,
                     },
                 },
                 rays_of
@@ -420,6 +427,18 @@ impl Fiv {
             })
             .collect()
     }
+}
+
+/// Corners of boxes around all that stops light; none if there are too many.
+fn boxes(handles: &Handles) -> Vec<[f32; 3]> {
+    let casting = || handles.moment.instances.iter().filter(|instance| instance.casts);
+    if casting().count() > MOST_BOXES {
+        return Vec::new();
+    }
+    let all = handles.bounds();
+    // Rounding must not lose what touches a side.
+    let grown = 1e-6 * all.max.abs().max(all.min.abs()).max_element();
+    casting().flat_map(|i| [(i.bounds.min - grown).to_array(), (i.bounds.max + grown).to_array()]).collect()
 }
 
 /// Which occluder each pixel shows (plus one; 0: none), with its linear depth; and the irradiance that this one leaves itself.

@@ -1,0 +1,169 @@
+//! Stages and environments that nobody has on purpose: what comes out is what light does, by stored vectors and by those of each frame.
+
+mod fiv_lab;
+mod tracer_lab;
+
+use fiv_lab::{Studio, ball, colourful, ground, nrmse, painted, thing};
+use glam::{Mat4, Vec3, vec3};
+use lucerna::{
+    gpu::{Gpu, testing::with_gpu},
+    scene::{Environment, Scene, View},
+    techniques::fiv::{Method, Settings},
+};
+use tracer_lab::flat_view;
+
+const TECHNIQUES: [Method; 2] = [Method::Vectors, Method::Online];
+
+/// Even samples, as those of each frame are.
+fn few(method: Method) -> Settings {
+    let base = Settings { size: 16, azimuths: 24, polars: 13, radii: 10, largest: 1.0, ..Settings::default() };
+    Settings { adaptive: false, method, ..base }
+}
+
+/// A ground with balls over it: centres and radii.
+fn stage(environment: Environment, balls: &[(Vec3, f32)]) -> Scene {
+    let mut scene = Scene { environment: Some(environment), ..Scene::default() };
+    ground(&mut scene, 20.0);
+    for (i, (at, radius)) in balls.iter().enumerate() {
+        let (positions, indices) = ball(*radius, 10);
+        thing(&mut scene, &format!("ball {i}"), positions, indices, Mat4::from_translation(*at));
+    }
+    scene
+}
+
+/// The ground around the origin, `size` metres of it, from close above.
+fn ground_view(size: f32) -> View {
+    flat_view(vec3(0.0, 0.05, 0.0), Vec3::ZERO, size, [16; 2])
+}
+
+fn picture(gpu: &Gpu, scene: &Scene, view: &View, method: Method) -> Vec<Vec3> {
+    Studio::new(gpu, scene, &few(method), None).irradiance(view, &few(method))
+}
+
+fn mean(picture: &[Vec3]) -> f32 {
+    picture.iter().map(|p| p.element_sum()).sum::<f32>() / picture.len() as f32
+}
+
+#[test]
+fn without_occluders_all_light_arrives() {
+    with_gpu(|gpu| {
+        let scene = stage(colourful(), &[]);
+        let open = picture(gpu, &scene, &ground_view(3.0), Method::Unshadowed);
+        let truth = picture(gpu, &scene, &ground_view(3.0), Method::BruteForce);
+        assert!((mean(&truth) / mean(&open) - 1.0).abs() < 5e-3);
+        for method in TECHNIQUES {
+            assert!(picture(gpu, &scene, &ground_view(3.0), method) == open, "{method:?}");
+        }
+    });
+}
+
+#[test]
+fn a_hundred_occluders_hide_what_they_hide_by_brute_force() {
+    with_gpu(|gpu| {
+        let at = |i: usize| vec3((i % 10) as f32 - 4.5, 0.8, (i / 10) as f32 - 4.5);
+        let many: Vec<(Vec3, f32)> = (0..100).map(|i| (at(i), 0.35)).collect();
+        let scene = stage(colourful(), &many);
+        let view = ground_view(8.0);
+        let [truth, open] = [Method::BruteForce, Method::Unshadowed].map(|m| picture(gpu, &scene, &view, m));
+        let [stored, online] = TECHNIQUES.map(|m| picture(gpu, &scene, &view, m));
+        assert!(stored == online);
+        let (error, unshadowed, kept) = (nrmse(&truth, &stored), nrmse(&truth, &open), mean(&stored) / mean(&truth));
+        eprintln!("a hundred: NRMSE {error:.3}, unshadowed {unshadowed:.3}, {kept:.3} of the light");
+        assert!(error < 0.5 * unshadowed && (0.7..1.3).contains(&kept));
+    });
+}
+
+#[test]
+fn an_occluder_larger_than_the_scene_leaves_the_horizon() {
+    with_gpu(|gpu| {
+        let scene = stage(colourful(), &[(vec3(0.0, 45.2, 0.0), 45.0), (vec3(0.3, 0.05, 0.0), 0.05)]);
+        let view = ground_view(3.0);
+        let [truth, open] = [Method::BruteForce, Method::Unshadowed].map(|m| picture(gpu, &scene, &view, m));
+        assert!(mean(&truth) < 0.2 * mean(&open));
+        for method in TECHNIQUES {
+            let found = picture(gpu, &scene, &view, method);
+            let off = (mean(&found) - mean(&truth)) / mean(&open);
+            eprintln!(
+                "{method:?}: {:.3} of the open light, brute force {:.3}",
+                mean(&found) / mean(&open),
+                mean(&truth) / mean(&open)
+            );
+            assert!(off.abs() < 0.1, "{method:?}: {off} of the open light");
+        }
+    });
+}
+
+#[test]
+fn inside_of_an_occluder_it_is_dark() {
+    with_gpu(|gpu| {
+        let scene = stage(colourful(), &[(vec3(0.0, 0.3, 0.0), 2.0)]);
+        let [truth, open] =
+            [Method::BruteForce, Method::Unshadowed].map(|m| picture(gpu, &scene, &ground_view(1.0), m));
+        assert!(mean(&truth) < 1e-3 * mean(&open));
+        for method in TECHNIQUES {
+            let found = picture(gpu, &scene, &ground_view(1.0), method);
+            assert!(mean(&found) < 0.01 * mean(&open), "{method:?}: {} of the open light", mean(&found) / mean(&open));
+        }
+    });
+}
+
+#[test]
+fn a_black_environment_gives_a_black_picture() {
+    with_gpu(|gpu| {
+        let scene = stage(painted(16, |_| Vec3::ZERO), &[(vec3(0.0, 0.8, 0.0), 0.5)]);
+        for method in [Method::Vectors, Method::Online, Method::BruteForce, Method::Unshadowed] {
+            let found = picture(gpu, &scene, &ground_view(3.0), method);
+            assert!(found.iter().all(|p| *p == Vec3::ZERO), "{method:?}");
+        }
+    });
+}
+
+#[test]
+fn one_texel_of_light_gives_one_shadow() {
+    with_gpu(|gpu| {
+        // All of one pixel lies in one texel: towards (0.31, 0.93, -0.19).
+        let mut light = painted(256, |_| Vec3::ZERO);
+        let (polar, azimuth) = (0.93f32.acos(), 0.31f32.atan2(0.19));
+        let (row, column) = (polar / std::f32::consts::PI * 128.0, (azimuth / std::f32::consts::TAU + 0.5) * 256.0);
+        light.pixels[row as usize * 256 + column as usize] = vec3(5e4, 3e4, 0.0);
+        let scene = stage(light, &[(vec3(0.0, 0.8, 0.0), 0.5)]);
+        let view = ground_view(3.0);
+        let [truth, open] = [Method::BruteForce, Method::Unshadowed].map(|m| picture(gpu, &scene, &view, m));
+        let full = open[0];
+        assert!(full.x > 0.0 && full.z == 0.0);
+        // One ray: all or nothing.
+        assert!(truth.iter().all(|p| *p == Vec3::ZERO || (*p - full).length() < 5e-3 * full.length()));
+        let dark = truth.iter().filter(|p| **p == Vec3::ZERO).count();
+        assert!((10..100).contains(&dark), "{dark} pixels in the shadow");
+        for method in TECHNIQUES {
+            let found = picture(gpu, &scene, &view, method);
+            assert!(found.iter().all(|p| p.x <= full.x * 1.0001 && p.z == 0.0), "{method:?}");
+            let lost = (mean(&open) - mean(&found)) / (mean(&open) - mean(&truth));
+            eprintln!("{method:?}: {lost:.3} of what is hidden by brute force, NRMSE {:.3}", nrmse(&truth, &found));
+            assert!((0.8..1.2).contains(&lost), "{method:?}: {lost} of what is hidden by brute force");
+            // Where its light cannot be hidden: towards the light.
+            let towards =
+                found.iter().zip(&truth).filter(|(_, t)| t.x > 0.0).map(|(f, _)| f.x / full.x).fold(0f32, f32::max);
+            assert!(towards > 0.99, "{method:?}: {towards}");
+        }
+    });
+}
+
+#[test]
+fn numbers_that_are_no_radiance_count_as_none() {
+    with_gpu(|gpu| {
+        let (mut odd, mut clean) = (colourful(), colourful());
+        for (i, wrong) in
+            [(5, vec3(f32::NAN, -1.0, f32::NEG_INFINITY)), (900, Vec3::splat(f32::NAN)), (4000, -Vec3::ONE)]
+        {
+            odd.pixels[i] = wrong;
+            clean.pixels[i] = Vec3::ZERO;
+        }
+        let balls = [(vec3(0.0, 0.8, 0.0), 0.5)];
+        let (odd, clean) = (stage(odd, &balls), stage(clean, &balls));
+        for method in [Method::Vectors, Method::Online, Method::BruteForce] {
+            let [a, b] = [&odd, &clean].map(|scene| picture(gpu, scene, &ground_view(3.0), method));
+            assert!(a == b && mean(&a) > 0.0, "{method:?}");
+        }
+    });
+}
