@@ -134,10 +134,12 @@ void main() {
         float front = PARTIAL != 0u ? fiv_front_share(occluders[i], d, n, along) : float(d > 0.0);
         float counts = fiv_near(occluders[i], length(offset));
         if (front * counts <= 0.0) continue;
-        vec3 hidden = fiv_dot(occluders[i], offset, n, TRILINEAR != 0u, SCALED != 0u).rgb;
+        vec4 looked = fiv_dot(occluders[i], offset, n, TRILINEAR != 0u, SCALED != 0u);
+        vec3 hidden = looked.rgb;
         if (PARTIAL == 2u && front < 1.0) hidden = fiv_cut(occluders[i], offset, n, along, hidden, open, behind);
-        if (PARTIAL == 1u) counts *= front;
-        hidden = max(hidden, vec3(0.0)) * (counts * seen);
+        hidden = max(hidden, vec3(0.0)) * (PARTIAL == 1u ? front : 1.0);
+        // Where most of the samples around lie inside of the occluder, so does the receiver: everything is hidden.
+        hidden = mix(hidden, open, clamp(1.0 - 2.0 * looked.w, 0.0, 1.0)) * (counts * seen);
         if (hidden == vec3(0.0)) continue;
         if (OVERLAP != 0u && whole.occluders > 1u) hidden *= own_share(i, self, p, n, along, tile);
         sum -= hidden;

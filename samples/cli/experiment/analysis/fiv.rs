@@ -7,6 +7,7 @@
 mod images;
 mod paper;
 mod perceived;
+mod reasons;
 mod tables;
 
 use lucerna::{

@@ -2,7 +2,7 @@
 
 use lucerna::Result;
 
-use super::{DEFAULT, DENSE, FRONT, GROUND, Lab, ONLINE, TRUTH, UNSHADOWED, over, own, paper};
+use super::{DEFAULT, DENSE, FRONT, GROUND, Lab, ONLINE, TRUTH, UNSHADOWED, over, own, paper, reasons};
 use crate::report::{Axis, Cell, Plot, Section, Table};
 
 /// Bytes of a megabyte, as the thesis counts.
@@ -35,7 +35,6 @@ pub(super) fn errors(lab: &Lab<'_>) -> Result<Section> {
         let technique =
             if case.figure == "18" { case.technique } else { lab.nearest(case.scene, GROUND, case.technique) };
         let Some(ours) = lab.nrmse(case.scene, GROUND, technique)? else { continue };
-        let why = paper::REASONS.iter().find(|(scene, _)| *scene == case.scene).map_or("above", |(_, why)| why);
         table.push([
             case.figure.into(),
             case.what.into(),
@@ -43,7 +42,11 @@ pub(super) fn errors(lab: &Lab<'_>) -> Result<Section> {
             case.nrmse.into(),
             ours.into(),
             over(Some(ours), Some(case.nrmse)),
-            if ours <= case.nrmse { "at or under".into() } else { why.into() },
+            if ours <= case.nrmse {
+                "at or under".into()
+            } else {
+                reasons::of(lab, case, technique, ours)?.into()
+            },
             lab.nrmse(case.scene, GROUND, UNSHADOWED)?.into(),
             lab.nrmse(case.scene, FRONT, technique)?.into(),
         ]);
@@ -114,7 +117,8 @@ pub(super) fn frames(lab: &Lab<'_>) -> Result<Section> {
         "thesis (MB)",
         "vectors (MB)",
     ];
-    let mut table = Table::new("table-3", lab.caption(&format!("Table 3; the thesis has {DENSE} samples")), columns).timed();
+    let mut table =
+        Table::new("table-3", lab.caption(&format!("Table 3; the thesis has {DENSE} samples")), columns).timed();
     let (mut ours, mut thesis) = (Vec::new(), Vec::new());
     for (name, things, vertices, megabytes, fps) in paper::TABLE_3 {
         let samples = lab.nearest(name, FRONT, DENSE);
