@@ -42,11 +42,7 @@ pub(super) fn errors(lab: &Lab<'_>) -> Result<Section> {
             case.nrmse.into(),
             ours.into(),
             over(Some(ours), Some(case.nrmse)),
-            if ours <= case.nrmse {
-                "at or under".into()
-            } else {
-                reasons::of(lab, case, technique, ours)?.into()
-            },
+            if ours <= case.nrmse { "at or under".into() } else { reasons::of(lab, case, technique, ours)?.into() },
             lab.nrmse(case.scene, GROUND, UNSHADOWED)?.into(),
             lab.nrmse(case.scene, FRONT, technique)?.into(),
         ]);
