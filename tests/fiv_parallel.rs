@@ -16,7 +16,10 @@ use lucerna::{
     techniques::fiv::{Light, Masks, Method, Occluder, Plan, Settings, Sky, cover::Cover},
 };
 
-fn covered(gpu: &Gpu, occluder: &Occluder, light: &Light, points: &[Vec3], look_up: bool) -> Vec<(twin::Vectors, f64)> {
+/// Vectors and solid angle of what is hidden.
+type Found = (twin::Vectors, f64);
+
+fn covered(gpu: &Gpu, occluder: &Occluder, light: &Light, points: &[Vec3], look_up: bool) -> Vec<Found> {
     let mut cover = Cover::new(gpu, occluder).unwrap();
     if look_up {
         cover.look_up(gpu, light.size, 1).unwrap();
@@ -77,9 +80,8 @@ fn looked_up_masks_are_those_of_rays_but_for_their_edges() {
             // The same points lie inside.
             assert!(open.len() + 2 >= rays.iter().filter(|a| a.0[0].x < f64::from(FIV_INSIDE)).count(), "{rho}");
             assert!(open.len() > 20, "{rho}: {}", open.len());
-            let sum = |of: &dyn Fn(&(&(twin::Vectors, f64), &(twin::Vectors, f64))) -> f64| {
-                open.iter().map(|pair| of(pair).powi(2)).sum::<f64>().sqrt()
-            };
+            let sum =
+                |of: &dyn Fn(&(&Found, &Found)) -> f64| open.iter().map(|pair| of(pair).powi(2)).sum::<f64>().sqrt();
             let error = sum(&|(a, b)| apart(&a.0, &b.0)) / sum(&|(a, _)| length(&a.0));
             let angle = open.iter().map(|p| p.1.1).sum::<f64>() / open.iter().map(|p| p.0.1).sum::<f64>();
             eprintln!("{rho} radii away: vectors {error:.4} apart, {angle:.4} of the angle");
