@@ -1,6 +1,9 @@
 //! Declaring resources and passes.
 
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::{
+    collections::{HashMap, HashSet},
+    sync::atomic::{AtomicU32, Ordering},
+};
 
 use bytemuck::{NoUninit, Pod};
 
@@ -27,10 +30,9 @@ pub struct PassRef<'g> {
 impl PassRef<'_> {
     /// Names it, instead of by its shader. A name used before gets `#2`, `#3`…
     pub fn named(self, name: impl Into<String>) -> Self {
-        // The old name must not count as used.
-        self.graph.passes[self.index].name.clear();
-        let name = unique(name.into(), self.graph.passes.iter().map(|p| p.name.as_str()));
-        self.graph.passes[self.index].name = name;
+        let pass = &mut self.graph.passes[self.index];
+        self.graph.pass_names.free(&pass.name);
+        pass.name = self.graph.pass_names.take(name.into());
         self
     }
 
@@ -47,12 +49,40 @@ impl PassRef<'_> {
     }
 }
 
-/// `name`, or `name#2`, `name#3`… if it is taken.
-fn unique<'a>(name: String, taken: impl Iterator<Item = &'a str> + Clone) -> String {
-    if !taken.clone().any(|t| t == name) {
-        return name;
+/// Names that are taken. A graph may have thousands of passes of one shader.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Names {
+    taken: HashSet<String>,
+    /// By name: all numbers from 2 up to below this one are taken.
+    next: HashMap<String, u32>,
+}
+
+impl Names {
+    /// `name`, or the first of `name#2`, `name#3`… that is free.
+    fn take(&mut self, name: String) -> String {
+        if self.taken.insert(name.clone()) {
+            return name;
+        }
+        let next = self.next.entry(name.clone()).or_insert(2);
+        loop {
+            let candidate = format!("{name}#{next}");
+            *next = next.saturating_add(1);
+            if self.taken.insert(candidate.clone()) || *next == u32::MAX {
+                return candidate;
+            }
+        }
     }
-    (2u32..).map(|n| format!("{name}#{n}")).find(|candidate| !taken.clone().any(|t| t == candidate)).unwrap_or(name)
+
+    /// Lets a name be taken again.
+    fn free(&mut self, name: &str) {
+        self.taken.remove(name);
+        let Some((base, number)) = name.rsplit_once('#') else { return };
+        if let (Some(next), Ok(number)) = (self.next.get_mut(base), number.parse::<u32>())
+            && number >= 2
+        {
+            *next = number.min(*next);
+        }
+    }
 }
 
 impl Graph {
@@ -63,6 +93,9 @@ impl Graph {
             frame: 0,
             seed: 0,
             id: GraphId { id: NEXT.fetch_add(1, Ordering::Relaxed), name },
+            image_names: Names::default(),
+            buffer_names: Names::default(),
+            pass_names: Names::default(),
             images: Vec::new(),
             buffers: Vec::new(),
             uniforms: Vec::new(),
@@ -103,7 +136,7 @@ impl Graph {
     }
 
     pub(super) fn add_image(&mut self, name: String, desc: ImageDesc, origin: Origin) -> Image {
-        let name = unique(name, self.images.iter().map(|i| i.name.as_str()));
+        let name = self.image_names.take(name);
         self.images.push(ImageEntry { name, desc, origin });
         self.whole_image((self.images.len() - 1) as u32)
     }
@@ -161,7 +194,7 @@ impl Graph {
     }
 
     fn add_buffer(&mut self, name: String, bytes: u64, contents: Option<Vec<u8>>, host: bool) -> Buffer {
-        let name = unique(name, self.buffers.iter().map(|b| b.name.as_str()));
+        let name = self.buffer_names.take(name);
         self.buffers.push(BufferEntry { name, bytes, origin: Origin::Transient, contents, host, accel: None });
         Buffer { graph: self.id, index: (self.buffers.len() - 1) as u32, offset: 0, size: bytes }
     }
@@ -337,7 +370,7 @@ impl Graph {
     }
 
     pub(super) fn pass(&mut self, name: impl Into<String>, work: Work) -> PassRef<'_> {
-        let name = unique(name.into(), self.passes.iter().map(|p| p.name.as_str()));
+        let name = self.pass_names.take(name.into());
         self.passes.push(Pass { name, scope: self.scope.clone(), counted: false, work });
         let index = self.passes.len() - 1;
         PassRef { graph: self, index }
@@ -348,4 +381,45 @@ fn bound<A: Args>(args: &A) -> Bound {
     let mut resources = Vec::new();
     let shader = args.variant(&mut resources);
     Bound { shader, resources, push: args.push().to_vec(), spec: args.spec() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What it was before: each candidate beside all that are taken.
+    fn slow(name: &str, taken: &[String]) -> String {
+        let free = |candidate: &String| !taken.contains(candidate);
+        let numbered = (2u32..).map(|n| format!("{name}#{n}"));
+        std::iter::once(name.to_owned()).chain(numbered).find(free).unwrap()
+    }
+
+    #[test]
+    fn names_are_the_first_that_are_free() {
+        let (mut names, mut taken) = (Names::default(), Vec::<String>::new());
+        let mut state = 7u32;
+        for step in 0..400 {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let name = ["a", "b", "a#3", "a#2#2", "b#x", "#2"][(state >> 16) as usize % 6];
+            let expected = slow(name, &taken);
+            assert_eq!(names.take(name.to_owned()), expected, "step {step}");
+            taken.push(expected);
+            // Some are given back, of the late and of the early ones.
+            if state >> 28 < 5 {
+                let gone = taken.swap_remove((state >> 8) as usize % taken.len());
+                names.free(&gone);
+            }
+        }
+    }
+
+    #[test]
+    fn thousands_of_passes_of_one_name_are_declared() {
+        // Each beside all before it, a hundred thousand would not end.
+        let mut graph = Graph::new("many");
+        let buffer = graph.buffer("b", 4);
+        (0..100_000).for_each(|_| drop(graph.fill(buffer, 0)));
+        assert_eq!(graph.fill(buffer, 0).name(), "fill b#100001");
+        assert_eq!(graph.fill(buffer, 0).named("fill b#7").name(), "fill b#7#2");
+        assert_eq!(graph.fill(buffer, 0).name(), "fill b#100002");
+    }
 }

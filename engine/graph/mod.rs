@@ -89,6 +89,9 @@ pub struct Graph {
     /// Seed of everything random. 0 unless set.
     pub seed: u32,
     id: GraphId,
+    image_names: build::Names,
+    buffer_names: build::Names,
+    pass_names: build::Names,
     images: Vec<ImageEntry>,
     buffers: Vec<BufferEntry>,
     uniforms: Vec<u8>,

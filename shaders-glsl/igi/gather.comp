@@ -30,7 +30,7 @@ layout(push_constant, scalar) uniform Push {
     uint factor;     // pixels along the side of a texel
     uint scattered;  // 1: its pixel is not the one in the middle
     float least;     // min_d of the bounded geometry term, metres; 0: none
-    uint irregular;  // 1: tiles have their subsets in different orders
+    uint stride;     // above 0: tiles have their subsets in different orders, and lights move on by so many subsets from round to round
     uint seed;
 };
 
@@ -43,8 +43,8 @@ void main() {
     if (z < 1.0) {
         vec3 p = screen_position(view, pixel, 1.0, z);
         vec3 n = decode_normal(texelFetch(normal, pixel, 0));
-        uint subset = vpl_subset(uvec2(texel), tile, irregular != 0u, seed);
-        Gathering how = Gathering(first, count, total, subset, tile * tile, irregular != 0u, least, seed);
+        uint subset = vpl_subset(uvec2(texel), tile, stride != 0u, seed);
+        Gathering how = Gathering(first, count, total, subset, tile * tile, stride, least, seed);
         vpl_gather(sum, p, n, surface_step(view, p, z), uvec2(pixel), how);
     }
     imageStore(irradiance, texel, sum);

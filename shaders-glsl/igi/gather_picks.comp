@@ -36,7 +36,7 @@ layout(push_constant, scalar) uniform Push {
     uint factor;     // pixels along the side of a texel
     uint scattered;  // 1: its pixel is not the one in the middle
     float least;     // min_d of the bounded geometry term, metres; 0: none
-    uint irregular;  // 1: tiles have their subsets in different orders
+    uint stride;     // above 0: tiles have their subsets in different orders
     uint seed;
 };
 
@@ -50,7 +50,7 @@ void main() {
         vec3 p = screen_position(view, pixel, 1.0, z);
         vec3 n = decode_normal(texelFetch(normal, pixel, 0));
         float gap = surface_step(view, p, z);
-        uint subset = vpl_subset(uvec2(texel), tile, irregular != 0u, seed);
+        uint subset = vpl_subset(uvec2(texel), tile, stride != 0u, seed);
         float offset = vpl_offset(uvec2(texel) / tile, subset, tile * tile, seed);
         Receiver receiver = Receiver(p, n, p + n * gap, offset, uvec2(pixel));
         sum += vpl_picked(receiver, Picking(picks, proposals, leaves, least, seed), first, count);

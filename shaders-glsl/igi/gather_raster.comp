@@ -29,7 +29,7 @@ layout(push_constant, scalar) uniform Push {
     uint factor;     // pixels along the side of a texel
     uint scattered;  // 1: its pixel is not the one in the middle
     float least;     // min_d of the bounded geometry term, metres; 0: none
-    uint irregular;  // 1: tiles have their subsets in different orders
+    uint stride;     // above 0: tiles have their subsets in different orders, and lights move on by so many subsets from round to round
     uint seed;
     float nearest;   // depth of the maps, metres
 };
@@ -65,9 +65,9 @@ void main() {
         vec3 n = decode_normal(texelFetch(normal, pixel, 0));
         vec3 place = p + n * surface_step(view, p, z);
         uint subsets = tile * tile;
-        uint subset = vpl_subset(uvec2(texel), tile, irregular != 0u, seed);
+        uint subset = vpl_subset(uvec2(texel), tile, stride != 0u, seed);
         for (uint turn = 0u; turn * subsets < count; ++turn) {
-            uint i = vpl_of_subset(first / subsets + turn, subset, subsets, irregular != 0u) - first;
+            uint i = vpl_of_subset(first / subsets + turn, subset, subsets, stride) - first;
             if (i >= count) continue;
             Vpl vpl = vpls[first + i];
             vec3 light = vpl_irradiance(vpl, p, n, least) * float(subsets);

@@ -83,8 +83,8 @@ void main() {
         } else {
             HitSurface s = hit_surface(hit, toward, settings.slots, settings.diffuse_only != 0u);
             share = s.glass + s.mirror;
-            if (level > 0u) node.light += node.weight * s.emission;
-            // The first surface's rough part is lit from the G-buffer; of later ones either part goes on.
+            // The first surface's rough part, with its share of what is emitted, is lit from the G-buffer; of later ones either part goes on.
+            node.light += (level > 0u ? node.weight : vec3(share)) * s.emission;
             bool rough = level > 0u && unit_float(words.y) < s.rough;
             if (rough && !s.unlit) {
                 node.state = TREE_SURFACE;

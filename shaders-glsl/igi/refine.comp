@@ -27,14 +27,15 @@ layout(push_constant, scalar) uniform Push {
     uint total;      // virtual lights
     uint tile;       // side of the tiles of pixels that share the lights
     float least;     // min_d of the bounded geometry term, metres; 0: none
-    uint irregular;  // 1: tiles have their subsets in different orders
+    uint stride;     // above 0: tiles have their subsets in different orders, and lights move on by so many subsets from round to round
     uint seed;
     uint own;        // lights of a subset
+    uint begin;      // place in the list of the first pixel
     float limit;     // above 0: brighter than the brightest coarse texel around by this factor is dimmed to it
 };
 
 void main() {
-    uint at = gl_GlobalInvocationID.x;
+    uint at = begin + gl_GlobalInvocationID.x;
     if (at >= unmatched_count) return;
     ivec2 pixel = ivec2(unmatched[at] & 0xffffu, unmatched[at] >> 16u);
     vec4 before = imageLoad(irradiance, pixel);
@@ -42,11 +43,12 @@ void main() {
     float z = texelFetch(depth, pixel, 0).r;
     vec3 p = screen_position(view, pixel, 1.0, z);
     vec3 n = decode_normal(texelFetch(normal, pixel, 0));
-    uint subset = vpl_subset(uvec2(pixel), tile, irregular != 0u, seed);
-    Gathering how = Gathering(first, count, total, subset, tile * tile, irregular != 0u, least, seed);
+    uint subset = vpl_subset(uvec2(pixel), tile, stride != 0u, seed);
+    Gathering how = Gathering(first, count, total, subset, tile * tile, stride, least, seed);
     vpl_gather(sum, p, n, surface_step(view, p, z), uvec2(pixel), how);
     const vec3 luminance = vec3(0.2126, 0.7152, 0.0722);
     float most = limit * before.a, bright = dot(sum.rgb, luminance);
-    if (limit > 0.0 && first + count >= own && bright > most) sum.rgb *= most / bright;
+    // Where no texel around shows anything there is nothing to go by.
+    if (limit > 0.0 && before.a > 0.0 && first + count >= own && bright > most) sum.rgb *= most / bright;
     imageStore(irradiance, pixel, vec4(sum.rgb, before.a));
 }

@@ -1,14 +1,22 @@
-// Size of the dispatches over the pixels that no coarse texel matches.
+// Size of the dispatches over the pixels that no coarse texel matches, one for each range of them.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 
-layout(local_size_x = 1) in;
+layout(local_size_x = 64) in;
 
 layout(binding = 0, scalar) readonly buffer Unmatched { uint unmatched_count; uint unmatched[]; };
-layout(binding = 1, scalar) writeonly buffer Groups { uint groups[]; };
+layout(binding = 1, scalar) writeonly buffer Groups { uint groups[]; }; // three a range
+
+layout(push_constant, scalar) uniform Push {
+    uint ranges;
+    uint pixels; // of a range: workgroups of them are no more than a device allows
+};
 
 void main() {
-    groups[0] = (unmatched_count + 63u) / 64u;
-    groups[1] = 1u;
-    groups[2] = 1u;
+    uint range = gl_GlobalInvocationID.x;
+    if (range >= ranges) return;
+    uint left = unmatched_count - min(range * pixels, unmatched_count);
+    groups[3u * range] = (min(left, pixels) + 63u) / 64u;
+    groups[3u * range + 1u] = 1u;
+    groups[3u * range + 2u] = 1u;
 }

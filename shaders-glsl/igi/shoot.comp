@@ -101,13 +101,15 @@ VplPath begun(uint at) {
             path.flux = one.intensity * (areas.x + areas.y + areas.z);
             path.range = 0.0;
         } else if (one.kind == LIGHT_SPOT) {
-            // The square of a line in the cosine from the outer to the inner cone, then 1.
+            // The square of a line in the cosine from the outer to the inner cone, then 1. In narrow cones the line may end before it is 1.
             float outer = clamp(-one.spot_offset / one.spot_scale, -1.0, 1.0);
-            float inner = clamp((1.0 - one.spot_offset) / one.spot_scale, -1.0, 1.0);
-            float full = 1.0 - inner, rim = (inner - outer) / 3.0;
+            float inner = (1.0 - one.spot_offset) / one.spot_scale;
+            float end = min(inner, 1.0);
+            float reached = clamp((end - outer) / max(inner - outer, 1e-30), 0.0, 1.0);
+            float full = 1.0 - end, rim = (inner - outer) / 3.0 * (reached * reached * reached);
             float pick = first.x * (full + rim);
-            float cosine = pick < rim ? outer + (inner - outer) * pow(pick / max(rim, 1e-30), 1.0 / 3.0)
-                : inner + (pick - rim);
+            float cosine = pick < rim ? outer + (end - outer) * pow(pick / max(rim, 1e-30), 1.0 / 3.0)
+                : end + (pick - rim);
             cosine = clamp(cosine, -1.0, 1.0);
             float phi = 2.0 * SAMPLING_PI * first.y;
             float sine = sqrt(max(1.0 - cosine * cosine, 0.0));
@@ -147,14 +149,16 @@ void main() {
             path.flux *= clamp(1.0 - q * q * q * q, 0.0, 1.0);
             path.range = 0.0;
         }
-        bool left = s.rough > 0.0 && s.albedo != vec3(0.0);
+        // Of a surface that is partly glass a path takes one part or the other. A virtual light stands for the rough part alone: light that
+        // goes through the rest has not bounced.
         bool on = unit_float(words.y) < s.rough;
+        bool left = on && s.albedo != vec3(0.0);
         uint depth = path.depth;
         // Light falls onto the triangle, and is received by the shading normal. Where these part the ratio grows without limit.
         float slant = max(dot(s.normal, -path.direction), 0.0) / max(dot(s.side, -path.direction), 1e-6);
         vec3 reflected = path.flux * s.albedo * min(slant, 4.0);
         if (left) {
-            vpls[depth * settings.paths + at] = Vpl(s.position, s.gap, s.side, depth, reflected * s.rough, at);
+            vpls[depth * settings.paths + at] = Vpl(s.position, s.gap, s.side, depth, reflected, at);
             path.depth += 1u;
         }
         bool room = path.depth < settings.bounces;

@@ -26,7 +26,8 @@ layout(push_constant, scalar) uniform Push {
     float sharpness; // exponent of the cosine between normals; the paper's 1
     float range;     // distance from the pixel's plane relative to its depth that weighs 0.6; 0: depth does not count (paper)
     uint scattered;  // 1: the pixel that a texel stands for is not the one in the middle
-    float least;     // share of the Gaussian on coarse texels that match below which a wider one is tried, and then the pixel listed; 0: never
+    float least;     // share of the Gaussian on coarse texels that match below which a wider one is tried, and then the pixel listed; 0: a
+                     // wider one only where there is no texel at all
 };
 
 // Below this weight no coarse texel matches, and the likest is taken.
@@ -81,7 +82,8 @@ void main() {
                 }
             }
         }
-        matched = weights >= least * all;
+        // Before the sky there may be no texel at all to match.
+        matched = least > 0.0 ? all > 0.0 && weights >= least * all : most > -1e29;
         if (matched || turn > 0u) break;
         // A thin thing may have been met further away.
         sum = vec4(0.0);
@@ -89,7 +91,7 @@ void main() {
         reach = WIDE_REACH;
         fall *= 1.0 / (WIDER * WIDER);
     }
-    if (!matched) unmatched[atomicAdd(unmatched_count, 1u)] = uint(pixel.x) | uint(pixel.y) << 16u;
+    if (!matched && least > 0.0) unmatched[atomicAdd(unmatched_count, 1u)] = uint(pixel.x) | uint(pixel.y) << 16u;
     vec3 found = weights < NO_MATCH ? likest.rgb : sum.rgb / weights;
     imageStore(irradiance, pixel, vec4(found, brightest));
 }

@@ -9,7 +9,7 @@ struct Gathering {
     uint total;     // virtual lights
     uint subset;
     uint subsets;
-    bool irregular;
+    uint stride;    // of irregular patterns, from round to round; 0: regular
     float least;    // min_d of the bounded geometry term, metres; 0: none
     uint seed;
 };
@@ -19,7 +19,7 @@ struct Gathering {
 void vpl_gather(inout vec4 sum, vec3 position, vec3 normal, float gap, uvec2 pixel, Gathering how) {
     vec3 origin = position + normal * gap;
     for (uint i = how.first; i < how.first + how.count; ++i) {
-        uint k = vpl_of_subset(i, how.subset, how.subsets, how.irregular);
+        uint k = vpl_of_subset(i, how.subset, how.subsets, how.stride);
         if (k >= how.total) break;
         Vpl vpl = vpls[k];
         vec3 light = vpl_irradiance(vpl, position, normal, how.least) * float(how.subsets);

@@ -18,13 +18,12 @@ uint vpl_subset(uvec2 texel, uint tile, bool irregular, uint seed) {
     return (order + words.x % (tile * tile)) % (tile * tile);
 }
 
-// Number of the i-th virtual light of a subset; i / subsets, rounded down, is i.
-uint vpl_of_subset(uint i, uint subset, uint subsets, bool irregular) {
+// Number of the i-th virtual light of a subset; divided by `subsets` and rounded down it is i. `stride`: of irregular patterns, about
+// 0.62 subsets without a factor that divides both; 0: regular.
+uint vpl_of_subset(uint i, uint subset, uint subsets, uint stride) {
     // Every subsets-th point of Halton's sequence has the same digits in each base that divides `subsets`: a ninth of the lights would lie
     // in a ninth of all directions. A step on from each round to the next, of about the golden ratio, gives every subset all digits.
-    uint step = irregular ? 633u * subsets >> 10u : 0u;
-    if (subsets % 2u == 0u) step |= uint(irregular);
-    return i * subsets + (subset + i * step) % subsets;
+    return i * subsets + (subset + i * stride) % subsets;
 }
 
 #endif

@@ -31,10 +31,12 @@ pub struct Shown {
 /// A scene that stays on the device for many pictures.
 pub struct Studio<'a> {
     scene: &'a Scene,
-    pose: Pose,
     resident: Resident,
     igi: Igi,
     runner: Runner,
+    /// Of the next picture.
+    pub frame: u32,
+    pub pose: Pose,
 }
 
 impl<'a> Studio<'a> {
@@ -46,12 +48,13 @@ impl<'a> Studio<'a> {
     pub fn with(gpu: &Gpu, scene: &'a Scene, settings: &Settings) -> Self {
         let resident = Resident::new(gpu, scene).unwrap();
         let igi = Igi::new(gpu, scene, &resident, settings).unwrap();
-        Self { scene, pose: Pose::rest(scene), resident, igi, runner: Runner::new(gpu) }
+        Self { scene, pose: Pose::rest(scene), resident, igi, runner: Runner::new(gpu), frame: 0 }
     }
 
     pub fn render(&mut self, view: &View, settings: &Settings, seed: u32) -> Shown {
         let mut graph = Graph::new("igi");
         graph.seed = seed;
+        graph.frame = self.frame;
         let handles = self.resident.frame_in(&mut graph, self.scene, &self.pose);
         let view = view.fit_far(&handles.bounds());
         let all = PictureSettings { igi: settings.clone(), ..Default::default() };

@@ -280,6 +280,11 @@ impl Resident {
         }
     }
 
+    /// Around everything in `pose`, world space; empty for an empty scene.
+    pub(crate) fn bounds_in(&self, scene: &Scene, pose: &Pose) -> Aabb {
+        self.moment(scene, pose).1.bounds
+    }
+
     fn moment(&self, scene: &Scene, pose: &Pose) -> (Vec<types::Instance>, Moment) {
         let deformed = self.deform.bounds(scene, pose);
         let mut gpu = Vec::with_capacity(self.items.len());

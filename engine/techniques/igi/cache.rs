@@ -1,6 +1,6 @@
 //! Irradiance in space for what mirrors and glass show: cells of a hashed grid, each lit once, instead of every surface by itself.
 
-use super::{Igi, Settings, Shared, Vpls};
+use super::{Igi, LEAST_CELL, Settings, Shared, Vpls};
 use crate::{
     graph::{Buffer, Extent, Graph},
     shaders::{
@@ -9,6 +9,8 @@ use crate::{
         types,
     },
 };
+
+use glam::Vec3;
 
 /// Invocations of a workgroup that gathers for nodes of trees.
 const GROUP: u32 = 64;
@@ -28,12 +30,14 @@ pub struct Cache {
 impl Cache {
     pub(super) fn new(graph: &mut Graph, shared: &Shared, settings: &Settings) -> Self {
         let slots = u64::from(CACHE_SLOTS);
+        let extent = Vec3::from(shared.block.high) - Vec3::from(shared.block.low);
         let cache = Self {
             keys: graph.buffer("igi.cache-keys", 4 * slots),
             cells: graph.buffer("igi.cache-cells", slots * size_of::<types::CacheCell>() as u64),
             list: graph.buffer("igi.cache-list", 4 * (1 + u64::from(settings.cache_cells))),
             low: shared.block.low,
-            side: (settings.cache * shared.diagonal).max(1e-12),
+            // Keys must reach all over a scene that has grown.
+            side: (settings.cache * shared.diagonal).max(LEAST_CELL * extent.length()).max(1e-12),
             most: settings.cache_cells,
         };
         graph.fill(cache.keys, u32::MAX);
@@ -80,8 +84,7 @@ impl Igi {
         nodes: u32,
     ) {
         let cells = cache.most.min(nodes);
-        // Most of them will not be there.
-        for (first, count) in self.batches(Extent::new(cells.div_ceil(4), 1), vpls.count) {
+        for (first, count) in self.batches(Extent::new(cells, 1), vpls.count) {
             let push = cache_fill::Push { first, count, most: cache.most, least: shared.least, seed: shared.seed };
             let args = crate::rays::traced!(
                 cache_fill::Args {

@@ -1,11 +1,22 @@
 //! Irradiance from virtual lights at the visible surfaces: from all of them, or from a few picked by the tree over them.
 
-use super::{Igi, LightTree, Pattern, Settings, Shared, Vpls};
+use super::{Igi, LightTree, Settings, Shared, Vpls};
 use crate::{
     graph::{Buffer, Extent, Format, Graph, Image},
     passes::gbuffer::GBuffer,
     shaders::igi::{gather, gather_picks, refine, refine_groups},
 };
+
+/// Invocations of a workgroup that gathers for single pixels.
+const GROUP: u64 = 64;
+/// Workgroups of a dispatch on every device.
+const MOST_GROUPS: u64 = 65_535;
+
+/// Ranges of `pixels` pixels, `most` to a range, about: how many a range has, and how many ranges there are.
+fn ranges(pixels: u64, most: u64) -> (u32, u32) {
+    let groups = (most / GROUP).clamp(1, MOST_GROUPS);
+    ((groups * GROUP) as u32, pixels.div_ceil(groups * GROUP).max(1) as u32)
+}
 
 impl Igi {
     /// Irradiance of every [`Settings::downsample`]-th pixel; alpha: shadow rays.
@@ -50,7 +61,7 @@ impl Igi {
                 factor: settings.downsample,
                 scattered: settings.scattered.into(),
                 least: shared.least,
-                irregular: (settings.pattern == Pattern::Irregular).into(),
+                stride: settings.stride(),
                 seed: shared.seed,
             };
             let spec = gather::Spec { imperfect: settings.imperfect.into() };
@@ -80,22 +91,26 @@ impl Igi {
         settings: &Settings,
         (irradiance, unmatched): (Image, Buffer),
     ) {
-        let groups = graph.buffer("igi.refine-groups", 12);
-        graph.compute(refine_groups::Args { unmatched, groups }, 1);
         let extent = graph.extent(irradiance);
         let own = vpls.count.div_ceil(settings.interleave * settings.interleave);
-        // Most pixels will not be there.
-        let few = Extent::new(extent.width.div_ceil(8), extent.height.div_ceil(4));
-        for (first, count) in self.batches(few, own) {
+        // Of a few hundred lights at once, and so of ranges of thousands of pixels. Most of these will be empty.
+        let lights = self.batches(Extent::new(1 << 14, 1), own);
+        let most = lights.first().map_or(1, |&(_, count)| count);
+        let (pixels, ranges) = ranges(extent.pixels(), self.rays_at_once / u64::from(most.max(1)));
+        let groups = graph.buffer("igi.refine-groups", 12 * u64::from(ranges));
+        let push = refine_groups::Push { ranges, pixels };
+        graph.compute(refine_groups::Args { unmatched, groups, push }, ranges);
+        for (range, (first, count)) in (0..ranges).flat_map(|range| lights.iter().map(move |&lights| (range, lights))) {
             let push = refine::Push {
                 first,
                 count,
                 total: vpls.count,
                 tile: settings.interleave,
                 least: shared.least,
-                irregular: (settings.pattern == Pattern::Irregular).into(),
+                stride: settings.stride(),
                 seed: shared.seed,
                 own,
+                begin: range * pixels,
                 limit: settings.despeckle,
             };
             let args = crate::rays::traced!(
@@ -111,7 +126,7 @@ impl Igi {
                 },
                 shared.hidden_by
             );
-            graph.compute_indirect(args, groups, 0);
+            graph.compute_indirect(args, groups, 12 * u64::from(range));
         }
     }
 
@@ -137,7 +152,7 @@ impl Igi {
                 factor: settings.downsample,
                 scattered: settings.scattered.into(),
                 least: shared.least,
-                irregular: (settings.pattern == Pattern::Irregular).into(),
+                stride: settings.stride(),
                 seed: shared.seed,
             };
             let args = crate::rays::traced!(
@@ -154,6 +169,24 @@ impl Igi {
                 shared.hidden_by
             );
             graph.compute(args, extent);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_hold_all_pixels_in_dispatches_that_every_device_allows() {
+        for (width, height) in [(1u64, 1u64), (64, 1), (65, 1), (800, 600), (3840, 2160), (16384, 16384)] {
+            for rays in [1u64, 2, 180, 10_000, u64::MAX] {
+                let (pixels, ranges) = ranges(width * height, super::super::MOST_RAYS / rays);
+                let (of_range, ranges) = (u64::from(pixels), u64::from(ranges));
+                assert!(of_range * ranges >= width * height && of_range * (ranges - 1) < width * height);
+                assert!(of_range % GROUP == 0 && of_range / GROUP <= MOST_GROUPS);
+                assert!(rays == u64::MAX || of_range * rays <= super::super::MOST_RAYS.max(GROUP * rays));
+            }
         }
     }
 }

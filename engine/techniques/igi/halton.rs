@@ -39,12 +39,20 @@ pub fn table_from(first: u32, paths: u32, dimensions: usize, seed: u32) -> Vec<f
     for path in 0..paths {
         for (dimension, shift) in shifts.iter().enumerate() {
             let base = PRIMES[dimension.min(DIMENSIONS - 1)];
-            let value = (radical_inverse(base, first.wrapping_add(path).saturating_add(1)) + shift).fract() as f32;
+            let value = (radical_inverse(base, first.wrapping_add(path).wrapping_add(1)) + shift).fract() as f32;
             // Rounding to 32 bits may reach 1.
             out.push(value.min(1.0 - f32::EPSILON / 2.0));
         }
     }
     out
+}
+
+/// Numbers from the rows of one frame to those of the next: the least from `paths` on that shares no factor with the bases of the first
+/// `dimensions`. Then a path that has the same place in every frame comes by all digits in each base, and among any bases together: its
+/// numbers are as even as the sequence. With `paths` itself, 720 say, a path's first four binary digits would be the same in all frames.
+pub fn step(paths: u32, dimensions: usize) -> u32 {
+    let bases = &PRIMES[..dimensions.min(DIMENSIONS)];
+    (paths..).find(|step| *step > 0 && bases.iter().all(|base| step % base != 0)).unwrap_or(paths)
 }
 
 /// Turn of a dimension, in [0, 1); 0 for seed 0.
@@ -107,6 +115,25 @@ mod tests {
                 assert!(hits.iter().all(|&h| h == 1), "2^{a} 3^{b} 5^{c} from {start}: {hits:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_path_comes_by_every_elementary_box_over_the_frames() {
+        for (paths, dimensions) in [(1u32, 6), (16, 6), (720, 8), (90, 8), (30_030, 20), (640_000, 20)] {
+            let step = step(paths, dimensions);
+            assert!(step >= paths && step - paths < 200, "{paths}: {step}");
+            // 2^5 and 3^3, alone and together.
+            for box_count in [32u32, 27, 32 * 27] {
+                for path in [0, paths - 1] {
+                    let mut seen = vec![false; box_count as usize];
+                    (0..box_count).for_each(|frame| seen[((frame * step + path) % box_count) as usize] = true);
+                    assert!(seen.iter().all(|&s| s), "{paths} paths, path {path}: some of {box_count} are never met");
+                }
+            }
+        }
+        assert_eq!((step(720, 8), step(0, 4)), (727, 1));
+        // Past the end of 32 bits.
+        assert_eq!(table_from(u32::MAX - 1, 3, 1, 0)[1..], [0.0, 0.5]);
     }
 
     #[test]

@@ -8,7 +8,8 @@
 //!   again. What differs from what they gave in the last frame has changed: it is no chance, for the numbers are the same. The more
 //!   has changed the fewer frames count, so that the average lags by about [`Settings::history_lag`] at most; change that goes on for
 //!   some frames is smoothed, and the average carried along with it.
-//! - With the scene at rest the average goes over [`Settings::history`] frames, and the frames together are as many virtual lights.
+//! - With the scene at rest the average goes over [`Settings::history`] frames, and the frames together are as many virtual lights, of
+//!   each lamp and each path spread evenly.
 //!
 //! Nothing is kept on the host: what a frame leaves to the next one is [`Graph::history`] of the runner. The frames must follow each
 //! other in `graph.frame`; where a number is left out, or history was forgotten, a frame stands for itself.
@@ -23,6 +24,7 @@ use crate::{
         resident::{Batches, Handles},
     },
     shaders::{
+        consts,
         igi::{history, motion, probe, probe_light, recall, remember},
         types,
     },
@@ -115,6 +117,11 @@ pub fn blend(
     graph.compute(args, extent);
 }
 
+/// Halton numbers of a path.
+pub(super) fn dimensions(settings: &Settings) -> usize {
+    (consts::VPL_FIRST_NUMBERS + 2 * settings.bounces) as usize
+}
+
 /// Seed of the random choices of a frame; that of the run in frame 0.
 fn seed_of(seed: u32, frame: u32) -> u32 {
     if frame == 0 {
@@ -125,14 +132,15 @@ fn seed_of(seed: u32, frame: u32) -> u32 {
 }
 
 impl Igi {
-    /// The same with the random numbers of `frame`: each frame takes the next ones of the sequence.
+    /// The same with the random numbers of `frame`: each frame takes the next ones of the sequence, and a few are left
+    /// out so that in the long run every path has numbers of all kinds: each lamp has the same few paths in every frame.
     pub(super) fn numbered(graph: &mut Graph, shared: &Shared, settings: &Settings, frame: u32) -> Shared {
         if frame == 0 {
             return *shared;
         }
         let seed = seed_of(shared.seed, frame);
         let settings_block = graph.uniform(&types::IgiSettings { seed, ..shared.block });
-        let first = frame.wrapping_mul(settings.paths().saturating_mul(settings.candidates));
+        let first = frame.wrapping_mul(halton::step(settings.paths() * settings.candidates, dimensions(settings)));
         Shared { settings: settings_block, seed, first, ..*shared }
     }
 

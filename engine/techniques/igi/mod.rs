@@ -36,6 +36,7 @@ pub use cache::Cache;
 pub use notes::notes;
 pub use order::LightTree;
 pub use picture::{Picture, PictureSettings};
+use settings::LEAST_CELL;
 pub use settings::{Pattern, Settings, Visibility};
 
 use crate::{
@@ -48,7 +49,7 @@ use crate::{
         Sources,
         tables::{self, LightTable},
     },
-    scene::{Pose, Scene, resident::Handles, resident::Resident},
+    scene::{Aabb, Pose, Scene, resident::Handles, resident::Resident},
     shaders::{self, consts, types},
 };
 
@@ -76,8 +77,12 @@ pub struct Igi {
     lights: Option<(Pose, LightTable)>,
     /// There may be mirrors or glass.
     sharp: bool,
+    /// Diagonal of the scene's box at rest, metres: what shares of the scene's size are of, whatever moves.
+    size: f32,
     /// Rays of an invocation.
     most_rays: u64,
+    /// Rays of a dispatch, about.
+    rays_at_once: u64,
     /// Of an image.
     most_layers: u32,
 }
@@ -101,7 +106,7 @@ struct Shared {
     direct_rays: u32,
     /// min_d, metres.
     least: f32,
-    /// Of the scene's box, metres.
+    /// Of the scene's box at rest, metres.
     diagonal: f32,
     /// Of random choices.
     seed: u32,
@@ -141,6 +146,11 @@ pub struct Outputs {
     pub vpls: Option<Vpls>,
     /// Cells of irradiance behind mirrors and glass; `None`: there are none.
     pub cache: Option<Cache>,
+}
+
+/// Metres; 0 if there is nothing.
+fn diagonal(bounds: &Aabb) -> f32 {
+    if bounds.is_empty() { 0.0 } else { (bounds.max - bounds.min).length() }
 }
 
 impl Igi {
@@ -184,7 +194,9 @@ impl Igi {
             double_sided: meshes.flat_map(|mesh| mesh.primitives.iter().map(double_sided)).collect(),
             lights: None,
             sharp: tables::has_sharp(scene),
+            size: diagonal(&resident.bounds_in(scene, &Pose::rest(scene))),
             most_rays,
+            rays_at_once: MOST_RAYS,
             most_layers: gpu.caps().limits.array_layers,
         })
     }
@@ -217,6 +229,8 @@ impl Igi {
         let table = self.lights.as_ref().map_or(&empty, |(_, table)| table);
         let bounds = handles.bounds();
         let (low, high) = if bounds.is_empty() { Default::default() } else { (bounds.min, bounds.max) };
+        // Something that has no size at rest has one now.
+        let diagonal = if self.size > 0.0 { self.size } else { diagonal(&bounds) };
         let sky = self.moments.is_some();
         let environment = scene.environment.as_ref();
         let block = types::IgiSettings {
@@ -252,8 +266,8 @@ impl Igi {
             instance_lights: graph.buffer_from("igi.instance-lights", &table.instances),
             light_nodes: graph.buffer_from("igi.light-nodes", &table.nodes),
             direct_rays: lights + (u32::from(table.tree) + u32::from(sky)) * settings.direct_samples,
-            least: settings.bound * (high - low).length(),
-            diagonal: (high - low).length(),
+            least: settings.bound * diagonal,
+            diagonal,
             seed: graph.seed,
             turn: graph.seed,
             first: 0,
@@ -271,8 +285,7 @@ impl Igi {
         let bounds = handles.bounds();
         let sources = starts::sources(&handles.moment.lights, triangles, sided, self.moments, &bounds);
         let starts = starts::starts(&sources, paths, shared.seed);
-        let dimensions = (consts::VPL_FIRST_NUMBERS + 2 * settings.bounces) as usize;
-        let numbers = halton::table_from(shared.first, paths, dimensions, shared.turn);
+        let numbers = halton::table_from(shared.first, paths, history::dimensions(settings), shared.turn);
         let count = paths * settings.bounces;
         let buffer = graph.buffer("igi.candidates", u64::from(count) * size_of::<types::Vpl>() as u64);
         let vpls = Vpls { buffer, count, tree: None };
@@ -330,7 +343,7 @@ impl Igi {
     /// without rays.
     fn batches(&self, extent: Extent, rays: u32) -> Vec<(u32, u32)> {
         let pixels = u64::from(extent.width) * u64::from(extent.height);
-        let each = (MOST_RAYS / pixels.max(1)).clamp(1, self.most_rays) as u32;
+        let each = (self.rays_at_once / pixels.max(1)).clamp(1, self.most_rays) as u32;
         (0..rays.max(1)).step_by(each as usize).map(|first| (first, each.min(rays.max(1) - first))).collect()
     }
 }

@@ -5,7 +5,7 @@
 //! place. Paraboloid maps (Brabec et al. 2002) need one or two maps a light and bend edges, so that a wall of two triangles would end up
 //! somewhere else; imperfect shadow maps (Ritschel et al. 2008) need points on all surfaces. Three flat views hold the hemisphere, too.
 
-use super::{Igi, Pattern, Settings, Shared, Vpls};
+use super::{Igi, Settings, Shared, Vpls};
 use crate::{
     Error, Result,
     graph::{Depth, Draw, Extent, Format, Graph, Image, ImageDesc, IndexedCall, Raster, Targets},
@@ -126,7 +126,7 @@ impl Igi {
                     factor: settings.downsample,
                     scattered: settings.scattered.into(),
                     least: shared.least,
-                    irregular: (settings.pattern == Pattern::Irregular).into(),
+                    stride: settings.stride(),
                     seed: shared.seed,
                     nearest,
                 },

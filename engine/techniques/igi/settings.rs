@@ -5,7 +5,7 @@ use crate::{Error, Result, shaders::consts::CACHE_CELLS};
 use serde::{Deserialize, Serialize};
 
 /// Least side of a cell: keys have nine bits an axis.
-const LEAST_CELL: f32 = 0.002;
+pub(super) const LEAST_CELL: f32 = 0.002;
 
 /// How rays are traced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -50,7 +50,7 @@ pub struct Settings {
     /// Visible surfaces that candidates are judged by, 1 to 1024, a shadow ray for each from each. With few, what matters to a small part
     /// of the view is missed and counts as rarely as is safe.
     pub judges: u32,
-    /// Bounding distance min_d of the geometry term, as share of the diagonal of the scene's box; 0 switches the bound off. Virtual
+    /// Bounding distance min_d of the geometry term, as share of the diagonal of the box around the scene at rest; 0 switches the bound off. Virtual
     /// lights nearer than 0.8 of it give nothing, from 1.2 of it on they give everything.
     pub bound: f32,
     /// Virtual lights that each pixel picks by what they may send to it, 1 to 1024, instead of gathering from all: cost grows with the
@@ -62,7 +62,7 @@ pub struct Settings {
     /// Short rays of each gathered pixel that put back the light which the bound takes, 0 to 64. 0: it is lost.
     pub compensation: u32,
     /// Side of the cells in which the light of virtual lights on what mirrors and glass show is kept, as share of the diagonal of the
-    /// scene's box, 0.002 to 0.2; 0: every surface that they show gathers for itself.
+    /// box around the scene at rest, 0.002 to 0.2; 0: every surface that they show gathers for itself.
     pub cache: f32,
     /// Such cells at most, 1 to 131,072. With more, every surface gathers for itself.
     pub cache_cells: u32,
@@ -189,6 +189,22 @@ impl Settings {
         self.picks > 0 && vpls > 4 * self.picks
     }
 
+    /// Subsets by which the virtual lights of an irregular subset move on from round to round: about the golden ratio of their number,
+    /// and without a common factor, so that in the end a subset has had all of them. 0: the pattern is regular.
+    pub(super) fn stride(&self) -> u32 {
+        let subsets = self.interleave * self.interleave;
+        if self.pattern == Pattern::Regular || subsets <= 1 {
+            return 0;
+        }
+        let common = |mut a: u32, mut b: u32| {
+            while b > 0 {
+                (a, b) = (b, a % b);
+            }
+            a
+        };
+        (633 * subsets >> 10..).find(|&stride| stride > 0 && common(stride, subsets) == 1).unwrap_or(1)
+    }
+
     /// Picks of a texel: pixels of a tile share them.
     pub fn texel_picks(&self) -> u32 {
         self.picks.div_ceil(self.interleave.max(1).pow(2))
@@ -264,6 +280,23 @@ mod tests {
         Settings::paper().validate().unwrap();
         Settings { interleave: 32, fused: true, smoothing: 5, ..Settings::default() }.validate().unwrap();
         assert_eq!(Settings { vpls: 181, bounces: 2, ..Settings::default() }.paths(), 91);
+    }
+
+    #[test]
+    fn an_irregular_subset_has_all_digits() {
+        for interleave in 2..=32 {
+            let settings = Settings { interleave, fused: true, pattern: Pattern::Irregular, ..Settings::default() };
+            let (subsets, stride) = (interleave * interleave, settings.stride());
+            let mut seen = vec![false; subsets as usize];
+            (0..subsets).for_each(|round| seen[(round * stride % subsets) as usize] = true);
+            assert!(seen.iter().all(|&s| s), "{interleave}: {stride} of {subsets}");
+            let share = f64::from(stride) / f64::from(subsets);
+            assert!(interleave < 4 || (share - 0.618).abs() < 0.06, "{interleave}: {share}");
+            assert_eq!(Settings { pattern: Pattern::Regular, ..settings }.stride(), 0);
+        }
+        // As it was where that was right.
+        let stride = |interleave| Settings { interleave, pattern: Pattern::Irregular, ..Settings::default() }.stride();
+        assert_eq!([1, 2, 3, 4, 6, 12].map(stride), [0, 3, 5, 9, 23, 89]);
     }
 
     #[test]

@@ -59,9 +59,12 @@ pub fn sources(
         let angle = match light.kind {
             LIGHT_DIRECTIONAL => light.direction.iter().zip(faces).map(|(d, face)| f64::from(d.abs()) * face).sum(),
             LIGHT_SPOT => {
-                let cosine = |at: f32| f64::from((at - light.spot_offset) / light.spot_scale).clamp(-1.0, 1.0);
-                let (outer, inner) = (cosine(0.0), cosine(1.0));
-                2.0 * PI * (1.0 - inner + (inner - outer) / 3.0)
+                // In narrow cones the line from the outer to the inner one may end before it is 1.
+                let cosine = |at: f32| f64::from((at - light.spot_offset) / light.spot_scale);
+                let (outer, inner) = (cosine(0.0).clamp(-1.0, 1.0), cosine(1.0));
+                let end = inner.min(1.0);
+                let reached = ((end - outer) / (inner - outer).max(1e-30)).clamp(0.0, 1.0);
+                2.0 * PI * (1.0 - end + (inner - outer) / 3.0 * reached.powi(3))
             }
             _ => 4.0 * PI,
         };
@@ -159,9 +162,12 @@ mod tests {
             spot_offset: -0.5 / (0.9 - 0.5),
             ..Light::default()
         };
+        // One degree: the line is a tenth of the way up in the middle.
+        let edge = 1f32.to_radians().cos();
+        let narrow = Light { spot_scale: 1e3, spot_offset: -1e3 * edge, ..spot };
         let sun = Light { intensity: [0.0, 3.0, 0.0], direction: [0.6, 0.0, -0.8], ..Light::default() };
         let bounds = Aabb { min: Vec3::ZERO, max: Vec3::new(2.0, 3.0, 4.0) };
-        let all = sources(&[spot, sun], (&[], &[]), |_| false, Some([1.0, 2.0, 0.5]), &bounds);
+        let all = sources(&[spot, sun, narrow], (&[], &[]), |_| false, Some([1.0, 2.0, 0.5]), &bounds);
         let steps = 200_000;
         let integral: f64 = (0..steps)
             .map(|i| {
@@ -171,7 +177,9 @@ mod tests {
             .sum();
         assert!((all[0].power - integral).abs() < 1e-5, "{} {integral}", all[0].power);
         assert!((all[1].power - 3.0 * (0.6 * 12.0 + 0.8 * 6.0)).abs() < 1e-5);
-        assert!((all[2].power - (12.0 + 2.0 * 8.0 + 0.5 * 6.0)).abs() < 1e-9);
+        let exact = 2.0 * PI * 1e6 * (1.0 - f64::from(edge)).powi(3) / 3.0;
+        assert!((all[2].power / exact - 1.0).abs() < 3e-3, "{} {exact}", all[2].power);
+        assert!((all[3].power - (12.0 + 2.0 * 8.0 + 0.5 * 6.0)).abs() < 1e-9);
     }
 
     #[test]

@@ -1,0 +1,188 @@
+//! Instant global illumination where a closed form, or the same picture made another way, says what must come out.
+
+mod igi_lab;
+mod tracer_lab;
+
+use glam::{Mat4, Quat, Vec3, vec3};
+use igi_lab::{Studio, flux, mean, plain};
+use lucerna::{
+    gpu::testing::with_gpu,
+    scene::{LightKind, Material, Pose, Transform},
+    techniques::igi::Settings,
+};
+use std::f64::consts::PI;
+use tracer_lab::{Stage, flat_view, view};
+
+/// A closed box of half side 1 around the origin.
+fn room(albedo: Vec3) -> Stage {
+    let mut stage = Stage::new();
+    let wall = stage.material(Material::diffuse("wall", albedo));
+    stage.cuboid(wall, Vec3::splat(-1.0), Vec3::ONE, true);
+    stage
+}
+
+#[test]
+fn a_wire_before_the_sky_gathers_for_itself() {
+    with_gpu(|gpu| {
+        // One pixel wide, between the pixels that texels stand for: no texel around shows anything at all.
+        let mut stage = Stage::new();
+        let white = stage.material(Material::diffuse("white", Vec3::splat(0.8)));
+        stage.quad(white, vec3(-0.625, -1.0, 0.0), Vec3::X * 0.125, Vec3::Y * 2.0);
+        stage.quad(white, vec3(-2.0, -2.0, 4.0), Vec3::Y * 4.0, Vec3::X * 4.0);
+        stage.point(vec3(0.0, 0.0, 3.0), Vec3::splat(3.0));
+        let mut studio = Studio::new(gpu, &stage.scene);
+        let seen = flat_view(vec3(0.0, 0.0, 2.0), Vec3::ZERO, 2.0, [16, 16]);
+        let right = studio.render(&seen, &plain(64), 3).irradiance;
+        let wire: Vec<usize> = (0..256).filter(|&i| right[i][1] > 0.0).collect();
+        assert!(wire.len() == 16 && wire.iter().all(|i| i % 16 == 3), "{wire:?}");
+        for despeckle in [0.0, 3.0] {
+            let settings = Settings { downsample: 4, refine: 0.05, despeckle, ..plain(64) };
+            let found = studio.render(&seen, &settings, 3).irradiance;
+            for &i in &wire {
+                let (found, right) = (found[i][1], right[i][1]);
+                assert!((found - right).abs() < 1e-4 * right, "pixel {i}: {found} instead of {right}, {despeckle}");
+            }
+        }
+        // Without refinement a texel further away is better than none.
+        stage.scene.meshes[0].primitives[0].positions[1..3].iter_mut().for_each(|p| p.x += 1.5);
+        let mut studio = Studio::new(gpu, &stage.scene);
+        let found = studio.render(&seen, &Settings { downsample: 4, ..plain(64) }, 3);
+        assert!(found.irradiance.iter().zip(&found.albedo).all(|(e, a)| a[1] == 0.0 || e[1] > 0.0));
+    });
+}
+
+#[test]
+fn mirrors_and_glass_show_what_they_emit() {
+    with_gpu(|gpu| {
+        // In the dark, seen directly and in a mirror behind the viewer's back, which has a tenth less.
+        let glow = vec3(1.0, 0.5, 2.0);
+        let base = Material { emissive: glow, roughness: 0.0, ..Material::diffuse("glow", Vec3::ONE) };
+        for material in [
+            Material { transmission: 1.0, ..base.clone() },
+            Material { transmission: 0.4, ..base.clone() },
+            Material { metallic: 1.0, ..base.clone() },
+            Material { ior: 1.0, ..base },
+        ] {
+            let mut stage = Stage::new();
+            let material = stage.material(material);
+            stage.quad(material, vec3(-1.0, -1.0, 0.0), Vec3::X * 2.0, Vec3::Y * 2.0);
+            let mut studio = Studio::new(gpu, &stage.scene);
+            for specular_depth in [0, 6] {
+                let settings = Settings { specular_depth, vpls: 8, candidates: 1, ..Settings::default() };
+                let shown = studio.render(&view(Vec3::Z, Vec3::ZERO, 30.0, [8, 8]), &settings, 0);
+                for pixel in &shown.total {
+                    let found = Vec3::from_slice(&pixel[..3]);
+                    assert!((found - glow).abs().max_element() < 2e-3, "{found} instead of {glow}");
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn a_narrow_spot_sends_no_more_than_it_shines() {
+    with_gpu(|gpu| {
+        // The slope of the cone's rim has a limit, so that the lamp is weaker than a narrow cone of its angle.
+        for (degrees, slack) in [(1.0f32, 5e-3), (2.0, 2e-3), (2.5, 1e-3), (10.0, 1e-4)] {
+            let mut stage = room(Vec3::splat(0.5));
+            let kind = LightKind::Spot { range: None, inner: 0.0, outer: degrees.to_radians() };
+            let turned = Mat4::from_rotation_translation(Quat::from_rotation_x(0.3), vec3(0.1, 0.2, 0.3));
+            stage.light(kind, Vec3::ONE, 3.0, turned);
+            let edge = f64::from(degrees.to_radians().cos());
+            let scale = 1.0 / (1.0 - edge).max(1e-3);
+            let power = 3.0 * 2.0 * PI * scale * scale * (1.0 - edge).powi(3) / 3.0;
+            let mut studio = Studio::new(gpu, &stage.scene);
+            let shown = studio.render(&view(Vec3::ZERO, Vec3::X, 60.0, [4, 4]), &plain(200), 0);
+            let found = f64::from(flux(&shown.vpls, 0).x) / 0.5;
+            assert!((found / power - 1.0).abs() < slack, "{degrees} degrees: {found} instead of {power}");
+            // Where its light falls: the mean of sin² about the axis of a line squared in the cosine.
+            let axis = turned.transform_vector3(Vec3::NEG_Z).as_dvec3();
+            let off = |vpl: &lucerna::shaders::types::Vpl| {
+                let to = (Vec3::from(vpl.position) - vec3(0.1, 0.2, 0.3)).as_dvec3().normalize();
+                to.cross(axis).length_squared()
+            };
+            let spread = shown.vpls.iter().map(off).sum::<f64>() / shown.vpls.len() as f64;
+            let expected = 0.5 * (1.0 - edge);
+            assert!((spread / expected - 1.0).abs() < 0.05, "{degrees} degrees: {spread} instead of {expected}");
+        }
+    });
+}
+
+#[test]
+fn light_behind_a_pane_has_not_bounced() {
+    with_gpu(|gpu| {
+        // A pane across the middle of a room, half of it glass of index 1: half of what meets it goes on.
+        let mut stage = room(Vec3::splat(0.5));
+        let pane = Material { transmission: 0.5, double_sided: true, ior: 1.0, ..Material::diffuse("pane", Vec3::ONE) };
+        let pane = stage.material(pane);
+        stage.quad(pane, vec3(0.0, -1.0, -1.0), Vec3::Y * 2.0, Vec3::Z * 2.0);
+        stage.point(vec3(-0.5, 0.0, 0.0), Vec3::ONE);
+        let mut studio = Studio::new(gpu, &stage.scene);
+        for bounces in [1, 3] {
+            let settings = Settings { bounces, specular: true, ..plain(3000 * bounces) };
+            let shown = studio.render(&view(Vec3::splat(0.5), Vec3::X, 60.0, [4, 4]), &settings, 0);
+            let first = |of: &dyn Fn(f32) -> bool| -> f64 {
+                let mine = shown.vpls.iter().filter(|vpl| vpl.depth == 0 && of(vpl.position[0]));
+                mine.map(|vpl| f64::from(vpl.flux[0])).sum()
+            };
+            // Solid angle of a square of half side 1 at a distance of a half.
+            let met = 4.0 * (1.0f64 / 1.25).asin();
+            let sides = [
+                ("before", first(&|x| x < -0.01), 0.5 * (4.0 * PI - met)),
+                ("on", first(&|x| x.abs() <= 0.01), 0.5 * met),
+                ("behind", first(&|x| x > 0.01), 0.5 * 0.5 * met),
+            ];
+            for (name, found, exact) in sides {
+                println!("{bounces} bounces, {name}: {found:.4}, exact {exact:.4}");
+                assert!((found / exact - 1.0).abs() < 0.08, "{bounces} bounces, {name}: {found} instead of {exact}");
+            }
+        }
+    });
+}
+
+#[test]
+fn a_weak_lamp_beside_a_strong_one_shines_all_around_in_time() {
+    with_gpu(|gpu| {
+        // One path in sixteen is its own: over as many frames its directions are spread evenly.
+        let mut stage = room(Vec3::splat(0.5));
+        stage.point(vec3(0.3, 0.0, 0.0), vec3(1.0, 0.0, 0.0));
+        stage.point(vec3(-0.3, 0.0, 0.0), vec3(0.0, 15.0, 0.0));
+        let mut studio = Studio::new(gpu, &stage.scene);
+        let mut counts = [0; 4];
+        for frame in 0..32 {
+            studio.frame = frame;
+            let settings = Settings { history: 100, ..plain(16) };
+            let shown = studio.render(&view(Vec3::ZERO, Vec3::X, 60.0, [4, 4]), &settings, 0);
+            for vpl in shown.vpls.iter().filter(|vpl| vpl.flux[0] > 0.0) {
+                let z = (Vec3::from(vpl.position) - vec3(0.3, 0.0, 0.0)).normalize().z;
+                counts[((2.0 * z + 2.0) as usize).min(3)] += 1;
+            }
+        }
+        let all: i32 = counts.iter().sum();
+        println!("{counts:?}");
+        assert!(all >= 24 && counts.iter().all(|&count| 4 * count >= all / 2), "{counts:?}");
+    });
+}
+
+#[test]
+fn what_flies_far_away_does_not_change_the_light_of_a_room() {
+    with_gpu(|gpu| {
+        let mut stage = room(Vec3::splat(0.7));
+        stage.point(vec3(0.2, 0.3, 0.1), Vec3::ONE);
+        let bird = stage.material(Material::diffuse("bird", Vec3::ZERO));
+        let bird = stage.quad(bird, vec3(-0.01, 0.99, -0.01), Vec3::X * 0.02, Vec3::Z * 0.02);
+        stage.scene.nodes[bird].local =
+            Transform::Trs { translation: Vec3::ZERO, rotation: Quat::IDENTITY, scale: Vec3::ONE };
+        let mut away = stage.scene.clone();
+        away.nodes[bird].local =
+            Transform::Trs { translation: Vec3::Y * 100.0, rotation: Quat::IDENTITY, scale: Vec3::ONE };
+        let away = Pose::rest(&away);
+        let mut studio = Studio::new(gpu, &stage.scene);
+        let seen = view(vec3(0.0, 0.0, 0.9), vec3(0.1, -0.3, -1.0), 70.0, [24, 24]);
+        let settings = Settings { bound: 0.05, ..plain(100) };
+        let near = mean(&studio.render(&seen, &settings, 0).irradiance);
+        studio.pose = away;
+        let far = mean(&studio.render(&seen, &settings, 0).irradiance);
+        assert!((far / near - 1.0).abs() < 1e-3, "{far} instead of {near}");
+    });
+}
