@@ -7,8 +7,9 @@ use glam::{Mat4, Quat, Vec3, vec3};
 use igi_lab::{Studio, flux, mean, plain};
 use lucerna::{
     gpu::testing::with_gpu,
-    scene::{LightKind, Material, Pose, Transform},
-    techniques::igi::Settings,
+    graph::Graph,
+    scene::{Environment, LightKind, Material, Pose, Transform, resident::Resident},
+    techniques::igi::{Igi, PictureSettings, Settings, Visibility},
 };
 use std::f64::consts::PI;
 use tracer_lab::{Stage, flat_view, view};
@@ -184,5 +185,73 @@ fn what_flies_far_away_does_not_change_the_light_of_a_room() {
         studio.pose = away;
         let far = mean(&studio.render(&seen, &settings, 0).irradiance);
         assert!((far / near - 1.0).abs() < 1e-3, "{far} instead of {near}");
+    });
+}
+
+#[test]
+fn short_paths_look_at_a_sun_beside_a_sky_as_often_as_it_is_worth() {
+    with_gpu(|gpu| {
+        // What they put back in a corner in the open: the number of shadow rays of direct light must not matter.
+        let court = |suns: u32| {
+            let mut stage = Stage::new();
+            let white = stage.material(Material::diffuse("white", Vec3::splat(0.8)));
+            stage.quad(white, vec3(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0);
+            stage.quad(white, vec3(-1.0, 0.0, -1.0), Vec3::X * 2.0, Vec3::Y);
+            let slanted = Mat4::from_quat(Quat::from_rotation_x(-0.8));
+            (0..suns).for_each(|_| stage.light(LightKind::Directional, Vec3::ONE, 3.0 / suns as f32, slanted));
+            stage.scene.environment = Some(Environment::constant(Vec3::splat(0.1)));
+            stage.scene
+        };
+        let seen = view(vec3(0.0, 0.5, 1.0), vec3(0.0, 0.1, -1.0), 50.0, [24, 24]);
+        let back = |suns: u32, direct_samples: u32| {
+            let scene = court(suns);
+            let mut studio = Studio::new(gpu, &scene);
+            let (mut sum, mut squares) = (0.0, 0.0);
+            for seed in 1..=4 {
+                let settings = Settings { bound: 0.3, direct_samples, ..plain(8) };
+                let without = studio.render(&seen, &settings, seed).irradiance;
+                let with = studio.render(&seen, &Settings { compensation: 2, ..settings }, seed).irradiance;
+                for (with, without) in with.iter().zip(&without) {
+                    let added = f64::from(with[1] - without[1]);
+                    assert!(added > -1e-4, "light was taken: {added}");
+                    sum += added / 4.0 / 576.0;
+                    squares += added * added / 4.0 / 576.0;
+                }
+            }
+            (sum, squares.sqrt())
+        };
+        let (one, few, many) = (back(1, 1), back(1, 64), back(40, 64));
+        println!("mean and root mean square: {one:?}, 64 samples {few:?}, 40 suns {many:?}");
+        for (name, (sum, squares)) in [("64 samples", few), ("40 suns", many)] {
+            assert!((sum / one.0 - 1.0).abs() < 0.06, "{name}: {sum} instead of {}", one.0);
+            assert!(squares < 1.25 * one.1, "{name}: spread {squares} beside {}", one.1);
+        }
+    });
+}
+
+#[test]
+fn rays_of_another_kind_than_the_scene_was_prepared_for_and_odd_backgrounds_are_refused() {
+    with_gpu(|gpu| {
+        let stage = room(Vec3::splat(0.5));
+        let seen = view(Vec3::ZERO, Vec3::X, 60.0, [4, 4]);
+        let query = Settings { visibility: Visibility::Query, ..plain(4) };
+        let compute = Settings { visibility: Visibility::Compute, ..plain(4) };
+        let refused = |made: &Settings, shown: &Settings, background: [f32; 3]| {
+            let mut resident = Resident::new(gpu, &stage.scene).unwrap();
+            let mut igi = Igi::new(gpu, &stage.scene, &resident, made).unwrap();
+            let mut graph = Graph::new("igi");
+            let pose = Pose::rest(&stage.scene);
+            let handles = resident.frame_in(&mut graph, &stage.scene, &pose);
+            let all = PictureSettings { igi: shown.clone(), background, ..Default::default() };
+            let picture = igi.picture(&mut graph, &stage.scene, &pose, &handles, &seen, &all);
+            picture.err().map(|error| (error.exit_code(), error.to_string()))
+        };
+        let (code, text) = refused(&compute, &query, [0.0; 3]).expect("queries after compute");
+        assert!(code == 2 && text.contains("igi.visibility"), "{text}");
+        assert_eq!(refused(&compute, &compute, [1.0; 3]), None);
+        for channel in [f32::NAN, -0.1, f32::INFINITY] {
+            let (code, text) = refused(&compute, &compute, [0.0, channel, 0.0]).expect("a background of no light");
+            assert!(code == 2 && text.starts_with("background: "), "{text}");
+        }
     });
 }

@@ -37,24 +37,30 @@ void main() {
     important[lane] = a;
     flux[lane] = b;
     barrier();
-    float all_important = 0.0, all_flux = 0.0, before_important = 0.0, before_flux = 0.0;
+    float all_important = 0.0, all_flux = 0.0;
+    // Sums at the borders of the lane's range: the end of one is the start of the next, to the last bit.
+    vec2 borders[2] = vec2[2](vec2(0.0), vec2(0.0));
     for (uint i = 0u; i < 256u; ++i) {
-        if (i == lane) {
-            before_important = all_important;
-            before_flux = all_flux;
-        }
+        if (i == lane) borders[0] = vec2(all_important, all_flux);
         all_important += important[i];
         all_flux += flux[i];
+        if (i == lane) borders[1] = vec2(all_important, all_flux);
     }
     float by_flux = all_important > 0.0 ? BY_FLUX : 1.0;
     float k_important = all_important > 0.0 ? (1.0 - by_flux) / all_important : 0.0;
     float k_flux = all_flux > 0.0 ? by_flux / all_flux : 0.0;
-    a = before_important;
-    b = before_flux;
+    precise float last = k_important * borders[0].x + k_flux * borders[0].y;
+    precise float most = k_important * borders[1].x + k_flux * borders[1].y;
+    a = borders[0].x;
+    b = borders[0].y;
     for (uint i = begin; i < end; ++i) {
         a += importances[i];
         b += strength(i);
-        weights[i] = k_important * importances[i] + k_flux * strength(i);
-        sums[i] = k_important * a + k_flux * b;
+        precise float sum = k_important * a + k_flux * b;
+        // Never falling; and the weight is what the rounded sums make of it, for by that candidates are drawn.
+        sum = i + 1u == end ? most : clamp(sum, last, most);
+        weights[i] = sum - last;
+        sums[i] = sum;
+        last = sum;
     }
 }

@@ -36,18 +36,44 @@ layout(push_constant, scalar) uniform Push {
 
 #include "lib/vpl_direct.glsl"
 
+// Lamps that are looked at; of more some by chance.
+const uint MOST_LAMPS = 16u;
+
 void main() {
     uint slot = gl_GlobalInvocationID.x;
     if (slot >= count || near_paths[slot].alive == 0u) return;
     NearPath path = near_paths[slot];
     vec3 above = path.position + path.side * path.gap;
     uvec4 words = pcg4d(uvec4(path.salt, number, turn, settings.seed ^ 0x11f0u));
-    uint lamps = direct_rays();
-    if (lamps == 0u) return;
     // Albedo π: radiance is irradiance.
     LitPoint p = LitPoint(path.position, above, path.normal, path.normal, vec3(0.0), LIT_MATT, vec3(BRDF_PI));
+    // A sample of each kind of light, and of these the one that is followed by what it sends if nothing is in the way (Talbot, Cline and
+    // Egbert, Importance Resampling for Global Illumination, 2005).
     Ray ray;
-    vec3 light = direct_ray(pick_below(words.x, lamps), p, words.zw, ray) * float(lamps);
-    if (light == vec3(0.0) || trace_any(ray, TRACE_SHADOW, words.y)) return;
-    near_paths[slot].light = path.light + path.weight * light;
+    vec3 light = vec3(0.0);
+    float strength = 0.0, strengths = 0.0;
+    uint lamps = min(light_count, MOST_LAMPS);
+    for (uint k = 0u; k < lamps + settings.tree + settings.sky; ++k) {
+        uvec4 more = pcg4d(uvec4(words.x, words.y, k, 0x1a3bu));
+        uint i = k;
+        float factor = 1.0;
+        if (k >= lamps) {
+            i = light_count + (k - lamps) * settings.samples + pick_below(more.x, settings.samples);
+            factor = float(settings.samples);
+        } else if (lamps < light_count) {
+            i = pick_below(more.x, light_count);
+            factor = float(light_count) / float(lamps);
+        }
+        Ray way;
+        vec3 sent = direct_ray(i, p, words.zw, way) * factor;
+        float weight = dot(sent, vec3(1.0));
+        if (weight <= 0.0) continue;
+        strengths += weight;
+        if (unit_float(more.y) * strengths >= weight) continue;
+        ray = way;
+        light = sent;
+        strength = weight;
+    }
+    if (strength <= 0.0 || trace_any(ray, TRACE_SHADOW, words.y)) return;
+    near_paths[slot].light = path.light + path.weight * light * (strengths / strength);
 }

@@ -21,8 +21,9 @@ void main() {
     uint at = gl_GlobalInvocationID.x;
     if (at >= count) return;
     float all = sums[total - 1u];
-    // Equal steps through the sum.
-    float wanted = (float(at) + offset) / float(count) * all;
+    // Equal steps through the sum, below all of it: what comes last may have no weight.
+    float wanted = min((float(at) + offset) / float(count), 0.99999994) * all;
+    if (wanted >= all) wanted = 0.0;
     uint low = 0u, high = total - 1u;
     while (low < high) {
         uint middle = (low + high) / 2u;

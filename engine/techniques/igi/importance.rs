@@ -53,6 +53,8 @@ impl Igi {
         graph.compute(cumulate::Args { candidates: candidates.buffer, importances, weights, sums, push }, 1);
         let vpls = graph.buffer("igi.vpls", u64::from(count) * size_of::<types::Vpl>() as u64);
         let offset = if shared.seed == 0 { 0.5 } else { halton::shift(shared.seed, u32::MAX - 1) as f32 };
+        // Rounding to 32 bits may reach 1.
+        let offset = offset.min(1.0 - f32::EPSILON / 2.0);
         let push = resample::Push { total, count, offset };
         graph.compute(resample::Args { candidates: candidates.buffer, weights, sums, vpls, push }, count);
         Vpls { buffer: vpls, count, tree: None }

@@ -40,7 +40,7 @@ use settings::LEAST_CELL;
 pub use settings::{Pattern, Settings, Visibility};
 
 use crate::{
-    Error, Result,
+    Result,
     gpu::{Gpu, OwnedBuffer, OwnedImage},
     graph::{Buffer, Extent, Format, Graph, Image, Uniform},
     passes::gbuffer::GBuffer,
@@ -66,6 +66,8 @@ pub struct Igi {
     boxes: Option<Rays>,
     /// `rays` are traced in compute.
     in_compute: bool,
+    /// The device has ray queries.
+    queries: bool,
     environment: OwnedImage,
     environment_columns: OwnedBuffer,
     cells: [u32; 2],
@@ -160,18 +162,8 @@ impl Igi {
     /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits; `Usage` if ray queries are asked for
     /// that the device does not have.
     pub fn new(gpu: &Gpu, scene: &Scene, resident: &Resident, settings: &Settings) -> Result<Self> {
-        let in_compute = match settings.visibility {
-            Visibility::Auto | Visibility::Raster => !gpu.caps().ray_query,
-            Visibility::Compute => true,
-            Visibility::Query if gpu.caps().ray_query => false,
-            Visibility::Query => {
-                return Err(Error::usage("the device has no ray queries, or they are switched off")
-                    .at("igi.visibility")
-                    .help(
-                        "Choose visibility = \"compute\"; CPU drivers use ray queries only with LUCERNA_RAY_QUERY=on",
-                    ));
-            }
-        };
+        let queries = gpu.caps().ray_query;
+        let in_compute = settings.visibility.in_compute(queries)?;
         let importance = tables::importance(scene.environment.as_ref());
         let columns = bytemuck::cast_slice(&importance.columns);
         let double_sided = |primitive: &crate::scene::Primitive| {
@@ -187,6 +179,7 @@ impl Igi {
             rays,
             boxes: (!in_compute && settings.imperfect).then(|| Rays::in_compute(gpu, scene, resident)).transpose()?,
             in_compute,
+            queries,
             environment: tables::radiance_map(gpu, scene.environment.as_ref())?,
             environment_columns: OwnedBuffer::with_contents(gpu, "igi.environment", columns)?,
             cells: importance.cells,

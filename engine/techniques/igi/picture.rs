@@ -1,5 +1,6 @@
 //! Everything from a scene on the device to the final picture.
 
+use super::super::allowed::within;
 use super::{Igi, Outputs, Settings, Shared, Visibility, Vpls, filters, order};
 use crate::{
     Error, Result,
@@ -19,7 +20,8 @@ use serde::{Deserialize, Serialize};
 pub struct PictureSettings {
     pub igi: Settings,
     pub gbuffer: gbuffer::Settings,
-    /// Radiance behind everything in scenes without an environment, linear RGB.
+    /// Radiance behind everything, added to that of an environment, linear RGB, not below 0. Seen directly and in mirrors; it lights
+    /// nothing.
     pub background: [f32; 3],
 }
 
@@ -57,7 +59,7 @@ impl Igi {
     /// `graph.frame` up by one from frame to frame and run all frames with one `Runner`; `Runner::forget_history` starts anew.
     ///
     /// # Errors
-    /// `Usage` if a setting is out of its range, or asks for boxes that [`Igi::new`] was not told of.
+    /// `Usage` if a setting is out of its range, or asks for rays or boxes that [`Igi::new`] was not told of.
     pub fn picture(
         &mut self,
         graph: &mut Graph,
@@ -69,6 +71,12 @@ impl Igi {
     ) -> Result<Picture> {
         let igi = &settings.igi;
         igi.validate().map_err(|error| error.at("igi"))?;
+        within(settings.background.map(|channel| ("background", channel, 0.0, f32::MAX)))?;
+        if igi.visibility.in_compute(self.queries)? != self.in_compute {
+            let how = if self.in_compute { "in compute" } else { "by ray queries" };
+            let what = format!("the scene was prepared for rays that are traced {how}");
+            return Err(Error::usage(what).at("igi.visibility").help("Give Igi::new the same settings"));
+        }
         if igi.imperfect && !self.in_compute && self.boxes.is_none() {
             let what = "there are no boxes: the scene was prepared for exact ray queries";
             return Err(Error::usage(what).at("igi.imperfect").help("Give Igi::new the same settings"));

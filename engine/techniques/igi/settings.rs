@@ -23,6 +23,20 @@ pub enum Visibility {
     Raster,
 }
 
+impl Visibility {
+    /// Whether rays are traced in compute on a device with or without ray queries.
+    pub(super) fn in_compute(self, queries: bool) -> Result<bool> {
+        match self {
+            Self::Auto | Self::Raster => Ok(!queries),
+            Self::Compute => Ok(true),
+            Self::Query if queries => Ok(false),
+            Self::Query => Err(Error::usage("the device has no ray queries, or they are switched off")
+                .at("igi.visibility")
+                .help("Choose visibility = \"compute\"; CPU drivers use ray queries only with LUCERNA_RAY_QUERY=on")),
+        }
+    }
+}
+
 /// Where the subsets of interleaved sampling lie.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -39,8 +53,8 @@ pub enum Pattern {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    /// Virtual point lights at most, 1 to 10,000. There are ⌈vpls / bounces⌉ paths of light; those that leave the scene, or end on
-    /// something black, leave fewer.
+    /// Virtual point lights at most, 1 to 10,000 and no less than `bounces`. There are ⌊vpls / bounces⌋ paths of light; those that leave
+    /// the scene, or end on something black, leave fewer.
     pub vpls: u32,
     /// Paths that are shot for each that virtual lights are kept of, 1 to 64: of what they leave, that is kept which matters to the view.
     /// 1: whatever they leave, as in the paper.
@@ -181,7 +195,7 @@ impl Settings {
 
     /// Paths of light.
     pub fn paths(&self) -> u32 {
-        self.vpls.div_ceil(self.bounces.max(1))
+        (self.vpls / self.bounces.max(1)).max(1)
     }
 
     /// Surfaces pick from so many virtual lights. From few it costs less to gather from all, without noise.
@@ -235,6 +249,13 @@ impl Settings {
             ("direct_samples", self.direct_samples, 1, 4096),
             ("raster_size", self.raster_size, 16, 1024),
         ])?;
+        if self.vpls < self.bounces {
+            return wrong(
+                "vpls",
+                self.vpls,
+                &format!("{} to 10000, for a path leaves one at each of its bounces", self.bounces),
+            );
+        }
         if self.visibility == Visibility::Raster {
             super::raster::validate(self)?;
             if self.picks > 0 {
@@ -279,7 +300,7 @@ mod tests {
         Settings::default().validate().unwrap();
         Settings::paper().validate().unwrap();
         Settings { interleave: 32, fused: true, smoothing: 5, ..Settings::default() }.validate().unwrap();
-        assert_eq!(Settings { vpls: 181, bounces: 2, ..Settings::default() }.paths(), 91);
+        assert_eq!(Settings { vpls: 181, bounces: 2, ..Settings::default() }.paths(), 90);
     }
 
     #[test]
@@ -306,6 +327,8 @@ mod tests {
         assert_eq!(error, "vpls: 0 is not allowed; allowed: 1 to 10000");
         let error = message(Settings { bound: f32::NAN, ..Settings::default() });
         assert_eq!(error, "bound: NaN is not allowed; allowed: 0 to 1");
+        let error = message(Settings { vpls: 2, bounces: 3, ..Settings::default() });
+        assert!(error.starts_with("vpls: 2 is not allowed; allowed: 3 to 10000"), "{error}");
         for wrong in [
             Settings { bounces: 9, ..Settings::default() },
             Settings { downsample: 0, ..Settings::default() },
