@@ -216,7 +216,7 @@ impl Settings {
             }
             a
         };
-        (633 * subsets >> 10..).find(|&stride| stride > 0 && common(stride, subsets) == 1).unwrap_or(1)
+        (((633 * subsets) >> 10)..).find(|&stride| stride > 0 && common(stride, subsets) == 1).unwrap_or(1)
     }
 
     /// Picks of a texel: pixels of a tile share them.
