@@ -2,6 +2,7 @@
 //! progressive path tracer that makes reference pictures on the device.
 
 pub mod fiv;
+pub mod fiv_specular;
 pub mod isr;
 pub mod isr_scene;
 pub mod path;

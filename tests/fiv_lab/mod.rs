@@ -158,6 +158,23 @@ impl<'a> Studio<'a> {
         (irradiance, total)
     }
 
+    /// What every pixel reflects glossily; it is part of its light.
+    pub fn gloss(&mut self, pose: &Pose, view: &View, settings: &Settings) -> Vec<Vec3> {
+        let mut graph = Graph::new("fiv");
+        let handles = self.resident.frame_in(&mut graph, self.scene, pose);
+        let view = view.fit_far(&handles.bounds());
+        let all = PictureSettings { fiv: settings.clone(), ..Default::default() };
+        let picture = self.fiv.picture(&mut graph, self.scene, pose, &handles, &view, &all).unwrap();
+        let tokens = [picture.outputs.specular.unwrap(), picture.outputs.total].map(|image| graph.read_image(image));
+        let frame = self.runner.run(&graph).unwrap_or_else(|error| panic!("{error}"));
+        let [gloss, total] = tokens.map(|token| {
+            let pixels = frame.image(token).to_f32();
+            pixels.into_iter().map(|[r, g, b, _]| Vec3::new(r, g, b)).collect::<Vec<_>>()
+        });
+        assert!(gloss.iter().zip(&total).all(|(g, t)| (*t - *g).min_element() >= -1e-6 * t.max_element()));
+        gloss
+    }
+
     /// Irradiance and distance (metres; 1e10: nothing) of every pixel.
     pub fn film(&mut self, pose: &Pose, view: &View, settings: &Settings) -> (Vec<[f32; 3]>, Vec<f32>) {
         let mut graph = Graph::new("fiv");

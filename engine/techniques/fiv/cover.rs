@@ -13,7 +13,7 @@ use crate::{
     Result,
     gpu::Gpu,
     graph::{Buffer, Graph, Runner},
-    rays::Rays,
+    rays::{RayHandles, Rays},
     scene::{Pose, resident::Resident},
     shaders::{
         consts::{FIV_FLOATS, FIV_SUN_SIDE, TRACE_STEPS},
@@ -58,7 +58,7 @@ pub struct Cover<'a> {
     rays: Rays,
     pose: Pose,
     tiles: u64,
-    turn: usize,
+    geometry_from_world: Mat3,
     parallel: Option<Parallel>,
 }
 
@@ -78,10 +78,12 @@ impl<'a> Cover<'a> {
         let resident = Resident::new(gpu, &occluder.scene)?;
         let rays = Rays::new(gpu, &occluder.scene, &resident)?;
         let tiles = tiles(gpu, &rays)?;
-        Ok(Self { occluder, resident, rays, pose: Pose::rest(&occluder.scene), tiles, turn: 0, parallel: None })
+        let pose = Pose::rest(&occluder.scene);
+        let geometry_from_world = Mat3::IDENTITY;
+        Ok(Self { occluder, resident, rays, pose, tiles, geometry_from_world, parallel: None })
     }
 
-    /// From now on points are looked up in pictures along the rays ([`super::parallel`]), where that is possible.
+    /// From now on points are looked up in pictures along the rays ([`super::parallel`]), where that is possible: not if it is turned.
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`.
@@ -90,9 +92,15 @@ impl<'a> Cover<'a> {
         Ok(())
     }
 
-    /// From now on with the light that the occluder has around itself if it is turned; `turn`: of the samples that the light has.
-    pub fn turn(&mut self, turn: usize) {
-        self.turn = turn;
+    /// From now on as `matrix`, a rotation, turns it around its centre. Points, places and vectors are in world axes.
+    pub fn turn(&mut self, matrix: Mat3) {
+        self.geometry_from_world = matrix.transpose();
+    }
+
+    /// Its rays in a frame.
+    pub(super) fn rays(&mut self, graph: &mut Graph) -> RayHandles {
+        let handles = self.resident.frame_in(graph, &self.occluder.scene, &self.pose);
+        self.rays.frame(graph, &handles)
     }
 
     /// Declares the passes for `points`, seen from the centre of the occluder, metres. `split`: rays along the edge of a texel.
@@ -108,22 +116,20 @@ impl<'a> Cover<'a> {
     }
 
     fn passes(&mut self, graph: &mut Graph, light: &Light, places: &[Place], split: u32, own: bool) -> Covered {
-        let handles = self.resident.frame_in(graph, &self.occluder.scene, &self.pose);
-        let rays = self.rays.frame(graph, &handles);
-        let texels = light.turned.get(self.turn.wrapping_sub(1)).unwrap_or(&light.texels);
-        let texels = graph.import_buffer(texels);
+        let rays = self.rays(graph);
+        let texels = graph.import_buffer(&light.texels);
         let point = |place: &Place| types::FivPoint { at: place.point.to_array(), turn: 0 };
         let points: Vec<types::FivPoint> = places.iter().map(point).collect();
         let list = graph.buffer_from("fiv.points", &points);
         let normals: Vec<[f32; 3]> =
             places.iter().take(if own { places.len() } else { 1 }).map(|p| p.normal.to_array()).collect();
         let normals = graph.buffer_from("fiv.normals", &normals);
-        let as_it_is = types::FivTurn {
-            geometry_from_world: Mat3::IDENTITY.to_cols_array_2d(),
+        let stands = types::FivTurn {
+            geometry_from_world: self.geometry_from_world.to_cols_array_2d(),
             centre: [0.0; 3],
             radius: reach(self.occluder.radius),
         };
-        let turns = graph.buffer_from("fiv.turns", &[as_it_is]);
+        let turns = graph.buffer_from("fiv.turns", &[stands]);
         let total = places.len() as u32;
         let covered = Covered {
             fivs: graph.buffer("fiv.vectors", u64::from(total) * u64::from(FIV_FLOATS) * 4),
@@ -131,7 +137,8 @@ impl<'a> Cover<'a> {
         };
         let row = light.size * split / 8;
         let all = 6 * row * row;
-        let parallel = self.parallel.as_ref().filter(|parallel| !own && parallel.fits(light, split));
+        let as_it_is = !own && self.geometry_from_world == Mat3::IDENTITY;
+        let parallel = self.parallel.as_ref().filter(|parallel| as_it_is && parallel.fits(light, split));
         let chunks = parallel.map_or(all.div_ceil(self.tiles as u32), Parallel::chunks);
         // A tenth of the sphere from each point, about; half of it from the surface.
         let part = if own { 2 } else { 10 };

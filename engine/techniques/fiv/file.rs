@@ -3,7 +3,7 @@
 //! | bytes | what |
 //! |---|---|
 //! | 8 | `lucfiv\r\n` |
-//! | 4 | version, 2 |
+//! | 4 | version, 3; 2 is read too: its turns are about +Y |
 //! | 4 | bytes of the header |
 //! | … | header: JSON, the [`Plan`] with the `range` of samples that are here |
 //! | … | the vectors of these samples: nine 32-bit floats each, x.rgb, y.rgb, z.rgb, W/m² |
@@ -19,7 +19,9 @@ use super::{hash::Hash, plan::Plan, room::MOST_SAMPLES};
 use crate::{Error, Result, image, shaders::consts::FIV_FLOATS};
 
 const MAGIC: &[u8; 8] = b"lucfiv\r\n";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
+/// Of the oldest files that are read.
+const OLDEST: u32 = 2;
 /// Bytes of a file that is read at most.
 const MOST_BYTES: u64 = 8 << 30;
 /// Bytes of a header that is read at most.
@@ -91,8 +93,8 @@ impl Stored {
         let (Some(version), Some(length)) = (word(8), word(12)) else {
             return Err(damaged(format!("is cut off after {} bytes", bytes.len())));
         };
-        if version != VERSION {
-            return Err(damaged(format!("has version {version}, version {VERSION} can be read")));
+        if !(OLDEST..=VERSION).contains(&version) {
+            return Err(damaged(format!("has version {version}, versions {OLDEST} to {VERSION} can be read")));
         }
         let length = length as usize;
         let header = bytes.get(16..16 + length.min(MOST_HEADER)).filter(|h| h.len() == length);

@@ -2,12 +2,11 @@
 
 use ash::vk;
 
-use super::{Settings, sky::Sky, suns, turn};
+use super::{sky::Sky, suns};
 use crate::{
     Result,
     gpu::{Gpu, ImageDesc, OwnedBuffer, OwnedImage},
     graph::{Graph, Runner},
-    scene::Environment,
     shaders::{consts::FIV_FLOATS, fiv, types},
 };
 
@@ -21,8 +20,6 @@ pub struct Light {
     pub size: u32,
     /// `types::FivTexel`
     pub texels: OwnedBuffer,
-    /// The same turned back by all samples of turns but the first one ([`super::turn`]).
-    pub turned: Vec<OwnedBuffer>,
     /// Irradiance for the normal of each texel, W/m²: a cube, to be looked up by `cube_lookup` of lib/fiv.glsl.
     pub difmap: OwnedImage,
     /// The fullsphere irradiance vector of the whole environment: x.rgb, y.rgb, z.rgb, W/m².
@@ -62,19 +59,6 @@ impl Light {
         let mut total = [0.0; FIV_FLOATS as usize];
         total.iter_mut().zip(sums).for_each(|(to, from)| *to = from);
         let (suns, lit, hash) = (suns::of(sky), sky.lit(), sky.hash());
-        Ok(Self { size: sky.size, texels: buffer, turned: Vec::new(), difmap, total, lit, suns, hash })
-    }
-
-    /// Uploads what occluders have around themselves that are turned.
-    ///
-    /// # Errors
-    /// `OutOfMemory`, `DeviceLost`; as [`Sky::new`].
-    pub fn turn(&mut self, gpu: &Gpu, environment: &Environment, settings: &Settings) -> Result<()> {
-        let turned = (1..settings.turns).map(|turn| {
-            let texels = turn::sky(environment, settings, turn)?.texels();
-            OwnedBuffer::with_contents(gpu, "fiv.sky.turned", bytemuck::cast_slice(&texels))
-        });
-        self.turned = turned.collect::<Result<_>>()?;
-        Ok(())
+        Ok(Self { size: sky.size, texels: buffer, difmap, total, lit, suns, hash })
     }
 }

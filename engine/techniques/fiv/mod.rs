@@ -21,6 +21,7 @@
 //! - Samples lie where what is hidden bends, if [`Settings::adaptive`] ([`pace`]).
 //! - What overlapping occluders share is less where they do not fill their bounding discs ([`fill`]).
 //! - The brightest texels can be kept out of the vectors and get hard shadows ([`suns`]).
+//! - Surfaces may reflect the environment glossily ([`specular`]), and occluders may turn ([`turn`]).
 //! - More than two overlapping occluders: see [`crate::reference::fiv::shares`].
 
 pub mod cover;
@@ -40,6 +41,7 @@ mod room;
 pub mod samples;
 mod settings;
 pub mod sky;
+pub mod specular;
 mod stage;
 pub mod suns;
 pub mod support;
@@ -51,6 +53,6 @@ pub use light::Light;
 pub use occluder::{Occluder, Occluders, Placed};
 pub use picture::{Outputs, Picture, PictureSettings};
 pub use plan::Plan;
-pub use settings::{Cut, Extent, Interpolation, Masks, Method, SelfSamples, Settings, Shared};
+pub use settings::{Cut, Extent, Interpolation, Masks, Method, SelfSamples, Settings, Shared, Specular};
 pub use sky::Sky;
 pub use stage::Fiv;

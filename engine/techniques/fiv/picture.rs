@@ -6,8 +6,8 @@ use glam::Mat3;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Extent as Reach, Fiv, Interpolation, Method, SelfSamples, Settings, online::Seen, online_standing::Standing,
-    pace::Paces, suns, support, turn,
+    Extent as Reach, Fiv, Interpolation, Method, SelfSamples, Settings, Specular, online::Seen,
+    online_standing::Standing, pace::Paces, specular::Shadows, suns, support, turn,
 };
 use crate::{
     Error, Result,
@@ -56,6 +56,8 @@ pub struct Outputs {
     pub total: Image,
     /// Of the visible surfaces, W/m²; 0 on the background.
     pub irradiance: Image,
+    /// What they reflect glossily, W/(sr·m²), if it was asked for.
+    pub specular: Option<Image>,
 }
 
 /// A picture and the stages before it.
@@ -98,14 +100,25 @@ impl Fiv {
         let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
         let extent = graph.extent(gbuffer.depth);
         let outputs = graph.scope("fiv", |graph| {
-            let irradiance = match (settings.fiv.method, &self.rays) {
-                (Method::BruteForce, Some(_)) => self.truth(graph, handles, &gbuffer),
-                _ => self.irradiance(graph, (scene, pose, handles), view, &gbuffer, &settings.fiv)?,
+            let (irradiance, shadows) = match (settings.fiv.method, &self.rays) {
+                (Method::BruteForce, Some(_)) => (self.truth(graph, handles, &gbuffer), None),
+                _ => {
+                    let (irradiance, shadows) =
+                        self.irradiance(graph, (scene, pose, handles), view, &gbuffer, &settings.fiv)?;
+                    (irradiance, Some(shadows))
+                }
             };
             let total = graph.image("fiv.radiance", Format::RGBA32F, extent);
             let (albedo, depth, emission) = (gbuffer.albedo, gbuffer.depth, gbuffer.emission);
             graph.compute(shaders::fiv::compose::Args { albedo, depth, emission, irradiance, total }, extent);
-            Ok::<_, Error>(Outputs { total, irradiance })
+            let specular = match settings.fiv.specular {
+                Specular::Off => None,
+                Specular::Summed => {
+                    let shadows = shadows.as_ref();
+                    Some(self.specular(graph, (pose, handles), &gbuffer, &settings.fiv, shadows, total)?)
+                }
+            };
+            Ok::<_, Error>(Outputs { total, irradiance, specular })
         })?;
         let mut behind = handles.clone();
         let moment = Arc::make_mut(&mut behind.moment);
@@ -129,7 +142,7 @@ impl Fiv {
         view: &View,
         gbuffer: &GBuffer,
         settings: &Settings,
-    ) -> Result<Image> {
+    ) -> Result<(Image, Shadows)> {
         let extent = graph.extent(gbuffer.depth);
         let irradiance = graph.image("fiv.irradiance", Format::RGBA32F, extent);
         graph.clear(irradiance, [0.0; 4]);
@@ -228,7 +241,7 @@ impl Fiv {
         }
         let pixels = Pixels { gbuffer, identity, occluders, near: (near, words), irradiance };
         self.suns(graph, pose, &standing.nodes, &pixels, settings.self_shadow);
-        Ok(irradiance)
+        Ok((irradiance, Shadows { identity, occluders, fivs, near: (near, words), count }))
     }
 
     /// Adds the light of texels that are kept apart.
@@ -239,7 +252,7 @@ impl Fiv {
         }
         let shade = |node: &u32| {
             let kind = self.occluders.placed.iter().find(|placed| placed.node == *node).map_or(0, |placed| placed.kind);
-            let own = own && self.yaw(pose, *node) == Some(0.0);
+            let own = own && self.angle(pose, *node) == Some(0.0);
             types::FivShade { map: kind * count * suns::FLOATS, own: own.into() }
         };
         let mut shades: Vec<_> = nodes.iter().map(shade).collect();
@@ -272,9 +285,9 @@ impl Fiv {
         let grid = self.plan.grid;
         let placed = self.occluders.placed.iter().map(|placed| {
             let kind = &self.plan.occluders[placed.kind as usize];
-            let yaw = self.yaw(pose, placed.node);
-            let turned = Mat3::from_rotation_y(yaw.unwrap_or(0.0));
-            let (first, second, blend) = turn::between(yaw.unwrap_or(0.0), self.plan.turns);
+            let angle = self.angle(pose, placed.node);
+            let turned = turn::rotation(angle.unwrap_or(0.0), self.plan.turn_axis);
+            let (first, second, blend) = turn::between(angle.unwrap_or(0.0), self.plan.turns);
             let pace = self.plan.samples() as u32 * FIV_FLOATS + placed.kind * (3 * FIV_PACE_KNOTS + grid.radii);
             types::FivOccluder {
                 centre: (pose.world[placed.node as usize].w_axis.truncate() + turned * placed.centre).to_array(),
@@ -289,8 +302,8 @@ impl Fiv {
                 farthest: kind.shells.farthest,
                 steps: kind.shells.steps(grid.radii) as f32,
                 pace: if kind.paces == Paces::default() { NONE } else { pace },
-                reach: if yaw.is_some() { placed.kind * support::LENGTH as u32 } else { NONE },
-                turned: yaw.is_some_and(|yaw| yaw != 0.0).into(),
+                reach: if angle.is_some() { placed.kind * support::LENGTH as u32 } else { NONE },
+                turned: angle.is_some_and(|angle| angle != 0.0).into(),
                 to_rest: turned.transpose().to_cols_array_2d(),
                 limit: NEVER,
                 ..Default::default()
@@ -328,11 +341,11 @@ impl Fiv {
                 // Stored vectors have all occluders, in their order.
                 let placed = self.occluders.placed.get(occluder as usize).filter(|_| known);
                 let Some(placed) = placed else { return owner };
-                let yaw = self.yaw(pose, node).filter(|_| !instance.deformed || *pose == self.at_rest);
-                let Some(yaw) = yaw else {
+                let angle = self.angle(pose, node).filter(|_| !instance.deformed || *pose == self.at_rest);
+                let Some(angle) = angle else {
                     return owner;
                 };
-                let (turn, next, blend) = turn::between(yaw, self.plan.turns);
+                let (turn, next, blend) = turn::between(angle, self.plan.turns);
                 let mut first = self.plan.grid.count();
                 for own in &self.occluders.kinds[placed.kind as usize].own {
                     if own.slot == slot {
@@ -358,13 +371,6 @@ impl Fiv {
     fn first_float(&self, kind: u32, turn: u32, sample: u32) -> u32 {
         let of_turn = self.plan.of_turn(&self.plan.occluders[kind as usize]) as u32;
         (self.plan.first(kind as usize) as u32 + turn * of_turn + sample) * FIV_FLOATS
-    }
-
-    /// How far a node is turned about +Y, as far as there are vectors for it; `None`: it does something else, too.
-    fn yaw(&self, pose: &Pose, node: u32) -> Option<f32> {
-        let linear = |of: &Pose| of.world.get(node as usize).map(|m| Mat3::from_mat4(*m));
-        let (now, rest) = linear(pose).zip(linear(&self.at_rest))?;
-        turn::yaw(now, rest).filter(|yaw| *yaw == 0.0 || self.plan.turns > 1)
     }
 
     /// Irradiance by a shadow ray to every texel that is not black.
@@ -410,7 +416,7 @@ impl Fiv {
     /// Occluders that do not stand as their vectors were computed.
     fn turned(&self, scene: &Scene, pose: &Pose, instances: &[Instance]) -> Vec<Note> {
         let deforms = |node: u32| *pose != self.at_rest && instances.iter().any(|i| i.node == node && i.deformed);
-        let what = |node: u32| match (self.yaw(pose, node), deforms(node)) {
+        let what = |node: u32| match (self.angle(pose, node), deforms(node)) {
             (_, true) => Some("deforms"),
             (None, _) => Some("turns or changes its size"),
             _ => None,

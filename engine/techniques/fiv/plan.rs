@@ -13,15 +13,10 @@ use super::{
     pace::{self, Paces},
     samples::{Grid, Shells},
     settings::{Interpolation, Masks, SelfSamples},
-    surface::Own,
-    turn,
+    surface::{Own, Place},
+    turn::{self, Axis},
 };
-use crate::{
-    Error, ErrorKind, Result,
-    gpu::Gpu,
-    graph::Runner,
-    shaders::consts::{FIV_FLOATS, FIV_INSIDE},
-};
+use crate::{Result, gpu::Gpu, graph::Runner, shaders::consts::FIV_FLOATS};
 
 /// Points of one run of the device: the finest grain of progress.
 const BATCH: u32 = 4096;
@@ -71,11 +66,14 @@ pub struct Plan {
     pub grid: Grid,
     /// Samples on surfaces follow those around.
     pub surface: bool,
-    /// Samples of turns about +Y; all others are there for each.
+    /// Samples of turns; all others are there for each.
     pub turns: u32,
     /// Bright texels that are kept apart, at most.
     #[serde(default)]
     pub suns: u32,
+    /// What occluders turn about.
+    #[serde(default)]
+    pub turn_axis: Axis,
     pub occluders: Vec<Kind>,
 }
 
@@ -102,6 +100,7 @@ impl Plan {
             surface: settings.on_surface(),
             turns: settings.turns,
             suns: settings.suns,
+            turn_axis: settings.turn_axis,
             occluders: occluders.iter().map(kind).collect(),
         }
     }
@@ -137,18 +136,24 @@ impl Plan {
     pub fn settings(&self, over: &Settings) -> Settings {
         let Grid { azimuths, polars, radii } = self.grid;
         let (size, split, masks, reach) = (self.size, self.split, self.masks, self.reach);
-        let (turns, suns) = (self.turns, self.suns);
+        let (turns, turn_axis, suns) = (self.turns, self.turn_axis, self.suns);
         let self_samples = if self.surface { SelfSamples::Surface } else { SelfSamples::Spheres };
-        Settings { size, split, masks, reach, azimuths, polars, radii, turns, suns, self_samples, ..over.clone() }
+        let out = Settings { size, split, masks, reach, azimuths, polars, radii, ..over.clone() };
+        Settings { turns, turn_axis, suns, self_samples, ..out }
     }
 
     /// How another plan differs in what decides the numbers, in words; `None`: it does not.
     pub fn difference(&self, other: &Self) -> Option<String> {
-        let plain = |of: &Self| (of.size, of.split, of.grid, of.turns, of.suns);
+        // One turn is about nothing.
+        let axis = |of: &Self| Some(of.turn_axis).filter(|_| of.turns > 1);
+        let plain = |of: &Self| (of.size, of.split, of.grid, of.turns, of.suns, axis(of));
         if plain(self) != plain(other) {
             let say = |of: &Self| {
+                let about = axis(of).map_or(String::new(), |axis| format!(" about {axis}"));
                 let Self { grid, turns, size, split, suns, .. } = of;
-                format!("{grid} samples, {turns} turns, {size} texels, {split} rays along one, {suns} lights apart")
+                format!(
+                    "{grid} samples, {turns} turns{about}, {size} texels, {split} rays along one, {suns} lights apart"
+                )
             };
             return Some(format!("{} instead of {}", say(other), say(self)));
         }
@@ -209,9 +214,6 @@ impl Plan {
         range: Range<u64>,
         mut done: impl FnMut(u64, &[f32]) -> Result<bool>,
     ) -> Result<()> {
-        if light.turned.len() + 1 < self.turns as usize {
-            return Err(Error::new(ErrorKind::Runtime, "the light was not turned").at("fiv.turns"));
-        }
         let mut runner = Runner::new(gpu);
         for (number, (occluder, kind)) in occluders.iter().zip(&self.occluders).enumerate() {
             let (mut at, last) = (range.start.max(self.first(number)), range.end.min(self.first(number + 1)));
@@ -229,26 +231,25 @@ impl Plan {
                 let begin = self.first(number) + turn * of_turn;
                 let border = begin + u64::from(self.grid.count());
                 let end = last.min(at + u64::from(BATCH)).min(if at < border { border } else { begin + of_turn });
-                let matrix = turn::matrix(turn as u32, self.turns);
-                cover.turn(turn as usize);
-                let mut fivs = if at < border {
+                let matrix = turn::matrix(turn as u32, self.turns, self.turn_axis).as_mat3();
+                cover.turn(matrix);
+                let fivs = if at < border {
                     let point = |sample: u64| {
                         let number = (sample - begin) as u32;
-                        match turn {
-                            0 if kind.paces == Paces::default() => -kind.shells.point(&self.grid, number),
-                            0 => -kind.offset(&self.grid, number).as_vec3(),
-                            _ => -(matrix.transpose() * kind.offset(&self.grid, number)).as_vec3(),
+                        if kind.paces == Paces::default() {
+                            -kind.shells.point(&self.grid, number)
+                        } else {
+                            -kind.offset(&self.grid, number).as_vec3()
                         }
                     };
                     let points: Vec<Vec3> = (at..end).map(point).collect();
                     around(&mut cover, &mut runner, light, &points, self.split)?
                 } else {
                     let places = places.get((at - border) as usize..(end - border) as usize).unwrap_or_default();
-                    cover.run_own(&mut runner, light, places, self.split)?.0
+                    let turned = |p: &Place| Place { point: matrix * p.point, normal: matrix * p.normal };
+                    let places: Vec<Place> = places.iter().map(turned).collect();
+                    cover.run_own(&mut runner, light, &places, self.split)?.0
                 };
-                for sample in fivs.chunks_exact_mut(FIV_FLOATS as usize).filter(|s| turn > 0 && s[0] < FIV_INSIDE) {
-                    turn::vectors(sample, &matrix);
-                }
                 debug_assert_eq!(fivs.len() as u64, (end - at) * u64::from(FIV_FLOATS));
                 if !done(end, &fivs)? {
                     return Ok(());

@@ -2,7 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{super::allowed::within, samples::Grid, sky::SIDES, suns};
+use super::{
+    super::allowed::{within, wrong},
+    samples::Grid,
+    sky::SIDES,
+    suns,
+    turn::Axis,
+};
 use crate::{Error, Result};
 
 /// How irradiance is found.
@@ -89,6 +95,17 @@ pub enum Interpolation {
     SolidAngle,
 }
 
+/// What surfaces reflect glossily.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Specular {
+    /// Nothing: they are matt.
+    #[default]
+    Off,
+    /// The environment, a sum over its texels, by the share that occluders leave of its cells.
+    Summed,
+}
+
 /// Settings of the technique.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -101,8 +118,10 @@ pub struct Settings {
     pub polars: u32,
     /// Spheres of samples, 2 to 128.
     pub radii: u32,
-    /// Samples of turns about +Y, 1 to 64, for occluders that turn so; 1: those at rest only.
+    /// Samples of turns about an axis, 1 to 64, for occluders that turn so; 1: those at rest only.
     pub turns: u32,
+    /// What they turn about, in world axes through their nodes' origins: `x`, `y`, `z`, or three numbers with commas between them.
+    pub turn_axis: Axis,
     /// The brightest texels of the environment are kept out of the vectors, so many at most, 0 to 16, of those of which each sends at least
     /// a hundredth of all light: their shadows have hard edges, from a map of each occluder for each. Not for occluders that turn, and
     /// only where vectors are computed beforehand.
@@ -136,6 +155,7 @@ pub struct Settings {
     /// Occluders shadow themselves.
     pub self_shadow: bool,
     pub self_samples: SelfSamples,
+    pub specular: Specular,
     pub method: Method,
     /// The environment turns by this angle about +Y, degrees counter-clockwise seen from above, -36000 to 36000.
     pub rotation: f32,
@@ -154,6 +174,7 @@ impl Default for Settings {
             polars: grid.polars,
             radii: grid.radii,
             turns: 1,
+            turn_axis: Axis::Y,
             suns: 0,
             reach: 16.0,
             adaptive: true,
@@ -171,6 +192,7 @@ impl Default for Settings {
             shared: Shared::default(),
             self_shadow: true,
             self_samples: SelfSamples::default(),
+            specular: Specular::default(),
             method: Method::Vectors,
             rotation: 0.0,
             turning: 0.0,
@@ -223,6 +245,12 @@ impl Settings {
         within([("reach", self.reach, 2.0, 1000.0), ("largest", self.largest, 0.0, 1.0)])?;
         within([("negligible", self.negligible, 0.0, 1.0)])?;
         within([("rotation", self.rotation, -36e3, 36e3), ("turning", self.turning, -36e3, 36e3)])?;
+        if self.method == Method::Online && self.specular != Specular::Off {
+            return wrong("specular", "glossy reflection with fiv.method=online", "off, or another method");
+        }
+        if self.suns > 0 && self.specular != Specular::Off {
+            return wrong("specular", "glossy reflection with lights kept apart (fiv.suns)", "off, or fiv.suns=0");
+        }
         within([("exposure", self.exposure, -30.0, 30.0)])?;
         within([("split", self.split, 1, 4), ("turns", self.turns, 1, 64), ("suns", self.suns, 0, suns::MOST)])?;
         if self.suns > 0 && self.turns > 1 {

@@ -1,8 +1,13 @@
 //! What lives as long as a scene: its occluders with their vectors, and the environment on the device.
 
 use super::{
-    Cut, Light, Method, Occluders, Plan, Settings, Shared, Sky, Stored, fill::fill, negligible, online::Online,
-    plan::Kind, suns,
+    Cut, Light, Method, Occluders, Plan, Settings, Shared, Sky, Stored,
+    fill::fill,
+    negligible,
+    online::Online,
+    plan::Kind,
+    specular::{self, Glossy},
+    suns,
 };
 use crate::{
     Error, ErrorKind, Result,
@@ -50,6 +55,8 @@ pub struct Fiv {
     pub(super) rays: Option<(Rays, u64)>,
     /// For vectors of each frame.
     pub(super) online: Option<Online>,
+    /// For glossy reflection with shadows.
+    pub(super) glossy: Option<Glossy>,
     /// Share, light, and the sine of the half angle under which an occluder hides no more than that.
     widest: Option<(f32, (f32, f32), f32)>,
 }
@@ -76,7 +83,7 @@ impl Fiv {
         resident: &Resident,
         settings: &Settings,
         stored: Option<&Stored>,
-        told: impl FnMut(u64, u64) -> bool,
+        mut told: impl FnMut(u64, u64) -> bool,
     ) -> Result<Self> {
         settings.validate().map_err(|error| error.at("fiv"))?;
         let settings = stored.map_or_else(|| settings.clone(), |stored| stored.plan.settings(settings));
@@ -86,7 +93,7 @@ impl Fiv {
         }
         let sky = lit_by(scene, &settings)?;
         let name = scene.environment.as_ref().map_or("", |e| e.name.as_str());
-        let mut light = Light::new(gpu, &sky)?;
+        let light = Light::new(gpu, &sky)?;
         let pose = Pose::rest(scene);
         let occluders = Occluders::of(scene, &pose, settings.flat, settings.largest);
         if occluders.placed.len() > MOST_OCCLUDERS {
@@ -98,15 +105,16 @@ impl Fiv {
         let fivs = match settings.method {
             Method::Vectors => {
                 plan.fits(Some(gpu.caps().limits.storage_range))?;
-                if let Some(environment) = &scene.environment {
-                    light.turn(gpu, environment, &settings)?;
-                }
                 notes.extend(stored.and_then(|stored| computed(&plan, stored)));
-                let mut fivs = vectors(gpu, &light, &occluders, (&mut plan, &settings), stored, told)?;
+                let mut fivs = vectors(gpu, &light, &occluders, (&mut plan, &settings), stored, &mut told)?;
                 paces(&plan, &mut fivs);
                 fivs
             }
             Method::Online | Method::Unshadowed | Method::BruteForce => Vec::new(),
+        };
+        let glossy = match specular::wanted(&settings) {
+            true => Some(Glossy::new(gpu, &sky, &plan, &occluders, &mut told)?),
+            false => None,
         };
         let online = match settings.method {
             Method::Online => Some(Online::new(gpu, scene, &occluders, &settings)?),
@@ -144,6 +152,7 @@ impl Fiv {
             plan,
             rays,
             online,
+            glossy,
             widest: None,
         })
     }
@@ -244,9 +253,9 @@ impl Fiv {
         Ok(found)
     }
 
-    /// Bytes of the vectors on the device.
+    /// Bytes of the vectors on the device, with what occluders hide of reflections.
     pub fn bytes(&self) -> u64 {
-        self.fivs.size()
+        self.fivs.size() + self.glossy.as_ref().map_or(0, Glossy::bytes)
     }
 }
 

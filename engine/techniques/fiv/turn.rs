@@ -1,80 +1,153 @@
-//! Occluders that turn about +Y: vectors for some turns of each, between which is interpolated (the thesis' future work, chapter 6).
-//!
-//! An occluder that is turned under still light hides what one at rest hides under light turned the other way: masks are made with the
-//! light turned back, and vectors turned along afterwards.
+//! Occluders that turn about an axis: vectors for some turns of each, between which is interpolated (the thesis' future work, chapter 6).
 
 use std::f64::consts::TAU;
 
-use glam::{DMat3, Mat3, Vec3};
+use glam::{DMat3, DVec3, Mat3, Quat, Vec3};
+use serde::{Deserialize, Serialize};
 
-use super::{Settings, Sky};
-use crate::{Result, scene::Environment};
+use super::Fiv;
+use crate::scene::Pose;
 
 /// Difference of matrices that counts as none, in parts of their scale.
 const SAME: f32 = 1e-4;
 
-/// Angle of a sample, radians, counter-clockwise seen from above.
+/// What occluders turn about, in world axes: `x`, `y`, `z`, or three numbers with commas between them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Axis(Vec3);
+
+impl Axis {
+    pub const Y: Self = Self(Vec3::Y);
+
+    /// Of this direction; `None` if it has none.
+    pub fn new(direction: Vec3) -> Option<Self> {
+        let length = direction.length();
+        (length.is_finite() && length > 1e-20).then_some(Self(direction))
+    }
+
+    /// Unit length.
+    pub fn direction(&self) -> DVec3 {
+        self.0.as_dvec3().normalize()
+    }
+}
+
+impl Default for Axis {
+    fn default() -> Self {
+        Self::Y
+    }
+}
+
+impl TryFrom<String> for Axis {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        let wrong =
+            || format!("`{text}` is no axis; allowed: x, y, z, or three numbers that are not all 0, as 1,0.5,0");
+        match text.trim() {
+            "x" => return Ok(Self(Vec3::X)),
+            "y" => return Ok(Self(Vec3::Y)),
+            "z" => return Ok(Self(Vec3::Z)),
+            _ => (),
+        }
+        let numbers: Vec<f32> = text.split(',').map_while(|part| part.trim().parse().ok()).collect();
+        let three = <[f32; 3]>::try_from(numbers).ok().filter(|_| text.split(',').count() == 3);
+        three.and_then(|three| Self::new(three.into())).ok_or_else(wrong)
+    }
+}
+
+impl From<Axis> for String {
+    fn from(axis: Axis) -> Self {
+        axis.to_string()
+    }
+}
+
+impl std::fmt::Display for Axis {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.0 {
+            Vec3::X => write!(f, "x"),
+            Vec3::Y => write!(f, "y"),
+            Vec3::Z => write!(f, "z"),
+            Vec3 { x, y, z } => write!(f, "{x},{y},{z}"),
+        }
+    }
+}
+
+/// Angle of a sample, radians, counter-clockwise seen from the tip of the axis.
 pub fn angle(turn: u32, turns: u32) -> f64 {
     TAU * f64::from(turn) / f64::from(turns.max(1))
 }
 
 /// Turns a vector from an occluder at rest to one that is turned.
-pub fn matrix(turn: u32, turns: u32) -> DMat3 {
-    DMat3::from_rotation_y(angle(turn, turns))
+pub fn matrix(turn: u32, turns: u32, axis: Axis) -> DMat3 {
+    if turn == 0 { DMat3::IDENTITY } else { DMat3::from_axis_angle(axis.direction(), angle(turn, turns)) }
 }
 
-/// The environment of these settings as an occluder that is turned has it around itself.
-///
-/// # Errors
-/// As [`Sky::new`].
-pub fn sky(environment: &Environment, settings: &Settings, turn: u32) -> Result<Sky> {
-    let rotation = environment.rotation - angle(turn, settings.turns) as f32;
-    Sky::of(Some(&Environment { rotation, ..environment.clone() }), settings)
-}
-
-/// How far something is turned about +Y, radians from -π to π; `None` if it does anything else but that.
-pub fn yaw(now: Mat3, rest: Mat3) -> Option<f32> {
+/// How far something is turned about an axis, radians from -π to π; `None` if it does anything else but that.
+pub fn about(now: Mat3, rest: Mat3, axis: Axis) -> Option<f32> {
     let scale = rest.to_cols_array().iter().fold(0f32, |m, x| m.max(x.abs()));
     if now.abs_diff_eq(rest, SAME * scale) {
         return Some(0.0);
     }
     let change = now * rest.inverse();
-    let yaw = (-change.x_axis.z).atan2(change.x_axis.x);
-    (yaw.is_finite() && change.abs_diff_eq(Mat3::from_rotation_y(yaw), 10.0 * SAME)).then_some(yaw)
+    if !change.is_finite() {
+        return None;
+    }
+    let turn = Quat::from_mat3(&change);
+    let axis = axis.direction().as_vec3();
+    let half = turn.xyz().dot(axis).atan2(turn.w);
+    // A quaternion and its negative turn alike.
+    let angle = (2.0 * half + std::f32::consts::PI).rem_euclid(std::f32::consts::TAU) - std::f32::consts::PI;
+    (angle.is_finite() && change.abs_diff_eq(Mat3::from_axis_angle(axis, angle), 10.0 * SAME)).then_some(angle)
+}
+
+/// By an angle about an axis; without a rounding where nothing turned.
+pub fn rotation(angle: f32, axis: Axis) -> Mat3 {
+    if angle == 0.0 { Mat3::IDENTITY } else { Mat3::from_axis_angle(axis.direction().as_vec3(), angle) }
 }
 
 /// The samples on both sides of a turn, and how far it is from the first to the second.
-pub fn between(yaw: f32, turns: u32) -> (u32, u32, f32) {
-    let at = (f64::from(yaw) / TAU).rem_euclid(1.0) * f64::from(turns);
+pub fn between(angle: f32, turns: u32) -> (u32, u32, f32) {
+    let at = (f64::from(angle) / TAU).rem_euclid(1.0) * f64::from(turns);
     let first = (at as u32).min(turns - 1);
     (first, (first + 1) % turns, (at - f64::from(first)) as f32)
 }
 
-/// The vectors (nine floats: x.rgb, y.rgb, z.rgb) of one sample after turning. Those that say `inside` stay as they are.
-pub fn vectors(floats: &mut [f32], matrix: &DMat3) {
-    let color = |k: usize| Vec3::from_slice(&floats[3 * k..]).as_dvec3();
-    let [x, y, z] = [color(0), color(1), color(2)];
-    for axis in 0..3 {
-        let row = matrix.row(axis);
-        floats[3 * axis..3 * axis + 3].copy_from_slice(&(x * row.x + y * row.y + z * row.z).as_vec3().to_array());
+impl Fiv {
+    /// How far a node is turned about the axis, as far as there are vectors for it; `None`: it does something else, too.
+    pub(super) fn angle(&self, pose: &Pose, node: u32) -> Option<f32> {
+        let linear = |of: &Pose| of.world.get(node as usize).map(|m| Mat3::from_mat4(*m));
+        let (now, rest) = linear(pose).zip(linear(&self.at_rest))?;
+        about(now, rest, self.plan.turn_axis).filter(|angle| *angle == 0.0 || self.plan.turns > 1)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DVec3;
 
     #[test]
     fn turns_are_found_and_other_changes_are_not() {
         let rest = Mat3::from_rotation_x(0.3) * Mat3::from_diagonal(Vec3::new(1.0, 2.0, 0.5));
-        for angle in [0.0, 0.4, -2.0, 3.0] {
-            let found = yaw(Mat3::from_rotation_y(angle) * rest, rest).unwrap();
-            assert!((found - angle).abs() < 1e-4, "{angle}: {found}");
+        for axis in ["x", "y", "z", "1,0.5,-2"] {
+            let axis = Axis::try_from(axis.to_owned()).unwrap();
+            let direction = axis.direction().as_vec3();
+            for angle in [0.0, 0.4, -2.0, 3.0, 0.5 * TAU as f32] {
+                let turned = Mat3::from_axis_angle(direction, angle);
+                let found = about(turned * rest, rest, axis).unwrap();
+                let apart = (found - angle).abs();
+                assert!(apart.min(TAU as f32 - apart) < 2e-4, "{axis} {angle}: {found}");
+                if angle != 0.0 {
+                    let (found, end) = (matrix(1, 7, axis), matrix(0, 7, axis));
+                    assert!(end == DMat3::IDENTITY && (found * axis.direction() - axis.direction()).length() < 1e-12);
+                }
+            }
+            let other = Mat3::from_axis_angle(direction.any_orthonormal_vector(), 0.5);
+            assert_eq!(about(other * rest, rest, axis), None);
+            assert_eq!(about(rest * 1.1, rest, axis), None);
+            assert_eq!(about(rest * -1.0, rest, axis), None);
         }
-        assert_eq!(yaw(Mat3::from_rotation_x(0.5) * rest, rest), None);
-        assert_eq!(yaw(rest * 1.1, rest), None);
-        assert_eq!(yaw(Mat3::ZERO, Mat3::ZERO), Some(0.0));
+        assert_eq!(about(Mat3::ZERO, Mat3::ZERO, Axis::Y), Some(0.0));
+        assert_eq!(about(Mat3::IDENTITY, Mat3::ZERO, Axis::Y), None);
     }
 
     #[test]
@@ -92,12 +165,14 @@ mod tests {
     }
 
     #[test]
-    fn vectors_turn_with_the_occluder() {
-        let mut floats = [0f32; 9];
-        // Red light from +X, blue from +Z.
-        (floats[0], floats[8]) = (2.0, 3.0);
-        vectors(&mut floats, &matrix(1, 4));
-        let of = |c: usize| DVec3::new(floats[c].into(), floats[3 + c].into(), floats[6 + c].into());
-        assert!((of(0) - DVec3::NEG_Z * 2.0).length() < 1e-6 && (of(2) - DVec3::X * 3.0).length() < 1e-6);
+    fn an_axis_is_written_as_it_is_read_and_others_are_refused() {
+        for text in ["x", "y", "z", "1,0.5,-2"] {
+            assert_eq!(Axis::try_from(text.to_owned()).unwrap().to_string(), text);
+        }
+        assert_eq!(Axis::try_from(" 0, 1, 0 ".to_owned()).unwrap(), Axis::Y);
+        for text in ["", "w", "0,0,0", "1,2", "1,2,3,4", "1,nan,0", "1,inf,0", "a,1,2", "1,2,x"] {
+            let error = Axis::try_from(text.to_owned()).unwrap_err();
+            assert!(error.contains("no axis; allowed: x, y, z"), "{error}");
+        }
     }
 }

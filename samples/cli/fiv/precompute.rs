@@ -130,8 +130,7 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
     let names: Vec<&str> = plan.occluders.iter().map(|o| o.name.as_str()).collect();
     console.info(&format!("{} samples of {} occluders: {}", plan.grid, names.len(), names.join(", ")));
     plan.fits(None)?;
-    let mut light = Light::new(&gpu, &sky)?;
-    light.turn(&gpu, &environment, &keys.fiv)?;
+    let light = Light::new(&gpu, &sky)?;
     plan.adapt(&gpu, &light, &occluders, &keys.fiv, |_| true)?;
     let range = args.shard.map_or(0..plan.samples(), |shard| plan.part(shard.index, shard.count));
     let part = partial(&args.output)?;

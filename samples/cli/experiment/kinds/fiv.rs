@@ -185,11 +185,7 @@ fn vectors(
             None => {
                 let light = match &mut light {
                     Some(light) => light,
-                    none => {
-                        let mut made = Light::new(gpu, &sky)?;
-                        made.turn(gpu, environment, settings)?;
-                        none.insert(made)
-                    }
+                    none => none.insert(Light::new(gpu, &sky)?),
                 };
                 let computed = compute(gpu, light, (&alone, settings), kind, stop)?;
                 std::fs::create_dir_all(&folder).map_err(|e| {

@@ -1,0 +1,395 @@
+//! Glossy reflection of the environment with shadows of occluders.
+//!
+//! The thesis leaves it to later work (chapter 6): for a fixed view the half vectors of all light are known, and a vector for each power
+//! of their cosine with the normal would give Phong's lobe. A lobe of GGX of roughness 0.3 would take hundreds of powers, for one view.
+//! What is kept here instead is for any view and any roughness: of each cell of the environment (4×4 texels) the share of its light that
+//! the occluder hides, a byte a cell, for the same samples as the vectors. A pixel then reflects
+//!
+//!   unshadowed × (Σ cells reflected × Π (1 - share of each occluder)) / (Σ cells reflected),
+//!
+//! channel by channel: the sum over all texels, or the prefiltered environment, tells how much light there is, and the cells which part of
+//! it is left. No light is ever below zero; without occluders nothing changes; an occluder that hides all light leaves none. Cells behind
+//! the surface reflect nothing, so that no correction for cut occluders is needed, and several occluders overlap cell by cell.
+//!
+//! Light of a texel or a cell is a lobe: its width makes the distribution of normals wider that it is reflected by, and so surfaces that
+//! are smoother than the environment is fine show it even and not as points. Brute force reflects texels in the same way.
+//!
+//! What an occluder hides of its own reflections is left out, as are reflections of occluders.
+
+use glam::{DVec3, Mat3, Vec3};
+
+use super::{
+    Fiv, Occluders, Plan, Sky, Specular,
+    cover::{self, Cover},
+    settings::Settings,
+    sky, turn,
+};
+use crate::{
+    Error, ErrorKind, Result,
+    gpu::{Gpu, OwnedBuffer},
+    graph::{Buffer, Format, Graph, Image, Runner},
+    passes::gbuffer::GBuffer,
+    scene::{Pose, resident::Handles},
+    shaders::{consts::FIV_CELL, fiv, types},
+};
+
+/// Points of a run of the device.
+const BATCH: usize = 4096;
+/// Turns of loops of one invocation.
+const MOST_TURNS: u32 = 20_000;
+/// Turns for an occluder: eight samples, of two turns.
+const TURNS_EACH: u32 = 24;
+/// Turns for sixteen cells without occluders.
+const TURNS_CELLS: u32 = 40;
+/// Rays that one dispatch traces at most, about.
+const MOST_RAYS: u64 = 1 << 22;
+/// Words of which a dispatch has a multiple.
+const WORDS: u32 = 4;
+/// Rec. 709.
+const LUMINANCE: DVec3 = DVec3::new(0.2126, 0.7152, 0.0722);
+
+/// What it needs to know of where occluders are in a frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Shadows {
+    /// Which occluder each pixel shows.
+    pub identity: Image,
+    pub occluders: Buffer,
+    /// Vectors of all samples.
+    pub fivs: Buffer,
+    /// Which occluders may matter to a tile of pixels, a bit each, in so many words.
+    pub near: (Buffer, u32),
+    pub count: u32,
+}
+
+/// The cells of an environment: four of 4×4 texels for each tile of 8×8, tiles in the order of texels; within a tile the left ones first,
+/// then the lower ones.
+#[derive(Clone, Debug)]
+pub struct Cells {
+    /// Of each texel: its part of the luminous power of its cell, of the solid angle in a black one.
+    pub weights: Vec<f32>,
+    /// The light of each cell; black ones fill it up to a multiple of sixteen.
+    pub lobes: Vec<types::FivLobe>,
+}
+
+impl Cells {
+    /// # Panics
+    /// Never for a sky that [`Sky::new`] made.
+    pub fn of(sky: &Sky) -> Self {
+        let count = 4 * words(sky.size) as usize;
+        // Power, power × direction of the luminance, power × solid angle, solid angle.
+        let mut sums = vec![(DVec3::ZERO, DVec3::ZERO, 0.0, 0.0); count];
+        for (i, radiance) in sky.radiance.iter().enumerate() {
+            let (face, x, y) = sky::place(sky.size, i as u32);
+            let angle = sky::solid_angle(sky.size, x, y);
+            let power = radiance.as_dvec3() * angle;
+            let sum = &mut sums[cell(sky.size, i as u32) as usize];
+            sum.0 += power;
+            sum.1 += sky::area(face, sky.size, x, y).normalize() * power.dot(LUMINANCE);
+            sum.2 += angle * power.dot(LUMINANCE);
+            sum.3 += angle;
+        }
+        let lobe = |(power, along, angle, _): &(DVec3, DVec3, f64, f64)| {
+            let all = power.dot(LUMINANCE).max(1e-300);
+            // The variance along either axis is the cosine's mean distance from one; half vectors have half the angle.
+            let apart = (1.0 - along.length() / all).clamp(0.0, 1.0);
+            types::FivLobe {
+                power: power.as_vec3().to_array(),
+                spread: (0.5 * apart + angle / all / 24.0) as f32,
+                direction: along.normalize_or_zero().as_vec3().to_array(),
+                least: (0.25 * angle / all) as f32,
+            }
+        };
+        let weight = |(i, radiance): (usize, &Vec3)| {
+            let (_, x, y) = sky::place(sky.size, i as u32);
+            let angle = sky::solid_angle(sky.size, x, y);
+            let (power, .., angles) = sums[cell(sky.size, i as u32) as usize];
+            let all = power.dot(LUMINANCE);
+            let part = if all > 0.0 { radiance.as_dvec3().dot(LUMINANCE) * angle / all } else { angle / angles };
+            part as f32
+        };
+        Self { weights: sky.radiance.iter().enumerate().map(weight).collect(), lobes: sums.iter().map(lobe).collect() }
+    }
+}
+
+/// Number of the cell that a texel is in.
+pub fn cell(size: u32, texel: u32) -> u32 {
+    let (face, x, y) = sky::place(size, texel);
+    let (tile, row) = (2 * FIV_CELL, size / (2 * FIV_CELL));
+    4 * ((face * row + y / tile) * row + x / tile) + 2 * (y / FIV_CELL % 2) + x / FIV_CELL % 2
+}
+
+/// Words of a sample, of four cells each.
+pub fn words(size: u32) -> u32 {
+    (6 * (size / (2 * FIV_CELL)).pow(2)).next_multiple_of(WORDS)
+}
+
+/// What is kept for glossy reflection.
+#[derive(Debug)]
+pub struct Glossy {
+    lobes: OwnedBuffer,
+    /// [`words`] for each sample around the occluders: of all turns of the first kind, of all of the second one …
+    shares: OwnedBuffer,
+}
+
+impl Glossy {
+    /// Uploads the cells, and looks at what occluders hide of them. `told` hears how many of the samples are done and says whether to go
+    /// on.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`; `Runtime` if told to stop or if there is more than the device's limits allow.
+    pub fn new(
+        gpu: &Gpu,
+        sky: &Sky,
+        plan: &Plan,
+        occluders: &Occluders,
+        told: impl FnMut(u64, u64) -> bool,
+    ) -> Result<Self> {
+        let cells = Cells::of(sky);
+        let samples = samples(plan) * u64::from(plan.turns) * occluders.kinds.len() as u64;
+        let (bytes, limit) = (4 * u64::from(words(sky.size)) * samples, gpu.caps().limits.storage_range);
+        if bytes > limit {
+            let what = format!("what occluders hide of reflections has {bytes} bytes; the device allows {limit}");
+            return Err(Error::new(ErrorKind::Runtime, what)
+                .at("fiv.specular")
+                .help("Take fewer samples (fiv.azimuths, fiv.polars, fiv.radii)"));
+        }
+        let mut all = shares(gpu, sky.size, &cells, plan, occluders, told)?;
+        all.resize(all.len().max(1), 0);
+        Ok(Self {
+            lobes: OwnedBuffer::with_contents(gpu, "fiv.lobes", bytemuck::cast_slice(&cells.lobes))?,
+            shares: OwnedBuffer::with_contents(gpu, "fiv.shares", bytemuck::cast_slice(&all))?,
+        })
+    }
+
+    /// Bytes on the device.
+    pub fn bytes(&self) -> u64 {
+        self.lobes.size() + self.shares.size()
+    }
+}
+
+/// Samples around one turn of an occluder.
+fn samples(plan: &Plan) -> u64 {
+    plan.grid.count().into()
+}
+
+fn shares(
+    gpu: &Gpu,
+    size: u32,
+    cells: &Cells,
+    plan: &Plan,
+    occluders: &Occluders,
+    mut told: impl FnMut(u64, u64) -> bool,
+) -> Result<Vec<u32>> {
+    let words = words(size);
+    let all = samples(plan) * u64::from(plan.turns) * occluders.kinds.len() as u64;
+    let mut out: Vec<u32> = Vec::with_capacity((all * u64::from(words)) as usize);
+    let mut runner = Runner::new(gpu);
+    for (occluder, kind) in occluders.kinds.iter().zip(&plan.occluders) {
+        let mut cover = Cover::new(gpu, occluder)?;
+        for turn in 0..plan.turns {
+            let matrix = turn::matrix(turn, plan.turns, plan.turn_axis).as_mat3();
+            let points: Vec<Vec3> =
+                (0..plan.grid.count()).map(|sample| -kind.offset(&plan.grid, sample).as_vec3()).collect();
+            for points in points.chunks(BATCH) {
+                out.extend(masks(&mut cover, &mut runner, &cells.weights, size, points, (matrix, occluder.radius))?);
+                if !told(out.len() as u64 / u64::from(words), all) {
+                    return Err(Error::new(ErrorKind::Runtime, "stopped while computing vectors").at("fiv"));
+                }
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// The shares of all cells that an occluder hides from `points` (seen from its centre, metres): [`words`] for each. `matrix` turns it.
+///
+/// # Errors
+/// `OutOfMemory`, `DeviceLost`.
+pub fn masks(
+    cover: &mut Cover<'_>,
+    runner: &mut Runner,
+    weights: &[f32],
+    size: u32,
+    points: &[Vec3],
+    (matrix, radius): (Mat3, f32),
+) -> Result<Vec<u32>> {
+    let mut graph = Graph::new("fiv masks");
+    let rays = cover.rays(&mut graph);
+    let words = words(size);
+    let tiles = 6 * (size / (2 * FIV_CELL)).pow(2);
+    let list: Vec<types::FivPoint> = points.iter().map(|p| types::FivPoint { at: p.to_array(), turn: 0 }).collect();
+    let stands = types::FivTurn {
+        geometry_from_world: matrix.transpose().to_cols_array_2d(),
+        centre: [0.0; 3],
+        radius: cover::reach(radius),
+    };
+    let (weights, turns) = (graph.buffer_from("fiv.weights", weights), graph.buffer_from("fiv.turns", &[stands]));
+    let list = graph.buffer_from("fiv.points", &list);
+    // A tenth of the sphere from each point, about.
+    let each = (MOST_RAYS / u64::from(tiles * 64 / 10).max(1)).clamp(1, BATCH as u64) as usize;
+    let mut tokens = Vec::new();
+    for (number, some) in points.chunks(each).enumerate() {
+        let shares = graph.buffer("fiv.shares", 4 * u64::from(words) * some.len() as u64);
+        graph.fill(shares, 0);
+        let push = fiv::specular_mask::Push { first: (number * each) as u32, size, words };
+        let args = crate::rays::traced!(fiv::specular_mask::Args { weights, points: list, turns, shares, push }, rays);
+        graph.compute(args, [64 * some.len() as u32, tiles, 1]);
+        tokens.push(graph.read_buffer(shares));
+    }
+    let frame = runner.run(graph)?;
+    Ok(tokens.into_iter().flat_map(|token| frame.buffer::<u32>(token)).collect())
+}
+
+impl Fiv {
+    /// Adds what visible surfaces reflect glossily to `total`; returns it alone, W/(sr·m²).
+    ///
+    /// # Errors
+    /// `Runtime` with more occluders than a shader can go through.
+    pub(super) fn specular(
+        &mut self,
+        graph: &mut Graph,
+        (pose, handles): (&Pose, &Handles),
+        gbuffer: &GBuffer,
+        settings: &Settings,
+        shadows: Option<&Shadows>,
+        total: Image,
+    ) -> Result<Image> {
+        let extent = graph.extent(gbuffer.depth);
+        let reflected = graph.image("fiv.specular", Format::RGBA32F, extent);
+        graph.clear(reflected, [0.0; 4]);
+        if self.rays.is_some() && settings.method == super::Method::BruteForce {
+            self.specular_truth(graph, handles, gbuffer, reflected);
+        } else {
+            self.specular_sum(graph, gbuffer, reflected);
+        }
+        let shadows = shadows.filter(|shadows| shadows.count > 0);
+        let shared = match (shadows, &self.glossy) {
+            (Some(shadows), Some(glossy)) => {
+                Some(self.specular_share(graph, glossy, (pose, gbuffer), settings, shadows)?)
+            }
+            _ => None,
+        };
+        let (whole, left) = shared.unwrap_or((gbuffer.emission, gbuffer.emission));
+        let (albedo, depth) = (gbuffer.albedo, gbuffer.depth);
+        let spec = fiv::specular_add::Spec { shared: shared.is_some().into() };
+        graph.compute(fiv::specular_add::Args { albedo, depth, whole, left, reflected, total, spec }, extent);
+        Ok(reflected)
+    }
+
+    /// Without occluders.
+    fn specular_sum(&self, graph: &mut Graph, gbuffer: &GBuffer, reflected: Image) {
+        let extent = graph.extent(reflected);
+        let count = self.light.lit.len() as u32;
+        let lit = graph.buffer_from("fiv.lit", if count > 0 { &self.light.lit } else { &[0] });
+        let texels = graph.import_buffer(&self.light.texels);
+        for first in (0..count).step_by(MOST_TURNS as usize) {
+            let args = fiv::specular_sum::Args {
+                view: gbuffer.view,
+                normal: gbuffer.normal,
+                depth: gbuffer.depth,
+                surface: gbuffer.specular,
+                texels,
+                lit,
+                reflected,
+                push: fiv::specular_sum::Push { first, count: MOST_TURNS.min(count - first) },
+            };
+            graph.compute(args, extent);
+        }
+    }
+
+    /// By a shadow ray to every texel that is not black.
+    fn specular_truth(&mut self, graph: &mut Graph, handles: &Handles, gbuffer: &GBuffer, reflected: Image) {
+        let extent = graph.extent(reflected);
+        let Some((rays, most)) = &mut self.rays else { return };
+        let count = self.light.lit.len() as u64;
+        if count == 0 {
+            return;
+        }
+        let rays = rays.frame(graph, handles);
+        let each = (MOST_RAYS / extent.pixels().max(1)).clamp(1, (*most).min(MOST_TURNS.into()));
+        let (texels, lit) = (graph.import_buffer(&self.light.texels), graph.buffer_from("fiv.lit", &self.light.lit));
+        for first in (0..count).step_by(each as usize) {
+            let args = crate::rays::traced!(
+                fiv::specular_truth::Args {
+                    view: gbuffer.view,
+                    normal: gbuffer.normal,
+                    depth: gbuffer.depth,
+                    surface: gbuffer.specular,
+                    texels,
+                    lit,
+                    reflected,
+                    push: fiv::specular_truth::Push {
+                        first: first as u32,
+                        count: each.min(count - first) as u32,
+                        size: self.light.size,
+                    },
+                },
+                rays
+            );
+            graph.compute(args, extent);
+        }
+    }
+
+    /// Light of the cells that is reflected, and what occluders leave of it.
+    fn specular_share(
+        &self,
+        graph: &mut Graph,
+        glossy: &Glossy,
+        (pose, gbuffer): (&Pose, &GBuffer),
+        settings: &Settings,
+        shadows: &Shadows,
+    ) -> Result<(Image, Image)> {
+        let extent = graph.extent(gbuffer.depth);
+        let [whole, left] =
+            ["fiv.specular.whole", "fiv.specular.left"].map(|name| graph.image(name, Format::RGBA32F, extent));
+        for image in [whole, left] {
+            graph.clear(image, [0.0; 4]);
+        }
+        let turns = shadows.near.1 + TURNS_CELLS + shadows.count * TURNS_EACH;
+        if turns > MOST_TURNS {
+            let most = (MOST_TURNS - TURNS_CELLS) / (TURNS_EACH + 1);
+            let what = format!("{} occluders, at most {most} can have reflections", shadows.count);
+            return Err(Error::new(ErrorKind::Runtime, what).at("fiv.specular").help("Join meshes into fewer nodes"));
+        }
+        let all = words(self.light.size);
+        let each = WORDS * (MOST_TURNS / turns);
+        let (lobes, shares) = (graph.import_buffer(&glossy.lobes), graph.import_buffer(&glossy.shares));
+        let places = graph.buffer_from("fiv.places", &self.share_places(pose, all));
+        for first in (0..all).step_by(each as usize) {
+            let args = fiv::specular_share::Args {
+                view: gbuffer.view,
+                normal: gbuffer.normal,
+                depth: gbuffer.depth,
+                surface: gbuffer.specular,
+                identity: shadows.identity,
+                occluders: shadows.occluders,
+                fivs: shadows.fivs,
+                lobes,
+                shares,
+                places,
+                near: shadows.near.0,
+                whole,
+                left,
+                push: fiv::specular_share::Push { first, count: each.min(all - first), all, words: shadows.near.1 },
+                spec: fiv::specular_share::Spec { trilinear: settings.trilinear.into() },
+            };
+            graph.compute(args, extent);
+        }
+        Ok((whole, left))
+    }
+
+    /// The first word of each occluder, and of its next turn; `words` for each sample.
+    fn share_places(&self, pose: &Pose, words: u32) -> Vec<[u32; 2]> {
+        let (turns, samples) = (self.plan.turns, self.plan.grid.count());
+        let place = |placed: &super::Placed| {
+            let (first, second, _) = turn::between(self.angle(pose, placed.node).unwrap_or(0.0), turns);
+            [first, second].map(|turn| (placed.kind * turns + turn) * samples * words)
+        };
+        self.occluders.placed.iter().map(place).collect()
+    }
+}
+
+/// Whether these settings need what occluders hide of cells.
+pub fn wanted(settings: &Settings) -> bool {
+    settings.specular != Specular::Off && settings.method == super::Method::Vectors
+}
