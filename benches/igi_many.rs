@@ -1,8 +1,9 @@
 //! What picks from many virtual lights, light put back, and cells of irradiance cost and how far they are off: three tables.
 //!
 //! `cargo bench --bench igi_many [-- WIDTHxHEIGHT [MOST [TABLE]]]`; 96x72 by default; MOST: virtual lights up to which all are gathered,
-//! 10000 by default; TABLE: `picks`, `compensation` or `cache` alone. `LUCERNA_DEVICE` chooses the device. Times are medians of three, of the passes named. Errors are relative
-//! mean squared errors of the indirect light against 10,000 virtual lights of another seed, or the path tracer.
+//! 10000 by default and at most; TABLE: `picks`, `compensation` or `cache` alone. `LUCERNA_DEVICE` chooses the device. Times are medians of
+//! three, of the passes named. Errors are relative mean squared errors of the indirect light: of picks against MOST virtual lights of another
+//! seed, of light put back against the path tracer, of cells against none.
 
 use lucerna::{
     Result,
@@ -101,19 +102,33 @@ fn sum(pixels: &[[f32; 4]]) -> f64 {
     pixels.iter().flat_map(|p| &p[..3]).map(|&v| f64::from(v)).sum()
 }
 
+/// Tables by their names.
+const TABLES: [&str; 3] = ["picks", "compensation", "cache"];
+
 const GATHER: [&str; 4] = ["igi.gather", "igi.order", "igi.gather_picks", "igi.near"];
 
 fn run() -> Result<()> {
-    let mut arguments = std::env::args().skip(1).filter(|a| !a.starts_with("--"));
+    // `--bench` comes from cargo.
+    let mut arguments = std::env::args().skip(1).filter(|a| a != "--bench");
     let size = arguments.next().unwrap_or_else(|| "96x72".into());
     let extent = match size.split_once('x').map(|(w, h)| (w.parse(), h.parse())) {
         Some((Ok(width), Ok(height))) => [width, height],
         _ => return Err(lucerna::Error::usage(format!("size {size:?}; allowed: WIDTHxHEIGHT"))),
     };
-    let most: u32 = arguments.next().and_then(|r| r.parse().ok()).unwrap_or(10_000);
+    let most = match arguments.next().map(|text| (text.parse(), text)) {
+        None => 10_000,
+        Some((Ok(most @ 1..=10_000), _)) => most,
+        Some((_, text)) => return Err(lucerna::Error::usage(format!("MOST {text:?}; allowed: 1 to 10000"))),
+    };
+    let table = arguments.next();
+    if let Some(unknown) = table.iter().find(|name| !TABLES.contains(&name.as_str())) {
+        return Err(lucerna::Error::usage(format!("TABLE {unknown:?}; allowed: {}", TABLES.join(", "))));
+    }
+    if let Some(more) = arguments.next() {
+        return Err(lucerna::Error::usage(format!("{more:?} is one too many; allowed: WIDTHxHEIGHT [MOST [TABLE]]")));
+    }
     let gpu = Gpu::new(GpuOptions::from_env()?)?;
     println!("{} at {}x{}", gpu.describe(), extent[0], extent[1]);
-    let table = arguments.next();
     let wanted = |name: &str| table.as_deref().is_none_or(|table| table == name);
     for name in ["cornell", "office"].into_iter().filter(|_| wanted("picks")) {
         picks(&gpu, name, extent, most)?;
@@ -128,8 +143,10 @@ fn run() -> Result<()> {
 fn picks(gpu: &Gpu, name: &str, extent: [u32; 2], most: u32) -> Result<()> {
     let mut studio = Studio::new(gpu, builtin::load(name)?, extent)?;
     let base = Settings { candidates: 1, bounces: 1, specular: false, direct_samples: 1, ..Settings::default() };
-    let truth = studio.once(&Settings { vpls: most.min(10_000), ..base.clone() }, 4711)?.indirect;
-    println!("\n{name}: all virtual lights, 16 and 64 picks: ms, rays per pixel, relative mean squared error");
+    let truth = studio.once(&Settings { vpls: most, ..base.clone() }, 4711)?.indirect;
+    println!(
+        "\n{name}: all virtual lights, 16 and 64 picks: ms, rays per pixel, relative mean squared error against {most}"
+    );
     println!("{:>6} {:>34} {:>30} {:>30}", "vpls", "all", "16 picks", "64 picks");
     for vpls in [30, 100, 300, 1000, 3000, 10_000] {
         print!("{vpls:>6}");

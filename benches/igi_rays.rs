@@ -1,7 +1,8 @@
 //! Rays a second of instant global illumination by stage, and of its gathering against the ray benchmark's own pass for the very same
 //! rays: any hit from every visible point to every virtual light.
 //!
-//! `cargo bench --bench igi_rays [-- [--size WxH] [--vpls N] [--rounds N] [--json] [SCENE…]]`; scenes are built-in names or files,
+//! `cargo bench --bench igi_rays [-- [--size WxH] [--vpls N] [--rounds N] [--json] [SCENE…]]`; at most 1024x1024 and 1000 virtual lights;
+//! rays of gathering are counted, those of shooting and of direct light are the most that there can be; scenes are built-in names or files,
 //! `LUCERNA_DEVICE` chooses the device.
 
 use lucerna::{
@@ -42,19 +43,29 @@ fn options() -> Result<Options> {
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().unwrap_or_default();
-        let wrong = |text: &str| Error::usage(format!("{argument} {text:?}; allowed: a number, or WxH for --size"));
-        let number = |text: &str| text.parse::<u32>().map_err(|_| wrong(text));
+        let within = |text: &str, allowed: std::ops::RangeInclusive<u32>| match text.parse::<u32>() {
+            Ok(number) if allowed.contains(&number) => Ok(number),
+            _ => {
+                let (least, most) = allowed.into_inner();
+                Err(Error::usage(format!("{argument} {text:?}; allowed: {least} to {most}")))
+            }
+        };
         match argument.as_str() {
             "--size" => {
                 let text = value();
-                let (w, h) = text.split_once('x').ok_or_else(|| wrong(&text))?;
-                out.size = [number(w)?.clamp(8, 1024), number(h)?.clamp(8, 1024)];
+                let wrong = || Error::usage(format!("--size {text:?}; allowed: WIDTHxHEIGHT, 8 to 1024 each"));
+                let (w, h) = text.split_once('x').ok_or_else(wrong)?;
+                out.size = [within(w, 8..=1024)?, within(h, 8..=1024)?];
             }
-            "--vpls" => out.vpls = number(&value())?.clamp(1, 1000),
-            "--rounds" => out.rounds = number(&value())?.max(1),
+            "--vpls" => out.vpls = within(&value(), 1..=1000)?,
+            "--rounds" => out.rounds = within(&value(), 1..=1000)?,
             "--json" => out.json = true,
             // From cargo.
             "--bench" => {}
+            flag if flag.starts_with("--") => {
+                let what = format!("unknown option {flag}; allowed: --size, --vpls, --rounds, --json");
+                return Err(Error::usage(what));
+            }
             _ => out.scenes.push(argument),
         }
     }
@@ -160,8 +171,8 @@ fn measure(gpu: &Gpu, name: &str, scene: &Scene, options: &Options) -> Result<()
     let rate = |stage: &str| best.get(stage).map(|ms| count / ms * 1e-3).unwrap_or(f64::NAN);
     let ratio = rate("gathering") / rate("benchmark");
     let pixels = f64::from(options.size[0]) * f64::from(options.size[1]);
-    // Of pixels that show geometry at most; shadow rays from behind are not traced.
-    let direct = pixels * f64::from(scene.lights.len() as u32);
+    // Of pixels that show geometry at most; shadow rays from behind, or of light that does not arrive, are not traced.
+    let direct = pixels * f64::from(direct_rays(scene, &pose, settings.direct_samples));
     let ms = |stage: &str| best.get(stage).copied().unwrap_or(0.0);
     if options.json {
         let stages: Vec<String> = best.iter().map(|(stage, ms)| format!("\"{stage}_ms\":{ms:.4}")).collect();
@@ -177,17 +188,31 @@ fn measure(gpu: &Gpu, name: &str, scene: &Scene, options: &Options) -> Result<()
     println!("  gathering          {:8.2} ms {:8.2} Mrays/s", ms("gathering"), rate("gathering"));
     println!("  the same, benchmark{:8.2} ms {:8.2} Mrays/s", ms("benchmark"), rate("benchmark"));
     println!("  ratio {ratio:.3}");
-    let paths = f64::from(settings.paths());
-    println!(
-        "  shooting           {:8.2} ms {:8.2} Mrays/s (a path each turn)",
-        ms("shooting"),
-        paths / ms("shooting") * 1e-3
-    );
+    // Diffuse and specular segments; paths that leave the scene have fewer.
+    let segments = settings.bounces + settings.specular_depth;
+    let paths = f64::from(settings.paths() * settings.candidates * segments);
+    println!("  shooting           {:8.2} ms {:8.2} Mrays/s (at most)", ms("shooting"), paths / ms("shooting") * 1e-3);
+    if ms("importance") > 0.0 {
+        let rays = f64::from(settings.paths() * settings.candidates * settings.bounces) * f64::from(settings.judges);
+        let rate = rays / ms("importance") * 1e-3;
+        println!("  choosing           {:8.2} ms {rate:8.2} Mrays/s (at most)", ms("importance"));
+    }
     println!("  direct             {:8.2} ms {:8.2} Mrays/s (at most)", ms("direct"), direct / ms("direct") * 1e-3);
     if ms("mirrors") > 0.0 {
         println!("  mirrors and glass  {:8.2} ms", ms("mirrors"));
     }
     Ok(())
+}
+
+/// Shadow rays of a point at most: one to each light, and samples of emissive surfaces and of the sky.
+fn direct_rays(scene: &Scene, pose: &Pose, samples: u32) -> u32 {
+    let emits = |primitive: &scene::Primitive| {
+        scene.materials.get(primitive.material as usize).is_some_and(|m| m.emissive != glam::Vec3::ZERO)
+    };
+    let mut meshes = scene.nodes.iter().filter_map(|node| scene.meshes.get(node.mesh? as usize));
+    let surfaces = meshes.any(|mesh| mesh.primitives.iter().any(emits));
+    let sky = scene.environment.as_ref().is_some_and(|sky| !sky.pixels.is_empty());
+    scene::resident::lights(scene, pose).len() as u32 + (u32::from(surfaces) + u32::from(sky)) * samples
 }
 
 /// Milliseconds of the ray benchmark's pass for a list of rays.
