@@ -45,9 +45,10 @@ void main() {
         uint face = tile / (row * row), place = tile % (row * row);
         uvec2 at = 8u * uvec2(place % row, place / row) + within;
         vec3 direction = cube_direction(face, (vec2(at) + 0.5) / float(side));
-        float along = -dot(origin, direction), squared = dot(direction, direction);
-        // Only what passes the bounding sphere.
-        bool near = rho2 <= radius2 || (along > 0.0 && along * along >= (rho2 - radius2) * squared);
+        // Only what passes the bounding sphere; by the distance of the line, which far away is no difference of large numbers.
+        vec3 across = cross(origin, direction);
+        bool near = rho2 <= radius2
+            || (dot(origin, direction) < 0.0 && dot(across, across) <= radius2 * dot(direction, direction));
         FivTexel t = texels[(face * size + at.y / split) * size + at.x / split];
         if (own != 0u ? dot(t.area, normal) <= 0.0 : !near) continue;
         if (near) {
