@@ -11,7 +11,7 @@ use lucerna::{
     gpu::testing::with_gpu,
     measure::steady::{Frame, Steadiness},
     scene::{self, Environment, LoadOptions, Pose, Scene, Transform, View, builtin},
-    techniques::fiv::{Extent, Method, SelfSamples, Settings, Shared},
+    techniques::fiv::{Extent, Method, SelfSamples, Settings},
 };
 use tracer_lab::{flat_view, view};
 
@@ -276,11 +276,10 @@ fn a_hundred_that_all_stand_differently() {
 fn a_sequence_changes_as_the_truth_does_and_does_not_pop() {
     with_gpu(|gpu| {
         let scene = builtin::load("shadows-moving").unwrap();
-        // What stands in one shadow after another changes less with the thesis' correction for overlap than with the default, by
-        // which up to 1.5 times as much changes from one frame to the next as in truth here.
-        let shared = Shared::Discs;
+        // With one ray to each of eight texels a side, thin rings that turn before the sun would flicker: the vectors of a few places
+        // count for all pixels, each of which has rays of its own by brute force.
         let settings =
-            |method| Settings { size: 8, azimuths: 32, polars: 17, radii: 15, method, shared, ..Settings::default() };
+            |method| Settings { size: 8, split: 2, azimuths: 32, polars: 17, radii: 15, method, ..Settings::default() };
         let film = |settings: &Settings| {
             let mut studio = Studio::new(gpu, &scene, settings, None);
             let frame = |i: u32| {
@@ -304,7 +303,7 @@ fn a_sequence_changes_as_the_truth_does_and_does_not_pop() {
             let largest = steady.largest();
             eprintln!("environment at {turning} degrees a second: {} parts, {largest:.4?}", steady.parts);
             assert!(steady.parts >= 6 && largest.truth > 0.01, "{steady:?}");
-            assert!(largest.found < 1.5 * largest.truth && largest.apart < 1.0 * largest.truth, "{steady:?}");
+            assert!(largest.found < 1.2 * largest.truth && largest.apart < 1.0 * largest.truth, "{steady:?}");
         }
     });
 }

@@ -5,6 +5,7 @@ pub mod fiv;
 pub mod fiv_specular;
 pub mod isr;
 pub mod isr_scene;
+pub mod overlap;
 pub mod path;
 pub mod tonemap;
 pub mod tracer;

@@ -15,12 +15,16 @@ layout(constant_id = 1) const uint OVERLAP = 1;   // what several occluders hide
 layout(constant_id = 2) const uint OWN = 1;       // occluders shadow themselves: 1 from the spheres' samples, 2 from their surface's
 layout(constant_id = 3) const uint TRILINEAR = 1; // between samples
 layout(constant_id = 4) const uint SCALED = 1;    // what is interpolated is free of the solid angle
+layout(constant_id = 5) const uint SPOTS = 0;     // a bright part of the environment is taken away once only
+layout(constant_id = 6) const uint NEGLIGIBLE = 0; // what can hide no more than a share of the light is left out
 
 struct FivWhole {
     vec3 x; // of the whole environment, W/m²
     vec3 y;
     vec3 z;
     uint occluders;
+    uint spots;
+    float negligible; // share of the mean irradiance
 };
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
@@ -37,6 +41,11 @@ layout(binding = 10, scalar) readonly buffer Reaches { float reaches[]; };
 
 layout(binding = 11, scalar) readonly buffer Near { uint near[]; }; // occluders that may matter to a tile of pixels, a bit each
 
+layout(binding = 12, scalar) readonly buffer Pairs { uint pairs[]; }; // and those of them that can overlap one of this call
+layout(binding = 13, scalar) readonly buffer Spots { FivSpot spots[]; };
+layout(binding = 14, scalar) buffer Taken { float taken[]; }; // what earlier calls took from them
+layout(binding = 15, scalar) readonly buffer Matter { float matter[]; };
+
 layout(push_constant, scalar) uniform Push {
     uint first; // occluder
     uint count;
@@ -45,11 +54,19 @@ layout(push_constant, scalar) uniform Push {
 
 #include "lib/fiv_lookup.glsl"
 #include "lib/fiv_reach.glsl"
+#include "lib/fiv_spots.glsl"
+#include "lib/fiv_matter.glsl"
 
 // Goes on to the next word with an occluder in it, up to the word `last`; `tile`: first word of the tile.
 bool fiv_next(inout uint w, inout uint bits, uint tile, uint last) {
     while (bits == 0u && ++w < last) bits = near[tile + w];
     return bits != 0u;
+}
+
+// How much an occluder counts: nothing where it can hide no more than what is negligible, which it comes to without a step.
+float fiv_counts(vec3 to, float far, float radius) {
+    if (NEGLIGIBLE == 0u || far <= radius) return 1.0;
+    return clamp(fiv_matter(to / far, radius / far) / whole.negligible - 1.0, 0.0, 1.0);
 }
 
 // Places where the mean over the unit interval is taken: Gauss-Legendre, exact for seven overlapping occluders.
@@ -59,22 +76,23 @@ const vec4 WEIGHTS = vec4(0.1739274226, 0.3260725774, 0.3260725774, 0.1739274226
 // The share of what occluder `i` hides that is to be taken away for it, so that what several hide is taken away once. For two it is
 // eq. 15. Where more overlap, the mean of 1 / (1 + number of others there), as if these lay there independently: the integral of
 // the product of 1 - g (1 - t) over t in 0..1.
-float own_share(uint i, uint self, vec3 p, vec3 n, FivAlong along, uint tile) {
+// `row`: first word of those that can overlap it.
+float own_share(uint i, uint self, vec3 p, vec3 n, FivAlong along, uint row) {
     vec3 to = occluders[i].centre - p;
     float rho = length(to);
     vec3 direction = to / max(rho, 1e-20);
     float r = min(occluders[i].radius / max(rho, 1e-20), 1.0);
     vec4 product = vec4(1.0);
-    uint w = 0u, bits = near[tile];
-    while (fiv_next(w, bits, tile, words)) {
+    for (uint w = 0u, bits = pairs[row];;) {
+        while (bits == 0u && ++w < words) bits = pairs[row + w];
+        if (bits == 0u) break;
         uint j = 32u * w + uint(findLSB(bits));
         bits &= bits - 1u;
-        if (j == i || j == self) continue;
+        if (j == self) continue;
         vec3 other = occluders[j].centre - p;
         float radius = occluders[j].radius;
         float far = length(other);
         float s = min(radius / max(far, 1e-20), 1.0);
-        // Most are apart, which is quickly known.
         float apart = length(other / max(far, 1e-20) - direction);
         if (apart >= r + s) continue;
         float d = dot(other, n);
@@ -83,7 +101,7 @@ float own_share(uint i, uint self, vec3 p, vec3 n, FivAlong along, uint tile) {
         // Of the lens a body hides as much as of its whole disc; where both are full this is eq. 15.
         vec2 fill = vec2(occluders[i].fill, occluders[j].fill);
         float g = 2.0 * lens_area(r, s, apart) * fill.x * fill.y / (FIV_PI * (r * r * fill.x + s * s * fill.y));
-        g *= front * fiv_near(occluders[j], far);
+        g *= front * fiv_counts(other, far, radius);
         product *= 1.0 - g * (1.0 - NODES);
     }
     return dot(product, WEIGHTS);
@@ -120,8 +138,19 @@ void main() {
         if (hidden.w > 0.0) lit = clamp(left, vec3(0.0), open);
     }
     vec3 sum = first == 0u ? lit : imageLoad(irradiance, pixel).rgb;
+    // Light of the bright parts, what is taken from each, and all other light.
+    vec3 bright[FIV_SPOTS], gone[FIV_SPOTS], even = open;
+    uint kept = 3u * FIV_SPOTS * uint(pixel.y * imageSize(irradiance).x + pixel.x);
+    for (uint m = 0u; m < FIV_SPOTS; ++m) {
+        bright[m] = vec3(0.0);
+        gone[m] = vec3(0.0);
+        if (SPOTS == 0u || m >= whole.spots) continue;
+        bright[m] = fiv_spot_light(m, n);
+        even = max(even - bright[m], vec3(0.0));
+        if (first > 0u) for (uint c = 0u; c < 3u; ++c) gone[m][c] = taken[kept + 3u * m + c];
+    }
     FivAlong along = fiv_along(n);
-    uint tile = fiv_tile(pixel, imageSize(irradiance).x) * words;
+    uint tile_number = fiv_tile(pixel, imageSize(irradiance).x), tile = tile_number * words;
     uint last = min((first + count + 31u) / 32u, words);
     uint w = first / 32u, bits = count > 0u ? near[tile + w] : 0u;
     while (fiv_next(w, bits, tile, last)) {
@@ -132,17 +161,44 @@ void main() {
         float d = dot(offset, n);
         // Without the correction for partial occluders those count whose centre is in front.
         float front = PARTIAL != 0u ? fiv_front_share(occluders[i], d, n, along) : float(d > 0.0);
-        float counts = fiv_near(occluders[i], length(offset));
-        if (front * counts <= 0.0) continue;
+        float rho = length(offset);
+        float fade = fiv_counts(offset, rho, occluders[i].radius);
+        if (front * fade <= 0.0) continue;
         vec4 looked = fiv_dot(occluders[i], offset, n, TRILINEAR != 0u, SCALED != 0u);
         vec3 hidden = looked.rgb;
         if (PARTIAL == 2u && front < 1.0) hidden = fiv_cut(occluders[i], offset, n, along, hidden, open, behind);
         hidden = max(hidden, vec3(0.0)) * (PARTIAL == 1u ? front : 1.0);
         // Where most of the samples around lie inside of the occluder, so does the receiver: everything is hidden.
-        hidden = mix(hidden, open, clamp(1.0 - 2.0 * looked.w, 0.0, 1.0)) * (counts * seen);
+        hidden = mix(hidden, open, clamp(1.0 - 2.0 * looked.w, 0.0, 1.0)) * (fade * seen);
         if (hidden == vec3(0.0)) continue;
-        if (OVERLAP != 0u && whole.occluders > 1u) hidden *= own_share(i, self, p, n, along, tile);
+        if (OVERLAP != 0u && whole.occluders > 1u) {
+            uint row = (tile_number * count + i - first) * words;
+            float share = own_share(i, self, p, n, along, row);
+            if (SPOTS != 0u) {
+                // What is more than its share of even light comes from the bright parts that its disc can hide.
+                vec3 direction = offset / max(rho, 1e-20);
+                float r = min(occluders[i].radius / max(rho, 1e-20), 1.0);
+                float flat_part = occluders[i].fill * front * fade * r * r * max(d / max(rho, 1e-20), 0.4 * r);
+                float soft = FIV_PI / float(occluders[i].azimuths);
+                vec3 could[FIV_SPOTS], all_could = vec3(0.0);
+                for (uint m = 0u; m < FIV_SPOTS; ++m) {
+                    could[m] = m < whole.spots ? bright[m] * fiv_spot_share(m, direction, r, soft) : vec3(0.0);
+                    all_could += could[m];
+                }
+                vec3 most = min(max(hidden - flat_part * even * seen, vec3(0.0)), all_could * seen);
+                vec3 part = share * most / max(all_could, vec3(1e-30));
+                for (uint m = 0u; m < FIV_SPOTS; ++m) gone[m] += part * could[m];
+                hidden -= most;
+            }
+            hidden *= share;
+        }
         sum -= hidden;
+    }
+    bool last_call = first + count >= whole.occluders;
+    for (uint m = 0u; m < FIV_SPOTS; ++m) {
+        if (SPOTS == 0u || m >= whole.spots) continue;
+        if (last_call) sum -= min(gone[m], bright[m] * seen);
+        else for (uint c = 0u; c < 3u; ++c) taken[kept + 3u * m + c] = gone[m][c];
     }
     imageStore(irradiance, pixel, vec4(sum, 1.0));
 }

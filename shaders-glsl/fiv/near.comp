@@ -1,5 +1,5 @@
 // Occluders that may matter to the surfaces of a tile of 8×8 pixels, a bit each: those that are wholly behind all of its surfaces, or
-// too far away to matter, are left out.
+// look too small to matter, are left out. And where these surfaces are.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -11,17 +11,23 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(constant_id = 0) const uint PARTIAL = 1;
+layout(constant_id = 1) const uint NEGLIGIBLE = 0; // what can hide no more than a share of the light is left out
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D normal;
 layout(binding = 2) uniform sampler2D depth;
 layout(binding = 3, scalar) readonly buffer Occluders { FivOccluder occluders[]; };
 layout(binding = 4, scalar) writeonly buffer Near { uint near[]; };
+layout(binding = 5, scalar) writeonly buffer Boxes { vec4 boxes[]; }; // middle and radius of each tile's surfaces, metres
+layout(binding = 6, scalar) readonly buffer Matter { float matter[]; };
 
 layout(push_constant, scalar) uniform Push {
     uint count; // of occluders
     uint words; // of a tile
+    float negligible; // share of the mean irradiance
 };
+
+#include "lib/fiv_matter.glsl"
 
 shared vec3 low[64];
 shared vec3 high[64];
@@ -66,6 +72,8 @@ void main() {
         barrier();
     }
     uint tile = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    float half_size = 0.50001 * length(most - least);
+    if (lane == 0u) boxes[tile] = vec4(middle, half_size + 1e-6 * length(middle));
     for (uint first = 0u; first < count; first += 64u) {
         if (lane < 2u) bits[lane] = 0u;
         barrier();
@@ -76,10 +84,13 @@ void main() {
             vec3 ahead = max(offset * flat_low[0], offset * flat_high[0]);
             float slack = 1e-4 * (length(offset) + length(most - least) + radius);
             float front = ahead.x + ahead.y + ahead.z + over[0] + slack;
-            vec3 apart = max(max(least - occluders[i].centre, occluders[i].centre - most), vec3(0.0));
-            if (front > (PARTIAL != 0u ? -radius : 0.0) && length(apart) - slack < occluders[i].limit) {
-                atomicOr(bits[lane >> 5u], 1u << (lane & 31u));
+            bool matters = front > (PARTIAL != 0u ? -radius : 0.0);
+            if (NEGLIGIBLE != 0u && matters) {
+                float far = length(offset), near_end = far - half_size - slack;
+                float off = 1.42 * (half_size + slack) / max(far, 1e-20);
+                if (near_end > radius) matters = fiv_matter_around(offset / far, off, radius / near_end) > negligible;
             }
+            if (matters) atomicOr(bits[lane >> 5u], 1u << (lane & 31u));
         }
         barrier();
         uint word = (first >> 5u) + lane;

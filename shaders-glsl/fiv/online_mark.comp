@@ -61,8 +61,6 @@ void main() {
                 if (OWN == 0u) continue;
             } else if (dot(offset, n) <= (PARTIAL != 0u ? -occluders[i].radius : 0.0)) {
                 continue;
-            } else if (fiv_near(occluders[i], length(offset)) <= 0.0) {
-                continue;
             }
             mark(occluders[i], offset);
         }

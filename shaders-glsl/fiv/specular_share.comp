@@ -91,12 +91,10 @@ void main() {
                 FivOccluder o = occluders[i];
                 vec3 offset = o.centre - p;
                 float rho = length(offset);
-                float counts = fiv_near(o, rho);
-                if (counts <= 0.0) continue;
                 FivCell cell = fiv_cell(o, offset, TRILINEAR != 0u);
                 // Beyond the last sphere what is hidden shrinks with the solid angle.
                 float beyond = min(o.farthest / max(rho, 1e-30), 1.0);
-                beyond *= beyond * counts;
+                beyond *= beyond;
                 mat4 hidden = hidden_of(o, o.first, places[i].x, cell, beyond, at);
                 if (o.blend > 0.0) {
                     hidden = hidden * (1.0 - o.blend) + hidden_of(o, o.second, places[i].y, cell, beyond, at) * o.blend;

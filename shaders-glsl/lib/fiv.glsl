@@ -24,7 +24,6 @@ struct FivOccluder {
     float nearest;  // radius of the first sphere, metres
     float farthest; // radius of the last sphere, metres
     float steps;    // spheres for each factor of e of the radius
-    float limit;    // from this distance on it counts for nothing, metres
     uint pace;      // float of FIV_PACE_KNOTS numbers of samples at even steps of each coordinate, then the spheres' radii
     uint reach;     // float of its table of how far it reaches (lib/fiv_reach.glsl), or FIV_NONE: as its bounding sphere
     uint turned;    // 1: it does not stand as that table has it
@@ -42,6 +41,15 @@ struct FivTurn {
     mat3 geometry_from_world;
     vec3 centre;  // of the occluder in the geometry, metres
     float radius; // of its bounding sphere, metres, world axes
+};
+
+// A bright part of the environment.
+struct FivSpot {
+    vec3 direction; // unit
+    float radius;   // sine of the half angle of a cap of its solid angle
+    vec3 x;         // its light as a vector a channel, W/m²
+    vec3 y;
+    vec3 z;
 };
 
 // What the surface of an instance needs to know of the occluder that it is of.
@@ -84,6 +92,13 @@ const uint FIV_REACH_POLARS = 17u; // export
 const uint FIV_FLOATS = 9u; // export
 // Stands in the first float of a vector whose sample lies inside the occluder.
 const float FIV_INSIDE = 1e38; // export
+
+// Bright parts of the environment at most.
+const uint FIV_SPOTS = 4u; // export
+// Directions and sizes for which it is known how bright the environment is at most (lib/fiv_matter.glsl).
+const uint FIV_MATTER_AZIMUTHS = 64u; // export
+const uint FIV_MATTER_POLARS = 33u; // export
+const uint FIV_MATTER_LEVELS = 6u; // export
 
 const float FIV_PI = 3.14159265358979;
 

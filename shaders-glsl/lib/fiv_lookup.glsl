@@ -114,9 +114,4 @@ uint fiv_tile(ivec2 pixel, int width) {
     return uint(pixel.y >> 3) * uint((width + 7) >> 3) + uint(pixel.x >> 3);
 }
 
-// How much an occluder counts at a distance: nothing from its limit on, which it reaches without a step.
-float fiv_near(FivOccluder o, float rho) {
-    return clamp((o.limit - rho) / (0.2 * o.limit), 0.0, 1.0);
-}
-
 #endif

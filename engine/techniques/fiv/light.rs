@@ -2,7 +2,11 @@
 
 use ash::vk;
 
-use super::{sky::Sky, suns};
+use super::{
+    sky::Sky,
+    spots::{self, Spot},
+    suns,
+};
 use crate::{
     Result,
     gpu::{Gpu, ImageDesc, OwnedBuffer, OwnedImage},
@@ -28,6 +32,8 @@ pub struct Light {
     pub lit: Vec<u32>,
     /// Texels that are kept apart: they are in nothing of the above.
     pub suns: Vec<types::FivSun>,
+    /// Its bright parts.
+    pub spots: Vec<Spot>,
     /// Of the environment.
     pub hash: u64,
 }
@@ -58,7 +64,15 @@ impl Light {
         let sums: Vec<f32> = Runner::new(gpu).run(graph)?.buffer(token);
         let mut total = [0.0; FIV_FLOATS as usize];
         total.iter_mut().zip(sums).for_each(|(to, from)| *to = from);
-        let (suns, lit, hash) = (suns::of(sky), sky.lit(), sky.hash());
-        Ok(Self { size: sky.size, texels: buffer, difmap, total, lit, suns, hash })
+        Ok(Self {
+            size: sky.size,
+            texels: buffer,
+            difmap,
+            total,
+            lit: sky.lit(),
+            suns: suns::of(sky),
+            spots: spots::spots(sky),
+            hash: sky.hash(),
+        })
     }
 }

@@ -19,7 +19,8 @@
 //!   ([`Cut::Light`]). The thesis makes the vector smaller, though it is too small already: [`Cut::Height`].
 //! - An occluder's shadow on itself comes from samples on its surface ([`surface`]); [`SelfSamples::Spheres`] is the thesis' way.
 //! - Samples lie where what is hidden bends, if [`Settings::adaptive`] ([`pace`]).
-//! - What overlapping occluders share is less where they do not fill their bounding discs ([`fill`]).
+//! - What overlapping occluders share is less where they do not fill their bounding discs ([`fill`]), and no bright part of the
+//!   environment is taken away twice ([`spots`]).
 //! - The brightest texels can be kept out of the vectors and get hard shadows ([`suns`]).
 //! - Surfaces may reflect the environment glossily ([`specular`]), and occluders may turn ([`turn`]).
 //! - More than two overlapping occluders: see [`crate::reference::fiv::shares`].
@@ -42,10 +43,12 @@ pub mod samples;
 mod settings;
 pub mod sky;
 pub mod specular;
+pub mod spots;
 mod stage;
 pub mod suns;
 pub mod support;
 pub mod surface;
+mod tiles;
 pub mod turn;
 
 pub use file::Stored;

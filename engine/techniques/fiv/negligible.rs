@@ -1,76 +1,132 @@
-//! How large an occluder must look to matter under an environment.
+//! How much of an environment's light an occluder can hide at most, told by where it is seen and how large it looks.
+//!
+//! A disc of directions whose radius is the sine r lets through at most π r² times the greatest radiance in it. So a table of the
+//! greatest radiance around each direction, for discs of a few sizes, bounds what any occluder hides: those whose bound is below a
+//! share of the mean irradiance can be left out, far from the sun near ones, under it none. What the shader reads between entries of the
+//! table is a bound too: each entry holds all that discs around its neighbours can see.
 
 use glam::{DVec2, DVec3, Vec3};
 
 use super::sky::{self, Sky};
+use crate::shaders::consts::{FIV_MATTER_AZIMUTHS, FIV_MATTER_LEVELS, FIV_MATTER_POLARS};
 
-/// Steps of 1 - cos of the half angle, from a direction to one at right angles.
-const STEPS: usize = 2048;
-/// Directions from which caps are looked at, along an edge of a face, at most.
-const CENTRES: u32 = 32;
+/// Sine of the radius of a disc at level 0; each level has twice that of the one before.
+const SMALLEST: f64 = 0.05;
 
-/// Sine of the half angle of the widest cap of directions that lets through at most `share` of the mean irradiance of the environment, in
-/// each channel and wherever the cap is. 0: none is small enough; 1: even a half space.
-pub fn widest(sky: &Sky, share: f32) -> f32 {
-    let texels: Vec<(Vec3, Vec3)> = (0..sky.radiance.len() as u32)
-        .filter(|&texel| sky.radiance[texel as usize] != Vec3::ZERO)
-        .map(|texel| {
-            let (face, x, y) = sky::place(sky.size, texel);
+/// Entries of the table.
+pub const LENGTH: usize = (FIV_MATTER_AZIMUTHS * FIV_MATTER_POLARS * FIV_MATTER_LEVELS) as usize;
+
+/// π times the greatest radiance around each direction over the mean irradiance, the most of all channels; levels, then polar angles,
+/// then azimuths. Twin of lib/fiv_matter.glsl.
+pub fn table(sky: &Sky) -> Vec<f32> {
+    let pi = std::f64::consts::PI;
+    let lit = (0..sky.radiance.len() as u32).filter(|&t| sky.radiance[t as usize] != Vec3::ZERO);
+    let texels: Vec<(DVec3, DVec3, f64)> = lit
+        .map(|t| {
+            let (face, x, y) = sky::place(sky.size, t);
             let area = sky::area(face, sky.size, x, y);
-            (area.normalize().as_vec3(), sky.radiance[texel as usize] * area.length() as f32)
+            (area.normalize(), sky.radiance[t as usize].as_dvec3(), area.length())
         })
         .collect();
-    let whole: DVec3 = texels.iter().map(|(_, power)| power.as_dvec3()).sum();
     // The irradiance of a normal is a quarter of all power in the mean.
-    let allowed = whole * (0.25 * f64::from(share));
-    let size = sky.size.min(CENTRES);
-    let mut sums = vec![DVec3::ZERO; STEPS];
-    let mut most = vec![DVec3::ZERO; STEPS];
-    for centre in 0..6 * size * size {
-        let (face, x, y) = sky::place(size, centre);
-        let st = (DVec2::new(x.into(), y.into()) + 0.5) / f64::from(size);
-        let centre = sky::direction(face, st).normalize().as_vec3();
-        sums.fill(DVec3::ZERO);
-        for (direction, power) in &texels {
-            let step = ((1.0 - centre.dot(*direction)) * STEPS as f32) as usize;
-            if let Some(sum) = sums.get_mut(step) {
-                *sum += power.as_dvec3();
+    let mean = 0.25 * texels.iter().map(|(_, radiance, area)| *radiance * *area).sum::<DVec3>();
+    let level = |radiance: DVec3| (pi * radiance / mean.max(DVec3::splat(1e-300))).max_element();
+    let texels: Vec<(Vec3, f32)> =
+        texels.iter().map(|(d, radiance, _)| (d.as_vec3(), level(*radiance) as f32)).collect();
+    // What is read anywhere comes from entries that are up to the diagonal of a cell away; texels reach out of their middles.
+    let cell = 2.0 * pi / f64::from(FIV_MATTER_AZIMUTHS);
+    let around = 2f64.sqrt() * (cell + 1.0 / f64::from(sky.size));
+    let within: Vec<f32> = (0..FIV_MATTER_LEVELS)
+        .map(|level| {
+            let sine = SMALLEST * f64::from(1u32 << (level + 1));
+            let angle = if sine < 1.0 { sine.asin() + around } else { pi };
+            angle.min(pi).cos() as f32 - 1e-6
+        })
+        .collect();
+    let mut table = vec![0f32; LENGTH];
+    let cells = (FIV_MATTER_AZIMUTHS * FIV_MATTER_POLARS) as usize;
+    for entry in 0..cells {
+        let (column, row) = (entry as u32 % FIV_MATTER_AZIMUTHS, entry as u32 / FIV_MATTER_AZIMUTHS);
+        let place = DVec2::new(column.into(), row.into());
+        let (azimuth, polar) = (place.x * cell, place.y * pi / f64::from(FIV_MATTER_POLARS - 1));
+        let at = DVec3::new(polar.sin() * azimuth.sin(), polar.cos(), -polar.sin() * azimuth.cos()).as_vec3();
+        for (direction, level) in &texels {
+            let cosine = at.dot(*direction);
+            // Levels are nested.
+            for number in (0..within.len()).rev().take_while(|&number| cosine >= within[number]) {
+                let known = &mut table[number * cells + entry];
+                *known = known.max(*level);
             }
         }
-        let mut below = DVec3::ZERO;
-        for (most, sum) in most.iter_mut().zip(&sums) {
-            below += *sum;
-            *most = most.max(below);
-        }
     }
-    let kept = most.iter().take_while(|most| most.cmple(allowed).all()).count();
-    // A cap may lie anywhere between these directions.
-    let between = std::f64::consts::SQRT_2 / f64::from(size);
-    let angle = (1.0 - kept as f64 / STEPS as f64).acos() - between;
-    if kept == STEPS { 1.0 } else { angle.max(0.0).sin() as f32 }
+    table
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Environment;
+    use crate::scene::{Environment, builtin};
 
-    #[test]
-    fn caps_of_even_light_have_their_share() {
-        let sky = Sky::new(Some(&Environment::constant(Vec3::ONE)), 16).unwrap();
-        // A cap of solid angle 2π(1 - cos α) has that much of power 4π, a quarter of which is the mean irradiance.
-        for share in [0.2f32, 0.5, 1.0] {
-            let exact = (1.0 - share / 2.0).acos().sin();
-            let found = widest(&sky, share);
-            assert!(found <= exact && found > exact - 0.15, "{share}: {found} instead of {exact}");
+    /// As lib/fiv_matter.glsl.
+    fn bound(table: &[f32], d: DVec3, r: f64) -> f64 {
+        let (azimuths, polars) = (FIV_MATTER_AZIMUTHS as usize, FIV_MATTER_POLARS as usize);
+        let azimuth = (d.x.atan2(-d.z) / std::f64::consts::TAU).rem_euclid(1.0) * azimuths as f64;
+        let polar = d.y.clamp(-1.0, 1.0).acos() / std::f64::consts::PI * (polars - 1) as f64;
+        let (a, p) = ((azimuth as usize).min(azimuths - 1), (polar as usize).min(polars - 2));
+        let level = (r.max(1e-6) / SMALLEST).log2().clamp(0.0, f64::from(FIV_MATTER_LEVELS - 1) - 1e-3);
+        let l = level as usize;
+        let mut sum = 0.0;
+        for (i, j, k) in (0..8).map(|k| (k & 1, k >> 1 & 1, k >> 2)) {
+            let weight =
+                |x: f64, low: usize, step: usize| if step == 1 { x - low as f64 } else { 1.0 - (x - low as f64) };
+            let entry = ((l + k) * polars + p + j) * azimuths + (a + i) % azimuths;
+            sum += weight(azimuth, a, i) * weight(polar, p, j) * weight(level, l, k) * f64::from(table[entry]);
         }
-        assert_eq!((widest(&sky, 1e-4), widest(&sky, 4.0)), (0.0, 1.0));
+        r * r * sum
+    }
+
+    fn directions(count: u32) -> impl Iterator<Item = DVec3> {
+        (0..count).map(move |i| {
+            let y = 1.0 - 2.0 * (f64::from(i) + 0.5) / f64::from(count);
+            let (sin, cos) = (2.399_963 * f64::from(i)).sin_cos();
+            DVec3::new((1.0 - y * y).sqrt() * cos, y, (1.0 - y * y).sqrt() * sin)
+        })
     }
 
     #[test]
-    fn a_small_light_leaves_nothing_negligible() {
-        let mut sky = Sky::new(Some(&Environment::constant(Vec3::splat(1e-3))), 8).unwrap();
-        sky.radiance[100] = Vec3::splat(1000.0);
-        assert_eq!(widest(&sky, 0.1), 0.0);
+    fn discs_of_even_light_have_their_area() {
+        let table = table(&Sky::new(Some(&Environment::constant(Vec3::ONE)), 16).unwrap());
+        for (d, r) in directions(50).flat_map(|d| [0.001, 0.05, 0.3, 0.9, 1.0].map(|r| (d, r))) {
+            // The share of a disc in the irradiance of a surface that faces it is r².
+            assert!((bound(&table, d, r) / (r * r) - 1.0).abs() < 0.01, "{d} {r}: {}", bound(&table, d, r));
+        }
+    }
+
+    #[test]
+    fn no_disc_hides_more_than_its_bound() {
+        for name in ["grove", "areas", "point"] {
+            let sky = Sky::new(Some(&builtin::environment(name).unwrap()), 16).unwrap();
+            let table = table(&sky);
+            let texels: Vec<(DVec3, DVec3)> = (0..sky.radiance.len() as u32)
+                .map(|t| {
+                    let (face, x, y) = sky::place(sky.size, t);
+                    (sky::area(face, sky.size, x, y), sky.radiance[t as usize].as_dvec3())
+                })
+                .collect();
+            let mean = 0.25 * texels.iter().map(|(area, radiance)| *radiance * area.length()).sum::<DVec3>();
+            let mut free = 0;
+            for (d, r) in directions(120).flat_map(|d| [0.02, 0.11, 0.4, 0.8].map(|r| (d, r))) {
+                let cosine = (1.0f64 - r * r).sqrt();
+                // Whole texels count where the disc has less than one.
+                let inside = |area: &DVec3| area.normalize().dot(d) > cosine;
+                let hidden: DVec3 = texels.iter().filter(|(a, _)| inside(a)).map(|(a, l)| *l * a.dot(d).max(0.0)).sum();
+                let share = (hidden / mean.max(DVec3::splat(1e-300))).max_element();
+                let slack = 4.0 / f64::from(sky.size * sky.size) * share;
+                assert!(share <= bound(&table, d, r) * 1.3 + slack, "{name} {d} {r}: {share}, {}", bound(&table, d, r));
+                free += u32::from(r == 0.11 && bound(&table, d, r) < 0.02);
+            }
+            // And it is of use: in most directions an occluder nine radii away hides little.
+            assert!(free > 40, "{name}: {free}");
+        }
     }
 }

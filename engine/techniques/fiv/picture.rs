@@ -1,13 +1,13 @@
 //! Everything from a scene on the device to the final picture.
 
-use std::sync::Arc;
+use std::{collections::HashMap, sync::Arc};
 
 use glam::Mat3;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Extent as Reach, Fiv, Interpolation, Method, SelfSamples, Settings, Specular, online::Seen,
-    online_standing::Standing, pace::Paces, specular::Shadows, suns, support, turn,
+    Extent as Reach, Fiv, Interpolation, Method, SelfSamples, Settings, Shared, Specular, online::Seen,
+    online_standing::Standing, pace::Paces, specular::Shadows, spots::Spot, suns, support, tiles::Tiles, turn,
 };
 use crate::{
     Error, Result,
@@ -23,21 +23,17 @@ use crate::{
     },
     shaders::{
         self,
-        consts::{FIV_FLOATS, FIV_PACE_KNOTS},
+        consts::{FIV_FLOATS, FIV_PACE_KNOTS, FIV_SPOTS},
         types,
     },
 };
 
 /// Rays that one dispatch traces at most, about: some milliseconds on a GPU.
 const MOST_RAYS: u64 = 1 << 22;
-/// Turns of the loops over occluders of one invocation.
-const MOST_TURNS: u32 = 20_000;
-/// Pixels along the edge of a tile of `near.comp`.
-const TILE: u32 = 8;
 /// Boxes of instances that brute force looks at before it traces a ray; with more, a tree is faster.
 const MOST_BOXES: usize = 8;
-/// Distance that nothing has, metres.
-const NEVER: f32 = 1e30;
+/// Turns of the loop over texels of one invocation.
+const MOST_TURNS: u64 = 20_000;
 /// No occluder, vector or table.
 const NONE: u32 = u32::MAX;
 
@@ -160,46 +156,43 @@ impl Fiv {
         if settings.extent == Reach::Sphere {
             list.iter_mut().for_each(|occluder| occluder.reach = NONE);
         }
-        let widest = self.widest(scene, settings)?;
-        list.iter_mut().for_each(|o| o.limit = if widest > 0.0 { o.radius / widest } else { NEVER });
+        let kinds: HashMap<u32, u32> = self.occluders.placed.iter().map(|placed| (placed.node, placed.kind)).collect();
         for (occluder, node) in list.iter_mut().zip(&standing.nodes) {
-            let placed = self.occluders.placed.iter().find(|placed| placed.node == *node);
-            occluder.fill = placed.map_or(1.0, |placed| self.fill(placed.kind));
-            occluder.body = placed.map_or(1.0, |placed| self.body(placed.kind));
+            let kind = kinds.get(node);
+            occluder.fill = kind.map_or(1.0, |&kind| self.fill(kind));
+            occluder.body = kind.map_or(1.0, |&kind| self.body(kind));
         }
         list.resize(list.len().max(1), types::FivOccluder::default());
         let occluders = graph.buffer_from("fiv.occluders", &list);
-        let words = count.div_ceil(32).max(1);
-        let tiles = extent.width.div_ceil(TILE) * extent.height.div_ceil(TILE);
-        let near = graph.buffer("fiv.near", 4 * u64::from(tiles) * u64::from(words));
-        let args = shaders::fiv::near::Args {
-            view: gbuffer.view,
-            normal: gbuffer.normal,
-            depth: gbuffer.depth,
-            occluders,
-            near,
-            push: shaders::fiv::near::Push { count, words },
-            spec: shaders::fiv::near::Spec { partial: settings.partial.into() },
-        };
-        graph.compute(args, extent);
+        let matter = self.matter(scene, settings)?.map(|table| graph.import_buffer(table));
+        let negligible = matter.is_some();
+        let matter = matter.unwrap_or_else(|| graph.buffer_from("fiv.matter", &[0f32]));
+        let tiles = Tiles::new(graph, gbuffer, (occluders, count), (matter, negligible), settings);
         let fivs = match &mut self.online {
             Some(online) if count > 0 => {
-                let seen = Seen { gbuffer, identity, occluders, own, near: (near, words) };
+                let seen = Seen { gbuffer, identity, occluders, own, near: (tiles.near, tiles.words) };
                 online.vectors(graph, (&self.occluders, pose), &standing, &self.light, &seen, settings)?
             }
             _ => stored,
         };
+        let shared = settings.overlap && settings.shared == Shared::Lights && count > 1 && !self.light.spots.is_empty();
         let total = self.light.total;
         let whole = types::FivWhole {
             x: [total[0], total[1], total[2]],
             y: [total[3], total[4], total[5]],
             z: [total[6], total[7], total[8]],
             occluders: count,
+            spots: if shared { self.light.spots.len() as u32 } else { 0 },
+            negligible: settings.negligible,
         };
         let whole = graph.uniform(&whole);
-        // With the correction each occluder looks at all others.
-        let turns = if settings.overlap { count + 8 } else { 8 };
-        let each = (MOST_TURNS / turns).max(1);
+        let mut spots: Vec<_> = self.light.spots.iter().map(Spot::packed).collect();
+        spots.resize(FIV_SPOTS as usize, types::FivSpot::default());
+        let spots = graph.buffer_from("fiv.spots", &spots);
+        // Only where there are several calls.
+        let kept = if shared && tiles.each < count { extent.pixels() * 12 * u64::from(FIV_SPOTS) } else { 4 };
+        let taken = graph.buffer("fiv.taken", kept);
+        graph.fill(taken, 0);
         let difmap = graph.import_image(&self.light.difmap);
         let mut reaches = graph.import_buffer(&self.reaches);
         if !standing.reaches.is_empty() {
@@ -214,7 +207,9 @@ impl Fiv {
             (_, SelfSamples::Spheres) => 1,
             (_, SelfSamples::Surface) => 2,
         };
-        for first in (0..count.max(1)).step_by(each as usize) {
+        for first in (0..count.max(1)).step_by(tiles.each as usize) {
+            let number = tiles.each.min(count.saturating_sub(first));
+            let pairs = tiles.pairs(graph, (first, number), settings);
             let args = shaders::fiv::light::Args {
                 view: gbuffer.view,
                 normal: gbuffer.normal,
@@ -227,21 +222,27 @@ impl Fiv {
                 whole,
                 own,
                 reaches,
-                near,
-                push: shaders::fiv::light::Push { first, count: each.min(count.saturating_sub(first)), words },
+                near: tiles.near,
+                pairs,
+                spots,
+                taken,
+                matter,
+                push: shaders::fiv::light::Push { first, count: number, words: tiles.words },
                 spec: shaders::fiv::light::Spec {
                     partial: settings.partial_way(),
                     overlap: settings.overlap.into(),
                     own: own_way,
                     trilinear: settings.trilinear.into(),
                     scaled: (settings.trilinear && settings.interpolation == Interpolation::SolidAngle).into(),
+                    spots: shared.into(),
+                    negligible: negligible.into(),
                 },
             };
             graph.compute(args, extent);
         }
-        let pixels = Pixels { gbuffer, identity, occluders, near: (near, words), irradiance };
+        let pixels = Pixels { gbuffer, identity, occluders, near: (tiles.near, tiles.words), irradiance };
         self.suns(graph, pose, &standing.nodes, &pixels, settings.self_shadow);
-        Ok((irradiance, Shadows { identity, occluders, fivs, near: (near, words), count }))
+        Ok((irradiance, Shadows { identity, occluders, fivs, near: (tiles.near, tiles.words), count }))
     }
 
     /// Adds the light of texels that are kept apart.
@@ -305,7 +306,6 @@ impl Fiv {
                 reach: if angle.is_some() { placed.kind * support::LENGTH as u32 } else { NONE },
                 turned: angle.is_some_and(|angle| angle != 0.0).into(),
                 to_rest: turned.transpose().to_cols_array_2d(),
-                limit: NEVER,
                 ..Default::default()
             }
         });
@@ -384,7 +384,7 @@ impl Fiv {
         }
         let rays_of = rays.frame(graph, handles);
         let count = self.light.lit.len() as u64;
-        let each = (MOST_RAYS / extent.pixels().max(1)).clamp(1, (*most).min(u64::from(MOST_TURNS)));
+        let each = (MOST_RAYS / extent.pixels().max(1)).clamp(1, (*most).min(MOST_TURNS));
         let (texels, lit) = (graph.import_buffer(&self.light.texels), graph.buffer_from("fiv.lit", &self.light.lit));
         let boxes = boxes(handles);
         let around = boxes.len() as u32 / 2;

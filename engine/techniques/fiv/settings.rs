@@ -76,8 +76,10 @@ pub enum Masks {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Shared {
-    /// What their bounding discs have in common, by how much each of them is filled on average.
+    /// As `Filled`; and of each bright part of the environment no more than it sends.
     #[default]
+    Lights,
+    /// What their bounding discs have in common, by how much each of them is filled on average.
     Filled,
     /// What their bounding discs have in common, as in the thesis: too much for bodies that are no balls.
     Discs,
@@ -256,6 +258,12 @@ impl Settings {
         if self.suns > 0 && self.turns > 1 {
             let error = Error::usage("lights can be kept apart for occluders at rest only").at("suns");
             return Err(error.help("Set fiv.suns or fiv.turns to its default"));
+        }
+        if self.negligible > 0.0 && (self.suns > 0 || self.specular != Specular::Off) {
+            let error = Error::usage(
+                "what is negligible for irradiance may hide lights that are kept apart, or seen in surfaces",
+            );
+            return Err(error.at("negligible").help("Set fiv.negligible to 0, or leave out fiv.suns and fiv.specular"));
         }
         Ok(())
     }

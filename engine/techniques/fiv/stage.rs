@@ -57,8 +57,8 @@ pub struct Fiv {
     pub(super) online: Option<Online>,
     /// For glossy reflection with shadows.
     pub(super) glossy: Option<Glossy>,
-    /// Share, light, and the sine of the half angle under which an occluder hides no more than that.
-    widest: Option<(f32, (f32, f32), f32)>,
+    /// What occluders can hide at most ([`negligible`]), with the light that this is for.
+    matter: Option<((f32, f32), OwnedBuffer)>,
 }
 
 /// What decides vectors, tables and which meshes are occluders.
@@ -153,7 +153,7 @@ impl Fiv {
             rays,
             online,
             glossy,
-            widest: None,
+            matter: None,
         })
     }
 
@@ -233,24 +233,21 @@ impl Fiv {
         Ok(())
     }
 
-    /// Sine of the half angle under which an occluder is negligible; 0: none is.
+    /// What occluders can hide at most, if some of them are to be left out: a table of [`negligible`].
     ///
     /// # Errors
-    /// As [`Sky::new`].
-    pub(super) fn widest(&mut self, scene: &Scene, settings: &Settings) -> Result<f32> {
+    /// `OutOfMemory`, `DeviceLost`; as [`Sky::new`].
+    pub(super) fn matter(&mut self, scene: &Scene, settings: &Settings) -> Result<Option<&OwnedBuffer>> {
         if settings.negligible <= 0.0 {
-            return Ok(0.0);
+            return Ok(None);
         }
-        let wanted = (settings.negligible, self.lit);
-        if let Some((share, lit, found)) = self.widest
-            && (share, lit) == wanted
-        {
-            return Ok(found);
+        if self.matter.as_ref().is_none_or(|(lit, _)| *lit != self.lit) {
+            let sky = lit_by(scene, &Settings { size: self.light.size, ..settings.clone() })?;
+            let table = negligible::table(&sky);
+            let buffer = OwnedBuffer::with_contents(&self.gpu, "fiv.matter", bytemuck::cast_slice(&table))?;
+            self.matter = Some((self.lit, buffer));
         }
-        let sky = lit_by(scene, &Settings { size: self.light.size, ..settings.clone() })?;
-        let found = negligible::widest(&sky, settings.negligible);
-        self.widest = Some((wanted.0, wanted.1, found));
-        Ok(found)
+        Ok(self.matter.as_ref().map(|(_, buffer)| buffer))
     }
 
     /// Bytes of the vectors on the device, with what occluders hide of reflections.
@@ -261,7 +258,7 @@ impl Fiv {
 
 /// Several occluders can hide the same, and it is asked how much.
 fn overlapping(occluders: &Occluders, settings: &Settings) -> bool {
-    settings.shared == Shared::Filled && occluders.placed.len() > 1
+    settings.shared != Shared::Discs && occluders.placed.len() > 1
 }
 
 /// How much of their bounding discs all kinds fill, where it is asked for.

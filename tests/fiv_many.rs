@@ -1,0 +1,218 @@
+//! Many occluders: lists of those that matter and of those that can overlap leave nothing out, light is hidden once, and what is
+//! negligible goes without a step.
+
+mod fiv_lab;
+mod tracer_lab;
+
+use fiv_lab::{Studio, ball, colourful, ground, thing};
+use glam::{DVec3, Mat4, Vec3, vec3};
+use lucerna::{
+    gpu::testing::with_gpu,
+    reference::{
+        fiv as twin,
+        overlap::{self, Seen},
+    },
+    scene::{Environment, Pose, Scene},
+    techniques::fiv::{Cut, Extent, Light, Settings, Shared, Sky, fill, spots},
+};
+use tracer_lab::flat_view;
+
+const RADIUS: f32 = 0.3;
+
+fn settings(shared: Shared) -> Settings {
+    Settings {
+        size: 16,
+        azimuths: 16,
+        polars: 9,
+        radii: 8,
+        largest: 1.0,
+        adaptive: false,
+        extent: Extent::Sphere,
+        cut: Cut::Height,
+        self_shadow: false,
+        shared,
+        ..Settings::default()
+    }
+}
+
+/// Even light and a sun, or even light alone.
+fn light(sun: bool) -> Environment {
+    let towards = DVec3::new(0.2, 0.9, 0.3).normalize();
+    fiv_lab::painted(128, |d| {
+        let bright = if sun && d.dot(towards) > 0.99 { 60.0 } else { 0.0 };
+        Vec3::new(1.0, 0.7, 1.3) + bright
+    })
+}
+
+/// Balls over, around and under the ground near the origin: most overlap others, as seen from it.
+fn places(count: u32) -> Vec<Vec3> {
+    let place = |i: u32| {
+        let (turn, far) = (2.399 * i as f32, 0.35 * (i as f32).sqrt());
+        vec3(far * turn.cos(), if i % 5 == 4 { -0.2 } else { 0.5 + 0.13 * (i % 7) as f32 }, far * turn.sin())
+    };
+    (0..count).map(place).collect()
+}
+
+fn stage(environment: Environment, places: &[Vec3]) -> Scene {
+    let mut scene = Scene { environment: Some(environment), ..Scene::default() };
+    ground(&mut scene, 20.0);
+    for (i, at) in places.iter().enumerate() {
+        let (positions, indices) = ball(RADIUS, 8);
+        thing(&mut scene, &format!("ball {i}"), positions, indices, Mat4::from_translation(*at));
+    }
+    scene
+}
+
+/// Pixels along an edge of the picture, which shows so much of the ground, metres, from under all balls.
+const EXTENT: u32 = 20;
+const SIZE: f32 = 2.5;
+const EYE: Vec3 = Vec3::new(0.0, 0.02, 0.0);
+
+/// Where the ground is that a pixel shows.
+fn shown(pixel: u32) -> Vec3 {
+    let at = |k: u32| ((k as f32 + 0.5) / EXTENT as f32 - 0.5) * SIZE;
+    vec3(-at(pixel % EXTENT), 0.0, -at(pixel / EXTENT))
+}
+
+#[test]
+fn lists_of_pairs_give_the_picture_of_all_pairs() {
+    with_gpu(|gpu| {
+        for (sun, shared, count) in [
+            (false, Shared::Discs, 60),
+            (false, Shared::Filled, 33),
+            (true, Shared::Lights, 60),
+            // More than one call sums up.
+            (true, Shared::Lights, 150),
+        ] {
+            let scene = stage(light(sun), &places(count));
+            let settings = settings(shared);
+            let sky = Sky::new(scene.environment.as_ref(), settings.size).unwrap();
+            let mut studio = Studio::new(gpu, &scene, &settings, None);
+            let (plan, all) = (studio.fiv.plan().clone(), studio.fiv.occluders().clone());
+            assert_eq!((all.kinds.len(), all.placed.len()), (1, count as usize));
+            let mut fivs = vec![];
+            plan.compute(gpu, &Light::new(gpu, &sky).unwrap(), &all.kinds, 0..plan.samples(), |_, new| {
+                fivs.extend_from_slice(new);
+                Ok(true)
+            })
+            .unwrap();
+            let kind = &plan.occluders[0];
+            let set = twin::Set { grid: plan.grid, shells: kind.shells, paces: &kind.paces, solid: None, fivs: &fivs };
+            let fill = f64::from(fill::fill(&all.kinds[0]));
+            let (open, spots) = (twin::irradiance(&sky, DVec3::Y), spots::spots(&sky));
+            assert_eq!(spots.len(), usize::from(sun));
+            let view = flat_view(EYE, vec3(0.0, 0.0, 0.0), SIZE, [EXTENT; 2]);
+            let found = studio.irradiance(&view, &settings);
+            let (mut dark, mut worst) = (0, 0f64);
+            for (pixel, found) in found.iter().enumerate() {
+                let p = shown(pixel as u32);
+                // Balls that are cut by the ground may hide it from the camera.
+                if places(count).iter().any(|at| at.distance(p) < 1.05 * RADIUS) {
+                    continue;
+                }
+                let seen = |at: &Vec3| {
+                    let offset = (*at + all.placed[0].centre - p).as_dvec3();
+                    let hidden = twin::dot(&set.lookup(offset).0, DVec3::Y);
+                    Seen {
+                        offset,
+                        radius: f64::from(kind.radius),
+                        fill,
+                        hidden,
+                        soft: std::f64::consts::PI / f64::from(plan.grid.azimuths),
+                    }
+                };
+                let occluders: Vec<Seen> = places(count).iter().map(seen).collect();
+                let exact = overlap::left(open, DVec3::Y, &occluders, &spots, shared);
+                let off = (found.as_dvec3() - exact).length() / open.length();
+                worst = worst.max(off);
+                dark += u32::from(exact.length() < 0.5 * open.length());
+            }
+            eprintln!("{shared:?}, {count} balls: {worst:.5} apart at most, {dark} pixels dark");
+            assert!(worst < 5e-3 && dark > 20, "{shared:?} {count}: {worst} {dark}");
+        }
+    });
+}
+
+#[test]
+fn a_light_behind_two_things_is_hidden_once() {
+    with_gpu(|gpu| {
+        // Thin crosses above one another: their discs are nearly empty, and both lie before the sun.
+        let towards = vec3(0.2, 0.9, 0.3).normalize();
+        let mut scene = Scene { environment: Some(light(true)), ..Scene::default() };
+        ground(&mut scene, 20.0);
+        for far in [1.4f32, 2.0, 2.6] {
+            let (mut positions, mut indices) = ball(0.8, 8);
+            positions.iter_mut().for_each(|p| *p *= vec3(1.0, 0.2, 0.25));
+            let (first, across) = (positions.len() as u32, positions.clone());
+            positions.extend(across.iter().map(|p| vec3(p.z, p.y, -p.x)));
+            indices.extend(indices.clone().iter().map(|i| i + first));
+            let at = Mat4::from_translation(towards * far);
+            thing(&mut scene, &format!("cross {far}"), positions, indices, at);
+        }
+        let view = flat_view(vec3(0.0, 0.02, 0.0), Vec3::ZERO, 0.2, [4, 4]);
+        let mean = |settings: &Settings, of: usize| {
+            let mut pose = Pose::rest(&scene);
+            pose.world[1 + of..].iter_mut().for_each(|world| world.w_axis.y = -1e4);
+            let mut studio = Studio::new(gpu, &scene, settings, None);
+            let picture = studio.shot(&pose, &view, settings).0;
+            picture.iter().map(|e| e.y).sum::<f32>() / picture.len() as f32
+        };
+        let truth = Settings { method: lucerna::techniques::fiv::Method::BruteForce, ..settings(Shared::Lights) };
+        let [open, one, all] = [0, 1, 3].map(|of| mean(&truth, of));
+        let [lights, filled] = [Shared::Lights, Shared::Filled].map(|s| mean(&Settings { split: 2, ..settings(s) }, 3));
+        eprintln!("open {open}, behind one {one}, behind three {all}; lights {lights}, filled {filled}");
+        // Others behind the first change hardly anything.
+        assert!(one < 0.7 * open && all > 0.8 * one);
+        assert!((lights - all).abs() < 0.12 * open && filled < all - 0.2 * open);
+    });
+}
+
+#[test]
+fn what_is_left_out_is_less_than_its_share() {
+    with_gpu(|gpu| {
+        // A sun low over a wide field of balls: those under it always matter.
+        let towards = DVec3::new(0.9, 0.35, 0.2).normalize();
+        let low = fiv_lab::painted(128, |d| Vec3::ONE * if d.dot(towards) > 0.995 { 200.0 } else { 1.0 });
+        let field: Vec<Vec3> =
+            (0..81).map(|i| vec3(1.9 * (i % 9) as f32 - 7.6, 0.32, 1.9 * (i / 9) as f32 - 7.6)).collect();
+        let scene = stage(low, &field);
+        let full = Settings { overlap: false, ..settings(Shared::Lights) };
+        let sky = Sky::new(scene.environment.as_ref(), full.size).unwrap();
+        let mean = 0.25 * sky.texels().iter().map(|t| t.radiance[0] * Vec3::from(t.area).length()).sum::<f32>();
+        let mut studio = Studio::new(gpu, &scene, &full, None);
+        let eye = flat_view(vec3(0.0, 0.01, 0.0), Vec3::ZERO, 1.0, [8, 8]);
+        let mut last = f32::INFINITY;
+        let all = studio.irradiance(&eye, &full);
+        for (share, least) in [(0.02, 0.05), (0.005, 0.005)] {
+            let settings = Settings { negligible: share, ..full.clone() };
+            let some = studio.irradiance(&eye, &settings);
+            // Each of 81 may be missing with this share of the mean.
+            let more: Vec<f32> = some.iter().zip(&all).map(|(s, a)| (s.x - a.x) / mean).collect();
+            let most = more.iter().copied().fold(0f32, f32::max);
+            eprintln!("negligible {share}: up to {most} of the mean irradiance more");
+            assert!(more.iter().all(|m| *m > -1e-4 && *m < 81.0 * share));
+            assert!(most > least * 0.2 && most < last, "{most}");
+            last = most;
+        }
+        // The shadow that the low sun casts is the same: what lies under it counts.
+        let shadow = |picture: &[Vec3]| picture.iter().map(|p| p.x).fold(f32::INFINITY, f32::min);
+        let settings = Settings { negligible: 0.005, ..full.clone() };
+        assert!(shadow(&studio.irradiance(&eye, &settings)) - shadow(&all) < 0.1 * mean);
+    });
+}
+
+#[test]
+fn colours_of_lights_are_hidden_apart() {
+    with_gpu(|gpu| {
+        // Whatever overlaps, light is never below zero nor above what there is.
+        let scene = stage(colourful(), &places(40));
+        let settings = settings(Shared::Lights);
+        let open = twin::irradiance(&Sky::new(scene.environment.as_ref(), 16).unwrap(), DVec3::Y).as_vec3();
+        let view = flat_view(EYE, Vec3::ZERO, SIZE, [EXTENT; 2]);
+        let shaded = Studio::new(gpu, &scene, &settings, None).irradiance(&view, &settings);
+        let discs = Settings { shared: Shared::Discs, ..settings.clone() };
+        let discs = Studio::new(gpu, &scene, &discs, None).irradiance(&view, &discs);
+        assert!(shaded.iter().all(|e| e.cmple(1.01 * open).all()));
+        assert!(shaded.iter().zip(&discs).any(|(a, b)| (*a - *b).length() > 0.02 * open.length()));
+    });
+}
