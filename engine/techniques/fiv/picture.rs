@@ -2,7 +2,6 @@
 
 use std::{collections::HashMap, sync::Arc};
 
-use glam::Mat3;
 use serde::{Deserialize, Serialize};
 
 use super::{
