@@ -80,7 +80,7 @@ fn counts(results: &Results) -> Result<Section> {
          surfaces, shadow rays to lights, and all light on what mirrors and glass show. *Indirect*: gathering by rays or maps, refinement, and light \
          put back. *Filters*: of the picture, and over time. *Other*: the sum, the sky, uploads, memory that is cleared.",
     );
-    let heads = ["scene", "surfaces", "virtual lights", "frames per second"].into_iter().chain(STAGES);
+    let heads = ["scene", "surfaces", "virtual lights", "frames/s"].into_iter().chain(STAGES);
     let mut table = Table::new("figure-4", "Frames per second and shares of the time", heads).timed();
     let axis = Axis::new("virtual lights");
     let mut plot = Plot::new("figure-4-plot", "Time of the indirect stage", axis, Axis::new("ms"));
@@ -139,13 +139,13 @@ fn variants(results: &Results) -> Result<Section> {
          has 1.5 to 2.0 for imperfect visibility, about 5 for downsampling, and 2.8 frames per second with all three. `{EXACT_SPECULAR}` and \
          `{PAPER_SPECULAR}` show mirrors, glass and highlights; all others, and all errors, are of diffuse surfaces alone, for the reference has no more.",
     ));
-    let heads = ["scene", "variant", "frames per second"].into_iter().chain(STAGES);
+    let heads = ["scene", "variant", "frames/s"].into_iter().chain(STAGES);
     let heads = heads.chain(["speed", "indirect, speed"]);
     let mut table = Table::new("figure-5", "Time of the variants", heads).timed();
     let columns = [
         "scene",
         "variant",
-        "indirect light / reference's",
+        "light",
         "rel. MSE to exact",
         "FLIP to exact",
         "PDiff to exact",
@@ -194,7 +194,7 @@ fn variants(results: &Results) -> Result<Section> {
     }
     section.add(table);
     section.text(
-        "Errors are of the whole picture; the reference traces paths with as many bounces and diffuse surfaces alone. *Indirect light / reference's* is the \
+        "Errors are of the whole picture; the reference traces paths with as many bounces and diffuse surfaces alone. *Light* is the \
          mean of the indirect light over that of the reference. One seed: where few virtual lights reach the view, as in the office with evenly shot paths, \
          another seed gives other figures.",
     );

@@ -130,14 +130,19 @@ impl Spent {
         Self { frame, parts }
     }
 
+    /// Of some parts. (The sum of no numbers is −0, which a table would show.)
+    fn sum(&self, of: impl Fn(Part) -> bool) -> f64 {
+        self.parts.iter().filter(|(part, _)| of(*part)).fold(0.0, |sum, (_, ms)| sum + ms)
+    }
+
     /// Of one part.
     pub fn part(&self, part: Part) -> f64 {
-        self.parts.iter().filter(|(known, _)| *known == part).map(|(_, ms)| ms).sum()
+        self.sum(|known| known == part)
     }
 
     /// Of one of [`STAGES`].
     fn stage(&self, stage: usize) -> f64 {
-        self.parts.iter().filter(|(part, _)| part.stage() == stage).map(|(_, ms)| ms).sum()
+        self.sum(|part| part.stage() == stage)
     }
 
     /// The paper's stage *direct and specular*.
@@ -157,7 +162,7 @@ impl Spent {
 
     /// Percent of the time of all passes, for [`STAGES`]; they add up to 100.
     pub fn shares(&self) -> [Cell; STAGES.len()] {
-        let all: f64 = self.parts.iter().map(|(_, ms)| ms).sum();
+        let all = self.sum(|_| true);
         std::array::from_fn(|stage| (all > 0.0).then(|| 100.0 * self.stage(stage) / all).into())
     }
 }
@@ -223,6 +228,7 @@ mod tests {
         assert_eq!(spent.gathering_and_filters(), 34.0);
         let sum: f64 = spent.shares().iter().map(|cell| if let Cell::Number(n) = cell { *n } else { 0.0 }).sum();
         assert!((sum - 100.0).abs() < 1e-9, "{sum}");
+        assert!(Spent::of(None, []).part(Part::Filters).is_sign_positive());
         assert!(Spent::of(None, []).shares().iter().all(|cell| *cell == Cell::Empty));
     }
 }
