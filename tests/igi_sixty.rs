@@ -15,7 +15,7 @@ const FRAMES: usize = 60;
 const MOVES: std::ops::Range<usize> = 20..40;
 
 /// Most that a frame changes while everything rests: mean over pixels relative to the mean light.
-const REST: f64 = 0.02;
+const REST: f64 = 0.025;
 /// Most that the change of a frame is off the true change while the lamp moves, in any frame.
 const MOVING: f64 = 0.22;
 /// Most that a frame is off, from the eighth on.
