@@ -41,9 +41,9 @@ fn ways(count: i32) -> impl Iterator<Item = DVec3> {
 fn the_looked_up_mask_of_a_sphere_is_its_cap() {
     with_gpu(|gpu| {
         let (sphere, _) = occluder(&one_ball(1.0, 40));
-        let sky = Sky::new(Some(&Environment::constant(Vec3::ONE)), 16).unwrap();
+        let sky = Sky::new(Some(&Environment::constant(Vec3::ONE)), 8).unwrap();
         let light = Light::new(gpu, &sky).unwrap();
-        for d in [1.05, 1.5, 3.0] {
+        for d in [1.05, 1.5, 2.0] {
             let points: Vec<Vec3> = ways(40).map(|way| (-way * d).as_vec3()).collect();
             let sin = 1.0 / d;
             let cap = 2.0 * PI * (1.0 - (1.0 - sin * sin).sqrt());
@@ -51,11 +51,11 @@ fn the_looked_up_mask_of_a_sphere_is_its_cap() {
             for ((hidden, angle), way) in covered(gpu, &sphere, &light, &points, true).into_iter().zip(ways(40)) {
                 let found = DVec3::new(hidden[0].x, hidden[1].x, hidden[2].x);
                 let exact = way * (PI * sin * sin);
-                // Texels of 1 / 120 sr count whole or not at all.
-                assert!((found - exact).length() < 0.12 * exact.length(), "{d} {way}: {found} instead of {exact}");
+                // Texels of 1 / 30 sr count whole or not at all.
+                assert!((found - exact).length() < 0.25 * exact.length(), "{d} {way}: {found} instead of {exact}");
                 mean += angle / cap / 40.0;
             }
-            assert!((mean - 1.0).abs() < 0.01, "{d}: {mean} of the cap");
+            assert!((mean - 1.0).abs() < 0.04, "{d}: {mean} of the cap");
         }
         // From within everything is hidden.
         let (inside, _) = covered(gpu, &sphere, &light, &[vec3(0.2, 0.1, 0.0)], true)[0];
@@ -68,8 +68,8 @@ fn looked_up_masks_are_those_of_rays_but_for_their_edges() {
     with_gpu(|gpu| {
         let hare = builtin::load("hare").unwrap();
         let (kind, _) = occluder(&hare);
-        let light = Light::new(gpu, &Sky::new(Some(&colourful()), 16).unwrap()).unwrap();
-        for (rho, slack) in [(0.5, 0.05), (1.0, 0.03), (2.0, 0.04), (8.0, 0.15)] {
+        let light = Light::new(gpu, &Sky::new(Some(&colourful()), 8).unwrap()).unwrap();
+        for (rho, slack) in [(0.5, 0.06), (1.0, 0.12), (2.0, 0.1), (4.0, 0.15)] {
             let points: Vec<Vec3> = ways(60).map(|way| (way * rho * f64::from(kind.radius)).as_vec3()).collect();
             let [rays, looked_up] = [false, true].map(|way| covered(gpu, &kind, &light, &points, way));
             let open: Vec<_> = rays
@@ -98,7 +98,7 @@ fn pictures_with_looked_up_masks_are_those_with_rays_nearly_and_plans_tell_them_
         let (mut positions, indices) = ball(0.5, 10);
         positions.iter_mut().for_each(|p| *p = *p * vec3(1.0, 0.4, 0.6) + vec3(0.0, 0.6, 0.0));
         thing(&mut scene, "stone", positions, indices, Mat4::IDENTITY);
-        let rays = Settings { size: 16, azimuths: 24, polars: 13, radii: 12, largest: 1.0, ..Settings::default() };
+        let rays = Settings { size: 8, azimuths: 24, polars: 13, radii: 12, largest: 1.0, ..Settings::default() };
         let looked_up = Settings { masks: Masks::Parallel, ..rays.clone() };
         let view = tracer_lab::view(vec3(0.0, 4.0, 0.1), Vec3::ZERO, 50.0, [24, 24]);
         let picture = |settings: &Settings| Studio::new(gpu, &scene, settings, None).irradiance(&view, settings);

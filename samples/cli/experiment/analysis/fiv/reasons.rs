@@ -7,6 +7,8 @@ use crate::experiment::results::Layer;
 
 /// The part of the ground that counts as steep: where the reference changes most from pixel to pixel.
 const STEEP: f64 = 0.1;
+/// Ground this close to what is covered counts as touched, of the picture's width.
+const TOUCHED: f64 = 1.0 / 64.0;
 
 /// In words; `technique`: that of the case's row, `ours`: its NRMSE.
 pub(super) fn of(lab: &Lab<'_>, case: &Case, technique: &str, ours: f64) -> Result<String> {
@@ -29,11 +31,14 @@ pub(super) fn of(lab: &Lab<'_>, case: &Case, technique: &str, ours: f64) -> Resu
             parts.push(format!("{value:.3} with {denser}"));
         }
     }
-    if let Some(share) = steep(lab, case.scene, technique)? {
+    if let Some([steep, touched, rest]) = shares(lab, case.scene, technique)? {
         let part = 100.0 * STEEP;
         parts.push(format!(
-            "{:.0} % of the squared error lies on the {part:.0} % of the ground where light changes most",
-            100.0 * share
+            "of the squared error {:.0} % lie on the {part:.0} % of the ground where light changes most, {:.0} % next to ground that is covered \
+             (on 1/64 of the width), without which it is {:.3}",
+            100.0 * steep,
+            100.0 * touched,
+            ours * rest.sqrt(),
         ));
     }
     if ours > 0.0 && parts.len() == 1 {
@@ -42,8 +47,9 @@ pub(super) fn of(lab: &Lab<'_>, case: &Case, technique: &str, ours: f64) -> Resu
     Ok(parts.join("; "))
 }
 
-/// The share of the squared error on the part of the ground where the reference changes most.
-fn steep(lab: &Lab<'_>, scene: &str, technique: &str) -> Result<Option<f64>> {
+/// The shares of the squared error on the part of the ground where the reference changes most, and on ground next to what is covered;
+/// and the mean squared error without the latter, over that of all.
+fn shares(lab: &Lab<'_>, scene: &str, technique: &str) -> Result<Option<[f64; 3]>> {
     let Some((truth, run)) = lab.run(scene, GROUND, TRUTH).zip(lab.run(scene, GROUND, technique)) else {
         return Ok(None);
     };
@@ -51,19 +57,31 @@ fn steep(lab: &Lab<'_>, scene: &str, technique: &str) -> Result<Option<f64>> {
     let [truth, test] = [truth, run].map(|run| lab.results.picture(Layer(run, "irradiance")));
     let (truth, test) = (truth?, test?);
     let (width, height) = (truth.width as usize, truth.height as usize);
+    let is_open = |i: usize| open.as_ref().is_none_or(|open| open[i]);
     let light = |i: usize| truth.pixels[i].iter().map(|v| f64::from(*v)).sum::<f64>();
+    let near = ((TOUCHED * width as f64) as usize).max(1);
+    let mut touched = vec![false; width * height];
+    for i in (0..width * height).filter(|i| !is_open(*i)) {
+        let (x, y) = (i % width, i / width);
+        for row in y.saturating_sub(near)..(y + near + 1).min(height) {
+            touched[row * width + x.saturating_sub(near)..row * width + (x + near + 1).min(width)].fill(true);
+        }
+    }
+    // Change, squared error, next to what is covered.
     let mut pixels = Vec::new();
-    for i in (0..width * height).filter(|i| open.as_ref().is_none_or(|open| open[*i])) {
+    for i in (0..width * height).filter(|i| is_open(*i)) {
         let (x, y) = (i % width, i / width);
         let along = |low: usize, high: usize| (light(high) - light(low)).abs();
         let across = along(i - x.min(1), i + usize::from(x + 1 < width));
-        let down = along(i - width * y.min(1), i + width * usize::from(y + 1 < height));
+        let down = along(i - width * y.min(1), i + if y + 1 < height { width } else { 0 });
         let error: f64 = (0..3).map(|c| f64::from(truth.pixels[i][c] - test.pixels[i][c]).powi(2)).sum();
-        pixels.push((across.hypot(down), error));
+        pixels.push((across.hypot(down), error, touched[i]));
     }
     pixels.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let all: f64 = pixels.iter().map(|p| p.1).sum();
-    let count = (STEEP * pixels.len() as f64) as usize;
-    let most: f64 = pixels.iter().take(count).map(|p| p.1).sum();
-    Ok((all > 0.0 && count > 0).then(|| most / all))
+    let sum = |list: &mut dyn Iterator<Item = f64>| list.sum::<f64>();
+    let all = sum(&mut pixels.iter().map(|p| p.1));
+    let steep = sum(&mut pixels.iter().take((STEEP * pixels.len() as f64) as usize).map(|p| p.1));
+    let next = sum(&mut pixels.iter().filter(|p| p.2).map(|p| p.1));
+    let far = pixels.iter().filter(|p| !p.2).count() as f64 / pixels.len().max(1) as f64;
+    Ok((all > 0.0 && far > 0.0).then(|| [steep / all, next / all, (1.0 - next / all) / far]))
 }
