@@ -311,19 +311,27 @@ fn occluders_that_turn_shade_reflections_as_those_that_are_made_turned() {
         let direction = axis.direction().as_vec3();
         let settings = Settings { turns: 8, turn_axis: axis, adaptive: false, ..by(Method::Vectors) };
         let view = flat_view(vec3(3.0, 0.7, 0.0), Vec3::ZERO, 2.0, [24, 16]);
-        let still = body(Mat3::IDENTITY, Mat4::IDENTITY);
-        let mut studio = Studio::new(gpu, &still, &settings, None);
+        let resting = body(Mat3::IDENTITY, Mat4::IDENTITY);
+        let mut studio = Studio::new(gpu, &resting, &settings, None);
         for (angle, slack) in [(0.75 * std::f32::consts::PI, 0.01), (1.2, 0.06)] {
             let turn = Mat3::from_axis_angle(direction, angle);
             let made = body(turn, Mat4::IDENTITY);
             let one = Settings { turns: 1, ..settings.clone() };
-            let exact = Studio::new(gpu, &made, &one, None).gloss(&Pose::rest(&made), &view, &one);
-            let mut pose = Pose::rest(&still);
+            let mut other = Studio::new(gpu, &made, &one, None);
+            let exact = other.gloss(&Pose::rest(&made), &view, &one);
+            let exact_light = other.shot(&Pose::rest(&made), &view, &one).0;
+            let mut pose = Pose::rest(&resting);
             pose.world[1] = pose.world[1] * Mat4::from_mat3(turn);
             let (found, rest) =
-                (studio.gloss(&pose, &view, &settings), studio.gloss(&Pose::rest(&still), &view, &settings));
+                (studio.gloss(&pose, &view, &settings), studio.gloss(&Pose::rest(&resting), &view, &settings));
             let (error, other) = (nrmse(&exact, &found), nrmse(&exact, &rest));
             eprintln!("turned by {angle}: {error:.4} from one made so, {other:.4} at rest");
+            assert!(error < slack && error < 0.5 * other, "{angle}: {error} {other}");
+            // The same of irradiance, and of the bar's own shadow.
+            let light = studio.shot(&pose, &view, &settings).0;
+            let still = studio.shot(&Pose::rest(&resting), &view, &settings).0;
+            let (error, other) = (nrmse(&exact_light, &light), nrmse(&exact_light, &still));
+            eprintln!("irradiance: {error:.4}, {other:.4} at rest");
             assert!(error < slack && error < 0.5 * other, "{angle}: {error} {other}");
         }
     });

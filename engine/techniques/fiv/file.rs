@@ -187,6 +187,7 @@ mod tests {
         Settings,
         plan::Kind,
         samples::{Grid, Shells},
+        turn::Axis,
     };
 
     fn stored() -> Stored {
@@ -216,6 +217,31 @@ mod tests {
         let bytes = whole.encode().unwrap();
         assert_eq!(Stored::decode(&bytes).unwrap(), whole);
         assert_eq!(whole.encode().unwrap(), bytes);
+    }
+
+    #[test]
+    fn the_axis_of_turns_is_kept_and_older_files_have_y() {
+        let mut whole = stored();
+        whole.plan.turn_axis = Axis::try_from("1,0.5,0".to_owned()).unwrap();
+        assert_eq!(Stored::decode(&whole.encode().unwrap()).unwrap(), whole);
+        // With one turn it decides nothing.
+        assert_eq!(whole.plan.difference(&stored().plan), None);
+        let [x, y] = ["x", "y"].map(|axis| Plan {
+            turns: 3,
+            turn_axis: Axis::try_from(axis.to_owned()).unwrap(),
+            ..stored().plan
+        });
+        assert!(x.difference(&y).unwrap().contains("3 turns about y"));
+        // As version 2 wrote it, without an axis.
+        let now = stored().encode().unwrap();
+        let length = u32::from_le_bytes([now[12], now[13], now[14], now[15]]) as usize;
+        let header = std::str::from_utf8(&now[16..16 + length]).unwrap().replacen("\"turn_axis\":\"y\",", "", 1);
+        assert!(header.len() < length);
+        let mut old = [&now[..8], &2u32.to_le_bytes(), &(header.len() as u32).to_le_bytes()].concat();
+        old.extend_from_slice(header.as_bytes());
+        old.extend_from_slice(&now[16 + length..now.len() - 8]);
+        old.extend_from_slice(&checksum(&old).to_le_bytes());
+        assert_eq!(Stored::decode(&old).unwrap(), stored());
     }
 
     #[test]
