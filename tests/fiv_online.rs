@@ -11,7 +11,7 @@ use lucerna::{
     gpu::testing::with_gpu,
     measure::steady::{Frame, Steadiness},
     scene::{self, Environment, LoadOptions, Pose, Scene, Transform, View, builtin},
-    techniques::fiv::{Extent, Method, SelfSamples, Settings},
+    techniques::fiv::{Cut, Extent, Method, SelfSamples, Settings},
 };
 use tracer_lab::{flat_view, view};
 
@@ -168,8 +168,8 @@ fn what_deforms_casts_the_shadow_of_its_moment() {
             [("AnimatedMorphCube/AnimatedMorphCube.gltf", [0.0, 1.6]), ("RiggedSimple/RiggedSimple.gltf", [0.0, 1.0])]
         {
             let Some(scene) = lying(file) else { return };
-            // Of what deforms the bounding sphere alone is known.
-            let sphere = |method| Settings { extent: Extent::Sphere, ..finer(method) };
+            // Of what deforms the bounding sphere alone is known, and how much it fills of its disc is that at rest.
+            let sphere = |method| Settings { extent: Extent::Sphere, cut: Cut::Height, ..finer(method) };
             let (online, brute) = (sphere(Method::Online), sphere(Method::BruteForce));
             let mut studio = Studio::new(gpu, &scene, &online, None);
             let mut truth = Studio::new(gpu, &scene, &brute, None);

@@ -212,7 +212,8 @@ fn what_stands_on_the_ground_is_not_cut_by_it() {
         let picture = |settings: &Settings| Studio::new(gpu, &scene, settings, None).irradiance(&view, settings);
         let truth = picture(&by(Method::BruteForce));
         let error = |extent: Extent| {
-            let settings = Settings { azimuths: 64, polars: 33, extent, ..coarse() };
+            // The height alone decides: with `Cut::Light` the bounding sphere does nearly as well.
+            let settings = Settings { azimuths: 64, polars: 33, extent, cut: Cut::Height, ..coarse() };
             nrmse(&truth, &picture(&settings))
         };
         let (hull, sphere) = (error(Extent::Hull), error(Extent::Sphere));
