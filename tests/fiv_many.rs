@@ -110,8 +110,13 @@ fn lists_of_pairs_give_the_picture_of_all_pairs() {
                 if places(count).iter().any(|at| at.distance(p) < 1.05 * RADIUS) {
                     continue;
                 }
+                let from = |at: &Vec3| (*at + all.placed[0].centre - p).as_dvec3();
+                // Where most samples lie inside of a ball everything counts as hidden.
+                if places(count).iter().any(|at| set.lookup(from(at)).1 < 0.501) {
+                    continue;
+                }
                 let seen = |at: &Vec3| {
-                    let offset = (*at + all.placed[0].centre - p).as_dvec3();
+                    let offset = from(at);
                     let hidden = twin::dot(&set.lookup(offset).0, DVec3::Y);
                     Seen {
                         offset,

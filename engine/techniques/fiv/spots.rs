@@ -130,7 +130,9 @@ mod tests {
             // Nothing else shines, or hardly.
             for (name, count) in [("point", 1), ("area", 1), ("areas", 2)] {
                 let (sky, spots) = of(name, size);
-                assert_eq!(spots.len(), count, "{name} {size}");
+                // Texels of eleven degrees may part a light in two.
+                let most = if size < 16 { count + 1 } else { count };
+                assert!((count..=most).contains(&spots.len()), "{name} {size}: {}", spots.len());
                 let whole = crate::reference::fiv::total(&sky);
                 let sum: DVec3 = spots.iter().map(|s| s.vectors[1]).sum();
                 assert!((sum - whole[1]).length() < 0.1 * whole[1].length(), "{name} {size}: {sum} of {}", whole[1]);
