@@ -3,12 +3,15 @@
 mod igi_lab;
 mod tracer_lab;
 
-use glam::{Mat4, Quat, Vec3, vec3};
+use glam::{Mat4, Quat, Vec3, vec3, vec4};
 use igi_lab::{Studio, flux, mean, plain};
 use lucerna::{
     gpu::testing::with_gpu,
     graph::Graph,
-    scene::{Environment, LightKind, Material, Pose, Transform, resident::Resident},
+    scene::{
+        AlphaMode, Environment, LightKind, Material, Pose, Transform, environment::uv_from_direction,
+        resident::Resident,
+    },
     techniques::igi::{Igi, PictureSettings, Settings, Visibility},
 };
 use std::f64::consts::PI;
@@ -253,5 +256,99 @@ fn rays_of_another_kind_than_the_scene_was_prepared_for_and_odd_backgrounds_are_
             let (code, text) = refused(&compute, &compute, [0.0, channel, 0.0]).expect("a background of no light");
             assert!(code == 2 && text.starts_with("background: "), "{text}");
         }
+    });
+}
+
+#[test]
+fn the_sun_and_a_bright_spot_of_the_sky_shine_from_where_they_stand() {
+    with_gpu(|gpu| {
+        // A floor and a roof above it: virtual lights lie on upper sides, and on the floor only where the roof lets light through.
+        let stage = || {
+            let mut stage = Stage::new();
+            let white = stage.material(Material::diffuse("white", Vec3::splat(0.5)));
+            stage.quad(white, vec3(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0);
+            stage.quad(white, vec3(-1.0, 1.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0);
+            stage
+        };
+        let wanted = vec3(-0.6, 0.7, 0.35).normalize();
+        let mut sun = stage();
+        let turned = Mat4::from_quat(Quat::from_rotation_arc(Vec3::NEG_Z, -wanted));
+        sun.light(LightKind::Directional, Vec3::ONE, 1.0, turned);
+        // The texel that has this direction once the map has turned; neighbours in the map see a little of it.
+        let mut sky = stage();
+        let (width, height, rotation) = (256u32, 128u32, 1.0f32);
+        let uv = uv_from_direction(Quat::from_rotation_y(-rotation) * wanted);
+        let (x, y) = ((uv.x * width as f32) as u32, (uv.y * height as f32) as u32);
+        let mut pixels = vec![Vec3::ZERO; (width * height) as usize];
+        pixels[(y * width + x) as usize] = Vec3::splat(1000.0);
+        sky.scene.environment =
+            Some(Environment { width, height, pixels, rotation, ..Environment::constant(Vec3::ONE) });
+        for (name, stage, slack) in [("sun", sun, 1e-3), ("sky", sky, 0.15)] {
+            let mut studio = Studio::new(gpu, &stage.scene);
+            let shown = studio.render(&view(Vec3::Y * 3.0, Vec3::ZERO, 60.0, [4, 4]), &plain(600), 0);
+            let lit = |vpl: &&lucerna::shaders::types::Vpl| vpl.flux[0] > 0.0;
+            let (mut floor, mut roof) = (0, 0);
+            for vpl in shown.vpls.iter().filter(lit) {
+                assert!(vpl.normal[1] > 0.99, "{name}: light from below at {:?}", vpl.position);
+                if vpl.position[1] > 0.5 {
+                    roof += 1;
+                    continue;
+                }
+                floor += 1;
+                let at = Vec3::from(vpl.position) + wanted / wanted.y;
+                let inside = at.x.abs() < 1.0 - slack && at.z.abs() < 1.0 - slack;
+                assert!(!inside, "{name}: light through the roof at {:?}", vpl.position);
+            }
+            // As much floor is lit as lies outside the roof's shadow.
+            let share = f64::from(floor) / f64::from(floor + roof);
+            let shadow = f64::from((2.0 - (wanted.x / wanted.y).abs()) * (2.0 - (wanted.z / wanted.y).abs()));
+            let expected = (4.0 - shadow) / (8.0 - shadow);
+            println!("{name}: {floor} on the floor, {roof} on the roof, share {share:.3} of {expected:.3}");
+            assert!((share - expected).abs() < 0.04, "{name}: {share} instead of {expected}");
+        }
+    });
+}
+
+#[test]
+fn boxes_hide_what_triangles_hide_turned_thin_and_cut_out() {
+    with_gpu(|gpu| {
+        let mut stage = room(Vec3::splat(0.7));
+        let white = stage.material(Material::diffuse("white", Vec3::splat(0.7)));
+        let masked = Material {
+            alpha: AlphaMode::Mask { cutoff: 0.5 },
+            base_color: vec4(0.7, 0.7, 0.7, 0.2),
+            double_sided: true,
+            ..Material::diffuse("holes", Vec3::ONE)
+        };
+        let holes = stage.material(masked);
+        stage.sphere(white, vec3(0.4, -0.5, -0.3), 0.3, 16, false);
+        // One mesh twice, turned and stretched; slivers across the room; a card that is all hole.
+        let first = stage.quad(white, vec3(-0.2, 0.0, 0.0), Vec3::X * 0.4, Vec3::Y * 0.4);
+        let again = stage.scene.nodes[first].clone();
+        let turned = |angle: f32, at: Vec3| Mat4::from_translation(at) * Mat4::from_rotation_y(angle);
+        stage.scene.nodes[first].local = Transform::Matrix(turned(0.6, vec3(-0.5, -0.6, -0.2)));
+        let stretched = turned(-0.4, vec3(-0.3, 0.2, -0.5)) * Mat4::from_scale(vec3(0.3, 1.5, 1.0));
+        stage.scene.nodes.push(lucerna::scene::Node { local: Transform::Matrix(stretched), ..again });
+        for k in 0..4 {
+            let at = vec3(-0.7 + 0.4 * k as f32, -0.9, -0.6);
+            stage.mesh(
+                white,
+                vec![at, at + vec3(0.02, 0.0, 0.0), at + vec3(0.1, 0.6, 0.1)],
+                vec![Vec3::Z; 3],
+                vec![0, 1, 2],
+            );
+        }
+        stage.quad(holes, vec3(-0.1, -0.4, 0.2), Vec3::X * 0.2, Vec3::Y * 0.2);
+        stage.point(vec3(0.3, 0.7, 0.4), Vec3::ONE);
+        let mut studio = Studio::new(gpu, &stage.scene);
+        let seen = view(vec3(0.0, 0.1, 0.95), vec3(0.0, -0.3, -1.0), 80.0, [40, 40]);
+        let settings = Settings { bound: 0.05, ..plain(80) };
+        let exact = studio.render(&seen, &settings, 1).irradiance;
+        let boxes = studio.render(&seen, &Settings { imperfect: true, ..settings }, 1).irradiance;
+        let brighter = boxes.iter().zip(&exact).filter(|(b, e)| (0..3).any(|c| b[c] > e[c] * 1.00001)).count();
+        let share = mean(&boxes) / mean(&exact);
+        println!("boxes leave {share:.3} of the light");
+        assert_eq!(brighter, 0, "imperfect visibility is brighter somewhere");
+        assert!((0.7..0.995).contains(&share), "boxes leave {share} of the light");
     });
 }
