@@ -235,7 +235,9 @@ fn without_the_bound_the_mean_is_the_path_tracers() {
                     );
                     // One in a hundred for all twelve together; more than 31 degrees of freedom.
                     assert!(t.abs() < 3.6, "{name}, {candidates} candidates: means {a} and {b}: t = {t}");
-                    assert!(deviation < if k == 0 { 0.009 } else { 0.025 } * b, "too noisy to say anything");
+                    // Lights next to surfaces make the court noisy.
+                    let most = if name == "cornell" { 0.009 } else { 0.016 } * if k == 0 { 1.0 } else { 3.0 };
+                    assert!(deviation < most * b, "too noisy to say anything");
                 }
             }
         }
