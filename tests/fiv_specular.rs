@@ -321,7 +321,7 @@ fn occluders_that_turn_shade_reflections_as_those_that_are_made_turned() {
             let exact = other.gloss(&Pose::rest(&made), &view, &one);
             let exact_light = other.shot(&Pose::rest(&made), &view, &one).0;
             let mut pose = Pose::rest(&resting);
-            pose.world[1] = pose.world[1] * Mat4::from_mat3(turn);
+            pose.world[1] *= Mat4::from_mat3(turn);
             let (found, rest) =
                 (studio.gloss(&pose, &view, &settings), studio.gloss(&Pose::rest(&resting), &view, &settings));
             let (error, other) = (nrmse(&exact, &found), nrmse(&exact, &rest));
