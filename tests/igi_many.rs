@@ -157,7 +157,7 @@ fn the_device_picks_what_its_twin_picks() {
         let stage = room();
         let mut studio = Studio::new(gpu, &stage.scene);
         for (vpls, bound, picks, proposals, interleave) in
-            [(1, 0.0, 1, 4, 1), (300, 0.0, 6, 1, 1), (300, 0.1, 8, 4, 1), (4000, 0.1, 18, 3, 3)]
+            [(2, 0.0, 1, 4, 1), (300, 0.0, 6, 1, 1), (300, 0.1, 8, 4, 1), (4000, 0.1, 18, 3, 3)]
         {
             let settings = Settings { bounces: 2, bound, picks, proposals, interleave, fused: true, ..plain(vpls) };
             let shown = studio.render(&wall_view(), &settings, 7);
