@@ -215,7 +215,7 @@ fn occluders_take_light_and_never_more_than_there_is() {
         let places = [vec3(0.0, 0.8, 0.0), vec3(0.1, 0.9, 0.1), vec3(1.2, 0.3, 0.4), vec3(-0.5, 2.0, -0.8)];
         for (roughness, environment) in [(0.2, colourful()), (0.7, colourful()), (0.4, cap(60, 20.0).0)] {
             let scene = stage(environment, &places, (roughness, 1.0));
-            let view = flat_view(vec3(3.0, 2.0, 4.0), Vec3::ZERO, 6.0, [16, 16]);
+            let view = flat_view(vec3(3.0, 2.0, 4.0), Vec3::ZERO, 6.0, [24, 24]);
             let [open, found] = [Method::Unshadowed, Method::Vectors].map(|method| {
                 Studio::new(gpu, &scene, &by(method), None).gloss(&Pose::rest(&scene), &view, &by(method))
             });
