@@ -11,7 +11,7 @@ const BRIGHT: f64 = 4.0;
 /// A part that has no more than this share of any channel's power is left out.
 const LEAST: f64 = 0.02;
 /// Cosine of how far the texels of a part are from its brightest one at most: 45 degrees.
-const WIDEST: f64 = 0.7071;
+const WIDEST: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// A bright part.
 #[derive(Clone, Copy, Debug, PartialEq)]

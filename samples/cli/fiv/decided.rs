@@ -11,9 +11,10 @@ use serde_json::Value;
 use crate::config;
 
 /// Keys that decide pictures and no vectors.
-const OF_PICTURES: [&str; 10] = [
+const OF_PICTURES: [&str; 11] = [
     "trilinear",
     "partial",
+    "cut",
     "extent",
     "overlap",
     "negligible",
