@@ -83,7 +83,7 @@ impl<'a> Cover<'a> {
         Ok(Self { occluder, resident, rays, pose, tiles, geometry_from_world, parallel: None })
     }
 
-    /// From now on points are looked up in pictures along the rays ([`super::parallel`]), where that is possible: not if it is turned.
+    /// From now on points are looked up in pictures along the rays (`parallel`), where that is possible: not if it is turned.
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`.
