@@ -12,7 +12,7 @@ const TOUCHED: f64 = 1.0 / 64.0;
 
 /// In words; `technique`: that of the case's row, `ours`: its NRMSE.
 pub(super) fn of(lab: &Lab<'_>, case: &Case, technique: &str, ours: f64) -> Result<String> {
-    let mut parts = vec!["above".to_owned()];
+    let mut parts = Vec::new();
     let beside = |name: &str| lab.nrmse(case.scene, GROUND, name);
     // Without a correction, or with the defaults in place of the thesis' choices.
     for (name, what) in [("no overlap", "without the correction"), ("no partial", "without the correction")] {
@@ -41,7 +41,7 @@ pub(super) fn of(lab: &Lab<'_>, case: &Case, technique: &str, ours: f64) -> Resu
             ours * rest.sqrt(),
         ));
     }
-    if ours > 0.0 && parts.len() == 1 {
+    if parts.is_empty() {
         parts.push("nothing else was rendered that would tell why".to_owned());
     }
     Ok(parts.join("; "))
