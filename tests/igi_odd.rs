@@ -4,14 +4,14 @@
 mod igi_lab;
 mod tracer_lab;
 
-use glam::{Mat4, Vec3, vec3};
+use glam::{Mat4, Quat, Vec3, vec3};
 use igi_lab::{Studio, flux, mean, plain};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::{Environment, LightKind, Material, Pose, Scene, Transform, View, builtin},
     techniques::igi::Settings,
 };
-use tracer_lab::{Stage, view};
+use tracer_lab::{Stage, flat_view, view};
 
 /// All that is on by default, in little.
 fn small() -> Settings {
@@ -133,6 +133,29 @@ fn a_room_looks_the_same_at_every_size() {
                 assert!((ratio - 1.0).abs() < 0.01, "scale {scale}: {ratio}");
             }
         }
+    });
+}
+
+#[test]
+fn unlit_surfaces_change_neither_light_nor_what_shares_of_the_scene_are_of() {
+    with_gpu(|gpu| {
+        // Open at the front, so that sun and sky come in; seen in parallel, for a far plane that nothing moves.
+        let mut stage = room(vec3(0.7, 0.5, 0.2));
+        stage.scene.nodes.retain(|node| node.mesh != Some(5));
+        stage.point(vec3(0.2, 0.3, -0.1), vec3(1.0, 2.0, 3.0));
+        let sun = Quat::from_rotation_arc(Vec3::NEG_Z, vec3(0.3, -0.4, -1.0).normalize());
+        stage.light(LightKind::Directional, Vec3::ONE, 2.0, Mat4::from_quat(sun));
+        stage.scene.environment = Some(Environment::constant(Vec3::splat(0.5)));
+        let room = stage.scene.clone();
+        let painted = stage.material(Material { unlit: true, ..Material::diffuse("painted", Vec3::ONE) });
+        stage.quad(painted, vec3(-300.0, -200.0, -500.0), 600.0 * Vec3::X, 400.0 * Vec3::Y);
+        let seen = flat_view(vec3(0.0, 0.0, 1.5), Vec3::ZERO, 1.8, [24, 24]);
+        let settings = Settings { bound: 0.1, candidates: 2, ..small() };
+        let [without, with] = [&room, &stage.scene].map(|scene| Studio::new(gpu, scene).render(&seen, &settings, 0));
+        let lights = without.vpls.iter().filter(|v| v.flux != [0.0; 3]).count();
+        assert!(lights > 20 && mean(&without.irradiance) > 0.1, "{lights} virtual lights");
+        assert!(bytemuck::cast_slice::<_, u8>(&without.vpls) == bytemuck::cast_slice::<_, u8>(&with.vpls));
+        assert!(without.irradiance == with.irradiance);
     });
 }
 

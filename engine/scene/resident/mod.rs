@@ -117,6 +117,19 @@ pub struct Moment {
     pub environment_rotation: f32,
 }
 
+impl Moment {
+    /// Around all that light meets, world space; empty if there is nothing. Unlit surfaces neither receive nor stop it: a sky dome
+    /// does not make a room larger.
+    pub fn lit_bounds(&self) -> Aabb {
+        around(self.instances.iter().filter(|instance| instance.casts))
+    }
+}
+
+/// Around instances with a finite place.
+fn around<'a>(instances: impl Iterator<Item = &'a Instance>) -> Aabb {
+    instances.map(|i| i.bounds).filter(Aabb::is_finite).fold(Aabb::EMPTY, Aabb::union)
+}
+
 /// The scene of one frame in one graph: what passes bind. Cheap to clone.
 #[derive(Clone, Debug)]
 pub struct Handles {
@@ -280,9 +293,9 @@ impl Resident {
         }
     }
 
-    /// Around everything in `pose`, world space; empty for an empty scene.
-    pub(crate) fn bounds_in(&self, scene: &Scene, pose: &Pose) -> Aabb {
-        self.moment(scene, pose).1.bounds
+    /// [`Moment::lit_bounds`] in `pose`.
+    pub(crate) fn lit_bounds_in(&self, scene: &Scene, pose: &Pose) -> Aabb {
+        self.moment(scene, pose).1.lit_bounds()
     }
 
     fn moment(&self, scene: &Scene, pose: &Pose) -> (Vec<types::Instance>, Moment) {
@@ -324,7 +337,7 @@ impl Resident {
                 },
             });
         }
-        let bounds = host.iter().map(|i| i.bounds).filter(Aabb::is_finite).fold(Aabb::EMPTY, Aabb::union);
+        let bounds = around(host.iter());
         let moment = Moment {
             instances: host,
             lights: lights(scene, pose),

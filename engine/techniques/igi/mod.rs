@@ -79,7 +79,7 @@ pub struct Igi {
     lights: Option<(Pose, LightTable)>,
     /// There may be mirrors or glass.
     sharp: bool,
-    /// Diagonal of the scene's box at rest, metres: what shares of the scene's size are of, whatever moves.
+    /// Diagonal of the box at rest around what light meets, metres: what shares of the scene's size are of, whatever moves.
     size: f32,
     /// Rays of an invocation.
     most_rays: u64,
@@ -108,7 +108,7 @@ struct Shared {
     direct_rays: u32,
     /// min_d, metres.
     least: f32,
-    /// Of the scene's box at rest, metres.
+    /// Of the box at rest around what light meets, metres.
     diagonal: f32,
     /// Of random choices.
     seed: u32,
@@ -187,7 +187,7 @@ impl Igi {
             double_sided: meshes.flat_map(|mesh| mesh.primitives.iter().map(double_sided)).collect(),
             lights: None,
             sharp: tables::has_sharp(scene),
-            size: diagonal(&resident.bounds_in(scene, &Pose::rest(scene))),
+            size: diagonal(&resident.lit_bounds_in(scene, &Pose::rest(scene))),
             most_rays,
             rays_at_once: MOST_RAYS,
             most_layers: gpu.caps().limits.array_layers,
@@ -220,7 +220,7 @@ impl Igi {
             instances: vec![u32::MAX],
         };
         let table = self.lights.as_ref().map_or(&empty, |(_, table)| table);
-        let bounds = handles.bounds();
+        let bounds = handles.moment.lit_bounds();
         let (low, high) = if bounds.is_empty() { Default::default() } else { (bounds.min, bounds.max) };
         // Something that has no size at rest has one now.
         let diagonal = if self.size > 0.0 { self.size } else { diagonal(&bounds) };
@@ -275,7 +275,7 @@ impl Igi {
             |target: &types::LightTarget| self.double_sided.get(target.instance as usize).copied().unwrap_or(false);
         let emissive = table.filter(|table| table.tree);
         let triangles = emissive.map_or((&[][..], &[][..]), |table| (&table.targets[..], &table.nodes[..]));
-        let bounds = handles.bounds();
+        let bounds = handles.moment.lit_bounds();
         let sources = starts::sources(&handles.moment.lights, triangles, sided, self.moments, &bounds);
         let starts = starts::starts(&sources, paths, shared.seed);
         let numbers = halton::table_from(shared.first, paths, history::dimensions(settings), shared.turn);

@@ -64,8 +64,9 @@ pub struct Settings {
     /// Visible surfaces that candidates are judged by, 1 to 1024, a shadow ray for each from each. With few, what matters to a small part
     /// of the view is missed and counts as rarely as is safe.
     pub judges: u32,
-    /// Bounding distance min_d of the geometry term, as share of the diagonal of the box around the scene at rest; 0 switches the bound off. Virtual
-    /// lights nearer than 0.8 of it give nothing, from 1.2 of it on they give everything.
+    /// Bounding distance min_d of the geometry term, as share of the diagonal of the box around the scene at rest, without
+    /// unlit surfaces, which light passes; 0 switches the bound off. Virtual lights nearer than 0.8 of it give nothing, from 1.2 of it on
+    /// they give everything.
     pub bound: f32,
     /// Virtual lights that each pixel picks by what they may send to it, 1 to 1024, instead of gathering from all: cost grows with the
     /// logarithm of their number, for noise. Tiles of interleaved pixels share the picks. Where there are no more than four virtual lights for
@@ -75,8 +76,8 @@ pub struct Settings {
     pub proposals: u32,
     /// Short rays of each gathered pixel that put back the light which the bound takes, 0 to 64. 0: it is lost.
     pub compensation: u32,
-    /// Side of the cells in which the light of virtual lights on what mirrors and glass show is kept, as share of the diagonal of the
-    /// box around the scene at rest, 0.002 to 0.2; 0: every surface that they show gathers for itself.
+    /// Side of the cells in which the light of virtual lights on what mirrors and glass show is kept, as share of the same diagonal,
+    /// 0.002 to 0.2; 0: every surface that they show gathers for itself.
     pub cache: f32,
     /// Such cells at most, 1 to 131,072. With more, every surface gathers for itself.
     pub cache_cells: u32,
