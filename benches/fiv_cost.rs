@@ -1,32 +1,30 @@
-//! What shadows from stored vectors cost in a frame: three tables. `objects`: against the number of occluders, with and without the
+//! What shadows from stored vectors cost in a frame: four tables. `objects`: against the number of occluders, with and without the
 //! correction for overlap. `culling`: with occluders left out that can hide little, on a wide ground. `vertices`: of the same things in
-//! finer and finer triangles, which show the same pixels.
+//! finer and finer triangles, which show the same pixels. `turning`: on the host, of an environment that turns or brightens from frame to
+//! frame, by its size.
 //!
 //! `cargo bench --bench fiv_cost [-- WIDTHxHEIGHT [ROUNDS [TABLE]]]`; 128x128 and 5 by default; TABLE: one of them alone.
 //! `LUCERNA_DEVICE` chooses the device. Times are medians of ROUNDS rounds, in each of which all rows take their turn, ms.
 
-use std::collections::HashMap;
+mod common;
 
+use std::{collections::HashMap, time::Instant};
+
+use common::{Places, median};
 use lucerna::{
-    Error, Result,
+    Result,
     gpu::{Gpu, GpuOptions},
     graph::{Graph, Report, Runner},
     scene::{
-        Pose, Primitive, Scene, View, builtin,
+        Environment, Pose, Primitive, Scene, View, builtin,
         ground::{self, Ground},
         resident::Resident,
     },
-    techniques::fiv::{Fiv, Light, Occluders, PictureSettings, Plan, SelfSamples, Settings, Sky, Stored},
+    techniques::fiv::{Fiv, Light, Method, Occluders, PictureSettings, Plan, SelfSamples, Settings, Sky, Stored},
 };
 
 fn main() -> std::process::ExitCode {
-    match run() {
-        Ok(()) => std::process::ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            std::process::ExitCode::from(error.exit_code())
-        }
-    }
+    common::end(run())
 }
 
 /// A scene that stays on the device.
@@ -87,11 +85,6 @@ fn times(report: &Report) -> [f64; 5] {
         let of = report.passes.iter().filter(|pass| names.iter().any(|name| pass.name.starts_with(name)));
         of.filter_map(|pass| pass.gpu_ms).sum()
     })
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 /// Times of the columns, and the irradiance.
@@ -177,25 +170,19 @@ fn apart(a: &[[f32; 4]], b: &[[f32; 4]]) -> (f64, f64) {
 }
 
 fn run() -> Result<()> {
-    let mut arguments = std::env::args().skip(1).filter(|a| !a.starts_with("--"));
-    let size = arguments.next().unwrap_or_else(|| "128x128".into());
-    let extent = match size.split_once('x').map(|(w, h)| (w.parse(), h.parse())) {
-        Some((Ok(width), Ok(height))) => [width, height],
-        _ => return Err(Error::usage(format!("size {size:?}; allowed: WIDTHxHEIGHT"))),
-    };
-    let rounds: usize = arguments.next().and_then(|r| r.parse().ok()).unwrap_or(5).max(1);
-    let table = arguments.next();
-    let wanted = |name: &str| table.as_deref().is_none_or(|table| table == name);
+    let mut words = Places::new("WIDTHxHEIGHT [ROUNDS [TABLE]]");
+    let extent = words.size([128, 128])?;
+    let rounds = words.number("ROUNDS", common::ROUNDS, 5)? as usize;
+    let tables = words.tables(&["objects", "culling", "vertices", "turning"])?;
     let gpu = Gpu::new(GpuOptions::from_env()?)?;
     println!("{} at {}x{}, medians of {rounds}, ms", gpu.describe(), extent[0], extent[1]);
-    if wanted("objects") {
-        objects(&gpu, extent, rounds)?;
-    }
-    if wanted("culling") {
-        culling(&gpu, extent, rounds)?;
-    }
-    if wanted("vertices") {
-        vertices(&gpu, extent, rounds)?;
+    for table in tables {
+        match table {
+            "objects" => objects(&gpu, extent, rounds)?,
+            "culling" => culling(&gpu, extent, rounds)?,
+            "vertices" => vertices(&gpu, extent, rounds)?,
+            _ => turning(&gpu, extent, rounds)?,
+        }
     }
     Ok(())
 }
@@ -290,6 +277,55 @@ fn vertices(gpu: &Gpu, extent: [u32; 2], rounds: usize) -> Result<()> {
             time[4] / results[0].0[4],
             apart(&results[0].1, picture).1
         );
+    }
+    Ok(())
+}
+
+/// Each pixel as `times` × `times`.
+fn larger(env: &Environment, times: u32) -> Environment {
+    let (width, height) = (env.width * times, env.height * times);
+    let of = |i: u32| env.pixels[(i / width / times * env.width + i % width / times) as usize];
+    Environment { width, height, pixels: (0..width * height).map(of).collect(), ..env.clone() }
+}
+
+/// Declaring a frame on the host, with the passes that an environment needs before it.
+fn turning(gpu: &Gpu, extent: [u32; 2], rounds: usize) -> Result<()> {
+    println!(
+        "\none hare, camera front, vectors of each frame, 32 texels to a side; ms on the host before a frame is run"
+    );
+    println!("{:>11} {:>8} {:>8} {:>10} {:>10}", "environment", "at rest", "turning", "brighter", "negligible");
+    let thing = builtin::load("hare")?;
+    let base = Settings { method: Method::Online, size: 32, ..settings() };
+    for times in [1, 2, 4] {
+        let mut scene = placed(&thing, "grove", 1, 0.4)?;
+        scene.environment = scene.environment.as_ref().map(|env| larger(env, times));
+        let size = scene.environment.as_ref().map_or(String::new(), |e| format!("{}x{}", e.width, e.height));
+        let mut resident = Resident::new(gpu, &scene)?;
+        let mut fiv = Fiv::new(gpu, &scene, &resident, &base, None, |_, _| true)?;
+        let pose = Pose::rest(&scene);
+        let view = View::of_camera(&scene, &pose, 0, extent)?;
+        let mut frame = |settings: Settings| {
+            let mut graph = Graph::new("fiv");
+            let handles = resident.frame_in(&mut graph, &scene, &pose);
+            let view = view.fit_far(&handles.bounds());
+            let all = PictureSettings { fiv: settings, ..PictureSettings::default() };
+            let begun = Instant::now();
+            fiv.picture(&mut graph, &scene, &pose, &handles, &view, &all)?;
+            Ok::<f64, lucerna::Error>(1e3 * begun.elapsed().as_secs_f64())
+        };
+        let ways: [fn(&Settings, f32) -> Settings; 4] = [
+            |base, _| base.clone(),
+            |base, step| Settings { rotation: step, ..base.clone() },
+            |base, step| Settings { exposure: 0.1 * step, ..base.clone() },
+            |base, step| Settings { rotation: step, negligible: 0.005, ..base.clone() },
+        ];
+        let mut row = format!("{size:>11}");
+        for way in ways {
+            // The first one makes pipelines, memory and what all turns share.
+            let times = (0..=rounds).map(|i| frame(way(&base, 1.0 + i as f32))).collect::<Result<Vec<f64>>>()?;
+            row += &format!(" {:>9.2}", median(times[1..].to_vec()));
+        }
+        println!("{row}");
     }
     Ok(())
 }

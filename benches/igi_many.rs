@@ -5,6 +5,8 @@
 //! three, of the passes named. Errors are relative mean squared errors of the indirect light: of picks against MOST virtual lights of another
 //! seed, of light put back against the path tracer, of cells against none.
 
+mod common;
+
 use lucerna::{
     Result,
     gpu::{Gpu, GpuOptions},
@@ -15,13 +17,7 @@ use lucerna::{
 };
 
 fn main() -> std::process::ExitCode {
-    match run() {
-        Ok(()) => std::process::ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            std::process::ExitCode::from(error.exit_code())
-        }
-    }
+    common::end(run())
 }
 
 /// A scene that stays on the device.
@@ -102,34 +98,16 @@ fn sum(pixels: &[[f32; 4]]) -> f64 {
     pixels.iter().flat_map(|p| &p[..3]).map(|&v| f64::from(v)).sum()
 }
 
-/// Tables by their names.
-const TABLES: [&str; 3] = ["picks", "compensation", "cache"];
-
 const GATHER: [&str; 4] = ["igi.gather", "igi.order", "igi.gather_picks", "igi.near"];
 
 fn run() -> Result<()> {
-    // `--bench` comes from cargo.
-    let mut arguments = std::env::args().skip(1).filter(|a| a != "--bench");
-    let size = arguments.next().unwrap_or_else(|| "96x72".into());
-    let extent = match size.split_once('x').map(|(w, h)| (w.parse(), h.parse())) {
-        Some((Ok(width), Ok(height))) => [width, height],
-        _ => return Err(lucerna::Error::usage(format!("size {size:?}; allowed: WIDTHxHEIGHT"))),
-    };
-    let most = match arguments.next().map(|text| (text.parse(), text)) {
-        None => 10_000,
-        Some((Ok(most @ 1..=10_000), _)) => most,
-        Some((_, text)) => return Err(lucerna::Error::usage(format!("MOST {text:?}; allowed: 1 to 10000"))),
-    };
-    let table = arguments.next();
-    if let Some(unknown) = table.iter().find(|name| !TABLES.contains(&name.as_str())) {
-        return Err(lucerna::Error::usage(format!("TABLE {unknown:?}; allowed: {}", TABLES.join(", "))));
-    }
-    if let Some(more) = arguments.next() {
-        return Err(lucerna::Error::usage(format!("{more:?} is one too many; allowed: WIDTHxHEIGHT [MOST [TABLE]]")));
-    }
+    let mut words = common::Places::new("WIDTHxHEIGHT [MOST [TABLE]]");
+    let extent = words.size([96, 72])?;
+    let most = words.number("MOST", 1..=10_000, 10_000)?;
+    let tables = words.tables(&["picks", "compensation", "cache"])?;
     let gpu = Gpu::new(GpuOptions::from_env()?)?;
     println!("{} at {}x{}", gpu.describe(), extent[0], extent[1]);
-    let wanted = |name: &str| table.as_deref().is_none_or(|table| table == name);
+    let wanted = |name: &str| tables.contains(&name);
     for name in ["cornell", "office"].into_iter().filter(|_| wanted("picks")) {
         picks(&gpu, name, extent, most)?;
     }

@@ -5,6 +5,8 @@
 //! rays of gathering are counted, those of shooting and of direct light are the most that there can be; scenes are built-in names or files,
 //! `LUCERNA_DEVICE` chooses the device.
 
+mod common;
+
 use lucerna::{
     Error, Result,
     gpu::{Gpu, GpuOptions},
@@ -17,16 +19,10 @@ use lucerna::{
     },
     techniques::igi::{Igi, PictureSettings, Settings, Visibility},
 };
-use std::{collections::BTreeMap, process::ExitCode};
+use std::collections::BTreeMap;
 
-fn main() -> ExitCode {
-    match run() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(error.exit_code())
-        }
-    }
+fn main() -> std::process::ExitCode {
+    common::end(run())
 }
 
 /// What to measure.
@@ -40,31 +36,16 @@ struct Options {
 
 fn options() -> Result<Options> {
     let mut out = Options { size: [128, 96], vpls: 60, rounds: 5, json: false, scenes: Vec::new() };
-    let mut arguments = std::env::args().skip(1);
+    let mut arguments = common::words();
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().unwrap_or_default();
-        let within = |text: &str, allowed: std::ops::RangeInclusive<u32>| match text.parse::<u32>() {
-            Ok(number) if allowed.contains(&number) => Ok(number),
-            _ => {
-                let (least, most) = allowed.into_inner();
-                Err(Error::usage(format!("{argument} {text:?}; allowed: {least} to {most}")))
-            }
-        };
         match argument.as_str() {
-            "--size" => {
-                let text = value();
-                let wrong = || Error::usage(format!("--size {text:?}; allowed: WIDTHxHEIGHT, 8 to 1024 each"));
-                let (w, h) = text.split_once('x').ok_or_else(wrong)?;
-                out.size = [within(w, 8..=1024)?, within(h, 8..=1024)?];
-            }
-            "--vpls" => out.vpls = within(&value(), 1..=1000)?,
-            "--rounds" => out.rounds = within(&value(), 1..=1000)?,
+            "--size" => out.size = common::size("--size", &value(), 8..=1024)?,
+            "--vpls" => out.vpls = common::number("--vpls", &value(), 1..=1000)?,
+            "--rounds" => out.rounds = common::number("--rounds", &value(), 1..=1000)?,
             "--json" => out.json = true,
-            // From cargo.
-            "--bench" => {}
             flag if flag.starts_with("--") => {
-                let what = format!("unknown option {flag}; allowed: --size, --vpls, --rounds, --json");
-                return Err(Error::usage(what));
+                return common::wrong("option", flag, "--size, --vpls, --rounds, --json");
             }
             _ => out.scenes.push(argument),
         }

@@ -6,6 +6,9 @@
 //!
 //! `cargo bench --bench isr_cost [-- WIDTHxHEIGHT [ROUNDS]]`; 1024x768 and 7 by default. `LUCERNA_DEVICE` chooses the device.
 
+mod common;
+
+use common::{Places, median};
 use glam::{Mat4, Quat, Vec3, vec3};
 use lucerna::{
     Result,
@@ -20,24 +23,14 @@ use lucerna::{
 };
 
 fn main() -> std::process::ExitCode {
-    match run() {
-        Ok(true) => std::process::ExitCode::SUCCESS,
-        Ok(false) => std::process::ExitCode::FAILURE,
-        Err(error) => {
-            eprintln!("error: {error}");
-            std::process::ExitCode::from(error.exit_code())
-        }
-    }
+    common::verdict(run())
 }
 
 fn run() -> Result<bool> {
-    let mut arguments = std::env::args().skip(1).filter(|a| !a.starts_with("--"));
-    let size = arguments.next().unwrap_or_else(|| "1024x768".into());
-    let extent = match size.split_once('x').map(|(w, h)| (w.parse(), h.parse())) {
-        Some((Ok(width), Ok(height))) => [width, height],
-        _ => return Err(lucerna::Error::usage(format!("size {size:?}; allowed: WIDTHxHEIGHT"))),
-    };
-    let rounds: usize = arguments.next().and_then(|r| r.parse().ok()).unwrap_or(7);
+    let mut words = Places::new("WIDTHxHEIGHT [ROUNDS]");
+    let extent = words.size([1024, 768])?;
+    let rounds = words.number("ROUNDS", common::ROUNDS, 7)? as usize;
+    words.end()?;
 
     let gpu = Gpu::new(GpuOptions::from_env()?)?;
     println!("{} at {}x{}, medians of {rounds} alternating runs, ms", gpu.describe(), extent[0], extent[1]);
@@ -99,11 +92,6 @@ const IMAGE_SPACE: [&str; 8] = [
 
 fn cost(report: &Report, counts: impl Fn(&str) -> bool) -> f64 {
     report.passes.iter().filter(|pass| counts(&pass.name)).filter_map(|pass| pass.gpu_ms).sum()
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 fn once(

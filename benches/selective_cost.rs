@@ -6,8 +6,11 @@
 //! `LUCERNA_DEVICE` chooses the device. The last column is the local mode's time through the selective one's (the thesis' STM/LTM,
 //! there of frames per second).
 
+mod common;
+
 use std::path::PathBuf;
 
+use common::median;
 use lucerna::{
     Error, Result,
     gpu::{Gpu, GpuOptions, ImageDesc, OwnedImage, Region, Started},
@@ -17,13 +20,7 @@ use lucerna::{
 };
 
 fn main() -> std::process::ExitCode {
-    match run() {
-        Ok(()) => std::process::ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            std::process::ExitCode::from(error.exit_code())
-        }
-    }
+    common::end(run())
 }
 
 struct Options {
@@ -42,11 +39,8 @@ fn options() -> Result<Options> {
         out: None,
         images: vec![],
     };
-    let mut arguments = std::env::args().skip(1);
+    let mut arguments = common::words();
     while let Some(argument) = arguments.next() {
-        if argument == "--bench" {
-            continue;
-        }
         if argument == "--normalize" {
             options.settings.normalize = true;
             continue;
@@ -68,7 +62,7 @@ fn options() -> Result<Options> {
             "--identify" if value == "saliency" => options.settings.identify = Identify::Saliency,
             "--threshold" => options.thresholds.push(value.parse().map_err(|_| wrong("numbers"))?),
             "--scale" => options.settings.identify_scale = value.parse().map_err(|_| wrong("1, 2, 4"))?,
-            "--rounds" => options.rounds = value.parse::<usize>().map_err(|_| wrong("numbers"))?.max(1),
+            "--rounds" => options.rounds = common::number("--rounds", &value, common::ROUNDS)? as usize,
             "--out" => options.out = Some(value.into()),
             _ => return Err(wrong("see the head of benches/selective_cost.rs")),
         }
@@ -107,11 +101,6 @@ fn once(runner: &mut Runner, color: &OwnedImage, settings: &Settings, read: bool
         once.map = map.map(|map| frame.image(map).to_f32().iter().map(|p| p[0]).collect());
     }
     Ok(once)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 const MARKS: [(&str, Mark); 4] =

@@ -6,12 +6,15 @@
 //! EXR. `--literal`: by definition as well for the large picture, which takes minutes on a CPU. Luminance HDR is left out where it is not
 //! installed. `LUCERNA_DEVICE` chooses the device.
 
+mod common;
+
 use std::{
     path::{Path, PathBuf},
     process::Command,
     time::Instant,
 };
 
+use common::median;
 use lucerna::{
     Error, Result,
     gpu::{Gpu, GpuOptions, ImageDesc, OwnedImage, Region},
@@ -22,13 +25,7 @@ use lucerna::{
 };
 
 fn main() -> std::process::ExitCode {
-    match run() {
-        Ok(()) => std::process::ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            std::process::ExitCode::from(error.exit_code())
-        }
-    }
+    common::end(run())
 }
 
 struct Options {
@@ -46,19 +43,15 @@ fn options() -> Result<Options> {
         rounds: 3,
         literal: false,
     };
-    let mut arguments = std::env::args().skip(1);
+    let mut arguments = common::words();
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
-            // From cargo.
-            "--bench" => {}
             "--literal" => options.literal = true,
             "--tonemap" => options.program = arguments.next().unwrap_or_default().into(),
             "--image" => options.image = arguments.next().unwrap_or_default().into(),
             "--rounds" => {
                 let text = arguments.next().unwrap_or_default();
-                let number = text.parse().ok().filter(|n| *n > 0);
-                options.rounds =
-                    number.ok_or_else(|| Error::usage(format!("--rounds {text:?}; allowed: 1 and more")))?;
+                options.rounds = common::number("--rounds", &text, common::ROUNDS)? as usize;
             }
             _ => return Err(Error::usage(format!("{argument:?}; allowed: --rounds, --literal, --tonemap, --image"))),
         }
@@ -86,11 +79,6 @@ fn repeated(from: &Layers, width: u32, height: u32, file: PathBuf) -> Result<Pic
     let layers = Layers::rgb(width, height, pixels.as_flattened().to_vec());
     image::write(&file, &layers, &WriteOptions { overwrite: true, ..Default::default() })?;
     Ok(Picture { width, height, pixels, file })
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 /// Milliseconds of a process; an error if it fails or leaves no output.

@@ -4,6 +4,8 @@
 //!
 //! `cargo bench --bench rays [-- [--assets DIR] [--size N] [--rounds N] [SCENE…]]`; `LUCERNA_DEVICE` chooses the device.
 
+#[path = "../common/mod.rs"]
+mod common;
 mod embree;
 mod sets;
 
@@ -18,13 +20,7 @@ use lucerna::{
 use std::path::PathBuf;
 
 fn main() -> std::process::ExitCode {
-    match run() {
-        Ok(()) => std::process::ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            std::process::ExitCode::from(error.exit_code())
-        }
-    }
+    common::end(run())
 }
 
 /// What to measure.
@@ -43,18 +39,14 @@ fn options() -> Result<Options> {
         rounds: 5,
         scenes: Vec::new(),
     };
-    let mut arguments = std::env::args().skip(1);
+    let mut arguments = common::words();
     while let Some(argument) = arguments.next() {
-        let mut number = || {
-            let text = arguments.next().unwrap_or_default();
-            text.parse::<u32>().map_err(|_| lucerna::Error::usage(format!("{argument} {text:?}; allowed: a number")))
-        };
+        let mut value = || arguments.next().unwrap_or_default();
         match argument.as_str() {
-            "--assets" => out.assets = arguments.next().unwrap_or_default().into(),
-            "--size" => out.size = number()?.clamp(8, 4096),
-            "--rounds" => out.rounds = number()?.max(1) as usize,
-            // From cargo.
-            "--bench" => {}
+            "--assets" => out.assets = value().into(),
+            "--size" => out.size = common::number("--size", &value(), 8..=4096)?,
+            "--rounds" => out.rounds = common::number("--rounds", &value(), common::ROUNDS)? as usize,
+            flag if flag.starts_with("--") => return common::wrong("option", flag, "--assets, --size, --rounds"),
             _ => out.scenes.push(argument),
         }
     }
