@@ -108,12 +108,19 @@ impl Stored {
         if let Some(kind) = plan.occluders.iter().find(|k| {
             !(positive(k.radius) && positive(k.shells.nearest) && positive(k.shells.farthest))
                 || k.shells.farthest <= k.shells.nearest
-                || !k.paces.fit(&plan.grid)
         }) {
             return Err(damaged(format!("has an impossible plan: radii of occluder `{}`", kind.name)));
         }
+        if let Some(kind) = plan.occluders.iter().find(|k| !k.paces.fit(&plan.grid)) {
+            let what = format!("has an impossible plan: how samples lie around occluder `{}`", kind.name);
+            return Err(damaged(what));
+        }
         let samples = plan.samples();
-        if samples > MOST_SAMPLES || first > last || last > samples {
+        if samples > MOST_SAMPLES {
+            let what = format!("has an impossible plan: {samples} samples, at most {MOST_SAMPLES} are allowed");
+            return Err(damaged(what));
+        }
+        if first > last || last > samples {
             return Err(damaged(format!("has an impossible plan: samples {first} to {last} of {samples}")));
         }
         let body = 16 + length;
@@ -277,6 +284,24 @@ mod tests {
         let mut beyond = stored();
         beyond.range = 20..44;
         refused(&beyond.encode().unwrap(), "20 to 44 of 24");
+        let mut bent = stored();
+        bent.plan.occluders[1].paces.polar = vec![0.5; 3];
+        refused(&bent.encode().unwrap(), "how samples lie around occluder `tree`");
+        let mut many = stored();
+        many.plan.occluders[0].surface = u32::MAX;
+        refused(&many.encode().unwrap(), "at most 134217728 are allowed");
+    }
+
+    #[test]
+    fn plans_that_differ_in_how_samples_lie_say_so() {
+        let (plain, mut bent) = (stored().plan, stored().plan);
+        bent.occluders[1].paces.polar = vec![0.0, 0.2, 1.0];
+        let what = plain.difference(&bent).unwrap();
+        assert!(what.contains("`tree`") && what.contains("fiv.adaptive") && !what.contains("instead"), "{what}");
+        let mut covered = stored().plan;
+        covered.occluders[0].surface = 7;
+        let what = plain.difference(&covered).unwrap();
+        assert!(what.contains("7 places") && what.contains("0 places"), "{what}");
     }
 
     #[test]

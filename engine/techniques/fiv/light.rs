@@ -10,7 +10,7 @@ use super::{
 use crate::{
     Result,
     gpu::{Gpu, ImageDesc, OwnedBuffer, OwnedImage},
-    graph::{Graph, Runner},
+    graph::{Buffer, Graph, Runner},
     shaders::{consts::FIV_FLOATS, fiv, types},
 };
 
@@ -44,6 +44,12 @@ impl Light {
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`.
     pub fn new(gpu: &Gpu, sky: &Sky) -> Result<Self> {
+        Self::with(&mut Runner::new(gpu), sky)
+    }
+
+    /// As [`Self::new`], with a runner that is there already.
+    pub(super) fn with(runner: &mut Runner, sky: &Sky) -> Result<Self> {
+        let gpu = &runner.gpu().clone();
         let texels = sky.texels();
         let buffer = OwnedBuffer::with_contents(gpu, "fiv.sky", bytemuck::cast_slice(&texels))?;
         let desc = ImageDesc::new(vk::Format::R32G32B32A32_SFLOAT, sky.size, sky.size)
@@ -61,7 +67,7 @@ impl Light {
         let fivs = graph.buffer("fiv.total", 4 * u64::from(FIV_FLOATS));
         graph.compute(fiv::total::Args { texels: handle, fivs, push: fiv::total::Push { count } }, 1);
         let token = graph.read_buffer(fivs);
-        let sums: Vec<f32> = Runner::new(gpu).run(graph)?.buffer(token);
+        let sums: Vec<f32> = runner.run(graph)?.buffer(token);
         let mut total = [0.0; FIV_FLOATS as usize];
         total.iter_mut().zip(sums).for_each(|(to, from)| *to = from);
         Ok(Self {
@@ -75,4 +81,15 @@ impl Light {
             hash: sky.hash(),
         })
     }
+    /// Its texels, and the numbers of those that are not black.
+    pub(super) fn import(&self, graph: &mut Graph) -> (Buffer, Buffer) {
+        let lit = if self.lit.is_empty() { &[0][..] } else { &self.lit };
+        (graph.import_buffer(&self.texels), graph.buffer_from("fiv.lit", lit))
+    }
+}
+
+/// The first of so many, and their number, for calls of `each` at most.
+pub(super) fn calls(count: u64, each: u64) -> impl Iterator<Item = (u32, u32)> {
+    let each = each.max(1);
+    (0..count).step_by(each as usize).map(move |first| (first as u32, each.min(count - first) as u32))
 }

@@ -50,6 +50,7 @@ pub mod support;
 pub mod surface;
 mod tiles;
 pub mod turn;
+mod turning;
 
 pub use file::Stored;
 pub use light::Light;

@@ -31,8 +31,10 @@ pub fn table(sky: &Sky) -> Vec<f32> {
     // The irradiance of a normal is a quarter of all power in the mean.
     let mean = 0.25 * texels.iter().map(|(_, radiance, area)| *radiance * *area).sum::<DVec3>();
     let level = |radiance: DVec3| (pi * radiance / mean.max(DVec3::splat(1e-300))).max_element();
-    let texels: Vec<(Vec3, f32)> =
+    let mut texels: Vec<(Vec3, f32)> =
         texels.iter().map(|(d, radiance, _)| (d.as_vec3(), level(*radiance) as f32)).collect();
+    // The first one in a disc is then its greatest.
+    texels.sort_by(|a, b| b.1.total_cmp(&a.1));
     // What is read anywhere comes from entries that are up to the diagonal of a cell away; texels reach out of their middles.
     let cell = 2.0 * pi / f64::from(FIV_MATTER_AZIMUTHS);
     let around = 2f64.sqrt() * (cell + 1.0 / f64::from(sky.size));
@@ -50,12 +52,16 @@ pub fn table(sky: &Sky) -> Vec<f32> {
         let place = DVec2::new(column.into(), row.into());
         let (azimuth, polar) = (place.x * cell, place.y * pi / f64::from(FIV_MATTER_POLARS - 1));
         let at = DVec3::new(polar.sin() * azimuth.sin(), polar.cos(), -polar.sin() * azimuth.cos()).as_vec3();
+        // Levels are nested: those from here on are known.
+        let mut known = within.len();
         for (direction, level) in &texels {
             let cosine = at.dot(*direction);
-            // Levels are nested.
-            for number in (0..within.len()).rev().take_while(|&number| cosine >= within[number]) {
-                let known = &mut table[number * cells + entry];
-                *known = known.max(*level);
+            while known > 0 && cosine >= within[known - 1] {
+                known -= 1;
+                table[known * cells + entry] = *level;
+            }
+            if known == 0 {
+                break;
             }
         }
     }

@@ -230,7 +230,7 @@ impl Online {
             };
             let handles = shape.resident.frame_in(graph, scene, pose);
             let rays = shape.rays.frame(graph, &handles);
-            if settings.on_surface() {
+            if settings.self_shadow && settings.on_surface() {
                 let sets = (job.sets.start as u32, job.sets.len() as u32);
                 let floats = blocks * FIV_BLOCK_SAMPLES * FIV_FLOATS;
                 own(graph, seen, light, (texels, lists.turns, rays), (sets, floats), shape.most);
@@ -311,11 +311,10 @@ impl Online {
         let samples = u64::from(self.blocks() * FIV_BLOCK_SAMPLES);
         let set_of = |first: u32| (first / (self.blocks() * FIV_BLOCK_SAMPLES * FIV_FLOATS)) as usize;
         let shape_of = |first: u32| standing.sets[set_of(first)].shape;
-        let most = |shape: usize, sets: u64| {
-            // Eight samples for each pixel and occluder.
-            let occluders = standing.list.iter().filter(|o| shape_of(o.first) == shape).count() as u64;
-            (8 * extent.pixels() * occluders).min(sets * samples)
-        };
+        let mut occluders = vec![0u64; self.shapes.len()];
+        standing.list.iter().for_each(|occluder| occluders[shape_of(occluder.first)] += 1);
+        // Eight samples for each pixel and occluder.
+        let most = |shape: usize, sets: u64| (8 * extent.pixels() * occluders[shape]).min(sets * samples);
         let mut list: Vec<Job> = Vec::new();
         for (number, set) in standing.sets.iter().enumerate() {
             match list.last_mut() {
@@ -362,14 +361,13 @@ impl Online {
             fiv::online_starts::Args { jobs: graph.buffer_from("fiv.jobs", &list), counts, starts, groups, push };
         graph.compute(args, 64 * list.len() as u32);
 
-        let base = |number: usize| {
-            let of = |job: &&Job| job.sets.contains(&number);
-            jobs.list.iter().find(of).map_or(0, |job| job.first as u32)
-        };
         let radii = self.grid.radii;
-        let sets: Vec<types::FivSet> = (0..standing.sets.len())
-            .map(|number| types::FivSet { base: base(number), radii_at: number as u32 * radii })
-            .collect();
+        // Jobs have all sets, in their order.
+        let sets_of = |job: &Job| {
+            let base = job.first as u32;
+            job.sets.clone().map(move |number| types::FivSet { base, radii_at: number as u32 * radii })
+        };
+        let sets: Vec<types::FivSet> = jobs.list.iter().flat_map(sets_of).collect();
         let spheres = |set: &Set| (0..radii).map(move |r| set.shells.radius(radii, r) as f32).collect::<Vec<f32>>();
         let distances: Vec<f32> = standing.sets.iter().flat_map(spheres).collect();
         let turns: Vec<types::FivTurn> = standing.sets.iter().map(turn).collect();

@@ -5,7 +5,7 @@ use std::{collections::HashMap, sync::Arc};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Extent as Reach, Fiv, Interpolation, Method, SelfSamples, Settings, Shared, Specular, online::Seen,
+    Extent as Reach, Fiv, Interpolation, Method, SelfSamples, Settings, Shared, Specular, light, online::Seen,
     online_standing::Standing, pace::Paces, specular::Shadows, spots::Spot, suns, support, tiles::Tiles, turn,
 };
 use crate::{
@@ -163,10 +163,10 @@ impl Fiv {
         }
         list.resize(list.len().max(1), types::FivOccluder::default());
         let occluders = graph.buffer_from("fiv.occluders", &list);
-        let matter = self.matter(scene, settings)?.map(|table| graph.import_buffer(table));
+        let matter = self.matter(settings)?.map(|table| graph.import_buffer(table));
         let negligible = matter.is_some();
         let matter = matter.unwrap_or_else(|| graph.buffer_from("fiv.matter", &[0f32]));
-        let tiles = Tiles::new(graph, gbuffer, (occluders, count), (matter, negligible), settings);
+        let tiles = Tiles::new(graph, gbuffer, (occluders, count), (matter, negligible), settings, self.limited);
         let fivs = match &mut self.online {
             Some(online) if count > 0 => {
                 let seen = Seen { gbuffer, identity, occluders, own, near: (tiles.near, tiles.words) };
@@ -382,13 +382,12 @@ impl Fiv {
             return irradiance;
         }
         let rays_of = rays.frame(graph, handles);
-        let count = self.light.lit.len() as u64;
         let each = (MOST_RAYS / extent.pixels().max(1)).clamp(1, (*most).min(MOST_TURNS));
-        let (texels, lit) = (graph.import_buffer(&self.light.texels), graph.buffer_from("fiv.lit", &self.light.lit));
+        let (texels, lit) = self.light.import(graph);
         let boxes = boxes(handles);
         let around = boxes.len() as u32 / 2;
         let boxes = graph.buffer_from("fiv.boxes", if boxes.is_empty() { &[[0.0; 3]] } else { &boxes[..] });
-        for first in (0..count).step_by(each as usize) {
+        for (first, count) in light::calls(self.light.lit.len() as u64, each) {
             let args = crate::rays::traced!(
                 shaders::fiv::truth::Args {
                     view: gbuffer.view,
@@ -398,12 +397,7 @@ impl Fiv {
                     lit,
                     irradiance,
                     boxes,
-                    push: shaders::fiv::truth::Push {
-                        first: first as u32,
-                        count: each.min(count - first) as u32,
-                        size: self.light.size,
-                        around,
-                    },
+                    push: shaders::fiv::truth::Push { first, count, size: self.light.size, around },
                 },
                 rays_of
             );

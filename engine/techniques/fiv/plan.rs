@@ -175,8 +175,17 @@ impl Plan {
             (&a.hash, &a.shells, a.surface, &a.paces) == (&b.hash, &b.shells, b.surface, &b.paces)
         };
         let (a, b) = self.occluders.iter().zip(&other.occluders).find(|pair| !same(pair))?;
-        let say =
-            |k: &Kind| format!("occluder `{}` ({}, {} m to {} m)", k.name, k.hash, k.shells.nearest, k.shells.farthest);
+        let say = |k: &Kind| {
+            let Kind { name, hash, shells, surface, .. } = k;
+            format!("occluder `{name}` ({hash}, {} m to {} m, {surface} places on it)", shells.nearest, shells.farthest)
+        };
+        if say(a) == say(b) {
+            let what = "the samples around occluder";
+            return Some(format!(
+                "{what} `{}` lie otherwise (fiv.adaptive, fiv.interpolation, or another device)",
+                a.name
+            ));
+        }
         Some(format!("{} instead of {}", say(b), say(a)))
     }
 
@@ -188,6 +197,16 @@ impl Plan {
     /// The first sample of an occluder. For each of its turns come first those around it, then those on its surface.
     pub fn first(&self, occluder: usize) -> u64 {
         self.occluders.iter().take(occluder).map(|kind| self.of_turn(kind) * u64::from(self.turns)).sum()
+    }
+
+    /// [`Self::first`] of all occluders, and behind them [`Self::samples`].
+    pub(super) fn firsts(&self) -> Vec<u64> {
+        let mut at = 0;
+        let next = |kind: &Kind| {
+            at += self.of_turn(kind) * u64::from(self.turns);
+            at
+        };
+        std::iter::once(0).chain(self.occluders.iter().map(next)).collect()
     }
 
     /// Samples of one turn of an occluder.
@@ -215,8 +234,9 @@ impl Plan {
         mut done: impl FnMut(u64, &[f32]) -> Result<bool>,
     ) -> Result<()> {
         let mut runner = Runner::new(gpu);
-        for (number, (occluder, kind)) in occluders.iter().zip(&self.occluders).enumerate() {
-            let (mut at, last) = (range.start.max(self.first(number)), range.end.min(self.first(number + 1)));
+        let firsts = self.firsts();
+        for ((occluder, kind), ends) in occluders.iter().zip(&self.occluders).zip(firsts.windows(2)) {
+            let (first, mut at, last) = (ends[0], range.start.max(ends[0]), range.end.min(ends[1]));
             if at >= last {
                 continue;
             }
@@ -227,8 +247,8 @@ impl Plan {
             let places = occluder.places();
             while at < last {
                 let of_turn = self.of_turn(kind);
-                let turn = (at - self.first(number)) / of_turn;
-                let begin = self.first(number) + turn * of_turn;
+                let turn = (at - first) / of_turn;
+                let begin = first + turn * of_turn;
                 let border = begin + u64::from(self.grid.count());
                 let end = last.min(at + u64::from(BATCH)).min(if at < border { border } else { begin + of_turn });
                 let matrix = turn::matrix(turn as u32, self.turns, self.turn_axis).as_mat3();
@@ -293,6 +313,7 @@ mod tests {
         let settings = Settings::default();
         let plan = Plan { occluders: vec![kind; 3], ..Plan::new("sky", 1, &[], &settings) };
         assert_eq!((plan.samples(), plan.first(1)), (3 * 63_460, 63_460));
+        assert_eq!(plan.firsts(), [0, 1, 2, 3].map(|kind| plan.first(kind)));
         for count in [1, 2, 7, 1000] {
             let parts: Vec<_> = (0..count).map(|i| plan.part(i, count)).collect();
             assert_eq!((parts[0].start, parts[count as usize - 1].end), (0, plan.samples()));

@@ -214,6 +214,11 @@ impl Settings {
         ((self.rotation % 360.0).to_radians(), self.exposure.exp2())
     }
 
+    /// Texels of the environment that are kept apart at most.
+    pub(super) fn apart(&self) -> u32 {
+        if self.method == Method::Vectors { self.suns } else { 0 }
+    }
+
     /// As they are `seconds` into a sequence.
     #[must_use]
     pub fn after(&self, seconds: f64) -> Self {

@@ -9,7 +9,6 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3, Vec3};
 
-use super::Method;
 use crate::{Error, Result, scene::Environment, shaders::types};
 
 /// What stands for endless radiance.
@@ -42,13 +41,23 @@ pub struct Sun {
     pub radiance: Vec3,
 }
 
-impl Sky {
-    /// Resamples an environment with its rotation and scale: each texel gets the mean over the area that it shares with each pixel,
-    /// by solid angle. Pixels are even over their area. `None`: black.
+/// The light of an environment in each texel, before its scale.
+#[derive(Clone, Debug)]
+pub(super) struct Sums {
+    /// Texels along an edge.
+    pub size: u32,
+    /// Radiance × solid angle of the source, W/m², and solid angle, steradians.
+    pub texels: Vec<(DVec3, f64)>,
+    /// Pixels of the source that were no radiance.
+    pub repaired: u64,
+}
+
+impl Sums {
+    /// Of an environment that is turned by `rotation` radians in place of its own.
     ///
     /// # Errors
-    /// `Usage` if `size` is not a multiple of 8 in [`SIDES`]; `Input` if the environment has no numbers that can be used.
-    pub fn new(environment: Option<&Environment>, size: u32) -> Result<Self> {
+    /// As [`Sky::new`].
+    pub fn of(environment: Option<&Environment>, rotation: f32, size: u32) -> Result<Self> {
         if !SIDES.contains(&size) || !size.is_multiple_of(8) {
             let what =
                 format!("{size} is not allowed; allowed: multiples of 8 from {} to {}", SIDES.start(), SIDES.end());
@@ -56,40 +65,81 @@ impl Sky {
         }
         let texels = 6 * size as usize * size as usize;
         let Some(env) = environment.filter(|e| !e.pixels.is_empty()) else {
-            return Ok(Self { size, radiance: vec![Vec3::ZERO; texels], suns: Vec::new(), repaired: 0 });
+            return Ok(Self { size, texels: vec![(DVec3::ZERO, 0.0); texels], repaired: 0 });
         };
-        let place = |error: Error| error.at(format!("environment `{}`", env.name));
-        if env.pixels.len() as u64 != u64::from(env.width) * u64::from(env.height) {
-            let what = format!("{} pixels for {}×{}", env.pixels.len(), env.width, env.height);
-            return Err(place(Error::input(what)));
-        }
-        if !(env.scale.is_finite() && env.scale >= 0.0 && env.rotation.is_finite()) {
-            let what = format!("a scale of {} and a rotation of {} are no numbers to use", env.scale, env.rotation);
-            return Err(place(Error::input(what).help("The scale is a number from 0, the rotation one in radians")));
-        }
+        usable(env, rotation, 1.0)?;
         let mut repaired = 0;
-        let clean = |value: f32| match value {
-            f32::INFINITY => (LARGEST, true),
-            _ if value >= 0.0 => (f64::from(value).min(1e30), false),
-            _ => (0.0, true),
-        };
         let pixels: Vec<DVec3> = env
             .pixels
             .iter()
-            .map(|p| {
-                let channels = p.to_array().map(clean);
-                repaired += u64::from(channels.iter().any(|c| c.1));
-                DVec3::from_array(channels.map(|c| c.0))
+            .map(|pixel| {
+                let (light, odd) = clean(*pixel);
+                repaired += u64::from(odd);
+                light
             })
             .collect();
-        let mut sums = vec![(DVec3::ZERO, 0.0); texels];
-        let rotation = f64::from(env.rotation);
+        let mut texels = vec![(DVec3::ZERO, 0.0); texels];
+        let rotation = f64::from(rotation);
         for (begin, end) in wedges(env.width, rotation, size) {
-            wedge(&mut sums, env, &pixels, size, begin, end);
+            wedge(&mut texels, (env, rotation), &pixels, size, begin, end);
         }
-        let scale = f64::from(env.scale);
-        let radiance = sums.iter().map(|(sum, weight)| (*sum * (scale / weight.max(1e-30))).min(DVec3::splat(1e30)));
-        Ok(Self { size, radiance: radiance.map(|r| r.as_vec3()).collect(), suns: Vec::new(), repaired })
+        Ok(Self { size, texels, repaired })
+    }
+
+    /// With `scale` as a factor on the light.
+    pub fn sky(&self, scale: f32) -> Sky {
+        let scale = f64::from(scale);
+        let mean =
+            |(sum, weight): &(DVec3, f64)| (*sum * (scale / weight.max(1e-30))).min(DVec3::splat(1e30)).as_vec3();
+        let radiance = self.texels.iter().map(mean).collect();
+        Sky { size: self.size, radiance, suns: Vec::new(), repaired: self.repaired }
+    }
+}
+
+/// A pixel's radiance as it counts, and whether it was none.
+pub(super) fn clean(pixel: Vec3) -> (DVec3, bool) {
+    let channels = pixel.to_array().map(|value| match value {
+        f32::INFINITY => (LARGEST, true),
+        _ if value >= 0.0 => (f64::from(value).min(1e30), false),
+        _ => (0.0, true),
+    });
+    (DVec3::from_array(channels.map(|c| c.0)), channels.iter().any(|c| c.1))
+}
+
+/// An environment can be resampled with this turn, radians, and this factor.
+///
+/// # Errors
+/// `Input`, naming the environment.
+pub(super) fn usable(env: &Environment, rotation: f32, scale: f32) -> Result<()> {
+    let place = |error: Error| error.at(format!("environment `{}`", env.name));
+    if env.pixels.len() as u64 != u64::from(env.width) * u64::from(env.height) {
+        let what = format!("{} pixels for {}×{}", env.pixels.len(), env.width, env.height);
+        return Err(place(Error::input(what)));
+    }
+    if !(scale.is_finite() && scale >= 0.0 && rotation.is_finite()) {
+        let what = format!("a scale of {scale} and a rotation of {rotation} are no numbers to use");
+        return Err(place(Error::input(what).help("The scale is a number from 0, the rotation one in radians")));
+    }
+    Ok(())
+}
+
+impl Sky {
+    /// Resamples an environment with its rotation and scale: each texel gets the mean over the area that it shares with each pixel,
+    /// by solid angle. Pixels are even over their area. `None`: black.
+    ///
+    /// # Errors
+    /// `Usage` if `size` is not a multiple of 8 in [`SIDES`]; `Input` if the environment has no numbers that can be used.
+    pub fn new(environment: Option<&Environment>, size: u32) -> Result<Self> {
+        Self::changed(environment, (0.0, 1.0), size)
+    }
+
+    /// As [`Self::new`], turned by so much more, radians, and with a factor.
+    fn changed(environment: Option<&Environment>, (turn, factor): (f32, f32), size: u32) -> Result<Self> {
+        let (rotation, scale) = environment.map_or((turn, factor), |e| (e.rotation + turn, e.scale * factor));
+        if let Some(environment) = environment.filter(|e| !e.pixels.is_empty()) {
+            usable(environment, rotation, scale)?;
+        }
+        Ok(Sums::of(environment, rotation, size)?.sky(scale))
     }
 
     /// As [`Self::new`], with the size, turn and exposure of `settings`.
@@ -97,15 +147,8 @@ impl Sky {
     /// # Errors
     /// As [`Self::new`].
     pub fn of(environment: Option<&Environment>, settings: &super::Settings) -> Result<Self> {
-        let (turn, factor) = settings.light();
-        let sky = if (turn, factor) == (0.0, 1.0) {
-            Self::new(environment, settings.size)
-        } else {
-            let changed =
-                environment.map(|e| Environment { rotation: e.rotation + turn, scale: e.scale * factor, ..e.clone() });
-            Self::new(changed.as_ref(), settings.size)
-        }?;
-        Ok(sky.apart(if settings.method == Method::Vectors { settings.suns } else { 0 }))
+        let sky = Self::changed(environment, settings.light(), settings.size)?;
+        Ok(sky.apart(settings.apart()))
     }
 
     /// With the brightest texels kept apart: `most` of those of which each sends at least a hundredth of all light.
@@ -223,7 +266,7 @@ pub fn area(face: u32, size: u32, x: u32, y: u32) -> DVec3 {
 }
 
 /// Azimuths (0 over −Z, π/2 over +X) between which no edge of a pixel or of a column of texels lies.
-fn wedges(width: u32, rotation: f64, size: u32) -> Vec<(f64, f64)> {
+pub(super) fn wedges(width: u32, rotation: f64, size: u32) -> Vec<(f64, f64)> {
     let mut cuts: Vec<f64> = (0..WEDGES).map(|i| TAU * f64::from(i) / f64::from(WEDGES)).collect();
     cuts.extend((0..width).map(|c| TAU * (f64::from(c) / f64::from(width) - 0.5) - rotation));
     for column in 0..size {
@@ -237,14 +280,37 @@ fn wedges(width: u32, rotation: f64, size: u32) -> Vec<(f64, f64)> {
 }
 
 /// Adds what lies between two azimuths: exact along the meridian in the middle, in sines of the latitude, where areas are even.
-fn wedge(sums: &mut [(DVec3, f64)], env: &Environment, pixels: &[DVec3], size: u32, begin: f64, end: f64) {
+fn wedge(
+    sums: &mut [(DVec3, f64)],
+    (env, rotation): (&Environment, f64),
+    pixels: &[DVec3],
+    size: u32,
+    begin: f64,
+    end: f64,
+) {
     let middle = 0.5 * (begin + end);
     let (x, z) = (middle.sin(), -middle.cos());
     let (width, height) = (env.width as usize, env.height as usize);
-    let u = ((middle + f64::from(env.rotation)) / TAU + 0.5).rem_euclid(1.0);
+    let u = ((middle + rotation) / TAU + 0.5).rem_euclid(1.0);
     let column = ((u * width as f64) as usize).min(width - 1);
     let mut cuts = vec![1.0, -1.0];
     cuts.extend((1..height).map(|row| (PI * row as f64 / height as f64).cos()));
+    cuts.extend(rows(x, z, size));
+    cuts.sort_by(f64::total_cmp);
+    for pair in cuts.windows(2).filter(|p| p[1] > p[0]) {
+        let sine = 0.5 * (pair[0] + pair[1]);
+        let cosine = (1.0 - sine * sine).max(0.0).sqrt();
+        let row = ((sine.acos() / PI * height as f64) as usize).min(height - 1);
+        let (sum, weight) = &mut sums[texel(size, DVec3::new(x * cosine, sine, z * cosine)) as usize];
+        let angle = (end - begin) * (pair[1] - pair[0]);
+        *sum += pixels[row * width + column] * angle;
+        *weight += angle;
+    }
+}
+
+/// Sines of the latitudes at which the meridian over (x, z), a unit vector, goes from one row of texels to another; in no order.
+pub(super) fn rows(x: f64, z: f64, size: u32) -> Vec<f64> {
+    let mut cuts = Vec::new();
     // On the side faces a row of texels ends at a height over the plane at distance one.
     let reach = x.abs().max(z.abs());
     for row in 0..=size {
@@ -257,16 +323,7 @@ fn wedge(sums: &mut [(DVec3, f64)], env: &Environment, pixels: &[DVec3], size: u
             cuts.extend([sine, -sine]);
         }
     }
-    cuts.sort_by(f64::total_cmp);
-    for pair in cuts.windows(2).filter(|p| p[1] > p[0]) {
-        let sine = 0.5 * (pair[0] + pair[1]);
-        let cosine = (1.0 - sine * sine).max(0.0).sqrt();
-        let row = ((sine.acos() / PI * height as f64) as usize).min(height - 1);
-        let (sum, weight) = &mut sums[texel(size, DVec3::new(x * cosine, sine, z * cosine)) as usize];
-        let angle = (end - begin) * (pair[1] - pair[0]);
-        *sum += pixels[row * width + column] * angle;
-        *weight += angle;
-    }
+    cuts
 }
 
 #[cfg(test)]

@@ -21,6 +21,7 @@ use glam::{DVec3, Mat3, Vec3};
 use super::{
     Fiv, Occluders, Plan, Sky, Specular,
     cover::{self, Cover},
+    light,
     settings::Settings,
     sky, turn,
 };
@@ -279,10 +280,8 @@ impl Fiv {
     /// Without occluders.
     fn specular_sum(&self, graph: &mut Graph, gbuffer: &GBuffer, reflected: Image) {
         let extent = graph.extent(reflected);
-        let count = self.light.lit.len() as u32;
-        let lit = graph.buffer_from("fiv.lit", if count > 0 { &self.light.lit } else { &[0] });
-        let texels = graph.import_buffer(&self.light.texels);
-        for first in (0..count).step_by(MOST_TURNS as usize) {
+        let (texels, lit) = self.light.import(graph);
+        for (first, count) in light::calls(self.light.lit.len() as u64, MOST_TURNS.into()) {
             let args = fiv::specular_sum::Args {
                 view: gbuffer.view,
                 normal: gbuffer.normal,
@@ -291,7 +290,7 @@ impl Fiv {
                 texels,
                 lit,
                 reflected,
-                push: fiv::specular_sum::Push { first, count: MOST_TURNS.min(count - first) },
+                push: fiv::specular_sum::Push { first, count },
             };
             graph.compute(args, extent);
         }
@@ -301,14 +300,13 @@ impl Fiv {
     fn specular_truth(&mut self, graph: &mut Graph, handles: &Handles, gbuffer: &GBuffer, reflected: Image) {
         let extent = graph.extent(reflected);
         let Some((rays, most)) = &mut self.rays else { return };
-        let count = self.light.lit.len() as u64;
-        if count == 0 {
+        if self.light.lit.is_empty() {
             return;
         }
         let rays = rays.frame(graph, handles);
         let each = (MOST_RAYS / extent.pixels().max(1)).clamp(1, (*most).min(MOST_TURNS.into()));
-        let (texels, lit) = (graph.import_buffer(&self.light.texels), graph.buffer_from("fiv.lit", &self.light.lit));
-        for first in (0..count).step_by(each as usize) {
+        let (texels, lit) = self.light.import(graph);
+        for (first, count) in light::calls(self.light.lit.len() as u64, each) {
             let args = crate::rays::traced!(
                 fiv::specular_truth::Args {
                     view: gbuffer.view,
@@ -318,11 +316,7 @@ impl Fiv {
                     texels,
                     lit,
                     reflected,
-                    push: fiv::specular_truth::Push {
-                        first: first as u32,
-                        count: each.min(count - first) as u32,
-                        size: self.light.size,
-                    },
+                    push: fiv::specular_truth::Push { first, count, size: self.light.size },
                 },
                 rays
             );

@@ -8,12 +8,14 @@ use super::{
     plan::Kind,
     specular::{self, Glossy},
     suns,
+    turning::Turning,
 };
 use crate::{
     Error, ErrorKind, Result,
     gpu::{Gpu, OwnedBuffer},
+    graph::Runner,
     rays::Rays,
-    scene::{Material, Note, NoteKind, Pose, Scene, resident::Resident},
+    scene::{Environment, Material, Note, NoteKind, Pose, Scene, resident::Resident},
     shaders::consts::{FIV_FLOATS, TRACE_STEPS},
 };
 
@@ -28,6 +30,13 @@ pub struct Fiv {
     /// What it was made ready for.
     pub(super) method: Method,
     pub(super) light: Light,
+    /// What it is of.
+    sky: Sky,
+    /// The environment for other turns.
+    turning: Turning,
+    runner: Runner,
+    /// The driver ends loops early.
+    pub(super) limited: bool,
     /// Turn and factor of the environment in it.
     lit: (f32, f32),
     /// And of that for which the vectors are.
@@ -91,9 +100,15 @@ impl Fiv {
             let error = Error::usage("vectors are for an environment that stands still").at("fiv.turning");
             return Err(error.help("Use fiv.method=online"));
         }
-        let sky = lit_by(scene, &settings)?;
-        let name = scene.environment.as_ref().map_or("", |e| e.name.as_str());
-        let light = Light::new(gpu, &sky)?;
+        let environment = lit_by(scene)?;
+        let lit = lit(environment, &settings);
+        // Vectors are for the light that they are computed under; all others may turn from that of the scene.
+        let still = if settings.method == Method::Vectors { lit.0 } else { environment.rotation };
+        let mut turning = Turning::new(settings.size, still);
+        let sky = turning.sky(environment, lit.0, lit.1)?.apart(settings.apart());
+        let name = environment.name.as_str();
+        let mut runner = Runner::new(gpu);
+        let light = Light::with(&mut runner, &sky)?;
         let pose = Pose::rest(scene);
         let occluders = Occluders::of(scene, &pose, settings.flat, settings.largest);
         if occluders.placed.len() > MOST_OCCLUDERS {
@@ -143,11 +158,15 @@ impl Fiv {
             maps: suns::maps(gpu, &light, &occluders.kinds)?,
             at_rest: pose,
             method: settings.method,
-            lit: lit(scene, &settings),
-            made_for: lit(scene, &settings),
+            lit,
+            made_for: lit,
             fixed: fixed(&settings),
             gpu: gpu.clone(),
             light,
+            sky,
+            turning,
+            runner,
+            limited: gpu.loop_limit()?.is_some(),
             occluders,
             plan,
             rays,
@@ -220,7 +239,8 @@ impl Fiv {
     /// # Errors
     /// `Usage` if the vectors were computed for another one, or as [`Fiv::new`]; `OutOfMemory`, `DeviceLost`.
     pub(super) fn follow(&mut self, scene: &Scene, settings: &Settings) -> Result<()> {
-        let wanted = lit(scene, settings);
+        let environment = lit_by(scene)?;
+        let wanted = lit(environment, settings);
         if settings.method == Method::Vectors && wanted != self.made_for {
             let error = Error::usage("the vectors were computed for another turn or scale of the environment");
             return Err(error.at("fiv").help("Make the scene ready again, or use fiv.method=online"));
@@ -228,7 +248,8 @@ impl Fiv {
         if wanted == self.lit {
             return Ok(());
         }
-        self.light = Light::new(&self.gpu, &lit_by(scene, &Settings { size: self.light.size, ..settings.clone() })?)?;
+        self.sky = self.turning.sky(environment, wanted.0, wanted.1)?.apart(settings.apart());
+        self.light = Light::with(&mut self.runner, &self.sky)?;
         self.lit = wanted;
         Ok(())
     }
@@ -236,14 +257,13 @@ impl Fiv {
     /// What occluders can hide at most, if some of them are to be left out: a table of [`negligible`].
     ///
     /// # Errors
-    /// `OutOfMemory`, `DeviceLost`; as [`Sky::new`].
-    pub(super) fn matter(&mut self, scene: &Scene, settings: &Settings) -> Result<Option<&OwnedBuffer>> {
+    /// `OutOfMemory`, `DeviceLost`.
+    pub(super) fn matter(&mut self, settings: &Settings) -> Result<Option<&OwnedBuffer>> {
         if settings.negligible <= 0.0 {
             return Ok(None);
         }
         if self.matter.as_ref().is_none_or(|(lit, _)| *lit != self.lit) {
-            let sky = lit_by(scene, &Settings { size: self.light.size, ..settings.clone() })?;
-            let table = negligible::table(&sky);
+            let table = negligible::table(&self.sky);
             let buffer = OwnedBuffer::with_contents(&self.gpu, "fiv.matter", bytemuck::cast_slice(&table))?;
             self.matter = Some((self.lit, buffer));
         }
@@ -281,13 +301,13 @@ fn reaches(gpu: &Gpu, occluders: &Occluders) -> Result<OwnedBuffer> {
 }
 
 /// Turn and factor of the environment.
-fn lit(scene: &Scene, settings: &Settings) -> (f32, f32) {
+fn lit(environment: &Environment, settings: &Settings) -> (f32, f32) {
     let (turn, factor) = settings.light();
-    scene.environment.as_ref().map_or((turn, factor), |e| (e.rotation + turn, e.scale * factor))
+    (environment.rotation + turn, environment.scale * factor)
 }
 
 /// The environment of a scene that has no other lights.
-fn lit_by(scene: &Scene, settings: &Settings) -> Result<Sky> {
+fn lit_by(scene: &Scene) -> Result<&Environment> {
     if let Some(light) = scene.nodes.iter().find_map(|node| scene.lights.get(node.light? as usize)) {
         let kind = match light.kind {
             crate::scene::LightKind::Directional => "directional",
@@ -297,11 +317,10 @@ fn lit_by(scene: &Scene, settings: &Settings) -> Result<Sky> {
         let what = format!("light `{}` ({kind}) cannot be served: light comes from the environment alone", light.name);
         return Err(Error::usage(what).at("fiv").help("Remove it, or use another technique"));
     }
-    if scene.environment.as_ref().is_none_or(|e| e.pixels.is_empty()) {
+    scene.environment.as_ref().filter(|e| !e.pixels.is_empty()).ok_or_else(|| {
         let what = "there is no environment, and light comes from it alone";
-        return Err(Error::usage(what).at("fiv").help("Name one with --environment"));
-    }
-    Sky::of(scene.environment.as_ref(), settings)
+        Error::usage(what).at("fiv").help("Name one with --environment")
+    })
 }
 
 /// The vectors of all kinds: stored ones, and those that are missing.
@@ -313,10 +332,11 @@ fn vectors(
     stored: Option<&Stored>,
     mut told: impl FnMut(u64, u64) -> bool,
 ) -> Result<Vec<f32>> {
-    let floats = |plan: &Plan, kind: usize| {
-        let at = |kind: usize| plan.first(kind) as usize * FIV_FLOATS as usize;
+    let floats = |firsts: &[u64], kind: usize| {
+        let at = |kind: usize| firsts[kind] as usize * FIV_FLOATS as usize;
         at(kind)..at(kind + 1)
     };
+    let ours = plan.firsts();
     let mut fivs = vec![0f32; plan.samples() as usize * FIV_FLOATS as usize];
     let mut missing: Vec<usize> = (0..plan.occluders.len()).collect();
     if let Some(stored) = stored {
@@ -332,10 +352,11 @@ fn vectors(
             let what = format!("only samples {} to {} of {all} are there", range.start, range.end);
             return Err(Error::input(what).help("Join all parts with `fiv merge`"));
         }
+        let theirs = stored.plan.firsts();
         missing.retain(|&kind| {
             let known = |k: &Kind| k.hash == plan.occluders[kind].hash && k.surface == plan.occluders[kind].surface;
             let Some(at) = stored.plan.occluders.iter().position(known) else { return true };
-            fivs[floats(plan, kind)].copy_from_slice(&stored.fivs[floats(&stored.plan, at)]);
+            fivs[floats(&ours, kind)].copy_from_slice(&stored.fivs[floats(&theirs, at)]);
             plan.occluders[kind].shells = stored.plan.occluders[at].shells;
             plan.occluders[kind].paces = stored.plan.occluders[at].paces.clone();
             false
@@ -348,6 +369,7 @@ fn vectors(
     let rest = Plan { occluders: missing.iter().map(|&k| plan.occluders[k].clone()).collect(), ..plan.clone() };
     let kinds: Vec<_> = missing.iter().map(|&k| occluders.kinds[k].clone()).collect();
     let all = rest.samples();
+    let rests = rest.firsts();
     let mut computed = Vec::with_capacity(all as usize * FIV_FLOATS as usize);
     rest.compute(gpu, light, &kinds, 0..all, |done, new| {
         computed.extend_from_slice(new);
@@ -357,7 +379,7 @@ fn vectors(
         return Err(Error::new(ErrorKind::Runtime, "stopped while computing vectors").at("fiv"));
     }
     for (number, &kind) in missing.iter().enumerate() {
-        fivs[floats(plan, kind)].copy_from_slice(&computed[floats(&rest, number)]);
+        fivs[floats(&ours, kind)].copy_from_slice(&computed[floats(&rests, number)]);
     }
     Ok(fivs)
 }

@@ -9,8 +9,9 @@ use crate::{
 
 /// Pixels along the edge of a tile of `near.comp`.
 const TILE: u32 = 8;
-/// Turns of the loops over occluders of one invocation.
-const MOST_TURNS: u32 = 20_000;
+/// Turns of the loops over occluders of one invocation: some milliseconds on a GPU; and where a driver ends loops early.
+const MOST_TURNS: u32 = 1 << 20;
+const TURNS_LIMITED: u32 = 20_000;
 /// Bytes of the rows of occluders that can overlap, about.
 const MOST_PAIRS: u64 = 64 << 20;
 
@@ -32,13 +33,14 @@ pub struct Tiles {
 
 impl Tiles {
     /// Declares the pass that lists what may matter among the first `count` of `occluders`; `matter`: the table of
-    /// [`negligible`](super::negligible), if something is negligible.
+    /// [`negligible`](super::negligible), if something is negligible; `limited`: the driver ends loops early.
     pub fn new(
         graph: &mut Graph,
         gbuffer: &GBuffer,
         (occluders, count): (Buffer, u32),
         matter: (Buffer, bool),
         settings: &Settings,
+        limited: bool,
     ) -> Self {
         let extent = graph.extent(gbuffer.depth);
         let tiles = Extent::new(extent.width.div_ceil(TILE), extent.height.div_ceil(TILE));
@@ -60,7 +62,8 @@ impl Tiles {
         graph.compute(args, extent);
         // With the correction each occluder looks at all others at most.
         let turns = if settings.overlap { count + words + 8 } else { 8 };
-        let mut each = (MOST_TURNS / turns).max(1);
+        let most = if limited { TURNS_LIMITED } else { MOST_TURNS };
+        let mut each = (most / turns).max(1);
         let overlap = settings.overlap && count > 1;
         if overlap {
             each = each.min((MOST_PAIRS / row.max(1)).clamp(1, u64::from(u32::MAX)) as u32);
