@@ -5,7 +5,7 @@ mod tracer_lab;
 
 use std::f64::consts::PI;
 
-use fiv_lab::{Studio, ball, colourful, ground, nrmse, painted, thing};
+use fiv_lab::{Studio, ball, colourful, ground, nrmse, thing};
 use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
@@ -323,37 +323,6 @@ fn occluders_turn_between_samples_of_turns() {
             );
             assert!(apart < slack && error < 0.6 * rest, "{angle}");
         }
-    });
-}
-
-#[test]
-fn odd_stages_give_numbers() {
-    with_gpu(|gpu| {
-        let black = painted(16, |_| Vec3::ZERO);
-        let mut one = black.clone();
-        one.pixels[37] = vec3(90.0, 0.0, 1.0);
-        let mut odd = colourful();
-        odd.pixels[5] = vec3(f32::NAN, f32::INFINITY, -1.0);
-        // In the middle of an occluder, and under one larger than the scene.
-        let around = [Vec3::ZERO, vec3(0.0, 0.7, 0.0)];
-        for environment in [black, one, odd] {
-            let mut scene = stage(environment, &around);
-            scene.nodes[2].local = lucerna::scene::Transform::Matrix(Mat4::from_scale(Vec3::splat(90.0)));
-            let settings = Settings { azimuths: 8, polars: 5, radii: 4, ..coarse() };
-            let mut studio = Studio::new(gpu, &scene, &settings, None);
-            let dark = studio.irradiance(&under(6), &settings);
-            assert!(dark.iter().all(|e| e.is_finite()));
-        }
-        // A hundred occluders.
-        let many: Vec<Vec3> = (0..100).map(|i| vec3((i % 10) as f32 - 4.5, 0.8, (i / 10) as f32 - 4.5)).collect();
-        let scene = stage(colourful(), &many);
-        let settings = Settings { azimuths: 8, polars: 5, radii: 4, ..coarse() };
-        let mut studio = Studio::new(gpu, &scene, &settings, None);
-        assert_eq!((studio.fiv.occluders().kinds.len(), studio.fiv.occluders().placed.len()), (1, 100));
-        let shaded = studio.irradiance(&under(6), &settings);
-        let open =
-            Studio::new(gpu, &scene, &by(Method::Unshadowed), None).irradiance(&under(6), &by(Method::Unshadowed));
-        assert!(shaded.iter().zip(&open).all(|(s, o)| s.element_sum() < 0.8 * o.element_sum()));
     });
 }
 

@@ -68,7 +68,7 @@ pub struct PrecomputeArgs {
     #[arg(long, help_heading = "Output")]
     pub restart: bool,
 
-    /// Seconds after which what is done is written to FILE.part
+    /// Seconds after which what is done is written to FILE.part; more where writing takes more than a tenth of that
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, help_heading = "Output")]
     pub checkpoint: f64,
 
@@ -145,13 +145,17 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
     }
 
     let mut meter = Meter::new(args.progress, console.is_quiet(), before, total);
-    let mut saved = Instant::now();
+    let (mut saved, mut took) = (Instant::now(), Duration::ZERO);
+    let checkpoint = Duration::from_secs_f64(args.checkpoint);
     plan.compute(&gpu, &light, &occluders, stored.range.end..range.end, |done, new| {
         stored.push(new);
         meter.show(done - range.start);
-        if saved.elapsed() >= Duration::from_secs_f64(args.checkpoint) {
+        // All is written anew each time: at most a tenth of the time goes into it.
+        if saved.elapsed() >= checkpoint.max(9 * took) {
+            let begun = Instant::now();
             stored.write(&part, true)?;
             saved = Instant::now();
+            took = saved - begun;
         }
         Ok(!interrupt.requested())
     })?;

@@ -40,17 +40,10 @@ pub struct SteadyArgs {
 /// Runs the command.
 ///
 /// # Errors
-/// `Input` if a folder has fewer than two frames, or the two have different ones.
+/// `Input` if a folder has fewer than two frames or frames of different sizes, or if the two have frames of other names or sizes.
 pub fn steady(args: &SteadyArgs, console: Console) -> Result<ExitCode> {
     let (ours, right) = (sequence(&args.frames)?, sequence(&args.truth)?);
-    if ours.len() != right.len() {
-        let what = format!("{} frames instead of {}", ours.len(), right.len());
-        return Err(Error::input(what).in_file(&args.frames));
-    }
-    if let Some((a, b)) = ours.iter().zip(&right).find(|(a, b)| a.size != b.size) {
-        let what = format!("{}×{} pixels instead of {}×{}", a.size[0], a.size[1], b.size[0], b.size[1]);
-        return Err(Error::input(what).in_file(&args.frames));
-    }
+    comparable([&args.frames, &args.truth], &ours, &right)?;
     fn frame(picture: &Picture) -> Frame<'_> {
         Frame { light: &picture.light, depth: &picture.depth }
     }
@@ -80,13 +73,49 @@ pub fn steady(args: &SteadyArgs, console: Console) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// What is to be compared.
+const SAME: &str = "Both folders must have the same frames under the same names, of the same size";
+
+/// Two sequences, each of one size, are of the same frames.
+///
+/// # Errors
+/// `Input`, naming both folders and what differs.
+fn comparable([folder, other]: [&Path; 2], ours: &[Picture], right: &[Picture]) -> Result<()> {
+    let wrong = |what: String| Err(Error::input(what).in_file(folder).help(SAME));
+    if let Some((a, b)) = ours.iter().zip(right).find(|(a, b)| a.name() != b.name()) {
+        return wrong(format!("has frame `{}` where {} has `{}`", a.name(), other.display(), b.name()));
+    }
+    if ours.len() != right.len() {
+        return wrong(format!("has {} frames, {} has {}", ours.len(), other.display(), right.len()));
+    }
+    ours.first().zip(right.first()).map_or(Ok(()), |(a, b)| same_size(a, b))
+}
+
+/// # Errors
+/// `Input`, naming both files.
+fn same_size(a: &Picture, b: &Picture) -> Result<()> {
+    if a.size == b.size {
+        return Ok(());
+    }
+    let ([w, h], [width, height]) = (a.size, b.size);
+    let what = format!("{w}×{h} pixels, {} has {width}×{height}", b.file.display());
+    Err(Error::input(what).in_file(&a.file).help(SAME))
+}
+
 struct Picture {
+    file: PathBuf,
     size: [u32; 2],
     light: Vec<[f32; 3]>,
     depth: Vec<f32>,
 }
 
-/// All frames of a folder in the order of their names.
+impl Picture {
+    fn name(&self) -> std::borrow::Cow<'_, str> {
+        self.file.file_name().unwrap_or_default().to_string_lossy()
+    }
+}
+
+/// All frames of a folder in the order of their names, of one size.
 fn sequence(folder: &Path) -> Result<Vec<Picture>> {
     let unreadable = |error: std::io::Error| Error::input("cannot be read").caused_by(error).in_file(folder);
     let mut files = Vec::new();
@@ -101,7 +130,10 @@ fn sequence(folder: &Path) -> Result<Vec<Picture>> {
         let error = Error::input(format!("{} .exr files, at least 2 are needed", files.len()));
         return Err(error.in_file(folder).help("Render with --frames 0..60 -o 'FOLDER/{frame:04}.exr'"));
     }
-    files.iter().map(|file| picture(file).map_err(|error| error.in_file(file))).collect()
+    let pictures: Vec<Picture> =
+        files.iter().map(|file| picture(file).map_err(|error| error.in_file(file))).collect::<Result<_>>()?;
+    pictures.iter().skip(1).try_for_each(|other| same_size(other, &pictures[0]))?;
+    Ok(pictures)
 }
 
 fn picture(file: &Path) -> Result<Picture> {
@@ -111,5 +143,38 @@ fn picture(file: &Path) -> Result<Picture> {
         layers.layer(name).filter(|l| l.channels.len() == channels).ok_or_else(missing)
     };
     let light = layer("irradiance", 3)?.data.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
-    Ok(Picture { size: [layers.width, layers.height], light, depth: layer("depth", 1)?.data.clone() })
+    Ok(Picture {
+        file: file.to_owned(),
+        size: [layers.width, layers.height],
+        light,
+        depth: layer("depth", 1)?.data.clone(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture(name: &str, size: [u32; 2]) -> Picture {
+        Picture { file: name.into(), size, light: Vec::new(), depth: Vec::new() }
+    }
+
+    fn refused(ours: &[Picture], right: &[Picture]) -> String {
+        let error = comparable([Path::new("ours"), Path::new("right")], ours, right).unwrap_err();
+        assert_eq!(error.exit_code(), 3);
+        error.to_string()
+    }
+
+    #[test]
+    fn only_the_same_frames_are_compared() {
+        let frames = |names: [&str; 2], size| names.map(|name| picture(name, size));
+        let (ours, same) = (frames(["0.exr", "1.exr"], [4, 3]), frames(["0.exr", "1.exr"], [4, 3]));
+        comparable([Path::new("ours"), Path::new("right")], &ours, &same).unwrap();
+        let text = refused(&ours, &frames(["0.exr", "2.exr"], [4, 3]));
+        assert!(["ours", "right", "`1.exr`", "`2.exr`"].iter().all(|part| text.contains(part)), "{text}");
+        let text = refused(&ours, &same[..1]);
+        assert!(text.contains("2 frames") && text.contains("has 1"), "{text}");
+        let text = refused(&ours, &frames(["0.exr", "1.exr"], [3, 4]));
+        assert!(text.contains("4×3") && text.contains("3×4"), "{text}");
+    }
 }
