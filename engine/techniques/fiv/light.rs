@@ -11,11 +11,15 @@ use crate::{
     Result,
     gpu::{Gpu, ImageDesc, OwnedBuffer, OwnedImage},
     graph::{Buffer, Graph, Runner},
+    scene::{Note, NoteKind},
     shaders::{consts::FIV_FLOATS, fiv, types},
 };
 
 /// Texels that one invocation sums up at most.
 const MOST_TEXELS: u32 = 24_576;
+
+/// Of the irradiance for every normal.
+const DIFMAP: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
 /// An environment on a device.
 #[derive(Debug)]
@@ -52,9 +56,7 @@ impl Light {
         let gpu = &runner.gpu().clone();
         let texels = sky.texels();
         let buffer = OwnedBuffer::with_contents(gpu, "fiv.sky", bytemuck::cast_slice(&texels))?;
-        let desc = ImageDesc::new(vk::Format::R32G32B32A32_SFLOAT, sky.size, sky.size)
-            .cubes(1)
-            .also(vk::ImageUsageFlags::STORAGE);
+        let desc = ImageDesc::new(DIFMAP, sky.size, sky.size).cubes(1).also(vk::ImageUsageFlags::STORAGE);
         let difmap = OwnedImage::new(gpu, "fiv.difmap", desc)?;
         let mut graph = Graph::new("fiv environment");
         let (handle, image) = (graph.import_buffer(&buffer), graph.import_image(&difmap));
@@ -86,6 +88,14 @@ impl Light {
         let lit = if self.lit.is_empty() { &[0][..] } else { &self.lit };
         (graph.import_buffer(&self.texels), graph.buffer_from("fiv.lit", lit))
     }
+}
+
+/// What the user should know where the device cannot filter what irradiance is looked up in; Vulkan does not promise that it can.
+pub(super) fn unfiltered(gpu: &Gpu) -> Option<Note> {
+    let filters = gpu.format_features(DIFMAP).contains(vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR);
+    let text =
+        "the device does not filter 32-bit images: irradiance is that of the nearest of 6 · size² normals".into();
+    (!filters).then(|| Note { kind: NoteKind::Approximated, place: "fiv.size".into(), text })
 }
 
 /// The first of so many, and their number, for calls of `each` at most.

@@ -1,9 +1,9 @@
 //! What lives as long as a scene: its occluders with their vectors, and the environment on the device.
 
 use super::{
-    Cut, Light, Method, Occluders, Plan, Settings, Shared, Sky, Stored,
+    Cut, Light, Method, Occluders, Plan, Settings, Shared, Sky, Specular, Stored,
     fill::fill,
-    negligible,
+    light, negligible,
     online::Online,
     plan::Kind,
     specular::{self, Glossy},
@@ -116,7 +116,8 @@ impl Fiv {
             return Err(Error::new(ErrorKind::Runtime, what).at("fiv").help("Join meshes into fewer nodes"));
         }
         let mut plan = Plan::new(name, light.hash, &occluders.kinds, &settings);
-        let mut notes = notes(scene, &occluders, sky.repaired);
+        let mut notes = notes(scene, &occluders, sky.repaired, settings.specular);
+        notes.extend(light::unfiltered(gpu));
         let fivs = match settings.method {
             Method::Vectors => {
                 plan.fits(Some(gpu.caps().limits.storage_range))?;
@@ -397,7 +398,7 @@ fn emissive(material: &Material) -> bool {
     material.emissive != glam::Vec3::ZERO && !material.unlit
 }
 
-fn notes(scene: &Scene, occluders: &Occluders, repaired: u64) -> Vec<Note> {
+fn notes(scene: &Scene, occluders: &Occluders, repaired: u64, specular: Specular) -> Vec<Note> {
     let mut notes = Vec::new();
     let mut note = |kind, place: &str, text: String| notes.push(Note { kind, place: place.into(), text });
     if repaired > 0 {
@@ -412,10 +413,12 @@ fn notes(scene: &Scene, occluders: &Occluders, repaired: u64) -> Vec<Note> {
     }
     for (what, which) in [
         ("are shown and light nothing: light comes from the environment alone", emissive as fn(&Material) -> bool),
-        ("reflect and pass light as if they were matt and opaque", |m| {
-            !m.unlit && (m.metallic > 0.0 || m.transmission > 0.0)
-        }),
-    ] {
+        ("pass no light on", |m| !m.unlit && m.transmission > 0.0),
+        ("reflect as if they were matt (fiv.specular=summed shows their gloss)", |m| !m.unlit && m.metallic > 0.0),
+    ]
+    .into_iter()
+    .take(if specular == Specular::Off { 3 } else { 2 })
+    {
         let named: Vec<_> = scene.materials.iter().filter(|m| which(m)).map(|m| format!("`{}`", m.name)).collect();
         if !named.is_empty() {
             note(NoteKind::Approximated, "materials", format!("{} {what}", named.join(", ")));

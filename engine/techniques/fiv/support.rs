@@ -10,6 +10,9 @@ use glam::{DVec3, Vec3};
 
 use crate::shaders::consts::{FIV_REACH_AZIMUTHS, FIV_REACH_POLARS};
 
+/// Points that are gone through at once.
+const LANES: usize = 8;
+
 /// Numbers of a table.
 pub const LENGTH: usize = (FIV_REACH_AZIMUTHS * FIV_REACH_POLARS) as usize;
 
@@ -21,9 +24,22 @@ pub struct Support(pub Vec<f32>);
 impl Support {
     /// Of points around the origin.
     pub fn of(points: &[Vec3]) -> Self {
+        // Several at once: what deforms is measured in each frame. The last point fills the last row up.
+        let row = |row: usize, axis: usize| {
+            std::array::from_fn(|lane| points[(LANES * row + lane).min(points.len() - 1)][axis])
+        };
+        let rows: Vec<[[f32; LANES]; 3]> =
+            (0..points.len().div_ceil(LANES)).map(|i| [0, 1, 2].map(|axis| row(i, axis))).collect();
         let reach = |i: usize| {
             let along = direction(i).as_vec3();
-            points.iter().map(|p| p.dot(along)).fold(f32::NEG_INFINITY, f32::max)
+            let mut most = [f32::NEG_INFINITY; LANES];
+            for [x, y, z] in &rows {
+                for (lane, most) in most.iter_mut().enumerate() {
+                    let reach = x[lane] * along.x + y[lane] * along.y + z[lane] * along.z;
+                    *most = if reach > *most { reach } else { *most };
+                }
+            }
+            most.into_iter().fold(f32::NEG_INFINITY, f32::max)
         };
         // All azimuths are one direction at the poles.
         let (row, last) = (FIV_REACH_AZIMUTHS as usize, LENGTH - FIV_REACH_AZIMUTHS as usize);
@@ -86,6 +102,19 @@ mod tests {
         // Standing on the plane it is all in front, below it nothing.
         assert_eq!((support.front(0.5, Vec3::Y), support.front(-0.5, Vec3::Y)), (1.0, 0.0));
         assert!((support.front(0.25, Vec3::Y) - 0.75).abs() < 1e-5);
+    }
+
+    #[test]
+    fn it_reaches_as_far_as_the_farthest_of_any_number_of_points() {
+        for count in [1, 7, 8, 9, 100] {
+            let points: Vec<Vec3> =
+                (0..count).map(|i| Vec3::new((i as f32).sin(), (1.7 * i as f32).cos(), 0.1 * i as f32 - 3.0)).collect();
+            let support = Support::of(&points);
+            for (i, found) in support.0.iter().enumerate().filter(|(i, _)| i % FIV_REACH_AZIMUTHS as usize == 0) {
+                let exact = points.iter().map(|p| p.dot(direction(i).as_vec3())).fold(f32::NEG_INFINITY, f32::max);
+                assert_eq!(found.to_bits(), exact.to_bits(), "{count} points, direction {i}");
+            }
+        }
     }
 
     #[test]
