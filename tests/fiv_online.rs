@@ -11,7 +11,7 @@ use lucerna::{
     gpu::testing::with_gpu,
     measure::steady::{Frame, Steadiness},
     scene::{self, Environment, LoadOptions, Pose, Scene, Transform, View, builtin},
-    techniques::fiv::{Cut, Extent, Method, SelfSamples, Settings},
+    techniques::fiv::{Method, SelfSamples, Settings},
 };
 use tracer_lab::{flat_view, view};
 
@@ -80,6 +80,14 @@ fn the_picture_is_bit_for_bit_that_of_vectors_computed_beforehand() {
             // In the next frame too.
             assert!(bits(&studio.irradiance(&eye, &online)) == bits(&exact));
         }
+        // Of a thing alone, whose centre lies behind all that is seen of it.
+        let scene = stage(&[odd_body(Quat::IDENTITY, vec3(0.0, 0.9, 0.0))]);
+        let eye = view(vec3(0.4, 2.2, 1.4), vec3(0.0, 0.9, 0.0), 15.0, [16, 16]);
+        let [exact, found, none] = [(Method::Vectors, true), (Method::Online, true), (Method::Online, false)]
+            .map(|(method, self_shadow)| Settings { self_shadow, partial: false, ..few(method) })
+            .map(|settings| Studio::new(gpu, &scene, &settings, None).irradiance(&eye, &settings));
+        assert!(bits(&found) == bits(&exact), "NRMSE {}", nrmse(&exact, &found));
+        assert!(bits(&found) != bits(&none));
     });
 }
 
@@ -105,9 +113,14 @@ fn a_turned_occluder_is_as_one_made_turned() {
         pose.world[1] *= squeezed;
         let mut made = made;
         made.nodes[1].local = Transform::Matrix(pose.world[1]);
-        let exact = Studio::new(gpu, &made, &before, None).irradiance(&around(4.0, 20), &before);
+        // Its samples lie around another centre than those of one that was made so.
+        let brute = finer(Method::BruteForce);
+        let exact = Studio::new(gpu, &made, &brute, None).irradiance(&around(4.0, 20), &brute);
+        let stored = Studio::new(gpu, &made, &before, None).irradiance(&around(4.0, 20), &before);
         let found = studio.shot(&pose, &around(4.0, 20), &online).0;
-        assert!(nrmse(&exact, &found) < 1e-3, "squeezed: {}", nrmse(&exact, &found));
+        let (stored, found) = (nrmse(&exact, &stored), nrmse(&exact, &found));
+        eprintln!("squeezed in the frame {found:.4}, made squeezed {stored:.4}");
+        assert!(found < 1.1 * stored, "squeezed: {found} {stored}");
     });
 }
 
@@ -168,12 +181,10 @@ fn what_deforms_casts_the_shadow_of_its_moment() {
             [("AnimatedMorphCube/AnimatedMorphCube.gltf", [0.0, 1.6]), ("RiggedSimple/RiggedSimple.gltf", [0.0, 1.0])]
         {
             let Some(scene) = lying(file) else { return };
-            // Of what deforms the bounding sphere alone is known, and how much it fills of its disc is that at rest.
-            let sphere = |method| Settings { extent: Extent::Sphere, cut: Cut::Height, ..finer(method) };
-            let (online, brute) = (sphere(Method::Online), sphere(Method::BruteForce));
+            let (online, brute) = (finer(Method::Online), finer(Method::BruteForce));
             let mut studio = Studio::new(gpu, &scene, &online, None);
             let mut truth = Studio::new(gpu, &scene, &brute, None);
-            let before = sphere(Method::Vectors);
+            let before = finer(Method::Vectors);
             let pictures = times.map(|seconds| {
                 let pose = Pose::playing(&scene, seconds);
                 let exact = truth.shot(&pose, &around(3.0, 20), &brute).0;
@@ -181,7 +192,8 @@ fn what_deforms_casts_the_shadow_of_its_moment() {
                 // As vectors of the mesh as it is now.
                 let frozen = frozen(&scene, &pose);
                 let same = Studio::new(gpu, &frozen, &before, None).irradiance(&around(3.0, 20), &before);
-                assert!(nrmse(&same, &found) < 2e-3, "{file}, {seconds} s: {}", nrmse(&same, &found));
+                eprintln!("{file}, {seconds} s: {:.5} from vectors of the mesh as it is", nrmse(&same, &found));
+                assert!(nrmse(&same, &found) < 1e-2, "{file}, {seconds} s: {}", nrmse(&same, &found));
                 (exact, found)
             });
             let [(first, found), (second, later)] = &pictures;

@@ -9,7 +9,10 @@ use lucerna::{
     gpu::testing::with_gpu,
     graph::Graph,
     scene::{Pose, Scene, View, builtin, resident::Resident},
-    techniques::fiv::{Fiv, Method, PictureSettings, SelfSamples, Settings, Shared, Stored},
+    techniques::fiv::{
+        Cut, Extent, Fiv, Interpolation, Masks, Method, PictureSettings, SelfSamples, Settings, Shared, Specular,
+        Stored, turn::Axis,
+    },
 };
 use tracer_lab::flat_view;
 
@@ -44,21 +47,81 @@ fn vectors_are_drawn_under_their_own_light_only() {
 #[test]
 fn a_picture_asks_for_what_the_scene_was_made_ready_for() {
     with_gpu(|gpu| {
-        let (scene, view) = (ball_over_ground(), flat_view(Vec3::Y * 10.0, Vec3::ZERO, 3.0, [16, 16]));
-        let made = Settings { shared: Shared::Discs, ..coarse() };
+        let (scene, view) = (ball_over_ground(), flat_view(Vec3::Y * 10.0, Vec3::ZERO, 3.0, [4, 4]));
+        let made = coarse();
+        let x = Axis::new(Vec3::X).unwrap();
+        let fixed = [
+            ("size", Settings { size: 16, ..made.clone() }),
+            ("azimuths", Settings { azimuths: 9, ..made.clone() }),
+            ("polars", Settings { polars: 6, ..made.clone() }),
+            ("radii", Settings { radii: 5, ..made.clone() }),
+            ("turns", Settings { turns: 2, ..made.clone() }),
+            ("turn_axis", Settings { turn_axis: x, ..made.clone() }),
+            ("suns", Settings { suns: 1, ..made.clone() }),
+            ("reach", Settings { reach: 8.0, ..made.clone() }),
+            ("adaptive", Settings { adaptive: false, ..made.clone() }),
+            ("split", Settings { split: 2, ..made.clone() }),
+            ("masks", Settings { masks: Masks::Parallel, ..made.clone() }),
+            ("flat", Settings { flat: true, ..made.clone() }),
+            ("largest", Settings { largest: 0.2, ..made.clone() }),
+            ("interpolation", Settings { interpolation: Interpolation::SolidAngle, ..made.clone() }),
+            ("self_samples", Settings { self_samples: SelfSamples::Spheres, ..made.clone() }),
+            ("specular", Settings { specular: Specular::Summed, ..made.clone() }),
+            ("method", Settings { method: Method::BruteForce, ..made.clone() }),
+        ];
+        let free = [
+            ("trilinear", Settings { trilinear: false, ..made.clone() }),
+            ("partial", Settings { partial: false, ..made.clone() }),
+            ("cut", Settings { cut: Cut::Height, ..made.clone() }),
+            ("extent", Settings { extent: Extent::Sphere, ..made.clone() }),
+            ("overlap", Settings { overlap: false, ..made.clone() }),
+            ("negligible", Settings { negligible: 0.1, ..made.clone() }),
+            ("shared", Settings { shared: Shared::Discs, ..made.clone() }),
+            ("self_shadow", Settings { self_shadow: false, ..made.clone() }),
+        ];
+        // Those of the light are the environment's, whose turn vectors have decided.
+        let known: Vec<&str> = [&fixed[..], &free[..]].concat().iter().map(|(key, _)| *key).collect();
+        let serde_json::Value::Object(all) = serde_json::to_value(&made).unwrap() else { panic!("no table") };
+        let others: Vec<_> = all.keys().filter(|key| !known.contains(&key.as_str())).collect();
+        assert_eq!(others, ["exposure", "rotation", "turning"]);
         let mut studio = Studio::new(gpu, &scene, &made, None);
-        for (wrong, key) in [
-            (Settings { size: 16, ..made.clone() }, "fiv.size"),
-            (Settings { flat: true, ..made.clone() }, "fiv.flat"),
-            (Settings { largest: 0.2, ..made.clone() }, "fiv.largest"),
-            (Settings { self_samples: SelfSamples::Spheres, ..made.clone() }, "fiv.self_samples"),
-            (Settings { shared: Shared::Filled, ..made.clone() }, "fiv.shared"),
-            (Settings { method: Method::BruteForce, ..made.clone() }, "fiv.method"),
-        ] {
+        for (key, wrong) in fixed {
             let error = studio.refused(&view, &wrong);
-            assert!(error.exit_code() == 2 && error.to_string().contains(key), "{error} without {key}");
+            assert!(error.exit_code() == 2 && error.place() == Some(&format!("fiv.{key}")), "{error} without {key}");
         }
-        studio.irradiance(&view, &Settings { overlap: false, shared: Shared::Filled, ..made.clone() });
+        for (key, choice) in free {
+            let found = studio.irradiance(&view, &choice);
+            // The same as if the scene had been made ready with it.
+            if ["cut", "shared"].contains(&key) {
+                let mut other = Studio::new(gpu, &scene, &choice, None);
+                assert!(found == other.irradiance(&view, &choice), "{key}");
+                assert!(studio.irradiance(&view, &made) == other.irradiance(&view, &made), "{key}");
+            }
+        }
+    });
+}
+
+#[test]
+fn what_a_file_decides_may_be_asked_for_as_it_was_given() {
+    with_gpu(|gpu| {
+        let (scene, view) = (ball_over_ground(), flat_view(Vec3::Y * 10.0, Vec3::ZERO, 3.0, [8, 8]));
+        let even = Settings { adaptive: false, azimuths: 10, ..coarse() };
+        let first = Studio::new(gpu, &scene, &even, None);
+        let plan = first.fiv.plan().clone();
+        // It says that its samples lie evenly.
+        assert_eq!(plan.settings(&coarse()), even);
+        let occluders = first.fiv.occluders();
+        let mut stored = Stored::empty(plan.clone(), 0);
+        plan.compute(gpu, first.fiv.light(), &occluders.kinds, 0..plan.samples(), |_, new| {
+            stored.push(new);
+            Ok(true)
+        })
+        .unwrap();
+        let mut second = Studio::new(gpu, &scene, &coarse(), Some(&stored));
+        let exact = second.irradiance(&view, &even);
+        assert!(second.irradiance(&view, &coarse()) == exact);
+        let error = second.refused(&view, &Settings { azimuths: 11, ..coarse() });
+        assert_eq!(error.place(), Some("fiv.azimuths"));
     });
 }
 

@@ -10,9 +10,9 @@ use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::Runner,
     reference::fiv_specular::{self as twin, Surface},
-    scene::{Environment, Pose, Scene, View, builtin, ground as grounds},
+    scene::{Environment, Pose, Scene, View, builtin, ground as grounds, resident::Resident},
     techniques::fiv::{
-        Method, Settings, Sky, Specular,
+        Fiv, Method, Settings, Sky, Specular,
         cover::Cover,
         specular::{Cells, masks, words},
     },
@@ -342,4 +342,39 @@ fn what_cannot_be_had_is_refused() {
     let wrong = Settings { method: Method::Online, specular: Specular::Summed, ..coarse() };
     let error = wrong.validate().unwrap_err();
     assert!(error.exit_code() == 2 && error.to_string().contains("specular"), "{error}");
+}
+
+#[test]
+fn more_occluders_than_can_be_reflected_are_refused_before_anything_is_computed() {
+    with_gpu(|gpu| {
+        let mut scene = Scene { environment: Some(colourful()), ..Scene::default() };
+        let (positions, indices) = ball(0.1, 3);
+        let node = thing(&mut scene, "ball", positions, indices, Mat4::IDENTITY);
+        let first = scene.nodes[node as usize].clone();
+        scene.nodes.extend(vec![first; 800]);
+        let resident = Resident::new(gpu, &scene).unwrap();
+        let settings = by(Method::Vectors);
+        let error = Fiv::new(gpu, &scene, &resident, &settings, None, |_, _| panic!("computed")).unwrap_err();
+        assert!(error.exit_code() == 1 && error.to_string().contains("801 occluders, at most 798"), "{error}");
+    });
+}
+
+#[test]
+fn what_is_told_of_vectors_and_reflections_goes_to_one_end() {
+    with_gpu(|gpu| {
+        let mut scene = Scene { environment: Some(colourful()), ..Scene::default() };
+        let (positions, indices) = ball(0.5, 6);
+        thing(&mut scene, "ball", positions, indices, Mat4::IDENTITY);
+        let resident = Resident::new(gpu, &scene).unwrap();
+        let settings = Settings { size: 8, azimuths: 8, polars: 5, radii: 4, ..by(Method::Vectors) };
+        let mut told = Vec::new();
+        Fiv::new(gpu, &scene, &resident, &settings, None, |done, all| {
+            told.push((done, all));
+            true
+        })
+        .unwrap();
+        let (end, all) = *told.last().unwrap();
+        assert!(end == all && told.len() > 1, "{told:?}");
+        assert!(told.windows(2).all(|pair| pair[0].0 < pair[1].0) && told.iter().all(|t| t.1 == all), "{told:?}");
+    });
 }

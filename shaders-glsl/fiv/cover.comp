@@ -52,8 +52,10 @@ void main() {
         FivTexel t = texels[(face * size + at.y / split) * size + at.x / split];
         if (own != 0u ? dot(t.area, normal) <= 0.0 : !near) continue;
         if (near) {
+            // Whether a blended surface is there is decided for each place anew, in the same way whatever is computed with it.
+            uint salt = pcg4d(uvec4(floatBitsToUint(origin), at.x + side * (at.y + side * face))).x;
             Ray ray = Ray(start, 0.0, turn.geometry_from_world * direction, 1.01 * (sqrt(rho2) + radius));
-            if (trace_any(ray, TRACE_SHADOW, at.x + side * (at.y + side * face)) == (own != 0u)) continue;
+            if (trace_any(ray, TRACE_SHADOW, salt) == (own != 0u)) continue;
         }
         x += t.radiance * (t.area.x * share);
         y += t.radiance * (t.area.y * share);

@@ -1,5 +1,5 @@
-// Which occluder each pixel shows, and at which depth: where that is not the G-buffer's, something was cut out here. And the light
-// that this occluder leaves itself there (Michael 2010, eq. 13).
+// Which occluder each pixel shows, and at which depth: that of the G-buffer, in which surfaces are cut out or let through what is behind
+// them. And the light that this occluder leaves itself there (Michael 2010, eq. 13).
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -10,6 +10,7 @@
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 4, scalar) readonly buffer Owners { FivOwner owners[]; }; // of each instance
 layout(binding = 6) uniform sampler2D normal;
+layout(binding = 7) uniform sampler2D depth;
 
 layout(location = 0) in float eye_z;
 layout(location = 1) flat in uint instance;
@@ -24,8 +25,11 @@ layout(location = 0) out vec2 identity; // number of the occluder plus one, 0: n
 layout(location = 1) out vec4 own;      // irradiance, W/m²; a: 1 where it is known
 
 void main() {
+    // What the G-buffer does not show here, because it is cut out, blended or hidden, must not stand before what it shows.
+    float shown = texelFetch(depth, ivec2(gl_FragCoord.xy), 0).r, linear = eye_z / view.far;
+    if (abs(linear - shown) > 1e-4 * shown) discard;
     FivOwner owner = owners[instance];
-    identity = vec2(owner.occluder == FIV_NONE ? 0.0 : float(owner.occluder + 1u), eye_z / view.far);
+    identity = vec2(owner.occluder == FIV_NONE ? 0.0 : float(owner.occluder + 1u), linear);
     bool front = gl_FrontFacing != (owner.flipped != 0u);
     vec4 x = front ? front_x : back_x;
     vec3 y = front ? front_y : back_y, z = front ? front_z : back_z;

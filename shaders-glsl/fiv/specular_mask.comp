@@ -39,8 +39,10 @@ void main() {
     // Only what passes the bounding sphere.
     bool met = weight > 0.0 && (rho2 <= radius2 || (along > 0.0 && along * along >= (rho2 - radius2) * squared));
     if (met) {
+        // Whether a blended surface is there is decided for each place anew.
+        uint salt = pcg4d(uvec4(floatBitsToUint(origin), at.x + size * (at.y + size * face))).x;
         Ray ray = Ray(start, 0.0, turn.geometry_from_world * direction, 1.01 * (sqrt(rho2) + turn.radius));
-        met = trace_any(ray, TRACE_SHADOW, at.x + size * (at.y + size * face));
+        met = trace_any(ray, TRACE_SHADOW, salt);
     }
     hidden[lane] = met ? weight : 0.0;
     barrier();

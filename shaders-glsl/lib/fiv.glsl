@@ -27,6 +27,7 @@ struct FivOccluder {
     uint pace;      // float of FIV_PACE_KNOTS numbers of samples at even steps of each coordinate, then the spheres' radii
     uint reach;     // float of its table of how far it reaches (lib/fiv_reach.glsl), or FIV_NONE: as its bounding sphere
     uint turned;    // 1: it does not stand as that table has it
+    uint stands;    // 1: it stands as its vectors have it, and shadows itself by them
     mat3 to_rest;   // takes directions to it at rest: the transpose of what turned and scaled it
 };
 

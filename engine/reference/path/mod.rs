@@ -9,7 +9,7 @@
 mod lights;
 mod random;
 mod scatter;
-mod surface;
+pub(crate) mod surface;
 
 use crate::scene::{
     Pose, Scene, View,

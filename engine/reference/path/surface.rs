@@ -169,6 +169,17 @@ impl<'a> Surfaces<'a> {
         self.base_color(primitive, material, corners, [1.0 - u - v, u, v]).w >= threshold
     }
 
+    /// The share of the light that the surface stops, by its alpha.
+    pub fn stops(&self, triangle: u32, u: f32, v: f32) -> f32 {
+        let (primitive, _, material, corners) = self.primitive(triangle);
+        let alpha = || self.base_color(primitive, material, corners, [1.0 - u - v, u, v]).w;
+        match material.alpha {
+            AlphaMode::Opaque => 1.0,
+            AlphaMode::Mask { cutoff } => f32::from(alpha() >= cutoff),
+            AlphaMode::Blend => alpha().clamp(0.0, 1.0),
+        }
+    }
+
     fn base_color(&self, primitive: &Primitive, material: &Material, corners: [usize; 3], w: [f32; 3]) -> Vec4 {
         let mut color = material.base_color;
         if let Some(texture) = &material.base_color_texture {

@@ -3,9 +3,12 @@
 use glam::Vec3;
 
 use super::Occluder;
-use crate::scene::{
-    Pose,
-    bvh::{Bvh, Ray},
+use crate::{
+    reference::path::surface::Surfaces,
+    scene::{
+        AlphaMode, Pose,
+        bvh::{Bvh, Ray, Step},
+    },
 };
 
 /// Directions that it is looked at from, on half a sphere: the other half sees the same.
@@ -15,11 +18,25 @@ const RAYS: u32 = 24;
 /// Turn from one direction to the next, radians: the golden angle.
 const TURN: f32 = 2.399_963;
 
-/// The mean of its silhouette's area over that of its bounding disc, above 0, at most 1.
+/// The mean of its silhouette's area over that of its bounding disc, above 0, at most 1. Where it is cut out there is nothing, and blended
+/// surfaces count by what they stop.
 pub fn fill(occluder: &Occluder) -> f32 {
     let bvh = Bvh::build(&occluder.scene, &Pose::rest(&occluder.scene));
     let radius = occluder.radius;
-    let (mut met, mut all) = (0u32, 0u32);
+    let opaque = occluder.scene.materials.iter().all(|m| m.alpha == AlphaMode::Opaque);
+    let surfaces = (!opaque).then(|| Surfaces::new(&occluder.scene, &Pose::rest(&occluder.scene), &bvh));
+    let stopped = |ray: &Ray| match &surfaces {
+        None => f32::from(bvh.any(ray)),
+        Some(surfaces) => {
+            let mut left = 1.0;
+            bvh.walk(ray, |hit| {
+                left *= 1.0 - surfaces.stops(hit.triangle, hit.u, hit.v);
+                if left > 0.0 { Step::Ignore } else { Step::End }
+            });
+            1.0 - left
+        }
+    };
+    let (mut met, mut all) = (0f32, 0u32);
     for k in 0..DIRECTIONS {
         let y = (k as f32 + 0.5) / DIRECTIONS as f32;
         let (sin, cos) = (k as f32 * TURN).sin_cos();
@@ -34,10 +51,11 @@ pub fn fill(occluder: &Occluder) -> f32 {
                 continue;
             }
             all += 1;
-            met += u32::from(bvh.any(&Ray::new((right * u + up * v - along * 1.5) * radius, along)));
+            met += stopped(&Ray::new((right * u + up * v - along * 1.5) * radius, along));
         }
     }
-    met.max(1) as f32 / all.max(1) as f32
+    // What is thinner than the rays are apart is something.
+    met.max(1.0) / all.max(1) as f32
 }
 
 #[cfg(test)]
@@ -72,6 +90,23 @@ mod tests {
             materials: vec![Material::default()],
             ..Scene::default()
         }
+    }
+
+    #[test]
+    fn what_lets_light_through_fills_less() {
+        let size = Vec3::new(1.0, 2.0, 0.5);
+        let with = |alpha: AlphaMode, value: f32| {
+            let mut scene = cuboid(size);
+            scene.materials[0] = Material { alpha, base_color: Vec4::new(1.0, 1.0, 1.0, value), ..Material::default() };
+            of(&scene).0
+        };
+        let whole = of(&cuboid(size)).0;
+        let cut = AlphaMode::Mask { cutoff: 0.5 };
+        assert_eq!([with(cut, 0.6), with(AlphaMode::Opaque, 0.1), with(AlphaMode::Blend, 1.0)], [whole; 3]);
+        assert!(with(cut, 0.4) < 1e-3, "{}", with(cut, 0.4));
+        // Light passes two sides, each of which stops a half of it.
+        let half = with(AlphaMode::Blend, 0.5);
+        assert!((half / whole - 0.75).abs() < 0.01, "{half} of {whole}");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use glam::{Mat4, Vec3, Vec4};
+use glam::{Mat3, Mat4, Vec3, Vec4};
 
 use super::{
     hash::Hash,
@@ -27,11 +27,51 @@ pub struct Occluder {
     pub radius: f32,
     /// From the centre to the nearest surface, metres.
     pub inner: f32,
+    /// Of all its triangles, m².
+    pub area: f32,
     pub triangles: usize,
     /// Places on the surface of each primitive that has triangles.
     pub own: Vec<Own>,
     /// Changes with the geometry.
     pub hash: u64,
+}
+
+/// What is measured of triangles around the origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Size {
+    /// Of the bounding sphere, metres.
+    pub radius: f32,
+    /// From the origin to the nearest surface, metres.
+    pub inner: f32,
+    /// Of all triangles, m².
+    pub area: f32,
+}
+
+impl Size {
+    /// `None` without a triangle that could be seen.
+    fn of(triangles: impl Iterator<Item = [Vec3; 3]>) -> Option<Self> {
+        let (mut radius, mut inner, mut area) = (0f32, f32::INFINITY, 0f64);
+        for triangle in triangles {
+            radius = triangle.iter().map(|p| p.length()).fold(radius, f32::max);
+            inner = inner.min(nearest(triangle));
+            let [a, b, c] = triangle;
+            area += f64::from(0.5 * (b - a).cross(c - a).length());
+        }
+        (radius.is_finite() && radius > 0.0).then_some(Self { radius, inner, area: area as f32 })
+    }
+
+    /// The spheres around it, as [`Occluder::shells`].
+    pub(super) fn shells(&self, reach: f32) -> Shells {
+        let nearest = self.inner.max(LEAST_FIRST * self.radius);
+        Shells { nearest, farthest: (reach * self.radius).max(1.01 * nearest) }
+    }
+
+    /// How much more of its bounding disc a body fills than when it had the size `rest`: convex bodies have silhouettes of a quarter of
+    /// their surface (Cauchy), and others are taken to overlap themselves as much as before.
+    pub(super) fn fill(&self, rest: &Self) -> f32 {
+        let more = (self.area / rest.area) * (rest.radius / self.radius).powi(2);
+        if more.is_finite() { more } else { 1.0 }
+    }
 }
 
 /// An occluder of a scene.
@@ -52,19 +92,26 @@ pub struct Occluders {
     pub placed: Vec<Placed>,
     /// Nodes that only receive shadows, because they are flat or as large as the scene.
     pub receivers: Vec<u32>,
+    /// Nodes whose meshes have no size in this pose (a scale of 0, say): they cast no shadow in any other either.
+    pub vanished: Vec<u32>,
 }
 
 impl Occluders {
     /// Every node with a mesh is one, but for flat ones (a ground) unless `flat`, and, where there are several, those whose radius is more
     /// than `largest` of the scene's (a room, a thick ground): they have no place from which to look at them that is far enough for their
-    /// size. Poses other than `pose` only move them.
+    /// size. Unlit surfaces stop no light and are part of none. Poses other than `pose` only move them.
     pub fn of(scene: &Scene, pose: &Pose, flat: bool, largest: f32) -> Self {
         let mut still = pose.clone();
-        let mut found = Vec::new();
+        let (mut out, mut found) = (Self::default(), Vec::new());
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for (index, node) in scene.nodes.iter().enumerate() {
             let Some(mesh) = node.mesh.and_then(|mesh| scene.meshes.get(mesh as usize)) else { continue };
-            let Some((occluder, centre)) = Occluder::of_node(scene, &mut still, index, mesh) else { continue };
+            let Some((occluder, centre)) = Occluder::of_node(scene, &mut still, index, mesh) else {
+                if mesh.primitives.iter().any(|p| p.indices.len() >= 3 && !is_unlit(scene, p)) {
+                    out.vanished.push(index as u32);
+                }
+                continue;
+            };
             let at = pose.world[index].w_axis.truncate() + centre;
             (low, high) = (low.min(at - occluder.radius), high.max(at + occluder.radius));
             let casts = flat || !occluder.is_flat();
@@ -72,7 +119,6 @@ impl Occluders {
         }
         let several = found.iter().filter(|(.., casts)| *casts).count() > 1;
         let most = if several { largest * 0.5 * (high - low).length() } else { f32::INFINITY };
-        let mut out = Self::default();
         let mut known = HashMap::new();
         for (node, occluder, centre, casts) in found {
             if !casts || occluder.radius > most {
@@ -90,10 +136,10 @@ impl Occluders {
 }
 
 impl Occluder {
-    /// The occluder and its centre seen from the node's origin; `None` without a triangle that could be seen.
+    /// The occluder and its centre seen from the node's origin; `None` without a triangle that could stop light.
     pub(super) fn of_node(scene: &Scene, pose: &mut Pose, node: usize, mesh: &Mesh) -> Option<(Self, Vec3)> {
         let (mut primitives, mut own): (Vec<Primitive>, Vec<Own>) = Default::default();
-        for (slot, primitive) in mesh.primitives.iter().enumerate() {
+        for (slot, primitive) in mesh.primitives.iter().enumerate().filter(|(_, p)| !is_unlit(scene, p)) {
             // Without its place, so that the same things in different places are the same to the last bit.
             let place = std::mem::replace(&mut pose.world[node].w_axis, Vec4::W);
             let deform::Vertices { mut positions, normals, .. } = deform::world_vertices(scene, pose, node, primitive);
@@ -120,20 +166,13 @@ impl Occluder {
             }
         }
         let centre = bounding_centre(&primitives)?;
-        let mut radius = 0f32;
         for primitive in &mut primitives {
             for position in &mut primitive.positions {
                 *position -= centre;
             }
-            for &i in &primitive.indices {
-                radius = radius.max(primitive.positions[i as usize].length());
-            }
         }
-        if !(radius.is_finite() && radius > 0.0) {
-            return None;
-        }
+        let Size { radius, inner, area } = Size::of(primitives.iter().flat_map(corners))?;
         let triangles = primitives.iter().map(|p| p.indices.len() / 3).sum();
-        let inner = primitives.iter().flat_map(corners).map(nearest).fold(f32::INFINITY, f32::min);
         let name = match scene.nodes[node].name.as_str() {
             "" if mesh.name.is_empty() => format!("node {node}"),
             "" => mesh.name.clone(),
@@ -141,7 +180,7 @@ impl Occluder {
         };
         let scene = alone(scene, primitives, &name);
         let hash = hash(&scene, &own);
-        Some((Self { name, scene, radius, inner, triangles, own, hash }, centre))
+        Some((Self { name, scene, radius, inner, area, triangles, own, hash }, centre))
     }
 
     /// How far it reaches along every direction.
@@ -173,11 +212,25 @@ impl Occluder {
         triangles().flatten().all(|p| (p - widest[0]).dot(across).abs() <= FLAT * self.radius)
     }
 
+    /// As `turn` squeezes it about its centre; `None` if nothing is left of it.
+    pub(super) fn squeezed(&self, turn: &Mat3) -> Option<Size> {
+        let squeezed = |corners: [Vec3; 3]| corners.map(|p| *turn * p);
+        Size::of(self.scene.meshes[0].primitives.iter().flat_map(corners).map(squeezed))
+    }
+
+    pub(super) fn size(&self) -> Size {
+        Size { radius: self.radius, inner: self.inner, area: self.area }
+    }
+
     /// The spheres around it: the first one touches its surface from within, the last one has `reach` times its radius.
     pub fn shells(&self, reach: f32) -> Shells {
-        let nearest = self.inner.max(LEAST_FIRST * self.radius);
-        Shells { nearest, farthest: (reach * self.radius).max(1.01 * nearest) }
+        self.size().shells(reach)
     }
+}
+
+/// Light passes unlit surfaces.
+fn is_unlit(scene: &Scene, primitive: &Primitive) -> bool {
+    scene.materials.get(primitive.material as usize).is_some_and(|material| material.unlit)
 }
 
 fn corners(primitive: &Primitive) -> impl Iterator<Item = [Vec3; 3]> + '_ {
@@ -390,6 +443,17 @@ mod tests {
         assert_eq!(all.receivers, [0, 1]);
         let with = Occluders::of(&scene, &Pose::rest(&scene), true, 1.0);
         assert!(with.receivers.is_empty() && with.placed.len() == 2);
+    }
+
+    #[test]
+    fn what_has_no_size_is_named_and_what_stops_no_light_is_nothing() {
+        let at = |x: f32| Mat4::from_translation(Vec3::new(x, 0.0, 0.0));
+        let mut scene = stage(&[at(0.0), at(1.0) * Mat4::from_scale(Vec3::ZERO)]);
+        let all = found(&scene);
+        assert_eq!((all.placed.len(), all.vanished, all.receivers), (1, vec![1], vec![]));
+        scene.materials[0].unlit = true;
+        let all = found(&scene);
+        assert_eq!((all.placed.len(), all.vanished, all.receivers), (0, vec![], vec![]));
     }
 
     #[test]

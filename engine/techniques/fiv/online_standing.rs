@@ -38,6 +38,8 @@ pub struct Standing {
     pub list: Vec<types::FivOccluder>,
     /// The node of each.
     pub nodes: Vec<u32>,
+    /// How much more of its bounding disc each fills than at rest; empty: as much.
+    pub fills: Vec<f32>,
     /// Those of one geometry lie next to each other.
     pub sets: Vec<Set>,
     /// How far those that deform reach, one after the other: to come behind the tables of all kinds.
@@ -64,9 +66,9 @@ impl Standing {
     /// As the occluders stand in `pose`.
     pub fn of(stage: &Stage<'_>, pose: &Pose) -> Self {
         let mut found = Vec::new();
-        let (mut sets, mut reaches) = (BTreeMap::new(), Vec::new());
+        let (mut sets, mut reaches, mut fills) = (BTreeMap::new(), Vec::new(), Vec::new());
         for (index, placed) in stage.occluders.placed.iter().enumerate() {
-            let Some(Stand { set, centre, turn, support }) = stand(stage, pose, index) else { continue };
+            let Some(Stand { set, centre, turn, support, fill }) = stand(stage, pose, index) else { continue };
             let kinds = stage.occluders.kinds.len() as u32;
             let reach = match &support {
                 Some(_) => kinds + (reaches.len() / support::LENGTH) as u32,
@@ -77,14 +79,17 @@ impl Standing {
             let alone = if stage.shapes[index].1 { index } else { usize::MAX };
             let key = (set.shape, alone, turn.to_cols_array().map(f32::to_bits));
             sets.insert(key, set);
+            fills.push(fill);
             found.push((key, placed.node, centre, set, turn, reach));
         }
         let numbers: BTreeMap<_, u32> = sets.keys().copied().zip(0..).collect();
         let Grid { azimuths, polars, radii } = stage.grid;
+        // What does not fit is refused before it is used.
+        let first = |key| u32::try_from(u64::from(numbers[key]) * u64::from(stage.floats)).unwrap_or(u32::MAX);
         let list = found.iter().map(|(key, _, centre, set, turn, reach)| types::FivOccluder {
             centre: centre.to_array(),
             radius: set.radius,
-            first: numbers[key] * stage.floats,
+            first: first(key),
             azimuths,
             polars,
             radii,
@@ -95,11 +100,13 @@ impl Standing {
             reach: reach * support::LENGTH as u32,
             turned: (*turn != Mat3::IDENTITY).into(),
             to_rest: turn.transpose().to_cols_array_2d(),
+            stands: 1,
             ..Default::default()
         });
         Self {
             list: list.collect(),
             nodes: found.iter().map(|(_, node, ..)| *node).collect(),
+            fills,
             sets: sets.into_values().collect(),
             reaches,
         }
@@ -115,6 +122,8 @@ struct Stand {
     turn: Mat3,
     /// How far it reaches, if that is not that of its kind, turned.
     support: Option<Support>,
+    /// How much more of its bounding disc it fills than its kind.
+    fill: f32,
 }
 
 /// `None` where the occluder has no extent.
@@ -124,14 +133,15 @@ fn stand(stage: &Stage<'_>, pose: &Pose, index: usize) -> Option<Stand> {
     let node = placed.node as usize;
     let world = pose.world.get(node)?;
     let place = world.w_axis.truncate();
+    let kind = &stage.occluders.kinds[placed.kind as usize];
     if deforms {
         let (occluder, centre) = measured(stage.scene, pose, node)?;
-        let (radius, shells) = (occluder.radius, occluder.shells(stage.reach));
-        let set = Set { shape, geometry_from_world: Mat3::IDENTITY, centre: place + centre, radius, shells };
-        let support = Some(occluder.support());
-        return Some(Stand { set, centre: place + centre, turn: Mat3::IDENTITY, support });
+        let (size, shells) = (occluder.size(), occluder.shells(stage.reach));
+        let set =
+            Set { shape, geometry_from_world: Mat3::IDENTITY, centre: place + centre, radius: size.radius, shells };
+        let (support, fill) = (Some(occluder.support()), size.fill(&kind.size()));
+        return Some(Stand { set, centre: place + centre, turn: Mat3::IDENTITY, support, fill });
     }
-    let kind = &stage.occluders.kinds[placed.kind as usize];
     let (now, rest) = (Mat3::from_mat4(*world), stage.rest[index]);
     // Without a rounding where nothing turned.
     let turn = if now == rest { Mat3::IDENTITY } else { now * rest.inverse() };
@@ -139,30 +149,19 @@ fn stand(stage: &Stage<'_>, pose: &Pose, index: usize) -> Option<Stand> {
     if !(turn.is_finite() && back.is_finite() && place.is_finite()) {
         return None;
     }
-    let set = match even(&turn) {
+    // Its centre stays that of its kind, about which it is known how far it reaches; what is squeezed gets a sphere around it.
+    let (radius, shells, fill) = match even(&turn) {
         Some(scale) => {
             let Shells { nearest, farthest } = kind.shells(stage.reach);
-            Set {
-                shape,
-                geometry_from_world: back,
-                centre: Vec3::ZERO,
-                radius: kind.radius * scale,
-                shells: Shells { nearest: nearest * scale, farthest: farthest * scale },
-            }
+            (kind.radius * scale, Shells { nearest: nearest * scale, farthest: farthest * scale }, 1.0)
         }
         None => {
-            let (occluder, centre) = measured(stage.scene, pose, node)?;
-            let set = Set {
-                shape,
-                geometry_from_world: back,
-                centre: back * centre - placed.centre,
-                radius: occluder.radius,
-                shells: occluder.shells(stage.reach),
-            };
-            return Some(Stand { set, centre: place + centre, turn, support: None });
+            let size = kind.squeezed(&turn)?;
+            (size.radius, size.shells(stage.reach), size.fill(&kind.size()))
         }
     };
-    Some(Stand { set, centre: place + turn * placed.centre, turn, support: None })
+    let set = Set { shape, geometry_from_world: back, centre: Vec3::ZERO, radius, shells };
+    Some(Stand { set, centre: place + turn * placed.centre, turn, support: None, fill })
 }
 
 /// The occluder as a node has it in a pose, and its centre seen from the node's origin.
@@ -211,6 +210,8 @@ mod tests {
             reach: 16.0,
             floats: 2048 * 9,
         };
+        // With more samples than a shader can number it is refused later on, by the device's limits.
+        assert_eq!(Standing::of(&Stage { floats: u32::MAX, ..stage }, &rest).list[2].first, u32::MAX);
         let still = Standing::of(&stage, &rest);
         assert_eq!((still.list.len(), still.sets.len()), (occluders.placed.len(), occluders.kinds.len()));
         for (found, placed) in still.list.iter().zip(&occluders.placed) {

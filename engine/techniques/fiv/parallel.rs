@@ -9,7 +9,7 @@
 //! What is given up: lines are looked up at the middles of pixels, a 64th of the radius apart. Edges of masks are off by half of that
 //! at most, in either direction as often; a texel is as wide from a third of the radius away, and wider beyond.
 
-use super::{cover::reach, light::Light, occluder::Occluder};
+use super::{cover::reach, light::Light, occluder::Occluder, plan::Plan, settings::Masks};
 use crate::{
     Result,
     gpu::{BufferDesc, Gpu, OwnedBuffer},
@@ -36,6 +36,40 @@ pub(super) struct Parallel {
     radius: f32,
 }
 
+/// Of the pictures of a face.
+fn bytes(size: u32, split: u32) -> u64 {
+    u64::from(size * split).pow(2) * u64::from(FIV_PARALLEL_SIDE * FIV_PARALLEL_SIDE) * 2
+}
+
+/// Surfaces let some of the light through, which each ray decides for itself.
+fn blended(occluder: &Occluder) -> bool {
+    occluder.scene.materials.iter().any(|m| m.alpha == AlphaMode::Blend)
+}
+
+impl Plan {
+    /// What of these occluders' vectors comes from rays all the same, in words, if masks are to come from pictures.
+    pub fn by_rays(&self, occluders: &[Occluder]) -> Option<String> {
+        if self.masks != Masks::Parallel {
+            return None;
+        }
+        if bytes(self.size, self.split) > MOST_BYTES {
+            return Some("by rays after all: pictures are for fiv.size · fiv.split up to 44".into());
+        }
+        let names: Vec<_> = occluders.iter().filter(|o| blended(o)).map(|o| format!("`{}`", o.name)).collect();
+        let mut parts = Vec::new();
+        if !names.is_empty() {
+            parts.push(format!("what has blended surfaces ({})", names.join(", ")));
+        }
+        if self.turns > 1 {
+            parts.push("all turns but the first".into());
+        }
+        if self.surface {
+            parts.push("samples on surfaces".into());
+        }
+        (!parts.is_empty()).then(|| format!("by rays all the same: {}", parts.join("; ")))
+    }
+}
+
 impl Parallel {
     /// Renders the pictures; `None` where they would be too large, or where surfaces let some of the light through, which each ray
     /// decides for itself.
@@ -48,10 +82,8 @@ impl Parallel {
         (resident, rays): (&mut Resident, &mut Rays),
         (size, split): (u32, u32),
     ) -> Result<Option<Self>> {
-        let side = size * split;
-        let bytes = u64::from(side * side) * u64::from(FIV_PARALLEL_SIDE * FIV_PARALLEL_SIDE) * 2;
-        let blended = occluder.scene.materials.iter().any(|m| m.alpha == AlphaMode::Blend);
-        if blended || bytes > MOST_BYTES.min(gpu.caps().limits.storage_range) {
+        let (side, bytes) = (size * split, bytes(size, split));
+        if blended(occluder) || bytes > MOST_BYTES.min(gpu.caps().limits.storage_range) {
             return Ok(None);
         }
         let radius = reach(occluder.radius);

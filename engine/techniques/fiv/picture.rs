@@ -5,8 +5,8 @@ use std::{collections::HashMap, sync::Arc};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Extent as Reach, Fiv, Interpolation, Method, SelfSamples, Settings, Shared, Specular, light, online::Seen,
-    online_standing::Standing, pace::Paces, specular::Shadows, spots::Spot, suns, support, tiles::Tiles, turn,
+    Extent as Reach, Fiv, Interpolation, Method, Placed, SelfSamples, Settings, Shared, Specular, light, online::Seen,
+    online_standing::Standing, specular::Shadows, spots::Spot, suns, tiles::Tiles,
 };
 use crate::{
     Error, Result,
@@ -16,15 +16,11 @@ use crate::{
         skybox,
     },
     scene::{
-        Note, NoteKind, Pose, Scene, View,
+        Note, Pose, Scene, View,
         cull::Frustum,
-        resident::{Batches, Handles, Instance},
+        resident::{Batches, Handles},
     },
-    shaders::{
-        self,
-        consts::{FIV_FLOATS, FIV_PACE_KNOTS, FIV_SPOTS},
-        types,
-    },
+    shaders::{self, consts::FIV_SPOTS, types},
 };
 
 /// Rays that one dispatch traces at most, about: some milliseconds on a GPU.
@@ -76,10 +72,11 @@ struct Pixels<'a> {
 
 impl Fiv {
     /// Declares a frame: G-buffer, irradiance, reflected light, sky. `handles` are of this graph, for `pose`. The settings that decide
-    /// the vectors are those that [`Fiv::new`] was given.
+    /// the vectors are those that [`Fiv::new`] was given. The parts of the method (`trilinear`, `partial`, `cut`, `extent`, `overlap`,
+    /// `shared`, `negligible`, `self_shadow`), the light (`rotation`, `exposure`) and [`Method::Unshadowed`] are chosen by each picture.
     ///
     /// # Errors
-    /// `Usage` if a setting is out of its range, or asks for a method that [`Fiv::new`] was not told of.
+    /// `Usage` if a setting is out of its range, or asks for what [`Fiv::new`] was not told of.
     pub fn picture(
         &mut self,
         graph: &mut Graph,
@@ -89,8 +86,7 @@ impl Fiv {
         view: &View,
         settings: &PictureSettings,
     ) -> Result<Picture> {
-        settings.fiv.validate().map_err(|error| error.at("fiv"))?;
-        self.ready_for(&settings.fiv)?;
+        let settings = &PictureSettings { fiv: self.ready.picture(&settings.fiv)?, ..settings.clone() };
         self.follow(scene, &settings.fiv)?;
         let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
         let extent = graph.extent(gbuffer.depth);
@@ -141,14 +137,15 @@ impl Fiv {
         let extent = graph.extent(gbuffer.depth);
         let irradiance = graph.image("fiv.irradiance", Format::RGBA32F, extent);
         graph.clear(irradiance, [0.0; 4]);
+        let deforming = self.deforming(pose, &handles.moment.instances);
         let standing = match (settings.method, &self.online) {
             (Method::Online, Some(online)) => online.standing(scene, pose, &self.occluders),
-            (Method::Vectors, _) => self.stored(pose),
+            (Method::Vectors, _) => self.stored(pose, &deforming),
             _ => Standing::default(),
         };
         let count = standing.list.len() as u32;
         let stored = graph.import_buffer(&self.fivs);
-        let owners = self.owners(pose, &standing.nodes, &handles.moment.instances, settings);
+        let owners = self.owners((pose, &deforming), &standing.nodes, &handles.moment.instances, settings);
         let any = !standing.nodes.is_empty();
         let (identity, own) = identity(graph, handles, view, gbuffer, (&owners, stored, any));
         let mut list = standing.list.clone();
@@ -156,10 +153,10 @@ impl Fiv {
             list.iter_mut().for_each(|occluder| occluder.reach = NONE);
         }
         let kinds: HashMap<u32, u32> = self.occluders.placed.iter().map(|placed| (placed.node, placed.kind)).collect();
-        for (occluder, node) in list.iter_mut().zip(&standing.nodes) {
-            let kind = kinds.get(node);
-            occluder.fill = kind.map_or(1.0, |&kind| self.fill(kind));
-            occluder.body = kind.map_or(1.0, |&kind| self.body(kind));
+        for (number, (occluder, node)) in list.iter_mut().zip(&standing.nodes).enumerate() {
+            let fill = kinds.get(node).map_or(1.0, |&kind| self.fill(kind));
+            occluder.body = (fill * standing.fills.get(number).copied().unwrap_or(1.0)).min(1.0);
+            occluder.fill = if settings.shared == Shared::Discs { 1.0 } else { occluder.body };
         }
         list.resize(list.len().max(1), types::FivOccluder::default());
         let occluders = graph.buffer_from("fiv.occluders", &list);
@@ -240,22 +237,22 @@ impl Fiv {
             graph.compute(args, extent);
         }
         let pixels = Pixels { gbuffer, identity, occluders, near: (tiles.near, tiles.words), irradiance };
-        self.suns(graph, pose, &standing.nodes, &pixels, settings.self_shadow);
+        self.suns(graph, &standing, &pixels, settings.self_shadow);
         Ok((irradiance, Shadows { identity, occluders, fivs, near: (tiles.near, tiles.words), count }))
     }
 
     /// Adds the light of texels that are kept apart.
-    fn suns(&self, graph: &mut Graph, pose: &Pose, nodes: &[u32], pixels: &Pixels<'_>, own: bool) {
+    fn suns(&self, graph: &mut Graph, standing: &Standing, pixels: &Pixels<'_>, own: bool) {
         let count = self.light.suns.len() as u32;
         if count == 0 {
             return;
         }
-        let shade = |node: &u32| {
-            let kind = self.occluders.placed.iter().find(|placed| placed.node == *node).map_or(0, |placed| placed.kind);
-            let own = own && self.angle(pose, *node) == Some(0.0);
-            types::FivShade { map: kind * count * suns::FLOATS, own: own.into() }
+        // Lights are kept apart for stored vectors alone, which all occluders have, in their order.
+        let shade = |(placed, occluder): (&Placed, &types::FivOccluder)| {
+            let own = own && occluder.stands != 0 && occluder.turned == 0;
+            types::FivShade { map: placed.kind * count * suns::FLOATS, own: own.into() }
         };
-        let mut shades: Vec<_> = nodes.iter().map(shade).collect();
+        let mut shades: Vec<_> = self.occluders.placed.iter().zip(&standing.list).map(shade).collect();
         shades.resize(shades.len().max(1), types::FivShade::default());
         let shades = graph.buffer_from("fiv.shades", &shades);
         let suns = graph.buffer_from("fiv.sunlight", &self.light.suns);
@@ -278,98 +275,6 @@ impl Fiv {
             };
             graph.compute(args, graph.extent(irradiance));
         }
-    }
-
-    /// The occluders with their vectors that were computed beforehand.
-    fn stored(&self, pose: &Pose) -> Standing {
-        let grid = self.plan.grid;
-        let placed = self.occluders.placed.iter().map(|placed| {
-            let kind = &self.plan.occluders[placed.kind as usize];
-            let angle = self.angle(pose, placed.node);
-            let turned = turn::rotation(angle.unwrap_or(0.0), self.plan.turn_axis);
-            let (first, second, blend) = turn::between(angle.unwrap_or(0.0), self.plan.turns);
-            let pace = self.plan.samples() as u32 * FIV_FLOATS + placed.kind * (3 * FIV_PACE_KNOTS + grid.radii);
-            types::FivOccluder {
-                centre: (pose.world[placed.node as usize].w_axis.truncate() + turned * placed.centre).to_array(),
-                radius: kind.radius,
-                first: self.first_float(placed.kind, first, 0),
-                second: self.first_float(placed.kind, second, 0),
-                blend,
-                azimuths: grid.azimuths,
-                polars: grid.polars,
-                radii: grid.radii,
-                nearest: kind.shells.nearest,
-                farthest: kind.shells.farthest,
-                steps: kind.shells.steps(grid.radii) as f32,
-                pace: if kind.paces == Paces::default() { NONE } else { pace },
-                reach: if angle.is_some() { placed.kind * support::LENGTH as u32 } else { NONE },
-                turned: angle.is_some_and(|angle| angle != 0.0).into(),
-                to_rest: turned.transpose().to_cols_array_2d(),
-                ..Default::default()
-            }
-        });
-        let nodes = self.occluders.placed.iter().map(|placed| placed.node).collect();
-        Standing { list: placed.collect(), nodes, ..Standing::default() }
-    }
-
-    /// Of each instance the occluder that it is of, and where the vectors of its corners are, as far as it stands as it did when they
-    /// were computed.
-    fn owners(&self, pose: &Pose, nodes: &[u32], instances: &[Instance], settings: &Settings) -> Vec<types::FivOwner> {
-        let none = types::FivOwner {
-            occluder: NONE,
-            front: NONE,
-            back: NONE,
-            front_next: NONE,
-            back_next: NONE,
-            ..Default::default()
-        };
-        let mut of_node = vec![NONE; self.at_rest.world.len()];
-        for (at, node) in nodes.iter().enumerate().rev() {
-            of_node[*node as usize] = at as u32;
-        }
-        let known = settings.method == Method::Vectors && self.plan.surface;
-        let (mut node, mut slot) = (NONE, 0);
-        let mut owners: Vec<_> = instances
-            .iter()
-            .map(|instance| {
-                // Primitives of a node stand next to each other, in their order.
-                slot = if instance.node == node { slot + 1 } else { 0 };
-                node = instance.node;
-                let occluder = of_node.get(node as usize).copied().unwrap_or(NONE);
-                let mut owner = types::FivOwner { occluder, ..none };
-                // Stored vectors have all occluders, in their order.
-                let placed = self.occluders.placed.get(occluder as usize).filter(|_| known);
-                let Some(placed) = placed else { return owner };
-                let angle = self.angle(pose, node).filter(|_| !instance.deformed || *pose == self.at_rest);
-                let Some(angle) = angle else {
-                    return owner;
-                };
-                let (turn, next, blend) = turn::between(angle, self.plan.turns);
-                let mut first = self.plan.grid.count();
-                for own in &self.occluders.kinds[placed.kind as usize].own {
-                    if own.slot == slot {
-                        let at = |turn: u32, sample: u32| self.first_float(placed.kind, turn, sample);
-                        let back = first + own.corners;
-                        (owner.front, owner.front_next) = (at(turn, first), at(next, first));
-                        if own.backs {
-                            (owner.back, owner.back_next) = (at(turn, back), at(next, back));
-                        }
-                        owner.flipped = (instance.world_from_object.determinant() < 0.0).into();
-                        owner.blend = blend;
-                    }
-                    first += own.count();
-                }
-                owner
-            })
-            .collect();
-        owners.resize(owners.len().max(1), none);
-        owners
-    }
-
-    /// Where the vector of a sample of a turn of a kind begins.
-    fn first_float(&self, kind: u32, turn: u32, sample: u32) -> u32 {
-        let of_turn = self.plan.of_turn(&self.plan.occluders[kind as usize]) as u32;
-        (self.plan.first(kind as usize) as u32 + turn * of_turn + sample) * FIV_FLOATS
     }
 
     /// Irradiance by a shadow ray to every texel that is not black.
@@ -404,27 +309,6 @@ impl Fiv {
             graph.compute(args, extent);
         }
         irradiance
-    }
-
-    /// Occluders that do not stand as their vectors were computed.
-    fn turned(&self, scene: &Scene, pose: &Pose, instances: &[Instance]) -> Vec<Note> {
-        let deforms = |node: u32| *pose != self.at_rest && instances.iter().any(|i| i.node == node && i.deformed);
-        let what = |node: u32| match (self.angle(pose, node), deforms(node)) {
-            (_, true) => Some("deforms"),
-            (None, _) => Some("turns or changes its size"),
-            _ => None,
-        };
-        let found = self.occluders.placed.iter().filter_map(|placed| Some((placed.node, what(placed.node)?)));
-        found
-            .map(|(node, what)| Note {
-                kind: NoteKind::Approximated,
-                place: format!("nodes[{node}] ({})", scene.nodes[node as usize].name),
-                text: format!(
-                    "{what}; its shadow on others stays that of its pose at rest, and it has none on itself \
-                     (fiv.method=online follows it)"
-                ),
-            })
-            .collect()
     }
 }
 
@@ -477,6 +361,7 @@ fn identity(
             owners,
             fivs,
             normal: gbuffer.normal,
+            depth: gbuffer.depth,
         };
         let state = Raster::new().cull(batch.map_or_else(Default::default, |b| b.sided.cull()));
         let none = || crate::graph::Draw::indexed(handles.indices, Vec::new());

@@ -138,8 +138,13 @@ impl Plan {
         let (size, split, masks, reach) = (self.size, self.split, self.masks, self.reach);
         let (turns, turn_axis, suns) = (self.turns, self.turn_axis, self.suns);
         let self_samples = if self.surface { SelfSamples::Surface } else { SelfSamples::Spheres };
+        // Without an occluder nothing is decided.
+        let adaptive = match self.occluders.is_empty() {
+            true => over.adaptive,
+            false => self.occluders.iter().any(|kind| kind.paces != Paces::default()),
+        };
         let out = Settings { size, split, masks, reach, azimuths, polars, radii, ..over.clone() };
-        Settings { turns, turn_axis, suns, self_samples, ..out }
+        Settings { turns, turn_axis, suns, self_samples, adaptive, ..out }
     }
 
     /// How another plan differs in what decides the numbers, in words; `None`: it does not.

@@ -240,6 +240,58 @@ impl Settings {
         self.self_samples == SelfSamples::Surface
     }
 
+    /// What vectors of a frame cannot have.
+    fn online(&self) -> Result<()> {
+        let beforehand = [
+            ("suns", self.suns > 0, "lights kept apart", "0"),
+            ("turns", self.turns > 1, "samples of turns", "1: vectors of a frame follow all turns"),
+            ("masks", self.masks == Masks::Parallel, "masks from pictures along rays", "rays"),
+        ];
+        beforehand.into_iter().filter(|(_, asked, ..)| *asked).try_for_each(|(key, _, what, allowed)| {
+            wrong(key, format!("{what} with fiv.method=online"), &format!("{allowed}, or another method"))
+        })
+    }
+
+    /// The keys that are not at their defaults and change nothing, with why.
+    pub fn idle(&self) -> Vec<(&'static str, &'static str)> {
+        let by = Self::default();
+        let vectors = self.method == Method::Vectors;
+        let shadows = vectors || self.method == Method::Online;
+        let unused = "fiv.method uses no vectors";
+        // Key, whether it is not at its default, whether it counts, and why it would not.
+        let keys = [
+            ("azimuths", self.azimuths != by.azimuths, shadows, unused),
+            ("polars", self.polars != by.polars, shadows, unused),
+            ("radii", self.radii != by.radii, shadows, unused),
+            ("turns", self.turns != by.turns, vectors, unused),
+            ("turn_axis", self.turn_axis != by.turn_axis, vectors && self.turns > 1, "fiv.turns is 1"),
+            ("suns", self.suns != by.suns, vectors, unused),
+            ("reach", self.reach != by.reach, shadows, unused),
+            ("adaptive", self.adaptive != by.adaptive, shadows, unused),
+            ("split", self.split != by.split, shadows, unused),
+            ("masks", self.masks != by.masks, vectors, unused),
+            ("flat", self.flat != by.flat, shadows, unused),
+            ("largest", self.largest != by.largest, shadows, unused),
+            ("trilinear", self.trilinear != by.trilinear, shadows, unused),
+            ("interpolation", self.interpolation != by.interpolation, shadows, unused),
+            ("partial", self.partial != by.partial, shadows, unused),
+            ("cut", self.cut != by.cut, shadows && self.partial, "fiv.partial is off"),
+            ("extent", self.extent != by.extent, shadows && self.partial, "fiv.partial is off"),
+            ("overlap", self.overlap != by.overlap, shadows, unused),
+            ("shared", self.shared != by.shared, shadows && self.overlap, "fiv.overlap is off"),
+            ("negligible", self.negligible != by.negligible, shadows, unused),
+            ("self_shadow", self.self_shadow != by.self_shadow, shadows, unused),
+            (
+                "self_samples",
+                self.self_samples != by.self_samples,
+                shadows && self.self_shadow,
+                "fiv.self_shadow is off",
+            ),
+        ];
+        let idle = keys.into_iter().filter(|(_, changed, counts, _)| *changed && !counts);
+        idle.map(|(key, .., why)| (key, if shadows { why } else { unused })).collect()
+    }
+
     /// # Errors
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
@@ -257,6 +309,9 @@ impl Settings {
         }
         if self.suns > 0 && self.specular != Specular::Off {
             return wrong("specular", "glossy reflection with lights kept apart (fiv.suns)", "off, or fiv.suns=0");
+        }
+        if self.method == Method::Online {
+            self.online()?;
         }
         within([("exposure", self.exposure, -30.0, 30.0)])?;
         within([("split", self.split, 1, 4), ("turns", self.turns, 1, 64), ("suns", self.suns, 0, suns::MOST)])?;
@@ -277,6 +332,40 @@ impl Settings {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_changes_nothing_is_refused_or_named() {
+        let online = Settings { method: Method::Online, ..Settings::default() };
+        for (wrong, key) in [
+            (Settings { suns: 4, ..online.clone() }, "suns"),
+            (Settings { turns: 8, ..online.clone() }, "turns"),
+            (Settings { masks: Masks::Parallel, ..online.clone() }, "masks"),
+        ] {
+            let error = wrong.validate().unwrap_err();
+            assert!(error.exit_code() == 2 && error.place() == Some(key), "{error}");
+            // It is for vectors computed beforehand.
+            let before = Settings { method: Method::Vectors, ..wrong };
+            before.validate().unwrap();
+            assert_eq!(before.idle(), []);
+        }
+        let good = Settings::default();
+        let x = Axis::new(glam::Vec3::X).unwrap();
+        for (idle, keys) in [
+            (good.clone(), &[][..]),
+            (Settings { turn_axis: x, ..good.clone() }, &["turn_axis"]),
+            (Settings { turn_axis: x, turns: 2, ..good.clone() }, &[]),
+            (Settings { partial: false, cut: Cut::Height, extent: Extent::Sphere, ..good.clone() }, &["cut", "extent"]),
+            (Settings { overlap: false, shared: Shared::Discs, ..good.clone() }, &["shared"]),
+            (Settings { self_shadow: false, self_samples: SelfSamples::Spheres, ..good.clone() }, &["self_samples"]),
+            (
+                Settings { method: Method::BruteForce, size: 16, suns: 3, negligible: 0.1, ..good.clone() },
+                &["suns", "negligible"],
+            ),
+            (Settings { adaptive: false, reach: 8.0, ..online.clone() }, &[]),
+        ] {
+            assert_eq!(idle.idle().iter().map(|(key, _)| *key).collect::<Vec<_>>(), keys);
+        }
+    }
 
     #[test]
     fn an_error_names_key_value_and_what_is_allowed() {

@@ -137,7 +137,7 @@ impl Glossy {
     /// on.
     ///
     /// # Errors
-    /// `OutOfMemory`, `DeviceLost`; `Runtime` if told to stop or if there is more than the device's limits allow.
+    /// `OutOfMemory`, `DeviceLost`; `Runtime` if told to stop.
     pub fn new(
         gpu: &Gpu,
         sky: &Sky,
@@ -146,14 +146,6 @@ impl Glossy {
         told: impl FnMut(u64, u64) -> bool,
     ) -> Result<Self> {
         let cells = Cells::of(sky);
-        let samples = samples(plan) * u64::from(plan.turns) * occluders.kinds.len() as u64;
-        let (bytes, limit) = (4 * u64::from(words(sky.size)) * samples, gpu.caps().limits.storage_range);
-        if bytes > limit {
-            let what = format!("what occluders hide of reflections has {bytes} bytes; the device allows {limit}");
-            return Err(Error::new(ErrorKind::Runtime, what)
-                .at("fiv.specular")
-                .help("Take fewer samples (fiv.azimuths, fiv.polars, fiv.radii)"));
-        }
         let mut all = shares(gpu, sky.size, &cells, plan, occluders, told)?;
         all.resize(all.len().max(1), 0);
         Ok(Self {
@@ -173,6 +165,41 @@ fn samples(plan: &Plan) -> u64 {
     plan.grid.count().into()
 }
 
+/// Samples of which shares are computed.
+pub(super) fn all(plan: &Plan) -> u64 {
+    samples(plan) * u64::from(plan.turns) * plan.occluders.len() as u64
+}
+
+/// Whether reflections of so many placed occluders can be drawn, before anything is computed for them.
+///
+/// # Errors
+/// `Runtime` if there is more than the device's limits allow.
+pub(super) fn fits(gpu: &Gpu, plan: &Plan, placed: usize) -> Result<()> {
+    turns(u32::try_from(placed).unwrap_or(u32::MAX))?;
+    let (bytes, limit) = (4 * u64::from(words(plan.size)) * all(plan), gpu.caps().limits.storage_range);
+    if bytes > limit {
+        let what = format!("what occluders hide of reflections has {bytes} bytes; the device allows {limit}");
+        return Err(Error::new(ErrorKind::Runtime, what)
+            .at("fiv.specular")
+            .help("Take fewer samples (fiv.azimuths, fiv.polars, fiv.radii)"));
+    }
+    Ok(())
+}
+
+/// Turns of the loops over `count` occluders for a step of the cells.
+///
+/// # Errors
+/// `Runtime` with more than a shader can go through.
+fn turns(count: u32) -> Result<u32> {
+    let turns = count.saturating_mul(TURNS_EACH).saturating_add(count.div_ceil(32).max(1) + TURNS_CELLS);
+    if turns > MOST_TURNS {
+        let most = (MOST_TURNS - TURNS_CELLS) / (TURNS_EACH + 1);
+        let what = format!("{count} occluders, at most {most} can have reflections");
+        return Err(Error::new(ErrorKind::Runtime, what).at("fiv.specular").help("Join meshes into fewer nodes"));
+    }
+    Ok(turns)
+}
+
 fn shares(
     gpu: &Gpu,
     size: u32,
@@ -182,7 +209,7 @@ fn shares(
     mut told: impl FnMut(u64, u64) -> bool,
 ) -> Result<Vec<u32>> {
     let words = words(size);
-    let all = samples(plan) * u64::from(plan.turns) * occluders.kinds.len() as u64;
+    let all = all(plan);
     let mut out: Vec<u32> = Vec::with_capacity((all * u64::from(words)) as usize);
     let mut runner = Runner::new(gpu);
     for (occluder, kind) in occluders.kinds.iter().zip(&plan.occluders) {
@@ -339,12 +366,7 @@ impl Fiv {
         for image in [whole, left] {
             graph.clear(image, [0.0; 4]);
         }
-        let turns = shadows.near.1 + TURNS_CELLS + shadows.count * TURNS_EACH;
-        if turns > MOST_TURNS {
-            let most = (MOST_TURNS - TURNS_CELLS) / (TURNS_EACH + 1);
-            let what = format!("{} occluders, at most {most} can have reflections", shadows.count);
-            return Err(Error::new(ErrorKind::Runtime, what).at("fiv.specular").help("Join meshes into fewer nodes"));
-        }
+        let turns = turns(shadows.count)?;
         let all = words(self.light.size);
         let each = WORDS * (MOST_TURNS / turns);
         let (lobes, shares) = (graph.import_buffer(&glossy.lobes), graph.import_buffer(&glossy.shares));

@@ -1,11 +1,12 @@
 //! What lives as long as a scene: its occluders with their vectors, and the environment on the device.
 
 use super::{
-    Cut, Light, Method, Occluders, Plan, Settings, Shared, Sky, Specular, Stored,
+    Light, Method, Occluder, Occluders, Plan, Settings, Sky, Specular, Stored,
     fill::fill,
     light, negligible,
     online::Online,
     plan::Kind,
+    ready::Ready,
     specular::{self, Glossy},
     suns,
     turning::Turning,
@@ -27,8 +28,6 @@ const MOST_OCCLUDERS: usize = 16_384;
 /// A scene whose shadows come from vectors.
 #[derive(Debug)]
 pub struct Fiv {
-    /// What it was made ready for.
-    pub(super) method: Method,
     pub(super) light: Light,
     /// What it is of.
     sky: Sky,
@@ -41,8 +40,8 @@ pub struct Fiv {
     lit: (f32, f32),
     /// And of that for which the vectors are.
     made_for: (f32, f32),
-    /// The choices that cannot change from picture to picture.
-    fixed: Fixed,
+    /// What pictures may choose.
+    pub(super) ready: Ready,
     gpu: Gpu,
     pub(super) occluders: Occluders,
     pub(super) plan: Plan,
@@ -50,13 +49,10 @@ pub struct Fiv {
     pub(super) fivs: OwnedBuffer,
     /// How far all kinds reach ([`super::support`]), one after the other.
     pub(super) reaches: OwnedBuffer,
-    shared: Shared,
     /// What hides lights that are kept apart ([`super::suns`]).
     pub(super) maps: OwnedBuffer,
-    /// How much of their bounding discs all kinds fill; empty: all of them.
+    /// How much of their bounding discs all kinds fill; empty where nothing asks for it.
     pub(super) fills: Vec<f32>,
-    /// The same for what is cut; empty: it is not asked for.
-    pub(super) bodies: Vec<f32>,
     /// As everything stood when the vectors were computed.
     pub(super) at_rest: Pose,
     pub(super) notes: Vec<Note>,
@@ -68,13 +64,6 @@ pub struct Fiv {
     pub(super) glossy: Option<Glossy>,
     /// What occluders can hide at most ([`negligible`]), with the light that this is for.
     matter: Option<((f32, f32), OwnedBuffer)>,
-}
-
-/// What decides vectors, tables and which meshes are occluders.
-type Fixed = (u32, bool, f32, super::SelfSamples);
-
-fn fixed(settings: &Settings) -> Fixed {
-    (settings.size, settings.flat, settings.largest, settings.self_samples)
 }
 
 impl Fiv {
@@ -95,7 +84,9 @@ impl Fiv {
         mut told: impl FnMut(u64, u64) -> bool,
     ) -> Result<Self> {
         settings.validate().map_err(|error| error.at("fiv"))?;
-        let settings = stored.map_or_else(|| settings.clone(), |stored| stored.plan.settings(settings));
+        let (given, stored) = (settings, stored.filter(|_| settings.method == Method::Vectors));
+        let settings = stored.map_or_else(|| given.clone(), |stored| stored.plan.settings(given));
+        settings.validate().map_err(|error| error.at("fiv"))?;
         if settings.method == Method::Vectors && settings.turning != 0.0 {
             let error = Error::usage("vectors are for an environment that stands still").at("fiv.turning");
             return Err(error.help("Use fiv.method=online"));
@@ -118,18 +109,29 @@ impl Fiv {
         let mut plan = Plan::new(name, light.hash, &occluders.kinds, &settings);
         let mut notes = notes(scene, &occluders, sky.repaired, settings.specular);
         notes.extend(light::unfiltered(gpu));
+        notes.extend(said(&settings, &plan, &occluders.kinds));
+        // Of one total: vectors, then what is hidden of reflections.
+        let glossy = specular::wanted(&settings);
+        let (mut before, later) = (0, if glossy { specular::all(&plan) } else { 0 });
+        if glossy {
+            specular::fits(gpu, &plan, occluders.placed.len())?;
+        }
         let fivs = match settings.method {
             Method::Vectors => {
                 plan.fits(Some(gpu.caps().limits.storage_range))?;
                 notes.extend(stored.and_then(|stored| computed(&plan, stored)));
-                let mut fivs = vectors(gpu, &light, &occluders, (&mut plan, &settings), stored, &mut told)?;
+                let told = |done, all| {
+                    before = all;
+                    told(done, all + later)
+                };
+                let mut fivs = vectors(gpu, &light, &occluders, (&mut plan, &settings), stored, told)?;
                 paces(&plan, &mut fivs);
                 fivs
             }
             Method::Online | Method::Unshadowed | Method::BruteForce => Vec::new(),
         };
-        let glossy = match specular::wanted(&settings) {
-            true => Some(Glossy::new(gpu, &sky, &plan, &occluders, &mut told)?),
+        let glossy = match glossy {
+            true => Some(Glossy::new(gpu, &sky, &plan, &occluders, |done, all| told(before + done, before + all))?),
             false => None,
         };
         let online = match settings.method {
@@ -148,20 +150,19 @@ impl Fiv {
             }
             _ => None,
         };
-        let full = full(&occluders, &settings);
         Ok(Self {
             fivs: OwnedBuffer::with_contents(gpu, "fiv.stored", if bytes.is_empty() { &[0; 4] } else { bytes })?,
             notes,
             reaches: reaches(gpu, &occluders)?,
-            shared: settings.shared,
-            fills: if overlapping(&occluders, &settings) { full.clone() } else { Vec::new() },
-            bodies: full,
+            fills: match settings.method {
+                Method::Vectors | Method::Online => occluders.kinds.iter().map(fill).collect(),
+                Method::Unshadowed | Method::BruteForce => Vec::new(),
+            },
             maps: suns::maps(gpu, &light, &occluders.kinds)?,
             at_rest: pose,
-            method: settings.method,
             lit,
             made_for: lit,
-            fixed: fixed(&settings),
+            ready: Ready::new(given, &settings),
             gpu: gpu.clone(),
             light,
             sky,
@@ -182,11 +183,6 @@ impl Fiv {
         self.fills.get(kind as usize).copied().unwrap_or(1.0)
     }
 
-    /// The same for occluders that are cut.
-    pub(super) fn body(&self, kind: u32) -> f32 {
-        self.bodies.get(kind as usize).copied().unwrap_or(1.0)
-    }
-
     /// What the user should know about how the scene is drawn.
     pub fn notes(&self) -> &[Note] {
         &self.notes
@@ -205,34 +201,6 @@ impl Fiv {
     /// What casts shadows.
     pub fn occluders(&self) -> &Occluders {
         &self.occluders
-    }
-
-    /// Whether a picture asks for what the scene was made ready for.
-    ///
-    /// # Errors
-    /// `Usage`, naming the key.
-    pub(super) fn ready_for(&self, settings: &Settings) -> Result<()> {
-        let no = |key: &str| {
-            let error = Error::usage("the scene was made ready for another choice").at(format!("fiv.{key}"));
-            Err(error.help("Give Fiv::new the same settings"))
-        };
-        if ![self.method, Method::Unshadowed].contains(&settings.method) {
-            return no("method");
-        }
-        let ((size, flat, largest, own), asked) = (self.fixed, fixed(settings));
-        let filled = self.shared != Shared::Filled && settings.shared == Shared::Filled && settings.overlap;
-        for (key, differs) in [
-            ("size", size != asked.0),
-            ("flat", flat != asked.1),
-            ("largest", largest != asked.2),
-            ("self_samples", own != asked.3),
-            ("shared", filled),
-        ] {
-            if differs && settings.method == self.method {
-                return no(key);
-            }
-        }
-        Ok(())
     }
 
     /// Takes the environment as `settings` have it turned and scaled.
@@ -275,18 +243,6 @@ impl Fiv {
     pub fn bytes(&self) -> u64 {
         self.fivs.size() + self.glossy.as_ref().map_or(0, Glossy::bytes)
     }
-}
-
-/// Several occluders can hide the same, and it is asked how much.
-fn overlapping(occluders: &Occluders, settings: &Settings) -> bool {
-    settings.shared != Shared::Discs && occluders.placed.len() > 1
-}
-
-/// How much of their bounding discs all kinds fill, where it is asked for.
-fn full(occluders: &Occluders, settings: &Settings) -> Vec<f32> {
-    let asked = settings.cut == Cut::Light || overlapping(occluders, settings);
-    let drawn = matches!(settings.method, Method::Vectors | Method::Online);
-    if asked && drawn { occluders.kinds.iter().map(fill).collect() } else { Vec::new() }
 }
 
 /// Appends how the samples of all kinds lie.
@@ -398,6 +354,18 @@ fn emissive(material: &Material) -> bool {
     material.emissive != glam::Vec3::ZERO && !material.unlit
 }
 
+/// What was asked for and is done otherwise, or not at all.
+fn said(settings: &Settings, plan: &Plan, kinds: &[Occluder]) -> Vec<Note> {
+    let note = |place: String, text: String| Note { kind: NoteKind::Ignored, place, text };
+    let idle = settings.idle().into_iter();
+    let mut notes: Vec<_> =
+        idle.map(|(key, why)| note(format!("fiv.{key}"), format!("changes nothing, because {why}"))).collect();
+    if settings.method == Method::Vectors {
+        notes.extend(plan.by_rays(kinds).map(|what| note("fiv.masks".into(), what)));
+    }
+    notes
+}
+
 fn notes(scene: &Scene, occluders: &Occluders, repaired: u64, specular: Specular) -> Vec<Note> {
     let mut notes = Vec::new();
     let mut note = |kind, place: &str, text: String| notes.push(Note { kind, place: place.into(), text });
@@ -409,6 +377,11 @@ fn notes(scene: &Scene, occluders: &Occluders, repaired: u64, specular: Specular
         let names: Vec<_> = occluders.receivers.iter().map(|&n| scene.nodes[n as usize].name.as_str()).collect();
         let (count, names) = (names.len(), names.join(", "));
         let text = format!("{count} flat or large meshes only receive shadows (fiv.flat, fiv.largest): {names}");
+        note(NoteKind::Approximated, "fiv", text);
+    }
+    if !occluders.vanished.is_empty() {
+        let names: Vec<_> = occluders.vanished.iter().map(|&n| scene.nodes[n as usize].name.as_str()).collect();
+        let text = format!("{} meshes have no size at rest and never cast shadows: {}", names.len(), names.join(", "));
         note(NoteKind::Approximated, "fiv", text);
     }
     for (what, which) in [

@@ -1,6 +1,6 @@
 //! What is known of tiles of pixels before light is: which occluders may matter to them, and which of those can overlap.
 
-use super::Settings;
+use super::{Settings, Specular};
 use crate::{
     graph::{Buffer, Extent, Graph},
     passes::gbuffer::GBuffer,
@@ -48,6 +48,10 @@ impl Tiles {
         let row = 4 * tiles.pixels() * u64::from(words);
         let near = graph.buffer("fiv.near", row);
         let boxes = graph.buffer("fiv.tiles", 16 * tiles.pixels());
+        // Without the correction for partial occluders those whose centres are in front matter to others; but a surface has the centre of
+        // its own occluder behind it, and lights kept apart and reflections ask for all that is in front.
+        let whole = settings.suns > 0 || settings.specular != Specular::Off;
+        let partial = settings.partial || whole || settings.self_shadow && !settings.on_surface();
         let args = fiv::near::Args {
             view: gbuffer.view,
             normal: gbuffer.normal,
@@ -57,7 +61,7 @@ impl Tiles {
             boxes,
             matter: matter.0,
             push: fiv::near::Push { count, words, negligible: settings.negligible },
-            spec: fiv::near::Spec { partial: settings.partial.into(), negligible: matter.1.into() },
+            spec: fiv::near::Spec { partial: partial.into(), negligible: matter.1.into() },
         };
         graph.compute(args, extent);
         // With the correction each occluder looks at all others at most.

@@ -12,7 +12,7 @@ use lucerna::{
     gpu::Gpu,
     image,
     scene::{Environment, Pose},
-    techniques::fiv::{Light, Occluder, Occluders, Plan, Settings, Sky, Stored},
+    techniques::fiv::{Light, Method, Occluder, Occluders, Plan, Settings, Sky, Stored},
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -107,7 +107,7 @@ struct Keys {
 /// # Errors
 /// Whatever fails, with the kind that decides the exit code.
 pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
-    let keys = args.settings.effective(&Keys::default())?;
+    let mut keys = args.settings.effective(&Keys::default())?;
     keys.fiv.validate().map_err(|error| error.at("fiv"))?;
     if args.settings.print_config {
         console::print(config::to_toml(&keys)?.trim_end())?;
@@ -117,6 +117,8 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
     if !idle.is_empty() {
         console.info(&format!("note: vectors do not depend on {}", idle.join(", ")));
     }
+    // Which lights are kept apart does depend on it.
+    keys.fiv.method = Method::Vectors;
     image::probe_output(&args.output, args.overwrite)?;
     let interrupt = Interrupt::install();
     let (occluders, environment) = load(args, &keys.fiv, console)?;
@@ -129,6 +131,9 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
     let names: Vec<&str> = plan.occluders.iter().map(|o| o.name.as_str()).collect();
     console.info(&format!("{} samples of {} occluders: {}", plan.grid, names.len(), names.join(", ")));
+    if let Some(what) = plan.by_rays(&occluders) {
+        console.info(&format!("note: fiv.masks: {what}"));
+    }
     plan.fits(None)?;
     let light = Light::new(&gpu, &sky)?;
     plan.adapt(&gpu, &light, &occluders, &keys.fiv, |_| true)?;
@@ -213,6 +218,10 @@ fn load(args: &PrecomputeArgs, settings: &Settings, console: Console) -> Result<
                 "note: flat or large meshes are left out (fiv.flat, fiv.largest): {}",
                 names.join(", ")
             ));
+        }
+        if !found.vanished.is_empty() {
+            let names: Vec<_> = found.vanished.iter().map(|&n| scene.nodes[n as usize].name.as_str()).collect();
+            console.info(&format!("note: meshes without size at rest are left out: {}", names.join(", ")));
         }
         for kind in found.kinds {
             if kinds.iter().all(|known| known.hash != kind.hash) {

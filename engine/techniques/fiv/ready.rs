@@ -1,0 +1,103 @@
+//! What a scene was made ready for, and what pictures of it may choose.
+
+use serde_json::Value;
+
+use super::{Method, Settings, Specular};
+use crate::{Error, ErrorKind, Result};
+
+/// The settings that a scene was made ready with.
+#[derive(Clone, Debug)]
+pub(super) struct Ready {
+    /// As they were given.
+    given: Settings,
+    /// As they count: a file of vectors decides some of them.
+    made: Settings,
+}
+
+impl Ready {
+    pub(super) fn new(given: &Settings, made: &Settings) -> Self {
+        Self { given: given.clone(), made: made.clone() }
+    }
+
+    /// The settings of a picture: its own choices, and in everything else what the scene was made ready for.
+    ///
+    /// # Errors
+    /// `Usage`, naming the key, if the picture asks for what the scene was not made ready for; as [`Settings::validate`].
+    pub(super) fn picture(&self, asked: &Settings) -> Result<Settings> {
+        asked.validate().map_err(|error| error.at("fiv"))?;
+        let made = &self.made;
+        if ![made.method, Method::Unshadowed].contains(&asked.method) {
+            return self.refused("method", asked);
+        }
+        let shadowed = asked.method == Method::Vectors;
+        if shadowed && asked.specular != Specular::Off && made.specular == Specular::Off {
+            return self.refused("specular", asked);
+        }
+        let (fixed, given) = (chosen(asked, made), chosen(&self.given, made));
+        if fixed != *made && fixed != given {
+            let other = differing(&fixed, &given)?;
+            let wrong = differing(&fixed, made)?
+                .into_iter()
+                .find(|key| other.contains(key) && decides(key, made, asked.method));
+            if let Some(key) = wrong {
+                return self.refused(&key, asked);
+            }
+        }
+        let mut taken = chosen(made, asked);
+        if !decides("interpolation", made, asked.method) {
+            taken.interpolation = asked.interpolation;
+        }
+        taken.validate().map_err(|error| error.at("fiv"))?;
+        Ok(taken)
+    }
+
+    fn refused(&self, key: &str, asked: &Settings) -> Result<Settings> {
+        let value = |of: &Settings| serde_json::to_value(of).ok().and_then(|all| all.get(key).cloned());
+        let say = |of: &Settings| value(of).unwrap_or_default();
+        let what = format!("{} is asked for, the scene was made ready for {}", say(asked), say(&self.made));
+        let error = Error::usage(what).at(format!("fiv.{key}"));
+        Err(error.help("Give Fiv::new the same settings"))
+    }
+}
+
+/// `of` with the choices of `picture` where each picture of a scene has its own.
+fn chosen(of: &Settings, picture: &Settings) -> Settings {
+    Settings {
+        trilinear: picture.trilinear,
+        partial: picture.partial,
+        cut: picture.cut,
+        extent: picture.extent,
+        overlap: picture.overlap,
+        shared: picture.shared,
+        negligible: picture.negligible,
+        self_shadow: picture.self_shadow,
+        specular: picture.specular,
+        method: picture.method,
+        rotation: picture.rotation,
+        turning: picture.turning,
+        exposure: picture.exposure,
+        ..of.clone()
+    }
+}
+
+/// Whether pictures by `method` depend on what the scene was made ready with by this key.
+fn decides(key: &str, made: &Settings, method: Method) -> bool {
+    match key {
+        "size" => true,
+        // It is also by what samples are chosen where to lie.
+        "interpolation" => method == Method::Vectors && made.adaptive,
+        "adaptive" => method == Method::Vectors,
+        _ => matches!(method, Method::Vectors | Method::Online),
+    }
+}
+
+/// The keys in which two settings differ.
+fn differing(a: &Settings, b: &Settings) -> Result<Vec<String>> {
+    let all = |of: &Settings| match serde_json::to_value(of) {
+        Ok(Value::Object(all)) => Ok(all),
+        Ok(_) => Err(Error::new(ErrorKind::Runtime, "settings are no table")),
+        Err(error) => Err(Error::new(ErrorKind::Runtime, "settings cannot be written").caused_by(error)),
+    };
+    let (a, b) = (all(a)?, all(b)?);
+    Ok(a.into_iter().filter(|(key, value)| b.get(key) != Some(value)).map(|(key, _)| key).collect())
+}

@@ -1,0 +1,143 @@
+//! How occluders stand against their vectors, where these were computed beforehand.
+
+use std::collections::HashSet;
+
+use super::{Fiv, Method, Settings, online_standing::Standing, pace::Paces, support, turn};
+use crate::{
+    scene::{Note, NoteKind, Pose, Scene, resident::Instance},
+    shaders::{
+        consts::{FIV_FLOATS, FIV_PACE_KNOTS},
+        types,
+    },
+};
+
+/// No occluder, vector or table.
+const NONE: u32 = u32::MAX;
+
+impl Fiv {
+    /// The occluders with their vectors that were computed beforehand.
+    pub(super) fn stored(&self, pose: &Pose, deforming: &HashSet<u32>) -> Standing {
+        let grid = self.plan.grid;
+        let placed = self.occluders.placed.iter().map(|placed| {
+            let kind = &self.plan.occluders[placed.kind as usize];
+            let angle = self.angle(pose, placed.node);
+            let turned = turn::rotation(angle.unwrap_or(0.0), self.plan.turn_axis);
+            let (first, second, blend) = turn::between(angle.unwrap_or(0.0), self.plan.turns);
+            let pace = self.plan.samples() as u32 * FIV_FLOATS + placed.kind * (3 * FIV_PACE_KNOTS + grid.radii);
+            types::FivOccluder {
+                centre: (pose.world[placed.node as usize].w_axis.truncate() + turned * placed.centre).to_array(),
+                radius: kind.radius,
+                first: self.first_float(placed.kind, first, 0),
+                second: self.first_float(placed.kind, second, 0),
+                blend,
+                azimuths: grid.azimuths,
+                polars: grid.polars,
+                radii: grid.radii,
+                nearest: kind.shells.nearest,
+                farthest: kind.shells.farthest,
+                steps: kind.shells.steps(grid.radii) as f32,
+                pace: if kind.paces == Paces::default() { NONE } else { pace },
+                reach: placed.kind * support::LENGTH as u32,
+                stands: (angle.is_some() && !deforming.contains(&placed.node)).into(),
+                turned: angle.is_some_and(|angle| angle != 0.0).into(),
+                to_rest: turned.transpose().to_cols_array_2d(),
+                ..Default::default()
+            }
+        });
+        let nodes = self.occluders.placed.iter().map(|placed| placed.node).collect();
+        Standing { list: placed.collect(), nodes, ..Standing::default() }
+    }
+
+    /// Of each instance the occluder that it is of, and where the vectors of its corners are, as far as it stands as it did when they
+    /// were computed.
+    pub(super) fn owners(
+        &self,
+        (pose, deforming): (&Pose, &HashSet<u32>),
+        nodes: &[u32],
+        instances: &[Instance],
+        settings: &Settings,
+    ) -> Vec<types::FivOwner> {
+        let none = types::FivOwner {
+            occluder: NONE,
+            front: NONE,
+            back: NONE,
+            front_next: NONE,
+            back_next: NONE,
+            ..Default::default()
+        };
+        let mut of_node = vec![NONE; self.at_rest.world.len()];
+        for (at, node) in nodes.iter().enumerate().rev() {
+            of_node[*node as usize] = at as u32;
+        }
+        let known = settings.method == Method::Vectors && self.plan.surface;
+        let (mut node, mut slot) = (NONE, 0);
+        let mut owners: Vec<_> = instances
+            .iter()
+            .map(|instance| {
+                // Primitives of a node stand next to each other, in their order.
+                slot = if instance.node == node { slot + 1 } else { 0 };
+                node = instance.node;
+                let occluder = of_node.get(node as usize).copied().unwrap_or(NONE);
+                let mut owner = types::FivOwner { occluder, ..none };
+                // Stored vectors have all occluders, in their order.
+                let placed = self.occluders.placed.get(occluder as usize).filter(|_| known);
+                let Some(placed) = placed else { return owner };
+                let angle = self.angle(pose, node).filter(|_| !deforming.contains(&node));
+                let Some(angle) = angle else {
+                    return owner;
+                };
+                let (turn, next, blend) = turn::between(angle, self.plan.turns);
+                let mut first = self.plan.grid.count();
+                for own in &self.occluders.kinds[placed.kind as usize].own {
+                    if own.slot == slot {
+                        let at = |turn: u32, sample: u32| self.first_float(placed.kind, turn, sample);
+                        let back = first + own.corners;
+                        (owner.front, owner.front_next) = (at(turn, first), at(next, first));
+                        if own.backs {
+                            (owner.back, owner.back_next) = (at(turn, back), at(next, back));
+                        }
+                        owner.flipped = (instance.world_from_object.determinant() < 0.0).into();
+                        owner.blend = blend;
+                    }
+                    first += own.count();
+                }
+                owner
+            })
+            .collect();
+        owners.resize(owners.len().max(1), none);
+        owners
+    }
+
+    /// Where the vector of a sample of a turn of a kind begins.
+    fn first_float(&self, kind: u32, turn: u32, sample: u32) -> u32 {
+        let of_turn = self.plan.of_turn(&self.plan.occluders[kind as usize]) as u32;
+        (self.plan.first(kind as usize) as u32 + turn * of_turn + sample) * FIV_FLOATS
+    }
+
+    /// Nodes whose meshes may be another than when the vectors were computed.
+    pub(super) fn deforming(&self, pose: &Pose, instances: &[Instance]) -> HashSet<u32> {
+        let moved = *pose != self.at_rest;
+        instances.iter().filter(|instance| moved && instance.deformed).map(|instance| instance.node).collect()
+    }
+
+    /// Occluders that do not stand as their vectors were computed.
+    pub(super) fn turned(&self, scene: &Scene, pose: &Pose, instances: &[Instance]) -> Vec<Note> {
+        let deforming = self.deforming(pose, instances);
+        let what = |node: u32| match (self.angle(pose, node), deforming.contains(&node)) {
+            (_, true) => Some("deforms"),
+            (None, _) => Some("turns or changes its size"),
+            _ => None,
+        };
+        let found = self.occluders.placed.iter().filter_map(|placed| Some((placed.node, what(placed.node)?)));
+        found
+            .map(|(node, what)| Note {
+                kind: NoteKind::Approximated,
+                place: format!("nodes[{node}] ({})", scene.nodes[node as usize].name),
+                text: format!(
+                    "{what}; its shadow on others stays that of its pose at rest, and it has none on itself \
+                     (fiv.method=online follows it)"
+                ),
+            })
+            .collect()
+    }
+}
