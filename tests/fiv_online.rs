@@ -193,7 +193,7 @@ fn what_deforms_casts_the_shadow_of_its_moment() {
                 let frozen = frozen(&scene, &pose);
                 let same = Studio::new(gpu, &frozen, &before, None).irradiance(&around(3.0, 20), &before);
                 eprintln!("{file}, {seconds} s: {:.5} from vectors of the mesh as it is", nrmse(&same, &found));
-                assert!(nrmse(&same, &found) < 1e-2, "{file}, {seconds} s: {}", nrmse(&same, &found));
+                assert!(nrmse(&same, &found) < 2e-3, "{file}, {seconds} s: {}", nrmse(&same, &found));
                 (exact, found)
             });
             let [(first, found), (second, later)] = &pictures;
@@ -203,7 +203,7 @@ fn what_deforms_casts_the_shadow_of_its_moment() {
             let stale = nrmse(second, found);
             eprintln!("{file}: the truth changes by {changed:.4}, errors {errors:.4?}, of the other moment {stale:.4}");
             assert!(changed > 0.03, "{file}: nothing moves");
-            assert!(errors.iter().all(|e| *e < 0.12) && errors[1] < 0.9 * stale, "{file}: {errors:?} {stale}");
+            assert!(errors.iter().all(|e| *e < 0.05) && errors[1] < 0.9 * stale, "{file}: {errors:?} {stale}");
         }
     });
 }
