@@ -110,6 +110,19 @@ mod tests {
     }
 
     #[test]
+    fn what_is_squeezed_fills_what_its_surface_tells() {
+        let rest = Vec3::new(1.0, 2.0, 0.5);
+        let kind = Occluders::of(&cuboid(rest), &Pose::rest(&cuboid(rest)), false, 1.0).kinds.remove(0);
+        for squeeze in [Vec3::new(1.0, 0.3, 1.0), Vec3::new(0.2, 1.0, 3.0), Vec3::splat(0.7)] {
+            let (exact, radius) = of(&cuboid(rest * squeeze));
+            let size = kind.squeezed(&glam::Mat3::from_diagonal(squeeze)).unwrap();
+            let found = fill(&kind) * size.fill(&kind.size());
+            assert!((found / exact - 1.0).abs() < 0.05, "{squeeze}: {found} instead of {exact}");
+            assert!((size.radius / radius - 1.0).abs() < 1e-3, "{squeeze}: {} {radius}", size.radius);
+        }
+    }
+
+    #[test]
     fn silhouettes_have_a_quarter_of_the_surface_of_convex_bodies() {
         let (ball, _) = of(&builtin::load("furnace-sphere").unwrap());
         assert!((0.97..=1.0).contains(&ball), "{ball}");

@@ -191,13 +191,12 @@ pub(super) fn fits(gpu: &Gpu, plan: &Plan, placed: usize) -> Result<()> {
 /// # Errors
 /// `Runtime` with more than a shader can go through.
 fn turns(count: u32) -> Result<u32> {
-    let turns = count.saturating_mul(TURNS_EACH).saturating_add(count.div_ceil(32).max(1) + TURNS_CELLS);
-    if turns > MOST_TURNS {
-        let most = (MOST_TURNS - TURNS_CELLS) / (TURNS_EACH + 1);
+    let most = (MOST_TURNS - TURNS_CELLS) / (TURNS_EACH + 1);
+    if count > most {
         let what = format!("{count} occluders, at most {most} can have reflections");
         return Err(Error::new(ErrorKind::Runtime, what).at("fiv.specular").help("Join meshes into fewer nodes"));
     }
-    Ok(turns)
+    Ok(count.div_ceil(32).max(1) + TURNS_CELLS + count * TURNS_EACH)
 }
 
 fn shares(
