@@ -25,6 +25,7 @@
 //! - Surfaces may reflect the environment glossily ([`specular`]), and occluders may turn ([`turn`]).
 //! - More than two overlapping occluders: see [`crate::reference::fiv::shares`].
 
+mod body;
 pub mod cover;
 pub mod file;
 pub mod fill;

@@ -5,15 +5,14 @@ use std::collections::HashMap;
 use glam::{Mat3, Mat4, Vec3, Vec4};
 
 use super::{
+    body::{self, Body, Part, Size, is_unlit},
     hash::Hash,
     samples::Shells,
     support::Support,
     surface::{self, Own, Place},
 };
-use crate::scene::{AlphaMode, Material, Mesh, Node, Pose, Primitive, Scene, deform};
+use crate::scene::{AlphaMode, Material, Mesh, Node, Pose, Primitive, Scene};
 
-/// The first sphere is at least this part of the bounding sphere.
-const LEAST_FIRST: f32 = 0.1;
 /// Geometry is flat if it reaches this part of its radius out of a plane at most.
 const FLAT: f32 = 1e-4;
 
@@ -34,44 +33,6 @@ pub struct Occluder {
     pub own: Vec<Own>,
     /// Changes with the geometry.
     pub hash: u64,
-}
-
-/// What is measured of triangles around the origin.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Size {
-    /// Of the bounding sphere, metres.
-    pub radius: f32,
-    /// From the origin to the nearest surface, metres.
-    pub inner: f32,
-    /// Of all triangles, m².
-    pub area: f32,
-}
-
-impl Size {
-    /// `None` without a triangle that could be seen.
-    fn of(triangles: impl Iterator<Item = [Vec3; 3]>) -> Option<Self> {
-        let (mut radius, mut inner, mut area) = (0f32, f32::INFINITY, 0f64);
-        for triangle in triangles {
-            radius = triangle.iter().map(|p| p.length()).fold(radius, f32::max);
-            inner = inner.min(nearest(triangle));
-            let [a, b, c] = triangle;
-            area += f64::from(0.5 * (b - a).cross(c - a).length());
-        }
-        (radius.is_finite() && radius > 0.0).then_some(Self { radius, inner, area: area as f32 })
-    }
-
-    /// The spheres around it, as [`Occluder::shells`].
-    pub(super) fn shells(&self, reach: f32) -> Shells {
-        let nearest = self.inner.max(LEAST_FIRST * self.radius);
-        Shells { nearest, farthest: (reach * self.radius).max(1.01 * nearest) }
-    }
-
-    /// How much more of its bounding disc a body fills than when it had the size `rest`: convex bodies have silhouettes of a quarter of
-    /// their surface (Cauchy), and others are taken to overlap themselves as much as before.
-    pub(super) fn fill(&self, rest: &Self) -> f32 {
-        let more = (self.area / rest.area) * (rest.radius / self.radius).powi(2);
-        if more.is_finite() { more } else { 1.0 }
-    }
 }
 
 /// An occluder of a scene.
@@ -138,40 +99,24 @@ impl Occluders {
 impl Occluder {
     /// The occluder and its centre seen from the node's origin; `None` without a triangle that could stop light.
     pub(super) fn of_node(scene: &Scene, pose: &mut Pose, node: usize, mesh: &Mesh) -> Option<(Self, Vec3)> {
+        let Body { parts, centre, size } = Body::of(scene, pose, node, mesh)?;
         let (mut primitives, mut own): (Vec<Primitive>, Vec<Own>) = Default::default();
-        for (slot, primitive) in mesh.primitives.iter().enumerate().filter(|(_, p)| !is_unlit(scene, p)) {
-            // Without its place, so that the same things in different places are the same to the last bit.
-            let place = std::mem::replace(&mut pose.world[node].w_axis, Vec4::W);
-            let deform::Vertices { mut positions, normals, .. } = deform::world_vertices(scene, pose, node, primitive);
-            pose.world[node].w_axis = place;
-            if scene.nodes[node].skin.is_some() && !primitive.joints.is_empty() {
-                positions.iter_mut().for_each(|p| *p -= place.truncate());
-            }
-            let good =
-                |corner: &[u32]| corner.iter().all(|&i| positions.get(i as usize).is_some_and(|p| p.is_finite()));
-            let indices: Vec<u32> = primitive.indices.chunks_exact(3).filter(|c| good(c)).flatten().copied().collect();
-            if !indices.is_empty() {
-                let backs = scene.materials.get(primitive.material as usize).is_some_and(|m| m.double_sided);
-                own.push(Own { slot: slot as u32, corners: positions.len() as u32, backs });
-                primitives.push(Primitive {
-                    normals,
-                    tangents: vec![Vec4::ZERO; positions.len()],
-                    positions,
-                    uvs: primitive.uvs.clone(),
-                    colors: primitive.colors.clone(),
-                    indices,
-                    material: primitive.material,
-                    ..Primitive::default()
-                });
-            }
+        for Part { slot, positions, normals, indices } in parts {
+            let primitive = &mesh.primitives[slot];
+            let backs = scene.materials.get(primitive.material as usize).is_some_and(|m| m.double_sided);
+            own.push(Own { slot: slot as u32, corners: positions.len() as u32, backs });
+            primitives.push(Primitive {
+                normals,
+                tangents: vec![Vec4::ZERO; positions.len()],
+                positions,
+                uvs: primitive.uvs.clone(),
+                colors: primitive.colors.clone(),
+                indices,
+                material: primitive.material,
+                ..Primitive::default()
+            });
         }
-        let centre = bounding_centre(&primitives)?;
-        for primitive in &mut primitives {
-            for position in &mut primitive.positions {
-                *position -= centre;
-            }
-        }
-        let Size { radius, inner, area } = Size::of(primitives.iter().flat_map(corners))?;
+        let Size { radius, inner, area } = size;
         let triangles = primitives.iter().map(|p| p.indices.len() / 3).sum();
         let name = match scene.nodes[node].name.as_str() {
             "" if mesh.name.is_empty() => format!("node {node}"),
@@ -185,11 +130,8 @@ impl Occluder {
 
     /// How far it reaches along every direction.
     pub fn support(&self) -> Support {
-        let used = |p: &Primitive| p.indices.iter().map(|&i| p.positions[i as usize]).collect::<Vec<_>>();
-        let mut points: Vec<Vec3> = self.scene.meshes[0].primitives.iter().flat_map(used).collect();
-        points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)));
-        points.dedup();
-        Support::of(&points)
+        let primitives = self.scene.meshes[0].primitives.iter();
+        body::support(primitives.map(|p| (&p.positions[..], &p.indices[..])))
     }
 
     /// Places on its surface, those of [`Self::own`] one after the other.
@@ -203,7 +145,7 @@ impl Occluder {
 
     /// All triangles lie in one plane, nearly.
     pub fn is_flat(&self) -> bool {
-        let triangles = || self.scene.meshes[0].primitives.iter().flat_map(corners);
+        let triangles = || self.scene.meshes[0].primitives.iter().flat_map(of_primitive);
         let normal = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a);
         let Some(widest) = triangles().max_by(|a, b| normal(*a).length().total_cmp(&normal(*b).length())) else {
             return true;
@@ -215,7 +157,7 @@ impl Occluder {
     /// As `turn` squeezes it about its centre; `None` if nothing is left of it.
     pub(super) fn squeezed(&self, turn: &Mat3) -> Option<Size> {
         let squeezed = |corners: [Vec3; 3]| corners.map(|p| *turn * p);
-        Size::of(self.scene.meshes[0].primitives.iter().flat_map(corners).map(squeezed))
+        Size::of(self.scene.meshes[0].primitives.iter().flat_map(of_primitive).map(squeezed))
     }
 
     pub(super) fn size(&self) -> Size {
@@ -228,62 +170,8 @@ impl Occluder {
     }
 }
 
-/// Light passes unlit surfaces.
-fn is_unlit(scene: &Scene, primitive: &Primitive) -> bool {
-    scene.materials.get(primitive.material as usize).is_some_and(|material| material.unlit)
-}
-
-fn corners(primitive: &Primitive) -> impl Iterator<Item = [Vec3; 3]> + '_ {
-    primitive.indices.chunks_exact(3).map(|c| [0, 1, 2].map(|k| primitive.positions[c[k] as usize]))
-}
-
-/// Centre of a small sphere around all corners: Ritter's, which is at most a few percent too large.
-fn bounding_centre(primitives: &[Primitive]) -> Option<Vec3> {
-    let points = || primitives.iter().flat_map(|p| p.indices.iter().map(|&i| p.positions[i as usize].as_dvec3()));
-    let farthest =
-        |from: glam::DVec3| points().max_by(|a, b| a.distance_squared(from).total_cmp(&b.distance_squared(from)));
-    let start = farthest(points().next()?)?;
-    let end = farthest(start)?;
-    let (mut centre, mut radius) = (0.5 * (start + end), 0.5 * start.distance(end));
-    for p in points() {
-        let distance = p.distance(centre);
-        if distance > radius {
-            radius = 0.5 * (radius + distance);
-            centre += (p - centre) * ((distance - radius) / distance);
-        }
-    }
-    Some(centre.as_vec3())
-}
-
-/// Distance of the origin from a triangle.
-fn nearest([a, b, c]: [Vec3; 3]) -> f32 {
-    let (ab, ac) = (b - a, c - a);
-    // Regions of corners and edges (Ericson, Real-Time Collision Detection, 5.1.5).
-    let (d1, d2) = (-ab.dot(a), -ac.dot(a));
-    if d1 <= 0.0 && d2 <= 0.0 {
-        return a.length();
-    }
-    let (d3, d4) = (-ab.dot(b), -ac.dot(b));
-    if d3 >= 0.0 && d4 <= d3 {
-        return b.length();
-    }
-    let (d5, d6) = (-ab.dot(c), -ac.dot(c));
-    if d6 >= 0.0 && d5 <= d6 {
-        return c.length();
-    }
-    let (vc, vb, va) = (d1 * d4 - d3 * d2, d5 * d2 - d1 * d6, d3 * d6 - d5 * d4);
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        return (a + ab * (d1 / (d1 - d3))).length();
-    }
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        return (a + ac * (d2 / (d2 - d6))).length();
-    }
-    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
-        return (b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)))).length();
-    }
-    let whole = 1.0 / (va + vb + vc);
-    let inside = a + ab * (vb * whole) + ac * (vc * whole);
-    if inside.is_finite() { inside.length() } else { a.length().min(b.length()).min(c.length()) }
+fn of_primitive(primitive: &Primitive) -> impl Iterator<Item = [Vec3; 3]> + '_ {
+    body::corners(&primitive.positions, &primitive.indices)
 }
 
 /// A scene of these primitives; of their materials only what stops rays is kept.
@@ -382,7 +270,7 @@ fn hash(alone: &Scene, own: &[Own]) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{body::nearest, *};
     use crate::scene::builtin;
     use glam::Quat;
 

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use glam::{Mat3, Vec3};
 
 use super::{
-    Occluder, Occluders,
+    Occluders,
+    body::Body,
     samples::{Grid, Shells},
     support::{self, Support},
 };
@@ -67,8 +68,12 @@ impl Standing {
     pub fn of(stage: &Stage<'_>, pose: &Pose) -> Self {
         let mut found = Vec::new();
         let (mut sets, mut reaches, mut fills) = (BTreeMap::new(), Vec::new(), Vec::new());
+        // Measuring takes a place out for a while, and puts it back.
+        let mut lent = None;
         for (index, placed) in stage.occluders.placed.iter().enumerate() {
-            let Some(Stand { set, centre, turn, support, fill }) = stand(stage, pose, index) else { continue };
+            let Some(Stand { set, centre, turn, support, fill }) = stand(stage, (pose, &mut lent), index) else {
+                continue;
+            };
             let kinds = stage.occluders.kinds.len() as u32;
             let reach = match &support {
                 Some(_) => kinds + (reaches.len() / support::LENGTH) as u32,
@@ -127,7 +132,7 @@ struct Stand {
 }
 
 /// `None` where the occluder has no extent.
-fn stand(stage: &Stage<'_>, pose: &Pose, index: usize) -> Option<Stand> {
+fn stand(stage: &Stage<'_>, (pose, lent): (&Pose, &mut Option<Pose>), index: usize) -> Option<Stand> {
     let placed = stage.occluders.placed.get(index)?;
     let (shape, deforms) = stage.shapes[index];
     let node = placed.node as usize;
@@ -135,12 +140,13 @@ fn stand(stage: &Stage<'_>, pose: &Pose, index: usize) -> Option<Stand> {
     let place = world.w_axis.truncate();
     let kind = &stage.occluders.kinds[placed.kind as usize];
     if deforms {
-        let (occluder, centre) = measured(stage.scene, pose, node)?;
-        let (size, shells) = (occluder.size(), occluder.shells(stage.reach));
-        let set =
-            Set { shape, geometry_from_world: Mat3::IDENTITY, centre: place + centre, radius: size.radius, shells };
-        let (support, fill) = (Some(occluder.support()), size.fill(&kind.size()));
-        return Some(Stand { set, centre: place + centre, turn: Mat3::IDENTITY, support, fill });
+        let mesh = stage.scene.meshes.get(stage.scene.nodes.get(node)?.mesh? as usize)?;
+        let body = Body::of(stage.scene, lent.get_or_insert_with(|| pose.clone()), node, mesh)?;
+        let (size, centre) = (body.size, place + body.centre);
+        let (radius, shells) = (size.radius, size.shells(stage.reach));
+        let set = Set { shape, geometry_from_world: Mat3::IDENTITY, centre, radius, shells };
+        let (support, fill) = (Some(body.support()), size.fill(&kind.size()));
+        return Some(Stand { set, centre, turn: Mat3::IDENTITY, support, fill });
     }
     let (now, rest) = (Mat3::from_mat4(*world), stage.rest[index]);
     // Without a rounding where nothing turned.
@@ -162,12 +168,6 @@ fn stand(stage: &Stage<'_>, pose: &Pose, index: usize) -> Option<Stand> {
     };
     let set = Set { shape, geometry_from_world: back, centre: Vec3::ZERO, radius, shells };
     Some(Stand { set, centre: place + turn * placed.centre, turn, support: None, fill })
-}
-
-/// The occluder as a node has it in a pose, and its centre seen from the node's origin.
-fn measured(scene: &Scene, pose: &Pose, node: usize) -> Option<(Occluder, Vec3)> {
-    let mesh = scene.meshes.get(scene.nodes.get(node)?.mesh? as usize)?;
-    Occluder::of_node(scene, &mut pose.clone(), node, mesh)
 }
 
 /// The scale of a matrix that but turns, mirrors and scales evenly.

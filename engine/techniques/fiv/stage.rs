@@ -45,6 +45,8 @@ pub struct Fiv {
     gpu: Gpu,
     pub(super) occluders: Occluders,
     pub(super) plan: Plan,
+    /// [`Plan::firsts`]: looked up for each occluder of each frame.
+    pub(super) firsts: Vec<u64>,
     /// Vectors of all kinds, one after the other.
     pub(super) fivs: OwnedBuffer,
     /// How far all kinds reach ([`super::support`]), one after the other.
@@ -170,6 +172,7 @@ impl Fiv {
             runner,
             limited: gpu.loop_limit()?.is_some(),
             occluders,
+            firsts: plan.firsts(),
             plan,
             rays,
             online,

@@ -18,12 +18,13 @@ impl Fiv {
     /// The occluders with their vectors that were computed beforehand.
     pub(super) fn stored(&self, pose: &Pose, deforming: &HashSet<u32>) -> Standing {
         let grid = self.plan.grid;
+        let paces = self.firsts.last().map_or(0, |samples| *samples as u32 * FIV_FLOATS);
         let placed = self.occluders.placed.iter().map(|placed| {
             let kind = &self.plan.occluders[placed.kind as usize];
             let angle = self.angle(pose, placed.node);
             let turned = turn::rotation(angle.unwrap_or(0.0), self.plan.turn_axis);
             let (first, second, blend) = turn::between(angle.unwrap_or(0.0), self.plan.turns);
-            let pace = self.plan.samples() as u32 * FIV_FLOATS + placed.kind * (3 * FIV_PACE_KNOTS + grid.radii);
+            let pace = paces + placed.kind * (3 * FIV_PACE_KNOTS + grid.radii);
             types::FivOccluder {
                 centre: (pose.world[placed.node as usize].w_axis.truncate() + turned * placed.centre).to_array(),
                 radius: kind.radius,
@@ -111,7 +112,7 @@ impl Fiv {
     /// Where the vector of a sample of a turn of a kind begins.
     fn first_float(&self, kind: u32, turn: u32, sample: u32) -> u32 {
         let of_turn = self.plan.of_turn(&self.plan.occluders[kind as usize]) as u32;
-        (self.plan.first(kind as usize) as u32 + turn * of_turn + sample) * FIV_FLOATS
+        (self.firsts[kind as usize] as u32 + turn * of_turn + sample) * FIV_FLOATS
     }
 
     /// Nodes whose meshes may be another than when the vectors were computed.
