@@ -126,6 +126,23 @@ fn what_a_file_decides_may_be_asked_for_as_it_was_given() {
 }
 
 #[test]
+fn own_shadows_are_there_if_the_scene_was_made_with_them() {
+    with_gpu(|gpu| {
+        let (scene, view) = (ball_over_ground(), flat_view(Vec3::Y * 10.0, Vec3::ZERO, 3.0, [16, 16]));
+        let without = Settings { self_shadow: false, ..coarse() };
+        let mut studio = Studio::new(gpu, &scene, &without, None);
+        let around = u64::from(without.grid().count());
+        assert_eq!(studio.fiv.plan().samples(), around, "places on the surface are computed for nothing");
+        let error = studio.refused(&view, &coarse());
+        assert!(error.exit_code() == 2 && error.to_string().contains("fiv.self_shadow"), "{error}");
+        let found = studio.irradiance(&view, &without);
+        let mut studio = Studio::new(gpu, &scene, &coarse(), None);
+        assert!(studio.fiv.plan().samples() > around);
+        assert!(studio.irradiance(&view, &without) == found);
+    });
+}
+
+#[test]
 fn what_would_not_fit_is_refused_before_anything_is_computed() {
     with_gpu(|gpu| {
         let scene = ball_over_ground();

@@ -73,7 +73,8 @@ struct Pixels<'a> {
 impl Fiv {
     /// Declares a frame: G-buffer, irradiance, reflected light, sky. `handles` are of this graph, for `pose`. The settings that decide
     /// the vectors are those that [`Fiv::new`] was given. The parts of the method (`trilinear`, `partial`, `cut`, `extent`, `overlap`,
-    /// `shared`, `negligible`, `self_shadow`), the light (`rotation`, `exposure`) and [`Method::Unshadowed`] are chosen by each picture.
+    /// `shared`, `negligible`, `self_shadow`), the light (`rotation`, `exposure`) and [`Method::Unshadowed`] are chosen by each picture;
+    /// `self_shadow` of stored vectors can only be switched off.
     ///
     /// # Errors
     /// `Usage` if a setting is out of its range, or asks for what [`Fiv::new`] was not told of.

@@ -80,13 +80,14 @@ pub struct Plan {
 impl Plan {
     /// For these occluders under this environment.
     pub fn new(environment: &str, hash: u64, occluders: &[Occluder], settings: &Settings) -> Self {
+        let surface = settings.self_shadow && settings.on_surface();
         let kind = |o: &Occluder| Kind {
             name: o.name.clone(),
             hash: format!("{:016x}", o.hash),
             radius: o.radius,
             shells: o.shells(settings.reach),
             triangles: o.triangles as u64,
-            surface: if settings.on_surface() { o.own.iter().map(Own::count).sum() } else { 0 },
+            surface: if surface { o.own.iter().map(Own::count).sum() } else { 0 },
             paces: Paces::default(),
         };
         Self {
@@ -97,7 +98,7 @@ impl Plan {
             masks: settings.masks,
             reach: settings.reach,
             grid: settings.grid(),
-            surface: settings.on_surface(),
+            surface,
             turns: settings.turns,
             suns: settings.suns,
             turn_axis: settings.turn_axis,
@@ -137,7 +138,12 @@ impl Plan {
         let Grid { azimuths, polars, radii } = self.grid;
         let (size, split, masks, reach) = (self.size, self.split, self.masks, self.reach);
         let (turns, turn_axis, suns) = (self.turns, self.turn_axis, self.suns);
-        let self_samples = if self.surface { SelfSamples::Surface } else { SelfSamples::Spheres };
+        let self_samples = match (self.surface, over.self_shadow) {
+            (true, _) => SelfSamples::Surface,
+            (false, true) => SelfSamples::Spheres,
+            // It decides nothing.
+            (false, false) => over.self_samples,
+        };
         // Without an occluder nothing is decided.
         let adaptive = match self.occluders.is_empty() {
             true => over.adaptive,

@@ -33,6 +33,9 @@ impl Ready {
         if shadowed && asked.specular != Specular::Off && made.specular == Specular::Off {
             return self.refused("specular", asked);
         }
+        if shadowed && asked.self_shadow && !made.self_shadow && made.on_surface() {
+            return self.refused("self_shadow", asked);
+        }
         let (fixed, given) = (chosen(asked, made), chosen(&self.given, made));
         if fixed != *made && fixed != given {
             let other = differing(&fixed, &given)?;

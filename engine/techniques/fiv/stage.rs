@@ -108,6 +108,9 @@ impl Fiv {
             let what = format!("{} occluders, at most {MOST_OCCLUDERS} can be drawn", occluders.placed.len());
             return Err(Error::new(ErrorKind::Runtime, what).at("fiv").help("Join meshes into fewer nodes"));
         }
+        // What a file has is kept for pictures that ask for it.
+        let self_shadow = settings.self_shadow || stored.is_some_and(|stored| stored.plan.surface);
+        let settings = Settings { self_shadow, ..settings };
         let mut plan = Plan::new(name, light.hash, &occluders.kinds, &settings);
         let mut notes = notes(scene, &occluders, sky.repaired, settings.specular);
         notes.extend(light::unfiltered(gpu));

@@ -11,19 +11,8 @@ use serde_json::Value;
 use crate::config;
 
 /// Keys that decide pictures and no vectors.
-const OF_PICTURES: [&str; 11] = [
-    "trilinear",
-    "partial",
-    "cut",
-    "extent",
-    "overlap",
-    "negligible",
-    "shared",
-    "self_shadow",
-    "specular",
-    "method",
-    "turning",
-];
+const OF_PICTURES: [&str; 10] =
+    ["trilinear", "partial", "cut", "extent", "overlap", "negligible", "shared", "specular", "method", "turning"];
 
 /// The keys in which two settings differ, with the values of both.
 fn differences(a: &Settings, b: &Settings) -> Result<Vec<(String, Value, Value)>> {
