@@ -139,6 +139,13 @@ fn pictures_from_files_are_those_without_and_can_be_made_again() {
     asked("fiv.method=brute-force").expect(2, &["v.fiv", "fiv.method", "--vectors"]);
     asked("fiv.azimuths=6").expect(0, &[]);
     precompute(&env, &at("idle.fiv"), &["-D", "fiv.turning=30"]).expect(0, &["do not depend on fiv.turning"]);
+    // That they lie evenly is decided as well; lights are kept apart whatever method is named.
+    precompute(&env, &at("even.fiv"), &["-D", "fiv.adaptive=false"]).expect(0, &[]);
+    let even = ["--vectors", &at("even.fiv"), "-D", "fiv.adaptive=true"];
+    picture(&env, &at("e.exr"), &even).expect(2, &["even.fiv", "fiv.adaptive"]);
+    let suns = ["-D", "fiv.suns=1", "-D", "fiv.method=brute-force"];
+    precompute("point", &at("suns.fiv"), &suns).expect(0, &["do not depend on fiv.method"]);
+    picture("point", &at("f.exr"), &["--vectors", &at("suns.fiv")]).expect(0, &[]);
     let other = environment(folder.path(), "other.exr", 2.0);
     picture(&other, &at("c.exr"), &["--vectors", &vectors]).expect(3, &["v.fiv", "other light"]);
 }
