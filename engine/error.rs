@@ -82,6 +82,13 @@ impl Error {
         self
     }
 
+    /// The same of another kind: what is wrong with a call is wrong with a file where the file says it.
+    #[must_use]
+    pub fn of_kind(mut self, kind: ErrorKind) -> Self {
+        self.0.kind = kind;
+        self
+    }
+
     /// What the reader can do about it: a full sentence without its final full stop.
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Self {

@@ -92,6 +92,7 @@ fn run(args: &Render) -> Result<ExitCode> {
         technique,
         &args.common,
         &base,
+        PictureSettings::validate,
         |gpu, scene, settings| {
             by_file(settings)?;
             let resident = Resident::new(gpu, scene)?;

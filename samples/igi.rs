@@ -69,6 +69,7 @@ fn run(render: &Render) -> Result<ExitCode> {
         technique,
         &render.common,
         &base,
+        PictureSettings::validate,
         |gpu, scene, settings| {
             let resident = Resident::new(gpu, scene)?;
             let igi = Igi::new(gpu, scene, &resident, &settings.igi)?;
@@ -89,7 +90,13 @@ fn compose(
 ) -> Result<Shown> {
     let scene = resident.frame_in(graph, input.scene, input.pose);
     let view = input.view.fit_far(&scene.bounds());
-    let picture = igi.picture(graph, input.scene, input.pose, &scene, &view, settings)?;
+    // Nobody looks at indirect light then.
+    let direct = mode == Mode::Direct && !input.layers;
+    let served = PictureSettings {
+        igi: igi::Settings { indirect: settings.igi.indirect && !direct, ..settings.igi.clone() },
+        ..settings.clone()
+    };
+    let picture = igi.picture(graph, input.scene, input.pose, &scene, &view, &served)?;
     let out = picture.outputs;
     let shown = match mode {
         Mode::Igi => Shown::new(out.total),
@@ -105,6 +112,7 @@ fn compose(
     Ok(gbuffer_layers::add(shown, &picture.gbuffer, &view).seen_by(view).noting(igi::notes(
         input.scene,
         resident.notes(),
-        &settings.igi,
+        settings,
+        input.frames,
     )))
 }

@@ -85,6 +85,7 @@ fn run(render: &Render) -> Result<ExitCode> {
         technique,
         &render.common,
         &base,
+        PictureSettings::validate,
         |gpu, scene, _| {
             let ambient = scene.environment.as_ref().map(Irradiance::of).unwrap_or_default();
             Ok((Resident::new(gpu, scene)?, ambient))

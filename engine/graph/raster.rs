@@ -1,6 +1,7 @@
 //! What a raster pass draws, onto what, with which fixed-function state.
 
 use super::handles::{Buffer, Image};
+use std::sync::Arc;
 
 /// What happens to a colour target before drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -288,7 +289,7 @@ pub struct IndexedCall {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum DrawKind {
     Calls(Vec<DrawCall>),
-    Indexed { indices: Buffer, calls: Vec<IndexedCall> },
+    Indexed { indices: Buffer, calls: Arc<[IndexedCall]> },
     Indirect { commands: Buffer, count: u32 },
     IndexedIndirect { indices: Buffer, commands: Buffer, count: u32 },
 }
@@ -340,9 +341,9 @@ impl Draw {
         Self::new(DrawKind::Calls(calls))
     }
 
-    /// Several draws in this order with 32-bit indices from `indices`.
-    pub fn indexed(indices: Buffer, calls: Vec<IndexedCall>) -> Self {
-        Self::new(DrawKind::Indexed { indices, calls })
+    /// Several draws in this order with 32-bit indices from `indices`. Passes that draw the same share an `Arc` of the calls.
+    pub fn indexed(indices: Buffer, calls: impl Into<Arc<[IndexedCall]>>) -> Self {
+        Self::new(DrawKind::Indexed { indices, calls: calls.into() })
     }
 
     /// `count` draws whose parameters (`VkDrawIndirectCommand`, 16 bytes: vertices, instances, first vertex, first

@@ -208,7 +208,7 @@ fn draw_slot(graph: &mut Graph, scene: &Handles, layer: Image, slot: &types::Sha
         push: opaque::Push { clip_from_world },
     };
     let (solid, holed): (Vec<_>, Vec<_>) = batches.list.iter().partition(|b| b.cutout == Cutout::Opaque);
-    let calls = solid.iter().flat_map(|b| b.calls.iter().copied()).collect();
+    let calls: Vec<_> = solid.iter().flat_map(|b| b.calls.iter().copied()).collect();
     let targets = |load| Targets::new().depth(layer, load);
     let draw = Draw::indexed(scene.indices, calls);
     graph.raster(targets(Depth::Clear(0.0)), state, args, draw).named(name);
@@ -225,7 +225,7 @@ fn draw_slot(graph: &mut Graph, scene: &Handles, layer: Image, slot: &types::Sha
         scene_textures: scene.textures,
         push: cutout::Push { clip_from_world },
     };
-    let calls = holed.iter().flat_map(|b| b.calls.iter().copied()).collect();
+    let calls: Vec<_> = holed.iter().flat_map(|b| b.calls.iter().copied()).collect();
     let draw = Draw::indexed(scene.indices, calls);
     graph.raster(targets(Depth::Keep), state, args, draw).named(format!("{name}.cutout"));
 }

@@ -32,6 +32,26 @@ impl SettingsArgs {
     pub fn effective<S: Serialize + DeserializeOwned>(&self, base: &S) -> Result<S> {
         effective(base, self.file.as_deref(), &self.define)
     }
+
+    /// What `check` says of settings; what it says of those of the file alone is an error of the file. `of_file`: `check` of the
+    /// settings in effect without `-D`.
+    ///
+    /// # Errors
+    /// Those of `check`; of kind `Input` and with the file's name where the file says it.
+    pub fn blamed(&self, checked: Result<()>, of_file: impl FnOnce() -> Result<()>) -> Result<()> {
+        checked.map_err(|error| {
+            let Some(path) = &self.file else { return error };
+            match of_file() {
+                Err(own) if own.to_string() == error.to_string() => error.of_kind(ErrorKind::Input).in_file(path),
+                _ => error,
+            }
+        })
+    }
+
+    /// The same without `-D`.
+    pub fn file_alone(&self) -> Self {
+        Self { define: Vec::new(), ..self.clone() }
+    }
 }
 
 /// Largest settings file that is read, bytes.

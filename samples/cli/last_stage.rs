@@ -32,11 +32,21 @@ const GREY: f32 = 18.0;
 const GROUP: &str = "tonemap";
 
 impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
-    /// The settings in effect over `base`.
+    /// The settings in effect over `base`, of which `check` must have nothing to say.
     ///
     /// # Errors
-    /// `Usage` or `Input`, naming the key.
-    pub fn effective(args: &SettingsArgs, base: &S) -> Result<Self> {
+    /// `Usage` or, with the file's name, `Input`, naming the key.
+    pub fn effective(args: &SettingsArgs, base: &S, check: impl Fn(&S) -> Result<()>) -> Result<Self> {
+        let checked = |settings: &Self| {
+            check(&settings.technique)?;
+            settings.tonemap.as_ref().map_or(Ok(()), |tonemap| tonemap.validate().map_err(|error| error.at(GROUP)))
+        };
+        let settings = Self::unchecked(args, base)?;
+        args.blamed(checked(&settings), || checked(&Self::unchecked(&args.file_alone(), base)?))?;
+        Ok(settings)
+    }
+
+    fn unchecked(args: &SettingsArgs, base: &S) -> Result<Self> {
         let asked = args.define.iter().any(|define| define.starts_with("tonemap."));
         let in_file = |text: String| text.parse::<toml::Table>().is_ok_and(|table| table.contains_key(GROUP));
         // What is wrong with the file is told below, with its name.
@@ -55,9 +65,6 @@ impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
             {
                 settings = other;
             }
-        }
-        if let Some(tonemap) = &settings.tonemap {
-            tonemap.validate().map_err(|error| error.at(GROUP))?;
         }
         Ok(settings)
     }
@@ -116,7 +123,11 @@ mod tests {
 
     fn with(defines: &[&str]) -> Result<Staged<PictureSettings>> {
         let define = defines.iter().map(|&d| d.to_owned()).collect();
-        Staged::effective(&SettingsArgs { define, ..SettingsArgs::default() }, &PictureSettings::default())
+        Staged::effective(
+            &SettingsArgs { define, ..SettingsArgs::default() },
+            &PictureSettings::default(),
+            PictureSettings::validate,
+        )
     }
 
     #[test]
@@ -127,11 +138,37 @@ mod tests {
         let both = with(&["tonemap.operator=agx", "tonemap.exposure=0.1", "isr.samples=24"]).unwrap();
         let tonemap = both.tonemap.as_ref().unwrap();
         assert_eq!((tonemap.operator, tonemap.exposure, both.technique.isr.samples), (Operator::Agx, 0.1, 24));
-        for bad in ["tonemap.operater=agx", "tonemap.operator=fattal", "isr.sampels=3", "tonemap.radius=99"] {
+        for bad in
+            ["tonemap.operater=agx", "tonemap.operator=fattal", "isr.sampels=3", "tonemap.radius=99", "isr.samples=25"]
+        {
             let error = with(&[bad]).unwrap_err();
             assert_eq!(error.exit_code(), 2, "{bad}: {error}");
         }
         assert!(with(&["isr.sampels=3"]).unwrap_err().to_string().contains("isr.samples"));
+    }
+
+    #[test]
+    fn what_is_wrong_in_a_file_is_the_files_fault() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("s.toml");
+        let told = |text: &str, defines: &[&str]| {
+            std::fs::write(&file, text).unwrap();
+            let define = defines.iter().map(|&d| d.to_owned()).collect();
+            let args = SettingsArgs { define, file: Some(file.clone()), ..SettingsArgs::default() };
+            let settings = Staged::effective(&args, &PictureSettings::default(), PictureSettings::validate);
+            settings.map(|_| ()).map_err(|error| (error.exit_code(), error.to_string()))
+        };
+        for (text, key) in [("[isr]\nbounces = 9", "isr.bounces: 9"), ("[tonemap]\nradius = 99", "tonemap.radius: 99")]
+        {
+            let (code, error) = told(text, &["isr.layers=2"]).unwrap_err();
+            assert!(code == 3 && error.contains(&format!("s.toml: {key}")), "{code} {error}");
+        }
+        // Mended or spoilt by -D, which wins.
+        told("[isr]\nbounces = 9", &["isr.bounces=2"]).unwrap();
+        for text in ["[isr]\nbounces = 2", "[isr]\nbounces = 9"] {
+            let (code, error) = told(text, &["isr.bounces=8"]).unwrap_err();
+            assert!(code == 2 && error.starts_with("isr.bounces: 8"), "{code} {error}");
+        }
     }
 
     #[test]
@@ -156,6 +193,7 @@ mod tests {
         let file = folder.path().join("s.toml");
         std::fs::write(&file, config::to_toml(&settings).unwrap()).unwrap();
         let args = SettingsArgs { file: Some(file), ..SettingsArgs::default() };
-        assert_eq!(Staged::effective(&args, &PictureSettings::default()).unwrap(), settings);
+        let read = Staged::effective(&args, &PictureSettings::default(), PictureSettings::validate).unwrap();
+        assert_eq!(read, settings);
     }
 }

@@ -41,13 +41,17 @@ pub struct Input<'a> {
     pub pose: &'a Pose,
     pub view: &'a View,
     pub frame: u32,
+    /// Frames of the run.
+    pub frames: u32,
     /// Time of the frame.
     pub seconds: f64,
+    /// More than the picture is looked at: its layers are written, images of the graph shown or dumped, its passes listed.
+    pub layers: bool,
 }
 
 /// Runs `render` for one technique.
 ///
-/// `base` are the settings to start from; `prepare` makes what lives as long as the run; `compose` declares one frame.
+/// `base` are the settings to start from; `check` says whether those in effect are in their ranges, before anything else is done; `prepare` makes what lives as long as the run; `compose` declares one frame.
 ///
 /// # Errors
 /// Whatever fails, with the kind that decides the exit code.
@@ -55,12 +59,13 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
     technique: Technique,
     args: &RenderArgs,
     base: &S,
+    check: impl Fn(&S) -> Result<()>,
     prepare: impl FnOnce(&Gpu, &Scene, &S) -> Result<R>,
     mut compose: impl FnMut(&mut Graph, &mut R, &Input<'_>, &S) -> Result<Shown>,
 ) -> Result<ExitCode> {
     let started = Instant::now();
     let console = args.talk.console();
-    let staged = Staged::effective(&args.settings, base)?;
+    let staged = Staged::effective(&args.settings, base, check)?;
     if args.settings.print_config {
         console::print(config::to_toml(&staged)?.trim_end())?;
         return Ok(ExitCode::SUCCESS);
@@ -78,6 +83,8 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
     let uploaded = started.elapsed();
     run.phases = vec![("load", loaded), ("device", opened - loaded), ("upload", uploaded - opened)];
 
+    let all = run.outputs.wants_layers() || args.view.is_some() || args.dump.is_some() || args.list_passes;
+    let frames = run.frames.len() as u32;
     let mut runner = Runner::new(&gpu);
     let mut progress = Progress::new(args.progress, console.is_quiet(), run.frames.len() as u64);
     for frame in run.frames.clone() {
@@ -91,7 +98,8 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
         let (pose, view) = run.stage.at(seconds, args.stage.size);
         let mut graph = Graph::new(technique.name);
         (graph.frame, graph.seed) = (frame, args.seed);
-        let input = Input { gpu: &gpu, scene: &run.stage.scene, pose: &pose, view: &view, frame, seconds };
+        let input =
+            Input { gpu: &gpu, scene: &run.stage.scene, pose: &pose, view: &view, frame, frames, seconds, layers: all };
         let mut shown = compose(&mut graph, &mut resources, &input, &settings)?;
         shown.develop(|picture| last.frame(&mut graph, picture, (1.0 / args.fps) as f32))?;
         if args.list_passes {
@@ -130,7 +138,16 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
             let begun = Instant::now();
             let mut graph = Graph::new(technique.name);
             (graph.frame, graph.seed) = (frame, args.seed);
-            let input = Input { gpu: &gpu, scene: &run.stage.scene, pose: &pose, view: &view, frame, seconds };
+            let input = Input {
+                gpu: &gpu,
+                scene: &run.stage.scene,
+                pose: &pose,
+                view: &view,
+                frame,
+                frames,
+                seconds,
+                layers: all,
+            };
             let mut shown = compose(&mut graph, &mut resources, &input, &settings)?;
             // No time passes, so that adaptation stays as it is.
             shown.develop(|picture| last.frame(&mut graph, picture, 0.0))?;

@@ -15,7 +15,7 @@ fn igi(more: &[&str]) -> support::Ran {
 #[test]
 fn wrong_settings_are_refused_and_named() {
     for (arguments, part) in [
-        (&["-D", "igi.vpls=0"][..], "1 to 10000"),
+        (&["-D", "igi.vpls=0"][..], "2 to 10000"),
         (&["-D", "igi.bounces=9"], "1 to 8"),
         (&["-D", "igi.downsample=5"], "1 to 4"),
         (&["-D", "igi.bound=-1"], "0 to 1"),
@@ -28,6 +28,15 @@ fn wrong_settings_are_refused_and_named() {
     ] {
         igi(arguments).expect(2, &[part]);
     }
+    // Before anything is read, and also where they are only to be printed.
+    let before = ["render", "no-such.glb", "-D", "igi.vpls=0"];
+    ran(command(env!("CARGO_BIN_EXE_igi")).args(before)).expect(2, &["igi.vpls: 0", "2 to 10000"]);
+    igi(&["--print-config", "-D", "background=[0.0,-1.0,0.0]"]).expect(2, &["background[1]: -1", "not below 0"]);
+    // In a file: its name, and the code of wrong input.
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("s.toml");
+    std::fs::write(&file, "[igi]\nvpls = 0\n").unwrap();
+    igi(&["--settings", file.to_str().unwrap()]).expect(3, &["s.toml: igi.vpls: 0", "2 to 10000"]);
     let shown = igi(&["--paper", "--print-config"]).expect(0, &[]).stdout;
     for line in ["downsample = 4", "interleave = 3", "imperfect = true", "candidates = 1"] {
         assert!(shown.contains(line), "{line} is not in {shown}");
@@ -104,7 +113,20 @@ fn what_is_not_shown_is_said() {
 
 #[test]
 fn too_many_lights_for_maps_are_refused_and_the_most_named() {
-    if device() {
-        igi(&["-D", "igi.visibility=raster", "-D", "igi.vpls=5000"]).expect(2, &["igi.vpls", "at most 2048"]);
+    igi(&["-D", "igi.visibility=raster", "-D", "igi.vpls=5000"]).expect(2, &["igi.vpls: 5000", "2 to 2048"]);
+}
+
+#[test]
+fn direct_light_alone_gathers_nothing_unless_layers_are_written() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    for (picture, times, gathers) in [("a.png", "a.csv", false), ("b.exr", "b.csv", true)] {
+        let more = ["--mode", "direct", "-D", "igi.vpls=8", "-o", &at(picture), "--timings", &at(times)];
+        igi(&more).expect(0, &[]);
+        let passes = std::fs::read_to_string(at(times)).unwrap();
+        assert!(passes.contains("igi.direct") && passes.contains("igi.gather") == gathers, "{picture}: {passes}");
     }
 }

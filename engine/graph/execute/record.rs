@@ -322,7 +322,7 @@ impl Recorder<'_> {
                 DrawKind::Indexed { indices, calls } => {
                     let buffer = self.raw_buffer(*indices)?;
                     device.cmd_bind_index_buffer(raw, buffer, indices.offset, vk::IndexType::UINT32);
-                    for c in calls {
+                    for c in calls.iter() {
                         device.cmd_draw_indexed(
                             raw,
                             c.indices,

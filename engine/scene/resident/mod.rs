@@ -178,10 +178,10 @@ impl Resident {
             notes.push(note("textures", format!("{} resized to share array images", packing.resampled)));
         }
         if scene.materials.iter().any(|m| m.transmission > 0.0) {
-            notes.push(note("materials", "surfaces with transmission are drawn opaque"));
+            notes.push(note("materials", told::TRANSMISSION));
         }
         if scene.environment.iter().flat_map(|e| &e.pixels).any(|p| p.max_element() > BRIGHTEST) {
-            notes.push(note("environment", format!("radiance over {BRIGHTEST} is cut there")));
+            notes.push(note("environment", told::BRIGHT_SKY));
         }
         let materials: Vec<types::Material> = scene.materials.iter().map(|m| material::material(m, &packing)).collect();
         let mut bytes = 0;
@@ -385,9 +385,16 @@ fn items(
         }
     }
     if blended {
-        notes.push(note("materials", "alpha blending is dithered: each pixel shows one surface"));
+        notes.push(note("materials", told::BLENDING));
     }
     Ok(items)
+}
+
+/// Notes that a technique may have to replace, for what they say holds for the rasteriser and not for rays.
+pub(crate) mod told {
+    pub(crate) const TRANSMISSION: &str = "surfaces with transmission are drawn opaque";
+    pub(crate) const BLENDING: &str = "alpha blending is dithered: each pixel shows one surface";
+    pub(crate) const BRIGHT_SKY: &str = "radiance over 65504 is cut there";
 }
 
 fn note(place: impl Into<String>, text: impl Into<String>) -> Note {

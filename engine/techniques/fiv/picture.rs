@@ -40,6 +40,14 @@ pub struct PictureSettings {
     pub gbuffer: gbuffer::Settings,
 }
 
+impl PictureSettings {
+    /// # Errors
+    /// `Usage`, naming the key with its group, the value found and the values allowed.
+    pub fn validate(&self) -> Result<()> {
+        self.fiv.validate().map_err(|error| error.at("fiv"))
+    }
+}
+
 /// Images of a frame, at full resolution.
 #[derive(Clone, Copy, Debug)]
 pub struct Outputs {

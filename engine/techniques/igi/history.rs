@@ -288,7 +288,7 @@ pub fn motion_of(graph: &mut Graph, handles: &Handles, g: &GBuffer, view: &View)
     let frustum = Frustum::new(view);
     let batches = Batches::new(&handles.moment, Some(&frustum), view.position);
     let visible = batches.visible_buffer(graph, "igi.visible");
-    let calls = batches.list.iter().flat_map(|batch| batch.calls.iter().copied()).collect();
+    let calls: Vec<_> = batches.list.iter().flat_map(|batch| batch.calls.iter().copied()).collect();
     let args = motion::Args {
         view: g.view,
         instances: handles.instances,

@@ -1,9 +1,10 @@
 //! What instant global illumination shows of a scene by something simpler, or not at all.
 
-use super::{Pattern, Settings, Visibility};
+use super::{PictureSettings, Settings, Visibility};
 use crate::{
+    passes::gbuffer::Blended,
     reference::tracer::tables,
-    scene::{AlphaMode, Material, Note, NoteKind, Scene},
+    scene::{AlphaMode, Environment, Material, Note, NoteKind, Scene, resident::told},
 };
 
 /// Names of materials in a note at most.
@@ -11,12 +12,12 @@ const NAMED: usize = 3;
 /// Emission of the G-buffer is cut there, W/(sr·m²).
 const BRIGHTEST: f32 = 65504.0;
 
-/// What of a scene these settings cannot serve. `of_device`: [`Resident::notes`](crate::scene::resident::Resident::notes).
-pub fn notes(scene: &Scene, of_device: &[Note], settings: &Settings) -> Vec<Note> {
-    // What the rasteriser says of glass does not hold here, and what it says of blending is said below.
-    let other = |note: &&Note| {
-        note.place != "materials" || !(note.text.contains("transmission") || note.text.contains("blending"))
-    };
+/// What of a scene these settings cannot serve, and what of the settings does nothing. `of_device`:
+/// [`Resident::notes`](crate::scene::resident::Resident::notes). `frames`: pictures of the sequence, 1 for one alone.
+pub fn notes(scene: &Scene, of_device: &[Note], settings: &PictureSettings, frames: u32) -> Vec<Note> {
+    let PictureSettings { igi: settings, gbuffer, .. } = settings;
+    // What the rasteriser says of glass does not hold here; what it says of blending and of a bright sky is said below.
+    let other = |note: &&Note| ![told::TRANSMISSION, told::BLENDING, told::BRIGHT_SKY].contains(&note.text.as_str());
     let mut out: Vec<Note> = of_device.iter().filter(other).cloned().collect();
     let mut say = |kind: NoteKind, which: &dyn Fn(&Material) -> bool, text: &str| {
         if let Some(place) = places(scene, which) {
@@ -27,11 +28,18 @@ pub fn notes(scene: &Scene, of_device: &[Note], settings: &Settings) -> Vec<Note
     let glass = |m: &Material| m.transmission > 0.0 && !m.unlit;
     let mirror = |m: &Material| m.is_mirror() && !m.unlit;
     use NoteKind::{Approximated, Ignored};
-    say(
-        Approximated,
-        &|m| m.alpha == AlphaMode::Blend,
-        "alpha blending is by chance: a pixel or a ray meets the surface or passes it",
-    );
+    let blended = match gbuffer.blended {
+        Blended::Dithered => "alpha blending is by chance: a pixel or a ray meets the surface or passes it",
+        Blended::Threshold => {
+            "alpha blending is by threshold for the camera alone (gbuffer.blended); rays meet the surface or pass it by chance: shadows, \
+             indirect light, mirrors"
+        }
+        Blended::Hidden => {
+            "alpha blending is hidden from the camera alone (gbuffer.blended); rays meet the surface or pass it by chance: shadows, \
+             indirect light, mirrors"
+        }
+    };
+    say(Approximated, &|m| m.alpha == AlphaMode::Blend, blended);
     if specular {
         say(Ignored, &glass, "lamps do not shine through glass: it casts the shadow of an opaque surface");
         say(Approximated, &|m| glass(m) && m.roughness >= 0.05, "rough glass is shown smooth");
@@ -64,73 +72,135 @@ pub fn notes(scene: &Scene, of_device: &[Note], settings: &Settings) -> Vec<Note
     let burns = |number: u32| {
         scene.lights.get(number as usize).is_some_and(|light| (light.color * light.intensity).max_element() > 0.0)
     };
-    let shines = scene.nodes.iter().any(|node| node.light.is_some_and(burns))
-        || places(scene, &|m| m.emissive.max_element() > 0.0 || m.unlit).is_some()
-        || scene.environment.as_ref().is_some_and(|e| e.scale > 0.0 && !e.pixels.is_empty());
-    if !shines && !scene.meshes.is_empty() {
+    let lit = scene.nodes.iter().any(|node| node.light.is_some_and(burns))
+        || places(scene, &|m| m.emissive.max_element() > 0.0 && !m.unlit).is_some()
+        || scene.environment.as_ref().is_some_and(shines);
+    // Where all is unlit there is nothing to shine on.
+    if !lit && places(scene, &|m| !m.unlit).is_some() {
         let text = "nothing shines: there is no light, no emissive surface, no environment".to_owned();
         out.push(Note { kind: Ignored, place: "scene".into(), text });
     }
-    out.extend(unused(scene, settings));
+    if of_device.iter().any(|note| note.text == told::BRIGHT_SKY) {
+        let text =
+            "radiance over 65504 W/(sr m²) is cut there where it is seen directly, not where it lights and in mirrors";
+        out.push(Note { kind: Approximated, place: "environment".into(), text: text.to_owned() });
+    }
+    out.extend(unused(scene, settings, frames));
     out
 }
 
-/// Settings that were chosen and do nothing, with what they need.
-fn unused(scene: &Scene, s: &Settings) -> Vec<Note> {
-    let plain = Settings::default();
-    let mut out = Vec::new();
-    let mut say = |key: &str, idle: bool, text: String| {
-        if idle {
-            out.push(Note { kind: NoteKind::Ignored, place: format!("igi.{key}"), text });
-        }
+/// A setting: its key; whether it was chosen; what it needs to do something, if that is missing.
+type Use = (&'static str, bool, Option<String>);
+
+/// Settings that were chosen and do nothing, with what they need. `frames` as in [`notes`].
+fn unused(scene: &Scene, s: &Settings, frames: u32) -> Vec<Note> {
+    let ignored = |key: &str, text: String| Note { kind: NoteKind::Ignored, place: format!("igi.{key}"), text };
+    let idle = |(key, chosen, missing): Use| {
+        missing.filter(|_| chosen).map(|what| ignored(key, format!("does nothing: it needs {what}")))
     };
-    let needs = |what: &str| format!("does nothing: it needs {what}");
-    if s.cache > 0.0 && s.specular && !tables::has_sharp(scene) {
-        say("cache", true, needs("mirrors or glass, and the scene has none"));
-    }
-    say("cache", s.cache > 0.0 && !s.specular, needs("specular = true"));
-    say("cache_cells", s.cache_cells != plain.cache_cells && s.cache == 0.0, needs("cache above 0"));
-    say("specular_depth", s.specular_depth != plain.specular_depth && !s.specular, needs("specular = true"));
+    let mut out: Vec<Note> = of_all_light(scene, s).into_iter().filter_map(idle).collect();
+    let of_indirect = of_indirect_light(scene, s, frames);
     if !s.indirect {
+        let chosen: Vec<&str> = of_indirect.into_iter().filter(|(_, chosen, _)| *chosen).map(|(key, ..)| key).collect();
+        if !chosen.is_empty() {
+            out.push(ignored("indirect", format!("with indirect = false these do nothing: {}", chosen.join(", "))));
+        }
         return out;
     }
-    let upsamples = s.downsample > 1 || (s.fused && s.interleave > 1);
-    let joins = s.interleave > 1 && !s.fused;
-    let smooths = s.smoothing > 0 || s.despeckle > 0.0;
-    let sparse = || needs("downsample above 1, or fused = true with interleave above 1");
-    say("judges", s.judges != plain.judges && s.candidates == 1, needs("candidates above 1"));
-    say("proposals", s.proposals != plain.proposals && s.picks == 0, needs("picks above 0"));
-    let lights = s.paths() * s.bounces;
-    let few = s.picks > 0 && !s.picks_from(lights);
-    let more = format!("vpls above {}, four for each pick; from {lights} all are gathered", 4 * s.picks);
-    say("picks", few, needs(&more));
-    say("compensation", s.compensation > 0 && s.bound == 0.0, needs("bound above 0, which takes light"));
-    say("scattered", s.scattered && s.downsample == 1, needs("downsample above 1"));
-    say("fused", s.fused && s.interleave == 1, needs("interleave above 1"));
-    say("pattern", s.pattern == Pattern::Irregular && s.interleave == 1, needs("interleave above 1"));
-    let subsets = s.interleave * s.interleave;
-    if subsets > lights && (s.picks == 0 || few) {
+    out.extend(of_indirect.into_iter().filter_map(idle));
+    if s.sorted && (s.picks > 0 || s.compensates()) {
+        out.push(ignored("sorted", "does nothing: with picks or compensation virtual lights are sorted anyway".into()));
+    }
+    let (lights, subsets) = (s.paths() * s.bounces, s.interleave * s.interleave);
+    if subsets > lights && !s.picks_from(lights) {
         let least = subsets.next_multiple_of(s.bounces.max(1));
         let none = subsets - lights;
         let text = format!(
             "{subsets} subsets share {lights} virtual lights: pixels of {none} of them gather from none; vpls = {least} is the least for one each"
         );
-        say("interleave", true, text);
+        out.push(ignored("interleave", text));
     }
-    say("refine", s.refine > 0.0 && !upsamples, sparse());
-    say("upsample_sigma", s.upsample_sigma != plain.upsample_sigma && !upsamples, sparse());
-    let weighs = upsamples || smooths;
-    say("upsample_normal", s.upsample_normal != plain.upsample_normal && !weighs, sparse());
-    say("upsample_range", s.upsample_range != plain.upsample_range && !weighs, sparse());
-    let apart = || needs("interleave above 1 without fused");
-    say("discontinuity_depth", s.discontinuity_depth != plain.discontinuity_depth && !joins, apart());
-    say("discontinuity_normal", s.discontinuity_normal != plain.discontinuity_normal && !joins, apart());
-    let past = || needs("history above 1");
-    say("history_lag", s.history_lag != plain.history_lag && s.history < 2, past());
-    say("history_range", s.history_range != plain.history_range && s.history < 2, past());
-    let maps = s.visibility == Visibility::Raster;
-    say("raster_size", s.raster_size != plain.raster_size && !maps, needs("visibility = \"raster\""));
     out
+}
+
+/// What something needs that is not there.
+fn unless(there: bool, what: &str) -> Option<String> {
+    (!there).then(|| what.to_owned())
+}
+
+/// Key, and whether it was chosen.
+macro_rules! chosen {
+    ($settings:ident . $key:ident) => {
+        (stringify!($key), $settings.$key != Settings::default().$key)
+    };
+}
+
+/// Uses of settings, each with what it needs.
+macro_rules! uses {
+    ($settings:ident, $($key:ident: $missing:expr,)*) => {
+        vec![$({ let (key, chosen) = chosen!($settings.$key); (key, chosen, $missing) },)*]
+    };
+}
+
+/// What has to do with direct light or with mirrors.
+fn of_all_light(scene: &Scene, s: &Settings) -> Vec<Use> {
+    let sharp = || unless(tables::has_sharp(scene), "mirrors or glass, and the scene has none");
+    let lit = scene.environment.as_ref().is_some_and(shines)
+        || places(scene, &|m| m.emissive.max_element() > 0.0 && !m.unlit).is_some();
+    uses!(s,
+        specular_depth: unless(s.specular, "specular = true").or_else(sharp),
+        direct_samples: unless(lit, "emissive surfaces or an environment, and the scene has none"),
+    )
+}
+
+/// What does nothing without indirect light.
+fn of_indirect_light(scene: &Scene, s: &Settings, frames: u32) -> Vec<Use> {
+    let lights = s.paths() * s.bounces;
+    let sparse = || unless(s.upsamples(), "downsample above 1, or fused = true with interleave above 1");
+    let weighs = || if s.smooths() { None } else { sparse() };
+    let tiles = || unless(s.interleave > 1, "interleave above 1");
+    let apart = || unless(s.joins(), "interleave above 1 without fused");
+    let past = || unless(s.history > 1, "history above 1");
+    let sharp = || unless(tables::has_sharp(scene), "mirrors or glass, and the scene has none");
+    let many = format!("vpls above {}, four for each pick; from {lights} all are gathered", 4 * s.picks);
+    let mut out = uses!(s,
+        vpls: None,
+        candidates: None,
+        bounces: None,
+        judges: unless(s.candidates > 1, "candidates above 1"),
+        bound: None,
+        picks: unless(s.picks_from(lights), &many),
+        proposals: unless(s.picks > 0, "picks above 0"),
+        compensation: unless(s.bound > 0.0, "bound above 0, which takes light"),
+        cache: unless(s.specular, "specular = true").or_else(sharp),
+        cache_cells: unless(s.cache > 0.0, "cache above 0"),
+        imperfect: None,
+        downsample: None,
+        scattered: unless(s.downsample > 1, "downsample above 1"),
+        interleave: None,
+        pattern: tiles(),
+        sorted: tiles(),
+        fused: tiles(),
+        smoothing: None,
+        despeckle: None,
+        refine: sparse(),
+        upsample_sigma: sparse(),
+        upsample_normal: weighs(),
+        upsample_range: weighs(),
+        discontinuity_depth: apart(),
+        discontinuity_normal: apart(),
+        history: unless(frames > 1, "a sequence of pictures (--frames), each with those before it"),
+        history_lag: past(),
+        history_range: past(),
+        raster_size: unless(s.visibility == Visibility::Raster, "visibility = \"raster\""),
+    );
+    // Its other values are how all rays are traced.
+    out.push(("visibility", s.visibility == Visibility::Raster, None));
+    out
+}
+
+fn shines(environment: &Environment) -> bool {
+    environment.scale > 0.0 && !environment.pixels.is_empty()
 }
 
 /// The materials in use that something holds of, the first ones by number and name.
@@ -155,7 +225,11 @@ fn places(scene: &Scene, which: &dyn Fn(&Material) -> bool) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Light, LightKind, Mesh, Node, Primitive};
+    use crate::{
+        passes::gbuffer,
+        scene::{Light, LightKind, Mesh, Node, Primitive},
+        techniques::igi::Pattern,
+    };
     use glam::Vec3;
 
     fn scene(materials: Vec<Material>) -> Scene {
@@ -164,8 +238,14 @@ mod tests {
         Scene { materials, meshes, ..Scene::default() }
     }
 
+    fn text(note: Note) -> String {
+        format!("{}: {}", note.place, note.text)
+    }
+
+    /// Of a sequence.
     fn told(scene: &Scene, settings: &Settings) -> Vec<String> {
-        notes(scene, &[], settings).into_iter().map(|note| format!("{}: {}", note.place, note.text)).collect()
+        let settings = PictureSettings { igi: settings.clone(), ..Default::default() };
+        notes(scene, &[], &settings, 2).into_iter().map(text).collect()
     }
 
     #[test]
@@ -210,12 +290,15 @@ mod tests {
         let note =
             |place: &str, text: &str| Note { kind: NoteKind::Approximated, place: place.into(), text: text.into() };
         let of_device = [
-            note("materials", "surfaces with transmission are drawn opaque"),
-            note("materials", "alpha blending is dithered"),
-            note("materials", "something else"),
+            note("materials", super::told::TRANSMISSION),
+            note("materials", super::told::BLENDING),
+            note("materials", "something else of transmission or blending"),
             note("textures", ""),
+            note("environment", super::told::BRIGHT_SKY),
         ];
-        assert_eq!(notes(&Scene::default(), &of_device, &Settings::default()), of_device[2..]);
+        let said = notes(&Scene::default(), &of_device, &PictureSettings::default(), 1);
+        assert_eq!(said[..2], of_device[2..4]);
+        assert!(said.len() == 3 && said[2].text.contains("cut there where it is seen directly"), "{said:?}");
     }
 
     #[test]
@@ -232,6 +315,13 @@ mod tests {
         assert!(dark(&room));
         room.lights[0].intensity = 1.0;
         assert!(!dark(&room));
+        // A sky that is seen and lights nothing; alone it has nothing to light.
+        room.lights[0].intensity = 0.0;
+        let sky = || Material { unlit: true, ..Material::emitter("sky", Vec3::ONE) };
+        room.materials[1] = sky();
+        room.meshes[0].primitives.push(Primitive { material: 1, ..Primitive::default() });
+        assert!(dark(&room));
+        assert!(!dark(&scene(vec![sky()])));
     }
 
     #[test]
@@ -247,9 +337,12 @@ mod tests {
     #[test]
     fn settings_that_do_nothing_are_named_with_what_they_need() {
         let lit = scene(vec![Material::emitter("lamp", Vec3::ONE)]);
-        for settings in
-            [Settings::default(), Settings::paper(), Settings { indirect: false, fused: true, ..Settings::default() }]
-        {
+        for settings in [
+            Settings::default(),
+            Settings::paper(),
+            Settings { indirect: false, direct_samples: 4, visibility: Visibility::Compute, ..Settings::default() },
+            Settings { history: 32, history_lag: 0.2, ..Settings::default() },
+        ] {
             assert!(told(&lit, &settings).is_empty(), "{:?}", told(&lit, &settings));
         }
         let of = Settings::default;
@@ -263,6 +356,20 @@ mod tests {
             (Settings { judges: 9, candidates: 1, ..of() }, "igi.judges: does nothing: it needs candidates"),
             (Settings { raster_size: 64, ..of() }, "igi.raster_size: does nothing: it needs visibility"),
             (Settings { cache: 0.1, ..of() }, "igi.cache: does nothing: it needs mirrors"),
+            (Settings { sorted: true, ..of() }, "igi.sorted: does nothing: it needs interleave above 1"),
+            (
+                Settings { sorted: true, interleave: 2, compensation: 1, ..of() },
+                "igi.sorted: does nothing: with picks or compensation",
+            ),
+            (Settings { specular_depth: 2, ..of() }, "igi.specular_depth: does nothing: it needs mirrors or glass"),
+            (
+                Settings { indirect: false, fused: true, vpls: 9, cache: 0.1, history: 4, ..of() },
+                "igi.indirect: with indirect = false these do nothing: vpls, cache, fused, history",
+            ),
+            (
+                Settings { indirect: false, visibility: Visibility::Raster, ..of() },
+                "igi.indirect: with indirect = false these do nothing: visibility",
+            ),
             (Settings { cache_cells: 9, ..of() }, "igi.cache_cells: does nothing: it needs cache"),
             (Settings { compensation: 1, bound: 0.0, ..of() }, "igi.compensation: does nothing: it needs bound"),
             (
@@ -282,6 +389,34 @@ mod tests {
         ] {
             let found = told(&lit, &settings);
             assert!(found.len() == 1 && found[0].contains(note), "{note} is not in {found:?}");
+        }
+        // Lit by a point alone; and a picture without others before it.
+        let kind = LightKind::Point { range: None };
+        let mut bulb = scene(vec![Material::diffuse("wall", Vec3::ONE)]);
+        bulb.lights.push(Light { name: String::new(), kind, color: Vec3::ONE, intensity: 1.0 });
+        bulb.nodes.push(Node { light: Some(0), ..Node::default() });
+        let found = told(&bulb, &Settings { direct_samples: 4, ..of() });
+        assert!(
+            found.len() == 1 && found[0].starts_with("igi.direct_samples: does nothing: it needs emissive"),
+            "{found:?}"
+        );
+        let igi = Settings { history: 32, ..of() };
+        let found = notes(&lit, &[], &PictureSettings { igi, ..Default::default() }, 1);
+        assert!(found.len() == 1 && found[0].text.contains("a sequence of pictures"), "{found:?}");
+    }
+
+    #[test]
+    fn what_blending_is_for_the_camera_alone_is_said() {
+        let veil = Material { alpha: AlphaMode::Blend, emissive: Vec3::ONE, ..Material::diffuse("veil", Vec3::ONE) };
+        let all = scene(vec![veil]);
+        for (blended, part) in [
+            (Blended::Dithered, "a pixel or a ray meets the surface or passes it"),
+            (Blended::Threshold, "by threshold for the camera alone"),
+            (Blended::Hidden, "hidden from the camera alone"),
+        ] {
+            let gbuffer = gbuffer::Settings { blended, ..Default::default() };
+            let found = notes(&all, &[], &PictureSettings { gbuffer, ..Default::default() }, 1);
+            assert!(found.len() == 1 && found[0].text.contains(part), "{found:?}");
         }
     }
 }

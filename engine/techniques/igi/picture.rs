@@ -1,10 +1,10 @@
 //! Everything from a scene on the device to the final picture.
 
-use super::super::allowed::within;
-use super::{Igi, Outputs, Settings, Shared, Visibility, Vpls, filters, order};
+use super::super::allowed::radiance;
+use super::{Igi, Outputs, Settings, Shared, Visibility, Vpls, filters, order, raster};
 use crate::{
     Error, Result,
-    graph::{Format, Graph},
+    graph::{Format, Graph, Image},
     passes::{
         gbuffer::{self, GBuffer},
         skybox,
@@ -29,6 +29,13 @@ impl PictureSettings {
     /// The paper's: [`Settings::paper`].
     pub fn paper() -> Self {
         Self { igi: Settings::paper(), ..Self::default() }
+    }
+
+    /// # Errors
+    /// `Usage`, naming the key with its group, the value found and the values allowed.
+    pub fn validate(&self) -> Result<()> {
+        self.igi.validate().map_err(|error| error.at("igi"))?;
+        radiance("background", self.background)
     }
 }
 
@@ -70,8 +77,7 @@ impl Igi {
         settings: &PictureSettings,
     ) -> Result<Picture> {
         let igi = &settings.igi;
-        igi.validate().map_err(|error| error.at("igi"))?;
-        within(settings.background.map(|channel| ("background", channel, 0.0, f32::MAX)))?;
+        settings.validate()?;
         if igi.visibility.in_compute(self.queries)? != self.in_compute {
             let how = if self.in_compute { "in compute" } else { "by ray queries" };
             let what = format!("the scene was prepared for rays that are traced {how}");
@@ -80,6 +86,9 @@ impl Igi {
         if igi.imperfect && !self.in_compute && self.boxes.is_none() {
             let what = "there are no boxes: the scene was prepared for exact ray queries";
             return Err(Error::usage(what).at("igi.imperfect").help("Give Igi::new the same settings"));
+        }
+        if igi.indirect && igi.visibility == Visibility::Raster {
+            raster::affordable(handles, igi).map_err(|error| error.at("igi"))?;
         }
         let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
         let outputs = graph.scope("igi", |graph| {
@@ -90,69 +99,98 @@ impl Igi {
             let shot = igi.indirect.then(|| self.virtual_lights(graph, handles, &gbuffer, &own, igi));
             let vpls = shot.map(|(_, chosen)| order::ordered_if_asked(graph, chosen, igi));
             let direct = self.direct(graph, handles, &gbuffer, &shared);
+            let seen = if igi.indirect { receivers(graph, &gbuffer, igi) } else { gbuffer };
             let gathered = match vpls {
                 Some(vpls) if igi.visibility == Visibility::Raster => {
-                    self.gather_raster(graph, handles, &gbuffer, &own, vpls, igi)
+                    self.gather_raster(graph, handles, &seen, &own, vpls, igi)
                 }
-                _ => self.gather(graph, &gbuffer, &own, vpls, igi),
+                _ => self.gather(graph, &seen, &own, vpls, igi),
             };
             if let Some(vpls) = vpls.filter(|_| igi.compensates()) {
-                self.compensate(graph, handles, &gbuffer, &own, vpls, igi, gathered);
+                self.compensate(graph, handles, &seen, &own, vpls, igi, gathered);
             }
-            let (joins, upsamples) =
-                (igi.interleave > 1 && !igi.fused, igi.downsample > 1 || (igi.fused && igi.interleave > 1));
-            let mut irradiance = gathered;
-            let smooths = igi.smoothing > 0 || igi.despeckle > 0.0;
-            if joins || upsamples || smooths {
-                let guide = filters::guide(graph, &gbuffer, igi);
-                if joins {
-                    irradiance = filters::join(graph, guide, irradiance, igi);
-                }
-                if smooths {
-                    irradiance = filters::smooth(graph, &gbuffer, guide, irradiance, igi);
-                }
-                if upsamples {
-                    let (upsampled, unmatched) = filters::upsample(graph, &gbuffer, guide, irradiance, igi);
-                    irradiance = upsampled;
-                    if let Some(vpls) = vpls.filter(|_| igi.refine > 0.0) {
-                        self.refine(graph, &gbuffer, &own, vpls, igi, (irradiance, unmatched));
-                    }
-                }
-            }
+            let mut irradiance = self.filtered(graph, &seen, &own, vpls, igi, gathered);
             if let Some((all, chosen)) = shot.filter(|_| igi.history > 1) {
                 let light = (all, chosen, irradiance);
-                irradiance = self.accumulate(graph, handles, (&gbuffer, view), &shared, light, igi);
+                irradiance = self.accumulate(graph, handles, (&seen, view), &shared, light, igi);
             }
             let trees = (self.sharp && igi.specular).then(|| {
                 // What mirrors show has no history: it takes the same numbers in each frame, lest it flickers.
-                let steady = if frame > 0 {
-                    shot.map(|_| {
+                let steady = match shot {
+                    Some(_) if frame > 0 => {
                         let (_, chosen) = self.virtual_lights(graph, handles, &gbuffer, &shared, igi);
-                        order::ordered_if_asked(graph, chosen, igi)
-                    })
-                } else {
-                    vpls
+                        Some(order::ordered_if_asked(graph, chosen, igi))
+                    }
+                    _ => vpls,
                 };
                 self.trees(graph, handles, &gbuffer, &shared, (steady, settings.background), igi)
             });
             let (sharp, cache) = (trees.map(|t| t.sharp), trees.and_then(|t| t.cache));
-            let extent = graph.extent(gbuffer.depth);
-            let total = graph.image("igi.total", Format::RGBA32F, extent);
-            let indirect = graph.image("igi.indirect", Format::RGBA32F, extent);
-            let args = shaders::igi::compose::Args {
-                albedo: gbuffer.albedo,
-                depth: gbuffer.depth,
-                direct,
-                irradiance,
-                sharp: sharp.unwrap_or(gathered),
-                total,
-                indirect,
-                spec: shaders::igi::compose::Spec { sharp: sharp.is_some().into() },
-            };
-            graph.compute(args, extent);
+            let (total, indirect) = composed(graph, &gbuffer, direct, irradiance, sharp);
             Outputs { total, direct, indirect, sharp, irradiance, gathered, vpls, cache }
         });
         skybox::draw(graph, handles, &gbuffer, settings.background.into(), outputs.total);
         Ok(Picture { gbuffer, outputs })
     }
+    /// Irradiance of every pixel from what was gathered for some of them, or from some of the virtual lights.
+    fn filtered(
+        &self,
+        graph: &mut Graph,
+        g: &GBuffer,
+        shared: &Shared,
+        vpls: Option<Vpls>,
+        settings: &Settings,
+        gathered: Image,
+    ) -> Image {
+        let mut irradiance = gathered;
+        if !(settings.joins() || settings.upsamples() || settings.smooths()) {
+            return irradiance;
+        }
+        let guide = filters::guide(graph, g, settings);
+        if settings.joins() {
+            irradiance = filters::join(graph, guide, irradiance, settings);
+        }
+        if settings.smooths() {
+            irradiance = filters::smooth(graph, g, guide, irradiance, settings);
+        }
+        if settings.upsamples() {
+            let (upsampled, unmatched) = filters::upsample(graph, g, guide, irradiance, settings);
+            irradiance = upsampled;
+            if let Some(vpls) = vpls.filter(|_| settings.refine > 0.0) {
+                self.refine(graph, g, shared, vpls, settings, (irradiance, unmatched));
+            }
+        }
+        irradiance
+    }
+}
+
+/// The G-buffer as indirect light is gathered for it: surfaces that can show none are background. Black ones and mirrors stay where others
+/// take light from their texels.
+fn receivers(graph: &mut Graph, g: &GBuffer, settings: &Settings) -> GBuffer {
+    let extent = graph.extent(g.depth);
+    let received = graph.image("igi.received", Format::R32F, extent);
+    let shared = settings.joins() || settings.upsamples() || settings.smooths() || settings.history > 1;
+    let push = shaders::igi::receivers::Push { black: shared.into() };
+    graph.compute(shaders::igi::receivers::Args { albedo: g.albedo, depth: g.depth, received, push }, extent);
+    GBuffer { depth: received, ..*g }
+}
+
+/// The sum of all light, and what of it is indirect. `direct` becomes what of it enters the sum.
+fn composed(graph: &mut Graph, g: &GBuffer, direct: Image, irradiance: Image, sharp: Option<Image>) -> (Image, Image) {
+    let extent = graph.extent(g.depth);
+    let total = graph.image("igi.total", Format::RGBA32F, extent);
+    let indirect = graph.image("igi.indirect", Format::RGBA32F, extent);
+    let args = shaders::igi::compose::Args {
+        albedo: g.albedo,
+        depth: g.depth,
+        direct,
+        irradiance,
+        // Not read where there is none.
+        sharp: sharp.unwrap_or(irradiance),
+        total,
+        indirect,
+        spec: shaders::igi::compose::Spec { sharp: sharp.is_some().into() },
+    };
+    graph.compute(args, extent);
+    (total, indirect)
 }

@@ -17,31 +17,53 @@ use crate::{
     },
 };
 use glam::Vec3;
+use std::sync::Arc;
 
 /// Bytes of all maps that are there at once.
 const MOST_BYTES: u64 = 384 << 20;
 /// Virtual lights of a frame: each takes three passes over the scene.
 pub const MOST_LIGHTS: u32 = 2048;
+/// Draws of a frame into maps: seconds of recording.
+const MOST_DRAWS: u64 = 10_000_000;
 /// Factor on a caster's own slope that it moves away by: the four texels around a place lie within one texel of it in both axes.
 const SLOPE: f32 = 2.0;
 /// Nearest depth of a map, of the scene's diagonal. Depth of a triangle that reaches from there to the far end is interpolated to within
 /// a few ten-thousandths there.
 const NEAREST: f32 = 2e-4;
 
-/// Refuses what maps cannot serve.
+/// Refuses what maps cannot serve, beside more than [`MOST_LIGHTS`].
 pub(super) fn validate(settings: &Settings) -> Result<()> {
-    let lights = settings.paths() * settings.bounces;
-    if lights > MOST_LIGHTS {
-        let what = format!(
-            "{lights} virtual lights are not allowed with visibility = \"raster\"; allowed: at most {MOST_LIGHTS}"
-        );
-        return Err(Error::usage(what).at("vpls").help("Each takes three passes over the scene; rays serve more"));
-    }
     if settings.imperfect {
         let what = "boxes of triangles need rays, and visibility is \"raster\"";
         return Err(Error::usage(what).at("imperfect").help("Choose imperfect = false or visibility = \"compute\""));
     }
     Ok(())
+}
+
+/// Refuses what would take minutes to record and gigabytes to hold: every primitive is drawn into three maps of every light, lit or not,
+/// for how many paths met nothing only the device knows.
+///
+/// # Errors
+/// `Usage`, naming both numbers.
+pub(super) fn affordable(handles: &Handles, settings: &Settings) -> Result<()> {
+    let calls = Batches::of_casters(&handles.moment, None, Vec3::ZERO).list.iter().map(|batch| batch.calls.len()).sum();
+    few_draws(calls, settings.paths() * settings.bounces)
+}
+
+fn few_draws(calls: usize, lights: u32) -> Result<()> {
+    let each = calls as u64 * u64::from(VPL_MAPS);
+    if each * u64::from(lights) <= MOST_DRAWS {
+        return Ok(());
+    }
+    let what = format!(
+        "{lights} virtual lights take {} draws with visibility = \"raster\", for the scene has {calls}; allowed: {MOST_DRAWS}",
+        each * u64::from(lights)
+    );
+    let help = match MOST_DRAWS / each {
+        0 => "Choose visibility = \"compute\"".to_owned(),
+        most => format!("Choose vpls = {most}, or visibility = \"compute\""),
+    };
+    Err(Error::usage(what).at("vpls").help(help))
 }
 
 /// Lights whose maps of `size`² are there at once: a multiple of `subsets`, whatever fits.
@@ -72,7 +94,7 @@ impl Igi {
         let maps = graph.image_with("igi.maps", desc);
         let batches = Batches::of_casters(&handles.moment, None, Vec3::ZERO);
         let visible = batches.visible_buffer(graph, "igi.casters");
-        let calls = |holed: bool| -> Vec<IndexedCall> {
+        let calls = |holed: bool| -> Arc<[IndexedCall]> {
             let of = batches.list.iter().filter(|b| (b.cutout != Cutout::Opaque) == holed);
             of.flat_map(|b| b.calls.iter().copied()).collect()
         };
@@ -91,9 +113,8 @@ impl Igi {
                     vpls: vpls.buffer,
                     push: opaque::Push { light, face, nearest },
                 };
-                let draw = Draw::indexed(handles.indices, solid.clone());
-                // Names of their own: giving thousands one name takes longer than drawing.
-                graph.raster(targets(Depth::Clear(0.0)), state, args, draw).named(format!("igi.raster.{light}.{face}"));
+                let draw = Draw::indexed(handles.indices, Arc::clone(&solid));
+                graph.raster(targets(Depth::Clear(0.0)), state, args, draw);
                 if holed.is_empty() {
                     continue;
                 }
@@ -108,9 +129,8 @@ impl Igi {
                     scene_textures: handles.textures,
                     push: cutout::Push { light, face, nearest },
                 };
-                let draw = Draw::indexed(handles.indices, holed.clone());
-                let name = format!("igi.raster_cutout.{light}.{face}");
-                graph.raster(targets(Depth::Keep), state, args, draw).named(name);
+                let draw = Draw::indexed(handles.indices, Arc::clone(&holed));
+                graph.raster(targets(Depth::Keep), state, args, draw);
             }
             let args = gather_raster::Args {
                 view: g.view,
@@ -152,11 +172,21 @@ mod tests {
     }
 
     #[test]
+    fn more_draws_than_a_frame_can_hold_are_refused() {
+        few_draws(1000, 2048).unwrap();
+        let error = few_draws(5000, 2048).unwrap_err();
+        for part in ["vpls", "2048 virtual lights take 30720000 draws", "has 5000", "10000000", "vpls = 666"] {
+            assert!(error.to_string().contains(part), "{error}");
+        }
+        assert!(error.exit_code() == 2 && few_draws(4_000_000, 1).unwrap_err().to_string().contains("compute"));
+    }
+
+    #[test]
     fn too_many_lights_and_boxes_are_refused_by_name() {
         let raster = Settings { visibility: Visibility::Raster, ..Settings::default() };
         raster.validate().unwrap();
         let error = Settings { vpls: 2049, bounces: 1, ..raster.clone() }.validate().unwrap_err().to_string();
-        assert!(error.contains("vpls") && error.contains("at most 2048"), "{error}");
+        assert!(error.contains("vpls: 2049") && error.contains("1 to 2048"), "{error}");
         let error = Settings { imperfect: true, ..raster }.validate().unwrap_err();
         assert!(error.exit_code() == 2 && error.to_string().contains("imperfect"), "{error}");
     }

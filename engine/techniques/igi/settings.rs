@@ -1,11 +1,17 @@
 //! What can be chosen in instant global illumination, and what the paper chose.
 
-use super::super::allowed::{within, wrong};
+use super::{
+    super::allowed::{within, wrong},
+    raster,
+};
 use crate::{Error, Result, shaders::consts::CACHE_CELLS};
 use serde::{Deserialize, Serialize};
 
 /// Least side of a cell: keys have nine bits an axis.
 pub(super) const LEAST_CELL: f32 = 0.002;
+const MOST_CELL: f32 = 0.2;
+/// Virtual lights of a frame.
+const MOST_LIGHTS: u32 = 10_000;
 
 /// How rays are traced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -225,6 +231,21 @@ impl Settings {
         self.picks.div_ceil(self.interleave.max(1).pow(2))
     }
 
+    /// The discontinuity buffer joins the pixels of tiles.
+    pub(super) fn joins(&self) -> bool {
+        self.interleave > 1 && !self.fused
+    }
+
+    /// What was gathered is smoothed.
+    pub(super) fn smooths(&self) -> bool {
+        self.smoothing > 0 || self.despeckle > 0.0
+    }
+
+    /// Pixels take light from texels around.
+    pub(super) fn upsamples(&self) -> bool {
+        self.downsample > 1 || (self.fused && self.interleave > 1)
+    }
+
     /// Short rays put light back: there is a bound that takes some.
     pub fn compensates(&self) -> bool {
         self.compensation > 0 && self.bound > 0.0
@@ -233,8 +254,8 @@ impl Settings {
     /// # Errors
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
+        let raster = self.visibility == Visibility::Raster;
         within([
-            ("vpls", self.vpls, 1, 10_000),
             ("candidates", self.candidates, 1, 64),
             ("judges", self.judges, 1, 1024),
             ("bounces", self.bounces, 1, 8),
@@ -250,35 +271,38 @@ impl Settings {
             ("direct_samples", self.direct_samples, 1, 4096),
             ("raster_size", self.raster_size, 16, 1024),
         ])?;
-        if self.vpls < self.bounces {
-            return wrong(
-                "vpls",
-                self.vpls,
-                &format!("{} to 10000, for a path leaves one at each of its bounces", self.bounces),
-            );
+        let most = if raster { raster::MOST_LIGHTS } else { MOST_LIGHTS };
+        if !(self.bounces..=most).contains(&self.vpls) {
+            let why = match (raster, self.bounces) {
+                (true, _) => {
+                    ", one for each bounce of a path at least, and with visibility = \"raster\" three passes over the scene for each"
+                }
+                (false, 1) => "",
+                (false, _) => ", for a path leaves one at each of its bounces",
+            };
+            return wrong("vpls", self.vpls, &format!("{} to {most}{why}", self.bounces));
         }
-        if self.visibility == Visibility::Raster {
-            super::raster::validate(self)?;
+        if raster {
+            raster::validate(self)?;
             if self.picks > 0 {
                 let what = "picks need rays, and visibility is \"raster\"";
                 return Err(Error::usage(what).at("picks").help("Choose picks = 0 or visibility = \"compute\""));
             }
         }
-        if self.interleave > 4 && (!self.fused || self.visibility == Visibility::Raster) {
+        if self.interleave > 4 && (!self.fused || raster) {
             let allowed = "1 to 4, up to 32 with fused = true and virtual lights by rays";
             return wrong("interleave", self.interleave, allowed);
         }
         if self.despeckle != 0.0 && !(1.0..=1000.0).contains(&self.despeckle) {
             return wrong("despeckle", self.despeckle, "0, or 1 to 1000");
         }
-        if self.refine > 0.0 && (self.picks > 0 || self.visibility == Visibility::Raster) {
+        if self.refine > 0.0 && (self.picks > 0 || raster) {
             return wrong("refine", self.refine, "0 with picks or visibility = \"raster\"");
         }
-        if self.cache > 0.0 && self.cache < LEAST_CELL {
-            return wrong("cache", self.cache, &format!("0, or {LEAST_CELL} to 0.2"));
+        if self.cache != 0.0 && !(LEAST_CELL..=MOST_CELL).contains(&self.cache) {
+            return wrong("cache", self.cache, &format!("0, or {LEAST_CELL} to {MOST_CELL}"));
         }
         within([
-            ("cache", self.cache, 0.0, 0.2),
             ("bound", self.bound, 0.0, 1.0),
             ("refine", self.refine, 0.0, 1.0),
             ("upsample_sigma", self.upsample_sigma, 0.1, 4.0),
@@ -324,12 +348,22 @@ mod tests {
     #[test]
     fn an_error_names_key_value_and_what_is_allowed() {
         let message = |s: Settings| s.validate().unwrap_err().to_string();
-        let error = message(Settings { vpls: 0, ..Settings::default() });
+        let error = message(Settings { vpls: 0, bounces: 1, ..Settings::default() });
         assert_eq!(error, "vpls: 0 is not allowed; allowed: 1 to 10000");
         let error = message(Settings { bound: f32::NAN, ..Settings::default() });
         assert_eq!(error, "bound: NaN is not allowed; allowed: 0 to 1");
         let error = message(Settings { vpls: 2, bounces: 3, ..Settings::default() });
         assert!(error.starts_with("vpls: 2 is not allowed; allowed: 3 to 10000"), "{error}");
+        // The same range, whichever end is missed.
+        let raster = Settings { visibility: Visibility::Raster, ..Settings::default() };
+        for vpls in [0, 1, 2049] {
+            let error = message(Settings { vpls, ..raster.clone() });
+            assert!(error.starts_with(&format!("vpls: {vpls} is not allowed; allowed: 2 to 2048")), "{error}");
+        }
+        for cache in [0.3, 0.001, -1.0, f32::NAN] {
+            let error = message(Settings { cache, ..Settings::default() });
+            assert_eq!(error, format!("cache: {cache} is not allowed; allowed: 0, or 0.002 to 0.2"));
+        }
         for wrong in [
             Settings { bounces: 9, ..Settings::default() },
             Settings { downsample: 0, ..Settings::default() },

@@ -1,5 +1,6 @@
 //! Everything from a scene on the device to the final picture.
 
+use super::super::allowed::radiance;
 use super::{Inputs, Outputs, Settings, frame, senders};
 use crate::{
     Result,
@@ -36,6 +37,13 @@ impl PictureSettings {
             background: [0.0; 3],
         }
     }
+
+    /// # Errors
+    /// `Usage`, naming the key with its group, the value found and the values allowed.
+    pub fn validate(&self) -> Result<()> {
+        self.isr.validate().map_err(|error| error.at("isr"))?;
+        radiance("background", self.background)
+    }
 }
 
 /// A picture and the stages before it.
@@ -57,7 +65,7 @@ pub fn picture(
     ambient: Irradiance,
     settings: &PictureSettings,
 ) -> Result<Picture> {
-    settings.isr.validate().map_err(|error| error.at("isr"))?;
+    settings.validate()?;
     let gbuffer = gbuffer::draw(graph, scene, view, &settings.gbuffer);
     let shadows = shadow::draw(graph, scene, view, &settings.shadow);
     let lights = Lights::from(&shadows);

@@ -177,7 +177,7 @@ pub const KINDS: &[Kind] = &[
         settings: |paper, changes| {
             let base = if paper { PictureSettings::paper() } else { PictureSettings::default() };
             let settings: PictureSettings = config::with(&base, changes)?;
-            settings.isr.validate()?;
+            settings.validate()?;
             config::to_value(&settings)
         },
         render: isr_picture,

@@ -99,12 +99,18 @@ impl ReferenceArgs {
     /// # Errors
     /// `Usage` or `Input`, naming the key.
     pub fn effective(&self) -> Result<Staged<Settings>> {
-        let Staged { technique: mut settings, tonemap } = Staged::effective(&self.settings, &Settings::default())?;
-        settings.samples = self.spp.unwrap_or(settings.samples).clamp(1, u32::MAX.into());
-        settings.reference.bounces = self.bounces.unwrap_or(settings.reference.bounces);
-        settings.reference.seed = self.seed.unwrap_or(settings.reference.seed);
-        settings.reference.validate().map_err(|error| error.at("reference"))?;
-        Ok(Staged { technique: settings, tonemap })
+        // Options win over what a file says, so that it is checked with them.
+        let with_options = |settings: &Settings| {
+            let mut settings = settings.clone();
+            settings.samples = self.spp.unwrap_or(settings.samples).clamp(1, u32::MAX.into());
+            settings.reference.bounces = self.bounces.unwrap_or(settings.reference.bounces);
+            settings.reference.seed = self.seed.unwrap_or(settings.reference.seed);
+            settings
+        };
+        let check =
+            |settings: &Settings| with_options(settings).reference.validate().map_err(|error| error.at("reference"));
+        let staged = Staged::effective(&self.settings, &Settings::default(), check)?;
+        Ok(Staged { technique: with_options(&staged.technique), ..staged })
     }
 }
 

@@ -281,6 +281,17 @@ impl TonemapArgs {
     /// # Errors
     /// `Usage` or `Input`, naming the setting.
     pub fn config(&self) -> Result<Config> {
+        let check = |config: &Config| config.tonemap.validate().map_err(|error| error.at("tonemap"));
+        let config = self.with(&self.settings.define)?;
+        self.settings.blamed(check(&config), || check(&self.with(&[])?))?;
+        if self.mask.is_some() && config.tonemap.mode() != Mode::Selective {
+            return Err(Error::usage("--mask names important pixels, which only --mode selective knows"));
+        }
+        Ok(config)
+    }
+
+    /// The same with these `-D`, unchecked.
+    fn with(&self, define: &[String]) -> Result<Config> {
         let mut config = config::effective(&Config::default(), self.settings.file.as_deref(), &[])?;
         let s = &mut config.tonemap;
         if let Some(name) = &self.operator {
@@ -305,11 +316,6 @@ impl TonemapArgs {
         if let Some(exposure) = self.exposure {
             s.exposure = exposure.stops;
         }
-        let config: Config = config::effective(&config, None, &self.settings.define)?;
-        config.tonemap.validate().map_err(|error| error.at("tonemap"))?;
-        if self.mask.is_some() && config.tonemap.mode() != Mode::Selective {
-            return Err(Error::usage("--mask names important pixels, which only --mode selective knows"));
-        }
-        Ok(config)
+        config::effective(&config, None, define)
     }
 }

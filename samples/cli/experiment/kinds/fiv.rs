@@ -41,7 +41,7 @@ pub(super) const SOURCES: &[&str] = &[
 
 pub(super) fn settings(_paper: bool, changes: &Changes) -> Result<Value> {
     let settings: PictureSettings = config::with(&PictureSettings::default(), changes)?;
-    settings.fiv.validate()?;
+    settings.validate()?;
     config::to_value(&settings)
 }
 

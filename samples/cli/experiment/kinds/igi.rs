@@ -14,7 +14,7 @@ use crate::{config, experiment::file::Changes, gbuffer_layers, shown::Shown};
 pub(super) fn settings(paper: bool, changes: &Changes) -> Result<Value> {
     let base = if paper { PictureSettings::paper() } else { PictureSettings::default() };
     let settings: PictureSettings = config::with(&base, changes)?;
-    settings.igi.validate().map_err(|error| error.at("igi"))?;
+    settings.validate()?;
     config::to_value(&settings)
 }
 
