@@ -4,7 +4,7 @@ mod igi_lab;
 mod tracer_lab;
 
 use glam::{Mat4, Quat, Vec3, vec3, vec4};
-use igi_lab::{Studio, flux, mean, plain};
+use igi_lab::{Studio, flux, mean, plain, room};
 use lucerna::{
     gpu::testing::with_gpu,
     graph::Graph,
@@ -16,14 +16,6 @@ use lucerna::{
 };
 use std::f64::consts::PI;
 use tracer_lab::{Stage, flat_view, view};
-
-/// A closed box of half side 1 around the origin.
-fn room(albedo: Vec3) -> Stage {
-    let mut stage = Stage::new();
-    let wall = stage.material(Material::diffuse("wall", albedo));
-    stage.cuboid(wall, Vec3::splat(-1.0), Vec3::ONE, true);
-    stage
-}
 
 #[test]
 fn a_wire_before_the_sky_gathers_for_itself() {

@@ -4,7 +4,7 @@ mod igi_lab;
 mod tracer_lab;
 
 use glam::{DVec3, Mat4, Quat, Vec3, vec3};
-use igi_lab::{Studio, flux, mean, plain};
+use igi_lab::{Studio, flux, mean, plain, room};
 use lucerna::{
     gpu::testing::{with_gpu, with_ray_query},
     reference::tracer::{self, Tracer},
@@ -14,14 +14,6 @@ use lucerna::{
 };
 use std::f64::consts::PI;
 use tracer_lab::{Stage, flat_view, matt, view};
-
-/// A closed box of half side 1 around the origin.
-fn room(albedo: Vec3) -> Stage {
-    let mut stage = Stage::new();
-    let wall = stage.material(Material::diffuse("wall", albedo));
-    stage.cuboid(wall, Vec3::splat(-1.0), Vec3::ONE, true);
-    stage
-}
 
 #[test]
 fn virtual_lights_inside_a_sphere_light_it_evenly() {

@@ -5,7 +5,7 @@ mod igi_lab;
 mod tracer_lab;
 
 use glam::{Mat4, Quat, Vec3, vec3};
-use igi_lab::{Studio, flux, mean, plain};
+use igi_lab::{Studio, flux, mean, plain, room};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::{Environment, LightKind, Material, Pose, Scene, Transform, View, builtin},
@@ -20,13 +20,6 @@ fn small() -> Settings {
 
 fn fast() -> Settings {
     Settings { imperfect: true, downsample: 4, interleave: 3, bounces: 3, ..small() }
-}
-
-fn room(albedo: Vec3) -> Stage {
-    let mut stage = Stage::new();
-    let wall = stage.material(Material::diffuse("wall", albedo));
-    stage.cuboid(wall, Vec3::splat(-1.0), Vec3::ONE, true);
-    stage
 }
 
 #[test]
@@ -231,12 +224,27 @@ fn lamps_in_walls_and_in_corners_give_no_more_than_they_have() {
                 }
             }
         }
-        // A spot without width, and one all around.
-        for (inner, outer) in [(0.0, 0.0), (0.0, 1e-4), (1.5, 1.57)] {
+        // Spots without width send nothing; else the strength is the square of a line in the cosine from the outer to the inner cone.
+        for (inner, outer, least, most) in [
+            (0.0, 0.0, 0.0, 0.0),
+            (0.0, 1e-4, 0.0, 0.0),
+            (0.0, 0.05, 4.1e-4, 4.2e-4),
+            (0.0, 1.57, 0.33, 0.335),
+            (1.5, 1.57, 0.95, 0.955),
+        ] {
             let mut stage = room(Vec3::splat(0.5));
             stage.light(LightKind::Spot { range: None, inner, outer }, Vec3::ONE, 2.0, Mat4::IDENTITY);
             let seen = view(vec3(0.0, 0.0, 0.5), Vec3::NEG_Z, 80.0, [9, 7]);
-            Studio::new(gpu, &stage.scene).render(&seen, &fast(), 0);
+            let shown = Studio::new(gpu, &stage.scene).render(&seen, &Settings { candidates: 1, ..fast() }, 0);
+            // Of what half a sphere at full strength would leave.
+            let share = flux(&shown.vpls, 0) / (0.5 * 2.0 * 2.0 * std::f32::consts::PI);
+            println!("cone from {inner} to {outer}: {share}");
+            assert!(
+                share.cmpge(Vec3::splat(least)).all() && share.cmple(Vec3::splat(most)).all(),
+                "{inner} {outer}: {share}"
+            );
+            let behind = shown.vpls.iter().any(|vpl| vpl.depth == 0 && vpl.flux[0] > 0.0 && vpl.position[2] > 0.0);
+            assert!(!behind, "{inner} {outer}: light behind the spot");
         }
     });
 }
@@ -247,17 +255,32 @@ fn pictures_smaller_than_tiles_and_few_lights() {
         let scene = builtin::load("cornell").unwrap();
         let pose = Pose::rest(&scene);
         let mut studio = Studio::new(gpu, &scene);
-        let whole = View::of_camera(&scene, &pose, 0, [24, 24]).unwrap();
-        let all = mean(&studio.render(&whole, &Settings { vpls: 64, ..small() }, 0).total);
-        for extent in [[1, 1], [2, 1], [3, 5], [17, 9]] {
+        for extent in [[1, 1], [3, 1], [3, 5], [17, 9]] {
+            let mut lit = false;
             let seen = View::of_camera(&scene, &pose, 0, extent).unwrap();
+            // The same rays through the middle of every ninth pixel of a larger picture.
+            let [width, height] = extent.map(|side| 9 * side as usize);
+            let large = View::of_camera(&scene, &pose, 0, [width as u32, height as u32]).unwrap();
+            let settings = Settings { vpls: 400, candidates: 1, direct_samples: 64, ..small() };
+            let large = studio.render(&large, &settings, 0);
+            let places = (4..height).step_by(9).flat_map(|y| (4..width).step_by(9).map(move |x| (x, y)));
+            let (direct, total): (Vec<_>, Vec<_>) =
+                places.map(|(x, y)| (large.direct[y * width + x], large.total[y * width + x])).unzip();
             for (vpls, bounces) in [(1, 1), (8, 8), (7, 3)] {
                 for (downsample, interleave, fused) in [(4, 4, false), (4, 4, true), (3, 2, false)] {
                     let settings = Settings { vpls, bounces, downsample, interleave, fused, ..small() };
-                    let found = mean(&studio.render(&seen, &settings, 0).total);
-                    assert!(found < 20.0 * all, "{extent:?}, {vpls} virtual lights: {found} beside {all}");
+                    let shown = studio.render(&seen, &settings, 0);
+                    let [first, all] =
+                        [(&shown.direct, &direct), (&shown.total, &total)].map(|(a, b)| mean(a) / mean(b));
+                    println!("{extent:?}, {vpls} virtual lights: {first} of the direct light, {all} of all");
+                    assert!((0.8..1.25).contains(&first), "{extent:?}, {vpls}: {first} of the direct light");
+                    // One virtual light may be seen by no pixel, or stand for all those of its tile.
+                    assert!(mean(&shown.total) > 0.9 * mean(&direct) && all < 20.0, "{extent:?}, {vpls}: {all} of all");
+                    // Light that goes from surface to surface is part of it, unless the only lights are seen from nowhere.
+                    lit |= mean(&shown.indirect) > 0.0;
                 }
             }
+            assert!(lit || extent[0] < 10, "{extent:?}: no indirect light at all");
         }
     });
 }
@@ -275,12 +298,31 @@ fn nothing_but_glass_and_mirrors() {
         stage.sphere(glass, vec3(0.2, 0.0, -0.3), 0.4, 12, false);
         stage.point(vec3(-0.5, 0.4, 0.3), Vec3::ONE);
         let seen = view(vec3(0.0, 0.0, 0.8), Vec3::NEG_Z, 80.0, [16, 16]);
-        for settings in [Settings { specular_depth: 16, ..small() }, fast(), Settings { specular: false, ..plain(20) }]
+        for settings in [Settings { specular_depth: 16, ..small() }, fast(), Settings { specular: false, ..plain(300) }]
         {
             let shown = Studio::new(gpu, &stage.scene).render(&seen, &settings, 0);
             if settings.specular {
                 assert!(shown.vpls.iter().all(|vpl| vpl.flux == [0.0; 3]) && mean(&shown.indirect) == 0.0);
+                continue;
             }
+            // Glass is then white and all light is left on it; mirrors are black, and what they cannot show is dark.
+            let lit: Vec<Vec3> =
+                shown.vpls.iter().filter(|vpl| vpl.flux[0] > 0.0).map(|vpl| vpl.position.into()).collect();
+            assert!(
+                !lit.is_empty() && lit.iter().all(|p| (p.distance(vec3(0.2, 0.0, -0.3)) - 0.4).abs() < 0.02),
+                "{lit:?}"
+            );
+            let (mut ball, mut walls) = (0, 0);
+            for (total, albedo) in shown.total.iter().zip(&shown.albedo) {
+                let white = albedo[..3] != [0.0; 3];
+                *(if white { &mut ball } else { &mut walls }) += 1;
+                // The lamp is behind the camera's half of the ball: all that is seen of it is lit, but for its rim.
+                assert!(white || total[..3] == [0.0; 3], "{total:?} of a mirror");
+            }
+            assert!(
+                ball > 10 && walls > 100 && mean(&shown.direct) > 0.0,
+                "{ball} pixels of the ball, {walls} of walls"
+            );
         }
     });
 }

@@ -423,13 +423,13 @@ fn light_that_goes_out_is_gone() {
         let right = Settings { vpls: 600, candidates: 1, ..base.clone() };
         let all = films(gpu, &scene, &poses, &seen, &[right, with_history(base.clone(), 1), with_history(base, 32)]);
         let sum = |shot: &Shot| shot.irradiance.iter().map(brightness).sum::<f64>();
-        for frame in [8, 9, 11] {
+        // As samples/igi/README.md states it.
+        for (frame, most) in [(8, 0.12), (9, 0.06), (11, 0.05)] {
             let (found, right) = (sum(&all[2][frame]), sum(&all[0][frame]));
             let alone = sum(&all[1][frame]);
             println!("frame {frame}: {} of the light, alone {}", found / right, alone / right);
+            assert!((found / right - 1.0).abs() < most, "frame {frame}: {} of the light", found / right);
         }
-        let left = sum(&all[2][8]) / sum(&all[1][8]);
-        assert!(left < 1.15, "{left} of the light of the frame alone");
     });
 }
 

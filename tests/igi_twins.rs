@@ -3,6 +3,7 @@
 
 mod igi_lab;
 mod isr_lab;
+mod tracer_lab;
 
 use glam::{DVec3, dvec3};
 use igi_lab::twins::{self, Texels, blended, joined, smoothed, upsampled};

@@ -3,11 +3,12 @@
 
 pub mod twins;
 
+use crate::tracer_lab::Stage;
 use glam::Vec3;
 use lucerna::{
     gpu::Gpu,
     graph::{Graph, Runner},
-    scene::{Pose, Scene, View, resident::Resident},
+    scene::{Material, Pose, Scene, View, resident::Resident},
     shaders::types,
     techniques::igi::{Igi, PictureSettings, Settings},
 };
@@ -83,6 +84,14 @@ impl<'a> Studio<'a> {
             cells: cells.map_or(0, |token| frame.buffer::<u32>(token)[0]),
         }
     }
+}
+
+/// A closed box of half side 1 around the origin.
+pub fn room(albedo: Vec3) -> Stage {
+    let mut stage = Stage::new();
+    let wall = stage.material(Material::diffuse("wall", albedo));
+    stage.cuboid(wall, Vec3::splat(-1.0), Vec3::ONE, true);
+    stage
 }
 
 /// Diffuse light alone, no bound, one bounce.
