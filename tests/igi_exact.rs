@@ -246,7 +246,7 @@ fn rays_of_another_kind_than_the_scene_was_prepared_for_and_odd_backgrounds_are_
         assert_eq!(refused(&compute, &compute, [1.0; 3]), None);
         for channel in [f32::NAN, -0.1, f32::INFINITY] {
             let (code, text) = refused(&compute, &compute, [0.0, channel, 0.0]).expect("a background of no light");
-            assert!(code == 2 && text.starts_with("background: "), "{text}");
+            assert!(code == 2 && text.starts_with("background[1]: "), "{text}");
         }
     });
 }
