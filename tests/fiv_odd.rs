@@ -102,7 +102,8 @@ fn sizes_places_and_triangles_leave_the_shadow_as_it_is() {
             let mut scene = Scene { environment: Some(colourful()), ..Scene::default() };
             ground(&mut scene, 20.0 * scale);
             scene.nodes[0].local = Transform::Matrix(Mat4::from_translation(at));
-            let place = Mat4::from_translation(at + vec3(0.0, 0.8, 0.0) * scale) * Mat4::from_scale(Vec3::splat(scale));
+            let place =
+                Mat4::from_translation(at + vec3(0.13, 0.8, 0.07) * scale) * Mat4::from_scale(Vec3::splat(scale));
             thing(&mut scene, "thing", positions, indices, place);
             let view = flat_view(at + vec3(0.0, 0.05, 0.0) * scale, at, 3.0 * scale, [16; 2]);
             picture(gpu, &scene, &view, method)
