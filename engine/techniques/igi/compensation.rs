@@ -17,6 +17,7 @@ use crate::{
 /// Paths that are held at once.
 const HELD: u32 = 1 << 18;
 
+/// `types::NearPath` of `paths` paths, undefined until they begin.
 fn held(graph: &mut Graph, paths: u32) -> Buffer {
     let near_paths = graph.buffer("igi.near", u64::from(paths.max(1)) * size_of::<types::NearPath>() as u64);
     graph.fill(near_paths, 0);

@@ -70,6 +70,7 @@ pub struct Igi {
     queries: bool,
     environment: OwnedImage,
     environment_columns: OwnedBuffer,
+    /// Of the environment's table: columns and rows of directions that are drawn alike.
     cells: [u32; 2],
     /// Of the environment: what it sends through a box.
     moments: Option<[f64; 3]>,

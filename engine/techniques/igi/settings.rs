@@ -22,7 +22,7 @@ pub enum Visibility {
     Auto,
     /// Through our own trees in a compute shader, on any device.
     Compute,
-    /// By ray queries; refused where the device has none.
+    /// By ray queries; an error of kind `Usage` where the device has none.
     Query,
     /// Virtual lights by shadow maps that the rasteriser draws, three each. Everything else (paths of light, direct light, what mirrors
     /// and glass show) as with `Auto`.

@@ -21,8 +21,9 @@ pub struct Source {
     pub power: f64,
 }
 
-/// Of a map, per W/(sr·m²) summed over channels: ∫ L |ωₖ| dω for the three axes. With the faces of a box it gives the power
-/// that enters the box.
+/// Of a map, W/m² summed over channels: ∫ L |ωₖ| dω for the three axes. With the areas of a box's faces across the axes it gives the
+/// power that enters the box (W): parallel light from ω meets Σ |ωₖ| Aₖ of a box, whose mean over directions is a quarter of its
+/// surface (Cauchy 1841).
 pub fn sky_moments(environment: &Environment) -> [f64; 3] {
     let mut sum = [0.0; 3];
     let (width, height) = (environment.width.max(1), environment.height.max(1));

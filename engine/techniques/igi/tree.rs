@@ -35,10 +35,12 @@ struct Range {
 }
 
 impl Range {
+    /// Nodes of its trees, `types::TreeNode`: [`TREE_WIDTH`] of each slot.
     fn nodes(&self) -> u32 {
         self.slots * TREE_WIDTH
     }
 
+    /// The same as an image, one node a pixel, for [`Igi::batches`].
     fn lit(&self) -> Extent {
         Extent::new(self.nodes(), 1)
     }
