@@ -326,3 +326,30 @@ fn nothing_but_glass_and_mirrors() {
         }
     });
 }
+
+#[test]
+fn surfaces_that_can_show_no_indirect_light_trace_no_rays_for_it() {
+    with_gpu(|gpu| {
+        let mut stage = room(Vec3::splat(0.7));
+        let screen = stage.material(Material { unlit: true, ..Material::diffuse("screen", Vec3::ONE) });
+        let black = stage.material(Material::diffuse("black", Vec3::ZERO));
+        stage.quad(screen, vec3(-0.8, -0.5, -0.9), Vec3::X * 0.7, Vec3::Y);
+        stage.quad(black, vec3(0.1, -0.5, -0.9), Vec3::X * 0.7, Vec3::Y);
+        stage.point(vec3(0.0, 0.6, 0.5), Vec3::ONE);
+        let mut studio = Studio::new(gpu, &stage.scene);
+        let seen = view(vec3(0.0, 0.0, 0.9), Vec3::NEG_Z, 80.0, [24, 24]);
+        // Texels of black surfaces serve others where there are filters.
+        for (interleave, of_black) in [(1, false), (2, true)] {
+            let shown = studio.render(&seen, &Settings { interleave, ..plain(64) }, 0);
+            let (mut counts, mut rays) = ([0; 3], [0.0; 3]);
+            for (albedo, gathered) in shown.albedo.iter().zip(&shown.gathered) {
+                let kind = if albedo[3] < 0.5 { 0 } else { usize::from(albedo[..3] != [0.0; 3]) + 1 };
+                counts[kind] += 1;
+                rays[kind] += gathered[3];
+            }
+            println!("interleave {interleave}: {rays:?} rays of {counts:?} pixels, unlit, black and others");
+            assert!(counts.iter().all(|count| *count > 20) && rays[0] == 0.0 && rays[2] > 0.0);
+            assert_eq!(rays[1] > 0.0, of_black, "interleave {interleave}");
+        }
+    });
+}
