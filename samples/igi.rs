@@ -109,6 +109,10 @@ fn compose(
         Some(sharp) => shown.color("specular", sharp),
         None => shown,
     };
+    let shown = match out.cache {
+        Some(cache) => shown.remarking(cache.list.range(0..4), move |count| cache.note(count)),
+        None => shown,
+    };
     Ok(gbuffer_layers::add(shown, &picture.gbuffer, &view).seen_by(view).noting(igi::notes(
         input.scene,
         resident.notes(),

@@ -5,7 +5,7 @@ mod isr_lab;
 mod tracer_lab;
 
 use glam::{DVec3, Vec3, dvec3, vec3};
-use igi_lab::{Studio, plain};
+use igi_lab::{Studio, mean, plain};
 use isr_lab::{Random, gbuffer, image, read};
 use lucerna::{
     gpu::testing::with_gpu,
@@ -238,6 +238,25 @@ fn pixels_that_gather_for_themselves_have_what_full_resolution_has() {
 }
 
 #[test]
+fn what_the_bound_takes_is_put_back_where_pixels_gather_for_themselves() {
+    with_gpu(|gpu| {
+        let scene = builtin::load("cornell").unwrap();
+        let mut studio = Studio::new(gpu, &scene);
+        let seen = View::of_camera(&scene, &Pose::rest(&scene), 0, [45, 38]).unwrap();
+        let bounded = Settings { bound: 0.12, bounces: 2, ..plain(60) };
+        let whole = Settings { compensation: 8, ..bounded.clone() };
+        let listed = Settings { downsample: 4, refine: 1.0, ..whole.clone() };
+        let [bounded, whole, listed] = [bounded, whole, listed].map(|s| mean(&studio.render(&seen, &s, 3).irradiance));
+        println!(
+            "{:.3} without what is put back, {:.3} where pixels gather for themselves",
+            bounded / whole,
+            listed / whole
+        );
+        assert!(bounded < 0.93 * whole && (listed / whole - 1.0).abs() < 0.02, "{bounded} {whole} {listed}");
+    });
+}
+
+#[test]
 fn every_barrier_of_the_graphs_matters_and_two_runs_are_the_same() {
     with_gpu(|gpu| {
         let mut runner = Runner::new(gpu);
@@ -259,6 +278,7 @@ fn every_barrier_of_the_graphs_matters_and_two_runs_are_the_same() {
                     smoothing: 2,
                     despeckle: 3.0,
                     refine: 0.05,
+                    compensation: 1,
                     ..Settings::default()
                 },
             ),

@@ -8,10 +8,10 @@ use igi_lab::{Studio, mean};
 use lucerna::{
     gpu::testing::with_gpu,
     reference::tracer::{Filter, Settings as Tracing},
-    scene::Material,
+    scene::{AlphaMode, Material},
     techniques::igi::Settings,
 };
-use tracer_lab::{Stage, render, view};
+use tracer_lab::{Stage, flat_view, render, view};
 
 /// Without gloss: F0 of an index of 1 is 0.
 fn matt(albedo: Vec3) -> Material {
@@ -98,5 +98,33 @@ fn a_mirror_shows_indirect_light() {
         println!("in the mirror {a}, directly {b} (indirect {})", mean(&plain_there.indirect));
         assert!((a / b - 1.0).abs() < 0.03, "in the mirror {a}, directly {b}");
         assert!(mean(&plain.total) > 0.0 && mean(&plain_there.indirect) > 0.05 * b);
+    });
+}
+
+#[test]
+fn what_of_glass_is_blended_away_shows_what_lies_behind_it() {
+    with_gpu(|gpu| {
+        // A pane before a glowing wall, lit from the front: its diffuse part, which glass does not have, would be bright.
+        let alpha = 0.4f32;
+        let picture = |pane: Option<AlphaMode>| {
+            let mut stage = Stage::new();
+            let glow = stage.emitter(vec3(0.8, 0.5, 0.3));
+            stage.quad(glow, vec3(-2.0, -2.0, -1.0), 4.0 * Vec3::X, 4.0 * Vec3::Y);
+            if let Some(mode) = pane {
+                let tinted = Material { alpha: mode, ..glass(true) };
+                let base_color = tinted.base_color.truncate().extend(alpha);
+                let tinted = stage.material(Material { base_color, ..tinted });
+                stage.quad(tinted, vec3(-2.0, -2.0, 0.0), 4.0 * Vec3::X, 4.0 * Vec3::Y);
+            }
+            stage.point(vec3(0.0, 0.0, 1.5), Vec3::splat(30.0));
+            let seen = flat_view(vec3(0.0, 0.0, 2.0), Vec3::ZERO, 2.0, [96, 96]);
+            let settings = Settings { indirect: false, ..Settings::default() };
+            mean(&Studio::new(gpu, &stage.scene).render(&seen, &settings, 0).total)
+        };
+        let (whole, none) = (picture(Some(AlphaMode::Opaque)), picture(None));
+        let found = picture(Some(AlphaMode::Blend));
+        let expected = f64::from(alpha) * whole + f64::from(1.0 - alpha) * none;
+        println!("pane {whole:.4}, none {none:.4}, blended {found:.4} instead of {expected:.4}");
+        assert!(whole < 0.95 * none && (found / expected - 1.0).abs() < 0.01, "{found} instead of {expected}");
     });
 }

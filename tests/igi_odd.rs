@@ -153,6 +153,42 @@ fn unlit_surfaces_change_neither_light_nor_what_shares_of_the_scene_are_of() {
 }
 
 #[test]
+fn what_hides_light_on_any_side_of_a_lamp_is_seen_at_once() {
+    with_gpu(|gpu| {
+        // More virtual lights than the probes of a history look at. A black plate comes before the lamp, on one side and on the other.
+        let mut stage = room(vec3(0.7, 0.6, 0.5));
+        let black = stage.material(Material { double_sided: true, ..Material::diffuse("black", Vec3::ZERO) });
+        let plate = stage.quad(black, vec3(-0.6, -0.6, 0.0), 1.2 * Vec3::X, 1.2 * Vec3::Y);
+        stage.point(Vec3::ZERO, Vec3::splat(2.0));
+        // The floor below it.
+        let seen = flat_view(vec3(0.0, -0.65, 0.0), vec3(0.0, -1.0, 0.0), 1.8, [32, 24]);
+        for z in [0.15, -0.15] {
+            // Light of the last frame before the plate is there, and of the first with it: alone, and with a history.
+            let [[before, after], [_, found]] = [1, 32].map(|history| {
+                let mut studio = Studio::new(gpu, &stage.scene);
+                let settings = Settings { history, direct_samples: 1, ..plain(512) };
+                let light: Vec<f64> = (0..9)
+                    .map(|frame| {
+                        let at = if frame < 8 { vec3(50.0, 0.0, 0.0) } else { vec3(0.0, 0.0, z) };
+                        studio.pose.world[plate] = Mat4::from_translation(at);
+                        studio.frame = frame;
+                        mean(&studio.render(&seen, &settings, 0).irradiance)
+                    })
+                    .collect();
+                [light[7], light[8]]
+            });
+            println!(
+                "plate at {z}: {:.3} of what was there is left, shown {:.3} of that",
+                after / before,
+                found / after
+            );
+            assert!(after < 0.75 * before, "{after} {before}");
+            assert!((found / after - 1.0).abs() < 0.2, "{} of the light", found / after);
+        }
+    });
+}
+
+#[test]
 fn triangles_without_area_change_nothing() {
     with_gpu(|gpu| {
         let build = |degenerate: bool| {

@@ -61,6 +61,10 @@ fn upsampling_and_the_fused_filter_agree_with_their_twin() {
             (4, 1.5, 0.01, 0.0, false),
             (3, 0.7, 0.01, 8.0, true),
             (4, 1.1, 0.02, 2.0, true),
+            // Of a narrow Gaussian little is left at the next texel, and that counts.
+            (4, 0.1, 0.01, 8.0, false),
+            (2, 0.1, 0.0, 1.0, false),
+            (3, 0.15, 0.01, 8.0, true),
         ] {
             let s = Settings {
                 downsample,

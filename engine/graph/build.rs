@@ -43,6 +43,13 @@ impl PassRef<'_> {
         self
     }
 
+    /// Says that it traces about `rays` rays, or works as long as that takes. Long graphs are handed to the device in parts by it, so
+    /// that no watchdog takes the whole for a device that hangs.
+    pub fn rays(self, rays: u64) -> Self {
+        self.graph.passes[self.index].rays = rays;
+        self
+    }
+
     /// The name it has in reports and messages.
     pub fn name(&self) -> &str {
         &self.graph.passes[self.index].name
@@ -371,7 +378,7 @@ impl Graph {
 
     pub(super) fn pass(&mut self, name: impl Into<String>, work: Work) -> PassRef<'_> {
         let name = self.pass_names.take(name.into());
-        self.passes.push(Pass { name, scope: self.scope.clone(), counted: false, work });
+        self.passes.push(Pass { name, scope: self.scope.clone(), counted: false, rays: 0, work });
         let index = self.passes.len() - 1;
         PassRef { graph: self, index }
     }

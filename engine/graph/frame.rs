@@ -129,6 +129,8 @@ pub struct Report {
     /// Milliseconds from submission to the end.
     pub wait_ms: f64,
     pub barriers: usize,
+    /// Parts in which the device had it: more than one where it is long.
+    pub submissions: usize,
     /// Memory of images and buffers that live in the graph.
     pub transient_bytes: u64,
     /// Things that are no mistake but look like one.

@@ -151,6 +151,8 @@ pub(crate) struct Pass {
     pub scope: Vec<String>,
     /// Its shaders' starts are counted.
     pub counted: bool,
+    /// Rays that it traces, about; 0: little is known of it.
+    pub rays: u64,
     pub work: Work,
 }
 

@@ -408,6 +408,7 @@ fn upload_pass(graph: &Graph) -> Option<Pass> {
         name: "upload".into(),
         scope: Vec::new(),
         counted: false,
+        rays: 0,
         work: Work::Upload { buffers },
     })
 }

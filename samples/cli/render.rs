@@ -119,6 +119,7 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
         if interrupt.requested() {
             break;
         }
+        run.note(&reading.notes(&result));
         let mut layers = reading.layers(&result);
         run.expose(&layers);
         layers.metadata = run.metadata(&gpu, &seen, frame)?;

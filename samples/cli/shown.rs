@@ -2,13 +2,15 @@
 
 use lucerna::{
     Result,
-    graph::{Frame, Graph, Image, ImageRead, Pixels},
+    graph::{Buffer, BufferRead, Frame, Graph, Image, ImageRead, Pixels},
     image::{Layer, Layers},
     scene::{Note, View},
 };
 
 /// Turns a pixel as the shader wrote it into what the layer holds.
 type Decode = Box<dyn Fn([f32; 4]) -> [f32; 4]>;
+/// What a number of the frame says.
+type Remark = Box<dyn Fn(u32) -> Option<Note>>;
 
 /// What a technique shows of a frame: the picture, and layers for formats that hold them.
 pub struct Shown {
@@ -21,6 +23,7 @@ pub struct Shown {
     pub view: Option<View>,
     /// What the technique could not serve in this frame.
     pub notes: Vec<Note>,
+    remarks: Vec<(Buffer, Remark)>,
 }
 
 /// A number of the whole frame: a value of each pixel, added up.
@@ -47,7 +50,8 @@ impl std::fmt::Debug for Shown {
 impl Shown {
     /// Only the picture: its red, green and blue are radiance.
     pub fn new(picture: Image) -> Self {
-        Self { picture, grey: false, layers: Vec::new(), sums: Vec::new(), view: None, notes: Vec::new() }
+        let (layers, sums, notes, remarks) = Default::default();
+        Self { picture, grey: false, layers, sums, view: None, notes, remarks }
     }
 
     /// Only the picture: the first channel of an image, as grey.
@@ -65,6 +69,13 @@ impl Shown {
     #[must_use]
     pub fn noting(self, notes: Vec<Note>) -> Self {
         Self { notes, ..self }
+    }
+
+    /// With what the first number of a buffer says of the frame, once that is there.
+    #[must_use]
+    pub fn remarking(mut self, number: Buffer, remark: impl Fn(u32) -> Option<Note> + 'static) -> Self {
+        self.remarks.push((number, Box::new(remark)));
+        self
     }
 
     /// With a layer of colours, `NAME.R` `NAME.G` `NAME.B`.
@@ -118,7 +129,8 @@ impl Shown {
         let (layers, sums) = if with_layers { (self.layers, self.sums) } else { Default::default() };
         let layers = layers.into_iter().map(|layer| (graph.read_image(layer.image), layer)).collect();
         let sums = sums.into_iter().map(|sum| (graph.read_image(sum.image), sum)).collect();
-        Reading { picture, grey: self.grey, view: false, layers, sums }
+        let remarks = self.remarks.into_iter().map(|(number, of)| (graph.read_buffer(number), of)).collect();
+        Reading { picture, grey: self.grey, view: false, layers, sums, remarks }
     }
 }
 
@@ -130,6 +142,7 @@ pub struct Reading {
     view: bool,
     layers: Vec<(ImageRead, Source)>,
     sums: Vec<(ImageRead, Sum)>,
+    remarks: Vec<(BufferRead, Remark)>,
 }
 
 impl std::fmt::Debug for Reading {
@@ -145,7 +158,7 @@ impl Reading {
     /// `Usage` if no pass writes it; the message lists the names.
     pub fn view(graph: &mut Graph, name: &str) -> Result<Self> {
         let picture = graph.view(name).map_err(|error| error.at("--view"))?;
-        Ok(Self { picture, grey: false, view: true, layers: Vec::new(), sums: Vec::new() })
+        Ok(Self { picture, grey: false, view: true, layers: Vec::new(), sums: Vec::new(), remarks: Vec::new() })
     }
 
     /// The numbers that were asked for, once the graph has run.
@@ -155,6 +168,12 @@ impl Reading {
             (sum.name.to_owned(), pixels.into_iter().map(|pixel| f64::from((sum.of)(pixel))).sum())
         };
         self.sums.iter().map(of).collect()
+    }
+
+    /// What the technique has to say of the frame, once the graph has run.
+    pub fn notes(&self, frame: &Frame) -> Vec<Note> {
+        let of = |(token, remark): &(BufferRead, Remark)| frame.buffer::<u32>(*token).first().and_then(|&n| remark(n));
+        self.remarks.iter().filter_map(of).collect()
     }
 
     /// The picture with its layers, once the graph has run. Layers of another size are stretched to that of the picture.

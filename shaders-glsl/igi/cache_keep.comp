@@ -8,7 +8,7 @@
 layout(local_size_x = 64) in;
 
 layout(push_constant, scalar) uniform Push {
-    vec3 low;   // corner of the scene's box, metres
+    vec3 low;   // corner of the cells, metres
     float side; // of a cell, metres
     uint first; // number of the first node
     uint nodes;

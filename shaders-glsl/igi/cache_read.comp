@@ -9,7 +9,7 @@
 layout(local_size_x = 64) in;
 
 layout(push_constant, scalar) uniform Push {
-    vec3 low;   // corner of the scene's box, metres
+    vec3 low;   // corner of the cells, metres
     float side; // of a cell, metres
     uint nodes;
     uint most;  // cells

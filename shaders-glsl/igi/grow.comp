@@ -24,12 +24,18 @@ layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 13, scalar) uniform SettingsBlock { IgiSettings settings; };
 layout(binding = 14, rgba32f) uniform writeonly image2D sharp; // a: share of the first surface that is mirror or glass
 
+layout(binding = 15) uniform sampler2D depth;
+
 layout(push_constant, scalar) uniform Push {
     uint first;      // slot
     uint count;      // slots
     uint level;
     vec3 background; // radiance beside the environment's
 };
+
+// Relative difference of depth within which the G-buffer's surface is looked for, and within which another one is taken for it: where it is
+// seen nearly along it, or cut out at its silhouette, a ray through the pixel's middle meets it elsewhere than the rasteriser.
+const float SAME = 1e-4, NEARLY = 1e-2;
 
 void leave(inout TreeNode node, HitSurface s, bool through, vec3 toward) {
     vec3 ahead = !through ? reflect(toward, s.normal) : s.thin ? toward : refract(toward, s.normal, 1.0 / s.eta);
@@ -45,14 +51,15 @@ void main() {
     uint at = gl_GlobalInvocationID.x;
     uvec2 extent = uvec2(view.extent);
     TreeNode node;
-    float near = view.near / view.far;
+    float near = view.near / view.far, z = 1.0;
     if (level == 0u) {
         if (branch != 0u) return;
         uvec2 pixel = pixel_of(first + slot, extent);
         bool inside = all(lessThan(pixel, extent));
+        if (inside) z = texelFetch(depth, ivec2(pixel), 0).r;
         vec2 uv = (vec2(pixel) + 0.5) / vec2(extent);
         vec3 direction = view_ray(view, uv);
-        node = TreeNode(view_base(view, uv) + near * direction, inside ? TREE_RAY : TREE_EMPTY, direction, 0.0,
+        node = TreeNode(view_base(view, uv) + near * direction, z < 1.0 ? TREE_RAY : TREE_EMPTY, direction, 0.0,
             vec3(1.0), 1.0, vec3(0.0, 1.0, 0.0), pixel.x | pixel.y << 16u, vec3(0.0), vec3(0.0), vec3(0.0));
         // Whatever the trees before left in the others.
         for (uint other = 1u; other < TREE_WIDTH; ++other) {
@@ -69,8 +76,17 @@ void main() {
     uvec4 words = pcg4d(uvec4(node.pixel, level * TREE_WIDTH + branch, settings.seed, 0x7ee5u));
     float share = 0.0;
     if (node.state == TREE_RAY) {
-        Hit hit = trace_closest(Ray(node.position, 0.0, node.direction, level == 0u ? 1.0 - near : 1e30),
-            level == 0u ? TRACE_CAMERA : 0u, words.x);
+        Hit hit = Hit(0.0, vec2(0.0), NONE, NONE);
+        // First the surface that the G-buffer has: what of it blending lets through was thrown for there. One call of the trace, for
+        // compilers' sake.
+        uint turns = level == 0u ? 2u : 1u;
+        for (uint turn = 0u; turn < turns && hit.instance == NONE; ++turn) {
+            float around = turn == 0u ? SAME : NEARLY;
+            float from = level == 0u ? max(z * (1.0 - around) - near, 0.0) : 0.0;
+            float to = level == 0u ? z * (1.0 + around) - near : 1e30;
+            uint mask = level > 0u ? 0u : turn == 0u ? TRACE_CAMERA | TRACE_SOLID : TRACE_CAMERA;
+            hit = trace_closest(Ray(node.position, from, node.direction, to), mask, words.x);
+        }
         vec3 toward = normalize(node.direction);
         node.state = TREE_EMPTY;
         if (hit.instance == NONE) {

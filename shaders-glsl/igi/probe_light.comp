@@ -19,7 +19,7 @@ layout(push_constant, scalar) uniform Push {
     uint probe_count;
     uint first;
     uint count;
-    uint stride;    // every so many virtual lights are looked at
+    uint stride;    // one of so many virtual lights is looked at
     uint total;     // virtual lights
     float least;    // min_d, metres
     uint seed;
@@ -33,7 +33,9 @@ void main() {
     vec3 origin = probe.position + probe.normal * probe.gap;
     vec3 sum = vec3(0.0);
     for (uint i = first; i < first + count; ++i) {
-        uint k = i * stride;
+        // By chance, and another one for each probe: in steps they would lie in one part of a lamp's directions, for neighbours in Halton's
+        // sequence have the same first digits. The same ones when the light of this frame is gathered again in the next one.
+        uint k = i * stride + pcg4d(uvec4(at, i, seed, 0x57e9u)).x % stride;
         if (k >= total) break;
         Vpl vpl = vpls[k];
         vec3 light = vpl_irradiance(vpl, probe.position, probe.normal, least);

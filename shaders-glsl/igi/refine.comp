@@ -10,6 +10,7 @@
 #include "lib/trace.glsl"
 #include "lib/vpl.glsl"
 #include "lib/vpl_subset.glsl"
+#include "lib/igi_speck.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -46,9 +47,6 @@ void main() {
     uint subset = vpl_subset(uvec2(pixel), tile, stride != 0u, seed);
     Gathering how = Gathering(first, count, total, subset, tile * tile, stride, least, seed);
     vpl_gather(sum, p, n, surface_step(view, p, z), uvec2(pixel), how);
-    const vec3 luminance = vec3(0.2126, 0.7152, 0.0722);
-    float most = limit * before.a, bright = dot(sum.rgb, luminance);
-    // Where no texel around shows anything there is nothing to go by.
-    if (limit > 0.0 && before.a > 0.0 && first + count >= own && bright > most) sum.rgb *= most / bright;
-    imageStore(irradiance, pixel, vec4(sum.rgb, before.a));
+    vec3 light = first + count >= own ? dimmed(sum.rgb, before.a, limit) : sum.rgb;
+    imageStore(irradiance, pixel, vec4(light, before.a));
 }

@@ -30,7 +30,7 @@ layout(push_constant, scalar) uniform Push {
                      // wider one only where there is no texel at all
 };
 
-// Below this weight no coarse texel matches, and the likest is taken.
+// Where less than this share of the Gaussian is on coarse texels that match none does, and the likest is taken.
 const float NO_MATCH = 1e-4;
 
 // Where too few match a Gaussian so much wider is tried, over so many texels to each side.
@@ -69,10 +69,8 @@ void main() {
                 float off = off_plane(plane, (vec2(place) + 0.5) / view.extent, there.w);
                 float likeness = max(dot(n, there.xyz), 1e-12);
                 vec2 apart = scattered != 0u ? vec2(place - pixel) / float(factor) : vec2(texel) - at;
-                if (least > 0.0) {
-                    brightest = max(brightest, dot(value.rgb, vec3(0.2126, 0.7152, 0.0722)));
-                    all += exp2(-fall * dot(apart, apart));
-                }
+                if (least > 0.0) brightest = max(brightest, dot(value.rgb, vec3(0.2126, 0.7152, 0.0722)));
+                all += exp2(-fall * dot(apart, apart));
                 float w = exp2(sharpness * log2(likeness) - fall * dot(apart, apart) - 0.72134752 * off * off);
                 sum += w * value;
                 weights += w;
@@ -92,6 +90,6 @@ void main() {
         fall *= 1.0 / (WIDER * WIDER);
     }
     if (!matched && least > 0.0) unmatched[atomicAdd(unmatched_count, 1u)] = uint(pixel.x) | uint(pixel.y) << 16u;
-    vec3 found = weights < NO_MATCH ? likest.rgb : sum.rgb / weights;
+    vec3 found = weights > NO_MATCH * all ? sum.rgb / weights : likest.rgb;
     imageStore(irradiance, pixel, vec4(found, brightest));
 }

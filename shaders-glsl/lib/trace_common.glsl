@@ -30,6 +30,7 @@ layout(constant_id = 15) const uint IMPERFECT = 0u;
 
 const uint TRACE_CAMERA = 1u; // back faces of single-sided surfaces are not there (as rasterised)
 const uint TRACE_SHADOW = 2u; // unlit surfaces do not stop light
+const uint TRACE_SOLID = 4u;  // surfaces are there whatever their alpha
 
 // Bits that a triangle's record has about its surface.
 const uint TRACE_SINGLE_SIDED = 1u; // export

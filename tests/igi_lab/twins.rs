@@ -38,7 +38,7 @@ pub fn upsampled(eye: &Eye, buffers: &Buffers, coarse: &Texels, s: &Settings, (x
     let centre = dvec2(middle(x), middle(y));
     let sigma = f64::from(s.upsample_sigma);
     let reach = (2.2 * sigma - 0.5).ceil().max(1.0);
-    let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
+    let (mut sum, mut weights, mut all) = (DVec3::ZERO, 0.0, 0.0);
     for row in 0..rows {
         for column in 0..columns {
             let texel = dvec2(column as f64, row as f64);
@@ -57,7 +57,9 @@ pub fn upsampled(eye: &Eye, buffers: &Buffers, coarse: &Texels, s: &Settings, (x
                 true => (dvec2(there.0 as f64, there.1 as f64) - dvec2(x as f64, y as f64)) / factor as f64,
                 false => texel - centre,
             };
-            weight *= (-0.5 * apart.length_squared() / (sigma * sigma)).exp();
+            let near = (-0.5 * apart.length_squared() / (sigma * sigma)).exp();
+            all += near;
+            weight *= near;
             if s.upsample_range > 0.0 {
                 let off = n.dot(place(eye, buffers, there) - p) / (z * eye.far * f64::from(s.upsample_range));
                 weight *= (-0.5 * off * off).exp();
@@ -66,8 +68,8 @@ pub fn upsampled(eye: &Eye, buffers: &Buffers, coarse: &Texels, s: &Settings, (x
             weights += weight;
         }
     }
-    // Near the limit rounding decides.
-    (weights > 2e-4).then(|| sum / weights)
+    // Near the limit rounding decides, and 32 bits end.
+    (weights > 2e-4 * all && weights > 1e-30).then(|| sum / weights)
 }
 
 /// The discontinuity buffer at a texel of every `downsample`-th pixel.

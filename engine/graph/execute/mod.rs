@@ -3,17 +3,19 @@
 
 mod accel;
 mod bind;
+mod parts;
 mod pool;
 mod record;
 #[cfg(test)]
 mod tests;
 mod transfer;
 
-use std::{borrow::Borrow, time::Instant};
+use std::{borrow::Borrow, sync::Arc, time::Instant};
 
 use ash::vk;
 
 use self::{
+    parts::Parts,
     pool::{Memory, Pool, device_format},
     record::Recorder,
 };
@@ -115,17 +117,9 @@ impl Runner {
         if counted > 0 && self.statistics.as_ref().is_none_or(|s| s.count() < counted) {
             self.statistics = Some(Statistics::new(&self.gpu, counted.next_power_of_two())?);
         }
-        let mut commands = self.gpu.commands(graph.name())?;
-        for memory in &memory {
-            match memory {
-                Memory::Image(image) => commands.keep(image.clone()),
-                Memory::Buffer(buffer) => commands.keep(buffer.clone()),
-                Memory::Accel(accel) => commands.keep(accel.clone()),
-            }
-        }
-        for buffer in self.uniforms.iter().chain(&self.staging) {
-            commands.keep(buffer.clone());
-        }
+        let held = (memory.clone(), self.uniforms.clone(), self.staging.clone());
+        let mut parts = Parts::new(&self.gpu, graph.name(), Arc::new(held));
+        let mut commands = parts.begin()?;
         transfer::clear_fresh(&self.gpu, &mut commands, &fresh);
         let end = vk::PipelineStageFlags2::ALL_COMMANDS;
         if let Some(timestamps) = &self.timestamps {
@@ -151,7 +145,12 @@ impl Runner {
         };
         let declared = plan.upload.iter().chain(&graph.passes);
         let mut open: &[String] = &[];
-        for (index, (pass, Pass { work, counted, .. })) in plan.passes.iter().zip(declared).enumerate() {
+        for (index, (pass, Pass { work, counted, rays, .. })) in plan.passes.iter().zip(declared).enumerate() {
+            if parts.is_full(*rays) {
+                open = labels(recorder.commands, open, &[]);
+                let next = parts.begin()?;
+                parts.push(std::mem::replace(recorder.commands, next));
+            }
             let begun = Instant::now();
             open = labels(recorder.commands, open, &pass.scope);
             recorder.barriers(plan.barriers_before(index));
@@ -182,9 +181,10 @@ impl Runner {
         }
         labels(recorder.commands, open, &[]);
         recorder.barriers(plan.barriers_before(plan.passes.len()));
+        parts.push(commands);
         let cpu_ms = milliseconds(begun);
         let submitted = Instant::now();
-        commands.submit()?.wait()?;
+        let submissions = parts.run()?;
         let wait_ms = milliseconds(submitted);
 
         accel::remember_built(graph);
@@ -218,6 +218,7 @@ impl Runner {
             record_ms: cpu_ms,
             wait_ms,
             barriers: plan.barriers.len(),
+            submissions,
             transient_bytes: transient_bytes(plan),
             warnings: plan.warnings.clone(),
         };

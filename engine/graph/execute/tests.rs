@@ -88,3 +88,41 @@ fn what_is_only_described_cannot_run() {
         assert!(error.contains("`someone else's` is only described"), "{error}");
     });
 }
+
+#[test]
+fn long_graphs_run_in_parts_and_short_ones_in_one() {
+    testing::with_gpu(|gpu| {
+        // Each pass adds to the last one's image; labels are open where a part ends.
+        let chain = |passes: u32, rays: u64| {
+            let mut graph = Graph::new("chain");
+            let mut image = graph.image("first", Format::RGBA32F, SMALL);
+            graph.compute(pattern::Args { image_out: image, push: pattern::Push { tag: 1.0 } }, SMALL).rays(rays);
+            graph.scope("chain", |graph| {
+                for _ in 0..passes {
+                    let next = graph.image("next", Format::RGBA32F, SMALL);
+                    graph.compute(advance::Args { previous: image, next }, SMALL).rays(rays);
+                    image = next;
+                }
+            });
+            let read = graph.read_image(image);
+            let frame = Runner::new(gpu).run(&graph).unwrap();
+            (frame.image(read).to_f32(), frame.report)
+        };
+        let (whole, report) = chain(30, 0);
+        assert_eq!(report.submissions, 1);
+        assert!(whole.iter().flatten().any(|value| *value > 1.0));
+        let (parts, report) = chain(30, 1 << 25);
+        // Two passes of so many rays are a part.
+        assert_eq!(report.submissions, 16);
+        assert!(report.passes.iter().all(|pass| pass.gpu_ms.is_some_and(|ms| ms >= 0.0)), "{report}");
+        assert!(parts == whole);
+        // A pass longer than a part may be is a part.
+        let (parts, report) = chain(30, u64::MAX);
+        assert_eq!(report.submissions, 32);
+        assert!(parts == whole);
+        // So many small ones have marks of their own.
+        let mut parts = Parts::new(gpu, "small", Arc::new(()));
+        let cuts: Vec<u32> = (0..2048).filter(|_| parts.is_full(1)).collect();
+        assert_eq!(cuts, [1024]);
+    });
+}

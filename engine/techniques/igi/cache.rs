@@ -1,8 +1,9 @@
 //! Irradiance in space for what mirrors and glass show: cells of a hashed grid, each lit once, instead of every surface by itself.
 
-use super::{Igi, LEAST_CELL, Settings, Shared, Vpls};
+use super::{Igi, LEAST_CELL, Settings, Shared, Vpls, rays};
 use crate::{
     graph::{Buffer, Extent, Graph},
+    scene::{Note, NoteKind},
     shaders::{
         consts::CACHE_SLOTS,
         igi::{cache_claim, cache_fill, cache_groups, cache_keep, cache_read},
@@ -27,23 +28,45 @@ pub struct Cache {
     most: u32,
 }
 
+/// Corner and side of cells of about `side` metres around the box from `low` to `high`, metres. What moves stretches the box; where
+/// cells lie is the same for all boxes, lest light in mirrors jumps with them.
+fn grid(low: Vec3, high: Vec3, side: f32) -> (Vec3, f32) {
+    // Keys must reach all over a scene that has grown: as few steps as will do.
+    let least = LEAST_CELL * (high - low).length();
+    let mut side = side.max(1e-12);
+    while side < least {
+        side *= 2.0;
+    }
+    // Half a cell aside: what stands at 0, as many a floor does, is in the middle of cells.
+    (((low / side).floor() - 0.5) * side, side)
+}
+
 impl Cache {
     pub(super) fn new(graph: &mut Graph, shared: &Shared, settings: &Settings) -> Self {
         let slots = u64::from(CACHE_SLOTS);
-        let extent = Vec3::from(shared.block.high) - Vec3::from(shared.block.low);
+        let (low, high) = (Vec3::from(shared.block.low), Vec3::from(shared.block.high));
+        let (low, side) = grid(low, high, settings.cache * shared.diagonal);
         let cache = Self {
             keys: graph.buffer("igi.cache-keys", 4 * slots),
             cells: graph.buffer("igi.cache-cells", slots * size_of::<types::CacheCell>() as u64),
             list: graph.buffer("igi.cache-list", 4 * (1 + u64::from(settings.cache_cells))),
-            low: shared.block.low,
-            // Keys must reach all over a scene that has grown.
-            side: (settings.cache * shared.diagonal).max(LEAST_CELL * extent.length()).max(1e-12),
+            low: low.to_array(),
+            side,
             most: settings.cache_cells,
         };
         graph.fill(cache.keys, u32::MAX);
         graph.fill(cache.cells, u32::MAX);
         graph.fill(cache.list, 0);
         cache
+    }
+
+    /// What there is to say if a frame has claimed `count` cells, the first number of [`Cache::list`].
+    pub fn note(&self, count: u32) -> Option<Note> {
+        let text = format!(
+            "more than {} cells (igi.cache_cells) would be needed: every surface behind mirrors and glass gathers for itself",
+            self.most
+        );
+        (count > self.most).then(|| Note { kind: NoteKind::Ignored, place: "igi.cache".to_owned(), text })
     }
 
     /// Makes cells for surfaces of `nodes` nodes; `first` is the number of the first of them in the picture.
@@ -97,7 +120,51 @@ impl Igi {
                 },
                 shared.hidden_by
             );
-            graph.compute(args, cells);
+            graph.compute(args, cells).rays(rays(Extent::new(cells, 1), count));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_stay_where_they_are_while_something_stretches_the_scene() {
+        let (low, side) = grid(Vec3::splat(-1.0), Vec3::ONE, 0.07);
+        assert_eq!(side, 0.07);
+        for step in 0..200 {
+            let bird = Vec3::new(0.013, 0.029, 0.017) * step as f32;
+            let (lower, wider) = grid(Vec3::splat(-1.0) - bird, Vec3::ONE, 0.07);
+            let cells = (low - lower) / side;
+            assert!(wider == side && (cells - cells.round()).abs().max_element() < 1e-4, "{cells}");
+            assert!(lower.cmple(Vec3::splat(-1.0) - bird).all(), "{lower}");
+        }
+    }
+
+    #[test]
+    fn a_cache_that_is_too_small_is_named() {
+        let mut graph = Graph::new("cells");
+        let list = graph.buffer("list", 4);
+        let cache = Cache { keys: list, cells: list, list, low: [0.0; 3], side: 1.0, most: 20 };
+        assert!(cache.note(20).is_none());
+        let note = cache.note(21).unwrap();
+        assert!(note.place == "igi.cache" && note.text.contains("20 cells (igi.cache_cells)"), "{note:?}");
+    }
+
+    #[test]
+    fn keys_reach_everywhere() {
+        for (low, high, side) in [
+            (Vec3::splat(-1.0), Vec3::ONE, LEAST_CELL * 12f32.sqrt()),
+            (Vec3::new(-70.3, 0.0, 1.0), Vec3::new(3000.0, 2.0, 90.0), 0.1),
+            (Vec3::ZERO, Vec3::new(1.0, 0.0, 0.0), LEAST_CELL),
+            (Vec3::ZERO, Vec3::ZERO, 0.0),
+        ] {
+            let (corner, wide) = grid(low, high, side);
+            let last = ((high - corner) / wide).floor();
+            assert!(wide >= side && last.cmple(Vec3::splat(511.0)).all(), "{last} of {wide} m");
+            // No wider than need be.
+            assert!(wide <= side.max(1e-12) || 0.5 * wide < LEAST_CELL * (high - low).length());
         }
     }
 }

@@ -2,20 +2,23 @@
 //! short rays instead of virtual lights, each weighted by the share that was taken. What lights those surfaces is bounded in its turn, and
 //! put back by the next segment, as often as light bounces.
 
-use super::{Igi, LightTree, Settings, Shared, Vpls};
+use super::{Igi, LightTree, Settings, Shared, Vpls, dispatch, gather::listed_groups};
 use crate::{
     graph::{Buffer, Graph, Image},
     passes::gbuffer::GBuffer,
     scene::resident::Handles,
     shaders::{
         consts::TEXTURE_SLOTS,
-        igi::{near_begin, near_begin_tree, near_direct, near_end, near_end_tree, near_pick, near_trace},
+        igi::{
+            near_begin, near_begin_listed, near_begin_tree, near_direct, near_end, near_end_listed, near_end_tree,
+            near_pick, near_trace,
+        },
         types,
     },
 };
 
 /// Paths that are held at once.
-const HELD: u32 = 1 << 18;
+pub(super) const HELD: u32 = 1 << 18;
 
 /// `types::NearPath` of `paths` paths, undefined until they begin.
 fn held(graph: &mut Graph, paths: u32) -> Buffer {
@@ -55,10 +58,47 @@ impl Igi {
                 };
                 let args = near_begin::Args { view: g.view, normal: g.normal, depth: g.depth, near_paths, push };
                 graph.compute(args, count);
-                self.follow(graph, handles, shared, (vpls, tree), settings, (near_paths, count, number));
+                self.follow(graph, handles, shared, (vpls, tree), settings, (near_paths, count, number, None));
             }
             let push = near_end::Push { first, count };
             graph.compute(near_end::Args { irradiance, near_paths, push }, count);
+        }
+    }
+
+    /// Adds to the irradiance of the pixels that gathered for themselves ([`Igi::refine`]), and dims specks among them.
+    pub(super) fn compensate_listed(
+        &self,
+        graph: &mut Graph,
+        handles: &Handles,
+        g: &GBuffer,
+        shared: &Shared,
+        (vpls, settings): (Vpls, &Settings),
+        (irradiance, unmatched): (Image, Buffer),
+    ) {
+        let Some(tree) = vpls.tree else { return };
+        let pixels = graph.extent(irradiance).pixels() as u32;
+        let count = HELD.min(pixels);
+        let near_paths = held(graph, count);
+        let ranges = pixels.div_ceil(count.max(1));
+        // Whole workgroups of a range come from the list: few of its places are taken.
+        let groups = listed_groups(graph, unmatched, count, ranges);
+        for range in 0..ranges {
+            let (first, groups) = (range * count, Some((groups, 12 * u64::from(range))));
+            for number in 0..settings.compensation {
+                let push = near_begin_listed::Push { first, count, number, paths: settings.compensation };
+                let args = near_begin_listed::Args {
+                    view: g.view,
+                    normal: g.normal,
+                    depth: g.depth,
+                    unmatched,
+                    near_paths,
+                    push,
+                };
+                dispatch(graph, args, groups, count);
+                self.follow(graph, handles, shared, (vpls, tree), settings, (near_paths, count, number, groups));
+            }
+            let push = near_end_listed::Push { first, count, limit: settings.despeckle };
+            dispatch(graph, near_end_listed::Args { irradiance, unmatched, near_paths, push }, groups, count);
         }
     }
 
@@ -77,13 +117,13 @@ impl Igi {
         for number in 0..settings.compensation {
             let push = near_begin_tree::Push { count, number, paths: settings.compensation };
             graph.compute(near_begin_tree::Args { tree_nodes, near_paths, push }, count);
-            self.follow(graph, handles, shared, (vpls, tree), settings, (near_paths, count, number));
+            self.follow(graph, handles, shared, (vpls, tree), settings, (near_paths, count, number, None));
         }
         let push = near_end_tree::Push { count };
         graph.compute(near_end_tree::Args { tree_nodes, near_paths, push }, count);
     }
 
-    /// Traces and lights paths that have begun.
+    /// Traces and lights paths that have begun. `groups`: size of the dispatches where only the device knows it.
     fn follow(
         &self,
         graph: &mut Graph,
@@ -91,17 +131,17 @@ impl Igi {
         shared: &Shared,
         (vpls, tree): (Vpls, LightTree),
         settings: &Settings,
-        (near_paths, count, number): (Buffer, u32, u32),
+        (near_paths, count, number, groups): (Buffer, u32, u32, Option<(Buffer, u64)>),
     ) {
         let (least, seed) = (shared.least, shared.seed);
         for turn in 0..settings.bounces {
             let diffuse_only = (!settings.specular).into();
             let push = near_trace::Push { count, turn, number, least, diffuse_only, slots: TEXTURE_SLOTS, seed };
             let args = crate::rays::traced!(near_trace::Args { near_paths, push }, shared.rays, handles);
-            graph.compute(args, count);
+            dispatch(graph, args, groups, count).rays(count.into());
             let push = near_direct::Push { count, turn, number };
             let args = traced_lit!(near_direct::Args { near_paths, push }, shared.rays, handles, shared, lamps);
-            graph.compute(args, count);
+            dispatch(graph, args, groups, count).rays(count.into());
             // Light that has bounced less often than it may.
             if turn + 1 < settings.bounces {
                 let (leaves, bounces) = (tree.leaves, settings.bounces);
@@ -110,7 +150,7 @@ impl Igi {
                     near_pick::Args { vpls: vpls.buffer, vpl_nodes: tree.nodes, near_paths, push },
                     shared.rays
                 );
-                graph.compute(args, count);
+                dispatch(graph, args, groups, count).rays(count.into());
             }
         }
     }

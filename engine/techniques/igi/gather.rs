@@ -1,6 +1,6 @@
 //! Irradiance from virtual lights at the visible surfaces: from all of them, or from a few picked by the tree over them.
 
-use super::{Igi, LightTree, Settings, Shared, Vpls};
+use super::{Igi, LightTree, Settings, Shared, Vpls, rays};
 use crate::{
     graph::{Buffer, Extent, Format, Graph, Image},
     passes::gbuffer::GBuffer,
@@ -16,6 +16,14 @@ const MOST_GROUPS: u64 = 65_535;
 fn ranges(pixels: u64, most: u64) -> (u32, u32) {
     let groups = (most / GROUP).clamp(1, MOST_GROUPS);
     ((groups * GROUP) as u32, pixels.div_ceil(groups * GROUP).max(1) as u32)
+}
+
+/// Sizes of the dispatches over `ranges` ranges of `pixels` pixels each of a list that only the device knows.
+pub(super) fn listed_groups(graph: &mut Graph, unmatched: Buffer, pixels: u32, ranges: u32) -> Buffer {
+    let groups = graph.buffer("igi.refine-groups", 12 * u64::from(ranges));
+    let push = refine_groups::Push { ranges, pixels };
+    graph.compute(refine_groups::Args { unmatched, groups, push }, ranges);
+    groups
 }
 
 impl Igi {
@@ -77,11 +85,22 @@ impl Igi {
                 },
                 shared.hidden_by
             );
-            graph.compute(args, extent);
+            graph.compute(args, extent).rays(rays(extent, count));
         }
     }
 
-    /// Gathers for the pixels that `unmatched` of [`filters::upsample`](super::filters::upsample) lists, each from a subset.
+    /// Ranges of lights for [`Self::refine`], then pixels of a range of pixels, and how many such ranges there are. `own`: lights of a
+    /// pixel.
+    pub(super) fn refined(&self, extent: Extent, own: u32) -> (Vec<(u32, u32)>, u32, u32) {
+        // Of a few hundred lights at once, and so of ranges of thousands of pixels. Most of these will be empty.
+        let lights = self.batches(Extent::new(1 << 14, 1), own);
+        let most = lights.first().map_or(1, |&(_, count)| count);
+        let (pixels, ranges) = ranges(extent.pixels(), self.rays_at_once / u64::from(most.max(1)));
+        (lights, pixels, ranges)
+    }
+
+    /// Gathers for the pixels that `unmatched` of [`filters::upsample`](super::filters::upsample) lists, each from a subset. What the
+    /// bound takes is put back by [`Self::compensate_listed`], which then dims specks too.
     pub(super) fn refine(
         &self,
         graph: &mut Graph,
@@ -91,15 +110,9 @@ impl Igi {
         settings: &Settings,
         (irradiance, unmatched): (Image, Buffer),
     ) {
-        let extent = graph.extent(irradiance);
         let own = vpls.count.div_ceil(settings.interleave * settings.interleave);
-        // Of a few hundred lights at once, and so of ranges of thousands of pixels. Most of these will be empty.
-        let lights = self.batches(Extent::new(1 << 14, 1), own);
-        let most = lights.first().map_or(1, |&(_, count)| count);
-        let (pixels, ranges) = ranges(extent.pixels(), self.rays_at_once / u64::from(most.max(1)));
-        let groups = graph.buffer("igi.refine-groups", 12 * u64::from(ranges));
-        let push = refine_groups::Push { ranges, pixels };
-        graph.compute(refine_groups::Args { unmatched, groups, push }, ranges);
+        let (lights, pixels, ranges) = self.refined(graph.extent(irradiance), own);
+        let groups = listed_groups(graph, unmatched, pixels, ranges);
         for (range, (first, count)) in (0..ranges).flat_map(|range| lights.iter().map(move |&lights| (range, lights))) {
             let push = refine::Push {
                 first,
@@ -111,7 +124,7 @@ impl Igi {
                 seed: shared.seed,
                 own,
                 begin: range * pixels,
-                limit: settings.despeckle,
+                limit: if settings.compensates() { 0.0 } else { settings.despeckle },
             };
             let args = crate::rays::traced!(
                 refine::Args {
@@ -126,7 +139,7 @@ impl Igi {
                 },
                 shared.hidden_by
             );
-            graph.compute_indirect(args, groups, 12 * u64::from(range));
+            graph.compute_indirect(args, groups, 12 * u64::from(range)).rays(u64::from(pixels) * u64::from(count));
         }
     }
 
@@ -168,7 +181,7 @@ impl Igi {
                 },
                 shared.hidden_by
             );
-            graph.compute(args, extent);
+            graph.compute(args, extent).rays(rays(extent, count));
         }
     }
 }

@@ -261,7 +261,7 @@ impl Igi {
                 },
                 *rays
             );
-            graph.compute(args, grid.count());
+            graph.compute(args, grid.count()).rays(super::rays(Extent::new(grid.count(), 1), count));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! More paths of light than there will be virtual lights, and of what they leave that which matters to the view (after Georgiev and
 //! Slusallek 2010, who reject candidates; here they are drawn in equal steps through the sum of their weights).
 
-use super::{Igi, Settings, Shared, Vpls, halton};
+use super::{Igi, Settings, Shared, Vpls, halton, rays};
 use crate::{
     graph::{Extent, Graph},
     passes::gbuffer::GBuffer,
@@ -46,7 +46,7 @@ impl Igi {
                 importance::Args { candidates: candidates.buffer, points: seen, importances, push },
                 shared.rays
             );
-            graph.compute(args, total);
+            graph.compute(args, total).rays(rays(Extent::new(total, 1), points));
         }
         let (weights, sums) = (graph.buffer("igi.weights", floats), graph.buffer("igi.sums", floats));
         let push = cumulate::Push { total };

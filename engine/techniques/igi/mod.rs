@@ -26,6 +26,7 @@ pub mod history;
 mod importance;
 mod notes;
 mod order;
+mod passes;
 mod picture;
 mod raster;
 mod settings;
@@ -42,7 +43,7 @@ pub use settings::{Pattern, Settings, Visibility};
 use crate::{
     Result,
     gpu::{Gpu, OwnedBuffer, OwnedImage},
-    graph::{Buffer, Extent, Format, Graph, Image, Uniform},
+    graph::{Buffer, Extent, Format, Graph, Image, PassRef, Uniform},
     passes::gbuffer::GBuffer,
     rays::{RayHandles, Rays},
     reference::tracer::{
@@ -50,6 +51,7 @@ use crate::{
         tables::{self, LightTable},
     },
     scene::{Aabb, Pose, Scene, resident::Handles, resident::Resident},
+    shader::ComputeArgs,
     shaders::{self, consts, types},
 };
 
@@ -154,6 +156,19 @@ pub struct Outputs {
 /// Metres; 0 if there is nothing.
 fn diagonal(bounds: &Aabb) -> f32 {
     if bounds.is_empty() { 0.0 } else { (bounds.max - bounds.min).length() }
+}
+
+/// Rays of a dispatch that traces `each` for every pixel.
+fn rays(extent: Extent, each: u32) -> u64 {
+    extent.pixels() * u64::from(each)
+}
+
+/// With `threads` threads, or with the workgroups that lie at an offset in a buffer.
+fn dispatch<A: ComputeArgs>(graph: &mut Graph, args: A, groups: Option<(Buffer, u64)>, threads: u32) -> PassRef<'_> {
+    match groups {
+        Some((groups, offset)) => graph.compute_indirect(args, groups, offset),
+        None => graph.compute(args, threads),
+    }
 }
 
 impl Igi {
@@ -301,7 +316,8 @@ impl Igi {
         );
         let segments = settings.bounces + if settings.specular { settings.specular_depth } else { 0 };
         for turn in 0..segments {
-            graph.compute(shaders::igi::shoot::Args { push: shaders::igi::shoot::Push { turn }, ..args }, paths);
+            let args = shaders::igi::shoot::Args { push: shaders::igi::shoot::Push { turn }, ..args };
+            graph.compute(args, paths).rays(paths.into());
         }
         vpls
     }
@@ -328,7 +344,7 @@ impl Igi {
                 shared,
                 lamps
             );
-            graph.compute(args, extent);
+            graph.compute(args, extent).rays(rays(extent, count));
         }
         direct
     }

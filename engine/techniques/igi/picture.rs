@@ -91,8 +91,9 @@ impl Igi {
             raster::affordable(handles, igi).map_err(|error| error.at("igi"))?;
         }
         let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
-        let outputs = graph.scope("igi", |graph| {
+        let outputs = graph.scope("igi", |graph| -> Result<Outputs> {
             let shared = self.shared(graph, scene, pose, handles, igi);
+            self.few_enough(graph.extent(gbuffer.depth), handles, &shared, igi)?;
             // With a history every frame takes numbers of its own.
             let frame = if igi.history > 0 { graph.frame } else { 0 };
             let own = Self::numbered(graph, &shared, igi, frame);
@@ -109,7 +110,7 @@ impl Igi {
             if let Some(vpls) = vpls.filter(|_| igi.compensates()) {
                 self.compensate(graph, handles, &seen, &own, vpls, igi, gathered);
             }
-            let mut irradiance = self.filtered(graph, &seen, &own, vpls, igi, gathered);
+            let mut irradiance = self.filtered(graph, handles, &seen, &own, (vpls, gathered), igi);
             if let Some((all, chosen)) = shot.filter(|_| igi.history > 1) {
                 let light = (all, chosen, irradiance);
                 irradiance = self.accumulate(graph, handles, (&seen, view), &shared, light, igi);
@@ -127,8 +128,8 @@ impl Igi {
             });
             let (sharp, cache) = (trees.map(|t| t.sharp), trees.and_then(|t| t.cache));
             let (total, indirect) = composed(graph, &gbuffer, direct, irradiance, sharp);
-            Outputs { total, direct, indirect, sharp, irradiance, gathered, vpls, cache }
-        });
+            Ok(Outputs { total, direct, indirect, sharp, irradiance, gathered, vpls, cache })
+        })?;
         skybox::draw(graph, handles, &gbuffer, settings.background.into(), outputs.total);
         Ok(Picture { gbuffer, outputs })
     }
@@ -136,11 +137,11 @@ impl Igi {
     fn filtered(
         &self,
         graph: &mut Graph,
+        handles: &Handles,
         g: &GBuffer,
         shared: &Shared,
-        vpls: Option<Vpls>,
+        (vpls, gathered): (Option<Vpls>, Image),
         settings: &Settings,
-        gathered: Image,
     ) -> Image {
         let mut irradiance = gathered;
         if !(settings.joins() || settings.upsamples() || settings.smooths()) {
@@ -158,6 +159,9 @@ impl Igi {
             irradiance = upsampled;
             if let Some(vpls) = vpls.filter(|_| settings.refine > 0.0) {
                 self.refine(graph, g, shared, vpls, settings, (irradiance, unmatched));
+                if settings.compensates() {
+                    self.compensate_listed(graph, handles, g, shared, (vpls, settings), (irradiance, unmatched));
+                }
             }
         }
         irradiance

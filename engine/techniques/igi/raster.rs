@@ -73,6 +73,13 @@ fn at_once(size: u32, layers: u32, subsets: u32) -> u32 {
     (most / subsets * subsets).max(subsets)
 }
 
+/// Passes for `lights` virtual lights on a device whose images have `layers` layers at most. `holed`: some things have holes, which take a
+/// pass of their own.
+pub(super) fn passes(settings: &Settings, lights: u32, layers: u32, holed: bool) -> u64 {
+    let batch = at_once(settings.raster_size, layers, settings.interleave * settings.interleave);
+    u64::from(lights * VPL_MAPS * (1 + u32::from(holed)) + lights.div_ceil(batch))
+}
+
 impl Igi {
     /// Irradiance from the virtual lights at the visible surfaces, hidden by what their maps show.
     pub(super) fn gather_raster(

@@ -85,7 +85,7 @@ pub struct Settings {
     /// Side of the cells in which the light of virtual lights on what mirrors and glass show is kept, as share of the same diagonal,
     /// 0.002 to 0.2; 0: every surface that they show gathers for itself.
     pub cache: f32,
-    /// Such cells at most, 1 to 131,072. With more, every surface gathers for itself.
+    /// Such cells at most, 1 to 131,072. With more, every surface gathers for itself ([`Cache::note`](super::Cache::note)).
     pub cache_cells: u32,
     /// Shadow rays of virtual lights test the boxes of triangles instead of triangles.
     pub imperfect: bool,

@@ -1,6 +1,6 @@
 //! Mirrors and glass: a tree of rays for each pixel that sees some (Whitted 1980).
 
-use super::{Igi, Settings, Shared, Vpls, cache::Cache};
+use super::{Igi, Settings, Shared, Vpls, cache::Cache, dispatch, rays};
 use crate::{
     graph::{Buffer, Extent, Format, Graph, Image},
     passes::gbuffer::GBuffer,
@@ -46,7 +46,18 @@ impl Range {
     }
 }
 
+/// Pixels with trees: whole blocks of 8 × 8.
+fn slots(extent: Extent) -> u32 {
+    extent.width.div_ceil(8) * extent.height.div_ceil(8) * 64
+}
+
 impl Igi {
+    /// Ranges of pixels in which trees are grown, and nodes of each, for a picture of `extent` pixels. `None`: there are no mirrors.
+    pub(super) fn trees_of(&self, extent: Extent) -> Option<(u64, u32)> {
+        let slots = slots(extent);
+        self.sharp.then(|| (u64::from(slots.div_ceil(SLOTS)), slots.min(SLOTS) * TREE_WIDTH))
+    }
+
     /// Grows the trees of all pixels, a range after the other, and lights their ends.
     pub(super) fn trees(
         &self,
@@ -59,8 +70,7 @@ impl Igi {
     ) -> Trees {
         let extent = graph.extent(g.depth);
         let sharp = graph.image("igi.sharp", Format::RGBA32F, extent);
-        // Whole blocks of 8 × 8 pixels.
-        let slots = extent.width.div_ceil(8) * extent.height.div_ceil(8) * 64;
+        let slots = slots(extent);
         let held = slots.min(SLOTS);
         let tree_nodes = graph.buffer("igi.trees", u64::from(held * TREE_WIDTH) * size_of::<types::TreeNode>() as u64);
         graph.fill(tree_nodes, 0);
@@ -114,12 +124,12 @@ impl Igi {
         for level in 0..=settings.specular_depth {
             let push = grow::Push { first: range.first, count: range.slots, level, background };
             let args = traced_lit!(
-                grow::Args { view: g.view, sharp: range.sharp, tree_nodes: range.tree_nodes, push },
+                grow::Args { view: g.view, depth: g.depth, sharp: range.sharp, tree_nodes: range.tree_nodes, push },
                 shared.rays,
                 handles,
                 shared
             );
-            graph.compute(args, range.nodes());
+            graph.compute(args, range.nodes()).rays(range.nodes().into());
         }
     }
 
@@ -134,7 +144,7 @@ impl Igi {
                 shared,
                 lamps
             );
-            graph.compute(args, range.nodes());
+            graph.compute(args, range.nodes()).rays(rays(range.lit(), count));
         }
     }
 
@@ -150,7 +160,7 @@ impl Igi {
     ) {
         let (nodes, tree_nodes) = (range.nodes(), range.tree_nodes);
         let (least, imperfect, seed) = (shared.least, settings.imperfect.into(), shared.seed);
-        if let (Some(tree), true, None) = (vpls.tree, settings.picks_from(vpls.count), groups) {
+        if let (Some(tree), true) = (vpls.tree, settings.picks_from(vpls.count)) {
             let (picks, proposals, leaves) = (settings.picks, settings.proposals, tree.leaves);
             for (first, count) in self.batches(range.lit(), picks) {
                 let push = gather_tree_picks::Push { first, count, picks, proposals, leaves, nodes, least, seed };
@@ -159,7 +169,7 @@ impl Igi {
                     gather_tree_picks::Args { vpls: vpls.buffer, vpl_nodes: tree.nodes, tree_nodes, push, spec },
                     shared.hidden_by
                 );
-                graph.compute(args, nodes);
+                dispatch(graph, args, groups.map(|groups| (groups, 0)), nodes).rays(rays(range.lit(), count));
             }
             return;
         }
@@ -168,10 +178,7 @@ impl Igi {
             let spec = gather_tree::Spec { imperfect };
             let args =
                 crate::rays::traced!(gather_tree::Args { vpls: vpls.buffer, tree_nodes, push, spec }, shared.hidden_by);
-            match groups {
-                Some(groups) => graph.compute_indirect(args, groups, 0),
-                None => graph.compute(args, nodes),
-            };
+            dispatch(graph, args, groups.map(|groups| (groups, 0)), nodes).rays(rays(range.lit(), count));
         }
     }
 }

@@ -1,0 +1,200 @@
+//! How many passes a frame takes, before any is declared: settings that may each be chosen may together ask for more than a host can
+//! plan and record.
+
+use super::{Igi, Settings, Shared, Visibility, raster};
+use crate::{
+    Error, Result,
+    graph::Extent,
+    scene::resident::{Cutout, Handles},
+};
+
+/// Passes of a frame at most. Planned and recorded they take some seconds and a hundred megabytes on the host.
+const MOST_PASSES: u64 = 50_000;
+
+/// Passes that grow with a setting.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Share {
+    pub key: &'static str,
+    pub passes: u64,
+    /// What makes them fewer.
+    less: &'static str,
+}
+
+impl Igi {
+    /// Passes of a frame of `extent` pixels, about, by what they are for.
+    pub(super) fn passes(&self, extent: Extent, handles: &Handles, shared: &Shared, settings: &Settings) -> Vec<Share> {
+        let batches = |extent: Extent, rays: u32| self.batches(extent, rays).len() as u64;
+        let (paths, total) = (settings.paths(), settings.paths() * settings.bounces);
+        let coarse = extent.div_ceil(settings.downsample);
+        let trees = self.trees_of(extent).filter(|_| settings.specular);
+        // Virtual lights for what is seen directly, and with a history others for mirrors.
+        let chosen = 1 + u64::from(settings.history > 0 && trees.is_some());
+        let shot = chosen + u64::from(settings.history > 1);
+        let indirect = u64::from(settings.indirect);
+        let mut out = Vec::new();
+        let mut add = |key, passes, less| out.push(Share { key, passes, less });
+
+        let segments = settings.bounces + if settings.specular { settings.specular_depth } else { 0 };
+        add("bounces", indirect * shot * u64::from(segments), "Choose fewer");
+        if settings.candidates > 1 {
+            let judged = batches(Extent::new(paths * settings.candidates * settings.bounces, 1), settings.judges);
+            add("judges", indirect * chosen * judged, "Choose fewer, or fewer candidates");
+        }
+        let direct = batches(extent, shared.direct_rays);
+        let (count, nodes) = trees.map_or((0, Extent::new(1, 1)), |(count, nodes)| (count, Extent::new(nodes, 1)));
+        let lit = count * batches(nodes, shared.direct_rays);
+        add("direct_samples", direct + lit, "Choose fewer, or a smaller picture");
+
+        let picks = settings.picks_from(total);
+        let own = total.div_ceil(settings.interleave * settings.interleave);
+        let gathered = match settings.visibility {
+            Visibility::Raster => {
+                let holed = handles.moment.instances.iter().any(|i| i.casts && i.cutout != Cutout::Opaque);
+                raster::passes(settings, total, self.most_layers, holed)
+            }
+            _ if picks => batches(coarse, settings.texel_picks()),
+            _ => batches(coarse, own),
+        };
+        let of_nodes = if picks { settings.picks } else { total };
+        let cells = if settings.cache > 0.0 && count > 0 {
+            batches(Extent::new(settings.cache_cells.min(count as u32 * nodes.width), 1), total)
+        } else {
+            0
+        };
+        let gathered = gathered + count * batches(nodes, of_nodes) + cells;
+        match picks {
+            true => add("picks", indirect * gathered, "Choose fewer, or a smaller picture"),
+            false => add("vpls", indirect * gathered, "Choose fewer, or igi.picks above 0, or a smaller picture"),
+        }
+        let refines = settings.refine > 0.0 && settings.upsamples();
+        if refines {
+            let (lights, _, ranges) = self.refined(extent, own);
+            let passes = lights.len() as u64 * u64::from(ranges);
+            add("refine", indirect * passes, "Choose 0, or fewer igi.vpls, or a smaller picture");
+        }
+        if settings.compensates() {
+            // Of a path its begin, and two or three a segment.
+            let each = 3 * u64::from(settings.bounces);
+            let held = |extent: Extent| extent.pixels().div_ceil(u64::from(super::compensation::HELD));
+            let listed = if refines { held(extent) } else { 0 };
+            let ranges = held(coarse) + listed + count;
+            let passes = ranges * (2 + u64::from(settings.compensation) * each);
+            add("compensation", indirect * passes, "Choose fewer, or a smaller picture");
+        }
+        let grown = count * (1 + u64::from(settings.cache > 0.0)) * u64::from(settings.specular_depth + 1);
+        add("specular_depth", grown, "Choose less, or a smaller picture");
+        out
+    }
+
+    /// # Errors
+    /// `Usage` if a frame would take more than [`MOST_PASSES`], naming the setting that most of them are for.
+    pub(super) fn few_enough(
+        &self,
+        extent: Extent,
+        handles: &Handles,
+        shared: &Shared,
+        settings: &Settings,
+    ) -> Result<()> {
+        let shares = self.passes(extent, handles, shared, settings);
+        let sum: u64 = shares.iter().map(|share| share.passes).sum();
+        let Some(most) = shares.iter().max_by_key(|share| share.passes).filter(|_| sum > MOST_PASSES) else {
+            return Ok(());
+        };
+        let what = format!(
+            "a picture of {}×{} pixels would take {sum} passes, {} of them for this setting; allowed: {MOST_PASSES}",
+            extent.width, extent.height, most.passes
+        );
+        Err(Error::usage(what).at(format!("igi.{}", most.key)).help(most.less))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        gpu::testing::with_gpu,
+        graph::Graph,
+        scene::{Material, Pose, Scene, View, builtin, resident::Resident},
+        techniques::igi::PictureSettings,
+    };
+
+    /// A Cornell box, some of it of metal.
+    fn mirrors() -> Scene {
+        let mut scene = builtin::load("cornell-area").unwrap();
+        scene.materials[0] = Material { metallic: 1.0, roughness: 0.0, ..scene.materials[0].clone() };
+        scene
+    }
+
+    #[test]
+    fn as_many_are_counted_as_are_declared() {
+        with_gpu(|gpu| {
+            let scene = mirrors();
+            let mut resident = Resident::new(gpu, &scene).unwrap();
+            let mut igi = Igi::new(gpu, &scene, &resident, &Settings::default()).unwrap();
+            // So that little makes many.
+            igi.rays_at_once = 1 << 14;
+            let pose = Pose::rest(&scene);
+            let view = View::of_camera(&scene, &pose, 0, [70, 50]).unwrap();
+            let base = Settings { vpls: 60, candidates: 1, direct_samples: 4, ..Settings::default() };
+            for (key, settings) in [
+                ("vpls", Settings { vpls: 2000, ..base.clone() }),
+                ("vpls", Settings { vpls: 2000, downsample: 2, interleave: 3, ..base.clone() }),
+                ("vpls", Settings { vpls: 200, visibility: Visibility::Raster, ..base.clone() }),
+                ("vpls", Settings { vpls: 2000, cache: 0.05, specular_depth: 1, ..base.clone() }),
+                ("picks", Settings { vpls: 5000, picks: 1000, ..base.clone() }),
+                ("direct_samples", Settings { direct_samples: 1000, ..base.clone() }),
+                ("direct_samples", Settings { direct_samples: 1000, indirect: false, ..base.clone() }),
+                ("judges", Settings { vpls: 600, candidates: 20, judges: 1000, ..base.clone() }),
+                ("compensation", Settings { compensation: 60, bounces: 3, ..base.clone() }),
+                ("refine", Settings { vpls: 2000, specular: false, downsample: 4, refine: 0.1, ..base.clone() }),
+                ("vpls", Settings { vpls: 2000, history: 8, ..base.clone() }),
+            ] {
+                let declare = |frame: u32, igi: &mut Igi, resident: &mut Resident| {
+                    let mut graph = Graph::new("count");
+                    graph.frame = frame;
+                    let handles = resident.frame_in(&mut graph, &scene, &pose);
+                    let before = graph.pass_count() as u64;
+                    let all = PictureSettings { igi: settings.clone(), ..Default::default() };
+                    igi.picture(&mut graph, &scene, &pose, &handles, &view, &all).unwrap();
+                    let declared = graph.pass_count() as u64 - before;
+                    let shared = igi.shared(&mut graph, &scene, &pose, &handles, &settings);
+                    (declared, igi.passes(Extent::from(view.extent), &handles, &shared, &settings))
+                };
+                let (declared, shares) = declare(1, &mut igi, &mut resident);
+                let counted: u64 = shares.iter().map(|share| share.passes).sum();
+                println!("{key}: {declared} passes, counted {counted}");
+                // Filters, clears and sorting are left out.
+                assert!(declared.abs_diff(counted) <= 80 + declared / 50, "{key}: {declared} and {counted} passes");
+                let most = shares.iter().max_by_key(|share| share.passes).unwrap();
+                assert!(most.key == key && most.passes > 100, "{most:?} instead of {key}");
+            }
+        });
+    }
+
+    #[test]
+    fn what_no_host_could_plan_is_refused_before_it_is_declared() {
+        with_gpu(|gpu| {
+            let scene = mirrors();
+            let mut resident = Resident::new(gpu, &scene).unwrap();
+            let mut igi = Igi::new(gpu, &scene, &resident, &Settings::default()).unwrap();
+            igi.rays_at_once = 1 << 14;
+            let pose = Pose::rest(&scene);
+            let view = View::of_camera(&scene, &pose, 0, [800, 600]).unwrap();
+            let mut declare = |vpls| {
+                let mut graph = Graph::new("refused");
+                let handles = resident.frame_in(&mut graph, &scene, &pose);
+                let all = PictureSettings { igi: Settings { vpls, ..Settings::default() }, ..Default::default() };
+                let result = igi.picture(&mut graph, &scene, &pose, &handles, &view, &all);
+                (result, graph.pass_count())
+            };
+            assert!(declare(20).0.is_ok());
+            let (result, passes) = declare(10_000);
+            let error = result.unwrap_err();
+            assert!(error.exit_code() == 2 && passes < 50, "{passes} passes");
+            let text = error.to_string();
+            for part in ["igi.vpls: ", "800×600 pixels", "allowed: 50000", "igi.picks above 0"] {
+                assert!(text.contains(part), "{part} is not in {text}");
+            }
+        });
+    }
+}
