@@ -291,12 +291,15 @@ fn all_eight_ways_to_be_faster_show_the_same_room() {
         let mut studio = Studio::new(gpu, &scene);
         let base = Settings { bound: 0.1, bounces: 2, ..plain(180) };
         let exact = studio.render(&seen, &base, 0);
+        // The unlit lamp shows none of what its texels have for those beside them.
+        let lit: Vec<bool> = exact.albedo.iter().map(|albedo| albedo[3] > 0.5).collect();
         let mut boxes = 0.0;
         for (downsample, interleave) in [(1, 1), (4, 1), (1, 3), (4, 3), (3, 2), (2, 4)] {
             let mut pictures = Vec::new();
             for imperfect in [false, true] {
                 let settings = Settings { imperfect, downsample, interleave, ..base.clone() };
-                let found = studio.render(&seen, &settings, 0).irradiance;
+                let mut found = studio.render(&seen, &settings, 0).irradiance;
+                found.iter_mut().zip(&lit).filter(|(_, lit)| !**lit).for_each(|(f, _)| *f = [0.0; 4]);
                 let error: f64 =
                     found.iter().zip(&exact.irradiance).map(|(f, e)| f64::from((f[1] - e[1]).abs())).sum::<f64>()
                         / exact.irradiance.iter().map(|e| f64::from(e[1])).sum::<f64>();

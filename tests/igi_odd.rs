@@ -374,8 +374,8 @@ fn surfaces_that_can_show_no_indirect_light_trace_no_rays_for_it() {
         stage.point(vec3(0.0, 0.6, 0.5), Vec3::ONE);
         let mut studio = Studio::new(gpu, &stage.scene);
         let seen = view(vec3(0.0, 0.0, 0.9), Vec3::NEG_Z, 80.0, [24, 24]);
-        // Texels of black surfaces serve others where there are filters.
-        for (interleave, of_black) in [(1, false), (2, true)] {
+        // Their texels serve others where there are filters.
+        for (interleave, traced) in [(1, false), (2, true)] {
             let shown = studio.render(&seen, &Settings { interleave, ..plain(64) }, 0);
             let (mut counts, mut rays) = ([0; 3], [0.0; 3]);
             for (albedo, gathered) in shown.albedo.iter().zip(&shown.gathered) {
@@ -384,8 +384,8 @@ fn surfaces_that_can_show_no_indirect_light_trace_no_rays_for_it() {
                 rays[kind] += gathered[3];
             }
             println!("interleave {interleave}: {rays:?} rays of {counts:?} pixels, unlit, black and others");
-            assert!(counts.iter().all(|count| *count > 20) && rays[0] == 0.0 && rays[2] > 0.0);
-            assert_eq!(rays[1] > 0.0, of_black, "interleave {interleave}");
+            assert!(counts.iter().all(|count| *count > 20) && rays[2] > 0.0);
+            assert!(rays[..2].iter().all(|rays| (*rays > 0.0) == traced), "interleave {interleave}");
         }
     });
 }

@@ -168,13 +168,13 @@ impl Igi {
     }
 }
 
-/// The G-buffer as indirect light is gathered for it: surfaces that can show none are background. Black ones and mirrors stay where others
-/// take light from their texels.
+/// The G-buffer as indirect light is gathered for it: surfaces that can show none (unlit and black ones, mirrors) are background, but where
+/// others take light from their texels.
 fn receivers(graph: &mut Graph, g: &GBuffer, settings: &Settings) -> GBuffer {
     let extent = graph.extent(g.depth);
     let received = graph.image("igi.received", Format::R32F, extent);
     let shared = settings.joins() || settings.upsamples() || settings.smooths() || settings.history > 1;
-    let push = shaders::igi::receivers::Push { black: shared.into() };
+    let push = shaders::igi::receivers::Push { all: shared.into() };
     graph.compute(shaders::igi::receivers::Args { albedo: g.albedo, depth: g.depth, received, push }, extent);
     GBuffer { depth: received, ..*g }
 }
