@@ -3,12 +3,12 @@
 mod fiv_lab;
 mod tracer_lab;
 
-use fiv_lab::{Studio, ball, colourful, ground, thing};
+use fiv_lab::{Studio, ball, colourful, ground, occluder, thing};
 use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
     graph::Graph,
-    scene::{Pose, Scene, View, builtin, resident::Resident},
+    scene::{AlphaMode, Pose, Scene, View, builtin, resident::Resident},
     techniques::fiv::{
         Cut, Extent, Fiv, Interpolation, Masks, Method, PictureSettings, SelfSamples, Settings, Shared, Specular,
         Stored, turn::Axis,
@@ -26,6 +26,22 @@ fn ball_over_ground() -> Scene {
     let (positions, indices) = ball(0.5, 8);
     thing(&mut scene, "ball", positions, indices, Mat4::from_translation(vec3(0.0, 0.8, 0.0)));
     scene
+}
+
+#[test]
+fn files_of_blended_occluders_made_when_masks_were_others_are_out_of_date() {
+    // A tetrahedron.
+    let hash = |alpha: AlphaMode| {
+        let mut scene = Scene::default();
+        let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+        thing(&mut scene, "body", corners, vec![0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3], Mat4::IDENTITY);
+        scene.materials[0].alpha = alpha;
+        format!("{:016x}", occluder(&scene).0.hash)
+    };
+    // As they were at first. Rays meet solid and cut surfaces as they did then.
+    assert_eq!(hash(AlphaMode::Opaque), "d534c1090e9bdb08");
+    assert_eq!(hash(AlphaMode::Mask { cutoff: 0.5 }), "1d84918ee84c41f5");
+    assert_ne!(hash(AlphaMode::Blend), "6bcef818bd52b9b8");
 }
 
 #[test]
