@@ -8,7 +8,7 @@ use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
     graph::Graph,
-    scene::{AlphaMode, Pose, Scene, View, builtin, resident::Resident},
+    scene::{AlphaMode, Environment, Pose, Scene, View, builtin, resident::Resident},
     techniques::fiv::{
         Cut, Extent, Fiv, Interpolation, Masks, Method, PictureSettings, SelfSamples, Settings, Shared, Specular,
         Stored, turn::Axis,
@@ -42,6 +42,36 @@ fn files_of_blended_occluders_made_when_masks_were_others_are_out_of_date() {
     assert_eq!(hash(AlphaMode::Opaque), "d534c1090e9bdb08");
     assert_eq!(hash(AlphaMode::Mask { cutoff: 0.5 }), "1d84918ee84c41f5");
     assert_ne!(hash(AlphaMode::Blend), "6bcef818bd52b9b8");
+}
+
+#[test]
+fn another_environment_than_the_scene_was_made_ready_with_is_refused() {
+    with_gpu(|gpu| {
+        let (scene, view) = (ball_over_ground(), flat_view(Vec3::Y * 10.0, Vec3::ZERO, 3.0, [4, 4]));
+        let ours = scene.environment.clone().unwrap();
+        let settings = coarse();
+        let mut resident = Resident::new(gpu, &scene).unwrap();
+        let mut fiv = Fiv::new(gpu, &scene, &resident, &settings, None, |_, _| true).unwrap();
+        let mut picture = |environment: Environment| {
+            let other = Scene { environment: Some(environment), ..scene.clone() };
+            let mut graph = Graph::new("fiv");
+            let pose = Pose::rest(&scene);
+            let handles = resident.frame_in(&mut graph, &scene, &pose);
+            let all = PictureSettings { fiv: settings.clone(), ..Default::default() };
+            fiv.picture(&mut graph, &other, &pose, &handles, &view, &all).map(|_| ())
+        };
+        picture(ours.clone()).unwrap();
+        let brighter = ours.pixels.iter().map(|p| *p * 1.5).collect();
+        for other in [
+            Environment { pixels: brighter, ..ours.clone() },
+            Environment { width: ours.height, height: ours.width, ..ours.clone() },
+            builtin::environment("areas").unwrap(),
+        ] {
+            let error = picture(other).unwrap_err();
+            assert!(error.exit_code() == 2 && error.to_string().contains("another environment"), "{error}");
+        }
+        picture(ours).unwrap();
+    });
 }
 
 #[test]

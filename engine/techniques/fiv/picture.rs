@@ -82,10 +82,12 @@ impl Fiv {
     /// Declares a frame: G-buffer, irradiance, reflected light, sky. `handles` are of this graph, for `pose`. The settings that decide
     /// the vectors are those that [`Fiv::new`] was given. The parts of the method (`trilinear`, `partial`, `cut`, `extent`, `overlap`,
     /// `shared`, `negligible`, `self_shadow`), the light (`rotation`, `exposure`) and [`Method::Unshadowed`] are chosen by each picture;
-    /// `self_shadow` of stored vectors can only be switched off.
+    /// `self_shadow` of stored vectors can only be switched off. The environment of `scene` is that which [`Fiv::new`] was given; only its
+    /// `rotation` and `scale` may be others.
     ///
     /// # Errors
-    /// `Usage` if a setting is out of its range, or asks for what [`Fiv::new`] was not told of.
+    /// `Usage` if a setting is out of its range, or asks for what [`Fiv::new`] was not told of, or if the environment has another size or
+    /// other pixels (a thousand are looked at).
     pub fn picture(
         &mut self,
         graph: &mut Graph,

@@ -3,6 +3,7 @@
 use super::{
     Light, Method, Occluder, Occluders, Plan, Settings, Sky, Specular, Stored,
     fill::fill,
+    hash::Hash,
     light, negligible,
     online::Online,
     plan::Kind,
@@ -24,6 +25,8 @@ use crate::{
 const TURNS_LIMITED: u64 = 2 * TRACE_STEPS as u64;
 /// Occluders that the loops of a shader can go through.
 const MOST_OCCLUDERS: usize = 16_384;
+/// Pixels by which environments are told apart, at least, if they have so many.
+const LOOKED_AT: usize = 1000;
 
 /// A scene whose shadows come from vectors.
 #[derive(Debug)]
@@ -40,6 +43,8 @@ pub struct Fiv {
     lit: (f32, f32),
     /// And of that for which the vectors are.
     made_for: (f32, f32),
+    /// Of the environment without its turn and factor: of which one pictures may be.
+    lit_by: u64,
     /// What pictures may choose.
     pub(super) ready: Ready,
     gpu: Gpu,
@@ -95,6 +100,7 @@ impl Fiv {
         }
         let environment = lit_by(scene)?;
         let lit = lit(environment, &settings);
+        let lit_by = told_by(environment);
         // Vectors are for the light that they are computed under; all others may turn from that of the scene.
         let still = if settings.method == Method::Vectors { lit.0 } else { environment.rotation };
         let mut turning = Turning::new(settings.size, still);
@@ -167,6 +173,7 @@ impl Fiv {
             at_rest: pose,
             lit,
             made_for: lit,
+            lit_by,
             ready: Ready::new(given, &settings),
             gpu: gpu.clone(),
             light,
@@ -212,9 +219,15 @@ impl Fiv {
     /// Takes the environment as `settings` have it turned and scaled.
     ///
     /// # Errors
-    /// `Usage` if the vectors were computed for another one, or as [`Fiv::new`]; `OutOfMemory`, `DeviceLost`.
+    /// `Usage` if the scene has another one than it was made ready with, or the vectors were computed for another turn or factor, or as
+    /// [`Fiv::new`]; `OutOfMemory`, `DeviceLost`.
     pub(super) fn follow(&mut self, scene: &Scene, settings: &Settings) -> Result<()> {
         let environment = lit_by(scene)?;
+        if told_by(environment) != self.lit_by {
+            let name = &environment.name;
+            let error = Error::usage(format!("`{name}` is another environment than the scene was made ready with"));
+            return Err(error.at("fiv").help("Make the scene ready again (Fiv::new)"));
+        }
         let wanted = lit(environment, settings);
         if settings.method == Method::Vectors && wanted != self.made_for {
             let error = Error::usage("the vectors were computed for another turn or scale of the environment");
@@ -267,6 +280,16 @@ fn reaches(gpu: &Gpu, occluders: &Occluders) -> Result<OwnedBuffer> {
 fn lit(environment: &Environment, settings: &Settings) -> (f32, f32) {
     let (turn, factor) = settings.light();
     (environment.rotation + turn, environment.scale * factor)
+}
+
+/// A number by which environments are told apart, without going through all of them for each picture: of their sizes and of a thousand
+/// pixels that lie evenly.
+fn told_by(environment: &Environment) -> u64 {
+    let mut hash = Hash::new();
+    hash.word(u64::from(environment.width) << 32 | u64::from(environment.height));
+    let each = (environment.pixels.len() / LOOKED_AT).max(1);
+    environment.pixels.iter().step_by(each).for_each(|pixel| hash.floats(&pixel.to_array()));
+    hash.finish()
 }
 
 /// The environment of a scene that has no other lights.
