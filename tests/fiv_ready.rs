@@ -45,6 +45,28 @@ fn files_of_blended_occluders_made_when_masks_were_others_are_out_of_date() {
 }
 
 #[test]
+fn a_turn_that_stays_is_exact_for_every_method() {
+    with_gpu(|gpu| {
+        let (scene, view) = (ball_over_ground(), flat_view(Vec3::Y * 10.0, Vec3::ZERO, 3.0, [8, 8]));
+        let turned = Environment { rotation: 37f32.to_radians(), ..scene.environment.clone().unwrap() };
+        let itself = Scene { environment: Some(turned), ..scene.clone() };
+        for method in [Method::Unshadowed, Method::BruteForce, Method::Online] {
+            let [still, asked] = [0.0, 37.0].map(|rotation| Settings { rotation, method, ..coarse() });
+            let exact = Studio::new(gpu, &itself, &still, None).irradiance(&view, &still);
+            assert!(Studio::new(gpu, &scene, &asked, None).irradiance(&view, &asked) == exact, "{method:?}");
+            // The same if it is a picture that asks for it, whichever came before.
+            let mut studio = Studio::new(gpu, &scene, &still, None);
+            assert!(studio.irradiance(&view, &still) != exact);
+            let turning = Settings { turning: 1.0, ..asked.clone() };
+            let nearly = studio.irradiance(&view, &turning);
+            assert!(studio.irradiance(&view, &asked) == exact, "{method:?}");
+            // One that goes on turning has its light from means.
+            assert!(nearly != exact && studio.irradiance(&view, &turning) == nearly, "{method:?}");
+        }
+    });
+}
+
+#[test]
 fn another_environment_than_the_scene_was_made_ready_with_is_refused() {
     with_gpu(|gpu| {
         let (scene, view) = (ball_over_ground(), flat_view(Vec3::Y * 10.0, Vec3::ZERO, 3.0, [4, 4]));

@@ -83,7 +83,8 @@ impl Fiv {
     /// the vectors are those that [`Fiv::new`] was given. The parts of the method (`trilinear`, `partial`, `cut`, `extent`, `overlap`,
     /// `shared`, `negligible`, `self_shadow`), the light (`rotation`, `exposure`) and [`Method::Unshadowed`] are chosen by each picture;
     /// `self_shadow` of stored vectors can only be switched off. The environment of `scene` is that which [`Fiv::new`] was given; only its
-    /// `rotation` and `scale` may be others.
+    /// `rotation` and `scale` may be others. A picture of another turn than the one before resamples it: pixel by pixel, or, much
+    /// faster and nearly the same, from means where `turning` is not 0.
     ///
     /// # Errors
     /// `Usage` if a setting is out of its range, or asks for what [`Fiv::new`] was not told of, or if the environment has another size or

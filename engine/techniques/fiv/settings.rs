@@ -161,7 +161,8 @@ pub struct Settings {
     pub method: Method,
     /// The environment turns by this angle about +Y, degrees counter-clockwise seen from above, -36000 to 36000.
     pub rotation: f32,
-    /// And by so much more each second of a sequence, degrees, -36000 to 36000.
+    /// And by so much more each second of a sequence, degrees, -36000 to 36000. Where it is not 0 the light of other turns than the
+    /// scene's comes from means of pixels, which takes less time and is off by some thousandths.
     pub turning: f32,
     /// Factor on the environment's light as a power of two, -30 to 30.
     pub exposure: f32,

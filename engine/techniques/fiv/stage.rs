@@ -39,10 +39,10 @@ pub struct Fiv {
     runner: Runner,
     /// The driver ends loops early.
     pub(super) limited: bool,
-    /// Turn and factor of the environment in it.
-    lit: (f32, f32),
-    /// And of that for which the vectors are.
-    made_for: (f32, f32),
+    /// The environment in it.
+    lit: Lit,
+    /// And that for which the vectors are.
+    made_for: Lit,
     /// Of the environment without its turn and factor: of which one pictures may be.
     lit_by: u64,
     /// What pictures may choose.
@@ -70,7 +70,32 @@ pub struct Fiv {
     /// For glossy reflection with shadows.
     pub(super) glossy: Option<Glossy>,
     /// What occluders can hide at most ([`negligible`]), with the light that this is for.
-    matter: Option<((f32, f32), OwnedBuffer)>,
+    matter: Option<(Lit, OwnedBuffer)>,
+}
+
+/// How an environment is taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Lit {
+    /// Radians about +Y, with its own.
+    turn: f32,
+    /// Of radiance, with its own.
+    factor: f32,
+    /// Resampled pixel by pixel: it does not turn from picture to picture.
+    still: bool,
+}
+
+impl Lit {
+    fn of(environment: &Environment, settings: &Settings) -> Self {
+        let (turn, factor) = settings.light();
+        let turn = environment.rotation + turn;
+        // All methods have the same light, of which vectors are computed beforehand.
+        let still = settings.method == Method::Vectors || settings.turning == 0.0 || turn == environment.rotation;
+        Self { turn, factor: environment.scale * factor, still }
+    }
+
+    fn sky(self, turning: &mut Turning, environment: &Environment) -> Result<Sky> {
+        turning.sky(environment, (self.turn, self.factor), self.still)
+    }
 }
 
 impl Fiv {
@@ -99,12 +124,10 @@ impl Fiv {
             return Err(error.help("Use fiv.method=online"));
         }
         let environment = lit_by(scene)?;
-        let lit = lit(environment, &settings);
+        let lit = Lit::of(environment, &settings);
         let lit_by = told_by(environment);
-        // Vectors are for the light that they are computed under; all others may turn from that of the scene.
-        let still = if settings.method == Method::Vectors { lit.0 } else { environment.rotation };
-        let mut turning = Turning::new(settings.size, still);
-        let sky = turning.sky(environment, lit.0, lit.1)?.apart(settings.apart());
+        let mut turning = Turning::new(settings.size);
+        let sky = lit.sky(&mut turning, environment)?.apart(settings.apart());
         let name = environment.name.as_str();
         let mut runner = Runner::new(gpu);
         let light = Light::with(&mut runner, &sky)?;
@@ -228,7 +251,7 @@ impl Fiv {
             let error = Error::usage(format!("`{name}` is another environment than the scene was made ready with"));
             return Err(error.at("fiv").help("Make the scene ready again (Fiv::new)"));
         }
-        let wanted = lit(environment, settings);
+        let wanted = Lit::of(environment, settings);
         if settings.method == Method::Vectors && wanted != self.made_for {
             let error = Error::usage("the vectors were computed for another turn or scale of the environment");
             return Err(error.at("fiv").help("Make the scene ready again, or use fiv.method=online"));
@@ -236,7 +259,7 @@ impl Fiv {
         if wanted == self.lit {
             return Ok(());
         }
-        self.sky = self.turning.sky(environment, wanted.0, wanted.1)?.apart(settings.apart());
+        self.sky = wanted.sky(&mut self.turning, environment)?.apart(settings.apart());
         self.light = Light::with(&mut self.runner, &self.sky)?;
         self.lit = wanted;
         Ok(())
@@ -274,12 +297,6 @@ fn reaches(gpu: &Gpu, occluders: &Occluders) -> Result<OwnedBuffer> {
     let mut all: Vec<f32> = occluders.kinds.iter().flat_map(|kind| kind.support().0).collect();
     all.resize(all.len().max(1), 0.0);
     OwnedBuffer::with_contents(gpu, "fiv.reaches", bytemuck::cast_slice(&all))
-}
-
-/// Turn and factor of the environment.
-fn lit(environment: &Environment, settings: &Settings) -> (f32, f32) {
-    let (turn, factor) = settings.light();
-    (environment.rotation + turn, environment.scale * factor)
 }
 
 /// A number by which environments are told apart, without going through all of them for each picture: of their sizes and of a thousand
