@@ -191,12 +191,16 @@ pub(super) fn fits(gpu: &Gpu, plan: &Plan, placed: usize) -> Result<()> {
 /// # Errors
 /// `Runtime` with more than a shader can go through.
 fn turns(count: u32) -> Result<u32> {
-    let most = (MOST_TURNS - TURNS_CELLS) / (TURNS_EACH + 1);
-    if count > most {
+    let all = |count: u32| {
+        let [words, count] = [count.div_ceil(32).max(1), count].map(u64::from);
+        words + u64::from(TURNS_CELLS) + count * u64::from(TURNS_EACH)
+    };
+    let fits = |count: u32| u32::try_from(all(count)).ok().filter(|turns| *turns <= MOST_TURNS);
+    fits(count).ok_or_else(|| {
+        let most = (0..count).take_while(|count| fits(*count).is_some()).last().unwrap_or(0);
         let what = format!("{count} occluders, at most {most} can have reflections");
-        return Err(Error::new(ErrorKind::Runtime, what).at("fiv.specular").help("Join meshes into fewer nodes"));
-    }
-    Ok(count.div_ceil(32).max(1) + TURNS_CELLS + count * TURNS_EACH)
+        Error::new(ErrorKind::Runtime, what).at("fiv.specular").help("Join meshes into fewer nodes")
+    })
 }
 
 fn shares(
