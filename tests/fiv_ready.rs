@@ -6,7 +6,7 @@ mod tracer_lab;
 use fiv_lab::{Studio, ball, colourful, ground, occluder, thing};
 use glam::{Mat4, Vec3, vec3};
 use lucerna::{
-    gpu::testing::with_gpu,
+    gpu::{Gpu, testing::with_gpu},
     graph::Graph,
     scene::{AlphaMode, Environment, Pose, Scene, View, builtin, resident::Resident},
     techniques::fiv::{
@@ -26,6 +26,20 @@ fn ball_over_ground() -> Scene {
     let (positions, indices) = ball(0.5, 8);
     thing(&mut scene, "ball", positions, indices, Mat4::from_translation(vec3(0.0, 0.8, 0.0)));
     scene
+}
+
+/// The vectors of a scene as a file has them.
+fn stored(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Stored {
+    let studio = Studio::new(gpu, scene, settings, None);
+    let (plan, kinds) = (studio.fiv.plan().clone(), &studio.fiv.occluders().kinds);
+    let mut stored = Stored::empty(plan.clone(), 0);
+    let light = studio.fiv.light();
+    plan.compute(gpu, light, kinds, 0..plan.samples(), |_, new| {
+        stored.push(new);
+        Ok(true)
+    })
+    .unwrap();
+    stored
 }
 
 #[test]
@@ -174,22 +188,29 @@ fn what_a_file_decides_may_be_asked_for_as_it_was_given() {
     with_gpu(|gpu| {
         let (scene, view) = (ball_over_ground(), flat_view(Vec3::Y * 10.0, Vec3::ZERO, 3.0, [8, 8]));
         let even = Settings { adaptive: false, azimuths: 10, ..coarse() };
-        let first = Studio::new(gpu, &scene, &even, None);
-        let plan = first.fiv.plan().clone();
+        let stored = stored(gpu, &scene, &even);
         // It says that its samples lie evenly.
-        assert_eq!(plan.settings(&coarse()), even);
-        let occluders = first.fiv.occluders();
-        let mut stored = Stored::empty(plan.clone(), 0);
-        plan.compute(gpu, first.fiv.light(), &occluders.kinds, 0..plan.samples(), |_, new| {
-            stored.push(new);
-            Ok(true)
-        })
-        .unwrap();
+        assert_eq!(stored.plan.settings(&coarse()), even);
         let mut second = Studio::new(gpu, &scene, &coarse(), Some(&stored));
         let exact = second.irradiance(&view, &even);
         assert!(second.irradiance(&view, &coarse()) == exact);
         let error = second.refused(&view, &Settings { azimuths: 11, ..coarse() });
         assert_eq!(error.place(), Some("fiv.azimuths"));
+    });
+}
+
+#[test]
+fn a_file_has_chosen_where_samples_lie_whatever_is_interpolated() {
+    with_gpu(|gpu| {
+        let (scene, view) = (ball_over_ground(), flat_view(Vec3::Y * 10.0, Vec3::ZERO, 3.0, [8, 8]));
+        let stored = stored(gpu, &scene, &coarse());
+        let other = Settings { interpolation: Interpolation::SolidAngle, ..coarse() };
+        let mut studio = Studio::new(gpu, &scene, &coarse(), Some(&stored));
+        let exact = Studio::new(gpu, &scene, &other, Some(&stored)).irradiance(&view, &other);
+        assert!(studio.irradiance(&view, &other) == exact && studio.irradiance(&view, &coarse()) != exact);
+        // Where they are chosen for the scene, it is by what is interpolated.
+        let error = Studio::new(gpu, &scene, &coarse(), None).refused(&view, &other);
+        assert_eq!(error.place(), Some("fiv.interpolation"));
     });
 }
 

@@ -12,11 +12,25 @@ pub(super) struct Ready {
     given: Settings,
     /// As they count: a file of vectors decides some of them.
     made: Settings,
+    /// It was chosen by them where samples lie, of some occluders at least.
+    adapted: bool,
 }
 
 impl Ready {
-    pub(super) fn new(given: &Settings, made: &Settings) -> Self {
-        Self { given: given.clone(), made: made.clone() }
+    /// `computed`: vectors of some occluders were not in a file.
+    pub(super) fn new(given: &Settings, made: &Settings, computed: bool) -> Self {
+        Self { given: given.clone(), made: made.clone(), adapted: made.adaptive && computed }
+    }
+
+    /// Whether pictures by `method` depend on what the scene was made ready with by this key.
+    fn decides(&self, key: &str, method: Method) -> bool {
+        match key {
+            "size" => true,
+            // It is also by what samples are chosen where to lie.
+            "interpolation" => method == Method::Vectors && self.adapted,
+            "adaptive" => method == Method::Vectors,
+            _ => matches!(method, Method::Vectors | Method::Online),
+        }
     }
 
     /// The settings of a picture: its own choices, and in everything else what the scene was made ready for.
@@ -39,15 +53,14 @@ impl Ready {
         let (fixed, given) = (chosen(asked, made), chosen(&self.given, made));
         if fixed != *made && fixed != given {
             let other = differing(&fixed, &given)?;
-            let wrong = differing(&fixed, made)?
-                .into_iter()
-                .find(|key| other.contains(key) && decides(key, made, asked.method));
+            let wrong =
+                differing(&fixed, made)?.into_iter().find(|key| other.contains(key) && self.decides(key, asked.method));
             if let Some(key) = wrong {
                 return self.refused(&key, asked);
             }
         }
         let mut taken = chosen(made, asked);
-        if !decides("interpolation", made, asked.method) {
+        if !self.decides("interpolation", asked.method) {
             taken.interpolation = asked.interpolation;
         }
         taken.validate().map_err(|error| error.at("fiv"))?;
@@ -80,17 +93,6 @@ fn chosen(of: &Settings, picture: &Settings) -> Settings {
         turning: picture.turning,
         exposure: picture.exposure,
         ..of.clone()
-    }
-}
-
-/// Whether pictures by `method` depend on what the scene was made ready with by this key.
-fn decides(key: &str, made: &Settings, method: Method) -> bool {
-    match key {
-        "size" => true,
-        // It is also by what samples are chosen where to lie.
-        "interpolation" => method == Method::Vectors && made.adaptive,
-        "adaptive" => method == Method::Vectors,
-        _ => matches!(method, Method::Vectors | Method::Online),
     }
 }
 

@@ -146,6 +146,8 @@ impl Fiv {
         notes.extend(said(&settings, &plan, &occluders.kinds));
         // Of one total: vectors, then what is hidden of reflections.
         let glossy = specular::wanted(&settings);
+        let missing = stored.map(|stored| missing(&plan, stored));
+        let computed = missing.as_ref().map_or(!plan.occluders.is_empty(), Option::is_some);
         let (mut before, later) = (0, if glossy { specular::all(&plan) } else { 0 });
         if glossy {
             specular::fits(gpu, &plan, occluders.placed.len())?;
@@ -153,7 +155,7 @@ impl Fiv {
         let fivs = match settings.method {
             Method::Vectors => {
                 plan.fits(Some(gpu.caps().limits.storage_range))?;
-                notes.extend(stored.and_then(|stored| computed(&plan, stored)));
+                notes.extend(missing.flatten());
                 let told = |done, all| {
                     before = all;
                     told(done, all + later)
@@ -197,7 +199,7 @@ impl Fiv {
             lit,
             made_for: lit,
             lit_by,
-            ready: Ready::new(given, &settings),
+            ready: Ready::new(given, &settings, computed),
             gpu: gpu.clone(),
             light,
             sky,
@@ -388,7 +390,7 @@ fn vectors(
 }
 
 /// What of a scene is not in a file of vectors.
-fn computed(plan: &Plan, stored: &Stored) -> Option<Note> {
+fn missing(plan: &Plan, stored: &Stored) -> Option<Note> {
     let known =
         |kind: &&Kind| !stored.plan.occluders.iter().any(|k| (&k.hash, k.surface) == (&kind.hash, kind.surface));
     let named: Vec<_> = plan.occluders.iter().filter(known).map(|k| format!("`{}` ({})", k.name, k.hash)).collect();
