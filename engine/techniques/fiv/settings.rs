@@ -268,7 +268,7 @@ impl Settings {
             ("turn_axis", self.turn_axis != by.turn_axis, vectors && self.turns > 1, "fiv.turns is 1"),
             ("suns", self.suns != by.suns, vectors, unused),
             ("reach", self.reach != by.reach, shadows, unused),
-            ("adaptive", self.adaptive != by.adaptive, shadows, unused),
+            ("adaptive", self.adaptive != by.adaptive, vectors, "vectors of a frame lie evenly whatever it says"),
             ("split", self.split != by.split, shadows, unused),
             ("masks", self.masks != by.masks, vectors, unused),
             ("flat", self.flat != by.flat, shadows, unused),
@@ -362,7 +362,8 @@ mod tests {
                 Settings { method: Method::BruteForce, size: 16, suns: 3, negligible: 0.1, ..good.clone() },
                 &["suns", "negligible"],
             ),
-            (Settings { adaptive: false, reach: 8.0, ..online.clone() }, &[]),
+            (Settings { reach: 8.0, ..online.clone() }, &[]),
+            (Settings { adaptive: false, ..online.clone() }, &["adaptive"]),
         ] {
             assert_eq!(idle.idle().iter().map(|(key, _)| *key).collect::<Vec<_>>(), keys);
         }
