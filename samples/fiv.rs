@@ -6,7 +6,7 @@ use clap::{Parser, Subcommand};
 use lucerna::{
     ErrorKind, Result,
     graph::Graph,
-    scene::resident::Resident,
+    scene::{Note, resident::Resident},
     techniques::fiv::{Fiv, PictureSettings, Stored},
 };
 use lucerna_samples::{
@@ -108,9 +108,17 @@ fn run(args: &Render) -> Result<ExitCode> {
                 Some(file) if error.kind() == ErrorKind::Input => error.in_file(file),
                 _ => error,
             })?;
-            Ok((resident, fiv))
+            // Notes about the file name it.
+            let named = |note: &Note| match &args.vectors {
+                Some(file) if note.place == "vectors" => {
+                    Note { place: format!("vectors {}", file.display()), ..note.clone() }
+                }
+                _ => note.clone(),
+            };
+            let notes: Vec<Note> = fiv.notes().iter().map(named).collect();
+            Ok((resident, fiv, notes))
         },
-        |graph, (resident, fiv), input, settings| compose(graph, resident, fiv, input, settings),
+        |graph, (resident, fiv, notes), input, settings| compose(graph, (resident, fiv, notes), input, settings),
     );
     match result {
         // Nothing was written.
@@ -122,8 +130,7 @@ fn run(args: &Render) -> Result<ExitCode> {
 /// Declares one frame.
 fn compose(
     graph: &mut Graph,
-    resident: &mut Resident,
-    fiv: &mut Fiv,
+    (resident, fiv, notes): (&mut Resident, &mut Fiv, &[Note]),
     input: &Input<'_>,
     settings: &PictureSettings,
 ) -> Result<Shown> {
@@ -132,6 +139,6 @@ fn compose(
     let settings = PictureSettings { fiv: settings.fiv.after(input.seconds), ..settings.clone() };
     let picture = fiv.picture(graph, input.scene, input.pose, &scene, &view, &settings)?;
     let shown = Shown::new(picture.outputs.total).color("irradiance", picture.outputs.irradiance);
-    let notes = [resident.notes(), fiv.notes(), &picture.notes].concat();
+    let notes = [resident.notes(), notes, &picture.notes].concat();
     Ok(gbuffer_layers::add(shown, &picture.gbuffer, &view).seen_by(view).noting(notes))
 }

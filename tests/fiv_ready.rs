@@ -262,6 +262,27 @@ fn what_a_file_of_vectors_lacks_is_named() {
 }
 
 #[test]
+fn what_a_file_lacks_for_own_shadows_and_keys_that_do_nothing_online_are_named() {
+    with_gpu(|gpu| {
+        let scene = ball_over_ground();
+        let told = |settings: &Settings, stored: Option<&Stored>| {
+            let studio = Studio::new(gpu, &scene, settings, stored);
+            studio.fiv.notes().iter().map(|n| format!("{}: {}", n.place, n.text)).collect::<Vec<_>>()
+        };
+        let without = Settings { self_shadow: false, ..coarse() };
+        let stored = stored(gpu, &scene, &without);
+        let named = |notes: &[String]| notes.iter().any(|n| n.starts_with("vectors:") && n.contains("on surfaces"));
+        let notes = told(&coarse(), Some(&stored));
+        assert!(named(&notes) && notes.iter().any(|n| n.contains("fiv.self_samples=surface")), "{notes:?}");
+        assert!(!named(&told(&without, Some(&stored))) && !named(&told(&coarse(), None)));
+        let online = Settings { method: Method::Online, adaptive: false, ..coarse() };
+        let notes = told(&online, None);
+        assert!(notes.iter().any(|n| n.starts_with("fiv.adaptive: changes nothing")), "{notes:?}");
+        assert!(told(&Settings { adaptive: false, ..coarse() }, None).iter().all(|n| !n.contains("fiv.adaptive")));
+    });
+}
+
+#[test]
 fn what_turns_or_deforms_is_named() {
     with_gpu(|gpu| {
         let scene = builtin::load("shadows-moving").unwrap();

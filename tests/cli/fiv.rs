@@ -146,6 +146,12 @@ fn pictures_from_files_are_those_without_and_can_be_made_again() {
     let suns = ["-D", "fiv.suns=1", "-D", "fiv.method=brute-force"];
     precompute("point", &at("suns.fiv"), &suns).expect(0, &["do not depend on fiv.method"]);
     picture("point", &at("f.exr"), &["--vectors", &at("suns.fiv")]).expect(0, &[]);
+    // What a file does not have, and what is done without it, is said with its name.
+    let matt = at("without.fiv");
+    precompute(&env, &matt, &["-q", "-D", "fiv.self_shadow=false"]).expect(0, &[]);
+    let base = ["render", "--builtin", "furnace-sphere", "--env", &env, "--size", "8x8", "-o", &at("g.exr")];
+    let noted = ["without.fiv", "samples on surfaces", "fiv.self_samples=surface"];
+    fiv(&[&base[..], &["--vectors", &matt]].concat()).expect(0, &noted);
     let other = environment(folder.path(), "other.exr", 2.0);
     picture(&other, &at("c.exr"), &["--vectors", &vectors]).expect(3, &["v.fiv", "other light"]);
 }

@@ -156,6 +156,7 @@ impl Fiv {
             Method::Vectors => {
                 plan.fits(Some(gpu.caps().limits.storage_range))?;
                 notes.extend(missing.flatten());
+                notes.extend(stored.and_then(|stored| without_own(&settings, stored)));
                 let told = |done, all| {
                     before = all;
                     told(done, all + later)
@@ -396,6 +397,15 @@ fn missing(plan: &Plan, stored: &Stored) -> Option<Note> {
     let named: Vec<_> = plan.occluders.iter().filter(known).map(|k| format!("`{}` ({})", k.name, k.hash)).collect();
     let text = format!("not in the file, and computed: {}", named.join(", "));
     (!named.is_empty()).then(|| Note { kind: NoteKind::Approximated, place: "vectors".into(), text })
+}
+
+/// That a file has nothing of what is asked for on surfaces, and what is done.
+fn without_own(settings: &Settings, stored: &Stored) -> Option<Note> {
+    let lacks = settings.self_shadow && !stored.plan.surface && !stored.plan.occluders.is_empty();
+    let text = "no samples on surfaces are in the file: shadows of occluders on themselves are those of the samples around them, which \
+                blotch (fiv.self_samples=spheres); for better ones compute it again with fiv.self_shadow=true and \
+                fiv.self_samples=surface";
+    lacks.then(|| Note { kind: NoteKind::Approximated, place: "vectors".into(), text: text.into() })
 }
 
 fn emissive(material: &Material) -> bool {
