@@ -146,6 +146,13 @@ fn pictures_from_files_are_those_without_and_can_be_made_again() {
     let suns = ["-D", "fiv.suns=1", "-D", "fiv.method=brute-force"];
     precompute("point", &at("suns.fiv"), &suns).expect(0, &["do not depend on fiv.method"]);
     picture("point", &at("f.exr"), &["--vectors", &at("suns.fiv")]).expect(0, &[]);
+    // What no vector depends on is not in the way of what they do.
+    let online = ["-D", "fiv.method=online", "-D", "fiv.turns=2", "-D", "fiv.specular=summed"];
+    precompute(&env, &at("turns.fiv"), &online).expect(0, &["do not depend on", "fiv.method", "fiv.specular"]);
+    let apart = ["-D", "fiv.suns=1", "-D", "fiv.specular=summed", "-D", "fiv.negligible=0.1"];
+    precompute("point", &at("apart.fiv"), &apart).expect(0, &["fiv.negligible", "fiv.specular"]);
+    precompute(&env, &at("x.fiv"), &["-D", "fiv.negligible=2"]).expect(2, &["fiv.negligible", "0 to 1"]);
+    precompute(&env, &at("x.fiv"), &["-D", "fiv.suns=1", "-D", "fiv.turns=2"]).expect(2, &["fiv.suns"]);
     // What a file does not have, and what is done without it, is said with its name.
     let matt = at("without.fiv");
     precompute(&env, &matt, &["-q", "-D", "fiv.self_shadow=false"]).expect(0, &[]);

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use lucerna::{
     Error, Result,
-    techniques::fiv::{Method, Settings, Stored},
+    techniques::fiv::{Method, Settings, Specular, Stored},
 };
 use serde_json::Value;
 
@@ -49,6 +49,13 @@ pub fn decided(file: &Path, stored: &Stored, settings: &Settings) -> Result<()> 
 pub(super) fn idle(settings: &Settings) -> Result<Vec<String>> {
     let set = differences(settings, &Settings::default())?.into_iter().map(|(key, ..)| key);
     Ok(set.filter(|key| OF_PICTURES.contains(&key.as_str())).map(|key| format!("fiv.{key}")).collect())
+}
+
+/// As vectors take them: keys that they do not depend on are not in the way of others that pictures could not have beside these. Values out
+/// of their range stay.
+pub(super) fn of_vectors(settings: &Settings) -> Settings {
+    let negligible = if (0.0..=1.0).contains(&settings.negligible) { 0.0 } else { settings.negligible };
+    Settings { method: Method::Vectors, specular: Specular::Off, negligible, ..settings.clone() }
 }
 
 #[cfg(test)]

@@ -108,7 +108,7 @@ struct Keys {
 /// Whatever fails, with the kind that decides the exit code.
 pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
     let mut keys = args.settings.effective(&Keys::default())?;
-    let checked = |keys: &Keys| keys.fiv.validate().map_err(|error| error.at("fiv"));
+    let checked = |keys: &Keys| decided::of_vectors(&keys.fiv).validate().map_err(|error| error.at("fiv"));
     args.settings.blamed(checked(&keys), || checked(&args.settings.file_alone().effective(&Keys::default())?))?;
     if args.settings.print_config {
         console::print(config::to_toml(&keys)?.trim_end())?;
