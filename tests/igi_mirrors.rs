@@ -128,3 +128,31 @@ fn what_of_glass_is_blended_away_shows_what_lies_behind_it() {
         assert!(whole < 0.95 * none && (found / expected - 1.0).abs() < 0.01, "{found} instead of {expected}");
     });
 }
+
+#[test]
+fn holes_close_to_a_mirror_show_what_it_shows() {
+    with_gpu(|gpu| {
+        // A glowing wall behind the camera, seen in a mirror with a sheet a twentieth of a millimetre before it.
+        let picture = |sheet: Option<(AlphaMode, f32)>| {
+            let mut stage = Stage::new();
+            let glow = stage.emitter(vec3(0.8, 0.5, 0.3));
+            stage.quad(glow, vec3(4.0, -4.0, 4.0), -8.0 * Vec3::X, 8.0 * Vec3::Y);
+            let shiny = stage.material(mirror());
+            stage.quad(shiny, vec3(-2.0, -2.0, 0.0), 4.0 * Vec3::X, 4.0 * Vec3::Y);
+            if let Some((mode, alpha)) = sheet {
+                let base_color = Vec3::ZERO.extend(alpha);
+                let black = stage.material(Material { alpha: mode, base_color, ..matt(Vec3::ZERO) });
+                stage.quad(black, vec3(-2.0, -2.0, 5e-5), 4.0 * Vec3::X, 4.0 * Vec3::Y);
+            }
+            let seen = flat_view(vec3(0.0, 0.0, 2.0), Vec3::ZERO, 2.0, [96, 96]);
+            let settings = Settings { indirect: false, ..Settings::default() };
+            mean(&Studio::new(gpu, &stage.scene).render(&seen, &settings, 0).total)
+        };
+        let whole = picture(None);
+        let cut = picture(Some((AlphaMode::Mask { cutoff: 0.5 }, 0.2)));
+        let left = picture(Some((AlphaMode::Mask { cutoff: 0.5 }, 0.8)));
+        let clear = picture(Some((AlphaMode::Blend, 0.0)));
+        println!("mirror {whole:.4}; behind a hole {cut:.4}, a sheet {left:.4}, nothing {clear:.4}");
+        assert!(whole > 0.3 && cut == whole && clear == whole && left < 0.01 * whole);
+    });
+}

@@ -30,7 +30,7 @@ layout(constant_id = 15) const uint IMPERFECT = 0u;
 
 const uint TRACE_CAMERA = 1u; // back faces of single-sided surfaces are not there (as rasterised)
 const uint TRACE_SHADOW = 2u; // unlit surfaces do not stop light
-const uint TRACE_SOLID = 4u;  // surfaces are there whatever their alpha
+const uint TRACE_SOLID = 4u;  // blended surfaces are there, but where nothing of them is
 
 // Bits that a triangle's record has about its surface.
 const uint TRACE_SINGLE_SIDED = 1u; // export
@@ -43,8 +43,9 @@ layout(binding = 44, scalar) readonly buffer TraceUvs { vec2 trace_uvs[]; };
 layout(binding = 45, scalar) readonly buffer TraceColors { vec4 trace_colors[]; };
 layout(binding = 46, scalar) readonly buffer TraceScene { Instance trace_scene[]; };
 
-// Whether the surface is there by its alpha: cut out below the cutoff, or there with probability alpha where blended.
-bool trace_covered(uint instance, uint triangle, vec2 barycentrics, uint salt) {
+// Whether the surface is there by its alpha: cut out below the cutoff; where blended with probability alpha, and always for rays with
+// TRACE_SOLID.
+bool trace_covered(uint instance, uint triangle, vec2 barycentrics, uint mask, uint salt) {
     uint m = trace_scene[instance].material;
     uint flags = materials[m].flags;
     float alpha = materials[m].base_color.a;
@@ -67,7 +68,8 @@ bool trace_covered(uint instance, uint triangle, vec2 barycentrics, uint salt) {
         alpha *= sample_texture(use, uv, 0.0).a;
     }
     bool blended = (flags & MATERIAL_BLEND) != 0u;
-    float cutoff = blended ? random_float(uvec4(salt, instance, triangle, 0u)) : materials[m].alpha_cutoff;
+    bool solid = (mask & TRACE_SOLID) != 0u;
+    float cutoff = !blended ? materials[m].alpha_cutoff : solid ? 0.0 : random_float(uvec4(salt, instance, triangle, 0u));
     // A random number of 0 must not show what is not there.
     return alpha >= cutoff && !(blended && alpha <= 0.0);
 }

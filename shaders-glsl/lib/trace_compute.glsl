@@ -204,8 +204,8 @@ Hit trace(Ray ray, uint mask, uint salt, bool any) {
                 uint other_triangle = floatBitsToUint(trace_triangles[3u * best + 2u].w);
                 nearer = instance < other || (instance == other && triangle < other_triangle);
             }
-            bool there = (surface & TRACE_CUTOUT) == 0u || (mask & TRACE_SOLID) != 0u;
-            if (nearer && (there || trace_covered(instance, triangle, candidate_at.yz, salt))) {
+            bool there = (surface & TRACE_CUTOUT) == 0u;
+            if (nearer && (there || trace_covered(instance, triangle, candidate_at.yz, mask, salt))) {
                 hit.t = candidate_at.x;
                 hit.barycentrics = candidate_at.yz;
                 hit.instance = first_instance;

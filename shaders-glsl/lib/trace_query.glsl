@@ -35,7 +35,7 @@ Hit trace(Ray ray, uint mask, uint salt, bool any) {
         uint instance = uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, false));
         uint triangle = uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, false));
         vec2 barycentrics = rayQueryGetIntersectionBarycentricsEXT(query, false);
-        if ((mask & TRACE_SOLID) != 0u || trace_covered(instance, triangle, barycentrics, salt)) {
+        if (trace_covered(instance, triangle, barycentrics, mask, salt)) {
             rayQueryConfirmIntersectionEXT(query);
         }
     }

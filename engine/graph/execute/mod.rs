@@ -184,7 +184,13 @@ impl Runner {
         parts.push(commands);
         let cpu_ms = milliseconds(begun);
         let submitted = Instant::now();
-        let submissions = parts.run()?;
+        let (submissions, ran) = parts.run();
+        if let Err(error) = ran {
+            if submissions > 0 {
+                self.forget_where_things_are(plan, &memory);
+            }
+            return Err(error);
+        }
         let wait_ms = milliseconds(submitted);
 
         accel::remember_built(graph);
@@ -223,6 +229,18 @@ impl Runner {
             warnings: plan.warnings.clone(),
         };
         self.results(graph, plan, &memory, report)
+    }
+
+    /// After a graph of which only some parts ran: history is half this frame's, and an image whose layout changes on the way is in none
+    /// that is known. Who imports such an image again is told so; the next frame is a first one.
+    fn forget_where_things_are(&mut self, plan: &Plan, memory: &[Memory]) {
+        self.pool.forget();
+        for barrier in plan.barriers.iter().filter(|b| b.from != b.to) {
+            let imported = matches!(plan.physical[barrier.physical].source, Source::Imported(_));
+            if let (true, Some(Memory::Image(image))) = (imported, memory.get(barrier.physical)) {
+                image.set_layout(vk::ImageLayout::UNDEFINED);
+            }
+        }
     }
 
     fn fill_uniforms(&mut self, graph: &Graph) -> Result<()> {

@@ -50,12 +50,17 @@ impl<'a> Parts<'a> {
         self.recorded.push(commands);
     }
 
-    /// Hands all parts to the device and waits for them in their order, so that the time that one may take is its own. Gives their
-    /// number.
-    pub fn run(self) -> Result<usize> {
-        let running = self.recorded.into_iter().map(Commands::submit).collect::<Result<Vec<_>>>()?;
-        let count = running.len();
-        running.into_iter().try_for_each(Submission::wait)?;
-        Ok(count)
+    /// Hands all parts to the device and waits for them in their order, so that the time that one may take is its own. Gives how many
+    /// the device was given, and whether all are done.
+    pub fn run(self) -> (usize, Result<()>) {
+        let mut running = Vec::with_capacity(self.recorded.len());
+        for commands in self.recorded {
+            match commands.submit() {
+                Ok(submission) => running.push(submission),
+                // Those before are waited for where they are dropped.
+                Err(error) => return (running.len(), Err(error)),
+            }
+        }
+        (running.len(), running.into_iter().try_for_each(Submission::wait))
     }
 }

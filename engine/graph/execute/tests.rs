@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{
-    gpu::{GpuOptions, testing},
+    gpu::{self, GpuOptions, OwnedImage, testing},
     graph::{Access, Extent, Format, Image, Stages, oracle},
     shaders::test::{advance, pattern},
 };
@@ -124,5 +124,30 @@ fn long_graphs_run_in_parts_and_short_ones_in_one() {
         let mut parts = Parts::new(gpu, "small", Arc::new(()));
         let cuts: Vec<u32> = (0..2048).filter(|_| parts.is_full(1)).collect();
         assert_eq!(cuts, [1024]);
+    });
+}
+
+#[test]
+fn after_some_parts_of_a_graph_nothing_is_taken_for_what_it_was() {
+    testing::with_gpu(|gpu| {
+        let mut runner = Runner::new(gpu);
+        let desc = gpu::ImageDesc::new(vk::Format::R32G32B32A32_SFLOAT, SMALL.width, SMALL.height);
+        let image = OwnedImage::new(gpu, "lasting", desc.also(vk::ImageUsageFlags::STORAGE)).unwrap();
+        let declare = || {
+            let mut graph = Graph::new("lasting");
+            let kept = graph.import_image(&image);
+            graph.compute(pattern::Args { image_out: kept, push: pattern::Push { tag: 1.0 } }, SMALL);
+            graph
+        };
+        runner.run(declare()).unwrap();
+        let graph = declare();
+        let plan = graph.plan().unwrap();
+        let (memory, _) = runner.pool.acquire(gpu, &graph, &plan).unwrap();
+        runner.forget_where_things_are(&plan, &memory);
+        assert_eq!(image.layout(), vk::ImageLayout::UNDEFINED);
+        let error = runner.run(graph).unwrap_err().to_string();
+        assert!(error.contains("image `lasting`") && error.contains("UNDEFINED"), "{error}");
+        // Imported anew it holds nothing, and can be written.
+        runner.run(declare()).unwrap();
     });
 }

@@ -42,7 +42,7 @@ pub use settings::{Pattern, Settings, Visibility};
 
 use crate::{
     Result,
-    gpu::{Gpu, OwnedBuffer, OwnedImage},
+    gpu::{DeviceKind, Gpu, OwnedBuffer, OwnedImage},
     graph::{Buffer, Extent, Format, Graph, Image, PassRef, Uniform},
     passes::gbuffer::GBuffer,
     rays::{RayHandles, Rays},
@@ -55,8 +55,10 @@ use crate::{
     shaders::{self, consts, types},
 };
 
-/// Rays that one dispatch traces at most, about: some milliseconds on a GPU.
+/// Rays that one dispatch traces at most, about: seconds on a CPU driver.
 const MOST_RAYS: u64 = 1 << 22;
+/// On a GPU: tens of milliseconds, half of what a submission holds. Fewer passes for the host to plan.
+const MOST_RAYS_GPU: u64 = 1 << 25;
 /// Turns of loops of one invocation where a driver ends loops early: two rays of the longest.
 const TURNS_LIMITED: u64 = 60_000;
 
@@ -205,7 +207,7 @@ impl Igi {
             sharp: tables::has_sharp(scene),
             size: diagonal(&resident.lit_bounds_in(scene, &Pose::rest(scene))),
             most_rays,
-            rays_at_once: MOST_RAYS,
+            rays_at_once: if gpu.caps().kind == DeviceKind::Cpu { MOST_RAYS } else { MOST_RAYS_GPU },
             most_layers: gpu.caps().limits.array_layers,
         })
     }

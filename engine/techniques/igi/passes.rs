@@ -112,27 +112,26 @@ impl Igi {
 mod tests {
     use super::*;
     use crate::{
-        gpu::testing::with_gpu,
+        gpu::{Gpu, testing::with_gpu},
         graph::Graph,
         scene::{Material, Pose, Scene, View, builtin, resident::Resident},
         techniques::igi::PictureSettings,
     };
 
-    /// A Cornell box, some of it of metal.
-    fn mirrors() -> Scene {
+    /// A Cornell box, some of it of metal, for dispatches so short that little makes many.
+    fn mirrors(gpu: &Gpu) -> (Scene, Resident, Igi) {
         let mut scene = builtin::load("cornell-area").unwrap();
         scene.materials[0] = Material { metallic: 1.0, roughness: 0.0, ..scene.materials[0].clone() };
-        scene
+        let resident = Resident::new(gpu, &scene).unwrap();
+        let mut igi = Igi::new(gpu, &scene, &resident, &Settings::default()).unwrap();
+        igi.rays_at_once = 1 << 14;
+        (scene, resident, igi)
     }
 
     #[test]
     fn as_many_are_counted_as_are_declared() {
         with_gpu(|gpu| {
-            let scene = mirrors();
-            let mut resident = Resident::new(gpu, &scene).unwrap();
-            let mut igi = Igi::new(gpu, &scene, &resident, &Settings::default()).unwrap();
-            // So that little makes many.
-            igi.rays_at_once = 1 << 14;
+            let (scene, mut resident, mut igi) = mirrors(gpu);
             let pose = Pose::rest(&scene);
             let view = View::of_camera(&scene, &pose, 0, [70, 50]).unwrap();
             let base = Settings { vpls: 60, candidates: 1, direct_samples: 4, ..Settings::default() };
@@ -174,10 +173,7 @@ mod tests {
     #[test]
     fn what_no_host_could_plan_is_refused_before_it_is_declared() {
         with_gpu(|gpu| {
-            let scene = mirrors();
-            let mut resident = Resident::new(gpu, &scene).unwrap();
-            let mut igi = Igi::new(gpu, &scene, &resident, &Settings::default()).unwrap();
-            igi.rays_at_once = 1 << 14;
+            let (scene, mut resident, mut igi) = mirrors(gpu);
             let pose = Pose::rest(&scene);
             let view = View::of_camera(&scene, &pose, 0, [800, 600]).unwrap();
             let mut declare = |vpls| {

@@ -5,7 +5,7 @@
 //! place. Paraboloid maps (Brabec et al. 2002) need one or two maps a light and bend edges, so that a wall of two triangles would end up
 //! somewhere else; imperfect shadow maps (Ritschel et al. 2008) need points on all surfaces. Three flat views hold the hemisphere, too.
 
-use super::{Igi, Settings, Shared, Vpls};
+use super::{Igi, Settings, Shared, Vpls, rays};
 use crate::{
     Error, Result,
     graph::{Depth, Draw, Extent, Format, Graph, Image, ImageDesc, IndexedCall, Raster, Targets},
@@ -106,6 +106,12 @@ impl Igi {
             of.flat_map(|b| b.calls.iter().copied()).collect()
         };
         let (solid, holed) = (calls(false), calls(true));
+        // A texel to clear, or a triangle to set up, takes about as long as a ray.
+        let work = |calls: &[IndexedCall]| {
+            let triangles = calls.iter().map(|call| u64::from(call.indices / 3) * u64::from(call.instances));
+            triangles.sum::<u64>() + u64::from(size) * u64::from(size)
+        };
+        let (solid_work, holed_work) = (work(&solid), work(&holed));
         let nearest = (NEAREST * shared.diagonal).max(f32::MIN_POSITIVE);
         let state = Raster::new().depth_bias(0.0, -SLOPE);
         for first in (0..vpls.count).step_by(batch as usize) {
@@ -121,7 +127,7 @@ impl Igi {
                     push: opaque::Push { light, face, nearest },
                 };
                 let draw = Draw::indexed(handles.indices, Arc::clone(&solid));
-                graph.raster(targets(Depth::Clear(0.0)), state, args, draw);
+                graph.raster(targets(Depth::Clear(0.0)), state, args, draw).rays(solid_work);
                 if holed.is_empty() {
                     continue;
                 }
@@ -137,7 +143,7 @@ impl Igi {
                     push: cutout::Push { light, face, nearest },
                 };
                 let draw = Draw::indexed(handles.indices, Arc::clone(&holed));
-                graph.raster(targets(Depth::Keep), state, args, draw);
+                graph.raster(targets(Depth::Keep), state, args, draw).rays(holed_work);
             }
             let args = gather_raster::Args {
                 view: g.view,
@@ -158,7 +164,7 @@ impl Igi {
                     nearest,
                 },
             };
-            graph.compute(args, extent);
+            graph.compute(args, extent).rays(rays(extent, count));
         }
         irradiance
     }
