@@ -17,6 +17,7 @@ layout(constant_id = 3) const uint TRILINEAR = 1; // between samples
 layout(constant_id = 4) const uint SCALED = 1;    // what is interpolated is free of the solid angle
 layout(constant_id = 5) const uint SPOTS = 0;     // a bright part of the environment is taken away once only
 layout(constant_id = 6) const uint NEGLIGIBLE = 0; // what can hide no more than a share of the light is left out
+layout(constant_id = 7) const uint HELD = 1;      // above 1: a pixel keeps how it sees each occluder, of which there are as many at most
 
 struct FivWhole {
     vec3 x; // of the whole environment, W/m²
@@ -69,6 +70,39 @@ float fiv_counts(vec3 to, float far, float radius) {
     return clamp(fiv_matter(to / far, radius / far) / whole.negligible - 1.0, 0.0, 1.0);
 }
 
+// An occluder as a pixel sees it.
+struct Seen {
+    vec3 direction; // of its centre, unit
+    float disc;     // sine of the half angle of its bounding sphere
+    float front;    // share of it in front of the receiver's plane
+    float fade;     // how much it counts
+    float area;     // of its disc, of which it hides as much as a body of its fill does, without the π
+    float fill;
+};
+
+Seen look(uint i, vec3 p, vec3 n, FivAlong along) {
+    vec3 offset = occluders[i].centre - p;
+    float d = dot(offset, n), rho = length(offset), radius = occluders[i].radius;
+    Seen o;
+    o.direction = offset / max(rho, 1e-20);
+    o.disc = min(radius / max(rho, 1e-20), 1.0);
+    // Without the correction for partial occluders those count whose centre is in front.
+    o.front = PARTIAL != 0u ? fiv_front_share(occluders[i], d, n, along) : float(d > 0.0);
+    o.fade = fiv_counts(offset, rho, radius);
+    o.fill = occluders[i].fill;
+    o.area = o.disc * o.disc * o.fill;
+    return o;
+}
+
+// How the pixel sees those that may matter to it, so that pairs of them cost little: direction and disc; front, fade, area, fill.
+vec4 held_at[HELD], held_as[HELD];
+
+Seen held(uint i, vec3 p, vec3 n, FivAlong along) {
+    if (HELD <= 1u) return look(i, p, n, along);
+    vec4 at = held_at[i], as = held_as[i];
+    return Seen(at.xyz, at.w, as.x, as.y, as.z, as.w);
+}
+
 // Places where the mean over the unit interval is taken: Gauss-Legendre, exact for seven overlapping occluders.
 const vec4 NODES = vec4(0.0694318442, 0.3300094782, 0.6699905218, 0.9305681558);
 const vec4 WEIGHTS = vec4(0.1739274226, 0.3260725774, 0.3260725774, 0.1739274226);
@@ -77,11 +111,7 @@ const vec4 WEIGHTS = vec4(0.1739274226, 0.3260725774, 0.3260725774, 0.1739274226
 // eq. 15. Where more overlap, the mean of 1 / (1 + number of others there), as if these lay there independently: the integral of
 // the product of 1 - g (1 - t) over t in 0..1.
 // `row`: first word of those that can overlap it.
-float own_share(uint i, uint self, vec3 p, vec3 n, FivAlong along, uint row) {
-    vec3 to = occluders[i].centre - p;
-    float rho = length(to);
-    vec3 direction = to / max(rho, 1e-20);
-    float r = min(occluders[i].radius / max(rho, 1e-20), 1.0);
+float own_share(Seen o, uint self, vec3 p, vec3 n, FivAlong along, uint row) {
     vec4 product = vec4(1.0);
     for (uint w = 0u, bits = pairs[row];;) {
         while (bits == 0u && ++w < words) bits = pairs[row + w];
@@ -89,20 +119,15 @@ float own_share(uint i, uint self, vec3 p, vec3 n, FivAlong along, uint row) {
         uint j = 32u * w + uint(findLSB(bits));
         bits &= bits - 1u;
         if (j == self) continue;
-        vec3 other = occluders[j].centre - p;
-        float radius = occluders[j].radius;
-        float far = length(other);
-        float s = min(radius / max(far, 1e-20), 1.0);
-        float apart = length(other / max(far, 1e-20) - direction);
-        if (apart >= r + s) continue;
-        float d = dot(other, n);
-        float front = PARTIAL != 0u ? fiv_front_share(occluders[j], d, n, along) : float(d > 0.0);
-        if (front <= 0.0) continue;
+        Seen other = held(j, p, n, along);
+        vec3 between = other.direction - o.direction;
+        float squared = dot(between, between), reach = o.disc + other.disc;
+        float counts = other.front * other.fade;
+        if (squared >= reach * reach || counts <= 0.0) continue;
         // Of the lens a body hides as much as of its whole disc; where both are full this is eq. 15.
-        vec2 fill = vec2(occluders[i].fill, occluders[j].fill);
-        float g = 2.0 * lens_area(r, s, apart) * fill.x * fill.y / (FIV_PI * (r * r * fill.x + s * s * fill.y));
-        g *= front * fiv_counts(other, far, radius);
-        product *= 1.0 - g * (1.0 - NODES);
+        float lens = lens_area(o.disc, other.disc, sqrt(squared));
+        float g = 2.0 * lens * o.fill * other.fill / (FIV_PI * (o.area + other.area));
+        product *= 1.0 - g * counts * (1.0 - NODES);
     }
     return dot(product, WEIGHTS);
 }
@@ -151,6 +176,15 @@ void main() {
     }
     FivAlong along = fiv_along(n);
     uint tile_number = fiv_tile(pixel, imageSize(irradiance).x), tile = tile_number * words;
+    if (HELD > 1u) {
+        for (uint w = 0u, bits = near[tile]; fiv_next(w, bits, tile, words);) {
+            uint i = 32u * w + uint(findLSB(bits));
+            bits &= bits - 1u;
+            Seen o = look(i, p, n, along);
+            held_at[i] = vec4(o.direction, o.disc);
+            held_as[i] = vec4(o.front, o.fade, o.area, o.fill);
+        }
+    }
     uint last = min((first + count + 31u) / 32u, words);
     uint w = first / 32u, bits = count > 0u ? near[tile + w] : 0u;
     while (fiv_next(w, bits, tile, last)) {
@@ -158,11 +192,8 @@ void main() {
         bits &= bits - 1u;
         if (i == self || i < first || i >= first + count) continue;
         vec3 offset = occluders[i].centre - p;
-        float d = dot(offset, n);
-        // Without the correction for partial occluders those count whose centre is in front.
-        float front = PARTIAL != 0u ? fiv_front_share(occluders[i], d, n, along) : float(d > 0.0);
-        float rho = length(offset);
-        float fade = fiv_counts(offset, rho, occluders[i].radius);
+        Seen o = held(i, p, n, along);
+        float front = o.front, fade = o.fade;
         if (front * fade <= 0.0) continue;
         vec4 looked = fiv_dot(occluders[i], offset, n, TRILINEAR != 0u, SCALED != 0u);
         vec3 hidden = looked.rgb;
@@ -173,16 +204,15 @@ void main() {
         if (hidden == vec3(0.0)) continue;
         if (OVERLAP != 0u && whole.occluders > 1u) {
             uint row = (tile_number * count + i - first) * words;
-            float share = own_share(i, self, p, n, along, row);
+            float share = own_share(o, self, p, n, along, row);
             if (SPOTS != 0u) {
                 // What is more than its share of even light comes from the bright parts that its disc can hide.
-                vec3 direction = offset / max(rho, 1e-20);
-                float r = min(occluders[i].radius / max(rho, 1e-20), 1.0);
-                float flat_part = occluders[i].fill * front * fade * r * r * max(d / max(rho, 1e-20), 0.4 * r);
+                float cosine = max(dot(o.direction, n), 0.4 * o.disc);
+                float flat_part = o.fill * front * fade * o.disc * o.disc * cosine;
                 float soft = FIV_PI / float(occluders[i].azimuths);
                 vec3 could[FIV_SPOTS], all_could = vec3(0.0);
                 for (uint m = 0u; m < FIV_SPOTS; ++m) {
-                    could[m] = m < whole.spots ? bright[m] * fiv_spot_share(m, direction, r, soft) : vec3(0.0);
+                    could[m] = m < whole.spots ? bright[m] * fiv_spot_share(m, o.direction, o.disc, soft) : vec3(0.0);
                     all_could += could[m];
                 }
                 vec3 most = min(max(hidden - flat_part * even * seen, vec3(0.0)), all_could * seen);

@@ -244,6 +244,7 @@ impl Fiv {
                     scaled: (settings.trilinear && settings.interpolation == Interpolation::SolidAngle).into(),
                     spots: shared.into(),
                     negligible: negligible.into(),
+                    held: if self.on_cpu { tiles.held(settings) } else { 1 },
                 },
             };
             graph.compute(args, extent);

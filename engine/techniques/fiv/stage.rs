@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     Error, ErrorKind, Result,
-    gpu::{Gpu, OwnedBuffer},
+    gpu::{DeviceKind, Gpu, OwnedBuffer},
     graph::Runner,
     rays::Rays,
     scene::{Environment, Material, Note, NoteKind, Pose, Scene, resident::Resident},
@@ -39,6 +39,8 @@ pub struct Fiv {
     runner: Runner,
     /// The driver ends loops early.
     pub(super) limited: bool,
+    /// The device is a CPU driver.
+    pub(super) on_cpu: bool,
     /// The environment in it.
     lit: Lit,
     /// And that for which the vectors are.
@@ -207,6 +209,7 @@ impl Fiv {
             turning,
             runner,
             limited: gpu.loop_limit()?.is_some(),
+            on_cpu: gpu.caps().kind == DeviceKind::Cpu,
             occluders,
             firsts: plan.firsts(),
             plan,

@@ -12,6 +12,8 @@ const TILE: u32 = 8;
 /// Turns of the loops over occluders of one invocation: some milliseconds on a GPU; and where a driver ends loops early.
 const MOST_TURNS: u32 = 1 << 20;
 const TURNS_LIMITED: u32 = 20_000;
+/// Occluders of which a pixel keeps how it sees them, 32 bytes each.
+const MOST_HELD: u32 = 128;
 /// Bytes of the rows of occluders that can overlap, about.
 const MOST_PAIRS: u64 = 64 << 20;
 
@@ -78,6 +80,13 @@ impl Tiles {
             graph.fill(pairs, 0);
         }
         Self { near, words, each, occluders, count, boxes, pairs, extent: tiles }
+    }
+
+    /// Of how many occluders a pixel keeps how it sees them, for the correction; 1: of none. On a CPU driver pairs cost less so. It takes
+    /// memory of each invocation, which ends with [`MOST_HELD`], and of which a GPU, with its thousands of invocations, has little.
+    pub fn held(&self, settings: &Settings) -> u32 {
+        let overlap = settings.overlap && self.count > 1;
+        if overlap && self.count <= MOST_HELD { self.count.next_power_of_two().max(8) } else { 1 }
     }
 
     /// Declares the pass that finds which occluders can overlap one of these, and gives its rows of bits.
