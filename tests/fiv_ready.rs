@@ -7,7 +7,7 @@ use fiv_lab::{Studio, ball, colourful, ground, occluder, thing};
 use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
-    graph::Graph,
+    graph::{Graph, Runner},
     scene::{AlphaMode, Environment, Pose, Scene, View, builtin, resident::Resident},
     techniques::fiv::{
         Cut, Extent, Fiv, Interpolation, Masks, Method, PictureSettings, SelfSamples, Settings, Shared, Specular,
@@ -81,32 +81,55 @@ fn a_turn_that_stays_is_exact_for_every_method() {
 }
 
 #[test]
-fn another_environment_than_the_scene_was_made_ready_with_is_refused() {
+fn another_environment_than_that_of_the_vectors_is_refused_or_followed() {
     with_gpu(|gpu| {
         let (scene, view) = (ball_over_ground(), flat_view(Vec3::Y * 10.0, Vec3::ZERO, 3.0, [4, 4]));
         let ours = scene.environment.clone().unwrap();
-        let settings = coarse();
         let mut resident = Resident::new(gpu, &scene).unwrap();
-        let mut fiv = Fiv::new(gpu, &scene, &resident, &settings, None, |_, _| true).unwrap();
-        let mut picture = |environment: Environment| {
-            let other = Scene { environment: Some(environment), ..scene.clone() };
+        let with = |method| Settings { method, ..coarse() };
+        let mut runner = Runner::new(gpu);
+        let mut picture = |fiv: &mut Fiv, environment: &Environment, method| {
+            let lit = Scene { environment: Some(environment.clone()), ..scene.clone() };
             let mut graph = Graph::new("fiv");
             let pose = Pose::rest(&scene);
             let handles = resident.frame_in(&mut graph, &scene, &pose);
-            let all = PictureSettings { fiv: settings.clone(), ..Default::default() };
-            fiv.picture(&mut graph, &other, &pose, &handles, &view, &all).map(|_| ())
+            let all = PictureSettings { fiv: with(method), ..Default::default() };
+            let picture = fiv.picture(&mut graph, &lit, &pose, &handles, &view, &all)?;
+            let read = graph.read_image(picture.outputs.irradiance);
+            Ok::<_, lucerna::Error>(runner.run(graph)?.image(read).to_f32())
         };
-        picture(ours.clone()).unwrap();
-        let brighter = ours.pixels.iter().map(|p| *p * 1.5).collect();
-        for other in [
-            Environment { pixels: brighter, ..ours.clone() },
+        let sources = Resident::new(gpu, &scene).unwrap();
+        let of = |environment: &Environment, method| {
+            let lit = Scene { environment: Some(environment.clone()), ..scene.clone() };
+            Fiv::new(gpu, &lit, &sources, &with(method), None, |_, _| true).unwrap()
+        };
+        let mut fiv = of(&ours, Method::Vectors);
+        let whole = picture(&mut fiv, &ours, Method::Vectors).unwrap();
+        let brighter = Environment { pixels: ours.pixels.iter().map(|p| *p * 1.5).collect(), ..ours.clone() };
+        let others = [
+            brighter,
             Environment { width: ours.height, height: ours.width, ..ours.clone() },
             builtin::environment("areas").unwrap(),
-        ] {
-            let error = picture(other).unwrap_err();
+        ];
+        for other in &others {
+            let error = picture(&mut fiv, other, Method::Vectors).unwrap_err();
             assert!(error.exit_code() == 2 && error.to_string().contains("another environment"), "{error}");
         }
-        picture(ours).unwrap();
+        // One pixel of many: seen by methods that keep nothing of the environment.
+        let mut pixels = ours.pixels.clone();
+        pixels[1] += 1e4;
+        let spot = Environment { pixels, ..ours.clone() };
+        for method in [Method::Online, Method::BruteForce, Method::Unshadowed] {
+            let mut fiv = of(&ours, method);
+            let before = picture(&mut fiv, &ours, method).unwrap();
+            for other in [&others[0], &others[2], &spot] {
+                let found = picture(&mut fiv, other, method).unwrap();
+                let made = picture(&mut of(other, method), other, method).unwrap();
+                assert!(found == made && found != before, "{method:?}");
+            }
+            assert_eq!(picture(&mut fiv, &ours, method).unwrap(), before);
+        }
+        assert_eq!(picture(&mut fiv, &ours, Method::Vectors).unwrap(), whole);
     });
 }
 

@@ -25,7 +25,7 @@ use crate::{
 const TURNS_LIMITED: u64 = 2 * TRACE_STEPS as u64;
 /// Occluders that the loops of a shader can go through.
 const MOST_OCCLUDERS: usize = 16_384;
-/// Pixels by which environments are told apart, at least, if they have so many.
+/// Pixels by which environments are told from that of the vectors, at least, if they have so many.
 const LOOKED_AT: usize = 1000;
 
 /// A scene whose shadows come from vectors.
@@ -45,8 +45,10 @@ pub struct Fiv {
     lit: Lit,
     /// And that for which the vectors are.
     made_for: Lit,
-    /// Of the environment without its turn and factor: of which one pictures may be.
+    /// Which environment `lit` is of, without its turn and factor.
     lit_by: u64,
+    /// And the vectors: by some of its pixels, and by all.
+    made_by: [u64; 2],
     /// What pictures may choose.
     pub(super) ready: Ready,
     gpu: Gpu,
@@ -127,7 +129,7 @@ impl Fiv {
         }
         let environment = lit_by(scene)?;
         let lit = Lit::of(environment, &settings);
-        let lit_by = told_by(environment);
+        let made_by = [LOOKED_AT, usize::MAX].map(|pixels| told_by(environment, pixels));
         let mut turning = Turning::new(settings.size);
         let sky = lit.sky(&mut turning, environment)?.apart(settings.apart());
         let name = environment.name.as_str();
@@ -201,7 +203,8 @@ impl Fiv {
             at_rest: pose,
             lit,
             made_for: lit,
-            lit_by,
+            lit_by: made_by[1],
+            made_by,
             ready: Ready::new(given, &settings, computed),
             gpu: gpu.clone(),
             light,
@@ -245,29 +248,36 @@ impl Fiv {
         &self.occluders
     }
 
-    /// Takes the environment as `settings` have it turned and scaled.
+    /// Takes the environment as `settings` have it turned and scaled, and as the scene has it now.
     ///
     /// # Errors
-    /// `Usage` if the scene has another one than it was made ready with, or the vectors were computed for another turn or factor, or as
-    /// [`Fiv::new`]; `OutOfMemory`, `DeviceLost`.
+    /// `Usage` if the vectors were computed for another environment, turn or factor, or as [`Fiv::new`]; `OutOfMemory`, `DeviceLost`.
     pub(super) fn follow(&mut self, scene: &Scene, settings: &Settings) -> Result<()> {
         let environment = lit_by(scene)?;
-        if told_by(environment) != self.lit_by {
-            let name = &environment.name;
-            let error = Error::usage(format!("`{name}` is another environment than the scene was made ready with"));
-            return Err(error.at("fiv").help("Make the scene ready again (Fiv::new)"));
-        }
+        let by = match settings.method {
+            // Of a frame that takes a millisecond the environment cannot be gone through.
+            Method::Vectors if told_by(environment, LOOKED_AT) == self.made_by[0] => self.made_by[1],
+            Method::Vectors => {
+                let name = &environment.name;
+                let error = Error::usage(format!("`{name}` is another environment than the scene was made ready with"));
+                return Err(error.at("fiv").help("Make the scene ready again (Fiv::new), or use fiv.method=online"));
+            }
+            _ => told_by(environment, usize::MAX),
+        };
         let wanted = Lit::of(environment, settings);
         if settings.method == Method::Vectors && wanted != self.made_for {
             let error = Error::usage("the vectors were computed for another turn or scale of the environment");
             return Err(error.at("fiv").help("Make the scene ready again, or use fiv.method=online"));
         }
-        if wanted == self.lit {
+        if by != self.lit_by {
+            self.turning.forget();
+            self.matter = None;
+        } else if wanted == self.lit {
             return Ok(());
         }
         self.sky = wanted.sky(&mut self.turning, environment)?.apart(settings.apart());
         self.light = Light::with(&mut self.runner, &self.sky)?;
-        self.lit = wanted;
+        (self.lit, self.lit_by) = (wanted, by);
         Ok(())
     }
 
@@ -305,12 +315,12 @@ fn reaches(gpu: &Gpu, occluders: &Occluders) -> Result<OwnedBuffer> {
     OwnedBuffer::with_contents(gpu, "fiv.reaches", bytemuck::cast_slice(&all))
 }
 
-/// A number by which environments are told apart, without going through all of them for each picture: of their sizes and of a thousand
-/// pixels that lie evenly.
-fn told_by(environment: &Environment) -> u64 {
+/// A number by which environments are told apart, without their turns and factors: by their sizes and so many of their pixels, at least,
+/// that lie evenly.
+fn told_by(environment: &Environment, pixels: usize) -> u64 {
     let mut hash = Hash::new();
     hash.word(u64::from(environment.width) << 32 | u64::from(environment.height));
-    let each = (environment.pixels.len() / LOOKED_AT).max(1);
+    let each = (environment.pixels.len() / pixels).max(1);
     environment.pixels.iter().step_by(each).for_each(|pixel| hash.floats(&pixel.to_array()));
     hash.finish()
 }

@@ -37,8 +37,14 @@ impl Turning {
         Self { size, exact: None, turned: None, last: None }
     }
 
+    /// Forgets the environment: the next may be another.
+    pub fn forget(&mut self) {
+        *self = Self::new(self.size);
+    }
+
     /// The environment turned by `rotation` radians, with a factor; both in place of its own. `still`: light is summed up pixel by pixel,
-    /// which takes long. The same for the same turn, whichever came before. It must be the environment of all calls before.
+    /// which takes long. The same for the same turn, whichever came before. It must be the environment of all calls before, since
+    /// [`Turning::forget`].
     ///
     /// # Errors
     /// As [`Sky::new`].
