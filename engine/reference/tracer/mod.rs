@@ -25,6 +25,7 @@ mod environment;
 mod light_tree;
 mod lights;
 mod settings;
+mod sharp;
 mod state;
 mod sums;
 mod work;
@@ -39,7 +40,7 @@ pub mod tables {
     pub use super::{
         environment::{Importance, importance, radiance_map},
         lights::{LightTable, table as lights},
-        work::has_sharp,
+        sharp::{has_sharp, may_be_sharp},
     };
 }
 

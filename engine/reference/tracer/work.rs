@@ -1,6 +1,6 @@
 //! One picture in the making, in tiles that no watchdog kills.
 
-use super::{Filter, Progress, Settings, Strategy, Sums, Tracer};
+use super::{Filter, Progress, Settings, Strategy, Sums, Tracer, sharp::may_be_sharp};
 use crate::{
     Error, ErrorKind, Result,
     gpu::{BufferDesc, Gpu, ImageDesc, OwnedBuffer, OwnedImage, Region, Tiles},
@@ -96,16 +96,9 @@ impl Job {
     }
 }
 
-/// Whether any surface of the scene may be a mirror or glass.
-pub fn has_sharp(scene: &Scene) -> bool {
-    scene.materials.iter().any(|m| {
-        m.transmission > 0.0 || (m.metallic > 0.5 && (m.roughness < 0.05 || m.metallic_roughness_texture.is_some()))
-    })
-}
-
 /// Surfaces that the longest path may visit.
 fn longest(scene: &Scene, settings: &Settings) -> u32 {
-    let sharp = !settings.diffuse_only && has_sharp(scene);
+    let sharp = !settings.diffuse_only && may_be_sharp(scene);
     settings.bounces + 3 + if sharp { settings.specular_bounces } else { 0 }
 }
 

@@ -144,7 +144,7 @@ macro_rules! uses {
 
 /// What has to do with direct light or with mirrors.
 fn of_all_light(scene: &Scene, s: &Settings) -> Vec<Use> {
-    let sharp = || unless(tables::has_sharp(scene), "mirrors or glass, and the scene has none");
+    let sharp = || unless(tables::may_be_sharp(scene), "mirrors or glass, and the scene has none");
     let lit = scene.environment.as_ref().is_some_and(shines)
         || places(scene, &|m| m.emissive.max_element() > 0.0 && !m.unlit).is_some();
     uses!(s,
@@ -161,7 +161,7 @@ fn of_indirect_light(scene: &Scene, s: &Settings, frames: u32) -> Vec<Use> {
     let tiles = || unless(s.interleave > 1, "interleave above 1");
     let apart = || unless(s.joins(), "interleave above 1 without fused");
     let past = || unless(s.history > 1, "history above 1");
-    let sharp = || unless(tables::has_sharp(scene), "mirrors or glass, and the scene has none");
+    let sharp = || unless(tables::may_be_sharp(scene), "mirrors or glass, and the scene has none");
     let many = format!("vpls above {}, four for each pick; from {lights} all are gathered", 4 * s.picks);
     let mut out = uses!(s,
         vpls: None,
