@@ -70,37 +70,34 @@ float fiv_counts(vec3 to, float far, float radius) {
     return clamp(fiv_matter(to / far, radius / far) / whole.negligible - 1.0, 0.0, 1.0);
 }
 
-// An occluder as a pixel sees it.
-struct Seen {
-    vec3 direction; // of its centre, unit
-    float disc;     // sine of the half angle of its bounding sphere
-    float front;    // share of it in front of the receiver's plane
-    float fade;     // how much it counts
-    float area;     // of its disc, of which it hides as much as a body of its fill does, without the π
-    float fill;
-};
-
-Seen look(uint i, vec3 p, vec3 n, FivAlong along) {
+// Where the pixel sees an occluder: direction of its centre, and the sine of the half angle of its bounding sphere.
+vec4 look_place(uint i, vec3 p) {
     vec3 offset = occluders[i].centre - p;
-    float d = dot(offset, n), rho = length(offset), radius = occluders[i].radius;
-    Seen o;
-    o.direction = offset / max(rho, 1e-20);
-    o.disc = min(radius / max(rho, 1e-20), 1.0);
-    // Without the correction for partial occluders those count whose centre is in front.
-    o.front = PARTIAL != 0u ? fiv_front_share(occluders[i], d, n, along) : float(d > 0.0);
-    o.fade = fiv_counts(offset, rho, radius);
-    o.fill = occluders[i].fill;
-    o.area = o.disc * o.disc * o.fill;
-    return o;
+    float far = max(length(offset), 1e-20);
+    return vec4(offset / far, min(occluders[i].radius / far, 1.0));
 }
 
-// How the pixel sees those that may matter to it, so that pairs of them cost little: direction and disc; front, fade, area, fill.
-vec4 held_at[HELD], held_as[HELD];
+// What it sees of it: the share in front of its plane, how much it counts, and the share of its disc that it hides.
+vec3 look_amount(uint i, vec3 p, vec3 n, FivAlong along) {
+    vec3 offset = occluders[i].centre - p;
+    float d = dot(offset, n);
+    // Without the correction for partial occluders those count whose centre is in front.
+    float front = PARTIAL != 0u ? fiv_front_share(occluders[i], d, n, along) : float(d > 0.0);
+    return vec3(front, fiv_counts(offset, length(offset), occluders[i].radius), occluders[i].fill);
+}
 
-Seen held(uint i, vec3 p, vec3 n, FivAlong along) {
-    if (HELD <= 1u) return look(i, p, n, along);
-    vec4 at = held_at[i], as = held_as[i];
-    return Seen(at.xyz, at.w, as.x, as.y, as.z, as.w);
+// Both of those that may matter to the pixel, where it keeps them, so that pairs cost little.
+vec4 held_places[HELD];
+vec3 held_amounts[HELD];
+
+vec4 place_of(uint i, vec3 p) {
+    if (HELD <= 1u) return look_place(i, p);
+    return held_places[i];
+}
+
+vec3 amount_of(uint i, vec3 p, vec3 n, FivAlong along) {
+    if (HELD <= 1u) return look_amount(i, p, n, along);
+    return held_amounts[i];
 }
 
 // Places where the mean over the unit interval is taken: Gauss-Legendre, exact for seven overlapping occluders.
@@ -111,7 +108,9 @@ const vec4 WEIGHTS = vec4(0.1739274226, 0.3260725774, 0.3260725774, 0.1739274226
 // eq. 15. Where more overlap, the mean of 1 / (1 + number of others there), as if these lay there independently: the integral of
 // the product of 1 - g (1 - t) over t in 0..1.
 // `row`: first word of those that can overlap it.
-float own_share(Seen o, uint self, vec3 p, vec3 n, FivAlong along, uint row) {
+float own_share(uint i, uint self, vec3 p, vec3 n, FivAlong along, uint row) {
+    vec4 place = place_of(i, p);
+    float fill = occluders[i].fill;
     vec4 product = vec4(1.0);
     for (uint w = 0u, bits = pairs[row];;) {
         while (bits == 0u && ++w < words) bits = pairs[row + w];
@@ -119,15 +118,16 @@ float own_share(Seen o, uint self, vec3 p, vec3 n, FivAlong along, uint row) {
         uint j = 32u * w + uint(findLSB(bits));
         bits &= bits - 1u;
         if (j == self) continue;
-        Seen other = held(j, p, n, along);
-        vec3 between = other.direction - o.direction;
-        float squared = dot(between, between), reach = o.disc + other.disc;
-        float counts = other.front * other.fade;
-        if (squared >= reach * reach || counts <= 0.0) continue;
+        vec4 other = place_of(j, p);
+        float apart = length(other.xyz - place.xyz);
+        if (apart >= place.w + other.w) continue;
+        // Front share, counts, fill.
+        vec3 amount = amount_of(j, p, n, along);
+        if (amount.x <= 0.0) continue;
         // Of the lens a body hides as much as of its whole disc; where both are full this is eq. 15.
-        float lens = lens_area(o.disc, other.disc, sqrt(squared));
-        float g = 2.0 * lens * o.fill * other.fill / (FIV_PI * (o.area + other.area));
-        product *= 1.0 - g * counts * (1.0 - NODES);
+        float discs = FIV_PI * (place.w * place.w * fill + other.w * other.w * amount.z);
+        float g = 2.0 * lens_area(place.w, other.w, apart) * fill * amount.z / discs;
+        product *= 1.0 - g * amount.x * amount.y * (1.0 - NODES);
     }
     return dot(product, WEIGHTS);
 }
@@ -180,9 +180,8 @@ void main() {
         for (uint w = 0u, bits = near[tile]; fiv_next(w, bits, tile, words);) {
             uint i = 32u * w + uint(findLSB(bits));
             bits &= bits - 1u;
-            Seen o = look(i, p, n, along);
-            held_at[i] = vec4(o.direction, o.disc);
-            held_as[i] = vec4(o.front, o.fade, o.area, o.fill);
+            held_places[i] = look_place(i, p);
+            held_amounts[i] = look_amount(i, p, n, along);
         }
     }
     uint last = min((first + count + 31u) / 32u, words);
@@ -192,8 +191,8 @@ void main() {
         bits &= bits - 1u;
         if (i == self || i < first || i >= first + count) continue;
         vec3 offset = occluders[i].centre - p;
-        Seen o = held(i, p, n, along);
-        float front = o.front, fade = o.fade;
+        vec3 amount = amount_of(i, p, n, along);
+        float front = amount.x, fade = amount.y;
         if (front * fade <= 0.0) continue;
         vec4 looked = fiv_dot(occluders[i], offset, n, TRILINEAR != 0u, SCALED != 0u);
         vec3 hidden = looked.rgb;
@@ -204,15 +203,15 @@ void main() {
         if (hidden == vec3(0.0)) continue;
         if (OVERLAP != 0u && whole.occluders > 1u) {
             uint row = (tile_number * count + i - first) * words;
-            float share = own_share(o, self, p, n, along, row);
+            float share = own_share(i, self, p, n, along, row);
             if (SPOTS != 0u) {
                 // What is more than its share of even light comes from the bright parts that its disc can hide.
-                float cosine = max(dot(o.direction, n), 0.4 * o.disc);
-                float flat_part = o.fill * front * fade * o.disc * o.disc * cosine;
+                vec4 place = place_of(i, p);
+                float flat_part = amount.z * front * fade * place.w * place.w * max(dot(place.xyz, n), 0.4 * place.w);
                 float soft = FIV_PI / float(occluders[i].azimuths);
                 vec3 could[FIV_SPOTS], all_could = vec3(0.0);
                 for (uint m = 0u; m < FIV_SPOTS; ++m) {
-                    could[m] = m < whole.spots ? bright[m] * fiv_spot_share(m, o.direction, o.disc, soft) : vec3(0.0);
+                    could[m] = m < whole.spots ? bright[m] * fiv_spot_share(m, place.xyz, place.w, soft) : vec3(0.0);
                     all_could += could[m];
                 }
                 vec3 most = min(max(hidden - flat_part * even * seen, vec3(0.0)), all_could * seen);
