@@ -16,7 +16,7 @@ pub fn has_sharp(scene: &Scene) -> bool {
     in_use(scene).any(|m| by_factors(m) && (m.transmission > 0.0 || by_texels(scene, m)))
 }
 
-/// Materials of surfaces that reflect light; of each primitive its own, so that some come several times.
+/// Materials that surfaces have and that reflect light.
 fn in_use(scene: &Scene) -> impl Iterator<Item = &Material> {
     let primitives = scene.meshes.iter().flat_map(|mesh| &mesh.primitives);
     let mut used: Vec<u32> = primitives.map(|primitive| primitive.material).collect();
