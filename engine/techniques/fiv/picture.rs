@@ -82,13 +82,14 @@ impl Fiv {
     /// Declares a frame: G-buffer, irradiance, reflected light, sky. `handles` are of this graph, for `pose`. The settings that decide
     /// the vectors are those that [`Fiv::new`] was given. The parts of the method (`trilinear`, `partial`, `cut`, `extent`, `overlap`,
     /// `shared`, `negligible`, `self_shadow`), the light (`rotation`, `exposure`) and [`Method::Unshadowed`] are chosen by each picture;
-    /// `self_shadow` of stored vectors can only be switched off. The environment of `scene` is that which [`Fiv::new`] was given; only its
-    /// `rotation` and `scale` may be others. A picture of another turn than the one before resamples it: pixel by pixel, or, much
-    /// faster and nearly the same, from means where `turning` is not 0.
+    /// `self_shadow` of stored vectors can only be switched off. Stored vectors are for the environment that [`Fiv::new`] was given. Other methods take that
+    /// of `scene` as it is now, whose pixels they go through to see whether they are others; the sky behind is that of `handles`. A picture
+    /// of another turn than the one before resamples it: pixel by pixel, or, much faster and nearly the same, from means where `turning`
+    /// is not 0.
     ///
     /// # Errors
-    /// `Usage` if a setting is out of its range, or asks for what [`Fiv::new`] was not told of, or if the environment has another size or
-    /// other pixels (a thousand are looked at).
+    /// `Usage` if a setting is out of its range, or asks for what [`Fiv::new`] was not told of, or if vectors are stored and the
+    /// environment has another size or other pixels (a thousand are looked at).
     pub fn picture(
         &mut self,
         graph: &mut Graph,

@@ -321,7 +321,11 @@ fn told_by(environment: &Environment, pixels: usize) -> u64 {
     let mut hash = Hash::new();
     hash.word(u64::from(environment.width) << 32 | u64::from(environment.height));
     let each = (environment.pixels.len() / pixels).max(1);
-    environment.pixels.iter().step_by(each).for_each(|pixel| hash.floats(&pixel.to_array()));
+    if each == 1 {
+        hash.bytes(bytemuck::cast_slice(&environment.pixels));
+    } else {
+        environment.pixels.iter().step_by(each).for_each(|pixel| hash.floats(&pixel.to_array()));
+    }
     hash.finish()
 }
 

@@ -12,7 +12,7 @@ const TILE: u32 = 8;
 /// Turns of the loops over occluders of one invocation: some milliseconds on a GPU; and where a driver ends loops early.
 const MOST_TURNS: u32 = 1 << 20;
 const TURNS_LIMITED: u32 = 20_000;
-/// Occluders of which a pixel keeps how it sees them, 32 bytes each.
+/// Occluders of which a pixel keeps how it sees them, 28 bytes each.
 const MOST_HELD: u32 = 128;
 /// Bytes of the rows of occluders that can overlap, about.
 const MOST_PAIRS: u64 = 64 << 20;
