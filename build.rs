@@ -107,7 +107,9 @@ fn variant(
 ) -> Result<(reflect::Interface, String), String> {
     let key = {
         let mut hasher = DefaultHasher::new();
-        (compile::closure(root, file), include_str!("engine/shader/compile.rs")).hash(&mut hasher);
+        // Another compiler writes another module.
+        let compiler = env::var_os("SHADERC_LIB_DIR");
+        (compile::closure(root, file), include_str!("engine/shader/compile.rs"), compiler).hash(&mut hasher);
         format!("{:016x}", hasher.finish())
     };
     let base = out.join(file.replace('/', ".") + if query { ".query" } else { "" });

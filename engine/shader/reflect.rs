@@ -114,6 +114,8 @@ struct Walk {
     constants: BTreeMap<u32, (u32, u32)>,
     variables: Vec<(u32, u32, u32)>,
     workgroup: [u32; 3],
+    /// Constants of the workgroup's size, where the compiler names them instead of numbers; they are declared later.
+    workgroup_ids: Option<[u32; 3]>,
     spec: Vec<u32>,
     ray_query: bool,
 }
@@ -148,11 +150,7 @@ fn walk(words: &[u32]) -> Result<Walk, String> {
             6 => drop(w.member_names.insert((a[0], a[1]), string(&a[2..]))),
             17 => w.ray_query |= a[0] == RAY_QUERY,
             16 if a[1] == 17 => w.workgroup = [a[2], a[3], a[4]],
-            331 if a[1] == 38 => {
-                for i in 0..3 {
-                    w.workgroup[i] = w.constants.get(&a[2 + i]).map_or(1, |c| c.0);
-                }
-            }
+            331 if a[1] == 38 => w.workgroup_ids = Some([a[2], a[3], a[4]]),
             20 => drop(w.types.insert(a[0], Raw::Bool)),
             21 => drop(w.types.insert(a[0], Raw::Int { width: a[1], signed: a[2] == 1 })),
             22 => drop(w.types.insert(a[0], Raw::Float(a[1]))),
@@ -185,6 +183,11 @@ fn walk(words: &[u32]) -> Result<Walk, String> {
             _ => {}
         }
         at += count;
+    }
+    if let Some(ids) = w.workgroup_ids {
+        for (size, id) in w.workgroup.iter_mut().zip(ids) {
+            *size = w.constants.get(&id).ok_or("the workgroup's size is not a constant")?.0;
+        }
     }
     Ok(w)
 }
