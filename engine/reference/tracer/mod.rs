@@ -34,7 +34,7 @@ pub use settings::{Filter, Settings, Sources, Strategy};
 pub use state::State;
 pub use sums::Sums;
 
-/// Tables that samples are drawn from, for tests.
+/// Tables that samples are drawn from, for techniques that sample the same lights, and for tests.
 #[doc(hidden)]
 pub mod tables {
     pub use super::{
