@@ -30,7 +30,7 @@ pub enum Normals {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Blended {
-    /// Each pixel shows the surface with probability alpha, by a fixed pattern of the seed.
+    /// Each pixel shows the surface with probability alpha, by a pattern that only the graph's seed changes.
     #[default]
     Dithered,
     /// The surface is shown where alpha is at least one half.
@@ -121,6 +121,7 @@ fn layer(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, n
             let octahedral = u32::from(settings.normals == Normals::Octahedral);
             let sharp = u32::from(!settings.mips);
             let sided = batch.map_or_else(Default::default, |b| b.sided.cull());
+            let seed = graph.seed;
             let draw =
                 batch.map_or_else(|| crate::graph::Draw::indexed(scene.indices, Vec::new()), |batch| batch.draw(scene));
             let targets = targets(&gbuffer, index == 0);
@@ -140,6 +141,7 @@ fn layer(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, n
                         $($more,)?
                         materials: scene.materials,
                         scene_textures: scene.textures,
+                        push: $shader::Push { seed },
                         spec: $shader::Spec { cutout, octahedral, sharp },
                     }
                 };
