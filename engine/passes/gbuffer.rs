@@ -2,7 +2,7 @@
 //! (ISR dissertation, section 4.2: CLR, NRM, DPT; with what physical materials need besides).
 
 use crate::{
-    graph::{Cull, Depth, Extent, Format, Graph, Image, Load, Raster, Stencil, StencilLoad, Targets, Uniform},
+    graph::{Compare, Cull, Depth, Extent, Format, Graph, Image, Load, Raster, Stencil, StencilLoad, Targets, Uniform},
     scene::{
         View,
         cull::Frustum,
@@ -125,7 +125,8 @@ fn layer(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, n
             let draw =
                 batch.map_or_else(|| crate::graph::Draw::indexed(scene.indices, Vec::new()), |batch| batch.draw(scene));
             let targets = targets(&gbuffer, index == 0);
-            let state = Raster::new().stencil(Stencil::write(1));
+            // Of surfaces at one place the first one drawn is seen; rays choose the same one (lib/trace_compute.glsl).
+            let state = Raster::new().depth_compare(Compare::Greater).stencil(Stencil::write(1));
             // The same arguments, of two generated types.
             macro_rules! args {
                 ($shader:ident $(, $more:ident)?) => {
