@@ -90,7 +90,7 @@ fn run(render: &Render) -> Result<ExitCode> {
             let ambient = scene.environment.as_ref().map(Irradiance::of).unwrap_or_default();
             Ok((Resident::new(gpu, scene)?, ambient))
         },
-        |graph, (resident, ambient), input, settings| compose(graph, resident, *ambient, input, settings, render.mode),
+        |graph, (resident, ambient), input, settings| compose(graph, resident, ambient, input, settings, render.mode),
     )
 }
 
@@ -98,7 +98,7 @@ fn run(render: &Render) -> Result<ExitCode> {
 fn compose(
     graph: &mut Graph,
     resident: &mut Resident,
-    ambient: Irradiance,
+    ambient: &Irradiance,
     input: &Input<'_>,
     settings: &PictureSettings,
     mode: Mode,
@@ -112,7 +112,7 @@ fn compose(
         skybox::draw(graph, &scene, &gbuffer, settings.background.into(), lit.direct);
         (Shown::new(lit.direct), gbuffer, shadows)
     } else {
-        let picture = isr::picture(graph, &scene, &view, ambient, settings)?;
+        let picture = isr::picture(graph, &scene, &view, ambient.clone(), settings)?;
         let out = picture.outputs;
         let shown = match mode {
             Mode::Indirect => Shown::new(out.indirect),

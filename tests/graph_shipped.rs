@@ -45,7 +45,7 @@ fn every_barrier_of_the_shipped_graphs_matters() {
                     let pose = Pose::playing(&scene, 0.25);
                     let handles = resident.frame_in(&mut graph, &scene, &pose);
                     let view = View::of_camera(&scene, &pose, 0, [64, 48]).unwrap().fit_far(&handles.bounds());
-                    let out = picture(&mut graph, &handles, &view, ambient, settings).unwrap();
+                    let out = picture(&mut graph, &handles, &view, ambient.clone(), settings).unwrap();
                     let dump = graph.dump();
                     let total = graph.read_image(out.outputs.total);
                     if pictures.is_empty() {

@@ -13,7 +13,7 @@ pub struct GraphId {
     pub(crate) name: &'static str,
 }
 
-/// How a sampled image is read. Five stock samplers and no others.
+/// How a sampled image is read: by one of these stock samplers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Sampler {
     /// Linear inside a level, nearest level, clamped to the edge.

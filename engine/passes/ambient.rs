@@ -1,19 +1,30 @@
-//! Diffuse light of a distant environment as nine spherical-harmonic coefficients of its irradiance (Ramamoorthi and
-//! Hanrahan 2001), which reproduce it within about 1 %.
+//! Diffuse light of a distant environment: its irradiance as a function of the normal.
+//!
+//! Nine spherical-harmonic coefficients (Ramamoorthi and Hanrahan, "An Efficient Representation for Irradiance Environment Maps",
+//! SIGGRAPH 2001) are the usual form. They are within 1 % of the mean; on photographed skies single normals are 8 % too dark to
+//! 14 % too bright, and colours shift. So the irradiance itself is stored, at the nodes of a finely divided octahedron, linear between them.
 
 use crate::{
-    graph::{Graph, Uniform},
+    graph::{Buffer, Graph},
     scene::{Environment, Scene},
-    shaders::types,
+    shaders::consts::AMBIENT_STEPS,
 };
-use glam::Vec3;
-use std::f32::consts::PI;
+use glam::{DVec3, Vec3};
+use std::{f64::consts::PI, num::NonZero, sync::Arc};
+
+/// Nodes along a side: both halves of the octahedron, unfolded to a square.
+const SIDE: usize = 2 * AMBIENT_STEPS as usize + 1;
+/// The environment's light is gathered into so many cells before it is summed for each node.
+const CELLS: [usize; 2] = [128, 64];
 
 /// Irradiance in W/m² as a function of the normal. Default: no environment.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+///
+/// Exact at its nodes but for cells (2.8°) that the horizon of a node cuts, linear between them: within 1 % of the brightest normal's for a
+/// sun of one pixel on black, and within 0.3 % of the irradiance itself on photographed skies.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Irradiance {
-    /// Coefficients for 1, y, z, x, xy, yz, 3z²−1, xz, x²−y²; cosine and basis constants folded in.
-    pub coefficients: [Vec3; 9],
+    /// W/m² at each node, row by row; empty: none.
+    nodes: Arc<[Vec3]>,
 }
 
 /// Of the scene's environment; none without one.
@@ -26,101 +37,140 @@ impl From<&Scene> for Irradiance {
 impl Irradiance {
     /// Of equal radiance L (W/(sr·m²)) from everywhere: π·L on every plane.
     pub fn constant(radiance: Vec3) -> Self {
-        let mut coefficients = [Vec3::ZERO; 9];
-        coefficients[0] = PI * radiance;
-        Self { coefficients }
+        Self { nodes: vec![std::f32::consts::PI * radiance; SIDE * SIDE].into() }
     }
 
-    /// Integrates all pixels of a latitude-longitude image.
+    /// Integrates all pixels of a latitude-longitude image with its rotation and scale.
     pub fn of(environment: &Environment) -> Self {
-        let (width, height) = (environment.width as usize, environment.height as usize);
-        let mut sums = [glam::DVec3::ZERO; 9];
-        for (y, row) in environment.pixels.chunks_exact(width.max(1)).take(height).enumerate() {
-            let theta = PI * (y as f32 + 0.5) / height as f32;
-            let solid_angle = f64::from(theta.sin() * PI / height as f32 * 2.0 * PI / width as f32);
-            for (x, radiance) in row.iter().enumerate() {
-                // The image centre looks down −Z, u grows towards +X; rotation turns the environment counter-clockwise
-                // seen from above, which turns −Z towards −X.
-                let phi = 2.0 * PI * ((x as f32 + 0.5) / width as f32 - 0.5) - environment.rotation;
-                let d = Vec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos());
-                for (sum, basis) in sums.iter_mut().zip(basis(d)) {
-                    *sum += radiance.as_dvec3() * f64::from(basis) * solid_angle;
-                }
+        let cells = cells(environment);
+        let mut nodes = vec![Vec3::ZERO; SIDE * SIDE];
+        parallel(&mut nodes, SIDE, |row, nodes| {
+            for (column, node) in nodes.iter_mut().enumerate() {
+                *node = received(&cells, direction(column, row).as_vec3());
             }
-        }
-        // Basis constants squared, times the cosine lobe's π, 2π/3, π/4.
-        let (a0, a1, a2) = (PI, 2.0 * PI / 3.0, PI / 4.0);
-        let (k0, k1, k2) = (0.282_095_f32.powi(2), 0.488_603_f32.powi(2), 1.092_548_f32.powi(2));
-        let (k3, k4) = (0.315_392_f32.powi(2), 0.546_274_f32.powi(2));
-        let factors = [a0 * k0, a1 * k1, a1 * k1, a1 * k1, a2 * k2, a2 * k2, a2 * k3, a2 * k2, a2 * k4];
-        let mut coefficients = [Vec3::ZERO; 9];
-        for i in 0..9 {
-            coefficients[i] = sums[i].as_vec3() * factors[i] * environment.scale;
-        }
-        Self { coefficients }
+        });
+        Self { nodes: nodes.into() }
     }
 
     /// W/m² on a plane with unit normal `n`.
     pub fn at(&self, n: Vec3) -> Vec3 {
-        let sum: Vec3 = self.coefficients.iter().zip(basis(n)).map(|(c, b)| *c * b).sum();
-        sum.max(Vec3::ZERO)
+        let (steps, a) = (AMBIENT_STEPS as f32, n.abs());
+        let sum = a.element_sum();
+        let (x, y) = if n.y < 0.0 { (1.0 - a.z / sum, 1.0 - a.x / sum) } else { (a.x / sum, a.z / sum) };
+        let base = [x, y].map(|q| (q * steps).floor().clamp(0.0, steps - 1.0));
+        let f = [x * steps - base[0], y * steps - base[1]];
+        let outer = f[0] + f[1] > 1.0;
+        let far = f32::from(u8::from(outer));
+        let weights = match outer {
+            true => [f[0] + f[1] - 1.0, 1.0 - f[1], 1.0 - f[0]],
+            false => [1.0 - f[0] - f[1], f[0], f[1]],
+        };
+        let offsets = [[far, far], [1.0, 0.0], [0.0, 1.0]];
+        let node = |[dx, dy]: [f32; 2]| {
+            let place = |q: f32, sign: f32| (steps + q.copysign(if sign < 0.0 { -1.0 } else { 1.0 })) as usize;
+            let index = place(base[1] + dy, n.z) * SIDE + place(base[0] + dx, n.x);
+            self.nodes.get(index).copied().unwrap_or_default()
+        };
+        weights.into_iter().zip(offsets).map(|(weight, offset)| weight * node(offset)).sum()
     }
 
-    /// The uniform block of `lib/ambient.glsl`.
-    pub fn upload(&self, graph: &mut Graph) -> Uniform<types::Ambient> {
-        graph.uniform(&types::Ambient { c: self.coefficients.map(Into::into) })
+    /// The buffer of `lib/ambient.glsl`.
+    pub fn upload(&self, graph: &mut Graph) -> Buffer {
+        let none = [[0.0f32; 3]; SIDE * SIDE];
+        let nodes: &[[f32; 3]] = if self.nodes.is_empty() { &none } else { bytemuck::cast_slice(&self.nodes) };
+        graph.buffer_from("ambient", nodes)
     }
 }
 
-/// The nine polynomials of a unit vector, without constants.
-fn basis(d: Vec3) -> [f32; 9] {
-    let Vec3 { x, y, z } = d;
-    [1.0, y, z, x, x * y, y * z, 3.0 * z * z - 1.0, x * z, x * x - y * y]
+/// Unit normal of a node.
+fn direction(column: usize, row: usize) -> DVec3 {
+    let q = [column, row].map(|i| i as f64 / f64::from(AMBIENT_STEPS) - 1.0);
+    let (a, b) = (q[0].abs(), q[1].abs());
+    let y = 1.0 - a - b;
+    let (x, z) = if y < 0.0 { (1.0 - b, 1.0 - a) } else { (a, b) };
+    DVec3::new(x.copysign(q[0]), y, z.copysign(q[1])).normalize()
+}
+
+/// Light of each cell and channel, ∫ L ω dω: direction times W/m² on a plane that faces it.
+struct Cells {
+    /// x, y and z of red, of green, of blue.
+    parts: [[Vec<f32>; 3]; 3],
+}
+
+/// Exact for the image as even pixels; one that is coarser than the cells is taken as it is looked up, bilinearly.
+fn cells(environment: &Environment) -> Cells {
+    let size = [environment.width.max(1) as usize, environment.height.max(1) as usize];
+    let finer = [size[0], size[1]].iter().zip(CELLS).map(|(&have, wanted)| wanted.div_ceil(have)).collect::<Vec<_>>();
+    let (width, height) = (size[0] * finer[0], size[1] * finer[1]);
+    let radiance = |x: usize, y: usize| match (finer[0], finer[1]) {
+        (1, 1) => environment.pixels.get(y * width + x).copied().unwrap_or_default(),
+        _ => environment.bilinear(glam::Vec2::new(
+            ((x as f64 + 0.5) / width as f64) as f32,
+            ((y as f64 + 0.5) / height as f64) as f32,
+        )),
+    };
+    // ∫ sin φ dφ and ∫ cos φ dφ over each column, φ from −Z towards +X; the rotation turns −Z towards −X.
+    let azimuth = |x: usize| 2.0 * PI * (x as f64 / width as f64 - 0.5) - f64::from(environment.rotation);
+    let columns: Vec<(f64, f64)> = (0..width)
+        .map(|x| {
+            let (a, b) = (azimuth(x), azimuth(x + 1));
+            (a.cos() - b.cos(), b.sin() - a.sin())
+        })
+        .collect();
+    let across = 2.0 * PI / width as f64;
+    let mut sums = vec![[DVec3::ZERO; 3]; CELLS[0] * CELLS[1]];
+    parallel(&mut sums, CELLS[0], |cell_row, sums| {
+        for y in cell_row * height / CELLS[1]..(cell_row + 1) * height / CELLS[1] {
+            // ∫ sin² θ dθ and ∫ sin θ cos θ dθ over the row.
+            let (a, b) = (PI * y as f64 / height as f64, PI * (y + 1) as f64 / height as f64);
+            let flat = 0.5 * (b - a) - 0.25 * ((2.0 * b).sin() - (2.0 * a).sin());
+            let up = 0.5 * (b.sin().powi(2) - a.sin().powi(2)) * across;
+            for (x, (sine, cosine)) in columns.iter().enumerate() {
+                let light = radiance(x, y).as_dvec3();
+                let area = DVec3::new(flat * sine, up, -flat * cosine);
+                for (sum, light) in sums[x * CELLS[0] / width].iter_mut().zip(light.to_array()) {
+                    *sum += light * area;
+                }
+            }
+        }
+    });
+    let scale = f64::from(environment.scale);
+    let part = |channel: usize, axis: usize| sums.iter().map(|sum| (sum[channel][axis] * scale) as f32).collect();
+    Cells { parts: [0, 1, 2].map(|channel| [0, 1, 2].map(|axis| part(channel, axis))) }
+}
+
+/// W/m² on a plane with unit normal `n`: of each cell the part in front.
+fn received(cells: &Cells, n: Vec3) -> Vec3 {
+    let channel = |[x, y, z]: &[Vec<f32>; 3]| {
+        let rows = x.chunks_exact(CELLS[0]).zip(y.chunks_exact(CELLS[0])).zip(z.chunks_exact(CELLS[0]));
+        let row = |((x, y), z): ((&[f32], &[f32]), &[f32])| {
+            // Eight sums side by side, which compilers keep in one register.
+            let mut sums = [0.0f32; 8];
+            for ((x, y), z) in x.chunks_exact(8).zip(y.chunks_exact(8)).zip(z.chunks_exact(8)) {
+                for k in 0..8 {
+                    sums[k] += (x[k] * n.x + y[k] * n.y + z[k] * n.z).max(0.0);
+                }
+            }
+            f64::from(sums.iter().sum::<f32>())
+        };
+        rows.map(row).sum::<f64>() as f32
+    };
+    Vec3::from_array([0, 1, 2].map(|k| channel(&cells.parts[k])))
+}
+
+/// Fills `out` row by row on all cores: `row` gets the number of a row and its `stride` values.
+fn parallel<T: Send>(out: &mut [T], stride: usize, row: impl Fn(usize, &mut [T]) + Sync) {
+    let cores = std::thread::available_parallelism().map_or(1, NonZero::get).clamp(1, 64);
+    let each = (out.len() / stride).div_ceil(cores).max(1);
+    std::thread::scope(|scope| {
+        for (part, values) in out.chunks_mut(each * stride).enumerate() {
+            let row = &row;
+            scope.spawn(move || {
+                values.chunks_mut(stride).enumerate().for_each(|(i, values)| row(part * each + i, values))
+            });
+        }
+    });
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn environment(radiance: impl Fn(Vec3) -> Vec3) -> Environment {
-        let (width, height) = (128, 64);
-        let mut pixels = Vec::new();
-        for y in 0..height {
-            for x in 0..width {
-                let theta = PI * (y as f32 + 0.5) / height as f32;
-                let phi = 2.0 * PI * ((x as f32 + 0.5) / width as f32 - 0.5);
-                pixels.push(radiance(Vec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos())));
-            }
-        }
-        Environment { name: String::new(), width, height, pixels, rotation: 0.0, scale: 1.0 }
-    }
-
-    #[test]
-    fn a_constant_environment_gives_pi_times_its_radiance() {
-        let e = Irradiance::of(&environment(|_| Vec3::new(1.0, 2.0, 3.0)));
-        for n in [Vec3::X, Vec3::NEG_Y, Vec3::new(0.6, 0.0, 0.8)] {
-            assert!((e.at(n) - PI * Vec3::new(1.0, 2.0, 3.0)).length() < 0.01, "{:?}", e.at(n));
-        }
-    }
-
-    #[test]
-    fn a_cosine_lobe_has_its_closed_form() {
-        // L = 1 + d·y: E(n) = π + (2π/3) n·y.
-        let e = Irradiance::of(&environment(|d| Vec3::splat(1.0 + d.y)));
-        for n in [Vec3::Y, Vec3::NEG_Y, Vec3::X, Vec3::new(0.0, 0.6, -0.8)] {
-            assert!((e.at(n).x - (PI + 2.0 * PI / 3.0 * n.y)).abs() < 0.01);
-        }
-        // L = max(d·(-z), 0): E(-z) = 2π/3; nine coefficients keep it within 2 %.
-        let e = Irradiance::of(&environment(|d| Vec3::splat((-d.z).max(0.0))));
-        assert!((e.at(Vec3::NEG_Z).x / (2.0 * PI / 3.0) - 1.0).abs() < 0.02);
-        assert!(e.at(Vec3::Z).x < 0.1);
-    }
-
-    #[test]
-    fn rotation_turns_counter_clockwise_seen_from_above() {
-        let mut sky = environment(|d| Vec3::splat((-d.z).max(0.0)));
-        sky.rotation = PI / 2.0;
-        let e = Irradiance::of(&sky);
-        assert!(e.at(Vec3::NEG_X).x > 2.0 && e.at(Vec3::X).x < 0.1);
-    }
-}
+mod tests;

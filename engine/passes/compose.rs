@@ -2,8 +2,8 @@
 
 use super::{downsample::Coarse, gbuffer::GBuffer};
 use crate::{
-    graph::{Format, Graph, Image, Uniform},
-    shaders::{passes::compose, types},
+    graph::{Buffer, Format, Graph, Image},
+    shaders::passes::compose,
 };
 
 /// Choices and constants of [`sum`].
@@ -35,12 +35,12 @@ pub struct Composed {
     pub accessibility: Image,
 }
 
-/// Equations 27 to 29. `gathered`: rgb radiance, a accumulated occlusion, at the resolution of `coarse`.
+/// Equations 27 to 29. `ambient`: of [`super::ambient::Irradiance::upload`]; `gathered`: rgb radiance, a accumulated occlusion, at the resolution of `coarse`.
 #[allow(clippy::too_many_arguments)]
 pub fn sum(
     graph: &mut Graph,
     g: &GBuffer,
-    ambient: Uniform<types::Ambient>,
+    ambient: Buffer,
     direct: Image,
     gathered: Image,
     coarse: &Coarse,

@@ -2,7 +2,7 @@
 //! (ISR dissertation, section 4.2: CLR, NRM, DPT; with what physical materials need besides).
 
 use crate::{
-    graph::{Cull, Depth, Extent, Format, Graph, Image, Load, Raster, Stencil, StencilLoad, Targets, Uniform},
+    graph::{Compare, Cull, Depth, Extent, Format, Graph, Image, Load, Raster, Stencil, StencilLoad, Targets, Uniform},
     scene::{
         View,
         cull::Frustum,
@@ -30,7 +30,7 @@ pub enum Normals {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Blended {
-    /// Each pixel shows the surface with probability alpha, by a fixed pattern of the seed.
+    /// Each pixel shows the surface with probability alpha, by a pattern that only the graph's seed changes.
     #[default]
     Dithered,
     /// The surface is shown where alpha is at least one half.
@@ -121,10 +121,12 @@ fn layer(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, n
             let octahedral = u32::from(settings.normals == Normals::Octahedral);
             let sharp = u32::from(!settings.mips);
             let sided = batch.map_or_else(Default::default, |b| b.sided.cull());
+            let seed = graph.seed;
             let draw =
                 batch.map_or_else(|| crate::graph::Draw::indexed(scene.indices, Vec::new()), |batch| batch.draw(scene));
             let targets = targets(&gbuffer, index == 0);
-            let state = Raster::new().stencil(Stencil::write(1));
+            // Of surfaces at one place the first one drawn is seen; rays choose the same one (lib/trace_compute.glsl).
+            let state = Raster::new().depth_compare(Compare::Greater).stencil(Stencil::write(1));
             // The same arguments, of two generated types.
             macro_rules! args {
                 ($shader:ident $(, $more:ident)?) => {
@@ -140,6 +142,7 @@ fn layer(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, n
                         $($more,)?
                         materials: scene.materials,
                         scene_textures: scene.textures,
+                        push: $shader::Push { seed },
                         spec: $shader::Spec { cutout, octahedral, sharp },
                     }
                 };

@@ -223,7 +223,7 @@ fn draw_slot(graph: &mut Graph, scene: &Handles, layer: Image, slot: &types::Sha
         colors: scene.colors,
         materials: scene.materials,
         scene_textures: scene.textures,
-        push: cutout::Push { clip_from_world },
+        push: cutout::Push { clip_from_world, seed: graph.seed },
     };
     let calls: Vec<_> = holed.iter().flat_map(|b| b.calls.iter().copied()).collect();
     let draw = Draw::indexed(scene.indices, calls);

@@ -70,7 +70,7 @@ impl Environment {
         u64::from(self.width) * u64::from(self.height) * 8
     }
 
-    fn bilinear(&self, uv: Vec2) -> Vec3 {
+    pub(crate) fn bilinear(&self, uv: Vec2) -> Vec3 {
         let (w, h) = (self.width as i64, self.height as i64);
         let x = f64::from(uv.x) * w as f64 - 0.5;
         let y = f64::from(uv.y) * h as f64 - 0.5;

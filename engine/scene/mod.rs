@@ -10,6 +10,7 @@ pub mod c_arrays;
 pub mod cull;
 pub mod deform;
 pub mod environment;
+pub mod extent;
 mod folder;
 pub mod gltf;
 pub mod ground;

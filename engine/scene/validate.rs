@@ -21,7 +21,8 @@ impl Material {
 }
 
 impl Scene {
-    /// Checks that every index is in range, every list as long as the others of its kind, and every number finite.
+    /// Checks that every index is in range, every list as long as the others of its kind, every number finite, and the scene at rest
+    /// neither too large nor too small ([`super::extent`]; moving ones are checked pose by pose).
     ///
     /// Front ends give only scenes that pass; scenes built by a program may be checked with it.
     ///
@@ -86,7 +87,9 @@ impl Scene {
             };
             check().map_err(|error: Error| error.at(format!("skins[{i}]")))?;
         }
-        self.check_animations()
+        self.check_animations()?;
+        // Last, for it follows the indices.
+        super::extent::Extents::of(self).check(self, &super::Pose::rest(self))
     }
 
     fn check_mesh(&self, mesh: &Mesh) -> Result<()> {

@@ -27,9 +27,6 @@ pub struct View {
     pub far: f32,
     /// Pixels.
     pub extent: [u32; 2],
-    /// Number of the frame, for seeds.
-    pub frame: u32,
-    pub seed: u32,
     projection: Projection,
 }
 
@@ -47,8 +44,6 @@ impl View {
             near: 0.0,
             far: 0.0,
             extent: extent.map(|e| e.max(1)),
-            frame: 0,
-            seed: 0,
             projection: camera.projection,
         };
         let (near, far) = match camera.projection {
@@ -156,8 +151,6 @@ impl View {
             near: self.near,
             far: self.far,
             orthographic: u32::from(self.is_orthographic()),
-            frame: self.frame,
-            seed: self.seed,
             pixel_angle: 2.0 * half.y / self.extent[1] as f32,
             base_o: self.position.to_array(),
             extent: self.extent.map(|e| e as f32),

@@ -74,7 +74,7 @@ pub fn add_missing_light(scene: &mut Scene, choice: DefaultLight) {
     let lit = scene.environment.is_some() || scene.nodes.iter().any(|node| node.light.is_some());
     let lamps = scene.materials.iter().any(lamp);
     if !lit && lamps && choice != DefaultLight::Always {
-        let text = "the scene is lit by its emissive surfaces alone, and of these only what the picture shows gives light \
+        let text = "the scene is lit by its emissive surfaces alone; with isr only those that the picture shows give light \
                     (--default-light always adds a sun and a sky, --light a lamp)";
         note(scene, "lights", text);
     }

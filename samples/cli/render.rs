@@ -95,7 +95,7 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
         }
         let begun = Instant::now();
         let seconds = args.stage.time + f64::from(frame) / args.fps;
-        let (pose, view) = run.stage.at(seconds, args.stage.size);
+        let (pose, view) = run.stage.at(seconds, args.stage.size)?;
         let mut graph = Graph::new(technique.name);
         (graph.frame, graph.seed) = (frame, args.seed);
         let input =

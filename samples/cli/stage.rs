@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 use glam::Mat4;
 use lucerna::{
     Result,
-    scene::{Camera, Note, Pose, Scene, View},
+    scene::{
+        Camera, Note, Pose, Scene, View,
+        extent::{self, Extents},
+    },
 };
 
 use crate::{
@@ -27,6 +30,7 @@ pub struct Stage {
     /// For file names and metadata, never empty.
     pub camera_name: String,
     pub eye: record::View,
+    extents: Extents,
     camera: Camera,
     /// The node that carries the camera, or where it stands.
     node: Option<usize>,
@@ -87,6 +91,7 @@ impl Stage {
         let fingerprint = fingerprint::scene(&scene);
         lights::add(&mut scene, &args.light, args.sun.as_ref());
         framing::add_missing_light(&mut scene, args.default_light);
+        let extents = Extents::of(&scene);
         let from_file = args.camera.as_deref().is_some_and(|asked| {
             Path::new(asked).is_file() || camera::in_list(asked).is_some_and(|(file, _)| Path::new(file).is_file())
         });
@@ -104,14 +109,24 @@ impl Stage {
                 let node = scene.nodes.iter().position(|node| node.camera == Some(index as u32));
                 let camera_name = if camera.name.is_empty() { format!("camera{index}") } else { camera.name.clone() };
                 let eye = record::View::Scene(index);
-                Self { source, fingerprint, camera_name, eye, camera, node, world_from_camera: Mat4::IDENTITY, scene }
+                Self {
+                    source,
+                    fingerprint,
+                    camera_name,
+                    eye,
+                    extents,
+                    camera,
+                    node,
+                    world_from_camera: Mat4::IDENTITY,
+                    scene,
+                }
             }
             Choice::File(file) => {
                 let world_from_camera = file.world_from_view();
                 let camera_name = name_of(args.camera.as_deref().unwrap_or_default());
                 let camera = Camera { name: camera_name.clone(), projection: file.projection() };
                 let eye = record::View::File(file);
-                Self { source, fingerprint, camera_name, eye, camera, node: None, world_from_camera, scene }
+                Self { source, fingerprint, camera_name, eye, extents, camera, node: None, world_from_camera, scene }
             }
         })
     }
@@ -122,11 +137,17 @@ impl Stage {
     }
 
     /// The pose of a time, seconds, and what the camera sees then.
-    pub fn at(&self, seconds: f64, size: Size) -> (Pose, View) {
+    ///
+    /// # Errors
+    /// `Input` if anything stands too far away then.
+    pub fn at(&self, seconds: f64, size: Size) -> Result<(Pose, View)> {
         let pose = Pose::playing(&self.scene, seconds as f32);
+        self.extents.check(&self.scene, &pose)?;
         let world_from_camera = self.node.map_or(self.world_from_camera, |node| pose.world[node]);
         let view = View::new(&self.camera, world_from_camera, [size.width, size.height]);
-        (pose, view)
+        extent::near(view.position.abs().max_element())
+            .map_err(|error| error.at(format!("camera '{}'", self.camera_name)))?;
+        Ok((pose, view))
     }
 }
 

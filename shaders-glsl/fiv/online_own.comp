@@ -30,6 +30,7 @@ layout(push_constant, scalar) uniform Push {
     uint set;       // first of the geometry
     uint sets;
     uint set_floats; // of a set
+    uint seed;  // of blended surfaces
 };
 
 void main() {
@@ -44,7 +45,8 @@ void main() {
     FivTurn turn = turns[number];
     vec3 n = decode_normal(texelFetch(normal, pixel, 0));
     vec3 p = screen_position(view, pixel, 1.0, z);
-    vec3 place = p + n * surface_step(view, p, z) - occluders[self].centre;
+    float gap = surface_step(view, p, z);
+    vec3 place = stepped_back(view, p, gap) + n * gap - occluders[self].centre;
     vec3 start = turn.centre + turn.geometry_from_world * place;
     vec3 sum = first == 0u ? vec3(0.0) : imageLoad(own, pixel).rgb;
     for (uint k = first; k < first + count; ++k) {
@@ -54,7 +56,7 @@ void main() {
         uint at = i % (size * size);
         vec3 direction = cube_direction(i / (size * size), (vec2(at % size, at / size) + 0.5) / float(size));
         Ray ray = Ray(start, 0.0, turn.geometry_from_world * direction, 1e30);
-        if (trace_any(ray, TRACE_SHADOW, pcg4d(uvec4(pixel, i, 0u)).x)) continue;
+        if (trace_any(ray, TRACE_SHADOW, pcg4d(uvec4(pixel, i, seed)).x)) continue;
         sum += texels[i].radiance * cosine;
     }
     imageStore(own, pixel, vec4(sum, 1.0));

@@ -25,6 +25,7 @@ layout(push_constant, scalar) uniform Push {
     uint first; // of the lit texels
     uint count;
     uint size;  // texels of the environment along an edge
+    uint seed;  // of blended surfaces
 };
 
 void main() {
@@ -38,7 +39,8 @@ void main() {
     vec3 n = decode_normal(texelFetch(normal, pixel, 0));
     vec3 p = screen_position(view, pixel, 1.0, z);
     vec3 v = to_camera(view, p);
-    vec3 origin = p + n * surface_step(view, p, z);
+    float gap = surface_step(view, p, z);
+    vec3 origin = stepped_back(view, p, gap) + n * gap;
     vec4 material = texelFetch(surface, pixel, 0);
     float a2 = fiv_width2(material.a);
     vec3 sum = first == 0u ? vec3(0.0) : imageLoad(reflected, pixel).rgb;
@@ -48,7 +50,7 @@ void main() {
         if (dot(n, t.area) <= 0.0) continue;
         uint place = i % (size * size);
         vec3 direction = cube_direction(i / (size * size), (vec2(place % size, place / size) + 0.5) / float(size));
-        if (trace_any(Ray(origin, 0.0, direction, 1e30), TRACE_SHADOW, pcg4d(uvec4(pixel, i, 0u)).x)) continue;
+        if (trace_any(Ray(origin, 0.0, direction, 1e30), TRACE_SHADOW, pcg4d(uvec4(pixel, i, seed)).x)) continue;
         vec3 l = normalize(t.area);
         sum += t.radiance * (t.angle * fiv_specular_texel(n, v, l, material.rgb, a2, t.angle));
     }

@@ -26,6 +26,7 @@ layout(push_constant, scalar) uniform Push {
     uint count;
     uint size;  // texels of the environment along an edge
     uint around; // boxes; 0: there are too many
+    uint seed;  // of blended surfaces
 };
 
 // Whether anything may lie on a ray: where a few things stand on a ground most rays pass all of them.
@@ -50,7 +51,8 @@ void main() {
     }
     vec3 n = decode_normal(texelFetch(normal, pixel, 0));
     vec3 p = screen_position(view, pixel, 1.0, z);
-    vec3 origin = p + n * surface_step(view, p, z);
+    float gap = surface_step(view, p, z);
+    vec3 origin = stepped_back(view, p, gap) + n * gap;
     vec3 sum = first == 0u ? vec3(0.0) : imageLoad(irradiance, pixel).rgb;
     for (uint k = first; k < first + count; ++k) {
         uint i = lit[k];
@@ -58,7 +60,7 @@ void main() {
         if (cosine <= 0.0) continue;
         uint place = i % (size * size);
         vec3 direction = cube_direction(i / (size * size), (vec2(place % size, place / size) + 0.5) / float(size));
-        if (near_anything(origin, direction) && trace_any(Ray(origin, 0.0, direction, 1e30), TRACE_SHADOW, pcg4d(uvec4(pixel, i, 0u)).x)) continue;
+        if (near_anything(origin, direction) && trace_any(Ray(origin, 0.0, direction, 1e30), TRACE_SHADOW, pcg4d(uvec4(pixel, i, seed)).x)) continue;
         sum += texels[i].radiance * cosine;
     }
     imageStore(irradiance, pixel, vec4(sum, 1.0));

@@ -57,7 +57,8 @@ void main() {
         LitPoint p;
         p.position = screen_position(view, pixel, 1.0, z);
         p.normal = decode_normal(texelFetch(normal, pixel, 0));
-        p.above = p.position + p.normal * surface_step(view, p.position, z);
+        float gap = surface_step(view, p.position, z);
+        p.above = stepped_back(view, p.position, gap) + p.normal * gap;
         p.viewer = to_camera(view, p.position);
         p.f0 = gloss.rgb;
         p.roughness = gloss.a;

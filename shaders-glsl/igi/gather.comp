@@ -45,7 +45,8 @@ void main() {
         vec3 n = decode_normal(texelFetch(normal, pixel, 0));
         uint subset = vpl_subset(uvec2(texel), tile, stride != 0u, seed);
         Gathering how = Gathering(first, count, total, subset, tile * tile, stride, least, seed);
-        vpl_gather(sum, p, n, surface_step(view, p, z), uvec2(pixel), how);
+        float gap = surface_step(view, p, z);
+        vpl_gather(sum, stepped_back(view, p, gap), n, gap, uvec2(pixel), how);
     }
     imageStore(irradiance, texel, sum);
 }

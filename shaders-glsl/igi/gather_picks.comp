@@ -52,7 +52,7 @@ void main() {
         float gap = surface_step(view, p, z);
         uint subset = vpl_subset(uvec2(texel), tile, stride != 0u, seed);
         float offset = vpl_offset(uvec2(texel) / tile, subset, tile * tile, seed);
-        Receiver receiver = Receiver(p, n, p + n * gap, offset, uvec2(pixel));
+        Receiver receiver = Receiver(p, n, stepped_back(view, p, gap) + n * gap, offset, uvec2(pixel));
         sum += vpl_picked(receiver, Picking(picks, proposals, leaves, least, seed), first, count);
     }
     imageStore(irradiance, texel, sum);

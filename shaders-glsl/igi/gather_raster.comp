@@ -63,7 +63,8 @@ void main() {
     if (z < 1.0) {
         vec3 p = screen_position(view, pixel, 1.0, z);
         vec3 n = decode_normal(texelFetch(normal, pixel, 0));
-        vec3 place = p + n * surface_step(view, p, z);
+        float gap = surface_step(view, p, z);
+        vec3 place = stepped_back(view, p, gap) + n * gap;
         uint subsets = tile * tile;
         uint subset = vpl_subset(uvec2(texel), tile, stride != 0u, seed);
         for (uint turn = 0u; turn * subsets < count; ++turn) {

@@ -104,7 +104,8 @@ void main() {
             bool rough = level > 0u && unit_float(words.y) < s.rough;
             if (rough && !s.unlit) {
                 node.state = TREE_SURFACE;
-                node.position = s.position;
+                // A step back along the ray, where nothing lies (stepped_back of lib/vpl.glsl).
+                node.position = s.position - toward * s.gap;
                 node.gap = s.gap;
                 node.direction = -toward;
                 node.normal = s.normal;

@@ -40,6 +40,7 @@ void main() {
     path.salt = salt;
     path.side = path.normal;
     path.gap = surface_step(view, path.position, z);
+    path.position = stepped_back(view, path.position, path.gap);
     path.weight = vec3(1.0 / float(paths));
     path.light = number == 0u ? vec3(0.0) : near_paths[slot].light;
     near_paths[slot] = path;

@@ -31,6 +31,7 @@ void main() {
         point.position = screen_position(view, pixel, 1.0, z);
         point.normal = decode_normal(texelFetch(normal, pixel, 0));
         point.gap = surface_step(view, point.position, z);
+        point.position = stepped_back(view, point.position, point.gap);
         // What a black surface shows does not matter; of mirrors the G-buffer knows little. Unlit ones receive nothing.
         vec4 color = texelFetch(albedo, pixel, 0);
         point.weight = color.a > 0.5 ? max(dot(color.rgb, vec3(0.2126, 0.7152, 0.0722)), 0.05) : 0.0;

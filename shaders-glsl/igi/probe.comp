@@ -21,14 +21,14 @@ layout(push_constant, scalar) uniform Push {
     uint columns; // of squares
     uint rows;
     uint side;    // pixels
-    uint frame;
+    uint seed;    // another one in each frame
 };
 
 void main() {
     uint at = gl_GlobalInvocationID.x;
     if (at >= columns * rows) return;
     uvec2 square = uvec2(at % columns, at / columns);
-    uvec4 words = pcg4d(uvec4(square, frame, 0x9b0be5u));
+    uvec4 words = pcg4d(uvec4(square, seed, 0x9b0be5u));
     ivec2 pixel = min(ivec2(square * side + words.xy % side), textureSize(depth, 0) - 1);
     HistoryProbe probe = HistoryProbe(vec3(0.0), 0.0, vec3(0.0), 0u);
     float z = texelFetch(depth, pixel, 0).r;
@@ -36,6 +36,7 @@ void main() {
         probe.position = screen_position(view, pixel, 1.0, z);
         probe.normal = decode_normal(texelFetch(normal, pixel, 0));
         probe.gap = surface_step(view, probe.position, z);
+        probe.position = stepped_back(view, probe.position, probe.gap);
         probe.there = 1u;
     }
     probes[at] = probe;

@@ -4,5 +4,11 @@
 #include "lib/scene.glsl"
 
 layout(binding = 1, scalar) readonly buffer Instances { Instance instances[]; };
+layout(push_constant, scalar) uniform Push {
+    uint light;    // virtual light
+    uint face;     // of its views
+    float nearest; // depth, metres
+    uint seed;     // of blended surfaces
+};
 
 #include "lib/shadow_cutout.glsl"

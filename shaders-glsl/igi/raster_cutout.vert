@@ -19,6 +19,7 @@ layout(push_constant, scalar) uniform Push {
     uint light;    // virtual light
     uint face;     // of its views
     float nearest; // depth, metres
+    uint seed;     // of blended surfaces
 };
 
 layout(location = 0) out vec2 uv;

@@ -46,7 +46,8 @@ void main() {
     vec3 n = decode_normal(texelFetch(normal, pixel, 0));
     uint subset = vpl_subset(uvec2(pixel), tile, stride != 0u, seed);
     Gathering how = Gathering(first, count, total, subset, tile * tile, stride, least, seed);
-    vpl_gather(sum, p, n, surface_step(view, p, z), uvec2(pixel), how);
+    float gap = surface_step(view, p, z);
+    vpl_gather(sum, stepped_back(view, p, gap), n, gap, uvec2(pixel), how);
     vec3 light = first + count >= own ? dimmed(sum.rgb, before.a, limit) : sum.rgb;
     imageStore(irradiance, pixel, vec4(light, before.a));
 }

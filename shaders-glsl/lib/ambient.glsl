@@ -1,12 +1,28 @@
-// Irradiance of a distant environment in nine spherical-harmonic coefficients, already convolved with the cosine and
-// with the basis constants folded in (engine/passes/ambient.rs).
-struct Ambient {
-    vec3 c[9];
-};
+// Irradiance of a distant environment as a function of the normal: linear between the nodes of a finely divided octahedron
+// (engine/passes/ambient.rs). Before including: a buffer `ambient` of vec3, W/m².
+
+const uint AMBIENT_STEPS = 32u; // export
+
+uint ambient_node(ivec2 at) {
+    const int steps = int(AMBIENT_STEPS);
+    return uint((at.y + steps) * (2 * steps + 1) + at.x + steps);
+}
 
 // W/m² on a plane with normal n.
-vec3 ambient_irradiance(Ambient a, vec3 n) {
-    vec3 e = a.c[0] + a.c[1] * n.y + a.c[2] * n.z + a.c[3] * n.x + a.c[4] * n.x * n.y + a.c[5] * n.y * n.z
-        + a.c[6] * (3.0 * n.z * n.z - 1.0) + a.c[7] * n.x * n.z + a.c[8] * (n.x * n.x - n.y * n.y);
-    return max(e, vec3(0.0));
+vec3 ambient_irradiance(vec3 n) {
+    const float steps = float(AMBIENT_STEPS);
+    vec3 a = abs(n);
+    // The octahedron |x| + |y| + |z| = 1 seen from +y; its lower half is folded outwards.
+    vec2 p = a.xz / (a.x + a.y + a.z);
+    if (n.y < 0.0) p = 1.0 - p.yx;
+    vec2 q = p * steps;
+    vec2 base = min(floor(q), steps - 1.0);
+    vec2 f = q - base;
+    // Cells are cut into triangles so that none reaches over a fold.
+    bool outer = f.x + f.y > 1.0;
+    ivec2 side = mix(ivec2(1), ivec2(-1), lessThan(n.xz, vec2(0.0)));
+    ivec2 at = ivec2(base), far = ivec2(outer ? 1 : 0);
+    vec3 weights = outer ? vec3(f.x + f.y - 1.0, 1.0 - f.y, 1.0 - f.x) : vec3(1.0 - f.x - f.y, f.x, f.y);
+    return weights.x * ambient[ambient_node(side * (at + far))] + weights.y * ambient[ambient_node(side * (at + ivec2(1, 0)))]
+        + weights.z * ambient[ambient_node(side * (at + ivec2(0, 1)))];
 }

@@ -12,6 +12,8 @@ layout(constant_id = 2) const uint SHARP = 0; // 1: textures at their finest lev
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1, scalar) readonly buffer Instances { Instance instances[]; };
 
+layout(push_constant, scalar) uniform Push { uint seed; };
+
 layout(location = 0) in vec3 normal_in;
 layout(location = 1) in vec4 tangent_in;
 layout(location = 2) in vec4 uv01;
@@ -63,7 +65,7 @@ void main() {
     if (CUTOUT == 2u) {
         uvec2 pixel = uvec2(gl_FragCoord.xy);
         // The instance in the seed: two panes behind each other hide independent shares.
-        if (base.a < random_float(uvec4(pixel, instance_in, view.seed))) discard;
+        if (base.a < random_float(uvec4(pixel, instance_in, seed))) discard;
     }
     if (CUTOUT == 3u && base.a < 0.5) discard;
 

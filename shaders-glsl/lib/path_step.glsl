@@ -113,7 +113,9 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
             vec3 geometric = normalize(points[0].area);
             front = dot(geometric, toward) < 0.0;
             side = front ? geometric : -geometric;
-            above = points[0].position + side * surface_gap(points[0]);
+            // Also a step back along the ray, where nothing lies: a hit on the edge between two surfaces may be a rounding error beyond
+            // the other one, and all light would stop at its back.
+            above = points[0].position + (side - toward) * surface_gap(points[0]);
         }
     }
     vec4 texels[TEXTURE_SLOTS + 2u];

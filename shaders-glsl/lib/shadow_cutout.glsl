@@ -1,4 +1,4 @@
-// The fragment of casters whose alpha cuts holes. Before including: a buffer `instances`.
+// The fragment of casters whose alpha cuts holes. Before including: a buffer `instances`, and push constants with a `seed`.
 #ifndef LIB_SHADOW_CUTOUT
 #define LIB_SHADOW_CUTOUT
 #include "lib/material.glsl"
@@ -18,7 +18,7 @@ void main() {
     }
     // Blended surfaces stop a share of the light: the same dither as in the G-buffer, fixed to the texels of the map.
     bool blended = (materials[m].flags & MATERIAL_BLEND) != 0u;
-    float cutoff = blended ? random_float(uvec4(uvec2(gl_FragCoord.xy), instance_in, 0u)) : materials[m].alpha_cutoff;
+    float cutoff = blended ? random_float(uvec4(uvec2(gl_FragCoord.xy), instance_in, seed)) : materials[m].alpha_cutoff;
     if (alpha < cutoff) discard;
 }
 

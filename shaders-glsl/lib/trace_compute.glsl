@@ -89,6 +89,13 @@ uint trace_permuted(uint bits, uint octant) {
     return (octant & 4u) != 0u ? (bits & 0x0fu) << 4u | bits >> 4u : bits;
 }
 
+// Order in which the rasteriser draws surfaces with these bits: opaque ones first, single-sided before double-sided ones
+// (scene::resident::Batches).
+uint trace_rank(uint surface) {
+    uint sides = (surface & TRACE_SINGLE_SIDED) == 0u ? 2u : (surface & TRACE_REVERSED) != 0u ? 1u : 0u;
+    return (surface & TRACE_CUTOUT) != 0u ? 4u + sides : sides;
+}
+
 Hit trace(Ray ray, uint mask, uint salt, bool any) {
     Hit hit = Hit(ray.t_max, vec2(0.0), NONE, NONE);
     uint best = NONE; // record of the hit
@@ -197,12 +204,13 @@ Hit trace(Ray ray, uint mask, uint salt, bool any) {
             uint instance = first_instance + floatBitsToUint(trace_triangles[3u * candidate + 1u].w);
             uint triangle = floatBitsToUint(trace_triangles[3u * candidate + 2u].w);
             uint surface = floatBitsToUint(trace_triangles[3u * candidate].w);
-            // Of equals the first instance's first triangle, whatever the order of the tree.
+            // Of equals that which the rasteriser draws first, then the first instance's first triangle, whatever the order of the tree.
             bool nearer = candidate_at.x < hit.t;
             if (!nearer && best != NONE) {
                 uint other = hit.instance + floatBitsToUint(trace_triangles[3u * best + 1u].w);
                 uint other_triangle = floatBitsToUint(trace_triangles[3u * best + 2u].w);
-                nearer = instance < other || (instance == other && triangle < other_triangle);
+                uint rank = trace_rank(surface), other_rank = trace_rank(floatBitsToUint(trace_triangles[3u * best].w));
+                nearer = rank < other_rank || (rank == other_rank && (instance < other || (instance == other && triangle < other_triangle)));
             }
             bool there = (surface & TRACE_CUTOUT) == 0u;
             if (nearer && (there || trace_covered(instance, triangle, candidate_at.yz, mask, salt))) {

@@ -15,11 +15,9 @@ struct View {
     vec3 frustum_u;     // along the top edge of the far plane to the right; zero for orthographic cameras
     uint orthographic;  // 1: rays are parallel
     vec3 frustum_v;     // along the left edge of the far plane downwards; zero for orthographic cameras
-    uint frame;         // number of the frame, for seeds
     vec3 base_o;        // the camera (perspective); top left corner of the plane through the camera (orthographic)
     float pixel_angle;  // size of a pixel: metres per metre of depth (perspective), metres (orthographic)
     vec3 base_u;        // zero for perspective cameras
-    uint seed;
     vec3 base_v;        // zero for perspective cameras
     vec2 extent;        // pixels
 };

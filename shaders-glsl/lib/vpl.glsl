@@ -71,6 +71,12 @@ float surface_step(View view, vec3 position, float z) {
     vec3 size = abs(position);
     return 1e-5 * max(max(size.x, size.y), size.z) + 2e-5 * z * view.far;
 }
+
+// The same place as far back towards the camera, where nothing lies: a surface whose edge falls on the middle of a pixel is found there a
+// rounding error beyond the surface that it meets, and all rays from there would hit that one from behind.
+vec3 stepped_back(View view, vec3 position, float step) {
+    return position + to_camera(view, position) * step;
+}
 #endif
 
 #endif

@@ -6,7 +6,6 @@
 #include "lib/screen.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/bilateral.glsl"
-#include "lib/ambient.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -20,7 +19,7 @@ layout(constant_id = 2) const uint TINT = 1;
 layout(constant_id = 3) const uint OCCLUDE_AMBIENT = 1;
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
-layout(binding = 1, scalar) uniform AmbientBlock { Ambient ambient; };
+layout(binding = 1, scalar) readonly buffer Ambient { vec3 ambient[]; };
 layout(binding = 2) uniform sampler2D albedo;
 layout(binding = 3) uniform sampler2D normal;
 layout(binding = 4) uniform sampler2D depth;
@@ -39,6 +38,8 @@ layout(push_constant, scalar) uniform Push {
     float k_isr;
     float epsilon;  // of the depth weight; same unit as the depth difference
 };
+
+#include "lib/ambient.glsl"
 
 // Below this share of the largest possible weight no coarse texel matches, and the nearest in depth is taken.
 const float NO_MATCH = 0.01;
@@ -105,12 +106,12 @@ void main() {
     vec4 own = texelFetch(emission, pixel, 0);
     vec3 glow = own.rgb;
     // The occlusion texture of the material darkens light from all around and nothing else.
-    vec3 around = color.rgb * ambient_irradiance(ambient, n);
+    vec3 around = color.rgb * ambient_irradiance(n);
     // Metals have no diffuse part and would be black: what they reflect beyond a dielectric's 4 % takes the environment as
     // blurred as its irradiance, from the mirrored direction.
     vec4 gloss = texelFetch(specular, pixel, 0);
     vec3 mirrored = normalize(mix(reflect(-to_camera(view, p), n), n, gloss.a * gloss.a));
-    around += max(gloss.rgb - 0.04, 0.0) * ambient_irradiance(ambient, mirrored);
+    around += max(gloss.rgb - 0.04, 0.0) * ambient_irradiance(mirrored);
     around *= color.a * own.a / 3.14159265358979;
     vec3 direct_part = OCCLUDE_AMBIENT != 0 ? light.rgb : (light.rgb - glow) * lit + glow;
     vec3 sum = direct_part + around * lit + bounced;

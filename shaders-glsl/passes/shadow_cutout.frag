@@ -4,5 +4,9 @@
 #include "lib/scene.glsl"
 
 layout(binding = 1, scalar) readonly buffer Instances { Instance instances[]; };
+layout(push_constant, scalar) uniform Push {
+    mat4 clip_from_world;
+    uint seed; // of blended surfaces
+};
 
 #include "lib/shadow_cutout.glsl"

@@ -10,7 +10,10 @@ layout(binding = 2, scalar) readonly buffer Visible { uint visible[]; };
 layout(binding = 3, scalar) readonly buffer Positions { vec3 positions[]; };
 layout(binding = 6, scalar) readonly buffer Uvs { vec2 uvs[]; };
 layout(binding = 7, scalar) readonly buffer Colors { vec4 colors[]; };
-layout(push_constant, scalar) uniform Push { mat4 clip_from_world; };
+layout(push_constant, scalar) uniform Push {
+    mat4 clip_from_world;
+    uint seed; // of blended surfaces
+};
 
 layout(location = 0) out vec2 uv;
 layout(location = 1) out float alpha;

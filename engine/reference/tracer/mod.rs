@@ -34,7 +34,7 @@ pub use settings::{Filter, Settings, Sources, Strategy};
 pub use state::State;
 pub use sums::Sums;
 
-/// Tables that samples are drawn from, for tests.
+/// Tables that samples are drawn from, for techniques that sample the same lights, and for tests.
 #[doc(hidden)]
 pub mod tables {
     pub use super::{
@@ -110,7 +110,7 @@ impl<'s> Tracer<'s> {
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
     pub fn new(gpu: &Gpu, scene: &'s Scene, pose: &Pose) -> Result<Self> {
-        let resident = Resident::new(gpu, scene)?;
+        let resident = Resident::for_rays(gpu, scene)?;
         let importance = environment::importance(scene.environment.as_ref());
         let environment_columns =
             OwnedBuffer::with_contents(gpu, "tracer.environment", bytemuck::cast_slice(&importance.columns))?;

@@ -1,4 +1,5 @@
-//! From visible instances to draw calls: grouped by pipeline state, equal meshes in one instanced call, near ones first.
+//! From visible instances to draw calls: grouped by pipeline state, equal meshes in one instanced call, near ones first. Things of the same
+//! extent are as near as each other and keep the scene's order, so that of two in one place the first is drawn first.
 
 use super::{Handles, Instance, Moment};
 use crate::{
@@ -93,7 +94,7 @@ impl Batches {
             for (_, instances) in &mut meshes {
                 instances.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             }
-            meshes.sort_by(|a, b| a.1[0].0.total_cmp(&b.1[0].0).then(a.0.cmp(&b.0)));
+            meshes.sort_by(|a, b| a.1[0].0.total_cmp(&b.1[0].0).then(a.1[0].1.cmp(&b.1[0].1)));
             let mut calls = Vec::new();
             for ((first_index, indices), instances) in meshes {
                 calls.push(IndexedCall {

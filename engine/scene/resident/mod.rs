@@ -168,6 +168,18 @@ impl Resident {
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
     pub fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
+        Self::decoded(gpu, scene, textures::Decoding::Device)
+    }
+
+    /// For rays alone: textures have no mip levels, and sRGB is decoded exactly where devices may be off by some per cent.
+    ///
+    /// # Errors
+    /// As [`Resident::new`].
+    pub(crate) fn for_rays(gpu: &Gpu, scene: &Scene) -> Result<Self> {
+        Self::decoded(gpu, scene, textures::Decoding::Exact)
+    }
+
+    fn decoded(gpu: &Gpu, scene: &Scene, decoding: textures::Decoding) -> Result<Self> {
         let mut streams = Streams::new(scene)?;
         let mut deform = deform::Deform::default();
         let mut notes = Vec::new();
@@ -196,7 +208,7 @@ impl Resident {
             bytes += contents.len() as u64;
             OwnedBuffer::with_contents(gpu, name, contents)
         };
-        let textures = textures::upload(gpu, scene, &packing)?;
+        let textures = textures::upload(gpu, scene, &packing, decoding)?;
         Ok(Self {
             positions: buffer("scene.positions", &raw(&streams.positions))?,
             normals: buffer("scene.normals", &raw(&streams.normals))?,

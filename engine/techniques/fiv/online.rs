@@ -449,6 +449,7 @@ fn own(
                     set,
                     sets,
                     set_floats,
+                    seed: graph.seed,
                 },
             },
             rays

@@ -316,7 +316,7 @@ impl Fiv {
                     lit,
                     irradiance,
                     boxes,
-                    push: shaders::fiv::truth::Push { first, count, size: self.light.size, around },
+                    push: shaders::fiv::truth::Push { first, count, size: self.light.size, around, seed: graph.seed },
                 },
                 rays_of
             );

@@ -346,7 +346,7 @@ impl Fiv {
                     texels,
                     lit,
                     reflected,
-                    push: fiv::specular_truth::Push { first, count, size: self.light.size },
+                    push: fiv::specular_truth::Push { first, count, size: self.light.size, seed: graph.seed },
                 },
                 rays
             );

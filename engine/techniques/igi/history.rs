@@ -182,15 +182,15 @@ impl Igi {
         let (probes_before, probes_next) = graph.history_buffer("igi.history.probes", probe_bytes);
         let (lit_before, lit_next) = graph.history_buffer("igi.history.lit", light_bytes);
         let Grid { columns, rows, side } = grid;
+        let seed = seed_of(shared.seed, frame);
         let args = probe::Args {
             view: g.view,
             normal: g.normal,
             depth: g.depth,
             probes: probes_next,
-            push: probe::Push { columns, rows, side, frame },
+            push: probe::Push { columns, rows, side, seed },
         };
         graph.compute(args, grid.count());
-        let seed = seed_of(shared.seed, frame);
         self.light_probes(graph, (probes_next, lit_next, grid), vpls, (shared, seed), settings);
 
         let relit = graph.buffer("igi.history.relit", light_bytes);

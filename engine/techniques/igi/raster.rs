@@ -140,7 +140,7 @@ impl Igi {
                     colors: handles.colors,
                     materials: handles.materials,
                     scene_textures: handles.textures,
-                    push: cutout::Push { light, face, nearest },
+                    push: cutout::Push { light, face, nearest, seed: shared.seed },
                 };
                 let draw = Draw::indexed(handles.indices, Arc::clone(&holed));
                 graph.raster(targets(Depth::Keep), state, args, draw).rays(holed_work);

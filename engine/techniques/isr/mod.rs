@@ -61,7 +61,7 @@ pub struct Outputs {
 }
 
 /// Everything a frame starts from.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Inputs {
     pub gbuffer: GBuffer,
     pub lights: direct::Lights,
@@ -191,7 +191,8 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
         blurred = filter(graph, gathered);
     }
 
-    let ambient = if settings.environment { inputs.ambient } else { Irradiance::default() }.upload(graph);
+    let none = Irradiance::default();
+    let ambient = if settings.environment { &inputs.ambient } else { &none }.upload(graph);
     let choices = Compose {
         factor,
         plane: settings.upsample == Upsample::Plane,

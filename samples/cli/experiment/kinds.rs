@@ -352,7 +352,7 @@ fn isr_picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
     on_device(runner, job, "isr", |graph| {
         let handles = resident.frame_in(graph, scene, pose);
         let view = job.view.fit_far(&handles.bounds());
-        let picture = isr::picture(graph, &handles, &view, *ambient, &settings)?;
+        let picture = isr::picture(graph, &handles, &view, ambient.clone(), &settings)?;
         let out = picture.outputs;
         let shown = Shown::new(out.total).color("direct", out.direct).color("indirect", out.indirect);
         let shown = shown.layer("occlusion", &["Y"], out.occlusion, |pixel| pixel);

@@ -218,7 +218,7 @@ pub fn run(args: &ExportPovArgs) -> Result<()> {
     }
     let stage = Stage::open(&args.stage)?;
     stage.notes().iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
-    let (pose, view) = stage.at(args.stage.time, args.stage.size);
+    let (pose, view) = stage.at(args.stage.time, args.stage.size)?;
     let stem = output.and_then(Path::file_stem).map_or("scene".into(), |s| s.to_string_lossy().into_owned());
     let exported = export(&stage.scene, &pose, &view, &settings.pov, &stem)?;
     exported.notes.iter().for_each(|note| console.info(&format!("note: {note}")));

@@ -88,7 +88,7 @@ pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
     }
     let gpu = Gpu::new(args.device.options()?)?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
-    let (pose, view) = stage.at(args.stage.time, args.stage.size);
+    let (pose, view) = stage.at(args.stage.time, args.stage.size)?;
     let mut tracer = Tracer::new(&gpu, &stage.scene, &pose)?;
     tracer.start(&view, &settings.reference)?;
     let first = args.output.first().filter(|name| *name != "-");
