@@ -59,9 +59,7 @@ void main() {
         p.normal = decode_normal(texelFetch(normal, pixel, 0));
         p.above = p.position + p.normal * surface_step(view, p.position, z);
         p.viewer = to_camera(view, p.position);
-        p.f0 = gloss.rgb;
-        p.roughness = gloss.a;
-        p.albedo = color.rgb;
+        p.brdf = lit_brdf(color.rgb, gloss.rgb, gloss.a, dot(p.normal, p.viewer));
         // Unlit surfaces are shown as they are.
         uint last = color.a > 0.5 ? min(first + count, direct_rays()) : 0u;
         for (uint i = first; i < last; ++i) {
