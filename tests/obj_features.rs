@@ -153,3 +153,65 @@ fn a_cut_jpeg_is_told_of() {
     assert_eq!(notes(&jpeg), []);
     assert_eq!(notes(&jpeg[..2 * jpeg.len() / 3]), [(r#"texture "a.jpg""#.to_owned(), cut.to_owned())]);
 }
+
+/// A tetrahedron around (x, 0.3, 0.3) with its fronts outwards, or inwards; its corners are the next four.
+fn tetrahedron(text: &mut String, x: f32, size: f32, inwards: bool) {
+    for [a, b, c] in [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
+        let at = |v: f32| 0.3 + size * (v - 0.25);
+        text.push_str(&format!("v {} {} {}\n", x - 0.3 + at(a), at(b), at(c)));
+    }
+    for [a, b, c] in [[-4, -2, -3], [-4, -3, -1], [-4, -1, -2], [-3, -2, -1]] {
+        let [b, c] = if inwards { [c, b] } else { [b, c] };
+        text.push_str(&format!("f {a} {b} {c}\n"));
+    }
+}
+
+const GLASS: (&str, &[u8]) =
+    ("a.mtl", b"newmtl glass\nillum 7\nNi 1.5\nKd 0 0 0\nKs 1 1 1\nTf 1 1 1\nnewmtl paint\nKd 0.5 0.5 0.5\n");
+
+/// Twelve times the volume that the primitive's triangles turn outwards, and its double-sidedness.
+fn outwards(scene: &Scene, primitive: &Primitive) -> (f32, bool) {
+    let corner = |i: usize| primitive.positions[primitive.indices[i] as usize];
+    let six = (0..primitive.indices.len()).step_by(3).map(|i| corner(i).dot(corner(i + 1).cross(corner(i + 2)))).sum();
+    for triangle in primitive.indices.chunks_exact(3) {
+        let [a, b, c] = [0, 1, 2].map(|k| primitive.positions[triangle[k] as usize]);
+        let facing = (b - a).cross(c - a).dot(primitive.normals[triangle[0] as usize]);
+        assert!(facing > 0.0, "normals on the other side than the triangles");
+    }
+    (six, scene.materials[primitive.material as usize].double_sided)
+}
+
+#[test]
+fn closed_glass_is_a_body_and_open_glass_a_sheet() {
+    // A body, one that is wound inside out, and one with a cavity.
+    for (inwards, cavity) in [(false, false), (true, false), (false, true)] {
+        let mut text = "mtllib a.mtl\nusemtl glass\n".to_owned();
+        tetrahedron(&mut text, 0.3, 1.0, inwards);
+        if cavity {
+            tetrahedron(&mut text, 0.3, 0.5, true);
+        }
+        let scene = read(&text, &[GLASS]).unwrap();
+        let (six, double_sided) = outwards(&scene, only(&scene));
+        assert!(!double_sided && (six - if cavity { 0.875 } else { 1.0 }).abs() < 1e-5, "{inwards} {cavity}: {six}");
+    }
+    // A body that lacks a side is a sheet, and said to be.
+    let mut text = "mtllib a.mtl\nusemtl glass\n".to_owned();
+    tetrahedron(&mut text, 0.3, 1.0, false);
+    let open = read(text.rsplit_once("f -3").unwrap().0, &[GLASS]).unwrap();
+    assert!(open.materials[only(&open).material as usize].double_sided);
+    assert!(open.notes.iter().any(|note| note.text.contains("thin panes")), "{:?}", open.notes);
+    // As is one with two sides at the same place.
+    let flat = format!("mtllib a.mtl\nusemtl glass\n{SQUARE}f 1 2 3 4\nf 4 3 2 1\n");
+    let flat = read(&flat, &[GLASS]).unwrap();
+    assert!(flat.materials[only(&flat).material as usize].double_sided);
+    // Both of one material become two, with all triangles kept; other surfaces keep both sides.
+    let mut text = format!("mtllib a.mtl\n{SQUARE}usemtl paint\nf 1 2 3 4\nusemtl glass\nf 1 2 3 4\n");
+    tetrahedron(&mut text, 4.0, 1.0, false);
+    let mixed = read(&text, &[GLASS]).unwrap();
+    let sides: Vec<(usize, bool)> = mixed.meshes[0]
+        .primitives
+        .iter()
+        .map(|p| (p.indices.len() / 3, mixed.materials[p.material as usize].double_sided))
+        .collect();
+    assert_eq!(sides, [(2, true), (2, true), (4, false)]);
+}

@@ -6,7 +6,10 @@ use glam::{DVec3, Mat4, Vec3};
 use lucerna::{
     gpu::{Gpu, ImageDesc, OwnedImage, Region, testing::with_gpu},
     graph::{Graph, Runner},
-    reference::tracer::{Sources, tables},
+    reference::{
+        brdf::Matter,
+        tracer::{Sources, tables},
+    },
     scene::{Environment, Light, LightKind, Material, Node, Pose, Scene, builtin, resident},
     shaders::{consts, test::samplers as shader, types},
 };
@@ -293,15 +296,10 @@ fn the_two_lobes_together() {
             for (d, value) in drawn.iter().zip(&values).filter(|(d, _)| d[2] > 1e-3).step_by(499) {
                 let want = density(direction(d).normalize());
                 assert!((f64::from(d[3]) - want).abs() < 2e-3 * want + 1e-6);
-                // The formula of lib/brdf.glsl, in double precision.
-                let (l, n) = (direction(d).normalize(), DVec3::Z);
-                let h = (v + l).normalize();
-                let a2 = a * a;
-                let ggx = a2 / (PI * (h.z * h.z * (a2 - 1.0) + 1.0).powi(2));
-                let side = |c: f64| (c * c * (1.0 - a2) + a2).sqrt();
-                let smith = 0.5 / (l.z * side(v.z) + v.z * side(l.z));
-                let fresnel = 0.3 + 0.7 * (1.0 - v.dot(h)).powi(5);
-                let exact = n.dot(l) * (0.5 / PI + ggx * smith * fresnel);
+                // In double precision.
+                let l = direction(d).normalize();
+                let matter = Matter { albedo: DVec3::splat(0.5), f0: DVec3::splat(0.3), roughness: a.sqrt() };
+                let exact = matter.response(DVec3::Z, v, l).x;
                 assert!((f64::from(value[0]) - exact).abs() < 2e-3 * exact, "{value:?} instead of {exact}");
                 // Reciprocity: f(l, v) = f(v, l); the shader gives f cos.
                 let (there, back) = (f64::from(value[1]) / l.z, f64::from(value[3]) / v.z);

@@ -28,7 +28,7 @@ impl From<&ShadowMaps> for Lights {
 pub struct Direct {
     /// The dissertation's equation 16 instead of radiometry.
     pub paper_law: bool,
-    /// GGX highlights.
+    /// GGX facets over the matt base (`lib/brdf.glsl`), under the paper's law added to it; otherwise Lambert's law alone.
     pub specular: bool,
     /// Paper law: of lights without a range, metres; 0: the far distance of the camera.
     pub light_radius: f32,

@@ -55,7 +55,8 @@ pub fn response(surface: &Surface, light: DVec3, (spread, least): (f64, f64)) ->
     let lambda = |c: f64| 0.5 * ((1.0 + a2 * (1.0 - c * c).max(0.0) / (c * c)).sqrt() - 1.0);
     let nv = n.dot(v).max(1e-4);
     let both = 1.0 / (1.0 + lambda(nv) + lambda(cosine));
-    let fresnel = surface.f0 + (1.0 - surface.f0) * (1.0 - v.dot(half).clamp(0.0, 1.0)).powi(5);
+    let grazing = (50.0 * surface.f0.max_element()).clamp(0.0, 1.0);
+    let fresnel = surface.f0 + (grazing - surface.f0) * (1.0 - v.dot(half).clamp(0.0, 1.0)).powi(5);
     fresnel * (distribution * both / (4.0 * nv))
 }
 
@@ -195,9 +196,10 @@ mod tests {
             assert!((mirror - 1.0).abs() < 2e-3, "{cosine}: {mirror}");
             let rough = albedo(&surface(1.0, cosine, 1.0), 128).x;
             assert!(rough > 0.3 && rough < 0.8, "{cosine}: {rough}");
-            // Schlick: with nothing at normal incidence only the fifth power is left.
-            let dark = albedo(&surface(0.0, cosine, 0.0), 64).x;
-            assert!((dark - (1.0 - cosine).powi(5)).abs() < 2e-3, "{cosine}: {dark}");
+            // Schlick: with little at normal incidence almost only the fifth power is left; without an interface nothing is.
+            let dark = albedo(&surface(0.0, cosine, 0.02), 64).x;
+            assert!((dark - 0.02 - 0.98 * (1.0 - cosine).powi(5)).abs() < 2e-3, "{cosine}: {dark}");
+            assert_eq!(albedo(&surface(0.0, cosine, 0.0), 64).x, 0.0);
         }
     }
 

@@ -1,19 +1,31 @@
 // What the visible surfaces reflect of the irradiance, and what they emit.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "lib/view.glsl"
+#include "lib/screen.glsl"
+#include "lib/gbuffer.glsl"
+#include "lib/brdf.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
+
+// 1: microfacets are over the base, and another pass adds what they reflect at once.
+layout(constant_id = 0) const uint LAYERED = 0;
 
 layout(binding = 0) uniform sampler2D albedo;
 layout(binding = 1) uniform sampler2D depth;
 layout(binding = 2) uniform sampler2D emission;
 layout(binding = 3, rgba32f) uniform image2D irradiance; // becomes zero where it was below
 layout(binding = 4, rgba32f) uniform writeonly image2D total;
+layout(binding = 5, scalar) uniform ViewBlock { View view; };
+layout(binding = 6) uniform sampler2D normal;
+layout(binding = 7) uniform sampler2D surface; // reflectance at normal incidence; a: roughness
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(total)))) return;
-    if (texelFetch(depth, pixel, 0).r >= 1.0) {
+    float z = texelFetch(depth, pixel, 0).r;
+    if (z >= 1.0) {
         imageStore(total, pixel, vec4(0.0));
         return;
     }
@@ -21,6 +33,14 @@ void main() {
     vec3 light = max(imageLoad(irradiance, pixel).rgb, vec3(0.0));
     imageStore(irradiance, pixel, vec4(light, 1.0));
     // Unlit surfaces are shown as they are.
-    vec3 reflected = color.a > 0.5 ? color.rgb * light / 3.14159265358979 : vec3(0.0);
+    vec3 matt = color.a > 0.5 ? color.rgb : vec3(0.0);
+    if (LAYERED != 0u && color.a > 0.5) {
+        // The irradiance has lost the directions: the share that light from everywhere alike would have.
+        vec4 gloss = texelFetch(surface, pixel, 0);
+        vec3 n = decode_normal(texelFetch(normal, pixel, 0));
+        vec3 v = to_camera(view, screen_position(view, pixel, 1.0, z));
+        matt = brdf_of(color.rgb, gloss.rgb, gloss.a, dot(n, v)).matt;
+    }
+    vec3 reflected = matt * light / 3.14159265358979;
     imageStore(total, pixel, vec4(reflected + texelFetch(emission, pixel, 0).rgb, 1.0));
 }

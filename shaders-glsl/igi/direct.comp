@@ -60,9 +60,7 @@ void main() {
         float gap = surface_step(view, p.position, z);
         p.above = stepped_back(view, p.position, gap) + p.normal * gap;
         p.viewer = to_camera(view, p.position);
-        p.f0 = gloss.rgb;
-        p.roughness = gloss.a;
-        p.albedo = color.rgb;
+        p.brdf = lit_brdf(color.rgb, gloss.rgb, gloss.a, dot(p.normal, p.viewer));
         // Unlit surfaces are shown as they are.
         uint last = color.a > 0.5 ? min(first + count, direct_rays()) : 0u;
         for (uint i = first; i < last; ++i) {

@@ -39,7 +39,8 @@ void main() {
     uint at = gl_GlobalInvocationID.x;
     if (at >= nodes || tree_nodes[at].state != TREE_SURFACE) return;
     TreeNode node = tree_nodes[at];
-    LitPoint p = LitPoint(node.position, node.position + node.normal * node.gap, node.normal, node.direction, node.f0, node.roughness, node.albedo);
+    Brdf brdf = lit_brdf(node.albedo, node.f0, node.roughness, dot(node.normal, node.direction));
+    LitPoint p = LitPoint(node.position, node.position + node.normal * node.gap, node.normal, node.direction, brdf);
     uvec2 place = uvec2(node.pixel, at % TREE_WIDTH);
     vec3 sum = vec3(0.0);
     uint last = min(first + count, direct_rays());

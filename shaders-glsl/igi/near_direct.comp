@@ -46,7 +46,7 @@ void main() {
     vec3 above = path.position + path.side * path.gap;
     uvec4 words = pcg4d(uvec4(path.salt, number, turn, settings.seed ^ 0x11f0u));
     // Albedo π: radiance is irradiance.
-    LitPoint p = LitPoint(path.position, above, path.normal, path.normal, vec3(0.0), LIT_MATT, vec3(BRDF_PI));
+    LitPoint p = LitPoint(path.position, above, path.normal, path.normal, lit_brdf(vec3(BRDF_PI), vec3(0.0), 1.0, 1.0));
     // A sample of each kind of light, and of these the one that is followed by what it sends if nothing is in the way (Talbot, Cline and
     // Egbert, Importance Resampling for Global Illumination, 2005).
     Ray ray;

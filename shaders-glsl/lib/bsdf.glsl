@@ -1,16 +1,15 @@
-// Scattering at a surface: Lambert and GGX as lib/brdf.glsl has them for direct light, mirrors, and smooth glass.
-// Before including: lib/sampling.glsl.
+// Scattering at a surface: the matt base under microfacets of lib/brdf.glsl, mirrors, and smooth glass.
 #ifndef LIB_BSDF
 #define LIB_BSDF
+
+#include "lib/brdf.glsl"
 
 struct Bsdf {
     vec3 normal;        // shading normal on the side of the viewer
     vec3 geometric;     // of the triangle, on the same side
-    vec3 albedo;        // of the Lambert lobe
-    vec3 f0;            // of the GGX lobe
-    float alpha;        // of the GGX lobe: roughness²
-    float glossy_share; // how often the GGX lobe is sampled; 0: there is none
-    float rough;        // weight of Lambert + GGX: 0 for mirrors
+    Brdf brdf;          // for this viewer
+    float glossy_share; // how often visible normals of GGX are sampled instead of the cosine; 0: there are none
+    float rough;        // weight of base and microfacets: 0 for mirrors
     float glass;        // weight of the smooth dielectric
     float mirror;       // weight of the mirror
     vec3 tint;          // of what passes the dielectric, and reflectance of the mirror at normal incidence
@@ -22,51 +21,37 @@ float brightest(vec3 c) {
     return max(c.r, max(c.g, c.b));
 }
 
+// Of mirrors.
 vec3 schlick(vec3 f0, float cosine) {
-    float m = clamp(1.0 - cosine, 0.0, 1.0);
-    float m2 = m * m;
-    return f0 + (1.0 - f0) * (m2 * m2 * m);
+    return brdf_schlick(f0, 1.0, cosine);
 }
 
-// The lobe of lib/brdf.glsl; its roughness has the same floor.
-float ggx_alpha(float roughness) {
-    float r = max(roughness, 0.045);
-    return r * r;
+// How often to sample visible normals. Neither never nor always: light has every direction by either lobe.
+float glossy_share(Brdf b) {
+    float matt = brightest(b.matt);
+    float shine = brightest(b.shine);
+    return b.f90 > 0.0 ? clamp(shine / max(matt + shine, 1e-6), 0.1, 0.95) : 0.0;
 }
 
-// How often to sample the GGX lobe for a viewer at cosine nv. Never 0: at grazing angles everything shines.
-float glossy_share(vec3 albedo, vec3 f0, float nv) {
-    float matt = brightest(albedo);
-    float shine = brightest(schlick(f0, nv));
-    return matt > 0.0 ? clamp(shine / (matt + shine), 0.1, 0.9) : 1.0;
-}
-
-// Cosine of the viewer as brdf_specular_cosine takes it.
+// Cosine of the viewer as brdf_of takes it.
 vec3 viewer_in_frame(mat3 frame, vec3 v) {
     vec3 local = v * frame;
     return normalize(vec3(local.xy, max(local.z, 1e-4)));
 }
 
-// Lambert + GGX times cosine for light from l, and the density per steradian with which bsdf_sample_rough chooses l.
+// BRDF times cosine for light from l, and the density per steradian with which bsdf_sample_rough chooses l.
 vec3 bsdf_rough(Bsdf b, vec3 v, vec3 l, out float density) {
     density = 0.0;
     float nl = dot(b.normal, l);
     if (nl <= 0.0 || dot(b.geometric, l) <= 0.0) return vec3(0.0);
-    vec3 value = b.albedo * (nl / SAMPLING_PI);
     density = (1.0 - b.glossy_share) * nl / SAMPLING_PI;
     if (b.glossy_share > 0.0) {
-        float nv = max(dot(b.normal, v), 1e-4);
-        vec3 h = normalize(v + l);
-        float d = ggx_distribution(clamp(dot(b.normal, h), 0.0, 1.0), length(cross(b.normal, h)), b.alpha);
-        float a2 = b.alpha * b.alpha;
-        float smith = 0.5 / (nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2));
-        value += d * smith * nl * schlick(b.f0, clamp(dot(v, h), 0.0, 1.0));
         mat3 frame = frame_around(b.normal);
         vec3 from = viewer_in_frame(frame, v);
         vec3 local = normalize(from + l * frame);
-        density += b.glossy_share * ggx_reflected_density(local, from, b.alpha);
+        density += b.glossy_share * ggx_reflected_density(local, from, b.brdf.alpha);
     }
-    return value;
+    return brdf_cosine(b.brdf, b.normal, v, l);
 }
 
 // A direction for light by the lobes' densities. May point below the surface: bsdf_rough is zero there.
@@ -74,7 +59,7 @@ vec3 bsdf_sample_rough(Bsdf b, vec3 v, float choice, vec2 u) {
     mat3 frame = frame_around(b.normal);
     if (choice >= b.glossy_share) return frame * sample_cosine(u);
     vec3 from = viewer_in_frame(frame, v);
-    vec3 h = sample_ggx_visible(u, from, b.alpha);
+    vec3 h = sample_ggx_visible(u, from, b.brdf.alpha);
     return frame * reflect(-from, h);
 }
 

@@ -2,6 +2,8 @@
 #ifndef LIB_FIV_SPECULAR
 #define LIB_FIV_SPECULAR
 
+#include "lib/brdf.glsl"
+
 // Edge of a cell of the environment, texels. A sample says of each cell how much of its light an occluder hides.
 const uint FIV_CELL = 4u; // export
 
@@ -19,7 +21,7 @@ float fiv_width2(float roughness) {
     return r * r * r * r;
 }
 
-// The specular lobe of lib/brdf.glsl times the cosine of the light, for light from around l: the distribution of normals is as much
+// What microfacets send on at once (lib/brdf.glsl), times the cosine of the light, for light from around l: the distribution of normals is as much
 // wider as the half vectors of that light are apart, which is its spread, and more where they see each other at an angle.
 vec3 fiv_specular(vec3 n, vec3 v, vec3 l, vec3 f0, float a2, float spread, float least) {
     float nl = dot(n, l);
@@ -33,9 +35,7 @@ vec3 fiv_specular(vec3 n, vec3 v, vec3 l, vec3 f0, float a2, float spread, float
     float d = nh * nh * (w2 - 1.0) + 1.0;
     float ggx = w2 / (3.14159265358979 * d * d);
     float smith = 0.5 / (nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2));
-    float m = 1.0 - vh;
-    float m2 = m * m;
-    return ggx * smith * nl * (f0 + (1.0 - f0) * (m2 * m2 * m));
+    return ggx * smith * nl * brdf_schlick(f0, brdf_f90(f0), vh);
 }
 
 // As well for a texel of solid angle `angle`: a square has a twelfth of its side's square as variance, half vectors a quarter of that,

@@ -73,4 +73,25 @@ float surface_gap(SurfacePoint p) {
     return max(p.reach, 1e-6) * 1e-5;
 }
 
+// The shading normal, bent towards that of the triangle, n, as far as it takes for light to be mirrored above the triangle: normal
+// maps and interpolated normals may lean so far that a mirror would show its own inside. v: unit, towards the viewer, above n.
+// Twin: reference::path::surface.
+vec3 mirroring_normal(vec3 shading, vec3 n, vec3 v) {
+    float along = dot(v, n);
+    // At most as steep as the light goes out, so that the triangle's own normal always does.
+    float least = min(0.9 * along, 0.025);
+    if (2.0 * dot(shading, v) * dot(shading, n) - along >= least) return shading;
+    vec3 x = shading - dot(shading, n) * n;
+    if (dot(x, x) < 1e-12 || along <= 0.0) return n;
+    x = normalize(x);
+    // In the plane of both normals: 2 (m·v) (m·n) - v·n = least for m = sin x + cos n, solved for cos².
+    float across = dot(v, x);
+    float a = across * across + along * along;
+    float b = a + along * least;
+    float c = along + least;
+    float root = sqrt(max(b * b - a * c * c, 0.0));
+    float cos2 = clamp(0.5 * (across < 0.0 ? b + root : b - root) / a, 0.0, 1.0);
+    return normalize(sqrt(1.0 - cos2) * x + sqrt(cos2) * n);
+}
+
 #endif

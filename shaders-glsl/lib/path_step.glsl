@@ -224,16 +224,15 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
 
     bool diffuse_only = (settings.flags & PATH_DIFFUSE_ONLY) != 0u;
     bool mirror = !diffuse_only && roughness < 0.05 && metallic > 0.5;
+    if (!diffuse_only && metallic > 0.5) normal = mirroring_normal(normal, side, -toward);
     float dielectric = (ior - 1.0) * (ior - 1.0) / ((ior + 1.0) * (ior + 1.0));
     float transmission = diffuse_only ? 0.0 : clamp(materials[material].transmission * texels[TEXTURE_TRANSMISSION].r, 0.0, 1.0);
     vec3 v = -toward;
     Bsdf b;
     b.normal = normal;
     b.geometric = side;
-    b.albedo = albedo;
-    b.f0 = mix(vec3(dielectric), base.rgb, metallic);
-    b.alpha = ggx_alpha(roughness);
-    b.glossy_share = diffuse_only ? 0.0 : glossy_share(b.albedo, b.f0, max(dot(normal, v), 1e-4));
+    b.brdf = brdf_of(albedo, diffuse_only ? vec3(0.0) : mix(vec3(dielectric), base.rgb, metallic), roughness, dot(normal, v));
+    b.glossy_share = glossy_share(b.brdf);
     b.glass = transmission;
     b.mirror = mirror ? 1.0 - transmission : 0.0;
     b.rough = mirror ? 0.0 : 1.0 - transmission;

@@ -4,19 +4,19 @@
 #ifndef LIB_VPL_DIRECT
 #define LIB_VPL_DIRECT
 
-// LitPoint.roughness of what has no gloss at all.
-const float LIT_MATT = 2.0;
-
 // A point that is lit.
 struct LitPoint {
     vec3 position; // metres
     vec3 above;    // the same a step off the surface
     vec3 normal;   // unit
     vec3 viewer;   // unit, towards where it is seen from
-    vec3 f0;
-    float roughness;
-    vec3 albedo;
+    Brdf brdf;     // for the viewer
 };
+
+// Base and microfacets as the settings want them.
+Brdf lit_brdf(vec3 albedo, vec3 f0, float roughness, float nv) {
+    return brdf_of(albedo, settings.diffuse_only != 0u ? vec3(0.0) : f0, roughness, nv);
+}
 
 // Shadow rays of a point.
 uint direct_rays() {
@@ -68,9 +68,7 @@ vec3 direct_ray(uint i, LitPoint p, uvec2 place, out Ray ray) {
     }
     float cosine = dot(p.normal, to_light);
     if (cosine <= 0.0 || arrives == vec3(0.0)) return vec3(0.0);
-    vec3 reflected = p.albedo * (cosine / BRDF_PI);
-    if (settings.diffuse_only == 0u && p.roughness < LIT_MATT) reflected += brdf_specular_cosine(p.normal, p.viewer, to_light, p.f0, p.roughness);
-    return arrives * reflected;
+    return arrives * brdf_cosine(p.brdf, p.normal, p.viewer, to_light);
 }
 
 #endif

@@ -50,10 +50,11 @@ HitSurface hit_surface(Hit hit, vec3 toward, uint slots, bool diffuse_only) {
         }
     }
     if (!front) normal = -normal;
-    s.normal = any(isnan(normal)) ? s.side : normal;
     s.unlit = (flags & MATERIAL_UNLIT) != 0u;
     float metallic = clamp(materials[m].metallic * texels[TEXTURE_METALLIC_ROUGHNESS].b, 0.0, 1.0);
     s.roughness = clamp(materials[m].roughness * texels[TEXTURE_METALLIC_ROUGHNESS].g, 0.0, 1.0);
+    s.normal = any(isnan(normal)) ? s.side : normal;
+    if (!diffuse_only && metallic > 0.5) s.normal = mirroring_normal(s.normal, s.side, -toward);
     float ior = materials[m].ior;
     float dielectric = (ior - 1.0) * (ior - 1.0) / ((ior + 1.0) * (ior + 1.0));
     s.albedo = s.unlit ? vec3(0.0) : (1.0 - metallic) * base.rgb;

@@ -13,10 +13,10 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-// 0: radiometry of glTF lights, reflected by Lambert (ρ/π) and GGX. 1: the dissertation's k_dl: colour relative to the
-// brightest light, equation 16 over distance, cosine; no π.
+// 0: radiometry of glTF lights, reflected by a matt base under microfacets (lib/brdf.glsl). 1: the dissertation's k_dl: colour relative to the
+// brightest light, equation 16 over distance, cosine; no π; microfacets are added to it.
 layout(constant_id = 0) const uint PAPER_LAW = 0;
-layout(constant_id = 1) const uint SPECULAR = 1;
+layout(constant_id = 1) const uint SPECULAR = 1; // 0: Lambert's law alone
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D albedo;
@@ -25,7 +25,7 @@ layout(binding = 3) uniform sampler2D depth;
 layout(binding = 4) uniform sampler2D specular;
 layout(binding = 5) uniform sampler2D emission;
 layout(binding = 6, rgba16f) uniform writeonly image2D direct;   // all that leaves towards the camera, with emission
-layout(binding = 7, rgba16f) uniform writeonly image2D diffuse;  // what leaves in all directions: Lambert part and emission
+layout(binding = 7, rgba16f) uniform writeonly image2D diffuse;  // what leaves in all directions: by Lambert's law, and emission
 
 layout(push_constant, scalar) uniform Push {
     float light_radius;  // l_r of lights without a range, metres; 0: the camera's far distance
@@ -63,6 +63,8 @@ void main() {
             brightest = max(brightest, max(c.r, max(c.g, c.b)));
         }
     }
+    bool layered = SPECULAR != 0 && PAPER_LAW == 0;
+    Brdf brdf = brdf_of(color.rgb, SPECULAR != 0 ? gloss.rgb : vec3(0.0), gloss.a, dot(n, v));
     vec3 matt = vec3(0.0);
     vec3 shine = vec3(0.0);
     for (uint i = 0u; i < light_count; ++i) {
@@ -83,10 +85,10 @@ void main() {
         e *= shadow_factor(one, p, n);
         matt += e * cosine;
         if (SPECULAR != 0) {
-            shine += e * brdf_specular_cosine(n, v, to_light, gloss.rgb, gloss.a);
+            shine += e * (layered ? brdf_cosine(brdf, n, v, to_light) : brdf_specular_cosine(brdf, n, v, to_light));
         }
     }
     vec3 reflected = color.a * color.rgb * matt * (PAPER_LAW != 0 ? 1.0 : 1.0 / BRDF_PI);
     imageStore(diffuse, pixel, vec4(reflected + glow, 1.0));
-    imageStore(direct, pixel, vec4(reflected + color.a * shine + glow, 1.0));
+    imageStore(direct, pixel, vec4((layered ? vec3(0.0) : reflected) + color.a * shine + glow, 1.0));
 }

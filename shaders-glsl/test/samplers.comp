@@ -57,13 +57,12 @@ void main() {
         Bsdf b;
         b.normal = vec3(0.0, 0.0, 1.0);
         b.geometric = b.normal;
-        b.albedo = albedo;
-        b.f0 = f0;
-        b.alpha = alpha;
+        b.brdf = brdf_of(albedo, f0, sqrt(alpha), view.z);
         b.glossy_share = share;
         found.xyz = bsdf_sample_rough(b, view, unit_float(words.z), u);
         value.xyz = bsdf_rough(b, view, found.xyz, found.w);
         float back;
+        b.brdf = brdf_of(albedo, f0, sqrt(alpha), found.z);
         value.w = bsdf_rough(b, found.xyz, view, back).g;
     }
     if (which == SAMPLER_ENVIRONMENT) {

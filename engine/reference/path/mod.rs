@@ -1,6 +1,6 @@
 //! A plain CPU path tracer: the slow and obvious ground truth that GPU techniques and the GPU path tracer are held against.
 //!
-//! Transport: Lambert and GGX as `lib/brdf.glsl` has them, for direct light and at every bounce; mirrors
+//! Transport: a matt base under microfacets as [`brdf`](super::brdf) has it, for direct light and at every bounce; mirrors
 //! (`roughness < 0.05 && metallic > 0.5`) and glass (`transmission`) are sharp; punctual lights, emissive surfaces, the
 //! environment. Light of an extent is found by scattered rays that happen to meet it; emissive surfaces can be sampled by their
 //! area instead ([`Settings::sample_lamps`]). There is no weighting between strategies, no roulette, no clamping.

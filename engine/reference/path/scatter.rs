@@ -9,7 +9,7 @@ use std::f32::consts::PI;
 
 /// What becomes of a path at a surface.
 pub enum Event {
-    /// It is scattered by Lambert's law and GGX.
+    /// It is scattered by the base and the microfacets over it.
     Rough,
     /// It goes on in one direction, from this place, with this share of its light.
     Sharp { origin: Vec3, direction: Vec3, share: Vec3 },
@@ -25,14 +25,14 @@ impl Face {
         }
         if self.mirror {
             // Schlick's Fresnel term, F0 = base colour.
-            let c = self.normal.dot(self.to_viewer).clamp(0.0, 1.0);
+            let c = self.lobe.dot(self.to_viewer).clamp(0.0, 1.0);
             return self.reflected(self.base + (1.0 - self.base) * (1.0 - c).powi(5));
         }
         if self.transmission > 0.0 && random.next() < self.transmission { self.glass(random) } else { Event::Rough }
     }
 
     fn reflected(&self, share: Vec3) -> Event {
-        let direction = 2.0 * self.normal.dot(self.to_viewer) * self.normal - self.to_viewer;
+        let direction = 2.0 * self.lobe.dot(self.to_viewer) * self.lobe - self.to_viewer;
         match direction.dot(self.geometric) > 0.0 {
             true => Event::Sharp { origin: self.lifted(), direction: direction.normalize(), share },
             false => Event::None,
@@ -41,7 +41,7 @@ impl Face {
 
     /// A smooth dielectric: reflects with the share F of Fresnel's equations, transmits the rest tinted by the base colour.
     fn glass(&self, random: &mut Random) -> Event {
-        let cosine = self.normal.dot(self.to_viewer).clamp(0.0, 1.0);
+        let cosine = self.lobe.dot(self.to_viewer).clamp(0.0, 1.0);
         if self.double_sided {
             // A thin wall: F at both interfaces, and all that goes to and fro between them.
             let f = fresnel(cosine, 1.0 / self.ior).0;
@@ -57,7 +57,7 @@ impl Face {
         if random.next() < f {
             return self.reflected(Vec3::ONE);
         }
-        let direction = (-self.to_viewer * eta + self.normal * (eta * cosine - behind)).normalize();
+        let direction = (-self.to_viewer * eta + self.lobe * (eta * cosine - behind)).normalize();
         if direction.dot(self.geometric) >= 0.0 {
             return Event::None;
         }
@@ -67,33 +67,41 @@ impl Face {
 
     /// BRDF · cosine of the rough part.
     pub fn rough(&self, to: Vec3, diffuse_only: bool) -> Vec3 {
-        let cosine = self.normal.dot(to);
+        let normal = self.scattering(diffuse_only);
+        let cosine = normal.dot(to);
         if cosine <= 0.0 || self.geometric.dot(to) <= 0.0 {
             return Vec3::ZERO;
         }
-        let lobe = if diffuse_only { Vec3::ZERO } else { self.specular(to) };
-        self.albedo * (cosine / PI) + lobe
+        if diffuse_only {
+            return self.albedo * (cosine / PI);
+        }
+        let [n, v, l] = [normal, self.to_viewer, to].map(Vec3::as_dvec3);
+        self.matter().response(n, v, l).as_vec3()
+    }
+
+    fn scattering(&self, diffuse_only: bool) -> Vec3 {
+        if diffuse_only { self.normal } else { self.lobe }
     }
 
     /// A direction of the rough part and BRDF · cosine / density; half of them around the mirror direction, half by the cosine.
     pub fn scatter(&self, diffuse_only: bool, random: &mut Random) -> Option<(Vec3, Vec3)> {
         let (choice, a, b) = (random.next(), random.next(), random.next());
-        let a2 = self.alpha_squared();
+        let (normal, a2) = (self.scattering(diffuse_only), self.alpha_squared());
         let share = if diffuse_only { 0.0 } else { 0.5 };
         let to = if choice < share {
-            let half = facet(self.normal, a2, a, b);
+            let half = facet(normal, a2, a, b);
             (2.0 * half.dot(self.to_viewer) * half - self.to_viewer).normalize()
         } else {
-            cosine_direction(self.normal, a, b)
+            cosine_direction(normal, a, b)
         };
         let value = self.rough(to, diffuse_only);
         if value == Vec3::ZERO {
             return None;
         }
-        let half = (self.to_viewer + to).normalize_or(self.normal);
-        let (nh, vh) = (self.normal.dot(half).clamp(0.0, 1.0), self.to_viewer.dot(half).max(1e-6));
+        let half = (self.to_viewer + to).normalize_or(normal);
+        let (nh, vh) = (normal.dot(half).clamp(0.0, 1.0), self.to_viewer.dot(half).max(1e-6));
         let facets = a2 / (PI * (nh * nh * (a2 - 1.0) + 1.0).powi(2)) * nh / (4.0 * vh);
-        let density = share * facets + (1.0 - share) * self.normal.dot(to) / PI;
+        let density = share * facets + (1.0 - share) * normal.dot(to) / PI;
         Some((to, value / density))
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::{
     image::srgb,
+    reference::brdf::Matter,
     scene::{
         AlphaMode, Environment, Material, Pose, Primitive, Scene, TextureRef, Wrap,
         bvh::Bvh,
@@ -16,6 +17,8 @@ pub struct Face {
     pub position: Vec3,
     /// Shading normal, with the normal map.
     pub normal: Vec3,
+    /// Normal that light is scattered by, but for Lambert's law alone: of metals [`mirroring`].
+    pub lobe: Vec3,
     /// True normal of the triangle, on the same side.
     pub geometric: Vec3,
     pub to_viewer: Vec3,
@@ -58,18 +61,9 @@ impl Face {
         self.roughness.max(0.045).powi(4)
     }
 
-    /// Specular BRDF · cosine: GGX with Smith's separable-by-height shadowing and Schlick's Fresnel term (glTF 2.0,
-    /// appendix B.3).
-    pub fn specular(&self, to_light: Vec3) -> Vec3 {
-        let half = (self.to_viewer + to_light).normalize_or(self.normal);
-        let (nl, nv) = (self.normal.dot(to_light), self.normal.dot(self.to_viewer).max(1e-4));
-        let (nh, vh) = (self.normal.dot(half).clamp(0.0, 1.0), self.to_viewer.dot(half).clamp(0.0, 1.0));
-        let a2 = self.alpha_squared();
-        let distribution = a2 / (std::f32::consts::PI * (nh * nh * (a2 - 1.0) + 1.0).powi(2));
-        let lambda = |c: f32| (a2 + (1.0 - a2) * c * c).sqrt();
-        let visibility = 0.5 / (nl * lambda(nv) + nv * lambda(nl));
-        let fresnel = self.f0 + (1.0 - self.f0) * (1.0 - vh).powi(5);
-        fresnel * (distribution * visibility * nl)
+    /// What light is scattered by.
+    pub fn matter(&self) -> Matter {
+        Matter { albedo: self.albedo.as_dvec3(), f0: self.f0.as_dvec3(), roughness: self.roughness.into() }
     }
 }
 
@@ -233,6 +227,7 @@ impl<'a> Surfaces<'a> {
         Face {
             position: mix(corners.map(|i| vertices.positions[i]), w),
             normal,
+            lobe: if metallic > 0.5 { mirroring(normal, geometric, to_viewer) } else { normal },
             geometric,
             to_viewer,
             albedo: if unlit { Vec3::ZERO } else { base * (1.0 - metallic) },
@@ -275,6 +270,26 @@ impl<'a> Surfaces<'a> {
         let top = texel(x, y).lerp(texel(x + 1, y), fx);
         top.lerp(texel(x, y + 1).lerp(texel(x + 1, y + 1), fx), fy)
     }
+}
+
+/// The shading normal, bent towards that of the triangle as far as it takes for light to be mirrored above the triangle. Found by
+/// halving, where the shader solves for it.
+pub fn mirroring(shading: Vec3, geometric: Vec3, to_viewer: Vec3) -> Vec3 {
+    let along = to_viewer.dot(geometric);
+    let least = (0.9 * along).min(0.025);
+    let above = |m: Vec3| 2.0 * m.dot(to_viewer) * m.dot(geometric) - along >= least;
+    if above(shading) {
+        return shading;
+    }
+    let across = shading - shading.dot(geometric) * geometric;
+    let Some(x) = across.try_normalize() else { return geometric };
+    let at = |angle: f32| x * angle.sin() + geometric * angle.cos();
+    let (mut good, mut bad) = (0.0, x.dot(shading).atan2(geometric.dot(shading)));
+    for _ in 0..40 {
+        let middle = 0.5 * (good + bad);
+        if above(at(middle)) { good = middle } else { bad = middle }
+    }
+    at(good).normalize()
 }
 
 fn wrapped(i: i64, size: i64, wrap: Wrap) -> usize {

@@ -196,6 +196,7 @@ fn blank() -> Face {
     Face {
         position: Vec3::ZERO,
         normal: Vec3::Y,
+        lobe: Vec3::Y,
         geometric: Vec3::Y,
         to_viewer: Vec3::Y,
         albedo: Vec3::ZERO,
@@ -233,7 +234,9 @@ fn the_specular_lobe_reflects_no_more_than_it_gets() {
                         ..blank()
                     };
                     // Specular BRDF · cos of the viewer instead of the light's.
-                    sum += f64::from(face.specular(to_light).x / cosine * c) * f64::from(2.0 * PI) / f64::from(n * n);
+                    let [n3, v, l] = [face.normal, face.to_viewer, to_light].map(Vec3::as_dvec3);
+                    let facets = face.matter().facets(n3, v, l).x;
+                    sum += facets / f64::from(cosine) * f64::from(c) * f64::from(2.0 * PI) / f64::from(n * n);
                 }
             }
             assert!(sum < 1.001, "roughness {roughness}, cosine {cosine}: {sum}");

@@ -16,7 +16,7 @@
 //! # }
 //! ```
 //!
-//! Transport: Lambert and GGX as in `lib/brdf.glsl`; mirrors (`roughness < 0.05 && metallic > 0.5`) and glass (transmission)
+//! Transport: a matt base under microfacets as in `lib/brdf.glsl`; mirrors (`roughness < 0.05 && metallic > 0.5`) and glass (transmission)
 //! are sharp, and light is followed through them only from the camera's side: what a point light sends through glass is
 //! missing, as is what it sends off a mirror. Emission leaves the front of single-sided surfaces.
 

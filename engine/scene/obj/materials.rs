@@ -50,6 +50,7 @@ impl Textures<'_> {
         }
         let mut out = Material::diffuse(mtl.name.clone(), diffuse.unwrap_or(Vec3::splat(0.8)));
         out.base_color_texture = base_color_texture;
+        // OBJ does not say which sides are seen: both. Bodies of glass are told from sheets by their meshes.
         out.double_sided = true;
         if let Some(ior) = mtl.refraction.filter(|&ior| ior >= 1.0) {
             out.ior = ior;
@@ -63,7 +64,7 @@ impl Textures<'_> {
                 (out.metallic, out.roughness) = (1.0, 0.0);
                 out.base_color = specular.min(Vec3::ONE).extend(1.0);
             }
-            Some(4 | 6 | 7) => {
+            Some(4 | 6 | 7 | 9) => {
                 (out.transmission, out.roughness) = (1.0, 0.0);
                 // Programs do not agree whether the filter says what passes or what stays; a dark one means clear glass.
                 let filter = mtl.filter.map(Vec3::from).filter(|filter| filter.max_element() > 0.5);

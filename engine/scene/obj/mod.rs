@@ -10,6 +10,7 @@ mod materials;
 mod mtl;
 mod parse;
 mod polygon;
+mod solid;
 
 use super::{
     Limits, Material, Mesh, Node, Primitive, Scene, Transform,
@@ -47,8 +48,9 @@ pub(crate) fn read(path: &Path, bytes: &[u8], unit: f32, limits: &Limits) -> Res
     }
     let folder = Folder::of(path)?;
     let (mut materials, textures) = read_materials(&obj, &folder, limits, &budget, &mut notes)?;
-    let meshes = read_meshes(&obj, &materials, &budget, &mut notes)?;
+    let mut meshes = read_meshes(&obj, &materials, &budget, &mut notes)?;
     surface::drop_unused_default(&mut materials, &meshes);
+    solid::tell_apart(&mut meshes, &mut materials, &mut notes);
     let local = Transform::Trs { translation: Vec3::ZERO, rotation: Quat::IDENTITY, scale: Vec3::splat(unit) };
     let nodes = meshes
         .iter()

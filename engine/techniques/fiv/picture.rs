@@ -114,7 +114,18 @@ impl Fiv {
             };
             let total = graph.image("fiv.radiance", Format::RGBA32F, extent);
             let (albedo, depth, emission) = (gbuffer.albedo, gbuffer.depth, gbuffer.emission);
-            graph.compute(shaders::fiv::compose::Args { albedo, depth, emission, irradiance, total }, extent);
+            let args = shaders::fiv::compose::Args {
+                view: gbuffer.view,
+                albedo,
+                normal: gbuffer.normal,
+                depth,
+                surface: gbuffer.specular,
+                emission,
+                irradiance,
+                total,
+                spec: shaders::fiv::compose::Spec { layered: (settings.fiv.specular == Specular::Summed).into() },
+            };
+            graph.compute(args, extent);
             let specular = match settings.fiv.specular {
                 Specular::Off => None,
                 Specular::Summed => {

@@ -206,7 +206,7 @@ pub struct Settings {
     pub light_power: f32,
     /// Light of the environment, times accessibility: on matt surfaces, and blurred on metals. The dissertation has none.
     pub environment: bool,
-    /// GGX highlights of direct light.
+    /// Direct light is reflected by GGX facets over the matt base; otherwise by Lambert's law alone.
     pub specular: bool,
 }
 
