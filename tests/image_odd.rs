@@ -89,11 +89,41 @@ fn tiles_and_luminance_alone() {
     assert!(pixel[0] > 1.9 && pixel == [pixel[0]; 3], "{pixel:?}");
 }
 
+/// Luminance with chroma at half resolution, reconstructed and mended at saturated pixels as OpenEXR's own reader does it, up to the borders.
+#[test]
+fn chroma_is_reconstructed_as_openexr_does_it() {
+    let (ours, theirs) = (read("yca.exr").unwrap(), read("yca-expected.exr").unwrap());
+    let [ours, theirs] = [&ours, &theirs].map(|picture| picture.main().unwrap());
+    assert_eq!((&ours.channels, ours.data.len()), (&theirs.channels, 4 * 16 * 12));
+    for (i, (a, b)) in ours.data.chunks(4).zip(theirs.data.chunks(4)).enumerate() {
+        // The reader rounds to halves after each of its four steps: 2⁻¹¹ of the pixel's largest value each.
+        let most = b[..3].iter().fold(0.0f32, |most, v| most.max(*v)) / 512.0;
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() <= most), "({}, {}): {a:?} {b:?}", i % 16, i / 16);
+    }
+}
+
 #[test]
 fn what_is_not_read_is_refused_with_the_reason() {
-    for (name, reason) in [("deep.exr", "deep pixels"), ("htj2k.exr", "ht j2k 32 compression")] {
+    let reasons = [
+        ("deep.exr", "deep pixels"),
+        ("htj2k.exr", "compression 11 (HTJ2K32) is not read"),
+        ("htj2k256.exr", "compression 10 (HTJ2K256) is not read"),
+        ("lj2k.exr", "compression 12 (LJ2K) is not read"),
+        ("zstd.exr", "compression 13 (ZSTD) is not read"),
+        ("zstd-second.exr", "compression 13 (ZSTD) is not read"),
+    ];
+    for (name, reason) in reasons {
         let error = read(name).unwrap_err();
         assert_eq!(error.exit_code(), 3);
-        assert!(error.to_string().contains(name) && error.to_string().contains(reason), "{error}");
+        let text = error.to_string();
+        assert!(text.contains(name) && text.contains(reason) && text.contains("oiiotool"), "{error}");
+        assert!(!text.contains("damaged"), "{error}");
     }
+    // A number that no version knows yet.
+    let mut newer = std::fs::read(path("zstd.exr")).unwrap();
+    let mark = b"compression\0compression\0\x01\0\0\0";
+    let at = newer.windows(mark.len()).position(|window| window == mark).unwrap() + mark.len();
+    newer[at] = 42;
+    let error = image::decode(&newer, &Limits::default()).unwrap_err().to_string();
+    assert!(error.contains("compression 42 (newer than what is known here)"), "{error}");
 }

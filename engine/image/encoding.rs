@@ -2,6 +2,15 @@
 
 use super::srgb;
 
+/// What is to be said of a picture with this ICC profile: nothing if it is sRGB by its own description, which is nearly always.
+pub(super) fn profile_warning(profile: Option<&[u8]>) -> Option<String> {
+    // Descriptions are ASCII or, since version 4, UTF-16.
+    let says = |name: &[u8]| profile.is_some_and(|bytes| bytes.windows(name.len()).any(|window| window == name));
+    let srgb = says(b"sRGB") || says(b"\0s\0R\0G\0B");
+    (profile.is_some() && !srgb)
+        .then(|| "its ICC colour profile is not sRGB and not applied; its colours are taken as sRGB".into())
+}
+
 /// Into [0, 1]; NaN becomes 0.
 pub(super) fn clamp(value: f32) -> f32 {
     if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) }

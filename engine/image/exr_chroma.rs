@@ -3,6 +3,8 @@
 //! The `exr` crate decompresses such chunks but expects as many bytes as without subsampling, so it is told how many
 //! there really are.
 
+use super::exr_write::header_end;
+use crate::{Error, Result};
 use exr::{
     block::{BlockIndex, UncompressedBlock, chunk::CompressedBlock, chunk::CompressedScanLineBlock},
     math::Vec2,
@@ -13,10 +15,6 @@ use exr::{
     },
     prelude::Compression,
 };
-use glam::Vec3;
-
-use super::{Layer, exr_write::header_end};
-use crate::{Error, Result};
 
 /// Whether any channel has not a sample for each pixel.
 pub(super) fn is_subsampled(header: &Header) -> bool {
@@ -36,6 +34,12 @@ pub(super) fn check(header: &Header, parts: usize) -> Result<()> {
     let display = header.shared_attributes.display_window;
     if header.own_attributes.layer_position != display.position || header.layer_size != display.size {
         return Err(Error::input("subsampled channels whose data window is not the display window are not read"));
+    }
+    let Vec2(left, top) = header.own_attributes.layer_position;
+    if left % 2 != 0 || top % 2 != 0 {
+        // Samples stand at even coordinates, so that the first row or column would have none. OpenEXR refuses these files, too.
+        let what = format!("subsampled channels whose data window begins at the odd coordinate ({left}, {top})");
+        return Err(Error::input(what).help("Samples stand at even coordinates: begin at an even one"));
     }
     match header.channels.list.iter().find(|c| !matches!((c.sampling.0, c.sampling.1), (1, 1) | (2, 2))) {
         Some(channel) => {
@@ -154,40 +158,4 @@ fn b44(packed: &[u8], header: &Header, bounds: IntegerBounds) -> Result<Vec<u8>,
         }
     }
     Ok(out)
-}
-
-/// Fills the pixels between samples that stand at even columns and rows, linearly; the last is repeated.
-pub(super) fn upsample(layer: &mut Layer, channel: usize, [width, height]: [usize; 2]) {
-    let stride = layer.channels.len();
-    let at = |x: usize, y: usize| (y * width + x) * stride + channel;
-    for y in (0..height).step_by(2) {
-        for x in (1..width).step_by(2) {
-            let right = if x + 1 < width { x + 1 } else { x - 1 };
-            layer.data[at(x, y)] = 0.5 * (layer.data[at(x - 1, y)] + layer.data[at(right, y)]);
-        }
-    }
-    for y in (1..height).step_by(2) {
-        let below = if y + 1 < height { y + 1 } else { y - 1 };
-        for x in 0..width {
-            layer.data[at(x, y)] = 0.5 * (layer.data[at(x, y - 1)] + layer.data[at(x, below)]);
-        }
-    }
-}
-
-/// Luminance Y and the chroma differences RY = (R − Y) / Y, BY = (B − Y) / Y become R G B. `weights`: of R, G and B in Y.
-pub(super) fn to_rgb(layer: &mut Layer, weights: Vec3) {
-    let (Some(y), Some(ry), Some(by)) = (layer.channel("Y"), layer.channel("RY"), layer.channel("BY")) else { return };
-    let mut places = [y, ry, by];
-    places.sort_unstable();
-    let [r, g, b] = places;
-    let channels = layer.channels.len();
-    for pixel in layer.data.chunks_exact_mut(channels) {
-        let luminance = pixel[y];
-        let (red, blue) = ((pixel[ry] + 1.0) * luminance, (pixel[by] + 1.0) * luminance);
-        let green = (luminance - red * weights.x - blue * weights.z) / weights.y;
-        (pixel[r], pixel[g], pixel[b]) = (red, green, blue);
-    }
-    for (at, name) in [(r, "R"), (g, "G"), (b, "B")] {
-        layer.channels[at] = name.to_owned();
-    }
 }

@@ -19,8 +19,8 @@ use exr::{
 };
 
 use super::{
-    Chromaticities, Layer, Layers, Metadata, Precision, REC_709, check_size, exr_chroma,
-    exr_write::{JSON, PREFIX},
+    Chromaticities, Layer, Layers, Metadata, Precision, REC_709, check_size, exr_chroma, exr_luminance,
+    exr_write::{self, JSON, PREFIX},
     zeroed,
 };
 use crate::{Error, Result, scene::Limits};
@@ -55,8 +55,28 @@ fn headers(bytes: &[u8]) -> Result<Vec<Header>> {
             "Flatten the image first, in the program that made it or with `oiiotool IN.exr --flatten -o OUT.exr`",
         ));
     }
+    check_compressions(bytes)?;
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|error| damaged(error).at("header"))?;
     Ok(meta.headers.into_vec())
+}
+
+/// Compressions from 10 on, none of which is read: `Compression` in ImfCompression.h of OpenEXR 3.5.
+const NEWER_COMPRESSIONS: [&str; 4] = ["HTJ2K256", "HTJ2K32", "LJ2K", "ZSTD"];
+
+/// Names a compression that is not read, before the decoder calls it damaged or unknown.
+fn check_compressions(bytes: &[u8]) -> Result<()> {
+    for attribute in exr_write::attributes(bytes) {
+        let Some(newer) = attribute.value.first().and_then(|number| number.checked_sub(10)) else { continue };
+        if attribute.name != b"compression" || attribute.kind != b"compression" {
+            continue;
+        }
+        let name = NEWER_COMPRESSIONS.get(usize::from(newer)).copied().unwrap_or("newer than what is known here");
+        let what = format!("compression {} ({name}) is not read", newer + 10);
+        return Err(Error::input(what)
+            .at("header.compression")
+            .help("Convert the file with a program that knows it: `oiiotool IN.exr --compression zip -o OUT.exr`"));
+    }
+    Ok(())
 }
 
 /// Where the samples of a channel of the file go.
@@ -119,15 +139,22 @@ fn decode_unguarded(bytes: &[u8], limits: &Limits) -> Result<Layers> {
     }
 
     let mut picture = Layers { metadata: read_metadata(&headers)?, ..Layers::new(width as u32, height as u32) };
+    let mut filtered = vec![false; layers.len()];
     for (header, slots) in headers.iter().zip(&slots) {
         let subsampled = header.channels.list.iter().zip(slots).filter(|(channel, _)| channel.sampling.0 == 2);
         for (_, slot) in subsampled {
-            exr_chroma::upsample(&mut layers[slot.layer], slot.channel, [width, height]);
+            let layer = &mut layers[slot.layer];
+            let chroma = matches!(layer.channels[slot.channel].as_str(), "RY" | "BY");
+            filtered[slot.layer] |= chroma;
+            let fill = if chroma { exr_luminance::fill_chroma } else { exr_luminance::fill_linearly };
+            fill(layer, slot.channel, [width, height])?;
         }
     }
     let primaries = chromaticities(&headers[0]);
     let weights = primaries.luminance_weights().map_err(|error| error.at("header"))?;
-    layers.iter_mut().for_each(|layer| exr_chroma::to_rgb(layer, weights));
+    for (layer, filtered) in layers.iter_mut().zip(filtered) {
+        exr_luminance::to_rgb(layer, weights, filtered, [width, height])?;
+    }
     if let Some(matrix) = primaries.rec709_from_rgb().map_err(|error| error.at("header"))? {
         layers.iter_mut().for_each(|layer| convert(layer, matrix));
     }
@@ -285,10 +312,11 @@ fn lay_out(headers: &[Header]) -> (Vec<Layer>, Vec<Vec<Slot>>) {
         slots.push(part_slots);
     }
     layers.iter_mut().for_each(|layer| standard_names(&mut layer.channels));
-    // The file has channels by the alphabet: A B G R becomes R G B A; X Y Z and U V stay in that order.
-    let rank = |name: &str| ["R", "RY", "G", "B", "BY", "A"].iter().position(|&c| c == name).unwrap_or(9);
+    // The file has channels by the alphabet: A B G R becomes R G B A, A BY RY Y becomes RY Y BY A; X Y Z and U V stay in that order.
     let mut places: Vec<Vec<usize>> = Vec::new();
     for layer in &mut layers {
+        let colours = if layer.channel("RY").is_some() { ["RY", "Y", "BY", "A"] } else { ["R", "G", "B", "A"] };
+        let rank = |name: &str| colours.iter().position(|&c| c == name).unwrap_or(9);
         let mut order: Vec<usize> = (0..layer.channels.len()).collect();
         order.sort_by_key(|&k| rank(&layer.channels[k]));
         layer.channels = order.iter().map(|&k| layer.channels[k].clone()).collect();

@@ -127,13 +127,46 @@ const ATTRIBUTES: usize = 8;
 
 /// Where the offset table of a file of one part begins: after its attributes and their end mark.
 pub(super) fn header_end(file: &[u8]) -> Option<usize> {
-    let zero = |from: usize| file.get(from..)?.iter().position(|&b| b == 0).map(|n| from + n);
     let mut at = ATTRIBUTES;
     while *file.get(at)? != 0 {
-        let kind = zero(at)? + 1;
-        let size = zero(kind)? + 1;
-        let bytes = u32::from_le_bytes(*file.get(size..)?.first_chunk()?);
-        at = (size + 4).checked_add(bytes as usize)?;
+        at = attribute(file, at)?.1;
     }
     Some(at + 1)
+}
+
+/// An attribute of a header as the file has it.
+pub(super) struct Attribute<'a> {
+    pub(super) name: &'a [u8],
+    pub(super) kind: &'a [u8],
+    pub(super) value: &'a [u8],
+}
+
+/// The attributes of all parts, as far as they are whole.
+pub(super) fn attributes(file: &[u8]) -> impl Iterator<Item = Attribute<'_>> {
+    const MULTI_PART: u32 = 1 << 12;
+    let flags = file.get(4..).and_then(<[u8]>::first_chunk).map_or(0, |flags| u32::from_le_bytes(*flags));
+    let mut at = ATTRIBUTES;
+    std::iter::from_fn(move || {
+        // The header of a part ends with a zero, and all headers of a file of several parts with another.
+        if flags & MULTI_PART != 0 && file.get(at) == Some(&0) {
+            at += 1;
+        }
+        let (found, next) = attribute(file, at)?;
+        at = next;
+        Some(found)
+    })
+}
+
+/// The attribute at a place, and where the next begins. `None` at an end mark, or if it is cut short.
+fn attribute(file: &[u8], at: usize) -> Option<(Attribute<'_>, usize)> {
+    let text = |from: usize| {
+        let bytes = file.get(from..)?;
+        bytes.get(..bytes.iter().position(|&b| b == 0)?).filter(|text| !text.is_empty())
+    };
+    let name = text(at)?;
+    let kind = text(at + name.len() + 1)?;
+    let size = at + name.len() + kind.len() + 2;
+    let bytes = u32::from_le_bytes(*file.get(size..)?.first_chunk()?) as usize;
+    let next = (size + 4).checked_add(bytes)?;
+    Some((Attribute { name, kind, value: file.get(size + 4..next)? }, next))
 }

@@ -2,9 +2,11 @@
 
 use std::io::Cursor;
 
-use image::{ExtendedColorType, ImageDecoder, codecs::jpeg::JpegDecoder, codecs::jpeg::JpegEncoder};
+use image::{
+    ExtendedColorType, ImageDecoder, codecs::jpeg::JpegDecoder, codecs::jpeg::JpegEncoder, metadata::Orientation,
+};
 
-use super::{Layer, Layers, Metadata, WriteOptions, check_size, encoding, srgb};
+use super::{Layer, Layers, Metadata, WriteOptions, check_size, encoding, orientation, srgb};
 use crate::{Error, ErrorKind, Result, scene::Limits};
 
 /// Longest side that the format holds, pixels.
@@ -108,19 +110,22 @@ pub fn is_cut(bytes: &[u8]) -> bool {
 
 pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Layers> {
     let damaged = |error: image::ImageError| Error::input("damaged or not served").caused_by(error);
-    let decoder = JpegDecoder::new(Cursor::new(bytes)).map_err(damaged)?;
+    let mut decoder = JpegDecoder::new(Cursor::new(bytes)).map_err(damaged)?;
     let (width, height) = decoder.dimensions();
     // Decoded as RGB codes and as three numbers a pixel.
     check_size(width.into(), height.into(), 3 * 5, limits)?;
+    // A damaged EXIF segment or profile says nothing; the picture is still there.
+    let held = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    let profile = decoder.icc_profile().unwrap_or_default();
     let codes = image::DynamicImage::from_decoder(decoder).map_err(damaged)?.into_rgb8();
     let data = codes.into_raw().into_iter().map(srgb::decode_u8).collect();
+    let (data, [width, height]) = orientation::upright(data, [width, height], 3, held, limits)?;
     // Text that is damaged does not make the picture unreadable; `metadata` says what is wrong with it.
     let metadata = metadata(bytes).unwrap_or_default();
-    let warnings = if is_cut(bytes) {
-        vec!["the file ends before its picture does; what is missing is grey".into()]
-    } else {
-        vec![]
-    };
+    let mut warnings: Vec<String> = encoding::profile_warning(profile.as_deref()).into_iter().collect();
+    if is_cut(bytes) {
+        warnings.push("the file ends before its picture does; what is missing is grey".into());
+    }
     Ok(Layers { metadata, warnings, ..Layers::new(width, height).with(Layer::new("", &["R", "G", "B"], data)) })
 }
 

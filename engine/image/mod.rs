@@ -2,19 +2,25 @@
 //!
 //! [`Layers`] are a stack of images of one size, each a [`Layer`]. Files: OpenEXR (all layers), Radiance .hdr, PFM, PNG and JPEG (one layer).
 //!
-//! Pixels are linear Rec. 709, top row first; sRGB encoding ([`srgb`]) happens only in PNG and JPEG files. Colour is
-//! premultiplied by alpha, as in OpenEXR; PNG files hold it unassociated.
+//! Pixels are linear Rec. 709, top row first, and upright (EXIF orientation is applied); sRGB encoding ([`srgb`]) happens only in PNG and
+//! JPEG files.
+//!
+//! Colour is premultiplied by alpha, as in OpenEXR: it is what is seen over black, and a pixel of alpha 0 may shine. PNG files hold it
+//! unassociated: what is read of a pixel of alpha 0 is black, whatever colour the file hides there, and a picture with light that its alpha
+//! would hide is written as it is seen over black, without alpha ([`Report::alpha_left_out`]).
 //!
 //! Everything is encoded in memory and then written by [`write_atomic`]: a file is complete or not there.
 
 mod color;
 mod encoding;
 mod exr_chroma;
+mod exr_luminance;
 mod exr_read;
 mod exr_write;
 mod file;
 pub(crate) mod jpeg;
 mod metadata;
+mod orientation;
 mod pfm;
 mod picture;
 mod png_file;
@@ -70,6 +76,9 @@ pub struct Report {
     pub negative: u64,
     /// Finite samples too large for 16 bits, written as 65504.
     pub overflow: u64,
+    /// The PNG file has no alpha, which the layer has: viewers would not have shown a hundredth or more of its light, which stands where
+    /// alpha is small or 0 (flames, glows).
+    pub alpha_left_out: bool,
     /// Where the first NaN or infinity stands: `layer "direct", pixel (3, 4), channel G`.
     pub first: Option<String>,
 }
@@ -181,7 +190,7 @@ pub fn encode(format: Format, picture: &Layers, options: &WriteOptions) -> Resul
         Format::Exr => exr_write::encode(picture, options.f32, &mut report)?,
         Format::Hdr => radiance::encode(picture, one)?,
         Format::Pfm => pfm::encode(picture, one)?,
-        Format::Png => png_file::encode(picture, one, options)?,
+        Format::Png => png_file::encode(picture, one, options, &mut report)?,
         Format::Jpeg => jpeg::encode(picture, one, options)?,
     };
     Ok((bytes, report))

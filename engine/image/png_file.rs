@@ -2,10 +2,12 @@
 
 use std::io::Cursor;
 
+use image::metadata::Orientation;
+
 use super::{
-    Layer, Layers, Metadata, WriteOptions, check_size,
+    Chromaticities, Layer, Layers, Metadata, Report, WriteOptions, check_size,
     encoding::{self, clamp},
-    srgb, zeroed,
+    orientation, srgb, zeroed,
 };
 use crate::{Error, ErrorKind, Result, scene::Limits};
 
@@ -14,20 +16,23 @@ const KEYWORD: &str = "lucerna";
 /// Keyword of the iTXt chunk that says what codes of numbers mean.
 const MAPPING: &str = "lucerna mapping";
 
-pub(super) fn encode(picture: &Layers, layer: &Layer, options: &WriteOptions) -> Result<Vec<u8>> {
-    let alpha = layer.channel("A").filter(|_| layer.channels.len() > 1);
+pub(super) fn encode(picture: &Layers, layer: &Layer, options: &WriteOptions, report: &mut Report) -> Result<Vec<u8>> {
     let colours = layer.colours().ok_or_else(|| {
         let channels = layer.channels.join(" ");
         Error::usage(format!("layer {:?} has the channels {channels}; PNG files hold RGB or one channel", layer.name))
     })?;
+    let alpha = layer.channel("A").filter(|_| layer.channels.len() > 1);
     let grey = layer.channels.len() - usize::from(alpha.is_some()) == 1;
+    let colours = &colours[..if grey { 1 } else { 3 }];
+    report.alpha_left_out = alpha.is_some_and(|alpha| hides_light(layer, colours, alpha, options));
+    let alpha = alpha.filter(|_| !report.alpha_left_out);
     let depth = match options.png_bits {
         8 => png::BitDepth::Eight,
         16 => png::BitDepth::Sixteen,
         bits => return Err(Error::usage(format!("{bits} bits a channel: PNG files are written with 8 or 16"))),
     };
     let mapping = Mapping::of(layer);
-    let source = Samples { layer, colours: &colours[..if grey { 1 } else { 3 }], alpha, mapping, options };
+    let source = Samples { layer, colours, alpha, mapping, options };
     let samples = if depth == png::BitDepth::Eight { source.eight_bits() } else { source.sixteen_bits() };
     let fail = |error: png::EncodingError| Error::new(ErrorKind::Runtime, "PNG encoding failed").caused_by(error);
     let mut out = Vec::new();
@@ -61,6 +66,24 @@ pub(super) fn encode(picture: &Layers, layer: &Layer, options: &WriteOptions) ->
     Ok(out)
 }
 
+/// Share of the light of a picture over black that may be lost by unassociated colour, which ends at 1: bright edges lose a little.
+const HIDDEN: f64 = 0.01;
+
+/// Whether a picture of premultiplied colour has light that no unassociated colour between 0 and 1 gives at its alpha.
+fn hides_light(layer: &Layer, colours: &[usize], alpha: usize, options: &WriteOptions) -> bool {
+    let scale = options.exposure_ev.exp2();
+    let (mut all, mut shown) = (0.0, 0.0);
+    for pixel in layer.data.chunks_exact(layer.channels.len()) {
+        let alpha = clamp(pixel[alpha]);
+        for &channel in colours {
+            let light = clamp(pixel[channel] * scale);
+            all += f64::from(light);
+            shown += f64::from(light.min(alpha));
+        }
+    }
+    shown < (1.0 - HIDDEN) * all
+}
+
 /// Where the samples of a file come from.
 struct Samples<'a> {
     layer: &'a Layer,
@@ -89,7 +112,7 @@ impl Samples<'_> {
         encoding::in_parts(&mut samples, count, |first, part| {
             let pixels = self.layer.data[first * channels..].chunks_exact(channels);
             for (out, pixel) in part.chunks_exact_mut(count).zip(pixels) {
-                let alpha = self.alpha.map(|a| pixel[a].clamp(0.0, 1.0));
+                let alpha = self.alpha.map(|a| clamp(pixel[a]));
                 let unassociate = match alpha {
                     Some(a) if a > 0.0 && a < 1.0 => scale / a,
                     _ => scale,
@@ -191,16 +214,63 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Layers> {
         };
         *value = if Some(i % names.len()) == alpha { code } else { transfer.decode(code) };
     }
+    drop(encoded);
     if let Some(alpha) = alpha {
         for pixel in data.chunks_exact_mut(names.len()) {
             let a = pixel[alpha];
-            pixel[..alpha].iter_mut().for_each(|value| *value *= if a > 0.0 { a } else { 1.0 });
+            pixel[..alpha].iter_mut().for_each(|value| *value *= a);
         }
     }
-    // Text chunks may stand after the pixels.
+    // Text chunks and EXIF data may stand after the pixels.
     let _ = reader.finish();
-    let metadata = text(reader.info())?;
-    Ok(Layers { metadata, ..Layers::new(width, height).with(Layer::new("", names, data)) })
+    let info = reader.info();
+    let mut warnings = colour_warnings(info);
+    if names.len() >= 3 {
+        to_rec709(info, names.len(), &mut data, &mut warnings);
+    }
+    let metadata = text(info)?;
+    let held =
+        info.exif_metadata.as_deref().and_then(Orientation::from_exif_chunk).unwrap_or(Orientation::NoTransforms);
+    let (data, [width, height]) = orientation::upright(data, [width, height], names.len(), held, limits)?;
+    Ok(Layers { metadata, warnings, ..Layers::new(width, height).with(Layer::new("", names, data)) })
+}
+
+/// What the file says about its colours and is not followed.
+fn colour_warnings(info: &png::Info<'_>) -> Vec<String> {
+    let Some(points) = info.coding_independent_code_points.as_ref() else {
+        return encoding::profile_warning(info.icc_profile.as_deref()).into_iter().collect();
+    };
+    // ITU-T H.273: Rec. 709 primaries, and the sRGB curve.
+    if (points.color_primaries, points.transfer_function) == (1, 13) {
+        return vec![];
+    }
+    let (primaries, transfer) = (points.color_primaries, points.transfer_function);
+    vec![format!(
+        "its cICP chunk (primaries {primaries}, transfer {transfer}) is not followed; its colours are taken as sRGB"
+    )]
+}
+
+/// Converts colours of the primaries that a cHRM chunk names, unless a chunk that goes before it is there.
+fn to_rec709(info: &png::Info<'_>, channels: usize, data: &mut [f32], warnings: &mut Vec<String>) {
+    let stronger = info.srgb.is_some() || info.icc_profile.is_some() || info.coding_independent_code_points.is_some();
+    let Some(given) = info.chrm_chunk.filter(|_| !stronger) else { return };
+    let pair = |(x, y): (png::ScaledFloat, png::ScaledFloat)| [x.into_value(), y.into_value()];
+    let primaries = Chromaticities {
+        red: pair(given.red),
+        green: pair(given.green),
+        blue: pair(given.blue),
+        white: pair(given.white),
+    };
+    match primaries.rec709_from_rgb() {
+        Ok(None) => {}
+        Ok(Some(matrix)) => {
+            for pixel in data.chunks_exact_mut(channels) {
+                let colour = matrix * glam::Vec3::from_slice(pixel);
+                pixel[..3].copy_from_slice(&colour.to_array());
+            }
+        }
+        Err(error) => warnings.push(format!("its primaries (cHRM) are not followed: {error}")),
+    }
 }
 
 pub(super) fn metadata(bytes: &[u8], limits: &Limits) -> Result<Metadata> {

@@ -43,7 +43,7 @@ impl Picture {
     }
 
     /// A layer of an image, by name; `None` or `""` or `total`: the picture. One channel stands for all three, `X Y Z`
-    /// are taken as three numbers. Alpha is left out: colour is premultiplied, so a transparent pixel is seen over black.
+    /// are taken as three numbers. Alpha is left out: colour is premultiplied, so every pixel is seen over black.
     ///
     /// # Errors
     /// `Input` if there is no such layer (naming those there are), or if it has neither one nor three channels.
@@ -66,9 +66,22 @@ impl Picture {
     /// # Errors
     /// As [`image::decode`] and [`from_layers`](Self::from_layers), naming the file.
     pub fn read(path: impl AsRef<std::path::Path>, layer: Option<&str>) -> Result<Self> {
+        Self::read_telling(path, layer, |_| {})
+    }
+
+    /// As [`read`](Self::read); what is wrong with the file, though it could be read ([`Layers::warnings`]), goes to `tell`.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn read_telling(
+        path: impl AsRef<std::path::Path>,
+        layer: Option<&str>,
+        tell: impl FnMut(&String),
+    ) -> Result<Self> {
         let (path, limits) = (path.as_ref(), crate::scene::Limits::default());
         let bytes = image::read_file_checked(path, limits.max_file)?;
         let layers = image::decode(&bytes, &limits).map_err(|error| error.in_file(path))?;
+        layers.warnings.iter().for_each(tell);
         let picture = Self::from_layers(&layers, layer).map_err(|error| error.in_file(path))?;
         Ok(Self { display_referred: image::is_display_referred(&bytes), ..picture })
     }

@@ -9,6 +9,9 @@ use lucerna::{
 
 use crate::pattern::{Pattern, Values};
 
+/// Said of a file where [`image::Report::alpha_left_out`] holds.
+pub const ALPHA_LEFT_OUT: &str =
+    "alpha is left out, for it would hide light (PNG shows no light of pixels of alpha 0); an .exr file keeps both";
 /// Standard output as a file name.
 const STDOUT: &str = "-";
 

@@ -18,7 +18,7 @@ use crate::{
     console::{self, Console},
     exposure,
     last_stage::Staged,
-    outputs::Outputs,
+    outputs::{ALPHA_LEFT_OUT, Outputs},
     pattern::Values,
     program,
     record::{Record, Source},
@@ -239,6 +239,9 @@ impl<'a> Run<'a> {
                 let first = report.first.as_deref().unwrap_or_default();
                 let (nan, infinite) = (report.nan, report.infinite);
                 self.warn(format!("{name}: {nan} samples are not numbers, {infinite} are infinite; first: {first}"));
+            }
+            if report.alpha_left_out {
+                self.warn(format!("{name}: {}", ALPHA_LEFT_OUT));
             }
         }
         Ok(written.into_iter().map(|(name, _)| name).collect())

@@ -98,7 +98,8 @@ impl Images {
 
 fn image(name: &str, args: &CompareArgs, notes: &mut Vec<String>) -> Result<Image> {
     let (file, own) = split(name);
-    let mut picture = Picture::read(file, own.or(args.layer.as_deref()))?;
+    let layer = own.or(args.layer.as_deref());
+    let mut picture = Picture::read_telling(file, layer, |what| notes.push(format!("{name}: {what}")))?;
     if let Some(value) = args.nan_as {
         let count = picture.replace_non_finite(value as f32);
         if count > 0 {

@@ -15,7 +15,7 @@ use lucerna::{
 use serde_json::{Value, json};
 
 use super::{Config, PIPE, Run, meter, names::Input};
-use crate::{config, program};
+use crate::{config, console::Console, outputs::ALPHA_LEFT_OUT, program};
 
 /// A picture that was written.
 #[derive(Debug)]
@@ -45,6 +45,7 @@ pub(super) struct Unwritten {
     files: Vec<(String, Format)>,
     layers: Layers,
     options: WriteOptions,
+    console: Console,
 }
 
 impl Unwritten {
@@ -52,14 +53,18 @@ impl Unwritten {
     pub(super) fn write(self) -> Result<(Vec<String>, Duration)> {
         let begun = Instant::now();
         for (name, format) in &self.files {
-            if name == PIPE {
-                let (bytes, _) = image::encode(*format, &self.layers, &self.options)?;
+            let report = if name == PIPE {
+                let (bytes, report) = image::encode(*format, &self.layers, &self.options)?;
                 let mut out = std::io::stdout().lock();
                 out.write_all(&bytes).and_then(|()| out.flush()).map_err(|error| {
                     Error::new(ErrorKind::Output, "could not write to standard output").caused_by(error)
                 })?;
+                report
             } else {
-                image::write(Path::new(name), &self.layers, &self.options)?;
+                image::write(Path::new(name), &self.layers, &self.options)?
+            };
+            if report.alpha_left_out {
+                self.console.warning(&format!("{name}: {}", ALPHA_LEFT_OUT));
             }
         }
         Ok((self.files.into_iter().map(|(name, _)| name).collect(), begun.elapsed()))
@@ -161,7 +166,7 @@ impl Run<'_> {
             working: Duration::ZERO,
             writing: Duration::ZERO,
         };
-        Ok((done, Unwritten { files, layers, options: self.write_options() }))
+        Ok((done, Unwritten { files, layers, options: self.write_options(), console: self.console }))
     }
 
     /// The settings of a picture: with the exposure that was measured, if that was asked for.
