@@ -10,7 +10,7 @@ struct Notes(Console);
 
 impl log::Log for Notes {
     fn enabled(&self, about: &log::Metadata<'_>) -> bool {
-        about.level() <= log::Level::Warn && about.target().split(':').next() == Some("lucerna")
+        about.level() <= log::Level::Warn && about.target().starts_with("lucerna")
     }
 
     fn log(&self, record: &log::Record<'_>) {

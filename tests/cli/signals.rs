@@ -114,7 +114,8 @@ fn vectors_that_were_computed_are_kept() {
     let at = |name: &str| folder.path().join(name).display().to_string();
     let (out, environment) = (at("a.fiv"), picture(folder.path(), 64, 32));
     let mut long = command(env!("CARGO_BIN_EXE_fiv"));
-    long.args(["precompute", "--builtin", "teapot", "--env", &environment, "-o", &out, "--progress", "plain"]);
+    long.args(["precompute", "--builtin", "furnace-sphere", "--env", &environment, "-o", &out, "--progress", "plain"]);
+    long.args(["-D", "fiv.azimuths=256", "-D", "fiv.polars=129", "-D", "fiv.radii=64", "-D", "fiv.size=16"]);
     let running = Running::until(&mut long, "samples of");
     // Before the first sample there may be nothing to be kept; the next start goes on wherever this one was.
     let code = running.stopped(Duration::from_secs(3), "fiv precompute");
@@ -133,9 +134,9 @@ fn a_huge_picture_is_left_wherever_it_is() {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("out.exr").display().to_string();
         let mut long = command(env!("CARGO_BIN_EXE_isr"));
-        long.args(["render", "--builtin", "cornell", "--size", "8000x8000", "-o", &out]);
+        long.args(["render", "--builtin", "cornell", "--size", "3000x3000", "-o", &out]);
         let running = Running::until(&mut long, "Vulkan");
-        let about = format!("isr 8000x8000 after {seconds} s");
+        let about = format!("isr 3000x3000 after {seconds} s");
         let code = match signals {
             1 => running.stopped(Duration::from_secs_f64(seconds), &about),
             _ => {
