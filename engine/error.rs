@@ -25,6 +25,8 @@ pub enum ErrorKind {
     Comparison,
     /// An output could not be written. Nothing of it was left behind.
     Output,
+    /// It was asked to stop before it was done ([`crate::Stop`]).
+    Interrupted,
     /// Anything else that failed while running.
     Runtime,
 }
@@ -133,6 +135,8 @@ impl Error {
             ErrorKind::OutOfMemory => 5,
             ErrorKind::DeviceLost => 6,
             ErrorKind::Comparison => 7,
+            // As a shell says it of a program that SIGINT ended.
+            ErrorKind::Interrupted => 130,
         }
     }
 }

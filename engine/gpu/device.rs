@@ -197,6 +197,11 @@ impl Gpu {
         self.0.instance.layer.is_some()
     }
 
+    /// What asks everything that this device does to stop ([`GpuOptions::stop`]).
+    pub fn stop(&self) -> &crate::Stop {
+        &self.0.options.stop
+    }
+
     /// The device is lost: every operation now fails.
     pub fn is_lost(&self) -> bool {
         self.0.lost.is_set()

@@ -74,8 +74,8 @@ impl Instance {
         let layer = layers.iter().find(|l| l.layer_name_as_c_str().is_ok_and(|n| n == VALIDATION_LAYER));
         let layer = layer.filter(|_| options.validation != Validation::Off);
         if layer.is_none() && options.validation != Validation::Off {
-            eprintln!(
-                "warning: validation was asked for, but the layer VK_LAYER_KHRONOS_validation is not installed \
+            log::warn!(
+                "validation was asked for, but the layer VK_LAYER_KHRONOS_validation is not installed \
                  (Debian: vulkan-validationlayers); running without"
             );
         }

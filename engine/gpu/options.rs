@@ -2,7 +2,7 @@
 
 use std::{str::FromStr, time::Duration};
 
-use crate::{Error, Result};
+use crate::{Error, Result, Stop};
 
 /// Which device to open.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -40,7 +40,7 @@ impl FromStr for DeviceChoice {
     }
 }
 
-/// How much the Khronos validation layer checks. Everything but `Off` needs the layer; without it a warning is printed,
+/// How much the Khronos validation layer checks. Everything but `Off` needs the layer; without it a warning is logged,
 /// and [`super::Gpu::validation_active`] is false.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Validation {
@@ -105,14 +105,16 @@ pub struct GpuOptions {
     pub require_gpu: bool,
     pub validation: Validation,
     pub ray_query: RayQuery,
-    /// Print validation messages as they come (at most ten of one kind).
+    /// Log validation messages as warnings as they come (at most ten of one kind).
     pub print_messages: bool,
-    /// After this time a wait names the pass in flight on standard error, once per doubling.
+    /// After this time a wait logs a warning that names the pass in flight, once per doubling.
     pub soft_limit: Duration,
     /// After this time a wait gives up and the device counts as lost. `None`: ten minutes on CPU drivers, one minute else.
     pub hard_limit: Option<Duration>,
     /// Fill every new buffer and image with `0x7FC0DEAD` (a NaN), so that reads of uninitialised memory show. For tests.
     pub poison: bool,
+    /// Asks everything that this device does to stop.
+    pub stop: Stop,
     /// Instance extensions that a window needs, as its library lists them. Not empty: the device also gets
     /// `VK_KHR_swapchain`.
     pub window_extensions: Vec<String>,
@@ -129,6 +131,7 @@ impl Default for GpuOptions {
             soft_limit: Duration::from_secs(10),
             hard_limit: None,
             poison: false,
+            stop: Stop::default(),
             window_extensions: Vec::new(),
         }
     }

@@ -20,8 +20,13 @@ use super::{
     options::Validation,
     select::DeviceKind,
 };
-use crate::{Error, Result};
+use crate::{Error, ErrorKind, Result};
 
+/// How often a wait looks whether it shall stop.
+const LOOK: Duration = Duration::from_millis(20);
+/// How long the device may go on with a submission after everything was asked to stop. Then the submission is given up, as after the
+/// hard limit: a driver offers no way to end it.
+const STOP_LIMIT: Duration = Duration::from_millis(800);
 /// Passes of one submission that have a mark of their own; later ones share the last.
 const MARKS: usize = 1024;
 
@@ -308,7 +313,7 @@ impl Submission {
     ///
     /// # Errors
     /// `DeviceLost`, naming the pass that the device was in, if it is lost or still works after the hard limit of
-    /// [`super::GpuOptions`].
+    /// [`super::GpuOptions`]; `Interrupted` if it was asked to stop and does not come to an end soon. The device is then lost as well.
     pub fn wait(mut self) -> Result<()> {
         self.finish()
     }
@@ -353,10 +358,11 @@ impl Submission {
         let context = &self.context;
         let begun = Instant::now();
         let mut warn_at = context.options.soft_limit;
+        let mut asked: Option<Instant> = None;
         loop {
             let waited = begun.elapsed();
             let left = context.hard_limit.saturating_sub(waited).min(warn_at.saturating_sub(waited));
-            let mut slice = left.max(Duration::from_millis(1));
+            let mut slice = left.clamp(Duration::from_millis(1), LOOK);
             let slice_begun = Instant::now();
             // Synchronisation validation (seen in 1.3.239) forgets a wait that ends while another thread submits, and then
             // takes later commands for unsynchronised. Under it, waits and submissions take turns.
@@ -372,6 +378,13 @@ impl Submission {
                 Err(vk::Result::TIMEOUT) => {}
                 Err(result) => return Err(self.failed(shell, "vkWaitForFences", result)),
             }
+            if context.options.stop.requested() && asked.get_or_insert_with(Instant::now).elapsed() >= STOP_LIMIT {
+                context.abandon();
+                let place = self.where_it_was(shell);
+                let _ =
+                    context.lost.set(format!("stopped on request while the device worked on `{}`{place}", self.name));
+                return context.options.stop.check();
+            }
             let waited = begun.elapsed();
             if waited >= context.hard_limit {
                 context.abandon();
@@ -385,11 +398,7 @@ impl Submission {
                 return Err(context.lost.set(report));
             }
             if waited >= warn_at {
-                eprintln!(
-                    "warning: waiting for the device since {:.0} s{}",
-                    waited.as_secs_f64(),
-                    self.where_it_was(shell)
-                );
+                log::warn!("waiting for the device since {:.0} s{}", waited.as_secs_f64(), self.where_it_was(shell));
                 warn_at *= 2;
             }
             // A driver that answers "not yet" without waiting must not keep a core busy.
@@ -445,8 +454,9 @@ impl Drop for Submission {
         let known = self.context.lost.is_set();
         if let Err(error) = self.finish()
             && !known
+            && error.kind() != ErrorKind::Interrupted
         {
-            eprintln!("warning: {error}");
+            log::warn!("{error}");
         }
     }
 }

@@ -133,9 +133,9 @@ impl Log {
         let count = state.counts.entry(message.id.clone()).or_insert(0);
         *count += 1;
         if self.print && !known && *count <= MAX_PRINTED {
-            eprintln!("vulkan {message}");
+            log::warn!("vulkan {message}");
             if *count == MAX_PRINTED {
-                eprintln!("vulkan: no more of {} is printed", message.id);
+                log::warn!("vulkan: no more of {} is printed", message.id);
             }
         }
         if state.messages.len() < MAX_KEPT {

@@ -1,5 +1,7 @@
 //! A resource cut into cells along every level, layer or byte at which some use begins or ends.
 
+use std::collections::HashMap;
+
 use super::vocab::Region;
 
 /// The cells of a physical resource.
@@ -55,11 +57,15 @@ impl Grid {
         }
         // (first row, end row, first column, end column)
         let mut boxes: Vec<(usize, usize, usize, usize)> = Vec::new();
+        // By where they end and their columns.
+        let mut open: HashMap<(usize, usize, usize), usize> = HashMap::new();
         for (row, begin, end) in runs {
-            match boxes.iter_mut().find(|(_, row_end, b, e)| *row_end == row && *b == begin && *e == end) {
-                Some((_, row_end, ..)) => *row_end = row + 1,
-                None => boxes.push((row, row + 1, begin, end)),
-            }
+            let number = open.remove(&(row, begin, end)).unwrap_or_else(|| {
+                boxes.push((row, row, begin, end));
+                boxes.len() - 1
+            });
+            boxes[number].1 = row + 1;
+            open.insert((row + 1, begin, end), number);
         }
         boxes
             .iter()

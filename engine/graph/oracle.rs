@@ -5,11 +5,11 @@
 //! It shares no code with the planner but the plain data. It is stricter than Vulkan in one point: a barrier on one resource
 //! orders nothing on another, so that each barrier must be there for its own reason.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
     plan::{Barrier, Physical, Plan, Shape, Source},
-    vocab::{Access, Layout, Region, Resource, Scope, Stages, Usage},
+    vocab::{Access, Layout, Region, Resource, Scope, Stages, Usage, Use},
 };
 
 /// Something that happens to a cell.
@@ -18,11 +18,17 @@ enum Event<'a> {
     Barrier(&'a Barrier),
 }
 
+impl Event<'_> {
+    fn only_reads(&self) -> bool {
+        matches!(self, Self::Use { scope, .. } if scope.access.writes().is_empty())
+    }
+}
+
 /// Every objection to `plan`; none: it is right.
 pub fn check(plan: &Plan) -> Vec<String> {
     let mut objections = Vec::new();
-    for index in 0..plan.physical.len() {
-        objections.extend(check_one(plan, index));
+    for happenings in all(plan) {
+        objections.extend(happenings.check());
     }
     lifetimes(plan, &mut objections);
     for barrier in &plan.barriers {
@@ -35,67 +41,97 @@ pub fn check(plan: &Plan) -> Vec<String> {
 
 /// Every objection to what `plan` does with the physical resource `index`.
 pub fn check_one(plan: &Plan, index: usize) -> Vec<String> {
-    let mut objections = Vec::new();
-    let physical = &plan.physical[index];
-    for cell in cells(plan, index, physical) {
-        let events = timeline(plan, index, physical, &cell);
-        let place = format!("{} {cell:?}", plan.name(physical.occupants[0]));
-        hazards(&events, &place, &mut objections);
-        contents(&events, physical, &place, &mut objections);
-    }
-    objections
+    all(plan).get(index).map_or_else(Vec::new, Happenings::check)
 }
 
-/// Regions inside of which every use and barrier covers all or nothing.
-fn cells(plan: &Plan, index: usize, physical: &Physical) -> Vec<Region> {
-    let (a_end, b_end) = match physical.shape {
-        Shape::Image(desc) => (desc.mips.into(), desc.layers.into()),
-        Shape::Buffer(bytes) => (bytes.max(1), 1),
-    };
-    let (mut a, mut b) = (BTreeSet::from([0, a_end]), BTreeSet::from([0, b_end]));
-    let uses = plan.passes.iter().flat_map(|p| &p.uses).filter(|u| physical.occupants.contains(&u.resource));
-    let barriers = plan.barriers.iter().filter(|b| b.physical == index);
-    for region in uses.map(|u| &u.region).chain(barriers.map(|b| &b.region)) {
-        a.extend([region.a.0, region.a.1]);
-        b.extend([region.b.0, region.b.1]);
-    }
-    let pairs = |cuts: BTreeSet<u64>| {
-        let cuts: Vec<u64> = cuts.into_iter().collect();
-        cuts.windows(2).map(|w| (w[0], w[1])).collect::<Vec<_>>()
-    };
-    let columns = pairs(b);
-    pairs(a).into_iter().flat_map(|a| columns.iter().map(move |b| Region { a, b: *b })).collect()
-}
-
-/// What happens to a cell, in order: earlier frames, barriers and passes, whoever comes after.
-fn timeline<'a>(plan: &'a Plan, index: usize, physical: &Physical, cell: &Region) -> Vec<Event<'a>> {
-    let earlier = Scope { stages: Stages::ALL, access: Access::WRITES };
-    let mut events = vec![Event::Use { who: "earlier frames".into(), scope: earlier, resource: None, layout: None }];
-    let barriers = |events: &mut Vec<Event<'a>>, before: usize| {
-        let here = plan.barriers.iter().filter(|b| b.before == before && b.physical == index);
-        events.extend(here.filter(|b| b.region.overlaps(cell)).map(Event::Barrier));
-    };
-    let mut used = false;
+/// What happens to each physical resource: one look at every use and barrier of the plan.
+fn all(plan: &Plan) -> Vec<Happenings<'_>> {
+    let each =
+        plan.physical.iter().map(|physical| Happenings { plan, physical, uses: Vec::new(), barriers: Vec::new() });
+    let mut all: Vec<Happenings<'_>> = each.collect();
     for (number, pass) in plan.passes.iter().enumerate() {
-        barriers(&mut events, number);
         for u in &pass.uses {
-            if plan.physical_of(u.resource) == Some(index) && u.region.overlaps(cell) {
-                used = true;
-                events.push(Event::Use {
-                    who: format!("`{}` as `{}`", pass.name, u.role),
-                    scope: u.scope,
-                    resource: Some(u.resource),
-                    layout: Some(u.layout),
-                });
+            if let Some(happenings) = plan.physical_of(u.resource).and_then(|physical| all.get_mut(physical)) {
+                happenings.uses.push((number, u));
             }
         }
     }
-    barriers(&mut events, plan.passes.len());
-    if physical.usage.contains(Usage::HOST) && used {
-        let scope = Scope { stages: Stages::HOST, access: Access::HOST_READ };
-        events.push(Event::Use { who: "the host".into(), scope, resource: Some(physical.occupants[0]), layout: None });
+    for barrier in plan.barriers.iter().filter(|barrier| barrier.before <= plan.passes.len()) {
+        if let Some(happenings) = all.get_mut(barrier.physical) {
+            happenings.barriers.push(barrier);
+        }
     }
-    events
+    all.iter_mut().for_each(|happenings| happenings.barriers.sort_by_key(|barrier| barrier.before));
+    all
+}
+
+/// Uses of a physical resource with the numbers of their passes, and its barriers, both in order.
+struct Happenings<'a> {
+    plan: &'a Plan,
+    physical: &'a Physical,
+    uses: Vec<(usize, &'a Use)>,
+    barriers: Vec<&'a Barrier>,
+}
+
+impl<'a> Happenings<'a> {
+    fn check(&self) -> Vec<String> {
+        let mut objections = Vec::new();
+        for cell in self.cells() {
+            let events = self.timeline(&cell);
+            let place = format!("{} {cell:?}", self.plan.name(self.physical.occupants[0]));
+            hazards(&events, &place, &mut objections);
+            contents(&events, self.physical, &place, &mut objections);
+        }
+        objections
+    }
+
+    /// Regions inside of which every use and barrier covers all or nothing.
+    fn cells(&self) -> Vec<Region> {
+        let (a_end, b_end) = match self.physical.shape {
+            Shape::Image(desc) => (desc.mips.into(), desc.layers.into()),
+            Shape::Buffer(bytes) => (bytes.max(1), 1),
+        };
+        let (mut a, mut b) = (BTreeSet::from([0, a_end]), BTreeSet::from([0, b_end]));
+        let uses = self.uses.iter().map(|(_, u)| &u.region);
+        for region in uses.chain(self.barriers.iter().map(|b| &b.region)) {
+            a.extend([region.a.0, region.a.1]);
+            b.extend([region.b.0, region.b.1]);
+        }
+        let pairs = |cuts: BTreeSet<u64>| {
+            let cuts: Vec<u64> = cuts.into_iter().collect();
+            cuts.windows(2).map(|w| (w[0], w[1])).collect::<Vec<_>>()
+        };
+        let columns = pairs(b);
+        pairs(a).into_iter().flat_map(|a| columns.iter().map(move |b| Region { a, b: *b })).collect()
+    }
+
+    /// What happens to a cell, in order: earlier frames, barriers and passes, whoever comes after.
+    fn timeline(&self, cell: &Region) -> Vec<Event<'a>> {
+        let earlier = Scope { stages: Stages::ALL, access: Access::WRITES };
+        let mut events =
+            vec![Event::Use { who: "earlier frames".into(), scope: earlier, resource: None, layout: None }];
+        let mut barriers = self.barriers.iter().filter(|b| b.region.overlaps(cell)).peekable();
+        let mut used = false;
+        for (number, u) in self.uses.iter().filter(|(_, u)| u.region.overlaps(cell)) {
+            while let Some(barrier) = barriers.next_if(|b| b.before <= *number) {
+                events.push(Event::Barrier(barrier));
+            }
+            used = true;
+            events.push(Event::Use {
+                who: format!("`{}` as `{}`", self.plan.passes[*number].name, u.role),
+                scope: u.scope,
+                resource: Some(u.resource),
+                layout: Some(u.layout),
+            });
+        }
+        events.extend(barriers.map(|barrier| Event::Barrier(barrier)));
+        if self.physical.usage.contains(Usage::HOST) && used {
+            let scope = Scope { stages: Stages::HOST, access: Access::HOST_READ };
+            let (who, resource) = ("the host".into(), Some(self.physical.occupants[0]));
+            events.push(Event::Use { who, scope, resource, layout: None });
+        }
+        events
+    }
 }
 
 /// Follows what one access of one stage did through later barriers. `made`: it wrote, with this access.
@@ -136,7 +172,11 @@ impl Flow {
 
 /// Every pair of accesses of which one writes.
 fn hazards(events: &[Event], place: &str, objections: &mut Vec<String>) {
+    // All that can come into conflict with a read: a reader need not look at the readers after it.
+    let writing: Vec<&Event> = events.iter().filter(|event| !event.only_reads()).collect();
+    let mut written = 0;
     for (i, first) in events.iter().enumerate() {
+        written += usize::from(!first.only_reads());
         match first {
             Event::Use { who, scope, .. } => {
                 for stage in scope.stages.each() {
@@ -144,7 +184,11 @@ fn hazards(events: &[Event], place: &str, objections: &mut Vec<String>) {
                         let write = access.and(Access::WRITES);
                         let flow =
                             Flow { origin: stage, write, after: Stages::NONE, available: false, visible: Vec::new() };
-                        follow(flow, who, &events[i + 1..], place, objections);
+                        if write.is_empty() {
+                            follow(flow, who, writing[written..].iter().copied(), place, objections);
+                        } else {
+                            follow(flow, who, events[i + 1..].iter(), place, objections);
+                        }
                     }
                 }
             }
@@ -157,14 +201,20 @@ fn hazards(events: &[Event], place: &str, objections: &mut Vec<String>) {
                     available: true,
                     visible: vec![b.dst],
                 };
-                follow(flow, "the change of layout", &events[i + 1..], place, objections);
+                follow(flow, "the change of layout", events[i + 1..].iter(), place, objections);
             }
             Event::Barrier(_) => {}
         }
     }
 }
 
-fn follow(mut flow: Flow, who: &str, later: &[Event], place: &str, objections: &mut Vec<String>) {
+fn follow<'a>(
+    mut flow: Flow,
+    who: &str,
+    later: impl Iterator<Item = &'a Event<'a>>,
+    place: &str,
+    objections: &mut Vec<String>,
+) {
     for event in later {
         match event {
             Event::Barrier(b) => {
@@ -248,22 +298,24 @@ fn contents(events: &[Event], physical: &Physical, place: &str, objections: &mut
 
 /// Two logical resources in one memory must not be in use together.
 fn lifetimes(plan: &Plan, objections: &mut Vec<String>) {
-    let life = |resource: Resource| {
-        let used = |p: &super::plan::PlannedPass| p.uses.iter().any(|u| u.resource == resource);
-        let first = plan.passes.iter().position(used);
-        let last = plan.passes.iter().rposition(used);
-        first.zip(last)
-    };
+    let mut lives: BTreeMap<Resource, (usize, usize)> = BTreeMap::new();
+    for (number, pass) in plan.passes.iter().enumerate() {
+        for u in &pass.uses {
+            lives.entry(u.resource).or_insert((number, number)).1 = number;
+        }
+    }
     for physical in &plan.physical {
-        for (i, a) in physical.occupants.iter().enumerate() {
-            for b in &physical.occupants[..i] {
-                if let (Some((a0, a1)), Some((b0, b1))) = (life(*a), life(*b))
-                    && a0 <= b1
-                    && b0 <= a1
-                {
-                    objections.push(format!("{} and {} are in use together", plan.name(*a), plan.name(*b)));
-                }
+        let lives = physical.occupants.iter().filter_map(|r| Some((*lives.get(r)?, *r)));
+        let mut lives: Vec<((usize, usize), Resource)> = lives.collect();
+        lives.sort_unstable();
+        // Those that have begun, as long as they may go on.
+        let mut alive: Vec<((usize, usize), Resource)> = Vec::new();
+        for ((first, last), resource) in lives {
+            alive.retain(|((_, end), _)| *end >= first);
+            for (_, other) in &alive {
+                objections.push(format!("{} and {} are in use together", plan.name(resource), plan.name(*other)));
             }
+            alive.push(((first, last), resource));
         }
         let host = physical.usage.contains(Usage::HOST);
         if (host || physical.source != Source::Pool) && physical.occupants.len() != 1 {

@@ -6,7 +6,8 @@
 //! are merged. Everything that earlier frames did counts as one write by every stage before the first pass, so that the
 //! first barrier of each resource is there too, at the very start, where it costs nothing.
 
-use std::collections::BTreeMap;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap, HashMap};
 
 use super::{
     Graph,
@@ -23,7 +24,7 @@ pub(super) const EARLIER: Scope = Scope { stages: Stages::ALL, access: Access::W
 const LATER: Scope = Scope { stages: Stages::ALL, access: Access::EVERYTHING };
 
 /// What a physical resource is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Shape {
     Image(ImageDesc),
     /// Bytes.
@@ -165,8 +166,9 @@ impl Plan {
         };
         mistakes.extend(shapes(graph));
         plan.place(graph);
-        for physical in 0..plan.physical.len() {
-            plan.synchronise(graph, physical, &mut mistakes);
+        let touches = plan.touches();
+        for (physical, touches) in touches.iter().enumerate() {
+            plan.synchronise(graph, (physical, touches), &mut mistakes);
         }
         plan.barriers.sort_by_key(|b| b.before);
         plan.warn(graph);
@@ -203,11 +205,16 @@ impl Plan {
 
     /// What is written and never read. Depth is read by its own tests.
     fn warn(&mut self, graph: &Graph) {
+        let mut read = vec![false; graph.images.len()];
+        for u in self.passes.iter().flat_map(|p| &p.uses).filter(|u| u.reads()) {
+            if let Resource::Image(i) = u.resource {
+                read[i as usize] = true;
+            }
+        }
         for (i, image) in graph.images.iter().enumerate() {
-            let resource = Resource::Image(i as u32);
-            let mut uses = self.passes.iter().flat_map(|p| &p.uses).filter(|u| u.resource == resource).peekable();
             let kept = !matches!(image.origin, Origin::Transient) || image.desc.format.is_depth();
-            if uses.peek().is_some() && !kept && uses.all(|u| !u.reads()) {
+            // What no pass uses has no place.
+            if self.images[i].is_some() && !kept && !read[i] {
                 self.warnings.push(format!("image `{}` is written and never read", image.name));
             }
         }
@@ -226,8 +233,8 @@ impl Plan {
         }
         let mut order: Vec<_> = lives.into_iter().collect();
         order.sort_by_key(|(resource, (first, ..))| (*first, *resource));
-        // End of the life of the last occupant.
-        let mut ends: Vec<usize> = Vec::new();
+        // Those of a pool, by what they can serve.
+        let mut shared: HashMap<(Shape, bool), Shared> = HashMap::new();
         for (resource, (first, last, mut usage)) in order {
             let (shape, origin, host) = match resource {
                 Resource::Image(i) => {
@@ -243,16 +250,9 @@ impl Plan {
             if host {
                 usage |= Usage::HOST;
             }
-            let free = matches!(origin, Origin::Transient).then(|| {
-                (0..ends.len()).find(|p| {
-                    let other = &self.physical[*p];
-                    other.source == Source::Pool
-                        && other.shape == shape
-                        && ends[*p] < first
-                        && other.usage.contains(Usage::HOST) == host
-                })
-            });
-            let physical = free.flatten().unwrap_or_else(|| {
+            let mut pool = matches!(origin, Origin::Transient).then(|| shared.entry((shape, host)).or_default());
+            let free = pool.as_mut().and_then(|pool| pool.free_at(first));
+            let physical = free.unwrap_or_else(|| {
                 let (source, rest, contents) = match (origin, resource) {
                     (Origin::Transient, _) => (Source::Pool, None, false),
                     (Origin::History { key, next }, Resource::Image(_)) => {
@@ -267,10 +267,11 @@ impl Plan {
                 };
                 let usage = Usage::NONE;
                 self.physical.push(Physical { shape, usage, source, rest, contents, occupants: Vec::new() });
-                ends.push(0);
                 self.physical.len() - 1
             });
-            ends[physical] = last;
+            if let Some(pool) = pool {
+                pool.busy.push(Reverse((last, physical)));
+            }
             self.physical[physical].usage |= usage;
             self.physical[physical].occupants.push(resource);
             match resource {
@@ -280,15 +281,31 @@ impl Plan {
         }
     }
 
+    /// The uses of each physical resource, in order, as numbers of the pass and of the use in it.
+    fn touches(&self) -> Vec<Vec<(usize, usize)>> {
+        let mut touches = vec![Vec::new(); self.physical.len()];
+        for (number, pass) in self.passes.iter().enumerate() {
+            for (i, u) in pass.uses.iter().enumerate() {
+                if let Some(physical) = self.physical_of(u.resource) {
+                    touches[physical].push((number, i));
+                }
+            }
+        }
+        touches
+    }
+
     /// The barriers of one physical resource, and reads of what was never written.
-    fn synchronise(&mut self, graph: &Graph, index: usize, mistakes: &mut Vec<Mistake>) {
+    fn synchronise(
+        &mut self,
+        graph: &Graph,
+        (index, touches): (usize, &[(usize, usize)]),
+        mistakes: &mut Vec<Mistake>,
+    ) {
         let physical = &self.physical[index];
         let whole = physical.shape.whole();
         let buffer = matches!(physical.shape, Shape::Buffer(_));
-        let mut touches: Vec<(usize, &Use)> = Vec::new();
-        for (number, pass) in self.passes.iter().enumerate() {
-            touches.extend(pass.uses.iter().filter(|u| physical.occupants.contains(&u.resource)).map(|u| (number, u)));
-        }
+        let touches: Vec<(usize, &Use)> =
+            touches.iter().map(|(number, i)| (*number, &self.passes[*number].uses[*i])).collect();
         let grid = Grid::new(&whole, touches.iter().map(|(_, u)| &u.region));
         // An imported image without contents has no layout yet.
         let layout = match (physical.rest, physical.contents, &physical.source) {
@@ -356,6 +373,25 @@ impl Plan {
             }
         }
         merged
+    }
+}
+
+/// Physical resources of a pool that are alike.
+#[derive(Default)]
+struct Shared {
+    /// By the last pass of their occupant, then by their number.
+    busy: BinaryHeap<Reverse<(usize, usize)>>,
+    free: BinaryHeap<Reverse<usize>>,
+}
+
+impl Shared {
+    /// The one of the lowest number that nobody uses from pass `first` on. Asked for passes in ascending order.
+    fn free_at(&mut self, first: usize) -> Option<usize> {
+        while let Some(Reverse((_, physical))) = self.busy.peek().filter(|Reverse((last, _))| *last < first) {
+            self.free.push(Reverse(*physical));
+            self.busy.pop();
+        }
+        self.free.pop().map(|Reverse(physical)| physical)
     }
 }
 

@@ -6,7 +6,7 @@ use std::{
     io::{self, Read, Write},
     path::{Path, PathBuf},
     sync::{
-        Mutex,
+        Mutex, MutexGuard, PoisonError,
         atomic::{AtomicU64, Ordering},
     },
     time::{Duration, SystemTime},
@@ -62,29 +62,83 @@ fn regular(metadata: &fs::Metadata) -> Result<()> {
 /// failure nothing is left behind; temporary files of killed processes are swept a day later by the next write into
 /// that folder. The error has [`ErrorKind::Output`] and says how many bytes were needed.
 pub fn write_atomic(path: &Path, bytes: &[u8], overwrite: bool) -> Result<()> {
-    let fail = |error: io::Error| failed(path, &format!("cannot write {} bytes", bytes.len()), error);
-    let target = inspect(path, overwrite)?;
-    if target.device {
-        let mut file = OpenOptions::new().write(true).open(&target.path).map_err(fail)?;
-        return file.write_all(bytes).and_then(|()| file.flush()).map_err(fail);
+    write_all_atomic(&[(path, bytes)], overwrite)
+}
+
+/// Writes files that belong together, all or none: each as [`write_atomic`] does, and none gets its name before the bytes of all are on
+/// the disk. They get their names in the order of the list, so that the one that names the rest comes last.
+///
+/// # Errors
+/// `Output`, naming the file that could not be written. Files that were not there before are then not there; one that was there is what
+/// it was, unless it got its new contents before a later one failed to get its name.
+pub fn write_all_atomic(files: &[(&Path, &[u8])], overwrite: bool) -> Result<()> {
+    let mut written = Vec::with_capacity(files.len());
+    for (path, bytes) in files {
+        let fail = |error: io::Error| cannot_write(path, bytes.len(), error);
+        let target = inspect(path, overwrite)?;
+        if target.device {
+            let mut file = OpenOptions::new().write(true).open(&target.path).map_err(fail)?;
+            file.write_all(bytes).and_then(|()| file.flush()).map_err(fail)?;
+            continue;
+        }
+        sweep(&target.folder);
+        let mut temporary = Temporary::create(&target.folder).map_err(fail)?;
+        temporary.file.write_all(bytes).map_err(fail)?;
+        if let Some(permissions) = &target.permissions {
+            // A replaced file keeps who may read it; failing to is no reason to lose the picture.
+            let _ = temporary.file.set_permissions(permissions.clone());
+        }
+        temporary.file.sync_all().map_err(fail)?;
+        written.push((*path, bytes.len(), target, temporary));
     }
-    sweep(&target.folder);
-    let mut temporary = Temporary::create(&target.folder).map_err(fail)?;
-    temporary.file.write_all(bytes).map_err(fail)?;
-    if let Some(permissions) = target.permissions {
-        // A replaced file keeps who may read it; failing to is no reason to lose the picture.
-        let _ = temporary.file.set_permissions(permissions);
-    }
-    temporary.file.sync_all().map_err(fail)?;
-    temporary.publish(&target.path, overwrite).map_err(|error| match error.kind() {
-        io::ErrorKind::AlreadyExists => exists(path),
-        _ => fail(error),
-    })?;
-    // The rename itself reaches the disk with its folder; not every file system can do that.
-    if let Ok(folder) = File::open(&target.folder) {
-        let _ = folder.sync_all();
+    publish(&written, overwrite)?;
+    let folders: HashSet<&Path> = written.iter().map(|(_, _, target, _)| target.folder.as_path()).collect();
+    for folder in folders {
+        // The rename itself reaches the disk with its folder; not every file system can do that.
+        if let Ok(folder) = File::open(folder) {
+            let _ = folder.sync_all();
+        }
     }
     Ok(())
+}
+
+/// Gives all files their names, or takes those away again that were not there before.
+fn publish(written: &[(&Path, usize, Target, Temporary)], overwrite: bool) -> Result<()> {
+    // Nobody leaves the process between two names.
+    let _unfinished = unfinished();
+    for (done, (path, bytes, target, temporary)) in written.iter().enumerate() {
+        if let Err(error) = temporary.publish(&target.path, overwrite) {
+            for (_, _, earlier, _) in written[..done].iter().filter(|(_, _, target, _)| target.permissions.is_none()) {
+                let _ = fs::remove_file(&earlier.path);
+            }
+            return Err(match error.kind() {
+                io::ErrorKind::AlreadyExists => exists(path),
+                _ => cannot_write(path, *bytes, error),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn cannot_write(path: &Path, bytes: usize, error: io::Error) -> Error {
+    failed(path, &format!("cannot write {bytes} bytes"), error)
+}
+
+/// Temporary files of this process.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// For a process that ends at once: removes what is being written in other threads. Each file is then what it was or complete, and
+/// nothing else lies in its folder. From now on no thread can write.
+pub fn leave_nothing_unfinished() {
+    let mut unfinished = unfinished();
+    for path in unfinished.drain(..) {
+        let _ = fs::remove_file(path);
+    }
+    std::mem::forget(unfinished);
 }
 
 /// Checks before work starts that [`write_atomic`] has a chance: the folder exists and takes new files, `path` is no
@@ -172,8 +226,13 @@ impl Temporary {
         for _ in 0..1000 {
             let number = COUNTER.fetch_add(1, Ordering::Relaxed);
             let path = folder.join(format!("{PREFIX}{}-{number}{SUFFIX}", std::process::id()));
+            // Nobody leaves the process between making the file and remembering it.
+            let mut unfinished = unfinished();
             match OpenOptions::new().write(true).create_new(true).open(&path) {
-                Ok(file) => return Ok(Self { path, file }),
+                Ok(file) => {
+                    unfinished.push(path.clone());
+                    return Ok(Self { path, file });
+                }
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(error),
             }
@@ -181,7 +240,7 @@ impl Temporary {
         Err(io::Error::other("no free name for a temporary file"))
     }
 
-    fn publish(&mut self, path: &Path, overwrite: bool) -> io::Result<()> {
+    fn publish(&self, path: &Path, overwrite: bool) -> io::Result<()> {
         if !overwrite {
             // A link fails when the name is taken meanwhile; a rename would replace it.
             match fs::hard_link(&self.path, path) {
@@ -200,6 +259,7 @@ impl Drop for Temporary {
     fn drop(&mut self) {
         // After a rename there is nothing to remove.
         let _ = fs::remove_file(&self.path);
+        unfinished().retain(|path| *path != self.path);
     }
 }
 

@@ -1,9 +1,9 @@
 //! Trees of eight-way nodes, built on the CPU.
 //!
-//! A binary tree by obvhs (PLOC with reinsertion) is collapsed to eight children a node as in Ylitie, Karras and Laine,
+//! A binary tree by obvhs (PLOC with reinsertion), or [`binned`] where that would not end, is collapsed to eight children a node as in Ylitie, Karras and Laine,
 //! "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017, section 3.2, with one thing a leaf.
 
-use crate::scene::Aabb;
+use crate::scene::{Aabb, bvh::binned};
 use glam::Vec3;
 use obvhs::{
     Boundable, BvhBuildParams, bvh2::Bvh2, bvh2::reinsertion::ReinsertionOptimizer, ploc::PlocBuilder,
@@ -76,14 +76,21 @@ impl Tree {
                 triangles.iter().map(|t| Triangle { v0: t[0].into(), v1: t[1].into(), v2: t[2].into() }).collect();
             split_aabbs_preset(&mut aabbs, &mut indices, &corners, sum / boxed.len() as f32, largest);
         }
-        let mut binary = PlocBuilder::with_capacity(aabbs.len()).build(
-            p.ploc_search_distance,
-            &aabbs,
-            indices,
-            p.sort_precision,
-            p.search_depth_threshold,
-        );
-        ReinsertionOptimizer::default().run(&mut binary, p.reinsertion_batch_ratio, None);
+        let binary = if binned::clusters(&aabbs) {
+            let mut clustered = PlocBuilder::with_capacity(aabbs.len()).build(
+                p.ploc_search_distance,
+                &aabbs,
+                indices,
+                p.sort_precision,
+                p.search_depth_threshold,
+            );
+            ReinsertionOptimizer::default().run(&mut clustered, p.reinsertion_batch_ratio, None);
+            clustered
+        } else {
+            let mut cut = binned::build(&aabbs, 1);
+            cut.primitive_indices.iter_mut().for_each(|i| *i = indices[*i as usize]);
+            cut
+        };
         // Equal boxes can make it as deep as they are many.
         collapse(&binary).filter(|t| t.levels.len() as u32 <= DEPTH + 1).unwrap_or_else(|| Self::eighths(boxes))
     }

@@ -1,12 +1,14 @@
 //! A bounding-volume hierarchy over all triangles of a scene, in world space.
 //!
-//! Built by the obvhs crate (PLOC with reinsertion); the traversal here is the plain CPU one that cameras, tests and
+//! Built by the obvhs crate (PLOC with reinsertion), or by [`binned`] where that would not end; the traversal here is the plain CPU one that cameras, tests and
 //! precomputations use. Rays that meet an edge shared by two triangles hit at least one of them: Woop, Benthin and Wald,
 //! "Watertight Ray/Triangle Intersection", JCGT 2013, with box tests padded as in Ize, "Robust BVH Ray Traversal", JCGT 2013.
 
+pub(crate) mod binned;
+
 use super::{Pose, Scene, deform::world_vertices};
 use glam::{BVec3A, DVec3, Vec3, Vec3A};
-use obvhs::{Boundable, BvhBuildParams, aabb::Aabb, bvh2::Bvh2, bvh2::builder::build_bvh2};
+use obvhs::{BvhBuildParams, aabb::Aabb, bvh2::Bvh2, bvh2::builder::build_bvh2};
 use std::time::Duration;
 
 /// Which triangle of the scene: `scene.meshes[scene.nodes[node].mesh].primitives[primitive].indices[3 * triangle..]`.
@@ -57,6 +59,9 @@ pub enum Step {
     End,
 }
 
+/// Triangles of a leaf where the crate does not build the tree.
+const LEAF: usize = 4;
+
 /// Triangles and the tree above them.
 pub struct Bvh {
     tree: Bvh2,
@@ -71,13 +76,8 @@ impl std::fmt::Debug for Bvh {
     }
 }
 
-struct Boxed<'a>(&'a [Vec3; 3]);
-
-impl Boundable for Boxed<'_> {
-    fn aabb(&self) -> Aabb {
-        let [a, b, c] = *self.0;
-        Aabb::new(a.min(b).min(c).into(), a.max(b).max(c).into())
-    }
+fn bounds([a, b, c]: &[Vec3; 3]) -> Aabb {
+    Aabb::new(a.min(*b).min(*c).into(), a.max(*b).max(*c).into())
 }
 
 impl Bvh {
@@ -105,11 +105,13 @@ impl Bvh {
     }
 
     fn over(triangles: Vec<[Vec3; 3]>, ids: Vec<TriangleId>) -> Self {
-        let boxes: Vec<Boxed<'_>> = triangles.iter().map(Boxed).collect();
+        let boxes: Vec<Aabb> = triangles.iter().map(bounds).collect();
         let tree = if boxes.is_empty() {
             Bvh2::default()
-        } else {
+        } else if binned::clusters(&boxes) {
             build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Duration::default())
+        } else {
+            binned::build(&boxes, LEAF)
         };
         Self { tree, triangles, ids }
     }

@@ -37,6 +37,14 @@ impl Console {
         }
     }
 
+    /// As [`Console::info`], from another thread than the one that shows progress: over a line that is not complete.
+    pub fn aside(&self, text: &str) {
+        if self.level >= 0 {
+            let clear = if std::io::stderr().is_terminal() { "\r\x1b[K" } else { "" };
+            self.plain(&format!("{clear}{text}"));
+        }
+    }
+
     /// Details; shown from `-v` on.
     pub fn detail(&self, text: &str) {
         if self.level >= 1 {

@@ -6,7 +6,7 @@ use lucerna::{
 };
 use serde_json::{Value, json};
 
-use crate::args::DeviceArgs;
+use crate::{args::DeviceArgs, signals::Interrupt};
 
 impl DeviceArgs {
     /// The environment's choices, changed by the command line.
@@ -19,6 +19,7 @@ impl DeviceArgs {
         if let Some(choice) = &self.ray_query {
             options.ray_query = choice.parse().map_err(|error: Error| error.at("--ray-query"))?;
         }
+        options.stop = Interrupt::stop();
         Ok(options)
     }
 }

@@ -18,6 +18,7 @@ pub mod info;
 pub mod inspect;
 pub mod last_stage;
 pub mod lights;
+pub mod notes;
 pub mod outputs;
 pub mod pattern;
 pub mod program;

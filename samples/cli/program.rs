@@ -2,9 +2,13 @@
 
 use std::process::ExitCode;
 
-use lucerna::{Error, Result};
+use lucerna::{Error, ErrorKind, Result};
 
-use crate::console::Console;
+use crate::{
+    console::Console,
+    notes,
+    signals::{self, Interrupt},
+};
 
 /// Stopped on request before the work was done, but with complete output of a part of it.
 pub const STOPPED_EARLY: u8 = 8;
@@ -13,6 +17,8 @@ pub const INTERRUPTED: u8 = 130;
 
 /// Runs a program's body. Exit codes: 0 success, else [`Error::exit_code`], or what the body chose.
 pub fn run(console: Console, body: impl FnOnce() -> Result<ExitCode>) -> ExitCode {
+    Interrupt::catch(console);
+    notes::show(console);
     std::panic::set_hook(Box::new(move |info| {
         let place = info.location().map(|at| format!(" at {}:{}", at.file(), at.line())).unwrap_or_default();
         let payload = info.payload();
@@ -29,13 +35,27 @@ pub fn run(console: Console, body: impl FnOnce() -> Result<ExitCode>) -> ExitCod
         }
     }));
     match std::panic::catch_unwind(std::panic::AssertUnwindSafe(body)) {
-        Ok(Ok(code)) => code,
-        Ok(Err(error)) => {
-            console.error(&error);
-            ExitCode::from(error.exit_code())
+        Ok(Ok(code)) => {
+            signals::let_it_be_said();
+            code
         }
+        Ok(Err(error)) => match signals::stopped().filter(|_| by_request(&error)) {
+            Some(code) => {
+                signals::let_it_be_said();
+                ExitCode::from(code)
+            }
+            None => {
+                console.error(&error);
+                ExitCode::from(error.exit_code())
+            }
+        },
         Err(_) => ExitCode::from(1),
     }
+}
+
+/// Whether this is how work ends that was asked to stop: a device that was left in the middle of its work serves nobody any more.
+pub fn by_request(error: &Error) -> bool {
+    matches!(error.kind(), ErrorKind::Interrupted | ErrorKind::DeviceLost)
 }
 
 /// What `--version` prints, and what pictures carry.

@@ -49,6 +49,17 @@ pub struct Input<'a> {
     pub layers: bool,
 }
 
+/// What work gave; `None` if it was asked to stop meanwhile, whether it ended because of that or not.
+///
+/// # Errors
+/// Any other failure.
+pub fn unless_stopped<T>(result: Result<T>, interrupt: &Interrupt) -> Result<Option<T>> {
+    match result {
+        Err(error) if !interrupt.requested() || !program::by_request(&error) => Err(error),
+        result => Ok(result.ok().filter(|_| !interrupt.requested())),
+    }
+}
+
 /// Runs `render` for one technique.
 ///
 /// `base` are the settings to start from; `check` says whether those in effect are in their ranges, before anything else is done; `prepare` makes what lives as long as the run; `compose` declares one frame.
@@ -87,7 +98,7 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
     let frames = run.frames.len() as u32;
     let mut runner = Runner::new(&gpu);
     let mut progress = Progress::new(args.progress, console.is_quiet(), run.frames.len() as u64);
-    for frame in run.frames.clone() {
+    'frames: for frame in run.frames.clone() {
         let late = args.time_limit.is_some_and(|limit| started.elapsed() >= limit.0);
         // One frame there will be, or the next run would get no further.
         if interrupt.requested() || (late && run.progress().0 > 0) {
@@ -100,7 +111,8 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
         (graph.frame, graph.seed) = (frame, args.seed);
         let input =
             Input { gpu: &gpu, scene: &run.stage.scene, pose: &pose, view: &view, frame, frames, seconds, layers: all };
-        let mut shown = compose(&mut graph, &mut resources, &input, &settings)?;
+        let shown = compose(&mut graph, &mut resources, &input, &settings);
+        let Some(mut shown) = unless_stopped(shown, &interrupt)? else { break };
         shown.develop(|picture| last.frame(&mut graph, picture, (1.0 / args.fps) as f32))?;
         if args.list_passes {
             console::print(graph.plan()?.list_passes().trim_end())?;
@@ -114,17 +126,16 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
         };
         let dump = args.dump.as_ref().map(|folder| (folder, graph.dump()));
         // The frame after this one builds on it once, however often it is repeated.
-        let result = if args.repeat > 1 { runner.run_held(&graph)? } else { runner.run(&graph)? };
+        let result = if args.repeat > 1 { runner.run_held(&graph) } else { runner.run(&graph) };
         // What was asked to stop is not written, unless it is all there.
-        if interrupt.requested() {
-            break;
-        }
+        let Some(result) = unless_stopped(result, &interrupt)? else { break };
         run.note(&reading.notes(&result));
         let mut layers = reading.layers(&result);
         run.expose(&layers);
         layers.metadata = run.metadata(&gpu, &seen, frame)?;
         let milliseconds = begun.elapsed().as_secs_f64() * 1e3;
         let files = run.write(&layers, frame)?;
+        interrupt.keep();
         for (folder, images) in dump.iter() {
             for (name, token) in images {
                 run.dump(folder, frame, name, shown::raw(&result.image(*token)))?;
@@ -153,8 +164,9 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
             // No time passes, so that adaptation stays as it is.
             shown.develop(|picture| last.frame(&mut graph, picture, 0.0))?;
             let last = repeat + 1 == args.repeat;
-            let report = if last { runner.run(&graph)? } else { runner.run_held(&graph)? }.report;
-            run.again(begun.elapsed().as_secs_f64() * 1e3, &report);
+            let result = if last { runner.run(&graph) } else { runner.run_held(&graph) };
+            let Some(result) = unless_stopped(result, &interrupt)? else { break 'frames };
+            run.again(begun.elapsed().as_secs_f64() * 1e3, &result.report);
         }
     }
     progress.finish();

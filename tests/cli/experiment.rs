@@ -200,12 +200,52 @@ fn what_is_interrupted_shows_what_is_there() {
     let interrupted = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     assert!(interrupted.success());
     assert_eq!(child.wait().unwrap().code(), Some(8));
+    // Nobody waits for a page of measures; whoever wants one asks for it.
+    assert!(!place.path("out/report.html").exists());
+    lucerna(["report".into(), place.path("out")]).expect(0, &["wrote"]);
     let json: Value = serde_json::from_slice(&fs::read(place.path("out/report.json")).unwrap()).unwrap();
     assert!(json["warnings"][0].as_str().unwrap().contains("Not complete"), "{}", json["warnings"]);
     let page = fs::read_to_string(place.path("out/report.html")).unwrap();
     assert!(page.contains("Not complete") && page.ends_with("</html>\n"));
     let (all, left) = place.planned("out", &[]);
     assert!(all == 10 && (1..=7).contains(&left), "{left} of {all}");
+}
+
+/// Files of a folder with this extension, by name.
+fn with_extension(folder: &Path, extension: &str) -> Vec<PathBuf> {
+    let paths = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut paths: Vec<PathBuf> = paths.filter(|path| path.extension().is_some_and(|e| e == extension)).collect();
+    paths.sort();
+    paths
+}
+
+#[test]
+fn what_was_damaged_or_exchanged_is_made_anew_and_said() {
+    let place = Place::new();
+    place.file(&EXPERIMENT.replace("[24, 48]", "[24]").replace("[1, 2, 3]", "[1]"));
+    place.run("out", &[]).expect(0, &["wrote"]);
+    let whole = contents(&place.path("out"));
+    let pictures = with_extension(&place.path("out/runs"), "exr");
+    let [first, second] = &pictures[..] else { panic!("{pictures:?}") };
+    let measures = with_extension(&place.path("out/measures"), "json").remove(0);
+    let text = fs::read_to_string(&measures).unwrap();
+    let mae = text.lines().find(|line| line.contains("\"mae\"")).unwrap();
+    let changes: [(&Path, Vec<u8>); 5] = [
+        (first, Vec::new()),
+        (first, fs::read(first).unwrap()[..100].to_vec()),
+        // A picture that can be read, but is another one.
+        (first, fs::read(second).unwrap()),
+        (&measures, text.replace(mae, "\"mae\": \"x\",").into_bytes()),
+        (&measures, b"{".to_vec()),
+    ];
+    for (file, bytes) in changes {
+        fs::write(file, bytes).unwrap();
+        let name = file.file_name().unwrap().to_str().unwrap();
+        place.run("out", &["-q"]).expect(0, &[name, "made anew"]);
+        assert!(contents(&place.path("out")) == whole, "{name}");
+        // Once.
+        assert!(!place.run("out", &["-q"]).expect(0, &[]).stderr.contains("made anew"));
+    }
 }
 
 #[test]

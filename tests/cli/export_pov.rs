@@ -26,6 +26,40 @@ fn povray_is_there() -> bool {
     found.is_ok()
 }
 
+/// A disk that is full after some of the side files leaves none of them; one that was there before is what it was.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_disk_that_fills_up_keeps_no_part_of_an_export() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = "mount -t tmpfs -o size=$LUCERNA_TEST_ROOM tmpfs \"$0\" || exit 99; echo old > \"$0/mine.txt\"; \"$@\"; code=$?; ls \"$0\"; exit $code";
+    let root = support::command("id").arg("-u").output().is_ok_and(|id| id.stdout == b"0\n");
+    let scene = folder.path().join("scene.pov");
+    for (room, code) in [("16m", 0), ("256k", 1)] {
+        let mut limited = support::command("unshare");
+        limited.args(if root { &["-m"][..] } else { &["-Urm"] }).args(["sh", "-c", script]).arg(folder.path());
+        limited.env("LUCERNA_TEST_ROOM", room).arg(env!("CARGO_BIN_EXE_lucerna"));
+        limited.args(["export-pov", "--builtin", "office", "-q", "-o"]).arg(&scene);
+        let Ok(output) = limited.output() else {
+            eprintln!("SKIPPED: there is no unshare");
+            return;
+        };
+        let said = String::from_utf8_lossy(&output.stderr);
+        if output.status.code() == Some(99) || said.contains("unshare") {
+            eprintln!("SKIPPED: no file system can be mounted here: {said}");
+            return;
+        }
+        assert_eq!(output.status.code(), Some(code), "{said}");
+        let left = String::from_utf8_lossy(&output.stdout).into_owned();
+        if code == 0 {
+            // The test must be able to fail: there are side files.
+            assert!(left.contains("scene.pov") && left.lines().count() > 3, "{left}");
+        } else {
+            assert!(said.contains("No space left"), "{said}");
+            assert_eq!(left, "mine.txt\n", "something was left behind");
+        }
+    }
+}
+
 const SIZE: Size = Size { width: 48, height: 36 };
 
 fn direct_only() -> Pov {

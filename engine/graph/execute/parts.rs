@@ -1,7 +1,7 @@
 //! A long graph in parts, each a submission of its own: a system that takes a device for stuck counts by submissions, and so does
 //! [`Submission::wait`].
 
-use std::{any::Any, sync::Arc};
+use std::{any::Any, collections::VecDeque, sync::Arc};
 
 use crate::{
     Result,
@@ -12,6 +12,9 @@ use crate::{
 const MOST: u64 = 1 << 26;
 /// What a pass counts for that says less of itself. Each of so many passes in a part has a mark of its own for messages.
 const LEAST: u64 = MOST / 1024;
+
+/// Parts that the device is given before it has done the first: it is never idle.
+const AHEAD: usize = 2;
 
 /// The parts of one graph.
 pub(super) struct Parts<'a> {
@@ -50,17 +53,25 @@ impl<'a> Parts<'a> {
         self.recorded.push(commands);
     }
 
-    /// Hands all parts to the device and waits for them in their order, so that the time that one may take is its own. Gives how many
-    /// the device was given, and whether all are done.
+    /// Hands all parts to the device and waits for them in their order, so that the time that one may take is its own. At most
+    /// [`AHEAD`] are in flight, so that little is left to be done when it is asked to stop. Gives how many the device was given, and
+    /// whether all are done.
     pub fn run(self) -> (usize, Result<()>) {
-        let mut running = Vec::with_capacity(self.recorded.len());
+        let stop = self.gpu.stop();
+        let mut running = VecDeque::with_capacity(AHEAD);
+        let mut given = 0;
         for commands in self.recorded {
-            match commands.submit() {
-                Ok(submission) => running.push(submission),
-                // Those before are waited for where they are dropped.
-                Err(error) => return (running.len(), Err(error)),
+            let ready = match running.len() {
+                AHEAD => running.pop_front().map_or(Ok(()), Submission::wait),
+                _ => Ok(()),
+            };
+            // Those before are waited for where they are dropped.
+            match ready.and_then(|()| stop.check()).and_then(|()| commands.submit()) {
+                Ok(submission) => running.push_back(submission),
+                Err(error) => return (given, Err(error)),
             }
+            given += 1;
         }
-        (running.len(), running.into_iter().try_for_each(Submission::wait))
+        (given, running.into_iter().try_for_each(Submission::wait))
     }
 }

@@ -3,8 +3,9 @@
 use crate::scene::surface::area_vector;
 use glam::{DVec2, DVec3, Vec3};
 
-/// Polygons of more corners are cut into a fan, because cutting ears takes the square of their number.
-const MAX_EARS: usize = 512;
+/// Polygons of more corners are cut by [`earcut`], which looks for ears along a space-filling curve, or by halves if they are convex: the
+/// square of their number is too much, and a fan of many makes boxes that lie in each other.
+const MAX_EARS: usize = 64;
 
 /// Appends the triangles of a plane simple polygon, which may be concave, in its own orientation.
 pub fn triangulate<T: Copy>(corners: &[T], position: impl Fn(T) -> Vec3, out: &mut Vec<T>) {
@@ -13,7 +14,7 @@ pub fn triangulate<T: Copy>(corners: &[T], position: impl Fn(T) -> Vec3, out: &m
             out.extend([corners[0], corners[i - 1], corners[i]]);
         }
     };
-    if corners.len() <= 3 || corners.len() > MAX_EARS {
+    if corners.len() <= 3 {
         return fan(out);
     }
     // Newell's normal: the sum over the triangles of any fan.
@@ -29,8 +30,16 @@ pub fn triangulate<T: Copy>(corners: &[T], position: impl Fn(T) -> Vec3, out: &m
         .map(|&corner| position(corner).as_dvec3() - first.as_dvec3())
         .map(|p| DVec2::new(p.dot(x), p.dot(y) * flip))
         .collect();
-    if convex(&flat) {
-        return fan(out);
+    match (convex(&flat), corners.len() > MAX_EARS) {
+        (true, false) => return fan(out),
+        (true, true) => return halves(corners, out),
+        (false, true) => {
+            let mut triangles: Vec<usize> = Vec::new();
+            earcut::Earcut::new().earcut(flat.iter().map(|p| p.to_array()), &[], &mut triangles);
+            out.extend(triangles.chunks_exact(3).flatten().map(|i| corners[*i]));
+            return;
+        }
+        (false, false) => {}
     }
     let mut left: Vec<usize> = (0..corners.len()).collect();
     while left.len() > 3 {
@@ -42,6 +51,19 @@ pub fn triangulate<T: Copy>(corners: &[T], position: impl Fn(T) -> Vec3, out: &m
         left.remove(i);
     }
     out.extend([corners[left[0]], corners[left[1]], corners[left[2]]]);
+}
+
+/// Cuts a convex polygon across its middle, and both parts again.
+fn halves<T: Copy>(corners: &[T], out: &mut Vec<T>) {
+    // First and last corner of parts, whose other edges are cut already.
+    let mut parts = vec![(0, corners.len() - 1)];
+    while let Some((first, last)) = parts.pop() {
+        if last - first >= 2 {
+            let middle = first + (last - first) / 2;
+            out.extend([corners[first], corners[middle], corners[last]]);
+            parts.extend([(middle, last), (first, middle)]);
+        }
+    }
 }
 
 fn turn(a: DVec2, b: DVec2, c: DVec2) -> f64 {
@@ -77,7 +99,9 @@ mod tests {
         let position = |i: usize| Vec3::new(points[i].0, 2.0, -points[i].1);
         let mut out = vec![];
         triangulate(&corners, position, &mut out);
-        assert_eq!(out.len(), 3 * (points.len() - 2));
+        // Of many corners those on a straight line need no triangle.
+        let (found, most) = (out.len() / 3, points.len() - 2);
+        assert!(found == most || (points.len() > MAX_EARS && found < most), "{found} of {most}");
         out.chunks(3).map(|t| area_vector([position(t[0]), position(t[1]), position(t[2])]).y / 2.0).collect()
     }
 
@@ -98,6 +122,30 @@ mod tests {
                 let areas = areas(&points);
                 assert!(areas.iter().all(|&area| area >= 0.0), "{areas:?}");
                 assert!((areas.iter().sum::<f64>() - want).abs() < 1e-9, "{areas:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn large_polygons_are_covered_once_and_quickly() {
+        let circle = |i: usize, count: usize, radius: f32| {
+            let angle = std::f32::consts::TAU * i as f32 / count as f32;
+            (radius * angle.cos(), radius * angle.sin())
+        };
+        for count in [65, 2_000, 100_000] {
+            let half = 0.5 * count as f64 * (std::f64::consts::TAU / count as f64).sin();
+            let round: Vec<_> = (0..count).map(|i| circle(i, count, 1.0)).collect();
+            // Every other corner of an even number inwards.
+            let even = count / 2 * 2;
+            let star: Vec<_> = (0..even).map(|i| circle(i, even, if i % 2 == 0 { 1.0 } else { 0.5 })).collect();
+            let spikes = 0.5 * 0.5 * even as f64 * (std::f64::consts::TAU / even as f64).sin();
+            for (points, want) in [(round, half), (star, spikes)] {
+                let begun = std::time::Instant::now();
+                let areas = areas(&points);
+                assert!(begun.elapsed().as_secs_f64() < 5.0, "{count} corners take {:?}", begun.elapsed());
+                assert!(areas.iter().all(|&area| area >= -1e-9), "{count}");
+                let sum: f64 = areas.iter().sum();
+                assert!((sum - want).abs() < 1e-4, "{count} corners: {sum} instead of {want}");
             }
         }
     }

@@ -1,9 +1,15 @@
 //! Pictures by what decided them: `runs/KEY.exr` and `runs/KEY.json` in the folder of a report.
 //!
 //! The text file is written after the picture: a picture counts once its text is there, so that whenever the program is killed,
-//! what is there is complete. Times stand in the text file; the picture's bytes depend on nothing but what the key names.
+//! what is there is complete. It holds the digest of the picture's file, and its own: what was damaged or put there by somebody else
+//! does not count, which is said once, and is made anew. Times stand in the text file; the picture's bytes depend on nothing but what the
+//! key names.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::HashMap,
+    path::{Path, PathBuf},
+    sync::{Arc, Mutex, PoisonError},
+};
 
 use lucerna::{
     Error, ErrorKind, Result,
@@ -12,51 +18,62 @@ use lucerna::{
     scene::Limits,
 };
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
-use super::{digest::Digest, kinds::Kind, kinds::Times};
-use crate::{config, program};
+use super::{digest::Digest, kinds::Kind, kinds::Times, sealed};
+use crate::program;
 
-include!(concat!(env!("OUT_DIR"), "/sources.rs"));
+/// Digest of the source files that can change a picture or a measure, as they were when this program was built
+/// ([`super::sources`]).
+pub const SOURCES: &str = env!("LUCERNA_SOURCES");
 
-/// Digest of the source files in these folders, as they were when this program was built.
-fn sources(folders: &[&str]) -> String {
-    let mut digest = Digest::default();
-    for (file, hash) in SOURCES {
-        if folders.iter().any(|folder| file.starts_with(folder) && file[folder.len()..].starts_with('/')) {
-            digest.add(file.as_bytes());
-            digest.add(&hash.to_le_bytes());
-        }
-    }
-    digest.hex()
+/// What a picture depends on besides the kind and the sources.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Inputs {
+    /// Fingerprint of its files.
+    pub scene: String,
+    pub view: Value,
+    /// All of them, those at their defaults too.
+    pub settings: Value,
+    pub seed: u32,
+    pub repeat: u32,
+    /// Those that are kept.
+    pub layers: Vec<String>,
+}
+
+/// Device and driver, as keys name them.
+pub fn device(gpu: &Gpu) -> String {
+    let about = gpu.describe();
+    format!("{}, {} {}", about.device, about.driver, about.driver_info)
 }
 
 /// What decides a picture, as text.
+#[derive(Clone, Debug)]
 pub struct Key {
     pub name: String,
     text: Value,
 }
 
 impl Key {
-    /// `what`: scene, view, size, settings, seed.
+    /// `needs`: version of the program that the kind needs.
     ///
     /// # Errors
     /// `Runtime` if it cannot be text.
-    pub fn new(kind: &Kind, gpu: &Gpu, needs: &str, what: Value) -> Result<Self> {
-        let about = gpu.describe();
-        let device = kind.on_device.then(|| format!("{}, {} {}", about.device, about.driver, about.driver_info));
+    pub fn new(kind: &Kind, device: &str, needs: &str, inputs: &Inputs) -> Result<Self> {
         let text = json!({
             "kind": kind.name,
             "version": program::VERSION,
-            "sources": sources(kind.sources),
-            "device": device,
+            "sources": SOURCES,
+            "device": kind.on_device.then_some(device),
             "needs": needs,
-            "what": what,
+            "what": crate::config::to_value(inputs)?,
         });
-        let bytes = serde_json::to_vec(&text)
-            .map_err(|error| Error::new(ErrorKind::Runtime, "a key cannot be text").caused_by(error))?;
-        Ok(Self { name: Digest::of(&bytes).hex(), text })
+        Ok(Self { name: name_of(&text), text })
     }
+}
+
+fn name_of(text: &Value) -> String {
+    Digest::of(text.to_string().as_bytes()).hex()
 }
 
 /// What stands beside a picture.
@@ -72,6 +89,8 @@ struct Record {
 #[derive(Clone, Debug)]
 pub struct Cache {
     folder: PathBuf,
+    /// Keys that were looked at: a file is read whole once in a run, however often it is asked for.
+    seen: Arc<Mutex<HashMap<String, Option<Record>>>>,
 }
 
 impl Cache {
@@ -86,12 +105,12 @@ impl Cache {
                 Error::new(ErrorKind::Output, "the folder cannot be made").in_file(&path).caused_by(error)
             })?;
         }
-        Ok(Self { folder: folder.to_path_buf() })
+        Ok(Self::open(folder))
     }
 
     /// One that exists.
     pub fn open(folder: &Path) -> Self {
-        Self { folder: folder.to_path_buf() }
+        Self { folder: folder.to_path_buf(), seen: Arc::default() }
     }
 
     fn picture(&self, key: &str) -> PathBuf {
@@ -102,13 +121,36 @@ impl Cache {
         self.folder.join("runs").join(format!("{key}.json"))
     }
 
+    /// The record of a picture that is there and is the one that was kept.
     fn record(&self, key: &str) -> Option<Record> {
-        serde_json::from_str(&config::read_text(&self.text(key)).ok()?).ok()
+        let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = seen.get(key) {
+            return known.clone();
+        }
+        let found = self.look(key).unwrap_or_else(|error| {
+            does_not_count(&error);
+            None
+        });
+        seen.insert(key.to_owned(), found.clone());
+        found
+    }
+
+    fn look(&self, key: &str) -> Result<Option<Record>> {
+        let (picture, text) = (self.picture(key), self.text(key));
+        let Some(record) = sealed::read::<Record>(&text)? else { return Ok(None) };
+        if name_of(&record.key) != key {
+            return Err(Error::input("is the text of another picture").in_file(&text));
+        }
+        let bytes = image::read_file_checked(&picture, Limits::default().max_file)?;
+        if Digest::of(&bytes).hex() != record.picture {
+            return Err(Error::input("is not the picture that was kept: damaged, or another one").in_file(&picture));
+        }
+        Ok(Some(record))
     }
 
     /// Times of a picture that is there.
     pub fn times(&self, key: &str) -> Option<Times> {
-        self.picture(key).is_file().then(|| self.record(key)).flatten().map(|record| record.times)
+        self.record(key).map(|record| record.times)
     }
 
     /// Digest of a picture that is there.
@@ -124,8 +166,9 @@ impl Cache {
         let (bytes, _) = image::encode(image::Format::Exr, layers, &WriteOptions::default())?;
         image::write_atomic(&self.picture(&key.name), &bytes, true)?;
         let record = Record { key: key.text.clone(), picture: Digest::of(&bytes).hex(), times: times.clone() };
-        let text = format!("{:#}\n", config::to_value(&record)?);
-        image::write_atomic(&self.text(&key.name), text.as_bytes(), true)
+        sealed::write(&self.text(&key.name), &record)?;
+        self.seen.lock().unwrap_or_else(PoisonError::into_inner).insert(key.name.clone(), Some(record));
+        Ok(())
     }
 
     /// Reads a picture.
@@ -133,37 +176,69 @@ impl Cache {
     /// # Errors
     /// `Input` if it is gone or damaged.
     pub fn layers(&self, key: &str) -> Result<Layers> {
-        image::read(self.picture(key), &Limits::default())
-            .map_err(|error| error.help("Run the experiment again; what is missing is rendered anew"))
+        let help = "Run the experiment again; what is missing is rendered anew";
+        if self.record(key).is_none() {
+            return Err(Error::input("is gone or damaged").in_file(self.picture(key)).help(help));
+        }
+        image::read(self.picture(key), &Limits::default()).map_err(|error| error.help(help))
     }
 
-    /// Measures of a pair, by their names.
-    pub fn measures(&self, pair: &str) -> serde_json::Map<String, Value> {
-        let path = self.folder.join("measures").join(format!("{pair}.json"));
-        config::read_text(&path).ok().and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default()
+    fn values(&self, pair: &str) -> PathBuf {
+        self.folder.join("measures").join(format!("{pair}.json"))
+    }
+
+    /// Measures of a pair, by their names: those that are there and are what they were.
+    pub fn measures(&self, pair: &str) -> Map<String, Value> {
+        let path = self.values(pair);
+        let mut known: Map<String, Value> = match sealed::read(&path) {
+            Ok(known) => known.unwrap_or_default(),
+            Err(error) => {
+                does_not_count(&error);
+                Map::new()
+            }
+        };
+        known.retain(|name, value| {
+            let good = number(value).is_some();
+            if !good {
+                does_not_count(&Error::input(format!("{value} is no number")).at(name).in_file(&path));
+            }
+            good
+        });
+        known
     }
 
     /// Keeps them.
     ///
     /// # Errors
     /// `Output` if they cannot be written.
-    pub fn put_measures(&self, pair: &str, values: &serde_json::Map<String, Value>) -> Result<()> {
-        let path = self.folder.join("measures").join(format!("{pair}.json"));
-        image::write_atomic(&path, format!("{:#}\n", Value::Object(values.clone())).as_bytes(), true)
+    pub fn put_measures(&self, pair: &str, values: &Map<String, Value>) -> Result<()> {
+        sealed::write(&self.values(pair), values)
     }
 
     /// The folder of what scenes share; it need not exist.
     pub fn shared(&self) -> PathBuf {
         self.folder.join("shared")
     }
+}
 
-    /// Digest of source files in these folders.
-    pub fn sources_of(folders: &[&str]) -> String {
-        sources(folders)
-    }
+/// Says why a file is not taken.
+pub fn does_not_count(error: &Error) {
+    log::warn!("{error}; it does not count and is made anew");
+}
 
-    /// Version of the code that measures.
-    pub fn measuring() -> String {
-        sources(&["engine/measure"])
+/// A measure as JSON, which has no infinity: its text.
+pub fn to_json(value: f64) -> Value {
+    if value.is_finite() { json!(value) } else { json!(value.to_string()) }
+}
+
+/// What [`to_json`] was given.
+pub fn number(value: &Value) -> Option<f64> {
+    match value {
+        Value::String(text) => text.parse().ok().filter(|value: &f64| !value.is_finite() && value.to_string() == *text),
+        value => value.as_f64(),
     }
 }
+
+#[cfg(test)]
+#[path = "cache_tests.rs"]
+mod tests;

@@ -114,10 +114,19 @@ pub fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCode> {
         return Ok(ExitCode::from(interrupt.exit_code()));
     }
     results.write_manifest(&folder)?;
+    interrupt.keep();
+    let all = results.runs.len() + results.missing;
+    if interrupt.requested() && results.missing > 0 {
+        // Who stops an experiment does not wait for the measures of a page.
+        let done = results.runs.len();
+        let folder = folder.display();
+        console.info(&format!(
+            "stopped: {done} of {all} runs are done; the same command goes on, `lucerna report {folder}` shows them"
+        ));
+        return Ok(ExitCode::from(STOPPED_EARLY));
+    }
     write(&results, &folder, console, args.json)?;
     if results.missing > 0 {
-        let all = results.runs.len() + results.missing;
-        console.info(&format!("stopped: {} of {all} runs are done; the same command goes on", results.runs.len()));
         return Ok(ExitCode::from(STOPPED_EARLY));
     }
     Ok(ExitCode::SUCCESS)

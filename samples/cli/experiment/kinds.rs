@@ -40,8 +40,6 @@ pub struct Kind {
     pub on_device: bool,
     /// It also takes pictures in place of scenes.
     pub of_images: bool,
-    /// Folders of the source tree that decide its pictures; when one changes, pictures are made again.
-    pub sources: &'static [&'static str],
     settings: fn(paper: bool, changes: &Changes) -> Result<Value>,
     /// The picture, or `None` if it was interrupted.
     pub render: fn(&mut Warm<'_>, &Job<'_>) -> Result<Option<Rendered>>,
@@ -164,16 +162,6 @@ pub const KINDS: &[Kind] = &[
         description: "image-space radiosity; layers direct, indirect, occlusion, albedo, normal, depth",
         on_device: true,
         of_images: false,
-        sources: &[
-            "engine/techniques/isr",
-            "engine/passes",
-            "engine/scene",
-            "shaders-glsl/common",
-            "shaders-glsl/isr",
-            "shaders-glsl/lib",
-            "shaders-glsl/passes",
-            "shaders-glsl/scene",
-        ],
         settings: |paper, changes| {
             let base = if paper { PictureSettings::paper() } else { PictureSettings::default() };
             let settings: PictureSettings = config::with(&base, changes)?;
@@ -188,19 +176,6 @@ pub const KINDS: &[Kind] = &[
         description: "instant global illumination; layers direct, indirect, specular, albedo, normal, depth",
         on_device: true,
         of_images: false,
-        sources: &[
-            "engine/techniques/igi",
-            "engine/passes",
-            "engine/rays",
-            "engine/reference/tracer",
-            "engine/scene",
-            "shaders-glsl/common",
-            "shaders-glsl/igi",
-            "shaders-glsl/lib",
-            "shaders-glsl/passes",
-            "shaders-glsl/rays",
-            "shaders-glsl/scene",
-        ],
         settings: igi::settings,
         render: igi::picture,
         available: || Ok(String::new()),
@@ -210,7 +185,6 @@ pub const KINDS: &[Kind] = &[
         description: "shadows from fullsphere irradiance vectors, and by brute force; layer irradiance",
         on_device: true,
         of_images: false,
-        sources: fiv::SOURCES,
         settings: fiv::settings,
         render: fiv::picture,
         available: || Ok(String::new()),
@@ -220,14 +194,6 @@ pub const KINDS: &[Kind] = &[
         description: "path tracer on the device; layers emission, direct, indirect, albedo, normal, depth, samples, variance",
         on_device: true,
         of_images: false,
-        sources: &[
-            "engine/reference/tracer",
-            "engine/rays",
-            "engine/scene",
-            "shaders-glsl/reference",
-            "shaders-glsl/rays",
-            "shaders-glsl/lib",
-        ],
         settings: |_, changes| {
             let settings: TracerSettings = config::with(&TracerSettings::default(), changes)?;
             settings.tracer.validate()?;
@@ -244,7 +210,6 @@ pub const KINDS: &[Kind] = &[
         description: "the program povray, with radiosity as the dissertation has it; the picture alone",
         on_device: false,
         of_images: false,
-        sources: &["samples/cli/export_pov"],
         settings: |_, changes| config::to_value(&config::with::<PovSettings>(&PovSettings::default(), changes)?),
         render: by_povray,
         available: || {
@@ -257,7 +222,6 @@ pub const KINDS: &[Kind] = &[
         description: "path tracer on the CPU; layers direct, indirect, albedo",
         on_device: false,
         of_images: false,
-        sources: &["engine/reference/path"],
         settings: |_, changes| config::to_value(&config::with::<PathSettings>(&PathSettings::default(), changes)?),
         render: path_picture,
         available: || Ok(String::new()),
@@ -267,7 +231,6 @@ pub const KINDS: &[Kind] = &[
         description: "tone mapping of a picture, or of a frame by image-space radiosity, on the device; layer important",
         on_device: true,
         of_images: true,
-        sources: &["engine/techniques", "engine/passes", "engine/scene", "shaders-glsl"],
         settings: tonemap::settings,
         render: tonemap::on_gpu,
         available: || Ok(String::new()),
@@ -277,7 +240,6 @@ pub const KINDS: &[Kind] = &[
         description: "the same by the slow program that it is held against",
         on_device: true,
         of_images: true,
-        sources: &["engine/techniques", "engine/passes", "engine/scene", "engine/reference/tonemap", "shaders-glsl"],
         settings: tonemap::settings,
         render: tonemap::on_cpu,
         available: || Ok(String::new()),

@@ -17,3 +17,5 @@ pub mod place;
 pub mod progress;
 pub mod results;
 pub mod run;
+pub mod sealed;
+pub mod sources;

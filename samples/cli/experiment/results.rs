@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use super::{
-    cache::Cache,
+    cache::{self, Cache},
     digest::Digest,
     file::{self, Changes, Experiment, Role},
     kinds::Times,
@@ -263,7 +263,7 @@ impl Results {
             let content = self.cache.content(&run.key).unwrap_or_else(|| run.key.clone());
             json!([content, layer])
         };
-        let mut which = json!([name(reference), name(test), baseline.map(name), Cache::measuring()]);
+        let mut which = json!([name(reference), name(test), baseline.map(name), cache::SOURCES]);
         if let Some(list) = which.as_array_mut().filter(|_| *options != Options::default()) {
             list.push(json!(format!("{options:?}")));
         }
@@ -281,19 +281,11 @@ impl Results {
             }
             for measure in unknown {
                 let value = measure.of(&pair, options).map_err(named)?.value;
-                // JSON has no infinity: its text.
-                known.insert(
-                    measure.name().into(),
-                    if value.is_finite() { json!(value) } else { json!(value.to_string()) },
-                );
+                known.insert(measure.name().into(), cache::to_json(value));
             }
             self.cache.put_measures(&which, &known)?;
         }
-        let value = |measure: &Measure| match known.get(measure.name()) {
-            Some(Value::String(text)) => text.parse().unwrap_or(f64::NAN),
-            Some(value) => value.as_f64().unwrap_or(f64::NAN),
-            None => f64::NAN,
-        };
+        let value = |measure: &Measure| known.get(measure.name()).and_then(cache::number).unwrap_or(f64::NAN);
         Ok(measures.iter().map(value).collect())
     }
 

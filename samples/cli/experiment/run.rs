@@ -10,7 +10,7 @@ use lucerna::{
 use serde_json::json;
 
 use super::{
-    cache::{Cache, Key},
+    cache::{self, Cache, Inputs, Key},
     file::{Changes, Experiment, IfMissing, Method, Scene},
     kinds::{self, Job, Kind, Warm},
     place::{self, Folders, Loaded, Placed},
@@ -55,7 +55,7 @@ pub struct Planned {
 /// # Errors
 /// `Input` for scenes that cannot be read, and whatever fails while rendering.
 pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Vec<Planned>)> {
-    let Context { gpu, cache, console, .. } = context;
+    let Context { gpu, cache: kept, console, .. } = context;
     let mut skipped = Vec::new();
     let needs = available(&experiment, &mut skipped)?;
     // All scenes are looked at first: what is missing shows at once, and how much there is to do.
@@ -87,6 +87,7 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
         experiment.size,
         gpu.describe()
     ));
+    let device = cache::device(gpu);
     let mut progress = Progress::new(context.progress, console.is_quiet() || context.dry, counts);
     let (mut planned, mut failed) = (Vec::new(), 0);
     'all: for (entry, list) in &steps {
@@ -101,16 +102,16 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
                 }
             },
         };
-        let mut warm = Warm::new(gpu, &loaded, cache.shared());
+        let mut warm = Warm::new(gpu, &loaded, kept.shared());
         for step in list {
             if context.interrupt.requested() {
                 break 'all;
             }
             let method = &experiment.methods[step.method];
             let one = One { experiment: &experiment, entry, loaded: &loaded, method, step, needs: &needs[step.method] };
-            let (done, key) = one.describe(gpu)?;
+            let (done, key) = one.describe(&device)?;
             let what = format!("{}/{} {}", done.scene, done.view, done.label());
-            let mut there = cache.times(&done.key).is_some();
+            let mut there = kept.times(&done.key).is_some();
             let begun = Instant::now();
             let mut seconds = None;
             if !there && !context.dry {
@@ -120,6 +121,7 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
                         seconds = Some(begun.elapsed().as_secs_f64());
                     }
                     Ok(false) => break 'all,
+                    Err(error) if context.interrupt.requested() && program::by_request(&error) => break 'all,
                     // Hours of other work must not be lost with one picture of a program that may be missing anyway.
                     Err(error) if method.if_missing == IfMissing::Skip && error.kind() != ErrorKind::DeviceLost => {
                         console.warning(&format!("{what} is skipped: {error}"));
@@ -137,7 +139,7 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
     let runs: Vec<Done> = planned.iter().filter(|run| run.there).map(|run| run.done.clone()).collect();
     let missing = total - runs.len() - failed;
     let facts = facts(&experiment, context);
-    Ok((Results { experiment, runs, skipped, missing, facts, cache: (*cache).clone() }, planned))
+    Ok((Results { experiment, runs, skipped, missing, facts, cache: (*kept).clone() }, planned))
 }
 
 /// Versions of the programs that methods need; `None` where one is missing and may be skipped.
@@ -192,18 +194,18 @@ impl One<'_> {
         kinds::find(&self.method.kind)
     }
 
-    fn describe(&self, gpu: &Gpu) -> Result<(Done, Key)> {
+    fn describe(&self, device: &str) -> Result<(Done, Key)> {
         let Self { experiment, entry, loaded, method, step, .. } = self;
         let view = self.placed().view(&loaded.pose, experiment.size);
-        let what = json!({
-            "scene": loaded.fingerprint,
-            "view": place::view_key(&view)?,
-            "settings": self.kind()?.effective(method, &step.variant)?,
-            "seed": experiment.seed,
-            "repeat": method.repeat,
-            "layers": method.layers,
-        });
-        let key = Key::new(self.kind()?, gpu, self.needs.as_deref().unwrap_or_default(), what)?;
+        let inputs = Inputs {
+            scene: loaded.fingerprint.clone(),
+            view: place::view_key(&view)?,
+            settings: self.kind()?.effective(method, &step.variant)?,
+            seed: experiment.seed,
+            repeat: method.repeat,
+            layers: method.layers.clone(),
+        };
+        let key = Key::new(self.kind()?, device, self.needs.as_deref().unwrap_or_default(), &inputs)?;
         let done = Done {
             scene: entry.name.clone(),
             group: entry.group.clone(),
@@ -256,6 +258,7 @@ impl One<'_> {
             ..rendered.layers
         };
         context.cache.put(key, &layers, &rendered.times)?;
+        context.interrupt.keep();
         Ok(true)
     }
 }
@@ -285,3 +288,7 @@ fn facts(experiment: &Experiment, context: &Context<'_>) -> Vec<(String, String)
     }
     facts
 }
+
+#[cfg(test)]
+#[path = "run_tests.rs"]
+mod tests;

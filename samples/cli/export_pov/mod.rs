@@ -22,6 +22,7 @@ use crate::{
     args::{TalkArgs, positive},
     config::{self, SettingsArgs},
     console, program,
+    signals::Interrupt,
     stage::{Stage, StageArgs},
 };
 
@@ -151,7 +152,7 @@ pub fn export(scene: &Scene, pose: &Pose, view: &View, settings: &Pov, stem: &st
 }
 
 impl Export {
-    /// Writes the file and its images beside it, the scene last.
+    /// Writes the file and its images beside it, the scene last: all of them or none.
     ///
     /// # Errors
     /// `Output` if one cannot be written or is there already.
@@ -161,10 +162,10 @@ impl Export {
         for (name, _) in &self.images {
             image::probe_output(&folder.join(name), overwrite)?;
         }
-        for (name, bytes) in &self.images {
-            image::write_atomic(&folder.join(name), bytes, overwrite)?;
-        }
-        image::write_atomic(path, self.text.as_bytes(), overwrite)
+        let paths: Vec<PathBuf> = self.images.iter().map(|(name, _)| folder.join(name)).collect();
+        let images = paths.iter().zip(&self.images).map(|(path, (_, bytes))| (path.as_path(), bytes.as_slice()));
+        let all: Vec<(&Path, &[u8])> = images.chain([(path, self.text.as_bytes())]).collect();
+        image::write_all_atomic(&all, overwrite)
     }
 }
 
@@ -231,6 +232,7 @@ pub fn run(args: &ExportPovArgs) -> Result<()> {
             time_limit: std::time::Duration::from_secs_f64(args.time_limit.min(1e9)),
             ..Default::default()
         };
+        Interrupt::install();
         let rendered = povray::render(&exported, args.stage.size, &options)?;
         let options = image::WriteOptions { overwrite: args.overwrite, ..Default::default() };
         image::write(picture, &rendered.picture, &options)?;

@@ -10,7 +10,7 @@ use std::{
 use lucerna::{Error, ErrorKind, Result, image, scene::Limits};
 
 use super::Export;
-use crate::args::Size;
+use crate::{args::Size, signals::Interrupt};
 
 /// How to run it.
 #[derive(Clone, Debug)]
@@ -90,6 +90,8 @@ pub fn render(export: &Export, size: Size, options: &Options) -> Result<Rendered
     if options.threads > 0 {
         command.arg(format!("+WT{}", options.threads.min(512)));
     }
+    // The other program and the folder of both must not be left behind.
+    let stop = Interrupt::stop();
     let begun = Instant::now();
     let mut child = command
         .current_dir(folder.path())
@@ -103,10 +105,12 @@ pub fn render(export: &Export, size: Size, options: &Options) -> Result<Rendered
         if let Some(status) = ended {
             break status;
         }
-        if begun.elapsed() > options.time_limit {
+        let asked = stop.check();
+        if asked.is_err() || begun.elapsed() > options.time_limit {
             // It may have ended just now; then there is nothing to stop.
             let _ = child.kill();
             let _ = child.wait();
+            asked?;
             let seconds = options.time_limit.as_secs_f64();
             return Err(failed(format!("POV-Ray was stopped after {seconds} s"))
                 .help("Allow more time, or lower pov.count or the picture's size"));

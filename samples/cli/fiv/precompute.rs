@@ -25,6 +25,7 @@ use crate::{
     ground::GroundArgs,
     program::{self, STOPPED_EARLY},
     progress::ProgressMode,
+    render::unless_stopped,
     signals::Interrupt,
     source,
 };
@@ -153,25 +154,32 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
     let mut meter = Meter::new(args.progress, console.is_quiet(), before, total);
     let (mut saved, mut took) = (Instant::now(), Duration::ZERO);
     let checkpoint = Duration::from_secs_f64(args.checkpoint);
-    plan.compute(&gpu, &light, &occluders, stored.range.end..range.end, |done, new| {
+    let computed = plan.compute(&gpu, &light, &occluders, stored.range.end..range.end, |done, new| {
         stored.push(new);
         meter.show(done - range.start);
         // All is written anew each time: at most a tenth of the time goes into it.
         if saved.elapsed() >= checkpoint.max(9 * took) {
             let begun = Instant::now();
+            let _saving = interrupt.saving();
             stored.write(&part, true)?;
             saved = Instant::now();
             took = saved - begun;
         }
         Ok(!interrupt.requested())
-    })?;
+    });
+    // What was computed before it was asked to stop counts.
+    unless_stopped(computed, &interrupt)?;
     if stored.range.end < range.end {
+        let _saving = interrupt.saving();
         stored.write(&part, true)?;
         let done = stored.range.end - range.start;
         console.info(&format!("stopped after {done} of {total} samples; the same command goes on"));
         return Ok(ExitCode::from(STOPPED_EARLY));
     }
+    let saving = interrupt.saving();
     stored.write(&args.output, args.overwrite)?;
+    interrupt.keep();
+    drop(saving);
     let _ = std::fs::remove_file(&part);
     let bytes = std::fs::metadata(&args.output).map_or(0, |m| m.len());
     console.info(&format!("wrote {}: {bytes} bytes", args.output.display()));

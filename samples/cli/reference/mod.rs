@@ -9,8 +9,8 @@ pub use options::{ReferenceArgs, Settings, Show, Span};
 use std::{path::PathBuf, process::ExitCode, time::Instant};
 
 use lucerna::{
-    Error, Result,
-    gpu::Gpu,
+    Error, Result, Stop,
+    gpu::{Gpu, GpuOptions},
     image::{Layer, Layers, Metadata, WriteOptions},
     reference::tracer::{Progress, Tracer},
     scene::{NoteKind, View, builtin},
@@ -86,7 +86,8 @@ pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
     {
         console.info(&format!("note: {}: {}", note.place, note.text));
     }
-    let gpu = Gpu::new(args.device.options()?)?;
+    // Between two tiles it stops by itself, with all that was computed: the device must not be left in the middle of one.
+    let gpu = Gpu::new(GpuOptions { stop: Stop::default(), ..args.device.options()? })?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
     let (pose, view) = stage.at(args.stage.time, args.stage.size)?;
     let mut tracer = Tracer::new(&gpu, &stage.scene, &pose)?;
@@ -105,6 +106,8 @@ pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
     let goals =
         Goals { samples: settings.samples, error: args.target_error, time: args.time_limit.map(|limit| limit.0) };
     let mut meter = Meter::new(args.progress, console.is_quiet(), goals, tracer.progress()?);
+    // Hours of work may be in the sums from now on.
+    let _saving = interrupt.saving();
     let end = work(args, &settings, &mut tracer, &mut checkpoint, &mut meter, &interrupt)?;
     let done = tracer.progress()?;
     if done.paths == 0 && end == End::Interrupt {
@@ -139,6 +142,7 @@ pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
         layers.metadata.extra.insert("part of a sample".into(), format!("{:.6}", done.samples.fract()));
     }
     let written = outputs.write(&values, &layers)?;
+    interrupt.keep();
     let files: Vec<&str> = written.iter().map(|(name, _)| name.as_str()).collect();
     console.info(&format!("wrote {}", files.join(" ")));
     if end.is_early() {

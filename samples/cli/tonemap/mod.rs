@@ -164,6 +164,7 @@ pub fn run(args: &TonemapArgs, console: Console) -> Result<ExitCode> {
             });
             if let Some((before, done, writer)) = writing.take() {
                 results.take(before, join(writer).map(|written| done.with(written)))?;
+                interrupt.keep();
                 // What failed may be of another sequence.
                 results.lost &= input.sequence == Some(false);
             }
@@ -174,13 +175,17 @@ pub fn run(args: &TonemapArgs, console: Console) -> Result<ExitCode> {
                         writing = Some((input, done, scope.spawn(move || unwritten.write())));
                     } else {
                         results.take(input, unwritten.write().map(|written| done.with(written)))?;
+                        interrupt.keep();
                     }
                 }
+                // Asked to stop: it is neither done nor has it failed.
+                Err(error) if interrupt.requested() && program::by_request(&error) => break,
                 Err(error) => results.take(input, Err(error))?,
             }
         }
         if let Some((input, done, writer)) = writing {
             results.take(input, join(writer).map(|written| done.with(written)))?;
+            interrupt.keep();
         }
         Ok(about)
     })?;

@@ -1,6 +1,9 @@
 //! Shadows from fullsphere irradiance vectors, and their brute force.
 
-use std::{path::PathBuf, time::Instant};
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
 
 use glam::{Vec2, Vec3};
 use lucerna::{
@@ -9,7 +12,7 @@ use lucerna::{
     graph::Runner,
     image::{Layer, Layers, Precision},
     scene::{
-        Pose, Scene, View,
+        Limits, Pose, Scene, View,
         bvh::{Bvh, Ray, TriangleId},
         resident::Resident,
     },
@@ -21,23 +24,9 @@ use serde_json::{Value, json};
 use super::{Job, Rendered, Warm, on_device, read};
 use crate::{
     config,
-    experiment::{cache::Cache, digest::Digest, file::Changes},
+    experiment::{cache, digest::Digest, file::Changes, sealed},
     shown::Shown,
 };
-
-/// What decides vectors.
-pub(super) const SOURCES: &[&str] = &[
-    "engine/techniques/fiv",
-    "engine/passes",
-    "engine/rays",
-    "engine/scene",
-    "shaders-glsl/common",
-    "shaders-glsl/fiv",
-    "shaders-glsl/lib",
-    "shaders-glsl/passes",
-    "shaders-glsl/rays",
-    "shaders-glsl/scene",
-];
 
 pub(super) fn settings(_paper: bool, changes: &Changes) -> Result<Value> {
     let settings: PictureSettings = config::with(&PictureSettings::default(), changes)?;
@@ -57,9 +46,12 @@ struct Kept {
     facts: Vec<(String, f64)>,
 }
 
-/// Time of computing the vectors of one thing, beside their file.
+/// What stands beside the vectors of one thing.
 #[derive(Serialize, Deserialize)]
 struct Cost {
+    /// Digest of their file.
+    vectors: String,
+    /// Time of computing them.
     seconds: f64,
 }
 
@@ -180,7 +172,11 @@ fn vectors(
         let alone = Plan { occluders: vec![plan.occluders[index].clone()], ..plan.clone() };
         let name = name(gpu, &alone, settings)?;
         let (file, cost) = (folder.join(format!("{name}.fiv")), folder.join(format!("{name}.json")));
-        let (part, spent) = match known(&file, &cost, &alone) {
+        let known = known(&file, &cost, &alone).unwrap_or_else(|error| {
+            cache::does_not_count(&error);
+            None
+        });
+        let (part, spent) = match known {
             Some(known) => known,
             None => {
                 let light = match &mut light {
@@ -192,8 +188,8 @@ fn vectors(
                     Error::new(lucerna::ErrorKind::Output, "cannot be made").in_file(&folder).caused_by(e)
                 })?;
                 computed.0.write(&file, true)?;
-                let text = format!("{}\n", config::to_value(&Cost { seconds: computed.1 })?);
-                lucerna::image::write_atomic(&cost, text.as_bytes(), true)?;
+                let vectors = Digest::of(&whole_file(&file)?).hex();
+                sealed::write(&cost, &Cost { vectors, seconds: computed.1 })?;
                 computed
             }
         };
@@ -206,21 +202,34 @@ fn vectors(
 
 /// Of everything that decides vectors.
 fn name(gpu: &Gpu, plan: &Plan, settings: &Settings) -> Result<String> {
-    let about = gpu.describe();
-    let device = format!("{}, {} {}", about.device, about.driver, about.driver_info);
     // How samples lie is chosen from these; all else that decides them is in the plan.
     let paces = (settings.adaptive, settings.interpolation);
-    let text = json!([Cache::sources_of(SOURCES), device, config::to_value(plan)?, config::to_value(&paces)?]);
+    let text = json!([cache::SOURCES, cache::device(gpu), config::to_value(plan)?, config::to_value(&paces)?]);
     Ok(Digest::of(text.to_string().as_bytes()).hex())
 }
 
-fn known(file: &std::path::Path, cost: &std::path::Path, plan: &Plan) -> Option<(Stored, f64)> {
-    let cost: Cost = serde_json::from_str(&config::read_text(cost).ok()?).ok()?;
-    let stored = Stored::read(file).ok()?;
+/// Vectors that are there.
+///
+/// # Errors
+/// `Input`, naming the file, if they are not those that were kept.
+fn known(file: &Path, cost: &Path, plan: &Plan) -> Result<Option<(Stored, f64)>> {
+    let Some(known) = sealed::read::<Cost>(cost)? else { return Ok(None) };
+    let bytes = whole_file(file)?;
+    if Digest::of(&bytes).hex() != known.vectors {
+        return Err(Error::input("are not the vectors that were kept: damaged, or others").in_file(file));
+    }
+    let stored = Stored::decode(&bytes).map_err(|error| error.in_file(file))?;
     // Its name is that of everything else.
     let hashes =
         |of: &Plan| (of.environment_hash.clone(), of.occluders.iter().map(|k| k.hash.clone()).collect::<Vec<_>>());
-    (stored.is_complete() && hashes(&stored.plan) == hashes(plan)).then_some((stored, cost.seconds))
+    if !stored.is_complete() || hashes(&stored.plan) != hashes(plan) {
+        return Err(Error::input("are the vectors of something else").in_file(file));
+    }
+    Ok(Some((stored, known.seconds)))
+}
+
+fn whole_file(file: &Path) -> Result<Vec<u8>> {
+    lucerna::image::read_file_checked(file, Limits::default().max_file)
 }
 
 fn compute(

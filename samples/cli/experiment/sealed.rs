@@ -1,0 +1,47 @@
+//! Text files that say themselves whether they are whole: `{ "digest": …, "holds": … }`, the digest of the compact text of what it holds.
+
+use std::path::Path;
+
+use lucerna::{Error, Result, image};
+use serde::{Serialize, de::DeserializeOwned};
+use serde_json::{Value, json};
+
+use super::digest::Digest;
+use crate::config;
+
+/// Writes it, over one that is there.
+///
+/// # Errors
+/// `Output` if it cannot be written.
+pub fn write(path: &Path, value: &impl Serialize) -> Result<()> {
+    let value = config::to_value(value)?;
+    let digest = digest(&value);
+    image::write_atomic(path, format!("{:#}\n", json!({ "digest": digest, "holds": value })).as_bytes(), true)
+}
+
+/// Reads it; `None`: it is not there.
+///
+/// # Errors
+/// `Input`, naming the file, if it is damaged or is something else.
+pub fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
+    // A link that leads nowhere is there, and cannot be read.
+    if path.symlink_metadata().is_err() {
+        return Ok(None);
+    }
+    let parsed: Result<Value, _> = serde_json::from_str(&config::read_text(path)?);
+    let value = match parsed {
+        Ok(Value::Object(mut whole)) => match (whole.remove("digest"), whole.remove("holds")) {
+            (Some(Value::String(said)), Some(value)) if said == digest(&value) => value,
+            _ => return Err(Error::input("is damaged, or was changed").in_file(path)),
+        },
+        _ => return Err(Error::input("is damaged, or of another program").in_file(path)),
+    };
+    match serde_json::from_value(value) {
+        Ok(value) => Ok(Some(value)),
+        Err(error) => Err(Error::input(format!("is of another version: {error}")).in_file(path)),
+    }
+}
+
+fn digest(value: &Value) -> String {
+    Digest::of(value.to_string().as_bytes()).hex()
+}
