@@ -23,7 +23,8 @@ const BRIGHT: f64 = 0.01;
 
 /// Irradiance in W/m² as a function of the normal. Default: no environment.
 ///
-/// Exact at its nodes but for cells (2.8°) that the horizon of a node cuts, linear between them: within 1 % on photographed skies. Cells
+/// Exact at its nodes but for cells (2.8°) that the horizon of a node cuts, linear between them: within 0.7 % on four photographed skies, and 2.2 % in the
+/// darkest direction of a room lit through its windows (ennis). Cells
 /// that send a hundredth of all light or more, such as the sun's, would be off where they rise and set; the brightest of them are summed by
 /// themselves.
 #[derive(Clone, Debug, Default, PartialEq)]
