@@ -26,7 +26,8 @@ fn stage(size: f32) -> (Stage, View) {
     stage.quad(matt, vec3(-s, 0.0, -s), vec3(2.0 * s, 0.0, 0.0), vec3(0.0, 2.0 * s, 0.0));
     stage.point(vec3(0.3 * s, 1.2 * s, 0.2 * s), Vec3::splat(s * s));
     let projection = Projection::Perspective { yfov: 1.0, aspect: None, znear: 0.05 * s, zfar: Some(10.0 * s) };
-    let world = Mat4::look_at_rh(vec3(0.2 * s, 0.8 * s, 1.6 * s), vec3(0.0, 0.5 * s, 0.0), Vec3::Y).inverse();
+    // Straight along −Z, from half the wall's height.
+    let world = Mat4::from_translation(vec3(0.2 * s, 0.8 * s, 1.6 * s));
     (stage, View::new(&Camera { name: String::new(), projection }, world, [24, 18]))
 }
 

@@ -50,9 +50,9 @@ fn every_srgb_code_has_its_exact_light() {
             worst = worst.max((f64::from(*light) / exact - 1.0).abs());
         }
         println!("linear filter {linear}: off by {worst} at most");
-        // Half floats have 11 bits: half of the last one is 2.4e-4. Where the filter blends neighbours, the place within a texel
+        // Half floats have 11 bits: half of the last one is 4.9e-4. Where the filter blends neighbours, the place within a texel
         // (8 bits on most devices) is not exactly its middle.
-        let allowed = if linear { 4e-4 } else { 2.5e-4 };
+        let allowed = if linear { 6e-4 } else { 4.9e-4 };
         assert!(light.is_empty() || worst < allowed, "linear filter {linear}: {worst}");
     }
 }

@@ -62,7 +62,8 @@ fn a_constant_environment_of_any_size_gives_pi_times_its_radiance() {
         for n in normals(60) {
             let off = (e.at(n) / (std::f32::consts::PI * radiance) - 1.0).abs().max_element();
             assert!(off < 5e-4, "{width}×{height}: {off} towards {n}");
-            assert!(e.at(n).distance(Irradiance::constant(radiance).at(n)) < 2e-3);
+            let plain = Irradiance::constant(radiance).at(n);
+            assert!((plain / (std::f32::consts::PI * radiance) - 1.0).abs().max_element() < 1e-6, "{plain}");
         }
     }
 }
@@ -88,12 +89,12 @@ fn a_sun_of_one_pixel_keeps_its_cosine() {
         let greatest = normals(200).map(|n| brute_force(&sky, n).x).fold(0.0, f32::max);
         let off = normals(500).map(|n| (e.at(n) - brute_force(&sky, n)).abs().x / greatest).fold(0.0, f32::max);
         println!("off by {off} of the brightest");
-        assert!(off < 0.01, "{off}");
-        // In the light of a hazy sky as well, which sends a fifth, the error is small against the irradiance itself.
+        assert!(off < 1e-3, "{off}");
+        // Beside a sky that sends a fifth, where the sun rises and sets as well.
         sky.pixels.iter_mut().for_each(|p| *p += Vec3::splat(0.2 * greatest / std::f32::consts::PI));
         let off = error(&sky, 200);
         println!("with haze {off}");
-        assert!(off < 0.03, "{off}");
+        assert!(off < 5e-3, "{off}");
     }
 }
 
@@ -119,9 +120,14 @@ fn rotation_turns_counter_clockwise_seen_from_above() {
     assert!(e.at(Vec3::NEG_X).x > 2.0 && e.at(Vec3::X).x < 0.1);
 }
 
+/// A table whose irradiance at each node is that node's normal.
+fn normals_of_nodes() -> Irradiance {
+    Irradiance::from_table((0..SIDE * SIDE).map(|i| direction(i % SIDE, i / SIDE).as_vec3()).collect(), &[])
+}
+
 #[test]
 fn nodes_are_looked_up_where_they_lie() {
-    let e = Irradiance { nodes: (0..SIDE * SIDE).map(|i| direction(i % SIDE, i / SIDE).as_vec3()).collect() };
+    let e = normals_of_nodes();
     for i in 0..SIDE * SIDE {
         let n = direction(i % SIDE, i / SIDE).as_vec3();
         assert!(e.at(n).distance(n) < 1e-5, "{n} {}", e.at(n));
@@ -137,7 +143,7 @@ proptest! {
             n[flat] = 0.0;
         }
         prop_assume!(n.length() > 0.1);
-        let e = Irradiance { nodes: (0..SIDE * SIDE).map(|i| direction(i % SIDE, i / SIDE).as_vec3()).collect() };
+        let e = normals_of_nodes();
         let n = n.normalize();
         prop_assert!(e.at(n).distance(n) < 2e-3);
         for axis in Vec3::AXES {

@@ -140,7 +140,7 @@ pub(super) fn pack(scene: &Scene, max_side: u32, max_layers: u32) -> Result<Pack
 pub(super) enum Decoding {
     /// The device, as it filters: four bytes a texel, and all mip levels. llvmpipe's curve is off by −1.2 to +0.5 %.
     Device,
-    /// This process, to half floats (within 2.5e-4, as Mitsuba 3 keeps textures of 8 bits): eight bytes a texel, the finest level alone,
+    /// This process, to half floats (within 5e-4, as Mitsuba 3 keeps textures of 8 bits): eight bytes a texel, the finest level alone,
     /// which is one and a half times as much memory. For rays, which read nothing else.
     Exact,
 }
