@@ -56,10 +56,11 @@ fn light_that_alpha_would_hide_is_written_as_seen_over_black() {
         let near = |(a, b): (&f32, &f32)| srgb::encode_u8(*a) == srgb::encode_u8(*b);
         assert!(found.iter().zip(&expected).all(near), "{i}: {found:?} {expected:?}");
     }
-    // Glass and black holes keep their alpha; so does a bright edge among many pixels. EXR files keep alpha always.
+    // Glass, black holes and bright edges keep their alpha, and so does a glow of one pixel among many. EXR files keep alpha always.
     let mut edge = [0.5, 0.5, 0.5, 1.0].repeat(200);
-    edge.extend([0.6, 0.6, 0.6, 0.5, 0.0, 0.0, 0.0, 0.0, 0.1, 0.2, 0.3, 0.4]);
-    let edge = Layers::rgba(203, 1, edge);
+    edge.extend([0.6, 0.6, 0.6, 0.5].repeat(100));
+    edge.extend([0.0, 0.0, 0.0, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.5, 0.5, 0.0]);
+    let edge = Layers::rgba(303, 1, edge);
     let (file, report) = image::encode(Format::Png, &edge, &WriteOptions::default()).unwrap();
     assert!(!report.alpha_left_out);
     assert_eq!(read(&file).main().unwrap().channels, ["R", "G", "B", "A"]);

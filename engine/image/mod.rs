@@ -6,8 +6,8 @@
 //! JPEG files.
 //!
 //! Colour is premultiplied by alpha, as in OpenEXR: it is what is seen over black, and a pixel of alpha 0 may shine. PNG files hold it
-//! unassociated: what is read of a pixel of alpha 0 is black, whatever colour the file hides there, and a picture with light that its alpha
-//! would hide is written as it is seen over black, without alpha ([`Report::alpha_left_out`]).
+//! unassociated: what is read of a pixel of alpha 0 is black, whatever colour the file hides there, and a picture with light at alpha 0 is
+//! written as it is seen over black, without alpha ([`Report::alpha_left_out`]).
 //!
 //! Everything is encoded in memory and then written by [`write_atomic`]: a file is complete or not there.
 
@@ -76,8 +76,8 @@ pub struct Report {
     pub negative: u64,
     /// Finite samples too large for 16 bits, written as 65504.
     pub overflow: u64,
-    /// The PNG file has no alpha, which the layer has: viewers would not have shown a hundredth or more of its light, which stands where
-    /// alpha is small or 0 (flames, glows).
+    /// The PNG file has no alpha, which the layer has: more than a hundredth of its light stands where alpha is 0 (flames, glows), and viewers
+    /// would not have shown it.
     pub alpha_left_out: bool,
     /// Where the first NaN or infinity stands: `layer "direct", pixel (3, 4), channel G`.
     pub first: Option<String>,

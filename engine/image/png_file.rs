@@ -66,22 +66,22 @@ pub(super) fn encode(picture: &Layers, layer: &Layer, options: &WriteOptions, re
     Ok(out)
 }
 
-/// Share of the light of a picture over black that may be lost by unassociated colour, which ends at 1: bright edges lose a little.
+/// Share of the light of a picture that may lie where alpha is none: a pixel or two at the rim of a mask.
 const HIDDEN: f64 = 0.01;
 
-/// Whether a picture of premultiplied colour has light that no unassociated colour between 0 and 1 gives at its alpha.
+/// Whether a picture of premultiplied colour has light where alpha is 0 in eight bits, and no unassociated colour could show it. Where there is
+/// a little alpha, colours end at 1 as those of opaque pixels do.
 fn hides_light(layer: &Layer, colours: &[usize], alpha: usize, options: &WriteOptions) -> bool {
     let scale = options.exposure_ev.exp2();
-    let (mut all, mut shown) = (0.0, 0.0);
+    let (mut all, mut hidden) = (0.0, 0.0);
     for pixel in layer.data.chunks_exact(layer.channels.len()) {
-        let alpha = clamp(pixel[alpha]);
-        for &channel in colours {
-            let light = clamp(pixel[channel] * scale);
-            all += f64::from(light);
-            shown += f64::from(light.min(alpha));
+        let light: f64 = colours.iter().map(|&channel| f64::from(clamp(pixel[channel] * scale))).sum();
+        all += light;
+        if encoding::eight_bits(clamp(pixel[alpha])) == 0 {
+            hidden += light;
         }
     }
-    shown < (1.0 - HIDDEN) * all
+    hidden > HIDDEN * all
 }
 
 /// Where the samples of a file come from.
