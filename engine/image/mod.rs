@@ -26,7 +26,7 @@ pub mod srgb;
 use std::path::Path;
 
 pub use color::{Chromaticities, REC_709};
-pub use file::{probe_output, read_file_checked, write_atomic};
+pub use file::{probe_output, read_file_checked, read_head_checked, write_atomic};
 pub use metadata::Metadata;
 pub use picture::{Layer, Layers, Precision};
 pub use probe::from_angular_map;
