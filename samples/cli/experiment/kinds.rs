@@ -245,7 +245,11 @@ pub const KINDS: &[Kind] = &[
         on_device: false,
         of_images: false,
         sources: &["samples/cli/export_pov"],
-        settings: |_, changes| config::to_value(&config::with::<PovSettings>(&PovSettings::default(), changes)?),
+        settings: |_, changes| {
+            let settings: PovSettings = config::with(&PovSettings::default(), changes)?;
+            settings.pov.check()?;
+            config::to_value(&settings)
+        },
         render: by_povray,
         available: || {
             let program = povray::find().map_err(|error| error.to_string())?;
@@ -258,7 +262,16 @@ pub const KINDS: &[Kind] = &[
         on_device: false,
         of_images: false,
         sources: &["engine/reference/path"],
-        settings: |_, changes| config::to_value(&config::with::<PathSettings>(&PathSettings::default(), changes)?),
+        settings: |_, changes| {
+            let settings: PathSettings = config::with(&PathSettings::default(), changes)?;
+            match (settings.samples, settings.bounces) {
+                (1..=MOST_SAMPLES, 0..=MOST_BOUNCES) => config::to_value(&settings),
+                (1..=MOST_SAMPLES, other) => {
+                    Err(Error::usage(format!("bounces is {other}, allowed are 0 to {MOST_BOUNCES}")))
+                }
+                (other, _) => Err(Error::usage(format!("samples is {other}, allowed are 1 to {MOST_SAMPLES}"))),
+            }
+        },
         render: path_picture,
         available: || Ok(String::new()),
     },
@@ -401,6 +414,8 @@ fn path_picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> 
 
 /// More paths a pixel are no experiment.
 const MOST_SAMPLES: u32 = 1 << 24;
+/// As for the path tracer on the device.
+const MOST_BOUNCES: u32 = 1000;
 
 /// Settings of the path tracer on the device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
