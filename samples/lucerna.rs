@@ -5,7 +5,7 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::{Parser, Subcommand};
 use lucerna::{Result, scene::builtin};
 use lucerna_samples::{
-    args::{DeviceArgs, TalkArgs},
+    args::TalkArgs,
     compare::{self, CompareArgs},
     console::{self, Console},
     devices,
@@ -13,7 +13,7 @@ use lucerna_samples::{
     export_pov::{self, ExportPovArgs},
     info, inspect, program,
     reference::{self, ReferenceArgs},
-    rerun,
+    rerun::{self, RerunArgs},
     source::SceneArgs,
     tonemap::{self, TonemapArgs},
     views::{self, command::ViewsArgs},
@@ -52,21 +52,8 @@ enum Command {
     /// Make a reference picture by path tracing: samples, time or an error decide when it is done
     #[command(args_override_self = true)]
     Reference(Box<ReferenceArgs>),
-    /// Make a picture again from what it says about itself, and compare the bits
-    Rerun {
-        /// An image that `render` wrote
-        image: PathBuf,
-        /// Largest difference of two samples that is accepted [default: the same bits]
-        #[arg(long, value_name = "X", value_parser = tolerance)]
-        tolerance: Option<f32>,
-        #[command(flatten)]
-        device: DeviceArgs,
-        #[command(flatten)]
-        talk: TalkArgs,
-        /// Print one JSON document
-        #[arg(long)]
-        json: bool,
-    },
+    /// Make a picture again from what it says about itself, in memory, and compare the bits
+    Rerun(RerunArgs),
     /// Write a scene and a view as a POV-Ray file, and render it where `povray` is installed
     ExportPov(Box<ExportPovArgs>),
     /// Measure how far images are from a reference
@@ -110,18 +97,14 @@ impl Command {
             Self::Compare(args) => args.talk.console(),
             Self::Tonemap(args) => args.talk.console(),
             Self::Reference(args) => args.talk.console(),
+            Self::Rerun(args) => args.talk.console(),
             Self::Inspect { talk, .. }
             | Self::Info { talk, .. }
-            | Self::Rerun { talk, .. }
             | Self::Devices { talk, .. }
             | Self::List { talk, .. } => talk.console(),
             Self::ExportPov(args) => args.talk.console(),
         }
     }
-}
-
-fn tolerance(text: &str) -> Result<f32, String> {
-    text.parse().ok().filter(|x: &f32| x.is_finite() && *x >= 0.0).ok_or_else(|| "expected a number from 0 on".into())
 }
 
 fn main() -> ExitCode {
@@ -133,6 +116,7 @@ fn main() -> ExitCode {
         Command::Compare(args) => compare::run(args, console),
         Command::Tonemap(args) => tonemap::run(args, console),
         Command::Reference(args) => reference::run(args, console),
+        Command::Rerun(args) => rerun::run(args, console),
         _ => serve(command, console).map(|()| ExitCode::SUCCESS),
     })
 }
@@ -154,14 +138,6 @@ fn serve(command: Command, console: Console) -> Result<()> {
                 false => console::print(&info::text(&image, &layers)),
             }
         }
-        Command::Rerun { image, tolerance, device, json, .. } => {
-            let result = rerun::rerun(&image, &device, console.is_quiet())?;
-            match json {
-                true => console::print_json(&console::to_json(&result)?)?,
-                false => console::print(&result.text(&image))?,
-            }
-            result.verdict(&image, tolerance)
-        }
         Command::ExportPov(args) => export_pov::run(&args),
         Command::Devices { require_gpu, json, .. } => {
             let list = devices::list(require_gpu)?;
@@ -173,6 +149,7 @@ fn serve(command: Command, console: Console) -> Result<()> {
         Command::Compare(args) => compare::run(&args, console).map(drop),
         Command::Tonemap(args) => tonemap::run(&args, console).map(drop),
         Command::Reference(args) => reference::run(&args, console).map(drop),
+        Command::Rerun(args) => rerun::run(&args, console).map(drop),
         Command::Views(args) => views::command::run(&args, console),
         // It chooses its exit code itself.
         Command::Reproduce(args) => experiment::reproduce(&args, console).map(|_| ()),

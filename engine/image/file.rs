@@ -45,6 +45,17 @@ fn read_checked(path: &Path, max_bytes: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// The first bytes of a regular file, at most `length`: what a large file says of itself. Folders, devices and pipes are refused as by
+/// [`read_file_checked`]. Errors name the file.
+pub fn read_head_checked(path: impl AsRef<Path>, length: u64) -> Result<Vec<u8>> {
+    let path = path.as_ref();
+    let cannot = |error: io::Error| Error::input("cannot be read").caused_by(error).in_file(path);
+    regular(&fs::metadata(path).map_err(cannot)?).map_err(|error| error.in_file(path))?;
+    let mut head = Vec::new();
+    File::open(path).map_err(cannot)?.take(length).read_to_end(&mut head).map_err(cannot)?;
+    Ok(head)
+}
+
 fn regular(metadata: &fs::Metadata) -> Result<()> {
     if metadata.is_dir() {
         Err(Error::input("is a folder, a file is needed"))
@@ -318,6 +329,8 @@ mod tests {
         let error = read_file_checked(&path, 4).unwrap_err().to_string();
         assert!(error.contains("five.bin: 5 bytes, at most 4"), "{error}");
         assert!(read_file_checked(folder.path(), 4).unwrap_err().to_string().contains("is a folder"));
+        assert_eq!(super::read_head_checked(&path, 3).unwrap(), b"123");
+        assert!(super::read_head_checked(folder.path(), 3).unwrap_err().to_string().contains("is a folder"));
         let error = read_file_checked(folder.path().join("none"), 4).unwrap_err();
         assert!(error.to_string().contains("none: cannot be read"), "{error}");
         assert_eq!(error.kind(), ErrorKind::Input);

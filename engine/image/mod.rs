@@ -32,7 +32,9 @@ pub mod srgb;
 use std::path::Path;
 
 pub use color::{Chromaticities, REC_709};
-pub use file::{leave_nothing_unfinished, probe_output, read_file_checked, write_all_atomic, write_atomic};
+pub use file::{
+    leave_nothing_unfinished, probe_output, read_file_checked, read_head_checked, write_all_atomic, write_atomic,
+};
 pub use metadata::Metadata;
 pub use picture::{Layer, Layers, Precision};
 pub use probe::from_angular_map;

@@ -45,7 +45,11 @@ impl Default for Ground {
 }
 
 impl Ground {
-    fn check(&self, things: usize) -> Result<()> {
+    /// Whether the numbers are in their ranges for so many different things.
+    ///
+    /// # Errors
+    /// `Usage`, naming the number.
+    pub fn check(&self, things: usize) -> Result<()> {
         let wrong = |key: &str, found: String, allowed: &str| {
             Err(Error::usage(format!("{found} is not allowed; allowed: {allowed}")).at(format!("ground.{key}")))
         };

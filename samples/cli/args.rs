@@ -161,7 +161,7 @@ impl std::fmt::Display for Size {
 pub struct Frames(pub Range<u32>);
 
 /// Most frames of one run.
-const MAX_FRAMES: u32 = 1_000_000;
+pub const MAX_FRAMES: u32 = 1_000_000;
 
 impl Frames {
     /// The frames of `--frames`, or only frame 0.

@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use lucerna::{Error, ErrorKind, Result};
+use lucerna::{Error, ErrorKind, Result, image};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::Value;
 
@@ -108,15 +108,13 @@ pub fn to_value<S: Serialize>(settings: &S) -> Result<Value> {
         .map_err(|error| Error::new(ErrorKind::Runtime, "settings are not JSON").caused_by(error))
 }
 
-/// Reads a small text file.
+/// Reads a small text file: a regular one of at most 1 MiB, whatever length it states.
 pub(crate) fn read_text(path: &Path) -> Result<String> {
-    let length = std::fs::metadata(path)
-        .map_err(|error| Error::input("could not be read").in_file(path).caused_by(error))?
-        .len();
-    if length > MAX_FILE {
-        return Err(Error::input(format!("is {length} bytes, at most {MAX_FILE} are allowed")).in_file(path));
-    }
-    std::fs::read_to_string(path).map_err(|error| Error::input("could not be read").in_file(path).caused_by(error))
+    let bytes = image::read_file_checked(path, MAX_FILE)?;
+    String::from_utf8(bytes).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        Error::input(format!("byte {at} is not UTF-8, which text files are made of")).in_file(path)
+    })
 }
 
 /// What is wrong, and with which key.
@@ -362,6 +360,27 @@ mod tests {
         assert!(text.contains("plain"), "{text}");
         assert_eq!(with(Some("samples = -1"), &[]).unwrap_err().exit_code(), 3);
         assert_eq!(with(Some("samples = = 1"), &[]).unwrap_err().exit_code(), 3);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn only_regular_files_of_some_length_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe.toml");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        for path in [Path::new("/dev/zero"), &pipe] {
+            let error = effective(&Settings::default(), Some(path), &[]).unwrap_err();
+            let text = error.to_string();
+            assert!(error.exit_code() == 3 && text.contains("a device or a pipe"), "{text}");
+            assert!(text.contains(&path.display().to_string()), "{text}");
+        }
+        let path = folder.path().join("s.toml");
+        std::fs::write(&path, vec![b'#'; 1 << 20]).unwrap();
+        read_text(&path).unwrap();
+        std::fs::write(&path, vec![b'#'; (1 << 20) + 1]).unwrap();
+        assert!(read_text(&path).unwrap_err().to_string().contains("at most 1048576"));
+        std::fs::write(&path, b"a = \"\xff\"").unwrap();
+        assert!(read_text(&path).unwrap_err().to_string().contains("byte 5 is not UTF-8"));
     }
 
     #[test]

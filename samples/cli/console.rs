@@ -1,6 +1,9 @@
 //! What a program says on stderr, and the one place that writes to stdout.
 
-use std::io::{IsTerminal, Write};
+use std::{
+    borrow::Cow,
+    io::{IsTerminal, Write},
+};
 
 use lucerna::{Error, ErrorKind, Result};
 
@@ -58,24 +61,41 @@ impl Console {
     }
 
     fn line(&self, label: &str, color: &str, text: &str) {
-        let text = text.trim_end().replace('\n', " | ");
+        let text = legible(text.trim_end()).replace('\n', " | ");
         if self.color {
-            self.plain(&format!("\x1b[1;{color}m{label}\x1b[0m: {text}"));
+            self.raw(&format!("\x1b[1;{color}m{label}\x1b[0m: {text}"));
         } else {
-            self.plain(&format!("{label}: {text}"));
+            self.raw(&format!("{label}: {text}"));
         }
     }
 
-    /// stderr may be closed: that is no reason to stop.
     fn plain(&self, text: &str) {
+        self.raw(&legible(text));
+    }
+
+    /// stderr may be closed: that is no reason to stop.
+    fn raw(&self, text: &str) {
         let _ = writeln!(std::io::stderr().lock(), "{text}");
     }
+}
+
+/// Names and texts of files from elsewhere as a terminal may show them: what it would obey (escape sequences) is written out.
+pub fn legible(text: &str) -> Cow<'_, str> {
+    let obeyed = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
+    if !text.contains(obeyed) {
+        return text.into();
+    }
+    let mut out = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        if obeyed(c) { out.extend(c.escape_default()) } else { out.push(c) }
+    }
+    out.into()
 }
 
 /// Writes `text` and a line end to stdout. A reader that went away (`| head`) is not an error.
 pub fn print(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
+    match out.write_all(legible(text).as_bytes()).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
             Err(Error::new(ErrorKind::Output, "could not write to standard output").caused_by(error))
         }
@@ -91,4 +111,15 @@ pub fn to_json(value: &impl serde::Serialize) -> Result<serde_json::Value> {
 /// Writes one JSON document to stdout.
 pub fn print_json(value: &serde_json::Value) -> Result<()> {
     print(&format!("{value:#}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_terminal_obeys_is_written_out() {
+        assert_eq!(legible("a\tb\nZürich →"), "a\tb\nZürich →");
+        assert_eq!(legible("x\u{1b}[2J\u{9b}1m\r\u{7}"), "x\\u{1b}[2J\\u{9b}1m\\r\\u{7}");
+    }
 }

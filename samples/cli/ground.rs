@@ -91,6 +91,8 @@ impl GroundOptions {
             waves: number(self.waves, defaults.waves),
             phase: number(self.phase, defaults.phase),
         };
+        // Before files are read.
+        ground.check(1 + self.beside.len())?;
         let mut things = vec![scene];
         for path in &self.beside {
             let options = source::in_unit(unit);
@@ -106,21 +108,6 @@ impl GroundOptions {
     /// Files that it needs.
     pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
         self.beside.iter().filter(|path| built_in(path).is_none())
-    }
-
-    /// As options of a command line.
-    pub fn arguments(&self) -> Vec<String> {
-        let number = |name: &str, value: Option<f64>| value.map(|value| format!("--{name}={value}"));
-        let copies = self.copies.map(|copies| format!("--copies={copies}"));
-        let beside = self.beside.iter().map(|path| format!("--beside={}", path.display()));
-        let numbers = [
-            number("height", self.height),
-            number("sunk", self.sunk),
-            number("gap", self.gap),
-            number("waves", self.waves),
-            number("phase", self.phase),
-        ];
-        copies.into_iter().chain(beside).chain(numbers.into_iter().flatten()).collect()
     }
 }
 
@@ -141,7 +128,6 @@ mod tests {
         let scene = options.place(hare, None, |path| Ok(path.to_path_buf())).unwrap();
         let names: Vec<&str> = scene.nodes.iter().filter(|n| n.mesh.is_some()).map(|n| n.name.as_str()).collect();
         assert_eq!(names, ["ground", "hare", "tree", "hare", "tree"]);
-        assert_eq!(options.arguments(), ["--copies=2", "--beside=tree", "--height=0.5"]);
         assert_eq!(options.files().count(), 0);
         let missing = GroundOptions { beside: vec!["no/such.obj".into()], ..options };
         assert_eq!(missing.files().count(), 1);

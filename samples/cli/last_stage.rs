@@ -6,13 +6,14 @@
 //! log-average of its picture becomes 18 cd/m² (`normalize`, and the exposure that leads there), and in sequences follows the adaptation.
 
 use lucerna::{
-    Result,
+    Error, ErrorKind, Result,
     gpu::Gpu,
     graph::{Graph, Image},
     image::{Layer, Layers},
     techniques::tonemap::{self, Operator, Still, Tonemap},
 };
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde_json::Value;
 
 use crate::config::{self, SettingsArgs};
 
@@ -46,6 +47,25 @@ impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
         Ok(settings)
     }
 
+    /// The settings that a picture says it was made with, over `base` for those that it does not name.
+    ///
+    /// # Errors
+    /// `Input`, naming the key.
+    pub fn recorded(settings: &Value, base: &S, check: impl Fn(&S) -> Result<()>) -> Result<Self> {
+        let wrong = |error: Error| error.of_kind(ErrorKind::Input).at("settings");
+        let Value::Object(changes) = without_nulls(settings) else {
+            return Err(wrong(Error::input("are no table")));
+        };
+        let tonemap = changes.contains_key(GROUP).then(tonemap::Settings::default);
+        let base = Self { technique: base.clone(), tonemap };
+        let staged = config::with(&base, &changes).map_err(wrong)?;
+        check(&staged.technique).map_err(wrong)?;
+        if let Some(tonemap) = &staged.tonemap {
+            tonemap.validate().map_err(|error| wrong(error.at(GROUP)))?;
+        }
+        Ok(staged)
+    }
+
     fn unchecked(args: &SettingsArgs, base: &S) -> Result<Self> {
         let asked = args.define.iter().any(|define| define.starts_with("tonemap."));
         let in_file = |text: String| text.parse::<toml::Table>().is_ok_and(|table| table.contains_key(GROUP));
@@ -67,6 +87,17 @@ impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
             }
         }
         Ok(settings)
+    }
+}
+
+/// What is not set is left out, so that settings that are not written when they are not set keep being keys.
+fn without_nulls(value: &Value) -> Value {
+    match value {
+        Value::Object(table) => {
+            let kept = table.iter().filter(|(_, value)| !value.is_null());
+            Value::Object(kept.map(|(key, value)| (key.clone(), without_nulls(value))).collect())
+        }
+        other => other.clone(),
     }
 }
 

@@ -34,6 +34,7 @@ pub mod shown;
 pub mod signals;
 pub mod source;
 pub mod stage;
+pub mod technique;
 pub mod timings;
 pub mod tonemap;
 pub mod views;

@@ -4,7 +4,7 @@ use std::{collections::HashSet, path::Path};
 
 use lucerna::{
     Error, ErrorKind, Result,
-    image::{self, Format, Layers, WriteOptions},
+    image::{self, Format, Layers, Metadata, WriteOptions},
 };
 
 use crate::pattern::{Pattern, Values};
@@ -12,6 +12,8 @@ use crate::pattern::{Pattern, Values};
 /// Said of a file where [`image::Report::alpha_left_out`] holds.
 pub const ALPHA_LEFT_OUT: &str =
     "alpha is left out, for it would hide light (PNG shows no light of pixels of alpha 0); an .exr file keeps both";
+/// The name of a picture that nobody named.
+pub const SINGLE: &str = "{scene}-{camera}-{technique}.png";
 /// Standard output as a file name.
 const STDOUT: &str = "-";
 
@@ -19,7 +21,28 @@ const STDOUT: &str = "-";
 #[derive(Debug)]
 pub struct Outputs {
     targets: Vec<(Pattern, Format)>,
+    /// The format of the picture that is kept in memory instead, and the last one.
+    memory: Option<(Format, Option<Fresh>)>,
     options: WriteOptions,
+}
+
+/// A picture as the file that would have been written.
+#[derive(Clone, Debug)]
+pub struct Fresh {
+    pub bytes: Vec<u8>,
+    /// What stands in the file, or beside it where the format has no place for it.
+    pub metadata: Metadata,
+}
+
+impl Fresh {
+    /// The bytes that [`image::write`] writes, and what was odd about the values.
+    ///
+    /// # Errors
+    /// As [`image::encode`].
+    pub fn new(format: Format, layers: &Layers, options: &WriteOptions) -> Result<(Self, image::Report)> {
+        let (bytes, report) = image::encode(format, layers, options)?;
+        Ok((Self { bytes, metadata: layers.metadata.clone() }, report))
+    }
 }
 
 impl Outputs {
@@ -29,7 +52,7 @@ impl Outputs {
     /// `Usage` for names that are not understood, or that several frames would share.
     pub fn new(names: &[String], frames: usize, options: WriteOptions) -> Result<Self> {
         let default = match frames {
-            1 => "{scene}-{camera}-{technique}.png",
+            1 => SINGLE,
             _ => "{scene}-{camera}-{technique}-{frame:04}.png",
         };
         let given: Vec<&str> =
@@ -44,7 +67,17 @@ impl Outputs {
             let format = if name == STDOUT { Format::Exr } else { Format::from_path(Path::new(name))? };
             targets.push((pattern, format));
         }
-        Ok(Self { targets, options })
+        Ok(Self { targets, memory: None, options })
+    }
+
+    /// No file at all: the last picture is kept as the bytes that its file would have.
+    pub fn in_memory(format: Format, options: WriteOptions) -> Self {
+        Self { targets: Vec::new(), memory: Some((format, None)), options }
+    }
+
+    /// The last picture that was kept in memory.
+    pub fn fresh(self) -> Option<Fresh> {
+        self.memory.and_then(|(_, fresh)| fresh)
     }
 
     /// PNG files show the radiance times 2^`ev` from now on.
@@ -54,7 +87,8 @@ impl Outputs {
 
     /// True if some file holds more than the picture.
     pub fn wants_layers(&self) -> bool {
-        self.targets.iter().any(|(pattern, format)| *format == Format::Exr || pattern.has_layer())
+        let in_memory = self.memory.as_ref().is_some_and(|(format, _)| *format == Format::Exr);
+        in_memory || self.targets.iter().any(|(pattern, format)| *format == Format::Exr || pattern.has_layer())
     }
 
     /// True if the image goes to standard output.
@@ -87,8 +121,13 @@ impl Outputs {
     ///
     /// # Errors
     /// `Output`: that file is not there, the ones before it are complete.
-    pub fn write(&self, values: &Values<'_>, layers: &Layers) -> Result<Vec<(String, image::Report)>> {
+    pub fn write(&mut self, values: &Values<'_>, layers: &Layers) -> Result<Vec<(String, image::Report)>> {
         let mut written = Vec::new();
+        if let Some((format, last)) = &mut self.memory {
+            let (fresh, report) = Fresh::new(*format, layers, &self.options)?;
+            *last = Some(fresh);
+            written.push(("(in memory)".to_owned(), report));
+        }
         for (pattern, format) in &self.targets {
             if !pattern.has_layer() {
                 written.push(self.write_one(&pattern.fill(values), *format, layers)?);

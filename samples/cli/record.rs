@@ -1,19 +1,22 @@
 //! What a picture remembers of the command that made it, enough to make it again.
 
-use std::{ffi::OsString, path::Path};
+use std::path::{Path, PathBuf};
 
 use lucerna::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::{
-    args::Size,
+    args::{Frames, MAX_FRAMES, MAX_SIDE, RenderArgs, Size},
     camera::CameraFile,
-    config,
+    config::SettingsArgs,
     framing::DefaultLight,
-    ground::GroundOptions,
+    ground::{GroundArgs, GroundOptions},
     lights::{Point, Sun},
-    stage::{Stage, StageArgs},
+    progress::ProgressMode,
+    render::Again,
+    source::{self, SceneArgs},
+    stage::{Eye, Stage, StageArgs},
 };
 
 /// The `config` of a picture's metadata.
@@ -120,86 +123,115 @@ impl Record {
         serde_json::from_value(config.clone()).map_err(|error| missing().caused_by(error))
     }
 
-    /// The command line that makes the picture again, without device and output. Files go into `folder`.
-    pub fn arguments(&self, folder: &Path) -> Result<Vec<OsString>> {
-        let settings = folder.join("settings.toml");
-        write(&settings, &config::to_toml(&without_nulls(&self.settings))?)?;
-        let mut list: Vec<OsString> = self.command.iter().skip(1).map(OsString::from).collect();
-        let mut add = |words: &[&str]| list.extend(words.iter().map(OsString::from));
-        match &self.scene {
-            // A file name may begin with a dash.
-            Source::File(path) if path.starts_with('-') => add(&[&format!("./{path}")]),
-            Source::File(path) => add(&[path]),
-            Source::Builtin(name) => add(&["--builtin", name]),
-        }
-        add(&["--size", &Size { width: self.width, height: self.height }.to_string()]);
-        match &self.camera {
-            View::Scene(index) => add(&["--camera", &index.to_string()]),
-            View::File(camera) => {
-                let path = folder.join("camera.toml");
-                write(&path, &config::to_toml(camera)?)?;
-                add(&["--camera", &path.to_string_lossy()]);
+    /// The options that decide what is seen. `camera`: name of the camera, if the scene has none for it.
+    ///
+    /// # Errors
+    /// `Input` for numbers that the command line would not take either.
+    pub fn stage_args(&self, camera: &str) -> Result<StageArgs> {
+        let wrong = |key: &str, found: String, allowed: &str| {
+            Err(Error::input(format!("{found} is not allowed; allowed: {allowed}")).at(key))
+        };
+        for (key, value) in [("width", self.width), ("height", self.height)] {
+            if !(1..=MAX_SIDE).contains(&value) {
+                return wrong(key, value.to_string(), &format!("1 to {MAX_SIDE}"));
             }
         }
-        self.light.iter().for_each(|light| add(&[&format!("--light={light}")]));
-        if let Some(sun) = self.sun {
-            add(&[&format!("--sun={sun}")]);
-        }
-        if let Some(unit) = self.unit {
-            add(&[&format!("--unit={unit}")]);
-        }
-        if let Some(ground) = &self.ground {
-            add(&["--ground"]);
-            ground.arguments().iter().for_each(|option| add(&[option]));
-        }
-        // A reference is one picture in full precision.
-        let single = self.command.get(1).is_some_and(|verb| verb == "reference");
-        if !single {
-            add(&["--frames", &format!("{}..={}", self.first_frame, self.frame), &format!("--fps={}", self.fps)]);
-        }
-        add(&[&format!("--time={}", self.time)]);
-        add(&[&format!("--exposure={}", self.exposure), &format!("--seed={}", self.seed)]);
-        match self.default_light {
-            DefaultLight::Auto => {}
-            DefaultLight::Always => add(&["--default-light=always"]),
-            DefaultLight::Never => add(&["--default-light=never"]),
-        }
-        for (option, value) in [("environment", &self.environment), ("view", &self.view), ("mode", &self.mode)] {
-            if let Some(value) = value {
-                add(&[&format!("--{option}={value}")]);
+        for (key, value) in [("unit", self.unit), ("fps", Some(self.fps))] {
+            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
+                return wrong(key, value.to_string(), "numbers above 0");
             }
         }
-        if self.f32 && !single {
-            add(&["--f32"]);
+        for (key, value) in [("time", self.time), ("exposure", self.exposure)] {
+            if !value.is_finite() {
+                return wrong(key, value.to_string(), "finite numbers");
+            }
         }
-        add(&["--settings", &settings.to_string_lossy()]);
-        Ok(list)
-    }
-}
-
-/// TOML has no null: what is not set is left out.
-fn without_nulls(value: &Value) -> Value {
-    match value {
-        Value::Object(table) => {
-            let kept = table.iter().filter(|(_, value)| !value.is_null());
-            Value::Object(kept.map(|(key, value)| (key.clone(), without_nulls(value))).collect())
+        if let View::File(camera) = &self.camera {
+            camera.check().map_err(|what| Error::input(what).at("camera"))?;
         }
-        other => other.clone(),
+        let (scene, builtin) = match &self.scene {
+            Source::File(path) => (Some(PathBuf::from(path)), None),
+            Source::Builtin(name) => (None, Some(name.clone())),
+        };
+        let ground = GroundArgs { ground: self.ground.is_some(), options: self.ground.clone().unwrap_or_default() };
+        Ok(StageArgs {
+            scene: SceneArgs { scene, builtin, unit: self.unit, ground },
+            size: Size { width: self.width, height: self.height },
+            camera: None,
+            time: self.time,
+            environment: self.environment.as_ref().map(PathBuf::from),
+            light: self.light.clone(),
+            sun: self.sun,
+            default_light: self.default_light,
+            eye: Some(Eye { view: self.camera.clone(), name: camera.to_owned() }),
+        })
     }
-}
 
-fn write(path: &Path, text: &str) -> Result<()> {
-    lucerna::image::write_atomic(path, text.as_bytes(), true)
+    /// The options of `render` for the frames up to this one. None of them writes anything.
+    ///
+    /// # Errors
+    /// As [`Self::stage_args`]; `Input` if the frame is before the first one.
+    pub fn render_args(&self, asked: &Again<'_>) -> Result<RenderArgs> {
+        let (first, last) = (self.first_frame, self.frame);
+        let end = last.checked_add(1).filter(|end| first <= last && end - first <= MAX_FRAMES).ok_or_else(|| {
+            let allowed = format!("A to B with A <= B < {}, and at most {MAX_FRAMES}", u32::MAX);
+            Error::input(format!("frames {first} to {last} are not allowed; allowed: {allowed}")).at("frame")
+        })?;
+        Ok(RenderArgs {
+            stage: self.stage_args(asked.camera)?,
+            output: Vec::new(),
+            overwrite: false,
+            f32: self.f32,
+            view: self.view.clone(),
+            dump: None,
+            timings: None,
+            repeat: 1,
+            list_passes: false,
+            json: false,
+            frames: Some(Frames(first..end)),
+            fps: self.fps,
+            time_limit: None,
+            exposure: Some(self.exposure),
+            seed: self.seed,
+            settings: SettingsArgs::default(),
+            paper: false,
+            device: asked.device.clone(),
+            talk: asked.talk.clone(),
+            progress: ProgressMode::default(),
+        })
+    }
+
+    /// The files that are read to make the picture again, as messages call them.
+    pub fn files(&self) -> Vec<String> {
+        let mut list = Vec::new();
+        if let Source::File(path) = &self.scene {
+            list.push(format!("{path:?}, and what it names in its folder"));
+        }
+        list.extend(
+            self.ground
+                .iter()
+                .flat_map(GroundOptions::files)
+                .map(|path| format!("{path:?}, and what it names in its folder")),
+        );
+        let environment = self.environment.as_deref().map(Path::new);
+        list.extend(environment.filter(|path| !source::is_built_in_environment(path)).map(|path| format!("{path:?}")));
+        list
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
+    use lucerna::image::Format;
 
     use super::*;
+    use crate::{
+        args::{DeviceArgs, TalkArgs},
+        signals::Interrupt,
+    };
 
     #[test]
-    fn comes_back_from_json_and_becomes_a_command() {
+    fn comes_back_from_json_and_becomes_options() {
         let camera = CameraFile {
             position: Vec3::new(0.1, 1.6, 4.0),
             target: Vec3::ZERO,
@@ -234,26 +266,38 @@ mod tests {
         };
         let again = Record::from_config(&serde_json::to_value(&record).unwrap()).unwrap();
         assert_eq!(again, record);
-        let folder = tempfile::tempdir().unwrap();
-        let list: Vec<String> =
-            again.arguments(folder.path()).unwrap().into_iter().map(|a| a.into_string().unwrap()).collect();
-        let all = list.join(" ");
-        for part in [
-            "render ./-odd.obj --size 64x48",
-            "--frames 2..=5",
-            "--time=-0.1",
-            "--unit=0.01",
-            "--ground --copies=3 --sunk=-0.2",
-            "--light=1,2,-3,4",
-            "--sun=-10,20,2",
-            "--mode=direct",
-            "--f32",
-            "--default-light=never",
+        let asked = Again {
+            record: &again,
+            camera: "left",
+            format: Format::Png,
+            device: &DeviceArgs::default(),
+            talk: &TalkArgs::default(),
+            long: false,
+            interrupt: &Interrupt::default(),
+        };
+        let args = again.render_args(&asked).unwrap();
+        assert_eq!(args.stage.scene.scene, Some("-odd.obj".into()));
+        assert_eq!((args.stage.size.to_string(), args.frames), ("64x48".into(), Some(Frames(2..6))));
+        assert_eq!((args.stage.scene.unit, args.stage.time, args.fps, args.f32), (Some(0.01), -0.1, 24.0, true));
+        assert_eq!(args.stage.scene.ground.options, again.ground.clone().unwrap());
+        assert!(args.stage.scene.ground.ground && args.stage.light == again.light && args.stage.sun == again.sun);
+        assert_eq!((args.exposure, args.seed, args.stage.default_light), (Some(1.5), u32::MAX, DefaultLight::Never));
+        // Nothing that writes, or that reads more than what is named.
+        assert!(args.output.is_empty() && args.dump.is_none() && args.timings.is_none() && args.stage.camera.is_none());
+        assert!(args.settings.file.is_none() && !args.overwrite && !args.json);
+        assert_eq!(again.files(), ["\"-odd.obj\", and what it names in its folder"]);
+        for (odd, place) in [
+            (Record { width: 0, ..record.clone() }, "width"),
+            (Record { height: MAX_SIDE + 1, ..record.clone() }, "height"),
+            (Record { fps: 0.0, ..record.clone() }, "fps"),
+            (Record { unit: Some(-1.0), ..record.clone() }, "unit"),
+            (Record { frame: 1, ..record.clone() }, "frame"),
+            (Record { frame: u32::MAX, ..record.clone() }, "frame"),
+            (Record { camera: View::File(CameraFile { target: camera.position, ..camera }), ..record }, "camera"),
         ] {
-            assert!(all.contains(part), "{part} is not in {all}");
+            let error = odd.render_args(&asked).unwrap_err();
+            assert_eq!((error.exit_code(), error.place()), (3, Some(place)));
         }
-        assert_eq!(CameraFile::read(&folder.path().join("camera.toml")).unwrap(), camera);
-        assert!(std::fs::read_to_string(folder.path().join("settings.toml")).unwrap().contains("strength = 0.1"));
     }
 
     #[test]

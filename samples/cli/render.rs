@@ -1,21 +1,26 @@
-//! `render`: a scene in, images out, frame after frame.
+//! `render`: a scene in, images out, frame after frame; or the last of them in memory, for `lucerna rerun`.
 
 use std::{process::ExitCode, time::Instant};
 
+use clap::ValueEnum;
 use lucerna::{
-    Result,
+    Error, Result,
     gpu::Gpu,
     graph::{Graph, Runner},
+    image::Format,
     scene::{Pose, Scene, View},
 };
 use serde::{Serialize, de::DeserializeOwned};
 
 use crate::{
-    args::RenderArgs,
-    config, console,
+    args::{DeviceArgs, RenderArgs, TalkArgs},
+    config,
+    console::{self, Console},
     last_stage::{LastStage, Staged},
+    outputs::Fresh,
     program::{self, STOPPED_EARLY},
     progress::Progress,
+    record::Record,
     run::Run,
     shown::{self, Reading, Shown},
     signals::Interrupt,
@@ -60,29 +65,127 @@ pub fn unless_stopped<T>(result: Result<T>, interrupt: &Interrupt) -> Result<Opt
     }
 }
 
-/// Runs `render` for one technique.
-///
-/// `base` are the settings to start from; `check` says whether those in effect are in their ranges, before anything else is done; `prepare` makes what lives as long as the run; `compose` declares one frame.
+/// A technique as `render` and `rerun` call it. Of the programs alone: in the engine techniques are functions, not objects.
+pub trait Renderer {
+    type Settings: Serialize + DeserializeOwned + Clone;
+    /// What lives as long as the run.
+    type Kept;
+
+    fn technique(&self) -> Technique;
+
+    /// Whether the settings are in their ranges; asked before anything else is done.
+    ///
+    /// # Errors
+    /// `Usage`, naming the setting.
+    fn check(settings: &Self::Settings) -> Result<()>;
+
+    /// Makes what lives as long as the run.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`; `Input` if the scene cannot be served.
+    fn prepare(&self, gpu: &Gpu, scene: &Scene, settings: &Self::Settings) -> Result<Self::Kept>;
+
+    /// Declares one frame.
+    ///
+    /// # Errors
+    /// `Usage` or `Input` for what cannot be served.
+    fn compose(
+        &self,
+        graph: &mut Graph,
+        kept: &mut Self::Kept,
+        input: &Input<'_>,
+        settings: &Self::Settings,
+    ) -> Result<Shown>;
+}
+
+/// Runs `render` for one technique. `base` are the settings to start from.
 ///
 /// # Errors
 /// Whatever fails, with the kind that decides the exit code.
-pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
-    technique: Technique,
-    args: &RenderArgs,
-    base: &S,
-    check: impl Fn(&S) -> Result<()>,
-    prepare: impl FnOnce(&Gpu, &Scene, &S) -> Result<R>,
-    mut compose: impl FnMut(&mut Graph, &mut R, &Input<'_>, &S) -> Result<Shown>,
-) -> Result<ExitCode> {
+pub fn render<R: Renderer>(renderer: &R, args: &RenderArgs, base: &R::Settings) -> Result<ExitCode> {
     let started = Instant::now();
-    let console = args.talk.console();
-    let staged = Staged::effective(&args.settings, base, check)?;
+    let staged = Staged::effective(&args.settings, base, R::check)?;
     if args.settings.print_config {
         console::print(config::to_toml(&staged)?.trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
     let interrupt = Interrupt::install();
-    let mut run = Run::new(technique, args, console, &staged)?;
+    let mut run = Run::new(renderer.technique(), args, args.talk.console(), &staged, None)?;
+    frames(renderer, args, staged, &mut run, &interrupt, started)?;
+    Ok(match run.progress() {
+        _ if args.list_passes => ExitCode::SUCCESS,
+        (done, asked) if done == asked => ExitCode::SUCCESS,
+        (0, _) => ExitCode::from(interrupt.exit_code()),
+        _ => ExitCode::from(STOPPED_EARLY),
+    })
+}
+
+/// A picture that is to be made again.
+#[derive(Debug)]
+pub struct Again<'a> {
+    pub record: &'a Record,
+    /// Name of the camera, which is written into the picture.
+    pub camera: &'a str,
+    /// Of the file.
+    pub format: Format,
+    pub device: &'a DeviceArgs,
+    pub talk: &'a TalkArgs,
+    /// Hours of work were asked for.
+    pub long: bool,
+    pub interrupt: &'a Interrupt,
+}
+
+impl Again<'_> {
+    pub fn console(&self) -> Console {
+        self.talk.console()
+    }
+
+    /// The mode of the record, one of those that the technique has.
+    ///
+    /// # Errors
+    /// `Input` if there is none of this name.
+    pub fn mode<M: ValueEnum + Default>(&self) -> Result<M> {
+        let Some(asked) = &self.record.mode else { return Ok(M::default()) };
+        M::from_str(asked, false).map_err(|_| {
+            let names = M::value_variants().iter().filter_map(ValueEnum::to_possible_value);
+            let names: Vec<String> = names.map(|value| value.get_name().to_owned()).collect();
+            Error::input(format!("{asked:?} is no mode; allowed are {}", names.join(", "))).at("mode")
+        })
+    }
+
+    /// # Errors
+    /// `Input` if the record has a mode.
+    pub fn no_mode(&self) -> Result<()> {
+        match &self.record.mode {
+            None => Ok(()),
+            Some(mode) => Err(Error::input(format!("{mode:?}, but this technique has no modes")).at("mode")),
+        }
+    }
+}
+
+/// Renders the frames of a record up to its own, which is kept in memory as the file that `render` would write. Nothing is
+/// written; of the record's words only scene and environment name files. `None`: interrupted.
+///
+/// # Errors
+/// Whatever fails while rendering; `Input` for what the record says.
+pub fn again<R: Renderer>(renderer: &R, asked: &Again<'_>, base: &R::Settings) -> Result<Option<Fresh>> {
+    let staged = Staged::recorded(&asked.record.settings, base, R::check)?;
+    let args = asked.record.render_args(asked)?;
+    let mut run = Run::new(renderer.technique(), &args, asked.console(), &staged, Some(asked.format))?;
+    frames(renderer, &args, staged, &mut run, asked.interrupt, Instant::now())?;
+    Ok(run.fresh())
+}
+
+/// Renders the frames of a run.
+fn frames<R: Renderer>(
+    renderer: &R,
+    args: &RenderArgs,
+    staged: Staged<R::Settings>,
+    run: &mut Run<'_>,
+    interrupt: &Interrupt,
+    started: Instant,
+) -> Result<()> {
+    let console = args.talk.console();
     let loaded = started.elapsed();
 
     let gpu = Gpu::new(args.device.options()?)?;
@@ -90,12 +193,12 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
     let opened = started.elapsed();
     let settings = staged.technique;
     let mut last = LastStage::new(&gpu, staged.tonemap.as_ref(), run.exposure())?;
-    let mut resources = prepare(&gpu, &run.stage.scene, &settings)?;
+    let mut resources = renderer.prepare(&gpu, &run.stage.scene, &settings)?;
     let uploaded = started.elapsed();
     run.phases = vec![("load", loaded), ("device", opened - loaded), ("upload", uploaded - opened)];
 
     let all = run.outputs.wants_layers() || args.view.is_some() || args.dump.is_some() || args.list_passes;
-    let frames = run.frames.len() as u32;
+    let (name, frames) = (renderer.technique().name, run.frames.len() as u32);
     let mut runner = Runner::new(&gpu);
     let mut progress = Progress::new(args.progress, console.is_quiet(), run.frames.len() as u64);
     'frames: for frame in run.frames.clone() {
@@ -107,16 +210,16 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
         let begun = Instant::now();
         let seconds = args.stage.time + f64::from(frame) / args.fps;
         let (pose, view) = run.stage.at(seconds, args.stage.size)?;
-        let mut graph = Graph::new(technique.name);
+        let mut graph = Graph::new(name);
         (graph.frame, graph.seed) = (frame, args.seed);
         let input =
             Input { gpu: &gpu, scene: &run.stage.scene, pose: &pose, view: &view, frame, frames, seconds, layers: all };
-        let shown = compose(&mut graph, &mut resources, &input, &settings);
-        let Some(mut shown) = unless_stopped(shown, &interrupt)? else { break };
+        let shown = renderer.compose(&mut graph, &mut resources, &input, &settings);
+        let Some(mut shown) = unless_stopped(shown, interrupt)? else { break };
         shown.develop(|picture| last.frame(&mut graph, picture, (1.0 / args.fps) as f32))?;
         if args.list_passes {
             console::print(graph.plan()?.list_passes().trim_end())?;
-            return Ok(ExitCode::SUCCESS);
+            return Ok(());
         }
         run.note(&shown.notes);
         let seen = shown.view.unwrap_or(view);
@@ -128,7 +231,7 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
         // The frame after this one builds on it once, however often it is repeated.
         let result = if args.repeat > 1 { runner.run_held(&graph) } else { runner.run(&graph) };
         // What was asked to stop is not written, unless it is all there.
-        let Some(result) = unless_stopped(result, &interrupt)? else { break };
+        let Some(result) = unless_stopped(result, interrupt)? else { break };
         run.note(&reading.notes(&result));
         let mut layers = reading.layers(&result);
         run.expose(&layers);
@@ -148,7 +251,7 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
                 break;
             }
             let begun = Instant::now();
-            let mut graph = Graph::new(technique.name);
+            let mut graph = Graph::new(name);
             (graph.frame, graph.seed) = (frame, args.seed);
             let input = Input {
                 gpu: &gpu,
@@ -160,20 +263,15 @@ pub fn render<S: Serialize + DeserializeOwned + Clone, R>(
                 seconds,
                 layers: all,
             };
-            let mut shown = compose(&mut graph, &mut resources, &input, &settings)?;
+            let mut shown = renderer.compose(&mut graph, &mut resources, &input, &settings)?;
             // No time passes, so that adaptation stays as it is.
             shown.develop(|picture| last.frame(&mut graph, picture, 0.0))?;
             let last = repeat + 1 == args.repeat;
             let result = if last { runner.run(&graph) } else { runner.run_held(&graph) };
-            let Some(result) = unless_stopped(result, &interrupt)? else { break 'frames };
+            let Some(result) = unless_stopped(result, interrupt)? else { break 'frames };
             run.again(begun.elapsed().as_secs_f64() * 1e3, &result.report);
         }
     }
     progress.finish();
-    run.finish(&gpu)?;
-    Ok(match run.progress() {
-        (done, asked) if done == asked => ExitCode::SUCCESS,
-        (0, _) => ExitCode::from(interrupt.exit_code()),
-        _ => ExitCode::from(STOPPED_EARLY),
-    })
+    run.finish(&gpu)
 }

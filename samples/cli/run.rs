@@ -6,7 +6,7 @@ use lucerna::{
     Error, ErrorKind, Result,
     gpu::Gpu,
     graph::Report,
-    image::{self, Layers, Metadata, WriteOptions},
+    image::{self, Format, Layers, Metadata, WriteOptions},
     scene::{Note, NoteKind, View, builtin},
 };
 use serde::Serialize;
@@ -18,7 +18,7 @@ use crate::{
     console::{self, Console},
     exposure,
     last_stage::Staged,
-    outputs::{ALPHA_LEFT_OUT, Outputs},
+    outputs::{ALPHA_LEFT_OUT, Fresh, Outputs},
     pattern::Values,
     program,
     record::{Record, Source},
@@ -67,17 +67,23 @@ struct RunTime {
 }
 
 impl<'a> Run<'a> {
-    /// Reads the scene and checks that everything asked for can be written.
+    /// Reads the scene and checks that everything asked for can be written. With `memory` nothing is: the last picture is kept as a
+    /// file of that format.
     pub fn new<S: Serialize>(
         technique: Technique,
         args: &'a RenderArgs,
         console: Console,
         settings: &Staged<S>,
+        memory: Option<Format>,
     ) -> Result<Self> {
         let frames = Frames::of(args.frames.as_ref());
         // Names before scenes: a wrong name shows at once.
         let mut options = WriteOptions { overwrite: args.overwrite, f32: args.f32, ..WriteOptions::default() };
-        Outputs::new(&args.output, frames.len(), options.clone())?;
+        let outputs = |options: WriteOptions| match memory {
+            Some(format) => Ok(Outputs::in_memory(format, options)),
+            None => Outputs::new(&args.output, frames.len(), options),
+        };
+        outputs(options.clone())?;
         let stage = Stage::open(&args.stage)?;
         let suits = match &stage.source {
             Source::Builtin(name) => builtin::exposure(name).map(f64::from),
@@ -94,7 +100,7 @@ impl<'a> Run<'a> {
         let exposure = args.exposure.or(suits.filter(|_| radiance && !normal));
         // Tone mapping takes the exposure itself; what it gives is for the screen.
         options.exposure_ev = if developed { 0.0 } else { exposure.unwrap_or(0.0) as f32 };
-        let outputs = Outputs::new(&args.output, frames.len(), options)?;
+        let outputs = outputs(options)?;
         if outputs.uses_stdout() && args.json {
             return Err(Error::usage("--json and an image both want standard output").help("Give the image a name"));
         }
@@ -233,7 +239,9 @@ impl<'a> Run<'a> {
 
     /// Writes the files of a frame and returns their names.
     pub fn write(&mut self, layers: &Layers, frame: u32) -> Result<Vec<String>> {
-        let written = self.outputs.write(&self.values(frame), layers)?;
+        let (scene, camera) = (&self.stage.scene.name, &self.stage.camera_name);
+        let values = Values { scene, camera, technique: &self.label, frame, layer: "" };
+        let written = self.outputs.write(&values, layers)?;
         for (name, report) in &written {
             if !report.is_finite() {
                 let first = report.first.as_deref().unwrap_or_default();
@@ -278,6 +286,12 @@ impl<'a> Run<'a> {
         if let Some(done) = self.done.last_mut() {
             done.runs.push(RunTime { milliseconds, gpu_milliseconds: report.gpu_ms() });
         }
+    }
+
+    /// The last picture, if it was kept in memory and no frame is missing.
+    pub fn fresh(self) -> Option<Fresh> {
+        let whole = self.done.len() == self.frames.len();
+        self.outputs.fresh().filter(|_| whole)
     }
 
     /// Frames done, and frames asked for.

@@ -71,6 +71,18 @@ pub struct StageArgs {
     /// Whether a sun and a sky are added
     #[arg(long, value_enum, default_value_t, value_name = "WHEN", help_heading = "Picture")]
     pub default_light: DefaultLight,
+
+    /// The camera of a picture that is made again, in place of `camera`.
+    #[arg(skip)]
+    pub eye: Option<Eye>,
+}
+
+/// A camera that was chosen before.
+#[derive(Clone, Debug)]
+pub struct Eye {
+    pub view: record::View,
+    /// For names and metadata, where the scene has none for it.
+    pub name: String,
 }
 
 impl Stage {
@@ -92,16 +104,25 @@ impl Stage {
         lights::add(&mut scene, &args.light, args.sun.as_ref());
         framing::add_missing_light(&mut scene, args.default_light);
         let extents = Extents::of(&scene);
-        let from_file = args.camera.as_deref().is_some_and(|asked| {
-            Path::new(asked).is_file() || camera::in_list(asked).is_some_and(|(file, _)| Path::new(file).is_file())
-        });
+        let named_file = || {
+            args.camera.as_deref().is_some_and(|asked| {
+                Path::new(asked).is_file() || camera::in_list(asked).is_some_and(|(file, _)| Path::new(file).is_file())
+            })
+        };
+        let from_file = match &args.eye {
+            Some(eye) => matches!(eye.view, record::View::File(_)),
+            None => named_file(),
+        };
         if !from_file {
             framing::add_missing_camera(&mut scene, args.size.aspect());
         }
         let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
-        let choice = match &args.camera {
-            Some(asked) => camera::choose(asked, &names)?,
-            None => Choice::Scene(first_placed(&scene)),
+        let choice = match (&args.eye, &args.camera) {
+            (Some(Eye { view: record::View::File(file), .. }), _) => Choice::File(file.clone()),
+            // An index is never taken for a file.
+            (Some(Eye { view: record::View::Scene(index), .. }), _) => camera::choose(&index.to_string(), &names)?,
+            (None, Some(asked)) => camera::choose(asked, &names)?,
+            (None, None) => Choice::Scene(first_placed(&scene)),
         };
         Ok(match choice {
             Choice::Scene(index) => {
@@ -123,7 +144,10 @@ impl Stage {
             }
             Choice::File(file) => {
                 let world_from_camera = file.world_from_view();
-                let camera_name = name_of(args.camera.as_deref().unwrap_or_default());
+                let camera_name = match &args.eye {
+                    Some(eye) => eye.name.clone(),
+                    None => name_of(args.camera.as_deref().unwrap_or_default()),
+                };
                 let camera = Camera { name: camera_name.clone(), projection: file.projection() };
                 let eye = record::View::File(file);
                 Self { source, fingerprint, camera_name, eye, extents, camera, node: None, world_from_camera, scene }

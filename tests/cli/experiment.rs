@@ -308,6 +308,53 @@ fn scenes_that_are_not_there_fail_or_are_skipped_by_name() {
     assert!(page.contains("Left out: scene hall"));
 }
 
+#[test]
+fn files_from_elsewhere_ask_for_no_work_without_bound() {
+    let place = Place::new();
+    let ten = "[1, 2, 3, 4, 5, 6, 7, 8, 9, 10]";
+    let keys =
+        ["samples", "radius", "strength", "layers", "bounces", "size", "near", "far", "bias", "limit", "seed", "x"];
+    let matrix: Vec<String> = keys.iter().map(|key| format!("\"isr.{key}\" = {ten}")).collect();
+    for (from, to, part) in [
+        ("matrix = { \"isr.samples\" = [24, 48] }", format!("matrix = {{ {} }}", matrix.join(", ")), "1000000000000"),
+        ("cameras = [\"0\"]", "random = 4000000000000".into(), "4000000000000"),
+        ("matrix = { samples = [1, 2, 3] }", "settings = { samples = 4000000000 }".into(), "4000000000"),
+        ("settings = { bounces = 1 }", "settings = { bounces = 4000000000 }".into(), "4000000000"),
+    ] {
+        assert!(EXPERIMENT.contains(from));
+        place.file(&EXPERIMENT.replace(from, &to));
+        let ran = place.run("out", &[]).expect(3, &[part]);
+        assert_eq!(ran.errors(), 1, "{}", ran.stderr);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_from_elsewhere_names_no_file_outside_of_it() {
+    let place = Place::new();
+    let out = place.path("out");
+    fs::create_dir_all(&out).unwrap();
+    let victim = place.path("victim.txt");
+    fs::write(&victim, "precious").unwrap();
+    let manifest = |key: &str| {
+        let run = match key {
+            "" => serde_json::json!([]),
+            key => serde_json::json!([{ "scene": "cornell", "group": "", "triangles": 1, "view": "0", "method": "isr",
+                "variant": {}, "key": key, "exposure": null }]),
+        };
+        let text = serde_json::json!({ "name": "x", "path": null, "quick": false, "text": EXPERIMENT, "runs": run,
+            "skipped": [], "missing": 0, "facts": [] });
+        fs::write(out.join("manifest.json"), text.to_string()).unwrap();
+    };
+    let report = || lucerna([Path::new("report"), &out]);
+    manifest("../../victim");
+    report().expect(3, &["manifest.json", "../../victim", "no key"]);
+    manifest("");
+    std::os::unix::fs::symlink(&victim, out.join("report.html")).unwrap();
+    report().expect(1, &["report.html", "symbolic link"]);
+    assert_eq!(fs::read_to_string(&victim).unwrap(), "precious");
+}
+
 #[cfg(unix)]
 #[test]
 fn a_program_that_fails_or_is_not_there_can_be_left_out() {

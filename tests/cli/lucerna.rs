@@ -116,14 +116,6 @@ fn what_is_no_image_is_refused_with_its_name() {
     // A picture without its recipe cannot be made again.
     let foreign = picture(folder.path(), "foreign.png", Metadata::default());
     lucerna(["rerun", &foreign]).expect(3, &["foreign.png", "does not say how it was made"]);
-    // Nor does a picture choose which program is started.
-    let config = serde_json::json!({
-        "command": ["../../bin/sh", "render"], "scene": {"builtin": "cornell"}, "fingerprint": "0", "width": 8, "height": 8,
-        "camera": {"scene": 0}, "first_frame": 0, "frame": 0, "time": 0.0, "fps": 30.0, "exposure": 0.0, "seed": 0,
-        "settings": {},
-    });
-    let hostile = picture(folder.path(), "hostile.png", Metadata { config, ..Metadata::default() });
-    lucerna(["rerun", &hostile]).expect(3, &["hostile.png", "not installed"]);
 }
 
 #[test]

@@ -90,8 +90,39 @@ fn time_and_error_end_it_with_a_picture() {
     // A state of other options is refused, and left alone.
     let refused = reference(&["--resume", "--bounces", "3", "-o", &exr]).expect(3, &["bounces was 8, now is 3"]);
     assert_eq!(refused.errors(), 1);
-    fs::write(path(&folder, "a.exr.state"), b"lucerna tracer 1 and nothing else").unwrap();
+    // Nor does a run that is not to go on with it take its place: it may be worth hours.
+    let state = path(&folder, "a.exr.state");
+    let kept = fs::read(&state).unwrap();
+    let picture = image::read(&exr, &Limits::default()).unwrap();
+    let samples = picture.layer("samples").unwrap().data.iter().copied().fold(f32::INFINITY, f32::min);
+    for more in [&["--spp", "2", "--overwrite"][..], &["--spp", "2", "--overwrite", "--time-limit", "0.1s"]] {
+        let said = format!("{samples:.0} samples a pixel of 48×40");
+        reference(&[more, &["-o", &exr]].concat()).expect(1, &["a.exr.state", &said, "--resume", "--restart"]);
+        assert!(fs::read(&state).unwrap() == kept);
+    }
+    reference(&["--resume", "--restart", "-o", &exr]).expect(2, &["--restart"]);
+    // Numbers that no run writes.
+    let mut forged = kept.clone();
+    forged[24..32].copy_from_slice(&u64::MAX.to_le_bytes());
+    let end = forged.len() - 8;
+    let check = checksum(&forged[..end]);
+    forged[end..].copy_from_slice(&check.to_le_bytes());
+    fs::write(&state, &forged).unwrap();
+    reference(&["--resume", "-o", &exr]).expect(3, &["a.exr.state", "18446744073709551615 samples"]);
+    fs::write(&state, b"lucerna tracer 1 and nothing else").unwrap();
     reference(&["--resume", "-o", &exr]).expect(3, &["a.exr.state", "checksum"]);
+    reference(&["--spp", "2", "--overwrite", "-o", &exr]).expect(1, &["a.exr.state", "--restart"]);
+    reference(&["--spp", "2", "--overwrite", "--restart", "-o", &exr]).expect(0, &[]);
+    assert!(!Path::new(&state).exists());
+}
+
+/// That of a state: it notices damage and is no secret.
+fn checksum(bytes: &[u8]) -> u64 {
+    bytes.chunks(8).fold(0xcbf2_9ce4_8422_2325_u64, |hash, chunk| {
+        let mut word = [0; 8];
+        word[..chunk.len()].copy_from_slice(chunk);
+        (hash ^ u64::from_le_bytes(word)).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(17)
+    })
 }
 
 #[test]

@@ -31,7 +31,7 @@ mod sums;
 mod work;
 
 pub use settings::{Filter, Settings, Sources, Strategy};
-pub use state::State;
+pub use state::{Head, State};
 pub use sums::Sums;
 
 /// Tables that samples are drawn from, for techniques that sample the same lights, and for tests.

@@ -1,11 +1,21 @@
 //! The state of a picture in the making as bytes, to go on in another process.
 
-use super::{Sums, work::Job};
-use crate::{Error, ErrorKind, Result, gpu::Gpu};
+use super::{
+    Sums,
+    work::{Job, LAYERS, slots_of},
+};
+use crate::{Error, ErrorKind, Result, gpu::Gpu, image};
 use serde_json::{Value, json};
+use std::path::Path;
 
 /// First bytes of a state.
 const MAGIC: &[u8; 16] = b"lucerna tracer 1";
+/// Bytes of the magic and of the four numbers behind it.
+const NUMBERS: usize = 16 + 4 * 8;
+/// Bytes of the text at most; it has some thousands.
+const MOST_TEXT: u64 = 1 << 24;
+/// Samples of a pixel are numbered with 32 bits.
+const MOST_SAMPLES: u64 = u32::MAX as u64;
 
 /// A picture in the making, outside of the device.
 #[derive(Clone, Debug)]
@@ -15,7 +25,77 @@ pub struct State {
     sums: Sums,
 }
 
+/// What stands before the pixels of a state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Head {
+    /// Width and height, pixels.
+    pub extent: [u32; 2],
+    /// Samples that every pixel has, at most 2³² − 1.
+    pub samples: u64,
+    /// Slots that have one more, fewer than there are.
+    begun: u64,
+    about: Value,
+    /// Where the pixels begin, bytes.
+    body: usize,
+    /// Bytes of the pixels.
+    bytes: u64,
+}
+
+fn broken(what: &str) -> Error {
+    Error::input(format!("is no state of a reference picture: {what}"))
+}
+
+impl Head {
+    /// From the first bytes of a state, of which there may be more. Numbers that no run writes are refused, whatever the checksum says.
+    fn decode(bytes: &[u8]) -> Result<Self> {
+        let mut rest = bytes.strip_prefix(MAGIC).ok_or_else(|| broken("it begins differently"))?;
+        let mut number = || -> Result<u64> {
+            let (head, tail) = rest.split_first_chunk::<8>().ok_or_else(|| broken("it ends early"))?;
+            rest = tail;
+            Ok(u64::from_le_bytes(*head))
+        };
+        let (length, samples, begun, layers) = (number()?, number()?, number()?, number()?);
+        if length > MOST_TEXT {
+            return Err(broken(&format!("a text of {length} bytes, at most {MOST_TEXT} are read")));
+        }
+        let text = rest.get(..length as usize).ok_or_else(|| broken("it ends early"))?;
+        let about: Value = serde_json::from_slice(text).map_err(|error| broken("its text").caused_by(error))?;
+        let side = |i: usize| about["extent"][i].as_u64().and_then(|v| u32::try_from(v).ok()).unwrap_or(0);
+        let extent = [side(0), side(1)];
+        let [width, height] = extent.map(u64::from);
+        let bytes = width.checked_mul(height).and_then(|pixels| pixels.checked_mul(16 * u64::from(LAYERS)));
+        let (Some(bytes), Some(slots)) = (bytes.filter(|bytes| *bytes > 0), slots_of(extent)) else {
+            return Err(broken(&format!("its size: {width}×{height} pixels")));
+        };
+        if layers != u64::from(LAYERS) {
+            return Err(broken(&format!("{layers} images, {LAYERS} are needed")));
+        }
+        if samples > MOST_SAMPLES || begun >= slots {
+            let what =
+                format!("{samples} samples a pixel and {begun} begun; there can be {MOST_SAMPLES} and {}", slots - 1);
+            return Err(broken(&what));
+        }
+        Ok(Self { extent, samples, begun, about, body: NUMBERS + length as usize, bytes })
+    }
+}
+
 impl State {
+    /// What a file of a state says of itself; its pixels are not read, and its checksum is not compared.
+    ///
+    /// # Errors
+    /// `Input` if it cannot be read or does not begin as a state does.
+    pub fn glance(path: impl AsRef<Path>) -> Result<Head> {
+        let path = path.as_ref();
+        let bytes = image::read_head_checked(path, NUMBERS as u64 + MOST_TEXT)?;
+        Head::decode(&bytes).map_err(|error| error.in_file(path))
+    }
+
+    /// Bytes of a state of a picture of this size at most.
+    pub fn most_bytes([width, height]: [u32; 2]) -> u64 {
+        let pixels = u64::from(width).saturating_mul(height.into()).saturating_mul(16 * u64::from(LAYERS));
+        pixels.saturating_add(NUMBERS as u64 + MOST_TEXT + 8)
+    }
+
     /// Samples that every pixel has.
     pub fn samples(&self) -> u64 {
         self.sums.samples()
@@ -47,29 +127,20 @@ impl State {
     /// # Errors
     /// `Input` if they are not a whole state.
     pub fn decode(bytes: &[u8]) -> Result<Self> {
-        let broken = |what: &str| Error::input(format!("is no state of a reference picture: {what}"));
-        let rest = bytes.strip_prefix(MAGIC).ok_or_else(|| broken("it begins differently"))?;
+        if !bytes.starts_with(MAGIC) {
+            return Err(broken("it begins differently"));
+        }
         let (body, check) = bytes.split_last_chunk::<8>().ok_or_else(|| broken("it ends early"))?;
         if checksum(body) != u64::from_le_bytes(*check) {
             return Err(broken("its checksum is wrong"));
         }
-        let mut rest = &rest[..rest.len().saturating_sub(8)];
-        let mut number = || -> Result<u64> {
-            let (head, tail) = rest.split_first_chunk::<8>().ok_or_else(|| broken("it ends early"))?;
-            rest = tail;
-            Ok(u64::from_le_bytes(*head))
-        };
-        let (length, samples, begun, count) = (number()?, number()?, number()?, number()?);
-        let length =
-            usize::try_from(length).ok().filter(|&l| l <= rest.len()).ok_or_else(|| broken("it ends early"))?;
-        let (about, pixels) = rest.split_at(length);
-        let about: Value = serde_json::from_slice(about).map_err(|error| broken("its text").caused_by(error))?;
-        let side = |i: usize| about["extent"][i].as_u64().and_then(|v| u32::try_from(v).ok());
-        let extent = [side(0), side(1)].map(|s| s.unwrap_or(0));
-        let bytes_each = u64::from(extent[0]) * u64::from(extent[1]) * 16;
-        if bytes_each == 0 || bytes_each.checked_mul(count) != Some(pixels.len() as u64) {
-            return Err(broken("its size"));
+        // The checksum is no secret: what it covers may have been written by anybody.
+        let Head { extent, samples, begun, about, body: start, bytes: length } = Head::decode(body)?;
+        let pixels = &body[start..];
+        if pixels.len() as u64 != length {
+            return Err(broken(&format!("{} bytes of pixels, by its header {length}", pixels.len())));
         }
+        let bytes_each = length / u64::from(LAYERS);
         let layers = pixels
             .chunks_exact(bytes_each as usize)
             .map(|layer| layer.chunks_exact(16).map(bytemuck::pod_read_unaligned).collect())
@@ -163,6 +234,54 @@ mod tests {
             broken[at] ^= 4;
             assert!(State::decode(&broken).is_err(), "byte {at}");
         }
+    }
+
+    /// A state whose numbers were changed by somebody who knows the checksum.
+    fn forged(number: usize, value: u64) -> Vec<u8> {
+        let mut bytes = state().encode().unwrap();
+        bytes[16 + 8 * number..24 + 8 * number].copy_from_slice(&value.to_le_bytes());
+        let end = bytes.len() - 8;
+        let check = checksum(&bytes[..end]);
+        bytes[end..].copy_from_slice(&check.to_le_bytes());
+        bytes
+    }
+
+    #[test]
+    fn numbers_that_no_run_writes_are_refused() {
+        // 3×2 pixels are one block of 64 slots.
+        for (number, value, part) in [
+            (0, u64::MAX, "text of 18446744073709551615 bytes"),
+            (0, 1 << 23, "ends early"),
+            (1, u64::MAX, "18446744073709551615 samples"),
+            (1, 1 << 32, "there can be 4294967295"),
+            (2, 64, "64 begun; there can be 4294967295 and 63"),
+            (3, 8, "8 images, 9 are needed"),
+            (3, u64::MAX, "images"),
+        ] {
+            let error = State::decode(&forged(number, value)).unwrap_err();
+            assert!(error.exit_code() == 3 && error.to_string().contains(part), "{error} without {part:?}");
+        }
+        let most = State::decode(&forged(1, u32::MAX.into())).unwrap();
+        assert_eq!(most.samples(), u64::from(u32::MAX));
+        for extent in [json!([0, 2]), json!([u32::MAX, u32::MAX]), json!([3]), json!("x")] {
+            let bytes = State { about: json!({ "extent": extent }), ..state() }.encode().unwrap();
+            assert!(State::decode(&bytes).unwrap_err().to_string().contains("size"), "{extent}");
+        }
+        let bytes = State { about: json!({ "extent": [3, 3] }), ..state() }.encode().unwrap();
+        assert!(State::decode(&bytes).unwrap_err().to_string().contains("bytes of pixels"));
+    }
+
+    #[test]
+    fn a_glance_reads_the_head_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.state");
+        std::fs::write(&path, &state().encode().unwrap()[..200]).unwrap();
+        let head = State::glance(&path).unwrap();
+        assert_eq!((head.extent, head.samples), ([3, 2], 7));
+        assert!(State::most_bytes(head.extent) >= state().encode().unwrap().len() as u64);
+        std::fs::write(&path, "nothing of the kind").unwrap();
+        let error = State::glance(&path).unwrap_err();
+        assert!(error.exit_code() == 3 && error.to_string().contains("a.state"), "{error}");
     }
 
     #[test]

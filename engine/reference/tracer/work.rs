@@ -24,7 +24,7 @@ const RAYS: u32 = 32;
 /// The same where a driver ends loops early: two rays of at most 30,000 steps stay below its limit.
 const RAYS_LIMITED: u32 = 2;
 /// Images of the sums: six sums, and the rounding errors of the first three.
-const LAYERS: u32 = consts::PATH_SUMS + consts::PATH_EXACT_SUMS;
+pub(super) const LAYERS: u32 = consts::PATH_SUMS + consts::PATH_EXACT_SUMS;
 
 /// A picture in the making.
 #[derive(Debug)]
@@ -54,8 +54,8 @@ impl Job {
 
     /// Slots of one sample: pixels, filled up to whole blocks.
     fn slots(&self) -> u64 {
-        let [width, height] = self.view.extent.map(|e| u64::from(e.div_ceil(BLOCK)));
-        width * height * u64::from(GRANULE)
+        // No device has images of which these are too many.
+        slots_of(self.view.extent).unwrap_or(u64::MAX)
     }
 
     /// Samples that every pixel has.
@@ -94,6 +94,12 @@ impl Job {
         self.done = sums.samples() * self.slots() + sums.begun();
         Ok(())
     }
+}
+
+/// Slots of one sample of a picture of this size; `None` if they cannot be counted.
+pub(super) fn slots_of(extent: [u32; 2]) -> Option<u64> {
+    let [width, height] = extent.map(|side| u64::from(side.div_ceil(BLOCK)));
+    width.checked_mul(height)?.checked_mul(GRANULE.into())
 }
 
 /// Surfaces that the longest path may visit.

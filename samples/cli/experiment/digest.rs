@@ -24,6 +24,11 @@ impl Digest {
         digest
     }
 
+    /// Whether a text is what [`Self::hex`] gives.
+    pub fn is_hex(text: &str) -> bool {
+        text.len() == 32 && text.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))
+    }
+
     /// 32 hexadecimal digits.
     pub fn hex(&self) -> String {
         format!("{:032x}", self.0)
@@ -38,6 +43,7 @@ mod tests {
     fn agrees_with_the_published_values() {
         assert_eq!(Digest::of(b"").hex(), "6c62272e07bb014262b821756295c58d");
         assert_eq!(Digest::of(b"a").hex(), "d228cb696f1a8caf78912b704e4a8964");
+        assert!(Digest::is_hex(&Digest::of(b"a").hex()) && !Digest::is_hex("../../../../../../etc/passwd.exr"));
         assert_eq!(Digest::of(b"foobar").hex(), "343e1662793c64bf6f0d3597ba446f18");
     }
 }

@@ -210,7 +210,11 @@ pub const KINDS: &[Kind] = &[
         description: "the program povray, with radiosity as the dissertation has it; the picture alone",
         on_device: false,
         of_images: false,
-        settings: |_, changes| config::to_value(&config::with::<PovSettings>(&PovSettings::default(), changes)?),
+        settings: |_, changes| {
+            let settings: PovSettings = config::with(&PovSettings::default(), changes)?;
+            settings.pov.check()?;
+            config::to_value(&settings)
+        },
         render: by_povray,
         available: || {
             let program = povray::find().map_err(|error| error.to_string())?;
@@ -222,7 +226,16 @@ pub const KINDS: &[Kind] = &[
         description: "path tracer on the CPU; layers direct, indirect, albedo",
         on_device: false,
         of_images: false,
-        settings: |_, changes| config::to_value(&config::with::<PathSettings>(&PathSettings::default(), changes)?),
+        settings: |_, changes| {
+            let settings: PathSettings = config::with(&PathSettings::default(), changes)?;
+            match (settings.samples, settings.bounces) {
+                (1..=MOST_SAMPLES, 0..=MOST_BOUNCES) => config::to_value(&settings),
+                (1..=MOST_SAMPLES, other) => {
+                    Err(Error::usage(format!("bounces is {other}, allowed are 0 to {MOST_BOUNCES}")))
+                }
+                (other, _) => Err(Error::usage(format!("samples is {other}, allowed are 1 to {MOST_SAMPLES}"))),
+            }
+        },
         render: path_picture,
         available: || Ok(String::new()),
     },
@@ -363,6 +376,8 @@ fn path_picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> 
 
 /// More paths a pixel are no experiment.
 const MOST_SAMPLES: u32 = 1 << 24;
+/// As for the path tracer on the device.
+const MOST_BOUNCES: u32 = 1000;
 
 /// Settings of the path tracer on the device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

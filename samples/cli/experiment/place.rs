@@ -162,12 +162,20 @@ fn still(path: &Path, entry: &Entry) -> Result<Loaded> {
     })
 }
 
+/// Views of a scene at most.
+const MOST_VIEWS: usize = 100_000;
+
 /// Every view at every size.
 fn sized(views: Vec<Placed>, entry: &Entry) -> Result<Vec<Placed>> {
     if entry.sizes.is_empty() {
         return Ok(views);
     }
     let sizes: Vec<Size> = entry.sizes.iter().map(|size| size.parse().map_err(Error::input)).collect::<Result<_>>()?;
+    let all = views.len().saturating_mul(sizes.len());
+    if all > MOST_VIEWS {
+        let what = format!("{} views at {} sizes are {all}; at most {MOST_VIEWS} are made", views.len(), sizes.len());
+        return Err(Error::input(what));
+    }
     let at =
         |view: &Placed, size: Size| Placed { name: format!("{} {size}", view.name), size: Some(size), ..view.clone() };
     Ok(views.iter().flat_map(|view| sizes.iter().map(move |&size| at(view, size))).collect())

@@ -17,7 +17,7 @@ use super::{
     file::{self, Changes, Experiment, Role},
     kinds::Times,
 };
-use crate::config;
+use crate::{config, report};
 
 /// What lights a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -140,12 +140,18 @@ impl Results {
     /// # Errors
     /// `Input` if there is nothing.
     pub fn open(folder: &Path) -> Result<Self> {
-        let path = folder.join("manifest.json");
+        let manifest_path = folder.join("manifest.json");
         let fail = |error: Error| error.help("`lucerna reproduce` writes such a folder");
-        let text = lucerna::image::read_file_checked(&path, 1 << 28).map_err(fail)?;
-        let manifest: Manifest =
-            serde_json::from_slice(&text).map_err(|error| fail(Error::input(error.to_string()).in_file(&path)))?;
+        let text = lucerna::image::read_file_checked(&manifest_path, 1 << 28).map_err(fail)?;
+        let manifest: Manifest = serde_json::from_slice(&text)
+            .map_err(|error| fail(Error::input(error.to_string()).in_file(&manifest_path)))?;
         let Manifest { name, path, quick, text, runs, skipped, missing, facts } = manifest;
+        // Keys become names of files in this folder.
+        if let Some(run) = runs.iter().find(|run| !Digest::is_hex(&run.key)) {
+            return Err(fail(
+                Error::input(format!("{:?} is no key of a picture", run.key)).at("runs").in_file(&manifest_path),
+            ));
+        }
         let experiment = file::parse(&name, path.as_deref(), &text, quick)?;
         Ok(Self { experiment, runs, skipped, missing, facts, cache: Cache::open(folder) })
     }
@@ -162,7 +168,7 @@ impl Results {
             facts: self.facts.clone(),
         };
         let text = format!("{:#}\n", config::to_value(&manifest)?);
-        lucerna::image::write_atomic(&folder.join("manifest.json"), text.as_bytes(), true)
+        report::write_own(&folder.join("manifest.json"), text.as_bytes())
     }
 
     /// Runs of a technique or reference.

@@ -85,7 +85,7 @@ impl Pov {
         }
     }
 
-    fn check(&self) -> Result<()> {
+    pub(crate) fn check(&self) -> Result<()> {
         let range = |name: &str, value: f32, low: f32, high: f32| {
             if (low..=high).contains(&value) {
                 return Ok(());

@@ -118,7 +118,8 @@ pub fn render(export: &Export, size: Size, options: &Options) -> Result<Rendered
         std::thread::sleep(Duration::from_millis(20));
     };
     if !status.success() {
-        let text = std::fs::read(&log).unwrap_or_default();
+        // The first lines say what was wrong, however long it went on.
+        let text = image::read_head_checked(&log, 1 << 20).unwrap_or_default();
         let text = String::from_utf8_lossy(&text);
         return Err(failed(format!("POV-Ray ended with {status}: {}", message(&text))));
     }

@@ -6,7 +6,7 @@ use std::{
 };
 
 use lucerna::{
-    Result,
+    Error, ErrorKind, Result,
     image::{read_file_checked, write_atomic},
     reference::tracer::{State, Tracer},
 };
@@ -16,8 +16,6 @@ use serde_json::Value;
 const PAUSE: Duration = Duration::from_secs(20);
 /// Of the time, at most this share goes into writing states.
 const SHARE: f64 = 0.05;
-/// Largest state that is read, bytes.
-const MOST: u64 = 64 << 30;
 
 /// Where the state is kept, and when it is due.
 #[derive(Debug)]
@@ -38,13 +36,41 @@ impl Checkpoint {
         Self { path, about, next: Instant::now() + pause() }
     }
 
+    /// Whether there is room for a state: that of a stopped run may be worth hours, and is neither replaced nor removed unless `restart`
+    /// says so.
+    ///
+    /// # Errors
+    /// `Output` if there is one, saying how far it is.
+    pub fn probe(&self, restart: bool) -> Result<()> {
+        let Some(path) = self.path.as_ref().filter(|path| !restart && path.symlink_metadata().is_ok()) else {
+            return Ok(());
+        };
+        let what = match State::glance(path) {
+            Ok(head) => {
+                let [width, height] = head.extent;
+                format!("a stopped run has left {} samples a pixel of {width}×{height}", head.samples)
+            }
+            Err(error) => format!("a stopped run has left a state that cannot be read ({})", error.what()),
+        };
+        Err(Error::new(ErrorKind::Output, what).in_file(path).help(
+            "Give --resume to go on with the options that it was begun with, --restart to start anew over it, or name another image with -o",
+        ))
+    }
+
     /// Goes on from the state, if there is one.
     ///
     /// # Errors
     /// `Input` if it is of another picture or damaged.
     pub fn resume(&self, tracer: &mut Tracer<'_>) -> Result<bool> {
         let Some(path) = self.path.as_ref().filter(|path| path.exists()) else { return Ok(false) };
-        let state = State::decode(&read_file_checked(path, MOST)?).map_err(|error| error.in_file(path))?;
+        let [width, height] = tracer.view()?.extent;
+        if let Some([w, h]) = State::glance(path).ok().map(|head| head.extent).filter(|of| *of != [width, height]) {
+            let what = format!("is the state of another picture: of {w}×{h} pixels, this one has {width}×{height}");
+            return Err(Error::input(what).in_file(path).help("Start anew, or give the size that it was begun with"));
+        }
+        // No more than the state of this picture takes, whatever the length of the file.
+        let bytes = read_file_checked(path, State::most_bytes([width, height]))?;
+        let state = State::decode(&bytes).map_err(|error| error.in_file(path))?;
         tracer.restore(&state, &self.about).map_err(|error| error.in_file(path))?;
         Ok(true)
     }

@@ -11,21 +11,23 @@ use std::{path::PathBuf, process::ExitCode, time::Instant};
 use lucerna::{
     Error, Result, Stop,
     gpu::{Gpu, GpuOptions},
-    image::{Layer, Layers, Metadata, WriteOptions},
+    image::{Format, Layer, Layers, Metadata, WriteOptions},
     reference::tracer::{Progress, Tracer},
     scene::{NoteKind, View, builtin},
 };
 use serde_json::{Value, json};
 
 use crate::{
-    config,
+    config::{self, SettingsArgs},
     console::{self, Console},
     exposure,
     last_stage::{self, Staged},
-    outputs::Outputs,
-    pattern::Values,
+    outputs::{self, Fresh, Outputs},
+    pattern::{Pattern, Values},
     program::{self, STOPPED_EARLY},
+    progress::ProgressMode,
     record::{Record, Source},
+    render::Again,
     signals::Interrupt,
     stage::Stage,
 };
@@ -64,22 +66,81 @@ const FINISH: f64 = 1.0;
 /// # Errors
 /// Whatever fails, with the kind that decides the exit code.
 pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
-    let Staged { technique: settings, tonemap } = args.effective()?;
+    let staged = args.effective()?;
     if args.settings.print_config {
-        console::print(config::to_toml(&Staged { technique: settings, tonemap })?.trim_end())?;
+        console::print(config::to_toml(&staged)?.trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
     let interrupt = Interrupt::install();
+    picture(args, staged, console, None, &interrupt).map(|(code, _)| code)
+}
+
+/// Makes a picture again, in memory; `None`: interrupted. Nothing is written, no state is read.
+///
+/// # Errors
+/// Whatever fails while rendering; `Input` for what the record says.
+pub fn again(asked: &Again<'_>) -> Result<Option<Fresh>> {
+    let check = |settings: &Settings| {
+        settings.validate()?;
+        settings.reference.validate().map_err(|error| error.at("reference"))
+    };
+    let staged = Staged::recorded(&asked.record.settings, &Settings::default(), check)?;
+    let args = ReferenceArgs {
+        stage: asked.record.stage_args(asked.camera)?,
+        output: Vec::new(),
+        overwrite: false,
+        show: asked.mode()?,
+        json: false,
+        spp: None,
+        time_limit: None,
+        target_error: None,
+        bounces: None,
+        resume: false,
+        restart: false,
+        exposure: Some(asked.record.exposure),
+        seed: None,
+        settings: SettingsArgs::default(),
+        device: asked.device.clone(),
+        talk: asked.talk.clone(),
+        progress: ProgressMode::default(),
+    };
+    picture(&args, staged, asked.console(), Some(asked.format), asked.interrupt).map(|(_, fresh)| fresh)
+}
+
+/// Makes the picture; with `memory` it is kept as a file of that format, and nothing is written.
+fn picture(
+    args: &ReferenceArgs,
+    Staged { technique: settings, tonemap }: Staged<Settings>,
+    console: Console,
+    memory: Option<Format>,
+    interrupt: &Interrupt,
+) -> Result<(ExitCode, Option<Fresh>)> {
     let options = WriteOptions { overwrite: args.overwrite || args.resume, f32: true, ..WriteOptions::default() };
-    Outputs::new(&args.output, 1, options.clone())?;
+    let outputs = |options: WriteOptions| match memory {
+        Some(format) => Ok(Outputs::in_memory(format, options)),
+        None => Outputs::new(&args.output, 1, options),
+    };
+    outputs(options.clone())?;
     let stage = Stage::open(&args.stage)?;
-    let mut outputs = Outputs::new(&args.output, 1, options)?;
+    let mut outputs = outputs(options)?;
     if outputs.uses_stdout() && args.json {
         return Err(Error::usage("--json and an image both want standard output").help("Give the image a name"));
     }
     let names = (stage.scene.name.clone(), stage.camera_name.clone());
     let values = Values { scene: &names.0, camera: &names.1, technique: "reference", frame: 0, layer: "" };
     outputs.probe(&values, &["picture"])?;
+    let first = args.output.first().filter(|name| *name != "-");
+    let path = match first {
+        _ if memory.is_some() => None,
+        Some(name) => Some(PathBuf::from(Pattern::parse(name)?.fill(&values))),
+        // Names of scenes and cameras never add a folder.
+        None if args.output.is_empty() => Some(PathBuf::from(Pattern::parse(outputs::SINGLE)?.fill(&values))),
+        None => None,
+    };
+    let mut checkpoint = Checkpoint::new(path, about(args, &stage));
+    if !args.resume {
+        checkpoint.probe(args.restart)?;
+    }
     // What techniques of the picture alone cannot do with emissive surfaces does not concern rays.
     for note in
         stage.notes().iter().filter(|n| n.kind != NoteKind::Repaired && !n.text.contains("only what the picture shows"))
@@ -92,13 +153,6 @@ pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
     let (pose, view) = stage.at(args.stage.time, args.stage.size)?;
     let mut tracer = Tracer::new(&gpu, &stage.scene, &pose)?;
     tracer.start(&view, &settings.reference)?;
-    let first = args.output.first().filter(|name| *name != "-");
-    let path = match first {
-        Some(name) => Some(PathBuf::from(crate::pattern::Pattern::parse(name)?.fill(&values))),
-        None if args.output.is_empty() => Some(PathBuf::from(format!("{}-{}-reference.png", names.0, names.1))),
-        None => None,
-    };
-    let mut checkpoint = Checkpoint::new(path, about(args, &stage));
     if args.resume && checkpoint.resume(&mut tracer)? {
         console.info(&format!("goes on after {:.0} samples a pixel", tracer.progress()?.samples));
     }
@@ -108,10 +162,10 @@ pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
     let mut meter = Meter::new(args.progress, console.is_quiet(), goals, tracer.progress()?);
     // Hours of work may be in the sums from now on.
     let _saving = interrupt.saving();
-    let end = work(args, &settings, &mut tracer, &mut checkpoint, &mut meter, &interrupt)?;
+    let end = work(args, &settings, &mut tracer, &mut checkpoint, &mut meter, interrupt)?;
     let done = tracer.progress()?;
     if done.paths == 0 && end == End::Interrupt {
-        return Ok(ExitCode::from(interrupt.exit_code()));
+        return Ok((ExitCode::from(interrupt.exit_code()), None));
     }
     let sums = tracer.sums()?;
     meter.finish(&done, sums.relative_error());
@@ -144,7 +198,9 @@ pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
     let written = outputs.write(&values, &layers)?;
     interrupt.keep();
     let files: Vec<&str> = written.iter().map(|(name, _)| name.as_str()).collect();
-    console.info(&format!("wrote {}", files.join(" ")));
+    if memory.is_none() {
+        console.info(&format!("wrote {}", files.join(" ")));
+    }
     if end.is_early() {
         if checkpoint.write(&tracer)? {
             console.info(&format!("stopped by {}; --resume goes on", end.text()));
@@ -155,7 +211,8 @@ pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
     if args.json {
         console::print_json(&report(&layers, &done, &meter, sums.relative_error(), end, &files))?;
     }
-    Ok(if end.is_early() { ExitCode::from(STOPPED_EARLY) } else { ExitCode::SUCCESS })
+    let code = if end.is_early() { ExitCode::from(STOPPED_EARLY) } else { ExitCode::SUCCESS };
+    Ok((code, outputs.fresh().filter(|_| !end.is_early())))
 }
 
 fn work(

@@ -3,7 +3,7 @@
 use std::{str::FromStr, time::Duration};
 
 use clap::ValueEnum;
-use lucerna::{Result, reference::tracer};
+use lucerna::{Error, Result, reference::tracer};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -56,6 +56,10 @@ pub struct ReferenceArgs {
     #[arg(long, help_heading = "Quality")]
     pub resume: bool,
 
+    /// Start anew, even if a stopped run has left a state beside the image
+    #[arg(long, conflicts_with = "resume", help_heading = "Quality")]
+    pub restart: bool,
+
     /// Exposure: colours of .png files are multiplied by 2^EV [default: what suits the scene]
     #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
     pub exposure: Option<f64>,
@@ -92,6 +96,20 @@ impl Default for Settings {
         Self { samples: 256, reference: tracer::Settings::default() }
     }
 }
+
+impl Settings {
+    /// # Errors
+    /// `Usage` if there are no samples, or more than can be numbered.
+    pub fn validate(&self) -> Result<()> {
+        match self.samples {
+            1..=MOST_SAMPLES => Ok(()),
+            other => Err(Error::usage(format!("{other}; allowed are 1 to {MOST_SAMPLES}")).at("samples")),
+        }
+    }
+}
+
+/// Samples of a pixel that can be numbered.
+const MOST_SAMPLES: u64 = u32::MAX as u64;
 
 impl ReferenceArgs {
     /// The settings in effect: defaults, file, `-D`, then the options that have names of their own.

@@ -28,7 +28,7 @@ mod ticks;
 
 use std::path::{Path, PathBuf};
 
-use lucerna::{Result, image};
+use lucerna::{Error, ErrorKind, Result, image};
 
 pub use images::{Comparison, Image};
 pub use plot::{Axis, Kind, Plot, Rule, Series};
@@ -137,9 +137,22 @@ impl Page {
         let mut written = Vec::new();
         for (name, text) in files {
             let path = folder.join(name);
-            image::write_atomic(&path, text.as_bytes(), true)?;
+            write_own(&path, text.as_bytes())?;
             written.push(path);
         }
         Ok(written)
     }
+}
+
+/// Writes a file of a report's folder. One that is a symbolic link may lead anywhere: a folder from elsewhere must not choose which file
+/// is replaced.
+///
+/// # Errors
+/// `Output` if it is a link or cannot be written.
+pub(crate) fn write_own(path: &Path, bytes: &[u8]) -> Result<()> {
+    if path.is_symlink() {
+        let what = "is a symbolic link, which may lead out of the report's folder";
+        return Err(Error::new(ErrorKind::Output, what).in_file(path).help("Remove it"));
+    }
+    image::write_atomic(path, bytes, true)
 }

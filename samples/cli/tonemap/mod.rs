@@ -4,11 +4,12 @@ mod args;
 mod meter;
 mod names;
 mod picture;
+mod recipe;
 
 use std::{
     collections::HashSet,
     io::Read,
-    path::Path,
+    path::{Path, PathBuf},
     process::ExitCode,
     sync::mpsc,
     time::{Duration, Instant},
@@ -24,6 +25,9 @@ use lucerna::{
 use serde_json::{Value, json};
 
 pub use args::{Config, TonemapArgs};
+pub use recipe::{Again, again};
+
+use args::Gamma;
 use names::{Input, OutputName, PIPE};
 use picture::Done;
 
@@ -45,9 +49,38 @@ const LIMITS: Limits = Limits {
     max_depth: 0,
 };
 
+/// How pictures are made and written, beside the settings.
+#[derive(Clone, Debug)]
+struct Making {
+    /// The exposure is measured.
+    auto: bool,
+    gamma: Gamma,
+    fps: f64,
+    mask: Option<PathBuf>,
+    png_bits: u8,
+    jpeg_quality: u8,
+    f32: bool,
+    overwrite: bool,
+}
+
+impl Making {
+    fn of(args: &TonemapArgs) -> Self {
+        Self {
+            auto: args.exposure.is_some_and(|exposure| exposure.auto),
+            gamma: args.gamma,
+            fps: args.fps,
+            mask: args.mask.clone(),
+            png_bits: if args.bits == "16" { 16 } else { 8 },
+            jpeg_quality: args.quality,
+            f32: args.f32,
+            overwrite: args.overwrite,
+        }
+    }
+}
+
 /// What all pictures of a run share.
-struct Run<'a> {
-    args: &'a TonemapArgs,
+struct Run {
+    making: Making,
     console: Console,
     config: Config,
     outputs: Vec<(OutputName, Format)>,
@@ -118,7 +151,8 @@ pub fn run(args: &TonemapArgs, console: Console) -> Result<ExitCode> {
     }
     let (inputs, notes) = names::inputs(&args.inputs, args.layer.as_deref(), args.frames.as_ref(), args.sequence)?;
     notes.iter().for_each(|note| console.warning(note));
-    let mut run = Run { args, console, config, outputs: outputs(args)?, mask: None, metered: None, before: None };
+    let making = Making::of(args);
+    let mut run = Run { making, console, config, outputs: outputs(args)?, mask: None, metered: None, before: None };
     run.probe(&inputs)?;
     if let Some(path) = &args.mask {
         run.mask = Some(image::read(path, &LIMITS)?);
@@ -237,7 +271,7 @@ fn read(input: &Input) -> Result<Layers> {
     image::read(path, &LIMITS)
 }
 
-impl Run<'_> {
+impl Run {
     fn settings(&self) -> &Settings {
         &self.config.tonemap
     }
@@ -269,7 +303,7 @@ impl Run<'_> {
                 if path.canonicalize().is_ok_and(|path| read.contains(&path)) {
                     return Err(Error::usage(format!("output '{name}' is one of the inputs")));
                 }
-                image::probe_output(path, self.args.overwrite)?;
+                image::probe_output(path, self.making.overwrite)?;
             }
         }
         Ok(())
@@ -277,23 +311,17 @@ impl Run<'_> {
 
     fn write_options(&self) -> WriteOptions {
         WriteOptions {
-            overwrite: self.args.overwrite,
-            png_bits: if self.args.bits == "16" { 16 } else { 8 },
-            jpeg_quality: self.args.quality,
-            gamma: self.args.gamma.0,
-            f32: self.args.f32,
+            overwrite: self.making.overwrite,
+            png_bits: self.making.png_bits,
+            jpeg_quality: self.making.jpeg_quality,
+            gamma: self.making.gamma.0,
+            f32: self.making.f32,
             ..WriteOptions::default()
         }
     }
 }
 
-fn json_of(
-    run: &Run<'_>,
-    about: &Description,
-    done: &[Done],
-    failed: &[(String, Error)],
-    asked: usize,
-) -> Result<Value> {
+fn json_of(run: &Run, about: &Description, done: &[Done], failed: &[(String, Error)], asked: usize) -> Result<Value> {
     let failed: Vec<Value> = failed
         .iter()
         .map(|(name, error)| json!({ "input": name, "error": error.to_string(), "exit_code": error.exit_code() }))

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use crate::{args::Frames, compare::split};
 use lucerna::{Error, Result};
 
+/// What messages call standard input.
+pub const STDIN: &str = "standard input";
 /// Standard input or output.
 pub const PIPE: &str = "-";
 
@@ -22,6 +24,8 @@ pub struct Input {
     pub frame: u32,
     /// `Some`: a frame of a sequence; true for its first.
     pub sequence: Option<bool>,
+    /// Of a numbered sequence: its name, and the number of its first frame.
+    pub pattern: Option<(String, u32)>,
 }
 
 /// A number between two texts: `%04d`, `####` or `{frame:04}` in a name.
@@ -105,7 +109,7 @@ pub fn inputs(
             let frame = list.len() as u32;
             let stem = "stdin".to_owned();
             let layer = layer.map(str::to_owned);
-            list.push(Input { name: "standard input".into(), path: None, layer, stem, frame, sequence: None });
+            list.push(Input { name: STDIN.into(), path: None, layer, stem, frame, sequence: None, pattern: None });
             continue;
         }
         let (file, own) = split(name);
@@ -117,6 +121,7 @@ pub fn inputs(
             layer: layer.clone(),
             frame,
             sequence,
+            pattern: None,
         };
         match Numbered::parse(file).filter(|_| !Path::new(file).exists()) {
             None => {
@@ -137,7 +142,13 @@ pub fn inputs(
                     notes.push(format!("{file}: {missing} numbers between {first} and {last} are missing"));
                 }
                 let each = numbers.iter().enumerate();
-                list.extend(each.map(|(i, &n)| input(pattern.fill(n).into(), n, Some(i == 0))));
+                let named = Some((file.to_owned(), *first));
+                list.extend(
+                    each.map(|(i, &n)| Input {
+                        pattern: named.clone(),
+                        ..input(pattern.fill(n).into(), n, Some(i == 0))
+                    }),
+                );
             }
         }
     }
@@ -146,10 +157,43 @@ pub fn inputs(
     }
     if sequence {
         for (i, input) in list.iter_mut().enumerate() {
-            (input.frame, input.sequence) = (i as u32, Some(i == 0));
+            (input.frame, input.sequence, input.pattern) = (i as u32, Some(i == 0), None);
         }
     }
     Ok((list, notes))
+}
+
+/// The frames of a numbered sequence from `first` to `last`, for the same work once more.
+///
+/// # Errors
+/// `Input` if there are none, or if `last` is not there.
+pub fn frames(pattern: &str, layer: Option<&str>, first: u32, last: u32) -> Result<Vec<Input>> {
+    let numbered = Numbered::parse(pattern).ok_or_else(|| {
+        Error::input(format!("{pattern:?} has no ####, %04d or {{frame}} in its name")).at("sequence")
+    })?;
+    let there = numbered.on_disk()?;
+    let path = |frame: u32| PathBuf::from(numbered.fill(frame));
+    let list: Vec<Input> = there
+        .into_iter()
+        .filter(|frame| (first..=last).contains(frame))
+        .enumerate()
+        .map(|(i, frame)| Input {
+            name: path(frame).display().to_string(),
+            path: Some(path(frame)),
+            layer: layer.map(str::to_owned),
+            stem: String::new(),
+            frame,
+            sequence: Some(i == 0),
+            pattern: Some((pattern.to_owned(), first)),
+        })
+        .collect();
+    let ends = |input: Option<&Input>, frame: u32| input.is_some_and(|input| input.frame == frame);
+    if !ends(list.first(), first) || !ends(list.last(), last) {
+        return Err(
+            Error::input(format!("frames {first} and {last} of the sequence are not both there")).in_file(pattern)
+        );
+    }
+    Ok(list)
 }
 
 /// A name to write, with its placeholders.
@@ -170,7 +214,8 @@ impl OutputName {
             text.to_owned()
         };
         let parsed = Self(name);
-        let input = Input { name: "x".into(), path: None, layer: None, stem: "x".into(), frame: 0, sequence: None };
+        let (sequence, pattern) = (None, None);
+        let input = Input { name: "x".into(), path: None, layer: None, stem: "x".into(), frame: 0, sequence, pattern };
         let filled = parsed.fill(&input, "x", "x");
         if filled.contains(['{', '}']) {
             return Err(Error::usage(format!("output '{text}': an unknown placeholder; {ALLOWED}")));

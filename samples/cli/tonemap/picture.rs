@@ -14,7 +14,7 @@ use lucerna::{
 };
 use serde_json::{Value, json};
 
-use super::{Config, PIPE, Run, meter, names::Input};
+use super::{Config, PIPE, Run, meter, names::Input, recipe::Recipe};
 use crate::{config, console::Console, outputs::ALPHA_LEFT_OUT, program};
 
 /// A picture that was written.
@@ -70,6 +70,11 @@ impl Unwritten {
         Ok((self.files.into_iter().map(|(name, _)| name).collect(), begun.elapsed()))
     }
 
+    /// The picture, and how it is written.
+    pub(super) fn into_layers(self) -> (Layers, WriteOptions) {
+        (self.layers, self.options)
+    }
+
     /// Small enough to be kept while the next picture is worked on.
     pub(super) fn is_small(&self) -> bool {
         u64::from(self.layers.width) * u64::from(self.layers.height) <= KEPT_PIXELS
@@ -109,7 +114,7 @@ pub(super) fn pixels(picture: &Layers, asked: Option<&str>) -> Result<(Vec<[f32;
     Ok((layer.data.chunks_exact(count).map(rgba).collect(), alpha.is_some()))
 }
 
-impl Run<'_> {
+impl Run {
     /// Maps a picture; what is left is to write its files.
     pub(super) fn develop(
         &mut self,
@@ -130,7 +135,7 @@ impl Run<'_> {
         let dt = input.sequence.map(|_| {
             let frames =
                 self.before.filter(|_| input.sequence == Some(false)).map_or(1, |b| input.frame.abs_diff(b).max(1));
-            (f64::from(frames) / self.args.fps) as f32
+            (f64::from(frames) / self.making.fps) as f32
         });
         self.before = Some(input.frame);
         let mapped = still.map(width, height, pixels, mask.as_deref(), dt)?;
@@ -172,7 +177,7 @@ impl Run<'_> {
     /// The settings of a picture: with the exposure that was measured, if that was asked for.
     fn exposed(&mut self, input: &Input, pixels: &[[f32; 4]]) -> Settings {
         let mut settings = self.settings().clone();
-        if !self.args.exposure.is_some_and(|exposure| exposure.auto) {
+        if !self.making.auto {
             return settings;
         }
         let metered = match self.metered.filter(|_| input.sequence == Some(false)) {
@@ -186,7 +191,7 @@ impl Run<'_> {
     }
 
     fn mask(&self, width: u32, height: u32) -> Result<Option<Vec<f32>>> {
-        let (Some(mask), Some(path)) = (&self.mask, &self.args.mask) else { return Ok(None) };
+        let (Some(mask), Some(path)) = (&self.mask, &self.making.mask) else { return Ok(None) };
         if [mask.width, mask.height] != [width, height] {
             let (w, h) = (mask.width, mask.height);
             return Err(
@@ -218,19 +223,7 @@ impl Run<'_> {
 
     fn metadata(&self, about: &Description, input: &Input, picture: &Layers, settings: &Settings) -> Result<Metadata> {
         let source = &picture.metadata;
-        let gamma = self.args.gamma.0.map_or_else(|| json!("srgb"), |gamma| json!(gamma));
-        let mut config = json!({
-            "command": ["tonemap"],
-            "input": input.name,
-            "gamma": gamma,
-            "settings": config::to_value(&Config { tonemap: settings.clone() })?,
-        });
-        if input.sequence.is_some() {
-            config["sequence"] = json!({ "frame": input.frame, "fps": self.args.fps });
-        }
-        if !source.config.is_null() {
-            config["source"] = source.config.clone();
-        }
+        let recipe = Recipe::new(&self.making, &Config { tonemap: settings.clone() }, input, &source.config)?;
         Ok(Metadata {
             program: "tonemap".into(),
             version: program::VERSION.into(),
@@ -238,7 +231,7 @@ impl Run<'_> {
             technique: format!("{}-{}", self.settings().operator.name(), mode_name(self.settings())),
             device: about.device.clone(),
             driver: format!("{} {}", about.driver, about.driver_info).trim().to_owned(),
-            config,
+            config: config::to_value(&recipe)?,
             ..source.clone()
         })
     }

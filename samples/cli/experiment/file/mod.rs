@@ -239,6 +239,11 @@ impl Method {
         })
     }
 
+    /// How many there are, without making them.
+    pub fn variant_count(&self) -> usize {
+        self.matrix.values().fold(1, |count, values| count.saturating_mul(values.len()))
+    }
+
     /// Whether it is run on a scene.
     pub fn takes(&self, scene: &str) -> bool {
         self.scenes.as_ref().is_none_or(|scenes| scenes.iter().any(|name| name == scene))

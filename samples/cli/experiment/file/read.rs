@@ -178,6 +178,10 @@ fn what_it_is(scene: &Scene) -> Result<()> {
         return Err(Error::input(what)
             .help("Leave out unit, ground, cameras, list, recorded, random, light, sun, environment, sizes"));
     }
+    if scene.random > MOST_DRAWN {
+        let what = format!("scene '{name}': random is {}, at most {MOST_DRAWN} views are drawn", scene.random);
+        return Err(Error::input(what));
+    }
     for size in &scene.sizes {
         size.parse::<Size>().map_err(|what| Error::input(format!("scene '{name}': sizes: {what}")))?;
     }
@@ -233,6 +237,11 @@ fn apply_quick(
     Ok(())
 }
 
+/// Variants of a technique at most.
+const MOST_VARIANTS: usize = 10_000;
+/// Views of a scene that are drawn at most, as by `lucerna views`.
+const MOST_DRAWN: usize = 10_000;
+
 /// What can only be said once everything is read.
 fn check(
     experiment: &Experiment,
@@ -265,6 +274,11 @@ fn check(
             return Err(fail(Error::input(format!("matrix: '{key}' has no values"))));
         }
         let kind = kinds::find(&method.kind).map_err(fail)?;
+        let count = method.variant_count();
+        if count > MOST_VARIANTS {
+            let what = format!("matrix: {count} combinations of its values, at most {MOST_VARIANTS} are made");
+            return Err(fail(Error::input(what)));
+        }
         for variant in method.variants() {
             kind.effective(method, &variant).map_err(|error| fail(Error::input(error.to_string())))?;
         }

@@ -1,17 +1,12 @@
-//! `lucerna rerun`: makes a picture again from its metadata and compares.
+//! A picture beside the one that was made again: bit by bit.
 
-use std::{
-    path::{Path, PathBuf},
-    process::{Command, Stdio},
-};
+use std::path::Path;
 
 use lucerna::{
     Error, ErrorKind, Result,
     image::{Layers, Metadata},
 };
 use serde::Serialize;
-
-use crate::{args::DeviceArgs, info, record::Record};
 
 /// What came out of the comparison.
 #[derive(Debug, Serialize)]
@@ -60,57 +55,8 @@ impl Comparison {
     }
 }
 
-/// Renders the picture at `path` again, into a temporary folder, and compares.
-pub fn rerun(path: &Path, device: &DeviceArgs, quiet: bool) -> Result<Comparison> {
-    let old = info::read(path)?;
-    let record = Record::from_config(&old.metadata.config).map_err(|error| error.in_file(path))?;
-    let folder =
-        tempfile::tempdir().map_err(|error| Error::new(ErrorKind::Output, "no temporary folder").caused_by(error))?;
-    let extension = path.extension().unwrap_or_default();
-    let fresh = folder.path().join("{frame}").with_extension(extension);
-
-    let program = program(&record).map_err(|error| error.in_file(path))?;
-    let mut command = Command::new(&program);
-    command.args(record.arguments(folder.path())?).arg("--output").arg(&fresh).stdin(Stdio::null());
-    command.args(device.device.iter().flat_map(|device| ["--device", device]));
-    command.args(device.ray_query.iter().flat_map(|choice| ["--ray-query", choice]));
-    command.args(device.require_gpu.then_some("--require-gpu"));
-    command.args(quiet.then_some("--quiet"));
-    let status = command.stdout(Stdio::null()).status().map_err(|error| {
-        Error::new(ErrorKind::Runtime, format!("{} could not be started", program.display())).caused_by(error)
-    })?;
-    if !status.success() {
-        // Its own message stands above; keep its meaning for whoever reads exit codes.
-        let kind = match status.code() {
-            Some(2) => ErrorKind::Usage,
-            Some(3) => ErrorKind::Input,
-            Some(4) => ErrorKind::NoDevice,
-            Some(5) => ErrorKind::OutOfMemory,
-            Some(6) => ErrorKind::DeviceLost,
-            _ => ErrorKind::Runtime,
-        };
-        return Err(Error::new(kind, "could not be rendered again (see above)").in_file(path));
-    }
-    let fresh = folder.path().join(record.frame.to_string()).with_extension(extension);
-    let new = info::read(&fresh)?;
-    let same_file = std::fs::read(path).ok() == std::fs::read(&fresh).ok();
-    Ok(compare(&old, &new, same_file))
-}
-
-/// The executable of the record: beside this one.
-fn program(record: &Record) -> Result<PathBuf> {
-    let name = record.command.first().map_or("", String::as_str);
-    let plain = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '-' | '_'));
-    let this = std::env::current_exe()
-        .map_err(|error| Error::new(ErrorKind::Runtime, "this program does not know where it is").caused_by(error))?;
-    let file = this.with_file_name(name).with_extension(std::env::consts::EXE_EXTENSION);
-    if !plain || !file.is_file() {
-        return Err(Error::input(format!("was made by {name:?}, which is not installed beside {}", this.display())));
-    }
-    Ok(file)
-}
-
-fn compare(old: &Layers, new: &Layers, same_file: bool) -> Comparison {
+/// What became of a picture.
+pub(super) fn compare(old: &Layers, new: &Layers, same_file: bool) -> Comparison {
     let mut result = Comparison {
         same_file,
         same_pixels: false,

@@ -1,0 +1,119 @@
+//! How much work a picture may ask for unasked.
+
+use lucerna::{Error, Result, techniques::fiv};
+
+use crate::record::Record;
+
+/// Frames from the first of its run to its own.
+const FRAMES: u64 = 1000;
+/// Paths of a reference: some minutes of a GPU.
+const PATHS: u64 = 10_000_000_000;
+/// Rays that vectors of an occluder take: some minutes of a GPU.
+const RAYS: u64 = 100_000_000_000;
+/// Pixels where those of the file do not say how many were rendered.
+const PIXELS: u64 = 1 << 24;
+/// Lights that were added, and things beside the first on a ground.
+const THINGS: u64 = 256;
+
+/// An error if the picture asks for `asked` of something, more than `allowed`.
+fn over(place: &str, asked: u64, allowed: u64, what: &str) -> Result<()> {
+    if asked <= allowed {
+        return Ok(());
+    }
+    Err(Error::input(format!("asks for {asked} {what}; at most {allowed} are made unasked"))
+        .at(place)
+        .help("Give --long if the picture is from somebody you trust, and there is time"))
+}
+
+/// Whether a record asks for no more than its picture needs, and for nothing that takes hours unless `long` allows it. `extent`: of the file.
+///
+/// # Errors
+/// `Input`, with the number.
+pub fn check(record: &Record, extent: [u32; 2], long: bool) -> Result<()> {
+    let [width, height] = [record.width, record.height];
+    // An image of the graph may have any size.
+    if record.view.is_none() && [width, height] != extent {
+        let [w, h] = extent;
+        return Err(
+            Error::input(format!("{width}×{height} pixels are said to be in the file, it has {w}×{h}")).at("width")
+        );
+    }
+    if long {
+        return Ok(());
+    }
+    let frames = u64::from(record.frame).saturating_sub(record.first_frame.into()) + 1;
+    over("frame", frames, FRAMES, "frames")?;
+    let pixels = u64::from(width) * u64::from(height);
+    if record.view.is_some() {
+        over("width", pixels, PIXELS, "pixels")?;
+    }
+    let samples = record.settings["samples"].as_u64().unwrap_or(1);
+    over("settings.samples", samples.saturating_mul(pixels), PATHS, "paths")?;
+    over("light", record.light.len() as u64, THINGS, "lights")?;
+    let beside = record.ground.as_ref().map_or(0, |ground| ground.beside.len());
+    over("ground.beside", beside as u64, THINGS, "things")
+}
+
+/// The same for vectors that are computed anew, which `settings` decide.
+///
+/// # Errors
+/// `Input`, with the number.
+pub fn vectors(settings: &fiv::Settings, long: bool) -> Result<()> {
+    let numbers = [settings.azimuths, settings.polars, settings.radii, settings.turns, 6];
+    let texel = [settings.size, settings.size, settings.split, settings.split];
+    let rays = numbers.iter().chain(&texel).fold(1u64, |rays, &n| rays.saturating_mul(n.into()));
+    if long { Ok(()) } else { over("settings.fiv", rays, RAYS, "rays for each occluder") }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn record(changes: serde_json::Value) -> Record {
+        let mut config = json!({
+            "command": ["isr", "render"], "scene": {"builtin": "cornell"}, "fingerprint": "0", "width": 8, "height": 4,
+            "camera": {"scene": 0}, "first_frame": 0, "frame": 0, "time": 0.0, "fps": 30.0, "exposure": 0.0, "seed": 0,
+            "settings": {},
+        });
+        changes.as_object().unwrap().iter().for_each(|(key, value)| config[key] = value.clone());
+        Record::from_config(&config).unwrap()
+    }
+
+    #[test]
+    fn what_would_take_hours_is_refused_unless_asked_for() {
+        let lights = vec!["0,1,0,1"; 300];
+        for (changes, number, place) in [
+            (json!({ "frame": 4_000_000_000u32 }), "4000000001", "frame"),
+            (json!({ "first_frame": 5, "frame": 1005 }), "1001", "frame"),
+            (json!({ "settings": { "samples": 400_000_000 } }), "12800000000", "settings.samples"),
+            (json!({ "settings": { "samples": u64::MAX } }), "18446744073709551615", "settings.samples"),
+            (json!({ "view": "x", "width": 16384, "height": 16384 }), "268435456", "width"),
+            (json!({ "light": lights }), "300", "light"),
+            (json!({ "ground": { "beside": vec!["a.obj"; 300] } }), "300", "ground.beside"),
+        ] {
+            let record = record(changes);
+            let error = check(&record, [8, 4], false).unwrap_err();
+            assert_eq!((error.exit_code(), error.place()), (3, Some(place)));
+            assert!(error.to_string().contains(number) && error.to_string().contains("--long"), "{error}");
+            check(&record, [8, 4], true).unwrap();
+        }
+        check(&record(json!({ "frame": 999, "settings": { "samples": 4096 } })), [8, 4], false).unwrap();
+    }
+
+    #[test]
+    fn sizes_are_those_of_the_file() {
+        let error = check(&record(json!({ "width": 16384, "height": 16384 })), [8, 4], true).unwrap_err();
+        assert!(error.to_string().contains("16384×16384") && error.to_string().contains("8×4"), "{error}");
+    }
+
+    #[test]
+    fn vectors_are_counted() {
+        vectors(&fiv::Settings::default(), false).unwrap();
+        let many = fiv::Settings { azimuths: 1024, polars: 513, radii: 128, ..fiv::Settings::default() };
+        assert!(vectors(&many, false).is_err() && vectors(&many, true).is_ok());
+        let most = fiv::Settings { azimuths: u32::MAX, size: u32::MAX, split: u32::MAX, ..many };
+        assert!(vectors(&most, false).unwrap_err().to_string().contains(&u64::MAX.to_string()));
+    }
+}

@@ -1,0 +1,202 @@
+//! `lucerna rerun`: makes a picture again from its metadata, in memory, and compares.
+//!
+//! A picture is data from elsewhere. What it says of its making is read into the settings that the command line would have been read
+//! into, and rendered in this process: no program is started, nothing is written, and no option comes from the picture. The files that
+//! it names are the scene, what the scene names in its folder, the environment, and for `tonemap` the picture that was developed; each is
+//! said before it is read. What would take hours is refused unless `--long` asks for it.
+
+pub mod bounds;
+mod comparison;
+
+use std::{path::PathBuf, process::ExitCode};
+
+use lucerna::{
+    Error, ErrorKind, Result,
+    image::{self, Format, Layers},
+    scene::Limits,
+};
+use serde_json::Value;
+
+pub use comparison::Comparison;
+
+use crate::{
+    args::{DeviceArgs, TalkArgs},
+    console::{self, Console},
+    outputs::Fresh,
+    record::Record,
+    reference,
+    render::Again,
+    signals::Interrupt,
+    technique::{fiv, igi, isr},
+    tonemap,
+};
+
+/// Options of `lucerna rerun`.
+#[derive(clap::Args, Clone, Debug)]
+pub struct RerunArgs {
+    /// An image that `isr`, `igi` or `fiv render`, `lucerna reference` or `tonemap` wrote
+    pub image: PathBuf,
+
+    /// Largest difference of two samples that is accepted [default: the same bits]
+    #[arg(long, value_name = "X", value_parser = tolerance)]
+    pub tolerance: Option<f32>,
+
+    /// Also make again what may take hours: more than 1000 frames, or 10^10 paths
+    #[arg(long)]
+    pub long: bool,
+
+    #[command(flatten)]
+    pub device: DeviceArgs,
+
+    #[command(flatten)]
+    pub talk: TalkArgs,
+
+    /// Print one JSON document
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn tolerance(text: &str) -> Result<f32, String> {
+    text.parse().ok().filter(|x: &f32| x.is_finite() && *x >= 0.0).ok_or_else(|| "expected a number from 0 on".into())
+}
+
+/// Who made a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Maker {
+    Isr,
+    Igi,
+    Fiv,
+    Reference,
+    Tonemap,
+}
+
+/// What may stand as `command` in a picture, word by word.
+const MAKERS: [(&[&str], Maker); 5] = [
+    (&["isr", "render"], Maker::Isr),
+    (&["igi", "render"], Maker::Igi),
+    (&["fiv", "render"], Maker::Fiv),
+    (&["lucerna", "reference"], Maker::Reference),
+    (&["tonemap"], Maker::Tonemap),
+];
+
+impl Maker {
+    fn of(config: &Value) -> Result<Self> {
+        let Some(command) = config.get("command") else {
+            return Err(Error::input("does not say how it was made")
+                .help("Pictures written by `render`, `lucerna reference` and `tonemap` do"));
+        };
+        let words = command.as_array().map(Vec::as_slice).unwrap_or_default();
+        let same = |known: &[&str]| known.iter().copied().map(Some).eq(words.iter().map(Value::as_str));
+        MAKERS.iter().find(|(known, _)| same(known)).map(|(_, maker)| *maker).ok_or_else(|| {
+            let known: Vec<String> = MAKERS.iter().map(|(words, _)| words.join(" ")).collect();
+            let shown: String = command.to_string().chars().take(100).collect();
+            Error::input(format!("{shown} is no command that is made again; those are {}", known.join(", ")))
+                .at("command")
+        })
+    }
+}
+
+/// Makes the picture again and says what is different.
+///
+/// # Errors
+/// `Input` for what the picture says and what it names; `Comparison` if it is another picture.
+pub fn run(args: &RerunArgs, console: Console) -> Result<ExitCode> {
+    let (path, limits) = (&args.image, Limits::default());
+    let bytes = image::read_file_checked(path, limits.max_file)?;
+    let mut old = image::decode(&bytes, &limits).map_err(|error| error.in_file(path))?;
+    let format = Format::sniff(&bytes).unwrap_or(Format::Png);
+    if format == Format::Pfm {
+        old.metadata = image::metadata(path)?;
+    }
+    // What is wrong with these is wrong with this call.
+    args.device.options()?;
+    let interrupt = Interrupt::install();
+    let fresh = again(args, &old, format, console, &interrupt).map_err(|error| {
+        // What is wrong with a call is wrong with the picture that says it.
+        let kind = if error.kind() == ErrorKind::Usage { ErrorKind::Input } else { error.kind() };
+        match error.file() {
+            Some(_) => Error::new(kind, error.to_string().trim_end_matches('.')).in_file(path),
+            None => error.of_kind(kind).in_file(path),
+        }
+    })?;
+    let Some(fresh) = fresh else { return Ok(ExitCode::from(interrupt.exit_code())) };
+    let mut new = image::decode(&fresh.bytes, &limits).map_err(|error| error.in_file(path))?;
+    if format == Format::Pfm {
+        new.metadata = fresh.metadata;
+    }
+    let result = comparison::compare(&old, &new, bytes == fresh.bytes);
+    match args.json {
+        true => console::print_json(&console::to_json(&result)?)?,
+        false => console::print(&result.text(path))?,
+    }
+    result.verdict(path, args.tolerance)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn again(
+    args: &RerunArgs,
+    old: &Layers,
+    format: Format,
+    console: Console,
+    interrupt: &Interrupt,
+) -> Result<Option<Fresh>> {
+    let config = &old.metadata.config;
+    let maker = Maker::of(config)?;
+    let extent = [old.width, old.height];
+    if maker == Maker::Tonemap {
+        let RerunArgs { device, long, .. } = args;
+        return tonemap::again(config, &tonemap::Again { extent, format, device, console, long: *long, interrupt });
+    }
+    let record = Record::from_config(config)?;
+    bounds::check(&record, extent, args.long)?;
+    for file in record.files() {
+        console.info(&format!("reads {file}"));
+    }
+    let asked = Again {
+        record: &record,
+        camera: &old.metadata.camera,
+        format,
+        device: &args.device,
+        talk: &args.talk,
+        long: args.long,
+        interrupt,
+    };
+    match maker {
+        Maker::Isr => isr::again(&asked),
+        Maker::Igi => igi::again(&asked),
+        Maker::Fiv => fiv::again(&asked),
+        Maker::Reference | Maker::Tonemap => reference::again(&asked),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn only_whole_commands_of_the_list_are_made_again() {
+        for (words, maker) in MAKERS {
+            assert_eq!(Maker::of(&json!({ "command": words })).unwrap(), maker);
+        }
+        for odd in [
+            json!([]),
+            json!(["isr"]),
+            json!(["render", "isr"]),
+            json!(["isr", "render", "--overwrite"]),
+            json!(["isr", "reference"]),
+            json!(["bash", "-c", "true"]),
+            json!(["../isr", "render"]),
+            json!(["ISR", "render"]),
+            json!(["tonemap", null]),
+            json!("isr render"),
+            json!({ "0": "isr", "1": "render" }),
+            json!(null),
+        ] {
+            let error = Maker::of(&json!({ "command": odd })).unwrap_err();
+            assert!(error.exit_code() == 3 && error.to_string().contains("no command"), "{odd}: {error}");
+        }
+        assert!(Maker::of(&json!({ "kind": "isr" })).unwrap_err().to_string().contains("does not say how"));
+    }
+}

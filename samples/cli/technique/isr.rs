@@ -1,0 +1,138 @@
+//! `isr`: image-space radiosity. A frame is declared by [`Renderer::compose`].
+
+use std::process::ExitCode;
+
+use clap::ValueEnum;
+use lucerna::{
+    Result,
+    gpu::Gpu,
+    graph::Graph,
+    passes::{
+        ambient::Irradiance,
+        direct::{self, Lights},
+        gbuffer, shadow, skybox,
+    },
+    scene::{Scene, resident::Resident},
+    techniques::isr::{self, PictureSettings, Preset},
+};
+
+use crate::{
+    args::RenderArgs,
+    gbuffer_layers,
+    outputs::Fresh,
+    render::{self, Again, Input, Renderer, Technique},
+    shown::Shown,
+};
+
+/// Options of `isr render`.
+#[derive(clap::Args, Debug)]
+pub struct IsrArgs {
+    #[command(flatten)]
+    pub common: RenderArgs,
+
+    /// Start from choices that go together: fast, balanced or best; -D and --settings win over it
+    #[arg(long, value_name = "NAME", help_heading = "Technique", conflicts_with = "paper")]
+    pub preset: Option<Preset>,
+
+    /// What the picture shows
+    #[arg(long, value_enum, default_value_t, help_heading = "Technique")]
+    pub mode: Mode,
+}
+
+/// What the picture shows.
+#[derive(ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mode {
+    /// Direct and indirect light
+    #[default]
+    Isr,
+    /// Direct light only; nothing is gathered
+    Direct,
+    /// Indirect light alone
+    Indirect,
+    /// Ambient occlusion alone: 1 open, 0 occluded
+    Occlusion,
+}
+
+impl Mode {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Isr => "isr",
+            Self::Direct => "direct",
+            Self::Indirect => "indirect",
+            Self::Occlusion => "occlusion",
+        }
+    }
+}
+
+/// The technique in one of its modes.
+#[derive(Debug)]
+struct Isr(Mode);
+
+/// Renders the frames of a command line.
+///
+/// # Errors
+/// Whatever fails, with the kind that decides the exit code.
+pub fn run(args: &IsrArgs) -> Result<ExitCode> {
+    let base = match args.preset {
+        _ if args.common.paper => PictureSettings::paper(),
+        Some(preset) => PictureSettings { isr: preset.settings(), ..PictureSettings::default() },
+        None => PictureSettings::default(),
+    };
+    render::render(&Isr(args.mode), &args.common, &base)
+}
+
+/// Makes a picture again, in memory; `None`: interrupted.
+///
+/// # Errors
+/// As [`render::again`].
+pub fn again(asked: &Again<'_>) -> Result<Option<Fresh>> {
+    render::again(&Isr(asked.mode()?), asked, &PictureSettings::default())
+}
+
+impl Renderer for Isr {
+    type Settings = PictureSettings;
+    type Kept = (Resident, Irradiance);
+
+    fn technique(&self) -> Technique {
+        Technique { name: "isr", mode: Some(self.0.name()), radiance: self.0 != Mode::Occlusion }
+    }
+
+    fn check(settings: &PictureSettings) -> Result<()> {
+        settings.validate()
+    }
+
+    fn prepare(&self, gpu: &Gpu, scene: &Scene, _: &PictureSettings) -> Result<Self::Kept> {
+        let ambient = scene.environment.as_ref().map(Irradiance::of).unwrap_or_default();
+        Ok((Resident::new(gpu, scene)?, ambient))
+    }
+
+    fn compose(
+        &self,
+        graph: &mut Graph,
+        (resident, ambient): &mut Self::Kept,
+        input: &Input<'_>,
+        settings: &PictureSettings,
+    ) -> Result<Shown> {
+        let scene = resident.frame_in(graph, input.scene, input.pose);
+        let view = input.view.fit_far(&scene.bounds());
+        let (shown, gbuffer, shadows) = if self.0 == Mode::Direct {
+            let gbuffer = gbuffer::draw(graph, &scene, &view, &settings.gbuffer);
+            let shadows = shadow::draw(graph, &scene, &view, &settings.shadow);
+            let lit = direct::light(graph, &gbuffer, Lights::from(&shadows), &settings.isr.direct());
+            skybox::draw(graph, &scene, &gbuffer, settings.background.into(), lit.direct);
+            (Shown::new(lit.direct), gbuffer, shadows)
+        } else {
+            let picture = isr::picture(graph, &scene, &view, ambient.clone(), settings)?;
+            let out = picture.outputs;
+            let shown = match self.0 {
+                Mode::Indirect => Shown::new(out.indirect),
+                Mode::Occlusion => Shown::grey(out.occlusion),
+                Mode::Isr | Mode::Direct => Shown::new(out.total),
+            };
+            let shown = shown.color("direct", out.direct).color("indirect", out.indirect);
+            (shown.layer("occlusion", &["Y"], out.occlusion, |pixel| pixel), picture.gbuffer, picture.shadows)
+        };
+        let notes = [resident.notes(), &shadows.notes].concat();
+        Ok(gbuffer_layers::add(shown, &gbuffer, &view).seen_by(view).noting(notes))
+    }
+}
