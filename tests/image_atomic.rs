@@ -196,7 +196,9 @@ fn files_that_belong_together_are_written_together() {
     assert_eq!([&first, &second, &last].map(|path| fs::read(path).unwrap()), [b"1", b"2", b"3"]);
 
     // One is there already: what is new is not.
-    [&first, &last].map(|path| fs::remove_file(path).unwrap());
+    for path in [&first, &last] {
+        fs::remove_file(path).unwrap();
+    }
     let error = write(&second, false).unwrap_err();
     assert!(error.to_string().contains("exists already"), "{error}");
     assert_eq!(names(folder.path()), ["b"]);
