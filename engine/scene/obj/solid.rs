@@ -97,7 +97,8 @@ fn keep(whole: &Primitive, chosen: impl Fn(usize) -> bool) -> Primitive {
 fn parts(meshes: &[Mesh], material: u32) -> Vec<Part> {
     // Corners by position: files repeat positions for normals and texture coordinates.
     let mut points: HashMap<[u32; 3], u32> = HashMap::new();
-    let (mut places, mut triangles): (Vec<Place>, Vec<([u32; 3], [Vec3; 3])>) = (Vec::new(), Vec::new());
+    let mut places: Vec<Place> = Vec::new();
+    let mut triangles: Vec<([u32; 3], [Vec3; 3])> = Vec::new();
     for (m, mesh) in meshes.iter().enumerate() {
         for (p, primitive) in mesh.primitives.iter().enumerate().filter(|(_, p)| p.material == material) {
             for (t, corners) in primitive.indices.chunks_exact(3).enumerate() {
