@@ -209,7 +209,9 @@ def main():
         for line in answers.read_text().splitlines():
             try:
                 entry = json.loads(line)
-                known[entry["tree"], entry["name"]] = entry
+                # What went wrong otherwise may have been the machine.
+                if entry["verdict"] in (CAUGHT, SURVIVED):
+                    known[entry["tree"], entry["name"]] = entry
             except (ValueError, KeyError, TypeError):
                 continue  # the last line of a run that was killed
 
