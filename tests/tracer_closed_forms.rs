@@ -192,6 +192,14 @@ fn mirrors_and_panes_by_fresnel() {
             let sigma = (through * (1.0 - through) / (256.0 * 64.0f64)).sqrt();
             assert!((found - through).abs() < 4.5 * sigma, "thin {thin}: {found} instead of {through} ± {sigma}");
         }
+        // A lamp inside of the glass: what leaves is thinner by the square of the index, and less by what is reflected.
+        let mut stage = Stage::new();
+        lamp_behind(&mut stage);
+        let pane = stage.material(glass(false));
+        stage.quad(pane, vec3(-1.0, 1.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0);
+        let found = mean(&render(gpu, &stage.scene, &above, &full(0), 64), "emission")[0] / 2.0 * 2.25;
+        let sigma = (0.96 * 0.04 / (256.0 * 64.0f64)).sqrt();
+        assert!((found - 0.96).abs() < 4.5 * sigma, "{found} instead of 0.96 ± {sigma}");
         // A mirror at 45° shows a lamp at the side.
         let aside = |material: Material| {
             let mut stage = Stage::new();
