@@ -147,6 +147,56 @@ fn upsampling_falls_back_to_the_nearest_in_depth() {
 }
 
 #[test]
+fn upsampling_takes_from_what_faces_alike() {
+    with_gpu(|gpu| {
+        let eye = Eye::look_at(DVec3::ZERO, -DVec3::Z, 0.9, 10.0, 4, 4);
+        let fine = Buffers {
+            width: 4,
+            height: 4,
+            depth: vec![0.2; 16],
+            albedo: vec![DVec3::ONE; 16],
+            mask: vec![1.0; 16],
+            normal: vec![DVec3::Z; 16],
+            sender: vec![DVec3::ZERO; 16],
+            factor: 1.0,
+        };
+        let mut graph = Graph::new("normals");
+        let g = gbuffer(&mut graph, &eye, &fine);
+        let ambient = Irradiance::default().upload(&mut graph);
+        let extent = Extent::new(2, 2);
+        // All coarse texels lie in the pixels' plane. Means of normals are shorter than one.
+        let cosines = [1.0f64, 0.8, 0.6, -1.0];
+        let normals = cosines.map(|c| [0.5 * (1.0 - c * c).sqrt() as f32, 0.0, 0.5 * c as f32, 0.0]);
+        let depth = image(&mut graph, "depth", extent, &[[0.2; 4]; 4]);
+        let normal = image(&mut graph, "normal", extent, &normals);
+        let values = [1.0f32, 2.0, 4.0, 8.0];
+        let coarse = image(&mut graph, "gathered", extent, &values.map(|v| [v, 0.0, 0.0, 0.0]));
+        let direct = image(&mut graph, "direct", Extent::new(4, 4), &[[0.0; 4]; 16]);
+        let choices = Compose {
+            factor: 2,
+            plane: true,
+            epsilon: 1e-3,
+            tint: false,
+            occlude_ambient: false,
+            k_ssao: 0.5,
+            k_isr: 1.0,
+        };
+        let sum =
+            compose::sum(&mut graph, &g, ambient, direct, coarse, &Coarse { albedo: depth, normal, depth }, &choices);
+        let [total] = read(gpu, graph, [sum.total]);
+        for (x, y) in [(1, 1), (2, 1), (1, 2), (2, 2)] {
+            let (fx, fy) = (if x == 1 { 0.25 } else { 0.75 }, if y == 1 { 0.25 } else { 0.75 });
+            let bilinear = [(1.0 - fx) * (1.0 - fy), fx * (1.0 - fy), (1.0 - fx) * fy, fx * fy];
+            // Bilinear times the fourth power of the cosine; nothing from behind.
+            let weights: Vec<f64> = bilinear.iter().zip(cosines).map(|(b, c)| b * c.max(0.0).powi(4)).collect();
+            let weighted: f64 = weights.iter().zip(values).map(|(w, v)| w * f64::from(v)).sum();
+            let (expected, found) = (weighted / weights.iter().sum::<f64>(), f64::from(total[y * 4 + x][0]));
+            assert!((found - expected).abs() < 2e-3 * expected, "({x}, {y}): {found} instead of {expected}");
+        }
+    });
+}
+
+#[test]
 fn direct_light_by_the_inverse_square_and_by_equation_16() {
     with_gpu(|gpu| {
         let (eye, patches) = scene(32, 24);

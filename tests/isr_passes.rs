@@ -250,10 +250,88 @@ fn bilateral_keeps_constants_and_does_not_leak() {
 }
 
 #[test]
+fn bilateral_weighs_creases_by_the_fourth_power_of_the_cosine() {
+    with_gpu(|gpu| {
+        let (width, height, radius) = (33usize, 5usize, 6i32);
+        let eye = Eye::look_at(DVec3::ZERO, -DVec3::Z, 0.9, 10.0, width, height);
+        // One plane whose right half has normals that lean by a cosine of 0.8, and are not of unit length.
+        let normal = |x: usize| if x < 16 { DVec3::Z } else { 0.5 * DVec3::new(0.0, 0.6, 0.8) };
+        let all = || 0..width * height;
+        let buffers = Buffers {
+            width,
+            height,
+            factor: 1.0,
+            depth: vec![0.2; width * height],
+            normal: all().map(|i| normal(i % width)).collect(),
+            albedo: vec![DVec3::ONE; width * height],
+            mask: vec![1.0; width * height],
+            sender: vec![DVec3::ZERO; width * height],
+        };
+        let value = |x: usize| if x < 16 { 1.0f32 } else { 3.0 };
+        let mut graph = Graph::new("creases");
+        let (coarse, _) = coarse(&mut graph, &buffers);
+        let view = graph.uniform(&view(&eye).uniform());
+        let colors: Vec<[f32; 4]> = all().map(|i| [value(i % width); 4]).collect();
+        let colors = image(&mut graph, "colors", Extent::new(width as u32, height as u32), &colors);
+        // Distance from the leaning texels' planes does not count.
+        let blurred = bilateral::blur(&mut graph, colors, &coarse, view, 1, radius as u32, 1e6);
+        let [found] = read(gpu, graph, [blurred]);
+        for x in 0..width {
+            let (mut sum, mut weights) = (0.0, 0.0);
+            for i in -radius..=radius {
+                let at = x as i32 + i;
+                if at < 0 || at >= width as i32 {
+                    continue;
+                }
+                // Standard deviation: half the radius.
+                let like = normal(x).normalize().dot(normal(at as usize).normalize());
+                let w = (-f64::from(i * i) / (2.0 * 3.0 * 3.0)).exp() * like.powi(4);
+                sum += w * f64::from(value(at as usize));
+                weights += w;
+            }
+            let (found, expected) = (f64::from(found[2 * width + x][0]), sum / weights);
+            assert!((found - expected).abs() < 3e-3, "texel {x}: {found} instead of {expected}");
+        }
+    });
+}
+
+#[test]
+fn a_bounce_sends_what_was_sent_and_what_is_reflected() {
+    with_gpu(|gpu| {
+        let extent = Extent::new(9, 7);
+        let mut random = Random(3);
+        let [sender, albedo, gathered] = [(); 3].map(|()| (0..63).map(|_| random.texel()).collect::<Vec<_>>());
+        for premultiplied in [0, 1] {
+            let mut graph = Graph::new("bounce");
+            let next = graph.image("next", Format::RGBA16F, extent);
+            let args = shaders::isr::bounce::Args {
+                sender: image(&mut graph, "sender", extent, &sender),
+                albedo: image(&mut graph, "albedo", extent, &albedo),
+                gathered: image(&mut graph, "gathered", extent, &gathered),
+                next,
+                spec: shaders::isr::bounce::Spec { premultiplied },
+            };
+            graph.compute(args, extent);
+            let [found] = read(gpu, graph, [next]);
+            let inputs = sender.iter().zip(&albedo).zip(&gathered);
+            for (i, (((sent, albedo), gathered), found)) in inputs.zip(&found).enumerate() {
+                let mask = if premultiplied == 1 { sent[3] } else { 1.0 };
+                let right = (0..3).all(|c| (found[c] - sent[c] - albedo[c] * gathered[c] * mask).abs() < 2e-3);
+                assert!(right && (found[3] - sent[3]).abs() < 1e-3, "texel {i}: {found:?} of {sent:?}");
+            }
+        }
+    });
+}
+
+#[test]
 fn gather_is_the_reference() {
     with_gpu(|gpu| {
         let (eye, patches) = scene(96, 72);
-        let buffers = Buffers::cast(&eye, &patches, 2);
+        let mut buffers = Buffers::cast(&eye, &patches, 2);
+        // What sends or receives in part, or not at all.
+        for (i, mask) in buffers.mask.iter_mut().enumerate() {
+            *mask *= [1.0, 0.5, 0.0, 0.8][(i / 3) % 4];
+        }
         for (estimator, pattern, samples, jitter) in [
             (Estimator::Area, Pattern::Rings { spread: 1.5 }, 48, true),
             (Estimator::Area, Pattern::Grid, 24, false),

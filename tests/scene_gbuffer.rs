@@ -111,6 +111,70 @@ fn a_plane_has_its_albedo_normal_depth_and_emission() {
     });
 }
 
+/// One texel of these codes.
+fn texel(rgba: [u8; 4]) -> Texture {
+    Texture { name: String::new(), width: 1, height: 1, rgba: vec![rgba] }
+}
+
+#[test]
+fn every_texture_reaches_its_channel() {
+    let codes =
+        [[188, 120, 60, 255], [20, 102, 51, 255], [170, 90, 230, 255], [102, 250, 10, 255], [90, 188, 250, 255]];
+    let [base, _, mapped, _, glow] = codes.map(|[r, g, b, _]| Vec3::new(r.into(), g.into(), b.into()) / 255.0);
+    let linear = |v: Vec3| Vec3::from_array(v.to_array().map(lucerna::image::srgb::decode));
+    let slot = |i: u32| Some(TextureRef::new(i));
+    let material = Material {
+        base_color: Vec3::new(0.8, 0.6, 0.4).extend(1.0),
+        base_color_texture: slot(0),
+        metallic: 0.5,
+        roughness: 0.75,
+        metallic_roughness_texture: slot(1),
+        normal_texture: slot(2),
+        normal_scale: 0.6,
+        occlusion_texture: slot(3),
+        occlusion_strength: 0.25,
+        emissive: Vec3::new(2.0, 3.0, 4.0),
+        emissive_texture: slot(4),
+        ior: 2.0,
+        ..Material::default()
+    };
+    let base = Vec3::new(0.8, 0.6, 0.4) * linear(base);
+    // Roughness from green, metallic from blue, accessibility from red.
+    let (roughness, metallic) = (0.75 * 102.0 / 255.0, 0.5 * 51.0 / 255.0);
+    let f0 = Vec3::splat(1.0 / 9.0).lerp(base, metallic);
+    let access = 1.0 + 0.25 * (102.0 / 255.0 - 1.0);
+    let glow = Vec3::new(2.0, 3.0, 4.0) * linear(glow);
+    let mapped = (mapped * 2.0 - 1.0) * Vec3::new(0.6, 0.6, 1.0);
+    let turned = Mat4::from_rotation_y(0.5);
+    with_gpu(|gpu| {
+        for world in [turned, turned * Mat4::from_scale(Vec3::new(-1.5, 1.0, 1.0))] {
+            for side in [1.0, -1.0] {
+                let mut scene = Scene { textures: codes.map(texel).to_vec(), ..Scene::default() };
+                let mut primitive = square();
+                primitive.tangents.iter_mut().for_each(|t| t.w = side);
+                let plane = mesh(&mut scene, primitive, material.clone());
+                place(&mut scene, plane, world);
+                // A transform that mirrors turns the bitangent around.
+                let tangent = world.transform_vector3(Vec3::X).normalize();
+                let bitangent = Vec3::Y.cross(tangent) * side * world.determinant().signum();
+                let normal = (tangent * mapped.x + bitangent * mapped.y + Vec3::Y * mapped.z).normalize();
+                let view = view(Vec3::new(0.0, 2.0, 1.0), Vec3::ZERO, EXTENT);
+                let got = surfaces(gpu, &scene, &view, Settings::default());
+                let at = (EXTENT[1] / 2 * EXTENT[0] + EXTENT[0] / 2) as usize;
+                assert!(got.depth[at] < 1.0);
+                assert!(got.normal[at].abs_diff_eq(normal, 8e-3), "{} instead of {normal}", got.normal[at]);
+                let close = |got: [f32; 4], want: [f32; 4], slack: f32| {
+                    assert!(got.iter().zip(want).all(|(a, b)| (a - b).abs() < slack), "{got:?} instead of {want:?}");
+                };
+                // sRGB8 and RGBA8 keep about half a percent; drivers decode sRGB about as well.
+                close(got.albedo[at], (base * (1.0 - metallic)).extend(1.0).to_array(), 6e-3);
+                close(got.specular[at], f0.extend(roughness).to_array(), 6e-3);
+                close(got.emission[at], glow.extend(access).to_array(), 0.05);
+            }
+        }
+    });
+}
+
 #[test]
 fn a_sphere_has_the_normals_and_depths_of_a_sphere_in_both_encodings() {
     let mut scene = Scene::default();
@@ -122,9 +186,12 @@ fn a_sphere_has_the_normals_and_depths_of_a_sphere_in_both_encodings() {
         Vec3::new(0.2, 0.1, 0.0),
     );
     place(&mut scene, ball, world);
-    let view = view(Vec3::new(0.5, 1.0, 4.0), Vec3::ZERO, EXTENT);
+    // From both ends: octahedra are folded along z = 0.
+    let eyes = [Vec3::new(0.5, 1.0, 4.0), Vec3::new(-0.9, -0.6, -4.0)];
+    let encodings = [(Normals::Octahedral, 0.04), (Normals::Bytes, 0.045)];
     with_gpu(|gpu| {
-        for (normals, tolerance) in [(Normals::Octahedral, 0.04), (Normals::Bytes, 0.045)] {
+        for (eye, (normals, tolerance)) in eyes.into_iter().flat_map(|eye| encodings.map(|encoding| (eye, encoding))) {
+            let view = view(eye, Vec3::ZERO, EXTENT);
             let got = surfaces(gpu, &scene, &view, Settings { normals, ..Settings::default() });
             let local = world.inverse();
             let mut seen = 0;
@@ -304,5 +371,35 @@ fn textures_far_away_are_smooth_or_as_rays_see_them() {
         }
         assert!(seen > 300 && bright > seen / 5 && bright < 4 * seen / 5, "{bright} of {seen}");
         assert_eq!(smooth.depth, sharp.depth);
+    });
+}
+
+#[test]
+fn textures_are_read_at_the_level_of_their_footprint() {
+    let extent = [32, 32];
+    let projection = Projection::Orthographic { xmag: 1.0, ymag: 1.0, znear: 0.1, zfar: 10.0 };
+    let camera = Camera { name: String::new(), projection };
+    let view = View::new(&camera, look(Vec3::new(0.0, 3.0, 0.0), Vec3::ZERO), extent);
+    with_gpu(|gpu| {
+        // Four texels a pixel: what is as fine as a pixel stays, what is finer is averaged; also if the transform makes it so.
+        for (side, scale) in [(128u32, 1.0f32), (64, 2.0)] {
+            for (block, clear) in [(8, true), (4, true), (2, false), (1, false)] {
+                let white = |i: u32| (i % side / block + i / side / block).is_multiple_of(2);
+                let rgba = (0..side * side).map(|i| [if white(i) { 255 } else { 0 }; 4]).collect();
+                let texture = Texture { name: String::new(), width: side, height: side, rgba };
+                let mut scene = Scene { textures: vec![texture], ..Scene::default() };
+                let transform = [scale, 0.0, 0.0, scale, 0.0, 0.0];
+                let used = Some(TextureRef { transform, ..TextureRef::new(0) });
+                let plain = Material { base_color_texture: used, ..Material::diffuse("", Vec3::ONE) };
+                let plane = mesh(&mut scene, square(), plain);
+                place(&mut scene, plane, Mat4::IDENTITY);
+                let got = surfaces(gpu, &scene, &view, Settings::default());
+                for (i, albedo) in got.albedo.iter().enumerate() {
+                    let bright = albedo[1];
+                    let right = if clear { !(0.02..=0.98).contains(&bright) } else { (bright - 0.5).abs() < 0.02 };
+                    assert!(right, "blocks of {block} of {side}, pixel {i}: {bright}");
+                }
+            }
+        }
     });
 }

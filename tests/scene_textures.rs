@@ -94,28 +94,45 @@ fn wrapping_and_filtering_follow_the_sampler() {
 
 #[test]
 fn transforms_move_coordinates_and_base_colours_are_decoded() {
-    let mut scene = Scene::default();
-    // Left half sRGB 188 (linear 0.5), right half black.
-    let rgba = (0..64).map(|i| if i % 8 < 4 { [188, 188, 188, 255] } else { [0, 0, 0, 255] }).collect();
-    scene.textures.push(Texture { name: String::new(), width: 8, height: 8, rgba });
-    // A quarter turn: u' = v, v' = 1 − u.
-    let transform = [0.0, 1.0, -1.0, 0.0, 0.0, 1.0];
-    let used = Some(TextureRef { transform, ..TextureRef::new(0) });
-    mesh(&mut scene, square(), Material { base_color_texture: used, ..Material::default() });
-    let at = [[0.3, 0.2], [0.2, 0.3], [0.3, 0.8], [0.8, 0.7]];
-    let probes = at.map(|uv| types::TextureProbe { uv, ..Default::default() });
-    with_gpu(|gpu| {
-        let (frame, read) = frame(gpu, &scene, |graph, handles| {
-            let buffer = graph.buffer_from("probes", &probes);
-            let args = probe::Args { probes: buffer, materials: handles.materials, scene_textures: handles.textures };
-            graph.compute(args, 4_u32);
-            graph.read_buffer(buffer)
+    // Red tells left from right, green upper from lower: sRGB 188 (linear 0.5) or black.
+    let code = |first: bool| if first { 188 } else { 0 };
+    let rgba = (0..64).map(|i| [code(i % 8 < 4), code(i / 8 < 4), 0, 255]).collect();
+    let texture = Texture { name: String::new(), width: 8, height: 8, rgba };
+    // A quarter turn, u' = v, v' = 1 − u, and one of everything.
+    let transforms = [[0.0, 1.0, -1.0, 0.0, 0.0, 1.0], [0.7, 0.4, -0.9, 1.3, 0.15, -0.35]];
+    for transform in transforms {
+        let mut scene = Scene { textures: vec![texture.clone()], ..Scene::default() };
+        let used = Some(TextureRef { transform, ..TextureRef::new(0) });
+        mesh(&mut scene, square(), Material { base_color_texture: used, ..Material::default() });
+        let [a, b, c, d, x, y] = transform;
+        let moved = |uv: Vec2| Vec2::new(a * uv.x + b * uv.y + x, c * uv.x + d * uv.y + y);
+        let uvs: Vec<Vec2> = (0..200)
+            .map(|i| Vec2::new((i as f32 * 0.137).fract(), (i as f32 * 0.311).fract()) * 3.0 - 1.0)
+            // Not where the filter blends halves.
+            .filter(|uv| {
+                let p = moved(*uv) * 2.0;
+                (p - p.round()).abs().min_element() > 0.15
+            })
+            .collect();
+        assert!(uvs.len() > 60);
+        let probes: Vec<types::TextureProbe> =
+            uvs.iter().map(|uv| types::TextureProbe { uv: uv.to_array(), ..Default::default() }).collect();
+        with_gpu(|gpu| {
+            let (frame, read) = frame(gpu, &scene, |graph, handles| {
+                let buffer = graph.buffer_from("probes", &probes);
+                let args =
+                    probe::Args { probes: buffer, materials: handles.materials, scene_textures: handles.textures };
+                graph.compute(args, probes.len() as u32);
+                graph.read_buffer(buffer)
+            });
+            for probe in frame.buffer::<types::TextureProbe>(read) {
+                let at = moved(probe.uv.into());
+                let want = [at.x, at.y].map(|v| if v.rem_euclid(1.0) < 0.5 { 0.5 } else { 0.0 });
+                let right = (0..2).all(|k| (probe.texel[k] - want[k]).abs() < 0.004);
+                assert!(right, "{transform:?} at {:?}: {:?} instead of {want:?}", probe.uv, probe.texel);
+            }
         });
-        let red: Vec<f32> = frame.buffer::<types::TextureProbe>(read).iter().map(|p| p.texel[0]).collect();
-        for (got, want) in red.iter().zip([0.5, 0.5, 0.0, 0.0]) {
-            assert!((got - want).abs() < 0.004, "{red:?}");
-        }
-    });
+    }
 }
 
 #[test]

@@ -54,6 +54,31 @@ fn frame_rate_does_not_matter_and_both_time_constants_are_kept() {
     });
 }
 
+#[test]
+fn the_limit_holds_until_the_exponential_is_slower() {
+    with_gpu(|gpu| {
+        // Six stops at six stops a second; from 6 τ stops on the exponential is slower.
+        for (from, to, tau) in [(1.0f32, 64.0f32, 0.4f32), (64.0, 1.0, 0.8)] {
+            let settings =
+                Settings { adapt_limit: 6.0, adapt_up: 0.4, adapt_down: 0.8, ..settings(Operator::Reinhard) };
+            for seconds in [0.1f32, 0.5, 1.0, 1.5] {
+                let steady = seconds.min((6.0 - 6.0 * tau) / 6.0);
+                let left = (6.0 - 6.0 * steady) * ((steady - seconds) / tau).exp();
+                let wanted = to * (if from < to { -left } else { left }).exp2();
+                for frames in [1, 4] {
+                    let mut still = still(gpu, &settings);
+                    after(&mut still, from, 1, 0.1);
+                    let found = after(&mut still, to, frames, seconds / frames as f32);
+                    assert!(
+                        (found / wanted - 1.0).abs() < 1e-4,
+                        "{from} to {to} in {seconds} s: {found}, not {wanted}"
+                    );
+                }
+            }
+        }
+    });
+}
+
 /// Twice the frames, half of the time between them: the same picture, in every mode, with and without the limit.
 #[test]
 fn twice_the_frames_of_half_the_time_are_the_same_picture() {

@@ -192,22 +192,38 @@ fn mirrors_and_panes_by_fresnel() {
             let sigma = (through * (1.0 - through) / (256.0 * 64.0f64)).sqrt();
             assert!((found - through).abs() < 4.5 * sigma, "thin {thin}: {found} instead of {through} ± {sigma}");
         }
-        // A mirror at 45° shows a lamp at the side.
+        // A lamp inside of the glass: what leaves is thinner by the square of the index, and less by what is reflected.
         let mut stage = Stage::new();
-        let mirror = stage.material(Material {
-            metallic: 1.0,
-            roughness: 0.0,
-            ..Material::diffuse("mirror", vec3(0.8, 0.5, 0.2))
-        });
-        let lamp = stage.emitter(Vec3::splat(2.0));
-        stage.quad(mirror, vec3(-1.0, -1.0, -1.0), Vec3::Z * 2.0, vec3(2.0, 2.0, 0.0));
-        stage.quad(lamp, vec3(-3.0, -5.0, -5.0), Vec3::Y * 10.0, Vec3::Z * 10.0);
-        let layers = render(gpu, &stage.scene, &above, &full(0), 2);
+        lamp_behind(&mut stage);
+        let pane = stage.material(glass(false));
+        stage.quad(pane, vec3(-1.0, 1.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0);
+        let found = mean(&render(gpu, &stage.scene, &above, &full(0), 64), "emission")[0] / 2.0 * 2.25;
+        let sigma = (0.96 * 0.04 / (256.0 * 64.0f64)).sqrt();
+        assert!((found - 0.96).abs() < 4.5 * sigma, "{found} instead of 0.96 ± {sigma}");
+        // A mirror at 45° shows a lamp at the side.
+        let aside = |material: Material| {
+            let mut stage = Stage::new();
+            let material = stage.material(material);
+            let lamp = stage.emitter(Vec3::splat(2.0));
+            stage.quad(material, vec3(-1.0, -1.0, -1.0), Vec3::Z * 2.0, vec3(2.0, 2.0, 0.0));
+            stage.quad(lamp, vec3(-3.0, -5.0, -5.0), Vec3::Y * 10.0, Vec3::Z * 10.0);
+            stage.scene
+        };
+        let metal = Material { metallic: 1.0, roughness: 0.0, ..Material::diffuse("mirror", vec3(0.8, 0.5, 0.2)) };
+        let layers = render(gpu, &aside(metal), &above, &full(0), 2);
         let graze = (1.0 - 0.5f64.sqrt()).powi(5);
         for (found, f0) in mean(&layers, "emission").into_iter().zip([0.8, 0.5, 0.2]) {
             let exact = 2.0 * (f0 + (1.0 - f0) * graze);
             assert!((found - exact).abs() < 1e-5, "{found} instead of {exact}");
         }
+        // As the front of a body of glass does: the mean of both polarisations by Fresnel's equations, 5.02 % at 45°.
+        let (cosine, through) = (0.5f64.sqrt(), (1.0 - 0.5 / 2.25f64).sqrt());
+        let s = (cosine - 1.5 * through) / (cosine + 1.5 * through);
+        let p = (1.5 * cosine - through) / (1.5 * cosine + through);
+        let exact = 0.5 * (s * s + p * p);
+        let found = mean(&render(gpu, &aside(glass(false)), &above, &full(0), 64), "emission")[0] / 2.0;
+        let sigma = (exact * (1.0 - exact) / (256.0 * 64.0f64)).sqrt();
+        assert!((found - exact).abs() < 4.5 * sigma, "{found} instead of {exact} ± {sigma}");
     });
 }
 

@@ -3,12 +3,12 @@
 
 mod tracer_lab;
 
-use glam::{Vec3, vec3};
+use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     image::Layers,
     reference::tracer::{Filter, Settings, Sources, State, Strategy, Tracer},
-    scene::{Environment, Material, Pose, Scene, View},
+    scene::{AlphaMode, Environment, LightKind, Material, Pose, Scene, View},
 };
 use tracer_lab::{Stage, luminance, matt, mean, render, view};
 
@@ -38,7 +38,8 @@ fn mixed() -> (Scene, View) {
 }
 
 fn settings() -> Settings {
-    Settings { bounces: 3, roulette: 2, ..Settings::default() }
+    // A seed other than the default: a way that forgets it shows.
+    Settings { bounces: 3, roulette: 2, seed: 7, ..Settings::default() }
 }
 
 const LIGHT: [&str; 4] = ["", "direct", "indirect", "emission"];
@@ -195,6 +196,198 @@ fn the_bits_do_not_depend_on_tiles_or_on_breaks() {
         assert_eq!(error.exit_code(), 3);
         let text = error.to_string();
         assert!(text.contains("settings.bounces was 3, now is 7") && text.contains("scene was 1, now is 2"), "{text}");
+    });
+}
+
+#[test]
+fn a_state_goes_on_with_its_own_settings_only() {
+    with_gpu(|gpu| {
+        let (scene, view) = mixed();
+        let about = serde_json::json!({ "scene": 1 });
+        let mut first = Tracer::new(gpu, &scene, &Pose::rest(&scene)).unwrap();
+        first.start(&view, &settings()).unwrap();
+        first.step(2).unwrap();
+        let state = State::decode(&first.save(&about).unwrap().encode().unwrap()).unwrap();
+        let base = settings();
+        let others = [
+            ("settings.seed was 7, now is 8", Settings { seed: 8, ..base.clone() }),
+            ("settings.bounces was 3, now is 4", Settings { bounces: 4, ..base.clone() }),
+            ("settings.specular_bounces was 8, now is 2", Settings { specular_bounces: 2, ..base.clone() }),
+            ("settings.roulette was 2, now is 3", Settings { roulette: 3, ..base.clone() }),
+            ("settings.diffuse_only was false, now is true", Settings { diffuse_only: true, ..base.clone() }),
+            ("settings.sources", Settings { sources: Sources::Punctual, ..base.clone() }),
+            ("settings.filter", Settings { filter: Filter::Centre, ..base.clone() }),
+            ("settings.strategy", Settings { strategy: Strategy::Bsdf, ..base.clone() }),
+        ];
+        let mut tracer = Tracer::new(gpu, &scene, &Pose::rest(&scene)).unwrap();
+        let mut refused = |view: &View, settings: &Settings, about: serde_json::Value, part: &str| {
+            tracer.start(view, settings).unwrap();
+            let error = tracer.restore(&state, &about).expect_err(part);
+            let text = error.to_string();
+            assert!(error.exit_code() == 3 && text.contains(part), "{part:?} is not in {text}");
+            // What differs is all that is named.
+            assert!(!text.contains("; "), "{text}");
+            assert_eq!(tracer.progress().unwrap().samples, 0.0, "{part}: the state was taken");
+        };
+        for (part, settings) in &others {
+            refused(&view, settings, about.clone(), part);
+        }
+        refused(&view, &base, serde_json::json!({ "scene": 2 }), "scene was 1, now is 2");
+        let moved = tracer_lab::view(vec3(0.8, 1.6, 3.4), vec3(0.0, 0.5, 0.0), 45.0, [24, 20]);
+        refused(&moved, &base, about.clone(), "camera");
+        // Whatever is in it: a setting that is added later is compared too.
+        assert_eq!(serde_json::to_value(&base).unwrap().as_object().unwrap().len(), others.len());
+    });
+}
+
+#[test]
+fn another_seed_is_another_picture_of_the_same_light() {
+    with_gpu(|gpu| {
+        let (scene, view) = mixed();
+        let of = |seed| render(gpu, &scene, &view, &Settings { seed, ..settings() }, 8);
+        let pictures = [0, 1, 7, 1 << 31].map(of);
+        for (i, a) in pictures.iter().enumerate() {
+            for b in &pictures[..i] {
+                let same = data(a, "").iter().zip(data(b, "")).filter(|(a, b)| a == b && **a != 0.0).count();
+                assert!(same < data(a, "").len() / 50, "{same} numbers are the same");
+                assert!(z(a, b) < 4.5, "{} deviations", z(a, b));
+            }
+        }
+    });
+}
+
+/// Scenes in which one choice alone is random, with the settings that make it so.
+fn single_choices() -> Vec<(&'static str, Scene, Settings)> {
+    let floor = |stage: &mut Stage| {
+        let floor = stage.material(Material::diffuse("floor", Vec3::splat(0.7)));
+        stage.quad(floor, vec3(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0);
+    };
+    let slope = || {
+        let pixels = (0..64 * 32).map(|i| Vec3::splat(0.5 + (i % 64) as f32 / 64.0 + (i / 64) as f32 / 20.0)).collect();
+        Environment { width: 64, height: 32, pixels, ..Environment::constant(Vec3::ONE) }
+    };
+    let fixed = Settings { bounces: 0, ..matt(0) };
+    let mut out = Vec::new();
+
+    let mut stage = Stage::new();
+    stage.scene.environment = Some(slope());
+    out.push(("the place in the pixel", stage.scene, Settings { filter: Filter::Box, ..fixed.clone() }));
+
+    let mut stage = Stage::new();
+    floor(&mut stage);
+    for x in [-1.0, 0.5, 1.2] {
+        stage.point(vec3(x, 1.0, 0.3), Vec3::splat(2.0));
+    }
+    out.push(("which lamp", stage.scene, fixed.clone()));
+
+    let mut stage = Stage::new();
+    floor(&mut stage);
+    let lamp = stage.emitter(Vec3::splat(3.0));
+    let corners = vec![vec3(-0.5, 1.0, -0.5), vec3(0.5, 1.0, -0.5), vec3(0.0, 1.0, 0.5)];
+    stage.mesh(lamp, corners, vec![Vec3::NEG_Y; 3], vec![0, 1, 2]);
+    let lights = Settings { strategy: Strategy::Lights, ..fixed.clone() };
+    out.push(("where on a lamp", stage.scene, lights.clone()));
+
+    let mut stage = Stage::new();
+    floor(&mut stage);
+    for x in [-0.5, 0.5] {
+        let down = Mat4::from_rotation_y(x) * Mat4::from_rotation_x(-1.0 - 0.5 * x);
+        stage.light(LightKind::Directional, Vec3::ONE, 1.5 + x, down);
+    }
+    out.push(("which sun", stage.scene, fixed.clone()));
+
+    let mut stage = Stage::new();
+    floor(&mut stage);
+    stage.scene.environment = Some(slope());
+    out.push(("where in the sky", stage.scene.clone(), lights));
+    out.push(("the way on", stage.scene, Settings { strategy: Strategy::Bsdf, ..fixed.clone() }));
+
+    let mut stage = Stage::new();
+    let lamp = stage.emitter(Vec3::splat(3.0));
+    stage.quad(lamp, vec3(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0);
+    let mut pane = Material { alpha: AlphaMode::Blend, ..Material::diffuse("pane", Vec3::ZERO) };
+    pane.base_color.w = 0.5;
+    let pane = stage.material(pane);
+    stage.quad(pane, vec3(-2.0, 0.5, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0);
+    out.push(("whether a blended surface is there", stage.scene, fixed.clone()));
+
+    let mut stage = Stage::new();
+    stage.scene.environment = Some(slope());
+    let glass = Material { transmission: 1.0, roughness: 0.0, ..Material::diffuse("glass", Vec3::ONE) };
+    let glass = stage.material(Material { double_sided: true, ior: 2.5, ..glass });
+    stage.quad(glass, vec3(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0);
+    out.push(("through glass or off it", stage.scene, Settings { diffuse_only: false, ..fixed.clone() }));
+
+    let mut stage = Stage::new();
+    let wall = stage.material(Material { emissive: Vec3::ONE, ..Material::diffuse("wall", Vec3::splat(0.5)) });
+    stage.cuboid(wall, vec3(-2.0, -2.0, -3.0), vec3(2.0, 2.0, 4.0), true);
+    // Rays meet the same light wherever they go, so that only where they end is random.
+    let ending = Settings { bounces: 12, roulette: 0, strategy: Strategy::Bsdf, ..fixed };
+    out.push(("where paths end", stage.scene, ending));
+    out
+}
+
+#[test]
+fn each_random_choice_depends_on_the_seed() {
+    with_gpu(|gpu| {
+        let seen = view(vec3(0.1, 1.5, 2.0), Vec3::ZERO, 50.0, [16, 16]);
+        for (choice, scene, settings) in single_choices() {
+            let of = |seed| render(gpu, &scene, &seen, &Settings { seed, ..settings.clone() }, 2);
+            let (a, b, again) = (of(7), of(8), of(7));
+            assert!(bits(&a) == bits(&again), "{choice}: not the same twice");
+            let pixels = |layers: &Layers| data(layers, "").iter().step_by(3).copied().collect::<Vec<f32>>();
+            let other = pixels(&a).iter().zip(pixels(&b)).filter(|(a, b)| **a != *b).count();
+            // Two of two coins fall alike in three of eight pixels.
+            assert!(other > 16 * 16 / 10, "{choice}: {other} of 256 pixels know of the seed");
+        }
+    });
+}
+
+#[test]
+fn variances_are_those_of_the_samples() {
+    with_gpu(|gpu| {
+        let (scene, view) = mixed();
+        let luminances = |n| {
+            let layers = render(gpu, &scene, &view, &settings(), n);
+            let each = data(&layers, "").chunks_exact(3).map(|p| luminance([0, 1, 2].map(|c| f64::from(p[c]))));
+            (each.collect::<Vec<f64>>(), layers)
+        };
+        let pictures = [1, 2, 3].map(luminances);
+        // The samples of a pixel, from the means of the first, the first two and all three.
+        let mean = |n: usize, pixel: usize| pictures[n - 1].0[pixel] * n as f64;
+        let (mut relative, mut spread) = (0.0, 0.0);
+        let variance = data(&pictures[2].1, "variance");
+        for (pixel, found) in variance.iter().enumerate() {
+            let samples = [mean(1, pixel), mean(2, pixel) - mean(1, pixel), mean(3, pixel) - mean(2, pixel)];
+            let middle = samples.iter().sum::<f64>() / 3.0;
+            // The mean's: the unbiased variance of a sample over their number.
+            let exact = samples.iter().map(|s| (s - middle).powi(2)).sum::<f64>() / 2.0 / 3.0;
+            let slack = 1e-3 * exact + 1e-5 * middle * middle + 1e-12;
+            assert!((f64::from(*found) - exact).abs() <= slack, "pixel {pixel}: {found} instead of {exact}");
+            relative += exact / (middle * middle + 0.01) / variance.len() as f64;
+            spread += exact;
+        }
+        assert!(spread > 0.0);
+        let mut tracer = Tracer::new(gpu, &scene, &Pose::rest(&scene)).unwrap();
+        tracer.render(&view, &settings(), 3).unwrap();
+        let found = tracer.sums().unwrap().relative_error();
+        assert!((found - relative).abs() < 1e-3 * relative, "{found} instead of {relative}");
+    });
+}
+
+#[test]
+fn thousands_of_samples_are_as_exact_as_one() {
+    with_gpu(|gpu| {
+        let mut stage = Stage::new();
+        let lamp = stage.emitter(Vec3::splat(0.1));
+        stage.quad(lamp, vec3(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0);
+        let seen = view(vec3(0.0, 1.0, 0.0), Vec3::ZERO, 20.0, [1, 1]);
+        // Added up plainly 2000 times, 0.1 comes out 1.5e-5 of it too large.
+        let layers = render(gpu, &stage.scene, &seen, &matt(0), 2000);
+        for name in ["", "emission"] {
+            let found = data(&layers, name)[1];
+            assert!((found - 0.1).abs() <= 0.1 * f32::EPSILON, "{name:?}: {found}");
+        }
     });
 }
 

@@ -201,3 +201,22 @@ fn an_interrupt_leaves_a_picture_and_a_state() {
     assert!(picture.layer("samples").unwrap().data.iter().all(|&n| n >= 1.0));
     assert_eq!(files(folder.path()), ["a.exr", "a.exr.state"]);
 }
+
+#[test]
+fn a_state_is_of_one_scene_one_time_and_one_seed() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, paint, exr) = (path(&folder, "a.obj"), path(&folder, "a.mtl"), path(&folder, "a.exr"));
+    fs::write(&scene, "mtllib a.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n").unwrap();
+    fs::write(&paint, "newmtl a\nKd 0.5 0.5 0.5\n").unwrap();
+    let run = |more: &[&str]| lucerna(["reference", &scene, "--size", "24x20", "-q", "-o", &exr].iter().chain(more));
+    run(&["--spp", "1000000", "--time-limit", "0.2s", "--seed", "3"]).expect(8, &[]);
+    let state = fs::read(format!("{exr}.state")).unwrap();
+    run(&["--resume"]).expect(3, &["settings.seed was 3, now is 0"]);
+    run(&["--resume", "--seed", "3", "--time", "1"]).expect(3, &["time was 0.0, now is 1.0"]);
+    fs::write(&paint, "newmtl a\nKd 0.5 0.5 0.4\n").unwrap();
+    run(&["--resume", "--seed", "3"]).expect(3, &["scene was "]);
+    assert!(fs::read(format!("{exr}.state")).unwrap() == state, "the state is left alone");
+}
