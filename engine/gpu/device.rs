@@ -198,8 +198,8 @@ impl Gpu {
     }
 
     /// What asks everything that this device does to stop ([`GpuOptions::stop`]).
-    pub fn stop(&self) -> &crate::Stop {
-        &self.0.options.stop
+    pub fn stop(&self) -> Option<&crate::Stop> {
+        self.0.options.stop.as_ref()
     }
 
     /// The device is lost: every operation now fails.

@@ -113,8 +113,8 @@ pub struct GpuOptions {
     pub hard_limit: Option<Duration>,
     /// Fill every new buffer and image with `0x7FC0DEAD` (a NaN), so that reads of uninitialised memory show. For tests.
     pub poison: bool,
-    /// Asks everything that this device does to stop.
-    pub stop: Stop,
+    /// Asks everything that this device does to stop; none: waits are not cut into slices to look for it.
+    pub stop: Option<Stop>,
     /// Instance extensions that a window needs, as its library lists them. Not empty: the device also gets
     /// `VK_KHR_swapchain`.
     pub window_extensions: Vec<String>,
@@ -131,7 +131,7 @@ impl Default for GpuOptions {
             soft_limit: Duration::from_secs(10),
             hard_limit: None,
             poison: false,
-            stop: Stop::default(),
+            stop: None,
             window_extensions: Vec::new(),
         }
     }

@@ -362,7 +362,10 @@ impl Submission {
         loop {
             let waited = begun.elapsed();
             let left = context.hard_limit.saturating_sub(waited).min(warn_at.saturating_sub(waited));
-            let mut slice = left.clamp(Duration::from_millis(1), LOOK);
+            let mut slice = left.max(Duration::from_millis(1));
+            if context.options.stop.is_some() {
+                slice = slice.min(LOOK);
+            }
             let slice_begun = Instant::now();
             // Synchronisation validation (seen in 1.3.239) forgets a wait that ends while another thread submits, and then
             // takes later commands for unsynchronised. Under it, waits and submissions take turns.
@@ -378,12 +381,15 @@ impl Submission {
                 Err(vk::Result::TIMEOUT) => {}
                 Err(result) => return Err(self.failed(shell, "vkWaitForFences", result)),
             }
-            if context.options.stop.requested() && asked.get_or_insert_with(Instant::now).elapsed() >= STOP_LIMIT {
+            let stop = context.options.stop.as_ref().filter(|stop| stop.requested());
+            if let Some(stop) = stop
+                && asked.get_or_insert_with(Instant::now).elapsed() >= STOP_LIMIT
+            {
                 context.abandon();
                 let place = self.where_it_was(shell);
                 let _ =
                     context.lost.set(format!("stopped on request while the device worked on `{}`{place}", self.name));
-                return context.options.stop.check();
+                return stop.check();
             }
             let waited = begun.elapsed();
             if waited >= context.hard_limit {

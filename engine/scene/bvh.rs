@@ -1,6 +1,6 @@
 //! A bounding-volume hierarchy over all triangles of a scene, in world space.
 //!
-//! Built by the obvhs crate (PLOC with reinsertion), or by [`binned`] where that would not end; the traversal here is the plain CPU one that cameras, tests and
+//! Built by the obvhs crate (PLOC with reinsertion), or by surface area over bins (`binned`) where that would not end; the traversal here is the plain CPU one that cameras, tests and
 //! precomputations use. Rays that meet an edge shared by two triangles hit at least one of them: Woop, Benthin and Wald,
 //! "Watertight Ray/Triangle Intersection", JCGT 2013, with box tests padded as in Ize, "Robust BVH Ray Traversal", JCGT 2013.
 

@@ -49,6 +49,8 @@ impl Extents {
             near(bounds.farthest()).map_err(|error| error.at(named("meshes", mesh, &scene.meshes[mesh].name)))?;
         }
         let mut all = Aabb::EMPTY;
+        // Once a skin: many nodes may share one of many joints.
+        let mut joints = vec![None; scene.skins.len()];
         for (i, node) in scene.nodes.iter().enumerate() {
             let Some(world) = pose.world.get(i) else { continue };
             let place = || named("nodes", i, &node.name);
@@ -60,18 +62,16 @@ impl Extents {
             let weights = pose.weights.get(i).into_iter().flatten().zip(&self.morphs[mesh]);
             let local = local.grown(weights.map(|(weight, moved)| weight.abs() * moved).sum());
             // Skinned vertices follow the joints, not the node.
-            let joints: Vec<Mat4> = match node.skin.and_then(|skin| scene.skins.get(skin as usize)) {
-                Some(skin) => {
-                    let joints = skin.joints.iter().zip(&skin.inverse_bind);
-                    joints.filter_map(|(joint, bind)| Some(*pose.world.get(*joint as usize)? * *bind)).collect()
-                }
-                None => vec![*world],
+            let skin = node.skin.map(|skin| skin as usize).filter(|skin| *skin < scene.skins.len());
+            let bounds = match skin {
+                Some(skin) => match joints[skin].get_or_insert_with(|| Joints::of(scene, pose, skin)) {
+                    Some(joints) => joints.around(local),
+                    None => continue,
+                },
+                None => local.transformed(world),
             };
-            for world in joints {
-                let bounds = local.transformed(&world);
-                near(bounds.farthest()).map_err(|error| error.at(place()))?;
-                all = all.union(bounds);
-            }
+            near(bounds.farthest()).map_err(|error| error.at(place()))?;
+            all = all.union(bounds);
         }
         let size = (all.max - all.min).max_element();
         match !all.is_empty() && size > 0.0 && size < SMALLEST {
@@ -81,6 +81,49 @@ impl Extents {
                     .help("Scale it up where it was made; --unit says how many metres a unit of an OBJ file is"))
             }
         }
+    }
+}
+
+/// The smallest and the largest of each number in the matrices of a skin's joints.
+#[derive(Clone, Copy, Debug)]
+struct Joints {
+    low: Mat4,
+    high: Mat4,
+}
+
+impl Joints {
+    /// `None` if the skin has no joints.
+    fn of(scene: &Scene, pose: &Pose, skin: usize) -> Option<Self> {
+        let skin = &scene.skins[skin];
+        let pairs = skin.joints.iter().zip(&skin.inverse_bind);
+        let matrices = pairs.filter_map(|(joint, bind)| Some(*pose.world.get(*joint as usize)? * *bind));
+        matrices.map(|m| Self { low: m, high: m }).reduce(|a, b| {
+            let each = |of: fn(f32, f32) -> f32, a: Mat4, b: Mat4| {
+                let (a, b) = (a.to_cols_array(), b.to_cols_array());
+                // A number that is none stays: it is refused.
+                Mat4::from_cols_array(&std::array::from_fn(|i| {
+                    if a[i].is_nan() { a[i] } else { of(a[i], b[i]) + 0.0 * b[i] }
+                }))
+            };
+            Self { low: each(f32::min, a.low, b.low), high: each(f32::max, a.high, b.high) }
+        })
+    }
+
+    /// A box that holds `local` moved by any of the joints; larger than needed where they turn it differently.
+    fn around(&self, local: Aabb) -> Aabb {
+        let (mut min, mut max) = (self.low.w_axis.truncate(), self.high.w_axis.truncate());
+        for axis in 0..3 {
+            let ends = [self.low.col(axis).truncate(), self.high.col(axis).truncate()];
+            let all = [
+                ends[0] * local.min[axis],
+                ends[0] * local.max[axis],
+                ends[1] * local.min[axis],
+                ends[1] * local.max[axis],
+            ];
+            min += all.into_iter().reduce(Vec3::min).unwrap_or_default();
+            max += all.into_iter().reduce(Vec3::max).unwrap_or_default();
+        }
+        Aabb { min, max }
     }
 }
 

@@ -19,7 +19,7 @@ impl DeviceArgs {
         if let Some(choice) = &self.ray_query {
             options.ray_query = choice.parse().map_err(|error: Error| error.at("--ray-query"))?;
         }
-        options.stop = Interrupt::stop();
+        options.stop = Some(Interrupt::stop());
         Ok(options)
     }
 }

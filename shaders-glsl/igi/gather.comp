@@ -46,7 +46,7 @@ void main() {
         uint subset = vpl_subset(uvec2(texel), tile, stride != 0u, seed);
         Gathering how = Gathering(first, count, total, subset, tile * tile, stride, least, seed);
         float gap = surface_step(view, p, z);
-        vpl_gather(sum, stepped_back(view, p, gap), n, gap, uvec2(pixel), how);
+        vpl_gather(sum, p, n, stepped_back(view, p, gap) + n * gap, uvec2(pixel), how);
     }
     imageStore(irradiance, texel, sum);
 }

@@ -47,7 +47,7 @@ void main() {
     uint subset = vpl_subset(uvec2(pixel), tile, stride != 0u, seed);
     Gathering how = Gathering(first, count, total, subset, tile * tile, stride, least, seed);
     float gap = surface_step(view, p, z);
-    vpl_gather(sum, stepped_back(view, p, gap), n, gap, uvec2(pixel), how);
+    vpl_gather(sum, p, n, stepped_back(view, p, gap) + n * gap, uvec2(pixel), how);
     vec3 light = first + count >= own ? dimmed(sum.rgb, before.a, limit) : sum.rgb;
     imageStore(irradiance, pixel, vec4(light, before.a));
 }

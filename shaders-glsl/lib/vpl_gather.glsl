@@ -14,10 +14,9 @@ struct Gathering {
     uint seed;
 };
 
-// Adds, in rgb as if all lights were like those of the subset, in a the rays traced. `gap`: how far shadow rays begin above the surface,
-// metres.
-void vpl_gather(inout vec4 sum, vec3 position, vec3 normal, float gap, uvec2 pixel, Gathering how) {
-    vec3 origin = position + normal * gap;
+// Adds, in rgb as if all lights were like those of the subset, in a the rays traced. `origin`: where shadow rays begin, a step off the
+// surface, metres.
+void vpl_gather(inout vec4 sum, vec3 position, vec3 normal, vec3 origin, uvec2 pixel, Gathering how) {
     for (uint i = how.first; i < how.first + how.count; ++i) {
         uint k = vpl_of_subset(i, how.subset, how.subsets, how.stride);
         if (k >= how.total) break;

@@ -318,7 +318,7 @@ fn files_from_elsewhere_ask_for_no_work_without_bound() {
     for (from, to, part) in [
         ("matrix = { \"isr.samples\" = [24, 48] }", format!("matrix = {{ {} }}", matrix.join(", ")), "1000000000000"),
         ("cameras = [\"0\"]", "random = 4000000000000".into(), "4000000000000"),
-        ("matrix = { samples = [1, 2, 3] }", "settings = { samples = 4000000000 }".into(), "4000000000"),
+        ("matrix = { samples = [1, 2, 3] }", "matrix = { samples = [1, 4000000000] }".into(), "4000000000"),
         ("settings = { bounces = 1 }", "settings = { bounces = 4000000000 }".into(), "4000000000"),
     ] {
         assert!(EXPERIMENT.contains(from));

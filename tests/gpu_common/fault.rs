@@ -21,6 +21,8 @@ const TASK: &str = "LUCERNA_TEST_TASK";
 /// If this process is a child: does its task and ends it with the exit code of the executables.
 pub fn child_process(tasks: impl FnOnce(&str) -> Result<()>) {
     if let Ok(task) = std::env::var(TASK) {
+        // Warnings of the engine are shown as a program shows them.
+        let _ = log::set_logger(&ToStandardError).map(|()| log::set_max_level(log::LevelFilter::Warn));
         let code = match tasks(&task) {
             Ok(()) => 0,
             Err(error) => {
@@ -31,6 +33,20 @@ pub fn child_process(tasks: impl FnOnce(&str) -> Result<()>) {
         // Not through the test harness: the exit code is what is tested.
         std::process::exit(code);
     }
+}
+
+struct ToStandardError;
+
+impl log::Log for ToStandardError {
+    fn enabled(&self, _: &log::Metadata<'_>) -> bool {
+        true
+    }
+
+    fn log(&self, record: &log::Record<'_>) {
+        eprintln!("warning: {}", record.args());
+    }
+
+    fn flush(&self) {}
 }
 
 /// With validation, and the environment's choices.

@@ -66,7 +66,7 @@ impl<'a> Parts<'a> {
                 _ => Ok(()),
             };
             // Those before are waited for where they are dropped.
-            match ready.and_then(|()| stop.check()).and_then(|()| commands.submit()) {
+            match ready.and_then(|()| stop.map_or(Ok(()), crate::Stop::check)).and_then(|()| commands.submit()) {
                 Ok(submission) => running.push_back(submission),
                 Err(error) => return (given, Err(error)),
             }

@@ -9,7 +9,7 @@ pub use options::{ReferenceArgs, Settings, Show, Span};
 use std::{path::PathBuf, process::ExitCode, time::Instant};
 
 use lucerna::{
-    Error, Result, Stop,
+    Error, Result,
     gpu::{Gpu, GpuOptions},
     image::{Format, Layer, Layers, Metadata, WriteOptions},
     reference::tracer::{Progress, Tracer},
@@ -148,7 +148,7 @@ fn picture(
         console.info(&format!("note: {}: {}", note.place, note.text));
     }
     // Between two tiles it stops by itself, with all that was computed: the device must not be left in the middle of one.
-    let gpu = Gpu::new(GpuOptions { stop: Stop::default(), ..args.device.options()? })?;
+    let gpu = Gpu::new(GpuOptions { stop: None, ..args.device.options()? })?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
     let (pose, view) = stage.at(args.stage.time, args.stage.size)?;
     let mut tracer = Tracer::new(&gpu, &stage.scene, &pose)?;
