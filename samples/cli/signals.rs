@@ -1,7 +1,7 @@
 //! Interruption on request, and signals that must not kill.
 //!
 //! The first SIGINT or SIGTERM asks: a thread says so at once, the engine ends between two submissions, loops end where they look, and
-//! what is complete is kept. Not everything can look: a driver that compiles, a foreign decoder. After [`PATIENCE`] that thread ends the
+//! what is complete is kept. Not everything can look: a driver that compiles, a foreign decoder. After 1.6 s (`PATIENCE`) that thread ends the
 //! process, with nothing half written. A second signal does the same at once.
 
 use std::{
