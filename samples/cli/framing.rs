@@ -66,6 +66,10 @@ pub enum DefaultLight {
     Never,
 }
 
+/// Said of scenes without any other light. It does not concern the path tracer.
+pub const EMISSIVE_ALONE: &str = "the scene is lit by its emissive surfaces alone; with isr only those that the picture shows give \
+                                  light (--default-light always adds a sun and a sky, --light a lamp)";
+
 /// Adds a sun and a sky to a scene that is dark, or as `choice` says.
 ///
 /// A surface with an emissive texture is a display, not a lamp: it lights nothing that one would notice.
@@ -74,9 +78,7 @@ pub fn add_missing_light(scene: &mut Scene, choice: DefaultLight) {
     let lit = scene.environment.is_some() || scene.nodes.iter().any(|node| node.light.is_some());
     let lamps = scene.materials.iter().any(lamp);
     if !lit && lamps && choice != DefaultLight::Always {
-        let text = "the scene is lit by its emissive surfaces alone; with isr only those that the picture shows give light \
-                    (--default-light always adds a sun and a sky, --light a lamp)";
-        note(scene, "lights", text);
+        note(scene, "lights", EMISSIVE_ALONE);
     }
     if choice == DefaultLight::Never || (choice == DefaultLight::Auto && (lit || lamps)) {
         return;

@@ -20,7 +20,7 @@ use serde_json::{Value, json};
 use crate::{
     config::{self, SettingsArgs},
     console::{self, Console},
-    exposure,
+    exposure, framing,
     last_stage::{self, Staged},
     outputs::{self, Fresh, Outputs},
     pattern::{Pattern, Values},
@@ -142,9 +142,7 @@ fn picture(
         checkpoint.probe(args.restart)?;
     }
     // What techniques of the picture alone cannot do with emissive surfaces does not concern rays.
-    for note in
-        stage.notes().iter().filter(|n| n.kind != NoteKind::Repaired && !n.text.contains("only what the picture shows"))
-    {
+    for note in stage.notes().iter().filter(|n| n.kind != NoteKind::Repaired && n.text != framing::EMISSIVE_ALONE) {
         console.info(&format!("note: {}: {}", note.place, note.text));
     }
     // Between two tiles it stops by itself, with all that was computed: the device must not be left in the middle of one.
