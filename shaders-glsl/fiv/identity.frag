@@ -4,6 +4,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
 #include "lib/view.glsl"
+#include "lib/pixel_depth.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/fiv.glsl"
 
@@ -12,7 +13,7 @@ layout(binding = 4, scalar) readonly buffer Owners { FivOwner owners[]; }; // of
 layout(binding = 6) uniform sampler2D normal;
 layout(binding = 7) uniform sampler2D depth;
 
-layout(location = 0) in float eye_z;
+layout(location = 0) in vec3 seen; // position in view space, metres
 layout(location = 1) flat in uint instance;
 layout(location = 2) in vec4 front_x;
 layout(location = 3) in vec3 front_y;
@@ -26,7 +27,7 @@ layout(location = 1) out vec4 own;      // irradiance, W/m²; a: 1 where it is k
 
 void main() {
     // What the G-buffer does not show here, because it is cut out, blended or hidden, must not stand before what it shows.
-    float shown = texelFetch(depth, ivec2(gl_FragCoord.xy), 0).r, linear = eye_z / view.far;
+    float shown = texelFetch(depth, ivec2(gl_FragCoord.xy), 0).r, linear = pixel_depth(view, seen);
     if (abs(linear - shown) > 1e-4 * shown) discard;
     FivOwner owner = owners[instance];
     identity = vec2(owner.occluder == FIV_NONE ? 0.0 : float(owner.occluder + 1u), linear);

@@ -13,7 +13,7 @@ layout(binding = 3, scalar) readonly buffer Positions { vec3 positions[]; };
 layout(binding = 4, scalar) readonly buffer Owners { FivOwner owners[]; }; // of each instance
 layout(binding = 5, scalar) readonly buffer Fivs { float fivs[]; };
 
-layout(location = 0) out float eye_z;
+layout(location = 0) out vec3 seen; // position in view space, metres
 layout(location = 1) flat out uint instance;
 // Vectors of the light that reaches fronts and backs of surfaces; w of x: 1, 0 where it is not known.
 layout(location = 2) out vec4 front_x;
@@ -50,7 +50,7 @@ void main() {
     uint i = visible[gl_InstanceIndex];
     vec4 world = instances[i].world_from_object * vec4(positions[instances[i].first_vertex + uint(gl_VertexIndex)], 1.0);
     gl_Position = view.clip_from_world * world;
-    eye_z = -(view.view_from_world * world).z;
+    seen = (view.view_from_world * world).xyz;
     instance = i;
     FivOwner owner = owners[i];
     load(owner.front, owner.front_next, owner.blend, front_x, front_y, front_z);

@@ -17,7 +17,7 @@ layout(push_constant, scalar) uniform Push {
 };
 
 layout(location = 0) out vec3 before;
-layout(location = 1) out float eye_z;
+layout(location = 1) out vec3 seen; // position in view space, metres
 
 void main() {
     uint i = visible[gl_InstanceIndex];
@@ -28,7 +28,7 @@ void main() {
     vec4 world = now * vec4(positions[at], 1.0);
     vec3 was = deformed ? before_positions[at - first_deformed] : positions[at];
     before = (then * vec4(was, 1.0)).xyz;
-    eye_z = -(view.view_from_world * world).z;
+    seen = (view.view_from_world * world).xyz;
     // Behind the near plane: nothing of a triangle whose instance rests is drawn.
     gl_Position = deformed || now != then ? view.clip_from_world * world : vec4(0.0, 0.0, 2.0, 1.0);
 }
