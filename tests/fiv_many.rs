@@ -97,7 +97,8 @@ fn lists_of_pairs_give_the_picture_of_all_pairs() {
             })
             .unwrap();
             let kind = &plan.occluders[0];
-            let set = twin::Set { grid: plan.grid, shells: kind.shells, paces: &kind.paces, solid: None, fivs: &fivs };
+            let set =
+                twin::Set { grid: plan.grid, shells: kind.shells, spacing: &kind.spacing, solid: None, fivs: &fivs };
             let fill = f64::from(fill::fill(&all.kinds[0]));
             let (open, spots) = (twin::irradiance(&sky, DVec3::Y), spots::spots(&sky));
             assert_eq!(spots.len(), usize::from(sun));

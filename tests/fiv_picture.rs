@@ -243,7 +243,7 @@ fn pictures_are_what_the_twin_looks_up() {
             .unwrap();
             let kind = &plan.occluders[0];
             let solid = (interpolation == Interpolation::SolidAngle).then_some(f64::from(kind.radius));
-            let set = twin::Set { grid: plan.grid, shells: kind.shells, paces: &kind.paces, solid, fivs: &fivs };
+            let set = twin::Set { grid: plan.grid, shells: kind.shells, spacing: &kind.spacing, solid, fivs: &fivs };
             let (up, fill) = (glam::DVec3::Y, lucerna::techniques::fiv::fill::fill(&kinds[0]));
             let centres = studio.fiv.occluders().placed.iter().map(|p| p.centre).collect::<Vec<_>>();
             // On both sides of the seam, straight below, where discs overlap in part, and where the lower ball is cut by the ground.

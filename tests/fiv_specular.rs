@@ -134,8 +134,8 @@ fn the_device_reflects_and_shades_as_the_twin_does() {
             Ok(true)
         })
         .unwrap();
-        let (grid, shells, paces) = (plan.grid, kind.shells, &kind.paces);
-        let set = twin::Masks { grid, shells, paces, words: words(16) as usize, shares: &shares, fivs: &fivs };
+        let (grid, shells, spacing) = (plan.grid, kind.shells, &kind.spacing);
+        let set = twin::Masks { grid, shells, spacing, words: words(16) as usize, shares: &shares, fivs: &fivs };
         for at in [Vec3::ZERO, vec3(0.4, 0.0, 0.3), vec3(-1.1, 0.0, 0.2), vec3(6.0, 0.0, -5.0)] {
             for eye in EYES {
                 let (view, surface) = glance(at, eye, (0.4, 1.0));
@@ -307,7 +307,7 @@ fn occluders_that_turn_shade_reflections_as_those_that_are_made_turned() {
             shine(&mut scene, 0.3, 1.0);
             scene
         };
-        let axis = lucerna::techniques::fiv::turn::Axis::new(vec3(0.3, 0.2, 1.0)).unwrap();
+        let axis = lucerna::techniques::fiv::occluder_rotation::Axis::new(vec3(0.3, 0.2, 1.0)).unwrap();
         let direction = axis.direction().as_vec3();
         let settings = Settings { turns: 8, turn_axis: axis, adaptive: false, ..by(Method::Vectors) };
         let view = flat_view(vec3(3.0, 0.7, 0.0), Vec3::ZERO, 2.0, [24, 16]);

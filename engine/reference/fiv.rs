@@ -8,9 +8,9 @@ use glam::{DVec2, DVec3, Vec3};
 use crate::{
     scene::bvh::{Bvh, Ray},
     techniques::fiv::{
-        pace::Paces,
         samples::{Grid, Shells},
         sky::{self, Sky},
+        spacing::Spacing,
         surface::Place,
     },
 };
@@ -103,7 +103,7 @@ pub struct Set<'a> {
     pub grid: Grid,
     pub shells: Shells,
     /// How the samples lie.
-    pub paces: &'a Paces,
+    pub spacing: &'a Spacing,
     /// Radius of the bounding sphere, metres, if what is interpolated along the radius is free of its solid angle.
     pub solid: Option<f64>,
     /// Nine for each sample.
@@ -123,11 +123,11 @@ impl Set<'_> {
         let Grid { azimuths, polars, radii } = self.grid;
         let rho = offset.length();
         let far = f64::from(self.shells.farthest);
-        let [a, p, r] = self.paces.numbers(&self.grid, &self.shells, offset);
+        let [a, p, r] = self.spacing.numbers(&self.grid, &self.shells, offset);
         let (a0, p0, r0) = ((a as u32).min(azimuths - 1), (p as u32).min(polars - 2), (r as u32).min(radii - 2));
         let growth = |sphere: u32| {
             let size = |rho: f64| self.solid.map_or(1.0, |radius| rho.max(radius).powi(2));
-            size(self.paces.radius(&self.grid, &self.shells, sphere)) / size(rho.min(far))
+            size(self.spacing.radius(&self.grid, &self.shells, sphere)) / size(rho.min(far))
         };
         let (mut sum, mut weights) = (Vectors::default(), 0.0);
         for (da, dp, dr) in (0..8).map(|k| (k & 1, k >> 1 & 1, k >> 2)) {
@@ -369,7 +369,7 @@ mod tests {
             let v = light(shells.offset(&grid, i));
             fivs.extend(v.iter().flat_map(|c| c.to_array()).map(|x| x as f32));
         }
-        let set = Set { grid, shells, paces: &Paces::default(), solid: None, fivs: &fivs };
+        let set = Set { grid, shells, spacing: &Spacing::default(), solid: None, fivs: &fivs };
         let close = |a: &Vectors, b: &Vectors, slack: f64| (0..3).all(|k| (a[k] - b[k]).length() < slack);
         for i in 0..grid.count() {
             let offset = shells.offset(&grid, i);
@@ -399,8 +399,8 @@ mod tests {
         let (grid, shells) = (Grid::of(12, 7, 4), Shells { nearest: 0.5, farthest: 8.0 });
         let light = |d: DVec3| 3.0 / d.length_squared().max(1.0);
         let fivs: Vec<f32> = (0..grid.count()).flat_map(|i| [light(shells.offset(&grid, i)) as f32; 9]).collect();
-        let paces = Paces::default();
-        let set = |solid| Set { grid, shells, paces: &paces, solid, fivs: &fivs };
+        let spacing = Spacing::default();
+        let set = |solid| Set { grid, shells, spacing: &spacing, solid, fivs: &fivs };
         for rho in [0.2, 0.5, 0.7, 1.0, 1.3, 2.0, 3.1, 5.0, 7.9, 8.0, 13.0] {
             let d = DVec3::new(0.48, -0.6, 0.64) * rho;
             let error = |solid| (set(solid).lookup(d).0[1].x / light(d) - 1.0).abs();
@@ -415,7 +415,7 @@ mod tests {
         let (grid, shells) = (Grid::of(4, 3, 2), Shells { nearest: 1.0, farthest: 2.0 });
         let mut fivs = vec![2.0f32; 9 * grid.count() as usize];
         (0..grid.index(0, 0, 1) as usize).for_each(|i| fivs[9 * i] = 2e38);
-        let set = Set { grid, shells, paces: &Paces::default(), solid: None, fivs: &fivs };
+        let set = Set { grid, shells, spacing: &Spacing::default(), solid: None, fivs: &fivs };
         let (found, weight) = set.lookup(DVec3::X * 2f64.sqrt());
         assert!((found[0].x - 2.0).abs() < 1e-9 && (weight - 0.5).abs() < 1e-9);
         assert_eq!(set.lookup(DVec3::X), (Vectors::default(), 0.0));

@@ -9,9 +9,9 @@ use crate::{
     scene::bvh::{Bvh, Ray},
     shaders::types::FivLobe,
     techniques::fiv::{
-        pace::Paces,
         samples::{Grid, Shells},
         sky::{self, Sky},
+        spacing::Spacing,
         specular::cell,
     },
 };
@@ -136,7 +136,7 @@ pub fn left(lobes: &[FivLobe], surface: &Surface, hidden: &[Vec<f64>]) -> (DVec3
 pub struct Masks<'a> {
     pub grid: Grid,
     pub shells: Shells,
-    pub paces: &'a Paces,
+    pub spacing: &'a Spacing,
     /// Words of a sample, each of four cells of a byte.
     pub words: usize,
     pub shares: &'a [u32],
@@ -148,7 +148,7 @@ impl Masks<'_> {
     /// The share of each cell that is hidden where the occluder's centre lies at `offset`, metres: trilinear between samples.
     pub fn lookup(&self, offset: DVec3) -> Vec<f64> {
         let Grid { azimuths, polars, radii } = self.grid;
-        let numbers = self.paces.numbers(&self.grid, &self.shells, offset);
+        let numbers = self.spacing.numbers(&self.grid, &self.shells, offset);
         let low = [azimuths - 1, polars - 2, radii - 2].map(f64::from);
         let first = [0, 1, 2].map(|k| numbers[k].floor().min(low[k]));
         let (mut sum, mut weights) = (vec![0.0; 4 * self.words], 0.0);

@@ -156,7 +156,7 @@ void main() {
             lit = min(left.rgb, open);
             if (OVERLAP != 0u) seen = lit / max(open, vec3(1e-30));
         }
-    } else if (OWN == 1u && self != FIV_NONE && occluders[self].stands != 0u) {
+    } else if (OWN == 1u && self != FIV_NONE && occluders[self].self_shadows != 0u) {
         // Everything that is not hidden lies in front of the surface (eq. 13). Where all samples lie inside of it: unshadowed.
         vec4 hidden = fiv_dot(occluders[self], occluders[self].centre - p, n, TRILINEAR != 0u, SCALED != 0u);
         vec3 left = n.x * whole.x + n.y * whole.y + n.z * whole.z - hidden.rgb;

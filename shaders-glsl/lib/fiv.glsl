@@ -14,7 +14,7 @@ struct FivOccluder {
     vec3 centre;    // of its bounding sphere, metres, world space
     float radius;   // of its bounding sphere, metres
     float fill;     // share of the bounding disc that it hides, on average, as the correction for overlaps takes it
-    float body;     // the same, as the correction for partial occluders takes it
+    float cut_fill;    // the same, as the correction for partial occluders takes it
     uint first;     // float of its first vector
     uint second;    // the same of the next turn
     float blend;    // part of the way to the next turn
@@ -24,10 +24,10 @@ struct FivOccluder {
     float nearest;  // radius of the first sphere, metres
     float farthest; // radius of the last sphere, metres
     float steps;    // spheres for each factor of e of the radius
-    uint pace;      // float of FIV_PACE_KNOTS numbers of samples at even steps of each coordinate, then the spheres' radii
+    uint spacing;      // float of FIV_SPACING_KNOTS numbers of samples at even steps of each coordinate, then the spheres' radii
     uint reach;     // float of its table of how far it reaches (lib/fiv_reach.glsl), or FIV_NONE: as its bounding sphere
     uint turned;    // 1: it does not stand as that table has it
-    uint stands;    // 1: it stands as its vectors have it, and shadows itself by them
+    uint self_shadows;   // 1: it stands as its vectors have it, and shadows itself by them
     mat3 to_rest;   // takes directions to it at rest: the transpose of what turned and scaled it
 };
 
@@ -84,7 +84,7 @@ const uint FIV_SUN_SIDE = 192u; // export
 // Stands where there is nothing of the occluder, metres.
 const float FIV_SUN_FREE = -1e30;
 
-const uint FIV_PACE_KNOTS = 33u; // export
+const uint FIV_SPACING_KNOTS = 33u; // export
 const uint FIV_NONE = 0xffffffffu;
 // Directions for which it is known how far an occluder reaches.
 const uint FIV_REACH_AZIMUTHS = 32u; // export

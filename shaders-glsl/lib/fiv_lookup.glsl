@@ -6,8 +6,8 @@
 #ifndef FIV_NO_VECTORS
 // Number of the sample, with its fraction, at a part (0..1) of a coordinate; `knots`: float of its table.
 float fiv_number(uint knots, float part) {
-    float knot = clamp(part, 0.0, 1.0) * float(FIV_PACE_KNOTS - 1u);
-    uint low = min(uint(knot), FIV_PACE_KNOTS - 2u);
+    float knot = clamp(part, 0.0, 1.0) * float(FIV_SPACING_KNOTS - 1u);
+    uint low = min(uint(knot), FIV_SPACING_KNOTS - 2u);
     return mix(fivs[knots + low], fivs[knots + low + 1u], knot - float(low));
 }
 #endif
@@ -25,10 +25,10 @@ FivCell fiv_cell(FivOccluder o, vec3 offset, bool trilinear) {
     precise float p = atan(length(offset.xz), offset.y) * (float(o.polars - 1u) / FIV_PI);
     precise float r = clamp(log(max(length(offset), o.nearest) / o.nearest) * o.steps, 0.0, float(o.radii - 1u));
 #ifndef FIV_NO_VECTORS
-    if (o.pace != FIV_NONE) {
-        a = fiv_number(o.pace, a / float(o.azimuths));
-        p = fiv_number(o.pace + FIV_PACE_KNOTS, p / float(o.polars - 1u));
-        r = fiv_number(o.pace + 2u * FIV_PACE_KNOTS, r / float(o.radii - 1u));
+    if (o.spacing != FIV_NONE) {
+        a = fiv_number(o.spacing, a / float(o.azimuths));
+        p = fiv_number(o.spacing + FIV_SPACING_KNOTS, p / float(o.polars - 1u));
+        r = fiv_number(o.spacing + 2u * FIV_SPACING_KNOTS, r / float(o.radii - 1u));
     }
 #endif
     if (!trilinear) {
@@ -54,7 +54,7 @@ float fiv_corner(FivOccluder o, FivCell cell, uint k, out uint number) {
 #ifndef FIV_NO_VECTORS
 // Radius of a sphere of samples, metres.
 float fiv_radius(FivOccluder o, uint sphere) {
-    return o.pace != FIV_NONE ? fivs[o.pace + 3u * FIV_PACE_KNOTS + sphere] : o.nearest * exp(float(sphere) / o.steps);
+    return o.spacing != FIV_NONE ? fivs[o.spacing + 3u * FIV_SPACING_KNOTS + sphere] : o.nearest * exp(float(sphere) / o.steps);
 }
 
 // normal · FIV of what occluder `o` hides, seen from where its centre lies at `offset` (metres): trilinear between the eight nearest

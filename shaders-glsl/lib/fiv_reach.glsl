@@ -71,9 +71,9 @@ vec3 fiv_cut(FivOccluder o, vec3 offset, vec3 n, FivAlong along, vec3 hidden, ve
     float radius = max(0.5 * (reach.x + reach.y), 1e-20);
     float d = dot(offset, n), middle = d + 0.5 * (reach.x - reach.y);
     float rho = sqrt(max(dot(offset, offset) - d * d, 0.0) + middle * middle);
-    float body = min(o.body * o.radius * o.radius / (radius * radius), 1.0);
-    vec3 under = behind * (body * fiv_ball(-middle, rho, radius));
-    vec3 over = open * (body * fiv_ball(middle, rho, radius));
+    float fill = min(o.cut_fill * o.radius * o.radius / (radius * radius), 1.0);
+    vec3 under = behind * (fill * fiv_ball(-middle, rho, radius));
+    vec3 over = open * (fill * fiv_ball(middle, rho, radius));
     vec3 ratio = min(under / max(over, vec3(1e-30)), vec3(1e15));
     return min(mix(over, hidden + under, 1.0 / (1.0 + ratio * ratio)), open);
 }

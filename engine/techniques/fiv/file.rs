@@ -15,7 +15,7 @@ use std::{ops::Range, path::Path};
 
 use serde::{Deserialize, Serialize};
 
-use super::{hash::Hash, plan::Plan, room::MOST_SAMPLES};
+use super::{hash::Hash, limits::MOST_SAMPLES, plan::Plan};
 use crate::{Error, Result, image, shaders::consts::FIV_FLOATS};
 
 const MAGIC: &[u8; 8] = b"lucfiv\r\n";
@@ -111,7 +111,7 @@ impl Stored {
         }) {
             return Err(damaged(format!("has an impossible plan: radii of occluder `{}`", kind.name)));
         }
-        if let Some(kind) = plan.occluders.iter().find(|k| !k.paces.fit(&plan.grid)) {
+        if let Some(kind) = plan.occluders.iter().find(|k| !k.spacing.fit(&plan.grid)) {
             let what = format!("has an impossible plan: how samples lie around occluder `{}`", kind.name);
             return Err(damaged(what));
         }
@@ -192,9 +192,9 @@ mod tests {
     use super::*;
     use crate::techniques::fiv::{
         Settings,
+        occluder_rotation::Axis,
         plan::Kind,
         samples::{Grid, Shells},
-        turn::Axis,
     };
 
     fn stored() -> Stored {
@@ -205,7 +205,7 @@ mod tests {
             shells: Shells { nearest: 0.012345678, farthest: 1.6 },
             triangles: 12,
             surface: 0,
-            paces: Default::default(),
+            spacing: Default::default(),
         };
         let plan = Plan {
             grid: Grid::of(3, 2, 2),
@@ -285,7 +285,7 @@ mod tests {
         beyond.range = 20..44;
         refused(&beyond.encode().unwrap(), "20 to 44 of 24");
         let mut bent = stored();
-        bent.plan.occluders[1].paces.polar = vec![0.5; 3];
+        bent.plan.occluders[1].spacing.polar = vec![0.5; 3];
         refused(&bent.encode().unwrap(), "how samples lie around occluder `tree`");
         let mut many = stored();
         many.plan.occluders[0].surface = u32::MAX;
@@ -295,7 +295,7 @@ mod tests {
     #[test]
     fn plans_that_differ_in_how_samples_lie_say_so() {
         let (plain, mut bent) = (stored().plan, stored().plan);
-        bent.occluders[1].paces.polar = vec![0.0, 0.2, 1.0];
+        bent.occluders[1].spacing.polar = vec![0.0, 0.2, 1.0];
         let what = plain.difference(&bent).unwrap();
         assert!(what.contains("`tree`") && what.contains("fiv.adaptive") && !what.contains("instead"), "{what}");
         let mut covered = stored().plan;

@@ -14,46 +14,46 @@
 //! - 1/π is explicit: a surface of albedo ρ reflects ρ/π · E; the thesis folds it into its factor (eq. 3).
 //! - The discs of the overlap correction have sin α = R / ρ as radius, so that they stay finite near an occluder.
 //! - How far an occluder reaches over the receiver's plane (cases A, B, C) is asked of its corners, not of its bounding sphere
-//!   ([`support`]); [`Extent::Sphere`] is the thesis' way.
+//!   ([`support_function`]); [`Extent::Sphere`] is the thesis' way.
 //! - What an occluder that the receiver's plane cuts hides is its vector and what the part behind hides of the light from behind
 //!   ([`Cut::Light`]). The thesis makes the vector smaller, though it is too small already: [`Cut::Height`].
 //! - An occluder's shadow on itself comes from samples on its surface ([`surface`]); [`SelfSamples::Spheres`] is the thesis' way.
-//! - Samples lie where what is hidden bends, if [`Settings::adaptive`] ([`pace`]).
+//! - Samples lie where what is hidden bends, if [`Settings::adaptive`] ([`spacing`]).
 //! - What overlapping occluders share is less where they do not fill their bounding discs ([`fill`]), and no bright part of the
 //!   environment is taken away twice ([`spots`]).
 //! - The brightest texels can be kept out of the vectors and get hard shadows ([`suns`]).
-//! - Surfaces may reflect the environment glossily ([`specular`]), and occluders may turn ([`turn`]).
+//! - Surfaces may reflect the environment glossily ([`specular`]), and occluders may turn ([`occluder_rotation`]).
 //! - More than two overlapping occluders: see [`crate::reference::fiv::shares`].
 
-mod body;
 pub mod cover;
 pub mod file;
 pub mod fill;
 mod hash;
 pub mod light;
+mod limits;
 mod negligible;
 pub mod occluder;
+pub mod occluder_rotation;
 mod online;
-mod online_standing;
-pub mod pace;
+mod online_occluders;
 mod parallel;
 mod picture;
 pub mod plan;
-mod ready;
-mod room;
+mod posed_mesh;
+mod prepared;
 pub mod samples;
 mod settings;
 pub mod sky;
+mod sky_rotation;
+pub mod spacing;
 pub mod specular;
 pub mod spots;
-mod stage;
-mod stored_standing;
+mod state;
+mod stored_occluders;
 pub mod suns;
-pub mod support;
+pub mod support_function;
 pub mod surface;
 mod tiles;
-pub mod turn;
-mod turning;
 
 pub use file::Stored;
 pub use light::Light;
@@ -62,4 +62,4 @@ pub use picture::{Outputs, Picture, PictureSettings};
 pub use plan::Plan;
 pub use settings::{Cut, Extent, Interpolation, Masks, Method, SelfSamples, Settings, Shared, Specular};
 pub use sky::Sky;
-pub use stage::Fiv;
+pub use state::Fiv;

@@ -5,10 +5,10 @@ use std::collections::HashMap;
 use glam::{Mat3, Mat4, Vec3, Vec4};
 
 use super::{
-    body::{self, Body, Part, Size, is_unlit},
     hash::Hash,
+    posed_mesh::{self, PosedMesh, PosedPrimitive, Size, is_unlit},
     samples::Shells,
-    support::Support,
+    support_function::SupportFunction,
     surface::{self, Own, Place},
 };
 use crate::scene::{AlphaMode, Material, Mesh, Node, Pose, Primitive, Scene};
@@ -103,9 +103,9 @@ impl Occluders {
 impl Occluder {
     /// The occluder and its centre seen from the node's origin; `None` without a triangle that could stop light.
     pub(super) fn of_node(scene: &Scene, pose: &mut Pose, node: usize, mesh: &Mesh) -> Option<(Self, Vec3)> {
-        let Body { parts, centre, size } = Body::of(scene, pose, node, mesh)?;
+        let PosedMesh { primitives: posed, centre, size } = PosedMesh::of(scene, pose, node, mesh)?;
         let (mut primitives, mut own): (Vec<Primitive>, Vec<Own>) = Default::default();
-        for Part { slot, positions, normals, indices } in parts {
+        for PosedPrimitive { slot, positions, normals, indices } in posed {
             let primitive = &mesh.primitives[slot];
             let backs = scene.materials.get(primitive.material as usize).is_some_and(|m| m.double_sided);
             own.push(Own { slot: slot as u32, corners: positions.len() as u32, backs });
@@ -133,9 +133,9 @@ impl Occluder {
     }
 
     /// How far it reaches along every direction.
-    pub fn support(&self) -> Support {
+    pub fn support_function(&self) -> SupportFunction {
         let primitives = self.scene.meshes[0].primitives.iter();
-        body::support(primitives.map(|p| (&p.positions[..], &p.indices[..])))
+        posed_mesh::support_function(primitives.map(|p| (&p.positions[..], &p.indices[..])))
     }
 
     /// Places on its surface, those of [`Self::own`] one after the other.
@@ -175,7 +175,7 @@ impl Occluder {
 }
 
 fn of_primitive(primitive: &Primitive) -> impl Iterator<Item = [Vec3; 3]> + '_ {
-    body::corners(&primitive.positions, &primitive.indices)
+    posed_mesh::corners(&primitive.positions, &primitive.indices)
 }
 
 /// A scene of these primitives; of their materials only what stops rays is kept.
@@ -277,7 +277,7 @@ fn hash(alone: &Scene, own: &[Own]) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{body::nearest, *};
+    use super::{posed_mesh::nearest, *};
     use crate::scene::builtin;
     use glam::Quat;
 

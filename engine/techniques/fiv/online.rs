@@ -22,7 +22,7 @@ use super::{
     cover::tiles,
     light::Light,
     occluder,
-    online_standing::{Set, Stage, Standing},
+    online_occluders::{FrameOccluders, PlacementInputs, Set},
     samples::Grid,
 };
 use crate::{
@@ -72,7 +72,7 @@ pub struct Online {
 /// A geometry that rays are traced through.
 #[derive(Debug)]
 struct Shape {
-    body: Body,
+    traced: TracedScene,
     resident: Resident,
     rays: Rays,
     tiles: u64,
@@ -81,7 +81,7 @@ struct Shape {
 }
 
 #[derive(Debug)]
-enum Body {
+enum TracedScene {
     /// A kind of occluder at rest, its centre at the origin.
     Still(usize),
     /// One node of a scene, in world space.
@@ -94,7 +94,7 @@ pub struct Seen<'a> {
     pub gbuffer: &'a GBuffer,
     /// Which occluder each pixel shows.
     pub identity: Image,
-    /// [`Standing::list`] on the device.
+    /// [`FrameOccluders::list`] on the device.
     pub occluders: Buffer,
     /// What the occluder of a pixel leaves itself; known after these passes, if asked for.
     pub own: Image,
@@ -128,15 +128,15 @@ impl Online {
                 of_placed.push((shape, false));
                 continue;
             }
-            let body = match deforms {
-                true => Body::Deforming(Box::new(occluder::only(scene, node))),
-                false => Body::Still(kind),
+            let traced = match deforms {
+                true => TracedScene::Deforming(Box::new(occluder::only(scene, node))),
+                false => TracedScene::Still(kind),
             };
             of_placed.push((shapes.len(), deforms));
             if !deforms {
                 known.insert(kind, shapes.len());
             }
-            let geometry = body.scene(occluders);
+            let geometry = traced.scene(occluders);
             let resident = Resident::new(gpu, geometry)?;
             let rays = Rays::new(gpu, geometry, &resident)?;
             let tiles = tiles(gpu, &rays)?;
@@ -144,7 +144,7 @@ impl Online {
                 Some(_) => (TURNS_LIMITED / rays.most_turns().max(1)).max(1),
                 None => MOST_TURNS,
             };
-            shapes.push(Shape { body, resident, rays, tiles, most });
+            shapes.push(Shape { traced, resident, rays, tiles, most });
         }
         let grid = settings.grid();
         let at = |ring: u32| grid.direction(ring % grid.azimuths, ring / grid.azimuths).as_vec3().to_array();
@@ -168,8 +168,8 @@ impl Online {
     }
 
     /// How all occluders stand.
-    pub fn standing(&self, scene: &Scene, pose: &Pose, occluders: &Occluders) -> Standing {
-        let stage = Stage {
+    pub fn in_frame(&self, scene: &Scene, pose: &Pose, occluders: &Occluders) -> FrameOccluders {
+        let inputs = PlacementInputs {
             scene,
             occluders,
             shapes: &self.of_placed,
@@ -178,7 +178,7 @@ impl Online {
             reach: self.reach,
             floats: self.blocks() * FIV_BLOCK_SAMPLES * FIV_FLOATS,
         };
-        Standing::of(&stage, pose)
+        FrameOccluders::of(&inputs, pose)
     }
 
     /// Declares the passes that compute the vectors that `seen` needs: a buffer in which each set has its place.
@@ -189,12 +189,12 @@ impl Online {
         &mut self,
         graph: &mut Graph,
         (occluders, pose): (&Occluders, &Pose),
-        standing: &Standing,
+        in_frame: &FrameOccluders,
         light: &Light,
         seen: &Seen<'_>,
         settings: &Settings,
     ) -> Result<Buffer> {
-        let (blocks, count) = (self.blocks(), standing.sets.len() as u32);
+        let (blocks, count) = (self.blocks(), in_frame.sets.len() as u32);
         let samples = u64::from(count) * u64::from(blocks * FIV_BLOCK_SAMPLES);
         let bytes = 4 * u64::from(FIV_FLOATS) * samples;
         if bytes > self.limit {
@@ -211,22 +211,22 @@ impl Online {
             return Ok(fivs);
         }
         let marks = self.marks(graph, seen, samples, settings);
-        let jobs = self.jobs(standing, extent, light);
-        let lists = self.lists(graph, standing, marks, &jobs, samples);
+        let jobs = self.jobs(in_frame, extent, light);
+        let lists = self.lists(graph, in_frame, marks, &jobs, samples);
         let found = graph.buffer("fiv.found", bytes);
         let coverage = graph.buffer("fiv.coverage", 4 * samples);
         let texels = graph.import_buffer(&light.texels);
         let normals = graph.buffer_from("fiv.normals", &[[0f32; 3]]);
         for job in &jobs.list {
             let shape = &mut self.shapes[job.shape];
-            let scene = shape.body.scene(occluders);
+            let scene = shape.traced.scene(occluders);
             let rest;
-            let pose = match &shape.body {
-                Body::Still(_) => {
+            let pose = match &shape.traced {
+                TracedScene::Still(_) => {
                     rest = Pose::rest(scene);
                     &rest
                 }
-                Body::Deforming(_) => pose,
+                TracedScene::Deforming(_) => pose,
             };
             let handles = shape.resident.frame_in(graph, scene, pose);
             let rays = shape.rays.frame(graph, &handles);
@@ -302,21 +302,21 @@ impl Online {
     }
 
     /// The work that each geometry can have at most.
-    fn jobs(&self, standing: &Standing, extent: Extent, light: &Light) -> Jobs {
+    fn jobs(&self, in_frame: &FrameOccluders, extent: Extent, light: &Light) -> Jobs {
         let row = light.size * self.split / 8;
         let all = 6 * row * row;
-        let used = || standing.sets.iter().map(|set| self.shapes[set.shape].tiles);
+        let used = || in_frame.sets.iter().map(|set| self.shapes[set.shape].tiles);
         let tiles = used().min().unwrap_or(1).min(all.into()) as u32;
         let chunks = all.div_ceil(tiles);
         let samples = u64::from(self.blocks() * FIV_BLOCK_SAMPLES);
         let set_of = |first: u32| (first / (self.blocks() * FIV_BLOCK_SAMPLES * FIV_FLOATS)) as usize;
-        let shape_of = |first: u32| standing.sets[set_of(first)].shape;
+        let shape_of = |first: u32| in_frame.sets[set_of(first)].shape;
         let mut occluders = vec![0u64; self.shapes.len()];
-        standing.list.iter().for_each(|occluder| occluders[shape_of(occluder.first)] += 1);
+        in_frame.list.iter().for_each(|occluder| occluders[shape_of(occluder.first)] += 1);
         // Eight samples for each pixel and occluder.
         let most = |shape: usize, sets: u64| (8 * extent.pixels() * occluders[shape]).min(sets * samples);
         let mut list: Vec<Job> = Vec::new();
-        for (number, set) in standing.sets.iter().enumerate() {
+        for (number, set) in in_frame.sets.iter().enumerate() {
             match list.last_mut() {
                 Some(job) if job.shape == set.shape => job.sets.end += 1,
                 _ => list.push(Job {
@@ -341,9 +341,9 @@ impl Online {
     }
 
     /// The marked samples of each geometry in a row, and the workgroups of each batch.
-    fn lists(&self, graph: &mut Graph, standing: &Standing, marks: Buffer, jobs: &Jobs, samples: u64) -> Lists {
+    fn lists(&self, graph: &mut Graph, in_frame: &FrameOccluders, marks: Buffer, jobs: &Jobs, samples: u64) -> Lists {
         let of_set = self.blocks();
-        let blocks = standing.sets.len() as u32 * of_set;
+        let blocks = in_frame.sets.len() as u32 * of_set;
         let counts = graph.buffer("fiv.counts", 4 * u64::from(blocks));
         let starts = graph.buffer("fiv.starts", 4 * u64::from(blocks));
         let groups = graph.buffer("fiv.groups", 24 * u64::from(jobs.batches));
@@ -369,8 +369,8 @@ impl Online {
         };
         let sets: Vec<types::FivSet> = jobs.list.iter().flat_map(sets_of).collect();
         let spheres = |set: &Set| (0..radii).map(move |r| set.shells.radius(radii, r) as f32).collect::<Vec<f32>>();
-        let distances: Vec<f32> = standing.sets.iter().flat_map(spheres).collect();
-        let turns: Vec<types::FivTurn> = standing.sets.iter().map(turn).collect();
+        let distances: Vec<f32> = in_frame.sets.iter().flat_map(spheres).collect();
+        let turns: Vec<types::FivTurn> = in_frame.sets.iter().map(rotation).collect();
         let lists = Lists {
             points: graph.buffer("fiv.points", 16 * samples),
             samples: graph.buffer("fiv.samples", 4 * samples),
@@ -458,7 +458,7 @@ fn own(
     }
 }
 
-impl Body {
+impl TracedScene {
     fn scene<'a>(&'a self, occluders: &'a Occluders) -> &'a Scene {
         match self {
             Self::Still(kind) => &occluders.kinds[*kind].scene,
@@ -467,7 +467,7 @@ impl Body {
     }
 }
 
-fn turn(set: &Set) -> types::FivTurn {
+fn rotation(set: &Set) -> types::FivTurn {
     types::FivTurn {
         geometry_from_world: set.geometry_from_world.to_cols_array_2d(),
         centre: set.centre.to_array(),

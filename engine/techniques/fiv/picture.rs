@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Extent as Reach, Fiv, Interpolation, Method, Placed, SelfSamples, Settings, Shared, Specular, light, online::Seen,
-    online_standing::Standing, specular::Shadows, spots::Spot, suns, tiles::Tiles,
+    online_occluders::FrameOccluders, specular::Shadows, spots::Spot, suns, tiles::Tiles,
 };
 use crate::{
     Error, Result,
@@ -99,7 +99,7 @@ impl Fiv {
         view: &View,
         settings: &PictureSettings,
     ) -> Result<Picture> {
-        let settings = &PictureSettings { fiv: self.ready.picture(&settings.fiv)?, ..settings.clone() };
+        let settings = &PictureSettings { fiv: self.prepared.picture(&settings.fiv)?, ..settings.clone() };
         self.follow(scene, &settings.fiv)?;
         let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
         let extent = graph.extent(gbuffer.depth);
@@ -162,25 +162,25 @@ impl Fiv {
         let irradiance = graph.image("fiv.irradiance", Format::RGBA32F, extent);
         graph.clear(irradiance, [0.0; 4]);
         let deforming = self.deforming(pose, &handles.moment.instances);
-        let standing = match (settings.method, &self.online) {
-            (Method::Online, Some(online)) => online.standing(scene, pose, &self.occluders),
+        let in_frame = match (settings.method, &self.online) {
+            (Method::Online, Some(online)) => online.in_frame(scene, pose, &self.occluders),
             (Method::Vectors, _) => self.stored(pose, &deforming),
-            _ => Standing::default(),
+            _ => FrameOccluders::default(),
         };
-        let count = standing.list.len() as u32;
+        let count = in_frame.list.len() as u32;
         let stored = graph.import_buffer(&self.fivs);
-        let owners = self.owners((pose, &deforming), &standing.nodes, &handles.moment.instances, settings);
-        let any = !standing.nodes.is_empty();
+        let owners = self.owners((pose, &deforming), &in_frame.nodes, &handles.moment.instances, settings);
+        let any = !in_frame.nodes.is_empty();
         let (identity, own) = identity(graph, handles, view, gbuffer, (&owners, stored, any));
-        let mut list = standing.list.clone();
+        let mut list = in_frame.list.clone();
         if settings.extent == Reach::Sphere {
             list.iter_mut().for_each(|occluder| occluder.reach = NONE);
         }
         let kinds: HashMap<u32, u32> = self.occluders.placed.iter().map(|placed| (placed.node, placed.kind)).collect();
-        for (number, (occluder, node)) in list.iter_mut().zip(&standing.nodes).enumerate() {
+        for (number, (occluder, node)) in list.iter_mut().zip(&in_frame.nodes).enumerate() {
             let fill = kinds.get(node).map_or(1.0, |&kind| self.fill(kind));
-            occluder.body = (fill * standing.fills.get(number).copied().unwrap_or(1.0)).min(1.0);
-            occluder.fill = if settings.shared == Shared::Discs { 1.0 } else { occluder.body };
+            occluder.cut_fill = (fill * in_frame.fills.get(number).copied().unwrap_or(1.0)).min(1.0);
+            occluder.fill = if settings.shared == Shared::Discs { 1.0 } else { occluder.cut_fill };
         }
         list.resize(list.len().max(1), types::FivOccluder::default());
         let occluders = graph.buffer_from("fiv.occluders", &list);
@@ -191,7 +191,7 @@ impl Fiv {
         let fivs = match &mut self.online {
             Some(online) if count > 0 => {
                 let seen = Seen { gbuffer, identity, occluders, own, near: (tiles.near, tiles.words) };
-                online.vectors(graph, (&self.occluders, pose), &standing, &self.light, &seen, settings)?
+                online.vectors(graph, (&self.occluders, pose), &in_frame, &self.light, &seen, settings)?
             }
             _ => stored,
         };
@@ -215,8 +215,8 @@ impl Fiv {
         graph.fill(taken, 0);
         let difmap = graph.import_image(&self.light.difmap);
         let mut reaches = graph.import_buffer(&self.reaches);
-        if !standing.reaches.is_empty() {
-            let moved = graph.buffer_from("fiv.reaches.moved", &standing.reaches);
+        if !in_frame.reaches.is_empty() {
+            let moved = graph.buffer_from("fiv.reaches.moved", &in_frame.reaches);
             let all = graph.buffer("fiv.reaches.all", reaches.size + moved.size);
             graph.copy_buffer(reaches, all.range(0..reaches.size));
             graph.copy_buffer(moved, all.range(reaches.size..all.size));
@@ -262,22 +262,22 @@ impl Fiv {
             graph.compute(args, extent);
         }
         let pixels = Pixels { gbuffer, identity, occluders, near: (tiles.near, tiles.words), irradiance };
-        self.suns(graph, &standing, &pixels, settings.self_shadow);
+        self.suns(graph, &in_frame, &pixels, settings.self_shadow);
         Ok((irradiance, Shadows { identity, occluders, fivs, near: (tiles.near, tiles.words), count }))
     }
 
     /// Adds the light of texels that are kept apart.
-    fn suns(&self, graph: &mut Graph, standing: &Standing, pixels: &Pixels<'_>, own: bool) {
+    fn suns(&self, graph: &mut Graph, in_frame: &FrameOccluders, pixels: &Pixels<'_>, own: bool) {
         let count = self.light.suns.len() as u32;
         if count == 0 {
             return;
         }
         // Lights are kept apart for stored vectors alone, which all occluders have, in their order.
         let shade = |(placed, occluder): (&Placed, &types::FivOccluder)| {
-            let own = own && occluder.stands != 0 && occluder.turned == 0;
+            let own = own && occluder.self_shadows != 0 && occluder.turned == 0;
             types::FivShade { map: placed.kind * count * suns::FLOATS, own: own.into() }
         };
-        let mut shades: Vec<_> = self.occluders.placed.iter().zip(&standing.list).map(shade).collect();
+        let mut shades: Vec<_> = self.occluders.placed.iter().zip(&in_frame.list).map(shade).collect();
         shades.resize(shades.len().max(1), types::FivShade::default());
         let shades = graph.buffer_from("fiv.shades", &shades);
         let suns = graph.buffer_from("fiv.sunlight", &self.light.suns);

@@ -10,11 +10,11 @@ use super::{
     cover::Cover,
     light::Light,
     occluder::Occluder,
-    pace::{self, Paces},
+    occluder_rotation::{self, Axis},
     samples::{Grid, Shells},
     settings::{Interpolation, Masks, SelfSamples},
+    spacing::{self, Spacing},
     surface::{Own, Place},
-    turn::{self, Axis},
 };
 use crate::{Result, gpu::Gpu, graph::Runner, shaders::consts::FIV_FLOATS};
 
@@ -35,14 +35,14 @@ pub struct Kind {
     /// Samples on its surface.
     pub surface: u32,
     /// How its samples lie.
-    #[serde(default)]
-    pub paces: Paces,
+    #[serde(default, rename = "paces")]
+    pub spacing: Spacing,
 }
 
 impl Kind {
     /// Place of the occluder's centre seen from the receiver, metres.
     pub fn offset(&self, grid: &Grid, index: u32) -> DVec3 {
-        self.paces.offset(grid, &self.shells, index)
+        self.spacing.offset(grid, &self.shells, index)
     }
 }
 
@@ -88,7 +88,7 @@ impl Plan {
             shells: o.shells(settings.reach),
             triangles: o.triangles as u64,
             surface: if surface { o.own.iter().map(Own::count).sum() } else { 0 },
-            paces: Paces::default(),
+            spacing: Spacing::default(),
         };
         Self {
             environment: environment.to_owned(),
@@ -127,7 +127,7 @@ impl Plan {
             if which(number) {
                 let mut cover = Cover::new(gpu, occluder)?;
                 let place = (&self.grid, &kind.shells);
-                kind.paces = pace::choose(&mut cover, &mut runner, light, place, (kind.radius, scaled))?;
+                kind.spacing = spacing::choose(&mut cover, &mut runner, light, place, (kind.radius, scaled))?;
             }
         }
         Ok(())
@@ -147,7 +147,7 @@ impl Plan {
         // Without an occluder nothing is decided.
         let adaptive = match self.occluders.is_empty() {
             true => over.adaptive,
-            false => self.occluders.iter().any(|kind| kind.paces != Paces::default()),
+            false => self.occluders.iter().any(|kind| kind.spacing != Spacing::default()),
         };
         let out = Settings { size, split, masks, reach, azimuths, polars, radii, ..over.clone() };
         Settings { turns, turn_axis, suns, self_samples, adaptive, ..out }
@@ -183,7 +183,7 @@ impl Plan {
             return Some(format!("{} instead of {}", say(other), say(self)));
         }
         let same = |(a, b): &(&Kind, &Kind)| {
-            (&a.hash, &a.shells, a.surface, &a.paces) == (&b.hash, &b.shells, b.surface, &b.paces)
+            (&a.hash, &a.shells, a.surface, &a.spacing) == (&b.hash, &b.shells, b.surface, &b.spacing)
         };
         let (a, b) = self.occluders.iter().zip(&other.occluders).find(|pair| !same(pair))?;
         let say = |k: &Kind| {
@@ -262,12 +262,12 @@ impl Plan {
                 let begin = first + turn * of_turn;
                 let border = begin + u64::from(self.grid.count());
                 let end = last.min(at + u64::from(BATCH)).min(if at < border { border } else { begin + of_turn });
-                let matrix = turn::matrix(turn as u32, self.turns, self.turn_axis).as_mat3();
+                let matrix = occluder_rotation::matrix(turn as u32, self.turns, self.turn_axis).as_mat3();
                 cover.turn(matrix);
                 let fivs = if at < border {
                     let point = |sample: u64| {
                         let number = (sample - begin) as u32;
-                        if kind.paces == Paces::default() {
+                        if kind.spacing == Spacing::default() {
                             -kind.shells.point(&self.grid, number)
                         } else {
                             -kind.offset(&self.grid, number).as_vec3()
@@ -319,7 +319,7 @@ mod tests {
             shells: Shells { nearest: 1.0, farthest: 2.0 },
             triangles: 1,
             surface: 100,
-            paces: Paces::default(),
+            spacing: Spacing::default(),
         };
         let settings = Settings::default();
         let plan = Plan { occluders: vec![kind; 3], ..Plan::new("sky", 1, &[], &settings) };

@@ -4,10 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     super::allowed::{within, wrong},
+    occluder_rotation::Axis,
     samples::Grid,
     sky::SIDES,
     suns,
-    turn::Axis,
 };
 use crate::{Error, Result};
 

@@ -21,9 +21,9 @@ use glam::{DVec3, Mat3, Vec3};
 use super::{
     Fiv, Occluders, Plan, Sky, Specular,
     cover::{self, Cover},
-    light,
+    light, occluder_rotation,
     settings::Settings,
-    sky, turn,
+    sky,
 };
 use crate::{
     Error, ErrorKind, Result,
@@ -133,20 +133,20 @@ pub struct Glossy {
 }
 
 impl Glossy {
-    /// Uploads the cells, and looks at what occluders hide of them. `told` hears how many of the samples are done and says whether to go
+    /// Uploads the cells, and looks at what occluders hide of them. `progress` hears how many of the samples are done and says whether to go
     /// on.
     ///
     /// # Errors
-    /// `OutOfMemory`, `DeviceLost`; `Runtime` if told to stop.
+    /// `OutOfMemory`, `DeviceLost`; `Runtime` if progress to stop.
     pub fn new(
         gpu: &Gpu,
         sky: &Sky,
         plan: &Plan,
         occluders: &Occluders,
-        told: impl FnMut(u64, u64) -> bool,
+        progress: impl FnMut(u64, u64) -> bool,
     ) -> Result<Self> {
         let cells = Cells::of(sky);
-        let mut all = shares(gpu, sky.size, &cells, plan, occluders, told)?;
+        let mut all = shares(gpu, sky.size, &cells, plan, occluders, progress)?;
         all.resize(all.len().max(1), 0);
         Ok(Self {
             lobes: OwnedBuffer::with_contents(gpu, "fiv.lobes", bytemuck::cast_slice(&cells.lobes))?,
@@ -209,7 +209,7 @@ fn shares(
     cells: &Cells,
     plan: &Plan,
     occluders: &Occluders,
-    mut told: impl FnMut(u64, u64) -> bool,
+    mut progress: impl FnMut(u64, u64) -> bool,
 ) -> Result<Vec<u32>> {
     let words = words(size);
     let all = all(plan);
@@ -218,12 +218,12 @@ fn shares(
     for (occluder, kind) in occluders.kinds.iter().zip(&plan.occluders) {
         let mut cover = Cover::new(gpu, occluder)?;
         for turn in 0..plan.turns {
-            let matrix = turn::matrix(turn, plan.turns, plan.turn_axis).as_mat3();
+            let matrix = occluder_rotation::matrix(turn, plan.turns, plan.turn_axis).as_mat3();
             let points: Vec<Vec3> =
                 (0..plan.grid.count()).map(|sample| -kind.offset(&plan.grid, sample).as_vec3()).collect();
             for points in points.chunks(BATCH) {
                 out.extend(masks(&mut cover, &mut runner, &cells.weights, size, points, (matrix, occluder.radius))?);
-                if !told(out.len() as u64 / u64::from(words), all) {
+                if !progress(out.len() as u64 / u64::from(words), all) {
                     return Err(Error::new(ErrorKind::Runtime, "stopped while computing vectors").at("fiv"));
                 }
             }
@@ -401,7 +401,7 @@ impl Fiv {
     fn share_places(&self, pose: &Pose, words: u32) -> Vec<[u32; 2]> {
         let (turns, samples) = (self.plan.turns, self.plan.grid.count());
         let place = |placed: &super::Placed| {
-            let (first, second, _) = turn::between(self.angle(pose, placed.node).unwrap_or(0.0), turns);
+            let (first, second, _) = occluder_rotation::between(self.angle(pose, placed.node).unwrap_or(0.0), turns);
             [first, second].map(|turn| (placed.kind * turns + turn) * samples * words)
         };
         self.occluders.placed.iter().map(place).collect()
@@ -409,6 +409,6 @@ impl Fiv {
 }
 
 /// Whether these settings need what occluders hide of cells.
-pub fn wanted(settings: &Settings) -> bool {
+pub fn needed(settings: &Settings) -> bool {
     settings.specular != Specular::Off && settings.method == super::Method::Vectors
 }

@@ -2,11 +2,13 @@
 
 use std::collections::HashSet;
 
-use super::{Fiv, Method, Settings, online_standing::Standing, pace::Paces, support, turn};
+use super::{
+    Fiv, Method, Settings, occluder_rotation, online_occluders::FrameOccluders, spacing::Spacing, support_function,
+};
 use crate::{
     scene::{Note, NoteKind, Pose, Scene, resident::Instance},
     shaders::{
-        consts::{FIV_FLOATS, FIV_PACE_KNOTS},
+        consts::{FIV_FLOATS, FIV_SPACING_KNOTS},
         types,
     },
 };
@@ -16,15 +18,15 @@ const NONE: u32 = u32::MAX;
 
 impl Fiv {
     /// The occluders with their vectors that were computed beforehand.
-    pub(super) fn stored(&self, pose: &Pose, deforming: &HashSet<u32>) -> Standing {
+    pub(super) fn stored(&self, pose: &Pose, deforming: &HashSet<u32>) -> FrameOccluders {
         let grid = self.plan.grid;
-        let paces = self.firsts.last().map_or(0, |samples| *samples as u32 * FIV_FLOATS);
+        let spacing = self.firsts.last().map_or(0, |samples| *samples as u32 * FIV_FLOATS);
         let placed = self.occluders.placed.iter().map(|placed| {
             let kind = &self.plan.occluders[placed.kind as usize];
             let angle = self.angle(pose, placed.node);
-            let turned = turn::rotation(angle.unwrap_or(0.0), self.plan.turn_axis);
-            let (first, second, blend) = turn::between(angle.unwrap_or(0.0), self.plan.turns);
-            let pace = paces + placed.kind * (3 * FIV_PACE_KNOTS + grid.radii);
+            let turned = occluder_rotation::rotation(angle.unwrap_or(0.0), self.plan.turn_axis);
+            let (first, second, blend) = occluder_rotation::between(angle.unwrap_or(0.0), self.plan.turns);
+            let table = spacing + placed.kind * (3 * FIV_SPACING_KNOTS + grid.radii);
             types::FivOccluder {
                 centre: (pose.world[placed.node as usize].w_axis.truncate() + turned * placed.centre).to_array(),
                 radius: kind.radius,
@@ -37,16 +39,16 @@ impl Fiv {
                 nearest: kind.shells.nearest,
                 farthest: kind.shells.farthest,
                 steps: kind.shells.steps(grid.radii) as f32,
-                pace: if kind.paces == Paces::default() { NONE } else { pace },
-                reach: placed.kind * support::LENGTH as u32,
-                stands: (angle.is_some() && !deforming.contains(&placed.node)).into(),
+                spacing: if kind.spacing == Spacing::default() { NONE } else { table },
+                reach: placed.kind * support_function::LENGTH as u32,
+                self_shadows: (angle.is_some() && !deforming.contains(&placed.node)).into(),
                 turned: angle.is_some_and(|angle| angle != 0.0).into(),
                 to_rest: turned.transpose().to_cols_array_2d(),
                 ..Default::default()
             }
         });
         let nodes = self.occluders.placed.iter().map(|placed| placed.node).collect();
-        Standing { list: placed.collect(), nodes, ..Standing::default() }
+        FrameOccluders { list: placed.collect(), nodes, ..FrameOccluders::default() }
     }
 
     /// Of each instance the occluder that it is of, and where the vectors of its corners are, as far as it stands as it did when they
@@ -87,7 +89,7 @@ impl Fiv {
                 let Some(angle) = angle else {
                     return owner;
                 };
-                let (turn, next, blend) = turn::between(angle, self.plan.turns);
+                let (turn, next, blend) = occluder_rotation::between(angle, self.plan.turns);
                 let mut first = self.plan.grid.count();
                 for own in &self.occluders.kinds[placed.kind as usize].own {
                     if own.slot == slot {

@@ -55,7 +55,7 @@ mod tests {
             shells: Shells { nearest: 1.0, farthest: 2.0 },
             triangles: 1,
             surface: 0,
-            paces: Default::default(),
+            spacing: Default::default(),
         };
         let plan = |azimuths, count| Plan {
             occluders: vec![kind.clone(); count],

@@ -7,7 +7,7 @@ use crate::{Error, ErrorKind, Result};
 
 /// The settings that a scene was made ready with.
 #[derive(Clone, Debug)]
-pub(super) struct Ready {
+pub(super) struct PreparedSettings {
     /// As they were given.
     given: Settings,
     /// As they count: a file of vectors decides some of them.
@@ -16,7 +16,7 @@ pub(super) struct Ready {
     adapted: bool,
 }
 
-impl Ready {
+impl PreparedSettings {
     /// `computed`: vectors of some occluders were not in a file.
     pub(super) fn new(given: &Settings, made: &Settings, computed: bool) -> Self {
         Self { given: given.clone(), made: made.clone(), adapted: made.adaptive && computed }

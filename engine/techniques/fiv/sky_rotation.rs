@@ -22,7 +22,7 @@ const ROWS: usize = 1024;
 
 /// The light of an environment under all turns.
 #[derive(Debug)]
-pub struct Turning {
+pub struct RotatingSky {
     size: u32,
     /// Summed up pixel by pixel, for the last such turn (radians).
     exact: Option<(f32, Sums)>,
@@ -31,7 +31,7 @@ pub struct Turning {
     last: Option<(f32, Sums)>,
 }
 
-impl Turning {
+impl RotatingSky {
     /// Nothing is summed up yet. `size`: texels along an edge of the cube.
     pub fn new(size: u32) -> Self {
         Self { size, exact: None, turned: None, last: None }
@@ -44,7 +44,7 @@ impl Turning {
 
     /// The environment turned by `rotation` radians, with a factor; both in place of its own. `still`: light is summed up pixel by pixel,
     /// which takes long. The same for the same turn, whichever came before. It must be the environment of all calls before, since
-    /// [`Turning::forget`].
+    /// [`RotatingSky::forget`].
     ///
     /// # Errors
     /// As [`Sky::new`].
@@ -225,12 +225,12 @@ mod tests {
     fn at_rest_it_is_the_sky_to_the_last_bit_and_turned_nearly() {
         for (name, size) in [("grove", 32), ("areas", 16), ("point", 8)] {
             let env = Environment { rotation: 0.3, scale: 0.7, ..builtin::environment(name).unwrap() };
-            let mut turning = Turning::new(size);
-            let first = turning.sky(&env, (env.rotation, env.scale), true).unwrap();
+            let mut rotating = RotatingSky::new(size);
+            let first = rotating.sky(&env, (env.rotation, env.scale), true).unwrap();
             assert!(first == Sky::new(Some(&env), size).unwrap());
             for rotation in [0.0, 0.301, 2.0, -3.0, 9.5] {
                 let (witness, found) =
-                    (exact(&env, rotation, size), turning.sky(&env, (rotation, env.scale), false).unwrap());
+                    (exact(&env, rotation, size), rotating.sky(&env, (rotation, env.scale), false).unwrap());
                 let off = apart(&witness, &found);
                 eprintln!("{name} at {rotation}: {off:.2e} apart, from the first {:.2e}", apart(&first, &found));
                 // The witness' wedges are up to twice as wide: light near edges of texels lies in one or the other.
@@ -244,15 +244,15 @@ mod tests {
                 let lit = |sky: &Sky| sky.lit().len() as f32;
                 assert!(lit(&found) <= 1.1 * lit(&witness) + 8.0, "{name}: {} {}", lit(&found), lit(&witness));
             }
-            assert!(turning.sky(&env, (env.rotation, env.scale), true).unwrap() == first);
-            assert!(turning.sky(&env, (2.0, env.scale), true).unwrap() == exact(&env, 2.0, size));
+            assert!(rotating.sky(&env, (env.rotation, env.scale), true).unwrap() == first);
+            assert!(rotating.sky(&env, (2.0, env.scale), true).unwrap() == exact(&env, 2.0, size));
         }
     }
 
     #[test]
     fn a_turn_does_not_depend_on_those_before_and_a_factor_is_one() {
         let env = builtin::environment("grove").unwrap();
-        let [mut long, mut short] = [0, 1].map(|_| Turning::new(16));
+        let [mut long, mut short] = [0, 1].map(|_| RotatingSky::new(16));
         for rotation in [0.1, 0.0, 4.0] {
             long.sky(&env, (rotation, 2.0), rotation == 0.0).unwrap();
         }
@@ -272,8 +272,8 @@ mod tests {
             }
             let (width, height) = (width as u32, height as u32);
             let env = Environment { width, height, pixels, ..Environment::constant(Vec3::ONE) };
-            let mut turning = Turning::new(16);
-            let sky = turning.sky(&env, (1.0, 1.0), false).unwrap();
+            let mut rotating = RotatingSky::new(16);
+            let sky = rotating.sky(&env, (1.0, 1.0), false).unwrap();
             assert_eq!(sky.repaired, u64::from(width > 2));
             let even = |r: &Vec3| (r.y - 0.5).abs() < 1e-6 && (r.z - 2.0).abs() < 1e-6;
             assert!(sky.radiance.iter().all(even), "{width}x{height}: {:?}", sky.radiance.iter().find(|r| !even(r)));

@@ -7,10 +7,10 @@ use super::{
     light, negligible,
     online::Online,
     plan::Kind,
-    ready::Ready,
+    prepared::PreparedSettings,
+    sky_rotation::RotatingSky,
     specular::{self, Glossy},
     suns,
-    turning::Turning,
 };
 use crate::{
     Error, ErrorKind, Result,
@@ -25,7 +25,7 @@ use crate::{
 const TURNS_LIMITED: u64 = 2 * TRACE_STEPS as u64;
 /// Occluders that the loops of a shader can go through.
 const MOST_OCCLUDERS: usize = 16_384;
-/// Pixels by which environments are told from that of the vectors, at least, if they have so many.
+/// Pixels by which environments are progress from that of the vectors, at least, if they have so many.
 const LOOKED_AT: usize = 1000;
 
 /// A scene whose shadows come from vectors.
@@ -35,22 +35,22 @@ pub struct Fiv {
     /// What it is of.
     sky: Sky,
     /// The environment for other turns.
-    turning: Turning,
+    rotating_sky: RotatingSky,
     runner: Runner,
     /// The driver ends loops early.
     pub(super) limited: bool,
     /// The device is a CPU driver.
     pub(super) on_cpu: bool,
     /// The environment in it.
-    lit: Lit,
+    lighting: Lighting,
     /// And that for which the vectors are.
-    made_for: Lit,
+    lighting_made_for: Lighting,
     /// Which environment `lit` is of, without its turn and factor.
-    lit_by: u64,
+    environment_now: u64,
     /// And the vectors: by some of its pixels, and by all.
-    made_by: [u64; 2],
+    environment_made_for: [u64; 2],
     /// What pictures may choose.
-    pub(super) ready: Ready,
+    pub(super) prepared: PreparedSettings,
     gpu: Gpu,
     pub(super) occluders: Occluders,
     pub(super) plan: Plan,
@@ -58,7 +58,7 @@ pub struct Fiv {
     pub(super) firsts: Vec<u64>,
     /// Vectors of all kinds, one after the other.
     pub(super) fivs: OwnedBuffer,
-    /// How far all kinds reach ([`super::support`]), one after the other.
+    /// How far all kinds reach ([`super::support_function`]), one after the other.
     pub(super) reaches: OwnedBuffer,
     /// What hides lights that are kept apart ([`super::suns`]).
     pub(super) maps: OwnedBuffer,
@@ -74,12 +74,12 @@ pub struct Fiv {
     /// For glossy reflection with shadows.
     pub(super) glossy: Option<Glossy>,
     /// What occluders can hide at most ([`negligible`]), with the light that this is for.
-    matter: Option<(Lit, OwnedBuffer)>,
+    matter: Option<(Lighting, OwnedBuffer)>,
 }
 
 /// How an environment is taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Lit {
+struct Lighting {
     /// Radians about +Y, with its own.
     turn: f32,
     /// Of radiance, with its own.
@@ -88,7 +88,7 @@ struct Lit {
     still: bool,
 }
 
-impl Lit {
+impl Lighting {
     fn of(environment: &Environment, settings: &Settings) -> Self {
         let (turn, factor) = settings.light();
         let turn = environment.rotation + turn;
@@ -97,19 +97,19 @@ impl Lit {
         Self { turn, factor: environment.scale * factor, still }
     }
 
-    fn sky(self, turning: &mut Turning, environment: &Environment) -> Result<Sky> {
-        turning.sky(environment, (self.turn, self.factor), self.still)
+    fn sky(self, rotating_sky: &mut RotatingSky, environment: &Environment) -> Result<Sky> {
+        rotating_sky.sky(environment, (self.turn, self.factor), self.still)
     }
 }
 
 impl Fiv {
     /// Makes a scene ready for [`Fiv::picture`]. Vectors come from `stored` as far as it has them, with its choice of samples instead
-    /// of that of `settings`; the others are computed. `told` hears how many of the samples to compute are done, and says whether to go
+    /// of that of `settings`; the others are computed. `progress` hears how many of the samples to compute are done, and says whether to go
     /// on; without vectors nothing is computed.
     ///
     /// # Errors
     /// `Usage` if a setting is out of its range, if the scene has no environment, or has lights of other kinds; `Input` if `stored` is
-    /// for another environment; `Runtime` if told to stop, or if the scene is larger than the device's limits; `OutOfMemory`,
+    /// for another environment; `Runtime` if progress to stop, or if the scene is larger than the device's limits; `OutOfMemory`,
     /// `DeviceLost`.
     pub fn new(
         gpu: &Gpu,
@@ -117,7 +117,7 @@ impl Fiv {
         resident: &Resident,
         settings: &Settings,
         stored: Option<&Stored>,
-        mut told: impl FnMut(u64, u64) -> bool,
+        mut progress: impl FnMut(u64, u64) -> bool,
     ) -> Result<Self> {
         settings.validate().map_err(|error| error.at("fiv"))?;
         let (given, stored) = (settings, stored.filter(|_| settings.method == Method::Vectors));
@@ -127,11 +127,11 @@ impl Fiv {
             let error = Error::usage("vectors are for an environment that stands still").at("fiv.turning");
             return Err(error.help("Use fiv.method=online"));
         }
-        let environment = lit_by(scene)?;
-        let lit = Lit::of(environment, &settings);
-        let made_by = [LOOKED_AT, usize::MAX].map(|pixels| told_by(environment, pixels));
-        let mut turning = Turning::new(settings.size);
-        let sky = lit.sky(&mut turning, environment)?.apart(settings.apart());
+        let environment = only_environment(scene)?;
+        let lighting = Lighting::of(environment, &settings);
+        let environment_made_for = [LOOKED_AT, usize::MAX].map(|pixels| fingerprint(environment, pixels));
+        let mut rotating_sky = RotatingSky::new(settings.size);
+        let sky = lighting.sky(&mut rotating_sky, environment)?.apart(settings.apart());
         let name = environment.name.as_str();
         let mut runner = Runner::new(gpu);
         let light = Light::with(&mut runner, &sky)?;
@@ -147,9 +147,9 @@ impl Fiv {
         let mut plan = Plan::new(name, light.hash, &occluders.kinds, &settings);
         let mut notes = notes(scene, &occluders, sky.repaired, settings.specular);
         notes.extend(light::unfiltered(gpu));
-        notes.extend(said(&settings, &plan, &occluders.kinds));
+        notes.extend(ignored_settings(&settings, &plan, &occluders.kinds));
         // Of one total: vectors, then what is hidden of reflections.
-        let glossy = specular::wanted(&settings);
+        let glossy = specular::needed(&settings);
         let missing = stored.map(|stored| missing(&plan, stored));
         let computed = missing.as_ref().map_or(!plan.occluders.is_empty(), Option::is_some);
         let (mut before, later) = (0, if glossy { specular::all(&plan) } else { 0 });
@@ -160,19 +160,19 @@ impl Fiv {
             Method::Vectors => {
                 plan.fits(Some(gpu.caps().limits.storage_range))?;
                 notes.extend(missing.flatten());
-                notes.extend(stored.and_then(|stored| without_own(&settings, stored)));
-                let told = |done, all| {
+                notes.extend(stored.and_then(|stored| lacks_surface_samples(&settings, stored)));
+                let progress = |done, all| {
                     before = all;
-                    told(done, all + later)
+                    progress(done, all + later)
                 };
-                let mut fivs = vectors(gpu, &light, &occluders, (&mut plan, &settings), stored, told)?;
-                paces(&plan, &mut fivs);
+                let mut fivs = vectors(gpu, &light, &occluders, (&mut plan, &settings), stored, progress)?;
+                append_spacing(&plan, &mut fivs);
                 fivs
             }
             Method::Online | Method::Unshadowed | Method::BruteForce => Vec::new(),
         };
         let glossy = match glossy {
-            true => Some(Glossy::new(gpu, &sky, &plan, &occluders, |done, all| told(before + done, before + all))?),
+            true => Some(Glossy::new(gpu, &sky, &plan, &occluders, |done, all| progress(before + done, before + all))?),
             false => None,
         };
         let online = match settings.method {
@@ -201,15 +201,15 @@ impl Fiv {
             },
             maps: suns::maps(gpu, &light, &occluders.kinds)?,
             at_rest: pose,
-            lit,
-            made_for: lit,
-            lit_by: made_by[1],
-            made_by,
-            ready: Ready::new(given, &settings, computed),
+            lighting,
+            lighting_made_for: lighting,
+            environment_now: environment_made_for[1],
+            environment_made_for,
+            prepared: PreparedSettings::new(given, &settings, computed),
             gpu: gpu.clone(),
             light,
             sky,
-            turning,
+            rotating_sky,
             runner,
             limited: gpu.loop_limit()?.is_some(),
             on_cpu: gpu.caps().kind == DeviceKind::Cpu,
@@ -253,31 +253,33 @@ impl Fiv {
     /// # Errors
     /// `Usage` if the vectors were computed for another environment, turn or factor, or as [`Fiv::new`]; `OutOfMemory`, `DeviceLost`.
     pub(super) fn follow(&mut self, scene: &Scene, settings: &Settings) -> Result<()> {
-        let environment = lit_by(scene)?;
+        let environment = only_environment(scene)?;
         let by = match settings.method {
             // Of a frame that takes a millisecond the environment cannot be gone through.
-            Method::Vectors if told_by(environment, LOOKED_AT) == self.made_by[0] => self.made_by[1],
+            Method::Vectors if fingerprint(environment, LOOKED_AT) == self.environment_made_for[0] => {
+                self.environment_made_for[1]
+            }
             Method::Vectors => {
                 let name = &environment.name;
                 let error = Error::usage(format!("`{name}` is another environment than the scene was made ready with"));
                 return Err(error.at("fiv").help("Make the scene ready again (Fiv::new), or use fiv.method=online"));
             }
-            _ => told_by(environment, usize::MAX),
+            _ => fingerprint(environment, usize::MAX),
         };
-        let wanted = Lit::of(environment, settings);
-        if settings.method == Method::Vectors && wanted != self.made_for {
+        let wanted = Lighting::of(environment, settings);
+        if settings.method == Method::Vectors && wanted != self.lighting_made_for {
             let error = Error::usage("the vectors were computed for another turn or scale of the environment");
             return Err(error.at("fiv").help("Make the scene ready again, or use fiv.method=online"));
         }
-        if by != self.lit_by {
-            self.turning.forget();
+        if by != self.environment_now {
+            self.rotating_sky.forget();
             self.matter = None;
-        } else if wanted == self.lit {
+        } else if wanted == self.lighting {
             return Ok(());
         }
-        self.sky = wanted.sky(&mut self.turning, environment)?.apart(settings.apart());
+        self.sky = wanted.sky(&mut self.rotating_sky, environment)?.apart(settings.apart());
         self.light = Light::with(&mut self.runner, &self.sky)?;
-        (self.lit, self.lit_by) = (wanted, by);
+        (self.lighting, self.environment_now) = (wanted, by);
         Ok(())
     }
 
@@ -289,10 +291,10 @@ impl Fiv {
         if settings.negligible <= 0.0 {
             return Ok(None);
         }
-        if self.matter.as_ref().is_none_or(|(lit, _)| *lit != self.lit) {
+        if self.matter.as_ref().is_none_or(|(made_for, _)| *made_for != self.lighting) {
             let table = negligible::table(&self.sky);
             let buffer = OwnedBuffer::with_contents(&self.gpu, "fiv.matter", bytemuck::cast_slice(&table))?;
-            self.matter = Some((self.lit, buffer));
+            self.matter = Some((self.lighting, buffer));
         }
         Ok(self.matter.as_ref().map(|(_, buffer)| buffer))
     }
@@ -304,20 +306,20 @@ impl Fiv {
 }
 
 /// Appends how the samples of all kinds lie.
-fn paces(plan: &Plan, fivs: &mut Vec<f32>) {
-    plan.occluders.iter().for_each(|kind| fivs.extend(kind.paces.table(&plan.grid, &kind.shells)));
+fn append_spacing(plan: &Plan, fivs: &mut Vec<f32>) {
+    plan.occluders.iter().for_each(|kind| fivs.extend(kind.spacing.table(&plan.grid, &kind.shells)));
 }
 
 /// The tables of all kinds on the device.
 fn reaches(gpu: &Gpu, occluders: &Occluders) -> Result<OwnedBuffer> {
-    let mut all: Vec<f32> = occluders.kinds.iter().flat_map(|kind| kind.support().0).collect();
+    let mut all: Vec<f32> = occluders.kinds.iter().flat_map(|kind| kind.support_function().0).collect();
     all.resize(all.len().max(1), 0.0);
     OwnedBuffer::with_contents(gpu, "fiv.reaches", bytemuck::cast_slice(&all))
 }
 
-/// A number by which environments are told apart, without their turns and factors: by their sizes and so many of their pixels, at least,
+/// A number by which environments are progress apart, without their turns and factors: by their sizes and so many of their pixels, at least,
 /// that lie evenly.
-fn told_by(environment: &Environment, pixels: usize) -> u64 {
+fn fingerprint(environment: &Environment, pixels: usize) -> u64 {
     let mut hash = Hash::new();
     hash.word(u64::from(environment.width) << 32 | u64::from(environment.height));
     let each = (environment.pixels.len() / pixels).max(1);
@@ -330,7 +332,7 @@ fn told_by(environment: &Environment, pixels: usize) -> u64 {
 }
 
 /// The environment of a scene that has no other lights.
-fn lit_by(scene: &Scene) -> Result<&Environment> {
+fn only_environment(scene: &Scene) -> Result<&Environment> {
     if let Some(light) = scene.nodes.iter().find_map(|node| scene.lights.get(node.light? as usize)) {
         let kind = match light.kind {
             crate::scene::LightKind::Directional => "directional",
@@ -353,7 +355,7 @@ fn vectors(
     occluders: &Occluders,
     (plan, settings): (&mut Plan, &Settings),
     stored: Option<&Stored>,
-    mut told: impl FnMut(u64, u64) -> bool,
+    mut progress: impl FnMut(u64, u64) -> bool,
 ) -> Result<Vec<f32>> {
     let floats = |firsts: &[u64], kind: usize| {
         let at = |kind: usize| firsts[kind] as usize * FIV_FLOATS as usize;
@@ -381,7 +383,7 @@ fn vectors(
             let Some(at) = stored.plan.occluders.iter().position(known) else { return true };
             fivs[floats(&ours, kind)].copy_from_slice(&stored.fivs[floats(&theirs, at)]);
             plan.occluders[kind].shells = stored.plan.occluders[at].shells;
-            plan.occluders[kind].paces = stored.plan.occluders[at].paces.clone();
+            plan.occluders[kind].spacing = stored.plan.occluders[at].spacing.clone();
             false
         });
     }
@@ -396,7 +398,7 @@ fn vectors(
     let mut computed = Vec::with_capacity(all as usize * FIV_FLOATS as usize);
     rest.compute(gpu, light, &kinds, 0..all, |done, new| {
         computed.extend_from_slice(new);
-        Ok(told(done, all))
+        Ok(progress(done, all))
     })?;
     if (computed.len() as u64) < all * u64::from(FIV_FLOATS) {
         return Err(Error::new(ErrorKind::Runtime, "stopped while computing vectors").at("fiv"));
@@ -417,7 +419,7 @@ fn missing(plan: &Plan, stored: &Stored) -> Option<Note> {
 }
 
 /// That a file has nothing of what is asked for on surfaces, and what is done.
-fn without_own(settings: &Settings, stored: &Stored) -> Option<Note> {
+fn lacks_surface_samples(settings: &Settings, stored: &Stored) -> Option<Note> {
     let lacks = settings.self_shadow && !stored.plan.surface && !stored.plan.occluders.is_empty();
     let text = "no samples on surfaces are in the file: shadows of occluders on themselves are those of the samples around them, which \
                 blotch (fiv.self_samples=spheres); for better ones compute it again with fiv.self_shadow=true and \
@@ -430,7 +432,7 @@ fn emissive(material: &Material) -> bool {
 }
 
 /// What was asked for and is done otherwise, or not at all.
-fn said(settings: &Settings, plan: &Plan, kinds: &[Occluder]) -> Vec<Note> {
+fn ignored_settings(settings: &Settings, plan: &Plan, kinds: &[Occluder]) -> Vec<Note> {
     let note = |place: String, text: String| Note { kind: NoteKind::Ignored, place, text };
     let idle = settings.idle().into_iter();
     let mut notes: Vec<_> =

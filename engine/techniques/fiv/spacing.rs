@@ -18,10 +18,10 @@ use super::{
 use crate::{
     Result,
     graph::Runner,
-    shaders::consts::{FIV_FLOATS, FIV_INSIDE, FIV_PACE_KNOTS},
+    shaders::consts::{FIV_FLOATS, FIV_INSIDE, FIV_SPACING_KNOTS},
 };
 
-const KNOTS: usize = FIV_PACE_KNOTS as usize;
+const KNOTS: usize = FIV_SPACING_KNOTS as usize;
 /// Directions along which radii are looked at.
 const WAYS: Grid = Grid::of(8, 5, 2);
 /// Directions that are looked at, azimuths and polar angles in fine steps; on spheres of these radii, in those of the occluder.
@@ -33,19 +33,19 @@ const LEAST: f64 = 0.25;
 const GRAIN: f64 = 1.0 / 256.0;
 
 /// How many samples lie below even steps of a coordinate, from 0 to all; empty: evenly.
-pub type Pace = Vec<f32>;
+pub type Knots = Vec<f32>;
 
 /// How samples lie along their three coordinates.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Paces {
+pub struct Spacing {
     /// Up to the one at 2π, which is the one at 0.
-    pub azimuth: Pace,
-    pub polar: Pace,
+    pub azimuth: Knots,
+    pub polar: Knots,
     /// In the logarithm of the radius.
-    pub radius: Pace,
+    pub radius: Knots,
 }
 
-impl Paces {
+impl Spacing {
     /// With the number of the last sample of each.
     fn all(&self, grid: &Grid) -> [(&[f32], f64); 3] {
         [
@@ -95,44 +95,46 @@ impl Paces {
     /// As shaders take it: knots of all three, then radii in metres.
     pub fn table(&self, grid: &Grid, shells: &Shells) -> Vec<f32> {
         let knot = |k: usize| k as f64 / (KNOTS - 1) as f64;
-        let knots =
-            self.all(grid).into_iter().flat_map(|(pace, last)| (0..KNOTS).map(move |k| number_at(pace, last, knot(k))));
+        let knots = self
+            .all(grid)
+            .into_iter()
+            .flat_map(|(knots, last)| (0..KNOTS).map(move |k| number_at(knots, last, knot(k))));
         let radii = (0..grid.radii).map(|sphere| self.radius(grid, shells, sphere));
         knots.chain(radii).map(|x| x as f32).collect()
     }
 
     /// They go from the first sample to the last, each knot beyond the one before.
     pub fn fit(&self, grid: &Grid) -> bool {
-        self.all(grid).iter().all(|(pace, last)| {
-            let ends = pace.first().zip(pace.last());
-            pace.is_empty()
-                || pace.len() == KNOTS
+        self.all(grid).iter().all(|(knots, last)| {
+            let ends = knots.first().zip(knots.last());
+            knots.is_empty()
+                || knots.len() == KNOTS
                     && ends.is_some_and(|(first, end)| (*first, f64::from(*end)) == (0.0, *last))
-                    && pace.windows(2).all(|p| p[1] > p[0])
+                    && knots.windows(2).all(|p| p[1] > p[0])
         })
     }
 }
 
 /// Number of the sample, with its fraction, at a part (0..1) of the coordinate; `last`: number at its end.
-fn number_at(pace: &[f32], last: f64, part: f64) -> f64 {
+fn number_at(knots: &[f32], last: f64, part: f64) -> f64 {
     let part = part.clamp(0.0, 1.0);
-    if pace.len() < 2 {
+    if knots.len() < 2 {
         return part * last;
     }
-    let x = part * (pace.len() - 1) as f64;
-    let k = (x as usize).min(pace.len() - 2);
-    let (low, high) = (f64::from(pace[k]), f64::from(pace[k + 1]));
+    let x = part * (knots.len() - 1) as f64;
+    let k = (x as usize).min(knots.len() - 2);
+    let (low, high) = (f64::from(knots[k]), f64::from(knots[k + 1]));
     low + (high - low) * (x - k as f64)
 }
 
 /// The inverse of [`number_at`].
-fn part_of(pace: &[f32], last: f64, number: f64) -> f64 {
-    if pace.len() < 2 {
+fn part_of(knots: &[f32], last: f64, number: f64) -> f64 {
+    if knots.len() < 2 {
         return number / last;
     }
-    let k = pace.partition_point(|p| f64::from(*p) <= number).clamp(1, pace.len() - 1) - 1;
-    let (low, high) = (f64::from(pace[k]), f64::from(pace[k + 1]));
-    (k as f64 + ((number - low) / (high - low)).clamp(0.0, 1.0)) / (pace.len() - 1) as f64
+    let k = knots.partition_point(|p| f64::from(*p) <= number).clamp(1, knots.len() - 1) - 1;
+    let (low, high) = (f64::from(knots[k]), f64::from(knots[k + 1]));
+    (k as f64 + ((number - low) / (high - low)).clamp(0.0, 1.0)) / (knots.len() - 1) as f64
 }
 
 /// Looks at an occluder and chooses. `radius`: of its bounding sphere, metres; `scaled`: what is interpolated is free of its solid angle.
@@ -145,7 +147,7 @@ pub fn choose(
     light: &Light,
     (grid, shells): (&Grid, &Shells),
     (radius, scaled): (f32, bool),
-) -> Result<Paces> {
+) -> Result<Spacing> {
     let mut look = |points: &[DVec3]| -> Result<Vec<f32>> {
         let points: Vec<Vec3> = points.iter().map(|p| -p.as_vec3()).collect();
         Ok(cover.run(runner, light, &points, 1)?.0)
@@ -186,7 +188,7 @@ pub fn choose(
     }
     // The one at 0 is the one at 2π.
     let around: Vec<f64> = (1..azimuths).map(|a| around[a]).collect();
-    Ok(Paces {
+    Ok(Spacing {
         azimuth: spread(&around, f64::from(grid.azimuths)),
         polar: spread(&down, f64::from(grid.polars - 1)),
         radius: of_radius,
@@ -209,11 +211,11 @@ fn bend(fivs: &[f32], at: [usize; 3], times: impl Fn(usize) -> f64) -> f64 {
 }
 
 /// Samples as densely as the fifth roots of the squares of second differences at even steps, without the first and the last one.
-fn spread(bends: &[f64], last: f64) -> Pace {
+fn spread(bends: &[f64], last: f64) -> Knots {
     let roots: Vec<f64> = bends.iter().map(|b| b.max(0.0).powf(0.2)).collect();
     let mean = roots.iter().sum::<f64>() / roots.len().max(1) as f64;
     if !(mean.is_finite() && mean > 0.0) {
-        return Pace::new();
+        return Knots::new();
     }
     // The mean of neighbours: rays make steps of their own.
     let around = |i: usize| {
@@ -228,10 +230,10 @@ fn spread(bends: &[f64], last: f64) -> Pace {
     }
     let (whole, each) = (sums[steps], steps / (KNOTS - 1));
     let knot = |knot: usize| ((sums[knot * each] / whole * last / GRAIN).round() * GRAIN) as f32;
-    let mut pace: Pace = (0..KNOTS).map(knot).collect();
-    pace[KNOTS - 1] = last as f32;
+    let mut knots: Knots = (0..KNOTS).map(knot).collect();
+    knots[KNOTS - 1] = last as f32;
     // Rounding never joins two.
-    if pace.windows(2).any(|p| p[1] <= p[0]) { Pace::new() } else { pace }
+    if knots.windows(2).any(|p| p[1] <= p[0]) { Knots::new() } else { knots }
 }
 
 #[cfg(test)]
@@ -252,21 +254,21 @@ mod tests {
     fn samples_crowd_where_it_bends_and_numbers_are_inverse_to_places() {
         let bends: Vec<f64> = (0..63).map(|i| if (10..20).contains(&i) { 1.0 } else { 1e-6 }).collect();
         let grid = Grid::of(16, 9, 15);
-        let paces =
-            Paces { azimuth: spread(&bends, 16.0), polar: spread(&bends[..31], 8.0), radius: spread(&bends, 14.0) };
-        assert!(paces.fit(&grid) && !paces.fit(&Grid::of(16, 9, 16)) && Paces::default().fit(&grid));
-        let there = paces.radius[9] - paces.radius[6];
-        assert!(there > 2.5 * (paces.radius[27] - paces.radius[24]), "{:?}", paces.radius);
+        let spacing =
+            Spacing { azimuth: spread(&bends, 16.0), polar: spread(&bends[..31], 8.0), radius: spread(&bends, 14.0) };
+        assert!(spacing.fit(&grid) && !spacing.fit(&Grid::of(16, 9, 16)) && Spacing::default().fit(&grid));
+        let there = spacing.radius[9] - spacing.radius[6];
+        assert!(there > 2.5 * (spacing.radius[27] - spacing.radius[24]), "{:?}", spacing.radius);
         let shells = Shells { nearest: 0.1, farthest: 6.4 };
-        for paces in [&paces, &Paces::default()] {
+        for spacing in [&spacing, &Spacing::default()] {
             for index in 0..grid.count() {
                 let [a, p, r] = grid.place(index);
-                let found = paces.numbers(&grid, &shells, paces.offset(&grid, &shells, index));
+                let found = spacing.numbers(&grid, &shells, spacing.offset(&grid, &shells, index));
                 assert!((found[1] - f64::from(p)).abs() < 1e-5 && (found[2] - f64::from(r)).abs() < 1e-5, "{found:?}");
                 let apart = (found[0] - f64::from(a)).rem_euclid(16.0);
                 assert!(p == 0 || p == 8 || apart.min(16.0 - apart) < 1e-5, "{found:?} instead of {a}");
             }
-            let table = paces.table(&grid, &shells);
+            let table = spacing.table(&grid, &shells);
             assert_eq!((table.len(), table[KNOTS - 1], table[3 * KNOTS - 1]), (3 * KNOTS + 15, 16.0, 14.0));
             assert!((table[3 * KNOTS] - 0.1).abs() < 1e-6 && (table[3 * KNOTS + 14] - 6.4).abs() < 1e-5);
         }

@@ -11,7 +11,7 @@ use lucerna::{
     scene::{AlphaMode, Environment, Pose, Scene, View, builtin, resident::Resident},
     techniques::fiv::{
         Cut, Extent, Fiv, Interpolation, Masks, Method, PictureSettings, SelfSamples, Settings, Shared, Specular,
-        Stored, turn::Axis,
+        Stored, occluder_rotation::Axis,
     },
 };
 use tracer_lab::flat_view;

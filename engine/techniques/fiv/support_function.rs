@@ -19,9 +19,9 @@ pub const LENGTH: usize = (FIV_REACH_AZIMUTHS * FIV_REACH_POLARS) as usize;
 /// Largest coordinate of some points along directions of a grid: azimuths around +Y (0 over −Z, towards +X) next to each other, then
 /// from +Y to −Y, both included. Metres. Opposite directions of the grid are of the grid.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Support(pub Vec<f32>);
+pub struct SupportFunction(pub Vec<f32>);
 
-impl Support {
+impl SupportFunction {
     /// Of points around the origin.
     pub fn of(points: &[Vec3]) -> Self {
         // Several at once: what deforms is measured in each frame. The last point fills the last row up.
@@ -88,7 +88,7 @@ mod tests {
         let corners: Vec<Vec3> = (0..8)
             .map(|k| half * Vec3::new(1.0 - (k & 1) as f32 * 2.0, 1.0 - (k & 2) as f32, 1.0 - (k & 4) as f32 * 0.5))
             .collect();
-        let support = Support::of(&corners);
+        let support = SupportFunction::of(&corners);
         for (axis, exact) in [(Vec3::X, 1.0), (Vec3::Y, 0.5), (Vec3::Z, 0.25), (Vec3::NEG_X, 1.0), (Vec3::NEG_Y, 0.5)] {
             assert!((support.along(axis) - exact).abs() < 1e-5, "{axis}: {}", support.along(axis));
         }
@@ -99,7 +99,7 @@ mod tests {
             let exact = n.abs().dot(half);
             assert!((support.along(n) - exact).abs() < 0.03, "{n}: {} instead of {exact}", support.along(n));
         }
-        // Standing on the plane it is all in front, below it nothing.
+        // FrameOccluders on the plane it is all in front, below it nothing.
         assert_eq!((support.front(0.5, Vec3::Y), support.front(-0.5, Vec3::Y)), (1.0, 0.0));
         assert!((support.front(0.25, Vec3::Y) - 0.75).abs() < 1e-5);
     }
@@ -109,7 +109,7 @@ mod tests {
         for count in [1, 7, 8, 9, 100] {
             let points: Vec<Vec3> =
                 (0..count).map(|i| Vec3::new((i as f32).sin(), (1.7 * i as f32).cos(), 0.1 * i as f32 - 3.0)).collect();
-            let support = Support::of(&points);
+            let support = SupportFunction::of(&points);
             for (i, found) in support.0.iter().enumerate().filter(|(i, _)| i % FIV_REACH_AZIMUTHS as usize == 0) {
                 let exact = points.iter().map(|p| p.dot(direction(i).as_vec3())).fold(f32::NEG_INFINITY, f32::max);
                 assert_eq!(found.to_bits(), exact.to_bits(), "{count} points, direction {i}");
@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn the_share_of_a_ball_is_the_thesis() {
         let points: Vec<Vec3> = (0..LENGTH).map(|i| direction(i).as_vec3() * 2.0).collect();
-        let support = Support::of(&points);
+        let support = SupportFunction::of(&points);
         for d in [-2.5f32, -1.0, 0.0, 0.7, 2.0, 3.0] {
             let exact = crate::reference::fiv::front(f64::from(d), 2.0) as f32;
             for n in [Vec3::Y, Vec3::X, Vec3::new(0.6, -0.64, 0.48)] {

@@ -2,7 +2,7 @@
 
 use glam::{Vec3, Vec4};
 
-use super::{samples::Shells, support::Support};
+use super::{samples::Shells, support_function::SupportFunction};
 use crate::scene::{Mesh, Pose, Primitive, Scene, deform};
 
 /// The first sphere is at least this part of the bounding sphere.
@@ -10,8 +10,8 @@ const LEAST_FIRST: f32 = 0.1;
 
 /// The triangles of a node, its centre at the origin.
 #[derive(Debug)]
-pub(super) struct Body {
-    pub parts: Vec<Part>,
+pub(super) struct PosedMesh {
+    pub primitives: Vec<PosedPrimitive>,
     /// Of a small sphere around it, seen from the node's origin, metres in world axes.
     pub centre: Vec3,
     pub size: Size,
@@ -19,7 +19,7 @@ pub(super) struct Body {
 
 /// The triangles of a primitive.
 #[derive(Debug)]
-pub(super) struct Part {
+pub(super) struct PosedPrimitive {
     /// Number of the primitive in its mesh.
     pub slot: usize,
     pub positions: Vec<Vec3>,
@@ -27,10 +27,10 @@ pub(super) struct Part {
     pub indices: Vec<u32>,
 }
 
-impl Body {
+impl PosedMesh {
     /// `None` without a triangle that could stop light. `pose` is the same afterwards.
     pub fn of(scene: &Scene, pose: &mut Pose, node: usize, mesh: &Mesh) -> Option<Self> {
-        let mut parts = Vec::new();
+        let mut primitives = Vec::new();
         for (slot, primitive) in mesh.primitives.iter().enumerate().filter(|(_, p)| !is_unlit(scene, p)) {
             // Without its place, so that the same things in different places are the same to the last bit.
             let place = std::mem::replace(&mut pose.world[node].w_axis, Vec4::W);
@@ -43,30 +43,30 @@ impl Body {
                 |corner: &[u32]| corner.iter().all(|&i| positions.get(i as usize).is_some_and(|p| p.is_finite()));
             let indices: Vec<u32> = primitive.indices.chunks_exact(3).filter(|c| good(c)).flatten().copied().collect();
             if !indices.is_empty() {
-                parts.push(Part { slot, positions, normals, indices });
+                primitives.push(PosedPrimitive { slot, positions, normals, indices });
             }
         }
-        let centre = bounding_centre(&parts)?;
-        parts.iter_mut().flat_map(|part| &mut part.positions).for_each(|position| *position -= centre);
-        let size = Size::of(parts.iter().flat_map(|part| corners(&part.positions, &part.indices)))?;
-        Some(Self { parts, centre, size })
+        let centre = bounding_centre(&primitives)?;
+        primitives.iter_mut().flat_map(|part| &mut part.positions).for_each(|position| *position -= centre);
+        let size = Size::of(primitives.iter().flat_map(|part| corners(&part.positions, &part.indices)))?;
+        Some(Self { primitives, centre, size })
     }
 
     /// How far it reaches along every direction.
-    pub fn support(&self) -> Support {
-        support(self.parts.iter().map(|part| (&part.positions[..], &part.indices[..])))
+    pub fn support_function(&self) -> SupportFunction {
+        support_function(self.primitives.iter().map(|part| (&part.positions[..], &part.indices[..])))
     }
 }
 
 /// Of positions and the triangles that they are corners of.
-pub(super) fn support<'a>(parts: impl Iterator<Item = (&'a [Vec3], &'a [u32])>) -> Support {
+pub(super) fn support_function<'a>(primitives: impl Iterator<Item = (&'a [Vec3], &'a [u32])>) -> SupportFunction {
     let mut points = Vec::new();
-    for (positions, indices) in parts {
+    for (positions, indices) in primitives {
         let mut used = vec![false; positions.len()];
         indices.iter().for_each(|&i| used[i as usize] = true);
         points.extend(positions.iter().zip(used).filter(|(_, used)| *used).map(|(position, _)| *position));
     }
-    Support::of(&points)
+    SupportFunction::of(&points)
 }
 
 /// What is measured of triangles around the origin.
@@ -117,8 +117,8 @@ pub(super) fn corners<'a>(positions: &'a [Vec3], indices: &'a [u32]) -> impl Ite
 }
 
 /// Centre of a small sphere around all corners: Ritter's, which is at most a few percent too large.
-fn bounding_centre(parts: &[Part]) -> Option<Vec3> {
-    let points = || parts.iter().flat_map(|p| p.indices.iter().map(|&i| p.positions[i as usize].as_dvec3()));
+fn bounding_centre(primitives: &[PosedPrimitive]) -> Option<Vec3> {
+    let points = || primitives.iter().flat_map(|p| p.indices.iter().map(|&i| p.positions[i as usize].as_dvec3()));
     let farthest =
         |from: glam::DVec3| points().max_by(|a, b| a.distance_squared(from).total_cmp(&b.distance_squared(from)));
     let start = farthest(points().next()?)?;
