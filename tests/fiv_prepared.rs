@@ -113,7 +113,7 @@ fn another_environment_than_that_of_the_vectors_is_refused_or_followed() {
         ];
         for other in &others {
             let error = picture(&mut fiv, other, Method::Vectors).unwrap_err();
-            assert!(error.exit_code() == 2 && error.to_string().contains("another environment"), "{error}");
+            assert!(error.exit_code() == 2 && error.to_string().contains("not the environment"), "{error}");
         }
         // One pixel of many: seen by methods that keep nothing of the environment.
         let mut pixels = ours.pixels.clone();
@@ -143,7 +143,7 @@ fn vectors_are_drawn_under_their_own_light_only() {
         // Without shadows any light will do; after it the vectors are still for theirs.
         let turned = studio.irradiance(&view, &with(90.0, Method::Unshadowed));
         let error = studio.refused(&view, &with(90.0, Method::Vectors));
-        assert!(error.exit_code() == 2 && error.to_string().contains("another turn"), "{error}");
+        assert!(error.exit_code() == 2 && error.to_string().contains("another rotation"), "{error}");
         let after = studio.irradiance(&view, &with(0.0, Method::Vectors));
         assert!(before == after && before != turned);
     });
@@ -300,7 +300,7 @@ fn what_a_file_lacks_for_own_shadows_and_keys_that_do_nothing_online_are_named()
         assert!(!named(&told(&without, Some(&stored))) && !named(&told(&coarse(), None)));
         let online = Settings { method: Method::Online, adaptive: false, ..coarse() };
         let notes = told(&online, None);
-        assert!(notes.iter().any(|n| n.starts_with("fiv.adaptive: changes nothing")), "{notes:?}");
+        assert!(notes.iter().any(|n| n.starts_with("fiv.adaptive: has no effect")), "{notes:?}");
         assert!(told(&Settings { adaptive: false, ..coarse() }, None).iter().all(|n| !n.contains("fiv.adaptive")));
     });
 }
@@ -323,6 +323,6 @@ fn what_turns_or_deforms_is_named() {
         };
         let told = notes(1.3);
         assert!(told.iter().any(|n| n.contains("sculpture") && n.contains("deforms")), "{told:?}");
-        assert!(told.iter().any(|n| n.contains("turns")), "{told:?}");
+        assert!(told.iter().any(|n| n.contains("rotates")), "{told:?}");
     });
 }

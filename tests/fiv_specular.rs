@@ -359,7 +359,10 @@ fn more_occluders_than_can_be_reflected_are_refused_before_anything_is_computed(
         scene.nodes.push(first);
         let resident = Resident::new(gpu, &scene).unwrap();
         let error = Fiv::new(gpu, &scene, &resident, &settings, None, |_, _| panic!("computed")).unwrap_err();
-        assert!(error.exit_code() == 1 && error.to_string().contains("831 occluders, at most 830"), "{error}");
+        assert!(
+            error.exit_code() == 1 && error.to_string().contains("831 occluders; fiv.specular allows at most 830"),
+            "{error}"
+        );
     });
 }
 

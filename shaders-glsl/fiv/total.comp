@@ -1,4 +1,4 @@
-// Fullsphere irradiance vector of the whole environment (Michael 2010, eq. 10): one workgroup, an ordered tree.
+// Fullsphere irradiance vector of the whole environment ([FIV 10]): one workgroup, which sums up in a fixed order.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require

@@ -47,7 +47,7 @@ fn wrong_calls_are_refused_and_named() {
         precompute(&env, out, more).expect(2, &[part]);
     }
     fiv(&["precompute", "--builtin", "cornell", "-o", out]).expect(2, &["--environment"]);
-    fiv(&["merge", &env, "-o", out]).expect(3, &["sky.exr", "no file of irradiance vectors"]);
+    fiv(&["merge", &env, "-o", out]).expect(3, &["sky.exr", "not a file of irradiance vectors"]);
     assert_eq!(files(folder.path()), ["sky.exr"]);
 }
 
@@ -160,7 +160,7 @@ fn pictures_from_files_are_those_without_and_can_be_made_again() {
     let noted = ["without.fiv", "samples on surfaces", "fiv.self_samples=surface"];
     fiv(&[&base[..], &["--vectors", &matt]].concat()).expect(0, &noted);
     let other = environment(folder.path(), "other.exr", 2.0);
-    picture(&other, &at("c.exr"), &["--vectors", &vectors]).expect(3, &["v.fiv", "other light"]);
+    picture(&other, &at("c.exr"), &["--vectors", &vectors]).expect(3, &["v.fiv", "different radiance"]);
 }
 
 #[test]

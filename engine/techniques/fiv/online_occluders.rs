@@ -1,4 +1,4 @@
-//! How occluders stand in a frame, and which of them can share samples.
+//! Poses of occluders in a frame, and the occluders that can share samples.
 
 use std::collections::BTreeMap;
 
@@ -15,60 +15,62 @@ use crate::{
     shaders::types,
 };
 
-/// How far a matrix may be from one that turns and scales evenly.
+/// Largest difference from a matrix that only rotates and scales uniformly.
 const EVEN: f32 = 1e-4;
 
-/// Samples around occluders that stand alike.
+/// The samples around occluders with the same geometry, rotation and scale.
 #[derive(Clone, Copy, Debug)]
 pub struct Set {
     /// Number of the geometry.
     pub shape: usize,
-    /// From the occluder as it stands to the geometry that rays are traced through.
+    /// Linear map from the occluder's current pose to the geometry that rays are traced through.
     pub geometry_from_world: Mat3,
-    /// Of the occluder in the geometry, metres.
+    /// Centre of the occluder in the geometry, metres.
     pub centre: Vec3,
-    /// Of the bounding sphere, metres.
+    /// Radius of the bounding sphere, metres.
     pub radius: f32,
     pub shells: Shells,
 }
 
-/// All occluders of a frame.
+/// All occluders of a frame in the form that shaders read.
 #[derive(Clone, Debug, Default)]
 pub struct FrameOccluders {
-    /// In the order of the placed ones, without those that have no extent.
+    /// In the order of [`Occluders::placed`], without occluders that have no extent.
     pub list: Vec<types::FivOccluder>,
-    /// The node of each.
+    /// The node of each occluder.
     pub nodes: Vec<u32>,
-    /// How much more of its bounding disc each fills than at rest; empty: as much.
+    /// Filled share of the bounding disc of each occluder relative to its share at rest. Empty if all shares are
+    /// unchanged.
     pub fills: Vec<f32>,
-    /// Those of one geometry lie next to each other.
+    /// Sets of samples. Sets of one geometry lie next to each other.
     pub sets: Vec<Set>,
-    /// How far those that deform reach, one after the other: to come behind the tables of all kinds.
+    /// Support functions of occluders that deform, one after the other. The device has them after the tables of all
+    /// kinds.
     pub reaches: Vec<f32>,
 }
 
-/// What decides where occluders stand, beside the pose.
+/// Inputs, beside the pose, from which the occluders of a frame are computed.
 #[derive(Clone, Copy, Debug)]
 pub struct PlacementInputs<'a> {
     pub scene: &'a Scene,
     pub occluders: &'a Occluders,
-    /// The geometry of each placed occluder, and whether it deforms.
+    /// The geometry of each placed occluder, and whether the geometry deforms.
     pub shapes: &'a [(usize, bool)],
-    /// Turns and scales of the placed occluders at rest.
+    /// Linear transforms of the placed occluders at rest.
     pub rest: &'a [Mat3],
     pub grid: Grid,
-    /// Radius of the last sphere, in radii of the occluder.
+    /// Radius of the last sphere of samples, in radii of the occluder.
     pub reach: f32,
     /// Floats from one set to the next.
     pub floats: u32,
 }
 
 impl FrameOccluders {
-    /// As the occluders stand in `pose`.
+    /// The occluders in `pose`.
     pub fn of(inputs: &PlacementInputs<'_>, pose: &Pose) -> Self {
         let mut found = Vec::new();
         let (mut sets, mut reaches, mut fills) = (BTreeMap::new(), Vec::new(), Vec::new());
-        // Measuring takes a place out for a while, and puts it back.
+        // The pose is cloned once, because measuring an occluder changes a transform for a while.
         let mut lent = None;
         for (index, placed) in inputs.occluders.placed.iter().enumerate() {
             let Some(OccluderPose { set, centre, turn, support, fill }) =
@@ -82,7 +84,7 @@ impl FrameOccluders {
                 None => placed.kind,
             };
             reaches.extend(support.into_iter().flat_map(|support| support.0));
-            // What deforms shares with nothing.
+            // An occluder that deforms shares no samples.
             let alone = if inputs.shapes[index].1 { index } else { usize::MAX };
             let key = (set.shape, alone, turn.to_cols_array().map(f32::to_bits));
             sets.insert(key, set);
@@ -91,7 +93,7 @@ impl FrameOccluders {
         }
         let numbers: BTreeMap<_, u32> = sets.keys().copied().zip(0..).collect();
         let Grid { azimuths, polars, radii } = inputs.grid;
-        // What does not fit is refused before it is used.
+        // A set beyond the range of 32-bit numbers is refused before its number is used.
         let first = |key| u32::try_from(u64::from(numbers[key]) * u64::from(inputs.floats)).unwrap_or(u32::MAX);
         let list = found.iter().map(|(key, _, centre, set, turn, reach)| types::FivOccluder {
             centre: centre.to_array(),
@@ -120,20 +122,20 @@ impl FrameOccluders {
     }
 }
 
-/// How one occluder stands.
+/// The pose of one occluder.
 struct OccluderPose {
     set: Set,
-    /// Metres, world space.
+    /// Centre of the bounding sphere, metres, world space.
     centre: Vec3,
-    /// Turn and scale against it at rest.
+    /// Linear map from the pose at rest to the current pose.
     turn: Mat3,
-    /// How far it reaches, if that is not that of its kind, turned.
+    /// The support function, if it is not that of the kind at rest.
     support: Option<SupportFunction>,
-    /// How much more of its bounding disc it fills than its kind.
+    /// Filled share of the bounding disc relative to the share of its kind.
     fill: f32,
 }
 
-/// `None` where the occluder has no extent.
+/// `None` if the occluder has no extent.
 fn occluder_pose(
     inputs: &PlacementInputs<'_>,
     (pose, lent): (&Pose, &mut Option<Pose>),
@@ -155,13 +157,14 @@ fn occluder_pose(
         return Some(OccluderPose { set, centre, turn: Mat3::IDENTITY, support, fill });
     }
     let (now, rest) = (Mat3::from_mat4(*world), inputs.rest[index]);
-    // Without a rounding where nothing turned.
+    // Without a rotation or scale the maps are the exact identity.
     let turn = if now == rest { Mat3::IDENTITY } else { now * rest.inverse() };
     let back = if now == rest { Mat3::IDENTITY } else { turn.inverse() };
     if !(turn.is_finite() && back.is_finite() && place.is_finite()) {
         return None;
     }
-    // Its centre stays that of its kind, about which it is known how far it reaches; what is squeezed gets a sphere around it.
+    // The centre stays the centre of the kind, because the support function is relative to this centre. A non-uniformly
+    // scaled occluder gets a new sphere around this centre.
     let (radius, shells, fill) = match even(&turn) {
         Some(scale) => {
             let Shells { nearest, farthest } = kind.shells(inputs.reach);
@@ -176,7 +179,7 @@ fn occluder_pose(
     Some(OccluderPose { set, centre: place + turn * placed.centre, turn, support: None, fill })
 }
 
-/// The scale of a matrix that but turns, mirrors and scales evenly.
+/// The scale of a matrix that only rotates, mirrors and scales uniformly.
 fn even(turn: &Mat3) -> Option<f32> {
     let scale = turn.determinant().abs().cbrt();
     let square = (turn.transpose() * *turn) * (scale * scale).recip();
@@ -216,7 +219,7 @@ mod tests {
             reach: 16.0,
             floats: 2048 * 9,
         };
-        // With more samples than a shader can number it is refused later on, by the device's limits.
+        // Sets with more samples than a shader can number are refused later by the device's limits.
         assert_eq!(FrameOccluders::of(&PlacementInputs { floats: u32::MAX, ..inputs }, &rest).list[2].first, u32::MAX);
         let still = FrameOccluders::of(&inputs, &rest);
         assert_eq!((still.list.len(), still.sets.len()), (occluders.placed.len(), occluders.kinds.len()));
@@ -225,7 +228,7 @@ mod tests {
             let set = &still.sets[(found.first / inputs.floats) as usize];
             assert_eq!((set.shape, set.geometry_from_world), (placed.kind as usize, Mat3::IDENTITY));
         }
-        // The first turns and is squeezed, the second vanishes.
+        // The first occluder is rotated and scaled, the second has a scale of 0.
         let mut pose = rest.clone();
         let node = occluders.placed[0].node as usize;
         pose.world[node] = pose.world[node] * Mat4::from_rotation_x(0.4) * Mat4::from_scale(vec3(1.0, 1.3, 1.0));
@@ -233,7 +236,7 @@ mod tests {
         let moved = FrameOccluders::of(&inputs, &pose);
         assert_eq!(moved.list.len(), occluders.placed.len() - 1);
         let set = &moved.sets[(moved.list[0].first / inputs.floats) as usize];
-        // The middle of the sphere is where the geometry has it.
+        // The centre of the sphere is the centre that the geometry has.
         let world = Vec3::from(moved.list[0].centre) - pose.world[node].w_axis.truncate();
         let there = set.geometry_from_world * world - occluders.placed[0].centre;
         assert!((there - set.centre).length() < 1e-4 && set.radius > 0.0, "{there} {}", set.centre);

@@ -1,9 +1,10 @@
-//! Where samples lie: close to each other where what is hidden bends, far apart where it is nearly straight.
+//! Spacing of the samples: dense where the vectors have a high curvature, sparse where they are nearly linear.
 //!
-//! The thesis grows radii by a constant factor and spreads directions evenly; its future work asks for samples that follow the occluder
-//! and the environment (chapter 6). Here an occluder is looked at along each of the three coordinates in fine steps first. Linear
-//! interpolation between samples `h` apart is wrong by h²/8 of the second derivative; the mean square is least where samples lie as
-//! densely as the fifth root of its square (de Boor, A Practical Guide to Splines, chapter III).
+//! The thesis grows radii by a constant factor and spaces directions evenly. Its future work asks for samples that
+//! adapt to the occluder and the environment (chapter 6). Here the vectors of an occluder are first computed in fine
+//! steps along each of the three coordinates. The error of linear interpolation between samples at distance `h` is h²/8
+//! times the second derivative. The mean square error is least if the density of samples is proportional to the fifth
+//! root of the square of the second derivative (de Boor, A Practical Guide to Splines, chapter III).
 
 use std::f64::consts::{PI, TAU};
 
@@ -22,31 +23,32 @@ use crate::{
 };
 
 const KNOTS: usize = FIV_SPACING_KNOTS as usize;
-/// Directions along which radii are looked at.
+/// Directions along which the vectors are computed in fine steps of the radius.
 const WAYS: Grid = Grid::of(8, 5, 2);
-/// Directions that are looked at, azimuths and polar angles in fine steps; on spheres of these radii, in those of the occluder.
+/// Fine steps of azimuth and polar angle, on spheres of these radii, in radii of the occluder.
 const FINE: [usize; 2] = [2 * (KNOTS - 1), KNOTS - 1];
 const SPHERES: [f64; 2] = [1.5, 4.0];
-/// Samples lie at least this part as densely as if evenly.
+/// Least density of samples, as a share of the even density.
 const LEAST: f64 = 0.25;
-/// Numbers are multiples of this, so that devices that round otherwise choose the same.
+/// Knots are rounded to multiples of this step, so that devices that round differently compute the same knots.
 const GRAIN: f64 = 1.0 / 256.0;
 
-/// How many samples lie below even steps of a coordinate, from 0 to all; empty: evenly.
+/// The sample number at each of the evenly spaced knots of a coordinate, from 0 to the last sample. Empty: samples are
+/// evenly spaced.
 pub type Knots = Vec<f32>;
 
-/// How samples lie along their three coordinates.
+/// Spacing of the samples along their three coordinates.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spacing {
-    /// Up to the one at 2π, which is the one at 0.
+    /// Up to the sample at 2π, which is the sample at 0.
     pub azimuth: Knots,
     pub polar: Knots,
-    /// In the logarithm of the radius.
+    /// Along the logarithm of the radius.
     pub radius: Knots,
 }
 
 impl Spacing {
-    /// With the number of the last sample of each.
+    /// The knots of each coordinate with the number of its last sample.
     fn all(&self, grid: &Grid) -> [(&[f32], f64); 3] {
         [
             (&self.azimuth, f64::from(grid.azimuths)),
@@ -55,13 +57,13 @@ impl Spacing {
         ]
     }
 
-    /// Place of the occluder's centre seen from the receiver, metres.
+    /// Offset of the occluder's centre from the receiver, metres.
     pub fn offset(&self, grid: &Grid, shells: &Shells, index: u32) -> DVec3 {
         let [azimuth, polar, sphere] = grid.place(index);
         self.direction(grid, azimuth, polar) * self.radius(grid, shells, sphere)
     }
 
-    /// Unit vector from the receiver to the occluder. At the poles the same for all azimuths.
+    /// Unit vector from the receiver to the occluder. At the poles all azimuths have the same direction.
     fn direction(&self, grid: &Grid, azimuth: u32, polar: u32) -> DVec3 {
         let [(a, azimuths), (p, polars), _] = self.all(grid);
         if (a.is_empty() && p.is_empty()) || polar == 0 || polar + 1 >= grid.polars {
@@ -71,7 +73,7 @@ impl Spacing {
         DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos())
     }
 
-    /// Of a sphere, metres.
+    /// Radius of a sphere of samples, metres.
     pub fn radius(&self, grid: &Grid, shells: &Shells, sphere: u32) -> f64 {
         if self.radius.is_empty() || sphere == 0 || sphere + 1 >= grid.radii {
             return shells.radius(grid.radii, sphere);
@@ -80,7 +82,7 @@ impl Spacing {
         near * (far / near).powf(part_of(&self.radius, f64::from(grid.radii - 1), sphere.into()))
     }
 
-    /// Numbers of the sample, with their fractions, where the occluder's centre lies at `offset` (metres).
+    /// Sample numbers with fractions for an occluder whose centre lies at `offset` (metres) from the receiver.
     pub fn numbers(&self, grid: &Grid, shells: &Shells, offset: DVec3) -> [f64; 3] {
         let (near, far) = (f64::from(shells.nearest), f64::from(shells.farthest));
         let parts = [
@@ -92,7 +94,7 @@ impl Spacing {
         [0, 1, 2].map(|k| number_at(all[k].0, all[k].1, parts[k]))
     }
 
-    /// As shaders take it: knots of all three, then radii in metres.
+    /// The table that shaders read: the knots of the three coordinates, then the radii of the spheres, metres.
     pub fn table(&self, grid: &Grid, shells: &Shells) -> Vec<f32> {
         let knot = |k: usize| k as f64 / (KNOTS - 1) as f64;
         let knots = self
@@ -103,7 +105,7 @@ impl Spacing {
         knots.chain(radii).map(|x| x as f32).collect()
     }
 
-    /// They go from the first sample to the last, each knot beyond the one before.
+    /// Whether each coordinate has increasing knots from the first sample to the last.
     pub fn fit(&self, grid: &Grid) -> bool {
         self.all(grid).iter().all(|(knots, last)| {
             let ends = knots.first().zip(knots.last());
@@ -115,7 +117,7 @@ impl Spacing {
     }
 }
 
-/// Number of the sample, with its fraction, at a part (0..1) of the coordinate; `last`: number at its end.
+/// Sample number with fraction at `part` (0..1) of the coordinate. `last`: number at the end of the coordinate.
 fn number_at(knots: &[f32], last: f64, part: f64) -> f64 {
     let part = part.clamp(0.0, 1.0);
     if knots.len() < 2 {
@@ -137,7 +139,8 @@ fn part_of(knots: &[f32], last: f64, number: f64) -> f64 {
     (k as f64 + ((number - low) / (high - low)).clamp(0.0, 1.0)) / (knots.len() - 1) as f64
 }
 
-/// Looks at an occluder and chooses. `radius`: of its bounding sphere, metres; `scaled`: what is interpolated is free of its solid angle.
+/// Computes the spacing for an occluder. `radius`: radius of its bounding sphere, metres. `scaled`: vectors are
+/// interpolated relative to the solid angle of the bounding sphere.
 ///
 /// # Errors
 /// `OutOfMemory`, `DeviceLost`.
@@ -152,7 +155,6 @@ pub fn choose(
         let points: Vec<Vec3> = points.iter().map(|p| -p.as_vec3()).collect();
         Ok(cover.run(runner, light, &points, 1)?.0)
     };
-    // Along radii.
     let steps = 2 * (KNOTS - 1);
     let rho = |step: usize| shells.radius(steps as u32 + 1, step as u32);
     let ways = (0..WAYS.azimuths * WAYS.polars).map(|i| WAYS.direction(i % WAYS.azimuths, i / WAYS.azimuths));
@@ -160,13 +162,12 @@ pub fn choose(
     let fivs = look(&points)?;
     let reach = |step: usize| if scaled { rho(step).max(f64::from(radius)).powi(2) } else { 1.0 };
     let lines: Vec<&[f32]> = fivs.chunks_exact(FIV_FLOATS as usize * (steps + 1)).collect();
-    // On a plane there is as much to be seen at a radius as its square, for each factor.
+    // A ground shows an area proportional to the square of the radius in each interval of the radius' logarithm.
     let bend = |s: usize| {
         lines.iter().map(|line| bend(line, [s - 1, s, s + 1], reach)).sum::<f64>() * (rho(s) / reach(s)).powi(2)
     };
     let of_radius = spread(&(1..steps).map(bend).collect::<Vec<_>>(), f64::from(grid.radii - 1));
 
-    // Along both angles.
     let [azimuths, polars] = FINE;
     let fine = Grid::of(azimuths as u32, polars as u32 + 1, 2);
     let way = |i: usize| fine.direction((i % azimuths) as u32, (i / azimuths) as u32);
@@ -186,7 +187,7 @@ pub fn choose(
             }
         }
     }
-    // The one at 0 is the one at 2π.
+    // The sample at 0 is the sample at 2π.
     let around: Vec<f64> = (1..azimuths).map(|a| around[a]).collect();
     Ok(Spacing {
         azimuth: spread(&around, f64::from(grid.azimuths)),
@@ -199,7 +200,8 @@ fn bend_of(fivs: &[f32], at: [usize; 3]) -> f64 {
     bend(fivs, at, |_| 1.0)
 }
 
-/// Square of the second difference of three vectors, each times a number; 0 if one of them lies inside.
+/// Square of the second difference of three vectors, each times a factor. 0 if one of the samples lies inside the
+/// occluder.
 fn bend(fivs: &[f32], at: [usize; 3], times: impl Fn(usize) -> f64) -> f64 {
     let floats = FIV_FLOATS as usize;
     let of = |step: usize| &fivs[floats * step..floats * (step + 1)];
@@ -210,14 +212,15 @@ fn bend(fivs: &[f32], at: [usize; 3], times: impl Fn(usize) -> f64) -> f64 {
     (0..floats).map(|k| (value(at[0], k) - 2.0 * value(at[1], k) + value(at[2], k)).powi(2)).sum()
 }
 
-/// Samples as densely as the fifth roots of the squares of second differences at even steps, without the first and the last one.
+/// Knots with a density proportional to the fifth roots of `bends`, the squares of second differences at even steps
+/// without the first and the last step.
 fn spread(bends: &[f64], last: f64) -> Knots {
     let roots: Vec<f64> = bends.iter().map(|b| b.max(0.0).powf(0.2)).collect();
     let mean = roots.iter().sum::<f64>() / roots.len().max(1) as f64;
     if !(mean.is_finite() && mean > 0.0) {
         return Knots::new();
     }
-    // The mean of neighbours: rays make steps of their own.
+    // The mean of neighbours removes the steps that single rays cause.
     let around = |i: usize| {
         let near = &roots[i.saturating_sub(2)..(i + 3).min(roots.len())];
         near.iter().sum::<f64>() / near.len() as f64
@@ -232,7 +235,7 @@ fn spread(bends: &[f64], last: f64) -> Knots {
     let knot = |knot: usize| ((sums[knot * each] / whole * last / GRAIN).round() * GRAIN) as f32;
     let mut knots: Knots = (0..KNOTS).map(knot).collect();
     knots[KNOTS - 1] = last as f32;
-    // Rounding never joins two.
+    // Even spacing replaces knots that rounding has joined.
     if knots.windows(2).any(|p| p[1] <= p[0]) { Knots::new() } else { knots }
 }
 

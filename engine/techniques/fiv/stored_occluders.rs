@@ -1,4 +1,4 @@
-//! How occluders stand against their vectors, where these were computed beforehand.
+//! Poses of occluders relative to their precomputed vectors.
 
 use std::collections::HashSet;
 
@@ -13,11 +13,11 @@ use crate::{
     },
 };
 
-/// No occluder, vector or table.
+/// Marks a missing occluder, vector or table.
 const NONE: u32 = u32::MAX;
 
 impl Fiv {
-    /// The occluders with their vectors that were computed beforehand.
+    /// The occluders of a frame with precomputed vectors.
     pub(super) fn stored(&self, pose: &Pose, deforming: &HashSet<u32>) -> FrameOccluders {
         let grid = self.plan.grid;
         let spacing = self.firsts.last().map_or(0, |samples| *samples as u32 * FIV_FLOATS);
@@ -51,8 +51,8 @@ impl Fiv {
         FrameOccluders { list: placed.collect(), nodes, ..FrameOccluders::default() }
     }
 
-    /// Of each instance the occluder that it is of, and where the vectors of its corners are, as far as it stands as it did when they
-    /// were computed.
+    /// For each instance the number of its occluder and the first vectors of its vertices. The vectors are left out if
+    /// the occluder's pose has no vectors.
     pub(super) fn owners(
         &self,
         (pose, deforming): (&Pose, &HashSet<u32>),
@@ -77,12 +77,12 @@ impl Fiv {
         let mut owners: Vec<_> = instances
             .iter()
             .map(|instance| {
-                // Primitives of a node stand next to each other, in their order.
+                // Primitives of a node are next to each other, in their order.
                 slot = if instance.node == node { slot + 1 } else { 0 };
                 node = instance.node;
                 let occluder = of_node.get(node as usize).copied().unwrap_or(NONE);
                 let mut owner = types::FivOwner { occluder, ..none };
-                // Stored vectors have all occluders, in their order.
+                // With precomputed vectors all occluders are in the list, in their order.
                 let placed = self.occluders.placed.get(occluder as usize).filter(|_| known);
                 let Some(placed) = placed else { return owner };
                 let angle = self.angle(pose, node).filter(|_| !deforming.contains(&node));
@@ -111,24 +111,24 @@ impl Fiv {
         owners
     }
 
-    /// Where the vector of a sample of a turn of a kind begins.
+    /// First float of the vector of a sample.
     fn first_float(&self, kind: u32, turn: u32, sample: u32) -> u32 {
         let of_turn = self.plan.of_turn(&self.plan.occluders[kind as usize]) as u32;
         (self.firsts[kind as usize] as u32 + turn * of_turn + sample) * FIV_FLOATS
     }
 
-    /// Nodes whose meshes may be another than when the vectors were computed.
+    /// Nodes whose meshes may differ from the meshes that the vectors were computed for.
     pub(super) fn deforming(&self, pose: &Pose, instances: &[Instance]) -> HashSet<u32> {
         let moved = *pose != self.at_rest;
         instances.iter().filter(|instance| moved && instance.deformed).map(|instance| instance.node).collect()
     }
 
-    /// Occluders that do not stand as their vectors were computed.
+    /// Notes on occluders whose current pose has no vectors.
     pub(super) fn turned(&self, scene: &Scene, pose: &Pose, instances: &[Instance]) -> Vec<Note> {
         let deforming = self.deforming(pose, instances);
         let what = |node: u32| match (self.angle(pose, node), deforming.contains(&node)) {
             (_, true) => Some("deforms"),
-            (None, _) => Some("turns or changes its size"),
+            (None, _) => Some("rotates or changes its size"),
             _ => None,
         };
         let found = self.occluders.placed.iter().filter_map(|placed| Some((placed.node, what(placed.node)?)));
@@ -137,8 +137,8 @@ impl Fiv {
                 kind: NoteKind::Approximated,
                 place: format!("nodes[{node}] ({})", scene.nodes[node as usize].name),
                 text: format!(
-                    "{what}; its shadow on others stays that of its pose at rest, and it has none on itself \
-                     (fiv.method=online follows it)"
+                    "{what}; its shadow on other surfaces stays the shadow of its pose at rest, and it has no shadow on \
+                     itself (fiv.method=online computes both)"
                 ),
             })
             .collect()
