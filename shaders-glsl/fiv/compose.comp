@@ -1,4 +1,4 @@
-// Radiance that the visible surfaces reflect ([FIV 3] with an explicit 1/π) and emit.
+// Radiance that the visible surfaces reflect ([FIV 3]) and emit.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -41,6 +41,6 @@ void main() {
         vec3 v = to_camera(view, screen_position(view, pixel, 1.0, z));
         matt = brdf_of(color.rgb, gloss.rgb, gloss.a, dot(n, v)).matt;
     }
-    vec3 reflected = matt * light / 3.14159265358979;
+    vec3 reflected = matt * light / 3.14159265358979; // [FIV 3] with an explicit 1/π
     imageStore(total, pixel, vec4(reflected + texelFetch(emission, pixel, 0).rgb, 1.0));
 }

@@ -60,7 +60,7 @@ void main() {
             Ray ray = Ray(start, 0.0, turn.geometry_from_world * direction, 1.01 * (sqrt(rho2) + radius));
             if (trace_any(ray, TRACE_SHADOW, salt) == (own != 0u)) continue;
         }
-        x += t.radiance * (t.area.x * share);
+        x += t.radiance * (t.area.x * share); // [FIV 10]
         y += t.radiance * (t.area.y * share);
         z += t.radiance * (t.area.z * share);
         angle += t.angle * share;

@@ -26,7 +26,7 @@ void main() {
         vec3 part = vec3(0.0);
         uint end = min(block + BLOCK, count);
         for (uint i = first + block; i < first + end; ++i) {
-            part += texels[i].radiance * max(dot(normal, texels[i].area), 0.0);
+            part += texels[i].radiance * max(dot(normal, texels[i].area), 0.0); // [FIV 6]
         }
         sum += part;
     }

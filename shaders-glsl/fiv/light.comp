@@ -128,7 +128,7 @@ float own_share(uint i, uint self, vec3 p, vec3 n, FivAlong along, uint row) {
         // Each occluder fills the same share of the lens as of its whole disc. With filled discs g / 2 is Overlapped%
         // of [FIV 15].
         float discs = FIV_PI * (place.w * place.w * fill + other.w * other.w * amount.z);
-        float g = 2.0 * lens_area(place.w, other.w, apart) * fill * amount.z / discs;
+        float g = 2.0 * lens_area(place.w, other.w, apart) * fill * amount.z / discs; // [FIV 15]
         product *= 1.0 - g * amount.x * amount.y * (1.0 - NODES);
     }
     return dot(product, WEIGHTS);
@@ -162,7 +162,7 @@ void main() {
         // All visible light lies in front of the surface, as [FIV 13] requires. If all samples lie inside the occluder,
         // the pixel is unshadowed.
         vec4 hidden = fiv_dot(occluders[self], occluders[self].centre - p, n, TRILINEAR != 0u, SCALED != 0u);
-        vec3 left = n.x * whole.x + n.y * whole.y + n.z * whole.z - hidden.rgb;
+        vec3 left = n.x * whole.x + n.y * whole.y + n.z * whole.z - hidden.rgb; // [FIV 13]
         if (hidden.w > 0.0) lit = clamp(left, vec3(0.0), open);
     }
     vec3 sum = first == 0u ? lit : imageLoad(irradiance, pixel).rgb;

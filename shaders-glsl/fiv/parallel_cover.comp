@@ -46,7 +46,7 @@ void main() {
         uint stored = word >> 16u * (pixel.x & 1u) & 0xffffu;
         if (stored == 0u || float(stored) < depth) continue;
         FivTexel t = texels[(face * size + place.y / split) * size + place.x / split];
-        x += t.radiance * (t.area.x * share);
+        x += t.radiance * (t.area.x * share); // [FIV 10]
         y += t.radiance * (t.area.y * share);
         z += t.radiance * (t.area.z * share);
         angle += t.angle * share;

@@ -18,7 +18,7 @@ void main() {
     vec3 x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
     for (uint i = lane; i < count; i += 64u) {
         FivTexel t = texels[i];
-        x += t.radiance * t.area.x;
+        x += t.radiance * t.area.x; // [FIV 10]
         y += t.radiance * t.area.y;
         z += t.radiance * t.area.z;
     }

@@ -61,7 +61,7 @@ void main() {
         uint place = i % (size * size);
         vec3 direction = cube_direction(i / (size * size), (vec2(place % size, place / size) + 0.5) / float(size));
         if (near_anything(origin, direction) && trace_any(Ray(origin, 0.0, direction, 1e30), TRACE_SHADOW, pcg4d(uvec4(pixel, i, seed)).x)) continue;
-        sum += texels[i].radiance * cosine;
+        sum += texels[i].radiance * cosine; // [FIV 6]
     }
     imageStore(irradiance, pixel, vec4(sum, 1.0));
 }

@@ -82,7 +82,7 @@ vec4 fiv_dot_turn(FivOccluder o, uint first, vec3 offset, vec3 normal, bool tril
         vec3 y = vec3(fivs[at + 3u], fivs[at + 4u], fivs[at + 5u]);
         vec3 z = vec3(fivs[at + 6u], fivs[at + 7u], fivs[at + 8u]);
         float grown = (k & 4u) == 0u ? growth.x : growth.y;
-        sum += vec4((normal.x * x + normal.y * y + normal.z * z) * grown, 1.0) * weight;
+        sum += vec4((normal.x * x + normal.y * y + normal.z * z) * grown, 1.0) * weight; // [FIV 11]
     }
     if (sum.w > 0.0) sum.rgb /= sum.w;
     // Beyond the last sphere the hidden light is proportional to the solid angle of the occluder.
