@@ -199,8 +199,8 @@ pub fn cut(hidden: DVec3, (open, behind): (DVec3, DVec3), (d, rho, radius): (f64
 }
 
 /// Share of its hidden irradiance that is subtracted for each occluder (centre relative to the receiver, radius). For
-/// two occluders this is [FIV 15] with the shared share of [FIV 14]. For more occluders it is the mean of 1 / (1 +
-/// number of other occluders at a point), with independent occluders.
+/// two occluders this is 1 − Overlapped% of [FIV 15], so that the sum of both is [FIV 14]. For more occluders it is the
+/// mean of 1 / (1 + number of other occluders at a point), with independent occluders.
 pub fn shares(normal: DVec3, occluders: &[(DVec3, f64)]) -> Vec<f64> {
     let disc = |&(to, radius): &(DVec3, f64)| (to.normalize_or_zero(), (radius / to.length().max(1e-20)).min(1.0));
     let share = |i: usize| {
@@ -306,7 +306,7 @@ mod tests {
             let all = shares(up, &vec![at(0.2); count]);
             assert!((all.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{count}");
         }
-        // What lies behind the receiver takes nothing away.
+        // Occluders behind the receiver hide no light.
         assert_eq!(shares(up, &[at(0.0), (DVec3::new(0.0, -2.0, 0.0), 0.5)])[0], 1.0);
         assert_eq!((front(-1.0, 1.0), front(0.0, 1.0), front(1.0, 1.0), front(0.5, 1.0)), (0.0, 0.5, 1.0, 0.75));
     }
@@ -351,7 +351,7 @@ mod tests {
                 let found = cut(vector(d, behind), (front, behind), (d, rho, radius), 1.0);
                 assert!((found - exact).length() < 1e-12, "{d}: {found} instead of {exact}");
             }
-            // What lies in front or behind needs no guess: a wrong one does nothing.
+            // A ball wholly in front or behind needs no estimate, so a wrong estimate has no effect.
             let found = cut(vector(d, back), (front, back), (d, rho, radius), 0.1);
             let apart = (found - exact).length();
             assert!(if d.abs() >= radius { apart < 1e-12 } else { apart < 0.5 * front.length() }, "{d}: {found}");

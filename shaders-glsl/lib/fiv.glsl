@@ -35,7 +35,7 @@ struct FivOccluder {
 // A point that looks at an occluder.
 struct FivPoint {
     vec3 at;   // relative to the centre of the occluder, metres, world axes
-    uint turn; // number of its FivTurn
+    uint turn; // number of its pose in the list of FivTurn
 };
 
 // Pose of an occluder relative to the geometry that rays are traced through.

@@ -141,7 +141,7 @@ impl Stored {
     }
 
     /// # Errors
-    /// `Input` with the file, if it cannot be read or is not what it should be.
+    /// `Input` with the file, if it cannot be read or is not a valid file of vectors.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = image::read_file_checked(path, MOST_BYTES)?;

@@ -3,7 +3,7 @@
 //! There are four steps. The host never learns the number of samples:
 //! 1. Every pixel marks the samples of each occluder that its lookup reads, a bit each.
 //! 2. The marks of each geometry become a list in the order of sample numbers, by prefix sums over blocks. The order is
-//!   the same in every run.
+//!    the same in every run.
 //! 3. The vectors of the list are computed as [`cover`](super::cover) computes them before the first frame.
 //! 4. The vectors are copied to the places where the lookup reads them.
 //!
@@ -335,7 +335,7 @@ impl Online {
         }
         let largest = list.iter().map(|job| most(job.shape, job.sets.len() as u64)).max().unwrap_or(1);
         let each = (MOST_PARTIALS / (u64::from(chunks) * 40)).clamp(64, MOST_POINTS).min(largest.max(1));
-        // What lies behind the last point of a batch must not be that of another.
+        // Entries after the last point of a batch must not belong to another batch.
         let each = each.next_multiple_of(64);
         let mut batch = 0;
         for job in &mut list {

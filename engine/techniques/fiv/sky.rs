@@ -366,7 +366,7 @@ mod tests {
             assert!((angle - 4.0 * PI).abs() < 1e-12, "{angle}");
             let sum: DVec3 = texels(size).map(|(f, x, y)| area(f, size, x, y)).sum();
             assert!(sum.length() < 1e-12, "{sum}");
-            // A whole face: by symmetry along its axis; half a face towards a side the same however it is cut.
+            // A whole face has a vector along its axis, and the sum over texels does not depend on their number.
             let face: DVec3 = texels(size).filter(|t| t.0 == 2).map(|(f, x, y)| area(f, size, x, y)).sum();
             assert!((face - area(2, 1, 0, 0)).length() < 1e-12 && face.x.abs() < 1e-12, "{face}");
             for (i, (face, x, y)) in texels(size).enumerate() {
@@ -402,7 +402,7 @@ mod tests {
             }
             assert_eq!(sky.repaired, 0);
         }
-        // One pixel of light, wherever it is: as much as it sends.
+        // The power of a single bright pixel is kept wherever it lies.
         for (x, y) in [(0, 0), (63, 31), (17, 3), (40, 16), (5, 30)] {
             let mut one = painted(64, |_| Vec3::ZERO);
             one.pixels[y * 64 + x] = Vec3::new(100.0, 1.0, 0.0);

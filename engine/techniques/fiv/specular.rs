@@ -6,7 +6,7 @@
 //! for each cell of the environment (4×4 texels) the share of the cell's light that the occluder hides, one byte per
 //! cell, for the same samples as the vectors. A pixel then reflects
 //!
-//!     unshadowed × (Σ cells reflected × Π (1 - share of each occluder)) / (Σ cells reflected),
+//!   unshadowed × (Σ cells reflected × Π (1 - share of each occluder)) / (Σ cells reflected),
 //!
 //! channel by channel. The sum over all texels, or the prefiltered environment, gives the unshadowed light. The cells
 //! give the share of this light that is left. The result is never negative, it equals the unshadowed light without

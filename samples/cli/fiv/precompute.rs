@@ -33,8 +33,8 @@ use crate::{
 /// Options of `fiv precompute`.
 #[derive(clap::Args, Clone, Debug)]
 pub struct PrecomputeArgs {
-    /// Scene files: .gltf, .glb or .obj. Every node with a mesh is an occluder, as it stands at rest; flat ones and those as
-    /// large as their scene are left out
+    /// Scene files: .gltf, .glb or .obj. Every node with a mesh is an occluder in its pose at rest; flat meshes and meshes
+    /// as large as their scene are left out
     #[arg(value_name = "MESH", required_unless_present = "builtin")]
     pub meshes: Vec<PathBuf>,
 
