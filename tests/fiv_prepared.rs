@@ -150,7 +150,7 @@ fn vectors_are_drawn_under_their_own_light_only() {
 }
 
 #[test]
-fn a_picture_asks_for_what_the_scene_was_made_ready_for() {
+fn pictures_may_choose_only_settings_that_preparation_leaves_open() {
     with_gpu(|gpu| {
         let (scene, view) = (ball_over_ground(), flat_view(Vec3::Y * 10.0, Vec3::ZERO, 3.0, [4, 4]));
         let made = coarse();
