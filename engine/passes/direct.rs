@@ -26,7 +26,7 @@ impl From<&ShadowMaps> for Lights {
 /// Choices of [`light`].
 #[derive(Clone, Copy, Debug)]
 pub struct Direct {
-    /// The dissertation's equation 16 instead of radiometry.
+    /// The dissertation's attenuation [ISR 16] instead of radiometry.
     pub paper_law: bool,
     /// GGX facets over the matt base (`lib/brdf.glsl`), under the paper's law added to it; otherwise Lambert's law alone.
     pub specular: bool,

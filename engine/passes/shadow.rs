@@ -1,5 +1,5 @@
 //! Shadow maps of spot, point and directional lights: plain, percentage closer, or exponential (ISR dissertation,
-//! section 4.6, eq. 30 and listing 8; cascades as its section 4.7 proposes).
+//! section 4.6, [ISR 30] and listing 8; cascades as its section 4.7 proposes).
 
 mod slots;
 
@@ -48,7 +48,7 @@ pub struct Settings {
     pub split: f32,
     /// Metres from the camera after which directional lights cast no shadow; 0: as far as the scene reaches.
     pub distance: f32,
-    /// c of eq. 30, for depths from 0 (at the light) to 1 (its range, or the end of the scene).
+    /// c of [ISR 30], for depths from 0 (at the light) to 1 (its range, or the end of the scene).
     pub exponent: f32,
     /// Metres: where a light reaches farther than this, c grows in proportion, so that large scenes do not leak light
     /// through thin walls. 0: c is the same everywhere, as in the dissertation.

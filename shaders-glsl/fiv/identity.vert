@@ -1,4 +1,4 @@
-// Which occluder each pixel shows, and the light that it leaves itself: vertices.
+// Vertices of the pass that draws the visible occluder of each pixel and the light past that occluder.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -15,7 +15,8 @@ layout(binding = 5, scalar) readonly buffer Fivs { float fivs[]; };
 
 layout(location = 0) out vec3 seen; // position in view space, metres
 layout(location = 1) flat out uint instance;
-// Vectors of the light that reaches fronts and backs of surfaces; w of x: 1, 0 where it is not known.
+// Vectors of the light that reaches the front and the back of surfaces. w of x: 1, or 0 where the vectors are not
+// known.
 layout(location = 2) out vec4 front_x;
 layout(location = 3) out vec3 front_y;
 layout(location = 4) out vec3 front_z;
@@ -34,7 +35,7 @@ void load(uint first, out vec4 x, out vec3 y, out vec3 z) {
     z = vec3(fivs[at + 6u], fivs[at + 7u], fivs[at + 8u]);
 }
 
-// Between two turns.
+// Interpolates between two rotation samples.
 void load(uint first, uint next, float blend, out vec4 x, out vec3 y, out vec3 z) {
     load(first, x, y, z);
     if (blend <= 0.0) return;

@@ -24,7 +24,7 @@ void main() {
     }
     vec4 color = texelFetch(albedo, pixel, 0);
     vec4 tree = SHARP != 0u ? texelFetch(sharp, pixel, 0) : vec4(0.0);
-    vec3 bounced = color.a * color.rgb * texelFetch(irradiance, pixel, 0).rgb * ((1.0 - tree.a) / 3.14159265358979);
+    vec3 bounced = color.a * color.rgb * texelFetch(irradiance, pixel, 0).rgb * ((1.0 - tree.a) / 3.14159265358979); // ρ of [IGI 1]
     vec3 rough = imageLoad(direct, pixel).rgb * (1.0 - tree.a);
     imageStore(direct, pixel, vec4(rough, 1.0));
     imageStore(indirect, pixel, vec4(bounced, 1.0));

@@ -1,4 +1,4 @@
-// Irradiance from a range of virtual lights at the visible surfaces (Marques and Santos, equation 1 without ρ).
+// Irradiance from a range of virtual lights at the visible surfaces ([IGI 1] without ρ).
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require

@@ -1,4 +1,4 @@
-// Joint bilateral upsampling of the irradiance (Marques and Santos, equation 2, after Kopf et al. 2007).
+// Joint bilateral upsampling of the irradiance ([IGI 2], after Kopf et al. 2007).
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -90,6 +90,6 @@ void main() {
         fall *= 1.0 / (WIDER * WIDER);
     }
     if (!matched && least > 0.0) unmatched[atomicAdd(unmatched_count, 1u)] = uint(pixel.x) | uint(pixel.y) << 16u;
-    vec3 found = weights > NO_MATCH * all ? sum.rgb / weights : likest.rgb;
+    vec3 found = weights > NO_MATCH * all ? sum.rgb / weights : likest.rgb; // [IGI 2]
     imageStore(irradiance, pixel, vec4(found, brightest));
 }

@@ -55,7 +55,7 @@ float vpl_bound(float least, float distance) {
     return x * x * (3.0 - 2.0 * x);
 }
 
-// Irradiance (W/m²) from a virtual light at a surface with unit normal, shadows aside (equation 1: L G without V).
+// Irradiance (W/m²) from a virtual light at a surface with unit normal, shadows aside ([IGI 1]: L G without V).
 vec3 vpl_irradiance(Vpl vpl, vec3 position, vec3 normal, float least) {
     vec3 to = vpl.position - position;
     float d2 = dot(to, to);

@@ -25,7 +25,7 @@ void vpl_gather(inout vec4 sum, vec3 position, vec3 normal, vec3 origin, uvec2 p
         if (light == vec3(0.0)) continue;
         vec3 to = vpl.position + vpl.normal * vpl.gap - origin;
         bool hidden = trace_any(Ray(origin, 0.0, to, 0.99999), TRACE_SHADOW, pcg4d(uvec4(pixel, k, how.seed)).x);
-        sum += vec4(hidden ? vec3(0.0) : light, 1.0);
+        sum += vec4(hidden ? vec3(0.0) : light, 1.0); // L V G of [IGI 1]
     }
 }
 

@@ -59,7 +59,7 @@ pub fn smooth(graph: &mut Graph, g: &GBuffer, guide: Image, coarse: Image, setti
     smoothed
 }
 
-/// Irradiance of every pixel from that of every `downsample`-th (equation 2): weights are a Gaussian of the distance in the picture,
+/// Irradiance of every pixel from that of every `downsample`-th [IGI 2]: weights are a Gaussian of the distance in the picture,
 /// the cosine between normals, and nearness to the pixel's plane where [`Settings::upsample_range`] is above 0. And a list of the pixels of which a share below
 /// [`Settings::refine`] of the weight is on texels that match: their number, then x + 65,536 y of each, in any order.
 pub fn upsample(graph: &mut Graph, g: &GBuffer, guide: Image, coarse: Image, settings: &Settings) -> (Image, Buffer) {

@@ -16,14 +16,14 @@ pub enum Sender {
 
 /// What one sample of the gather stands for.
 ///
-/// Equation 25 sums (2π/N)·F over N samples. The area integral that it stands for is the sum of F alone, F the form factor to
+/// The paper's estimator [ISR 25] sums (2π/N)·F over N samples. The area integral that it stands for is the sum of F alone, F the form factor to
 /// the whole [`Patch`] that a sample represents. So the dissertation's sum is 2π/N of the true irradiance from within reach
 /// (0.26, 0.13, 0.08 for 24, 48, 80 samples), and with single texels as patches 2π/(N s²), s the spacing of the grid in texels:
 /// more samples make it darker, and `k_isr` balances it for one choice only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
-    /// Equation 25 as written.
+    /// The estimator [ISR 25] as written.
     Paper,
     /// F to the footprint of the whole cell of the image that a sample represents: converges to the one-bounce irradiance from
     /// all senders in reach, whatever N, reach and resolution.
@@ -95,7 +95,7 @@ pub enum Blur {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Upsample {
-    /// Difference of linear depth / far (equation 27).
+    /// Difference of linear depth / far [ISR 27].
     Depth,
     /// Normal, and distance from the pixel's plane relative to its depth: steep surfaces are one surface, creases part them.
     Plane,
@@ -115,7 +115,7 @@ pub enum Receiver {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Occlude {
-    /// Direct light, as in equation 29.
+    /// Direct light, as in [ISR 29].
     Direct,
     /// Light of the environment only: direct light has its own shadows.
     Ambient,
@@ -125,7 +125,7 @@ pub enum Occlude {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LightLaw {
-    /// Equation 16 and k_dl: colours relative to the brightest light times `light_power`, no π.
+    /// Attenuation [ISR 16] and k_dl: colours relative to the brightest light times `light_power`, no π.
     Paper,
     /// W/sr over squared distance, ρ/π.
     Physical,
@@ -180,9 +180,9 @@ pub struct Settings {
     pub occlusion: bool,
     /// How far occluders are looked for, pixels of the full image.
     pub occlusion_reach: f32,
-    /// Radius of the sphere that a sample stands for in equation 26, in sides of its cell.
+    /// Radius of the sphere that a sample stands for in [ISR 26], in sides of its cell.
     pub occluder_radius: f32,
-    /// Subtracted from the cosine of equation 26, against flat surfaces that occlude themselves by rounded normals.
+    /// Subtracted from the cosine of [ISR 26], against flat surfaces that occlude themselves by rounded normals.
     pub occlusion_bias: f32,
     pub blur: Blur,
     /// Texels of the coarse buffers to each side, 0 to 16; the standard deviation is half of it.
@@ -190,12 +190,12 @@ pub struct Settings {
     /// Bilateral: distance from a texel's plane, relative to its depth, at which another weighs 0.6.
     pub blur_range: f32,
     pub upsample: Upsample,
-    /// ε of equation 27, in the unit that `upsample` compares.
+    /// ε of [ISR 27], in the unit that `upsample` compares.
     pub upsample_epsilon: f32,
     pub receiver: Receiver,
     /// Power of indirect light. The area estimator needs no balancing: 1.
     pub k_isr: f32,
-    /// Power of occlusion, 0 to 1: light is multiplied by accessibility + 1 − k_ssao, at most 1 (equation 29). With 1 this is
+    /// Power of occlusion, 0 to 1: light is multiplied by accessibility + 1 − k_ssao, at most 1 [ISR 29]. With 1 this is
     /// accessibility itself; with the dissertation's 0.5, light is darkened only where more than half is occluded.
     pub k_ssao: f32,
     pub occlude: Occlude,

@@ -29,18 +29,18 @@ pub struct FivArgs {
     #[command(flatten)]
     pub common: RenderArgs,
 
-    /// Vectors of `fiv precompute`; those that it does not have are computed
+    /// File of `fiv precompute`; vectors that the file does not contain are computed
     #[arg(long, value_name = "FILE.fiv", help_heading = "Technique")]
     pub vectors: Option<PathBuf>,
 }
 
-/// The technique, with the vectors that were computed before.
+/// The technique, with the file of precomputed vectors.
 struct ByVectors<'a> {
     stored: Option<(&'a PathBuf, Stored)>,
     progress: ProgressMode,
     quiet: bool,
     interrupt: Interrupt,
-    /// It was interrupted before there was a frame.
+    /// Whether the run was interrupted before the first frame.
     stopped: Cell<bool>,
 }
 
@@ -52,7 +52,7 @@ pub fn run(args: &FivArgs) -> Result<ExitCode> {
     let stored = args.vectors.as_ref().map(|file| Stored::read(file).map(|stored| (file, stored))).transpose()?;
     let mut base = PictureSettings::default();
     if let Some((_, stored)) = &stored {
-        // What is written about the picture is then enough to make it again.
+        // The settings in the picture's metadata are then sufficient to render the picture again.
         base.fiv = stored.plan.settings(&base.fiv);
     }
     let technique = ByVectors {
@@ -69,7 +69,8 @@ pub fn run(args: &FivArgs) -> Result<ExitCode> {
     }
 }
 
-/// Makes a picture again, in memory; `None`: interrupted. Vectors are computed: the settings of the picture say all of them.
+/// Renders a picture again in memory. `None` if interrupted. All vectors are computed, because the settings of the
+/// picture determine them.
 ///
 /// # Errors
 /// As [`render::again`].
@@ -92,7 +93,7 @@ pub fn again(asked: &Again<'_>) -> Result<Option<Fresh>> {
 }
 
 impl ByVectors<'_> {
-    /// Errors and notes about the file of vectors name it.
+    /// Adds the file of vectors to errors about it.
     fn named(&self, error: Error) -> Error {
         match &self.stored {
             Some((file, _)) if error.kind() == ErrorKind::Input => error.in_file(file),

@@ -78,7 +78,7 @@ impl<'a> Lab<'a> {
         run.map(|run| self.results.times(run)).transpose()
     }
 
-    /// NRMSE (eq. 17) of the irradiance of a view, over the pixels that are not covered.
+    /// NRMSE [FIV 17] of the irradiance of a view, over the pixels that are not covered.
     fn nrmse(&self, scene: &str, view: &str, method: &str) -> Result<Option<f64>> {
         let Some((truth, run)) = self.run(scene, view, TRUTH).zip(self.run(scene, view, method)) else {
             return Ok(None);

@@ -203,8 +203,8 @@ fn vectors(
 /// Of everything that decides vectors.
 fn name(gpu: &Gpu, plan: &Plan, settings: &Settings) -> Result<String> {
     // How samples lie is chosen from these; all else that decides them is in the plan.
-    let paces = (settings.adaptive, settings.interpolation);
-    let text = json!([cache::SOURCES, cache::device(gpu), config::to_value(plan)?, config::to_value(&paces)?]);
+    let spacing = (settings.adaptive, settings.interpolation);
+    let text = json!([cache::SOURCES, cache::device(gpu), config::to_value(plan)?, config::to_value(&spacing)?]);
     Ok(Digest::of(text.to_string().as_bytes()).hex())
 }
 

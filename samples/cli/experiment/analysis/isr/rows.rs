@@ -7,7 +7,7 @@ pub struct Row {
     pub view: String,
     /// More than 25,000 triangles.
     pub complex: bool,
-    /// Mean absolute error over pixels and channels (equation 19), linear radiance, W/(sr·m²).
+    /// Mean absolute error over pixels and channels [ISR 19], linear radiance, W/(sr·m²).
     pub direct: f64,
     pub technique: f64,
     /// The same of 8-bit sRGB codes at the exposure that shows the reference.

@@ -1,4 +1,4 @@
-//! What a scene was made ready for, and what is said of what is not served.
+//! Settings that a scene was prepared with, settings of its pictures, and notes on everything that is not supported.
 
 mod fiv_lab;
 mod tracer_lab;
@@ -11,7 +11,7 @@ use lucerna::{
     scene::{AlphaMode, Environment, Pose, Scene, View, builtin, resident::Resident},
     techniques::fiv::{
         Cut, Extent, Fiv, Interpolation, Masks, Method, PictureSettings, SelfSamples, Settings, Shared, Specular,
-        Stored, turn::Axis,
+        Stored, occluder_rotation::Axis,
     },
 };
 use tracer_lab::flat_view;
@@ -28,7 +28,7 @@ fn ball_over_ground() -> Scene {
     scene
 }
 
-/// The vectors of a scene as a file has them.
+/// The vectors of a scene in the form of a file.
 fn stored(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Stored {
     let studio = Studio::new(gpu, scene, settings, None);
     let (plan, kinds) = (studio.fiv.plan().clone(), &studio.fiv.occluders().kinds);
@@ -52,7 +52,7 @@ fn files_of_blended_occluders_made_when_masks_were_others_are_out_of_date() {
         scene.materials[0].alpha = alpha;
         format!("{:016x}", occluder(&scene).0.hash)
     };
-    // As they were at first. Rays meet solid and cut surfaces as they did then.
+    // Hashes of an earlier version. Rays hit solid and cut surfaces as in that version.
     assert_eq!(hash(AlphaMode::Opaque), "d534c1090e9bdb08");
     assert_eq!(hash(AlphaMode::Mask { cutoff: 0.5 }), "1d84918ee84c41f5");
     assert_ne!(hash(AlphaMode::Blend), "6bcef818bd52b9b8");
@@ -68,13 +68,13 @@ fn a_turn_that_stays_is_exact_for_every_method() {
             let [still, asked] = [0.0, 37.0].map(|rotation| Settings { rotation, method, ..coarse() });
             let exact = Studio::new(gpu, &itself, &still, None).irradiance(&view, &still);
             assert!(Studio::new(gpu, &scene, &asked, None).irradiance(&view, &asked) == exact, "{method:?}");
-            // The same if it is a picture that asks for it, whichever came before.
+            // The same light results if a picture asks for the rotation, whatever picture came before.
             let mut studio = Studio::new(gpu, &scene, &still, None);
             assert!(studio.irradiance(&view, &still) != exact);
             let turning = Settings { turning: 1.0, ..asked.clone() };
             let nearly = studio.irradiance(&view, &turning);
             assert!(studio.irradiance(&view, &asked) == exact, "{method:?}");
-            // One that goes on turning has its light from means.
+            // An environment that keeps rotating is resampled from means.
             assert!(nearly != exact && studio.irradiance(&view, &turning) == nearly, "{method:?}");
         }
     });
@@ -113,9 +113,9 @@ fn another_environment_than_that_of_the_vectors_is_refused_or_followed() {
         ];
         for other in &others {
             let error = picture(&mut fiv, other, Method::Vectors).unwrap_err();
-            assert!(error.exit_code() == 2 && error.to_string().contains("another environment"), "{error}");
+            assert!(error.exit_code() == 2 && error.to_string().contains("not the environment"), "{error}");
         }
-        // One pixel of many: seen by methods that keep nothing of the environment.
+        // A change of one pixel is detected by methods that keep no data of the environment.
         let mut pixels = ours.pixels.clone();
         pixels[1] += 1e4;
         let spot = Environment { pixels, ..ours.clone() };
@@ -140,17 +140,17 @@ fn vectors_are_drawn_under_their_own_light_only() {
         let with = |rotation, method| Settings { rotation, method, ..coarse() };
         let mut studio = Studio::new(gpu, &scene, &coarse(), None);
         let before = studio.irradiance(&view, &with(0.0, Method::Vectors));
-        // Without shadows any light will do; after it the vectors are still for theirs.
+        // Without shadows any rotation is allowed. Afterwards the vectors are still valid for their own rotation.
         let turned = studio.irradiance(&view, &with(90.0, Method::Unshadowed));
         let error = studio.refused(&view, &with(90.0, Method::Vectors));
-        assert!(error.exit_code() == 2 && error.to_string().contains("another turn"), "{error}");
+        assert!(error.exit_code() == 2 && error.to_string().contains("another rotation"), "{error}");
         let after = studio.irradiance(&view, &with(0.0, Method::Vectors));
         assert!(before == after && before != turned);
     });
 }
 
 #[test]
-fn a_picture_asks_for_what_the_scene_was_made_ready_for() {
+fn pictures_may_choose_only_settings_that_preparation_leaves_open() {
     with_gpu(|gpu| {
         let (scene, view) = (ball_over_ground(), flat_view(Vec3::Y * 10.0, Vec3::ZERO, 3.0, [4, 4]));
         let made = coarse();
@@ -184,7 +184,7 @@ fn a_picture_asks_for_what_the_scene_was_made_ready_for() {
             ("shared", Settings { shared: Shared::Discs, ..made.clone() }),
             ("self_shadow", Settings { self_shadow: false, ..made.clone() }),
         ];
-        // Those of the light are the environment's, whose turn vectors have decided.
+        // The remaining keys belong to the environment, whose rotation the vectors have fixed.
         let known: Vec<&str> = [&fixed[..], &free[..]].concat().iter().map(|(key, _)| *key).collect();
         let serde_json::Value::Object(all) = serde_json::to_value(&made).unwrap() else { panic!("no table") };
         let others: Vec<_> = all.keys().filter(|key| !known.contains(&key.as_str())).collect();
@@ -196,7 +196,7 @@ fn a_picture_asks_for_what_the_scene_was_made_ready_for() {
         }
         for (key, choice) in free {
             let found = studio.irradiance(&view, &choice);
-            // The same as if the scene had been made ready with it.
+            // The picture equals the picture of a scene prepared with this choice.
             if ["cut", "shared"].contains(&key) {
                 let mut other = Studio::new(gpu, &scene, &choice, None);
                 assert!(found == other.irradiance(&view, &choice), "{key}");
@@ -212,7 +212,7 @@ fn what_a_file_decides_may_be_asked_for_as_it_was_given() {
         let (scene, view) = (ball_over_ground(), flat_view(Vec3::Y * 10.0, Vec3::ZERO, 3.0, [8, 8]));
         let even = Settings { adaptive: false, azimuths: 10, ..coarse() };
         let stored = stored(gpu, &scene, &even);
-        // It says that its samples lie evenly.
+        // The file says that its samples are evenly spaced.
         assert_eq!(stored.plan.settings(&coarse()), even);
         let mut second = Studio::new(gpu, &scene, &coarse(), Some(&stored));
         let exact = second.irradiance(&view, &even);
@@ -231,7 +231,7 @@ fn a_file_has_chosen_where_samples_lie_whatever_is_interpolated() {
         let mut studio = Studio::new(gpu, &scene, &coarse(), Some(&stored));
         let exact = Studio::new(gpu, &scene, &other, Some(&stored)).irradiance(&view, &other);
         assert!(studio.irradiance(&view, &other) == exact && studio.irradiance(&view, &coarse()) != exact);
-        // Where they are chosen for the scene, it is by what is interpolated.
+        // The spacing that was computed for the scene depends on the interpolation.
         let error = Studio::new(gpu, &scene, &coarse(), None).refused(&view, &other);
         assert_eq!(error.place(), Some("fiv.interpolation"));
     });
@@ -300,7 +300,7 @@ fn what_a_file_lacks_for_own_shadows_and_keys_that_do_nothing_online_are_named()
         assert!(!named(&told(&without, Some(&stored))) && !named(&told(&coarse(), None)));
         let online = Settings { method: Method::Online, adaptive: false, ..coarse() };
         let notes = told(&online, None);
-        assert!(notes.iter().any(|n| n.starts_with("fiv.adaptive: changes nothing")), "{notes:?}");
+        assert!(notes.iter().any(|n| n.starts_with("fiv.adaptive: has no effect")), "{notes:?}");
         assert!(told(&Settings { adaptive: false, ..coarse() }, None).iter().all(|n| !n.contains("fiv.adaptive")));
     });
 }
@@ -323,6 +323,6 @@ fn what_turns_or_deforms_is_named() {
         };
         let told = notes(1.3);
         assert!(told.iter().any(|n| n.contains("sculpture") && n.contains("deforms")), "{told:?}");
-        assert!(told.iter().any(|n| n.contains("turns")), "{told:?}");
+        assert!(told.iter().any(|n| n.contains("rotates")), "{told:?}");
     });
 }

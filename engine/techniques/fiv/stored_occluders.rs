@@ -1,30 +1,32 @@
-//! How occluders stand against their vectors, where these were computed beforehand.
+//! Poses of occluders relative to their precomputed vectors.
 
 use std::collections::HashSet;
 
-use super::{Fiv, Method, Settings, online_standing::Standing, pace::Paces, support, turn};
+use super::{
+    Fiv, Method, Settings, occluder_rotation, online_occluders::FrameOccluders, spacing::Spacing, support_function,
+};
 use crate::{
     scene::{Note, NoteKind, Pose, Scene, resident::Instance},
     shaders::{
-        consts::{FIV_FLOATS, FIV_PACE_KNOTS},
+        consts::{FIV_FLOATS, FIV_SPACING_KNOTS},
         types,
     },
 };
 
-/// No occluder, vector or table.
+/// Marks a missing occluder, vector or table.
 const NONE: u32 = u32::MAX;
 
 impl Fiv {
-    /// The occluders with their vectors that were computed beforehand.
-    pub(super) fn stored(&self, pose: &Pose, deforming: &HashSet<u32>) -> Standing {
+    /// The occluders of a frame with precomputed vectors.
+    pub(super) fn stored(&self, pose: &Pose, deforming: &HashSet<u32>) -> FrameOccluders {
         let grid = self.plan.grid;
-        let paces = self.firsts.last().map_or(0, |samples| *samples as u32 * FIV_FLOATS);
+        let spacing = self.firsts.last().map_or(0, |samples| *samples as u32 * FIV_FLOATS);
         let placed = self.occluders.placed.iter().map(|placed| {
             let kind = &self.plan.occluders[placed.kind as usize];
             let angle = self.angle(pose, placed.node);
-            let turned = turn::rotation(angle.unwrap_or(0.0), self.plan.turn_axis);
-            let (first, second, blend) = turn::between(angle.unwrap_or(0.0), self.plan.turns);
-            let pace = paces + placed.kind * (3 * FIV_PACE_KNOTS + grid.radii);
+            let turned = occluder_rotation::rotation(angle.unwrap_or(0.0), self.plan.turn_axis);
+            let (first, second, blend) = occluder_rotation::between(angle.unwrap_or(0.0), self.plan.turns);
+            let table = spacing + placed.kind * (3 * FIV_SPACING_KNOTS + grid.radii);
             types::FivOccluder {
                 centre: (pose.world[placed.node as usize].w_axis.truncate() + turned * placed.centre).to_array(),
                 radius: kind.radius,
@@ -37,20 +39,20 @@ impl Fiv {
                 nearest: kind.shells.nearest,
                 farthest: kind.shells.farthest,
                 steps: kind.shells.steps(grid.radii) as f32,
-                pace: if kind.paces == Paces::default() { NONE } else { pace },
-                reach: placed.kind * support::LENGTH as u32,
-                stands: (angle.is_some() && !deforming.contains(&placed.node)).into(),
+                spacing: if kind.spacing == Spacing::default() { NONE } else { table },
+                reach: placed.kind * support_function::LENGTH as u32,
+                self_shadows: (angle.is_some() && !deforming.contains(&placed.node)).into(),
                 turned: angle.is_some_and(|angle| angle != 0.0).into(),
                 to_rest: turned.transpose().to_cols_array_2d(),
                 ..Default::default()
             }
         });
         let nodes = self.occluders.placed.iter().map(|placed| placed.node).collect();
-        Standing { list: placed.collect(), nodes, ..Standing::default() }
+        FrameOccluders { list: placed.collect(), nodes, ..FrameOccluders::default() }
     }
 
-    /// Of each instance the occluder that it is of, and where the vectors of its corners are, as far as it stands as it did when they
-    /// were computed.
+    /// For each instance the number of its occluder and the first vectors of its vertices. The vectors are left out if
+    /// the occluder's pose has no vectors.
     pub(super) fn owners(
         &self,
         (pose, deforming): (&Pose, &HashSet<u32>),
@@ -75,19 +77,19 @@ impl Fiv {
         let mut owners: Vec<_> = instances
             .iter()
             .map(|instance| {
-                // Primitives of a node stand next to each other, in their order.
+                // Primitives of a node are next to each other, in their order.
                 slot = if instance.node == node { slot + 1 } else { 0 };
                 node = instance.node;
                 let occluder = of_node.get(node as usize).copied().unwrap_or(NONE);
                 let mut owner = types::FivOwner { occluder, ..none };
-                // Stored vectors have all occluders, in their order.
+                // With precomputed vectors all occluders are in the list, in their order.
                 let placed = self.occluders.placed.get(occluder as usize).filter(|_| known);
                 let Some(placed) = placed else { return owner };
                 let angle = self.angle(pose, node).filter(|_| !deforming.contains(&node));
                 let Some(angle) = angle else {
                     return owner;
                 };
-                let (turn, next, blend) = turn::between(angle, self.plan.turns);
+                let (turn, next, blend) = occluder_rotation::between(angle, self.plan.turns);
                 let mut first = self.plan.grid.count();
                 for own in &self.occluders.kinds[placed.kind as usize].own {
                     if own.slot == slot {
@@ -109,24 +111,24 @@ impl Fiv {
         owners
     }
 
-    /// Where the vector of a sample of a turn of a kind begins.
+    /// First float of the vector of a sample.
     fn first_float(&self, kind: u32, turn: u32, sample: u32) -> u32 {
         let of_turn = self.plan.of_turn(&self.plan.occluders[kind as usize]) as u32;
         (self.firsts[kind as usize] as u32 + turn * of_turn + sample) * FIV_FLOATS
     }
 
-    /// Nodes whose meshes may be another than when the vectors were computed.
+    /// Nodes whose meshes may differ from the meshes that the vectors were computed for.
     pub(super) fn deforming(&self, pose: &Pose, instances: &[Instance]) -> HashSet<u32> {
         let moved = *pose != self.at_rest;
         instances.iter().filter(|instance| moved && instance.deformed).map(|instance| instance.node).collect()
     }
 
-    /// Occluders that do not stand as their vectors were computed.
+    /// Notes on occluders whose current pose has no vectors.
     pub(super) fn turned(&self, scene: &Scene, pose: &Pose, instances: &[Instance]) -> Vec<Note> {
         let deforming = self.deforming(pose, instances);
         let what = |node: u32| match (self.angle(pose, node), deforming.contains(&node)) {
             (_, true) => Some("deforms"),
-            (None, _) => Some("turns or changes its size"),
+            (None, _) => Some("rotates or changes its size"),
             _ => None,
         };
         let found = self.occluders.placed.iter().filter_map(|placed| Some((placed.node, what(placed.node)?)));
@@ -135,8 +137,8 @@ impl Fiv {
                 kind: NoteKind::Approximated,
                 place: format!("nodes[{node}] ({})", scene.nodes[node as usize].name),
                 text: format!(
-                    "{what}; its shadow on others stays that of its pose at rest, and it has none on itself \
-                     (fiv.method=online follows it)"
+                    "{what}; its shadow on other surfaces stays the shadow of its pose at rest, and it has no shadow on \
+                     itself (fiv.method=online computes both)"
                 ),
             })
             .collect()

@@ -1,9 +1,10 @@
-//! Where samples lie: close to each other where what is hidden bends, far apart where it is nearly straight.
+//! Spacing of the samples: dense where the vectors have a high curvature, sparse where they are nearly linear.
 //!
-//! The thesis grows radii by a constant factor and spreads directions evenly; its future work asks for samples that follow the occluder
-//! and the environment (chapter 6). Here an occluder is looked at along each of the three coordinates in fine steps first. Linear
-//! interpolation between samples `h` apart is wrong by h²/8 of the second derivative; the mean square is least where samples lie as
-//! densely as the fifth root of its square (de Boor, A Practical Guide to Splines, chapter III).
+//! The thesis grows radii by a constant factor and spaces directions evenly. Its future work asks for samples that
+//! adapt to the occluder and the environment (chapter 6). Here the vectors of an occluder are first computed in fine
+//! steps along each of the three coordinates. The error of linear interpolation between samples at distance `h` is h²/8
+//! times the second derivative. The mean square error is least if the density of samples is proportional to the fifth
+//! root of the square of the second derivative (de Boor, A Practical Guide to Splines, chapter III).
 
 use std::f64::consts::{PI, TAU};
 
@@ -18,35 +19,36 @@ use super::{
 use crate::{
     Result,
     graph::Runner,
-    shaders::consts::{FIV_FLOATS, FIV_INSIDE, FIV_PACE_KNOTS},
+    shaders::consts::{FIV_FLOATS, FIV_INSIDE, FIV_SPACING_KNOTS},
 };
 
-const KNOTS: usize = FIV_PACE_KNOTS as usize;
-/// Directions along which radii are looked at.
+const KNOTS: usize = FIV_SPACING_KNOTS as usize;
+/// Directions along which the vectors are computed in fine steps of the radius.
 const WAYS: Grid = Grid::of(8, 5, 2);
-/// Directions that are looked at, azimuths and polar angles in fine steps; on spheres of these radii, in those of the occluder.
+/// Fine steps of azimuth and polar angle, on spheres of these radii, in radii of the occluder.
 const FINE: [usize; 2] = [2 * (KNOTS - 1), KNOTS - 1];
 const SPHERES: [f64; 2] = [1.5, 4.0];
-/// Samples lie at least this part as densely as if evenly.
+/// Least density of samples, as a share of the even density.
 const LEAST: f64 = 0.25;
-/// Numbers are multiples of this, so that devices that round otherwise choose the same.
+/// Knots are rounded to multiples of this step, so that devices that round differently compute the same knots.
 const GRAIN: f64 = 1.0 / 256.0;
 
-/// How many samples lie below even steps of a coordinate, from 0 to all; empty: evenly.
-pub type Pace = Vec<f32>;
+/// The sample number at each of the evenly spaced knots of a coordinate, from 0 to the last sample. Empty: samples are
+/// evenly spaced.
+pub type Knots = Vec<f32>;
 
-/// How samples lie along their three coordinates.
+/// Spacing of the samples along their three coordinates.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Paces {
-    /// Up to the one at 2π, which is the one at 0.
-    pub azimuth: Pace,
-    pub polar: Pace,
-    /// In the logarithm of the radius.
-    pub radius: Pace,
+pub struct Spacing {
+    /// Up to the sample at 2π, which is the sample at 0.
+    pub azimuth: Knots,
+    pub polar: Knots,
+    /// Along the logarithm of the radius.
+    pub radius: Knots,
 }
 
-impl Paces {
-    /// With the number of the last sample of each.
+impl Spacing {
+    /// The knots of each coordinate with the number of its last sample.
     fn all(&self, grid: &Grid) -> [(&[f32], f64); 3] {
         [
             (&self.azimuth, f64::from(grid.azimuths)),
@@ -55,13 +57,13 @@ impl Paces {
         ]
     }
 
-    /// Place of the occluder's centre seen from the receiver, metres.
+    /// Offset of the occluder's centre from the receiver, metres.
     pub fn offset(&self, grid: &Grid, shells: &Shells, index: u32) -> DVec3 {
         let [azimuth, polar, sphere] = grid.place(index);
         self.direction(grid, azimuth, polar) * self.radius(grid, shells, sphere)
     }
 
-    /// Unit vector from the receiver to the occluder. At the poles the same for all azimuths.
+    /// Unit vector from the receiver to the occluder. At the poles all azimuths have the same direction.
     fn direction(&self, grid: &Grid, azimuth: u32, polar: u32) -> DVec3 {
         let [(a, azimuths), (p, polars), _] = self.all(grid);
         if (a.is_empty() && p.is_empty()) || polar == 0 || polar + 1 >= grid.polars {
@@ -71,7 +73,7 @@ impl Paces {
         DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos())
     }
 
-    /// Of a sphere, metres.
+    /// Radius of a sphere of samples, metres.
     pub fn radius(&self, grid: &Grid, shells: &Shells, sphere: u32) -> f64 {
         if self.radius.is_empty() || sphere == 0 || sphere + 1 >= grid.radii {
             return shells.radius(grid.radii, sphere);
@@ -80,7 +82,7 @@ impl Paces {
         near * (far / near).powf(part_of(&self.radius, f64::from(grid.radii - 1), sphere.into()))
     }
 
-    /// Numbers of the sample, with their fractions, where the occluder's centre lies at `offset` (metres).
+    /// Sample numbers with fractions for an occluder whose centre lies at `offset` (metres) from the receiver.
     pub fn numbers(&self, grid: &Grid, shells: &Shells, offset: DVec3) -> [f64; 3] {
         let (near, far) = (f64::from(shells.nearest), f64::from(shells.farthest));
         let parts = [
@@ -92,50 +94,53 @@ impl Paces {
         [0, 1, 2].map(|k| number_at(all[k].0, all[k].1, parts[k]))
     }
 
-    /// As shaders take it: knots of all three, then radii in metres.
+    /// The table that shaders read: the knots of the three coordinates, then the radii of the spheres, metres.
     pub fn table(&self, grid: &Grid, shells: &Shells) -> Vec<f32> {
         let knot = |k: usize| k as f64 / (KNOTS - 1) as f64;
-        let knots =
-            self.all(grid).into_iter().flat_map(|(pace, last)| (0..KNOTS).map(move |k| number_at(pace, last, knot(k))));
+        let knots = self
+            .all(grid)
+            .into_iter()
+            .flat_map(|(knots, last)| (0..KNOTS).map(move |k| number_at(knots, last, knot(k))));
         let radii = (0..grid.radii).map(|sphere| self.radius(grid, shells, sphere));
         knots.chain(radii).map(|x| x as f32).collect()
     }
 
-    /// They go from the first sample to the last, each knot beyond the one before.
+    /// Whether each coordinate has increasing knots from the first sample to the last.
     pub fn fit(&self, grid: &Grid) -> bool {
-        self.all(grid).iter().all(|(pace, last)| {
-            let ends = pace.first().zip(pace.last());
-            pace.is_empty()
-                || pace.len() == KNOTS
+        self.all(grid).iter().all(|(knots, last)| {
+            let ends = knots.first().zip(knots.last());
+            knots.is_empty()
+                || knots.len() == KNOTS
                     && ends.is_some_and(|(first, end)| (*first, f64::from(*end)) == (0.0, *last))
-                    && pace.windows(2).all(|p| p[1] > p[0])
+                    && knots.windows(2).all(|p| p[1] > p[0])
         })
     }
 }
 
-/// Number of the sample, with its fraction, at a part (0..1) of the coordinate; `last`: number at its end.
-fn number_at(pace: &[f32], last: f64, part: f64) -> f64 {
+/// Sample number with fraction at `part` (0..1) of the coordinate. `last`: number at the end of the coordinate.
+fn number_at(knots: &[f32], last: f64, part: f64) -> f64 {
     let part = part.clamp(0.0, 1.0);
-    if pace.len() < 2 {
+    if knots.len() < 2 {
         return part * last;
     }
-    let x = part * (pace.len() - 1) as f64;
-    let k = (x as usize).min(pace.len() - 2);
-    let (low, high) = (f64::from(pace[k]), f64::from(pace[k + 1]));
+    let x = part * (knots.len() - 1) as f64;
+    let k = (x as usize).min(knots.len() - 2);
+    let (low, high) = (f64::from(knots[k]), f64::from(knots[k + 1]));
     low + (high - low) * (x - k as f64)
 }
 
 /// The inverse of [`number_at`].
-fn part_of(pace: &[f32], last: f64, number: f64) -> f64 {
-    if pace.len() < 2 {
+fn part_of(knots: &[f32], last: f64, number: f64) -> f64 {
+    if knots.len() < 2 {
         return number / last;
     }
-    let k = pace.partition_point(|p| f64::from(*p) <= number).clamp(1, pace.len() - 1) - 1;
-    let (low, high) = (f64::from(pace[k]), f64::from(pace[k + 1]));
-    (k as f64 + ((number - low) / (high - low)).clamp(0.0, 1.0)) / (pace.len() - 1) as f64
+    let k = knots.partition_point(|p| f64::from(*p) <= number).clamp(1, knots.len() - 1) - 1;
+    let (low, high) = (f64::from(knots[k]), f64::from(knots[k + 1]));
+    (k as f64 + ((number - low) / (high - low)).clamp(0.0, 1.0)) / (knots.len() - 1) as f64
 }
 
-/// Looks at an occluder and chooses. `radius`: of its bounding sphere, metres; `scaled`: what is interpolated is free of its solid angle.
+/// Computes the spacing for an occluder. `radius`: radius of its bounding sphere, metres. `scaled`: vectors are
+/// interpolated relative to the solid angle of the bounding sphere.
 ///
 /// # Errors
 /// `OutOfMemory`, `DeviceLost`.
@@ -145,12 +150,11 @@ pub fn choose(
     light: &Light,
     (grid, shells): (&Grid, &Shells),
     (radius, scaled): (f32, bool),
-) -> Result<Paces> {
+) -> Result<Spacing> {
     let mut look = |points: &[DVec3]| -> Result<Vec<f32>> {
         let points: Vec<Vec3> = points.iter().map(|p| -p.as_vec3()).collect();
         Ok(cover.run(runner, light, &points, 1)?.0)
     };
-    // Along radii.
     let steps = 2 * (KNOTS - 1);
     let rho = |step: usize| shells.radius(steps as u32 + 1, step as u32);
     let ways = (0..WAYS.azimuths * WAYS.polars).map(|i| WAYS.direction(i % WAYS.azimuths, i / WAYS.azimuths));
@@ -158,13 +162,12 @@ pub fn choose(
     let fivs = look(&points)?;
     let reach = |step: usize| if scaled { rho(step).max(f64::from(radius)).powi(2) } else { 1.0 };
     let lines: Vec<&[f32]> = fivs.chunks_exact(FIV_FLOATS as usize * (steps + 1)).collect();
-    // On a plane there is as much to be seen at a radius as its square, for each factor.
+    // A ground shows an area proportional to the square of the radius in each interval of the radius' logarithm.
     let bend = |s: usize| {
         lines.iter().map(|line| bend(line, [s - 1, s, s + 1], reach)).sum::<f64>() * (rho(s) / reach(s)).powi(2)
     };
     let of_radius = spread(&(1..steps).map(bend).collect::<Vec<_>>(), f64::from(grid.radii - 1));
 
-    // Along both angles.
     let [azimuths, polars] = FINE;
     let fine = Grid::of(azimuths as u32, polars as u32 + 1, 2);
     let way = |i: usize| fine.direction((i % azimuths) as u32, (i / azimuths) as u32);
@@ -184,9 +187,9 @@ pub fn choose(
             }
         }
     }
-    // The one at 0 is the one at 2π.
+    // The sample at 0 is the sample at 2π.
     let around: Vec<f64> = (1..azimuths).map(|a| around[a]).collect();
-    Ok(Paces {
+    Ok(Spacing {
         azimuth: spread(&around, f64::from(grid.azimuths)),
         polar: spread(&down, f64::from(grid.polars - 1)),
         radius: of_radius,
@@ -197,7 +200,8 @@ fn bend_of(fivs: &[f32], at: [usize; 3]) -> f64 {
     bend(fivs, at, |_| 1.0)
 }
 
-/// Square of the second difference of three vectors, each times a number; 0 if one of them lies inside.
+/// Square of the second difference of three vectors, each times a factor. 0 if one of the samples lies inside the
+/// occluder.
 fn bend(fivs: &[f32], at: [usize; 3], times: impl Fn(usize) -> f64) -> f64 {
     let floats = FIV_FLOATS as usize;
     let of = |step: usize| &fivs[floats * step..floats * (step + 1)];
@@ -208,14 +212,15 @@ fn bend(fivs: &[f32], at: [usize; 3], times: impl Fn(usize) -> f64) -> f64 {
     (0..floats).map(|k| (value(at[0], k) - 2.0 * value(at[1], k) + value(at[2], k)).powi(2)).sum()
 }
 
-/// Samples as densely as the fifth roots of the squares of second differences at even steps, without the first and the last one.
-fn spread(bends: &[f64], last: f64) -> Pace {
+/// Knots with a density proportional to the fifth roots of `bends`, the squares of second differences at even steps
+/// without the first and the last step.
+fn spread(bends: &[f64], last: f64) -> Knots {
     let roots: Vec<f64> = bends.iter().map(|b| b.max(0.0).powf(0.2)).collect();
     let mean = roots.iter().sum::<f64>() / roots.len().max(1) as f64;
     if !(mean.is_finite() && mean > 0.0) {
-        return Pace::new();
+        return Knots::new();
     }
-    // The mean of neighbours: rays make steps of their own.
+    // The mean of neighbours removes the steps that single rays cause.
     let around = |i: usize| {
         let near = &roots[i.saturating_sub(2)..(i + 3).min(roots.len())];
         near.iter().sum::<f64>() / near.len() as f64
@@ -228,10 +233,10 @@ fn spread(bends: &[f64], last: f64) -> Pace {
     }
     let (whole, each) = (sums[steps], steps / (KNOTS - 1));
     let knot = |knot: usize| ((sums[knot * each] / whole * last / GRAIN).round() * GRAIN) as f32;
-    let mut pace: Pace = (0..KNOTS).map(knot).collect();
-    pace[KNOTS - 1] = last as f32;
-    // Rounding never joins two.
-    if pace.windows(2).any(|p| p[1] <= p[0]) { Pace::new() } else { pace }
+    let mut knots: Knots = (0..KNOTS).map(knot).collect();
+    knots[KNOTS - 1] = last as f32;
+    // Even spacing replaces knots that rounding has joined.
+    if knots.windows(2).any(|p| p[1] <= p[0]) { Knots::new() } else { knots }
 }
 
 #[cfg(test)]
@@ -252,21 +257,21 @@ mod tests {
     fn samples_crowd_where_it_bends_and_numbers_are_inverse_to_places() {
         let bends: Vec<f64> = (0..63).map(|i| if (10..20).contains(&i) { 1.0 } else { 1e-6 }).collect();
         let grid = Grid::of(16, 9, 15);
-        let paces =
-            Paces { azimuth: spread(&bends, 16.0), polar: spread(&bends[..31], 8.0), radius: spread(&bends, 14.0) };
-        assert!(paces.fit(&grid) && !paces.fit(&Grid::of(16, 9, 16)) && Paces::default().fit(&grid));
-        let there = paces.radius[9] - paces.radius[6];
-        assert!(there > 2.5 * (paces.radius[27] - paces.radius[24]), "{:?}", paces.radius);
+        let spacing =
+            Spacing { azimuth: spread(&bends, 16.0), polar: spread(&bends[..31], 8.0), radius: spread(&bends, 14.0) };
+        assert!(spacing.fit(&grid) && !spacing.fit(&Grid::of(16, 9, 16)) && Spacing::default().fit(&grid));
+        let there = spacing.radius[9] - spacing.radius[6];
+        assert!(there > 2.5 * (spacing.radius[27] - spacing.radius[24]), "{:?}", spacing.radius);
         let shells = Shells { nearest: 0.1, farthest: 6.4 };
-        for paces in [&paces, &Paces::default()] {
+        for spacing in [&spacing, &Spacing::default()] {
             for index in 0..grid.count() {
                 let [a, p, r] = grid.place(index);
-                let found = paces.numbers(&grid, &shells, paces.offset(&grid, &shells, index));
+                let found = spacing.numbers(&grid, &shells, spacing.offset(&grid, &shells, index));
                 assert!((found[1] - f64::from(p)).abs() < 1e-5 && (found[2] - f64::from(r)).abs() < 1e-5, "{found:?}");
                 let apart = (found[0] - f64::from(a)).rem_euclid(16.0);
                 assert!(p == 0 || p == 8 || apart.min(16.0 - apart) < 1e-5, "{found:?} instead of {a}");
             }
-            let table = paces.table(&grid, &shells);
+            let table = spacing.table(&grid, &shells);
             assert_eq!((table.len(), table[KNOTS - 1], table[3 * KNOTS - 1]), (3 * KNOTS + 15, 16.0, 14.0));
             assert!((table[3 * KNOTS] - 0.1).abs() < 1e-6 && (table[3 * KNOTS + 14] - 6.4).abs() < 1e-5);
         }

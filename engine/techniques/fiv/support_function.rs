@@ -1,8 +1,10 @@
-//! How far an occluder reaches along every direction: what decides whether it lies in front of a receiver's plane.
+//! Extent of an occluder along every direction. It decides which share of the occluder lies in front of a receiver's
+//! plane.
 //!
-//! The thesis asks its bounding sphere (section 3.3.3.1). A body that stands on a ground dips below it with its sphere, though not with
-//! itself, and would count as cut: its whole shadow would be too light. The support function of its corners says how far it really
-//! reaches; for a ball both are the same.
+//! The thesis uses the bounding sphere (section 3.3.3.1). The bounding sphere of a body that stands on the ground
+//! reaches below the ground, although the body does not. The body would count as cut, and its whole shadow would be too
+//! light. The support function of the vertices gives the exact extent of the convex hull. For a ball both methods
+//! agree.
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,21 +12,23 @@ use glam::{DVec3, Vec3};
 
 use crate::shaders::consts::{FIV_REACH_AZIMUTHS, FIV_REACH_POLARS};
 
-/// Points that are gone through at once.
+/// Points that are processed at once, for the vector units of the CPU.
 const LANES: usize = 8;
 
-/// Numbers of a table.
+/// Entries of a table.
 pub const LENGTH: usize = (FIV_REACH_AZIMUTHS * FIV_REACH_POLARS) as usize;
 
-/// Largest coordinate of some points along directions of a grid: azimuths around +Y (0 over −Z, towards +X) next to each other, then
-/// from +Y to −Y, both included. Metres. Opposite directions of the grid are of the grid.
+/// Largest coordinate of a set of points along the directions of a grid, metres. Azimuths around +Y (0 over −Z, towards
+/// +X) lie next to each other, then the polar angles from +Y to −Y, both included. The opposite of each grid direction
+/// is a grid direction.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Support(pub Vec<f32>);
+pub struct SupportFunction(pub Vec<f32>);
 
-impl Support {
-    /// Of points around the origin.
+impl SupportFunction {
+    /// The support function of points around the origin.
     pub fn of(points: &[Vec3]) -> Self {
-        // Several at once: what deforms is measured in each frame. The last point fills the last row up.
+        // Eight points at once, because occluders that deform are measured in each frame. Copies of the last point fill
+        // the last row.
         let row = |row: usize, axis: usize| {
             std::array::from_fn(|lane| points[(LANES * row + lane).min(points.len() - 1)][axis])
         };
@@ -41,7 +45,7 @@ impl Support {
             }
             most.into_iter().fold(f32::NEG_INFINITY, f32::max)
         };
-        // All azimuths are one direction at the poles.
+        // All azimuths have the same direction at the poles.
         let (row, last) = (FIV_REACH_AZIMUTHS as usize, LENGTH - FIV_REACH_AZIMUTHS as usize);
         let mut table: Vec<f32> =
             (0..LENGTH).map(|i| if i % row > 0 && !(row..last).contains(&i) { 0.0 } else { reach(i) }).collect();
@@ -51,7 +55,7 @@ impl Support {
         Self(table)
     }
 
-    /// Along a unit vector, metres: bilinear between directions of the grid. Twin of lib/fiv_reach.glsl.
+    /// Extent along a unit vector, metres, interpolated between four grid directions. Twin of lib/fiv_reach.glsl.
     pub fn along(&self, n: Vec3) -> f32 {
         let n = n.as_dvec3();
         let (azimuths, polars) = (FIV_REACH_AZIMUTHS, FIV_REACH_POLARS);
@@ -64,7 +68,8 @@ impl Support {
         row(p0) * (1.0 - t) + row(p0 + 1) * t
     }
 
-    /// The part of the body's height over a plane that lies in front of it; `distance` of the origin from the plane, metres.
+    /// Share of the extent along `normal` that lies in front of a plane. `distance`: signed distance of the origin from
+    /// the plane, metres.
     pub fn front(&self, distance: f32, normal: Vec3) -> f32 {
         let (over, under) = (self.along(normal), self.along(-normal));
         ((distance + over) / (over + under).max(1e-20)).clamp(0.0, 1.0)
@@ -88,7 +93,7 @@ mod tests {
         let corners: Vec<Vec3> = (0..8)
             .map(|k| half * Vec3::new(1.0 - (k & 1) as f32 * 2.0, 1.0 - (k & 2) as f32, 1.0 - (k & 4) as f32 * 0.5))
             .collect();
-        let support = Support::of(&corners);
+        let support = SupportFunction::of(&corners);
         for (axis, exact) in [(Vec3::X, 1.0), (Vec3::Y, 0.5), (Vec3::Z, 0.25), (Vec3::NEG_X, 1.0), (Vec3::NEG_Y, 0.5)] {
             assert!((support.along(axis) - exact).abs() < 1e-5, "{axis}: {}", support.along(axis));
         }
@@ -99,7 +104,7 @@ mod tests {
             let exact = n.abs().dot(half);
             assert!((support.along(n) - exact).abs() < 0.03, "{n}: {} instead of {exact}", support.along(n));
         }
-        // Standing on the plane it is all in front, below it nothing.
+        // A box that stands on the plane lies in front of the plane, a box below the plane lies behind it.
         assert_eq!((support.front(0.5, Vec3::Y), support.front(-0.5, Vec3::Y)), (1.0, 0.0));
         assert!((support.front(0.25, Vec3::Y) - 0.75).abs() < 1e-5);
     }
@@ -109,7 +114,7 @@ mod tests {
         for count in [1, 7, 8, 9, 100] {
             let points: Vec<Vec3> =
                 (0..count).map(|i| Vec3::new((i as f32).sin(), (1.7 * i as f32).cos(), 0.1 * i as f32 - 3.0)).collect();
-            let support = Support::of(&points);
+            let support = SupportFunction::of(&points);
             for (i, found) in support.0.iter().enumerate().filter(|(i, _)| i % FIV_REACH_AZIMUTHS as usize == 0) {
                 let exact = points.iter().map(|p| p.dot(direction(i).as_vec3())).fold(f32::NEG_INFINITY, f32::max);
                 assert_eq!(found.to_bits(), exact.to_bits(), "{count} points, direction {i}");
@@ -120,7 +125,7 @@ mod tests {
     #[test]
     fn the_share_of_a_ball_is_the_thesis() {
         let points: Vec<Vec3> = (0..LENGTH).map(|i| direction(i).as_vec3() * 2.0).collect();
-        let support = Support::of(&points);
+        let support = SupportFunction::of(&points);
         for d in [-2.5f32, -1.0, 0.0, 0.7, 2.0, 3.0] {
             let exact = crate::reference::fiv::front(f64::from(d), 2.0) as f32;
             for n in [Vec3::Y, Vec3::X, Vec3::new(0.6, -0.64, 0.48)] {

@@ -1,12 +1,14 @@
-//! An environment that turns: its texels for any turn, without going through all of its pixels again.
+//! An environment that rotates: its cube map for any rotation without a pass over all pixels.
 //!
-//! Turns move columns of pixels and leave their rows where they are, and so are the texels of a cube cut into wedges of azimuth once
-//! and for all. Of each column sums from the top down are kept; what a wedge has between two latitudes is then a difference of two
-//! numbers of each of the few columns that it shares. Where nothing turns light is summed up pixel by pixel, as by [`Sky::new`].
+//! A rotation shifts the columns of a latitude-longitude image and keeps its rows. The texels of the cube map are
+//! therefore cut once into wedges of azimuth. Each column has prefix sums of radiance from the top down. The light of a
+//! wedge between two latitudes is then a difference of two prefix sums in each of the few columns that overlap the
+//! wedge. Environments that do not rotate are resampled pixel by pixel, as by [`Sky::new`].
 //!
-//! The difference of two sums lacks what rounding has lost in both: below a pixel of 10¹⁴ times their radiance 32 texels to a side are off
-//! by half a percent, at 10¹⁵ by a sixth, and from 10¹⁶ on they are noise (1024 rows; the mean irradiance does not notice, shadows of such
-//! a pixel do).
+//! The difference of two prefix sums has the rounding errors of both. With 1024 rows and a pixel of 10¹⁴ times the
+//! radiance of the texels below this pixel, these texels are off by half a percent in a cube map of 32 texels to a
+//! side. At 10¹⁵ the error is a sixth. From 10¹⁶ on the texels are noise. The mean irradiance stays correct, but
+//! shadows of such a pixel do not.
 
 use std::f64::consts::{PI, TAU};
 
@@ -15,36 +17,36 @@ use glam::DVec3;
 use super::sky::{self, Sky, Sums};
 use crate::{Result, scene::Environment};
 
-/// Columns and rows that are told apart: finer pictures have means of several pixels there. A sixteenth of a texel's edge, if there
-/// are 32.
+/// Largest numbers of columns and rows. Finer images are averaged to these sizes. A column is a sixteenth of a texel's
+/// edge with 32 texels to a side.
 const COLUMNS: usize = 2048;
 const ROWS: usize = 1024;
 
-/// The light of an environment under all turns.
+/// Cube maps of an environment for all rotations.
 #[derive(Debug)]
-pub struct Turning {
+pub struct RotatingSky {
     size: u32,
-    /// Summed up pixel by pixel, for the last such turn (radians).
+    /// The result of the pixel-by-pixel method for its last rotation (radians).
     exact: Option<(f32, Sums)>,
     turned: Option<Table>,
-    /// By the table, for the last such turn.
+    /// The result of the table for its last rotation (radians).
     last: Option<(f32, Sums)>,
 }
 
-impl Turning {
-    /// Nothing is summed up yet. `size`: texels along an edge of the cube.
+impl RotatingSky {
+    /// Creates an empty cache. `size`: texels along an edge of the cube.
     pub fn new(size: u32) -> Self {
         Self { size, exact: None, turned: None, last: None }
     }
 
-    /// Forgets the environment: the next may be another.
+    /// Clears the cache, because the next environment may be different.
     pub fn forget(&mut self) {
         *self = Self::new(self.size);
     }
 
-    /// The environment turned by `rotation` radians, with a factor; both in place of its own. `still`: light is summed up pixel by pixel,
-    /// which takes long. The same for the same turn, whichever came before. It must be the environment of all calls before, since
-    /// [`Turning::forget`].
+    /// The cube map of the environment with the rotation `rotation` (radians) and the scale `scale` instead of its own.
+    /// `still`: use the slow pixel-by-pixel method. The result does not depend on earlier calls. `environment` must be
+    /// the same in all calls since [`RotatingSky::forget`].
     ///
     /// # Errors
     /// As [`Sky::new`].
@@ -65,36 +67,38 @@ impl Turning {
     }
 }
 
-/// Where the texels of a cube and the columns of a picture are.
+/// Wedges of the cube map and prefix sums of the image.
 #[derive(Debug)]
 struct Table {
     size: u32,
     repaired: u64,
     rows: usize,
-    /// Where columns begin and the last one ends, parts of a turn.
+    /// Azimuths at which columns begin and the last column ends, as parts of a full turn.
     edges: Vec<f64>,
-    /// For each column, one after the other, at each edge of its rows: radiance × differences of sines of the latitude above.
+    /// Prefix sums for each column at each edge of its rows: radiance × differences of the sine of the latitude, from
+    /// the top down.
     above: Vec<DVec3>,
     wedges: Vec<Wedge>,
-    /// Solid angles of the texels as wedges have them.
+    /// Solid angle of each texel as the sum over the wedges, sr.
     angles: Vec<f64>,
 }
 
-/// What lies between two azimuths.
+/// The part of the sphere between two azimuths, radians.
 #[derive(Debug)]
 struct Wedge {
     begin: f64,
     end: f64,
-    /// From the top down.
+    /// Intersections with texels from the top down.
     runs: Vec<Run>,
 }
 
-/// What of a wedge lies in one texel.
+/// The intersection of a wedge with a texel.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     texel: u32,
-    /// Its lower end: the row of the picture, and the part of that above.
+    /// Row of the image at the lower end of the intersection.
     row: u32,
+    /// Fraction of this row above the lower end.
     part: f64,
 }
 
@@ -124,7 +128,7 @@ impl Table {
         }
         let sines: Vec<f64> = (0..=rows).map(|row| sine(row * height / rows)).collect();
         let mut angles = vec![0.0; 6 * size as usize * size as usize];
-        // As fine as the columns are.
+        // The wedges are as narrow as the columns.
         let wedges = sky::wedges(COLUMNS as u32, 0.0, size)
             .into_iter()
             .map(|(begin, end)| Wedge { begin, end, runs: runs(&sines, size, (begin, end), &mut angles) })
@@ -133,7 +137,7 @@ impl Table {
         Self { size, repaired, rows, edges, above, wedges, angles }
     }
 
-    /// Under a turn by `rotation` radians.
+    /// The sums of all texels for a rotation by `rotation` radians.
     fn sums(&self, rotation: f64) -> Sums {
         let mut light = vec![DVec3::ZERO; self.angles.len()];
         let mut shares = Vec::new();
@@ -146,7 +150,7 @@ impl Table {
                     let [from, to] = [0, 1].map(|next| self.above[first + run.row as usize + next]);
                     now += (from + (to - from) * run.part) * *share;
                 }
-                // Where nothing shines both are the same; rounding must not make light below nothing.
+                // Both prefix sums are equal in black parts. Rounding must not make negative light there.
                 light[run.texel as usize] += (now - before).max(DVec3::ZERO);
                 before = now;
             }
@@ -155,7 +159,8 @@ impl Table {
         Sums { size: self.size, texels, repaired: self.repaired }
     }
 
-    /// Where the columns that a wedge shares begin in `above`, and how much of it each has, radians.
+    /// For each column that overlaps a wedge: the start of the column in `above`, and the width of the overlap,
+    /// radians.
     fn columns(&self, wedge: &Wedge, rotation: f64, shares: &mut Vec<(usize, f64)>) {
         shares.clear();
         let count = self.edges.len() - 1;
@@ -170,7 +175,7 @@ impl Table {
             left -= here;
             column = (column + 1) % count;
             at = self.edges[column];
-            // A turn is all there is.
+            // A wedge is never wider than a full turn.
             if shares.len() > count {
                 break;
             }
@@ -178,7 +183,7 @@ impl Table {
     }
 }
 
-/// The texels along the meridian in the middle of a wedge; adds its solid angle to that of each.
+/// The texels along the meridian in the middle of a wedge. Adds the solid angle of each intersection to `angles`.
 fn runs(sines: &[f64], size: u32, (begin, end): (f64, f64), angles: &mut [f64]) -> Vec<Run> {
     let middle = 0.5 * (begin + end);
     let (x, z) = (middle.sin(), -middle.cos());
@@ -210,7 +215,7 @@ mod tests {
     use super::*;
     use crate::scene::builtin;
 
-    /// How far apart two skies are, against the mean of the first.
+    /// Mean difference of two cube maps relative to the mean of the first.
     fn apart(a: &Sky, b: &Sky) -> f32 {
         let mean = a.radiance.iter().copied().sum::<Vec3>().element_sum() / a.radiance.len() as f32;
         let off = a.radiance.iter().zip(&b.radiance).map(|(a, b)| (*a - *b).abs().element_sum());
@@ -225,34 +230,35 @@ mod tests {
     fn at_rest_it_is_the_sky_to_the_last_bit_and_turned_nearly() {
         for (name, size) in [("grove", 32), ("areas", 16), ("point", 8)] {
             let env = Environment { rotation: 0.3, scale: 0.7, ..builtin::environment(name).unwrap() };
-            let mut turning = Turning::new(size);
-            let first = turning.sky(&env, (env.rotation, env.scale), true).unwrap();
+            let mut rotating = RotatingSky::new(size);
+            let first = rotating.sky(&env, (env.rotation, env.scale), true).unwrap();
             assert!(first == Sky::new(Some(&env), size).unwrap());
             for rotation in [0.0, 0.301, 2.0, -3.0, 9.5] {
                 let (witness, found) =
-                    (exact(&env, rotation, size), turning.sky(&env, (rotation, env.scale), false).unwrap());
+                    (exact(&env, rotation, size), rotating.sky(&env, (rotation, env.scale), false).unwrap());
                 let off = apart(&witness, &found);
                 eprintln!("{name} at {rotation}: {off:.2e} apart, from the first {:.2e}", apart(&first, &found));
-                // The witness' wedges are up to twice as wide: light near edges of texels lies in one or the other.
+                // The wedges of the witness are up to twice as wide, so light near the edges of texels may fall into a
+                // neighbouring texel.
                 assert!(off < 2e-2, "{name} {rotation}: {off}");
                 for normal in [DVec3::Y, DVec3::X, DVec3::new(0.6, 0.64, -0.48)] {
                     let [a, b] = [&witness, &found].map(|sky| crate::reference::fiv::irradiance(sky, normal));
                     assert!((a - b).length() < 2e-3 * a.length() + 1e-6, "{name} {rotation}: {a} {b}");
                 }
-                // Where nothing shines nothing does, however it turns.
+                // Black parts stay black for every rotation.
                 assert!(found.radiance.iter().all(|r| r.min_element() >= 0.0));
                 let lit = |sky: &Sky| sky.lit().len() as f32;
                 assert!(lit(&found) <= 1.1 * lit(&witness) + 8.0, "{name}: {} {}", lit(&found), lit(&witness));
             }
-            assert!(turning.sky(&env, (env.rotation, env.scale), true).unwrap() == first);
-            assert!(turning.sky(&env, (2.0, env.scale), true).unwrap() == exact(&env, 2.0, size));
+            assert!(rotating.sky(&env, (env.rotation, env.scale), true).unwrap() == first);
+            assert!(rotating.sky(&env, (2.0, env.scale), true).unwrap() == exact(&env, 2.0, size));
         }
     }
 
     #[test]
     fn a_turn_does_not_depend_on_those_before_and_a_factor_is_one() {
         let env = builtin::environment("grove").unwrap();
-        let [mut long, mut short] = [0, 1].map(|_| Turning::new(16));
+        let [mut long, mut short] = [0, 1].map(|_| RotatingSky::new(16));
         for rotation in [0.1, 0.0, 4.0] {
             long.sky(&env, (rotation, 2.0), rotation == 0.0).unwrap();
         }
@@ -272,8 +278,8 @@ mod tests {
             }
             let (width, height) = (width as u32, height as u32);
             let env = Environment { width, height, pixels, ..Environment::constant(Vec3::ONE) };
-            let mut turning = Turning::new(16);
-            let sky = turning.sky(&env, (1.0, 1.0), false).unwrap();
+            let mut rotating = RotatingSky::new(16);
+            let sky = rotating.sky(&env, (1.0, 1.0), false).unwrap();
             assert_eq!(sky.repaired, u64::from(width > 2));
             let even = |r: &Vec3| (r.y - 0.5).abs() < 1e-6 && (r.z - 2.0).abs() < 1e-6;
             assert!(sky.radiance.iter().all(even), "{width}x{height}: {:?}", sky.radiance.iter().find(|r| !even(r)));

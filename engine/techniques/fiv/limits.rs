@@ -1,9 +1,9 @@
-//! How large vectors may become, looked at before hours are spent on them.
+//! Limits on the size of all vectors, checked before hours are spent on their computation.
 
 use super::{Plan, Settings};
 use crate::{Error, ErrorKind, Result, shaders::consts::FIV_FLOATS};
 
-/// Samples that a plan may have: with their header they fit into the largest file that is read.
+/// Most samples of a plan. With its header such a file is below the largest size that is read.
 pub const MOST_SAMPLES: u64 = 1 << 27;
 
 impl Plan {
@@ -12,7 +12,7 @@ impl Plan {
         self.samples().saturating_mul(4 * u64::from(FIV_FLOATS))
     }
 
-    /// Whether the numbers of a plan are within those that settings may have.
+    /// Checks the numbers of a plan by the rules of [`Settings::validate`].
     ///
     /// # Errors
     /// `Usage`, naming the key, the value found and the values allowed.
@@ -20,10 +20,11 @@ impl Plan {
         self.settings(&Settings::default()).validate()
     }
 
-    /// Whether a file can keep the vectors, and a device with this limit on storage buffers, bytes, can draw with them.
+    /// Checks that a file can hold the vectors, and that a device with the limit `storage` on storage buffers (bytes)
+    /// can use them.
     ///
     /// # Errors
-    /// `Runtime`, naming what is found, what is allowed, and the settings that decide it.
+    /// `Runtime`, naming the size found, the size allowed, and the settings that decide the size.
     pub fn fits(&self, storage: Option<u64>) -> Result<()> {
         let most = (MOST_SAMPLES * 4 * u64::from(FIV_FLOATS)).min(storage.unwrap_or(u64::MAX));
         if self.bytes() <= most {
@@ -55,7 +56,7 @@ mod tests {
             shells: Shells { nearest: 1.0, farthest: 2.0 },
             triangles: 1,
             surface: 0,
-            paces: Default::default(),
+            spacing: Default::default(),
         };
         let plan = |azimuths, count| Plan {
             occluders: vec![kind.clone(); count],

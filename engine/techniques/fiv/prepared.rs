@@ -1,42 +1,43 @@
-//! What a scene was made ready for, and what pictures of it may choose.
+//! The settings that a scene was prepared with, and the settings that its pictures may choose.
 
 use serde_json::Value;
 
 use super::{Method, Settings, Specular};
 use crate::{Error, ErrorKind, Result};
 
-/// The settings that a scene was made ready with.
+/// The settings that a scene was prepared with.
 #[derive(Clone, Debug)]
-pub(super) struct Ready {
-    /// As they were given.
+pub(super) struct PreparedSettings {
+    /// As the caller gave them.
     given: Settings,
-    /// As they count: a file of vectors decides some of them.
+    /// As they are in effect, because a file of vectors decides some of them.
     made: Settings,
-    /// It was chosen by them where samples lie, of some occluders at least.
+    /// Whether the spacing of some occluder's samples was computed with these settings.
     adapted: bool,
 }
 
-impl Ready {
-    /// `computed`: vectors of some occluders were not in a file.
+impl PreparedSettings {
+    /// `computed`: the vectors of some occluders were not in a file and were computed.
     pub(super) fn new(given: &Settings, made: &Settings, computed: bool) -> Self {
         Self { given: given.clone(), made: made.clone(), adapted: made.adaptive && computed }
     }
 
-    /// Whether pictures by `method` depend on what the scene was made ready with by this key.
+    /// Whether pictures by `method` depend on the value of this key at preparation.
     fn decides(&self, key: &str, method: Method) -> bool {
         match key {
             "size" => true,
-            // It is also by what samples are chosen where to lie.
+            // The adaptive spacing of samples depends on the interpolation.
             "interpolation" => method == Method::Vectors && self.adapted,
             "adaptive" => method == Method::Vectors,
             _ => matches!(method, Method::Vectors | Method::Online),
         }
     }
 
-    /// The settings of a picture: its own choices, and in everything else what the scene was made ready for.
+    /// The settings of a picture: its own choices, and the prepared values of all other keys.
     ///
     /// # Errors
-    /// `Usage`, naming the key, if the picture asks for what the scene was not made ready for; as [`Settings::validate`].
+    /// `Usage`, naming the key, if the picture asks for a value that the scene was not prepared for; as
+    /// [`Settings::validate`].
     pub(super) fn picture(&self, asked: &Settings) -> Result<Settings> {
         asked.validate().map_err(|error| error.at("fiv"))?;
         let made = &self.made;
@@ -70,13 +71,13 @@ impl Ready {
     fn refused(&self, key: &str, asked: &Settings) -> Result<Settings> {
         let value = |of: &Settings| serde_json::to_value(of).ok().and_then(|all| all.get(key).cloned());
         let say = |of: &Settings| value(of).unwrap_or_default();
-        let what = format!("{} is asked for, the scene was made ready for {}", say(asked), say(&self.made));
+        let what = format!("the picture asks for {}, the scene was prepared for {}", say(asked), say(&self.made));
         let error = Error::usage(what).at(format!("fiv.{key}"));
         Err(error.help("Give Fiv::new the same settings"))
     }
 }
 
-/// `of` with the choices of `picture` where each picture of a scene has its own.
+/// `of` with the keys of `picture` that each picture may choose.
 fn chosen(of: &Settings, picture: &Settings) -> Settings {
     Settings {
         trilinear: picture.trilinear,

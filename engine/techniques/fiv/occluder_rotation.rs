@@ -1,4 +1,5 @@
-//! Occluders that turn about an axis: vectors for some turns of each, between which is interpolated (the thesis' future work, chapter 6).
+//! Occluders that rotate about an axis. Vectors are computed for some rotation angles and interpolated between them.
+//! The thesis lists such rotation samples as future work (chapter 6).
 
 use std::f64::consts::TAU;
 
@@ -8,10 +9,10 @@ use serde::{Deserialize, Serialize};
 use super::Fiv;
 use crate::scene::Pose;
 
-/// Difference of matrices that counts as none, in parts of their scale.
+/// Largest difference of matrices that counts as equal, relative to their largest entry.
 const SAME: f32 = 1e-4;
 
-/// What occluders turn about, in world axes: `x`, `y`, `z`, or three numbers with commas between them.
+/// Axis of the rotation samples, in world axes: `x`, `y`, `z`, or three numbers with commas between them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Axis(Vec3);
@@ -19,13 +20,13 @@ pub struct Axis(Vec3);
 impl Axis {
     pub const Y: Self = Self(Vec3::Y);
 
-    /// Of this direction; `None` if it has none.
+    /// The axis with this direction. `None` if the vector has no usable length.
     pub fn new(direction: Vec3) -> Option<Self> {
         let length = direction.length();
         (length.is_finite() && length > 1e-20).then_some(Self(direction))
     }
 
-    /// Unit length.
+    /// Direction of the axis, unit length.
     pub fn direction(&self) -> DVec3 {
         self.0.as_dvec3().normalize()
     }
@@ -72,17 +73,18 @@ impl std::fmt::Display for Axis {
     }
 }
 
-/// Angle of a sample, radians, counter-clockwise seen from the tip of the axis.
+/// Angle of a rotation sample, radians, counter-clockwise seen from the tip of the axis.
 pub fn angle(turn: u32, turns: u32) -> f64 {
     TAU * f64::from(turn) / f64::from(turns.max(1))
 }
 
-/// Turns a vector from an occluder at rest to one that is turned.
+/// Rotation of an occluder from its pose at rest to a rotation sample.
 pub fn matrix(turn: u32, turns: u32, axis: Axis) -> DMat3 {
     if turn == 0 { DMat3::IDENTITY } else { DMat3::from_axis_angle(axis.direction(), angle(turn, turns)) }
 }
 
-/// How far something is turned about an axis, radians from -π to π; `None` if it does anything else but that.
+/// Angle from `rest` to `now` about an axis, radians from −π to π. `None` if the change is not a rotation about the
+/// axis.
 pub fn about(now: Mat3, rest: Mat3, axis: Axis) -> Option<f32> {
     let scale = rest.to_cols_array().iter().fold(0f32, |m, x| m.max(x.abs()));
     if now.abs_diff_eq(rest, SAME * scale) {
@@ -95,17 +97,17 @@ pub fn about(now: Mat3, rest: Mat3, axis: Axis) -> Option<f32> {
     let turn = Quat::from_mat3(&change);
     let axis = axis.direction().as_vec3();
     let half = turn.xyz().dot(axis).atan2(turn.w);
-    // A quaternion and its negative turn alike.
+    // A quaternion and its negative are the same rotation.
     let angle = (2.0 * half + std::f32::consts::PI).rem_euclid(std::f32::consts::TAU) - std::f32::consts::PI;
     (angle.is_finite() && change.abs_diff_eq(Mat3::from_axis_angle(axis, angle), 10.0 * SAME)).then_some(angle)
 }
 
-/// By an angle about an axis; without a rounding where nothing turned.
+/// Rotation by an angle about an axis. The angle 0 gives the exact identity.
 pub fn rotation(angle: f32, axis: Axis) -> Mat3 {
     if angle == 0.0 { Mat3::IDENTITY } else { Mat3::from_axis_angle(axis.direction().as_vec3(), angle) }
 }
 
-/// The samples on both sides of a turn, and how far it is from the first to the second.
+/// The two rotation samples next to an angle, and the fraction of the way from the first to the second.
 pub fn between(angle: f32, turns: u32) -> (u32, u32, f32) {
     let at = (f64::from(angle) / TAU).rem_euclid(1.0) * f64::from(turns);
     let first = (at as u32).min(turns - 1);
@@ -113,7 +115,8 @@ pub fn between(angle: f32, turns: u32) -> (u32, u32, f32) {
 }
 
 impl Fiv {
-    /// How far a node is turned about the axis, as far as there are vectors for it; `None`: it does something else, too.
+    /// Rotation angle of a node about the axis, radians. `None` if the change has no vectors: another rotation, a
+    /// scale, or only one rotation sample.
     pub(super) fn angle(&self, pose: &Pose, node: u32) -> Option<f32> {
         let linear = |of: &Pose| of.world.get(node as usize).map(|m| Mat3::from_mat4(*m));
         let (now, rest) = linear(pose).zip(linear(&self.at_rest))?;

@@ -1,4 +1,4 @@
-//! What lives as long as a scene: its occluders with their vectors, and the environment on the device.
+//! State that outlives a frame: the occluders of a scene with their vectors, and the environment on the device.
 
 use super::{
     Light, Method, Occluder, Occluders, Plan, Settings, Sky, Specular, Stored,
@@ -7,10 +7,10 @@ use super::{
     light, negligible,
     online::Online,
     plan::Kind,
-    ready::Ready,
+    prepared::PreparedSettings,
+    sky_rotation::RotatingSky,
     specular::{self, Glossy},
     suns,
-    turning::Turning,
 };
 use crate::{
     Error, ErrorKind, Result,
@@ -21,95 +21,96 @@ use crate::{
     shaders::consts::{FIV_FLOATS, TRACE_STEPS},
 };
 
-/// Turns of loops of one invocation where a driver ends loops early: two rays of the longest.
+/// Most loop iterations of one invocation on drivers that end loops early: two rays of the longest traversal.
 const TURNS_LIMITED: u64 = 2 * TRACE_STEPS as u64;
-/// Occluders that the loops of a shader can go through.
+/// Most occluders that the loops of a shader can process.
 const MOST_OCCLUDERS: usize = 16_384;
-/// Pixels by which environments are told from that of the vectors, at least, if they have so many.
+/// Least number of pixels that the quick fingerprint of an environment contains, if the environment has so many.
 const LOOKED_AT: usize = 1000;
 
-/// A scene whose shadows come from vectors.
+/// A scene with the vectors of its occluders.
 #[derive(Debug)]
 pub struct Fiv {
     pub(super) light: Light,
-    /// What it is of.
+    /// The environment that `light` was made from.
     sky: Sky,
-    /// The environment for other turns.
-    turning: Turning,
+    /// Resampled environments for other rotations.
+    rotating_sky: RotatingSky,
     runner: Runner,
-    /// The driver ends loops early.
+    /// Whether the driver ends loops early.
     pub(super) limited: bool,
-    /// The device is a CPU driver.
+    /// Whether the device is a CPU driver.
     pub(super) on_cpu: bool,
-    /// The environment in it.
-    lit: Lit,
-    /// And that for which the vectors are.
-    made_for: Lit,
-    /// Which environment `lit` is of, without its turn and factor.
-    lit_by: u64,
-    /// And the vectors: by some of its pixels, and by all.
-    made_by: [u64; 2],
-    /// What pictures may choose.
-    pub(super) ready: Ready,
+    /// Rotation and scale of the environment in `light`.
+    lighting: Lighting,
+    /// Rotation and scale of the environment that the vectors were computed for.
+    lighting_made_for: Lighting,
+    /// Fingerprint of the environment in `light`, without its rotation and scale.
+    environment_now: u64,
+    /// Fingerprints of the environment that the vectors were computed for: of some pixels, and of all pixels.
+    environment_made_for: [u64; 2],
+    /// The settings that pictures may choose.
+    pub(super) prepared: PreparedSettings,
     gpu: Gpu,
     pub(super) occluders: Occluders,
     pub(super) plan: Plan,
-    /// [`Plan::firsts`]: looked up for each occluder of each frame.
+    /// [`Plan::firsts`], which each frame needs for each occluder.
     pub(super) firsts: Vec<u64>,
-    /// Vectors of all kinds, one after the other.
+    /// Vectors of all kinds, one kind after the other.
     pub(super) fivs: OwnedBuffer,
-    /// How far all kinds reach ([`super::support`]), one after the other.
+    /// Support functions of all kinds ([`super::support_function`]), one kind after the other.
     pub(super) reaches: OwnedBuffer,
-    /// What hides lights that are kept apart ([`super::suns`]).
+    /// Shadow maps of the separated texels ([`super::suns`]).
     pub(super) maps: OwnedBuffer,
-    /// How much of their bounding discs all kinds fill; empty where nothing asks for it.
+    /// Filled shares of the bounding discs of all kinds ([`super::fill`]); empty for methods without vectors.
     pub(super) fills: Vec<f32>,
-    /// As everything stood when the vectors were computed.
+    /// The pose for which the vectors were computed.
     pub(super) at_rest: Pose,
     pub(super) notes: Vec<Note>,
-    /// For brute force, with the rays of an invocation.
+    /// For brute force: the acceleration structure, and the most rays of one invocation.
     pub(super) rays: Option<(Rays, u64)>,
-    /// For vectors of each frame.
+    /// For vectors that each frame computes.
     pub(super) online: Option<Online>,
-    /// For glossy reflection with shadows.
+    /// For glossy reflection with shadows of occluders.
     pub(super) glossy: Option<Glossy>,
-    /// What occluders can hide at most ([`negligible`]), with the light that this is for.
-    matter: Option<(Lit, OwnedBuffer)>,
+    /// The table of [`negligible`] with the rotation and scale that the table was computed for.
+    matter: Option<(Lighting, OwnedBuffer)>,
 }
 
-/// How an environment is taken.
+/// Rotation and scale of the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Lit {
-    /// Radians about +Y, with its own.
+struct Lighting {
+    /// Rotation about +Y, radians, with the environment's own rotation.
     turn: f32,
-    /// Of radiance, with its own.
+    /// Scale of radiance, with the environment's own scale.
     factor: f32,
-    /// Resampled pixel by pixel: it does not turn from picture to picture.
+    /// The environment is resampled pixel by pixel, because its rotation stays the same from picture to picture.
     still: bool,
 }
 
-impl Lit {
+impl Lighting {
     fn of(environment: &Environment, settings: &Settings) -> Self {
         let (turn, factor) = settings.light();
         let turn = environment.rotation + turn;
-        // All methods have the same light, of which vectors are computed beforehand.
+        // All methods must have the light that precomputed vectors were computed for.
         let still = settings.method == Method::Vectors || settings.turning == 0.0 || turn == environment.rotation;
         Self { turn, factor: environment.scale * factor, still }
     }
 
-    fn sky(self, turning: &mut Turning, environment: &Environment) -> Result<Sky> {
-        turning.sky(environment, (self.turn, self.factor), self.still)
+    fn sky(self, rotating_sky: &mut RotatingSky, environment: &Environment) -> Result<Sky> {
+        rotating_sky.sky(environment, (self.turn, self.factor), self.still)
     }
 }
 
 impl Fiv {
-    /// Makes a scene ready for [`Fiv::picture`]. Vectors come from `stored` as far as it has them, with its choice of samples instead
-    /// of that of `settings`; the others are computed. `told` hears how many of the samples to compute are done, and says whether to go
-    /// on; without vectors nothing is computed.
+    /// Prepares a scene for [`Fiv::picture`]. Vectors that `stored` contains are taken from there. The number and
+    /// spacing of samples in `stored` replace the choices of `settings`. All other vectors are computed. `progress`
+    /// receives the number of samples that are done and the number of all samples to compute. It returns whether to go
+    /// on. Methods other than vectors compute nothing here.
     ///
     /// # Errors
     /// `Usage` if a setting is out of its range, if the scene has no environment, or has lights of other kinds; `Input` if `stored` is
-    /// for another environment; `Runtime` if told to stop, or if the scene is larger than the device's limits; `OutOfMemory`,
+    /// for another environment; `Runtime` if `progress` returns false, or if the scene is larger than the device's limits; `OutOfMemory`,
     /// `DeviceLost`.
     pub fn new(
         gpu: &Gpu,
@@ -117,21 +118,21 @@ impl Fiv {
         resident: &Resident,
         settings: &Settings,
         stored: Option<&Stored>,
-        mut told: impl FnMut(u64, u64) -> bool,
+        mut progress: impl FnMut(u64, u64) -> bool,
     ) -> Result<Self> {
         settings.validate().map_err(|error| error.at("fiv"))?;
         let (given, stored) = (settings, stored.filter(|_| settings.method == Method::Vectors));
         let settings = stored.map_or_else(|| given.clone(), |stored| stored.plan.settings(given));
         settings.validate().map_err(|error| error.at("fiv"))?;
         if settings.method == Method::Vectors && settings.turning != 0.0 {
-            let error = Error::usage("vectors are for an environment that stands still").at("fiv.turning");
+            let error = Error::usage("precomputed vectors need an environment that does not rotate").at("fiv.turning");
             return Err(error.help("Use fiv.method=online"));
         }
-        let environment = lit_by(scene)?;
-        let lit = Lit::of(environment, &settings);
-        let made_by = [LOOKED_AT, usize::MAX].map(|pixels| told_by(environment, pixels));
-        let mut turning = Turning::new(settings.size);
-        let sky = lit.sky(&mut turning, environment)?.apart(settings.apart());
+        let environment = only_environment(scene)?;
+        let lighting = Lighting::of(environment, &settings);
+        let environment_made_for = [LOOKED_AT, usize::MAX].map(|pixels| fingerprint(environment, pixels));
+        let mut rotating_sky = RotatingSky::new(settings.size);
+        let sky = lighting.sky(&mut rotating_sky, environment)?.apart(settings.apart());
         let name = environment.name.as_str();
         let mut runner = Runner::new(gpu);
         let light = Light::with(&mut runner, &sky)?;
@@ -141,15 +142,15 @@ impl Fiv {
             let what = format!("{} occluders, at most {MOST_OCCLUDERS} can be drawn", occluders.placed.len());
             return Err(Error::new(ErrorKind::Runtime, what).at("fiv").help("Join meshes into fewer nodes"));
         }
-        // What a file has is kept for pictures that ask for it.
+        // Samples on surfaces that a file contains are kept for pictures that use them.
         let self_shadow = settings.self_shadow || stored.is_some_and(|stored| stored.plan.surface);
         let settings = Settings { self_shadow, ..settings };
         let mut plan = Plan::new(name, light.hash, &occluders.kinds, &settings);
         let mut notes = notes(scene, &occluders, sky.repaired, settings.specular);
         notes.extend(light::unfiltered(gpu));
-        notes.extend(said(&settings, &plan, &occluders.kinds));
-        // Of one total: vectors, then what is hidden of reflections.
-        let glossy = specular::wanted(&settings);
+        notes.extend(ignored_settings(&settings, &plan, &occluders.kinds));
+        // Progress has one total: first the samples of vectors, then the samples of glossy reflection.
+        let glossy = specular::needed(&settings);
         let missing = stored.map(|stored| missing(&plan, stored));
         let computed = missing.as_ref().map_or(!plan.occluders.is_empty(), Option::is_some);
         let (mut before, later) = (0, if glossy { specular::all(&plan) } else { 0 });
@@ -160,19 +161,19 @@ impl Fiv {
             Method::Vectors => {
                 plan.fits(Some(gpu.caps().limits.storage_range))?;
                 notes.extend(missing.flatten());
-                notes.extend(stored.and_then(|stored| without_own(&settings, stored)));
-                let told = |done, all| {
+                notes.extend(stored.and_then(|stored| lacks_surface_samples(&settings, stored)));
+                let progress = |done, all| {
                     before = all;
-                    told(done, all + later)
+                    progress(done, all + later)
                 };
-                let mut fivs = vectors(gpu, &light, &occluders, (&mut plan, &settings), stored, told)?;
-                paces(&plan, &mut fivs);
+                let mut fivs = vectors(gpu, &light, &occluders, (&mut plan, &settings), stored, progress)?;
+                append_spacing(&plan, &mut fivs);
                 fivs
             }
             Method::Online | Method::Unshadowed | Method::BruteForce => Vec::new(),
         };
         let glossy = match glossy {
-            true => Some(Glossy::new(gpu, &sky, &plan, &occluders, |done, all| told(before + done, before + all))?),
+            true => Some(Glossy::new(gpu, &sky, &plan, &occluders, |done, all| progress(before + done, before + all))?),
             false => None,
         };
         let online = match settings.method {
@@ -201,15 +202,15 @@ impl Fiv {
             },
             maps: suns::maps(gpu, &light, &occluders.kinds)?,
             at_rest: pose,
-            lit,
-            made_for: lit,
-            lit_by: made_by[1],
-            made_by,
-            ready: Ready::new(given, &settings, computed),
+            lighting,
+            lighting_made_for: lighting,
+            environment_now: environment_made_for[1],
+            environment_made_for,
+            prepared: PreparedSettings::new(given, &settings, computed),
             gpu: gpu.clone(),
             light,
             sky,
-            turning,
+            rotating_sky,
             runner,
             limited: gpu.loop_limit()?.is_some(),
             on_cpu: gpu.caps().kind == DeviceKind::Cpu,
@@ -223,17 +224,17 @@ impl Fiv {
         })
     }
 
-    /// How much of its bounding disc a kind fills.
+    /// Filled share of the bounding disc of a kind.
     pub(super) fn fill(&self, kind: u32) -> f32 {
         self.fills.get(kind as usize).copied().unwrap_or(1.0)
     }
 
-    /// What the user should know about how the scene is drawn.
+    /// Notes on approximations and ignored settings.
     pub fn notes(&self) -> &[Note] {
         &self.notes
     }
 
-    /// What was computed or read.
+    /// The plan of the vectors that were computed or read.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
@@ -243,45 +244,48 @@ impl Fiv {
         &self.light
     }
 
-    /// What casts shadows.
+    /// The occluders of the scene.
     pub fn occluders(&self) -> &Occluders {
         &self.occluders
     }
 
-    /// Takes the environment as `settings` have it turned and scaled, and as the scene has it now.
+    /// Updates the environment on the device to the rotation and scale of `settings` and to the pixels that the scene
+    /// has now.
     ///
     /// # Errors
-    /// `Usage` if the vectors were computed for another environment, turn or factor, or as [`Fiv::new`]; `OutOfMemory`, `DeviceLost`.
+    /// `Usage` if the vectors were computed for another environment, rotation or scale, or as [`Fiv::new`]; `OutOfMemory`, `DeviceLost`.
     pub(super) fn follow(&mut self, scene: &Scene, settings: &Settings) -> Result<()> {
-        let environment = lit_by(scene)?;
+        let environment = only_environment(scene)?;
         let by = match settings.method {
-            // Of a frame that takes a millisecond the environment cannot be gone through.
-            Method::Vectors if told_by(environment, LOOKED_AT) == self.made_by[0] => self.made_by[1],
+            // A frame may take a millisecond, which is too short to read all pixels of the environment.
+            Method::Vectors if fingerprint(environment, LOOKED_AT) == self.environment_made_for[0] => {
+                self.environment_made_for[1]
+            }
             Method::Vectors => {
                 let name = &environment.name;
-                let error = Error::usage(format!("`{name}` is another environment than the scene was made ready with"));
-                return Err(error.at("fiv").help("Make the scene ready again (Fiv::new), or use fiv.method=online"));
+                let error = Error::usage(format!("`{name}` is not the environment that the scene was prepared with"));
+                return Err(error.at("fiv").help("Prepare the scene again (Fiv::new), or use fiv.method=online"));
             }
-            _ => told_by(environment, usize::MAX),
+            _ => fingerprint(environment, usize::MAX),
         };
-        let wanted = Lit::of(environment, settings);
-        if settings.method == Method::Vectors && wanted != self.made_for {
-            let error = Error::usage("the vectors were computed for another turn or scale of the environment");
-            return Err(error.at("fiv").help("Make the scene ready again, or use fiv.method=online"));
+        let wanted = Lighting::of(environment, settings);
+        if settings.method == Method::Vectors && wanted != self.lighting_made_for {
+            let error = Error::usage("the vectors were computed for another rotation or scale of the environment");
+            return Err(error.at("fiv").help("Prepare the scene again (Fiv::new), or use fiv.method=online"));
         }
-        if by != self.lit_by {
-            self.turning.forget();
+        if by != self.environment_now {
+            self.rotating_sky.forget();
             self.matter = None;
-        } else if wanted == self.lit {
+        } else if wanted == self.lighting {
             return Ok(());
         }
-        self.sky = wanted.sky(&mut self.turning, environment)?.apart(settings.apart());
+        self.sky = wanted.sky(&mut self.rotating_sky, environment)?.apart(settings.apart());
         self.light = Light::with(&mut self.runner, &self.sky)?;
-        (self.lit, self.lit_by) = (wanted, by);
+        (self.lighting, self.environment_now) = (wanted, by);
         Ok(())
     }
 
-    /// What occluders can hide at most, if some of them are to be left out: a table of [`negligible`].
+    /// The table of [`negligible`] on the device, if some occluders are to be left out.
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`.
@@ -289,35 +293,34 @@ impl Fiv {
         if settings.negligible <= 0.0 {
             return Ok(None);
         }
-        if self.matter.as_ref().is_none_or(|(lit, _)| *lit != self.lit) {
+        if self.matter.as_ref().is_none_or(|(made_for, _)| *made_for != self.lighting) {
             let table = negligible::table(&self.sky);
             let buffer = OwnedBuffer::with_contents(&self.gpu, "fiv.matter", bytemuck::cast_slice(&table))?;
-            self.matter = Some((self.lit, buffer));
+            self.matter = Some((self.lighting, buffer));
         }
         Ok(self.matter.as_ref().map(|(_, buffer)| buffer))
     }
 
-    /// Bytes of the vectors on the device, with what occluders hide of reflections.
+    /// Bytes on the device of the vectors and of the data for glossy reflection.
     pub fn bytes(&self) -> u64 {
         self.fivs.size() + self.glossy.as_ref().map_or(0, Glossy::bytes)
     }
 }
 
-/// Appends how the samples of all kinds lie.
-fn paces(plan: &Plan, fivs: &mut Vec<f32>) {
-    plan.occluders.iter().for_each(|kind| fivs.extend(kind.paces.table(&plan.grid, &kind.shells)));
+/// Appends the spacing tables of all kinds to the vectors.
+fn append_spacing(plan: &Plan, fivs: &mut Vec<f32>) {
+    plan.occluders.iter().for_each(|kind| fivs.extend(kind.spacing.table(&plan.grid, &kind.shells)));
 }
 
-/// The tables of all kinds on the device.
+/// The support functions of all kinds on the device.
 fn reaches(gpu: &Gpu, occluders: &Occluders) -> Result<OwnedBuffer> {
-    let mut all: Vec<f32> = occluders.kinds.iter().flat_map(|kind| kind.support().0).collect();
+    let mut all: Vec<f32> = occluders.kinds.iter().flat_map(|kind| kind.support_function().0).collect();
     all.resize(all.len().max(1), 0.0);
     OwnedBuffer::with_contents(gpu, "fiv.reaches", bytemuck::cast_slice(&all))
 }
 
-/// A number by which environments are told apart, without their turns and factors: by their sizes and so many of their pixels, at least,
-/// that lie evenly.
-fn told_by(environment: &Environment, pixels: usize) -> u64 {
+/// A hash of an environment's size and of at least `pixels` evenly spaced pixels, without its rotation and scale.
+fn fingerprint(environment: &Environment, pixels: usize) -> u64 {
     let mut hash = Hash::new();
     hash.word(u64::from(environment.width) << 32 | u64::from(environment.height));
     let each = (environment.pixels.len() / pixels).max(1);
@@ -330,30 +333,30 @@ fn told_by(environment: &Environment, pixels: usize) -> u64 {
 }
 
 /// The environment of a scene that has no other lights.
-fn lit_by(scene: &Scene) -> Result<&Environment> {
+fn only_environment(scene: &Scene) -> Result<&Environment> {
     if let Some(light) = scene.nodes.iter().find_map(|node| scene.lights.get(node.light? as usize)) {
         let kind = match light.kind {
             crate::scene::LightKind::Directional => "directional",
             crate::scene::LightKind::Point { .. } => "point",
             crate::scene::LightKind::Spot { .. } => "spot",
         };
-        let what = format!("light `{}` ({kind}) cannot be served: light comes from the environment alone", light.name);
+        let what = format!("light `{}` ({kind}) cannot be used: fiv takes light from the environment only", light.name);
         return Err(Error::usage(what).at("fiv").help("Remove it, or use another technique"));
     }
     scene.environment.as_ref().filter(|e| !e.pixels.is_empty()).ok_or_else(|| {
-        let what = "there is no environment, and light comes from it alone";
+        let what = "the scene has no environment, and fiv takes light from the environment only";
         Error::usage(what).at("fiv").help("Name one with --environment")
     })
 }
 
-/// The vectors of all kinds: stored ones, and those that are missing.
+/// The vectors of all kinds: those in `stored`, and computed ones for all other kinds.
 fn vectors(
     gpu: &Gpu,
     light: &Light,
     occluders: &Occluders,
     (plan, settings): (&mut Plan, &Settings),
     stored: Option<&Stored>,
-    mut told: impl FnMut(u64, u64) -> bool,
+    mut progress: impl FnMut(u64, u64) -> bool,
 ) -> Result<Vec<f32>> {
     let floats = |firsts: &[u64], kind: usize| {
         let at = |kind: usize| firsts[kind] as usize * FIV_FLOATS as usize;
@@ -366,13 +369,13 @@ fn vectors(
         if stored.plan.environment_hash != plan.environment_hash {
             let (theirs, ours) = (&stored.plan.environment, &plan.environment);
             let what = format!(
-                "the vectors were computed for environment `{theirs}`, the scene has `{ours}` with other light"
+                "the vectors were computed for environment `{theirs}`, the scene has `{ours}` with different radiance"
             );
             return Err(Error::input(what).help("Compute them again with `fiv precompute`"));
         }
         if !stored.is_complete() {
             let (range, all) = (&stored.range, stored.plan.samples());
-            let what = format!("only samples {} to {} of {all} are there", range.start, range.end);
+            let what = format!("the file contains only samples {} to {} of {all}", range.start, range.end);
             return Err(Error::input(what).help("Join all parts with `fiv merge`"));
         }
         let theirs = stored.plan.firsts();
@@ -381,7 +384,7 @@ fn vectors(
             let Some(at) = stored.plan.occluders.iter().position(known) else { return true };
             fivs[floats(&ours, kind)].copy_from_slice(&stored.fivs[floats(&theirs, at)]);
             plan.occluders[kind].shells = stored.plan.occluders[at].shells;
-            plan.occluders[kind].paces = stored.plan.occluders[at].paces.clone();
+            plan.occluders[kind].spacing = stored.plan.occluders[at].spacing.clone();
             false
         });
     }
@@ -396,7 +399,7 @@ fn vectors(
     let mut computed = Vec::with_capacity(all as usize * FIV_FLOATS as usize);
     rest.compute(gpu, light, &kinds, 0..all, |done, new| {
         computed.extend_from_slice(new);
-        Ok(told(done, all))
+        Ok(progress(done, all))
     })?;
     if (computed.len() as u64) < all * u64::from(FIV_FLOATS) {
         return Err(Error::new(ErrorKind::Runtime, "stopped while computing vectors").at("fiv"));
@@ -407,21 +410,21 @@ fn vectors(
     Ok(fivs)
 }
 
-/// What of a scene is not in a file of vectors.
+/// Names the kinds of a scene that a file does not contain.
 fn missing(plan: &Plan, stored: &Stored) -> Option<Note> {
     let known =
         |kind: &&Kind| !stored.plan.occluders.iter().any(|k| (&k.hash, k.surface) == (&kind.hash, kind.surface));
     let named: Vec<_> = plan.occluders.iter().filter(known).map(|k| format!("`{}` ({})", k.name, k.hash)).collect();
-    let text = format!("not in the file, and computed: {}", named.join(", "));
+    let text = format!("the file does not contain these occluders, whose vectors were computed: {}", named.join(", "));
     (!named.is_empty()).then(|| Note { kind: NoteKind::Approximated, place: "vectors".into(), text })
 }
 
-/// That a file has nothing of what is asked for on surfaces, and what is done.
-fn without_own(settings: &Settings, stored: &Stored) -> Option<Note> {
+/// Says that a file has no samples on surfaces although the settings need them.
+fn lacks_surface_samples(settings: &Settings, stored: &Stored) -> Option<Note> {
     let lacks = settings.self_shadow && !stored.plan.surface && !stored.plan.occluders.is_empty();
-    let text = "no samples on surfaces are in the file: shadows of occluders on themselves are those of the samples around them, which \
-                blotch (fiv.self_samples=spheres); for better ones compute it again with fiv.self_shadow=true and \
-                fiv.self_samples=surface";
+    let text = "the file has no samples on surfaces: shadows of occluders on themselves come from the samples around them \
+                (fiv.self_samples=spheres), which makes these shadows blotchy; for better shadows compute the file again \
+                with fiv.self_shadow=true and fiv.self_samples=surface";
     lacks.then(|| Note { kind: NoteKind::Approximated, place: "vectors".into(), text: text.into() })
 }
 
@@ -429,12 +432,12 @@ fn emissive(material: &Material) -> bool {
     material.emissive != glam::Vec3::ZERO && !material.unlit
 }
 
-/// What was asked for and is done otherwise, or not at all.
-fn said(settings: &Settings, plan: &Plan, kinds: &[Occluder]) -> Vec<Note> {
+/// Notes on settings that have no effect, and on masks that rays compute although `masks` is parallel.
+fn ignored_settings(settings: &Settings, plan: &Plan, kinds: &[Occluder]) -> Vec<Note> {
     let note = |place: String, text: String| Note { kind: NoteKind::Ignored, place, text };
     let idle = settings.idle().into_iter();
     let mut notes: Vec<_> =
-        idle.map(|(key, why)| note(format!("fiv.{key}"), format!("changes nothing, because {why}"))).collect();
+        idle.map(|(key, why)| note(format!("fiv.{key}"), format!("has no effect, because {why}"))).collect();
     if settings.method == Method::Vectors {
         notes.extend(plan.by_rays(kinds).map(|what| note("fiv.masks".into(), what)));
     }
@@ -445,7 +448,9 @@ fn notes(scene: &Scene, occluders: &Occluders, repaired: u64, specular: Specular
     let mut notes = Vec::new();
     let mut note = |kind, place: &str, text: String| notes.push(Note { kind, place: place.into(), text });
     if repaired > 0 {
-        let text = format!("{repaired} pixels of the environment are no radiance and count as black or as 65504");
+        let text = format!(
+            "{repaired} pixels of the environment are not valid radiance; they are replaced by black or by 65504"
+        );
         note(NoteKind::Repaired, "environment", text);
     }
     if !occluders.receivers.is_empty() {
@@ -456,13 +461,17 @@ fn notes(scene: &Scene, occluders: &Occluders, repaired: u64, specular: Specular
     }
     if !occluders.vanished.is_empty() {
         let names: Vec<_> = occluders.vanished.iter().map(|&n| scene.nodes[n as usize].name.as_str()).collect();
-        let text = format!("{} meshes have no size at rest and never cast shadows: {}", names.len(), names.join(", "));
+        let text =
+            format!("{} meshes have no size at rest and cast no shadow in any pose: {}", names.len(), names.join(", "));
         note(NoteKind::Approximated, "fiv", text);
     }
     for (what, which) in [
-        ("are shown and light nothing: light comes from the environment alone", emissive as fn(&Material) -> bool),
-        ("pass no light on", |m| !m.unlit && m.transmission > 0.0),
-        ("reflect as if they were matt (fiv.specular=summed shows their gloss)", |m| !m.unlit && m.metallic > 0.0),
+        (
+            "are visible but illuminate nothing: fiv takes light from the environment only",
+            emissive as fn(&Material) -> bool,
+        ),
+        ("transmit no light", |m| !m.unlit && m.transmission > 0.0),
+        ("reflect diffusely (fiv.specular=summed adds their glossy reflection)", |m| !m.unlit && m.metallic > 0.0),
     ]
     .into_iter()
     .take(if specular == Specular::Off { 3 } else { 2 })
