@@ -7,8 +7,8 @@ use lucerna::scene::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    room::{self, Room},
-    world,
+    interior::{self, Interior},
+    scene_bounds,
 };
 
 /// Full vertical angle of the camera that is added, radians.
@@ -33,11 +33,12 @@ pub fn add_missing_camera(scene: &mut Scene, aspect: f32) {
     if scene.nodes.iter().any(|node| node.camera.is_some()) {
         return;
     }
-    let (name, text, (world_from_view, projection)) = match room::find(scene) {
+    let (name, text, (world_from_view, projection)) = match interior::find(scene) {
         Some(room) => ("inside", "one was added inside the room that it is", in_room(&room)),
         None => {
-            let bounds = world::reach(scene).unwrap_or(Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE });
-            let from = room::opening(scene).unwrap_or(VIEW_FROM);
+            let bounds =
+                scene_bounds::over_animations(scene).unwrap_or(Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE });
+            let from = interior::opening(scene).unwrap_or(VIEW_FROM);
             ("fitted", "one was added that sees all of it", fitted(&bounds, aspect, from))
         }
     };
@@ -47,7 +48,7 @@ pub fn add_missing_camera(scene: &mut Scene, aspect: f32) {
 }
 
 /// A camera at one end of a room, looking along it.
-fn in_room(room: &Room) -> (Mat4, Projection) {
+fn in_room(room: &Interior) -> (Mat4, Projection) {
     let back = -room.forward;
     let right = Vec3::Y.cross(back);
     let world = Mat4::from_cols(right.extend(0.0), Vec3::Y.extend(0.0), back.extend(0.0), room.eye.extend(1.0));
@@ -83,7 +84,7 @@ pub fn add_missing_light(scene: &mut Scene, choice: DefaultLight) {
     if choice == DefaultLight::Never || (choice == DefaultLight::Auto && (lit || lamps)) {
         return;
     }
-    if let Some((under, floor)) = room::find(scene).and_then(|room| Some((room.ceiling?, room.floor))) {
+    if let Some((under, floor)) = interior::find(scene).and_then(|room| Some((room.ceiling?, room.floor))) {
         // The sun does not reach a closed room, and a sky would shine through its walls.
         let height = under.y - floor.y;
         let lamp = Light {

@@ -3,15 +3,15 @@
 use glam::{Vec2, Vec3};
 use lucerna::{passes::gbuffer::GBuffer, scene::View};
 
-use crate::shown::Shown;
+use crate::frame_output::FrameOutput;
 
 /// Depth that the background gets, metres: what Blender writes.
 const BACKGROUND: f32 = 1e10;
 
 /// Adds `albedo`, `normal` (world space) and `depth` (distance along the line of sight, metres).
-pub fn add(shown: Shown, gbuffer: &GBuffer, view: &View) -> Shown {
+pub fn add(output: FrameOutput, gbuffer: &GBuffer, view: &View) -> FrameOutput {
     let far = view.far;
-    shown
+    output
         .color("albedo", gbuffer.albedo)
         .layer("normal", &["X", "Y", "Z"], gbuffer.normal, |texel| decode_normal(texel).extend(0.0).to_array())
         .layer("depth", &["Z"], gbuffer.depth, move |[z, ..]| {

@@ -6,7 +6,7 @@ use glam::{Mat4, Vec3};
 use lucerna::scene::{Aabb, AlphaMode, LightKind, Material, Note, Pose, Projection, Scene};
 use serde::Serialize;
 
-use crate::world;
+use crate::scene_bounds;
 
 /// What `inspect` tells; the fields of its JSON.
 #[derive(Debug, Serialize)]
@@ -120,7 +120,7 @@ pub fn summary(scene: &Scene) -> Summary {
     Summary {
         scene: scene.name.clone(),
         counts: counts(scene),
-        bounds: world::bounds(scene, &pose).map(|Aabb { min, max }| Bounds { min, max }),
+        bounds: scene_bounds::in_pose(scene, &pose).map(|Aabb { min, max }| Bounds { min, max }),
         memory: memory(scene),
         cameras: (0..scene.cameras.len()).map(|i| camera(scene, i, place(i, |node| node.camera))).collect(),
         lights: lights(scene, world),

@@ -16,13 +16,13 @@ use crate::{
     args::{DeviceArgs, RenderArgs, TalkArgs},
     config,
     console::{self, Console},
+    frame_output::{self, FrameOutput, Readback},
     last_stage::{LastStage, Staged},
     outputs::Fresh,
     program::{self, STOPPED_EARLY},
     progress::Progress,
     record::Record,
     run::Run,
-    shown::{self, Reading, Shown},
     signals::Interrupt,
 };
 
@@ -95,7 +95,7 @@ pub trait Renderer {
         kept: &mut Self::Kept,
         input: &Input<'_>,
         settings: &Self::Settings,
-    ) -> Result<Shown>;
+    ) -> Result<FrameOutput>;
 }
 
 /// Runs `render` for one technique. `base` are the settings to start from.
@@ -214,18 +214,18 @@ fn frames<R: Renderer>(
         (graph.frame, graph.seed) = (frame, args.seed);
         let input =
             Input { gpu: &gpu, scene: &run.stage.scene, pose: &pose, view: &view, frame, frames, seconds, layers: all };
-        let shown = renderer.compose(&mut graph, &mut resources, &input, &settings);
-        let Some(mut shown) = unless_stopped(shown, interrupt)? else { break };
-        shown.develop(|picture| last.frame(&mut graph, picture, (1.0 / args.fps) as f32))?;
+        let output = renderer.compose(&mut graph, &mut resources, &input, &settings);
+        let Some(mut output) = unless_stopped(output, interrupt)? else { break };
+        output.develop(|picture| last.frame(&mut graph, picture, (1.0 / args.fps) as f32))?;
         if args.list_passes {
             console::print(graph.plan()?.list_passes().trim_end())?;
             return Ok(());
         }
-        run.note(&shown.notes);
-        let seen = shown.view.unwrap_or(view);
+        run.note(&output.notes);
+        let seen = output.view.unwrap_or(view);
         let reading = match &args.view {
-            Some(name) => Reading::view(&mut graph, name)?,
-            None => shown.read(&mut graph, run.outputs.wants_layers()),
+            Some(name) => Readback::view(&mut graph, name)?,
+            None => output.read(&mut graph, run.outputs.wants_layers()),
         };
         let dump = args.dump.as_ref().map(|folder| (folder, graph.dump()));
         // The frame after this one builds on it once, however often it is repeated.
@@ -241,7 +241,7 @@ fn frames<R: Renderer>(
         interrupt.keep();
         for (folder, images) in dump.iter() {
             for (name, token) in images {
-                run.dump(folder, frame, name, shown::raw(&result.image(*token)))?;
+                run.dump(folder, frame, name, frame_output::raw(&result.image(*token)))?;
             }
         }
         progress.frame(frame, milliseconds, &files);
@@ -263,9 +263,9 @@ fn frames<R: Renderer>(
                 seconds,
                 layers: all,
             };
-            let mut shown = renderer.compose(&mut graph, &mut resources, &input, &settings)?;
+            let mut output = renderer.compose(&mut graph, &mut resources, &input, &settings)?;
             // No time passes, so that adaptation stays as it is.
-            shown.develop(|picture| last.frame(&mut graph, picture, 0.0))?;
+            output.develop(|picture| last.frame(&mut graph, picture, 0.0))?;
             let last = repeat + 1 == args.repeat;
             let result = if last { runner.run(&graph) } else { runner.run_held(&graph) };
             let Some(result) = unless_stopped(result, interrupt)? else { break 'frames };

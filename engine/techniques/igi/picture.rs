@@ -1,7 +1,7 @@
 //! Everything from a scene on the device to the final picture.
 
 use super::super::allowed::radiance;
-use super::{Igi, Outputs, Settings, Shared, Visibility, Vpls, filters, order, raster};
+use super::{Igi, Outputs, Settings, Shared, Visibility, Vpls, filters, light_tree, raster};
 use crate::{
     Error, Result,
     graph::{Format, Graph, Image},
@@ -98,7 +98,7 @@ impl Igi {
             let frame = if igi.history > 0 { graph.frame } else { 0 };
             let own = Self::numbered(graph, &shared, igi, frame);
             let shot = igi.indirect.then(|| self.virtual_lights(graph, handles, &gbuffer, &own, igi));
-            let vpls = shot.map(|(_, chosen)| order::ordered_if_asked(graph, chosen, igi));
+            let vpls = shot.map(|(_, chosen)| light_tree::with_light_tree(graph, chosen, igi));
             let direct = self.direct(graph, handles, &gbuffer, &shared);
             let seen = if igi.indirect { receivers(graph, &gbuffer, igi) } else { gbuffer };
             let gathered = match vpls {
@@ -120,7 +120,7 @@ impl Igi {
                 let steady = match shot {
                     Some(_) if frame > 0 => {
                         let (_, chosen) = self.virtual_lights(graph, handles, &gbuffer, &shared, igi);
-                        Some(order::ordered_if_asked(graph, chosen, igi))
+                        Some(light_tree::with_light_tree(graph, chosen, igi))
                     }
                     _ => vpls,
                 };

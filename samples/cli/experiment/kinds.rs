@@ -27,8 +27,8 @@ use crate::{
     args::Size,
     config,
     export_pov::{self, Pov, povray},
+    frame_output::FrameOutput,
     gbuffer_layers,
-    shown::Shown,
     signals::Interrupt,
 };
 
@@ -284,7 +284,7 @@ pub fn on_device(
     runner: &mut Runner,
     job: &Job<'_>,
     name: &'static str,
-    mut compose: impl FnMut(&mut Graph) -> Result<Shown>,
+    mut compose: impl FnMut(&mut Graph) -> Result<FrameOutput>,
 ) -> Result<Option<Rendered>> {
     let (mut layers, mut times) = (None, Times::default());
     let mut reports: Vec<Report> = Vec::new();
@@ -295,8 +295,8 @@ pub fn on_device(
         let begun = Instant::now();
         let mut graph = Graph::new(name);
         graph.seed = job.seed;
-        let shown = compose(&mut graph)?;
-        let reading = layers.is_none().then(|| shown.read(&mut graph, true));
+        let output = compose(&mut graph)?;
+        let reading = layers.is_none().then(|| output.read(&mut graph, true));
         let frame = runner.run(&graph)?;
         if let Some(reading) = reading {
             layers = Some(reading.layers(&frame));
@@ -329,9 +329,9 @@ fn isr_picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
         let view = job.view.fit_far(&handles.bounds());
         let picture = isr::picture(graph, &handles, &view, ambient.clone(), &settings)?;
         let out = picture.outputs;
-        let shown = Shown::new(out.total).color("direct", out.direct).color("indirect", out.indirect);
-        let shown = shown.layer("occlusion", &["Y"], out.occlusion, |pixel| pixel);
-        Ok(gbuffer_layers::add(shown, &picture.gbuffer, &view))
+        let output = FrameOutput::new(out.total).color("direct", out.direct).color("indirect", out.indirect);
+        let output = output.layer("occlusion", &["Y"], out.occlusion, |pixel| pixel);
+        Ok(gbuffer_layers::add(output, &picture.gbuffer, &view))
     })
 }
 

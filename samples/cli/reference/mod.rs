@@ -1,8 +1,8 @@
 //! `lucerna reference`: a picture by path tracing, better the longer it runs.
 
 mod checkpoint;
-mod meter;
 mod options;
+mod progress_line;
 
 pub use options::{ReferenceArgs, Settings, Show, Span};
 
@@ -32,7 +32,7 @@ use crate::{
     stage::Stage,
 };
 use checkpoint::Checkpoint;
-use meter::{Goals, Meter};
+use progress_line::{Goals, ProgressLine};
 
 /// Why the work ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -157,16 +157,16 @@ fn picture(
 
     let goals =
         Goals { samples: settings.samples, error: args.target_error, time: args.time_limit.map(|limit| limit.0) };
-    let mut meter = Meter::new(args.progress, console.is_quiet(), goals, tracer.progress()?);
+    let mut line = ProgressLine::new(args.progress, console.is_quiet(), goals, tracer.progress()?);
     // Hours of work may be in the sums from now on.
     let _saving = interrupt.saving();
-    let end = work(args, &settings, &mut tracer, &mut checkpoint, &mut meter, interrupt)?;
+    let end = work(args, &settings, &mut tracer, &mut checkpoint, &mut line, interrupt)?;
     let done = tracer.progress()?;
     if done.paths == 0 && end == End::Interrupt {
         return Ok((ExitCode::from(interrupt.exit_code()), None));
     }
     let sums = tracer.sums()?;
-    meter.finish(&done, sums.relative_error());
+    line.finish(&done, sums.relative_error());
     if sums.lost() > 0 {
         console.warning(&format!("{} paths gave no number and are left out", sums.lost()));
     }
@@ -207,7 +207,7 @@ fn picture(
         checkpoint.remove();
     }
     if args.json {
-        console::print_json(&report(&layers, &done, &meter, sums.relative_error(), end, &files))?;
+        console::print_json(&report(&layers, &done, &line, sums.relative_error(), end, &files))?;
     }
     let code = if end.is_early() { ExitCode::from(STOPPED_EARLY) } else { ExitCode::SUCCESS };
     Ok((code, outputs.fresh().filter(|_| !end.is_early())))
@@ -218,7 +218,7 @@ fn work(
     settings: &Settings,
     tracer: &mut Tracer<'_>,
     checkpoint: &mut Checkpoint,
-    meter: &mut Meter,
+    line: &mut ProgressLine,
     interrupt: &Interrupt,
 ) -> Result<End> {
     let started = Instant::now();
@@ -228,9 +228,9 @@ fn work(
         let mut reason = None;
         let mut stopped: Option<Instant> = None;
         let save = &mut *checkpoint;
-        let shown = &mut *meter;
+        let line = &mut *line;
         tracer.run(settings.samples, |progress: &Progress| {
-            shown.show(progress);
+            line.show(progress);
             let whole = progress.samples.fract() == 0.0;
             if reason.is_none() {
                 if interrupt.requested() {
@@ -244,7 +244,7 @@ fn work(
                 return !whole && since.elapsed().as_secs_f64() < FINISH;
             }
             // Out of the loop to read the sums.
-            let looks = progress.samples >= look && (args.target_error.is_some() || shown.wants_error());
+            let looks = progress.samples >= look && (args.target_error.is_some() || line.wants_error());
             !looks && !save.is_due()
         })?;
         let progress = tracer.progress()?;
@@ -259,7 +259,7 @@ fn work(
         }
         if progress.samples >= look {
             let error = tracer.sums()?.relative_error();
-            meter.error(&progress, error);
+            line.error(&progress, error);
             look = (progress.samples * 1.25).ceil();
             if args.target_error.is_some_and(|target| error <= target) {
                 // To whole samples, so that the picture can be made again.
@@ -319,7 +319,7 @@ fn metadata(
     })
 }
 
-fn report(layers: &Layers, done: &Progress, meter: &Meter, error: f64, end: End, files: &[&str]) -> Value {
+fn report(layers: &Layers, done: &Progress, line: &ProgressLine, error: f64, end: End, files: &[&str]) -> Value {
     json!({
         "program": layers.metadata.program,
         "version": layers.metadata.version,
@@ -328,8 +328,8 @@ fn report(layers: &Layers, done: &Progress, meter: &Meter, error: f64, end: End,
         "config": layers.metadata.config,
         "samples": done.samples,
         "paths": done.paths,
-        "paths_per_second": meter.rate(done),
-        "seconds": meter.seconds(),
+        "paths_per_second": line.rate(done),
+        "seconds": line.seconds(),
         "device_seconds": done.time.as_secs_f64(),
         "relative_error": if error.is_finite() { json!(error) } else { Value::Null },
         "ended_by": end.text(),

@@ -13,10 +13,10 @@ use lucerna::{
 
 use crate::{
     args::RenderArgs,
+    frame_output::FrameOutput,
     gbuffer_layers,
     outputs::Fresh,
     render::{self, Again, Input, Renderer, Technique},
-    shown::Shown,
 };
 
 /// Options of `igi render`.
@@ -97,7 +97,7 @@ impl Renderer for ByLights {
         (resident, igi): &mut Self::Kept,
         input: &Input<'_>,
         settings: &PictureSettings,
-    ) -> Result<Shown> {
+    ) -> Result<FrameOutput> {
         let scene = resident.frame_in(graph, input.scene, input.pose);
         let view = input.view.fit_far(&scene.bounds());
         // Nobody looks at indirect light then.
@@ -108,22 +108,22 @@ impl Renderer for ByLights {
         };
         let picture = igi.picture(graph, input.scene, input.pose, &scene, &view, &served)?;
         let out = picture.outputs;
-        let shown = match self.0 {
-            Mode::Igi => Shown::new(out.total),
-            Mode::Direct => Shown::new(out.direct),
-            Mode::Indirect => Shown::new(out.indirect),
+        let output = match self.0 {
+            Mode::Igi => FrameOutput::new(out.total),
+            Mode::Direct => FrameOutput::new(out.direct),
+            Mode::Indirect => FrameOutput::new(out.indirect),
         };
-        let shown = shown.color("direct", out.direct).color("indirect", out.indirect);
+        let output = output.color("direct", out.direct).color("indirect", out.indirect);
         // What mirrors and glass show.
-        let shown = match out.sharp {
-            Some(sharp) => shown.color("specular", sharp),
-            None => shown,
+        let output = match out.sharp {
+            Some(sharp) => output.color("specular", sharp),
+            None => output,
         };
-        let shown = match out.cache {
-            Some(cache) => shown.remarking(cache.list.range(0..4), move |count| cache.note(count)),
-            None => shown,
+        let output = match out.cache {
+            Some(cache) => output.remarking(cache.list.range(0..4), move |count| cache.note(count)),
+            None => output,
         };
-        Ok(gbuffer_layers::add(shown, &picture.gbuffer, &view).seen_by(view).noting(igi::notes(
+        Ok(gbuffer_layers::add(output, &picture.gbuffer, &view).seen_by(view).noting(igi::notes(
             input.scene,
             resident.notes(),
             settings,

@@ -1,7 +1,7 @@
 //! `tonemap`: pictures of light in, pictures for a screen out; one device for all of them.
 
 mod args;
-mod meter;
+mod auto_exposure;
 mod names;
 mod picture;
 mod recipe;

@@ -14,7 +14,7 @@ use lucerna::{
 };
 use serde_json::{Value, json};
 
-use super::{Config, PIPE, Run, meter, names::Input, recipe::Recipe};
+use super::{Config, PIPE, Run, auto_exposure, names::Input, recipe::Recipe};
 use crate::{config, console::Console, outputs::ALPHA_LEFT_OUT, program};
 
 /// A picture that was written.
@@ -182,7 +182,7 @@ impl Run {
         }
         let metered = match self.metered.filter(|_| input.sequence == Some(false)) {
             Some(stops) => stops,
-            None => meter::stops(pixels, settings.operator),
+            None => auto_exposure::stops(pixels, settings.operator),
         };
         self.metered = Some(metered);
         self.console.detail(&format!("{}: measured exposure {metered:+.2} EV", input.name));

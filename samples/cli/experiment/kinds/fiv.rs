@@ -25,7 +25,7 @@ use super::{Job, Rendered, Warm, on_device, read};
 use crate::{
     config,
     experiment::{cache, digest::Digest, file::Changes, sealed},
-    shown::Shown,
+    frame_output::FrameOutput,
 };
 
 pub(super) fn settings(_paper: bool, changes: &Changes) -> Result<Value> {
@@ -81,7 +81,7 @@ pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rende
         let handles = resident.frame_in(graph, scene, pose);
         let view = job.view.fit_far(&handles.bounds());
         let picture = fiv.picture(graph, scene, pose, &handles, &view, &settings)?;
-        Ok(Shown::new(picture.outputs.total).color("irradiance", picture.outputs.irradiance))
+        Ok(FrameOutput::new(picture.outputs.total).color("irradiance", picture.outputs.irradiance))
     })?;
     let facts = facts.clone();
     let radius = fiv.occluders().kinds.iter().map(|kind| kind.radius).fold(0f32, f32::max);

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::{Job, Rendered, Times, Warm, isr_picture, on_device, read};
-use crate::{config, experiment::file::Changes, shown::Shown};
+use crate::{config, experiment::file::Changes, frame_output::FrameOutput};
 
 /// Settings of both kinds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -89,10 +89,10 @@ pub(super) fn on_gpu(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Render
     let rendered = on_device(runner, job, "tonemap", |graph| {
         let picture = graph.import_image(&source.image);
         let out = tonemap.frame(graph, picture, None)?;
-        let shown = Shown::new(out.mapped).layer("luminance", &["Y"], out.luminance, |pixel| pixel);
+        let output = FrameOutput::new(out.mapped).layer("luminance", &["Y"], out.luminance, |pixel| pixel);
         Ok(match out.important {
-            Some(map) => shown.layer("important", &["Y"], map, |pixel| pixel),
-            None => shown,
+            Some(map) => output.layer("important", &["Y"], map, |pixel| pixel),
+            None => output,
         })
     })?;
     Ok(rendered.map(|rendered| Rendered { layers: precise(rendered.layers), ..rendered }))

@@ -6,7 +6,7 @@ use crate::{
     graph::{Buffer, Graph},
     shaders::{
         consts::VPL_TREE_MOST,
-        igi::{order_join, order_keys, order_leaves, order_sort},
+        igi::{light_tree_join, light_tree_keys, light_tree_leaves, light_tree_sort},
         types,
     },
 };
@@ -21,7 +21,7 @@ pub struct LightTree {
 }
 
 /// The same virtual lights, with a tree over them if something picks from it, sorted if that or their order is asked for.
-pub(super) fn ordered_if_asked(graph: &mut Graph, vpls: Vpls, settings: &Settings) -> Vpls {
+pub(super) fn with_light_tree(graph: &mut Graph, vpls: Vpls, settings: &Settings) -> Vpls {
     let picked = settings.picks > 0 || settings.compensates();
     if picked || settings.sorted { ordered(graph, vpls, picked) } else { vpls }
 }
@@ -31,24 +31,24 @@ fn ordered(graph: &mut Graph, vpls: Vpls, picked: bool) -> Vpls {
     let total = vpls.count;
     debug_assert!(total <= VPL_TREE_MOST);
     let leaves = total.max(1).next_power_of_two();
-    let keys = [(); 2].map(|()| graph.buffer("igi.order", 8 * u64::from(total.max(1))));
-    graph.compute(order_keys::Args { vpls: vpls.buffer, keys: keys[0], push: order_keys::Push { total } }, 1);
+    let keys = [(); 2].map(|()| graph.buffer("igi.light-tree-keys", 8 * u64::from(total.max(1))));
+    graph.compute(light_tree_keys::Args { vpls: vpls.buffer, keys: keys[0], push: light_tree_keys::Push { total } }, 1);
     // An even number of turns, back into the first.
     for turn in 0..8 {
         let (from, to) = if turn % 2 == 0 { (keys[0], keys[1]) } else { (keys[1], keys[0]) };
-        let push = order_sort::Push { total, shift: 4 * turn };
-        graph.compute(order_sort::Args { keys: from, sorted: to, push }, 1);
+        let push = light_tree_sort::Push { total, shift: 4 * turn };
+        graph.compute(light_tree_sort::Args { keys: from, sorted: to, push }, 1);
     }
-    let ordered = graph.buffer("igi.ordered", u64::from(total.max(1)) * size_of::<types::Vpl>() as u64);
+    let ordered = graph.buffer("igi.sorted-vpls", u64::from(total.max(1)) * size_of::<types::Vpl>() as u64);
     let nodes = graph.buffer("igi.light-tree", 2 * u64::from(leaves) * size_of::<types::VplNode>() as u64);
-    let push = order_leaves::Push { total, leaves };
-    graph.compute(order_leaves::Args { keys: keys[0], vpls: vpls.buffer, ordered, nodes, push }, leaves);
+    let push = light_tree_leaves::Push { total, leaves };
+    graph.compute(light_tree_leaves::Args { keys: keys[0], vpls: vpls.buffer, ordered, nodes, push }, leaves);
     if !picked {
         return Vpls { buffer: ordered, count: total, tree: None };
     }
     let mut first = leaves / 2;
     while first > 0 {
-        graph.compute(order_join::Args { nodes, push: order_join::Push { first } }, first);
+        graph.compute(light_tree_join::Args { nodes, push: light_tree_join::Push { first } }, first);
         first /= 2;
     }
     Vpls { buffer: ordered, count: total, tree: Some(LightTree { nodes, leaves }) }

@@ -38,7 +38,7 @@ impl Goals {
 
 /// Shows progress from time to time.
 #[derive(Debug)]
-pub struct Meter {
+pub struct ProgressLine {
     mode: ProgressMode,
     goals: Goals,
     started: Instant,
@@ -49,7 +49,7 @@ pub struct Meter {
     error: Option<(f64, f64)>,
 }
 
-impl Meter {
+impl ProgressLine {
     /// Towards `goals`.
     pub fn new(mode: ProgressMode, quiet: bool, goals: Goals, before: Progress) -> Self {
         let mode = mode.here(quiet, false);

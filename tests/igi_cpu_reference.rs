@@ -211,7 +211,7 @@ fn near(found: [f32; 3], expected: DVec3, slack: f64) -> bool {
 }
 
 #[test]
-fn paths_of_light_leave_virtual_lights_where_a_slow_program_does() {
+fn paths_of_light_leave_virtual_lights_where_a_cpu_reference_does() {
     with_gpu(|gpu| {
         let (scene, lamps) = room();
         let world = triangles(&scene);
@@ -278,7 +278,7 @@ fn seen_at(world: &[Triangle], view: &View, pixel: [u32; 2]) -> (DVec3, DVec3, D
 }
 
 #[test]
-fn pixels_gather_what_a_slow_program_does() {
+fn pixels_gather_what_a_cpu_reference_does() {
     with_gpu(|gpu| {
         let (scene, _) = room();
         let world = triangles(&scene);
@@ -357,7 +357,7 @@ fn luminance(color: DVec3) -> f64 {
 }
 
 #[test]
-fn lights_are_chosen_as_a_slow_program_chooses_them() {
+fn lights_are_chosen_as_a_cpu_reference_chooses_them() {
     with_gpu(|gpu| {
         let (scene, _) = room();
         let world = triangles(&scene);

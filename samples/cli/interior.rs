@@ -17,7 +17,7 @@ const EYE: (f32, f32) = (0.45, 0.15);
 
 /// A room, metres, world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Room {
+pub struct Interior {
     /// At eye height at one end of the room.
     pub eye: Vec3,
     /// Unit vector along the room.
@@ -69,7 +69,7 @@ impl Survey {
 }
 
 /// A room if walls with their front towards the middle stand all around it, and a floor lies below.
-pub fn find(scene: &Scene) -> Option<Room> {
+pub fn find(scene: &Scene) -> Option<Interior> {
     let survey = Survey::of(scene)?;
     if survey.walls() < WALLS {
         return None;
@@ -83,7 +83,7 @@ pub fn find(scene: &Scene) -> Option<Room> {
     let height = floor.y + (EYE.0 * (top - floor.y)).min(EYE.1 * length);
     let centre = Vec3::new(middle.x, height, middle.z);
     let back = survey.inside(centre, -forward).unwrap_or(0.0);
-    Some(Room { eye: centre - forward * back * 0.9, forward, ceiling, floor, length })
+    Some(Interior { eye: centre - forward * back * 0.9, forward, ceiling, floor, length })
 }
 
 /// Where a box is open to one side (the Cornell box): the direction out of it, horizontal.

@@ -7,7 +7,7 @@ use crate::{
     scene::resident::Handles,
     shaders::{
         consts::TREE_WIDTH,
-        igi::{direct_tree, gather_tree, gather_tree_picks, grow, reap},
+        igi::{ray_tree_direct, ray_tree_gather, ray_tree_gather_picks, ray_tree_grow, ray_tree_sum},
         types,
     },
 };
@@ -104,8 +104,8 @@ impl Igi {
                     self.compensate_trees(graph, handles, shared, vpls, settings, (tree_nodes, range.nodes()));
                 }
             }
-            let push = reap::Push { first: range.first, count: range.slots };
-            graph.compute(reap::Args { sharp, tree_nodes, push }, range.slots);
+            let push = ray_tree_sum::Push { first: range.first, count: range.slots };
+            graph.compute(ray_tree_sum::Args { sharp, tree_nodes, push }, range.slots);
         }
         Trees { sharp, cache }
     }
@@ -122,9 +122,15 @@ impl Igi {
         range: &Range,
     ) {
         for level in 0..=settings.specular_depth {
-            let push = grow::Push { first: range.first, count: range.slots, level, background };
+            let push = ray_tree_grow::Push { first: range.first, count: range.slots, level, background };
             let args = traced_lit!(
-                grow::Args { view: g.view, depth: g.depth, sharp: range.sharp, tree_nodes: range.tree_nodes, push },
+                ray_tree_grow::Args {
+                    view: g.view,
+                    depth: g.depth,
+                    sharp: range.sharp,
+                    tree_nodes: range.tree_nodes,
+                    push
+                },
                 shared.rays,
                 handles,
                 shared
@@ -136,9 +142,9 @@ impl Igi {
     /// Direct light.
     fn direct_of_trees(&self, graph: &mut Graph, handles: &Handles, shared: &Shared, range: &Range) {
         for (first, count) in self.batches(range.lit(), shared.direct_rays) {
-            let push = direct_tree::Push { first, count, nodes: range.nodes() };
+            let push = ray_tree_direct::Push { first, count, nodes: range.nodes() };
             let args = traced_lit!(
-                direct_tree::Args { tree_nodes: range.tree_nodes, push },
+                ray_tree_direct::Args { tree_nodes: range.tree_nodes, push },
                 shared.rays,
                 handles,
                 shared,
@@ -163,10 +169,10 @@ impl Igi {
         if let (Some(tree), true) = (vpls.tree, settings.picks_from(vpls.count)) {
             let (picks, proposals, leaves) = (settings.picks, settings.proposals, tree.leaves);
             for (first, count) in self.batches(range.lit(), picks) {
-                let push = gather_tree_picks::Push { first, count, picks, proposals, leaves, nodes, least, seed };
-                let spec = gather_tree_picks::Spec { imperfect };
+                let push = ray_tree_gather_picks::Push { first, count, picks, proposals, leaves, nodes, least, seed };
+                let spec = ray_tree_gather_picks::Spec { imperfect };
                 let args = crate::rays::traced!(
-                    gather_tree_picks::Args { vpls: vpls.buffer, vpl_nodes: tree.nodes, tree_nodes, push, spec },
+                    ray_tree_gather_picks::Args { vpls: vpls.buffer, vpl_nodes: tree.nodes, tree_nodes, push, spec },
                     shared.hidden_by
                 );
                 dispatch(graph, args, groups.map(|groups| (groups, 0)), nodes).rays(rays(range.lit(), count));
@@ -174,10 +180,12 @@ impl Igi {
             return;
         }
         for (first, count) in self.batches(range.lit(), vpls.count) {
-            let push = gather_tree::Push { first, count, nodes, least, seed };
-            let spec = gather_tree::Spec { imperfect };
-            let args =
-                crate::rays::traced!(gather_tree::Args { vpls: vpls.buffer, tree_nodes, push, spec }, shared.hidden_by);
+            let push = ray_tree_gather::Push { first, count, nodes, least, seed };
+            let spec = ray_tree_gather::Spec { imperfect };
+            let args = crate::rays::traced!(
+                ray_tree_gather::Args { vpls: vpls.buffer, tree_nodes, push, spec },
+                shared.hidden_by
+            );
             dispatch(graph, args, groups.map(|groups| (groups, 0)), nodes).rays(rays(range.lit(), count));
         }
     }

@@ -1,7 +1,7 @@
 // Trees of mirrored and refracted rays (Whitted 1980), grown a level a dispatch. A pixel has TREE_WIDTH nodes; a ray that splits keeps its
 // node for what goes on through and gives the reflection a free one. Where none is left one of the two is taken at random.
-#ifndef LIB_IGI_TREE
-#define LIB_IGI_TREE
+#ifndef LIB_IGI_RAY_TREE
+#define LIB_IGI_RAY_TREE
 
 const uint TREE_WIDTH = 4u; // export
 

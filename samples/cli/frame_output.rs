@@ -13,7 +13,7 @@ type Decode = Box<dyn Fn([f32; 4]) -> [f32; 4]>;
 type Remark = Box<dyn Fn(u32) -> Option<Note>>;
 
 /// What a technique shows of a frame: the picture, and layers for formats that hold them.
-pub struct Shown {
+pub struct FrameOutput {
     picture: Image,
     /// One channel, shown as grey.
     grey: bool,
@@ -40,14 +40,14 @@ struct Source {
     decode: Decode,
 }
 
-impl std::fmt::Debug for Shown {
+impl std::fmt::Debug for FrameOutput {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let names: Vec<&str> = self.layers.iter().map(|layer| layer.name).collect();
-        write!(f, "Shown({:?}, layers {names:?})", self.picture)
+        write!(f, "FrameOutput({:?}, layers {names:?})", self.picture)
     }
 }
 
-impl Shown {
+impl FrameOutput {
     /// Only the picture: its red, green and blue are radiance.
     pub fn new(picture: Image) -> Self {
         let (layers, sums, notes, remarks) = Default::default();
@@ -124,18 +124,18 @@ impl Shown {
     }
 
     /// Asks the graph for the pixels.
-    pub fn read(self, graph: &mut Graph, with_layers: bool) -> Reading {
+    pub fn read(self, graph: &mut Graph, with_layers: bool) -> Readback {
         let picture = graph.read_image(self.picture);
         let (layers, sums) = if with_layers { (self.layers, self.sums) } else { Default::default() };
         let layers = layers.into_iter().map(|layer| (graph.read_image(layer.image), layer)).collect();
         let sums = sums.into_iter().map(|sum| (graph.read_image(sum.image), sum)).collect();
         let remarks = self.remarks.into_iter().map(|(number, of)| (graph.read_buffer(number), of)).collect();
-        Reading { picture, grey: self.grey, view: false, layers, sums, remarks }
+        Readback { picture, grey: self.grey, view: false, layers, sums, remarks }
     }
 }
 
 /// Pixels that were asked for.
-pub struct Reading {
+pub struct Readback {
     picture: ImageRead,
     grey: bool,
     /// Any image of the graph, to look at.
@@ -145,13 +145,13 @@ pub struct Reading {
     remarks: Vec<(BufferRead, Remark)>,
 }
 
-impl std::fmt::Debug for Reading {
+impl std::fmt::Debug for Readback {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Reading({} layers)", self.layers.len())
+        write!(f, "Readback({} layers)", self.layers.len())
     }
 }
 
-impl Reading {
+impl Readback {
     /// Asks for the image of this name instead of a technique's picture.
     ///
     /// # Errors

@@ -16,7 +16,7 @@
 #include "lib/trace.glsl"
 #include "lib/igi.glsl"
 #include "lib/vpl_surface.glsl"
-#include "lib/igi_tree.glsl"
+#include "lib/igi_ray_tree.glsl"
 
 layout(local_size_x = 64) in;
 
