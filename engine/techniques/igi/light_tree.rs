@@ -1,5 +1,6 @@
-//! A tree over the virtual lights of a frame, so that a surface can pick those that matter to it. Built on the device: sorted by a radix
-//! sort, then joined two by two.
+//! The light tree: a binary tree over the virtual lights of a frame, from which a receiver picks the lights that send it the most
+//! light (Yuksel 2019; Lin and Yuksel 2020). The device builds the tree: a radix sort orders the lights, then pairs of nodes are
+//! joined level by level.
 
 use super::{Settings, Vpls};
 use crate::{
@@ -11,29 +12,29 @@ use crate::{
     },
 };
 
-/// A perfectly balanced tree over virtual lights.
+/// A perfectly balanced binary tree over virtual lights.
 #[derive(Clone, Copy, Debug)]
 pub struct LightTree {
-    /// `types::VplNode`: the root is number 1, below node i are 2 i and 2 i + 1.
+    /// 2·`leaves` values of `types::VplNode`. Node 1 is the root; the children of node i are nodes 2i and 2i + 1.
     pub nodes: Buffer,
-    /// A power of two; leaf i is node `leaves` + i and stands for virtual light i, or for none.
+    /// Number of leaves, a power of two. Leaf i is node `leaves` + i. It holds virtual light i, or nothing if there is no light i.
     pub leaves: u32,
 }
 
-/// The same virtual lights, with a tree over them if something picks from it, sorted if that or their order is asked for.
+/// Sorts the virtual lights if the settings need it, and builds a tree if receivers pick from it.
 pub(super) fn with_light_tree(graph: &mut Graph, vpls: Vpls, settings: &Settings) -> Vpls {
     let picked = settings.picks > 0 || settings.compensates();
-    if picked || settings.sorted { ordered(graph, vpls, picked) } else { vpls }
+    if picked || settings.sorted { sorted(graph, vpls, picked) } else { vpls }
 }
 
-/// The same virtual lights, sorted; with a tree over them if `picked`.
-fn ordered(graph: &mut Graph, vpls: Vpls, picked: bool) -> Vpls {
+/// Sorts the virtual lights, and builds a tree over them if `picked`.
+fn sorted(graph: &mut Graph, vpls: Vpls, picked: bool) -> Vpls {
     let total = vpls.count;
     debug_assert!(total <= VPL_TREE_MOST);
     let leaves = total.max(1).next_power_of_two();
     let keys = [(); 2].map(|()| graph.buffer("igi.light-tree-keys", 8 * u64::from(total.max(1))));
     graph.compute(light_tree_keys::Args { vpls: vpls.buffer, keys: keys[0], push: light_tree_keys::Push { total } }, 1);
-    // An even number of turns, back into the first.
+    // The number of sorting passes is even, so that the result is in the first buffer again.
     for turn in 0..8 {
         let (from, to) = if turn % 2 == 0 { (keys[0], keys[1]) } else { (keys[1], keys[0]) };
         let push = light_tree_sort::Push { total, shift: 4 * turn };
