@@ -1,4 +1,4 @@
-// Short paths begin at the surfaces at the ends of trees.
+// Starts short paths at the surfaces of the ray tree nodes.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -10,8 +10,8 @@ layout(local_size_x = 64) in;
 
 layout(push_constant, scalar) uniform Push {
     uint count;  // nodes
-    uint number; // of the path
-    uint paths;  // of a node
+    uint number; // which path of the node
+    uint paths;  // paths per node
 };
 
 void main() {

@@ -1,4 +1,4 @@
-// What short paths have brought to the surfaces at the ends of trees.
+// Adds the light of the short paths to the ray tree nodes.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require

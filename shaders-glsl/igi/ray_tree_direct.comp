@@ -1,4 +1,4 @@
-// Direct light of the surfaces at the ends of the trees by a range of their shadow rays.
+// Adds direct light to the ray tree nodes for a range of their shadow rays.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require

@@ -1,4 +1,4 @@
-// Light from a range of virtual lights at the surfaces at the ends of the trees: every light, at full resolution, as the paper has it.
+// Adds the light of a range of virtual lights to the ray tree nodes: from every light and at full resolution, as in the paper.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -13,7 +13,7 @@ layout(local_size_x = 64) in;
 layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; };
 
 layout(push_constant, scalar) uniform Push {
-    uint first;
+    uint first;      // virtual light
     uint count;
     uint nodes;
     float least;     // min_d of the bounded geometry term, metres; 0: none

@@ -1,4 +1,4 @@
-// Light at the surfaces at the ends of the trees from a few virtual lights picked by the tree over them (as igi/gather_picks.comp).
+// Adds to the ray tree nodes the light of a few virtual lights, picked from the light tree (like igi/gather_picks.comp).
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -21,7 +21,7 @@ layout(push_constant, scalar) uniform Push {
     uint count;
     uint picks;
     uint proposals;  // for each pick
-    uint leaves;     // of the tree over the virtual lights
+    uint leaves;     // of the light tree
     uint nodes;
     float least;     // min_d of the bounded geometry term, metres; 0: none
     uint seed;
