@@ -1,4 +1,4 @@
-//! What the executables share: command line, settings, the loop over frames, output names, messages, exit codes.
+//! The code that the executables share: command line, settings, the loop over frames, output names, messages, exit codes.
 
 pub mod args;
 pub mod camera;

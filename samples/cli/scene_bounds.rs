@@ -1,8 +1,8 @@
-//! The space that a scene takes.
+//! Bounding boxes of scenes.
 
 use lucerna::scene::{Aabb, Pose, Scene, deform};
 
-/// Times at which an animation is looked at.
+/// Number of times at which an animation is sampled.
 const MOMENTS: u32 = 8;
 
 /// The box around all geometry in one pose, metres; `None` if there is none.
@@ -18,7 +18,7 @@ pub fn in_pose(scene: &Scene, pose: &Pose) -> Option<Aabb> {
     around.is_finite().then_some(around)
 }
 
-/// The box around everything that the geometry reaches while the animations play.
+/// The box around all geometry over the time of the animations, metres; `None` if there is no geometry.
 pub fn over_animations(scene: &Scene) -> Option<Aabb> {
     let longest = scene.animations.iter().map(|a| a.duration()).fold(0.0, f32::max);
     let moments = if longest > 0.0 { MOMENTS } else { 1 };

@@ -36,9 +36,9 @@ pub enum Mode {
     /// Direct and indirect light
     #[default]
     Igi,
-    /// Direct light alone
+    /// Direct light only
     Direct,
-    /// Indirect light alone
+    /// Indirect light only
     Indirect,
 }
 
@@ -59,7 +59,7 @@ struct ByLights(Mode);
 /// Renders the frames of a command line.
 ///
 /// # Errors
-/// Whatever fails, with the kind that decides the exit code.
+/// Any error of the run. Its kind decides the exit code.
 pub fn run(args: &IgiArgs) -> Result<ExitCode> {
     let base = if args.common.paper { PictureSettings::paper() } else { PictureSettings::default() };
     render::render(&ByLights(args.mode), &args.common, &base)
@@ -100,7 +100,7 @@ impl Renderer for ByLights {
     ) -> Result<FrameOutput> {
         let scene = resident.frame_in(graph, input.scene, input.pose);
         let view = input.view.fit_far(&scene.bounds());
-        // Nobody looks at indirect light then.
+        // Indirect light is not computed if no output shows it.
         let direct = self.0 == Mode::Direct && !input.layers;
         let served = PictureSettings {
             igi: igi::Settings { indirect: settings.igi.indirect && !direct, ..settings.igi.clone() },
@@ -114,7 +114,7 @@ impl Renderer for ByLights {
             Mode::Indirect => FrameOutput::new(out.indirect),
         };
         let output = output.color("direct", out.direct).color("indirect", out.indirect);
-        // What mirrors and glass show.
+        // The light in mirrors and glass.
         let output = match out.sharp {
             Some(sharp) => output.color("specular", sharp),
             None => output,

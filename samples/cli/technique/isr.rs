@@ -30,7 +30,7 @@ pub struct IsrArgs {
     #[command(flatten)]
     pub common: RenderArgs,
 
-    /// Start from choices that go together: fast, balanced or best; -D and --settings win over it
+    /// Settings preset: fast, balanced or best; -D and --settings override it
     #[arg(long, value_name = "NAME", help_heading = "Technique", conflicts_with = "paper")]
     pub preset: Option<Preset>,
 
@@ -45,11 +45,11 @@ pub enum Mode {
     /// Direct and indirect light
     #[default]
     Isr,
-    /// Direct light only; nothing is gathered
+    /// Direct light only; no light is gathered
     Direct,
-    /// Indirect light alone
+    /// Indirect light only
     Indirect,
-    /// Ambient occlusion alone: 1 open, 0 occluded
+    /// Ambient occlusion only: 1 open, 0 occluded
     Occlusion,
 }
 
@@ -71,7 +71,7 @@ struct Isr(Mode);
 /// Renders the frames of a command line.
 ///
 /// # Errors
-/// Whatever fails, with the kind that decides the exit code.
+/// Any error of the run. Its kind decides the exit code.
 pub fn run(args: &IsrArgs) -> Result<ExitCode> {
     let base = match args.preset {
         _ if args.common.paper => PictureSettings::paper(),
