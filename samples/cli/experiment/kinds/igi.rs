@@ -18,7 +18,7 @@ pub(super) fn settings(paper: bool, changes: &Changes) -> Result<Value> {
     config::to_value(&settings)
 }
 
-/// What is kept of a scene, for one way to trace rays.
+/// The technique's data for a scene, for one choice of ray tracing.
 struct Kept {
     resident: Resident,
     igi: Igi,
@@ -28,14 +28,14 @@ struct Kept {
 pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
     let settings: PictureSettings = read(job.settings)?;
     let (scene, pose) = (warm.scene, warm.pose);
-    // Boxes and rays of another kind need trees of their own.
+    // Imperfect visibility and other choices of ray tracing need other acceleration structures.
     let name = if settings.igi.imperfect { "igi, imperfect" } else { "igi" };
     let name = match settings.igi.visibility {
         Visibility::Auto => name,
         _ => "igi, chosen rays",
     };
     if name == "igi, chosen rays" {
-        // Not kept: the next one may choose others.
+        // The data is not kept, because the next variant may choose another kind of ray tracing.
         warm.forget(name);
     }
     let Kept { resident, igi, runner } = warm.keep(name, |gpu, scene, _| {
