@@ -1,5 +1,5 @@
 //! The G-buffer: attributes of the nearest visible surface of every pixel, in one pass over the culled scene
-//! (ISR dissertation, section 4.2: CLR, NRM, DPT; with what physical materials need besides).
+//! (ISR dissertation, section 4.2: CLR, NRM, DPT), and further attributes of physical materials.
 
 use crate::{
     graph::{Compare, Cull, Depth, Extent, Format, Graph, Image, Load, Raster, Stencil, StencilLoad, Targets, Uniform},

@@ -15,7 +15,7 @@ pub const STOPPED_EARLY: u8 = 8;
 /// Exit code: SIGINT stopped the program before any output was written.
 pub const INTERRUPTED: u8 = 130;
 
-/// Runs a program's body. Exit codes: 0 success, else [`Error::exit_code`], or what the body chose.
+/// Runs a program's body. Exit codes: the body's exit code on success, else [`Error::exit_code`].
 pub fn run(console: Console, body: impl FnOnce() -> Result<ExitCode>) -> ExitCode {
     Interrupt::catch(console);
     notes::show(console);

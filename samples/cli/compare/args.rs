@@ -51,8 +51,8 @@ pub struct CompareArgs {
     #[arg(long, value_name = "DIR")]
     pub map: Option<PathBuf>,
 
-    /// Kinds of maps: `magma` on a fixed scale, `exr` with the numbers, `difference` and `negative`: |R-T| of what a screen shows, and
-    /// 1 minus that
+    /// Kinds of maps: `magma` on a fixed scale, `exr` with the numbers, `difference`: |R-T| of screen values, `negative`: 1 minus
+    /// |R-T|
     #[arg(long, value_enum, value_delimiter = ',', default_value = "magma", requires = "map")]
     pub map_style: Vec<MapStyle>,
 
@@ -77,7 +77,7 @@ pub struct CompareArgs {
     #[arg(long)]
     pub idiff_codes: bool,
 
-    /// Stops of exposure for measures of what a screen shows, the same for all images; `auto`: found on the reference
+    /// Exposure for measures of screen values, stops, the same for all images; `auto`: computed from the reference
     #[arg(long, value_name = "EV|auto", allow_hyphen_values = true, value_parser = exposure, default_value = "auto", help_heading = HDR)]
     pub exposure: Stops,
 
@@ -163,26 +163,26 @@ pub struct CompareArgs {
 }
 
 const HELP: &str = "\
-Every TEST is compared pixel by pixel with REFERENCE: one line a test, one column a measure. Images of different sizes, images with
-NaN or infinite pixels, and light beside screen codes (unless --exposure says how it is shown) are refused.
+Compares every TEST with REFERENCE pixel by pixel, and prints one line for each test and one column for each measure. Refuses images of
+different sizes, images with NaN or infinite pixels, and HDR images together with screen codes (unless --exposure is given).
 
 Measures:
-  mae rmse nrmse rms-percent mean-percent rel-mse pearson   linear values as they are
-  psnr ssim ms-ssim flip pdiff vdp                          what a screen shows: exposure, tone curve, sRGB
+  mae rmse nrmse rms-percent mean-percent rel-mse pearson   compare linear values
+  psnr ssim ms-ssim flip pdiff vdp                          compare screen values: exposure, tone curve, sRGB
   hdr-flip                                                  chooses its own exposures
-  fq gain improved                                          against --baseline; fq is -1 where TEST is nearer than the baseline
+  fq gain improved                                          compare with --baseline; fq is -1 where TEST is nearer than the baseline
 
-Exit codes: 0 measured and nothing over a threshold, 7 over a threshold, 2 wrong usage, 3 unreadable or not comparable, 1 a map could not
-be written.
+Exit codes: 0 no measure is over its threshold, 7 a measure is over its threshold, 2 wrong usage, 3 an image is unreadable or not
+comparable, 1 a map could not be written.
 
 Examples:
   lucerna compare reference.exr isr.exr                            the usual measures
   lucerna compare reference.exr a.exr b.exr c.exr -m flip,ssim     a table
-  lucerna compare reference.exr isr.exr --baseline isr.exr:direct  is it better than direct light alone?
+  lucerna compare reference.exr isr.exr --baseline isr.exr:direct  is it better than direct light only?
   lucerna compare golden.png new.png --fail-over flip=0.02         for CI: exit code 7 if it looks different
   lucerna compare a.exr b.exr -m all --map maps --json             everything, with maps
 
-docs/measures.md has each measure's formula, source, range and what it is good for.";
+docs/measures.md has the formula, source, range and purpose of each measure.";
 
 /// A measure and its threshold.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,8 +1,8 @@
 //! Images in a page, with their linear values.
 //!
-//! Values are kept as 16-bit floats of which 8 significant bits are stored (relative steps below 0.4 %), high bytes first, then
-//! low bytes, each the difference to its left neighbour, deflated. The page unpacks them, so that exposure, difference and the
-//! values under the cursor work on radiance and not on what a screen showed.
+//! Values are stored as 16-bit floats with 8 significant bits (relative steps below 0.4 %): first all high bytes, then all low bytes, each as
+//! the difference from its left neighbour, deflated. The page unpacks them, so that exposure, difference and the values under the cursor use
+//! radiance and not screen values.
 
 use std::io::Write;
 

@@ -159,22 +159,22 @@ pub struct TonemapArgs {
 
 const HELP: &str = "\
 Operators:
-  ashikhmin        (default) keeps the contrast that the eye would see in the scene; light is taken as cd/m²
-  reinhard         as a photographer dodges and burns a print; needs no units: start here if a picture comes out dark
+  ashikhmin        (default) keeps the contrast that the eye would see in the scene; needs light in cd/m²
+  reinhard         photographic dodging and burning; needs no units: try it first if a picture is too dark
   bilateral        compresses large areas and keeps fine detail; needs no units
-  linear           nothing but exposure; what is over white is cut
-  reinhard-global  a soft shoulder: lights are not cut off below --white
+  linear           exposure only; clips values above white
+  reinhard-global  a soft shoulder: does not clip lights below --white
   aces, agx        film-like curves of games and films; they expect a well exposed picture (--exposure auto)
-  neutral          Khronos PBR Neutral: colours of products stay as they are
+  neutral          Khronos PBR Neutral: does not change the colours of products
 
-Colour: pictures are taken to linear Rec. 709 by what they say of themselves (EXR chromaticities, XYZ, luminance with chroma; \
-PRIMARIES and XYZE of .hdr; sRGB or gAMA of .png; .jpg is sRGB); without a word they are Rec. 709. Colours outside of it become \
-negative and fall under --bad-values. White is not adapted. .png and .jpg are written in sRGB, .exr .hdr .pfm as linear light \
-relative to the screen's white. Alpha is kept in .png and .exr; .jpg shows the picture over black.
+Colour: pictures are converted to linear Rec. 709 by their metadata (EXR chromaticities, XYZ, luminance with chroma; PRIMARIES and XYZE \
+of .hdr; sRGB or gAMA of .png; .jpg is sRGB). Without metadata they are taken as Rec. 709. Colours outside of Rec. 709 become negative, \
+and --bad-values applies to them. White is not adapted. .png and .jpg are written in sRGB, .exr .hdr .pfm as linear light relative to \
+the screen's white. .png and .exr keep alpha; .jpg shows the picture over black.
 
 Exit codes: 0 all done; 2 wrong usage; 3 a picture cannot be read; 1 a file cannot be written; 4 no device; 5 out of memory; 6 device \
-lost; 8 stopped early, what was written is complete; 130 stopped before anything was written. A picture that fails does not stop the \
-ones after it; the first failure decides the code.
+lost; 8 stopped early, with complete files; 130 stopped before any file was written. After a failed picture the other pictures are \
+still processed; the first failure decides the code.
 
 Examples:
   tonemap church.hdr -o church.png
@@ -182,7 +182,7 @@ Examples:
   tonemap photos/*.exr -o developed/               a folder, one device for all
   tonemap shot-####.exr -o out-####.png --fps 24   a sequence: the eye adapts from frame to frame
   isr render room.gltf -o - | tonemap - -o a.png   in a pipe
-  tonemap a.exr -o a.png -D tonemap.radius=6       any setting; --print-config shows all";
+  tonemap a.exr -o a.png -D tonemap.radius=6       any setting; --print-config shows all settings";
 
 /// Settings in files and after `-D`, with the keys `tonemap.key`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -1,4 +1,4 @@
-//! Tables 17 and 18: what is seen of the errors before and after tone mapping.
+//! Tables 17 and 18: visibility of the errors before and after tone mapping.
 
 use lucerna::{
     Result,
@@ -13,9 +13,9 @@ use crate::{
     report::{Section, Table},
 };
 
-/// What the brightest of a picture becomes on the screen, but for one pixel in a hundred.
+/// Screen value to which the 99th percentile of a picture is mapped.
 const BRIGHT: f64 = 0.9;
-/// Luminance that the log-average becomes for an operator that works in cd/m².
+/// Luminance to which the log-average is scaled for an operator that works in cd/m².
 const GREY: f32 = 18.0;
 
 /// Five of 255 steps to the screen's white.
@@ -63,7 +63,7 @@ fn seen(lab: &Lab<'_>, scene: &str, technique: &str) -> Result<Option<[f64; 3]>>
     let picture = |run: &Done| lab.results.picture(Layer(run, ""));
     let open = lab.open(truth)?;
     let (truth, mut test) = (picture(truth)?, picture(run)?);
-    // What is never seen is no difference.
+    // Pixels that are never visible do not count as different.
     for (i, _) in open.iter().flatten().enumerate().filter(|(_, open)| !**open) {
         test.pixels[i] = truth.pixels[i];
     }

@@ -1,4 +1,4 @@
-//! Errors, cost of precomputing, cost of a frame.
+//! Tables of errors, of the time of precomputation, and of the time of a frame.
 
 use lucerna::Result;
 
@@ -151,7 +151,7 @@ pub(super) fn frames(lab: &Lab<'_>) -> Result<Section> {
     Ok(section)
 }
 
-/// What the cost does not depend on.
+/// Independence of the time from vertices and lights.
 pub(super) fn independence(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("What the cost depends on");
     section.text(

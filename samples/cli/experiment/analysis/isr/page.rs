@@ -38,7 +38,7 @@ fn of(rows: &[Row], value: impl Fn(&Row) -> f64) -> Option<Spread> {
     Spread::of(rows.iter().map(value))
 }
 
-/// Everything that the dissertation states in numbers.
+/// The dissertation's figures, compared with ours.
 pub(super) fn figures(lit: &[Row], albedo: &[Row], weaker: &[Row]) -> Section {
     let mut section = Section::new("The dissertation's figures");
     section.text(
@@ -163,7 +163,7 @@ fn cost(results: &Results) -> Result<Section> {
     Ok(section)
 }
 
-/// What image-space radiosity adds to direct light: everything of its own but G-buffer, shadow maps and direct light.
+/// Time of image-space radiosity without G-buffer, shadow maps and direct light.
 fn gathering(times: &crate::experiment::kinds::Times) -> f64 {
     let own = |name: &str| {
         let last = name.rsplit('/').next().unwrap_or(name);
@@ -218,7 +218,7 @@ const COLUMNS: [&str; 9] = [
     "light found",
 ];
 
-/// Percent of the pixels of all views.
+/// Percentage of the pixels of all views.
 fn share(rows: &[Row], of: impl Fn(&Row) -> usize) -> Option<f64> {
     let sum = |of: &dyn Fn(&Row) -> usize| rows.iter().map(of).sum::<usize>() as f64;
     (!rows.is_empty()).then(|| 100.0 * sum(&of) / sum(&|row| row.pixels))
@@ -289,7 +289,7 @@ fn small_gains(lit: &[Row]) -> Section {
     section
 }
 
-/// Options and presets: cost and error on the views that all of them were rendered for.
+/// Options and presets: time and error on the views that all of them have.
 fn beyond(results: &Results, all: &[Labelled]) -> Result<Section> {
     let mut section = Section::new("Beyond the dissertation");
     section.text(
@@ -327,7 +327,7 @@ fn beyond(results: &Results, all: &[Labelled]) -> Result<Section> {
     Ok(section)
 }
 
-/// Against POV-Ray, where it is installed: with the dissertation's settings, and without its factor on gathered light.
+/// Comparison with POV-Ray, if it is installed: with the dissertation's settings, and without its factor on gathered light.
 fn povray(results: &Results, lit: &[Row]) -> Result<Option<Section>> {
     use lucerna::measure::Measure::{Gain, Mae, Pearson};
     let columns = [

@@ -32,7 +32,7 @@ const TABLES_12_13: [(&str, f64, f64); 2] = [("memorial", 3.28, 2.48), ("desk", 
 const TABLES_14_16: [(&str, f64, f64, f64, f64); 2] =
     [("memorial", 2.41, 3.62, 0.9876, 5.44), ("desk", 2.72, 2.05, 0.9925, 17.66)];
 
-/// Where selection pays today.
+/// The gain of selection, for each way of averaging.
 pub(super) fn payoff(views: &[View<'_>]) -> Result<Section> {
     let mut section = Section::new("Does selection still pay?");
     section.text(
@@ -321,7 +321,7 @@ pub(super) fn quality(views: &[View<'_>]) -> Result<Section> {
     Ok(section)
 }
 
-/// The same for the other operators.
+/// Losses and times of the other operators.
 pub(super) fn operators(views: &[View<'_>]) -> Result<Section> {
     let mut section = Section::new("Other operators in the same framework");
     let columns = ["picture", "operator", "VDP % global", "VDP % selective", "SSIM selective"];
