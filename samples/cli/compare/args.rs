@@ -12,7 +12,7 @@ use crate::args::TalkArgs;
 
 const VIEWING: &str = "Viewing conditions";
 const DETAILS: &str = "Details of measures";
-const HDR: &str = "From light to screen";
+const HDR: &str = "Conversion of light to screen values";
 
 /// The arguments of `lucerna compare`.
 #[derive(Args, Clone, Debug)]

@@ -19,7 +19,7 @@ use crate::{
 const LOOK: &str = "Look";
 const OUTPUT: &str = "Output";
 const INPUT: &str = "Input";
-const WORK: &str = "How local work is done";
+const WORK: &str = "Local and selective operators";
 
 /// The arguments of `tonemap`.
 #[derive(Args, Clone, Debug)]

@@ -24,13 +24,13 @@ const CODES: f64 = 5.0 / 255.0;
 pub(super) fn tables(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("Tables 17 and 18: before and after tone mapping");
     section.text(
-        "Share of pixels whose difference to brute force is seen (VDP, an observer who does not know what to look for, p > 0.75), of the \
-         ground without what stands on it, as in the thesis: before tone mapping at an exposure at which the picture spans \
-         the screen, and after Ashikhmin's local operator. The thesis names neither the program that computed its VDP nor its settings. \
-         *Differ* is the share of pixels that differ before tone mapping by more than 5/255 of the screen's white. The measure marks more than \
-         that: for 32×17×15 samples in 96×96 under one point light 44 % where 6.6 % differ by 1/255, 25 % where each pixel is shown as 5×5. Its settings \
-         move that between 38 % (p > 0.95) and 72 % (masking of a practised observer); a white of 40 or 300 cd/m², or a fourth of the pixels in a degree, by \
-         a tenth. For 64×33×30 under one area light: 5.8 %, between 3.9 % and 14 %, where 0.9 % differ. No setting gives the thesis' 0.2 %.",
+        "Share of pixels with a visible difference to brute force (VDP for an inexperienced observer, p > 0.75), for the ground without the objects on \
+         it, as in the thesis: before tone mapping, at an exposure at which the picture spans the screen's range, and after Ashikhmin's local \
+         operator. The thesis names neither the program that computed its VDP nor its settings. *Differ* is the share of pixels that differ before \
+         tone mapping by more than 5/255 of the screen's white. VDP marks more pixels. For 32×17×15 samples in 96×96 under one point light it marks \
+         44 %, although 6.6 % differ by 1/255; it marks 25 % if each pixel is shown as 5×5. Its settings change this value to between 38 % (p > 0.95) and \
+         72 % (masking of a practised observer); a white of 40 or 300 cd/m², or a fourth of the pixels per degree, changes it by a tenth. For \
+         64×33×30 under one area light it marks 5.8 %, or 3.9 % to 14 % with other settings, although 0.9 % differ. No setting gives the thesis' 0.2 %.",
     );
     let columns = ["samples", "before (thesis)", "before", "after (thesis)", "after", "differ"];
     let mut table =

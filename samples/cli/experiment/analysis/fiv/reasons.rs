@@ -34,15 +34,15 @@ pub(super) fn of(lab: &Lab<'_>, case: &Case, technique: &str, ours: f64) -> Resu
     if let Some([steep, touched, rest]) = shares(lab, case.scene, technique)? {
         let part = 100.0 * STEEP;
         parts.push(format!(
-            "of the squared error {:.0} % lie on the {part:.0} % of the ground where light changes most, {:.0} % next to ground that is covered \
-             (on 1/64 of the width), without which it is {:.3}",
+            "{:.0} % of the squared error is on the {part:.0} % of the ground with the largest change of light, {:.0} % within 1/64 of the width \
+             from covered ground, without which the NRMSE is {:.3}",
             100.0 * steep,
             100.0 * touched,
             ours * rest.sqrt(),
         ));
     }
     if parts.is_empty() {
-        parts.push("nothing else was rendered that would tell why".to_owned());
+        parts.push("there are no other pictures that would show the reason".to_owned());
     }
     Ok(parts.join("; "))
 }
