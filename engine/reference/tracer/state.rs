@@ -177,7 +177,7 @@ impl Job {
         differ("", &state.about, &now, &mut differences);
         if !differences.is_empty() {
             let what = format!("is the state of another picture: {}", differences.join("; "));
-            return Err(Error::input(what).help("Start anew, or give the options that it was begun with"));
+            return Err(Error::input(what).help("Start again, or give the options of that picture"));
         }
         self.set_sums(&state.sums)
     }

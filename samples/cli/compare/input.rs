@@ -72,16 +72,15 @@ impl Images {
         }
         let (Some(light), Some(codes)) = (light, codes) else { return Ok(()) };
         let Some(stops) = args.exposure.0 else {
-            return Err(Error::input(format!("{light} holds light of any range, {codes} what a screen shows"))
-                .help("Say with --exposure EV (and --tone-curve) how the light was shown; 0 takes 1 as white"));
+            return Err(Error::input(format!("{light} is an HDR image, but {codes} holds screen values"))
+                .help("Give the exposure of the HDR image with --exposure EV (and --tone-curve); with 0, a value of 1 is white"));
         };
         let curve = args.tone_curve.curve();
         for image in self.each().filter(|image| !image.picture.display_referred) {
             image.picture = measure::develop(&image.picture, stops, curve);
         }
-        let note = format!(
-            "{light} and others with light of any range are shown with {stops} stops and compared as screen values"
-        );
+        let note =
+            format!("HDR images ({light} and others) are exposed by {stops} stops and compared as screen values");
         self.notes.push(note);
         self.developed = true;
         Ok(())

@@ -99,7 +99,7 @@ impl<'a> Folder<'a> {
             extra.insert("meaning".to_owned(), measured.map.meaning.to_owned());
             extra.insert("scale".to_owned(), format!("magma from {low} (darkest) to {high} (brightest)"));
         } else {
-            extra.insert("meaning".to_owned(), "|R-T| of what a screen shows, or 1 minus that".to_owned());
+            extra.insert("meaning".to_owned(), "|R-T| of screen values, or 1 minus |R-T|".to_owned());
         }
         Metadata {
             program: "lucerna compare".into(),

@@ -160,7 +160,7 @@ fn chosen(args: &CompareArgs, images: &Images, fail: &[Threshold], warn: &[Thres
     });
     if let Some(measure) = list.iter().find(|m| m.info().needs_baseline && !with_baseline) {
         return Err(Error::usage(format!("{measure} compares each image with a baseline"))
-            .help("Name the image to beat with --baseline FILE, for example direct light alone"));
+            .help("Give the baseline with --baseline FILE, for example a picture with direct light only"));
     }
     Ok(list)
 }

@@ -142,7 +142,7 @@ impl Cache {
         }
         let bytes = image::read_file_checked(&picture, Limits::default().max_file)?;
         if Digest::of(&bytes).hex() != record.picture {
-            return Err(Error::input("is not the picture that was kept: damaged, or another one").in_file(&picture));
+            return Err(Error::input("is damaged, or is not the stored picture").in_file(&picture));
         }
         Ok(Some(record))
     }

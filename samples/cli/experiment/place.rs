@@ -38,7 +38,7 @@ impl Folders {
     fn missing(&self, name: &str) -> Error {
         let places: Vec<String> = self.0.iter().map(|folder| folder.display().to_string()).collect();
         Error::input(format!("no file '{name}' in {}", places.join(", ")))
-            .help("Say where with --assets DIR, or let it be skipped with if_missing = \"skip\"")
+            .help("Give the folder with --assets DIR, or allow to skip the scene with if_missing = \"skip\"")
     }
 }
 

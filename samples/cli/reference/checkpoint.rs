@@ -53,7 +53,7 @@ impl Checkpoint {
             Err(error) => format!("a stopped run has left a state that cannot be read ({})", error.what()),
         };
         Err(Error::new(ErrorKind::Output, what).in_file(path).help(
-            "Give --resume to go on with the options that it was begun with, --restart to start anew over it, or name another image with -o",
+            "Give --resume to continue with the same options, --restart to start again and overwrite it, or give another image with -o",
         ))
     }
 
@@ -66,7 +66,9 @@ impl Checkpoint {
         let [width, height] = tracer.view()?.extent;
         if let Some([w, h]) = State::glance(path).ok().map(|head| head.extent).filter(|of| *of != [width, height]) {
             let what = format!("is the state of another picture: of {w}×{h} pixels, this one has {width}×{height}");
-            return Err(Error::input(what).in_file(path).help("Start anew, or give the size that it was begun with"));
+            return Err(Error::input(what)
+                .in_file(path)
+                .help("Start again with --restart, or give the size of that picture"));
         }
         // Reads at most the size of this picture's state, even if the file is longer.
         let bytes = read_file_checked(path, State::most_bytes([width, height]))?;

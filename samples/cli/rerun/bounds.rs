@@ -20,9 +20,9 @@ fn over(place: &str, asked: u64, allowed: u64, what: &str) -> Result<()> {
     if asked <= allowed {
         return Ok(());
     }
-    Err(Error::input(format!("asks for {asked} {what}; at most {allowed} are made unasked"))
+    Err(Error::input(format!("needs {asked} {what}; without --long at most {allowed} are allowed"))
         .at(place)
-        .help("Give --long if the picture is from somebody you trust, and there is time"))
+        .help("Give --long if you trust the source of the picture and have enough time"))
 }
 
 /// Checks that a record does not need more than its picture justifies, and, without `long`, no work that takes hours. `extent`: size of the
@@ -36,7 +36,7 @@ pub fn check(record: &Record, extent: [u32; 2], long: bool) -> Result<()> {
     if record.view.is_none() && [width, height] != extent {
         let [w, h] = extent;
         return Err(
-            Error::input(format!("{width}×{height} pixels are said to be in the file, it has {w}×{h}")).at("width")
+            Error::input(format!("the metadata state {width}×{height} pixels, but the file has {w}×{h}")).at("width")
         );
     }
     if long {
@@ -52,7 +52,7 @@ pub fn check(record: &Record, extent: [u32; 2], long: bool) -> Result<()> {
     over("settings.samples", samples.saturating_mul(pixels), PATHS, "paths")?;
     over("light", record.light.len() as u64, THINGS, "lights")?;
     let beside = record.ground.as_ref().map_or(0, |ground| ground.beside.len());
-    over("ground.beside", beside as u64, THINGS, "things")
+    over("ground.beside", beside as u64, THINGS, "objects")
 }
 
 /// The same check for vectors that must be computed again with `settings`.

@@ -286,7 +286,7 @@ impl TonemapArgs {
         let config = self.with(&self.settings.define)?;
         self.settings.blamed(check(&config), || check(&self.with(&[])?))?;
         if self.mask.is_some() && config.tonemap.mode() != Mode::Selective {
-            return Err(Error::usage("--mask names important pixels, which only --mode selective knows"));
+            return Err(Error::usage("--mask needs --mode selective"));
         }
         Ok(config)
     }

@@ -140,7 +140,7 @@ impl Recipe {
         let Some(Sequence { frame, pattern, .. }) = &self.sequence else {
             let path = PathBuf::from(&self.input);
             if self.input == names::STDIN {
-                return Err(Error::input("the picture that was developed came from standard input").at("input"));
+                return Err(Error::input("the input picture came from standard input").at("input"));
             }
             let (stem, layer, name) = (String::new(), self.layer.clone(), self.input.clone());
             return Ok(vec![Input { name, path: Some(path), layer, stem, frame: 0, sequence: None, pattern: None }]);
@@ -152,9 +152,12 @@ impl Recipe {
         };
         let list = names::frames(pattern, layer, *first, *frame)?;
         if list.len() > FRAMES && !long {
-            return Err(Error::input(format!("asks for {} frames; at most {FRAMES} are made unasked", list.len()))
-                .at("sequence")
-                .help("Give --long if the picture is from somebody you trust, and there is time"));
+            return Err(Error::input(format!(
+                "needs {} frames; without --long at most {FRAMES} are allowed",
+                list.len()
+            ))
+            .at("sequence")
+            .help("Give --long if you trust the source of the picture and have enough time"));
         }
         Ok(list)
     }
