@@ -332,7 +332,7 @@ mod tests {
         let leaf = Material { alpha: AlphaMode::Mask { cutoff: 0.5 }, ..Material::diffuse("leaf", Vec3::ONE) };
         let all = scene(vec![Material::emitter("arc", Vec3::splat(1e5)), leaf]);
         let text = told(&all, &Settings::default()).join("\n");
-        assert!(text.contains("materials[0] \"arc\": emission over") && !text.contains("leaf"), "{text}");
+        assert!(text.contains("materials[0] \"arc\": emission above") && !text.contains("leaf"), "{text}");
         let text = told(&all, &Settings { imperfect: true, ..Settings::default() }).join("\n");
         assert!(text.contains("materials[1] \"leaf\": with imperfect = true"), "{text}");
     }
