@@ -1,4 +1,4 @@
-// Keeps of what moved only the surface that the G-buffer shows: cutouts and what is hidden need no further test.
+// Writes the motion of the surface that the G-buffer shows. The depth comparison rejects hidden surfaces and alpha cutouts.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -13,7 +13,7 @@ layout(location = 1) in vec3 seen; // position in view space, metres
 
 layout(location = 0) out vec4 motion; // xyz: world position in the last frame; w: 1
 
-// Relative difference of depth by which two passes round the same surface.
+// Relative difference between the depths of the same surface in two passes, caused by rounding.
 const float SAME = 1e-4;
 
 void main() {

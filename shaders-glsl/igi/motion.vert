@@ -1,4 +1,4 @@
-// Where the surfaces that moved since the last frame were then. What did not move is left out.
+// Draws the surfaces that moved since the last frame, and computes their positions in the last frame. Skips instances that did not move.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -13,7 +13,7 @@ layout(binding = 4, scalar) readonly buffer BeforeInstances { Instance before_in
 layout(binding = 5, scalar) readonly buffer BeforePositions { vec3 before_positions[]; }; // of the deformed vertices
 
 layout(push_constant, scalar) uniform Push {
-    uint first_deformed; // vertex from which on the streams are written anew each frame
+    uint first_deformed; // from this vertex on, the streams are rewritten in each frame
 };
 
 layout(location = 0) out vec3 before;
@@ -29,6 +29,6 @@ void main() {
     vec3 was = deformed ? before_positions[at - first_deformed] : positions[at];
     before = (then * vec4(was, 1.0)).xyz;
     seen = (view.view_from_world * world).xyz;
-    // Behind the near plane: nothing of a triangle whose instance rests is drawn.
+    // A resting instance is moved outside of the clip volume, so that it is not drawn.
     gl_Position = deformed || now != then ? view.clip_from_world * world : vec4(0.0, 0.0, 2.0, 1.0);
 }

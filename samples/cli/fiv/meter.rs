@@ -47,7 +47,7 @@ impl Meter {
                 format!("{done}/{} samples ({percent:.0} %), {rate:.0} samples/s, {} left", self.total, span(left))
             }
         };
-        self.mode.meter_line(&text, last);
+        self.mode.progress_line(&text, last);
     }
 }
 

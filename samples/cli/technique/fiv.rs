@@ -13,13 +13,13 @@ use lucerna::{
 use crate::{
     args::RenderArgs,
     fiv::{Meter, decided},
+    frame_output::FrameOutput,
     gbuffer_layers,
     last_stage::Staged,
     outputs::Fresh,
     progress::ProgressMode,
     render::{self, Again, Input, Renderer, Technique},
     rerun::bounds,
-    shown::Shown,
     signals::Interrupt,
 };
 
@@ -144,12 +144,12 @@ impl Renderer for ByVectors<'_> {
         (resident, fiv, notes): &mut Self::Kept,
         input: &Input<'_>,
         settings: &PictureSettings,
-    ) -> Result<Shown> {
+    ) -> Result<FrameOutput> {
         let scene = resident.frame_in(graph, input.scene, input.pose);
         let view = input.view.fit_far(&scene.bounds());
         let settings = PictureSettings { fiv: settings.fiv.after(input.seconds), ..settings.clone() };
         let picture = fiv.picture(graph, input.scene, input.pose, &scene, &view, &settings)?;
-        let shown = Shown::new(picture.outputs.total).color("irradiance", picture.outputs.irradiance);
+        let shown = FrameOutput::new(picture.outputs.total).color("irradiance", picture.outputs.irradiance);
         let notes = [resident.notes(), notes, &picture.notes].concat();
         Ok(gbuffer_layers::add(shown, &picture.gbuffer, &view).seen_by(view).noting(notes))
     }

@@ -1,12 +1,12 @@
-//! The space that a scene takes.
+//! Bounding boxes of scenes.
 
 use lucerna::scene::{Aabb, Pose, Scene, deform};
 
-/// Times at which an animation is looked at.
+/// Number of times at which an animation is sampled.
 const MOMENTS: u32 = 8;
 
 /// The box around all geometry in one pose, metres; `None` if there is none.
-pub fn bounds(scene: &Scene, pose: &Pose) -> Option<Aabb> {
+pub fn in_pose(scene: &Scene, pose: &Pose) -> Option<Aabb> {
     let mut around = Aabb::EMPTY;
     for (index, node) in scene.nodes.iter().enumerate() {
         let Some(mesh) = node.mesh.and_then(|mesh| scene.meshes.get(mesh as usize)) else { continue };
@@ -18,11 +18,11 @@ pub fn bounds(scene: &Scene, pose: &Pose) -> Option<Aabb> {
     around.is_finite().then_some(around)
 }
 
-/// The box around everything that the geometry reaches while the animations play.
-pub fn reach(scene: &Scene) -> Option<Aabb> {
+/// The box around all geometry over the time of the animations, metres; `None` if there is no geometry.
+pub fn over_animations(scene: &Scene) -> Option<Aabb> {
     let longest = scene.animations.iter().map(|a| a.duration()).fold(0.0, f32::max);
     let moments = if longest > 0.0 { MOMENTS } else { 1 };
-    let at = |moment: u32| bounds(scene, &Pose::playing(scene, longest * moment as f32 / MOMENTS as f32));
+    let at = |moment: u32| in_pose(scene, &Pose::playing(scene, longest * moment as f32 / MOMENTS as f32));
     (0..moments).filter_map(at).reduce(Aabb::union)
 }
 
@@ -45,10 +45,10 @@ mod tests {
         let primitive = Primitive { positions, normals, tangents, ..Primitive::default() };
         let mut scene =
             Scene { meshes: vec![Mesh { primitives: vec![primitive], ..Mesh::default() }], ..Scene::default() };
-        assert_eq!(reach(&scene), None);
+        assert_eq!(over_animations(&scene), None);
         scene.nodes = vec![at(Vec3::X, None), Node { mesh: Some(0), ..at(Vec3::Y, Some(0)) }];
         let rest = Aabb { min: Vec3::new(1.0, 1.0, 0.0), max: Vec3::new(2.0, 2.0, 1.0) };
-        assert_eq!(reach(&scene), Some(rest));
+        assert_eq!(over_animations(&scene), Some(rest));
         let channel = Channel {
             node: 0,
             interpolation: Interpolation::Linear,
@@ -56,8 +56,8 @@ mod tests {
             values: Keys::Translation(vec![Vec3::X, Vec3::X * 9.0]),
         };
         scene.animations = vec![Animation { name: String::new(), channels: vec![channel] }];
-        assert_eq!(bounds(&scene, &Pose::rest(&scene)), Some(rest));
+        assert_eq!(in_pose(&scene, &Pose::rest(&scene)), Some(rest));
         // The last of eight moments is at 7/8.
-        assert_eq!(reach(&scene), Some(Aabb { max: Vec3::new(9.0, 2.0, 1.0), ..rest }));
+        assert_eq!(over_animations(&scene), Some(Aabb { max: Vec3::new(9.0, 2.0, 1.0), ..rest }));
     }
 }

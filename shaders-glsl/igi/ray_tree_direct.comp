@@ -1,4 +1,4 @@
-// Direct light of the surfaces at the ends of the trees by a range of their shadow rays.
+// Adds direct light to the ray tree nodes for a range of their shadow rays.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -21,7 +21,7 @@
 #include "lib/trace.glsl"
 #include "lib/igi.glsl"
 #include "lib/vpl_surface.glsl"
-#include "lib/igi_tree.glsl"
+#include "lib/igi_ray_tree.glsl"
 
 layout(local_size_x = 64) in;
 

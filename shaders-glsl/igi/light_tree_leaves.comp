@@ -1,4 +1,4 @@
-// Virtual lights in their order, and the leaves of the tree over them.
+// Copies the virtual lights in sorted order, and writes the leaves of the light tree.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -27,6 +27,6 @@ void main() {
         node = VplNode(vpl.position, dot(vpl.flux, vec3(1.0)), vpl.position, 1.0, vpl.normal, vpl.flux == vec3(0.0) ? 0u : 1u);
     }
     nodes[leaves + at] = node;
-    // Nothing is above the root.
+    // The root is node 1; node 0 is not part of the tree.
     if (at == 0u) nodes[0] = VplNode(vec3(0.0), 0.0, vec3(0.0), 1.0, vec3(0.0, 1.0, 0.0), 0u);
 }

@@ -1,4 +1,4 @@
-//! Mirrors and glass: a tree of rays for each pixel that sees some (Whitted 1980).
+//! Mirrors and glass: a tree of reflected and refracted rays for each pixel that shows a mirror or glass (Whitted 1980).
 
 use super::{Igi, Settings, Shared, Vpls, cache::Cache, dispatch, rays};
 use crate::{
@@ -7,24 +7,24 @@ use crate::{
     scene::resident::Handles,
     shaders::{
         consts::TREE_WIDTH,
-        igi::{direct_tree, gather_tree, gather_tree_picks, grow, reap},
+        igi::{ray_tree_direct, ray_tree_gather, ray_tree_gather_picks, ray_tree_grow, ray_tree_sum},
         types,
     },
 };
 
-/// Pixels whose trees are held at once.
+/// Pixels whose ray trees are in memory at one time.
 const SLOTS: u32 = 1 << 16;
 
-/// What mirrors and glass show.
+/// The light of all ray trees.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trees {
-    /// Radiance, and in alpha the share of each pixel's surface that is mirror or glass.
+    /// Radiance, W/(sr·m²); alpha: the share of each pixel's surface that is mirror or glass.
     pub sharp: Image,
-    /// `None`: there is no cache.
+    /// `None` if the irradiance cache is off.
     pub cache: Option<Cache>,
 }
 
-/// Trees of a range of pixels.
+/// The ray trees of a range of pixels.
 #[derive(Clone, Copy, Debug)]
 struct Range {
     sharp: Image,
@@ -35,30 +35,31 @@ struct Range {
 }
 
 impl Range {
-    /// Nodes of its trees, `types::TreeNode`: [`TREE_WIDTH`] of each slot.
+    /// Nodes (`types::TreeNode`) of the range: [`TREE_WIDTH`] for each slot.
     fn nodes(&self) -> u32 {
         self.slots * TREE_WIDTH
     }
 
-    /// The same as an image, one node a pixel, for [`Igi::batches`].
+    /// The nodes as an image with one node per pixel, as [`Igi::batches`] needs it.
     fn lit(&self) -> Extent {
         Extent::new(self.nodes(), 1)
     }
 }
 
-/// Pixels with trees: whole blocks of 8 × 8.
+/// Slots for a picture: its pixels, rounded up to whole blocks of 8 × 8.
 fn slots(extent: Extent) -> u32 {
     extent.width.div_ceil(8) * extent.height.div_ceil(8) * 64
 }
 
 impl Igi {
-    /// Ranges of pixels in which trees are grown, and nodes of each, for a picture of `extent` pixels. `None`: there are no mirrors.
+    /// For a picture of `extent` pixels, the number of pixel ranges and the nodes of each range. `None` if the scene has no mirrors
+    /// and no glass.
     pub(super) fn trees_of(&self, extent: Extent) -> Option<(u64, u32)> {
         let slots = slots(extent);
         self.sharp.then(|| (u64::from(slots.div_ceil(SLOTS)), slots.min(SLOTS) * TREE_WIDTH))
     }
 
-    /// Grows the trees of all pixels, a range after the other, and lights their ends.
+    /// For each range of pixels, traces the ray trees and computes the light at the surfaces where their rays end.
     pub(super) fn trees(
         &self,
         graph: &mut Graph,
@@ -80,7 +81,7 @@ impl Igi {
             .map(|first| Range { sharp, tree_nodes, first, slots: held.min(slots - first) })
             .collect();
         let cache = vpls.filter(|_| settings.cache > 0.0).map(|vpls| {
-            // Cells first, for all ranges: neighbours in different ones must see the same.
+            // The cells of all ranges are filled before any range reads them, so that there is no seam between ranges.
             let cache = Cache::new(graph, shared, settings);
             for range in &ranges {
                 self.grow(graph, handles, g, shared, background, settings, range);
@@ -97,19 +98,20 @@ impl Igi {
             if let Some(vpls) = vpls {
                 let groups = cache.as_ref().map(|cache| {
                     cache.read(graph, tree_nodes, range.nodes());
-                    cache.otherwise(graph, range.nodes())
+                    cache.fallback_groups(graph, range.nodes())
                 });
                 self.gather_of_trees(graph, shared, vpls, settings, range, groups);
                 if settings.compensates() {
                     self.compensate_trees(graph, handles, shared, vpls, settings, (tree_nodes, range.nodes()));
                 }
             }
-            let push = reap::Push { first: range.first, count: range.slots };
-            graph.compute(reap::Args { sharp, tree_nodes, push }, range.slots);
+            let push = ray_tree_sum::Push { first: range.first, count: range.slots };
+            graph.compute(ray_tree_sum::Args { sharp, tree_nodes, push }, range.slots);
         }
         Trees { sharp, cache }
     }
 
+    /// Traces the rays of a range of pixels, one level of the trees per dispatch.
     #[allow(clippy::too_many_arguments)]
     fn grow(
         &self,
@@ -122,9 +124,15 @@ impl Igi {
         range: &Range,
     ) {
         for level in 0..=settings.specular_depth {
-            let push = grow::Push { first: range.first, count: range.slots, level, background };
+            let push = ray_tree_grow::Push { first: range.first, count: range.slots, level, background };
             let args = traced_lit!(
-                grow::Args { view: g.view, depth: g.depth, sharp: range.sharp, tree_nodes: range.tree_nodes, push },
+                ray_tree_grow::Args {
+                    view: g.view,
+                    depth: g.depth,
+                    sharp: range.sharp,
+                    tree_nodes: range.tree_nodes,
+                    push
+                },
                 shared.rays,
                 handles,
                 shared
@@ -133,12 +141,12 @@ impl Igi {
         }
     }
 
-    /// Direct light.
+    /// Adds direct light at the ends of the ray trees.
     fn direct_of_trees(&self, graph: &mut Graph, handles: &Handles, shared: &Shared, range: &Range) {
         for (first, count) in self.batches(range.lit(), shared.direct_rays) {
-            let push = direct_tree::Push { first, count, nodes: range.nodes() };
+            let push = ray_tree_direct::Push { first, count, nodes: range.nodes() };
             let args = traced_lit!(
-                direct_tree::Args { tree_nodes: range.tree_nodes, push },
+                ray_tree_direct::Args { tree_nodes: range.tree_nodes, push },
                 shared.rays,
                 handles,
                 shared,
@@ -148,7 +156,7 @@ impl Igi {
         }
     }
 
-    /// Light of the virtual lights. `groups`: size of the dispatches.
+    /// Adds the light of the virtual lights at the ends of the ray trees. `groups`: number of workgroups, where the device computes it.
     fn gather_of_trees(
         &self,
         graph: &mut Graph,
@@ -163,10 +171,10 @@ impl Igi {
         if let (Some(tree), true) = (vpls.tree, settings.picks_from(vpls.count)) {
             let (picks, proposals, leaves) = (settings.picks, settings.proposals, tree.leaves);
             for (first, count) in self.batches(range.lit(), picks) {
-                let push = gather_tree_picks::Push { first, count, picks, proposals, leaves, nodes, least, seed };
-                let spec = gather_tree_picks::Spec { imperfect };
+                let push = ray_tree_gather_picks::Push { first, count, picks, proposals, leaves, nodes, least, seed };
+                let spec = ray_tree_gather_picks::Spec { imperfect };
                 let args = crate::rays::traced!(
-                    gather_tree_picks::Args { vpls: vpls.buffer, vpl_nodes: tree.nodes, tree_nodes, push, spec },
+                    ray_tree_gather_picks::Args { vpls: vpls.buffer, vpl_nodes: tree.nodes, tree_nodes, push, spec },
                     shared.hidden_by
                 );
                 dispatch(graph, args, groups.map(|groups| (groups, 0)), nodes).rays(rays(range.lit(), count));
@@ -174,10 +182,12 @@ impl Igi {
             return;
         }
         for (first, count) in self.batches(range.lit(), vpls.count) {
-            let push = gather_tree::Push { first, count, nodes, least, seed };
-            let spec = gather_tree::Spec { imperfect };
-            let args =
-                crate::rays::traced!(gather_tree::Args { vpls: vpls.buffer, tree_nodes, push, spec }, shared.hidden_by);
+            let push = ray_tree_gather::Push { first, count, nodes, least, seed };
+            let spec = ray_tree_gather::Spec { imperfect };
+            let args = crate::rays::traced!(
+                ray_tree_gather::Args { vpls: vpls.buffer, tree_nodes, push, spec },
+                shared.hidden_by
+            );
             dispatch(graph, args, groups.map(|groups| (groups, 0)), nodes).rays(rays(range.lit(), count));
         }
     }

@@ -1,4 +1,5 @@
-// What virtual lights are sorted by: those that lie near each other and look alike get near numbers. By one workgroup.
+// Sort keys of the virtual lights: a Morton code that includes the direction of the normal, so that lights with near positions and similar
+// normals get near keys. One workgroup.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -16,7 +17,7 @@ layout(push_constant, scalar) uniform Push {
 shared vec3 lowest[128];
 shared vec3 highest[128];
 
-// Every third bit of 30.
+// Spreads ten bits to every third bit of 30.
 uint spread(uint v) {
     v = (v | v << 16u) & 0x030000ffu;
     v = (v | v << 8u) & 0x0300f00fu;
@@ -24,7 +25,7 @@ uint spread(uint v) {
     return (v | v << 2u) & 0x09249249u;
 }
 
-// Which of six ways a normal looks.
+// The dominant axis of a normal and its sign, 0 to 5.
 uint facing(vec3 n) {
     vec3 size = abs(n);
     uint axis = size.x > size.y && size.x > size.z ? 0u : size.y > size.z ? 1u : 2u;
@@ -46,14 +47,14 @@ void main() {
         low = min(low, lowest[i]);
         high = max(high, highest[i]);
     }
-    // One scale for all axes: cells are cubes.
+    // All axes have the same scale, so that the cells are cubes.
     vec3 size = high - low;
     float scale = 511.999 / max(max(size.x, max(size.y, size.z)), 1e-20);
     for (uint i = lane; i < total; i += 128u) {
         Vpl vpl = vpls[i];
         uvec3 cell = uvec3(clamp((vpl.position - low) * scale, vec3(0.0), vec3(511.0)));
         uint place = spread(cell.x) << 2u | spread(cell.y) << 1u | spread(cell.z);
-        // The normal counts more than where in an eighth of the box the light is.
+        // The key has the octant of the box first, then the normal, then the position within the octant.
         uint key = (place >> 24u) << 27u | facing(vpl.normal) << 24u | (place & 0xffffffu);
         keys[i] = uvec2(vpl.flux == vec3(0.0) ? 0xffffffffu : key, i);
     }

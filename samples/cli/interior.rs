@@ -1,4 +1,4 @@
-//! Is a scene a room, to be seen from inside?
+//! Detects interiors: scenes that a camera should see from the inside.
 
 use glam::Vec3;
 use lucerna::scene::{
@@ -6,38 +6,38 @@ use lucerna::scene::{
     bvh::{Bvh, Ray},
 };
 
-/// Directions that are looked into, all around.
+/// Number of horizontal directions in which rays are traced.
 const DIRECTIONS: u32 = 24;
-/// So many of them must end at the inside of a wall.
+/// Minimum of rays that must hit the front of a wall in an interior.
 const WALLS: u32 = 19;
-/// So many make a box that is open to one side.
+/// Minimum of rays that must hit the front of a wall in a box with one open side.
 const BOX: u32 = 15;
-/// Height of the eye over the floor, of the height of the room and of its length, whichever is less.
+/// Height of the eye above the floor: the smaller of these shares of the interior's height and of its length.
 const EYE: (f32, f32) = (0.45, 0.15);
 
-/// A room, metres, world space.
+/// An interior. Lengths in metres, world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Room {
-    /// At eye height at one end of the room.
+pub struct Interior {
+    /// Position of the camera, at one end of the interior.
     pub eye: Vec3,
-    /// Unit vector along the room.
+    /// Unit vector along the interior.
     pub forward: Vec3,
-    /// Over the middle; none where the sky is open.
+    /// Point of the ceiling above the middle; `None` without a ceiling.
     pub ceiling: Option<Vec3>,
-    /// Under the middle.
+    /// Point of the floor below the middle.
     pub floor: Vec3,
-    /// From end to end.
+    /// Length of the interior.
     pub length: f32,
 }
 
-/// What the middle of a scene sees around it.
+/// The surroundings of a scene's middle, found by tracing rays from it.
 struct Survey {
     bvh: Bvh,
     min: Vec3,
     max: Vec3,
     middle: Vec3,
     floor: Vec3,
-    /// Directions without a wall.
+    /// Directions in which no wall was hit.
     open: Vec<Vec3>,
 }
 
@@ -56,7 +56,7 @@ impl Survey {
         Some(survey)
     }
 
-    /// How far it is to a surface that shows its front. A solid body shows its backs to its middle.
+    /// Distance to the nearest surface, metres, if the ray hits its front. From inside a solid object rays hit backs only.
     fn inside(&self, from: Vec3, direction: Vec3) -> Option<f32> {
         let hit = self.bvh.closest(&Ray::new(from, direction))?;
         let [a, b, c] = self.bvh.triangles()[hit.triangle as usize];
@@ -68,8 +68,8 @@ impl Survey {
     }
 }
 
-/// A room if walls with their front towards the middle stand all around it, and a floor lies below.
-pub fn find(scene: &Scene) -> Option<Room> {
+/// Finds an interior: walls around the middle, with their front towards it, and a floor below.
+pub fn find(scene: &Scene) -> Option<Interior> {
     let survey = Survey::of(scene)?;
     if survey.walls() < WALLS {
         return None;
@@ -83,10 +83,10 @@ pub fn find(scene: &Scene) -> Option<Room> {
     let height = floor.y + (EYE.0 * (top - floor.y)).min(EYE.1 * length);
     let centre = Vec3::new(middle.x, height, middle.z);
     let back = survey.inside(centre, -forward).unwrap_or(0.0);
-    Some(Room { eye: centre - forward * back * 0.9, forward, ceiling, floor, length })
+    Some(Interior { eye: centre - forward * back * 0.9, forward, ceiling, floor, length })
 }
 
-/// Where a box is open to one side (the Cornell box): the direction out of it, horizontal.
+/// For a box with one open side (the Cornell box), the horizontal direction out of it.
 pub fn opening(scene: &Scene) -> Option<Vec3> {
     let survey = Survey::of(scene)?;
     let sum: Vec3 = survey.open.iter().sum();
@@ -109,7 +109,7 @@ mod tests {
             let scene = builtin::load(body).unwrap();
             assert_eq!((find(&scene), opening(&scene)), (None, None), "{body}");
         }
-        // The Cornell box is open to where its camera stands.
+        // The Cornell box is open towards its camera.
         let scene = builtin::load("cornell").unwrap();
         let out = opening(&scene).expect("it is open");
         assert!(find(&scene).is_none() && out.dot(Vec3::NEG_Z) > 0.95, "{out}");

@@ -1,4 +1,4 @@
-//! From images of the render graph to layers of a picture.
+//! The output of a technique for a frame: graph images, and their readback as the layers of a picture.
 
 use lucerna::{
     Result,
@@ -7,26 +7,26 @@ use lucerna::{
     scene::{Note, View},
 };
 
-/// Turns a pixel as the shader wrote it into what the layer holds.
+/// Converts a pixel from the shader's encoding to the layer's values.
 type Decode = Box<dyn Fn([f32; 4]) -> [f32; 4]>;
-/// What a number of the frame says.
+/// Makes a note from a number that the frame has computed.
 type Remark = Box<dyn Fn(u32) -> Option<Note>>;
 
-/// What a technique shows of a frame: the picture, and layers for formats that hold them.
-pub struct Shown {
+/// The output of a technique for a frame: the picture, layers for formats that hold them, sums, and notes.
+pub struct FrameOutput {
     picture: Image,
-    /// One channel, shown as grey.
+    /// The picture's first channel is shown as grey.
     grey: bool,
     layers: Vec<Source>,
     sums: Vec<Sum>,
-    /// What the camera really saw, if the technique changed it (its far plane).
+    /// The rendered view, if the technique changed it (its far plane).
     pub view: Option<View>,
-    /// What the technique could not serve in this frame.
+    /// Notes of the technique about this frame.
     pub notes: Vec<Note>,
     remarks: Vec<(Buffer, Remark)>,
 }
 
-/// A number of the whole frame: a value of each pixel, added up.
+/// A number for the whole frame: the sum of a value of each pixel.
 struct Sum {
     name: &'static str,
     image: Image,
@@ -40,58 +40,58 @@ struct Source {
     decode: Decode,
 }
 
-impl std::fmt::Debug for Shown {
+impl std::fmt::Debug for FrameOutput {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let names: Vec<&str> = self.layers.iter().map(|layer| layer.name).collect();
-        write!(f, "Shown({:?}, layers {names:?})", self.picture)
+        write!(f, "FrameOutput({:?}, layers {names:?})", self.picture)
     }
 }
 
-impl Shown {
-    /// Only the picture: its red, green and blue are radiance.
+impl FrameOutput {
+    /// An output with a picture only; its red, green and blue channels are radiance.
     pub fn new(picture: Image) -> Self {
         let (layers, sums, notes, remarks) = Default::default();
         Self { picture, grey: false, layers, sums, view: None, notes, remarks }
     }
 
-    /// Only the picture: the first channel of an image, as grey.
+    /// An output with a picture only: the first channel of an image, as grey.
     pub fn grey(picture: Image) -> Self {
         Self { grey: true, ..Self::new(picture) }
     }
 
-    /// With the view that was rendered.
+    /// Sets the rendered view.
     #[must_use]
     pub fn seen_by(self, view: View) -> Self {
         Self { view: Some(view), ..self }
     }
 
-    /// With what could not be served.
+    /// Sets the notes.
     #[must_use]
     pub fn noting(self, notes: Vec<Note>) -> Self {
         Self { notes, ..self }
     }
 
-    /// With what the first number of a buffer says of the frame, once that is there.
+    /// Adds a note that depends on the first number of a buffer, which is known after the frame has run.
     #[must_use]
     pub fn remarking(mut self, number: Buffer, remark: impl Fn(u32) -> Option<Note> + 'static) -> Self {
         self.remarks.push((number, Box::new(remark)));
         self
     }
 
-    /// With a layer of colours, `NAME.R` `NAME.G` `NAME.B`.
+    /// Adds a layer of colours, `NAME.R` `NAME.G` `NAME.B`.
     #[must_use]
     pub fn color(self, name: &'static str, image: Image) -> Self {
         self.layer(name, &["R", "G", "B"], image, |pixel| pixel)
     }
 
-    /// With a number: the sum of a value of each pixel of an image, of whatever size.
+    /// Adds a number: the sum of a value of each pixel of an image, which may have any size.
     #[must_use]
     pub fn sum(mut self, name: &'static str, image: Image, of: fn([f32; 4]) -> f32) -> Self {
         self.sums.push(Sum { name, image, of });
         self
     }
 
-    /// With a layer of other values.
+    /// Adds a layer of other values.
     #[must_use]
     pub fn layer(
         mut self,
@@ -104,10 +104,10 @@ impl Shown {
         self
     }
 
-    /// Puts the picture through `stage`; if that changes it, its light stays as the layer `light`.
+    /// Applies `stage` to the picture. If the stage changes it, the picture before the stage becomes the layer `light`.
     ///
     /// # Errors
-    /// Those of `stage`.
+    /// The errors of `stage`.
     pub fn develop(&mut self, stage: impl FnOnce(Image) -> Result<Image>) -> Result<()> {
         let light = self.picture;
         self.picture = stage(light)?;
@@ -123,36 +123,36 @@ impl Shown {
         std::iter::once("picture").chain(self.layers.iter().map(|layer| layer.name)).collect()
     }
 
-    /// Asks the graph for the pixels.
-    pub fn read(self, graph: &mut Graph, with_layers: bool) -> Reading {
+    /// Declares the readback of the picture and, if wanted, of the layers and sums.
+    pub fn read(self, graph: &mut Graph, with_layers: bool) -> Readback {
         let picture = graph.read_image(self.picture);
         let (layers, sums) = if with_layers { (self.layers, self.sums) } else { Default::default() };
         let layers = layers.into_iter().map(|layer| (graph.read_image(layer.image), layer)).collect();
         let sums = sums.into_iter().map(|sum| (graph.read_image(sum.image), sum)).collect();
         let remarks = self.remarks.into_iter().map(|(number, of)| (graph.read_buffer(number), of)).collect();
-        Reading { picture, grey: self.grey, view: false, layers, sums, remarks }
+        Readback { picture, grey: self.grey, view: false, layers, sums, remarks }
     }
 }
 
-/// Pixels that were asked for.
-pub struct Reading {
+/// The readback of a frame's output.
+pub struct Readback {
     picture: ImageRead,
     grey: bool,
-    /// Any image of the graph, to look at.
+    /// The picture is an arbitrary image of the graph (`--view`).
     view: bool,
     layers: Vec<(ImageRead, Source)>,
     sums: Vec<(ImageRead, Sum)>,
     remarks: Vec<(BufferRead, Remark)>,
 }
 
-impl std::fmt::Debug for Reading {
+impl std::fmt::Debug for Readback {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Reading({} layers)", self.layers.len())
+        write!(f, "Readback({} layers)", self.layers.len())
     }
 }
 
-impl Reading {
-    /// Asks for the image of this name instead of a technique's picture.
+impl Readback {
+    /// Declares the readback of the graph image of this name, instead of a technique's picture.
     ///
     /// # Errors
     /// `Usage` if no pass writes it; the message lists the names.
@@ -161,7 +161,7 @@ impl Reading {
         Ok(Self { picture, grey: false, view: true, layers: Vec::new(), sums: Vec::new(), remarks: Vec::new() })
     }
 
-    /// The numbers that were asked for, once the graph has run.
+    /// The sums, after the graph has run.
     pub fn sums(&self, frame: &Frame) -> Vec<(String, f64)> {
         let of = |(token, sum): &(ImageRead, Sum)| {
             let pixels = frame.image(*token).to_f32();
@@ -170,18 +170,18 @@ impl Reading {
         self.sums.iter().map(of).collect()
     }
 
-    /// What the technique has to say of the frame, once the graph has run.
+    /// The notes that depend on numbers of the frame, after the graph has run.
     pub fn notes(&self, frame: &Frame) -> Vec<Note> {
         let of = |(token, remark): &(BufferRead, Remark)| frame.buffer::<u32>(*token).first().and_then(|&n| remark(n));
         self.remarks.iter().filter_map(of).collect()
     }
 
-    /// The picture with its layers, once the graph has run. Layers of another size are stretched to that of the picture.
+    /// The picture with its layers, after the graph has run. Layers of another size are resampled to the size of the picture.
     pub fn layers(&self, frame: &Frame) -> Layers {
         let picture = frame.image(self.picture);
         let (width, height) = (picture.extent.width, picture.extent.height);
         if self.view {
-            // What is looked at may be anything: made visible as the picture, and as it is in a layer.
+            // A graph image may hold any values. The picture makes them visible; the layer `raw` has them unchanged.
             let visible = picture.picture().into_iter().take(width as usize * height as usize);
             let data = visible.flat_map(|[r, g, b, _]| [r, g, b]).collect();
             let mut layers = Layers::rgb(width, height, data);
@@ -203,7 +203,7 @@ impl Reading {
     }
 }
 
-/// The first layer of `pixels` at another size, each pixel from its nearest.
+/// The first layer of `pixels` at another size, by nearest-neighbour resampling.
 fn stretched(pixels: &Pixels, width: u32, height: u32) -> Vec<[f32; 4]> {
     let all = pixels.to_f32();
     let (w, h) = (pixels.extent.width, pixels.extent.height);
@@ -215,7 +215,7 @@ fn stretched(pixels: &Pixels, width: u32, height: u32) -> Vec<[f32; 4]> {
     (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| at(x, y)).collect()
 }
 
-/// An image of the graph as it is: R G B A of its first layer and level.
+/// An image of the graph with unchanged values: all channels of its first layer and mip level.
 pub fn raw(pixels: &Pixels) -> Layers {
     let (width, height) = (pixels.extent.width, pixels.extent.height);
     let count = pixels.format.channels().clamp(1, 4) as usize;

@@ -1,8 +1,8 @@
-// What the trees of a range of pixels have gathered.
+// Sums the light of the ray tree nodes of each pixel.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
-#include "lib/igi_tree.glsl"
+#include "lib/igi_ray_tree.glsl"
 
 layout(local_size_x = 64) in;
 

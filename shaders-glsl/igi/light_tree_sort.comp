@@ -1,4 +1,4 @@
-// Sorts keys by four of their bits, equals in their order: one turn of a radix sort, by one workgroup of equal ranges.
+// One pass of a stable radix sort, by four bits of the keys. One workgroup; each invocation has an equal range of keys.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 
@@ -12,7 +12,7 @@ layout(push_constant, scalar) uniform Push {
     uint shift; // lowest of the four bits
 };
 
-shared uint places[16 * 128]; // digit by digit, range by range
+shared uint places[16 * 128]; // for each digit, for each range: first the count, then the next output index
 shared uint sums[128];
 
 void main() {

@@ -1,5 +1,5 @@
-//! Shooting and gathering of virtual lights against slow programs that share nothing with the shaders: other formulas, double
-//! precision, every triangle tried for every ray.
+//! Shooting and gathering of virtual lights against a CPU reference that shares no code with the shaders: it uses other formulas and
+//! double precision, and tests every triangle for every ray.
 
 mod igi_lab;
 mod tracer_lab;
@@ -15,7 +15,7 @@ use lucerna::{
 use std::f64::consts::PI;
 use tracer_lab::{Stage, view};
 
-/// A triangle in world space with what it reflects.
+/// A triangle in world space, with its albedo.
 struct Triangle {
     corners: [DVec3; 3],
     normals: [DVec3; 3],
@@ -62,7 +62,7 @@ fn mirrored(base: u64, mut number: u64) -> f64 {
     out
 }
 
-/// Two axes across a unit vector as the engine chooses them: the limit of turning +z (or -z) into it by the shortest way.
+/// Two axes perpendicular to a unit vector, chosen like in the engine: x and y after the shortest rotation of +z (or -z) to the vector.
 fn across(n: DVec3) -> (DVec3, DVec3) {
     let pole = if n.z >= 0.0 { DVec3::Z } else { DVec3::NEG_Z };
     let turn = glam::DQuat::from_rotation_arc(pole, n);
@@ -70,7 +70,7 @@ fn across(n: DVec3) -> (DVec3, DVec3) {
     (turn * DVec3::X, turn * DVec3::Y * sign)
 }
 
-/// A cosine-distributed direction about n from two numbers, by squares that become discs.
+/// A cosine-distributed direction about n from two numbers, by the concentric mapping of a square to a disc.
 fn cosine_direction(n: DVec3, [u, v]: [f64; 2]) -> DVec3 {
     let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
     let (radius, angle) = if a.abs() > b.abs() {
@@ -85,7 +85,7 @@ fn cosine_direction(n: DVec3, [u, v]: [f64; 2]) -> DVec3 {
     s * x + t * y + n * (1.0 - x * x - y * y).max(0.0).sqrt()
 }
 
-/// A lamp: where, along what, its strength along that, and the angles of its cone (none: all around).
+/// A lamp: its position, axis and intensity along the axis, and the angles of its cone (`None`: all directions).
 struct Lamp {
     at: DVec3,
     along: DVec3,
@@ -94,7 +94,7 @@ struct Lamp {
 }
 
 impl Lamp {
-    /// Share of the axial intensity at a cosine from the axis.
+    /// Share of the axial intensity at a cosine to the axis.
     fn fall(&self, cosine: f64) -> f64 {
         self.cone.map_or(1.0, |(inner, outer)| {
             ((cosine - outer.cos()) / (inner.cos() - outer.cos())).clamp(0.0, 1.0).powi(2)
@@ -120,7 +120,7 @@ impl Lamp {
             let r = (1.0 - z * z).max(0.0).sqrt();
             return DVec3::new(r * (2.0 * PI * v).cos(), r * (2.0 * PI * v).sin(), z);
         };
-        // The cosine below which the share u of all lies, by halving.
+        // Bisection for the cosine below which the share u of the flux lies.
         let (mut low, mut high) = (-1.0, 1.0);
         let wanted = u * self.flux_up_to(1.0);
         for _ in 0..40 {
@@ -139,14 +139,14 @@ struct Shot {
     flux: DVec3,
 }
 
-/// Virtual lights of `paths` paths, the first ones of all paths, then the second ones.
+/// Virtual lights of `paths` paths: first the lights at the first hits of all paths, then those at the second hits, and so on.
 fn shoot(world: &[Triangle], lamps: &[Lamp], paths: usize, bounces: usize) -> Vec<Option<Shot>> {
     const PRIMES: [u64; 12] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
     let total: f64 = lamps.iter().map(Lamp::power).sum();
     let mut out: Vec<Option<Shot>> = (0..paths * bounces).map(|_| None).collect();
     for path in 0..paths {
         let pair = |k: usize| [0, 1].map(|i| mirrored(PRIMES[2 * k + i], path as u64 + 1));
-        // Equal steps through the powers, from the middle of the first.
+        // Systematic sampling: equal steps through the running sum of the powers, from the middle of the first step.
         let mut left = (path as f64 + 0.5) / paths as f64 * total;
         let mut lamp = &lamps[0];
         for one in lamps {
@@ -156,7 +156,7 @@ fn shoot(world: &[Triangle], lamps: &[Lamp], paths: usize, bounces: usize) -> Ve
             }
             left -= one.power();
         }
-        // Each path of a lamp carries the same part of its power.
+        // All paths of a lamp carry the same flux.
         let mut flux = lamp.intensity / lamp.intensity.element_sum() * total / paths as f64;
         let (mut origin, mut direction) = (lamp.at, lamp.direction(pair(0)));
         for bounce in 0..bounces {
@@ -211,7 +211,7 @@ fn near(found: [f32; 3], expected: DVec3, slack: f64) -> bool {
 }
 
 #[test]
-fn paths_of_light_leave_virtual_lights_where_a_slow_program_does() {
+fn paths_of_light_leave_virtual_lights_where_a_cpu_reference_does() {
     with_gpu(|gpu| {
         let (scene, lamps) = room();
         let world = triangles(&scene);
@@ -224,7 +224,7 @@ fn paths_of_light_leave_virtual_lights_where_a_slow_program_does() {
         let mut others = [0; 3];
         for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
             let expected = expected.as_ref().expect("the room is closed");
-            // A ray along an edge may go either way, and all that follows with it.
+            // Rounding decides which triangle a ray along an edge hits, and so the rest of its path.
             let same = near(found.position, expected.position, 3e-4)
                 && near(found.normal, expected.normal, 1e-4)
                 && near(found.flux, expected.flux, 2e-4 * expected.flux.length());
@@ -236,13 +236,13 @@ fn paths_of_light_leave_virtual_lights_where_a_slow_program_does() {
         }
         println!("{others:?} of {paths} paths went another way at the first, second and third surface");
         assert!(others[0] <= 1 && others[1] <= 3 && others[2] <= 8, "{others:?}");
-        // The twin itself keeps the power.
+        // The CPU reference itself conserves the power.
         let total: f64 = lamps.iter().map(Lamp::power).sum();
         assert!((lamps[0].power() - 4.0 * PI * 6.0).abs() < 1e-6 && total > lamps[0].power());
     });
 }
 
-/// Irradiance of a point from virtual lights, nothing taken from the engine but the list.
+/// Irradiance of a point from virtual lights. Only the list of lights comes from the engine.
 fn gathered(world: &[Triangle], vpls: &[&types::Vpl], x: DVec3, n: DVec3, least: f64) -> DVec3 {
     let mut sum = DVec3::ZERO;
     for vpl in vpls {
@@ -253,7 +253,7 @@ fn gathered(world: &[Triangle], vpls: &[&types::Vpl], x: DVec3, n: DVec3, least:
         if here <= 0.0 || there <= 0.0 {
             continue;
         }
-        // Both ends lifted off their surfaces.
+        // Both ends of the ray are moved off their surfaces.
         let (from, to) = (x + n * 2e-5, place + sends * 2e-5);
         if world.iter().any(|t| meet(t, from, to - from).is_some_and(|(at, ..)| at < 1.0)) {
             continue;
@@ -265,7 +265,7 @@ fn gathered(world: &[Triangle], vpls: &[&types::Vpl], x: DVec3, n: DVec3, least:
     sum
 }
 
-/// Where the ray through a pixel first meets something, and the normal and albedo there.
+/// Position, normal and albedo at the first hit of the ray through a pixel.
 fn seen_at(world: &[Triangle], view: &View, pixel: [u32; 2]) -> (DVec3, DVec3, DVec3) {
     let uv =
         (glam::vec2(pixel[0] as f32, pixel[1] as f32) + 0.5) / glam::vec2(view.extent[0] as f32, view.extent[1] as f32);
@@ -278,7 +278,7 @@ fn seen_at(world: &[Triangle], view: &View, pixel: [u32; 2]) -> (DVec3, DVec3, D
 }
 
 #[test]
-fn pixels_gather_what_a_slow_program_does() {
+fn pixels_gather_what_a_cpu_reference_does() {
     with_gpu(|gpu| {
         let (scene, _) = room();
         let world = triangles(&scene);
@@ -296,7 +296,7 @@ fn pixels_gather_what_a_slow_program_does() {
                 let found = Vec3::new(pixel[0], pixel[1], pixel[2]).as_dvec3();
                 ours += found.element_sum();
                 theirs += expected.element_sum();
-                // Normals are stored in 32 bits, depth in 32: a virtual light on the horizon or behind an edge may be seen or not.
+                // Normals and depths are rounded to 32 bits, which decides whether a virtual light on the horizon or at an edge is visible.
                 if (found - expected).length() > 3e-3 * expected.length() + 1e-6 {
                     others += 1;
                 }
@@ -337,7 +337,7 @@ fn a_pixel_of_a_tile_gathers_its_own_lights_alone() {
             assert!(others * 40 <= all, "sorted {sorted}: {others} of {all} pixels differ");
             lists.push(shown.vpls);
         }
-        // The same lights, and each next to others.
+        // The same lights in another order.
         let way = |list: &[types::Vpl]| -> f32 {
             let apart = |pair: &[types::Vpl]| Vec3::from(pair[0].position).distance(pair[1].position.into());
             list.windows(2).map(apart).sum()
@@ -357,7 +357,7 @@ fn luminance(color: DVec3) -> f64 {
 }
 
 #[test]
-fn lights_are_chosen_as_a_slow_program_chooses_them() {
+fn lights_are_chosen_as_a_cpu_reference_chooses_them() {
     with_gpu(|gpu| {
         let (scene, _) = room();
         let world = triangles(&scene);
@@ -366,19 +366,19 @@ fn lights_are_chosen_as_a_slow_program_chooses_them() {
         let (vpls, candidates, judges) = (120u32, 4, 24);
         let base = Settings { bounces: 2, ..plain(vpls) };
         let found = studio.render(&seen, &Settings { candidates, judges, ..base.clone() }, 0).vpls;
-        // What all those paths leave.
+        // The virtual lights of all candidate paths.
         let all = studio.render(&seen, &Settings { vpls: vpls * candidates, ..base }, 0).vpls;
         let least = 0.03 * DVec3::new(2.0, 1.7, 2.2).length();
         let mut important = vec![0.0; all.len()];
         for judge in 0..judges {
-            // The sequence of the plastic number, the root of x³ = x + 1: over the picture more evenly than chance.
+            // The R2 sequence, with the plastic number, the root of x³ = x + 1; it is more even than random points.
             let plastic = 1.324_717_957_244_746_f64;
             let place = |power: i32, side: u32| {
                 ((0.5 + f64::from(judge) / plastic.powi(power)).fract() * f64::from(side)) as u32
             };
             let (x, n, albedo) = seen_at(&world, &seen, [place(1, 20), place(2, 15)]);
             for (important, vpl) in important.iter_mut().zip(&all) {
-                // Next to a surface a light is worth no more than it is a little further away.
+                // Importance is damped near a point, so that it does not grow without limit.
                 let q = (Vec3::from(vpl.position).as_dvec3().distance_squared(x) / (least * least)).min(1.0);
                 let light = luminance(gathered(&world, &[vpl], x, n, 0.0));
                 *important += light * luminance(albedo).max(0.05) * q * q;
@@ -386,7 +386,7 @@ fn lights_are_chosen_as_a_slow_program_chooses_them() {
         }
         let flux = |vpl: &types::Vpl| Vec3::from(vpl.flux).as_dvec3().element_sum();
         let (light, power): (f64, f64) = (important.iter().sum(), all.iter().map(flux).sum());
-        // Half by what judges see, half by flux.
+        // Half of the probability follows the importance, half the flux.
         let weights: Vec<f64> =
             all.iter().zip(&important).map(|(vpl, i)| 0.5 * i / light + 0.5 * flux(vpl) / power).collect();
         let (mut at, mut before, mut others) = (0, 0.0, 0);
@@ -406,9 +406,9 @@ fn lights_are_chosen_as_a_slow_program_chooses_them() {
             }
         }
         println!("{others} of {} lights are others", found.len());
-        // Sums are rounded to 32 bits, the albedo to 8.
+        // The device rounds sums to 32 bits and the albedo to 8 bits.
         assert!(found.len() == vpls as usize && others * 100 <= found.len(), "{others} of {} lights", found.len());
-        // Not just every fourth.
+        // The weights are uneven, so the test would notice draws with equal weights.
         let even = |factor: f64| factor / all.len() as f64;
         assert!(weights.iter().any(|w| *w > even(1.5)) && weights.iter().any(|w| *w < even(0.7)));
     });

@@ -1,4 +1,4 @@
-// One level of the trees of a range of pixels: a ray of each node, to the next surface.
+// Traces one level of the ray trees of a range of pixels: the ray of each node, to the next surface.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -16,7 +16,7 @@
 #include "lib/trace.glsl"
 #include "lib/igi.glsl"
 #include "lib/vpl_surface.glsl"
-#include "lib/igi_tree.glsl"
+#include "lib/igi_ray_tree.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -30,11 +30,11 @@ layout(push_constant, scalar) uniform Push {
     uint first;      // slot
     uint count;      // slots
     uint level;
-    vec3 background; // radiance beside the environment's
+    vec3 background; // radiance, added to the environment's
 };
 
-// Relative difference of depth within which the G-buffer's surface is looked for, and within which another one is taken for it: where it is
-// seen nearly along it, or cut out at its silhouette, a ray through the pixel's middle meets it elsewhere than the rasteriser.
+// Relative differences in depth for finding the G-buffer's surface with a ray: first within SAME, then within NEARLY. At grazing angles
+// and at cut-out silhouettes a ray through the middle of the pixel hits the surface at another depth than the rasteriser.
 const float SAME = 1e-4, NEARLY = 1e-2;
 
 void leave(inout TreeNode node, HitSurface s, bool through, vec3 toward) {
@@ -61,13 +61,13 @@ void main() {
         vec3 direction = view_ray(view, uv);
         node = TreeNode(view_base(view, uv) + near * direction, z < 1.0 ? TREE_RAY : TREE_EMPTY, direction, 0.0,
             vec3(1.0), 1.0, vec3(0.0, 1.0, 0.0), pixel.x | pixel.y << 16u, vec3(0.0), vec3(0.0), vec3(0.0));
-        // Whatever the trees before left in the others.
+        // Clears the nodes that the previous range of pixels may have filled.
         for (uint other = 1u; other < TREE_WIDTH; ++other) {
             tree_nodes[at + other].state = TREE_EMPTY;
             tree_nodes[at + other].light = vec3(0.0);
         }
     } else {
-        // Nodes that an earlier level may have filled.
+        // Other nodes cannot hold a ray at this level.
         if (branch % max(TREE_WIDTH >> level, 1u) != 0u) return;
         node = tree_nodes[at];
         if (node.state != TREE_RAY) return;
@@ -77,8 +77,8 @@ void main() {
     float share = 0.0;
     if (node.state == TREE_RAY) {
         Hit hit = Hit(0.0, vec2(0.0), NONE, NONE);
-        // First the surface that the G-buffer has: what of it blending lets through was thrown for there. One call of the trace, for
-        // compilers' sake.
+        // Level 0 searches the surface in the G-buffer. The G-buffer pass has already decided at random which blended surfaces are hit, so
+        // TRACE_SOLID takes all of them as solid. A loop with one call of the trace keeps the shader small.
         uint turns = level == 0u ? 2u : 1u;
         for (uint turn = 0u; turn < turns && hit.instance == NONE; ++turn) {
             float around = turn == 0u ? SAME : NEARLY;
@@ -90,7 +90,7 @@ void main() {
         vec3 toward = normalize(node.direction);
         node.state = TREE_EMPTY;
         if (hit.instance == NONE) {
-            // What the pixel itself sees of the sky is drawn by another pass.
+            // The skybox pass draws the sky that the camera sees directly.
             if (level > 0u) {
                 vec3 sky = background;
                 if (settings.sky != 0u) sky += environment_radiance(settings.environment, toward);
@@ -99,12 +99,13 @@ void main() {
         } else {
             HitSurface s = hit_surface(hit, toward, settings.slots, settings.diffuse_only != 0u);
             share = s.glass + s.mirror;
-            // The first surface's rough part, with its share of what is emitted, is lit from the G-buffer; of later ones either part goes on.
+            // The G-buffer's passes light the rough part of the first surface and add its share of the emission. At later surfaces either
+            // the rough part or the sharp part is chosen at random.
             node.light += (level > 0u ? node.weight : vec3(share)) * s.emission;
             bool rough = level > 0u && unit_float(words.y) < s.rough;
             if (rough && !s.unlit) {
                 node.state = TREE_SURFACE;
-                // A step back along the ray, where nothing lies (stepped_back of lib/vpl.glsl).
+                // A step back along the ray, where there is free space (see stepped_back in lib/vpl.glsl).
                 node.position = s.position - toward * s.gap;
                 node.gap = s.gap;
                 node.direction = -toward;

@@ -1,4 +1,4 @@
-//! How far a reference picture is, on stderr.
+//! The progress of a reference picture, on stderr.
 
 use std::time::{Duration, Instant};
 
@@ -6,21 +6,21 @@ use lucerna::reference::tracer::Progress;
 
 use crate::progress::{ProgressMode, span};
 
-/// What ends a run, whichever comes first.
+/// The goals of a run. The first one that is reached ends it.
 #[derive(Clone, Copy, Debug)]
 pub struct Goals {
-    /// Paths for each pixel.
+    /// Paths per pixel.
     pub samples: u64,
     /// Estimated relative mean squared error.
     pub error: Option<f64>,
-    /// Of this run.
+    /// Time of this run.
     pub time: Option<Duration>,
 }
 
 impl Goals {
-    /// Seconds that are left, and which goal will be met first. `samples` of which `done` are of this run, which took `seconds`;
-    /// `error`: the last one that was estimated, and after how many samples. The error is a variance and falls as one over the
-    /// number of samples.
+    /// Estimated remaining time in seconds, and the goal that will be reached first. `samples`: all samples; `done`: samples of this run,
+    /// which took `seconds`. `error`: the last estimated error, and the number of samples at that time. The error is a variance, so it is
+    /// inversely proportional to the number of samples.
     fn left(&self, samples: f64, done: f64, seconds: f64, error: Option<(f64, f64)>) -> (f64, &'static str) {
         let each = seconds / done.max(1e-12);
         let mut first = ((self.samples as f64 - samples).max(0.0) * each, "samples");
@@ -38,30 +38,30 @@ impl Goals {
 
 /// Shows progress from time to time.
 #[derive(Debug)]
-pub struct Meter {
+pub struct ProgressLine {
     mode: ProgressMode,
     goals: Goals,
     started: Instant,
-    /// Before this run.
+    /// Progress at the start of this run.
     before: Progress,
     shown: Option<Instant>,
-    /// The last estimate, and after how many samples.
+    /// The last estimated error, and the number of samples at that time.
     error: Option<(f64, f64)>,
 }
 
-impl Meter {
-    /// Towards `goals`.
+impl ProgressLine {
+    /// A progress line for a run with `goals`. `before`: the progress of earlier runs.
     pub fn new(mode: ProgressMode, quiet: bool, goals: Goals, before: Progress) -> Self {
         let mode = mode.here(quiet, false);
         Self { mode, goals, started: Instant::now(), before, shown: None, error: None }
     }
 
-    /// Whether the error is shown to anybody.
+    /// Whether the line shows the error.
     pub fn wants_error(&self) -> bool {
         self.mode != ProgressMode::None
     }
 
-    /// The estimated error was looked at.
+    /// Records an estimated error.
     pub fn error(&mut self, now: &Progress, error: f64) {
         self.error = Some((error, now.samples));
     }
@@ -71,12 +71,12 @@ impl Meter {
         self.started.elapsed().as_secs_f64()
     }
 
-    /// Paths a second of this run.
+    /// Paths per second in this run.
     pub fn rate(&self, now: &Progress) -> f64 {
         (now.paths - self.before.paths) as f64 / self.seconds().max(1e-9)
     }
 
-    /// Shows it, if it was not just shown.
+    /// Prints the line, unless it was printed a short time ago.
     pub fn show(&mut self, now: &Progress) {
         let pause = match self.mode {
             ProgressMode::Bar => Duration::from_millis(200),
@@ -86,7 +86,7 @@ impl Meter {
             return;
         }
         if self.shown.is_none() && self.mode != ProgressMode::Bar {
-            // Short runs say only how they ended.
+            // Short runs print only the last line.
             self.shown = Some(Instant::now());
             return;
         }
@@ -94,7 +94,7 @@ impl Meter {
         self.line(now, false);
     }
 
-    /// The last line.
+    /// Prints the last line.
     pub fn finish(&mut self, now: &Progress, error: f64) {
         self.error(now, error);
         if self.mode != ProgressMode::None {
@@ -112,7 +112,7 @@ impl Meter {
                 "relative_error": error, "target_error": self.goals.error,
                 "seconds_left": if last { 0.0 } else { left }, "ends_by": by, "done": last,
             });
-            self.mode.meter_line(&text.to_string(), last);
+            self.mode.progress_line(&text.to_string(), last);
             return;
         }
         let samples = if now.samples < 10.0 { format!("{:.1}", now.samples) } else { format!("{:.0}", now.samples) };
@@ -127,7 +127,7 @@ impl Meter {
             true => text += &format!(", {:.1} s", self.seconds()),
             false => text += &format!(", {} left", span(left)),
         }
-        self.mode.meter_line(&text, last);
+        self.mode.progress_line(&text, last);
     }
 }
 
@@ -154,7 +154,7 @@ mod tests {
         assert!((left - 22.0).abs() < 1e-9 && by == "error", "{left} {by}");
         assert_eq!(goals.left(100.0, 100.0, 10.0, None).1, "samples");
         assert_eq!(goals.left(100.0, 100.0, 10.0, Some((f64::INFINITY, 1.0))).1, "samples");
-        // Already better than asked for: done at the next look.
+        // The error goal is already reached; the run ends at the next estimate.
         assert_eq!(goals.left(100.0, 100.0, 10.0, Some((0.001, 80.0))), (0.0, "error"));
         let goals = Goals { time: Some(Duration::from_secs(15)), ..goals };
         assert_eq!(goals.left(100.0, 100.0, 10.0, Some((0.04, 80.0))), (5.0, "time"));

@@ -1,4 +1,4 @@
-// One level of the tree over the virtual lights: bounds of two nodes each.
+// One level of the light tree: each node gets the bounds of its two children.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -10,10 +10,10 @@ layout(local_size_x = 64) in;
 layout(binding = 0, scalar) buffer Nodes { VplNode nodes[]; };
 
 layout(push_constant, scalar) uniform Push {
-    uint first; // node of the level: as many as its number
+    uint first; // first node of the level; the level has `first` nodes
 };
 
-// Cosine of the sum of two angles, -1 from 180 degrees on.
+// Cosine of the sum of two angles that are given by their cosines; -1 if the sum is 180 degrees or more.
 float cosine_of_sum(float a, float b) {
     if (a + b <= 0.0) return -1.0;
     return a * b - sqrt(max(1.0 - a * a, 0.0) * max(1.0 - b * b, 0.0));
@@ -36,7 +36,7 @@ void main() {
             node.axis = sum / size;
             float widest = min(cosine_of_sum(clamp(dot(node.axis, a.axis), -1.0, 1.0), a.cos_spread),
                 cosine_of_sum(clamp(dot(node.axis, b.axis), -1.0, 1.0), b.cos_spread));
-            // Rounding must not narrow it.
+            // A margin for rounding: the cone must contain all normals.
             node.cos_spread = max(widest - 1e-5, -1.0);
         }
     }

@@ -1,5 +1,5 @@
-//! How many passes a frame takes, before any is declared: settings that may each be chosen may together ask for more than a host can
-//! plan and record.
+//! The pass budget: an estimate of a frame's passes, made before any pass is declared. Each setting may be within its range, and
+//! together they may still need more passes than a host can plan and record.
 
 use super::{Igi, Settings, Shared, Visibility, raster};
 use crate::{
@@ -8,26 +8,26 @@ use crate::{
     scene::resident::{Cutout, Handles},
 };
 
-/// Passes of a frame at most. Planned and recorded they take some seconds and a hundred megabytes on the host.
+/// Maximum of passes per frame. The host takes some seconds and a hundred megabytes to plan and record them.
 const MOST_PASSES: u64 = 50_000;
 
-/// Passes that grow with a setting.
+/// The passes whose number grows with one setting.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Share {
     pub key: &'static str,
     pub passes: u64,
-    /// What makes them fewer.
+    /// Advice on how to reduce the passes.
     less: &'static str,
 }
 
 impl Igi {
-    /// Passes of a frame of `extent` pixels, about, by what they are for.
+    /// Estimated number of passes of a frame of `extent` pixels, for each setting that causes them.
     pub(super) fn passes(&self, extent: Extent, handles: &Handles, shared: &Shared, settings: &Settings) -> Vec<Share> {
         let batches = |extent: Extent, rays: u32| self.batches(extent, rays).len() as u64;
         let (paths, total) = (settings.paths(), settings.paths() * settings.bounces);
         let coarse = extent.div_ceil(settings.downsample);
         let trees = self.trees_of(extent).filter(|_| settings.specular);
-        // Virtual lights for what is seen directly, and with a history others for mirrors.
+        // With a history, mirrors use a second set of virtual lights.
         let chosen = 1 + u64::from(settings.history > 0 && trees.is_some());
         let shot = chosen + u64::from(settings.history > 1);
         let indirect = u64::from(settings.indirect);
@@ -73,7 +73,7 @@ impl Igi {
             add("refine", indirect * passes, "Choose 0, or fewer igi.vpls, or a smaller picture");
         }
         if settings.compensates() {
-            // Of a path its begin, and two or three a segment.
+            // A path has one pass at its start and two or three passes per segment.
             let each = 3 * u64::from(settings.bounces);
             let held = |extent: Extent| extent.pixels().div_ceil(u64::from(super::compensation::HELD));
             let listed = if refines { held(extent) } else { 0 };
@@ -87,7 +87,7 @@ impl Igi {
     }
 
     /// # Errors
-    /// `Usage` if a frame would take more than [`MOST_PASSES`], naming the setting that most of them are for.
+    /// `Usage` if a frame would need more than [`MOST_PASSES`]; names the setting that causes most of them.
     pub(super) fn few_enough(
         &self,
         extent: Extent,
@@ -101,7 +101,7 @@ impl Igi {
             return Ok(());
         };
         let what = format!(
-            "a picture of {}×{} pixels would take {sum} passes, {} of them for this setting; allowed: {MOST_PASSES}",
+            "a picture of {}×{} pixels would need {sum} passes, {} of them because of this setting; allowed: {MOST_PASSES}",
             extent.width, extent.height, most.passes
         );
         Err(Error::usage(what).at(format!("igi.{}", most.key)).help(most.less))
@@ -118,7 +118,7 @@ mod tests {
         techniques::igi::PictureSettings,
     };
 
-    /// A Cornell box, some of it of metal, for dispatches so short that little makes many.
+    /// A Cornell box with metal walls. Dispatches are short, so that small settings cause many passes.
     fn mirrors(gpu: &Gpu) -> (Scene, Resident, Igi) {
         let mut scene = builtin::load("cornell-area").unwrap();
         scene.materials[0] = Material { metallic: 1.0, roughness: 0.0, ..scene.materials[0].clone() };
@@ -162,7 +162,7 @@ mod tests {
                 let (declared, shares) = declare(1, &mut igi, &mut resident);
                 let counted: u64 = shares.iter().map(|share| share.passes).sum();
                 println!("{key}: {declared} passes, counted {counted}");
-                // Filters, clears and sorting are left out.
+                // The estimate leaves out filters, clears and sorting.
                 assert!(declared.abs_diff(counted) <= 80 + declared / 50, "{key}: {declared} and {counted} passes");
                 let most = shares.iter().max_by_key(|share| share.passes).unwrap();
                 assert!(most.key == key && most.passes > 100, "{most:?} instead of {key}");

@@ -1,4 +1,4 @@
-// Light at the surfaces at the ends of the trees from a few virtual lights picked by the tree over them (as igi/gather_picks.comp).
+// Adds the light of a range of virtual lights to the ray tree nodes: from every light and at full resolution, as in the paper.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -6,22 +6,15 @@
 #include "lib/random.glsl"
 #include "lib/trace.glsl"
 #include "lib/vpl.glsl"
-#include "lib/igi_tree.glsl"
-#define VPL_NODES_BINDING 4
-#include "lib/vpl_tree.glsl"
+#include "lib/igi_ray_tree.glsl"
 
 layout(local_size_x = 64) in;
 
 layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; };
 
-#include "lib/vpl_picked.glsl"
-
 layout(push_constant, scalar) uniform Push {
-    uint first;      // pick
+    uint first;      // virtual light
     uint count;
-    uint picks;
-    uint proposals;  // for each pick
-    uint leaves;     // of the tree over the virtual lights
     uint nodes;
     float least;     // min_d of the bounded geometry term, metres; 0: none
     uint seed;
@@ -32,8 +25,14 @@ void main() {
     if (at >= nodes || tree_nodes[at].state != TREE_SURFACE) return;
     TreeNode node = tree_nodes[at];
     vec3 origin = node.position + node.normal * node.gap;
-    float offset = vpl_offset(uvec2(node.pixel & 0xffffu, node.pixel >> 16u), at % TREE_WIDTH, TREE_WIDTH, seed);
-    Receiver receiver = Receiver(node.position, node.normal, origin, offset, uvec2(node.pixel, at % TREE_WIDTH));
-    vec3 sum = vpl_picked(receiver, Picking(picks, proposals, leaves, least, seed), first, count).rgb;
+    vec3 sum = vec3(0.0);
+    for (uint k = first; k < first + count; ++k) {
+        Vpl vpl = vpls[k];
+        vec3 light = vpl_irradiance(vpl, node.position, node.normal, least);
+        if (light == vec3(0.0)) continue;
+        vec3 to = vpl.position + vpl.normal * vpl.gap - origin;
+        uint salt = pcg4d(uvec4(node.pixel, at % TREE_WIDTH, k, seed)).x;
+        if (!trace_any(Ray(origin, 0.0, to, 0.99999), TRACE_SHADOW, salt)) sum += light;
+    }
     tree_nodes[at].light = node.light + node.weight * node.albedo * (sum / 3.14159265358979);
 }
