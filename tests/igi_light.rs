@@ -162,6 +162,38 @@ fn flux_is_kept_from_every_kind_of_light() {
     });
 }
 
+#[test]
+fn the_window_of_a_range_takes_its_share_of_the_flux_once() {
+    with_gpu(|gpu| {
+        // From the middle of a sphere all light goes as far: 1 - (r / range)⁴ of it arrives, and what is reflected goes on without end.
+        let (radius, rho, intensity) = (1.5f32, 0.5f32, 2.0f32);
+        for range in [None, Some(4.0), Some(1.7), Some(1.4f32)] {
+            let (inner, outer) = (0.3f32, 0.8f32);
+            let cone = 1.0 - inner.cos() + (inner.cos() - outer.cos()) / 3.0;
+            let kinds = [
+                (LightKind::Point { range }, 4.0 * std::f32::consts::PI),
+                (LightKind::Spot { range, inner, outer }, 2.0 * std::f32::consts::PI * cone),
+            ];
+            for (kind, angle) in kinds {
+                let mut stage = Stage::new();
+                let wall = stage.material(Material::diffuse("wall", Vec3::splat(rho)));
+                stage.sphere(wall, Vec3::ZERO, radius, 80, true);
+                stage.light(kind, Vec3::ONE, intensity, Mat4::IDENTITY);
+                let seen = view(vec3(0.1, 0.2, 0.0), Vec3::X, 60.0, [4, 4]);
+                let vpls =
+                    Studio::new(gpu, &stage.scene).render(&seen, &Settings { bounces: 2, ..plain(2000) }, 0).vpls;
+                let arrives = range.map_or(1.0, |range| (1.0 - (radius / range).powi(4)).max(0.0));
+                let (first, second) = (flux(&vpls, 0).x, flux(&vpls, 1).x);
+                let exact = rho * intensity * angle * arrives;
+                println!("{kind:?}: {first} and {second}, the first {exact}");
+                // Facets lie up to a third of a thousandth of the radius further in.
+                assert!((first - exact).abs() <= 4e-3 * exact, "{kind:?}: {first} instead of {exact}");
+                assert!((second - rho * first).abs() <= 1e-3 * exact, "{kind:?}: second {second} after {first}");
+            }
+        }
+    });
+}
+
 /// Mean and variance.
 fn moments(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;

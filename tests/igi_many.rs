@@ -294,6 +294,40 @@ fn what_the_bound_takes_is_put_back_in_a_sphere() {
 }
 
 #[test]
+fn what_is_put_back_is_the_matt_share_of_a_wall_and_the_light_of_every_lamp() {
+    with_gpu(|gpu| {
+        let (radius, rho, intensity) = (1.5f32, 0.6f32, 2.0f32);
+        let once = f64::from(rho * intensity / (radius * radius));
+        let seen = view(vec3(0.1, 0.2, 0.0), vec3(1.0, 0.4, 0.3), 80.0, [32, 32]);
+        // More lamps than a short path looks at, weak and strong ones, as bright together as the one.
+        let lamps = 40;
+        let strengths = (0..lamps).map(|i| [0.5, 1.5][i % 2] * intensity / lamps as f32).collect();
+        for (name, share, strengths) in
+            [("half glass", 0.5f32, vec![intensity]), ("matt", 1.0, vec![intensity]), ("forty lamps", 1.0, strengths)]
+        {
+            let mut stage = Stage::new();
+            // An index of 1: half of the light leaves as if there were nothing.
+            let matt = Material::diffuse("wall", Vec3::splat(rho));
+            let wall = Material { ior: 1.0, transmission: 1.0 - share, double_sided: true, ..matt };
+            let wall = stage.material(wall);
+            stage.sphere(wall, Vec3::ZERO, radius, 80, true);
+            for (i, strength) in strengths.iter().enumerate() {
+                let at = 0.01 * vec3((i % 3) as f32 - 1.0, (i / 3 % 3) as f32 - 1.0, (i % 7) as f32 / 3.0 - 1.0);
+                stage.point(if strengths.len() == 1 { Vec3::ZERO } else { at }, Vec3::splat(*strength));
+            }
+            let mut studio = Studio::new(gpu, &stage.scene);
+            // Most of the light comes by short paths.
+            let settings = Settings { bound: 0.45, picks: 16, specular: true, direct_samples: 1, ..plain(3000) };
+            let without = mean(&studio.render(&seen, &settings, 0).irradiance) / (once * f64::from(share));
+            let settings = Settings { compensation: 4, ..settings };
+            let with = mean(&studio.render(&seen, &settings, 0).irradiance) / (once * f64::from(share));
+            println!("{name}: {without:.4} without, {with:.4} with");
+            assert!(without < 0.6 && (with - 1.0).abs() < 0.02, "{name}: {without} without, {with} with");
+        }
+    });
+}
+
+#[test]
 fn with_compensation_a_picture_has_the_path_tracers_energy() {
     with_gpu(|gpu| {
         let (scene, seen) = cornell(32);

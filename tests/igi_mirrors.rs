@@ -4,7 +4,7 @@ mod igi_lab;
 mod tracer_lab;
 
 use glam::{Vec3, vec3};
-use igi_lab::{Studio, mean};
+use igi_lab::{Studio, flux, mean, plain, room};
 use lucerna::{
     gpu::testing::with_gpu,
     reference::tracer::{Filter, Settings as Tracing},
@@ -154,5 +154,57 @@ fn holes_close_to_a_mirror_show_what_it_shows() {
         let clear = picture(Some((AlphaMode::Blend, 0.0)));
         println!("mirror {whole:.4}; behind a hole {cut:.4}, a sheet {left:.4}, nothing {clear:.4}");
         assert!(whole > 0.3 && cut == whole && clear == whole && left < 0.01 * whole);
+    });
+}
+
+#[test]
+fn light_passes_as_many_panes_as_it_may() {
+    with_gpu(|gpu| {
+        // Boxes of clear sheets around a lamp, one in the other, that bend and reflect nothing.
+        let mut stage = room(Vec3::splat(0.5));
+        let clear = Material { ior: 1.0, base_color: Vec3::ONE.extend(1.0), ..glass(true) };
+        let clear = stage.material(clear);
+        for half in [0.2, 0.3, 0.4] {
+            stage.cuboid(clear, Vec3::splat(-half), Vec3::splat(half), false);
+        }
+        stage.point(vec3(0.01, 0.02, -0.03), Vec3::splat(2.0));
+        let mut studio = Studio::new(gpu, &stage.scene);
+        let seen = view(vec3(0.0, 0.0, 0.9), vec3(0.3, 0.2, 1.0), 60.0, [4, 4]);
+        let exact = 0.5 * 8.0 * std::f32::consts::PI;
+        for (specular_depth, share) in [(2, 0.0), (3, 1.0), (4, 1.0)] {
+            let settings = Settings { specular: true, specular_depth, ..plain(600) };
+            let found = flux(&studio.render(&seen, &settings, 0).vpls, 0).x / exact;
+            println!("{specular_depth} panes: {found} of the flux");
+            assert!((found - share).abs() < 1e-3, "{specular_depth} panes: {found} of the flux");
+        }
+    });
+}
+
+#[test]
+fn a_surface_that_is_glass_in_part_reflects_by_the_rest() {
+    with_gpu(|gpu| {
+        // A wall before nothing, lit by a lamp and by the floor: of what it reflects the glass takes its share, and shows black.
+        let shown = |transmission: f32| {
+            let mut stage = Stage::new();
+            let floor = stage.material(matt(vec3(0.8, 0.6, 0.4)));
+            let wall = stage.material(Material { transmission, double_sided: true, ..matt(vec3(0.7, 0.5, 0.9)) });
+            stage.quad(floor, vec3(-1.0, 0.0, 0.0), Vec3::Z * 2.0, Vec3::X * 2.0);
+            stage.quad(wall, vec3(-1.0, 0.0, 0.0), Vec3::X * 2.0, Vec3::Y * 2.0);
+            stage.point(vec3(0.2, 1.0, 1.0), Vec3::splat(3.0));
+            let seen = flat_view(vec3(0.0, 1.0, 3.0), vec3(0.0, 1.0, 0.0), 1.8, [24, 24]);
+            let settings = Settings { specular: true, direct_samples: 1, ..plain(200) };
+            let shown = Studio::new(gpu, &stage.scene).render(&seen, &settings, 0);
+            [mean(&shown.direct), mean(&shown.indirect), mean(&shown.total)]
+        };
+        let whole = shown(0.0);
+        assert!(whole[1] > 0.05 * whole[2], "{whole:?}");
+        for transmission in [0.25f32, 0.75, 1.0] {
+            let found = shown(transmission);
+            println!("{transmission} glass: direct, indirect, total {found:?} of {whole:?}");
+            for (found, whole) in found.into_iter().zip(whole) {
+                let expected = f64::from(1.0 - transmission) * whole;
+                assert!((found - expected).abs() < 2e-3 * whole, "{transmission}: {found} instead of {expected}");
+            }
+        }
     });
 }

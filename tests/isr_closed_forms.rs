@@ -37,6 +37,8 @@ fn area(samples: usize, jitter: bool, reach: f64) -> Gather {
         occlusion_reach: 8.0,
         occluder_radius: 1.0,
         occlusion_bias: 0.0,
+        visibility_steps: 0,
+        thickness: 0.0,
     }
 }
 

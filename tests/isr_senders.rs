@@ -96,6 +96,22 @@ fn a_wall_beyond_the_picture_lights_the_floor_as_the_closed_form_says() {
         let shared = share_of_exact(&indirect(gpu, (&eye, &own), &views, &settings), &eye, &own, &patches[1]);
         println!("three views: {shared:.3} of the closed form");
         assert!((shared - 1.0).abs() < 0.1, "{shared}");
+
+        // A hole of half the picture, in which there is no wall: samples are the fewer texels each, and send as much together.
+        let factor = 2.85;
+        let (narrow, _) = floor_and_wall(120, 96, wider(yfov, factor));
+        let around = Buffers::cast(&narrow, &patches, 1);
+        let hole = 0.48;
+        let own_wall = |i: usize| around.sender[i] != DVec3::ZERO;
+        let inside = |i: usize| {
+            let (u, v) = around.uv(&narrow, i % 120, i / 120);
+            (2.0 * u - 1.0).abs().max((2.0 * v - 1.0).abs()) < f64::from(hole)
+        };
+        assert!((0..around.depth.len()).all(|i| !(own_wall(i) && inside(i))), "a part of the wall lies in the hole");
+        let views = [(&narrow, &around, hole)];
+        let once = share_of_exact(&indirect(gpu, (&eye, &own), &views, &settings), &eye, &own, &patches[1]);
+        println!("border with a hole of half its width: {once:.3} of the closed form");
+        assert!((once - 1.0).abs() < 0.1, "{once}");
     });
 }
 

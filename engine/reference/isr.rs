@@ -136,6 +136,47 @@ pub struct Gather {
     /// Sides of the sample's cell.
     pub occluder_radius: f64,
     pub occlusion_bias: f64,
+    /// Places between receiver and sender at which the depth buffer is asked for something in between; 0: all senders are visible.
+    pub visibility_steps: usize,
+    /// Of what hides a sender, relative to its depth.
+    pub thickness: f64,
+}
+
+/// The distance along the axis, over `far`, at which the line between two points crosses the line of sight of the place `t` of the
+/// way between their images: by halving the line, with nothing but the projection.
+pub fn depth_between(eye: &Eye, from: DVec3, to: DVec3, t: f64) -> f64 {
+    let seen = |p: DVec3| {
+        let local = p - eye.position;
+        let z = local.dot(eye.forward);
+        (DVec2::new(local.dot(eye.right), local.dot(eye.up)) / z, z / eye.far)
+    };
+    let (start, end) = (seen(from).0, seen(to).0);
+    let way = end - start;
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..30 {
+        let middle = 0.5 * (low + high);
+        if (seen(from.lerp(to, middle)).0 - start).dot(way) < t * way.length_squared() {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    seen(from.lerp(to, low)).1
+}
+
+/// Whether the depth buffer shows something between the surfaces of two texels: as far before the line between them as a thing of the
+/// settings' thickness may be, and no nearer to it than rounding.
+fn hidden(eye: &Eye, buffers: &Buffers, settings: &Gather, from: (usize, usize), to: (usize, usize)) -> bool {
+    let place = |(x, y): (usize, usize)| DVec2::new(x as f64, y as f64);
+    let (p, q) = (buffers.position(eye, from.0, from.1), buffers.position(eye, to.0, to.1));
+    (1..=settings.visibility_steps).any(|i| {
+        let t = i as f64 / (settings.visibility_steps + 1) as f64;
+        let at = place(from).lerp(place(to), t).round();
+        let at = (at.x as usize, at.y as usize);
+        let shown = buffers.depth[buffers.at(at.0, at.1)];
+        let line = depth_between(eye, p, q, t);
+        at != from && at != to && shown < 0.98 * line && shown > (0.98 - settings.thickness) * line
+    })
 }
 
 /// Gathered radiance of a white receiver (rgb) and accumulated occlusion (w) for every texel.
@@ -183,6 +224,9 @@ pub fn gather_texel(eye: &Eye, buffers: &Buffers, settings: &Gather, x: usize, y
                 form_factor(p, n, q, q_normal, texel * area) * bounded
             }
         };
+        if factor > 0.0 && hidden(eye, buffers, settings, (x, y), (sx, sy)) {
+            continue;
+        }
         light += factor * buffers.mask[sender] * buffers.sender[sender];
         factors += factor;
     }
