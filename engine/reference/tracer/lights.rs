@@ -226,6 +226,12 @@ mod tests {
         assert_eq!(all.instances.iter().filter(|&&first| first != NONE).count(), 1);
         let emissive = table(&scene, &pose, &lights, Sources::Emissive);
         assert_eq!((emissive.suns, emissive.targets.len()), (0, 2));
+        // Along its axis a lamp sends radiance times area, W/sr, as a punctual light its intensity.
+        let glow = scene.materials.iter().find(|material| material.emissive != Vec3::ZERO).unwrap().emissive;
+        let lamp = &emissive.nodes[0];
+        let area = (lamp.high[0] - lamp.low[0]) * (lamp.high[2] - lamp.low[2]);
+        let sent = strength(glow) * f64::from(area);
+        assert!((f64::from(lamp.power) / sent - 1.0).abs() < 1e-5, "{} instead of {sent}", lamp.power);
         let none = table(&Scene::default(), &Pose::rest(&Scene::default()), &[], Sources::All);
         assert_eq!((none.suns, none.tree, none.nodes.len(), none.targets.len()), (0, false, 1, 1));
     }

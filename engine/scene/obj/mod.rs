@@ -6,6 +6,7 @@
 //! and lines are counted in the notes. Smoothing groups are not read: where a file has no normals, edges up to 45° are
 //! smooth.
 
+mod delaunay;
 mod materials;
 mod mtl;
 mod parse;

@@ -86,6 +86,8 @@ mod tests {
 
     #[test]
     fn every_elementary_box_holds_its_share() {
+        // Bases with a common factor leave boxes empty.
+        assert!(PRIMES.iter().all(|base| (2..*base).all(|divisor| base % divisor != 0)), "{PRIMES:?}");
         // Of 2^a 3^b consecutive points, exactly one lies in each box of 2^-a × 3^-b, for any first point. In three dimensions the
         // boxes are 2^-a × 3^-b × 5^-c.
         for (a, b, c) in [(1u32, 1u32, 0u32), (3, 2, 0), (5, 1, 0), (2, 4, 0), (3, 2, 1), (2, 1, 2)] {
