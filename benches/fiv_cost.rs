@@ -1,10 +1,11 @@
-//! What shadows from stored vectors cost in a frame: four tables. `objects`: against the number of occluders, with and without the
-//! correction for overlap. `culling`: with occluders left out that can hide little, on a wide ground. `vertices`: of the same things in
-//! finer and finer triangles, which show the same pixels. `turning`: on the host, of an environment that turns or brightens from frame to
-//! frame, by its size.
+//! Cost of shadows from precomputed vectors in a frame, in four tables. `objects`: against the number of occluders,
+//! with and without the overlap correction. `culling`: with negligible occluders left out, on a wide ground.
+//! `vertices`: with finer and finer triangles of the same objects, so that the same pixels are covered. `turning`: cost
+//! on the host for an environment that rotates or brightens from frame to frame, by its size.
 //!
-//! `cargo bench --bench fiv_cost [-- WIDTHxHEIGHT [ROUNDS [TABLE]]]`; 128x128 and 5 by default; TABLE: one of them alone.
-//! `LUCERNA_DEVICE` chooses the device. Times are medians of ROUNDS rounds, in each of which all rows take their turn, ms.
+//! `cargo bench --bench fiv_cost [-- WIDTHxHEIGHT [ROUNDS [TABLE]]]`; 128x128 and 5 by default; TABLE: one of the
+//! tables alone. `LUCERNA_DEVICE` chooses the device. Times are medians of ROUNDS rounds, ms. In each round all rows
+//! run once.
 
 mod common;
 
@@ -58,7 +59,7 @@ impl Studio {
     }
 }
 
-/// Cost does not depend on how many samples there are, as long as they stay in the same caches.
+/// The cost does not depend on the number of samples, as long as they fit into the same caches.
 fn settings() -> Settings {
     Settings {
         size: 16,
@@ -90,11 +91,11 @@ fn times(report: &Report) -> [f64; 5] {
 /// Times of the columns, and the irradiance.
 type Measured = ([f64; 5], Vec<[f32; 4]>);
 
-/// Medians of all rows, which take turns; and their pictures.
+/// Medians of all rows, which alternate, and their pictures.
 fn measure(rows: &mut [(&mut Studio, Settings)], rounds: usize) -> Result<Vec<Measured>> {
     let mut all = vec![<[Vec<f64>; 5]>::default(); rows.len()];
     let mut pictures = vec![Vec::new(); rows.len()];
-    // The first round makes pipelines and memory.
+    // The first round creates pipelines and memory.
     for round in 0..=rounds {
         for (i, (studio, settings)) in rows.iter_mut().enumerate() {
             let (picture, report) = studio.once(settings)?;
@@ -325,7 +326,7 @@ fn turning(gpu: &Gpu, extent: [u32; 2], rounds: usize) -> Result<()> {
         ];
         let mut row = format!("{size:>11}");
         for (way, width) in ways.into_iter().zip([9, 9, 9, 10]) {
-            // The first one makes pipelines, memory and what all turns share.
+            // The first frame creates pipelines, memory and the data that all rotations share.
             let times = (0..=rounds).map(|i| frame(way(&base, 1.0 + i as f32))).collect::<Result<Vec<f64>>>()?;
             row += &format!(" {:>width$.2}", median(times[1..].to_vec()));
         }

@@ -98,7 +98,7 @@ fn sum(pixels: &[[f32; 4]]) -> f64 {
     pixels.iter().flat_map(|p| &p[..3]).map(|&v| f64::from(v)).sum()
 }
 
-const GATHER: [&str; 4] = ["igi.gather", "igi.order", "igi.gather_picks", "igi.near"];
+const GATHER: [&str; 4] = ["igi.gather", "igi.light_tree", "igi.gather_picks", "igi.near"];
 
 fn run() -> Result<()> {
     let mut words = common::Places::new("WIDTHxHEIGHT [MOST [TABLE]]");
@@ -177,7 +177,7 @@ fn cache(gpu: &Gpu, extent: [u32; 2]) -> Result<()> {
     }
     let mut studio = Studio::new(gpu, scene, extent)?;
     let base = Settings { vpls: 300, candidates: 1, ..Settings::default() };
-    let passes = ["igi.gather_tree", "igi.cache"];
+    let passes = ["igi.ray_tree_gather", "igi.cache"];
     println!("\ncornell with mirrors, 300 virtual lights: light on what they show");
     println!("{:>8} {:>10} {:>8} {:>10}", "cells", "ms", "number", "error");
     let (exact, ms) = studio.timed(&base, 1, &passes)?;

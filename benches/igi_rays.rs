@@ -83,7 +83,7 @@ fn stages(report: &Report) -> BTreeMap<&'static str, f64> {
             "igi.importance" => "importance",
             "igi.gather" => "gathering",
             "igi.direct" => "direct",
-            "igi.grow" => "mirrors",
+            "igi.ray_tree_grow" => "mirrors",
             _ => continue,
         };
         *out.entry(stage).or_default() += pass.gpu_ms.unwrap_or(pass.cpu_ms);

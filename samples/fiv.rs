@@ -19,14 +19,15 @@ struct Arguments {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Compute the vectors of occluders under an environment into a file
+    /// Compute the vectors of occluders under an environment and write them to a file
     #[command(args_override_self = true)]
     Precompute(Box<PrecomputeArgs>),
     /// Join the parts of a file
     Merge(MergeArgs),
     /// Write a built-in environment into a file
     Environment(EnvironmentArgs),
-    /// How a sequence changes from frame to frame against one by brute force, where surfaces stand still
+    /// Compare the changes between the frames of a sequence with those of a sequence by brute force, where surfaces
+    /// stand still
     Steady(SteadyArgs),
     /// Render a scene into images
     #[command(args_override_self = true)]

@@ -1,4 +1,4 @@
-//! Occluders that the receiver's plane cuts, and lights that are kept out of the vectors, against brute force.
+//! Occluders that the receiver's plane cuts, and separated texels, against brute force.
 
 mod fiv_lab;
 mod tracer_lab;
@@ -45,7 +45,7 @@ fn what_lies_behind_the_plane_is_known_by_the_light_from_there() {
         for (name, environment) in [("even", even), ("bright below", bright_below), ("from above", from_above)] {
             for height in [0.2, -0.15] {
                 let scene = stage(environment.clone(), &[vec3(0.0, height, 0.0)]);
-                // Beside the ball, on the side of its shadow.
+                // The pixel lies beside the ball on the side of its shadow.
                 let view = flat_view(vec3(1.3, 2.0, 0.2), vec3(1.3, 0.0, 0.2), 0.7, [12, 12]);
                 let few = base();
                 let reference = picture(gpu, &scene, &view, &truth(&few));
@@ -59,9 +59,9 @@ fn what_lies_behind_the_plane_is_known_by_the_light_from_there() {
                 let by_height = error(&Settings { cut: Cut::Height, ..few.clone() });
                 let off = error(&Settings { partial: false, ..few.clone() });
                 eprintln!("{name}, centre at {height}: {light:.4}, by height {by_height:.4}, without {off:.4}");
-                // Few samples take a shadow that is nearly none for a little more: a hundredth is theirs.
+                // The set has few samples, so a weak shadow may be off by a hundredth of the light.
                 assert!(light < 0.05 && light < 1.05 * off + 1e-2, "{name} {height}");
-                // Under light from above alone there is nothing to correct.
+                // Light from above alone needs no correction.
                 assert!(name == "from above" || (light < 0.7 * by_height && light < 0.9 * off), "{name} {height}");
             }
         }
@@ -86,11 +86,11 @@ fn lights_kept_apart_are_all_light_together_with_the_rest() {
         again.radiance[sun.texel as usize] = sun.radiance;
     }
     assert_eq!(again, whole);
-    // The first is the brightest: where the sun is.
+    // The first separated texel is the brightest, which contains the sun.
     let (face, x, y) = sky::place(16, split.suns[0].texel);
     let st = (glam::DVec2::new(x.into(), y.into()) + 0.5) / 16.0;
     assert!(sky::direction(face, st).normalize().dot(DVec3::new(0.4, 0.8, -0.3).normalize()) > 0.99);
-    // Even light has nothing that stands out.
+    // Constant radiance has no texel to separate.
     assert!(Sky::new(Some(&Environment::constant(Vec3::ONE)), 16).unwrap().apart(16).suns.is_empty());
 }
 
@@ -98,7 +98,7 @@ fn lights_kept_apart_are_all_light_together_with_the_rest() {
 fn suns_have_hard_shadows_which_overlap_once() {
     with_gpu(|gpu| {
         let apart = Settings { suns: 4, ..base() };
-        // One over the other as the sun sees them, and one beside.
+        // Two balls one behind the other as seen from the sun, and one ball beside them.
         let toward = vec3(0.4, 0.8, -0.3);
         for balls in [vec![vec3(0.0, 0.7, 0.0)], vec![vec3(0.0, 0.7, 0.0), toward * 1.6 + vec3(0.0, 0.6, 0.0), Vec3::Y]]
         {
@@ -107,10 +107,10 @@ fn suns_have_hard_shadows_which_overlap_once() {
             let reference = picture(gpu, &scene, &view, &truth(&base()));
             let error = |settings: &Settings| nrmse(&reference, &picture(gpu, &scene, &view, settings));
             let (without, with) = (error(&base()), error(&apart));
-            eprintln!("NRMSE of {} balls under a sun: {without:.4}, kept apart {with:.4}", balls.len());
+            eprintln!("NRMSE of {} balls under a sun: {without:.4}, separated {with:.4}", balls.len());
             assert!(with < 0.03 && with < 0.4 * without);
         }
-        // A ball's own shadow: half of it is turned away, and no more than that is dark.
+        // The shadow of a ball on itself: exactly the half that faces away from the sun is dark.
         let scene = stage(sunny(), &[vec3(0.0, 0.7, 0.0)]);
         let view = flat_view(vec3(1.5, 2.5, 0.5), vec3(0.0, 0.7, 0.0), 0.45, [32, 32]);
         let reference = picture(gpu, &scene, &view, &truth(&base()));
@@ -118,9 +118,9 @@ fn suns_have_hard_shadows_which_overlap_once() {
             nrmse(&reference, &picture(gpu, &scene, &view, &base())),
             nrmse(&reference, &picture(gpu, &scene, &view, &apart)),
         );
-        eprintln!("NRMSE on the ball: {without:.4}, kept apart {with:.4}");
+        eprintln!("NRMSE on the ball: {without:.4}, separated {with:.4}");
         assert!(with < 0.03 && with < 1.2 * without);
-        // Nothing stands in the way: as much light as ever.
+        // Without occluders no light is lost.
         let empty = stage(sunny(), &[]);
         let view = flat_view(Vec3::Y, Vec3::ZERO, 0.5, [2, 2]);
         let (open, found) = (picture(gpu, &empty, &view, &truth(&base()))[0], picture(gpu, &empty, &view, &apart)[0]);

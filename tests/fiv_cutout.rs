@@ -1,4 +1,4 @@
-//! Surfaces that are cut out, let light through or are no obstacle to it: in the picture and among what casts shadows.
+//! Surfaces that are cut out, blended or unlit: in the picture and among the occluders.
 
 mod fiv_lab;
 mod tracer_lab;
@@ -41,11 +41,11 @@ fn what_is_seen_through_a_pane_is_as_without_it() {
         let before = Mat4::from_translation(vec3(0.0, 0.8, 1.5)) * Mat4::from_rotation_x(std::f32::consts::FRAC_PI_2);
         for (alpha, value) in [(AlphaMode::Mask { cutoff: 0.5 }, 0.2), (AlphaMode::Blend, 0.1)] {
             let mut glazed = plain.clone();
-            // Within the bounds of the rest, so that the picture is as deep.
+            // The pane lies within the bounds of the scene, so that the depth range of the picture stays the same.
             pane(&mut glazed, 0.55, before, alpha, value);
             for method in [Method::Vectors, Method::Online] {
                 for self_samples in [SelfSamples::Surface, SelfSamples::Spheres] {
-                    // Bounding spheres reach before the surfaces that they bound.
+                    // Bounding spheres extend beyond the surfaces that they bound.
                     let settings = Settings { method, self_samples, extent: Extent::Sphere, ..few() };
                     let film = |scene: &Scene| {
                         Studio::new(gpu, scene, &settings, None).film(&Pose::rest(scene), &eye, &settings)
@@ -85,7 +85,7 @@ fn a_glowing_shell_takes_nothing_from_the_shadow_of_what_is_in_it() {
 #[test]
 fn half_of_the_light_passes_a_pane_that_stops_half_of_it() {
     with_gpu(|gpu| {
-        // A sun straight above, in the four texels around the zenith.
+        // A sun at the zenith fills the four texels around the zenith.
         let sun = painted(256, |d| if d.y > 0.999 { Vec3::splat(100.0) } else { Vec3::ZERO });
         let mut scene = Scene { environment: Some(sun), ..Scene::default() };
         ground(&mut scene, 20.0);
@@ -97,7 +97,7 @@ fn half_of_the_light_passes_a_pane_that_stops_half_of_it() {
             let settings = Settings { method, flat: true, largest: 0.5, azimuths: 32, polars: 33, radii: 15, ..few() };
             let mut studio = Studio::new(gpu, &scene, &settings, None);
             let light = studio.film(&Pose::rest(&scene), &below, &settings).0;
-            // The halves below its two triangles.
+            // Points below the two triangles of the pane.
             let mean = |half: bool| {
                 let below = (0..light.len()).filter(|i| i % 24 != i / 24 && (i % 24 > i / 24) == half);
                 let (sum, all) = below.fold((0.0, 0.0), |(s, a), i| (s + light[i][0], a + open[i][0]));

@@ -1,5 +1,5 @@
-//! Many occluders: lists of those that matter and of those that can overlap leave nothing out, light is hidden once, and what is
-//! negligible goes without a step.
+//! Many occluders: the lists of relevant occluders and of overlapping pairs are complete, light is hidden once, and
+//! negligible occluders fade out continuously.
 
 mod fiv_lab;
 mod tracer_lab;
@@ -35,7 +35,7 @@ fn settings(shared: Shared) -> Settings {
     }
 }
 
-/// Even light and a sun, or even light alone.
+/// Constant radiance with a sun, or constant radiance alone.
 fn light(sun: bool) -> Environment {
     let towards = DVec3::new(0.2, 0.9, 0.3).normalize();
     fiv_lab::painted(128, |d| {
@@ -44,7 +44,7 @@ fn light(sun: bool) -> Environment {
     })
 }
 
-/// Balls over, around and under the ground near the origin: most overlap others, as seen from it.
+/// Balls above, around and below the ground near the origin. Most of them overlap others as seen from the origin.
 fn places(count: u32) -> Vec<Vec3> {
     let place = |i: u32| {
         let (turn, far) = (2.399 * i as f32, 0.35 * (i as f32).sqrt());
@@ -63,12 +63,12 @@ fn stage(environment: Environment, places: &[Vec3]) -> Scene {
     scene
 }
 
-/// Pixels along an edge of the picture, which shows so much of the ground, metres, from under all balls.
+/// Pixels along an edge of the picture, and metres of ground that the picture shows from below all balls.
 const EXTENT: u32 = 20;
 const SIZE: f32 = 2.5;
 const EYE: Vec3 = Vec3::new(0.0, 0.02, 0.0);
 
-/// Where the ground is that a pixel shows.
+/// Position of the ground that a pixel shows.
 fn shown(pixel: u32) -> Vec3 {
     let at = |k: u32| ((k as f32 + 0.5) / EXTENT as f32 - 0.5) * SIZE;
     vec3(-at(pixel % EXTENT), 0.0, -at(pixel / EXTENT))
@@ -81,7 +81,7 @@ fn lists_of_pairs_give_the_picture_of_all_pairs() {
             (false, Shared::Discs, 60),
             (false, Shared::Filled, 33),
             (true, Shared::Lights, 60),
-            // More than one call sums up.
+            // The occluders need more than one call of the irradiance pass.
             (true, Shared::Lights, 150),
         ] {
             let scene = stage(light(sun), &places(count));
@@ -97,7 +97,8 @@ fn lists_of_pairs_give_the_picture_of_all_pairs() {
             })
             .unwrap();
             let kind = &plan.occluders[0];
-            let set = twin::Set { grid: plan.grid, shells: kind.shells, paces: &kind.paces, solid: None, fivs: &fivs };
+            let set =
+                twin::Set { grid: plan.grid, shells: kind.shells, spacing: &kind.spacing, solid: None, fivs: &fivs };
             let fill = f64::from(fill::fill(&all.kinds[0]));
             let (open, spots) = (twin::irradiance(&sky, DVec3::Y), spots::spots(&sky));
             assert_eq!(spots.len(), usize::from(sun));
@@ -106,12 +107,12 @@ fn lists_of_pairs_give_the_picture_of_all_pairs() {
             let (mut dark, mut worst) = (0, 0f64);
             for (pixel, found) in found.iter().enumerate() {
                 let p = shown(pixel as u32);
-                // Balls that are cut by the ground may hide it from the camera.
+                // Balls that the ground cuts may hide the ground from the camera.
                 if places(count).iter().any(|at| at.distance(p) < 1.05 * RADIUS) {
                     continue;
                 }
                 let from = |at: &Vec3| (*at + all.placed[0].centre - p).as_dvec3();
-                // Where most samples lie inside of a ball everything counts as hidden.
+                // Receivers with most samples inside a ball are dark.
                 if places(count).iter().any(|at| set.lookup(from(at)).1 < 0.501) {
                     continue;
                 }
@@ -141,7 +142,7 @@ fn lists_of_pairs_give_the_picture_of_all_pairs() {
 #[test]
 fn a_light_behind_two_things_is_hidden_once() {
     with_gpu(|gpu| {
-        // Thin crosses above one another: their discs are nearly empty, and both lie before the sun.
+        // Thin crosses one above the other: their discs are nearly empty, and both cover the sun.
         let towards = vec3(0.2, 0.9, 0.3).normalize();
         let mut scene = Scene { environment: Some(light(true)), ..Scene::default() };
         ground(&mut scene, 20.0);
@@ -166,7 +167,7 @@ fn a_light_behind_two_things_is_hidden_once() {
         let [open, one, all] = [0, 1, 3].map(|of| mean(&truth, of));
         let [lights, filled] = [Shared::Lights, Shared::Filled].map(|s| mean(&Settings { split: 2, ..settings(s) }, 3));
         eprintln!("open {open}, behind one {one}, behind three {all}; lights {lights}, filled {filled}");
-        // Others behind the first change hardly anything.
+        // More crosses behind the first change hardly anything.
         assert!(one < 0.7 * open && all > 0.8 * one);
         assert!((lights - all).abs() < 0.12 * open && filled < all - 0.2 * open);
     });
@@ -175,7 +176,7 @@ fn a_light_behind_two_things_is_hidden_once() {
 #[test]
 fn what_is_left_out_is_less_than_its_share() {
     with_gpu(|gpu| {
-        // A sun low over a wide field of balls: those under it always matter.
+        // A low sun over a wide field of balls. Balls in front of the sun are never negligible.
         let towards = DVec3::new(0.9, 0.35, 0.2).normalize();
         let low = fiv_lab::painted(128, |d| Vec3::ONE * if d.dot(towards) > 0.995 { 200.0 } else { 1.0 });
         let field: Vec<Vec3> =
@@ -189,7 +190,8 @@ fn what_is_left_out_is_less_than_its_share() {
         let mut last = f32::INFINITY;
         let all = studio.irradiance(&eye, &full);
         let centre = studio.fiv.occluders().placed[0].centre;
-        // What those can hide that have less than this share, over the mean irradiance: Nusselt's discs of even light, and all of the sun.
+        // Upper bound of the light that negligible balls hide, relative to the mean irradiance: the projected discs
+        // under constant radiance, and all light of the sun.
         let missing = |pixel: usize, share: f32| {
             let at = |k: usize| 0.5 - (k as f32 + 0.5) / 8.0;
             let p = vec3(at(pixel % 8), 0.0, at(pixel / 8));
@@ -209,13 +211,13 @@ fn what_is_left_out_is_less_than_its_share() {
             let most = more.iter().copied().fold(0f32, f32::max);
             let bound = (0..more.len()).map(|pixel| missing(pixel, share)).fold(0f32, f32::max);
             eprintln!("negligible {share}: up to {most} of the mean irradiance more, they could hide {bound}");
-            // The picture is one tile. Far balls are about as wide as a texel.
+            // The picture is one tile. Distant balls are about as wide as a texel.
             assert!(more.iter().all(|m| (-1e-4..1.5 * bound).contains(m)), "{more:?}");
-            // Something is left out, and less with a smaller share.
+            // Some balls are left out, and fewer with a smaller share.
             assert!(most > 0.1 * bound && most < last, "{most}");
             last = most;
         }
-        // The shadow that the low sun casts is the same: what lies under it counts.
+        // The shadow of the low sun is unchanged, because balls in front of the sun count.
         let shadow = |picture: &[Vec3]| picture.iter().map(|p| p.x).fold(f32::INFINITY, f32::min);
         let settings = Settings { negligible: 0.005, ..full.clone() };
         assert!(shadow(&studio.irradiance(&eye, &settings)) - shadow(&all) < 0.1 * mean);
@@ -225,7 +227,8 @@ fn what_is_left_out_is_less_than_its_share() {
 #[test]
 fn colours_of_lights_are_hidden_apart() {
     with_gpu(|gpu| {
-        // A red and a blue light over green: what is hidden of one colour is what is hidden without the other.
+        // A red and a blue light over green radiance: the hidden light of one colour does not depend on the other
+        // colours.
         let [red, blue] = [DVec3::new(0.6, 0.8, 0.1), DVec3::new(-0.5, 0.8, -0.3)].map(DVec3::normalize);
         let lit = |colours: Vec3| {
             fiv_lab::painted(128, |d| {
@@ -244,7 +247,7 @@ fn colours_of_lights_are_hidden_apart() {
             let both = shaded(Vec3::ONE);
             let [reds, blues] = [vec3(1.0, 1.0, 0.0), vec3(0.0, 1.0, 1.0)].map(shaded);
             for (i, both) in both.iter().enumerate() {
-                // Light is summed up in another order. Of the green one each bright part has its share.
+                // The order of summation differs, and each bright part gets its share of green.
                 let off = |colour: usize, alone: f32| (both[colour] - alone).abs() / open[colour];
                 assert!(off(0, reds[i].x) < 1e-4 && off(2, blues[i].z) < 1e-4, "{shared:?} {i}: {both} {}", blues[i]);
             }

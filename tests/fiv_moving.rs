@@ -1,4 +1,5 @@
-//! Occluders that do not stand as their vectors were computed, or are squeezed in the frame.
+//! Occluders whose pose differs from the pose of their vectors, and occluders that are scaled non-uniformly in the
+//! frame.
 
 mod common;
 mod fiv_lab;
@@ -70,7 +71,7 @@ fn what_is_squeezed_on_its_ground_reaches_as_far_as_it_does() {
         let (scene, squeeze) = (stage(cone(0.6, 1.4), Mat4::IDENTITY), Mat4::from_scale(vec3(1.0, 0.5, 1.0)));
         let made = stage(cone(0.6, 1.4), squeeze);
         let pose = Pose::rest(&made);
-        // Around it, for what it stands on is never seen.
+        // The ground below the cone is never visible, so only the ground around it counts.
         let eyes = [vec3(1.1, 0.0, 0.0), vec3(-0.2, 0.0, 1.1)]
             .map(|at| flat_view(at + vec3(0.0, 0.002, 0.0), at, 0.8, [12; 2]));
         let brute = few(Method::BruteForce);

@@ -1,4 +1,4 @@
-//! Stages and environments that nobody has on purpose: what comes out is what light does, by stored vectors and by those of each frame.
+//! Unusual scenes and environments: precomputed vectors and vectors of the frame give physically right results.
 
 mod fiv_lab;
 mod tracer_lab;
@@ -14,7 +14,7 @@ use tracer_lab::flat_view;
 
 const TECHNIQUES: [Method; 2] = [Method::Vectors, Method::Online];
 
-/// Even samples, as those of each frame are.
+/// Evenly spaced samples, as in vectors of the frame.
 fn few(method: Method) -> Settings {
     let base = Settings { size: 16, azimuths: 24, polars: 13, radii: 10, largest: 1.0, ..Settings::default() };
     Settings { adaptive: false, method, ..base }
@@ -88,7 +88,7 @@ fn an_occluder_larger_than_the_scene_leaves_the_horizon() {
                 mean(&found) / mean(&open),
                 mean(&truth) / mean(&open)
             );
-            // Samples are metres apart, and light leaks between them: the page says so.
+            // Samples are metres apart, and light leaks between them, as the page says.
             assert!((0.5..6.0).contains(&times), "{method:?}: {times} times the light that arrives");
         }
     });
@@ -97,7 +97,7 @@ fn an_occluder_larger_than_the_scene_leaves_the_horizon() {
 #[test]
 fn sizes_places_and_triangles_leave_the_shadow_as_it_is() {
     with_gpu(|gpu| {
-        // The thing, how much larger all is, and where it is.
+        // Object, scale of the scene, and offset from the origin.
         let shadow = |(positions, indices): (Vec<Vec3>, Vec<u32>), scale: f32, at: Vec3, method: Method| {
             let mut scene = Scene { environment: Some(colourful()), ..Scene::default() };
             ground(&mut scene, 20.0 * scale);
@@ -115,7 +115,7 @@ fn sizes_places_and_triangles_leave_the_shadow_as_it_is() {
             let corners: Vec<Vec3> = indices.iter().map(|&i| positions[i as usize]).collect();
             (corners, (0..indices.len() as u32).collect())
         };
-        // A point, a line back and forth, and a corner three times.
+        // Degenerate triangles: a point, a line, and a vertex used three times.
         let thin = |(positions, mut indices): (Vec<Vec3>, Vec<u32>)| {
             indices.extend([5, 5, 5, 5, 20, 5, 7, 7, 9]);
             (positions, indices)
@@ -136,7 +136,7 @@ fn sizes_places_and_triangles_leave_the_shadow_as_it_is() {
                 eprintln!("{name}, {method:?}: {off:.2e}");
                 assert!(off < slack, "{name}, {method:?}: {off}");
             }
-            // There is a shadow to be the same.
+            // The scene has a shadow.
             let open = plain.iter().map(|p| p.element_sum()).fold(0f32, f32::max);
             assert!(mean(&plain) < 0.9 * open);
         }
@@ -171,7 +171,7 @@ fn a_black_environment_gives_a_black_picture() {
 #[test]
 fn one_texel_of_light_gives_one_shadow() {
     with_gpu(|gpu| {
-        // All of one pixel lies in one texel: towards (0.31, 0.93, -0.19).
+        // The whole pixel lies in one texel, towards (0.31, 0.93, -0.19).
         let mut light = painted(256, |_| Vec3::ZERO);
         let (polar, azimuth) = (0.93f32.acos(), 0.31f32.atan2(0.19));
         let (row, column) = (polar / std::f32::consts::PI * 128.0, (azimuth / std::f32::consts::TAU + 0.5) * 256.0);
@@ -181,7 +181,7 @@ fn one_texel_of_light_gives_one_shadow() {
         let [truth, open] = [Method::BruteForce, Method::Unshadowed].map(|m| picture(gpu, &scene, &view, m));
         let full = open[0];
         assert!(full.x > 0.0 && full.z == 0.0);
-        // One ray: all or nothing.
+        // A single ray sees all light or none.
         assert!(truth.iter().all(|p| *p == Vec3::ZERO || (*p - full).length() < 5e-3 * full.length()));
         let dark = truth.iter().filter(|p| **p == Vec3::ZERO).count();
         assert!((10..100).contains(&dark), "{dark} pixels in the shadow");
@@ -191,7 +191,7 @@ fn one_texel_of_light_gives_one_shadow() {
             let lost = (mean(&open) - mean(&found)) / (mean(&open) - mean(&truth));
             eprintln!("{method:?}: {lost:.3} of what is hidden by brute force");
             assert!((0.8..1.2).contains(&lost), "{method:?}: {lost} of what is hidden by brute force");
-            // Where its light cannot be hidden: towards the light.
+            // A pixel whose light is not hidden, on the side of the light.
             let towards =
                 found.iter().zip(&truth).filter(|(_, t)| t.x > 0.0).map(|(f, _)| f.x / full.x).fold(0f32, f32::max);
             assert!(towards > 0.99, "{method:?}: {towards}");

@@ -1,5 +1,5 @@
-//! Vectors that are computed in the frame, where they are needed: the same picture as from vectors computed beforehand, and right where
-//! those cannot be, because occluders turn and deform and the environment changes.
+//! Vectors of the frame: they give the same picture as precomputed vectors, and they stay right for occluders that
+//! rotate and deform and for environments that change.
 
 mod common;
 mod fiv_lab;
@@ -77,10 +77,10 @@ fn the_picture_is_bit_for_bit_that_of_vectors_computed_beforehand() {
             let found = studio.irradiance(&eye, &online);
             assert_eq!(studio.fiv.occluders().placed.len(), 3);
             assert!(bits(&found) == bits(&exact), "NRMSE {}", nrmse(&exact, &found));
-            // In the next frame too.
+            // The next frame must be equal too.
             assert!(bits(&studio.irradiance(&eye, &online)) == bits(&exact));
         }
-        // Of a thing alone, whose centre lies behind all that is seen of it.
+        // A single object, whose centre lies behind all its visible surfaces.
         let scene = stage(&[odd_body(Quat::IDENTITY, vec3(0.0, 0.9, 0.0))]);
         let eye = view(vec3(0.4, 2.2, 1.4), vec3(0.0, 0.9, 0.0), 15.0, [16, 16]);
         let [exact, found, none] = [(Method::Vectors, true), (Method::Online, true), (Method::Online, false)]
@@ -99,7 +99,7 @@ fn a_turned_occluder_is_as_one_made_turned() {
         let (before, online) = (finer(Method::Vectors), finer(Method::Online));
         let made = stage(&[odd_body(turn, at)]);
         let exact = Studio::new(gpu, &made, &before, None).irradiance(&around(4.0, 20), &before);
-        // At rest it stands otherwise.
+        // The pose at rest differs.
         let scene = stage(&[odd_body(Quat::IDENTITY, at)]);
         let mut studio = Studio::new(gpu, &scene, &online, None);
         let still = studio.irradiance(&around(4.0, 20), &online);
@@ -113,7 +113,7 @@ fn a_turned_occluder_is_as_one_made_turned() {
         pose.world[1] *= squeezed;
         let mut made = made;
         made.nodes[1].local = Transform::Matrix(pose.world[1]);
-        // Its samples lie around another centre than those of one that was made so.
+        // The samples lie around another centre than those of a mesh that was built in this pose.
         let brute = finer(Method::BruteForce);
         let exact = Studio::new(gpu, &made, &brute, None).irradiance(&around(4.0, 20), &brute);
         let stored = Studio::new(gpu, &made, &before, None).irradiance(&around(4.0, 20), &before);
@@ -132,7 +132,7 @@ fn lying(file: &str) -> Option<Scene> {
     let scale = 1.2 / (bounds.1.y - bounds.0.y);
     let rotation = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
     let translation = vec3(0.0, 0.7, 0.0) - rotation * (0.5 * scale * (bounds.0 + bounds.1));
-    // Everything stands on one node more, which comes first.
+    // All nodes become children of one more node, which comes first.
     let holder = scene::Node {
         local: Transform::Trs { translation, rotation, scale: Vec3::splat(scale) },
         ..scene::Node::default()
@@ -189,7 +189,7 @@ fn what_deforms_casts_the_shadow_of_its_moment() {
                 let pose = Pose::playing(&scene, seconds);
                 let exact = truth.shot(&pose, &around(3.0, 20), &brute).0;
                 let found = studio.shot(&pose, &around(3.0, 20), &online).0;
-                // As vectors of the mesh as it is now.
+                // The picture equals the picture by precomputed vectors of the deformed mesh.
                 let frozen = frozen(&scene, &pose);
                 let same = Studio::new(gpu, &frozen, &before, None).irradiance(&around(3.0, 20), &before);
                 eprintln!("{file}, {seconds} s: {:.5} from vectors of the mesh as it is", nrmse(&same, &found));
@@ -199,7 +199,7 @@ fn what_deforms_casts_the_shadow_of_its_moment() {
             let [(first, found), (second, later)] = &pictures;
             let changed = nrmse(first, second);
             let errors = [nrmse(first, found), nrmse(second, later)];
-            // The shadow of the other moment would be this far off.
+            // The shadow of the other moment would have this error.
             let stale = nrmse(second, found);
             eprintln!("{file}: the truth changes by {changed:.4}, errors {errors:.4?}, of the other moment {stale:.4}");
             assert!(changed > 0.03, "{file}: nothing moves");
@@ -224,9 +224,9 @@ fn the_environment_turns_and_brightens_in_the_frame() {
         let exact = Studio::new(gpu, &made, &before, None).irradiance(&around(4.0, 16), &before);
         assert!(nrmse(&exact, &found) < 1e-5, "{}", nrmse(&exact, &found));
         assert!(nrmse(&exact, &first) > 0.1);
-        // And back again, to the last bit.
+        // The first rotation gives the first picture again to the last bit.
         assert!(bits(&studio.irradiance(&around(4.0, 16), &online)) == bits(&first));
-        // Vectors are for one light.
+        // Precomputed vectors are valid for one rotation only.
         let mut studio = Studio::new(gpu, &scene, &before, None);
         let refused = studio.refused(&around(4.0, 16), &Settings { rotation: 10.0, ..before.clone() });
         assert!(refused.exit_code() == 2 && refused.to_string().contains("online"), "{refused}");
@@ -247,16 +247,16 @@ fn odd_numbers_of_occluders_and_odd_places() {
             assert!(bits(&found) == bits(&exact), "NRMSE {}", nrmse(&exact, &found));
             found
         };
-        // None.
+        // No occluder.
         let open = same(&stage(&[]), &around(3.0, 8));
         let unshadowed = few(Method::Unshadowed);
         let plain = Studio::new(gpu, &stage(&[]), &unshadowed, None).irradiance(&around(3.0, 8), &unshadowed);
         assert!(bits(&open) == bits(&plain));
-        // One around the receivers, which lie in the middle of it, and another larger than the scene.
+        // One occluder around the receivers, and one larger than the scene.
         let dark = same(&stage(&[ball(2.0, vec3(0.0, 0.1, 0.0))]), &around(1.0, 8));
         assert!(dark.iter().zip(&open).all(|(d, o)| d.is_finite() && d.element_sum() <= o.element_sum()));
         same(&stage(&[ball(0.5, Vec3::Y), ball(90.0, vec3(0.0, 100.0, 0.0))]), &around(3.0, 8));
-        // A hundred, of which some look alike.
+        // A hundred occluders, some of them equal.
         let many: Vec<_> = (0..100)
             .map(|i| ball(if i % 3 == 0 { 0.3 } else { 0.2 }, vec3((i % 10) as f32 - 4.5, 0.6, (i / 10) as f32 - 4.5)))
             .collect();
@@ -288,8 +288,8 @@ fn a_hundred_that_all_stand_differently() {
 fn a_sequence_changes_as_the_truth_does_and_does_not_pop() {
     with_gpu(|gpu| {
         let scene = builtin::load("shadows-moving").unwrap();
-        // With one ray to each of eight texels a side, thin rings that turn before the sun would flicker: the vectors of a few places
-        // count for all pixels, each of which has rays of its own by brute force.
+        // With eight texels to a side and one ray per texel, thin rotating rings in front of the sun would flicker: by
+        // vectors all pixels share a few samples, by brute force each pixel has its own rays.
         let settings =
             |method| Settings { size: 8, split: 2, azimuths: 32, polars: 17, radii: 15, method, ..Settings::default() };
         let film = |settings: &Settings| {
@@ -343,7 +343,7 @@ fn lists_of_what_is_near_leave_out_nothing_that_matters() {
         let all = Studio::new(gpu, &scene, &settings, None).film(&Pose::rest(&scene), &eye, &settings).0;
         let open = Settings { method: Method::Unshadowed, ..settings.clone() };
         let open = Studio::new(gpu, &scene, &open, None).film(&Pose::rest(&scene), &eye, &open).0;
-        // One after the other, with all others out of sight.
+        // Each ball alone, with all other balls out of sight.
         let mut studio = Studio::new(gpu, &scene, &settings, None);
         let rest = Pose::rest(&scene);
         let mut sum = vec![Vec3::ZERO; open.len()];
@@ -365,7 +365,7 @@ fn lists_of_what_is_near_leave_out_nothing_that_matters() {
         let shown = Studio::new(gpu, &scene, &settings, None).film(&rest, &eye, &settings).1;
         let mut compared = 0;
         for i in 0..all.len() {
-            // Where no ball is in front of the ground.
+            // Only pixels where no ball covers the ground.
             if (shown[i] - ground.1[i]).abs() > 1e-3 * shown[i] || shown[i] > 1e9 {
                 continue;
             }
@@ -394,11 +394,11 @@ fn what_is_negligible_is_left_out_without_a_step() {
         };
         let (all, most, none) = (picture(0.0), picture(0.2), picture(1.0));
         let difference = |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).map(|(a, b)| b.x - a.x).fold(0f32, f32::max);
-        // Even light of radiance one has an irradiance of π.
+        // Constant radiance of one has an irradiance of π.
         let (some, much) = (difference(&all, &most), difference(&all, &none));
         eprintln!("left out with 0.2: {some}, with 1: {much} of π");
         assert!(some > 0.0 && some < much && most.iter().zip(&all).all(|(m, a)| m.x >= a.x - 1e-5));
-        // An occluder that comes closer fades in.
+        // An approaching occluder fades in.
         let settings = Settings { negligible: 0.2, ..full.clone() };
         let mut pose = Pose::rest(&scene);
         pose.world[1..].iter_mut().for_each(|world| world.w_axis.y = -1e4);
@@ -420,7 +420,7 @@ fn what_is_negligible_is_left_out_without_a_step() {
 #[test]
 fn shadows_of_an_occluder_on_itself_are_those_of_brute_force() {
     with_gpu(|gpu| {
-        // A turned body alone: all that hides light is itself.
+        // A rotated body alone, which is shadowed by itself only.
         let turn = Quat::from_rotation_y(0.7) * Quat::from_rotation_x(1.1);
         let with = |turn: Quat| {
             let mut scene = stage(&[odd_body(turn, Vec3::Y)]);

@@ -1,4 +1,5 @@
-//! Masks looked up in pictures along the directions of the light, against closed forms and rays; brute force with and without its boxes.
+//! Masks from depth images along the directions of the texels, against closed forms and rays. And brute force with and
+//! without its boxes.
 
 mod fiv_lab;
 mod tracer_lab;
@@ -16,7 +17,7 @@ use lucerna::{
     techniques::fiv::{Light, Masks, Method, Occluder, Plan, Settings, Sky, cover::Cover},
 };
 
-/// Vectors and solid angle of what is hidden.
+/// Vectors and solid angle of the hidden light.
 type Found = (twin::Vectors, f64);
 
 fn covered(gpu: &Gpu, occluder: &Occluder, light: &Light, points: &[Vec3], look_up: bool) -> Vec<Found> {
@@ -51,13 +52,13 @@ fn the_looked_up_mask_of_a_sphere_is_its_cap() {
             for ((hidden, angle), way) in covered(gpu, &sphere, &light, &points, true).into_iter().zip(ways(40)) {
                 let found = DVec3::new(hidden[0].x, hidden[1].x, hidden[2].x);
                 let exact = way * (PI * sin * sin);
-                // Texels of 1 / 30 sr count whole or not at all.
+                // A texel of 1 / 30 sr is hidden whole or not at all.
                 assert!((found - exact).length() < 0.25 * exact.length(), "{d} {way}: {found} instead of {exact}");
                 mean += angle / cap / 40.0;
             }
             assert!((mean - 1.0).abs() < 0.04, "{d}: {mean} of the cap");
         }
-        // From within everything is hidden.
+        // Points inside see no light.
         let (inside, _) = covered(gpu, &sphere, &light, &[vec3(0.2, 0.1, 0.0)], true)[0];
         assert!(inside[0].x >= f64::from(FIV_INSIDE));
     });
@@ -77,7 +78,7 @@ fn looked_up_masks_are_those_of_rays_but_for_their_edges() {
                 .zip(&looked_up)
                 .filter(|(a, b)| [a, b].iter().all(|of| of.0[0].x < f64::from(FIV_INSIDE)))
                 .collect();
-            // The same points lie inside.
+            // Both methods find the same points inside.
             assert!(open.len() + 2 >= rays.iter().filter(|a| a.0[0].x < f64::from(FIV_INSIDE)).count(), "{rho}");
             assert!(open.len() > 20, "{rho}: {}", open.len());
             let sum =
@@ -144,7 +145,7 @@ fn brute_force_loses_nothing_by_its_boxes() {
                 let at = Mat4::from_translation(vec3(i as f32 - 1.0, 0.15 + 0.3 * i as f32, 0.2 * i as f32));
                 thing(&mut scene, &format!("stone {i}"), positions, indices, at);
             }
-            // Under the ground and turned away from everything: so many that there are no boxes.
+            // Objects below the ground that face away from everything, so many that no boxes are used.
             for i in 0..more {
                 let corner = vec3(i as f32, -50.0, 0.0);
                 let corners = vec![corner, corner + Vec3::X * 0.01, corner + Vec3::Z * 0.01];
@@ -158,7 +159,7 @@ fn brute_force_loses_nothing_by_its_boxes() {
             let [few, many] =
                 [0, 8].map(|more| Studio::new(gpu, &stage(more), &settings, None).irradiance(&view, &settings));
             let apart = few.iter().zip(&many).filter(|(a, b)| a != b).count();
-            // Trees of other shape may meet an edge on its other side.
+            // A different hierarchy may resolve a ray through an edge differently.
             assert!(apart <= few.len() / 100 && nrmse(&many, &few) < 1e-3, "{apart} pixels");
         }
     });

@@ -1,4 +1,4 @@
-//! Pictures by fullsphere irradiance vectors against brute force, closed forms and what must be the same.
+//! Pictures by fullsphere irradiance vectors against brute force, closed forms and symmetries.
 
 mod fiv_lab;
 mod tracer_lab;
@@ -49,7 +49,7 @@ fn without_occluders_light_is_the_table_and_brute_force_agrees() {
             let mut studio = Studio::new(gpu, &scene, &by(method), None);
             let (irradiance, total) = studio.shot(&Pose::rest(&scene), &under(8), &by(method));
             for (e, l) in irradiance.iter().zip(&total) {
-                // The table is interpolated.
+                // The irradiance map is interpolated.
                 assert!((*e - exact).length() < 5e-3 * exact.length(), "{method:?}: {e} instead of {exact}");
                 // Albedo is stored in eight bits.
                 let reflected = 0.5 * *e / PI as f32;
@@ -93,15 +93,14 @@ fn shadows_of_disjoint_occluders_add_and_their_order_is_nothing() {
             let left = open[i] - each.iter().map(|single| open[i] - single[i]).sum::<Vec3>();
             assert!((*e - left.max(Vec3::ZERO)).length() < 1e-4 * open[i].length(), "{e} instead of {left}");
         }
-        // With the correction, and in another order.
+        // With the overlap correction the order of occluders has no effect.
         let settings = coarse();
         let (one, other) = (render(&places, &settings), render(&[places[2], places[0], places[1]], &settings));
         for (i, (a, b)) in one.iter().zip(&other).enumerate() {
             assert!((*a - *b).length() < 1e-5 * open[i].length(), "{a} {b}");
             assert!(a.cmpge(all[i] - 1e-4 * open[i]).all(), "the correction never darkens: {a} {}", all[i]);
         }
-        // Many in one place are one.
-        // What is known to be full is hidden once.
+        // With filled discs, several occluders at one place hide as much as a single one.
         let settings = Settings { shared: Shared::Discs, ..coarse() };
         let (one, many) = (render(&places[..1], &settings), render(&[places[0]; 5], &settings));
         for (i, (a, b)) in one.iter().zip(&many).enumerate() {
@@ -147,12 +146,12 @@ fn a_convex_body_does_not_shadow_itself() {
         let picture = |settings: &Settings| Studio::new(gpu, &scene, settings, None).irradiance(&view, settings);
         let open = picture(&by(Method::Unshadowed));
         let found = picture(&coarse());
-        // Where the sun is near the horizon, corners a seventh of a right angle apart know little of it.
+        // Near the horizon of the sun the shadow is coarse, because vertices are a seventh of a right angle apart.
         let ratios: Vec<f32> = found.iter().zip(&open).map(|(e, o)| (*e / *o).min_element()).collect();
         let mean_ratio = ratios.iter().sum::<f32>() / ratios.len() as f32;
         assert!(mean_ratio > 0.98 && ratios.iter().all(|r| (0.85..1.0001).contains(r)), "{mean_ratio} {ratios:?}");
-        // The thesis' way: from a sample over the surface a little of what is behind it is seen, and taken away: of even light
-        // 1 - (R / ρ)².
+        // The method of the thesis: a sample above the surface sees a part of the environment behind the surface, and
+        // this light is subtracted. Under constant radiance the share is 1 - (R / ρ)².
         let spheres = Settings { self_samples: SelfSamples::Spheres, ..coarse() };
         let mean = |p: &[Vec3]| p.iter().copied().sum::<Vec3>() / p.len() as f32;
         let ratio =
@@ -212,7 +211,7 @@ fn what_stands_on_the_ground_is_not_cut_by_it() {
         let picture = |settings: &Settings| Studio::new(gpu, &scene, settings, None).irradiance(&view, settings);
         let truth = picture(&by(Method::BruteForce));
         let error = |extent: Extent| {
-            // The height alone decides: with `Cut::Light` the bounding sphere does nearly as well.
+            // Only `Cut::Height` depends on the extent. With `Cut::Light` the bounding sphere does nearly as well.
             let settings = Settings { azimuths: 64, polars: 33, extent, cut: Cut::Height, ..coarse() };
             nrmse(&truth, &picture(&settings))
         };
@@ -243,10 +242,11 @@ fn pictures_are_what_the_twin_looks_up() {
             .unwrap();
             let kind = &plan.occluders[0];
             let solid = (interpolation == Interpolation::SolidAngle).then_some(f64::from(kind.radius));
-            let set = twin::Set { grid: plan.grid, shells: kind.shells, paces: &kind.paces, solid, fivs: &fivs };
+            let set = twin::Set { grid: plan.grid, shells: kind.shells, spacing: &kind.spacing, solid, fivs: &fivs };
             let (up, fill) = (glam::DVec3::Y, lucerna::techniques::fiv::fill::fill(&kinds[0]));
             let centres = studio.fiv.occluders().placed.iter().map(|p| p.centre).collect::<Vec<_>>();
-            // On both sides of the seam, straight below, where discs overlap in part, and where the lower ball is cut by the ground.
+            // Points on both sides of the seam, straight below, where discs overlap in part, and where the ground cuts
+            // the lower ball.
             for at in [
                 vec3(0.0, 0.0, 0.0),
                 vec3(1e-3, 0.0, 1.0),
@@ -279,7 +279,7 @@ fn pictures_are_what_the_twin_looks_up() {
                     exact -= hidden.max(glam::DVec3::ZERO) * share;
                 }
                 let exact = exact.max(glam::DVec3::ZERO);
-                // The twin takes bodies for full discs where they overlap.
+                // The twin assumes filled discs.
                 assert!(
                     (found - exact).length() < 5e-3 * twin::irradiance(&sky, up).length(),
                     "{at}: {found} instead of {exact}"
@@ -292,7 +292,7 @@ fn pictures_are_what_the_twin_looks_up() {
 #[test]
 fn occluders_turn_between_samples_of_turns() {
     with_gpu(|gpu| {
-        // A bar on a foot, away from its node's origin.
+        // A bar on a foot, at a distance from its node's origin.
         let body = |turn: f32, at: f32| {
             let mut scene = Scene { environment: Some(colourful()), ..Scene::default() };
             ground(&mut scene, 20.0);

@@ -1,5 +1,5 @@
-//! Glossy reflection of an environment, with shadows of occluders from what they hide of its cells: against closed forms, the slow twin,
-//! and brute force.
+//! Glossy reflection of an environment with the shadows of occluders: against closed forms, the slow twin, and brute
+//! force.
 
 mod fiv_lab;
 mod tracer_lab;
@@ -46,7 +46,7 @@ fn shine(scene: &mut Scene, roughness: f32, metallic: f32) {
     scene.materials[0].base_color = glam::Vec4::ONE;
 }
 
-/// What one place of the ground looks like from a direction; a surface as the G-buffer keeps it.
+/// Radiance of one point of the ground seen from a direction. The surface has the precision of the G-buffer.
 fn glance(at: Vec3, eye: Vec3, (roughness, f0): (f32, f32)) -> (View, Surface) {
     let eye = eye.normalize();
     let kept = |x: f32| f64::from((x * 255.0).round() / 255.0);
@@ -57,7 +57,7 @@ fn glance(at: Vec3, eye: Vec3, (roughness, f0): (f32, f32)) -> (View, Surface) {
 
 const EYES: [Vec3; 3] = [vec3(0.05, 1.0, 0.02), vec3(0.6, 0.7, 0.3), vec3(-0.9, 0.35, 0.1)];
 
-/// Radiance of a pixel, and that by which it shines.
+/// Radiance of a pixel, and its glossy part.
 fn pixel(gpu: &Gpu, scene: &Scene, view: &View, settings: &Settings) -> DVec3 {
     Studio::new(gpu, scene, settings, None).gloss(&Pose::rest(scene), view, settings)[0].as_dvec3()
 }
@@ -76,7 +76,8 @@ fn without_occluders_even_light_is_reflected_by_the_albedo_of_the_lobe() {
                     let found = studio.gloss(&Pose::rest(&scene), &view, &settings)[0].as_dvec3();
                     let exact = twin::albedo(&surface, 96).x;
                     let (red, green) = (found.x / (2.0 * exact), found.y / exact);
-                    // Texels are wider than the lobe of the smoothest; seen from the side some of their light falls behind the surface.
+                    // Texels are wider than the lobe of the smoothest surface. At grazing view some of their light
+                    // falls behind the surface.
                     let smooth = if surface.eye.y < 0.5 { 0.12 } else { 0.04 };
                     let slack = if roughness < 0.3 { smooth } else { 0.025 };
                     assert!(
@@ -92,7 +93,8 @@ fn without_occluders_even_light_is_reflected_by_the_albedo_of_the_lobe() {
 #[test]
 fn a_mirror_shows_the_environment() {
     with_gpu(|gpu| {
-        // What light is where the reflected ray goes: linear in the direction, so that no width of a texel changes it much.
+        // Radiance in the direction of the reflected ray: linear in the direction, so that the size of a texel changes
+        // it little.
         let slopes = [vec3(0.5, 0.1, 0.0), vec3(0.0, 0.3, 0.4), vec3(-0.4, 0.3, 0.2)];
         let linear = painted(256, |d| Vec3::from_array(slopes.map(|a| 1.0 + a.dot(d.as_vec3()))));
         let scene = stage(linear, &[], (0.0, 1.0));
@@ -112,7 +114,7 @@ fn a_mirror_shows_the_environment() {
 fn the_device_reflects_and_shades_as_the_twin_does() {
     with_gpu(|gpu| {
         let places = [vec3(0.3, 0.9, 0.0), vec3(-0.6, 0.7, 0.5)];
-        // A roughness that eight bits hold.
+        // A roughness that eight bits represent exactly.
         let scene = stage(colourful(), &places, (0.4, 1.0));
         let sky = Sky::new(scene.environment.as_ref(), 16).unwrap();
         let truth = Studio::new(gpu, &scene, &by(Method::BruteForce), None);
@@ -134,8 +136,8 @@ fn the_device_reflects_and_shades_as_the_twin_does() {
             Ok(true)
         })
         .unwrap();
-        let (grid, shells, paces) = (plan.grid, kind.shells, &kind.paces);
-        let set = twin::Masks { grid, shells, paces, words: words(16) as usize, shares: &shares, fivs: &fivs };
+        let (grid, shells, spacing) = (plan.grid, kind.shells, &kind.spacing);
+        let set = twin::Masks { grid, shells, spacing, words: words(16) as usize, shares: &shares, fivs: &fivs };
         for at in [Vec3::ZERO, vec3(0.4, 0.0, 0.3), vec3(-1.1, 0.0, 0.2), vec3(6.0, 0.0, -5.0)] {
             for eye in EYES {
                 let (view, surface) = glance(at, eye, (0.4, 1.0));
@@ -167,7 +169,7 @@ fn masks_of_cells_are_those_of_the_cpus_hierarchy() {
         let (scene, sky) = (one_ball(0.7, 10), Sky::new(Some(&colourful()), 24).unwrap());
         let (shape, _) = occluder(&scene);
         let cells = Cells::of(&sky);
-        // Every cell's weights are one, and all of them have all light.
+        // The weights of each cell sum to one, and the cells contain all light.
         let mut sums = vec![0.0; cells.lobes.len()];
         for (i, weight) in cells.weights.iter().enumerate() {
             sums[lucerna::techniques::fiv::specular::cell(24, i as u32) as usize] += f64::from(*weight);
@@ -232,7 +234,7 @@ fn occluders_take_light_and_never_more_than_there_is() {
 #[test]
 fn where_all_light_is_hidden_nothing_shines() {
     with_gpu(|gpu| {
-        // A light around the zenith of 10 degrees, behind a ball from below.
+        // A light of 10 degrees around the zenith, which a ball hides from below.
         let scene = stage(cap(28, 50.0).0, &[vec3(0.0, 1.0, 0.0)], (0.5, 1.0));
         let settings = by(Method::Vectors);
         let mut studio = Studio::new(gpu, &scene, &settings, None);
@@ -250,10 +252,11 @@ fn where_all_light_is_hidden_nothing_shines() {
     });
 }
 
-/// Radiance that the ground does not have.
+/// Emission that marks objects other than the ground.
 const BRIGHT: f32 = 1e4;
 
-/// NRMSE of what the ground reflects glossily where it is seen: from vectors, without shadows; and light in all of both.
+/// NRMSE of the glossily reflected light where the ground is visible: by vectors, and without shadows. And the sum of
+/// both lights.
 fn errors(gpu: &Gpu, scene: &Scene, view: &View, base: &Settings) -> (f64, f64, f64) {
     let gloss = |method: Method| {
         let settings = Settings { method, specular: Specular::Summed, ..base.clone() };
@@ -277,7 +280,7 @@ fn shadows_in_reflections_come_close_to_brute_force() {
         for (name, light, most, gloss) in [("queen", "areas", 0.03, [0.4, 0.7]), ("hare", "grove", 0.06, [0.2, 0.5])] {
             let mut scene = grounds::on_ground(&[builtin::load(name).unwrap()], &Default::default()).unwrap();
             scene.environment = Some(builtin::environment(light).unwrap());
-            // What stands there is told by what it emits: the ground is looked at.
+            // Objects are recognised by their emission, so only the ground is compared.
             let camera = scene.cameras.iter().position(|c| c.name == "front").unwrap();
             let view = View::of_camera(&scene, &Pose::rest(&scene), camera, [24, 24]).unwrap();
             for material in scene.materials.iter_mut().skip(1) {
@@ -307,7 +310,7 @@ fn occluders_that_turn_shade_reflections_as_those_that_are_made_turned() {
             shine(&mut scene, 0.3, 1.0);
             scene
         };
-        let axis = lucerna::techniques::fiv::turn::Axis::new(vec3(0.3, 0.2, 1.0)).unwrap();
+        let axis = lucerna::techniques::fiv::occluder_rotation::Axis::new(vec3(0.3, 0.2, 1.0)).unwrap();
         let direction = axis.direction().as_vec3();
         let settings = Settings { turns: 8, turn_axis: axis, adaptive: false, ..by(Method::Vectors) };
         let view = flat_view(vec3(3.0, 0.7, 0.0), Vec3::ZERO, 2.0, [24, 16]);
@@ -327,7 +330,7 @@ fn occluders_that_turn_shade_reflections_as_those_that_are_made_turned() {
             let (error, other) = (nrmse(&exact, &found), nrmse(&exact, &rest));
             eprintln!("turned by {angle}: {error:.4} from one made so, {other:.4} at rest");
             assert!(error < slack && error < 0.5 * other, "{angle}: {error} {other}");
-            // The same of irradiance, and of the bar's own shadow.
+            // The irradiance must be equal too, with the bar's shadow on itself.
             let light = studio.shot(&pose, &view, &settings).0;
             let still = studio.shot(&Pose::rest(&resting), &view, &settings).0;
             let (error, other) = (nrmse(&exact_light, &light), nrmse(&exact_light, &still));
@@ -353,13 +356,16 @@ fn more_occluders_than_can_be_reflected_are_refused_before_anything_is_computed(
         let first = scene.nodes[node as usize].clone();
         scene.nodes.extend(vec![first.clone(); 829]);
         let settings = Settings { size: 8, azimuths: 3, polars: 2, radii: 2, ..by(Method::Vectors) };
-        // So many can be drawn.
+        // The largest number of occluders that can be drawn.
         let view = flat_view(Vec3::Y * 10.0, Vec3::ZERO, 3.0, [2, 2]);
         Studio::new(gpu, &scene, &settings, None).gloss(&Pose::rest(&scene), &view, &settings);
         scene.nodes.push(first);
         let resident = Resident::new(gpu, &scene).unwrap();
         let error = Fiv::new(gpu, &scene, &resident, &settings, None, |_, _| panic!("computed")).unwrap_err();
-        assert!(error.exit_code() == 1 && error.to_string().contains("831 occluders, at most 830"), "{error}");
+        assert!(
+            error.exit_code() == 1 && error.to_string().contains("831 occluders; fiv.specular allows at most 830"),
+            "{error}"
+        );
     });
 }
 

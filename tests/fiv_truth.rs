@@ -1,5 +1,5 @@
-//! Brute force, what irradiance vectors are measured against, beside the path tracer, which shares nothing with it but rays: the direct
-//! light of an environment on matt surfaces.
+//! Brute force, the reference for irradiance vectors, against the path tracer, with which it shares only the rays:
+//! direct light of an environment on diffuse surfaces.
 
 mod fiv_lab;
 mod tracer_lab;
@@ -13,7 +13,7 @@ use lucerna::{
     techniques::fiv::{Method, Settings, Shared},
 };
 
-/// Smooth light of many colours, with a sun of 20 degrees: nothing that 32 texels do not hold.
+/// Smooth coloured radiance with a sun of 20 degrees, which 32 texels resolve.
 fn light() -> Environment {
     painted(256, |d| {
         let sun = (40.0 * (d.dot(glam::DVec3::new(0.5, 0.7, -0.4).normalize()) - 1.0)).exp();
@@ -50,7 +50,7 @@ fn brute_force_and_path_tracer_agree_on_direct_light() {
             let layers = tracer.layers().unwrap();
             let traced: Vec<Vec3> =
                 layers.layer("direct").unwrap().rgb_pixels().unwrap().into_iter().map(Vec3::from).collect();
-            // The background is light that reaches the eye from behind everything, which is no direct light.
+            // The background is not direct light of a surface.
             let both: Vec<(Vec3, Vec3)> =
                 traced.into_iter().zip(found).filter(|(t, _)| t.max_element() > 0.0).collect();
             assert!(both.len() > 200, "{name}: {} pixels", both.len());
@@ -72,7 +72,7 @@ fn the_ground_alone_is_seen_from_above() {
         let settings = Settings { method: Method::Unshadowed, ..Settings::default() };
         let view = view_of(&scene, "ground", [32, 32]);
         let irradiance = Studio::new(gpu, &scene, &settings, None).irradiance(&view, &settings);
-        // One normal everywhere: nothing stands in the way.
+        // A plane has one normal, and no occluder hides any light.
         let first = irradiance[0];
         assert!(first.min_element() > 0.0 && irradiance.iter().all(|e| (*e - first).length() < 1e-5 * first.length()));
     });
@@ -91,7 +91,7 @@ fn what_thin_bodies_share_is_less_than_what_their_discs_share() {
         let reference = Studio::new(gpu, &scene, &truth, None).irradiance(&view, &truth);
         let error = |settings: &Settings| {
             let found = Studio::new(gpu, &scene, settings, None).irradiance(&view, settings);
-            // Where the queens stand, nothing is seen.
+            // Ground below the queens is never visible.
             let seen = reference.iter().zip(found).filter(|(r, _)| r.min_element() > 0.0);
             let (r, f): (Vec<Vec3>, Vec<Vec3>) = seen.map(|(r, f)| (*r, f)).unzip();
             nrmse(&r, &f)

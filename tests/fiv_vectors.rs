@@ -86,7 +86,7 @@ fn the_device_sums_as_the_twin_does() {
             for (n, e) in map.iter().step_by(7) {
                 let exact = twin::irradiance(&sky, *n);
                 assert!((*e - exact).length() < 3e-6 * exact.length(), "{n}: {e} instead of {exact}");
-                // Gershun: what is in front less what is behind.
+                // Gershun's identity: light from the front minus light from behind.
                 let behind = twin::irradiance(&sky, -*n);
                 assert!((twin::dot(&whole, *n) - (*e - behind)).length() < 1e-5 * exact.length());
             }
@@ -107,10 +107,10 @@ fn light_adds_scales_and_turns() {
         assert!(apart(&total(&both), &sum) < 1e-5 * length(&sum));
         let doubled = total(&Environment { scale: 2.0, ..a.clone() });
         assert!(apart(&doubled, &of_a.map(|v| v * 2.0)) < 1e-5 * length(&doubled));
-        // By a quarter, texels fall on texels; by any other angle nearly so.
+        // A rotation by a quarter turn maps texels to texels, other angles nearly so.
         for (angle, slack) in [(0.5 * PI, 1e-5), (0.4, 3e-3)] {
             let turned = total(&Environment { rotation: angle as f32, ..a.clone() });
-            // From colours of x, y, z to vectors of channels and back.
+            // Converts the colours of x, y and z to one vector per channel and back.
             let turn = DMat3::from_rotation_y(angle) * DMat3::from_cols(of_a[0], of_a[1], of_a[2]).transpose();
             let exact = turn.transpose();
             let exact = [exact.x_axis, exact.y_axis, exact.z_axis];
@@ -140,7 +140,7 @@ fn odd_environments_give_numbers() {
     });
 }
 
-/// Vectors and solid angles of what an occluder hides from some points.
+/// Vectors and solid angles that an occluder hides from some points.
 fn covered(gpu: &Gpu, occluder: &Occluder, light: &Light, points: &[Vec3], split: u32) -> Vec<(twin::Vectors, f64)> {
     let (fivs, coverage) = Cover::new(gpu, occluder).unwrap().run(&mut Runner::new(gpu), light, points, split).unwrap();
     assert_eq!((fivs.len(), coverage.len()), (9 * points.len(), points.len()));
@@ -152,7 +152,8 @@ fn the_mask_of_a_sphere_is_its_cap() {
     with_gpu(|gpu| {
         let (sphere, _) = occluder(&one_ball(1.0, 40));
         let light = Light::new(gpu, &sky(&Environment::constant(Vec3::ONE), 32)).unwrap();
-        // Seen under α: a solid angle of 2π(1 − cos α), a vector of π sin²α towards it. Texels count whole or not at all.
+        // A ball of half angle α: its solid angle is 2π(1 − cos α), and its vector has the length π sin²α. A texel is
+        // hidden whole or not at all.
         for (d, slack) in [(1.05, 0.01), (1.5, 0.02), (2.0, 0.03), (4.0, 0.06)] {
             for direction in [DVec3::X, DVec3::NEG_Y, DVec3::new(1.0, 1.0, 1.0), DVec3::new(-0.3, 0.2, -0.9)] {
                 let direction = direction.normalize();
@@ -165,10 +166,10 @@ fn the_mask_of_a_sphere_is_its_cap() {
                 assert!((found - exact).length() < slack * exact.length(), "{d}: {found} instead of {exact}");
             }
         }
-        // From within everything is hidden: such samples are left out.
+        // Samples inside see no light and are left out.
         let (inside, angle) = covered(gpu, &sphere, &light, &[vec3(0.2, 0.1, 0.0)], 1)[0];
         assert!(inside[0].x >= f64::from(FIV_INSIDE) && (angle / (4.0 * PI) - 1.0).abs() < 1e-5);
-        // More rays, less of a staircase.
+        // More rays reduce the error of the staircase.
         let far = |split| covered(gpu, &sphere, &light, &[vec3(0.0, 3.1, 5.2)], split)[0].1;
         let exact = 2.0 * PI * (1.0 - (1.0 - 1.0 / (3.1f64.powi(2) + 5.2f64.powi(2))).sqrt());
         assert!((far(4) / exact - 1.0).abs() < 0.02, "{} instead of {exact}", far(4));
@@ -185,7 +186,7 @@ fn masks_are_those_of_the_cpus_hierarchy_and_disjoint_occluders_add() {
             thing(&mut scene, "one", moved, indices.clone(), Mat4::IDENTITY);
             occluder(&scene)
         };
-        // Two in one mesh, which do not hide each other from where they are looked at.
+        // Two balls in one mesh, which do not hide each other from the tested points.
         let mut scene = Scene::default();
         let count = positions.len() as u32;
         let side = |x: f32| positions.iter().map(move |p| *p * vec3(1.0, 2.0, 1.0) + vec3(x, 0.0, 0.0));
@@ -217,7 +218,7 @@ fn masks_are_those_of_the_cpus_hierarchy_and_disjoint_occluders_add() {
     });
 }
 
-/// What is seen from the places on an occluder's surface, with the solid angles.
+/// Vectors of the visible light at the samples on an occluder's surface, with the solid angles.
 fn seen(gpu: &Gpu, occluder: &Occluder, light: &Light, split: u32) -> Vec<(twin::Vectors, f64)> {
     let (places, mut runner) = (occluder.places(), Runner::new(gpu));
     let (fivs, angles) = Cover::new(gpu, occluder).unwrap().run_own(&mut runner, light, &places, split).unwrap();
@@ -235,7 +236,8 @@ fn a_convex_body_leaves_itself_all_that_is_before_it() {
         for split in [1, 2] {
             for (place, (found, angle)) in sphere.places().iter().zip(seen(gpu, &sphere, &light, split)) {
                 let n = place.normal.as_dvec3();
-                // At the seam and the poles of this mesh normals lean, and neighbours are before them.
+                // At the seam and the poles of this mesh normals are tilted, and neighbouring vertices lie in front of
+                // the plane.
                 if n.dot(place.point.normalize().as_dvec3()) < 0.9999 {
                     continue;
                 }
@@ -273,7 +275,7 @@ fn a_leaf_has_two_sides_and_its_edges_see_only_what_is_before_them() {
 #[test]
 fn places_on_a_surface_are_those_of_the_cpus_hierarchy_and_buried_ones_are_told() {
     with_gpu(|gpu| {
-        // Two balls that run into each other.
+        // Two balls that intersect.
         let (positions, indices) = ball(1.0, 10);
         let mut scene = Scene::default();
         let count = positions.len() as u32;
@@ -329,7 +331,7 @@ fn each_sample_is_the_same_whatever_is_computed_with_it() {
         let parts = [0..1, 1..77, 77..133, 133..240, 240..samples].map(run).concat();
         let bits = |v: &[f32]| v.iter().map(|f| f.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(&whole), bits(&parts));
-        // At the poles all azimuths are one place.
+        // At the poles all azimuths have the same position.
         for azimuth in 1..6 {
             let at = |a: u32| &whole[9 * plan.grid.index(a, 0, 3) as usize..][..9];
             assert_eq!(at(0), at(azimuth));

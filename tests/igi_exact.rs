@@ -1,4 +1,4 @@
-//! Instant global illumination where a closed form, or the same picture made another way, says what must come out.
+//! Instant global illumination against closed forms, and against the same picture computed in another way.
 
 mod igi_lab;
 mod tracer_lab;
@@ -20,7 +20,7 @@ use tracer_lab::{Stage, flat_view, view};
 #[test]
 fn a_wire_before_the_sky_gathers_for_itself() {
     with_gpu(|gpu| {
-        // One pixel wide, between the pixels that texels stand for: no texel around shows anything at all.
+        // An object one pixel wide, between the pixels of the coarse texels: no texel in the neighbourhood hits a surface.
         let mut stage = Stage::new();
         let white = stage.material(Material::diffuse("white", Vec3::splat(0.8)));
         stage.quad(white, vec3(-0.625, -1.0, 0.0), Vec3::X * 0.125, Vec3::Y * 2.0);
@@ -39,7 +39,7 @@ fn a_wire_before_the_sky_gathers_for_itself() {
                 assert!((found - right).abs() < 1e-4 * right, "pixel {i}: {found} instead of {right}, {despeckle}");
             }
         }
-        // Without refinement a texel further away is better than none.
+        // Without refinement a pixel uses a texel further away.
         stage.scene.meshes[0].primitives[0].positions[1..3].iter_mut().for_each(|p| p.x += 1.5);
         let mut studio = Studio::new(gpu, &stage.scene);
         let found = studio.render(&seen, &Settings { downsample: 4, ..plain(64) }, 3);
@@ -50,7 +50,7 @@ fn a_wire_before_the_sky_gathers_for_itself() {
 #[test]
 fn mirrors_and_glass_show_what_they_emit() {
     with_gpu(|gpu| {
-        // In the dark, seen directly and in a mirror behind the viewer's back, which has a tenth less.
+        // A dark scene: the emitter is seen directly, and in a mirror behind the camera that reflects nine tenths.
         let glow = vec3(1.0, 0.5, 2.0);
         let base = Material { emissive: glow, roughness: 0.0, ..Material::diffuse("glow", Vec3::ONE) };
         for material in [
@@ -78,7 +78,7 @@ fn mirrors_and_glass_show_what_they_emit() {
 #[test]
 fn a_narrow_spot_sends_no_more_than_it_shines() {
     with_gpu(|gpu| {
-        // The slope of the cone's rim has a limit, so that the lamp is weaker than a narrow cone of its angle.
+        // The slope of the falloff at the cone's rim is limited, so a narrow cone has less flux than its angles say.
         for (degrees, slack) in [(1.0f32, 5e-3), (2.0, 2e-3), (2.5, 1e-3), (10.0, 1e-4)] {
             let mut stage = room(Vec3::splat(0.5));
             let kind = LightKind::Spot { range: None, inner: 0.0, outer: degrees.to_radians() };
@@ -91,7 +91,7 @@ fn a_narrow_spot_sends_no_more_than_it_shines() {
             let shown = studio.render(&view(Vec3::ZERO, Vec3::X, 60.0, [4, 4]), &plain(200), 0);
             let found = f64::from(flux(&shown.vpls, 0).x) / 0.5;
             assert!((found / power - 1.0).abs() < slack, "{degrees} degrees: {found} instead of {power}");
-            // Where its light falls: the mean of sin² about the axis of a line squared in the cosine.
+            // The distribution of the light: the mean of sin² about the axis, for a falloff that is the square of a linear ramp in the cosine.
             let axis = turned.transform_vector3(Vec3::NEG_Z).as_dvec3();
             let off = |vpl: &lucerna::shaders::types::Vpl| {
                 let to = (Vec3::from(vpl.position) - vec3(0.1, 0.2, 0.3)).as_dvec3().normalize();
@@ -107,7 +107,7 @@ fn a_narrow_spot_sends_no_more_than_it_shines() {
 #[test]
 fn light_behind_a_pane_has_not_bounced() {
     with_gpu(|gpu| {
-        // A pane across the middle of a room, half of it glass of index 1: half of what meets it goes on.
+        // A pane of transmission 0.5 and index 1 across the middle of a room: it transmits half of the light.
         let mut stage = room(Vec3::splat(0.5));
         let pane = Material { transmission: 0.5, double_sided: true, ior: 1.0, ..Material::diffuse("pane", Vec3::ONE) };
         let pane = stage.material(pane);
@@ -121,7 +121,7 @@ fn light_behind_a_pane_has_not_bounced() {
                 let mine = shown.vpls.iter().filter(|vpl| vpl.depth == 0 && of(vpl.position[0]));
                 mine.map(|vpl| f64::from(vpl.flux[0])).sum()
             };
-            // Solid angle of a square of half side 1 at a distance of a half.
+            // Solid angle of a square of half side 1 at distance 0.5.
             let met = 4.0 * (1.0f64 / 1.25).asin();
             let sides = [
                 ("before", first(&|x| x < -0.01), 0.5 * (4.0 * PI - met)),
@@ -139,7 +139,7 @@ fn light_behind_a_pane_has_not_bounced() {
 #[test]
 fn a_weak_lamp_beside_a_strong_one_shines_all_around_in_time() {
     with_gpu(|gpu| {
-        // One path in sixteen is its own: over as many frames its directions are spread evenly.
+        // One path in sixteen belongs to the weak lamp. Over many frames the directions of this path are spread evenly.
         let mut stage = room(Vec3::splat(0.5));
         stage.point(vec3(0.3, 0.0, 0.0), vec3(1.0, 0.0, 0.0));
         stage.point(vec3(-0.3, 0.0, 0.0), vec3(0.0, 15.0, 0.0));
@@ -186,7 +186,7 @@ fn what_flies_far_away_does_not_change_the_light_of_a_room() {
 #[test]
 fn short_paths_look_at_a_sun_beside_a_sky_as_often_as_it_is_worth() {
     with_gpu(|gpu| {
-        // What they put back in a corner in the open: the number of shadow rays of direct light must not matter.
+        // Compensation in an open corner. The number of shadow rays for direct light must not change its mean.
         let court = |suns: u32| {
             let mut stage = Stage::new();
             let white = stage.material(Material::diffuse("white", Vec3::splat(0.8)));
@@ -254,7 +254,7 @@ fn rays_of_another_kind_than_the_scene_was_prepared_for_and_odd_backgrounds_are_
 #[test]
 fn the_sun_and_a_bright_spot_of_the_sky_shine_from_where_they_stand() {
     with_gpu(|gpu| {
-        // A floor and a roof above it: virtual lights lie on upper sides, and on the floor only where the roof lets light through.
+        // A floor and a roof above it. Virtual lights must lie on upper sides only, and on the floor only outside of the roof's shadow.
         let stage = || {
             let mut stage = Stage::new();
             let white = stage.material(Material::diffuse("white", Vec3::splat(0.5)));
@@ -266,7 +266,7 @@ fn the_sun_and_a_bright_spot_of_the_sky_shine_from_where_they_stand() {
         let mut sun = stage();
         let turned = Mat4::from_quat(Quat::from_rotation_arc(Vec3::NEG_Z, -wanted));
         sun.light(LightKind::Directional, Vec3::ONE, 1.0, turned);
-        // The texel that has this direction once the map has turned; neighbours in the map see a little of it.
+        // The texel in this direction after the rotation of the map. Interpolation spreads a little of its light to its neighbours.
         let mut sky = stage();
         let (width, height, rotation) = (256u32, 128u32, 1.0f32);
         let uv = uv_from_direction(Quat::from_rotation_y(-rotation) * wanted);
@@ -291,7 +291,7 @@ fn the_sun_and_a_bright_spot_of_the_sky_shine_from_where_they_stand() {
                 let inside = at.x.abs() < 1.0 - slack && at.z.abs() < 1.0 - slack;
                 assert!(!inside, "{name}: light through the roof at {:?}", vpl.position);
             }
-            // As much floor is lit as lies outside the roof's shadow.
+            // The lit share of the floor is its share outside of the roof's shadow.
             let share = f64::from(floor) / f64::from(floor + roof);
             let shadow = f64::from((2.0 - (wanted.x / wanted.y).abs()) * (2.0 - (wanted.z / wanted.y).abs()));
             let expected = (4.0 - shadow) / (8.0 - shadow);
@@ -314,7 +314,7 @@ fn boxes_hide_what_triangles_hide_turned_thin_and_cut_out() {
         };
         let holes = stage.material(masked);
         stage.sphere(white, vec3(0.4, -0.5, -0.3), 0.3, 16, false);
-        // One mesh twice, turned and stretched; slivers across the room; a card that is all hole.
+        // Two instances of a mesh, rotated and stretched; slivers across the room; a card with alpha 0.
         let first = stage.quad(white, vec3(-0.2, 0.0, 0.0), Vec3::X * 0.4, Vec3::Y * 0.4);
         let again = stage.scene.nodes[first].clone();
         let turned = |angle: f32, at: Vec3| Mat4::from_translation(at) * Mat4::from_rotation_y(angle);

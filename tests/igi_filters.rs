@@ -20,7 +20,7 @@ fn patch(corner: DVec3, a: DVec3, b: DVec3) -> Patch {
     Patch { corner, a, b, albedo: DVec3::splat(0.5), radiance: DVec3::ZERO }
 }
 
-/// A wall, and before its left half another one that faces the camera as well: a step of depth without a change of normal.
+/// A wall, and a second wall in front of its left half, both facing the camera: a step in depth without a change of the normal.
 fn step(width: usize, height: usize) -> (Eye, Buffers) {
     let eye = Eye::look_at(dvec3(0.0, 0.0, 3.0), DVec3::ZERO, 0.9, 10.0, width, height);
     let far = patch(dvec3(-9.0, -9.0, -1.0), dvec3(18.0, 0.0, 0.0), dvec3(0.0, 18.0, 0.0));
@@ -47,7 +47,7 @@ fn upsampling_is_a_partition_of_unity_within_bounds_and_does_not_leak() {
             let g = gbuffer(&mut graph, &eye, &buffers);
             let even = vec![[2.5, 0.25, 7.0, 1.0]; small.pixels() as usize];
             let noise: Vec<[f32; 4]> = (0..small.pixels()).map(|_| random.texel()).collect();
-            // Light on the nearer wall only.
+            // Only the nearer wall is lit.
             let pixel_of = |i: u64| {
                 let middle = |k: u64, most: usize| (k as usize * factor as usize + factor as usize / 2).min(most - 1);
                 (middle(i % u64::from(small.width), width), middle(i / u64::from(small.width), height))
@@ -77,7 +77,7 @@ fn upsampling_is_a_partition_of_unity_within_bounds_and_does_not_leak() {
                 let own = f32::from(u8::from(near(i % width, i / width)));
                 mixed_up += usize::from((parted[i][0] - own).abs() > 1e-3);
             }
-            // Without the term of depth the walls are one, as in the paper.
+            // Without the depth term, as in the paper, the filter does not distinguish the walls.
             assert_eq!(
                 range > 0.0,
                 mixed_up == 0,
@@ -127,7 +127,7 @@ fn the_discontinuity_buffer_is_the_mean_of_the_tile_on_one_surface() {
 #[test]
 fn subsets_of_a_tile_sum_to_all_virtual_lights() {
     with_gpu(|gpu| {
-        // A wall so small that all pixels stand at the same place, far from the lit surfaces: each has the mean of the subsets.
+        // A very small wall, far from the lit surfaces. All pixels have nearly the same position, so each must have the mean of the subsets.
         let mut stage = Stage::new();
         let white = stage.material(Material::diffuse("white", Vec3::splat(0.8)));
         stage.cuboid(white, Vec3::splat(-1.0), Vec3::ONE, true);
@@ -138,7 +138,7 @@ fn subsets_of_a_tile_sum_to_all_virtual_lights() {
         for interleave in [2, 3, 4] {
             let found = studio.render(&seen, &Settings { interleave, ..plain(181) }, 3).irradiance;
             let mut apart = 0;
-            // Those whose tile is whole.
+            // Only pixels with a complete tile around them.
             for i in (0..24 * 24).filter(|i| (2..22).contains(&(i % 24)) && (2..22).contains(&(i / 24))) {
                 for c in 0..3 {
                     let off = (found[i][c] / all[i][c] - 1.0).abs();
@@ -154,7 +154,7 @@ fn subsets_of_a_tile_sum_to_all_virtual_lights() {
 #[test]
 fn an_irregular_tile_has_each_virtual_light_once_and_each_of_its_texels_light_from_all_sides() {
     with_gpu(|gpu| {
-        // As above: all pixels stand at the same place, so that a tile's mean is the sum over all virtual lights.
+        // As above, all pixels have nearly the same position, so the mean over a tile is the sum over all virtual lights.
         let mut stage = Stage::new();
         let white = stage.material(Material::diffuse("white", Vec3::splat(0.8)));
         stage.cuboid(white, Vec3::splat(-1.0), Vec3::ONE, true);
@@ -195,7 +195,7 @@ fn a_speck_is_dimmed_to_what_its_neighbours_allow_and_nothing_else_changes() {
         let mut texels = vec![[1.0, 2.0, 0.5, 0.0]; width * height];
         let speck = 9 * width + 22;
         texels[speck] = [100.0, 200.0, 50.0, 0.0];
-        // Twice as bright as others is no speck.
+        // A texel with twice the luminance of its neighbours is within the limit.
         texels[3 * width + 5] = [2.0, 4.0, 1.0, 0.0];
         let mut graph = Graph::new("despeckle");
         let g = gbuffer(&mut graph, &eye, &buffers);
@@ -232,7 +232,7 @@ fn pixels_that_gather_for_themselves_have_what_full_resolution_has() {
             same(Settings { refine: 1.0, ..coarse }),
         );
         println!("as at full resolution: {plain:.3} of the pixels, refined {some:.3}, all of them {all:.3}");
-        // Of a pixel in the middle of a wall every texel around may match to the last digit.
+        // In the middle of a wall all texels may match exactly, so even a share of 1 does not refine every pixel.
         assert!(plain < 0.3 && some > plain + 0.02 && all > 0.7, "{plain} {some} {all}");
     });
 }
@@ -248,16 +248,12 @@ fn what_the_bound_takes_is_put_back_where_pixels_gather_for_themselves() {
         let listed = Settings { downsample: 4, refine: 1.0, ..whole.clone() };
         let [bounded, whole, listed] = [bounded, whole, listed].map(|s| {
             let mut shown = studio.render(&seen, &s, 3);
-            // The unlit lamp shows none of what its texels have for those beside them.
+            // The texels of the unlit lamp have irradiance only for their neighbours; the lamp itself reflects none.
             let unlit = shown.irradiance.iter_mut().zip(&shown.albedo).filter(|(_, albedo)| albedo[3] < 0.5);
             unlit.for_each(|(irradiance, _)| *irradiance = [0.0; 4]);
             mean(&shown.irradiance)
         });
-        println!(
-            "{:.3} without what is put back, {:.3} where pixels gather for themselves",
-            bounded / whole,
-            listed / whole
-        );
+        println!("{:.3} without compensation, {:.3} in refined pixels", bounded / whole, listed / whole);
         assert!(bounded < 0.93 * whole && (listed / whole - 1.0).abs() < 0.02, "{bounded} {whole} {listed}");
     });
 }
@@ -297,7 +293,7 @@ fn every_barrier_of_the_graphs_matters_and_two_runs_are_the_same() {
             let mut pictures = Vec::new();
             for _ in 0..2 {
                 let mut graph = Graph::new("igi");
-                // With a history: one in which the paths of the last frame are shot again.
+                // A frame with a history, in which the paths of the last frame are shot again.
                 graph.frame = 1;
                 let pose = Pose::playing(&scene, 0.25);
                 let handles = resident.frame_in(&mut graph, &scene, &pose);

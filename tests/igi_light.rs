@@ -18,8 +18,8 @@ use tracer_lab::{Stage, flat_view, matt, view};
 #[test]
 fn virtual_lights_inside_a_sphere_light_it_evenly() {
     with_gpu(|gpu| {
-        // Between two points of a sphere cos θ cos θ' / d² is 1 / 4R²: E = ρ Φ / 4πR², wherever the virtual lights are and however
-        // many. The lamp stands off the centre, so that they are not spread evenly.
+        // Between any two points of a sphere cos θ cos θ' / d² is 1 / 4R², so E = ρ Φ / 4πR² for any positions and any number of virtual
+        // lights. The lamp is off the centre, so that the virtual lights are not spread evenly.
         let (radius, rho, intensity) = (1.5f32, 0.6f32, 2.0f32);
         let mut stage = Stage::new();
         let wall = stage.material(Material::diffuse("wall", Vec3::splat(rho)));
@@ -33,7 +33,7 @@ fn virtual_lights_inside_a_sphere_light_it_evenly() {
             assert_eq!(shown.vpls.len(), vpls as usize);
             let mut found: Vec<f64> = shown.irradiance.iter().map(|p| f64::from(p[1])).collect();
             found.sort_by(f64::total_cmp);
-            // Facets are flat: close to a virtual light the mesh is no sphere.
+            // The mesh has flat facets, so close to a virtual light it differs from a sphere.
             let middle = found[found.len() / 2];
             assert!((middle / exact - 1.0).abs() < 4e-3, "{vpls}: {middle} instead of {exact}");
             let all = mean(&shown.irradiance);
@@ -45,7 +45,7 @@ fn virtual_lights_inside_a_sphere_light_it_evenly() {
 #[test]
 fn the_gather_is_the_sum_over_the_virtual_lights() {
     with_gpu(|gpu| {
-        // In a convex room nothing is hidden: every pixel by the formula, from the virtual lights as they were shot.
+        // In a convex room nothing is occluded: the formula gives every pixel from the virtual lights that were shot.
         let mut stage = room(vec3(0.7, 0.5, 0.2));
         stage.point(vec3(0.2, 0.3, -0.1), vec3(1.0, 2.0, 3.0));
         let mut studio = Studio::new(gpu, &stage.scene);
@@ -94,7 +94,7 @@ fn lamps() -> Vec<(&'static str, Scene, f64, f64)> {
     let (i, o) = (f64::from(inner.cos()), f64::from(outer.cos()));
     add("spot", stage, 3.0 * 2.0 * PI * (1.0 - i + (i - o) / 3.0), 1e-4);
 
-    // A floor seen from the sun at 30 degrees from the zenith.
+    // A floor under a sun at 30 degrees from the zenith.
     let mut stage = Stage::new();
     let floor = stage.material(Material::diffuse("floor", Vec3::splat(0.5)));
     stage.quad(floor, vec3(-1.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 2.0);
@@ -119,7 +119,7 @@ fn lamps() -> Vec<(&'static str, Scene, f64, f64)> {
     stage.mesh(lamp, positions, vec![Vec3::Y; 33], indices);
     add("disc", stage, 5.0 * PI * 0.09 * 16.0 * (PI / 16.0).sin(), 1e-4);
 
-    // A plate under an even sky, lit from both sides. The table of the sky is even, the cosines are not.
+    // A plate under a constant sky, lit from both sides. The table of the sky is uniform; the distribution of cosines is not.
     let mut stage = Stage::new();
     let plate = stage.material(Material::diffuse("plate", Vec3::splat(0.5)));
     stage.quad(plate, vec3(-1.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 2.0);
@@ -138,7 +138,7 @@ fn flux_is_kept_from_every_kind_of_light() {
                 let shown = studio.render(&seen, &Settings { bounces: 2, ..plain(vpls) }, seed);
                 let first = f64::from(flux(&shown.vpls, 0).x);
                 assert!((first / (0.5 * power) - 1.0).abs() < slack, "{name}: {first} instead of {}", 0.5 * power);
-                // In a closed room nothing leaves; on a plate nothing comes back. Lamps are black and take their share.
+                // No light leaves a closed room, and no light returns to a plate. Lamps are black and absorb their share.
                 let second = f64::from(flux(&shown.vpls, 1).x);
                 let expected = match name {
                     "point" | "spot" => 0.25 * power,
@@ -151,7 +151,7 @@ fn flux_is_kept_from_every_kind_of_light() {
                 );
             }
         }
-        // Two lamps of unlike power and colour together.
+        // Two lamps with different power and colour.
         let mut stage = room(Vec3::splat(0.5));
         stage.point(vec3(0.5, 0.0, 0.0), vec3(3.0, 0.0, 0.0));
         stage.point(vec3(-0.5, 0.0, 0.0), vec3(0.0, 1.0, 0.0));
@@ -169,7 +169,7 @@ fn moments(values: &[f64]) -> (f64, f64) {
     (mean, values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0))
 }
 
-/// A corner in the open under a sun and a sky that is brighter on one side, with a lamp that is a surface.
+/// An open corner with an emissive surface, under a sun and a sky that is brighter on one side.
 fn court() -> Scene {
     let mut stage = Stage::new();
     let white = stage.material(Material { ior: 1.0, ..Material::diffuse("white", Vec3::splat(0.7)) });
@@ -190,7 +190,7 @@ fn court() -> Scene {
 #[test]
 fn without_the_bound_the_mean_is_the_path_tracers() {
     with_gpu(|gpu| {
-        // One bounce: Welch's test of the mean of the picture over 32 seeds, all of it and in three parts.
+        // One bounce: Welch's test of the picture's mean over 32 seeds, for the whole picture and for three parts of it.
         let cornell = builtin::load("cornell").unwrap();
         let box_view = lucerna::scene::View::of_camera(&cornell, &Pose::rest(&cornell), 0, [18, 18]).unwrap();
         let court = court();
@@ -225,9 +225,9 @@ fn without_the_bound_the_mean_is_the_path_tracers() {
                         "{name}, {candidates} candidates: {a:.4} and {b:.4} ± {deviation:.4} ({:.4} ours), t = {t:.2}",
                         (va / 32.0).sqrt()
                     );
-                    // One in a hundred for all twelve together; more than 31 degrees of freedom.
+                    // A false alarm in one of a hundred runs, for all twelve tests together, with more than 31 degrees of freedom.
                     assert!(t.abs() < 3.6, "{name}, {candidates} candidates: means {a} and {b}: t = {t}");
-                    // Lights next to surfaces make the court noisy.
+                    // In the court, virtual lights close to surfaces cause more noise.
                     let most = if name == "cornell" { 0.009 } else { 0.016 } * if k == 0 { 1.0 } else { 3.0 };
                     assert!(deviation < most * b, "too noisy to say anything");
                 }
@@ -258,7 +258,7 @@ fn the_error_falls_with_the_number_of_virtual_lights() {
         let slope = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>()
             / points.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>();
         println!("slope of the mean squared error: {slope:.2}");
-        // Random points would give -1; these are spread more evenly than that.
+        // Random points would give -1; Halton points are more even.
         assert!((-2.2..-0.95).contains(&slope), "{slope}: {points:?}");
     });
 }
@@ -277,7 +277,7 @@ fn the_bound_only_takes_away() {
             }
             before = Some(found);
         }
-        // With the diagonal of the room as bound next to nothing is left.
+        // With the diagonal of the room as bound nearly no light is left.
         let all = mean(&studio.render(&seen, &Settings { bounces: 2, ..plain(200) }, 0).irradiance);
         assert!(before.is_some_and(|b| mean(&b) < 0.02 * all));
     });
@@ -291,7 +291,7 @@ fn all_eight_ways_to_be_faster_show_the_same_room() {
         let mut studio = Studio::new(gpu, &scene);
         let base = Settings { bound: 0.1, bounces: 2, ..plain(180) };
         let exact = studio.render(&seen, &base, 0);
-        // The unlit lamp shows none of what its texels have for those beside them.
+        // The texels of the unlit lamp have irradiance only for their neighbours; the lamp itself reflects none.
         let lit: Vec<bool> = exact.albedo.iter().map(|albedo| albedo[3] > 0.5).collect();
         let mut boxes = 0.0;
         for (downsample, interleave) in [(1, 1), (4, 1), (1, 3), (4, 3), (3, 2), (2, 4)] {
@@ -311,7 +311,7 @@ fn all_eight_ways_to_be_faster_show_the_same_room() {
                     _ => 0.28,
                 };
                 assert!(error < most, "{downsample} {interleave}: {error}");
-                // No light is gained or lost but by the boxes, which take as much in every way.
+                // Only the boxes lose light, and they lose the same share in every variant.
                 let light = mean(&found) / mean(&exact.irradiance);
                 if (downsample, interleave, imperfect) == (1, 1, true) {
                     boxes = light;
@@ -319,13 +319,13 @@ fn all_eight_ways_to_be_faster_show_the_same_room() {
                 }
                 let expected = if imperfect { boxes } else { 1.0 };
                 println!("    light {light:.4} beside {expected:.4}");
-                // Few texels on each wall: what is lost is lost along edges.
+                // There are few texels on each wall, and the filters lose light along edges.
                 let slack = if downsample * interleave > 4 { 0.05 } else { 0.025 };
                 assert!((light / expected - 1.0).abs() < slack, "{downsample} {interleave}: {light} beside {expected}");
                 assert!(error > 0.0 || (downsample, interleave, imperfect) == (1, 1, false));
                 pictures.push(found);
             }
-            // What a triangle hides its box hides too.
+            // A box occludes every ray that its triangle occludes.
             let darker = pictures[1].iter().zip(&pictures[0]).all(|(i, e)| (0..3).all(|c| i[c] <= e[c] * 1.00001));
             assert!(darker, "imperfect visibility is brighter somewhere: {downsample} {interleave}");
         }
@@ -337,18 +337,18 @@ fn scenes_with_next_to_nothing() {
     with_gpu(|gpu| {
         let seen = view(vec3(0.0, 0.0, 3.0), Vec3::ZERO, 40.0, [8, 8]);
         let every = Settings { bounces: 3, imperfect: true, downsample: 4, interleave: 3, ..Settings::default() };
-        // Nothing at all.
+        // An empty scene.
         let shown = Studio::new(gpu, &Scene::default()).render(&seen, &every, 0);
         assert!(shown.total.iter().all(|p| p[..3] == [0.0; 3]));
-        // A lamp and nothing to light.
+        // A lamp without surfaces to light.
         let mut stage = Stage::new();
         stage.point(Vec3::ZERO, Vec3::ONE);
         assert_eq!(mean(&Studio::new(gpu, &stage.scene).render(&seen, &every, 1).total), 0.0);
-        // Something and no lamp.
+        // Surfaces without a lamp.
         let dark = room(Vec3::ONE);
         let shown = Studio::new(gpu, &dark.scene).render(&view(Vec3::ZERO, Vec3::X, 60.0, [8, 8]), &every, 0);
         assert!(mean(&shown.total) == 0.0 && shown.vpls.iter().all(|v| v.flux == [0.0; 3]));
-        // One triangle under a lamp: direct light, and no light of its own on itself.
+        // One triangle under a lamp has direct light, and does not light itself.
         let mut stage = Stage::new();
         let white = stage.material(Material::diffuse("white", Vec3::ONE));
         stage.mesh(
@@ -364,7 +364,7 @@ fn scenes_with_next_to_nothing() {
             0,
         );
         assert!(mean(&shown.direct) > 0.01 && mean(&shown.indirect) == 0.0);
-        // Only mirrors: light goes round and leaves nothing.
+        // Only mirrors: light paths leave no virtual lights.
         let mut stage = Stage::new();
         let mirror =
             stage.material(Material { metallic: 1.0, roughness: 0.0, ..Material::diffuse("mirror", Vec3::splat(0.9)) });
@@ -386,7 +386,7 @@ fn ray_queries_show_the_same() {
                 let settings = Settings { visibility, imperfect, ..base.clone() };
                 Studio::with(gpu, &scene, &settings).render(&seen, &settings, 0)
             });
-            // A ray along an edge may go either way.
+            // Rounding decides which triangle a ray along an edge hits.
             let differ = |a: &[f32; 4], b: &[f32; 4]| (0..3).any(|c| (a[c] - b[c]).abs() > 1e-3 * b[c].abs() + 1e-5);
             let [compute, query] = &shown;
             let other = compute.total.iter().zip(&query.total).filter(|(a, b)| differ(a, b)).count();
@@ -400,7 +400,7 @@ fn ray_queries_show_the_same() {
 #[test]
 fn virtual_lights_go_where_they_are_seen() {
     with_gpu(|gpu| {
-        // Two closed rooms alike, the viewer in one of them.
+        // Two identical closed rooms; the camera is in one of them.
         let mut stage = room(Vec3::splat(0.6));
         let wall = stage.material(Material::diffuse("wall", Vec3::splat(0.6)));
         stage.cuboid(wall, vec3(3.0, -1.0, -1.0), vec3(5.0, 1.0, 1.0), true);
@@ -420,7 +420,7 @@ fn virtual_lights_go_where_they_are_seen() {
             }
         }
         println!("shares {share:?}, errors of the mean {error:?}");
-        // Half of them go by flux alone, wherever they are.
+        // Half of the probability follows the flux alone, and so is shared evenly by the rooms.
         assert!((share[0] - 0.5).abs() < 0.02 && (share[1] - 0.75).abs() < 0.02, "{share:?}");
         assert!(error.iter().all(|e| e.abs() < 0.02), "{error:?}");
     });

@@ -1,4 +1,4 @@
-//! Picks from many virtual lights, what the bound takes put back, and irradiance kept behind mirrors.
+//! Picks from the light tree, compensation of the bound, and the irradiance cache.
 
 mod igi_lab;
 mod igi_picks;
@@ -26,7 +26,7 @@ fn room() -> Stage {
     stage
 }
 
-/// The inside of a sphere with a lamp: from every one of its points to every other cos θ cos θ' / d² is 1 / 4R².
+/// The inside of a sphere with a lamp: between any two of its points cos θ cos θ' / d² is 1 / 4R².
 fn sphere(radius: f32, albedo: f32, lamp: Vec3) -> Stage {
     let mut stage = Stage::new();
     let wall = stage.material(Material::diffuse("wall", Vec3::splat(albedo)));
@@ -60,7 +60,7 @@ fn the_tree_bounds_the_virtual_lights_and_holds_each_once() {
     with_gpu(|gpu| {
         let stage = room();
         let mut studio = Studio::new(gpu, &stage.scene);
-        // One, a few, a power of two, and one more than that; some paths leave nothing behind.
+        // One light, a few lights, a power of two, and one more. Some paths leave no virtual light.
         for (vpls, candidates) in [(1, 1), (2, 1), (5, 1), (256, 1), (257, 4), (10_000, 1)] {
             let settings = Settings { candidates, bounces: 1, ..plain(vpls) };
             let plain = studio.render(&wall_view(), &settings, 3);
@@ -81,7 +81,7 @@ fn the_tree_bounds_the_virtual_lights_and_holds_each_once() {
                 let node = &nodes[i];
                 let flux = nodes[2 * i].flux + nodes[2 * i + 1].flux;
                 assert!((node.flux - flux).abs() <= 1e-5 * flux, "{vpls}, node {i}");
-                // Every leaf below, not only the halves.
+                // All leaves below the node, not only its two children.
                 let (mut from, mut to) = (i, i + 1);
                 while from < leaves {
                     (from, to) = (2 * from, 2 * to);
@@ -119,7 +119,7 @@ fn probabilities_sum_to_one_and_reach_all_that_shines() {
         for (vpls, bound) in [(30, 0.0), (1000, 0.0), (1000, 0.1)] {
             let shown = studio.render(&seen, &Settings { picks: 1, bound, bounces: 2, ..plain(vpls) }, 1);
             let least = f64::from(bound);
-            // Places beside surfaces and in the air, facing anywhere.
+            // Points near surfaces and in free space, with random normals.
             for i in 0..50u32 {
                 let number = |k: u32| f64::from((i * 7 + k).wrapping_mul(2_654_435_769) >> 8) / 16_777_216.0;
                 let vpl = &shown.vpls[(number(0) * shown.vpls.len() as f64) as usize];
@@ -134,7 +134,7 @@ fn probabilities_sum_to_one_and_reach_all_that_shines() {
                     let flat = normal.dot(position(vpl) - point) <= 2e-4 * position(vpl).distance(point);
                     assert!(light == DVec3::ZERO || flat || *probability > 0.0, "{light} is never picked");
                 }
-                // Evenly spaced numbers pick each light in its share.
+                // Evenly spaced numbers pick each light in proportion to its probability.
                 let count = 4096;
                 let mut found = vec![0.0; probabilities.len()];
                 for j in 0..count {
@@ -153,7 +153,7 @@ fn probabilities_sum_to_one_and_reach_all_that_shines() {
 #[test]
 fn the_device_picks_what_its_twin_picks() {
     with_gpu(|gpu| {
-        // In a convex room nothing is hidden.
+        // In a convex room nothing is occluded.
         let stage = room();
         let mut studio = Studio::new(gpu, &stage.scene);
         for (vpls, bound, picks, proposals, interleave) in
@@ -176,7 +176,7 @@ fn the_device_picks_what_its_twin_picks() {
                 other += usize::from((0..3).any(|c| (f64::from(pixel[c]) - sum[c]).abs() > 2e-3 * sum[c] + 1e-6));
             }
             println!("{vpls}: {other} of 256 pixels differ");
-            // Where a number falls between two halves rounding decides.
+            // Rounding decides if a number lies on the border between two children.
             assert!(other <= 8, "{vpls}: {other} pixels differ");
         }
     });
@@ -192,7 +192,7 @@ fn moments(values: &[f64]) -> (f64, f64) {
 #[test]
 fn the_mean_of_picks_is_the_sum_over_all() {
     with_gpu(|gpu| {
-        // The same seed shoots the same virtual lights: parts of the picture less those of the full sum, over seeds.
+        // The same seed shoots the same virtual lights. The test compares parts of the picture with those of the full sum, over seeds.
         let (scene, seen) = cornell(18);
         let mut studio = Studio::new(gpu, &scene);
         for (picks, bound) in [(3, 0.05), (12, 0.02)] {
@@ -234,7 +234,7 @@ fn picks_light_a_sphere_evenly_with_every_filter() {
         {
             let settings = Settings { bound: 0.03, picks, downsample, interleave, fused, ..plain(vpls) };
             let found = mean(&studio.render(&seen, &settings, 0).irradiance);
-            // The bound takes what lies within it: (min_d / 2R)², smoothly.
+            // The bound removes the light from within its distance, a share of about (min_d / 2R)².
             let lost = (0.03 * 12f64.sqrt() / 2.0).powi(2);
             println!("{vpls}, {picks} picks: {:.4}", found / exact);
             assert!((found / exact - 1.0 + lost).abs() < 0.02, "{vpls}: {found} instead of {exact}");
@@ -258,7 +258,7 @@ fn picks_err_less_the_more_they_are_and_repeat_to_the_bit() {
             let settings = Settings { picks, ..base.clone() };
             let found = studio.render(&seen, &settings, 1).irradiance;
             println!("{picks} picks: {:.4}", error(&found));
-            // Stratified: better than independent ones, whose error would halve.
+            // Picks are stratified, so the error falls faster than with independent picks, which would halve it.
             assert!(error(&found) < 0.62 * last, "{picks} picks");
             last = error(&found);
             assert!(found == studio.render(&seen, &settings, 1).irradiance, "{picks} picks do not repeat");
@@ -286,7 +286,7 @@ fn what_the_bound_takes_is_put_back_in_a_sphere() {
             assert!(lost < 0.95 && (found - 1.0).abs() < 0.015, "{bounces} bounces: {lost} without, {found} with");
             assert!(with.iter().zip(&without).all(|(w, o)| (0..3).all(|c| w[c] >= 0.9999 * o[c])), "darker somewhere");
         }
-        // No bound, nothing to put back.
+        // Without a bound there is nothing to compensate.
         let settings = Settings { bound: 0.0, ..plain(300) };
         let without = studio.render(&seen, &settings, 0).irradiance;
         assert!(without == studio.render(&seen, &Settings { compensation: 4, ..settings }, 0).irradiance);
@@ -307,10 +307,10 @@ fn with_compensation_a_picture_has_the_path_tracers_energy() {
             let sum = |seed| mean(&studio.render(&seen, &base, seed).indirect) * (32 * 32 * 3) as f64;
             (1..=seeds).map(sum).sum::<f64>() / f64::from(seeds) / truth
         };
-        // Without the bound what is near shines brightly and is rare: many seeds.
+        // Without the bound near virtual lights are rare and bright, so the mean needs many seeds.
         let unbounded = energy(0.0, 0, 400, 24);
         let [without, with] = [0, 2].map(|rays| energy(0.12, rays, 2000, 3));
-        println!("energy {unbounded:.4} without bound, {without:.4} with it, {with:.4} with what it takes put back");
+        println!("energy {unbounded:.4} without bound, {without:.4} with it, {with:.4} with compensation");
         assert!((unbounded - 1.0).abs() < 0.02, "energy {unbounded} without bound");
         assert!(without < 0.95 && (with - 1.0).abs() < 0.02, "energy {without} without, {with} with");
     });
@@ -346,7 +346,7 @@ fn what_the_bound_takes_is_put_back_behind_mirrors() {
             ];
             for (energy, settings) in energy.iter_mut().zip(&all) {
                 let shown = studio.render(&seen, settings, seed);
-                // Of those pixels that see the mirror.
+                // Only pixels that see the mirror.
                 let mirror = shown.total.iter().zip(&shown.albedo).filter(|(_, albedo)| albedo[..3] == [0.0; 3]);
                 *energy += mirror.map(|(p, _)| f64::from(p[0] + p[1] + p[2])).sum::<f64>();
             }
@@ -377,7 +377,7 @@ fn cells_show_what_every_surface_would_gather() {
         let settings = Settings { bounces: 2, vpls: 200, candidates: 1, bound: 0.05, ..Settings::default() };
         let exact = studio.render(&seen, &settings, 0);
         let direct = studio.render(&seen, &Settings { indirect: false, ..settings.clone() }, 0);
-        // What the mirror shows of indirect light.
+        // The indirect light in the mirror.
         let mirrored = |shown: &Shown| -> Vec<[f32; 4]> {
             let pairs = shown.total.iter().zip(&direct.total).zip(&shown.albedo);
             let inside = pairs.filter(|(_, albedo)| albedo[..3] == [0.0; 3]);
@@ -386,7 +386,7 @@ fn cells_show_what_every_surface_would_gather() {
         let right = mirrored(&exact);
         assert!(right.len() > 400 && mean(&right) > 0.05 * mean(&exact.total));
         let mut last = (f64::MAX, 0);
-        // As samples/igi/README.md states it, and a quarter more.
+        // The bounds are the errors in samples/igi/README.md plus a quarter.
         for (side, stated) in [(0.1, 0.125), (0.05, 0.097), (0.025, 0.014), (0.004f32, 1e-4)] {
             let cached = Settings { cache: side, ..settings.clone() };
             let shown = studio.render(&seen, &cached, 0);
@@ -398,14 +398,14 @@ fn cells_show_what_every_surface_would_gather() {
             let again = studio.render(&seen, &cached, 0);
             assert!(shown.total == again.total && shown.cells == again.cells, "cells do not repeat");
         }
-        // Too many: as without.
+        // With too many cells the picture is the same as without a cache.
         let few = Settings { cache: 0.05, cache_cells: 20, ..settings.clone() };
         assert!(studio.render(&seen, &few, 0).total == exact.total);
-        // With picks every surface picks for itself.
+        // With picks and without a cache, each surface behind the mirror picks lights.
         let picks = Settings { picks: 16, ..settings.clone() };
         let few = Settings { cache: 0.05, cache_cells: 20, ..picks.clone() };
         assert!(studio.render(&seen, &few, 0).total == studio.render(&seen, &picks, 0).total);
-        // Cells gather from all.
+        // The cells of a cache gather from all lights, also with picks.
         let cached = Settings { cache: 0.05, ..settings };
         let picked = studio.render(&seen, &Settings { picks: 16, ..cached.clone() }, 0);
         let in_mirror = |shown: &Shown| -> Vec<[f32; 4]> {

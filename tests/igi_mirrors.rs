@@ -1,4 +1,4 @@
-//! Mirrors and glass of instant global illumination beside the path tracer.
+//! Mirrors and glass of instant global illumination against the path tracer.
 
 mod igi_lab;
 mod tracer_lab;
@@ -13,7 +13,7 @@ use lucerna::{
 };
 use tracer_lab::{Stage, flat_view, render, view};
 
-/// Without gloss: F0 of an index of 1 is 0.
+/// A material without gloss: with a refractive index of 1, F0 is 0.
 fn matt(albedo: Vec3) -> Material {
     Material { ior: 1.0, ..Material::diffuse("matt", albedo) }
 }
@@ -37,7 +37,7 @@ fn blocks(pixels: impl Iterator<Item = f64> + Clone, width: usize, side: usize) 
 #[test]
 fn mirrors_and_glass_show_what_the_path_tracer_shows() {
     with_gpu(|gpu| {
-        // Direct light only: seen in mirrors behind each other, through a ball of glass and through a pane.
+        // Direct light only, seen in mirrors that reflect each other, through a glass ball and through a pane.
         let mut stage = Stage::new();
         let (red, white) = (stage.material(matt(vec3(0.8, 0.2, 0.1))), stage.material(matt(Vec3::splat(0.7))));
         let (shine, pane, ball) = (stage.material(mirror()), stage.material(glass(true)), stage.material(glass(false)));
@@ -56,7 +56,7 @@ fn mirrors_and_glass_show_what_the_path_tracer_shows() {
         let settings = Settings { indirect: false, specular_depth: 8, direct_samples: 32, ..Settings::default() };
         let mut studio = Studio::new(gpu, &stage.scene);
         let mut sum = vec![0.0; SIDE * SIDE];
-        // Trees deeper than their nodes choose at random.
+        // Ray trees with too few nodes choose branches at random.
         for seed in 0..8 {
             let shown = studio.render(&seen, &settings, seed);
             sum.iter_mut().zip(&shown.total).for_each(|(sum, p)| *sum += f64::from(p[0] + p[1] + p[2]) / 8.0);
@@ -83,13 +83,13 @@ fn a_mirror_shows_indirect_light() {
         let settings = Settings { vpls: 64, candidates: 1, bounces: 1, bound: 0.05, ..Settings::default() };
         let direct = view(vec3(0.0, 0.0, 0.3), vec3(-1.0, 0.0, -0.7), 20.0, [16, 16]);
         let plain = Studio::new(gpu, &stage.scene).render(&direct, &settings, 0);
-        // The mirror hangs where it takes no light from the wall, and turns the view by its normal.
+        // The mirror does not occlude the wall, and reflects the view by its normal.
         stage.quad(shine, vec3(0.5, -0.02, -0.02), Vec3::Z * 0.04, Vec3::Y * 0.04);
         let (at, towards) = (vec3(0.0, 0.0, 0.3), vec3(0.5, 0.0, 0.0));
         let mirrored = view(at, towards, 1.0, [16, 16]);
         let shown = Studio::new(gpu, &stage.scene).render(&mirrored, &settings, 0);
         assert!(mean(&shown.indirect) == 0.0, "a mirror has no diffuse part");
-        // The same point of the wall: the ray goes on from the mirror to x = -1.
+        // The same point of the wall, where the reflected ray reaches x = -1.
         let reflected = vec3(-0.5, 0.0, -0.3);
         let wall = towards + reflected * 3.0;
         let same = view(vec3(0.3, 0.0, -0.12), wall, 1.0, [16, 16]);
@@ -104,7 +104,7 @@ fn a_mirror_shows_indirect_light() {
 #[test]
 fn what_of_glass_is_blended_away_shows_what_lies_behind_it() {
     with_gpu(|gpu| {
-        // A pane before a glowing wall, lit from the front: its diffuse part, which glass does not have, would be bright.
+        // A pane in front of an emissive wall, lit from the front. A diffuse part of the pane, which glass must not have, would be bright.
         let alpha = 0.4f32;
         let picture = |pane: Option<AlphaMode>| {
             let mut stage = Stage::new();
@@ -132,7 +132,7 @@ fn what_of_glass_is_blended_away_shows_what_lies_behind_it() {
 #[test]
 fn holes_close_to_a_mirror_show_what_it_shows() {
     with_gpu(|gpu| {
-        // A glowing wall behind the camera, seen in a mirror with a sheet a twentieth of a millimetre before it.
+        // An emissive wall behind the camera, seen in a mirror with a sheet a twentieth of a millimetre in front of it.
         let picture = |sheet: Option<(AlphaMode, f32)>| {
             let mut stage = Stage::new();
             let glow = stage.emitter(vec3(0.8, 0.5, 0.3));

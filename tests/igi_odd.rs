@@ -1,5 +1,5 @@
-//! Instant global illumination of scenes that are hard to serve: every picture is finite (the studio checks each pixel) and, where
-//! something exact is known, it.
+//! Instant global illumination of unusual scenes: every picture must be finite (the studio checks each pixel), and must agree with a closed
+//! form if there is one.
 
 mod igi_lab;
 mod tracer_lab;
@@ -13,7 +13,7 @@ use lucerna::{
 };
 use tracer_lab::{Stage, flat_view, view};
 
-/// All that is on by default, in little.
+/// The default settings with fewer lights and rays.
 fn small() -> Settings {
     Settings { vpls: 40, candidates: 2, direct_samples: 4, ..Settings::default() }
 }
@@ -25,7 +25,7 @@ fn fast() -> Settings {
 #[test]
 fn an_environment_alone_lights_what_it_reaches() {
     with_gpu(|gpu| {
-        // A convex body under an even sky shows ρ L everywhere and throws no light on itself.
+        // A convex object under a constant sky reflects ρ L everywhere and does not light itself.
         let mut stage = Stage::new();
         let matt = stage.material(Material { ior: 1.0, ..Material::diffuse("matt", vec3(0.5, 0.25, 0.1)) });
         stage.sphere(matt, Vec3::ZERO, 1.0, 24, false);
@@ -41,7 +41,7 @@ fn an_environment_alone_lights_what_it_reaches() {
             }
             assert!(mean(&shown.indirect) < 1e-3 * mean(&shown.direct), "a ball lights itself");
         }
-        // A closed box keeps it out.
+        // No light of the sky enters a closed box.
         let mut dark = room(Vec3::splat(0.8));
         dark.scene.environment = Some(Environment::constant(Vec3::splat(2.0)));
         let shown = Studio::new(gpu, &dark.scene).render(&view(Vec3::ZERO, Vec3::X, 60.0, [12, 12]), &small(), 0);
@@ -52,7 +52,8 @@ fn an_environment_alone_lights_what_it_reaches() {
 #[test]
 fn emissive_surfaces_alone_light_a_room() {
     with_gpu(|gpu| {
-        // Closed and even: radiance L / (1 - ρ) after all bounces; after two L (1 + ρ + ρ²), from virtual lights all but the first two terms.
+        // In a closed room with constant emission L and albedo ρ the radiance after all bounces is L / (1 - ρ), after two bounces
+        // L (1 + ρ + ρ²). Virtual lights give all but the first two terms.
         let (radiance, rho) = (1.5f32, 0.5f32);
         let mut stage = Stage::new();
         let glow =
@@ -75,7 +76,7 @@ fn emissive_surfaces_alone_light_a_room() {
 fn scaled(scene: &Scene, scale: f32) -> (Scene, View) {
     let mut scene = scene.clone();
     for node in &mut scene.nodes {
-        // Sizes go into the meshes, for cameras and lamps must keep theirs.
+        // The scale is applied to the meshes, because scaled nodes would change cameras and lamps.
         let matrix = node.local.matrix();
         node.local = Transform::Matrix(Mat4::from_cols(
             matrix.x_axis,
@@ -88,7 +89,7 @@ fn scaled(scene: &Scene, scale: f32) -> (Scene, View) {
         primitive.positions.iter_mut().for_each(|p| *p *= scale);
     }
     for light in &mut scene.lights {
-        // W/sr: at twice the distance four times as much.
+        // Intensities (W/sr) grow with the square of the scale.
         light.intensity *= scale * scale;
     }
     let pose = Pose::rest(&scene);
@@ -121,7 +122,7 @@ fn a_room_looks_the_same_at_every_size() {
                 let count = one.total.iter().zip(&other.total).filter(|(a, b)| differ(a, b)).count();
                 let ratio = mean(&other.total) / mean(&one.total);
                 println!("scale {scale}: {count} of {} pixels differ, ratio {ratio:.5}", one.total.len());
-                // Rays along edges, and the boxes of triangles of rounded size.
+                // Rounding changes hits along edges, and the sizes of boxes.
                 assert!(count * most <= one.total.len(), "scale {scale}: {count} pixels differ");
                 assert!((ratio - 1.0).abs() < 0.01, "scale {scale}: {ratio}");
             }
@@ -132,7 +133,8 @@ fn a_room_looks_the_same_at_every_size() {
 #[test]
 fn unlit_surfaces_change_neither_light_nor_what_shares_of_the_scene_are_of() {
     with_gpu(|gpu| {
-        // Open at the front, so that sun and sky come in; seen in parallel, for a far plane that nothing moves.
+        // The room is open at the front, so that sun and sky light it. The view is orthographic, because its far plane does not depend on the
+        // scene.
         let mut stage = room(vec3(0.7, 0.5, 0.2));
         stage.scene.nodes.retain(|node| node.mesh != Some(5));
         stage.point(vec3(0.2, 0.3, -0.1), vec3(1.0, 2.0, 3.0));
@@ -155,15 +157,15 @@ fn unlit_surfaces_change_neither_light_nor_what_shares_of_the_scene_are_of() {
 #[test]
 fn what_hides_light_on_any_side_of_a_lamp_is_seen_at_once() {
     with_gpu(|gpu| {
-        // More virtual lights than the probes of a history look at. A black plate comes before the lamp, on one side and on the other.
+        // More virtual lights than the probes of the history use. A black plate appears in front of the lamp, on one side or on the other.
         let mut stage = room(vec3(0.7, 0.6, 0.5));
         let black = stage.material(Material { double_sided: true, ..Material::diffuse("black", Vec3::ZERO) });
         let plate = stage.quad(black, vec3(-0.6, -0.6, 0.0), 1.2 * Vec3::X, 1.2 * Vec3::Y);
         stage.point(Vec3::ZERO, Vec3::splat(2.0));
-        // The floor below it.
+        // The floor below the lamp.
         let seen = flat_view(vec3(0.0, -0.65, 0.0), vec3(0.0, -1.0, 0.0), 1.8, [32, 24]);
         for z in [0.15, -0.15] {
-            // Light of the last frame before the plate is there, and of the first with it: alone, and with a history.
+            // Light in the last frame without the plate and in the first frame with it; without and with a history.
             let [[before, after], [_, found]] = [1, 32].map(|history| {
                 let mut studio = Studio::new(gpu, &stage.scene);
                 let settings = Settings { history, direct_samples: 1, ..plain(512) };
@@ -199,7 +201,7 @@ fn triangles_without_area_change_nothing() {
             if degenerate {
                 let at = vec3(0.1, -0.2, 0.3);
                 for material in [0, glow] {
-                    // A point, a line there and back, and three places in a row.
+                    // Degenerate triangles: a point, a line to and fro, and three points on a line.
                     stage.mesh(material, vec![at; 3], vec![Vec3::Y; 3], vec![0, 1, 2]);
                     stage.mesh(material, vec![at, at + Vec3::X, at], vec![Vec3::Y; 3], vec![0, 1, 2]);
                     stage.mesh(material, vec![at, at + Vec3::X, at + 0.5 * Vec3::X], vec![Vec3::Y; 3], vec![0, 1, 2]);
@@ -213,7 +215,7 @@ fn triangles_without_area_change_nothing() {
             let scene = build(degenerate);
             Studio::new(gpu, &scene).render(&seen, &settings, 0)
         });
-        // The tree of lamps may be another: direct light is sampled anew.
+        // The light tree may differ, and so the samples of direct light.
         let ratio = mean(&with.total) / mean(&without.total);
         assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
         let ratio = mean(&with.indirect) / mean(&without.indirect);
@@ -235,7 +237,7 @@ fn a_lamp_in_a_closed_box_lights_nothing_outside() {
             let shown = studio.render(&out, &settings, 0);
             assert_eq!((mean(&shown.direct), mean(&shown.indirect)), (0.0, 0.0), "light through walls: {settings:?}");
         }
-        // The inner faces are backs, which a camera does not see but light does.
+        // The inner faces are back faces. The camera does not see them, but light paths hit them.
         assert!(studio.render(&within, &small(), 0).vpls.iter().any(|vpl| vpl.flux[0] > 0.0));
     });
 }
@@ -243,7 +245,7 @@ fn a_lamp_in_a_closed_box_lights_nothing_outside() {
 #[test]
 fn lamps_in_walls_and_in_corners_give_no_more_than_they_have() {
     with_gpu(|gpu| {
-        // On a wall, in an edge, in a corner, outside, where the camera is; strong and weak; of no strength at all.
+        // Lamps on a wall, on an edge, in a corner, outside, and at the camera; strong, weak, and without intensity.
         for at in [vec3(0.0, 1.0, 0.0), vec3(1.0, 1.0, 0.2), Vec3::ONE, vec3(3.0, 0.0, 0.0), vec3(0.0, 0.0, 0.5)] {
             for strength in [1e-12, 1.0, 1e9] {
                 let mut stage = room(vec3(0.9, 0.5, 1.0));
@@ -251,7 +253,7 @@ fn lamps_in_walls_and_in_corners_give_no_more_than_they_have() {
                 stage.point(vec3(0.2, 0.2, 0.2), Vec3::ZERO);
                 let seen = view(vec3(0.0, 0.0, 0.5), vec3(0.3, 0.2, -1.0), 80.0, [9, 7]);
                 let shown = Studio::new(gpu, &stage.scene).render(&seen, &Settings { candidates: 1, ..small() }, 0);
-                // At most what the lamp has is reflected; from outside it falls on the outer sides of a closed room.
+                // Not more than the lamp's flux is reflected. A lamp outside lights the outer sides of the closed room.
                 let sent = flux(&shown.vpls, 0);
                 let most = vec3(0.9, 0.5, 1.0) * (4.0 * std::f32::consts::PI * strength * 1.0001);
                 assert!(sent.cmple(most).all(), "{at} {strength}: {sent} of {most}");
@@ -260,7 +262,8 @@ fn lamps_in_walls_and_in_corners_give_no_more_than_they_have() {
                 }
             }
         }
-        // Spots without width send nothing; else the strength is the square of a line in the cosine from the outer to the inner cone.
+        // Spot lights without width emit no light. Otherwise the intensity is the square of a ramp in the cosine between the outer and the inner
+        // cone.
         for (inner, outer, least, most) in [
             (0.0, 0.0, 0.0, 0.0),
             (0.0, 1e-4, 0.0, 0.0),
@@ -272,7 +275,7 @@ fn lamps_in_walls_and_in_corners_give_no_more_than_they_have() {
             stage.light(LightKind::Spot { range: None, inner, outer }, Vec3::ONE, 2.0, Mat4::IDENTITY);
             let seen = view(vec3(0.0, 0.0, 0.5), Vec3::NEG_Z, 80.0, [9, 7]);
             let shown = Studio::new(gpu, &stage.scene).render(&seen, &Settings { candidates: 1, ..fast() }, 0);
-            // Of what half a sphere at full strength would leave.
+            // Relative to the flux of a hemisphere with full intensity.
             let share = flux(&shown.vpls, 0) / (0.5 * 2.0 * 2.0 * std::f32::consts::PI);
             println!("cone from {inner} to {outer}: {share}");
             assert!(
@@ -294,7 +297,7 @@ fn pictures_smaller_than_tiles_and_few_lights() {
         for extent in [[1, 1], [3, 1], [3, 5], [17, 9]] {
             let mut lit = false;
             let seen = View::of_camera(&scene, &pose, 0, extent).unwrap();
-            // The same rays through the middle of every ninth pixel of a larger picture.
+            // The same rays as those through the middle of every ninth pixel of a larger picture.
             let [width, height] = extent.map(|side| 9 * side as usize);
             let large = View::of_camera(&scene, &pose, 0, [width as u32, height as u32]).unwrap();
             let settings = Settings { vpls: 400, candidates: 1, direct_samples: 64, ..small() };
@@ -310,9 +313,9 @@ fn pictures_smaller_than_tiles_and_few_lights() {
                         [(&shown.direct, &direct), (&shown.total, &total)].map(|(a, b)| mean(a) / mean(b));
                     println!("{extent:?}, {vpls} virtual lights: {first} of the direct light, {all} of all");
                     assert!((0.8..1.25).contains(&first), "{extent:?}, {vpls}: {first} of the direct light");
-                    // One virtual light may be seen by no pixel, or stand for all those of its tile.
+                    // A single virtual light may be visible from no pixel, or represent all lights of its tile.
                     assert!(mean(&shown.total) > 0.9 * mean(&direct) && all < 20.0, "{extent:?}, {vpls}: {all} of all");
-                    // Light that goes from surface to surface is part of it, unless the only lights are seen from nowhere.
+                    // There is indirect light, unless no pixel sees a virtual light.
                     lit |= mean(&shown.indirect) > 0.0;
                 }
             }
@@ -324,7 +327,7 @@ fn pictures_smaller_than_tiles_and_few_lights() {
 #[test]
 fn nothing_but_glass_and_mirrors() {
     with_gpu(|gpu| {
-        // Light goes round and finds no diffuse surface: no virtual light, no indirect light, and an end.
+        // Light paths hit no diffuse surface: there is no virtual light and no indirect light, and the paths end.
         let mut stage = Stage::new();
         let mirror =
             stage.material(Material { metallic: 1.0, roughness: 0.0, ..Material::diffuse("mirror", Vec3::ONE) });
@@ -341,7 +344,7 @@ fn nothing_but_glass_and_mirrors() {
                 assert!(shown.vpls.iter().all(|vpl| vpl.flux == [0.0; 3]) && mean(&shown.indirect) == 0.0);
                 continue;
             }
-            // Glass is then white and all light is left on it; mirrors are black, and what they cannot show is dark.
+            // Without specular, glass is white and diffuse, and mirrors are black.
             let lit: Vec<Vec3> =
                 shown.vpls.iter().filter(|vpl| vpl.flux[0] > 0.0).map(|vpl| vpl.position.into()).collect();
             assert!(
@@ -352,7 +355,7 @@ fn nothing_but_glass_and_mirrors() {
             for (total, albedo) in shown.total.iter().zip(&shown.albedo) {
                 let white = albedo[..3] != [0.0; 3];
                 *(if white { &mut ball } else { &mut walls }) += 1;
-                // The lamp is behind the camera's half of the ball: all that is seen of it is lit, but for its rim.
+                // The lamp is on the camera's side of the ball, so the visible half is lit, except for its rim.
                 assert!(white || total[..3] == [0.0; 3], "{total:?} of a mirror");
             }
             assert!(
@@ -374,7 +377,7 @@ fn surfaces_that_can_show_no_indirect_light_trace_no_rays_for_it() {
         stage.point(vec3(0.0, 0.6, 0.5), Vec3::ONE);
         let mut studio = Studio::new(gpu, &stage.scene);
         let seen = view(vec3(0.0, 0.0, 0.9), Vec3::NEG_Z, 80.0, [24, 24]);
-        // Their texels serve others where there are filters.
+        // With filters, the texels of these surfaces gather for their neighbours.
         for (interleave, traced) in [(1, false), (2, true)] {
             let shown = studio.render(&seen, &Settings { interleave, ..plain(64) }, 0);
             let (mut counts, mut rays) = ([0; 3], [0.0; 3]);

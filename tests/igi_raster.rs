@@ -1,4 +1,4 @@
-//! Virtual lights by shadow maps: the same picture as by rays, within what their texels allow.
+//! Virtual lights with shadow maps: the picture agrees with that of shadow rays, up to the resolution of the maps.
 
 mod igi_lab;
 mod tracer_lab;
@@ -19,7 +19,7 @@ fn raster(settings: &Settings, raster_size: u32) -> Settings {
 #[test]
 fn the_inside_of_a_sphere_is_lit_evenly() {
     with_gpu(|gpu| {
-        // As by rays: E = ρ Φ / 4πR² wherever the virtual lights are. Every shadow here would be a wrong one.
+        // As with rays, E = ρ Φ / 4πR² for any positions of the virtual lights. A sphere has no shadows on its inside.
         let (radius, rho, intensity) = (1.5f32, 0.6f32, 2.0f32);
         let mut stage = Stage::new();
         let wall = stage.material(Material::diffuse("wall", Vec3::splat(rho)));
@@ -40,8 +40,8 @@ fn the_inside_of_a_sphere_is_lit_evenly() {
     });
 }
 
-/// Share of pixels that differ by more than a twentieth; their difference without its sign, of all light; and the ratio of the sums, raster
-/// over rays.
+/// Share of pixels that differ by more than a twentieth; sum of their absolute differences, relative to all light; and the ratio of the sums,
+/// raster over rays.
 fn compared(scene: &Scene, gpu: &lucerna::gpu::Gpu, seen: &View, settings: &Settings, size: u32) -> (f64, f64, f64) {
     let mut studio = Studio::new(gpu, scene);
     let rays = studio.render(seen, settings, 0);
@@ -50,7 +50,7 @@ fn compared(scene: &Scene, gpu: &lucerna::gpu::Gpu, seen: &View, settings: &Sett
     let differ = |a: &[f32; 4], b: &[f32; 4]| (0..3).any(|c| (a[c] - b[c]).abs() > 0.05 * b[c] + floor);
     let others: Vec<_> = maps.irradiance.iter().zip(&rays.irradiance).filter(|(a, b)| differ(a, b)).collect();
     let off: f64 = others.iter().map(|(a, b)| (0..3).map(|c| f64::from((a[c] - b[c]).abs())).sum::<f64>()).sum();
-    // The very same virtual lights.
+    // Both have the same virtual lights, bit for bit.
     assert_eq!(bytemuck::cast_slice::<_, u8>(&maps.vpls), bytemuck::cast_slice::<_, u8>(&rays.vpls));
     let pixels = maps.irradiance.len() as f64;
     let all = mean(&rays.irradiance);
@@ -88,7 +88,7 @@ fn rooms_look_as_by_rays() {
 #[test]
 fn holes_of_alpha_masks_let_light_through() {
     with_gpu(|gpu| {
-        // A virtual light on the floor, a screen of vertex alpha between it and the wall: all there, or all cut out.
+        // A screen with vertex alpha between a virtual light on the floor and the wall: opaque, or fully cut out.
         let build = |alpha: Option<f32>| {
             let mut stage = Stage::new();
             let wall = stage.material(Material::diffuse("wall", Vec3::splat(0.7)));
@@ -127,7 +127,7 @@ fn deforming_meshes_cast_where_they_stand() {
         let settings = Settings { bound: 0.02, ..plain(12) };
         let mut runner = lucerna::graph::Runner::new(gpu);
         let mut shares = Vec::new();
-        // Late enough for the figure to have walked on; against rays of the other moment as a control.
+        // At the second time the figure has moved. As a control, each picture is also compared with rays at the other time.
         let mut render = |settings: &Settings, seconds: f32| {
             let mut igi = Igi::new(gpu, &scene, &resident, settings).unwrap();
             let mut graph = lucerna::graph::Graph::new("igi");
@@ -163,13 +163,13 @@ fn maps_in_several_batches_and_all_accelerations_of_pixels() {
         {
             let scattered = pattern == Pattern::Irregular;
             let base = Settings { downsample, interleave, pattern, scattered, bound: 0.05, ..plain(40) };
-            // At 1024² no more than 32 lights are there at once.
+            // At 1024² only 32 lights fit into memory at one time.
             let large = studio.render(&seen, &raster(&base, 1024), 0);
             let rays = studio.render(&seen, &base, 0);
             let ratio = mean(&large.irradiance) / mean(&rays.irradiance);
             println!("downsample {downsample}, interleave {interleave}: ratio {ratio:.4}");
             assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
-            // Every texel has the lights that it has by rays.
+            // Every texel gathers from the same subset as with rays.
             let apart = large.gathered.iter().zip(&rays.gathered).filter(|(a, b)| (a[1] - b[1]).abs() > 0.1 * b[1]);
             let apart = apart.count();
             assert!(20 * apart <= rays.gathered.len(), "{apart} of {} texels have other lights", rays.gathered.len());

@@ -1,5 +1,5 @@
-//! A sequence of sixty frames in which a lamp moves: how much the picture of indirect light changes from frame to frame beyond what the
-//! light itself changes, and how far it is off, as samples/igi/README.md states both.
+//! A sequence of sixty frames in which a lamp moves. The test measures the flicker of the indirect light, which is its change from frame to
+//! frame beyond the true change, and its error; samples/igi/README.md states both.
 
 use glam::{Mat4, Vec3, vec3};
 use lucerna::{
@@ -14,17 +14,17 @@ const FRAMES: usize = 60;
 /// The lamp moves from the first of these to the last one.
 const MOVES: std::ops::Range<usize> = 20..40;
 
-/// Most that a frame changes while everything rests: mean over pixels relative to the mean light.
+/// Maximum change per frame while the scene rests: mean over pixels relative to the mean light.
 const REST: f64 = 0.025;
-/// Most that the change of a frame is off the true change while the lamp moves, in any frame.
+/// Maximum difference between the change of a frame and the true change while the lamp moves, in any frame.
 const MOVING: f64 = 0.22;
-/// Most that a frame is off, from the eighth on.
+/// Maximum error of a frame, from the eighth on.
 const ERROR: f64 = 0.24;
 
 /// Irradiance, red, green and blue together.
 type Film = Vec<Vec<f64>>;
 
-/// The box with a second lamp, and the number of its node.
+/// The Cornell box with a second lamp, and the number of the lamp's node.
 fn scene() -> (Scene, usize) {
     let mut scene = builtin::load("cornell").unwrap();
     let kind = LightKind::Point { range: None };
@@ -35,7 +35,7 @@ fn scene() -> (Scene, usize) {
     (scene, node)
 }
 
-/// Rests, goes to the other side within two thirds of a second, rests.
+/// The lamp rests, moves to the other side within two thirds of a second, and rests.
 fn poses(scene: &Scene, lamp: usize) -> Vec<Pose> {
     let (from, to) = (vec3(0.12, 0.4, 0.2), vec3(0.44, 0.4, 0.2));
     let pose = |frame: usize| {
@@ -47,7 +47,7 @@ fn poses(scene: &Scene, lamp: usize) -> Vec<Pose> {
     (0..FRAMES).map(pose).collect()
 }
 
-/// Some frames of the sequence, each after all before it.
+/// The wanted frames of the sequence; all frames are rendered in order.
 fn film(gpu: &Gpu, scene: &Scene, poses: &[Pose], settings: &Settings, wanted: impl Fn(usize) -> bool) -> Film {
     let mut resident = Resident::new(gpu, scene).unwrap();
     let mut igi = Igi::new(gpu, scene, &resident, settings).unwrap();
@@ -66,7 +66,7 @@ fn film(gpu: &Gpu, scene: &Scene, poses: &[Pose], settings: &Settings, wanted: i
     (0..poses.len()).map(|frame| if wanted(frame) { shoot(frame) } else { Vec::new() }).collect()
 }
 
-/// Mean of a difference over the mean light, and its root mean square, which the few brightest pixels rule.
+/// Mean absolute difference over the mean light, and the root mean square, which the few brightest pixels dominate.
 fn relative(difference: impl Iterator<Item = f64>, light: &[f64]) -> [f64; 2] {
     let (mut sum, mut squares) = (0.0, 0.0);
     for d in difference {
@@ -78,19 +78,19 @@ fn relative(difference: impl Iterator<Item = f64>, light: &[f64]) -> [f64; 2] {
     [sum / count / mean, (squares / count).sqrt() / mean]
 }
 
-/// Of frames: the worst, and the worst root mean square.
+/// Over frames: the largest mean, and the largest root mean square.
 fn most(values: impl IntoIterator<Item = [f64; 2]>) -> [f64; 2] {
     values.into_iter().fold([0.0; 2], |most, of| [most[0].max(of[0]), most[1].max(of[1])])
 }
 
-/// What a viewer would notice of a film beside the right one.
+/// Visible defects of a film, compared with the true film.
 #[derive(Debug)]
 struct Seen {
-    /// From frame to frame, before the lamp moves and long after it.
+    /// Change from frame to frame, before the lamp moves and long after it.
     rest: [f64; 2],
-    /// Off the true change, the worst frame.
+    /// Difference from the true change, in the worst frame.
     moving: [f64; 2],
-    /// Off the right picture, the worst frame from the eighth on.
+    /// Error in the worst frame from the eighth on.
     error: [f64; 2],
 }
 
@@ -120,7 +120,7 @@ fn sixty_frames_with_a_moving_lamp_keep_the_stated_bounds() {
         let truth = Settings { vpls: 600, candidates: 1, ..base.clone() };
         let moves = |frame: usize| MOVES.contains(&frame) || frame == 0;
         let mut right = film(gpu, &scene, &poses, &truth, moves);
-        // The same before and after.
+        // While the scene rests, the true picture does not change.
         let after = film(gpu, &scene, &poses, &truth, |frame| frame == MOVES.end).swap_remove(MOVES.end);
         for frame in 0..FRAMES {
             if frame < MOVES.start {
@@ -134,7 +134,7 @@ fn sixty_frames_with_a_moving_lamp_keep_the_stated_bounds() {
         println!("history of 32: {long:.4?}");
         println!("history of 1:  {none:.4?}");
         assert!(long.rest[0] < REST && long.moving[0] < MOVING && long.error[0] < ERROR, "{long:?}");
-        // Without a history none of it holds.
+        // Without a history all bounds are exceeded.
         assert!(none.rest[0] > 3.0 * REST && none.moving[0] > 1.5 * MOVING && none.error[0] > ERROR, "{none:?}");
     });
 }

@@ -1,5 +1,5 @@
-//! Instant global illumination over time: what a history of frames gains at rest, what it costs while things move, and when it must
-//! be forgotten.
+//! Instant global illumination over time: the gain of the history while the scene rests, its error while objects move, and the cases in which
+//! it must be discarded.
 
 mod igi_lab;
 mod tracer_lab;
@@ -16,7 +16,7 @@ use tracer_lab::{Stage, view};
 
 type Texels = Vec<[f32; 4]>;
 
-/// A scene on the device whose frames follow each other.
+/// A scene on the device, rendered as a sequence of frames.
 struct Film<'a> {
     scene: &'a Scene,
     resident: Resident,
@@ -27,9 +27,9 @@ struct Film<'a> {
     repeats: u32,
 }
 
-/// One frame of it.
+/// One frame of a film.
 struct Shot {
-    /// Alpha: how many frames count, with a history.
+    /// Alpha: the number of averaged frames, with a history.
     irradiance: Texels,
     /// Linear depth / far; 1: background.
     depth: Vec<f32>,
@@ -54,7 +54,7 @@ impl<'a> Film<'a> {
         let picture = self.igi.picture(&mut graph, self.scene, pose, &handles, &view, &all).unwrap();
         let tokens = [picture.outputs.irradiance, picture.gbuffer.depth, picture.outputs.total];
         let [irradiance, depth, total] = tokens.map(|image| graph.read_image(image));
-        // A frame may run more than once.
+        // The same frame may run several times.
         for _ in 0..self.repeats {
             self.runner.run_held(&graph).unwrap();
         }
@@ -67,13 +67,13 @@ impl<'a> Film<'a> {
     }
 }
 
-/// A room with a block in its middle that hides light, and a lamp. Nodes of block and lamp.
+/// A room with a lamp, and with a block in its middle that casts shadows. Also returns the nodes of block and lamp.
 fn room() -> (Scene, usize, usize) {
     let mut stage = Stage::new();
     let wall = stage.material(Material::diffuse("wall", vec3(0.7, 0.6, 0.5)));
     let red = stage.material(Material::diffuse("red", vec3(0.7, 0.2, 0.1)));
     stage.cuboid(wall, Vec3::splat(-1.0), Vec3::ONE, true);
-    // Closed from below only by the floor: one mesh.
+    // The block is one mesh without a bottom; the floor closes it.
     let block = block(&mut stage, red, vec3(-0.3, -0.6, -0.3), vec3(0.3, 0.0, 0.3));
     stage.point(vec3(0.3, 0.7, 0.2), vec3(2.0, 1.8, 1.5));
     let lamp = stage.scene.nodes.len() - 1;
@@ -107,14 +107,14 @@ fn eye(extent: [u32; 2]) -> View {
 }
 
 const SMALL: [u32; 2] = [48, 36];
-/// For films.
+/// Size of films.
 const TINY: [u32; 2] = [32, 24];
 
 fn brightness(texel: &[f32; 4]) -> f64 {
     f64::from(texel[0]) + f64::from(texel[1]) + f64::from(texel[2])
 }
 
-/// Root of the mean squared difference, relative to the mean of `right`, over pixels with `of`.
+/// Root mean square difference, relative to the mean of `right`, over the pixels that `of` selects.
 fn error(found: &Texels, right: &Texels, of: impl Fn(usize) -> bool) -> f64 {
     let (mut sum, mut all, mut count) = (0.0, 0.0, 0.0);
     for i in (0..right.len()).filter(|&i| of(i)) {
@@ -136,13 +136,13 @@ fn a_rest_of_many_frames_is_one_frame_of_all_their_virtual_lights() {
         let (scene, ..) = room();
         let pose = Pose::rest(&scene);
         let seen = eye(SMALL);
-        // A number of paths without factors that the first bases of the sequence have: then no number is left out.
+        // This number of paths has no common factor with the bases of the sequence, so no points are skipped between frames.
         let (each, frames) = (23, 16);
         let base = Settings { bounces: 2, ..plain(2 * each) };
         let mut film = Film::new(gpu, &scene, &with_history(base.clone(), frames));
         let shots: Vec<Shot> = (0..frames).map(|_| film.shoot(&pose, &seen)).collect();
         let all = Film::new(gpu, &scene, &Settings { vpls: 2 * each * frames, ..base.clone() }).shoot(&pose, &seen);
-        // The paths of all frames are those of the one: the same points of the sequence, each of the same power.
+        // The paths of all frames together are those of the single frame: the same points of the sequence, with the same flux.
         let last = &shots[frames as usize - 1].irradiance;
         for (i, (found, right)) in last.iter().zip(&all.irradiance).enumerate() {
             assert!((found[3] - frames as f32).abs() < 0.01, "pixel {i} counts {} frames", found[3]);
@@ -153,9 +153,9 @@ fn a_rest_of_many_frames_is_one_frame_of_all_their_virtual_lights() {
         }
         let alone = error(&shots[0].irradiance, &all.irradiance, |_| true);
         assert!(alone > 0.05, "a frame alone is as good: {alone}");
-        // Chosen from candidates they are not the same ones; the error falls all the same.
+        // With importance resampling the frames have other virtual lights, but the error falls as well.
         let seen = eye(TINY);
-        // (Bounded: a virtual light next to a pixel would be all the error there is.)
+        // (With a bound, because a virtual light next to a pixel would dominate the error.)
         let base = Settings { candidates: 4, bound: 0.05, ..base };
         let mut film = Film::new(gpu, &scene, &with_history(base.clone(), 100));
         let shots: Vec<Shot> = (0..16).map(|_| film.shoot(&pose, &seen)).collect();
@@ -179,26 +179,26 @@ fn first_frames_and_cuts_and_gaps_stand_for_themselves() {
             film.shoot(&pose, view).total
         };
         let mut film = Film::new(gpu, &scene, &with_history(base.clone(), 16));
-        // The first frame is the picture without any history.
+        // The first frame is the same as without a history.
         let first = film.shoot(&pose, &seen).total;
         assert_eq!(first, Film::new(gpu, &scene, &base).shoot(&pose, &seen).total);
-        // The second is not that frame alone.
+        // The second frame differs from the same frame without a history.
         assert_ne!(film.shoot(&pose, &seen).total, single(1, &seen));
-        // A cut to the wall behind.
+        // After a cut to the wall behind the camera the history does not count.
         let back = view(vec3(0.2, 0.1, 0.5), vec3(0.3, 0.2, 0.9), 60.0, SMALL);
         assert_eq!(film.shoot(&pose, &back).total, single(2, &back));
-        // Another size.
+        // Nor does it count after a change of size.
         film.shoot(&pose, &seen);
         let smaller = eye([40, 30]);
         assert_eq!(film.shoot(&pose, &smaller).total, single(4, &smaller));
-        // A frame left out.
+        // Nor after a skipped frame.
         film.shoot(&pose, &smaller);
         film.frame += 1;
         assert_eq!(film.shoot(&pose, &smaller).total, single(7, &smaller));
-        // Forgotten.
+        // Nor after `forget_history`.
         film.runner.forget_history();
         assert_eq!(film.shoot(&pose, &smaller).total, single(8, &smaller));
-        // The same film again gives the same bits, also if its frames run more than once.
+        // Rendering the film again gives the same bits, also if its frames run several times.
         let again = |repeats| {
             let mut film = Film { repeats, ..Film::new(gpu, &scene, &with_history(base.clone(), 16)) };
             [(); 3].map(|()| film.shoot(&pose, &smaller).total)
@@ -211,7 +211,7 @@ fn first_frames_and_cuts_and_gaps_stand_for_themselves() {
 #[test]
 fn the_motion_of_nodes_and_of_deforming_meshes_is_known() {
     with_gpu(|gpu| {
-        // A moved and turned block: what it shows was, one frame before, where its last transform had it.
+        // A moved and rotated block: the previous position of each visible point follows from the block's previous transform.
         let (scene, block, _) = room();
         let rest = Pose::rest(&scene);
         let moved = Mat4::from_rotation_translation(glam::Quat::from_rotation_y(0.1), vec3(0.1, 0.02, -0.05));
@@ -236,7 +236,7 @@ fn the_motion_of_nodes_and_of_deforming_meshes_is_known() {
             let uv = glam::vec2((i % 48) as f32 + 0.5, (i / 48) as f32 + 0.5) / glam::vec2(48.0, 36.0);
             let place = seen.world_from_depth(uv, depth[0]);
             let before = moved.inverse().transform_point3(place);
-            // On the block in its own space, and not on the walls, which rest.
+            // Whether the point is on the block, in the block's object space, and not on the walls, which do not move.
             let own = before.clamp(vec3(-0.3, -0.6, -0.3), vec3(0.3, 0.0, 0.3)).distance(before) < 1e-4;
             assert_eq!(motion[3] > 0.0, own, "pixel {i}: {motion:?}");
             if own {
@@ -247,7 +247,7 @@ fn the_motion_of_nodes_and_of_deforming_meshes_is_known() {
         }
         assert!(found > 100, "{found} pixels of the block");
 
-        // Skin and morph targets: where the surface of a pixel was, a picture of that moment shows a surface.
+        // Skins and morph targets: at the previous position of a pixel's surface, the previous picture shows a surface.
         let scene = builtin::load("figure").unwrap();
         let poses = [0.4f32, 0.44].map(|t| Pose::playing(&scene, t));
         let mut resident = Resident::new(gpu, &scene).unwrap();
@@ -265,7 +265,7 @@ fn the_motion_of_nodes_and_of_deforming_meshes_is_known() {
         }
         let (before, _, depths) = &shots[0];
         let (now, motion, own) = &shots[1];
-        // Distance of the surface of the last picture from a place, along the line of sight, metres.
+        // Distance between a point and the surface in the previous picture, along the line of sight, metres.
         let off = |place: Vec3| {
             let clip = before.clip_from_world * place.extend(1.0);
             let (u, v) = (0.5 + 0.5 * clip.x / clip.w, 0.5 - 0.5 * clip.y / clip.w);
@@ -293,7 +293,7 @@ fn the_motion_of_nodes_and_of_deforming_meshes_is_known() {
     });
 }
 
-/// Pictures of a film and what is right at each moment: error of each, and how much the error changes from frame to frame.
+/// The errors of a film against the true pictures, and the change of the error from frame to frame.
 struct Course {
     errors: Vec<f64>,
     /// Root mean square over pixels and frames, relative to the mean.
@@ -318,7 +318,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Films one course of poses with several settings.
+/// Renders one sequence of poses with several settings.
 fn films(gpu: &Gpu, scene: &Scene, poses: &[Pose], view: &View, settings: &[Settings]) -> Vec<Vec<Shot>> {
     let film = |s: &Settings| {
         let mut film = Film::new(gpu, scene, s);
@@ -327,8 +327,8 @@ fn films(gpu: &Gpu, scene: &Scene, poses: &[Pose], view: &View, settings: &[Sett
     settings.iter().map(film).collect()
 }
 
-/// From frame to frame, root mean square over pixels relative to the mean: the most that a resting scene changes with a history of 32
-/// frames, as samples/igi/README.md states it.
+/// Maximum change of a resting scene from frame to frame with a history of 32 frames, root mean square over pixels relative to the mean. The
+/// value is stated in samples/igi/README.md.
 const REST: f64 = 0.012;
 
 #[test]
@@ -339,7 +339,7 @@ fn a_resting_scene_does_not_flicker() {
         let poses = vec![Pose::rest(&scene); 44];
         let base = Settings { specular: false, direct_samples: 1, vpls: 60, ..Settings::default() };
         let all = films(gpu, &scene, &poses, &seen, &[with_history(base.clone(), 32), with_history(base, 1)]);
-        // From frame to frame, and standard deviation over twelve of them.
+        // Change from frame to frame, and standard deviation over twelve frames.
         let unrest = |shots: &[Shot]| {
             let pairs: Vec<f64> =
                 shots.windows(2).map(|p| error(&p[1].irradiance, &p[0].irradiance, |_| true).powi(2)).collect();
@@ -360,7 +360,7 @@ fn a_resting_scene_does_not_flicker() {
     });
 }
 
-/// The same of what a picture changes besides the light's own change, while a lamp crosses the room within half a second.
+/// Maximum change beyond the true change, in the same measure, while a lamp crosses the room within half a second.
 const MOVING: f64 = 0.16;
 
 #[test]
@@ -368,7 +368,7 @@ fn moving_lights_leave_no_ghosts() {
     with_gpu(|gpu| {
         let (scene, _, lamp) = room();
         let seen = eye(TINY);
-        // Rests, goes to the other side in 16 frames, rests.
+        // The lamp rests, moves to the other side in 16 frames, and rests.
         let poses: Vec<Pose> = (0..28)
             .map(|frame| {
                 let t = ((frame as f32 - 6.0) / 16.0).clamp(0.0, 1.0);
@@ -394,7 +394,7 @@ fn moving_lights_leave_no_ghosts() {
         }
         let moving = 8..22;
         let [fresh_error, long_error, deaf_error] = [&fresh, &long, &deaf].map(|c| mean(&c.errors[moving.clone()]));
-        // What lags behind is less than what a frame alone is off by, and much less than without a look at what changed.
+        // The lag of the history is smaller than the error of a single frame, and much smaller than without the detection of changes.
         assert!(long_error < 0.75 * fresh_error, "{long_error} {fresh_error}");
         let after = [&long, &deaf].map(|c| mean(&c.errors[20..]));
         assert!(long_error < deaf_error && after[0] < 0.65 * after[1], "{long_error} {deaf_error} {after:?}");
@@ -405,7 +405,7 @@ fn moving_lights_leave_no_ghosts() {
 #[test]
 fn light_that_goes_out_is_gone() {
     with_gpu(|gpu| {
-        // Two lamps; the stronger one goes out: from frame to frame nothing of it may be seen for long.
+        // Two lamps; the stronger one is switched off. Its light must disappear within a few frames.
         let (mut scene, _, lamp) = room();
         let far = scene.nodes[lamp].clone();
         scene.nodes.push(far);
@@ -423,7 +423,7 @@ fn light_that_goes_out_is_gone() {
         let right = Settings { vpls: 600, candidates: 1, ..base.clone() };
         let all = films(gpu, &scene, &poses, &seen, &[right, with_history(base.clone(), 1), with_history(base, 32)]);
         let sum = |shot: &Shot| shot.irradiance.iter().map(brightness).sum::<f64>();
-        // As samples/igi/README.md states it.
+        // The bounds are stated in samples/igi/README.md.
         for (frame, most) in [(8, 0.12), (9, 0.06), (11, 0.05)] {
             let (found, right) = (sum(&all[2][frame]), sum(&all[0][frame]));
             let alone = sum(&all[1][frame]);

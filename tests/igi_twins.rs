@@ -1,5 +1,5 @@
-//! The filters of instant global illumination against their twins in main memory, on random light over surfaces with edges, steps
-//! and background.
+//! The filters of instant global illumination against CPU implementations (twins), on random irradiance over surfaces with edges, steps and
+//! background.
 
 mod igi_lab;
 mod isr_lab;
@@ -19,7 +19,7 @@ use lucerna::{
     },
 };
 
-/// Normal, or nothing there; light then and now.
+/// The normal (`None`: no surface), and the light in the last frame and in this one.
 type Probe = (Option<DVec3>, DVec3, DVec3);
 
 const SIZE: (usize, usize) = (45, 34);
@@ -52,7 +52,7 @@ fn upsampling_and_the_fused_filter_agree_with_their_twin() {
     with_gpu(|gpu| {
         let (eye, buffers) = stage();
         let mut random = Random(11);
-        // Factor 1 is the fused filter over interleaved texels at full resolution.
+        // With factor 1 the fused filter reads interleaved texels at full resolution.
         for (downsample, sigma, upsample_range, upsample_normal, scattered) in [
             (1, 1.2, 0.01, 8.0, false),
             (2, 0.6, 0.01, 8.0, false),
@@ -61,7 +61,7 @@ fn upsampling_and_the_fused_filter_agree_with_their_twin() {
             (4, 1.5, 0.01, 0.0, false),
             (3, 0.7, 0.01, 8.0, true),
             (4, 1.1, 0.02, 2.0, true),
-            // Of a narrow Gaussian little is left at the next texel, and that counts.
+            // A narrow Gaussian has a small weight at the next texel, which must be right as well.
             (4, 0.1, 0.01, 8.0, false),
             (2, 0.1, 0.0, 1.0, false),
             (3, 0.15, 0.01, 8.0, true),
@@ -149,7 +149,7 @@ fn the_discontinuity_buffer_agrees_with_its_twin() {
                 .flat_map(|i| joined(&buffers, &noise, &s, (i % columns, i / columns)).to_array())
                 .collect();
             let found: Vec<f32> = out.iter().flat_map(|texel| [texel[0], texel[1], texel[2]]).collect();
-            // A neighbour at the very threshold may fall to either side.
+            // Rounding decides about neighbours exactly at a threshold.
             agree(&found, &expected, 1e-5, 6, &format!("factor {downsample}, tile {interleave}"));
         }
     });
@@ -161,7 +161,7 @@ fn the_history_agrees_with_its_twin() {
         let (eye, buffers) = stage();
         let (_, patches) = scene(SIZE.0, SIZE.1);
         let mut random = Random(13);
-        // The camera stood still, moved, and turned.
+        // The camera has not moved, has moved, or has rotated.
         let eyes = [
             eye,
             Eye::look_at(dvec3(0.33, 1.16, 0.95), dvec3(0.02, 0.25, -1.3), 0.8, 10.0, SIZE.0, SIZE.1),
@@ -172,17 +172,17 @@ fn the_history_agrees_with_its_twin() {
             let s = Settings { history: 12, history_lag: 0.2, ..Settings::default() };
             let all = SIZE.0 * SIZE.1;
             let fresh: Texels = (0..all).map(|_| random.texel()).collect();
-            // A tenth has no past; the rest between 1 and 12 frames.
+            // A tenth of the pixels has no past; the others have between 1 and 12 frames.
             let old: Texels = (0..all)
                 .map(|_| {
                     let [r, g, b, a] = random.texel();
                     [r, g, b, if a < 0.1 { 0.0 } else { 1.0 + 11.0 * a }]
                 })
                 .collect();
-            // Light that grew, shrank or rested.
+            // The light has grown, shrunk or not changed.
             let trend: Texels =
                 (0..all).map(|_| random.texel().map(|v| v - 0.5)).map(|[r, g, b, a]| [r, g, b, a + 0.5]).collect();
-            // A quarter moved, some of it along its own plane.
+            // A quarter of the pixels has moved, some of them within their own plane.
             let motion: Texels = (0..all)
                 .map(|i| {
                     let (u, v) = buffers.uv(&eye, i % SIZE.0, i / SIZE.0);
@@ -199,7 +199,7 @@ fn the_history_agrees_with_its_twin() {
             let mut probes = Vec::new();
             for i in 0..grid.count() {
                 let was = light();
-                // Some rest, some drift a little, some are others.
+                // The light of some probes is unchanged, of some it has drifted, of some it is unrelated.
                 let is = match i % 3 {
                     0 => was,
                     1 => was * 1.02,
@@ -259,7 +259,7 @@ fn the_history_agrees_with_its_twin() {
                 (0..all).map(|i| blended(&eye, &buffers, &fresh, &past, &s, (i % SIZE.0, i / SIZE.0))).collect();
             let found: Vec<f32> = out.iter().flatten().copied().collect();
             let wanted: Vec<f64> = expected.iter().flat_map(|(e, _)| e.to_array()).collect();
-            // Surfaces at the very limit of what is the same may fall to either side.
+            // Rounding decides about surfaces exactly at a threshold.
             agree(&found, &wanted, 1e-3, 4 * all / 100, &format!("camera {turn}"));
             let found: Vec<f32> = goes.iter().flatten().copied().collect();
             let wanted: Vec<f64> = expected.iter().flat_map(|(_, t)| t.to_array()).collect();

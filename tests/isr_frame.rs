@@ -190,7 +190,7 @@ fn the_papers_choices_bleed_colour_and_darken_corners() {
         assert!(mean(&indirect, 0, 0.0, 0.2) > 3.0 * mean(&indirect, 1, 0.0, 0.2));
         assert!(mean(&indirect, 0, 0.0, 0.2) > 1.5 * mean(&indirect, 0, 1.0, 1.5));
         assert!(mean(&open, 0, 0.0, 0.2) < mean(&open, 0, 1.0, 1.5) - 0.05);
-        // Equation 29, pixel by pixel: `indirect` holds k_ISR L_ISR.
+        // [ISR 29], pixel by pixel: `indirect` holds k_ISR L_ISR.
         for i in 0..total.len() {
             let lit = (open[i][0] + 1.0 - settings.k_ssao).clamp(0.0, 1.0);
             let expected = direct[i][0] * lit + indirect[i][0];

@@ -65,6 +65,15 @@ fn is_exact(gpu: &Gpu) -> bool {
     gpu.describe().device.contains("llvmpipe")
 }
 
+/// Share of a triangle beside its edges in which rounding decides whether it is hit.
+const EDGE: f32 = 1e-4;
+
+/// Whether a hit with these weights of the second and third corner lies clear of the edges. Slivers have hits beside edges alone.
+fn is_clear(barycentrics: [f32; 2]) -> bool {
+    let [v, w] = barycentrics;
+    v.min(w).min(1.0 - v - w) > EDGE
+}
+
 fn check(gpu: &Gpu, what: &str, triangles: &[[Vec3; 3]], rays: &[types::Ray]) -> usize {
     let scene = scene_of(triangles);
     let traced = Traceable::new(gpu, &scene).trace(&Pose::rest(&scene), rays, 0, 0);
@@ -73,12 +82,20 @@ fn check(gpu: &Gpu, what: &str, triangles: &[[Vec3; 3]], rays: &[types::Ray]) ->
         let (found, expected) = (traced.closest[i], brute_force(ray, triangles));
         let text = format!("{what}, ray {i} {ray:?}: {found:?}, expected {expected:?}");
         assert_eq!(traced.any[i], found.instance != u32::MAX, "{text}");
+        // Coordinates are rounded, and with them places along the ray.
+        let size = Vec3::from(ray.origin).abs().max_element() / Vec3::from(ray.direction).length();
         match expected {
             Some((at, triangle)) if is_exact(gpu) => {
                 assert_eq!((found.t, found.barycentrics, found.triangle), (at[0], [at[1], at[2]], triangle), "{text}");
             }
-            Some((at, _)) => assert!((found.t - at[0]).abs() <= 1e-4 * at[0].abs(), "{text}"),
-            None => assert_eq!(found.instance, u32::MAX, "{text}"),
+            Some((at, _)) if is_clear([at[1], at[2]]) => {
+                // Something nearer may be hit beside an edge.
+                let near = (found.t - at[0]).abs() <= 1e-4 * at[0].abs() + 1e-5 * size;
+                assert!(near || (found.t < at[0] && !is_clear(found.barycentrics)), "{text}");
+            }
+            Some(_) => {}
+            None if is_exact(gpu) => assert_eq!(found.instance, u32::MAX, "{text}"),
+            None => assert!(found.instance == u32::MAX || !is_clear(found.barycentrics), "{text}"),
         }
         hits += usize::from(expected.is_some());
     }

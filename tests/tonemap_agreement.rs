@@ -104,7 +104,7 @@ fn ours(operator: &str, luminance: &Plane, adaptation: Adaptation, capacity: Cap
     }
 }
 
-/// Largest RMS % and mean % (Michael 2010, equations 18 and 19) that are accepted.
+/// Largest RMS % and mean % [TM 18], [TM 19] that are accepted.
 fn tolerance(operator: &str, program: &str, adaptation: Adaptation) -> [f64; 2] {
     match (program.starts_with("Luminance"), operator, adaptation) {
         (false, ..) => [1e-4, 1e-4],

@@ -94,7 +94,7 @@ fn squared(r: [f64; 3], t: [f64; 3]) -> f64 {
     (0..3).map(|c| (r[c] - t[c]).powi(2)).sum::<f64>() / 3.0
 }
 
-/// Mean absolute error, 1/(3wh) Σ|r − t|: the error factor ε of the ISR dissertation (eq. 19, Imalyzer).
+/// Mean absolute error, 1/(3wh) Σ|r − t|: the error factor ε [ISR 19] of Imalyzer.
 ///
 /// Linear values; that program took the codes of PNG files, which [`Space::Display`] gives as 0 to 1.
 pub fn mae(pair: &Pair<'_>, options: &Options) -> Result<Measured> {
@@ -112,7 +112,7 @@ pub fn rmse(pair: &Pair<'_>, options: &Options) -> Result<Measured> {
     Ok(values.finish(Measured::new(Measure::Rmse, (sum / values.pixels()).sqrt(), map)))
 }
 
-/// For each channel √(1/n Σ(r − t)²) / (max − min), then the mean of the three (Michael, ch. 3, eq. 17).
+/// For each channel √(1/n Σ(r − t)²) / (max − min), then the mean of the three ([FIV 17]).
 ///
 /// The text takes maximum and minimum "of all pixels in the images"; here it is the reference's range unless
 /// [`NrmseRange::Both`] is chosen, so that several tests are divided by the same number. A channel that is the same everywhere
@@ -180,13 +180,13 @@ fn percent(measure: Measure, pair: &Pair<'_>, options: &Options, power: i32, mea
     values.finish(measured)
 }
 
-/// 100 √(1/n Σ((r − t)/r)²) of luminances (Michael, ch. 4, eq. 18). Pixels where the reference is black and the test is not are left
+/// 100 √(1/n Σ((r − t)/r)²) of luminances ([TM 18]). Pixels where the reference is black and the test is not are left
 /// out, and counted.
 pub fn rms_percent(pair: &Pair<'_>, options: &Options) -> Result<Measured> {
     Ok(percent(Measure::RmsPercent, pair, options, 2, "|r − t|/r of luminance, %"))
 }
 
-/// 100/n Σ|(r − t)/r| of luminances (Michael, ch. 4, eq. 19), with the same rule for black.
+/// 100/n Σ|(r − t)/r| of luminances ([TM 19]), with the same rule for black.
 pub fn mean_percent(pair: &Pair<'_>, options: &Options) -> Result<Measured> {
     Ok(percent(Measure::MeanPercent, pair, options, 1, "|r − t|/r of luminance, %"))
 }
@@ -218,7 +218,7 @@ pub fn psnr(pair: &Pair<'_>, options: &Options) -> Result<Measured> {
     Ok(values.finish(if mse == 0.0 { measured.noted("infinite: the images are equal") } else { measured }))
 }
 
-/// Correlation of all channel values, 1/n Σ (r − μr)/σr (t − μt)/σt (the dissertation's eq. 20).
+/// Correlation of all channel values, 1/n Σ (r − μr)/σr (t − μt)/σt ([ISR 20]).
 ///
 /// Equal images give 1. Not defined if either image has one value everywhere.
 pub fn pearson(pair: &Pair<'_>, options: &Options) -> Result<Measured> {

@@ -76,7 +76,7 @@ fn sign(test: f64, baseline: f64) -> f64 {
     }
 }
 
-/// Quality function f_q(I0, I1, I2) of the dissertation (eq. 21) with I1 the baseline and I2 the test: −1 if the test's mean error is
+/// Quality function f_q(I0, I1, I2) of the dissertation ([ISR 21]) with I1 the baseline and I2 the test: −1 if the test's mean error is
 /// smaller, 1 if the baseline's is, 0 if they are equal. Lower is better.
 pub fn fq(pair: &Pair<'_>, options: &Options) -> Result<Measured> {
     let errors = Errors::new(Measure::Fq, pair, options)?;

@@ -12,28 +12,30 @@ use crate::{
 use glam::{DVec3, Vec3};
 use std::{f64::consts::PI, num::NonZero, sync::Arc};
 
-/// Nodes along a side: both halves of the octahedron, unfolded to a square.
+/// Nodes along a side of the table: both halves of the octahedron, unfolded to a square.
 const SIDE: usize = 2 * AMBIENT_STEPS as usize + 1;
-/// The environment's light is gathered into so many cells before it is summed for each node.
+/// Columns and rows of the cells into which the environment's light is summed before it is integrated for each node.
 const CELLS: [usize; 2] = [128, 64];
-/// Vectors of the bright lights.
+/// Vectors in the table for the bright lights.
 const SUNS: usize = 3 * AMBIENT_SUNS as usize;
-/// What a cell must send of all light to be one of them.
+/// Minimum share of the environment's light that makes a cell a bright light.
 const BRIGHT: f64 = 0.01;
 
 /// Irradiance in W/m² as a function of the normal. Default: no environment.
 ///
-/// Exact at its nodes but for cells (2.8°) that the horizon of a node cuts, linear between them: within 0.7 % on four photographed skies, and 2.2 % in the
-/// darkest direction of a room lit through its windows (ennis). Cells
-/// that send a hundredth of all light or more, such as the sun's, would be off where they rise and set; the brightest of them are summed by
-/// themselves.
+/// At a node the value is exact except for cells (2.8°) that the node's horizon cuts. Between nodes it is interpolated linearly. The error is
+/// at most 0.7 % on four photographed skies, and 2.2 % in the darkest direction of a room lit through its windows (ennis).
+///
+/// A cell with a hundredth of all light or more, such as the sun's, would cause a large error near the horizon. The brightest of these cells
+/// are stored and summed separately.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Irradiance {
-    /// W/m² at each node, row by row, then of each bright light the direction times W/m² of red, green and blue; empty: none.
+    /// Irradiance (W/m²) at each node, row by row; then for each bright light its direction times its irradiance (W/m²) in red, green and
+    /// blue. Empty without an environment.
     table: Arc<[Vec3]>,
 }
 
-/// Of the scene's environment; none without one.
+/// The irradiance of the scene's environment; zero without one.
 impl From<&Scene> for Irradiance {
     fn from(scene: &Scene) -> Self {
         scene.environment.as_ref().map(Self::of).unwrap_or_default()
@@ -41,7 +43,7 @@ impl From<&Scene> for Irradiance {
 }
 
 impl Irradiance {
-    /// Of equal radiance L (W/(sr·m²)) from everywhere: π·L on every plane.
+    /// The irradiance of a constant radiance L (W/(sr·m²)) from all directions: π·L on every plane.
     pub fn constant(radiance: Vec3) -> Self {
         Self::from_table(vec![std::f32::consts::PI * radiance; SIDE * SIDE], &[])
     }
@@ -65,7 +67,7 @@ impl Irradiance {
         Self { table: nodes.into() }
     }
 
-    /// W/m² on a plane with unit normal `n`.
+    /// Irradiance (W/m²) on a plane with unit normal `n`.
     pub fn at(&self, n: Vec3) -> Vec3 {
         let (steps, a) = (AMBIENT_STEPS as f32, n.abs());
         let sum = a.element_sum();
@@ -107,14 +109,14 @@ fn direction(column: usize, row: usize) -> DVec3 {
     DVec3::new(x.copysign(q[0]), y, z.copysign(q[1])).normalize()
 }
 
-/// Light of each cell and channel, ∫ L ω dω: direction times W/m² on a plane that faces it.
+/// The light of each cell and channel, ∫ L ω dω: its direction times the irradiance (W/m²) on a plane that faces it.
 struct Cells {
     /// x, y and z of red, of green, of blue.
     parts: [[Vec<f32>; 3]; 3],
 }
 
 impl Cells {
-    /// Takes out the brightest cells, those that send at least [`BRIGHT`] of all light.
+    /// Removes and returns the brightest cells with at least [`BRIGHT`] of all light.
     fn take_suns(&mut self) -> Vec<[Vec3; 3]> {
         let vector = |cells: &Self, i: usize| cells.parts.each_ref().map(|[x, y, z]| Vec3::new(x[i], y[i], z[i]));
         let strength = |i: usize| vector(self, i).iter().map(|v| f64::from(v.length())).sum::<f64>();
@@ -131,7 +133,8 @@ impl Cells {
     }
 }
 
-/// Exact for the image as even pixels; one that is coarser than the cells is taken as it is looked up, bilinearly.
+/// Sums the image into cells, exact for piecewise constant pixels. An image that is coarser than the cells is interpolated bilinearly, as
+/// shaders read it.
 fn cells(environment: &Environment) -> Cells {
     let size = [environment.width.max(1) as usize, environment.height.max(1) as usize];
     let finer = [size[0], size[1]].iter().zip(CELLS).map(|(&have, wanted)| wanted.div_ceil(have)).collect::<Vec<_>>();
@@ -173,12 +176,12 @@ fn cells(environment: &Environment) -> Cells {
     Cells { parts: [0, 1, 2].map(|channel| [0, 1, 2].map(|axis| part(channel, axis))) }
 }
 
-/// W/m² on a plane with unit normal `n`: of each cell the part in front.
+/// Irradiance (W/m²) on a plane with unit normal `n`: the sum over the cells in front of the plane.
 fn received(cells: &Cells, n: Vec3) -> Vec3 {
     let channel = |[x, y, z]: &[Vec<f32>; 3]| {
         let rows = x.chunks_exact(CELLS[0]).zip(y.chunks_exact(CELLS[0])).zip(z.chunks_exact(CELLS[0]));
         let row = |((x, y), z): ((&[f32], &[f32]), &[f32])| {
-            // Eight sums side by side, which compilers keep in one register.
+            // Eight partial sums, which compilers keep in one vector register.
             let mut sums = [0.0f32; 8];
             for ((x, y), z) in x.chunks_exact(8).zip(y.chunks_exact(8)).zip(z.chunks_exact(8)) {
                 for k in 0..8 {

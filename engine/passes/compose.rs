@@ -14,7 +14,7 @@ pub struct Compose {
     /// Weight by likeness of normals and distance from the pixel's plane, relative to its depth, instead of difference of
     /// depth / far.
     pub plane: bool,
-    /// ε of the dissertation's equation 27.
+    /// ε of [ISR 27].
     pub epsilon: f32,
     /// Multiply gathered light by the albedo.
     pub tint: bool,
@@ -35,7 +35,7 @@ pub struct Composed {
     pub accessibility: Image,
 }
 
-/// Equations 27 to 29. `ambient`: of [`super::ambient::Irradiance::upload`]; `gathered`: rgb radiance, a accumulated occlusion, at the resolution of `coarse`.
+/// Bilateral upsampling [ISR 27], [ISR 28] and the sum of all light [ISR 29]. `ambient`: of [`super::ambient::Irradiance::upload`]; `gathered`: rgb radiance, a accumulated occlusion, at the resolution of `coarse`.
 #[allow(clippy::too_many_arguments)]
 pub fn sum(
     graph: &mut Graph,

@@ -26,13 +26,13 @@ impl From<&ShadowMaps> for Lights {
 /// Choices of [`light`].
 #[derive(Clone, Copy, Debug)]
 pub struct Direct {
-    /// The dissertation's equation 16 instead of radiometry.
+    /// The dissertation's attenuation [ISR 16] instead of radiometry.
     pub paper_law: bool,
-    /// GGX facets over the matt base (`lib/brdf.glsl`), under the paper's law added to it; otherwise Lambert's law alone.
+    /// GGX microfacets over the diffuse base (`lib/brdf.glsl`); the paper's law adds them to the base. If off, surfaces are Lambertian.
     pub specular: bool,
-    /// Paper law: of lights without a range, metres; 0: the far distance of the camera.
+    /// Paper law: radius of lights without a range, metres; 0: the far distance of the camera.
     pub light_radius: f32,
-    /// Paper law: of the brightest light.
+    /// Paper law: power of the brightest light.
     pub light_power: f32,
 }
 
@@ -41,7 +41,7 @@ pub struct Direct {
 pub struct Lit {
     /// Radiance towards the camera, with emission.
     pub direct: Image,
-    /// Radiance that leaves in all directions: reflected by Lambert's law, and emitted.
+    /// Radiance that is equal in all directions: the diffuse reflection and the emission.
     pub diffuse: Image,
 }
 

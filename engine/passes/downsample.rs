@@ -9,7 +9,7 @@ use crate::{
 /// Relative difference in depth within which texels count as one surface.
 const TOLERANCE: f32 = 0.05;
 
-/// What image-space gathering reads.
+/// The coarse G-buffer, which image-space gathering reads.
 #[derive(Clone, Copy, Debug)]
 pub struct Coarse {
     /// Linear albedo; alpha is the radiation mask.
@@ -43,7 +43,8 @@ pub fn gbuffer(graph: &mut Graph, g: &GBuffer, factor: u32, depth_aware: bool) -
     coarse
 }
 
-/// Radiance `color` likewise; alpha is the radiation mask times the share of the texel that the chosen ones cover.
+/// Downsamples the radiance `color` like [`gbuffer`]. Alpha is the radiation mask times the share of the coarse texel that the chosen texels
+/// cover.
 pub fn color(graph: &mut Graph, color: Image, g: &GBuffer, factor: u32, depth_aware: bool) -> Image {
     let extent = graph.extent(g.depth).div_ceil(factor);
     let coarse = graph.image("coarse.color", Format::RGBA16F, extent);

@@ -1,5 +1,5 @@
 //! The G-buffer: attributes of the nearest visible surface of every pixel, in one pass over the culled scene
-//! (ISR dissertation, section 4.2: CLR, NRM, DPT; with what physical materials need besides).
+//! (ISR dissertation, section 4.2: CLR, NRM, DPT), and further attributes of physical materials.
 
 use crate::{
     graph::{Compare, Cull, Depth, Extent, Format, Graph, Image, Load, Raster, Stencil, StencilLoad, Targets, Uniform},
@@ -26,11 +26,11 @@ pub enum Normals {
     Octahedral,
 }
 
-/// What becomes of alpha-blended surfaces, which a G-buffer cannot hold next to what is behind them.
+/// Treatment of alpha-blended surfaces. A G-buffer holds one surface per pixel, so it cannot hold them together with the surface behind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Blended {
-    /// Each pixel shows the surface with probability alpha, by a pattern that only the graph's seed changes.
+    /// Each pixel shows the surface with probability alpha. Only the graph's seed changes the pattern.
     #[default]
     Dithered,
     /// The surface is shown where alpha is at least one half.
@@ -45,10 +45,10 @@ pub enum Blended {
 pub struct Settings {
     pub normals: Normals,
     pub blended: Blended,
-    /// Textures are read at the level that suits a pixel's size. Off: at their finest, as a ray through the middle of each pixel sees them,
-    /// for comparison with what traces such rays.
+    /// Textures are read at the mip level that fits the pixel's size. Off: always at the finest level, like a path tracer without ray
+    /// differentials reads them. This makes pictures comparable with such a path tracer.
     pub mips: bool,
-    /// Leaves out what lies outside of the view. Off only to check that it changes nothing.
+    /// Frustum culling. Tests switch it off to check that it does not change the picture.
     pub culling: bool,
 }
 
@@ -73,7 +73,7 @@ pub struct GBuffer {
     pub emission: Image,
     /// Depth with stencil: 1 geometry, 0 background. Reversed depth.
     pub hardware: Image,
-    /// The view it was drawn for.
+    /// The view for which the G-buffer was drawn.
     pub view: Uniform<types::View>,
 }
 
@@ -82,8 +82,8 @@ pub fn draw(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings
     layer(graph, scene, view, settings, None)
 }
 
-/// What `view` would see if everything at and before the linear depths `nearer` (R32F, same extent) were not there: the next layer
-/// of a depth peeling. Backs of single-sided surfaces are there, with the normal of their front.
+/// The next layer of a depth peeling: the nearest surface behind the linear depths `nearer` (R32F, same extent). Back faces of single-sided
+/// surfaces are drawn, with the normal of their front.
 pub fn draw_behind(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, nearer: Image) -> GBuffer {
     layer(graph, scene, view, settings, Some(nearer))
 }
@@ -109,7 +109,7 @@ fn layer(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, n
     let drawn = batches.list.iter().filter(|b| b.cutout != Cutout::Blend || settings.blended != Blended::Hidden);
     let drawn: Vec<_> = drawn.collect();
     graph.scope("gbuffer", |graph| {
-        // Without anything to draw one empty pass still clears.
+        // Without draws an empty pass still clears the images.
         for index in 0..drawn.len().max(1) {
             let batch = drawn.get(index);
             let cutout = match batch.map(|b| b.cutout) {
@@ -125,9 +125,9 @@ fn layer(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, n
             let draw =
                 batch.map_or_else(|| crate::graph::Draw::indexed(scene.indices, Vec::new()), |batch| batch.draw(scene));
             let targets = targets(&gbuffer, index == 0);
-            // Of surfaces at one place the first one drawn is seen; rays choose the same one (lib/trace_compute.glsl).
+            // Of coplanar surfaces the first one drawn is visible. Rays choose the same surface (lib/trace_compute.glsl).
             let state = Raster::new().depth_compare(Compare::Greater).stencil(Stencil::write(1));
-            // The same arguments, of two generated types.
+            // The two generated types have the same fields.
             macro_rules! args {
                 ($shader:ident $(, $more:ident)?) => {
                     $shader::Args {

@@ -1,5 +1,5 @@
 //! Shadow maps of spot, point and directional lights: plain, percentage closer, or exponential (ISR dissertation,
-//! section 4.6, eq. 30 and listing 8; cascades as its section 4.7 proposes).
+//! section 4.6, [ISR 30] and listing 8; cascades as its section 4.7 proposes).
 
 mod slots;
 
@@ -20,13 +20,13 @@ use crate::{
 };
 use serde::{Deserialize, Serialize};
 
-/// How the depth of a map is compared with that of a receiver.
+/// How the depth in a map is compared with the receiver's depth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// No shadows.
     Off,
-    /// One texel, yes or no.
+    /// A comparison with one texel.
     Plain,
     /// Percentage closer filter of 3×3 texels.
     #[default]
@@ -40,27 +40,26 @@ pub enum Kind {
 #[serde(default)]
 pub struct Settings {
     pub kind: Kind,
-    /// Texels of a side of each map.
+    /// Side of each map, texels.
     pub size: u32,
     /// Maps of a directional light, 1 to 8.
     pub cascades: u32,
-    /// Where cascades end: 0 evenly spaced, 1 in geometric progression.
+    /// Distribution of the cascades: 0 evenly spaced, 1 in geometric progression.
     pub split: f32,
     /// Metres from the camera after which directional lights cast no shadow; 0: as far as the scene reaches.
     pub distance: f32,
-    /// c of eq. 30, for depths from 0 (at the light) to 1 (its range, or the end of the scene).
+    /// c of [ISR 30], for depths from 0 (at the light) to 1 (at the light's range, or at the end of the scene).
     pub exponent: f32,
-    /// Metres: where a light reaches farther than this, c grows in proportion, so that large scenes do not leak light
-    /// through thin walls. 0: c is the same everywhere, as in the dissertation.
+    /// Metres. For lights that reach farther than this, c grows in proportion, so that no light leaks through thin walls in large
+    /// scenes. 0: c is the same for all lights, as in the dissertation.
     pub exponent_reach: f32,
-    /// Exponential: the least share of c that remains where light grazes a surface. 0: c falls with the cosine, as in
-    /// listing 8, which leaks light along walls.
+    /// Exponential: minimum share of c at grazing angles. 0: c falls with the cosine, as in listing 8, which leaks light along walls.
     pub grazing: f32,
     /// Standard deviation of the logarithmic Gaussian prefilter, texels; 0: no filter.
     pub blur: f32,
-    /// Texels that a receiver is moved to the light before the comparison (plain and PCF).
+    /// Offset of the receiver towards the light before the comparison, texels (plain and PCF).
     pub depth_bias: f32,
-    /// Texels that a receiver is moved along its normal where light grazes it.
+    /// Offset of the receiver along its normal at grazing angles, texels.
     pub normal_bias: f32,
 }
 
@@ -89,7 +88,7 @@ impl Settings {
     }
 }
 
-/// What `lib/shadow.glsl` binds, and what could not be served.
+/// The resources that `lib/shadow.glsl` binds, and notes about lights without shadows.
 #[derive(Clone, Debug)]
 pub struct ShadowMaps {
     /// Block `Lights`: the scene's lights.
@@ -102,7 +101,7 @@ pub struct ShadowMaps {
     pub notes: Vec<Note>,
 }
 
-/// Draws the shadow maps of all lights of the scene; the first lights of the list get maps while there are any.
+/// Draws the shadow maps of all lights of the scene. Lights get maps in the order of the list, until all maps are taken.
 pub fn draw(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings) -> ShadowMaps {
     let settings = sane(settings);
     let assignment = match settings.kind {

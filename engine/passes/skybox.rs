@@ -1,4 +1,4 @@
-//! The environment or a constant colour behind everything.
+//! The background: the environment or a constant colour.
 
 use crate::{
     graph::{Depth, Draw, Graph, Image, Load, Raster, Stencil, StencilLoad, Targets},
@@ -9,7 +9,7 @@ use crate::{
 use glam::Vec3;
 
 /// Draws the scene's environment plus `constant` (radiance, W/(sr·m²)) into the pixels of `target` where the G-buffer has
-/// no surface; the others keep what they have.
+/// no surface. All other pixels keep their values.
 pub fn draw(graph: &mut Graph, scene: &Handles, gbuffer: &GBuffer, constant: Vec3, target: Image) {
     let args = shader::Args {
         view: gbuffer.view,

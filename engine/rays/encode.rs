@@ -1,13 +1,13 @@
-//! Nodes as the shaders read them (`lib/trace_compute.glsl`); twin of `rays/refit.comp`.
+//! Encoding of nodes for the shaders (`lib/trace_compute.glsl`). `rays/refit.comp` computes the same encoding on the device.
 
 use super::tree::{Child, Node, Tree};
 use crate::scene::Aabb;
 use glam::Vec3;
 
-/// Words of a node.
+/// Size of an encoded node, 32-bit words.
 pub const WORDS: usize = 20;
 
-/// Appends the nodes of `tree`, whose references count from `first_node` and `first_leaf`.
+/// Appends the nodes of `tree`. Node references are relative to `first_node`, leaf references to `first_leaf`.
 pub fn encode(tree: &Tree, first_node: u32, first_leaf: u32, out: &mut Vec<u32>) {
     for node in &tree.nodes {
         out.extend(words(node, first_node, first_leaf));
@@ -47,18 +47,18 @@ fn words(node: &Node, first_node: u32, first_leaf: u32) -> [u32; WORDS] {
     words
 }
 
-/// Biased exponent of the smallest power of two of which 254 cover `low` to `high`.
+/// Biased exponent of the smallest power of two such that 254 steps of it cover the range from `low` to `high`.
 fn exponent(low: f32, high: f32) -> u32 {
-    // One of the 255 is left for rounding.
+    // A byte has 255 steps; one of them is reserved for rounding.
     let step = ((high - low) / 254.0).clamp(1e-30, 1e30).to_bits();
     (step >> 23) + u32::from(step & 0x7f_ffff != 0)
 }
 
-/// Steps of `scale` from `origin` that enclose `low` to `high`.
+/// The range from `low` to `high` in steps of `scale` from `origin`, rounded outwards.
 fn quantised(low: f32, high: f32, origin: f32, scale: f32) -> [u32; 2] {
     let steps = |x: f32| ((x - origin) / scale).clamp(0.0, 255.0);
     let (mut low_step, mut high_step) = (steps(low).floor(), steps(high).ceil());
-    // The quotient is rounded, and so is what the shader makes of it.
+    // Both the quotient here and the product in the shader are rounded, so the result is checked.
     if origin + low_step * scale > low {
         low_step -= 1.0;
     }

@@ -1,7 +1,7 @@
-//! The scene as shaders trace rays through it: `trace_closest` and `trace_any` of `lib/trace.glsl`.
+//! Acceleration structures of a scene, through which shaders trace rays with `trace_closest` and `trace_any` of `lib/trace.glsl`.
 //!
-//! Two levels: a bottom tree over the triangles of each shape, which instances of it share, and a top tree over the places
-//! where they stand. What never moves on its own is one shape in world space. The top tree is rebuilt each frame.
+//! There are two levels: a bottom tree over the triangles of each shape, which all instances of the shape share, and a top tree
+//! over the instances. All objects that never move are merged into one shape in world space. The top tree is rebuilt each frame.
 //!
 //! ```no_run
 //! # use lucerna::{gpu::Gpu, graph::Graph, rays::Rays, scene::{Scene, resident::Resident}};
@@ -42,31 +42,31 @@ use glam::{Mat4, Vec3};
 use shapes::{Encoded, Gathered, Shape, Use};
 use tree::{DEPTH, EIGHTHS_DEPTH, Tree};
 
-// The stack has an entry for each level, two for the way back up, and one for the end.
+// The traversal stack needs an entry for each level and two more entries.
 const _: () = assert!(DEPTH + EIGHTHS_DEPTH + 2 <= TRACE_DEPTH);
 const _: () = assert!(WORDS == TRACE_NODE_WORDS as usize);
 
-/// Nodes, triangles and instances have numbers of 24 bits.
+/// Maximum of nodes, triangles and instances: their numbers have 24 bits.
 const MOST: usize = 1 << 24;
 
-/// Trees of one scene on a device.
+/// The acceleration structures of one scene on a device.
 #[derive(Debug)]
 pub struct Rays {
     nodes: OwnedBuffer,
     triangles: OwnedBuffer,
     shapes: Vec<Shape>,
     uses: Vec<Use>,
-    /// Instances in world space with where they stood when the tree was built.
+    /// Merged instances, with their transforms at the time when the tree was built.
     merged: Vec<(u32, Mat4)>,
-    /// Some have stood elsewhere since.
+    /// The transform of a merged instance has changed since then.
     disturbed: bool,
-    /// What ray queries trace instead.
+    /// Hardware acceleration structures, which ray queries trace instead.
     query: Option<query::Query>,
-    /// Nodes at the start of the buffer that are left to the top tree.
+    /// Nodes at the start of the buffer that are reserved for the top tree.
     top_nodes: u32,
 }
 
-/// What a pass that includes `lib/trace.glsl` binds; each field goes into the field of `Args` of the same name.
+/// The bindings of a pass that includes `lib/trace.glsl`. Each field goes into the field of `Args` with the same name.
 #[derive(Clone, Copy, Debug)]
 pub struct RayHandles {
     pub trace_nodes: Buffer,
@@ -76,14 +76,14 @@ pub struct RayHandles {
     pub trace_uvs: Buffer,
     pub trace_colors: Buffer,
     pub trace_scene: Buffer,
-    /// `NONE`: rays are traced in compute.
+    /// `NONE` if rays are traced in compute.
     pub trace_accel: Accel,
     pub materials: Buffer,
     pub scene_textures: [Image; MAX_TEXTURE_ARRAYS as usize],
 }
 
 impl Rays {
-    /// Builds the trees of a scene that was made `resident`.
+    /// Builds the acceleration structures of a scene that `resident` has uploaded.
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
@@ -91,18 +91,18 @@ impl Rays {
         if !gpu.caps().ray_query {
             return Self::in_compute(gpu, scene, resident);
         }
-        // No trees of our own are needed then.
+        // Ray queries need no trees for compute shaders.
         let query = Some(query::Query::new(gpu, resident)?);
         Ok(Self { query, ..Self::in_compute(gpu, &Scene::default(), resident)? })
     }
 
-    /// As [`Self::new`], but rays are traced in compute also where the device has ray queries.
+    /// Like [`Self::new`], but rays are traced in compute even if the device has ray queries.
     ///
     /// # Errors
     /// As [`Self::new`].
     pub fn in_compute(gpu: &Gpu, scene: &Scene, _resident: &Resident) -> Result<Self> {
         let mut out = Encoded::default();
-        // Each node but the last of a level has eight children; how many uses there will be is not known yet.
+        // An upper bound, because the number of uses is not known yet. Every node has eight children, except the last one of each level.
         let pieces: usize =
             scene.nodes.iter().filter_map(|n| scene.meshes.get(n.mesh? as usize)).map(|m| m.primitives.len()).sum();
         let top_nodes = (pieces as u32).div_ceil(4) + EIGHTHS_DEPTH;
@@ -137,11 +137,11 @@ impl Rays {
         })
     }
 
-    /// Turns of all loops of a ray at most. CPU drivers run eight invocations together, through each turn that one of them needs; scenes
-    /// of more triangles than some hundred get [`TRACE_STEPS`], at which traversal ends.
+    /// Maximum of loop iterations that one ray needs. CPU drivers run eight invocations together and execute each iteration that one of them
+    /// needs. For scenes of more than a few hundred triangles this is [`TRACE_STEPS`], the limit at which traversal ends.
     pub fn most_turns(&self) -> u64 {
         if self.query.is_some() {
-            // Its trees are the driver's.
+            // The driver builds these trees, so their depth is unknown.
             return TRACE_STEPS.into();
         }
         let of = |usage: &Use| self.shapes.get(usage.shape).map_or(0, Shape::most_turns);
@@ -149,7 +149,7 @@ impl Rays {
         (8 * one).min(TRACE_STEPS.into())
     }
 
-    /// The trees as the scene stands in `scene`, for its graph.
+    /// Declares the update of the trees for the frame of `scene`, and returns their handles in its graph.
     pub fn frame(&mut self, graph: &mut Graph, scene: &Handles) -> RayHandles {
         let nodes = graph.import_buffer(&self.nodes);
         let moved = |(i, built): &(u32, Mat4)| {
@@ -179,7 +179,7 @@ impl Rays {
         }
     }
 
-    /// The top tree, and what its leaves refer to, the tree itself first.
+    /// The top tree, and the instances to which its leaves refer.
     fn top(&self, scene: &Handles) -> (Tree, Vec<types::TraceInstance>) {
         let mut boxes = Vec::new();
         let mut places = Vec::new();
@@ -187,7 +187,7 @@ impl Rays {
             let Some(shape) = self.shapes.get(usage.shape) else { continue };
             let Some(instance) = scene.moment.instances.get(usage.first_instance as usize) else { continue };
             let world = if shape.merged { Mat4::IDENTITY } else { instance.world_from_object };
-            // Rounding of the inverse would carry rays past what they meet.
+            // With an inverse in single precision, rounding would let rays miss triangles.
             let inverse = world.as_dmat4().inverse().as_mat4();
             let bounds = match (shape.merged, shape.deformed) {
                 (true, _) if self.disturbed => {
@@ -201,7 +201,7 @@ impl Rays {
                 continue;
             }
             let bounds = Aabb { min: bounds.min.max(-HUGE), max: bounds.max.min(HUGE) };
-            // Corners are rounded on the way to the world.
+            // A margin for the rounding of the corners in the transform to world space.
             boxes.push(bounds.grown(1e-5 * reach(&bounds)));
             let rows = inverse.transpose();
             places.push(types::TraceInstance {
@@ -221,7 +221,7 @@ impl Rays {
     }
 }
 
-/// Farther out nothing is distinguished.
+/// Coordinates are clamped to this size, metres, so that products stay finite.
 const HUGE: Vec3 = Vec3::splat(1e15);
 
 /// The largest coordinate of a box.

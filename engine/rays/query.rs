@@ -1,5 +1,5 @@
-//! What hardware ray queries trace: a bottom level for each primitive as the vertex streams have it, an instance for each of
-//! the scene's.
+//! Hardware acceleration structures for ray queries: a bottom level for each primitive in the vertex streams, and a top level with all
+//! instances of the scene.
 
 use std::collections::HashMap;
 
@@ -11,11 +11,11 @@ use crate::{
     shaders::consts::{TRACE_SEES_LIT, TRACE_SEES_UNLIT},
 };
 
-/// Frames after which the bottom levels of deforming primitives are built anew instead of refitted: a tree whose boxes only
-/// grow and move gets worse the further its triangles went from where they were.
+/// Number of frames after which the bottom levels of deforming primitives are rebuilt instead of refitted. The further the triangles have
+/// moved, the slower a refitted tree becomes.
 const REBUILD_EVERY: u64 = 16;
 
-/// First index and first vertex of a primitive: instances with the same share a bottom level.
+/// First index and first vertex of a primitive. Instances with the same key share a bottom level.
 type Key = (u32, u32);
 
 /// Acceleration structures of one scene.
@@ -48,8 +48,8 @@ impl Query {
         Ok(Self { accel, bottoms, frames: 0 })
     }
 
-    /// The structures as the scene stands in `scene`: in the first frame everything is built, in later ones what deforms is
-    /// refitted or built anew, and the top level built anew.
+    /// Declares the update for the frame of `scene`. The first frame builds all levels. Later frames refit or rebuild the bottom levels of
+    /// deforming primitives, and rebuild the top level.
     pub fn frame(&mut self, graph: &mut Graph, scene: &Handles) -> Accel {
         let accel = graph.import_accel(&self.accel);
         let first = !self.accel.is_built();
@@ -71,7 +71,7 @@ impl Query {
                     refit,
                 });
             }
-            // What is flat has no inside for a ray to be brought into.
+            // A singular transform has no inverse, so rays cannot be transformed to object space.
             if !instance.world_from_object.inverse().is_finite() {
                 continue;
             }

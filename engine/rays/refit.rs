@@ -1,5 +1,5 @@
-//! Brings trees to where their triangles are in a frame, on the device: corners first, then boxes level by level from the
-//! leaves up. Everything is written by one invocation, so the same scene gives the same bits.
+//! Refits trees to the positions of their triangles in a frame, on the device: first the corners, then the boxes, level by level from the
+//! leaves to the root. Each value is written by one invocation only, so the result is bit-identical for the same scene.
 
 use super::shapes::Shape;
 use crate::{
@@ -8,7 +8,7 @@ use crate::{
     shaders::rays::{records, refit},
 };
 
-/// Declares the passes for `shapes`, each with the first instance of its use.
+/// Declares the passes that refit `shapes`, each given with the first instance of its use.
 pub fn declare(graph: &mut Graph, scene: &Handles, nodes: Buffer, triangles: Buffer, shapes: &[(&Shape, u32)]) {
     let total: usize = shapes.iter().map(|(shape, _)| shape.node_count()).sum();
     if total == 0 {
@@ -16,7 +16,7 @@ pub fn declare(graph: &mut Graph, scene: &Handles, nodes: Buffer, triangles: Buf
     }
     graph.scope("refit", |graph| {
         let boxes = graph.buffer("rays.boxes", 24 * total as u64);
-        // The lowest level reads none, which the graph cannot know.
+        // The lowest level reads no boxes, but the graph requires that a buffer is written before a pass reads it.
         graph.fill(boxes, 0);
         let mut first_box = 0;
         for (shape, first_instance) in shapes {

@@ -1,4 +1,4 @@
-//! Which triangles share a bottom tree, and where each tree stands.
+//! Shapes: the groups of triangles that share a bottom tree, and the instances that use each shape.
 
 use super::{
     encode::{WORDS, encode},
@@ -11,31 +11,30 @@ use crate::{
 use glam::{Mat3, Mat4, Vec3};
 use std::collections::{BTreeMap, HashSet};
 
-/// Shapes that stand in several places are put into one tree with everything that does not move while the scene has no more
-/// triangles than this that way.
+/// Static instances of shared shapes are copied into the merged tree, as long as the scene then has no more triangles than this.
 const MERGED_TRIANGLES: usize = 2_000_000;
 
 /// A triangle of a shape.
 #[derive(Clone, Copy, Debug)]
 pub struct Record {
     pub corners: [Vec3; 3],
-    /// From the first instance of the shape's use.
+    /// Relative to the first instance of the shape's use.
     pub instance: u32,
     pub triangle: u32,
-    /// `TRACE_SINGLE_SIDED` …
+    /// Flags: `TRACE_SINGLE_SIDED` and others.
     pub surface: u32,
 }
 
-/// Triangles and where the tree over them lies on the device.
+/// The triangles of a shape, and the location of its tree on the device.
 #[derive(Debug)]
 pub struct Shape {
-    /// At rest.
+    /// In the rest pose.
     pub bounds: Aabb,
-    /// Everything that does not move by itself, in world space.
+    /// The shape holds all static objects, in world space.
     pub merged: bool,
-    /// Its vertices are written anew each frame.
+    /// The vertices are rewritten in each frame.
     pub deformed: bool,
-    /// Node.
+    /// Number of the root node.
     pub root: u32,
     /// First node of each level from the root, and the number of nodes.
     pub levels: Vec<u32>,
@@ -43,11 +42,11 @@ pub struct Shape {
     records: u32,
 }
 
-/// A shape in a place.
+/// A use of a shape by instances.
 #[derive(Clone, Copy, Debug)]
 pub struct Use {
     pub shape: usize,
-    /// Into the resident scene's instances; its transform is that of all of them.
+    /// Index of the first instance in the resident scene. All instances of the use have the same transform.
     pub first_instance: u32,
 }
 
@@ -73,7 +72,7 @@ fn pieces(scene: &Scene) -> Vec<Piece<'_>> {
     out
 }
 
-/// For each node, whether an animation moves it or something it stands on.
+/// For each node, whether an animation moves it or one of its ancestors.
 fn moving(scene: &Scene) -> Vec<bool> {
     let mut moving = vec![false; scene.nodes.len()];
     for channel in scene.animations.iter().flat_map(|a| &a.channels) {
@@ -88,14 +87,14 @@ fn moving(scene: &Scene) -> Vec<bool> {
     moving
 }
 
-/// All shapes of a scene, their uses, and the instances that stand in the merged one with where they stood.
+/// All shapes of a scene, their uses, and the instances in the merged shape with their transforms.
 pub struct Gathered {
     pub shapes: Vec<Shape>,
     pub uses: Vec<Use>,
     pub merged: Vec<(u32, Mat4)>,
 }
 
-/// All shapes of a scene; `out` gets their nodes and records.
+/// Gathers all shapes of a scene, and appends their nodes and records to `out`.
 pub fn gather(scene: &Scene, out: &mut Encoded) -> Gathered {
     let pose = Pose::rest(scene);
     let moving = moving(scene);
@@ -113,7 +112,7 @@ pub fn gather(scene: &Scene, out: &mut Encoded) -> Gathered {
     let mut merged_places = Vec::new();
     let mut shapes = Vec::new();
     let mut uses = Vec::new();
-    // Mesh, skinned → shape.
+    // Maps (mesh, skinned) to a shape.
     let mut shared: BTreeMap<(usize, bool), usize> = BTreeMap::new();
     let mut first_of_node = 0;
     for (index, piece) in pieces.iter().enumerate() {
@@ -132,7 +131,7 @@ pub fn gather(scene: &Scene, out: &mut Encoded) -> Gathered {
             let first_instance = first_of_node as u32;
             let of_node = pieces[first_of_node..].iter().take_while(|p| p.node == piece.node);
             let rigid: Vec<_> = of_node.enumerate().filter(|(_, p)| !p.deformed).collect();
-            // Once a node.
+            // One entry per node.
             if rigid.first().is_none_or(|(i, _)| first_of_node + i != index) {
                 continue;
             }
@@ -152,7 +151,7 @@ pub fn gather(scene: &Scene, out: &mut Encoded) -> Gathered {
     Gathered { shapes, uses, merged: merged_places }
 }
 
-/// Triangles of `piece` carried by `world`; those that are nowhere are left out.
+/// The triangles of `piece`, transformed by `world`. Leaves out triangles that are not finite, except in deforming shapes.
 fn records(piece: &Piece<'_>, instance: u32, world: Mat4, placed: bool) -> Vec<Record> {
     let mut surface = 0;
     if !piece.material.double_sided {
@@ -164,7 +163,7 @@ fn records(piece: &Piece<'_>, instance: u32, world: Mat4, placed: bool) -> Vec<R
     if !matches!(piece.material.alpha, AlphaMode::Opaque) {
         surface |= TRACE_CUTOUT;
     }
-    // In world space a mirrored triangle winds the other way round.
+    // A mirroring transform reverses the winding.
     if placed && Mat3::from_mat4(world).determinant() < 0.0 {
         surface |= TRACE_REVERSED;
     }
@@ -179,8 +178,8 @@ fn records(piece: &Piece<'_>, instance: u32, world: Mat4, placed: bool) -> Vec<R
 }
 
 impl Shape {
-    /// Turns of the loops of one ray through it: one for each node and triangle, two more for each triangle that is looked at again because it is
-    /// cut out or as near as another, and for going in and out.
+    /// Maximum of loop iterations that one ray needs for the shape: one for each node and triangle, two more for each triangle that is tested
+    /// again because of alpha or an equal distance, and some for entering and leaving.
     pub fn most_turns(&self) -> u64 {
         u64::from(self.levels.last().copied().unwrap_or(0)) + 4 * u64::from(self.records) + 8
     }
@@ -190,7 +189,7 @@ impl Shape {
         self.levels.last().map_or(0, |n| *n as usize)
     }
 
-    /// Triangles; more than there are where a tree has one in several leaves.
+    /// Number of triangle records. A triangle in several leaves has several records.
     pub fn record_count(&self) -> u32 {
         self.records
     }
@@ -209,7 +208,7 @@ impl Encoded {
         let list = if deformed {
             list
         } else {
-            // Of equal triangles of an instance the first is the one that is hit.
+            // Of identical triangles of an instance a ray hits the first.
             let key = |r: &Record| (r.corners.map(|p| p.to_array().map(f32::to_bits)), r.instance, r.surface);
             let mut seen = HashSet::with_capacity(list.len());
             distinct = list.iter().filter(|r| r.surface & TRACE_CUTOUT != 0 || seen.insert(key(r))).copied().collect();
@@ -220,7 +219,7 @@ impl Encoded {
             if aabb.is_empty() { Aabb::of([Vec3::ZERO]) } else { aabb }
         };
         let boxes: Vec<Aabb> = list.iter().map(around).collect();
-        // The parts of triangles that change would have to be cut anew.
+        // Triangles of deforming shapes are not split, because refitting cannot recompute the parts.
         let corners: Vec<[Vec3; 3]> = if deformed { Vec::new() } else { list.iter().map(|r| r.corners).collect() };
         let tree = Tree::build(&boxes, &corners);
         let root = (self.nodes.len() / WORDS) as u32;

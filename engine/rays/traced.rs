@@ -1,7 +1,7 @@
-//! `Args` of passes that trace rays, without a list of bindings at each.
+//! `Args` of passes that trace rays, with the bindings filled in.
 
-/// `Args` with the fields given and those of `lib/trace.glsl` and `lib/material.glsl` from `rays` ([`RayHandles`](crate::rays::RayHandles)); also
-/// those of `lib/hit_surface.glsl` where the scene's `handles` are given.
+/// `Args` with the given fields. Fills in the bindings of `lib/trace.glsl` and `lib/material.glsl` from `rays`
+/// ([`RayHandles`](crate::rays::RayHandles)) and, if the scene's `handles` are given, the bindings of `lib/hit_surface.glsl`.
 macro_rules! traced {
     ($($name:ident)::+ { $($fields:tt)* }, $rays:expr $(,)?) => {{
         let rays: $crate::rays::RayHandles = $rays;

@@ -1,7 +1,8 @@
-//! Trees of eight-way nodes, built on the CPU.
+//! Trees with eight children per node, built on the CPU.
 //!
-//! A binary tree by obvhs (PLOC with reinsertion), or [`binned`] where that would not end, is collapsed to eight children a node as in Ylitie, Karras and Laine,
-//! "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017, section 3.2, with one thing a leaf.
+//! obvhs (PLOC with reinsertion) builds a binary tree; [`binned`] builds it for inputs on which PLOC would not end. The binary tree is
+//! collapsed to eight children per node as in Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide
+//! BVHs", HPG 2017, section 3.2, with one item per leaf.
 
 use crate::scene::{Aabb, bvh::binned};
 use glam::Vec3;
@@ -10,23 +11,23 @@ use obvhs::{
     splits::split_aabbs_preset, triangle::Triangle,
 };
 
-/// Levels of a tree, at most: what the shaders' stack has room for, see [`Tree::build`].
+/// Maximum of levels of a tree, limited by the shaders' stack; see [`Tree::build`].
 pub const DEPTH: u32 = 22;
-/// Levels of a tree by [`Tree::eighths`] over as many things as there may be, ⌈log₈ 2²⁴⌉.
+/// Levels of a tree by [`Tree::eighths`] over the maximum of items, ⌈log₈ 2²⁴⌉.
 pub const EIGHTHS_DEPTH: u32 = 8;
 
-/// What a slot of a node holds.
+/// The content of a slot of a node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Child {
     #[default]
     Empty,
-    /// Place in [`Tree::order`].
+    /// Index into [`Tree::order`].
     Leaf(u32),
     Node(u32),
 }
 
-/// Eight boxes and what they hold. Slots are in the order of the octants as seen from the middle: bit 0 is set on the
-/// side of larger x, bit 1 of y, bit 2 of z, as far as there is room.
+/// Eight boxes and their contents. The number of a slot follows the octant of its box as seen from the node's middle, as far as slots
+/// are free: bit 0 is set on the side of larger x, bit 1 of larger y, bit 2 of larger z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node {
     pub boxes: [Aabb; 8],
@@ -37,14 +38,14 @@ impl Node {
     const EMPTY: Self = Self { boxes: [Aabb::EMPTY; 8], children: [Child::Empty; 8] };
 }
 
-/// A tree over things with boxes. Nodes of a level stand together, levels from the root (node 0) down; the children of a
-/// node that are nodes follow each other in the order of its slots, and so do the places of those that are leaves.
+/// A tree over items with boxes. Nodes are stored level by level, from the root (node 0) down. The child nodes of a node are consecutive, in
+/// the order of its slots, and so are the indices of its leaves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tree {
     pub nodes: Vec<Node>,
     /// First node of each level, and the number of nodes.
     pub levels: Vec<u32>,
-    /// Which thing stands at each place.
+    /// The item of each leaf.
     pub order: Vec<u32>,
 }
 
@@ -57,8 +58,8 @@ impl Boundable for Boxed {
 }
 
 impl Tree {
-    /// A tree for many rays over `boxes`, which are finite and not empty. It has at most [`DEPTH`] levels. Where their
-    /// `triangles` are given as well, large ones are in several leaves, each with the box of a part.
+    /// Builds a tree of high quality over `boxes`, which must be finite and not empty. It has at most [`DEPTH`] levels. If `triangles` are
+    /// given, a large triangle is in several leaves, each with the box of a part.
     pub fn build(boxes: &[Aabb], triangles: &[[Vec3; 3]]) -> Self {
         if boxes.len() <= 8 {
             return Self::eighths(boxes);
@@ -91,17 +92,16 @@ impl Tree {
             cut.primitive_indices.iter_mut().for_each(|i| *i = indices[*i as usize]);
             cut
         };
-        // Equal boxes can make it as deep as they are many.
+        // With many equal boxes the binary tree may be too deep.
         collapse(&binary).filter(|t| t.levels.len() as u32 <= DEPTH + 1).unwrap_or_else(|| Self::eighths(boxes))
     }
 
-    /// A tree whose nodes cut the list into eighths along the longest sides, so that it has ⌈log₈ n⌉ levels whatever the
-    /// boxes are.
+    /// Builds a balanced tree: each node divides its list into eighths along the longest sides. It has ⌈log₈ n⌉ levels for any boxes.
     pub fn eighths(boxes: &[Aabb]) -> Self {
         Self::by_levels(Part::new(boxes, (0..boxes.len() as u32).collect()), |part| part.eighths(boxes))
     }
 
-    /// Lays out the tree that `split` makes of `root`.
+    /// Stores the tree that `split` makes from `root`, level by level.
     fn by_levels<T: Split>(root: T, split: impl Fn(&T) -> Vec<T>) -> Self {
         let mut tree = Self { nodes: Vec::new(), levels: vec![0], order: Vec::new() };
         let mut level = vec![root];
@@ -137,15 +137,14 @@ impl Tree {
     }
 }
 
-/// A part of a tree that is being laid out.
+/// A subtree that is not stored yet.
 trait Split {
     fn bounds(&self) -> Aabb;
-    /// The only thing in it, if it is not to be a node.
+    /// The only item of the subtree, if it becomes a leaf.
     fn leaf(&self) -> Option<u32>;
 }
 
-/// Puts up to eight boxes into slots so that those on the far side of an octant's direction get numbers with that octant's
-/// bits (greedily, Ylitie et al., section 3.3).
+/// Assigns up to eight boxes to slots by their octants, with a greedy algorithm (Ylitie et al., section 3.3).
 fn slots(boxes: &[Aabb]) -> Vec<usize> {
     let all = boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union);
     let middle = all.centre();
@@ -160,7 +159,7 @@ fn slots(boxes: &[Aabb]) -> Vec<usize> {
         for (i, b) in boxes.iter().enumerate().filter(|(i, _)| slots[*i] == usize::MAX) {
             for slot in (0..8).filter(|s| free[*s]) {
                 let gain = gain(b, slot);
-                // Without numbers to compare the first free one.
+                // If no gain is comparable (NaN), this takes the first free slot.
                 if gain > best.0 || best.0 == f32::NEG_INFINITY {
                     best = (gain, i, slot);
                 }
@@ -172,7 +171,7 @@ fn slots(boxes: &[Aabb]) -> Vec<usize> {
     slots
 }
 
-/// Things of a tree by halves.
+/// Items of a subtree of a balanced tree.
 struct Part {
     order: Vec<u32>,
     bounds: Aabb,
@@ -239,23 +238,23 @@ fn bounds(tree: &Bvh2, node: u32) -> Aabb {
     Aabb { min: aabb.min.into(), max: aabb.max.into() }
 }
 
-/// How the best of a subtree as at most i + 1 children of one node is reached.
+/// The optimal representation of a subtree as at most i + 1 children of one node, for each i.
 #[derive(Clone, Copy, Default)]
 struct Plan {
-    /// Expected cost, relative to a node's.
+    /// Expected cost, relative to the cost of a node test.
     cost: [f32; 7],
-    /// Children that the left one becomes; 0: it stays one node.
+    /// Number of slots for the left child; 0: the subtree stays one node.
     left: [u8; 7],
-    /// The same where it is a node of its own.
+    /// The same if the subtree is a node.
     own: u8,
 }
 
-/// A triangle test beside a node's.
+/// Cost of a triangle test, relative to a node test.
 const TRIANGLE_COST: f32 = 0.5;
 
-/// `None` if it is not a tree with one thing a leaf.
+/// Collapses a binary tree to eight children per node. `None` if a leaf has not exactly one item.
 fn collapse(tree: &Bvh2) -> Option<Tree> {
-    // Parents before children, whatever the order of the nodes is.
+    // Sorts parents before children, because the nodes may be in any order.
     let mut order = vec![0u32];
     let mut at = 0;
     while let Some(&node) = order.get(at) {
@@ -281,7 +280,7 @@ fn collapse(tree: &Bvh2) -> Option<Tree> {
             plan.cost = [area * TRIANGLE_COST; 7];
         } else {
             let (left, right) = (plans[n.first_index as usize], plans[n.first_index as usize + 1]);
-            // The best of `slots` children.
+            // The best division of `slots` slots between the two children.
             let best = |slots: usize| {
                 let ways = (1..slots).filter(|k| *k <= 7 && slots - k <= 7);
                 let cost = |k: usize| left.cost[k - 1] + right.cost[slots - k - 1];
@@ -294,7 +293,7 @@ fn collapse(tree: &Bvh2) -> Option<Tree> {
                 let (cost, k) = best(i + 1);
                 (plan.cost[i], plan.left[i]) =
                     if cost < plan.cost[i - 1] { (cost, k) } else { (plan.cost[i - 1], plan.left[i - 1]) };
-                // Fewer slots than there are may be best: remember how many that were.
+                // Fewer slots may have a lower cost; KEEP marks this case.
                 if cost >= plan.cost[i - 1] {
                     plan.left[i] |= KEEP;
                 }
@@ -316,10 +315,10 @@ fn collapse(tree: &Bvh2) -> Option<Tree> {
     }))
 }
 
-/// In [`Plan::left`]: as with one slot less.
+/// In [`Plan::left`]: the solution is the same as with one slot less.
 const KEEP: u8 = 0x80;
 
-/// Appends what `node` becomes with `slots` slots.
+/// Appends the children into which `node` is opened with `slots` slots.
 fn open(tree: &Bvh2, plans: &[Plan], node: u32, mut slots: usize, out: &mut Vec<u32>) {
     let n = &tree.nodes[node as usize];
     let plan = &plans[node as usize];

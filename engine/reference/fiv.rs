@@ -1,5 +1,5 @@
-//! Fullsphere irradiance vectors, slowly: sums over the texels of the environment in double precision, rays by the CPU's hierarchy,
-//! lookups and overlaps as the thesis has them (Michael 2010, chapter 3).
+//! Slow twin of the fullsphere irradiance vectors (Michael 2010, chapter 3): sums over the texels of the environment in
+//! double precision, rays through the hierarchy of the CPU, lookups and the overlap correction.
 
 use std::f64::consts::PI;
 
@@ -8,17 +8,17 @@ use glam::{DVec2, DVec3, Vec3};
 use crate::{
     scene::bvh::{Bvh, Ray},
     techniques::fiv::{
-        pace::Paces,
         samples::{Grid, Shells},
         sky::{self, Sky},
+        spacing::Spacing,
         surface::Place,
     },
 };
 
-/// One 3-vector a colour channel, as three colours: those of x, y and z. W/m².
+/// One 3-vector per colour channel, stored as the colours of x, y and z, W/m².
 pub type Vectors = [DVec3; 3];
 
-/// normal · FIV for each channel, W/m².
+/// normal · FIV for each channel, W/m² ([FIV 11]).
 pub fn dot(vectors: &Vectors, normal: DVec3) -> DVec3 {
     vectors[0] * normal.x + vectors[1] * normal.y + vectors[2] * normal.z
 }
@@ -30,12 +30,12 @@ fn texels(sky: &Sky) -> impl Iterator<Item = (DVec3, DVec3)> + '_ {
     })
 }
 
-/// Irradiance for a normal, W/m² (eq. 6 with the solid angle written out).
+/// Irradiance for a normal, W/m² ([FIV 6] with the solid angle).
 pub fn irradiance(sky: &Sky, normal: DVec3) -> DVec3 {
     texels(sky).map(|(radiance, area)| radiance * area.dot(normal).max(0.0)).sum()
 }
 
-/// Vectors of the whole environment (eq. 10).
+/// Vectors of the whole environment ([FIV 10]).
 pub fn total(sky: &Sky) -> Vectors {
     texels(sky).fold(Vectors::default(), |sum, (radiance, area)| add(sum, radiance, area))
 }
@@ -47,7 +47,7 @@ fn add(mut sum: Vectors, radiance: DVec3, area: DVec3) -> Vectors {
     sum
 }
 
-/// What an occluder hides.
+/// The light that an occluder hides.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Hidden {
     /// W/m²
@@ -56,7 +56,7 @@ pub struct Hidden {
     pub angle: f64,
 }
 
-/// What geometry hides of the environment from a point: texels whose `split`² rays meet it.
+/// The part of the environment that geometry hides from a point: texels whose `split`² rays hit the geometry.
 pub fn hidden(sky: &Sky, geometry: &Bvh, point: Vec3, split: u32) -> Hidden {
     let side = sky.size * split;
     let mut out = Hidden::default();
@@ -75,7 +75,8 @@ pub fn hidden(sky: &Sky, geometry: &Bvh, point: Vec3, split: u32) -> Hidden {
     out
 }
 
-/// What geometry leaves of the environment in front of a place on it, and its solid angle in steradians.
+/// Vectors of the part of the environment in front of a surface sample that geometry does not hide, and its solid angle
+/// in steradians.
 pub fn seen(sky: &Sky, geometry: &Bvh, place: Place, split: u32) -> (Vectors, f64) {
     let side = sky.size * split;
     let share = 1.0 / f64::from(split * split);
@@ -97,16 +98,16 @@ pub fn seen(sky: &Sky, geometry: &Bvh, place: Place, split: u32) -> (Vectors, f6
     out
 }
 
-/// Stored vectors of one occluder.
+/// Precomputed vectors of one occluder.
 #[derive(Clone, Copy, Debug)]
 pub struct Set<'a> {
     pub grid: Grid,
     pub shells: Shells,
-    /// How the samples lie.
-    pub paces: &'a Paces,
-    /// Radius of the bounding sphere, metres, if what is interpolated along the radius is free of its solid angle.
+    /// Spacing of the samples.
+    pub spacing: &'a Spacing,
+    /// Radius of the bounding sphere, metres, if vectors are interpolated relative to its solid angle.
     pub solid: Option<f64>,
-    /// Nine for each sample.
+    /// Nine floats for each sample.
     pub fivs: &'a [f32],
 }
 
@@ -117,17 +118,18 @@ impl Set<'_> {
         (floats[0] < crate::shaders::consts::FIV_INSIDE).then(|| [color(0), color(1), color(2)])
     }
 
-    /// What is hidden from where the occluder's centre lies at `offset` (metres), and the share of the samples' weight that lies
-    /// outside of it. Trilinear in azimuth, polar angle and logarithm of the radius.
+    /// Vectors of the light that the occluder hides if its centre lies at `offset` (metres) from the receiver, and the
+    /// share of the interpolation weight of samples outside the occluder. Trilinear in azimuth, polar angle and
+    /// logarithm of the radius.
     pub fn lookup(&self, offset: DVec3) -> (Vectors, f64) {
         let Grid { azimuths, polars, radii } = self.grid;
         let rho = offset.length();
         let far = f64::from(self.shells.farthest);
-        let [a, p, r] = self.paces.numbers(&self.grid, &self.shells, offset);
+        let [a, p, r] = self.spacing.numbers(&self.grid, &self.shells, offset);
         let (a0, p0, r0) = ((a as u32).min(azimuths - 1), (p as u32).min(polars - 2), (r as u32).min(radii - 2));
         let growth = |sphere: u32| {
             let size = |rho: f64| self.solid.map_or(1.0, |radius| rho.max(radius).powi(2));
-            size(self.paces.radius(&self.grid, &self.shells, sphere)) / size(rho.min(far))
+            size(self.spacing.radius(&self.grid, &self.shells, sphere)) / size(rho.min(far))
         };
         let (mut sum, mut weights) = (Vectors::default(), 0.0);
         for (da, dp, dr) in (0..8).map(|k| (k & 1, k >> 1 & 1, k >> 2)) {
@@ -149,7 +151,7 @@ impl Set<'_> {
     }
 }
 
-/// Area that two discs have in common: radii, distance of the centres.
+/// Area that two discs have in common. `r1`, `r2`: radii, `d`: distance of the centres.
 pub fn lens(r1: f64, r2: f64, d: f64) -> f64 {
     if d >= r1 + r2 {
         return 0.0;
@@ -164,13 +166,14 @@ pub fn lens(r1: f64, r2: f64, d: f64) -> f64 {
     sector(r1, r2) + sector(r2, r1)
 }
 
-/// Share of a bounding sphere in front of a plane at distance `d` of its centre (section 3.3.3.1, partial occluders).
+/// Share of a bounding sphere in front of a plane at distance `d` from its centre (section 3.3.3.1, partial occluders).
 pub fn front(d: f64, radius: f64) -> f64 {
     ((d + radius) / (2.0 * radius)).clamp(0.0, 1.0)
 }
 
-/// Share of the irradiance of even light that is hidden by the part of a ball in front of the plane through the receiver; its centre is
-/// `d` in front of the plane, `rho` from the receiver. In closed form (Snyder, Area Light Sources for Real-Time Graphics, 1996).
+/// Share of the irradiance of constant radiance that the part of a ball in front of the receiver's plane hides. The
+/// centre of the ball is `d` in front of the plane and `rho` from the receiver, metres. Closed form (Snyder, Area Light
+/// Sources for Real-Time Graphics, 1996).
 pub fn ball(d: f64, rho: f64, radius: f64) -> f64 {
     let h = (rho / radius).max(1.0001);
     let c = (d / rho.max(1e-20)).clamp(-1.0, 1.0);
@@ -183,9 +186,10 @@ pub fn ball(d: f64, rho: f64, radius: f64) -> f64 {
     ((c * side - squared.sqrt() * g) / (h * h) + (squared.sqrt() / g).atan()) / PI
 }
 
-/// What a ball that the receiver's plane cuts hides in front of it, where normal · FIV is `hidden` and the environment's irradiance in
-/// front is `open`, `behind` for the opposite normal. normal · FIV is what is hidden in front less what is hidden behind; the one or the other
-/// is guessed as if light were even, the smaller the more. `fill`: share of the ball that is not hole.
+/// Irradiance that a ball hides if the receiver's plane cuts it. `hidden` is normal · FIV of the ball. `open` is the
+/// irradiance of the environment for the normal, `behind` for the opposite normal. normal · FIV is the light hidden in
+/// front minus the light hidden behind. One of the two is estimated as if radiance were constant. The smaller estimate
+/// gets the larger weight. `fill`: share of the ball that is not a hole.
 pub fn cut(hidden: DVec3, (open, behind): (DVec3, DVec3), (d, rho, radius): (f64, f64, f64), fill: f64) -> DVec3 {
     let under = behind * (fill * ball(-d, rho, radius));
     let over = open * (fill * ball(d, rho, radius));
@@ -194,8 +198,9 @@ pub fn cut(hidden: DVec3, (open, behind): (DVec3, DVec3), (d, rho, radius): (f64
     (over + (hidden + under - over) * weight).clamp(DVec3::ZERO, open)
 }
 
-/// For each occluder (centre seen from the receiver, radius) the share of what it hides that is taken away for it: eq. 15 for two,
-/// the mean of 1 / (1 + others there) for more, as if the others lay there independently.
+/// Share of its hidden irradiance that is subtracted for each occluder (centre relative to the receiver, radius). For
+/// two occluders this is 1 − Overlapped% of [FIV 15], so that the sum of both is [FIV 14]. For more occluders it is the
+/// mean of 1 / (1 + number of other occluders at a point), with independent occluders.
 pub fn shares(normal: DVec3, occluders: &[(DVec3, f64)]) -> Vec<f64> {
     let disc = |&(to, radius): &(DVec3, f64)| (to.normalize_or_zero(), (radius / to.length().max(1e-20)).min(1.0));
     let share = |i: usize| {
@@ -208,7 +213,7 @@ pub fn shares(normal: DVec3, occluders: &[(DVec3, f64)]) -> Vec<f64> {
                 both * front(occluders[j].0.dot(normal), occluders[j].1)
             })
             .collect();
-        // How many others there are: the distribution of a sum of independent events.
+        // Distribution of the number of other occluders, a sum of independent events.
         let mut chances = vec![1.0];
         for g in others {
             let mut next = vec![0.0; chances.len() + 1];
@@ -245,7 +250,7 @@ mod tests {
     fn even_light_gives_pi_for_every_normal_and_no_vector() {
         let sky = even(32);
         for n in normals().chain([DVec3::X, DVec3::NEG_Y, DVec3::Z]) {
-            // Texels on the horizon count with their mean, which is a little too little.
+            // Texels on the horizon count with their mean cosine, which is slightly too small.
             let found = irradiance(&sky, n).x / PI;
             assert!((0.9993..1.000001).contains(&found), "{n}: {found}");
         }
@@ -301,7 +306,7 @@ mod tests {
             let all = shares(up, &vec![at(0.2); count]);
             assert!((all.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{count}");
         }
-        // What lies behind the receiver takes nothing away.
+        // Occluders behind the receiver hide no light.
         assert_eq!(shares(up, &[at(0.0), (DVec3::new(0.0, -2.0, 0.0), 0.5)])[0], 1.0);
         assert_eq!((front(-1.0, 1.0), front(0.0, 1.0), front(1.0, 1.0), front(0.5, 1.0)), (0.0, 0.5, 1.0, 0.75));
     }
@@ -346,7 +351,7 @@ mod tests {
                 let found = cut(vector(d, behind), (front, behind), (d, rho, radius), 1.0);
                 assert!((found - exact).length() < 1e-12, "{d}: {found} instead of {exact}");
             }
-            // What lies in front or behind needs no guess: a wrong one does nothing.
+            // A ball wholly in front or behind needs no estimate, so a wrong estimate has no effect.
             let found = cut(vector(d, back), (front, back), (d, rho, radius), 0.1);
             let apart = (found - exact).length();
             assert!(if d.abs() >= radius { apart < 1e-12 } else { apart < 0.5 * front.length() }, "{d}: {found}");
@@ -369,7 +374,7 @@ mod tests {
             let v = light(shells.offset(&grid, i));
             fivs.extend(v.iter().flat_map(|c| c.to_array()).map(|x| x as f32));
         }
-        let set = Set { grid, shells, paces: &Paces::default(), solid: None, fivs: &fivs };
+        let set = Set { grid, shells, spacing: &Spacing::default(), solid: None, fivs: &fivs };
         let close = |a: &Vectors, b: &Vectors, slack: f64| (0..3).all(|k| (a[k] - b[k]).length() < slack);
         for i in 0..grid.count() {
             let offset = shells.offset(&grid, i);
@@ -399,8 +404,8 @@ mod tests {
         let (grid, shells) = (Grid::of(12, 7, 4), Shells { nearest: 0.5, farthest: 8.0 });
         let light = |d: DVec3| 3.0 / d.length_squared().max(1.0);
         let fivs: Vec<f32> = (0..grid.count()).flat_map(|i| [light(shells.offset(&grid, i)) as f32; 9]).collect();
-        let paces = Paces::default();
-        let set = |solid| Set { grid, shells, paces: &paces, solid, fivs: &fivs };
+        let spacing = Spacing::default();
+        let set = |solid| Set { grid, shells, spacing: &spacing, solid, fivs: &fivs };
         for rho in [0.2, 0.5, 0.7, 1.0, 1.3, 2.0, 3.1, 5.0, 7.9, 8.0, 13.0] {
             let d = DVec3::new(0.48, -0.6, 0.64) * rho;
             let error = |solid| (set(solid).lookup(d).0[1].x / light(d) - 1.0).abs();
@@ -415,7 +420,7 @@ mod tests {
         let (grid, shells) = (Grid::of(4, 3, 2), Shells { nearest: 1.0, farthest: 2.0 });
         let mut fivs = vec![2.0f32; 9 * grid.count() as usize];
         (0..grid.index(0, 0, 1) as usize).for_each(|i| fivs[9 * i] = 2e38);
-        let set = Set { grid, shells, paces: &Paces::default(), solid: None, fivs: &fivs };
+        let set = Set { grid, shells, spacing: &Spacing::default(), solid: None, fivs: &fivs };
         let (found, weight) = set.lookup(DVec3::X * 2f64.sqrt());
         assert!((found[0].x - 2.0).abs() < 1e-9 && (weight - 0.5).abs() < 1e-9);
         assert_eq!(set.lookup(DVec3::X), (Vectors::default(), 0.0));

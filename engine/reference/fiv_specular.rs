@@ -1,5 +1,6 @@
-//! Glossy reflection of an environment, slowly: sums over its texels in double precision, rays by the CPU's hierarchy, and the share that
-//! occluders leave of its cells (techniques::fiv::specular). Written from Walter et al. 2007, Heitz 2014 and Schlick 1994.
+//! Slow twin of the glossy reflection of an environment: sums over its texels in double precision, rays through the
+//! hierarchy of the CPU, and the share of its cells that occluders leave visible (techniques::fiv::specular). After
+//! Walter et al. 2007, Heitz 2014 and Schlick 1994.
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,9 +10,9 @@ use crate::{
     scene::bvh::{Bvh, Ray},
     shaders::types::FivLobe,
     techniques::fiv::{
-        pace::Paces,
         samples::{Grid, Shells},
         sky::{self, Sky},
+        spacing::Spacing,
         specular::cell,
     },
 };
@@ -19,7 +20,7 @@ use crate::{
 /// A glossy surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
-    /// From where rays start, metres.
+    /// Origin of shadow rays, metres.
     pub point: Vec3,
     /// Unit length.
     pub normal: DVec3,
@@ -27,17 +28,17 @@ pub struct Surface {
     pub eye: DVec3,
     /// Reflectance at normal incidence.
     pub f0: DVec3,
-    /// Perceptual.
+    /// Perceptual roughness.
     pub roughness: f64,
 }
 
-/// Square of the GGX width alpha; below a roughness of 0.045 it gets no less.
+/// Square of the GGX width alpha. Roughness below 0.045 counts as 0.045.
 pub fn width2(roughness: f64) -> f64 {
     roughness.max(0.045).powi(4)
 }
 
-/// BRDF × cosine for light from around `light`, a unit vector; `spread` makes the distribution of normals wider, and more so the less
-/// light and eye see each other from one side; the square of its width is never below `least`.
+/// BRDF × cosine for a lobe of light around `light`, a unit vector. `spread` widens the distribution of normals, more
+/// so at a large angle between light and eye. `least` is the least square of the width.
 pub fn response(surface: &Surface, light: DVec3, (spread, least): (f64, f64)) -> DVec3 {
     let (n, v) = (surface.normal, surface.eye);
     let cosine = n.dot(light);
@@ -60,7 +61,8 @@ pub fn response(surface: &Surface, light: DVec3, (spread, least): (f64, f64)) ->
     fresnel * (distribution * both / (4.0 * nv))
 }
 
-/// Light of the environment that a surface reflects glossily, W/(sr·m²); geometry hides the texels whose middle it meets.
+/// Radiance of the environment that a surface reflects glossily, W/(sr·m²). Geometry hides the texels whose middles it
+/// covers.
 pub fn reflected(sky: &Sky, surface: &Surface, geometry: Option<&Bvh>) -> DVec3 {
     let mut sum = DVec3::ZERO;
     for (i, radiance) in sky.radiance.iter().enumerate() {
@@ -80,7 +82,7 @@ pub fn reflected(sky: &Sky, surface: &Surface, geometry: Option<&Bvh>) -> DVec3 
     sum
 }
 
-/// The part of light from everywhere alike that a surface reflects glossily: `steps`² normals by their GGX probability.
+/// Share of constant radiance that a surface reflects glossily, from `steps`² normals by their GGX probability.
 pub fn albedo(surface: &Surface, steps: u32) -> DVec3 {
     let n = surface.normal;
     let (right, up) = n.any_orthonormal_pair();
@@ -103,7 +105,8 @@ pub fn albedo(surface: &Surface, steps: u32) -> DVec3 {
     sum / f64::from(steps * steps)
 }
 
-/// The share of the light of each cell that geometry hides from a point; `weights` of the texels as [`Cells::of`] has them.
+/// Share of the light of each cell that geometry hides from a point. `weights`: weights of the texels as [`Cells::of`]
+/// has them.
 ///
 /// [`Cells::of`]: crate::techniques::fiv::specular::Cells::of
 pub fn hidden(size: u32, weights: &[f32], cells: usize, geometry: &Bvh, point: Vec3) -> Vec<f64> {
@@ -118,7 +121,8 @@ pub fn hidden(size: u32, weights: &[f32], cells: usize, geometry: &Bvh, point: V
     out
 }
 
-/// What a surface reflects of cells, and what of it is left where occluders hide these shares of them. W/(sr·m²).
+/// Radiance that a surface reflects from cells without occluders, and the radiance that is left if occluders hide these
+/// shares of the cells, W/(sr·m²).
 pub fn left(lobes: &[FivLobe], surface: &Surface, hidden: &[Vec<f64>]) -> (DVec3, DVec3) {
     let (mut whole, mut left) = (DVec3::ZERO, DVec3::ZERO);
     for (i, lobe) in lobes.iter().enumerate().filter(|(_, lobe)| lobe.power != [0.0; 3]) {
@@ -131,24 +135,25 @@ pub fn left(lobes: &[FivLobe], surface: &Surface, hidden: &[Vec<f64>]) -> (DVec3
     (whole, left)
 }
 
-/// Samples of one occluder with what it hides of cells.
+/// Samples of one occluder with the hidden shares of cells.
 #[derive(Clone, Copy, Debug)]
 pub struct Masks<'a> {
     pub grid: Grid,
     pub shells: Shells,
-    pub paces: &'a Paces,
-    /// Words of a sample, each of four cells of a byte.
+    pub spacing: &'a Spacing,
+    /// Words per sample, with four cells of a byte each.
     pub words: usize,
     pub shares: &'a [u32],
-    /// Nine for each sample, as in [`super::fiv::Set`]: those inside of the occluder are told by them.
+    /// Vectors as in [`super::fiv::Set`]. They mark the samples inside the occluder.
     pub fivs: &'a [f32],
 }
 
 impl Masks<'_> {
-    /// The share of each cell that is hidden where the occluder's centre lies at `offset`, metres: trilinear between samples.
+    /// Hidden share of each cell if the occluder's centre lies at `offset` (metres) from the receiver, trilinear
+    /// between samples.
     pub fn lookup(&self, offset: DVec3) -> Vec<f64> {
         let Grid { azimuths, polars, radii } = self.grid;
-        let numbers = self.paces.numbers(&self.grid, &self.shells, offset);
+        let numbers = self.spacing.numbers(&self.grid, &self.shells, offset);
         let low = [azimuths - 1, polars - 2, radii - 2].map(f64::from);
         let first = [0, 1, 2].map(|k| numbers[k].floor().min(low[k]));
         let (mut sum, mut weights) = (vec![0.0; 4 * self.words], 0.0);
@@ -172,7 +177,7 @@ impl Masks<'_> {
             }
         }
         let beyond = (f64::from(self.shells.farthest) / offset.length().max(1e-30)).min(1.0).powi(2);
-        // Where most samples lie inside, so does the receiver: everything is hidden.
+        // If most samples lie inside the occluder, the receiver does too, and all light is hidden.
         let inside = (1.0 - 2.0 * weights).clamp(0.0, 1.0);
         let scale = if weights > 0.0 { beyond / weights * (1.0 - inside) } else { 0.0 };
         sum.into_iter().map(|s| s * scale + inside).collect()
@@ -196,7 +201,8 @@ mod tests {
             assert!((mirror - 1.0).abs() < 2e-3, "{cosine}: {mirror}");
             let rough = albedo(&surface(1.0, cosine, 1.0), 128).x;
             assert!(rough > 0.3 && rough < 0.8, "{cosine}: {rough}");
-            // Schlick: with little at normal incidence almost only the fifth power is left; without an interface nothing is.
+            // Schlick: with a small reflectance at normal incidence almost only the fifth power is left, and without an
+            // interface nothing is reflected.
             let dark = albedo(&surface(0.0, cosine, 0.02), 64).x;
             assert!((dark - 0.02 - 0.98 * (1.0 - cosine).powi(5)).abs() < 2e-3, "{cosine}: {dark}");
             assert_eq!(albedo(&surface(0.0, cosine, 0.0), 64).x, 0.0);
@@ -220,7 +226,7 @@ mod tests {
         let sky = Sky::new(Some(&Environment::constant(Vec3::ONE)), 32).unwrap();
         for (roughness, slack) in [(0.0, 0.05), (0.2, 0.05), (0.35, 0.02), (0.6, 0.01), (1.0, 0.01)] {
             for cosine in [0.35, 0.7, 0.95] {
-                // Seen from the side, some light of texels that are wider than the lobe falls behind the surface.
+                // At grazing view some light of texels wider than the lobe falls behind the surface.
                 let slack = if cosine < 0.5 && roughness < 0.3 { 0.13 } else { slack };
                 let surface = surface(roughness, cosine, 1.0);
                 let (found, exact) = (reflected(&sky, &surface, None).x, albedo(&surface, 128).x);

@@ -6,7 +6,7 @@ use super::isr_scene::{Buffers, Eye};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 
-/// Equation 6: the share of what leaves a differential patch at `p` that arrives at the area `d_area` (m²) at `x`.
+/// Form factor [ISR 6]: the share of what leaves a differential patch at `p` that arrives at the area `d_area` (m²) at `x`.
 /// Unbounded as the two touch.
 pub fn form_factor(p: DVec3, p_normal: DVec3, x: DVec3, x_normal: DVec3, d_area: f64) -> f64 {
     let line = x - p;
@@ -16,7 +16,7 @@ pub fn form_factor(p: DVec3, p_normal: DVec3, x: DVec3, x_normal: DVec3, d_area:
     if cos_p * cos_x == 0.0 { 0.0 } else { cos_p * cos_x * d_area / (PI * line.length_squared()) }
 }
 
-/// Equation 26 without the factor 2π/N: how much a sphere of `radius` at `x` hides from `p`.
+/// Occlusion [ISR 26] without the factor 2π/N: how much a sphere of `radius` at `x` hides from `p`.
 pub fn occlusion(p: DVec3, normal: DVec3, x: DVec3, radius: f64, bias: f64) -> f64 {
     let distance = p.distance(x);
     if distance < 1e-6 {
@@ -26,12 +26,12 @@ pub fn occlusion(p: DVec3, normal: DVec3, x: DVec3, radius: f64, bias: f64) -> f
     (1.0 - (1.0 - sine.powi(2)).sqrt()) * (normal.dot((x - p) / distance) - bias).max(0.0)
 }
 
-/// Equation 16.
+/// Attenuation [ISR 16] of the dissertation's spherical lights; both arguments in metres.
 pub fn paper_attenuation(distance: f64, light_radius: f64) -> f64 {
     (1.0 - (distance / light_radius).powi(2)).clamp(0.0, 1.0)
 }
 
-/// Equation 29. `accessibility` = 1 − accumulated occlusion, clamped to 0..1.
+/// Sum of all light [ISR 29]. `accessibility` = 1 − accumulated occlusion, clamped to 0..1.
 pub fn sum(direct: DVec3, accessibility: f64, indirect: DVec3, k_ssao: f64, k_isr: f64) -> DVec3 {
     direct * (accessibility + 1.0 - k_ssao).clamp(0.0, 1.0) + indirect * k_isr
 }
@@ -110,7 +110,7 @@ pub fn jitter(x: usize, y: usize) -> DVec2 {
 /// What one sample of the sum stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Estimator {
-    /// Equation 25: (2π/N) · F, with the footprint of one texel in F.
+    /// The sum [ISR 25]: (2π/N) · F, with the footprint of one texel in F.
     Paper,
     /// The same with the footprint of the sample's whole cell in F.
     PaperCells,
@@ -174,6 +174,7 @@ pub fn gather_texel(eye: &Eye, buffers: &Buffers, settings: &Gather, x: usize, y
         let (q, q_normal) = (buffers.position(eye, sx, sy), buffers.normal[sender].normalize());
         let texel = buffers.footprint(eye, sx, sy);
         let factor = match settings.estimator {
+            // [ISR 25]
             Estimator::Paper => 2.0 * PI / count * form_factor(p, n, q, q_normal, texel),
             Estimator::PaperCells => 2.0 * PI / count * form_factor(p, n, q, q_normal, texel * area),
             Estimator::Area => {
@@ -192,6 +193,7 @@ pub fn gather_texel(eye: &Eye, buffers: &Buffers, settings: &Gather, x: usize, y
     for (sx, sy, area) in others(settings.occlusion_reach) {
         let z = buffers.depth[buffers.at(sx, sy)];
         let radius = settings.occluder_radius * (area * buffers.facing_area(eye, z)).sqrt();
+        // [ISR 26]
         hidden += 2.0 * PI / count * occlusion(p, n, buffers.position(eye, sx, sy), radius, settings.occlusion_bias);
     }
     (light * buffers.mask[here], hidden)
@@ -262,7 +264,7 @@ pub fn gaussian(width: usize, height: usize, image: &[f64], radius: i64, sigma: 
     result
 }
 
-/// Equations 27 and 28 for one pixel between four coarse samples, each with value and distance in depth; (x, y) in 0..1 from
+/// Bilateral upsampling [ISR 27] with weights normalised by [ISR 28], for one pixel between four coarse samples, each with value and distance in depth; (x, y) in 0..1 from
 /// the first. `None` stands for background. If the best share of the largest weight 1/ε is below 1 %, the nearest in depth.
 pub fn upsample(samples: [Option<(f64, f64)>; 4], x: f64, y: f64, epsilon: f64) -> f64 {
     let bilinear = [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y];

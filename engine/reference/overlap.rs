@@ -1,4 +1,4 @@
-//! What several occluders hide together of an environment, slowly: every pair looked at, in double precision.
+//! Slow twin of the overlap correction: every pair of occluders in double precision.
 
 use std::f64::consts::PI;
 
@@ -10,28 +10,30 @@ use crate::techniques::fiv::{Shared, spots::Spot};
 /// An occluder as a receiver sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
-    /// Of the bounding sphere's centre from the receiver, metres.
+    /// Offset of the bounding sphere's centre from the receiver, metres.
     pub offset: DVec3,
-    /// Of the bounding sphere, metres.
+    /// Radius of the bounding sphere, metres.
     pub radius: f64,
-    /// Share of its bounding disc that it hides, on average.
+    /// Mean share of its bounding disc that it fills.
     pub fill: f64,
-    /// What it would hide alone, as if it lay wholly before the receiver's plane, W/m².
+    /// Irradiance that it would hide alone if it lay wholly in front of the receiver's plane, W/m².
     pub hidden: DVec3,
-    /// Angle from one sample to the next, over two: what is looked up between them is as soft.
+    /// Half the angle between two samples, radians: interpolated shadow edges are this soft.
     pub soft: f64,
 }
 
 impl Seen {
-    /// Direction, and sine of the radius of its disc.
+    /// Direction and sine of the radius of its disc.
     fn disc(&self) -> (DVec3, f64) {
         (self.offset.normalize_or_zero(), (self.radius / self.offset.length().max(1e-20)).min(1.0))
     }
 }
 
-/// Irradiance that is left of `open` (W/m²): for two occluders without bright parts eq. 15 of the thesis with discs that are filled in
-/// part; for more, the mean of 1 / (1 + others there), as if these lay there independently. With [`Shared::Lights`] what an occluder
-/// hides beyond its share of even light is taken from the bright parts that its disc can reach, and of each no more than it sends.
+/// Irradiance that is left of `open` (W/m²). For two occluders without bright parts this is [FIV 15] for discs that are
+/// partly filled. For more occluders the factor is the mean of 1 / (1 + number of other occluders at a point), with
+/// independent occluders. With [`Shared::Lights`] the irradiance that an occluder hides beyond its share of constant
+/// radiance is subtracted from the bright parts that its disc can cover, and at most all light of each part is
+/// subtracted.
 pub fn left(open: DVec3, normal: DVec3, occluders: &[Seen], spots: &[Spot], shared: Shared) -> DVec3 {
     let spots = if shared == Shared::Lights && occluders.len() > 1 { spots } else { &[] };
     let light = |spot: &Spot| {
@@ -61,11 +63,11 @@ pub fn left(open: DVec3, normal: DVec3, occluders: &[Seen], spots: &[Spot], shar
     (sum - spent).max(DVec3::ZERO)
 }
 
-/// Share of what `own` hides that is taken away for it.
+/// Share of the irradiance that `own` hides that is subtracted for it.
 fn share<'a>(own: &Seen, others: impl Iterator<Item = &'a Seen>, normal: DVec3, shared: Shared) -> f64 {
     let (direction, r) = own.disc();
     let fill = |o: &Seen| if shared == Shared::Discs { 1.0 } else { o.fill };
-    // How many others there are: the distribution of a sum of independent events.
+    // Distribution of the number of other occluders, a sum of independent events.
     let mut chances = vec![1.0];
     for other in others {
         let (at, s) = other.disc();
@@ -82,7 +84,7 @@ fn share<'a>(own: &Seen, others: impl Iterator<Item = &'a Seen>, normal: DVec3, 
     chances.iter().enumerate().map(|(k, chance)| chance / (k + 1) as f64).sum()
 }
 
-/// How much of a bright part a disc can hide.
+/// Share of a bright part that a disc can hide.
 fn reached(spot: &Spot, direction: DVec3, r: f64, soft: f64) -> f64 {
     let b = f64::from(spot.packed().radius);
     let apart = spot.direction.distance(direction);
@@ -93,7 +95,7 @@ fn reached(spot: &Spot, direction: DVec3, r: f64, soft: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// A small light above and even light, of one W/m² each.
+    /// A small light above and constant radiance, of one W/m² each.
     fn sun() -> Spot {
         Spot { direction: DVec3::Y, angle: 1e-3, vectors: [DVec3::ZERO, DVec3::ONE, DVec3::ZERO] }
     }
@@ -105,14 +107,14 @@ mod tests {
     #[test]
     fn one_shadow_on_another_leaves_a_light_hidden_once() {
         let open = DVec3::splat(2.0);
-        // Each hides the sun and a hundredth of the rest.
+        // Each occluder hides the sun and a hundredth of the other light.
         let two = [over(5.0, 0.0, 1.012), over(9.0, 0.0, 1.0037)];
         let once = left(open, DVec3::Y, &two, &[sun()], Shared::Lights);
         assert!((once.x - 0.985).abs() < 0.01, "{once}");
-        // The mean fill says that the second one hides mostly something else.
+        // By the mean fill alone the second occluder would mostly hide other light.
         let twice = left(open, DVec3::Y, &two, &[sun()], Shared::Filled);
         assert!(twice.x < 0.2, "{twice}");
-        // What lies apart is taken from each.
+        // Occluders that do not overlap are subtracted separately.
         let apart = [over(5.0, 3.0, 0.01), over(5.0, -3.0, 0.01), two[0]];
         let left_over = left(open, DVec3::Y, &apart, &[sun()], Shared::Lights);
         assert!((left_over.x - (2.0 - 1.012 - 0.02)).abs() < 1e-9, "{left_over}");

@@ -145,7 +145,7 @@ impl Description {
                 _ => true,
             };
             if !good {
-                let found = if found.is_null() { "NaN or infinity".to_owned() } else { found.to_string() };
+                let found = found.as_f64().map_or_else(|| "NaN or infinity".to_owned(), |found| found.to_string());
                 let what = format!("{found} is not allowed; allowed: {}", key.allowed);
                 return Err(Error::usage(what).at(&key.name));
             }

@@ -84,8 +84,11 @@ fn numbers_out_of_range_are_refused_with_what_is_allowed() {
         (Settings { vpls: 9, ..good.clone() }, "vpls: 9 is not allowed; allowed: multiples of 8 from 1 to 96"),
         (Settings { vpls: 104, ..good.clone() }, "vpls: 104 is not allowed; allowed: multiples of 8 from 1 to 96"),
         (Settings { bound: 0.001, ..good.clone() }, "bound: 0.001 is not allowed; allowed: 0, or 0.002 to 0.2"),
-        (Settings { bound: f32::NAN, ..good.clone() }, "bound: NaN or infinity is not allowed; allowed: 0, or 0.002 to 0.2"),
-        (Settings { limit: Some(-1.0), ..good.clone() }, "limit: -1.0 is not allowed; allowed: 0 to 10"),
+        (
+            Settings { bound: f32::NAN, ..good.clone() },
+            "bound: NaN or infinity is not allowed; allowed: 0, or 0.002 to 0.2",
+        ),
+        (Settings { limit: Some(-1.0), ..good.clone() }, "limit: -1 is not allowed; allowed: 0 to 10"),
         (Settings { a_number: 25, ..good.clone() }, "a_number: 25 is not allowed; allowed: 24, 48"),
     ] {
         let error = check(wrong).unwrap_err();
@@ -120,22 +123,61 @@ fn differences_and_choices_of_another() {
 }
 
 #[test]
-fn toml_says_what_keys_do_and_reads_back() {
-    let settings = Settings { other: Some(Rays::ByDevice), bound: 1e-2, ..Settings::default() };
-    let text = description().toml(&settings, "test").unwrap();
-    let expected = "# Lights at most.\n# A second paragraph, over two lines.\n# Allowed: multiples of 8 from 1 to 96 lights.\nvpls = 8\n";
-    assert!(text.starts_with(&format!("[test]\n{expected}")), "{text}");
-    assert!(text.contains("# by-device: By the device.\n") && text.contains("# Needs on = true.\nrays = \"trees\"\n"), "{text}");
-    assert!(text.contains("# limit = …\n"), "{text}");
-    let mut read: toml::Table = toml::from_str(&text).unwrap();
-    let read: Settings = read.remove("test").unwrap().try_into().unwrap();
-    assert_eq!(read, settings);
+fn comments_say_what_keys_do() {
+    let comment = |name| description().key(name).unwrap().comment();
+    let vpls = [
+        "# Lights at most.",
+        "# A second paragraph, over two lines.",
+        "# Allowed: multiples of 8 from 1 to 96 lights.",
+    ];
+    assert_eq!(comment("vpls"), vpls);
+    let rays = [
+        "# trees: Through trees.",
+        "# by-device: By the device.",
+        "# Allowed: trees, by-device.",
+        "# Needs on = true.",
+    ];
+    assert_eq!(comment("rays")[..], rays[..]);
+}
+
+#[test]
+fn every_key_of_the_techniques_is_described() {
+    for (technique, description) in crate::techniques::descriptions() {
+        for key in &description.keys {
+            let text = format!("{technique}.{}", key.name);
+            assert!(!key.doc.is_empty(), "{text} has no docs");
+            if let Kind::Choice(all) = &key.kind {
+                assert!(all.len() > 1 && all.iter().all(|choice| !choice.doc.is_empty()), "{text}: {all:?}");
+            }
+            let number = matches!(key.kind, Kind::Whole | Kind::Number);
+            assert_eq!(key.allowed != Allowed::All, number, "{text} has no range");
+            let default = key.default.as_f64();
+            assert!(default.is_none_or(|default| key.allowed.contains(default)), "{text}: {:?}", key.default);
+            for (needed, condition) in &key.needs {
+                let other = description.key(needed).unwrap_or_else(|| panic!("{text} needs {needed}, which is no key"));
+                let rules = condition.as_object().unwrap();
+                let known = ["const", "enum", "minimum", "exclusiveMinimum", "not"];
+                assert!(rules.keys().all(|rule| known.contains(&rule.as_str())), "{text}: {condition}");
+                // Words of conditions are words of the key.
+                if let Kind::Choice(all) = &other.kind {
+                    let words = rules.values().flat_map(|with| match with {
+                        serde_json::Value::Array(all) => all.clone(),
+                        serde_json::Value::Object(not) => not.values().cloned().collect(),
+                        one => vec![one.clone()],
+                    });
+                    for word in words {
+                        assert!(all.iter().any(|choice| word == choice.name.as_str()), "{text}: {condition}");
+                    }
+                }
+            }
+        }
+    }
 }
 
 #[test]
 fn the_table_has_a_row_a_key() {
     let table = description().table();
     assert_eq!(table.lines().count(), 2 + description().keys.len());
-    let row = "| `limit` | 0 to 10 | open |  Needs rays = by-device. |";
+    let row = "| `limit` | 0 to 10 | open | Needs rays = by-device. |";
     assert!(table.lines().any(|line| line == row), "{table}");
 }

@@ -1,8 +1,6 @@
 //! A description for people: ranges in words, TOML with comments, tables in Markdown.
 
-use super::{Allowed, Description, Key, Kind, description::plain, schema};
-use crate::Result;
-use serde::Serialize;
+use super::{Allowed, Description, Key, Kind, description::plain};
 use serde_json::Value;
 use std::fmt::{self, Display, Formatter};
 
@@ -94,34 +92,19 @@ fn paragraphs(doc: &str) -> impl Iterator<Item = String> {
     })
 }
 
-impl Description {
-    /// Settings as TOML, each key below what it does, its values, its unit and what it needs. Reading it gives the same settings.
-    ///
-    /// `group`: name of the table, as in `-D group.key=value`.
-    ///
-    /// # Errors
-    /// `Runtime` if the settings cannot be written.
-    pub fn toml<S: Serialize>(&self, settings: &S, group: &str) -> Result<String> {
-        let values = schema::values(settings)?;
-        let mut out = format!("[{group}]\n");
-        for key in &self.keys {
-            let mut about = key.lines();
-            about.extend(Some(key.values()).filter(|values| !values.is_empty()).map(|values| format!("Allowed: {values}.")));
-            about.extend(Some(key.needs()).filter(|needs| !needs.is_empty()).map(|needs| format!("Needs {needs}.")));
-            about.iter().flat_map(|line| wrapped(line)).for_each(|line| out.push_str(&format!("# {line}\n")));
-            let line = match values.get(&key.name).unwrap_or(&Value::Null) {
-                // TOML has no word for it: the key is left out.
-                Value::Null => format!("# {} = …\n", key.name),
-                value => format!("{} = {value}\n", key.name),
-            };
-            out.push_str(&line);
-            out.push('\n');
-        }
-        out.truncate(out.trim_end().len());
-        out.push('\n');
-        Ok(out)
+impl Key {
+    /// What a person has to know who writes the key into a TOML file, as comment lines of at most [`WIDTH`] characters.
+    pub fn comment(&self) -> Vec<String> {
+        let mut about = self.lines();
+        about.extend(
+            Some(self.values()).filter(|values| !values.is_empty()).map(|values| format!("Allowed: {values}.")),
+        );
+        about.extend(Some(self.needs()).filter(|needs| !needs.is_empty()).map(|needs| format!("Needs {needs}.")));
+        about.iter().flat_map(|line| wrapped(line)).map(|line| format!("# {line}")).collect()
     }
+}
 
+impl Description {
     /// The table of the keys in Markdown: key, values, default, what the key does.
     pub fn table(&self) -> String {
         let mut out = "| key | values | default | |\n|---|---|---|---|\n".to_owned();
@@ -130,7 +113,7 @@ impl Description {
             if !key.needs.is_empty() {
                 about.push_str(&format!(" Needs {}.", key.needs()));
             }
-            let cell = |text: &str| text.replace('|', "\\|");
+            let cell = |text: &str| text.trim().replace('|', "\\|");
             let (values, default) = (key.values(), plain(&key.default));
             out.push_str(&format!("| `{}` | {} | {} | {} |\n", key.name, cell(&values), cell(&default), cell(&about)));
         }

@@ -1,4 +1,4 @@
-//! The options that every program has.
+//! Command line options that several programs share.
 
 use std::{ops::Range, path::PathBuf, str::FromStr};
 
@@ -12,12 +12,12 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub stage: StageArgs,
 
-    /// Image to write; may be given more than once. The ending chooses the format: .exr (all layers), .png, .jpg, .hdr, .pfm.
+    /// Image to write; may be given more than once. The extension chooses the format: .exr (all layers), .png, .jpg, .hdr, .pfm.
     /// Placeholders: {scene} {camera} {technique} {frame:04} {layer}. [default: {scene}-{camera}-{technique}.png]
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     pub output: Vec<String>,
 
-    /// Replace images that exist
+    /// Overwrite existing images
     #[arg(long, help_heading = "Output")]
     pub overwrite: bool,
 
@@ -33,15 +33,15 @@ pub struct RenderArgs {
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     pub dump: Option<PathBuf>,
 
-    /// Write the time of every pass of every frame to this .csv file
+    /// Write the times of all passes of every frame to this .csv file
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub timings: Option<PathBuf>,
 
-    /// Render every frame N times; times are medians, and the picture is the first one
+    /// Render every frame N times; the times are medians, the picture is the first one
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = "Output")]
     pub repeat: u32,
 
-    /// List the passes with what they read and write, then stop
+    /// List the passes and the resources that they read and write, then stop
     #[arg(long, help_heading = "Output")]
     pub list_passes: bool,
 
@@ -57,22 +57,22 @@ pub struct RenderArgs {
     #[arg(long, default_value_t = 30.0, value_parser = positive, help_heading = "Picture")]
     pub fps: f64,
 
-    /// Begin no frame after this time: 90, 90s, 10m, 1h30m; the first is always made; exit code 8 if some are missing
+    /// Start no further frame after this time: 90, 90s, 10m, 1h30m. The first frame is always rendered. Exit code 8 if frames are missing
     #[arg(long, value_name = "TIME", help_heading = "Picture")]
     pub time_limit: Option<Span>,
 
-    /// Exposure: colours of .png files are multiplied by 2^EV [default: 0, or what suits the scene]
+    /// Exposure: colours of .png files are multiplied by 2^EV [default: 0, or chosen from the first picture if it is very dark or bright]
     #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
     pub exposure: Option<f64>,
 
-    /// Seed of everything random
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Picture")]
     pub seed: u32,
 
     #[command(flatten)]
     pub settings: SettingsArgs,
 
-    /// Start from the choices of the paper instead of our defaults
+    /// Use the paper's settings as defaults
     #[arg(long, help_heading = "Settings")]
     pub paper: bool,
 
@@ -104,14 +104,14 @@ pub struct DeviceArgs {
     pub ray_query: Option<String>,
 }
 
-/// How much is said.
+/// Options for the amount of messages.
 #[derive(Args, Clone, Debug, Default)]
 pub struct TalkArgs {
-    /// Say more; may be repeated
+    /// Print more messages; may be repeated
     #[arg(short, long, action = ArgAction::Count, help_heading = "Messages")]
     pub verbose: u8,
 
-    /// Say nothing but warnings and errors
+    /// Print only warnings and errors
     #[arg(short, long, conflicts_with = "verbose", help_heading = "Messages")]
     pub quiet: bool,
 }
@@ -129,7 +129,7 @@ pub struct Size {
     pub height: u32,
 }
 
-/// Longest side that is accepted, pixels.
+/// Maximum of pixels along a side of an image.
 pub const MAX_SIDE: u32 = 16384;
 
 impl Size {
@@ -160,7 +160,7 @@ impl std::fmt::Display for Size {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frames(pub Range<u32>);
 
-/// Most frames of one run.
+/// Maximum of frames per run.
 pub const MAX_FRAMES: u32 = 1_000_000;
 
 impl Frames {

@@ -1,4 +1,4 @@
-//! Which camera a picture is taken with, and cameras from files.
+//! The choice of the camera (`--camera`), and camera files.
 
 use std::path::Path;
 
@@ -28,7 +28,7 @@ pub struct CameraFile {
     pub yfov_degrees: f32,
     #[serde(default = "znear")]
     pub znear: f32,
-    /// None: infinitely far.
+    /// `None`: at infinity.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zfar: Option<f32>,
 }
@@ -95,7 +95,7 @@ impl CameraFile {
     }
 }
 
-/// What `--camera` asked for.
+/// The camera that `--camera` names.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Choice {
     /// Index into the scene's cameras.
@@ -126,7 +126,7 @@ pub fn choose(asked: &str, names: &[&str]) -> Result<Choice> {
     Err(unknown(asked, names))
 }
 
-/// Takes `LIST.toml#VIEW` apart.
+/// Splits `LIST.toml#VIEW` into file and view.
 pub fn in_list(asked: &str) -> Option<(&str, &str)> {
     asked.rsplit_once('#').filter(|(file, _)| Path::new(file).extension().is_some_and(|e| e == "toml"))
 }

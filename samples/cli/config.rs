@@ -8,7 +8,7 @@ use lucerna::{Error, ErrorKind, Result, image};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::Value;
 
-/// The options that set settings.
+/// The options that change settings.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct SettingsArgs {
     /// Set one setting (`--print-config` shows all)
@@ -33,11 +33,11 @@ impl SettingsArgs {
         effective(base, self.file.as_deref(), &self.define)
     }
 
-    /// What `check` says of settings; what it says of those of the file alone is an error of the file. `of_file`: `check` of the
-    /// settings in effect without `-D`.
+    /// The result of checking the settings, with an error that names the settings file if the file is the cause. `checked`: result for
+    /// the settings in effect. `of_file`: the same check for the settings without `-D`.
     ///
     /// # Errors
-    /// Those of `check`; of kind `Input` and with the file's name where the file says it.
+    /// The error of `checked`; of kind `Input` and with the file's name if `of_file` fails as well.
     pub fn blamed(&self, checked: Result<()>, of_file: impl FnOnce() -> Result<()>) -> Result<()> {
         checked.map_err(|error| {
             let Some(path) = &self.file else { return error };
@@ -48,13 +48,13 @@ impl SettingsArgs {
         })
     }
 
-    /// The same without `-D`.
+    /// These options without `-D`.
     pub fn file_alone(&self) -> Self {
         Self { define: Vec::new(), ..self.clone() }
     }
 }
 
-/// Largest settings file that is read, bytes.
+/// Maximum size of a settings file, bytes.
 const MAX_FILE: u64 = 1 << 20;
 
 /// The settings in effect. `defines` are `dotted.key=value`, the value in TOML or a bare word.
@@ -79,7 +79,7 @@ pub fn effective<S: Serialize + DeserializeOwned>(base: &S, file: Option<&Path>,
     serde_json::from_value(tree).map_err(|error| Error::usage(format!("settings: {error}")))
 }
 
-/// `base` with some settings changed; keys as with `-D`, or groups of them.
+/// `base` with changed settings. The keys are as with `-D`, or name groups of settings.
 ///
 /// # Errors
 /// `Usage`, naming the key.
@@ -108,7 +108,7 @@ pub fn to_value<S: Serialize>(settings: &S) -> Result<Value> {
         .map_err(|error| Error::new(ErrorKind::Runtime, "settings are not JSON").caused_by(error))
 }
 
-/// Reads a small text file: a regular one of at most 1 MiB, whatever length it states.
+/// Reads a small text file. It must be a regular file of at most 1 MiB; the limit also holds if the file grows while it is read.
 pub(crate) fn read_text(path: &Path) -> Result<String> {
     let bytes = image::read_file_checked(path, MAX_FILE)?;
     String::from_utf8(bytes).map_err(|error| {
@@ -117,7 +117,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String> {
     })
 }
 
-/// What is wrong, and with which key.
+/// An error message, and the key to which it refers.
 struct Wrong(String, String);
 
 fn apply_all<S: Serialize + DeserializeOwned>(
@@ -128,7 +128,7 @@ fn apply_all<S: Serialize + DeserializeOwned>(
     let Value::Object(entries) = overrides else { return Ok(()) };
     for (key, value) in entries {
         path.push(key.clone());
-        // A table either goes into a table of the settings, or is a value by itself (an enum variant with fields).
+        // A table is merged into a table of the settings. If the settings have no table there, it is a value: an enum variant with fields.
         if value.is_object() && get(tree, path).is_some_and(Value::is_object) {
             let mut trial = tree.clone();
             let as_group = apply_all::<S>(&mut trial, path, value);
@@ -144,7 +144,7 @@ fn apply_all<S: Serialize + DeserializeOwned>(
     Ok(())
 }
 
-/// The path of `key`. Its groups may be left out where one setting alone has that ending: `samples` for `isr.samples`.
+/// The full path of `key`. The groups may be omitted if only one setting ends with the key: `samples` for `isr.samples`.
 fn full_path(tree: &Value, key: &str) -> Vec<String> {
     let split = |key: &str| key.split('.').map(str::to_owned).collect::<Vec<_>>();
     let asked = split(key);
@@ -160,7 +160,7 @@ fn full_path(tree: &Value, key: &str) -> Vec<String> {
     }
 }
 
-/// Sets one key, if the settings have it and take the value.
+/// Sets one key. Fails if the settings have no such key or reject the value.
 fn apply<S: Serialize + DeserializeOwned>(tree: &mut Value, path: &[String], value: Value) -> Result<(), Wrong> {
     let dotted = path.join(".");
     let mut trial = tree.clone();
@@ -184,7 +184,7 @@ fn get<'a>(tree: &'a Value, path: &[String]) -> Option<&'a Value> {
     path.iter().try_fold(tree, |value, key| value.as_object()?.get(key))
 }
 
-/// False if the way there leads through something that is not a table.
+/// Returns false if the path leads through a value that is not a table.
 fn set(tree: &mut Value, path: &[String], value: Value) -> bool {
     let Some((last, way)) = path.split_last() else { return false };
     let mut at = tree;
@@ -238,7 +238,7 @@ fn leaves(tree: &Value, prefix: &mut String, keys: &mut Vec<String>) {
     }
 }
 
-/// The name most like `asked`, if any is much like it.
+/// The name most similar to `asked`, if one is similar enough.
 pub fn nearest<'a>(asked: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     names
         .into_iter()
@@ -252,7 +252,7 @@ fn likeness(a: &str, b: &str) -> f64 {
     strsim::jaro_winkler(&a.to_lowercase(), &b.to_lowercase())
 }
 
-/// TOML errors come with the source line drawn below them; one line is enough here.
+/// The first lines of a TOML error. The rest only repeats the source line.
 fn first_lines(text: &str) -> String {
     let mut lines = text.lines().filter(|l| !l.trim_start().starts_with('|') && !l.contains(" | "));
     let first = lines.next().unwrap_or_default().trim();

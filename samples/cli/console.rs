@@ -1,4 +1,4 @@
-//! What a program says on stderr, and the one place that writes to stdout.
+//! Messages on stderr, and the only functions that write to stdout.
 
 use std::{
     borrow::Cow,
@@ -7,7 +7,7 @@ use std::{
 
 use lucerna::{Error, ErrorKind, Result};
 
-/// How much is said. Errors always are.
+/// Prints messages by their importance. Errors are always printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Console {
     /// −1 with `-q`, one more for each `-v`.
@@ -23,24 +23,24 @@ impl Console {
         Self { level, color }
     }
 
-    /// One line for what ended the program.
+    /// One line for the error that ends the program.
     pub fn error(&self, error: &Error) {
         self.line("error", "31", &error.to_string());
     }
 
-    /// Something the user should know, although the work goes on. Not silenced by `-q`.
+    /// A warning; the work continues. `-q` does not silence it.
     pub fn warning(&self, text: &str) {
         self.line("warning", "33", text);
     }
 
-    /// What is being done; silenced by `-q`.
+    /// Information about the work; `-q` silences it.
     pub fn info(&self, text: &str) {
         if self.level >= 0 {
             self.plain(text);
         }
     }
 
-    /// As [`Console::info`], from another thread than the one that shows progress: over a line that is not complete.
+    /// Like [`Console::info`], for other threads than the one that shows progress: overwrites an incomplete progress line.
     pub fn aside(&self, text: &str) {
         if self.level >= 0 {
             let clear = if std::io::stderr().is_terminal() { "\r\x1b[K" } else { "" };
@@ -48,7 +48,7 @@ impl Console {
         }
     }
 
-    /// Details; shown from `-v` on.
+    /// Details; printed with `-v`.
     pub fn detail(&self, text: &str) {
         if self.level >= 1 {
             self.plain(text);
@@ -73,13 +73,13 @@ impl Console {
         self.raw(&legible(text));
     }
 
-    /// stderr may be closed: that is no reason to stop.
+    /// Ignores errors: the work continues even if stderr is closed.
     fn raw(&self, text: &str) {
         let _ = writeln!(std::io::stderr().lock(), "{text}");
     }
 }
 
-/// Names and texts of files from elsewhere as a terminal may show them: what it would obey (escape sequences) is written out.
+/// Makes a text from an untrusted file safe for terminals: escape sequences are printed as text and not obeyed.
 pub fn legible(text: &str) -> Cow<'_, str> {
     let obeyed = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
     if !text.contains(obeyed) {
@@ -92,7 +92,7 @@ pub fn legible(text: &str) -> Cow<'_, str> {
     out.into()
 }
 
-/// Writes `text` and a line end to stdout. A reader that went away (`| head`) is not an error.
+/// Writes `text` and a line end to stdout. A closed pipe (`| head`) is not an error.
 pub fn print(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(legible(text).as_bytes()).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
@@ -103,7 +103,7 @@ pub fn print(text: &str) -> Result<()> {
     }
 }
 
-/// Anything as JSON.
+/// A value as JSON.
 pub fn to_json(value: &impl serde::Serialize) -> Result<serde_json::Value> {
     serde_json::to_value(value).map_err(|error| Error::new(ErrorKind::Runtime, "cannot be JSON").caused_by(error))
 }

@@ -1,4 +1,4 @@
-//! `lucerna devices`, and which device a program asks for.
+//! `lucerna devices`, and the choice of a device.
 
 use lucerna::{
     Error, Result,
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use crate::{args::DeviceArgs, signals::Interrupt};
 
 impl DeviceArgs {
-    /// The environment's choices, changed by the command line.
+    /// The options from environment variables, overridden by the command line.
     pub fn options(&self) -> Result<GpuOptions> {
         let mut options = GpuOptions::from_env()?;
         if let Some(device) = &self.device {
@@ -24,7 +24,7 @@ impl DeviceArgs {
     }
 }
 
-/// All devices, one line each, with what the unsuitable ones lack.
+/// A list of all devices, one line each, with the features that unsuitable devices lack.
 pub fn text(list: &[Listed]) -> String {
     let mut lines = Vec::new();
     for (index, device) in list.iter().enumerate() {
@@ -60,7 +60,7 @@ pub fn list(require_gpu: bool) -> Result<Vec<Listed>> {
     let is_gpu = |d: &Listed| d.missing.is_empty() && d.description.kind != DeviceKind::Cpu;
     if require_gpu && !list.iter().any(is_gpu) {
         return Err(Error::new(lucerna::ErrorKind::NoDevice, "no usable GPU among the devices")
-            .help("`lucerna devices` lists them with what they lack"));
+            .help("`lucerna devices` lists the devices and the features that they lack"));
     }
     Ok(list)
 }

@@ -1,25 +1,26 @@
-//! An exposure for scenes whose light is far from what a screen shows.
+//! The automatic exposure of .png files, for scenes whose radiance is far outside of a screen's range.
 //!
-//! glTF lights are in candela and lux: a scene lit by a bright sun has radiances of thousands.
+//! glTF lights are in candela and lux: a scene in bright sunlight has radiances of thousands.
 
 use lucerna::image::Layers;
 
-/// Medians of the brightest channel that are shown as they are, W/(sr·m²).
+/// If the median of the brightest channel is in this range, W/(sr·m²), the exposure stays 0.
 const FINE: std::ops::RangeInclusive<f32> = 0.01..=1.0;
-/// The median after exposure, where it had to be changed.
+/// The median after a changed exposure.
 const TARGET: f32 = 0.2;
 
-/// Nothing at all is seen.
+/// Whether all pixels are black.
 pub fn is_black(picture: &Layers) -> bool {
     picture.main().is_some_and(|layer| layer.data.iter().all(|value| *value <= 0.0))
 }
 
-/// Whole stops by which the picture must be scaled to be seen: 0 if it can be seen as it is.
+/// The exposure of a picture, EV; 0 if its median is in the screen's range.
 ///
-/// From the median of what is not black. Whole stops, so that rounding on another device does not show.
+/// Uses the median of the pixels that are not black. The result is a whole number of stops, so that rounding differences between devices do
+/// not change it.
 pub fn fitting(picture: &Layers) -> f64 {
     let Some(pixels) = picture.main().and_then(|layer| layer.rgb_pixels()) else { return 0.0 };
-    // Not luminance: a blue room is not dark.
+    // The brightest channel and not the luminance, because a blue room is not dark.
     let brightest = pixels.iter().map(|[r, g, b]| r.max(*g).max(*b));
     let mut lit: Vec<f32> = brightest.filter(|l| l.is_finite() && *l > 0.0).collect();
     if lit.is_empty() {

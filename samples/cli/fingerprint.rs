@@ -1,4 +1,4 @@
-//! A number that changes when a scene changes, for the metadata of pictures.
+//! A hash of a scene, for the metadata of pictures.
 
 use std::fmt::{self, Write};
 
@@ -7,9 +7,9 @@ use lucerna::{
     scene::{Environment, Mesh, Primitive, Scene, Texture},
 };
 
-/// 64 bits over everything of the scene that can reach a picture. For finding out that a file was edited, not for security.
+/// A 64-bit hash over all data of the scene that can change a picture. It detects edited files, but is not cryptographic.
 pub fn scene(scene: &Scene) -> String {
-    // Taken apart without `..`, so that what is added to a scene does not compile until it is here.
+    // Destructured without `..`, so that a new field of `Scene` is a compile error until it is handled here.
     let Scene {
         name: _,
         nodes,
@@ -50,7 +50,7 @@ pub fn scene(scene: &Scene) -> String {
 
 fn primitive(mixer: &mut Mixer, primitive: &Primitive) {
     let Primitive { positions, normals, tangents, uvs, colors, joints, weights, morphs, indices, material } = primitive;
-    // Lengths stand before lists: what moves from one to the next shows.
+    // Each list is preceded by its length, so that moving an element from one list to the next changes the hash.
     for vectors in [positions, normals] {
         mixer.word(vectors.len() as u64);
         vectors.iter().for_each(|v| mixer.floats(&v.to_array()));
@@ -69,7 +69,7 @@ fn primitive(mixer: &mut Mixer, primitive: &Primitive) {
     let _ = write!(mixer, "{joints:?}{weights:?}{morphs:?}");
 }
 
-/// The same of a picture.
+/// The hash of a picture.
 pub fn image(image: &Layers) -> String {
     let mut mixer = Mixer(0x9E37_79B9_7F4A_7C15);
     mixer.word(u64::from(image.width) << 32 | u64::from(image.height));
@@ -116,7 +116,7 @@ mod tests {
 
     use super::*;
 
-    /// Something of everything.
+    /// A scene with an element of every kind.
     fn full() -> Scene {
         let morph = MorphTarget { positions: vec![Vec3::X; 3], normals: vec![Vec3::Y; 3], ..MorphTarget::default() };
         let primitive = Primitive {
@@ -217,7 +217,7 @@ mod tests {
             edit(&mut edited);
             assert!(seen.insert(super::scene(&edited)), "{what} does not show");
         }
-        // What the scene is called decides no picture.
+        // The scene's name does not change a picture.
         assert!(seen.contains(&super::scene(&Scene { name: "other".into(), ..full() })));
     }
 

@@ -1,4 +1,4 @@
-//! A camera and light for scenes that bring none, so that every file gives a picture. What was added is said in a note.
+//! Adds a camera and lights to scenes without them, so that every file gives a picture. A note tells the user what was added.
 
 use glam::{Mat4, Quat, Vec3};
 use lucerna::scene::{
@@ -7,38 +7,39 @@ use lucerna::scene::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    room::{self, Room},
-    world,
+    interior::{self, Interior},
+    scene_bounds,
 };
 
-/// Full vertical angle of the camera that is added, radians.
+/// Full vertical angle of view of an added camera, radians.
 const YFOV: f32 = 45.0 * std::f32::consts::PI / 180.0;
-/// The same inside a room.
-const YFOV_ROOM: f32 = 60.0 * std::f32::consts::PI / 180.0;
-/// How much farther away than just seeing everything it stands.
-const ROOM: f32 = 1.05;
-/// Where the camera that is added stands, seen from the middle of the scene: to the right, above, in front.
+/// The same in an interior.
+const YFOV_INTERIOR: f32 = 60.0 * std::f32::consts::PI / 180.0;
+/// Factor on the distance from which an added camera just sees the whole scene.
+const MARGIN: f32 = 1.05;
+/// Direction from the middle of the scene to an added camera: to the right, above, in front.
 const VIEW_FROM: Vec3 = Vec3::new(0.55, 0.4, 1.0);
-/// Irradiance of the light that is added on a facing plane, W/m²: with the sky, a white wall facing it stays below radiance 1.
+/// Irradiance of an added sun on a plane that faces it, W/m². With the added sky, a white wall that faces the sun stays below radiance 1.
 const SUN: f32 = 2.0;
-/// Height of the lamp that is added in a closed room, of the height of the room. On the floor it gives as much as the sun.
+/// Height of an added lamp, as share of the height of the interior. On the floor its irradiance is that of the added sun.
 const LAMP: f32 = 0.8;
-/// Where that light comes from.
+/// Direction towards an added sun.
 const SUN_FROM: Vec3 = Vec3::new(0.5, 1.0, 0.6);
-/// Radiance of the sky that is added, W/(sr·m²): above, at the horizon, below.
+/// Radiance of an added sky, W/(sr·m²): above, at the horizon, below.
 const SKY: [Vec3; 3] = [Vec3::new(0.24, 0.32, 0.44), Vec3::new(0.34, 0.34, 0.34), Vec3::new(0.12, 0.11, 0.09)];
 
-/// Adds a camera that sees the whole scene if there is none.
+/// Adds a camera that sees the whole scene, if the scene has no camera.
 pub fn add_missing_camera(scene: &mut Scene, aspect: f32) {
     if scene.nodes.iter().any(|node| node.camera.is_some()) {
         return;
     }
-    let (name, text, (world_from_view, projection)) = match room::find(scene) {
-        Some(room) => ("inside", "one was added inside the room that it is", in_room(&room)),
+    let (name, text, (world_from_view, projection)) = match interior::find(scene) {
+        Some(interior) => ("inside", "a camera was added inside the room", in_interior(&interior)),
         None => {
-            let bounds = world::reach(scene).unwrap_or(Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE });
-            let from = room::opening(scene).unwrap_or(VIEW_FROM);
-            ("fitted", "one was added that sees all of it", fitted(&bounds, aspect, from))
+            let bounds =
+                scene_bounds::over_animations(scene).unwrap_or(Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE });
+            let from = interior::opening(scene).unwrap_or(VIEW_FROM);
+            ("fitted", "a camera was added that sees the whole scene", fitted(&bounds, aspect, from))
         }
     };
     scene.cameras.push(Camera { name: name.into(), projection });
@@ -46,33 +47,33 @@ pub fn add_missing_camera(scene: &mut Scene, aspect: f32) {
     note(scene, "cameras", &format!("the scene has no camera: {text}"));
 }
 
-/// A camera at one end of a room, looking along it.
-fn in_room(room: &Room) -> (Mat4, Projection) {
+/// A camera at one end of an interior, looking along it.
+fn in_interior(room: &Interior) -> (Mat4, Projection) {
     let back = -room.forward;
     let right = Vec3::Y.cross(back);
     let world = Mat4::from_cols(right.extend(0.0), Vec3::Y.extend(0.0), back.extend(0.0), room.eye.extend(1.0));
     let znear = (room.length * 2e-3).max(1e-4);
-    (world, Projection::Perspective { yfov: YFOV_ROOM, aspect: None, znear, zfar: Some(room.length * 2.0) })
+    (world, Projection::Perspective { yfov: YFOV_INTERIOR, aspect: None, znear, zfar: Some(room.length * 2.0) })
 }
 
-/// When a light and a sky are added.
+/// When default lights are added.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DefaultLight {
-    /// If the scene has no light, no environment, and no surface that is a lamp
+    /// If the scene has no light, no environment, and no emissive surface without a texture
     #[default]
     Auto,
     Always,
     Never,
 }
 
-/// Said of scenes without any other light. It does not concern the path tracer.
-pub const EMISSIVE_ALONE: &str = "the scene is lit by its emissive surfaces alone; with isr only those that the picture shows give \
-                                  light (--default-light always adds a sun and a sky, --light a lamp)";
+/// Note for scenes without other lights. It does not apply to the path tracer.
+pub const EMISSIVE_ALONE: &str = "only emissive surfaces light the scene; with isr only the emissive surfaces in the picture give \
+                                  light (--default-light always adds a sun and a sky, --light adds a lamp)";
 
-/// Adds a sun and a sky to a scene that is dark, or as `choice` says.
+/// Adds default lights to a dark scene, or as `choice` demands: a lamp to an interior, else a sun and a sky.
 ///
-/// A surface with an emissive texture is a display, not a lamp: it lights nothing that one would notice.
+/// A surface with an emissive texture counts as a display and not as a lamp, because displays are too weak to light a scene.
 pub fn add_missing_light(scene: &mut Scene, choice: DefaultLight) {
     let lamp = |m: &Material| m.emissive.max_element() > 0.0 && m.emissive_texture.is_none();
     let lit = scene.environment.is_some() || scene.nodes.iter().any(|node| node.light.is_some());
@@ -83,8 +84,8 @@ pub fn add_missing_light(scene: &mut Scene, choice: DefaultLight) {
     if choice == DefaultLight::Never || (choice == DefaultLight::Auto && (lit || lamps)) {
         return;
     }
-    if let Some((under, floor)) = room::find(scene).and_then(|room| Some((room.ceiling?, room.floor))) {
-        // The sun does not reach a closed room, and a sky would shine through its walls.
+    if let Some((under, floor)) = interior::find(scene).and_then(|room| Some((room.ceiling?, room.floor))) {
+        // A sun cannot light a closed room, and techniques without shadows for the sky would let it shine through the walls.
         let height = under.y - floor.y;
         let lamp = Light {
             name: "default lamp".into(),
@@ -93,16 +94,20 @@ pub fn add_missing_light(scene: &mut Scene, choice: DefaultLight) {
             intensity: SUN * (LAMP * height).powi(2),
         };
         add_light(scene, lamp, Mat4::from_translation(floor + Vec3::Y * LAMP * height));
-        note(scene, "lights", "a lamp was added inside the room (--default-light never leaves it out)");
+        note(
+            scene,
+            "lights",
+            "the scene has no light: a lamp was added inside the room (--default-light never adds none)",
+        );
         return;
     }
     let light = Light { name: "default sun".into(), kind: LightKind::Directional, color: Vec3::ONE, intensity: SUN };
     add_light(scene, light, Mat4::from_quat(Quat::from_rotation_arc(Vec3::Z, SUN_FROM.normalize())));
     scene.environment.get_or_insert_with(default_sky);
-    note(scene, "lights", "a sun and a sky were added (--default-light never leaves them out)");
+    note(scene, "lights", "a sun and a sky were added (--default-light never adds none)");
 }
 
-/// Adds a light that stands at `world`.
+/// Adds a light with the transform `world`.
 pub fn add_light(scene: &mut Scene, light: Light, world: Mat4) {
     let name = light.name.clone();
     scene.lights.push(light);
@@ -134,7 +139,7 @@ fn note(scene: &mut Scene, place: &str, text: &str) {
     scene.notes.push(Note { kind: NoteKind::Approximated, place: place.into(), text: text.into() });
 }
 
-/// A camera in direction `from` of the middle, from which every corner of `bounds` is in the picture, with a little room around.
+/// A camera in the direction `from` of the middle of `bounds`. The picture shows every corner of `bounds`, with a small margin.
 fn fitted(bounds: &Aabb, aspect: f32, from: Vec3) -> (Mat4, Projection) {
     let radius = bounds.half().length().max(1e-4);
     let back = from.normalize();
@@ -145,7 +150,7 @@ fn fitted(bounds: &Aabb, aspect: f32, from: Vec3) -> (Mat4, Projection) {
         let p = corner - bounds.centre();
         p.dot(back) + (p.dot(right).abs() / (slope * aspect)).max(p.dot(up).abs() / slope)
     };
-    let distance = bounds.corners().into_iter().map(needed).fold(radius, f32::max) * ROOM;
+    let distance = bounds.corners().into_iter().map(needed).fold(radius, f32::max) * MARGIN;
     let position = bounds.centre() + back * distance;
     let world = Mat4::from_cols(right.extend(0.0), up.extend(0.0), back.extend(0.0), position.extend(1.0));
     let (znear, zfar) = ((distance - radius) * 0.5, Some((distance + radius) * 2.0));
@@ -205,7 +210,7 @@ mod tests {
         assert!(scene.lights.is_empty());
         add_missing_light(&mut scene, DefaultLight::Auto);
         assert!(scene.lights.len() == 1 && scene.environment.is_some() && scene.notes.len() == 2);
-        // Lights shine down −Z of their node: this one comes from above.
+        // Lights shine along −Z of their node. The added sun must shine from above.
         assert!(scene.nodes[1].local.matrix().transform_vector3(Vec3::NEG_Z).y < -0.5);
     }
 

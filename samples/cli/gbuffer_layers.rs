@@ -1,17 +1,17 @@
-//! The layers of a picture that come from the G-buffer, the same for every technique.
+//! The layers of a picture from the G-buffer, which all techniques have in common.
 
 use glam::{Vec2, Vec3};
 use lucerna::{passes::gbuffer::GBuffer, scene::View};
 
-use crate::shown::Shown;
+use crate::frame_output::FrameOutput;
 
-/// Depth that the background gets, metres: what Blender writes.
+/// Depth of the background, metres; the value that Blender writes.
 const BACKGROUND: f32 = 1e10;
 
 /// Adds `albedo`, `normal` (world space) and `depth` (distance along the line of sight, metres).
-pub fn add(shown: Shown, gbuffer: &GBuffer, view: &View) -> Shown {
+pub fn add(output: FrameOutput, gbuffer: &GBuffer, view: &View) -> FrameOutput {
     let far = view.far;
-    shown
+    output
         .color("albedo", gbuffer.albedo)
         .layer("normal", &["X", "Y", "Z"], gbuffer.normal, |texel| decode_normal(texel).extend(0.0).to_array())
         .layer("depth", &["Z"], gbuffer.depth, move |[z, ..]| {
@@ -19,7 +19,7 @@ pub fn add(shown: Shown, gbuffer: &GBuffer, view: &View) -> Shown {
         })
 }
 
-/// As in `lib/gbuffer.glsl`: octahedral where alpha is 1, else a byte a component.
+/// Decodes a normal as in `lib/gbuffer.glsl`: octahedral if alpha is 1, else one byte per component.
 fn decode_normal([x, y, z, a]: [f32; 4]) -> Vec3 {
     if a <= 0.5 {
         return (Vec3::new(x, y, z) * 2.0 - 1.0).normalize_or_zero();

@@ -1,4 +1,4 @@
-//! `--ground`: the scene on a plain ground, as often as asked for, alone or in turns with others.
+//! `--ground`: one or several copies of the scene, and of other scenes, on a plain ground.
 
 use std::path::{Path, PathBuf};
 
@@ -13,10 +13,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::{args::finite, args::positive, source};
 
-/// `--ground` and what belongs to it.
+/// `--ground` and its further options.
 #[derive(clap::Args, Clone, Debug, Default, PartialEq)]
 pub struct GroundArgs {
-    /// Put the scene on a plain ground, with cameras of its own: front, above, ground (which sees the ground alone)
+    /// Put the scene on a plain ground, with three cameras: front, above, ground (which sees only the ground)
     #[arg(long, help_heading = "Ground")]
     pub ground: bool,
 
@@ -24,49 +24,49 @@ pub struct GroundArgs {
     pub options: GroundOptions,
 }
 
-/// How things stand on the ground, on a command line and in the file of an experiment.
+/// Arrangement of the objects on the ground, for the command line and for experiment files.
 #[derive(clap::Args, Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GroundOptions {
-    /// So many of each [default: 1]
+    /// Number of copies of each scene [default: 1]
     #[arg(long, value_name = "N", requires = "ground", help_heading = "Ground")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub copies: Option<u32>,
 
-    /// Another scene that stands there in turns with the first one: a file, or a built-in scene or thing (hare, queen, tree); may be given
-    /// more than once
+    /// Another scene, which alternates with the first one: a file, or a built-in scene or object (hare, queen, tree); may be given more
+    /// than once
     #[arg(long, value_name = "SCENE", requires = "ground", help_heading = "Ground")]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub beside: Vec<PathBuf>,
 
-    /// Make each thing so high, metres [default: as it is]
+    /// Scale each object to this height, metres [default: unscaled]
     #[arg(long, value_name = "METRES", requires = "ground", value_parser = positive, help_heading = "Ground")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub height: Option<f64>,
 
-    /// The part of its height that is below the ground; below zero it floats [default: 0]
+    /// Share of an object's height below the ground; an object with a negative share floats [default: 0]
     #[arg(long, value_name = "SHARE", requires = "ground", value_parser = finite, allow_negative_numbers = true, help_heading = "Ground")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sunk: Option<f64>,
 
-    /// Room between neighbours, in widths of the widest [default: 0.4]
+    /// Distance between neighbours, in widths of the widest object [default: 0.4]
     #[arg(long, value_name = "WIDTHS", requires = "ground", value_parser = finite, allow_negative_numbers = true, help_heading = "Ground")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gap: Option<f64>,
 
-    /// Height of waves of the ground, in heights of the highest thing [default: 0]
+    /// Height of the ground's waves, in heights of the highest object [default: 0]
     #[arg(long, value_name = "HEIGHTS", requires = "ground", value_parser = finite, help_heading = "Ground")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub waves: Option<f64>,
 
-    /// Where the waves are in their period, 0 to 1 [default: 0]
+    /// Phase of the waves, 0 to 1 [default: 0]
     #[arg(long, value_name = "SHARE", requires = "ground", value_parser = finite, help_heading = "Ground")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub phase: Option<f64>,
 }
 
 impl GroundArgs {
-    /// Puts a scene on the ground if asked to.
+    /// Puts a scene on the ground if `--ground` is given.
     ///
     /// # Errors
     /// As [`GroundOptions::place`].
@@ -76,7 +76,7 @@ impl GroundArgs {
 }
 
 impl GroundOptions {
-    /// Puts a scene on the ground; `found` says where files are.
+    /// Puts a scene on the ground. `found`: resolves the path of a file.
     ///
     /// # Errors
     /// `Usage` for numbers out of range, `Input` for files that cannot be read and scenes without triangles.
@@ -91,7 +91,7 @@ impl GroundOptions {
             waves: number(self.waves, defaults.waves),
             phase: number(self.phase, defaults.phase),
         };
-        // Before files are read.
+        // Checked before the files are read, which may take long.
         ground.check(1 + self.beside.len())?;
         let mut things = vec![scene];
         for path in &self.beside {
@@ -105,13 +105,13 @@ impl GroundOptions {
         ground::on_ground(&things, &ground)
     }
 
-    /// Files that it needs.
+    /// The files to read.
     pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
         self.beside.iter().filter(|path| built_in(path).is_none())
     }
 }
 
-/// The name of a built-in scene or thing.
+/// The path as the name of a built-in scene or object, if it is one.
 fn built_in(path: &Path) -> Option<&str> {
     path.to_str().filter(|name| builtin::description(name).is_some())
 }

@@ -1,4 +1,4 @@
-//! `lucerna info`: what is in an image file and how it was made.
+//! `lucerna info`: the contents and the metadata of an image file.
 
 use std::{fmt::Write, path::Path};
 
@@ -9,11 +9,11 @@ use lucerna::{
 };
 use serde_json::{Value, json};
 
-/// Values of a channel.
+/// Statistics of a channel.
 struct Statistics {
     min: f32,
     max: f32,
-    /// Of the finite values.
+    /// Mean of the finite values.
     mean: f64,
     not_finite: usize,
 }
@@ -73,7 +73,7 @@ pub fn json(layers: &Layers) -> Value {
     json!({ "width": layers.width, "height": layers.height, "layers": list, "metadata": layers.metadata, "warnings": layers.warnings })
 }
 
-/// For people.
+/// As text for terminals.
 pub fn text(path: &Path, layers: &Layers) -> String {
     let mut out = format!("{}\n  {}×{}", path.display(), layers.width, layers.height);
     for warning in &layers.warnings {

@@ -1,4 +1,4 @@
-//! `lucerna inspect`: what is in a scene.
+//! `lucerna inspect`: the contents of a scene.
 
 use std::fmt::Write;
 
@@ -6,9 +6,9 @@ use glam::{Mat4, Vec3};
 use lucerna::scene::{Aabb, AlphaMode, LightKind, Material, Note, Pose, Projection, Scene};
 use serde::Serialize;
 
-use crate::world;
+use crate::scene_bounds;
 
-/// What `inspect` tells; the fields of its JSON.
+/// The summary of a scene; its fields are those of the JSON output.
 #[derive(Debug, Serialize)]
 pub struct Summary {
     pub scene: String,
@@ -22,7 +22,7 @@ pub struct Summary {
     pub textures: Vec<TextureInfo>,
     pub animations: Vec<AnimationInfo>,
     pub environment: Option<TextureInfo>,
-    /// What is unsupported, approximated or was repaired.
+    /// Notes about unsupported, approximated and repaired parts.
     pub notes: Vec<Note>,
 }
 
@@ -47,7 +47,7 @@ pub struct Counts {
     pub joints: usize,
 }
 
-/// Bytes on the device, roughly.
+/// Approximate memory on the device, bytes.
 #[derive(Debug, Serialize)]
 pub struct Memory {
     pub geometry: u64,
@@ -109,7 +109,7 @@ pub struct AnimationInfo {
     pub seconds: f32,
 }
 
-/// Looks at a scene.
+/// Summarises a scene.
 pub fn summary(scene: &Scene) -> Summary {
     let pose = Pose::rest(scene);
     let world = &pose.world;
@@ -120,7 +120,7 @@ pub fn summary(scene: &Scene) -> Summary {
     Summary {
         scene: scene.name.clone(),
         counts: counts(scene),
-        bounds: world::bounds(scene, &pose).map(|Aabb { min, max }| Bounds { min, max }),
+        bounds: scene_bounds::in_pose(scene, &pose).map(|Aabb { min, max }| Bounds { min, max }),
         memory: memory(scene),
         cameras: (0..scene.cameras.len()).map(|i| camera(scene, i, place(i, |node| node.camera))).collect(),
         lights: lights(scene, world),
@@ -260,7 +260,7 @@ fn material(material: &Material) -> MaterialInfo {
 }
 
 impl Summary {
-    /// For people.
+    /// As text for terminals.
     pub fn text(&self) -> String {
         let mut out = String::new();
         // Writing into a String cannot fail.
@@ -334,7 +334,7 @@ impl Summary {
     }
 }
 
-/// A headline, if there is anything below it.
+/// A headline, if its section is not empty.
 fn section(out: &mut String, name: &str, count: usize) -> std::fmt::Result {
     if count > 0 { writeln!(out, "{name} ({count})") } else { Ok(()) }
 }

@@ -1,9 +1,9 @@
 //! Tone mapping as the last stage of every technique: `-D tonemap.operator=reinhard`.
 //!
-//! Without any setting of the group `tonemap` pictures stay light, as before.
+//! Without any setting of the group `tonemap` a picture is not tone mapped and stays radiance.
 //!
-//! Ashikhmin's operator takes light as cd/m², which a render is not: unless `tonemap.exposure` or `tonemap.normalize` say otherwise, the
-//! log-average of its picture becomes 18 cd/m² (`normalize`, and the exposure that leads there), and in sequences follows the adaptation.
+//! Ashikhmin's operator needs luminance in cd/m², which a render does not have. Unless `tonemap.exposure` or `tonemap.normalize` are set, the
+//! log-average of the picture is scaled to 18 cd/m² (by `normalize` and a fitting exposure); in sequences it follows the adaptation.
 
 use lucerna::{
     Error, ErrorKind, Result,
@@ -17,7 +17,7 @@ use serde_json::Value;
 
 use crate::config::{self, SettingsArgs};
 
-/// Settings of a technique and, if asked for, of the tone mapping after it.
+/// Settings of a technique and, if any is set, of the tone mapping after it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Staged<S> {
     #[serde(flatten)]
@@ -26,14 +26,14 @@ pub struct Staged<S> {
     pub tonemap: Option<tonemap::Settings>,
 }
 
-/// Luminance that the log-average becomes for an operator that works in cd/m²: 18 % of a screen's white of 100.
+/// Luminance to which the log-average is scaled for an operator that works in cd/m²: 18 % of a screen's white of 100.
 const GREY: f32 = 18.0;
 
 /// The group of settings.
 const GROUP: &str = "tonemap";
 
 impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
-    /// The settings in effect over `base`, of which `check` must have nothing to say.
+    /// The settings in effect over `base`, checked by `check`.
     ///
     /// # Errors
     /// `Usage` or, with the file's name, `Input`, naming the key.
@@ -47,7 +47,7 @@ impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
         Ok(settings)
     }
 
-    /// The settings that a picture says it was made with, over `base` for those that it does not name.
+    /// The settings from a picture's metadata; settings that it does not name have the value of `base`.
     ///
     /// # Errors
     /// `Input`, naming the key.
@@ -69,7 +69,7 @@ impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
     fn unchecked(args: &SettingsArgs, base: &S) -> Result<Self> {
         let asked = args.define.iter().any(|define| define.starts_with("tonemap."));
         let in_file = |text: String| text.parse::<toml::Table>().is_ok_and(|table| table.contains_key(GROUP));
-        // What is wrong with the file is told below, with its name.
+        // Errors of the file are reported below, with its name.
         let wanted = asked || args.file.as_deref().is_some_and(|file| config::read_text(file).is_ok_and(in_file));
         let over = |settings: tonemap::Settings| -> Result<Self> {
             args.effective(&Self { technique: base.clone(), tonemap: wanted.then_some(settings) })
@@ -78,7 +78,7 @@ impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
         let grey = tonemap::Settings { normalize: true, exposure: GREY.log2(), ..plain.clone() };
         let mut settings = over(plain.clone())?;
         if settings.tonemap.as_ref().is_some_and(|s| s.operator == Operator::Ashikhmin) {
-            // What nobody has set is as it was before, whatever that is.
+            // The settings are computed over two different bases. A value that follows its base in both cases was not set by the user.
             let (other, unit) = (over(grey.clone())?, |s: &tonemap::Settings| (s.normalize, s.exposure));
             if settings.tonemap.as_ref().map(unit) == Some(unit(&plain))
                 && other.tonemap.as_ref().map(unit) == Some(unit(&grey))
@@ -90,7 +90,7 @@ impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
     }
 }
 
-/// What is not set is left out, so that settings that are not written when they are not set keep being keys.
+/// The settings without null values. A setting that is `None` is then not written, but its key stays valid.
 fn without_nulls(value: &Value) -> Value {
     match value {
         Value::Object(table) => {
@@ -101,12 +101,12 @@ fn without_nulls(value: &Value) -> Value {
     }
 }
 
-/// The stage of a run over frames.
+/// The tone mapping stage of a run over frames.
 #[derive(Debug)]
 pub struct LastStage(Option<Tonemap>);
 
 impl LastStage {
-    /// `ev`: stops before those of the settings.
+    /// `ev`: stops added before the exposure of the settings.
     ///
     /// # Errors
     /// `OutOfMemory`; `Usage` if the stops are too many.
@@ -115,7 +115,7 @@ impl LastStage {
         exposed.map(|settings| Tonemap::new(gpu, &settings)).transpose().map(Self)
     }
 
-    /// The picture after the stage. `dt`: seconds since the frame before.
+    /// The picture after the stage. `dt`: seconds since the previous frame.
     ///
     /// # Errors
     /// `Usage` if the picture cannot be tone mapped as the settings ask.
@@ -131,7 +131,7 @@ fn exposed(settings: &tonemap::Settings, ev: f64) -> tonemap::Settings {
     tonemap::Settings { exposure: settings.exposure + ev as f32, ..settings.clone() }
 }
 
-/// The stage for one picture in main memory: its light stays as the layer `light`.
+/// Applies the stage to one picture in host memory. The picture before the stage becomes the layer `light`.
 ///
 /// # Errors
 /// `Input` for bad values if the settings refuse them; `OutOfMemory`, `DeviceLost`.
@@ -194,7 +194,7 @@ mod tests {
             let (code, error) = told(text, &["isr.layers=2"]).unwrap_err();
             assert!(code == 3 && error.contains(&format!("s.toml: {key}")), "{code} {error}");
         }
-        // Mended or spoilt by -D, which wins.
+        // -D overrides the file: it can correct a value of the file, or make it wrong.
         told("[isr]\nbounces = 9", &["isr.bounces=2"]).unwrap();
         for text in ["[isr]\nbounces = 2", "[isr]\nbounces = 9"] {
             let (code, error) = told(text, &["isr.bounces=8"]).unwrap_err();

@@ -1,4 +1,4 @@
-//! What the executables share: command line, settings, the loop over frames, output names, messages, exit codes.
+//! The code that the executables share: command line, settings, the loop over frames, output names, messages, exit codes.
 
 pub mod args;
 pub mod camera;
@@ -11,11 +11,13 @@ pub mod export_pov;
 pub mod exposure;
 pub mod fingerprint;
 pub mod fiv;
+pub mod frame_output;
 pub mod framing;
 pub mod gbuffer_layers;
 pub mod ground;
 pub mod info;
 pub mod inspect;
+pub mod interior;
 pub mod last_stage;
 pub mod lights;
 pub mod notes;
@@ -28,9 +30,9 @@ pub mod reference;
 pub mod render;
 pub mod report;
 pub mod rerun;
-pub mod room;
 pub mod run;
-pub mod shown;
+pub mod scene_bounds;
+pub mod settings_list;
 pub mod signals;
 pub mod source;
 pub mod stage;
@@ -38,4 +40,3 @@ pub mod technique;
 pub mod timings;
 pub mod tonemap;
 pub mod views;
-pub mod world;

@@ -1,4 +1,4 @@
-//! Lights from the command line, for scenes that have none or the wrong ones.
+//! Lights from the command line (`--light`, `--sun`).
 
 use std::{fmt, str::FromStr};
 
@@ -8,21 +8,21 @@ use serde::{Deserialize, Serialize};
 
 use crate::framing;
 
-/// Irradiance of a sun without a stated one, W/m².
+/// Default irradiance of a sun, W/m².
 const SUN: f32 = 2.0;
 
-/// A white point light: `X,Y,Z,INTENSITY`, metres and W/sr; with `,X2,Y2,Z2,SECONDS` behind it, it moves there in a straight line, and
-/// back, once in so many seconds, again and again.
+/// A white point light: `X,Y,Z,INTENSITY`, metres and W/sr. With `,X2,Y2,Z2,SECONDS` it moves in a straight line to the second position and
+/// back, with a period of this many seconds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub struct Point {
     position: Vec3,
     intensity: f32,
-    /// Where it turns round, and the seconds of a whole turn.
+    /// The second position, and the period in seconds.
     to: Option<(Vec3, f32)>,
 }
 
-/// A white sun: `AZIMUTH,ELEVATION[,IRRADIANCE]`, degrees and W/m². Azimuth 0 stands over +Z, 90 over +X.
+/// A white sun: `AZIMUTH,ELEVATION[,IRRADIANCE]`, degrees and W/m². Azimuth 0 is over +Z, 90 over +X.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub struct Sun {
@@ -120,7 +120,7 @@ impl Sun {
     }
 }
 
-/// Adds the lights; a sun brings the default sky if the scene has no environment.
+/// Adds the lights. With a sun it also adds the default sky, if the scene has no environment.
 pub fn add(scene: &mut Scene, points: &[Point], sun: Option<&Sun>) {
     for (i, point) in points.iter().enumerate() {
         let name = format!("light {i}");

@@ -1,10 +1,10 @@
-//! What the engine logs, on the console.
+//! Prints the engine's log messages on the console.
 
 use std::sync::OnceLock;
 
 use crate::console::Console;
 
-/// Warnings of the engine; what the libraries below it log is for their makers.
+/// A logger for the engine's warnings. Messages of other libraries are not shown, because users cannot act on them.
 #[derive(Debug)]
 struct Notes(Console);
 
@@ -22,7 +22,7 @@ impl log::Log for Notes {
     fn flush(&self) {}
 }
 
-/// From now on `console` shows what the engine logs. The first call in a process counts.
+/// Shows the engine's log messages on `console`. Only the first call in a process has an effect.
 pub fn show(console: Console) {
     static NOTES: OnceLock<Notes> = OnceLock::new();
     if log::set_logger(NOTES.get_or_init(|| Notes(console))).is_ok() {

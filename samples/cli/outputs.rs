@@ -1,4 +1,4 @@
-//! Which image files a run writes: names from patterns, checked before work starts, written whole.
+//! The image files of a run. Their names follow patterns and are checked before the work starts; files are written as a whole or not at all.
 
 use std::{collections::HashSet, path::Path};
 
@@ -9,10 +9,10 @@ use lucerna::{
 
 use crate::pattern::{Pattern, Values};
 
-/// Said of a file where [`image::Report::alpha_left_out`] holds.
+/// Note for a file with [`image::Report::alpha_left_out`].
 pub const ALPHA_LEFT_OUT: &str =
-    "alpha is left out, for it would hide light (PNG shows no light of pixels of alpha 0); an .exr file keeps both";
-/// The name of a picture that nobody named.
+    "alpha is left out, because it would hide light (a PNG pixel with alpha 0 shows no light); an .exr file keeps both";
+/// The default file name of a picture.
 pub const SINGLE: &str = "{scene}-{camera}-{technique}.png";
 /// Standard output as a file name.
 const STDOUT: &str = "-";
@@ -21,21 +21,21 @@ const STDOUT: &str = "-";
 #[derive(Debug)]
 pub struct Outputs {
     targets: Vec<(Pattern, Format)>,
-    /// The format of the picture that is kept in memory instead, and the last one.
+    /// Instead of files: the format of the picture that is kept in memory, and the last picture.
     memory: Option<(Format, Option<Fresh>)>,
     options: WriteOptions,
 }
 
-/// A picture as the file that would have been written.
+/// A picture in memory, with the contents of the file that `render` would write.
 #[derive(Clone, Debug)]
 pub struct Fresh {
     pub bytes: Vec<u8>,
-    /// What stands in the file, or beside it where the format has no place for it.
+    /// The metadata in the file, or in a second file if the format holds no metadata.
     pub metadata: Metadata,
 }
 
 impl Fresh {
-    /// The bytes that [`image::write`] writes, and what was odd about the values.
+    /// The bytes that [`image::write`] writes, and a report about unusual values.
     ///
     /// # Errors
     /// As [`image::encode`].
@@ -46,10 +46,10 @@ impl Fresh {
 }
 
 impl Outputs {
-    /// Reads the names of `-o`; none: one PNG file named after scene, camera and technique.
+    /// Parses the names of `-o`. Without names there is one PNG file, named after scene, camera and technique.
     ///
     /// # Errors
-    /// `Usage` for names that are not understood, or that several frames would share.
+    /// `Usage` for invalid names, and for names that are the same for several frames.
     pub fn new(names: &[String], frames: usize, options: WriteOptions) -> Result<Self> {
         let default = match frames {
             1 => SINGLE,
@@ -61,7 +61,7 @@ impl Outputs {
         for name in given {
             let pattern = Pattern::parse(name)?;
             if frames > 1 && !pattern.has_frame() {
-                let what = format!("output '{name}': {frames} frames would be written over each other");
+                let what = format!("output '{name}': {frames} frames would overwrite each other");
                 return Err(Error::usage(what).help("Put {frame:04} into the name"));
             }
             let format = if name == STDOUT { Format::Exr } else { Format::from_path(Path::new(name))? };
@@ -70,22 +70,22 @@ impl Outputs {
         Ok(Self { targets, memory: None, options })
     }
 
-    /// No file at all: the last picture is kept as the bytes that its file would have.
+    /// Writes no file: keeps the last picture in memory, as the bytes of its file.
     pub fn in_memory(format: Format, options: WriteOptions) -> Self {
         Self { targets: Vec::new(), memory: Some((format, None)), options }
     }
 
-    /// The last picture that was kept in memory.
+    /// The picture that was kept in memory.
     pub fn fresh(self) -> Option<Fresh> {
         self.memory.and_then(|(_, fresh)| fresh)
     }
 
-    /// PNG files show the radiance times 2^`ev` from now on.
+    /// From now on PNG files are written with the radiance times 2^`ev`.
     pub fn expose(&mut self, ev: f64) {
         self.options.exposure_ev = ev as f32;
     }
 
-    /// True if some file holds more than the picture.
+    /// True if a file holds layers.
     pub fn wants_layers(&self) -> bool {
         let in_memory = self.memory.as_ref().is_some_and(|(format, _)| *format == Format::Exr);
         in_memory || self.targets.iter().any(|(pattern, format)| *format == Format::Exr || pattern.has_layer())
@@ -96,7 +96,7 @@ impl Outputs {
         self.targets.iter().any(|(pattern, _)| pattern.text() == STDOUT)
     }
 
-    /// Checks that the files of a frame can be written: the folders are there, nothing is overwritten unasked.
+    /// Checks that the files of a frame can be written: the folders exist, and no file exists, unless overwriting is allowed.
     ///
     /// # Errors
     /// `Usage` if two files have one name, `Output` if one cannot be written.
@@ -117,10 +117,10 @@ impl Outputs {
         Ok(())
     }
 
-    /// Writes the files of a frame and returns their names with what was odd about the values.
+    /// Writes the files of a frame. Returns their names and reports about unusual values.
     ///
     /// # Errors
-    /// `Output`: that file is not there, the ones before it are complete.
+    /// `Output`: the named file was not written; the files before it are complete.
     pub fn write(&mut self, values: &Values<'_>, layers: &Layers) -> Result<Vec<(String, image::Report)>> {
         let mut written = Vec::new();
         if let Some((format, last)) = &mut self.memory {

@@ -20,7 +20,7 @@ enum Piece {
     Layer,
 }
 
-/// What the placeholders stand for.
+/// The values of the placeholders.
 #[derive(Clone, Copy, Debug)]
 pub struct Values<'a> {
     pub scene: &'a str,
@@ -76,7 +76,7 @@ impl Pattern {
         Ok(Self { text: text.to_owned(), pieces })
     }
 
-    /// The name with everything filled in. Values never add a folder: their separators become `-`.
+    /// The name with the values filled in. Path separators in values become `-`, so that values never add a folder.
     pub fn fill(&self, values: &Values<'_>) -> String {
         let mut out = String::new();
         for piece in &self.pieces {
@@ -92,7 +92,7 @@ impl Pattern {
         out
     }
 
-    /// As the user wrote it.
+    /// The pattern as the user wrote it.
     pub fn text(&self) -> &str {
         &self.text
     }
@@ -108,7 +108,7 @@ impl Pattern {
     }
 }
 
-/// A name as part of a file name: no separators, no spaces, nothing hidden, never empty.
+/// A name as part of a file name: without separators, spaces and leading dots, and never empty.
 pub fn file_part(name: &str) -> String {
     let clean: String = name
         .chars()

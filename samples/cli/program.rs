@@ -10,12 +10,12 @@ use crate::{
     signals::{self, Interrupt},
 };
 
-/// Stopped on request before the work was done, but with complete output of a part of it.
+/// Exit code: the program was stopped before all work was done, but a part of the output is complete.
 pub const STOPPED_EARLY: u8 = 8;
-/// Stopped by SIGINT before anything was written.
+/// Exit code: SIGINT stopped the program before any output was written.
 pub const INTERRUPTED: u8 = 130;
 
-/// Runs a program's body. Exit codes: 0 success, else [`Error::exit_code`], or what the body chose.
+/// Runs a program's body. Exit codes: the body's exit code on success, else [`Error::exit_code`].
 pub fn run(console: Console, body: impl FnOnce() -> Result<ExitCode>) -> ExitCode {
     Interrupt::catch(console);
     notes::show(console);
@@ -53,15 +53,15 @@ pub fn run(console: Console, body: impl FnOnce() -> Result<ExitCode>) -> ExitCod
     }
 }
 
-/// Whether this is how work ends that was asked to stop: a device that was left in the middle of its work serves nobody any more.
+/// Whether the error is the consequence of a request to stop. A device that was interrupted in its work reports further errors.
 pub fn by_request(error: &Error) -> bool {
     matches!(error.kind(), ErrorKind::Interrupted | ErrorKind::DeviceLost)
 }
 
-/// What `--version` prints, and what pictures carry.
+/// The version, for `--version` and for the metadata of pictures.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// The git revision that this was built from, if it was built in a checkout; `+` if files were edited since.
+/// The git revision of the build, if it was built in a checkout; with `+` if files were edited since.
 pub fn revision() -> Option<&'static str> {
     option_env!("LUCERNA_REVISION").filter(|revision| !revision.is_empty())
 }

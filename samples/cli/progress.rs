@@ -12,15 +12,16 @@ pub enum ProgressMode {
     Auto,
     /// A bar.
     Bar,
-    /// One line a frame.
+    /// One line per frame.
     Plain,
-    /// One JSON object a line.
+    /// One JSON object per line.
     Json,
     None,
 }
 
 impl ProgressMode {
-    /// What to do here: never `Auto`. A bar is made of escape codes and goes to terminals alone; `few`: where one would show nothing.
+    /// Resolves `Auto` for this process. A bar consists of escape codes, so it is shown on terminals only. `few`: there is too little work
+    /// for a bar.
     pub fn here(self, quiet: bool, few: bool) -> Self {
         let terminal = std::io::stderr().is_terminal();
         match self {
@@ -32,10 +33,10 @@ impl ProgressMode {
         }
     }
 
-    /// Writes a line of a meter, over the one before where that is a bar. `last`: none follows.
-    pub fn meter_line(self, text: &str, last: bool) {
+    /// Writes a progress line. As a bar it overwrites the line before. `last`: no further line follows.
+    pub fn progress_line(self, text: &str, last: bool) {
         let mut err = std::io::stderr().lock();
-        // Where nobody reads it there is nothing to be done.
+        // A closed stderr is not an error.
         let _ = match (self, last) {
             (Self::None, _) => Ok(()),
             (Self::Bar, false) => write!(err, "\r\x1b[K{text}").and_then(|()| err.flush()),
@@ -45,7 +46,7 @@ impl ProgressMode {
     }
 }
 
-/// A time that is left, roughly: `59 s`, `12 min`, `20 h`.
+/// A rough time span: `59 s`, `12 min`, `20 h`.
 pub fn span(seconds: f64) -> String {
     match seconds {
         s if s >= 36_000.0 => format!("{:.0} h", s / 3600.0),
@@ -78,7 +79,7 @@ impl Progress {
         Self { mode, total, done: 0, bar }
     }
 
-    /// One more frame is done: its number, the milliseconds it took, and what was written.
+    /// Reports a finished frame: its number, its time in milliseconds, and the files written.
     pub fn frame(&mut self, frame: u32, milliseconds: f64, files: &[String]) {
         self.step(&format!("frame {frame}"), json!(frame), milliseconds, files);
     }
@@ -111,7 +112,7 @@ impl Progress {
         };
     }
 
-    /// One more picture is done, as [`Progress::frame`].
+    /// Reports a finished picture by its name, like [`Progress::frame`].
     pub fn named(&mut self, name: &str, milliseconds: f64, files: &[String]) {
         self.step(name, json!(name), milliseconds, files);
     }

@@ -1,4 +1,4 @@
-//! What a picture remembers of the command that made it, enough to make it again.
+//! The record of the command that made a picture. The picture's metadata holds it, and `lucerna rerun` makes the picture again from it.
 
 use std::path::{Path, PathBuf};
 
@@ -28,15 +28,15 @@ pub struct Record {
     /// Metres of one unit of the scene file, if it was given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<f64>,
-    /// What the scene stands on, if it was put there.
+    /// The options of `--ground`, if it was given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ground: Option<GroundOptions>,
-    /// Changes when the scene changes.
+    /// Hash of the scene ([`crate::fingerprint::scene`]).
     pub fingerprint: String,
     pub width: u32,
     pub height: u32,
     pub camera: View,
-    /// First frame of the run: frames may depend on the ones before.
+    /// First frame of the run, because a frame may depend on the frames before it.
     pub first_frame: u32,
     pub frame: u32,
     /// Time of frame 0, seconds.
@@ -53,10 +53,10 @@ pub struct Record {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sun: Option<Sun>,
     pub seed: u32,
-    /// The image of the render graph that is shown instead of the result.
+    /// The image of the render graph that was written instead of the result (`--view`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub view: Option<String>,
-    /// What the picture consists of: everything, direct light, …
+    /// The value of `--mode`: all light, direct light, …
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mode: Option<String>,
     #[serde(default)]
@@ -65,7 +65,7 @@ pub struct Record {
     pub settings: Value,
 }
 
-/// Where the scene came from.
+/// The source of the scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Source {
@@ -83,7 +83,7 @@ pub enum View {
 }
 
 impl Record {
-    /// What `args` decided, for one picture without settings; the rest is the caller's.
+    /// A record of the options `args`, for one picture without settings. The caller fills in the other fields.
     pub fn new(command: &[&str], args: &StageArgs, stage: &Stage) -> Self {
         Self {
             command: command.iter().map(|&word| word.to_owned()).collect(),
@@ -123,10 +123,10 @@ impl Record {
         serde_json::from_value(config.clone()).map_err(|error| missing().caused_by(error))
     }
 
-    /// The options that decide what is seen. `camera`: name of the camera, if the scene has none for it.
+    /// The options for scene and camera. `camera`: name of the camera, if the scene has no name for it.
     ///
     /// # Errors
-    /// `Input` for numbers that the command line would not take either.
+    /// `Input` for numbers that the command line would reject as well.
     pub fn stage_args(&self, camera: &str) -> Result<StageArgs> {
         let wrong = |key: &str, found: String, allowed: &str| {
             Err(Error::input(format!("{found} is not allowed; allowed: {allowed}")).at(key))
@@ -167,7 +167,7 @@ impl Record {
         })
     }
 
-    /// The options of `render` for the frames up to this one. None of them writes anything.
+    /// The options of `render` for the frames up to this one. They do not write any file.
     ///
     /// # Errors
     /// As [`Self::stage_args`]; `Input` if the frame is before the first one.
@@ -201,17 +201,17 @@ impl Record {
         })
     }
 
-    /// The files that are read to make the picture again, as messages call them.
+    /// The files that are read to make the picture again, as text for messages.
     pub fn files(&self) -> Vec<String> {
         let mut list = Vec::new();
         if let Source::File(path) = &self.scene {
-            list.push(format!("{path:?}, and what it names in its folder"));
+            list.push(format!("{path:?}, and the files in its folder that it refers to"));
         }
         list.extend(
             self.ground
                 .iter()
                 .flat_map(GroundOptions::files)
-                .map(|path| format!("{path:?}, and what it names in its folder")),
+                .map(|path| format!("{path:?}, and the files in its folder that it refers to")),
         );
         let environment = self.environment.as_deref().map(Path::new);
         list.extend(environment.filter(|path| !source::is_built_in_environment(path)).map(|path| format!("{path:?}")));
@@ -282,10 +282,10 @@ mod tests {
         assert_eq!(args.stage.scene.ground.options, again.ground.clone().unwrap());
         assert!(args.stage.scene.ground.ground && args.stage.light == again.light && args.stage.sun == again.sun);
         assert_eq!((args.exposure, args.seed, args.stage.default_light), (Some(1.5), u32::MAX, DefaultLight::Never));
-        // Nothing that writes, or that reads more than what is named.
+        // No option may write a file, or read a file that the record does not name.
         assert!(args.output.is_empty() && args.dump.is_none() && args.timings.is_none() && args.stage.camera.is_none());
         assert!(args.settings.file.is_none() && !args.overwrite && !args.json);
-        assert_eq!(again.files(), ["\"-odd.obj\", and what it names in its folder"]);
+        assert_eq!(again.files(), ["\"-odd.obj\", and the files in its folder that it refers to"]);
         for (odd, place) in [
             (Record { width: 0, ..record.clone() }, "width"),
             (Record { height: MAX_SIDE + 1, ..record.clone() }, "height"),

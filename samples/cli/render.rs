@@ -1,4 +1,4 @@
-//! `render`: a scene in, images out, frame after frame; or the last of them in memory, for `lucerna rerun`.
+//! `render`: reads a scene, renders frames and writes images. For `lucerna rerun` it keeps the last image in memory instead.
 
 use std::{process::ExitCode, time::Instant};
 
@@ -16,45 +16,46 @@ use crate::{
     args::{DeviceArgs, RenderArgs, TalkArgs},
     config,
     console::{self, Console},
+    frame_output::{self, FrameOutput, Readback},
     last_stage::{LastStage, Staged},
     outputs::Fresh,
     program::{self, STOPPED_EARLY},
     progress::Progress,
     record::Record,
     run::Run,
-    shown::{self, Reading, Shown},
+    settings_list,
     signals::Interrupt,
 };
 
-/// Who renders.
+/// The technique that renders.
 #[derive(Clone, Copy, Debug)]
 pub struct Technique {
-    /// Executable, and technique in names and metadata: `isr`.
+    /// Name of the executable, and of the technique in file names and metadata, for example `isr`.
     pub name: &'static str,
-    /// What the picture consists of, as `--mode` takes it; the word for "everything" is left out of file names.
+    /// The value of `--mode`; `None` for the mode with all light, which file names leave out.
     pub mode: Option<&'static str>,
-    /// The picture is radiance, which exposure scales to be seen; else it is shown as it is.
+    /// The picture is radiance, which the exposure scales. Otherwise its values are shown unscaled.
     pub radiance: bool,
 }
 
-/// A frame to be composed.
+/// The input of a technique for a frame.
 #[derive(Debug)]
 pub struct Input<'a> {
     pub gpu: &'a Gpu,
     pub scene: &'a Scene,
-    /// At this frame's time.
+    /// The pose at the frame's time.
     pub pose: &'a Pose,
     pub view: &'a View,
     pub frame: u32,
-    /// Frames of the run.
+    /// Number of frames of the run.
     pub frames: u32,
-    /// Time of the frame.
+    /// Time of the frame, seconds.
     pub seconds: f64,
-    /// More than the picture is looked at: its layers are written, images of the graph shown or dumped, its passes listed.
+    /// The run needs more than the picture: layers, other images of the graph, or the list of passes.
     pub layers: bool,
 }
 
-/// What work gave; `None` if it was asked to stop meanwhile, whether it ended because of that or not.
+/// The result of some work; `None` if the user has requested a stop meanwhile and the work failed because of it or did not.
 ///
 /// # Errors
 /// Any other failure.
@@ -65,48 +66,48 @@ pub fn unless_stopped<T>(result: Result<T>, interrupt: &Interrupt) -> Result<Opt
     }
 }
 
-/// A technique as `render` and `rerun` call it. Of the programs alone: in the engine techniques are functions, not objects.
+/// The interface of a technique for `render` and `rerun`. Only the programs use it; in the engine techniques are functions.
 pub trait Renderer {
     type Settings: Serialize + DeserializeOwned + Clone;
-    /// What lives as long as the run.
+    /// Data that lives as long as the run.
     type Kept;
 
     fn technique(&self) -> Technique;
 
-    /// Whether the settings are in their ranges; asked before anything else is done.
+    /// Checks that the settings are in their ranges. Called before any other work.
     ///
     /// # Errors
     /// `Usage`, naming the setting.
     fn check(settings: &Self::Settings) -> Result<()>;
 
-    /// Makes what lives as long as the run.
+    /// Makes the data that lives as long as the run.
     ///
     /// # Errors
-    /// `OutOfMemory`, `DeviceLost`; `Input` if the scene cannot be served.
+    /// `OutOfMemory`, `DeviceLost`; `Input` if the technique does not support the scene.
     fn prepare(&self, gpu: &Gpu, scene: &Scene, settings: &Self::Settings) -> Result<Self::Kept>;
 
-    /// Declares one frame.
+    /// Declares the passes of one frame.
     ///
     /// # Errors
-    /// `Usage` or `Input` for what cannot be served.
+    /// `Usage` or `Input` for settings or scenes that the technique does not support.
     fn compose(
         &self,
         graph: &mut Graph,
         kept: &mut Self::Kept,
         input: &Input<'_>,
         settings: &Self::Settings,
-    ) -> Result<Shown>;
+    ) -> Result<FrameOutput>;
 }
 
-/// Runs `render` for one technique. `base` are the settings to start from.
+/// Runs `render` for one technique. `base`: the settings before the settings file and `-D` change them.
 ///
 /// # Errors
-/// Whatever fails, with the kind that decides the exit code.
+/// Any error of the run. Its kind decides the exit code.
 pub fn render<R: Renderer>(renderer: &R, args: &RenderArgs, base: &R::Settings) -> Result<ExitCode> {
     let started = Instant::now();
     let staged = Staged::effective(&args.settings, base, R::check)?;
     if args.settings.print_config {
-        console::print(config::to_toml(&staged)?.trim_end())?;
+        console::print(settings_list::with_docs(&config::to_toml(&staged)?).trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
     let interrupt = Interrupt::install();
@@ -120,17 +121,17 @@ pub fn render<R: Renderer>(renderer: &R, args: &RenderArgs, base: &R::Settings) 
     })
 }
 
-/// A picture that is to be made again.
+/// A request to make a picture again.
 #[derive(Debug)]
 pub struct Again<'a> {
     pub record: &'a Record,
-    /// Name of the camera, which is written into the picture.
+    /// Name of the camera for the picture's metadata.
     pub camera: &'a str,
-    /// Of the file.
+    /// Format of the file.
     pub format: Format,
     pub device: &'a DeviceArgs,
     pub talk: &'a TalkArgs,
-    /// Hours of work were asked for.
+    /// The user allows work that takes hours.
     pub long: bool,
     pub interrupt: &'a Interrupt,
 }
@@ -140,19 +141,21 @@ impl Again<'_> {
         self.talk.console()
     }
 
-    /// The mode of the record, one of those that the technique has.
+    /// The mode of the record.
     ///
     /// # Errors
-    /// `Input` if there is none of this name.
+    /// `Input` if the technique has no mode of this name.
     pub fn mode<M: ValueEnum + Default>(&self) -> Result<M> {
         let Some(asked) = &self.record.mode else { return Ok(M::default()) };
         M::from_str(asked, false).map_err(|_| {
             let names = M::value_variants().iter().filter_map(ValueEnum::to_possible_value);
             let names: Vec<String> = names.map(|value| value.get_name().to_owned()).collect();
-            Error::input(format!("{asked:?} is no mode; allowed are {}", names.join(", "))).at("mode")
+            Error::input(format!("{asked:?} is not a mode; allowed are {}", names.join(", "))).at("mode")
         })
     }
 
+    /// For techniques without modes.
+    ///
     /// # Errors
     /// `Input` if the record has a mode.
     pub fn no_mode(&self) -> Result<()> {
@@ -163,11 +166,11 @@ impl Again<'_> {
     }
 }
 
-/// Renders the frames of a record up to its own, which is kept in memory as the file that `render` would write. Nothing is
-/// written; of the record's words only scene and environment name files. `None`: interrupted.
+/// Renders the frames of a record up to the recorded frame, and returns this frame as the bytes of the file that `render` would write.
+/// Writes no file, and reads only the files that the record names as scene, environment and ground objects. `None`: interrupted.
 ///
 /// # Errors
-/// Whatever fails while rendering; `Input` for what the record says.
+/// Any error of rendering; `Input` for wrong values in the record.
 pub fn again<R: Renderer>(renderer: &R, asked: &Again<'_>, base: &R::Settings) -> Result<Option<Fresh>> {
     let staged = Staged::recorded(&asked.record.settings, base, R::check)?;
     let args = asked.record.render_args(asked)?;
@@ -203,7 +206,7 @@ fn frames<R: Renderer>(
     let mut progress = Progress::new(args.progress, console.is_quiet(), run.frames.len() as u64);
     'frames: for frame in run.frames.clone() {
         let late = args.time_limit.is_some_and(|limit| started.elapsed() >= limit.0);
-        // One frame there will be, or the next run would get no further.
+        // The first frame is always rendered; otherwise a run with a short time limit would make no progress.
         if interrupt.requested() || (late && run.progress().0 > 0) {
             break;
         }
@@ -214,23 +217,23 @@ fn frames<R: Renderer>(
         (graph.frame, graph.seed) = (frame, args.seed);
         let input =
             Input { gpu: &gpu, scene: &run.stage.scene, pose: &pose, view: &view, frame, frames, seconds, layers: all };
-        let shown = renderer.compose(&mut graph, &mut resources, &input, &settings);
-        let Some(mut shown) = unless_stopped(shown, interrupt)? else { break };
-        shown.develop(|picture| last.frame(&mut graph, picture, (1.0 / args.fps) as f32))?;
+        let output = renderer.compose(&mut graph, &mut resources, &input, &settings);
+        let Some(mut output) = unless_stopped(output, interrupt)? else { break };
+        output.develop(|picture| last.frame(&mut graph, picture, (1.0 / args.fps) as f32))?;
         if args.list_passes {
             console::print(graph.plan()?.list_passes().trim_end())?;
             return Ok(());
         }
-        run.note(&shown.notes);
-        let seen = shown.view.unwrap_or(view);
+        run.note(&output.notes);
+        let seen = output.view.unwrap_or(view);
         let reading = match &args.view {
-            Some(name) => Reading::view(&mut graph, name)?,
-            None => shown.read(&mut graph, run.outputs.wants_layers()),
+            Some(name) => Readback::view(&mut graph, name)?,
+            None => output.read(&mut graph, run.outputs.wants_layers()),
         };
         let dump = args.dump.as_ref().map(|folder| (folder, graph.dump()));
-        // The frame after this one builds on it once, however often it is repeated.
+        // Repetitions must not advance the history: the next frame follows the first run of this frame.
         let result = if args.repeat > 1 { runner.run_held(&graph) } else { runner.run(&graph) };
-        // What was asked to stop is not written, unless it is all there.
+        // An interrupted frame is not written, unless it is complete.
         let Some(result) = unless_stopped(result, interrupt)? else { break };
         run.note(&reading.notes(&result));
         let mut layers = reading.layers(&result);
@@ -241,7 +244,7 @@ fn frames<R: Renderer>(
         interrupt.keep();
         for (folder, images) in dump.iter() {
             for (name, token) in images {
-                run.dump(folder, frame, name, shown::raw(&result.image(*token)))?;
+                run.dump(folder, frame, name, frame_output::raw(&result.image(*token)))?;
             }
         }
         progress.frame(frame, milliseconds, &files);
@@ -263,9 +266,9 @@ fn frames<R: Renderer>(
                 seconds,
                 layers: all,
             };
-            let mut shown = renderer.compose(&mut graph, &mut resources, &input, &settings)?;
-            // No time passes, so that adaptation stays as it is.
-            shown.develop(|picture| last.frame(&mut graph, picture, 0.0))?;
+            let mut output = renderer.compose(&mut graph, &mut resources, &input, &settings)?;
+            // A time step of 0 leaves the adaptation unchanged.
+            output.develop(|picture| last.frame(&mut graph, picture, 0.0))?;
             let last = repeat + 1 == args.repeat;
             let result = if last { runner.run(&graph) } else { runner.run_held(&graph) };
             let Some(result) = unless_stopped(result, interrupt)? else { break 'frames };

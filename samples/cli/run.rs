@@ -1,4 +1,4 @@
-//! The state of one `render`: what it was asked, what it has done, and what it tells about it.
+//! The state of one run of `render`: its options, its finished frames, and its report.
 
 use std::{ops::Range, path::Path, time::Duration};
 
@@ -32,14 +32,14 @@ use crate::{
 pub struct Run<'a> {
     args: &'a RenderArgs,
     console: Console,
-    /// As in file names: `isr`, or `isr-direct` in another mode.
+    /// Technique and mode in file names: `isr`, or `isr-direct` with a mode.
     label: String,
-    /// The exposure follows from the first frame.
+    /// The exposure is chosen by the first frame.
     fit_exposure: bool,
     pub stage: Stage,
     pub outputs: Outputs,
     pub frames: Range<u32>,
-    /// Everything of the record but the frame.
+    /// The record without the frame's number.
     record: Record,
     timings: Timings,
     done: Vec<Done>,
@@ -52,23 +52,23 @@ pub struct Run<'a> {
 struct Done {
     frame: u32,
     seconds: f64,
-    /// Wall-clock time of the first run, with reading back.
+    /// Wall-clock time of the first run, including the readback.
     milliseconds: f64,
     files: Vec<String>,
-    /// Of each run. The first makes pipelines and reads the picture back.
+    /// Times of each run. The first run also creates pipelines and reads the picture back.
     runs: Vec<RunTime>,
 }
 
 #[derive(Debug, Serialize)]
 struct RunTime {
     milliseconds: f64,
-    /// Of all passes on the device; `null` if it has no clock.
+    /// Time of all passes on the device; `null` if the device has no timestamps.
     gpu_milliseconds: Option<f64>,
 }
 
 impl<'a> Run<'a> {
-    /// Reads the scene and checks that everything asked for can be written. With `memory` nothing is: the last picture is kept as a
-    /// file of that format.
+    /// Reads the scene and checks that all outputs can be written. With `memory` the run writes no files, and keeps the last picture as the
+    /// bytes of a file of this format.
     pub fn new<S: Serialize>(
         technique: Technique,
         args: &'a RenderArgs,
@@ -77,7 +77,7 @@ impl<'a> Run<'a> {
         memory: Option<Format>,
     ) -> Result<Self> {
         let frames = Frames::of(args.frames.as_ref());
-        // Names before scenes: a wrong name shows at once.
+        // The names are checked before the scene is read, so that a wrong name is reported at once.
         let mut options = WriteOptions { overwrite: args.overwrite, f32: args.f32, ..WriteOptions::default() };
         let outputs = |options: WriteOptions| match memory {
             Some(format) => Ok(Outputs::in_memory(format, options)),
@@ -90,15 +90,18 @@ impl<'a> Run<'a> {
             Source::File(_) => None,
         };
         if settings.tonemap.is_some() && !technique.radiance {
-            let what = format!("the picture of this mode of {} is no light, which tone mapping needs", technique.name);
+            let what = format!(
+                "tone mapping needs radiance, but the picture of this mode of {} is not radiance",
+                technique.name
+            );
             return Err(Error::usage(what).at("tonemap"));
         }
         let radiance = technique.radiance && args.view.is_none();
         let developed = settings.tonemap.is_some() && radiance;
-        // What suits the scene means nothing to a picture that is normalised.
+        // A normalised picture needs no automatic exposure.
         let normal = settings.tonemap.as_ref().is_some_and(|tonemap| tonemap.normalize);
         let exposure = args.exposure.or(suits.filter(|_| radiance && !normal));
-        // Tone mapping takes the exposure itself; what it gives is for the screen.
+        // Tone mapping applies the exposure, so that the file must not apply it again.
         options.exposure_ev = if developed { 0.0 } else { exposure.unwrap_or(0.0) as f32 };
         let outputs = outputs(options)?;
         if outputs.uses_stdout() && args.json {
@@ -141,7 +144,7 @@ impl<'a> Run<'a> {
         Ok(run)
     }
 
-    /// The first and the last frame stand for all.
+    /// Checks the outputs of the first and the last frame only; the others differ from them in their number.
     fn probe(&self) -> Result<()> {
         for frame in [self.frames.start, self.frames.end - 1] {
             self.outputs.probe(&self.values(frame), &["picture"])?;
@@ -178,7 +181,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Notes of a frame; each is told once.
+    /// Prints the notes of a frame; each note only once per run.
     pub fn note(&mut self, notes: &[Note]) {
         for note in notes {
             if !self.stage.scene.notes.contains(note) {
@@ -193,7 +196,7 @@ impl<'a> Run<'a> {
         Values { scene, camera, technique: &self.label, frame, layer: "" }
     }
 
-    /// What a picture says about itself.
+    /// The metadata of a picture.
     pub fn metadata(&self, gpu: &Gpu, view: &View, frame: u32) -> Result<Metadata> {
         let about = gpu.describe();
         Ok(Metadata {
@@ -214,12 +217,12 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Stops that were asked for, or suit the scene.
+    /// The exposure, EV: given by the user, or chosen by the first frame.
     pub fn exposure(&self) -> f64 {
         self.record.exposure
     }
 
-    /// Chooses the exposure by the first frame, if nobody did.
+    /// Chooses the exposure by the first frame, if the user gave none.
     pub fn expose(&mut self, picture: &Layers) {
         if self.done.is_empty() && exposure::is_black(picture) {
             self.console
@@ -230,8 +233,9 @@ impl<'a> Run<'a> {
         }
         let ev = exposure::fitting(picture);
         if ev != 0.0 {
-            self.console
-                .info(&format!("note: exposure {ev:+} EV was chosen for .png files, to see something (--exposure)"));
+            self.console.info(&format!(
+                "note: the exposure of .png files was set to {ev:+} EV, to fit the screen's range (--exposure)"
+            ));
         }
         self.record.exposure = ev;
         self.outputs.expose(ev);
@@ -246,7 +250,7 @@ impl<'a> Run<'a> {
             if !report.is_finite() {
                 let first = report.first.as_deref().unwrap_or_default();
                 let (nan, infinite) = (report.nan, report.infinite);
-                self.warn(format!("{name}: {nan} samples are not numbers, {infinite} are infinite; first: {first}"));
+                self.warn(format!("{name}: {nan} values are not numbers, {infinite} are infinite; first: {first}"));
             }
             if report.alpha_left_out {
                 self.warn(format!("{name}: {}", ALPHA_LEFT_OUT));
@@ -267,14 +271,14 @@ impl<'a> Run<'a> {
         self.warnings.push(text);
     }
 
-    /// A frame is complete.
+    /// Records a finished frame.
     pub fn done(&mut self, frame: u32, seconds: f64, milliseconds: f64, files: Vec<String>, report: &Report) {
         self.timings.add(frame, report);
         self.done.push(Done { frame, seconds, milliseconds, files, runs: Vec::new() });
         self.record_time(milliseconds, report);
     }
 
-    /// The last frame ran once more.
+    /// Records a repetition of the last frame.
     pub fn again(&mut self, milliseconds: f64, report: &Report) {
         if let Some(done) = self.done.last() {
             self.timings.add(done.frame, report);
@@ -288,13 +292,13 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// The last picture, if it was kept in memory and no frame is missing.
+    /// The picture in memory, if all frames are finished.
     pub fn fresh(self) -> Option<Fresh> {
         let whole = self.done.len() == self.frames.len();
         self.outputs.fresh().filter(|_| whole)
     }
 
-    /// Frames done, and frames asked for.
+    /// Number of finished frames, and of all frames.
     pub fn progress(&self) -> (usize, usize) {
         (self.done.len(), self.frames.len())
     }

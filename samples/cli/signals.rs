@@ -1,8 +1,8 @@
-//! Interruption on request, and signals that must not kill.
+//! Signals: interruption on request, without incomplete files.
 //!
-//! The first SIGINT or SIGTERM asks: a thread says so at once, the engine ends between two submissions, loops end where they look, and
-//! what is complete is kept. Not everything can look: a driver that compiles, a foreign decoder. After 1.6 s (`PATIENCE`) that thread ends the
-//! process, with nothing half written. A second signal does the same at once.
+//! The first SIGINT or SIGTERM requests a stop. A thread tells the user at once; the engine stops between two submissions, and loops stop when
+//! they check the request. Complete output is kept. Some code cannot check, for example a driver that compiles, or a foreign decoder. After
+//! 1.6 s (`PATIENCE`) the thread therefore ends the process, without leaving incomplete files. A second signal does so at once.
 
 use std::{
     sync::{
@@ -16,13 +16,13 @@ use lucerna::{Stop, image};
 
 use crate::{console::Console, program::STOPPED_EARLY};
 
-/// How long a program may take to end by itself once it was asked to: more than a device is given
-/// ([`lucerna::gpu::Submission::wait`]), and together with what ending takes under two seconds.
+/// Time in which a program may stop by itself after a request. It is longer than the time that a device gets
+/// ([`lucerna::gpu::Submission::wait`]), and together with the time for ending the process it is below two seconds.
 const PATIENCE: Duration = Duration::from_millis(1600);
-/// How often the thread that ends the process looks whether the program is still writing what it saves.
+/// Interval at which the thread that ends the process checks whether the program is still saving data.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Set by the first SIGINT or SIGTERM. Clones are the same one.
+/// A request to stop, set by the first SIGINT or SIGTERM. Clones share their state.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt(Arc<State>);
 
@@ -30,19 +30,19 @@ pub struct Interrupt(Arc<State>);
 struct State {
     requested: Arc<AtomicBool>,
     signal: Arc<AtomicUsize>,
-    /// The program ends by itself where it can; otherwise the first signal ends it at once.
+    /// The program checks for requests and stops by itself. Otherwise the first signal ends it at once.
     listens: AtomicBool,
-    /// Something that was asked for is complete.
+    /// Some requested output is complete.
     kept: AtomicBool,
-    /// Writers of what must not be lost.
+    /// Number of writers of data that must not be lost.
     saving: AtomicUsize,
-    /// The first signal was answered.
+    /// The message about the first signal was printed.
     said: AtomicBool,
-    /// The process is being ended: one more signal ends it without any care.
+    /// The process is being ended. One more signal ends it at once, without waiting for writers.
     ending: Arc<AtomicBool>,
 }
 
-/// What must not be lost is being written as long as this lives: the process is not ended meanwhile, but by one more signal.
+/// A guard for writing data that must not be lost. While it lives, only one more signal ends the process.
 #[derive(Debug)]
 pub struct Saving(Arc<State>);
 
@@ -52,11 +52,11 @@ impl Drop for Saving {
     }
 }
 
-/// The one whose handlers are installed.
+/// The request whose signal handlers are installed.
 static INSTALLED: OnceLock<Interrupt> = OnceLock::new();
 
 impl Interrupt {
-    /// Installs the handlers, once in a process. Where that fails (or on other systems) signals keep their default meaning.
+    /// Installs the handlers, once per process. If this fails, and on other systems, signals keep their default meaning.
     pub fn catch(console: Console) {
         let interrupt = Self::default();
         if INSTALLED.set(interrupt.clone()).is_ok() {
@@ -64,14 +64,14 @@ impl Interrupt {
         }
     }
 
-    /// From now on the program looks itself whether it shall stop. Without handlers ([`Interrupt::catch`]) it is never asked to.
+    /// Declares that the program from now on checks for requests itself. Without handlers ([`Interrupt::catch`]) there are no requests.
     pub fn install() -> Self {
         let interrupt = INSTALLED.get().cloned().unwrap_or_default();
         interrupt.0.listens.store(true, Ordering::Release);
         interrupt
     }
 
-    /// For devices.
+    /// The request, in the form that devices check.
     pub fn stop() -> Stop {
         INSTALLED.get().map_or_else(Stop::default, |interrupt| Stop::by(Arc::clone(&interrupt.0.requested)))
     }
@@ -81,17 +81,17 @@ impl Interrupt {
         use signal_hook::{consts, flag, low_level::pipe};
         use std::os::unix::net::UnixStream;
 
-        // A file-size limit then fails the write (EFBIG) instead of killing the program in the middle of it.
+        // With a handler a file-size limit makes the write fail (EFBIG), instead of killing the program during the write.
         let _ = flag::register(consts::SIGXFSZ, Arc::default());
         let Ok((heard, told)) = UnixStream::pair() else { return };
         let state = Arc::clone(&self.0);
         let thread = std::thread::Builder::new().name("signals".into());
-        // Without the thread nobody would answer.
+        // Without the thread signals would have no effect.
         if thread.spawn(move || watch(&state, heard, console)).is_err() {
             return;
         }
         for signal in [consts::SIGINT, consts::SIGTERM] {
-            // In the order of the calls: whoever reads the byte finds everything else set.
+            // Handlers run in the order of their registration: when the thread reads the byte, all other flags are set.
             let _ = flag::register_conditional_shutdown(signal, exit_code(signal), Arc::clone(&self.0.ending));
             let _ = flag::register_usize(signal, Arc::clone(&self.0.signal), signal as usize);
             let _ = flag::register(signal, Arc::clone(&self.0.requested));
@@ -107,30 +107,31 @@ impl Interrupt {
         self.0.requested.load(Ordering::Acquire)
     }
 
-    /// Something that was asked for is complete: if the process is ended it has stopped early, not in vain.
+    /// Declares that some requested output is complete. If the process is ended now, the exit code says "stopped early".
     pub fn keep(&self) {
         self.0.kept.store(true, Ordering::Release);
     }
 
-    /// Guards the writing of what must not be lost.
+    /// A guard for writing data that must not be lost.
     #[must_use]
     pub fn saving(&self) -> Saving {
         self.0.saving.fetch_add(1, Ordering::AcqRel);
         Saving(Arc::clone(&self.0))
     }
 
-    /// What a shell expects of a program that this signal ended: 130 for SIGINT, 143 for SIGTERM.
+    /// The exit code that shells expect after this signal: 130 for SIGINT, 143 for SIGTERM.
     pub fn exit_code(&self) -> u8 {
         exit_code(self.0.signal.load(Ordering::Acquire) as i32) as u8
     }
 }
 
-/// How the program ends if it fails because it was asked to stop; `None`: it was not asked.
+/// The exit code after a request to stop; `None` without a request.
 pub fn stopped() -> Option<u8> {
     INSTALLED.get().filter(|interrupt| interrupt.requested()).map(|interrupt| interrupt.0.end_code())
 }
 
-/// Waits until the first signal was answered, if there was one: a program that ends at once must not end without a word.
+/// Waits until the message about the first signal is printed, if there was a signal. Otherwise a program that ends at once would print
+/// nothing.
 pub fn let_it_be_said() {
     let Some(Interrupt(state)) = INSTALLED.get() else { return };
     let begun = Instant::now();
@@ -148,7 +149,7 @@ impl State {
         }
     }
 
-    /// Ends the process with nothing half written.
+    /// Ends the process without leaving incomplete files.
     #[cfg(unix)]
     fn end(&self) -> ! {
         self.ending.store(true, Ordering::Release);
@@ -156,11 +157,12 @@ impl State {
         signal_hook::low_level::exit(self.end_code().into())
     }
 
-    /// Says that the signal was heard. In a thread of its own: who does not read what a program says must still be able to end it.
+    /// Prints that the signal was received. Runs in its own thread, because printing blocks if nobody reads stderr, and signals must still
+    /// end the program.
     fn say(self: &Arc<Self>, console: Console) {
         let state = Arc::clone(self);
         let _ = std::thread::Builder::new().spawn(move || {
-            console.aside("stopping; what is complete is kept (again to stop now)");
+            console.aside("stopping; complete output is kept (signal again to stop now)");
             state.said.store(true, Ordering::Release);
         });
     }

@@ -1,4 +1,4 @@
-//! The scene of a command line.
+//! The scene options of a command line.
 
 use std::path::{Path, PathBuf};
 
@@ -9,18 +9,18 @@ use lucerna::{
 
 use crate::{args::positive, ground::GroundArgs, record::Source};
 
-/// `SCENE | --builtin NAME`, `--unit`.
+/// The options `SCENE`, `--builtin NAME` and `--unit`.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct SceneArgs {
     /// Scene file: .gltf, .glb or .obj
     #[arg(value_name = "SCENE")]
     pub scene: Option<PathBuf>,
 
-    /// A built-in scene instead of a file (`lucerna list` names them)
+    /// A built-in scene instead of a file (`lucerna list` lists them)
     #[arg(long, value_name = "NAME", conflicts_with = "scene")]
     pub builtin: Option<String>,
 
-    /// Metres that one unit of the scene file stands for, where the format leaves it open (OBJ, C arrays) [default: 1]
+    /// Length of one unit of the scene file, metres, for formats without a fixed unit (OBJ, C arrays) [default: 1]
     #[arg(long, value_name = "METRES", value_parser = positive, conflicts_with = "builtin")]
     pub unit: Option<f64>,
 
@@ -39,26 +39,26 @@ impl SceneArgs {
     }
 }
 
-/// Options for reading a scene whose unit stands for `unit` metres.
+/// Options for reading a scene whose unit is `unit` metres.
 pub fn in_unit(unit: Option<f64>) -> LoadOptions {
     LoadOptions { unit: unit.map(|metres| metres as f32), ..LoadOptions::default() }
 }
 
-/// Whether this is the name of a built-in environment and not of a file.
+/// Whether `path` names a built-in environment and not a file.
 pub fn is_built_in_environment(path: &Path) -> bool {
     path.to_str().is_some_and(|name| builtin::ENVIRONMENTS.contains(&name)) && !path.is_file()
 }
 
-/// Reads an environment, or makes a built-in one. A square picture is a light probe, an angular map.
+/// Reads an environment, or makes a built-in one. A square picture is taken as a light probe (an angular map).
 ///
 /// # Errors
-/// `Input` if the file cannot be served.
+/// `Input` if the file cannot be read or is not supported.
 pub fn environment(path: &Path) -> Result<(Environment, Vec<Note>)> {
     match path.to_str() {
         Some(name) if is_built_in_environment(path) => Ok((builtin::environment(name)?, Vec::new())),
         _ if path.is_dir() => environment::load(path, &Limits::default()),
         _ => {
-            // Its latitude-longitude picture is twice as large, and both stand side by side.
+            // The latitude-longitude picture is twice as large as the probe, and both are in memory at the same time.
             let limits = Limits::default();
             let limits = Limits { max_alloc: limits.max_alloc / 4, ..limits };
             let picture = image::read(path, &limits)?;
@@ -74,7 +74,7 @@ pub fn environment(path: &Path) -> Result<(Environment, Vec<Note>)> {
 /// Reads a file or makes a built-in scene.
 ///
 /// # Errors
-/// `Input` if the file cannot be served, `Usage` if there is no such built-in scene.
+/// `Input` if the file cannot be read or is not supported, `Usage` if there is no such built-in scene.
 pub fn open(file: Option<&Path>, name: Option<&str>, options: &LoadOptions) -> Result<(Scene, Source)> {
     match (file, name) {
         (Some(path), _) => {
@@ -82,6 +82,6 @@ pub fn open(file: Option<&Path>, name: Option<&str>, options: &LoadOptions) -> R
             Ok((scene, Source::File(path.to_string_lossy().into_owned())))
         }
         (None, Some(name)) => Ok((builtin::load(name)?, Source::Builtin(name.to_owned()))),
-        (None, None) => Err(Error::usage("no scene was named").help("Name a file, or a built-in scene with --builtin")),
+        (None, None) => Err(Error::usage("no scene was given").help("Give a file, or a built-in scene with --builtin")),
     }
 }

@@ -21,23 +21,23 @@ use crate::{
     source::{self, SceneArgs},
 };
 
-/// What is rendered, and from where.
+/// The scene and the camera that are rendered.
 #[derive(Debug)]
 pub struct Stage {
     pub scene: Scene,
     pub source: Source,
     pub fingerprint: String,
-    /// For file names and metadata, never empty.
+    /// Name of the camera for file names and metadata, never empty.
     pub camera_name: String,
     pub eye: record::View,
     extents: Extents,
     camera: Camera,
-    /// The node that carries the camera, or where it stands.
+    /// The node that carries the camera; `None` if the camera is not part of the scene.
     node: Option<usize>,
     world_from_camera: Mat4,
 }
 
-/// The options that decide what is seen: the scene, its lights, camera, size and time.
+/// The options for the scene: its lights, camera, size and time.
 #[derive(clap::Args, Clone, Debug)]
 pub struct StageArgs {
     #[command(flatten)]
@@ -47,20 +47,20 @@ pub struct StageArgs {
     #[arg(long, value_name = "WxH", default_value = "1024x768", help_heading = "Picture")]
     pub size: Size,
 
-    /// Camera by name, by index, from a .toml file, or from a list of views (LIST.toml#NAME); default: the scene's first one
+    /// Camera by name, by index, from a .toml file, or from a list of views (LIST.toml#NAME); default: the scene's first camera
     #[arg(long, value_name = "NAME|INDEX|FILE", help_heading = "Picture")]
     pub camera: Option<String>,
 
-    /// Time of an animated scene (of frame 0, where there are frames), seconds
+    /// Time of an animated scene, seconds; in a sequence the time of frame 0
     #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
     pub time: f64,
 
-    /// Light the scene with this environment instead of its own: .hdr, .exr, or a built-in one (point, area, areas, grove)
+    /// Replace the scene's environment: .hdr, .exr, or a built-in environment (point, area, areas, grove)
     #[arg(long, alias = "env", value_name = "FILE", help_heading = "Picture")]
     pub environment: Option<PathBuf>,
 
-    /// Add a white point light: place in metres, intensity in W/sr; with ,X2,Y2,Z2,SECONDS it goes there and back in so many seconds;
-    /// may be given more than once
+    /// Add a white point light: position in metres, intensity in W/sr; with ,X2,Y2,Z2,SECONDS it moves to the second position and back in
+    /// this time; may be given more than once
     #[arg(long, value_name = "X,Y,Z,INTENSITY", allow_hyphen_values = true, help_heading = "Picture")]
     pub light: Vec<Point>,
 
@@ -68,28 +68,28 @@ pub struct StageArgs {
     #[arg(long, value_name = "AZIMUTH,ELEVATION[,IRRADIANCE]", allow_hyphen_values = true, help_heading = "Picture")]
     pub sun: Option<Sun>,
 
-    /// Whether a sun and a sky are added
+    /// When to add default lights
     #[arg(long, value_enum, default_value_t, value_name = "WHEN", help_heading = "Picture")]
     pub default_light: DefaultLight,
 
-    /// The camera of a picture that is made again, in place of `camera`.
+    /// The camera of a picture that is made again; replaces `camera`.
     #[arg(skip)]
     pub eye: Option<Eye>,
 }
 
-/// A camera that was chosen before.
+/// The camera from a picture's record.
 #[derive(Clone, Debug)]
 pub struct Eye {
     pub view: record::View,
-    /// For names and metadata, where the scene has none for it.
+    /// Name for files and metadata, if the scene has none.
     pub name: String,
 }
 
 impl Stage {
-    /// Reads the scene, adds what it lacks to be seen, and chooses the camera.
+    /// Reads the scene, adds a missing camera and missing lights, and chooses the camera.
     ///
     /// # Errors
-    /// `Input` for files that cannot be served, `Usage` for names that do not exist.
+    /// `Input` for files that cannot be read, `Usage` for names that do not exist.
     pub fn open(args: &StageArgs) -> Result<Self> {
         let (mut scene, source) = args.scene.open()?;
         if scene.name.is_empty() {
@@ -119,7 +119,7 @@ impl Stage {
         let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
         let choice = match (&args.eye, &args.camera) {
             (Some(Eye { view: record::View::File(file), .. }), _) => Choice::File(file.clone()),
-            // An index is never taken for a file.
+            // An index from a record must not be interpreted as a file name.
             (Some(Eye { view: record::View::Scene(index), .. }), _) => camera::choose(&index.to_string(), &names)?,
             (None, Some(asked)) => camera::choose(asked, &names)?,
             (None, None) => Choice::Scene(first_placed(&scene)),
@@ -155,15 +155,15 @@ impl Stage {
         })
     }
 
-    /// What the user should know about how the scene was read.
+    /// Notes about the scene for the user.
     pub fn notes(&self) -> &[Note] {
         &self.scene.notes
     }
 
-    /// The pose of a time, seconds, and what the camera sees then.
+    /// The pose and the camera's view at a time, seconds.
     ///
     /// # Errors
-    /// `Input` if anything stands too far away then.
+    /// `Input` if an object is too far away at this time.
     pub fn at(&self, seconds: f64, size: Size) -> Result<(Pose, View)> {
         let pose = Pose::playing(&self.scene, seconds as f32);
         self.extents.check(&self.scene, &pose)?;
@@ -175,7 +175,7 @@ impl Stage {
     }
 }
 
-/// The first camera that stands somewhere.
+/// The first camera that a node carries.
 fn first_placed(scene: &Scene) -> usize {
     let placed = |index: usize| scene.nodes.iter().any(|node| node.camera == Some(index as u32));
     (0..scene.cameras.len()).find(|&index| placed(index)).unwrap_or(0)

@@ -1,10 +1,10 @@
-//! `--timings FILE.csv`: what every pass of every frame cost.
+//! `--timings FILE.csv`: the time of every pass of every frame.
 
 use std::{fmt::Write, path::Path};
 
 use lucerna::{Result, graph::Report, image};
 
-/// Rows of a CSV file: frame, scope, pass, milliseconds on the device (empty if it has no clock) and on the CPU.
+/// Rows of a CSV file: frame, scope, pass, milliseconds on the device (empty if it has no timestamps) and on the CPU.
 #[derive(Debug)]
 pub struct Timings {
     csv: String,
@@ -27,7 +27,7 @@ impl Timings {
         }
     }
 
-    /// Writes the file, whole.
+    /// Writes the file as a whole or not at all.
     pub fn write(&self, path: &Path) -> Result<()> {
         image::write_atomic(path, self.csv.as_bytes(), true)
     }

@@ -1,6 +1,7 @@
-// What an occluder hides of the environment from many points: its mask on the cube, a ray for each texel, and the sum of what the
-// mask lets through (Michael 2010, section 3.3.2). Or what is left of the environment in front of places on the occluder itself.
-// A workgroup has one point and some tiles of 8×8 texels.
+// Vectors of the light that an occluder hides from many points ([FIV 10]): one ray per texel makes the occluder's mask
+// on the cube map, and the covered texels are summed up (Michael 2010, section 3.3.2). Or, for samples on the
+// occluder's surface, vectors of the light that remains in front of each sample. A workgroup has one point and some
+// tiles of 8×8 texels.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -11,16 +12,16 @@ layout(local_size_x = 64) in;
 
 layout(binding = 0, scalar) readonly buffer Texels { FivTexel texels[]; };
 layout(binding = 1, scalar) readonly buffer Points { FivPoint points[]; };
-layout(binding = 2, scalar) writeonly buffer Partials { float partials[]; }; // ten for each point and chunk
+layout(binding = 2, scalar) writeonly buffer Partials { float partials[]; }; // ten floats for each point and chunk
 layout(binding = 3, scalar) readonly buffer Turns { FivTurn turns[]; };
-layout(binding = 4, scalar) readonly buffer Normals { vec3 normals[]; }; // of the places on the occluder
+layout(binding = 4, scalar) readonly buffer Normals { vec3 normals[]; }; // of the samples on the surface
 
 layout(push_constant, scalar) uniform Push {
-    uint first;   // point
+    uint first;   // first point
     uint size;    // texels of the environment along an edge
     uint split;   // rays along the edge of a texel
-    uint tiles;   // of a chunk
-    uint own;     // 1: the points lie on the occluder, and what is seen from before them counts
+    uint tiles;   // tiles of a chunk
+    uint own;     // 1: the points lie on the occluder's surface, and the visible light in front of them is summed up
 };
 
 shared vec3 sums[3][64];
@@ -28,7 +29,7 @@ shared float covered[64];
 
 void main() {
     uint lane = gl_LocalInvocationID.x;
-    // Eight neighbouring invocations make a block of 4 × 2 texels: CPU drivers run them together.
+    // Eight neighbouring invocations form a block of 4×2 texels, because CPU drivers run them together.
     uvec2 within = uvec2(lane & 3u | (lane >> 3u & 1u) << 2u, lane >> 2u & 1u | (lane >> 4u & 3u) << 1u);
     uint side = size * split, row = side / 8u;
     vec3 origin = points[first + gl_WorkGroupID.x].at;
@@ -45,19 +46,21 @@ void main() {
         uint face = tile / (row * row), place = tile % (row * row);
         uvec2 at = 8u * uvec2(place % row, place / row) + within;
         vec3 direction = cube_direction(face, (vec2(at) + 0.5) / float(side));
-        // Only what passes the bounding sphere; by the distance of the line, which far away is no difference of large numbers.
+        // Only rays that meet the bounding sphere can hit the occluder. The test uses the distance of the line from the
+        // centre, which stays exact at a great distance.
         vec3 across = cross(origin, direction);
         bool near = rho2 <= radius2
             || (dot(origin, direction) < 0.0 && dot(across, across) <= radius2 * dot(direction, direction));
         FivTexel t = texels[(face * size + at.y / split) * size + at.x / split];
         if (own != 0u ? dot(t.area, normal) <= 0.0 : !near) continue;
         if (near) {
-            // Whether a blended surface is there is decided for each place anew, in the same way whatever is computed with it.
+            // The random number of a blended surface depends only on the point and the ray, so a sample does not depend
+            // on the other samples of the dispatch.
             uint salt = pcg4d(uvec4(floatBitsToUint(origin), at.x + side * (at.y + side * face))).x;
             Ray ray = Ray(start, 0.0, turn.geometry_from_world * direction, 1.01 * (sqrt(rho2) + radius));
             if (trace_any(ray, TRACE_SHADOW, salt) == (own != 0u)) continue;
         }
-        x += t.radiance * (t.area.x * share);
+        x += t.radiance * (t.area.x * share); // [FIV 10]
         y += t.radiance * (t.area.y * share);
         z += t.radiance * (t.area.z * share);
         angle += t.angle * share;

@@ -1,4 +1,4 @@
-// Irradiance for the normal of every texel of a cube: the sum over the texels of the environment (Michael 2010, eq. 6).
+// Irradiance for the normal of every texel of a cube map: a sum over the texels of the environment ([FIV 6]).
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -14,7 +14,7 @@ layout(push_constant, scalar) uniform Push {
     uint count; // at most 24,576
 };
 
-const uint BLOCK = 64u; // sums of sums: rounding grows with the root only
+const uint BLOCK = 64u; // sums of partial sums, so that rounding errors grow with the square root only
 
 void main() {
     ivec3 at = ivec3(gl_GlobalInvocationID);
@@ -26,7 +26,7 @@ void main() {
         vec3 part = vec3(0.0);
         uint end = min(block + BLOCK, count);
         for (uint i = first + block; i < first + end; ++i) {
-            part += texels[i].radiance * max(dot(normal, texels[i].area), 0.0);
+            part += texels[i].radiance * max(dot(normal, texels[i].area), 0.0); // [FIV 6]
         }
         sum += part;
     }

@@ -1,4 +1,4 @@
-// Sums of the chunks of each point, in their order.
+// Sums of the chunks of each point, in a fixed order.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -7,15 +7,15 @@
 layout(local_size_x = 64) in;
 
 layout(binding = 0, scalar) readonly buffer Partials { float partials[]; };
-layout(binding = 1, scalar) writeonly buffer Fivs { float fivs[]; };         // nine for each point
-layout(binding = 2, scalar) writeonly buffer Coverage { float coverage[]; }; // solid angle that is hidden (own: seen), sr
+layout(binding = 1, scalar) writeonly buffer Fivs { float fivs[]; };         // nine floats for each point
+layout(binding = 2, scalar) writeonly buffer Coverage { float coverage[]; }; // hidden (own: visible) solid angle, sr
 
 layout(push_constant, scalar) uniform Push {
-    uint first; // point
+    uint first; // first point
     uint count;
     uint chunks;
-    float inside; // a point from which as much is hidden lies inside of the occluder, sr
-    uint own;     // 1: it is seen, and a place from which no more is seen lies inside
+    float inside; // hidden solid angle from which on a point lies inside the occluder, sr
+    uint own;     // 1: the solid angle is the visible one, and a point that sees no more than `inside` lies inside
 };
 
 void main() {

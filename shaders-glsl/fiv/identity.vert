@@ -1,4 +1,4 @@
-// Which occluder each pixel shows, and the light that it leaves itself: vertices.
+// Vertices of the pass that draws the visible occluder of each pixel and the light past that occluder.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -13,9 +13,10 @@ layout(binding = 3, scalar) readonly buffer Positions { vec3 positions[]; };
 layout(binding = 4, scalar) readonly buffer Owners { FivOwner owners[]; }; // of each instance
 layout(binding = 5, scalar) readonly buffer Fivs { float fivs[]; };
 
-layout(location = 0) out float eye_z;
+layout(location = 0) out vec3 seen; // position in view space, metres
 layout(location = 1) flat out uint instance;
-// Vectors of the light that reaches fronts and backs of surfaces; w of x: 1, 0 where it is not known.
+// Vectors of the light that reaches the front and the back of surfaces. w of x: 1, or 0 where the vectors are not
+// known.
 layout(location = 2) out vec4 front_x;
 layout(location = 3) out vec3 front_y;
 layout(location = 4) out vec3 front_z;
@@ -34,7 +35,7 @@ void load(uint first, out vec4 x, out vec3 y, out vec3 z) {
     z = vec3(fivs[at + 6u], fivs[at + 7u], fivs[at + 8u]);
 }
 
-// Between two turns.
+// Interpolates between two rotation samples.
 void load(uint first, uint next, float blend, out vec4 x, out vec3 y, out vec3 z) {
     load(first, x, y, z);
     if (blend <= 0.0) return;
@@ -50,7 +51,7 @@ void main() {
     uint i = visible[gl_InstanceIndex];
     vec4 world = instances[i].world_from_object * vec4(positions[instances[i].first_vertex + uint(gl_VertexIndex)], 1.0);
     gl_Position = view.clip_from_world * world;
-    eye_z = -(view.view_from_world * world).z;
+    seen = (view.view_from_world * world).xyz;
     instance = i;
     FivOwner owner = owners[i];
     load(owner.front, owner.front_next, owner.blend, front_x, front_y, front_z);

@@ -1,4 +1,5 @@
-// Irradiance of the visible surfaces: that of the whole environment without what occluders hide (Michael 2010, section 3.3.3).
+// Irradiance of the visible surfaces: the irradiance of the whole environment minus the irradiance that occluders hide
+// ([FIV 12]; Michael 2010, section 3.3.3).
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -10,17 +11,17 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-layout(constant_id = 0) const uint PARTIAL = 1;   // occluders cut by the receiver's plane: 0 whole, 1 by their height, 2 by the light
-layout(constant_id = 1) const uint OVERLAP = 1;   // what several occluders hide is taken away once
-layout(constant_id = 2) const uint OWN = 1;       // occluders shadow themselves: 1 from the spheres' samples, 2 from their surface's
-layout(constant_id = 3) const uint TRILINEAR = 1; // between samples
-layout(constant_id = 4) const uint SCALED = 1;    // what is interpolated is free of the solid angle
-layout(constant_id = 5) const uint SPOTS = 0;     // a bright part of the environment is taken away once only
-layout(constant_id = 6) const uint NEGLIGIBLE = 0; // what can hide no more than a share of the light is left out
-layout(constant_id = 7) const uint HELD = 1;      // above 1: a pixel keeps how it sees each occluder, of which there are as many at most
+layout(constant_id = 0) const uint PARTIAL = 1;   // occluders that the receiver's plane cuts: 0 not corrected, 1 by their height, 2 by the light from behind
+layout(constant_id = 1) const uint OVERLAP = 1;   // irradiance that several occluders hide is subtracted once
+layout(constant_id = 2) const uint OWN = 1;       // shadows of occluders on themselves: 1 from samples on spheres, 2 from samples on their surfaces
+layout(constant_id = 3) const uint TRILINEAR = 1; // interpolation between samples
+layout(constant_id = 4) const uint SCALED = 1;    // interpolation relative to the solid angle
+layout(constant_id = 5) const uint SPOTS = 0;     // light of a bright part is subtracted at most once
+layout(constant_id = 6) const uint NEGLIGIBLE = 0; // occluders that can hide only a small share of the light are left out
+layout(constant_id = 7) const uint HELD = 1;      // above 1: the most occluders whose direction and size a pixel keeps
 
 struct FivWhole {
-    vec3 x; // of the whole environment, W/m²
+    vec3 x; // vectors of the whole environment, W/m²
     vec3 y;
     vec3 z;
     uint occluders;
@@ -35,22 +36,22 @@ layout(binding = 3) uniform sampler2D identity;
 layout(binding = 4) uniform samplerCube difmap;
 layout(binding = 5, scalar) readonly buffer Occluders { FivOccluder occluders[]; };
 layout(binding = 6, scalar) readonly buffer Fivs { float fivs[]; };
-layout(binding = 7, rgba32f) uniform image2D irradiance; // W/m²; below zero where occluders took more than there was
+layout(binding = 7, rgba32f) uniform image2D irradiance; // W/m²; negative where occluders hide more light than there was
 layout(binding = 8, scalar) uniform WholeBlock { FivWhole whole; };
-layout(binding = 9) uniform sampler2D own; // irradiance that the pixel's occluder leaves itself, W/m²; a: 1 where it is known
+layout(binding = 9) uniform sampler2D own; // irradiance past the pixel's own occluder, W/m²; a: 1 where the irradiance is known
 layout(binding = 10, scalar) readonly buffer Reaches { float reaches[]; };
 
-layout(binding = 11, scalar) readonly buffer Near { uint near[]; }; // occluders that may matter to a tile of pixels, a bit each
+layout(binding = 11, scalar) readonly buffer Near { uint near[]; }; // occluders that may affect a tile of pixels, a bit each
 
-layout(binding = 12, scalar) readonly buffer Pairs { uint pairs[]; }; // and those of them that can overlap one of this call
+layout(binding = 12, scalar) readonly buffer Pairs { uint pairs[]; }; // occluders that may overlap one of this call, a bit each
 layout(binding = 13, scalar) readonly buffer Spots { FivSpot spots[]; };
-layout(binding = 14, scalar) buffer Taken { float taken[]; }; // what earlier calls took from them
+layout(binding = 14, scalar) buffer Taken { float taken[]; }; // light that earlier calls subtracted from the bright parts
 layout(binding = 15, scalar) readonly buffer Matter { float matter[]; };
 
 layout(push_constant, scalar) uniform Push {
-    uint first; // occluder
+    uint first; // first occluder
     uint count;
-    uint words; // of a tile
+    uint words; // words of a tile
 };
 
 #include "lib/fiv_lookup.glsl"
@@ -58,35 +59,35 @@ layout(push_constant, scalar) uniform Push {
 #include "lib/fiv_spots.glsl"
 #include "lib/fiv_matter.glsl"
 
-// Goes on to the next word with an occluder in it, up to the word `last`; `tile`: first word of the tile.
+// Advances to the next word with an occluder, up to the word `last`. `tile`: first word of the tile.
 bool fiv_next(inout uint w, inout uint bits, uint tile, uint last) {
     while (bits == 0u && ++w < last) bits = near[tile + w];
     return bits != 0u;
 }
 
-// How much an occluder counts: nothing where it can hide no more than what is negligible, which it comes to without a step.
+// Weight of an occluder: 0 if it can hide no more than the negligible share, with a continuous transition.
 float fiv_counts(vec3 to, float far, float radius) {
     if (NEGLIGIBLE == 0u || far <= radius) return 1.0;
     return clamp(fiv_matter(to / far, radius / far) / whole.negligible - 1.0, 0.0, 1.0);
 }
 
-// Where the pixel sees an occluder: direction of its centre, and the sine of the half angle of its bounding sphere.
+// Direction of the occluder's centre, and sine of the half angle of its bounding sphere.
 vec4 look_place(uint i, vec3 p) {
     vec3 offset = occluders[i].centre - p;
     float far = max(length(offset), 1e-20);
     return vec4(offset / far, min(occluders[i].radius / far, 1.0));
 }
 
-// What it sees of it: the share in front of its plane, how much it counts, and the share of its disc that it hides.
+// Share of the occluder in front of the receiver's plane, its weight, and the share of its disc that it fills.
 vec3 look_amount(uint i, vec3 p, vec3 n, FivAlong along) {
     vec3 offset = occluders[i].centre - p;
     float d = dot(offset, n);
-    // Without the correction for partial occluders those count whose centre is in front.
+    // Without the correction for partial occluders, an occluder counts if its centre lies in front.
     float front = PARTIAL != 0u ? fiv_front_share(occluders[i], d, n, along) : float(d > 0.0);
     return vec3(front, fiv_counts(offset, length(offset), occluders[i].radius), occluders[i].fill);
 }
 
-// Both of those that may matter to the pixel, where it keeps them, so that pairs cost little.
+// Directions, sizes and shares of the occluders that may affect the pixel. They are kept so that pairs cost little.
 vec4 held_places[HELD];
 vec3 held_amounts[HELD];
 
@@ -100,14 +101,14 @@ vec3 amount_of(uint i, vec3 p, vec3 n, FivAlong along) {
     return held_amounts[i];
 }
 
-// Places where the mean over the unit interval is taken: Gauss-Legendre, exact for seven overlapping occluders.
+// Nodes of the mean over the unit interval: Gauss-Legendre, exact for seven overlapping occluders.
 const vec4 NODES = vec4(0.0694318442, 0.3300094782, 0.6699905218, 0.9305681558);
 const vec4 WEIGHTS = vec4(0.1739274226, 0.3260725774, 0.3260725774, 0.1739274226);
 
-// The share of what occluder `i` hides that is to be taken away for it, so that what several hide is taken away once. For two it is
-// eq. 15. Where more overlap, the mean of 1 / (1 + number of others there), as if these lay there independently: the integral of
-// the product of 1 - g (1 - t) over t in 0..1.
-// `row`: first word of those that can overlap it.
+// Share of the irradiance hidden by occluder `i` that is subtracted, so that irradiance hidden by several occluders is
+// subtracted once. For two occluders the share is 1 − Overlapped% of [FIV 15]. For more occluders the share is the mean
+// of 1 / (1 + number of other occluders at a point), with independent occluders, which is the integral of the product
+// of 1 - g (1 - t) over t in 0..1. `row`: first word of the occluders that may overlap it.
 float own_share(uint i, uint self, vec3 p, vec3 n, FivAlong along, uint row) {
     vec4 place = place_of(i, p);
     float fill = occluders[i].fill;
@@ -121,12 +122,13 @@ float own_share(uint i, uint self, vec3 p, vec3 n, FivAlong along, uint row) {
         vec4 other = place_of(j, p);
         float apart = length(other.xyz - place.xyz);
         if (apart >= place.w + other.w) continue;
-        // Front share, counts, fill.
+        // Share in front, weight, filled share.
         vec3 amount = amount_of(j, p, n, along);
         if (amount.x <= 0.0) continue;
-        // Of the lens a body hides as much as of its whole disc; where both are full this is eq. 15.
+        // Each occluder fills the same share of the lens as of its whole disc. With filled discs g / 2 is Overlapped%
+        // of [FIV 15].
         float discs = FIV_PI * (place.w * place.w * fill + other.w * other.w * amount.z);
-        float g = 2.0 * lens_area(place.w, other.w, apart) * fill * amount.z / discs;
+        float g = 2.0 * lens_area(place.w, other.w, apart) * fill * amount.z / discs; // [FIV 15]
         product *= 1.0 - g * amount.x * amount.y * (1.0 - NODES);
     }
     return dot(product, WEIGHTS);
@@ -148,7 +150,7 @@ void main() {
     vec3 open = textureLod(difmap, cube_lookup(n), 0.0).rgb;
     vec3 behind = PARTIAL == 2u ? textureLod(difmap, cube_lookup(-n), 0.0).rgb : vec3(0.0);
     vec3 lit = open;
-    // What others hide is hidden by itself already in part, as if both lay there independently.
+    // Light that other occluders hide may already be hidden by the own occluder. The two are taken as independent.
     vec3 seen = vec3(1.0);
     if (OWN == 2u && self != FIV_NONE) {
         vec4 left = texelFetch(own, pixel, 0);
@@ -156,14 +158,15 @@ void main() {
             lit = min(left.rgb, open);
             if (OVERLAP != 0u) seen = lit / max(open, vec3(1e-30));
         }
-    } else if (OWN == 1u && self != FIV_NONE && occluders[self].stands != 0u) {
-        // Everything that is not hidden lies in front of the surface (eq. 13). Where all samples lie inside of it: unshadowed.
+    } else if (OWN == 1u && self != FIV_NONE && occluders[self].self_shadows != 0u) {
+        // All visible light lies in front of the surface, as [FIV 13] requires. If all samples lie inside the occluder,
+        // the pixel is unshadowed.
         vec4 hidden = fiv_dot(occluders[self], occluders[self].centre - p, n, TRILINEAR != 0u, SCALED != 0u);
-        vec3 left = n.x * whole.x + n.y * whole.y + n.z * whole.z - hidden.rgb;
+        vec3 left = n.x * whole.x + n.y * whole.y + n.z * whole.z - hidden.rgb; // [FIV 13]
         if (hidden.w > 0.0) lit = clamp(left, vec3(0.0), open);
     }
     vec3 sum = first == 0u ? lit : imageLoad(irradiance, pixel).rgb;
-    // Light of the bright parts, what is taken from each, and all other light.
+    // Light of the bright parts, light that is subtracted from each part, and all other light.
     vec3 bright[FIV_SPOTS], gone[FIV_SPOTS], even = open;
     uint kept = 3u * FIV_SPOTS * uint(pixel.y * imageSize(irradiance).x + pixel.x);
     for (uint m = 0u; m < FIV_SPOTS; ++m) {
@@ -198,14 +201,15 @@ void main() {
         vec3 hidden = looked.rgb;
         if (PARTIAL == 2u && front < 1.0) hidden = fiv_cut(occluders[i], offset, n, along, hidden, open, behind);
         hidden = max(hidden, vec3(0.0)) * (PARTIAL == 1u ? front : 1.0);
-        // Where most of the samples around lie inside of the occluder, so does the receiver: everything is hidden.
+        // If most of the nearest samples lie inside the occluder, the receiver does too, and all light is hidden.
         hidden = mix(hidden, open, clamp(1.0 - 2.0 * looked.w, 0.0, 1.0)) * (fade * seen);
         if (hidden == vec3(0.0)) continue;
         if (OVERLAP != 0u && whole.occluders > 1u) {
             uint row = (tile_number * count + i - first) * words;
             float share = own_share(i, self, p, n, along, row);
             if (SPOTS != 0u) {
-                // What is more than its share of even light comes from the bright parts that its disc can hide.
+                // Hidden irradiance beyond the occluder's share of constant radiance comes from the bright parts that
+                // its disc can cover.
                 vec4 place = place_of(i, p);
                 float flat_part = amount.z * front * fade * place.w * place.w * max(dot(place.xyz, n), 0.4 * place.w);
                 float soft = FIV_PI / float(occluders[i].azimuths);
@@ -221,6 +225,7 @@ void main() {
             }
             hidden *= share;
         }
+        // [FIV 14]: the shares of all occluders, subtracted from the total as in [FIV 12].
         sum -= hidden;
     }
     bool last_call = first + count >= whole.occluders;

@@ -1,5 +1,5 @@
-// Occluders that may matter to the surfaces of a tile of 8×8 pixels, a bit each: those that are wholly behind all of its surfaces, or
-// look too small to matter, are left out. And where these surfaces are.
+// Lists the occluders that may affect the surfaces of a tile of 8×8 pixels, a bit each. Occluders behind all surfaces
+// of the tile or of negligible size are left out. Also computes a sphere around the surfaces of the tile.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -11,19 +11,19 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(constant_id = 0) const uint PARTIAL = 1;
-layout(constant_id = 1) const uint NEGLIGIBLE = 0; // what can hide no more than a share of the light is left out
+layout(constant_id = 1) const uint NEGLIGIBLE = 0; // occluders that can hide only a small share of the light are left out
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D normal;
 layout(binding = 2) uniform sampler2D depth;
 layout(binding = 3, scalar) readonly buffer Occluders { FivOccluder occluders[]; };
 layout(binding = 4, scalar) writeonly buffer Near { uint near[]; };
-layout(binding = 5, scalar) writeonly buffer Boxes { vec4 boxes[]; }; // middle and radius of each tile's surfaces, metres
+layout(binding = 5, scalar) writeonly buffer Boxes { vec4 boxes[]; }; // centre and radius of a sphere around each tile's surfaces, metres
 layout(binding = 6, scalar) readonly buffer Matter { float matter[]; };
 
 layout(push_constant, scalar) uniform Push {
-    uint count; // of occluders
-    uint words; // of a tile
+    uint count; // number of occluders
+    uint words; // words of a tile
     float negligible; // share of the mean irradiance
 };
 
@@ -63,7 +63,7 @@ void main() {
     }
     vec3 least = low[0], most = high[0];
     bool empty = least.x > most.x;
-    // The surface is at most so far in front of the plane through the middle that has its normal.
+    // Greatest distance of a surface behind the plane through the middle that has the surface's normal.
     vec3 middle = 0.5 * (least + most);
     over[lane] = any ? dot(middle - p, n) : -1e30;
     barrier();

@@ -1,4 +1,4 @@
-// Marked samples of each block.
+// Number of marked samples of each block.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require

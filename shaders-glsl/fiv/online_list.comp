@@ -1,4 +1,4 @@
-// The marked samples in the order of their numbers, as points from which their occluder is looked at.
+// Lists the marked samples in the order of their numbers, as points that look at their occluder.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -13,11 +13,11 @@ layout(binding = 2, scalar) readonly buffer Sets { FivSet sets[]; };
 layout(binding = 3, scalar) readonly buffer Directions { vec3 directions[]; }; // from the receiver to the occluder
 layout(binding = 4, scalar) readonly buffer Radii { float radii[]; };          // metres
 layout(binding = 5, scalar) writeonly buffer Points { FivPoint points[]; };
-layout(binding = 6, scalar) writeonly buffer Samples { uint samples[]; }; // number of each point's sample
+layout(binding = 6, scalar) writeonly buffer Samples { uint samples[]; }; // sample number of each point
 
 layout(push_constant, scalar) uniform Push {
     uint blocks;
-    uint set_blocks; // of a set
+    uint set_blocks; // blocks of a set
     uint rings;      // directions of a sphere
 };
 

@@ -1,4 +1,4 @@
-// Marks the samples that the lookups of the visible surfaces read: as light.comp goes through the occluders.
+// Marks the samples that the lookups of the visible surfaces read, with the same loop over occluders as light.comp.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -22,12 +22,12 @@ layout(binding = 3) uniform sampler2D identity;
 layout(binding = 4, scalar) readonly buffer Occluders { FivOccluder occluders[]; };
 layout(binding = 5, scalar) buffer Marks { uint marks[]; }; // a bit for each sample
 
-layout(binding = 6, scalar) readonly buffer Near { uint near[]; }; // occluders that may matter to a tile of pixels, a bit each
+layout(binding = 6, scalar) readonly buffer Near { uint near[]; }; // occluders that may affect a tile of pixels, a bit each
 
 layout(push_constant, scalar) uniform Push {
-    uint first; // word of them
+    uint first; // first word of the occluders
     uint count;
-    uint words; // of a tile
+    uint words; // words of a tile
 };
 
 void mark(FivOccluder o, vec3 offset) {
@@ -37,7 +37,7 @@ void mark(FivOccluder o, vec3 offset) {
         if (fiv_corner(o, cell, k, number) <= 0.0) continue;
         uint at = o.first / FIV_FLOATS + number;
         uint bit = 1u << (at & 31u);
-        // Neighbours need the same ones.
+        // Neighbouring pixels mark the same samples, and the test saves most atomic operations.
         if ((marks[at >> 5u] & bit) == 0u) atomicOr(marks[at >> 5u], bit);
     }
 }

@@ -1,5 +1,5 @@
-// Light that reaches the visible surfaces of the occluders of one geometry past that geometry alone: a ray to every texel of the
-// environment that is not black.
+// Irradiance of the visible surfaces of the occluders of one geometry, with shadows of this geometry only: a ray to
+// every texel that is not black.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -21,16 +21,16 @@ layout(binding = 4, scalar) readonly buffer Occluders { FivOccluder occluders[];
 layout(binding = 5, scalar) readonly buffer Texels { FivTexel texels[]; };
 layout(binding = 6, scalar) readonly buffer Lit { uint lit[]; }; // texels that are not black
 layout(binding = 7, scalar) readonly buffer Turns { FivTurn turns[]; };
-layout(binding = 8, rgba32f) uniform image2D own; // irradiance, W/m²; a: 1 where it is known
+layout(binding = 8, rgba32f) uniform image2D own; // irradiance, W/m²; a: 1 where the irradiance is known
 
 layout(push_constant, scalar) uniform Push {
-    uint first;     // of the lit texels
+    uint first;     // first of the lit texels
     uint count;
     uint size;      // texels of the environment along an edge
-    uint set;       // first of the geometry
+    uint set;       // first set of the geometry
     uint sets;
-    uint set_floats; // of a set
-    uint seed;  // of blended surfaces
+    uint set_floats; // floats of a set
+    uint seed;  // seed for blended surfaces
 };
 
 void main() {

@@ -1,4 +1,4 @@
-// Brings the vectors of listed points to the places of their samples.
+// Copies the vectors of listed points to the places of their samples.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -12,7 +12,7 @@ layout(binding = 2, scalar) readonly buffer Groups { uint groups[]; };
 layout(binding = 3, scalar) buffer Fivs { float fivs[]; };
 
 layout(push_constant, scalar) uniform Push {
-    uint first; // point
+    uint first; // first point
     uint batch;
 };
 

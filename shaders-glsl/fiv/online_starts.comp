@@ -1,4 +1,5 @@
-// Where the samples of each block go in the lists of its geometry, and the workgroups that compute them: one workgroup a geometry.
+// First entry of the samples of each block in the lists of its geometry, and the numbers of workgroups for the passes
+// that compute the samples. One workgroup per geometry.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -9,11 +10,11 @@ layout(local_size_x = 64) in;
 layout(binding = 0, scalar) readonly buffer Jobs { FivJob jobs[]; };
 layout(binding = 1, scalar) readonly buffer Counts { uint counts[]; };
 layout(binding = 2, scalar) writeonly buffer Starts { uint starts[]; }; // of each block
-layout(binding = 3, scalar) writeonly buffer Groups { uint groups[]; }; // six of each batch: of cover.comp, and of what has a lane a point
+layout(binding = 3, scalar) writeonly buffer Groups { uint groups[]; }; // six words for each batch: for cover.comp, and for passes with one invocation per point
 
 layout(push_constant, scalar) uniform Push {
-    uint each;   // points of a batch at most
-    uint chunks; // of the directions of a point
+    uint each;   // most points of a batch
+    uint chunks; // chunks of the directions of a point
 };
 
 shared uint sums[64];

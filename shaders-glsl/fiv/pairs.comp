@@ -1,4 +1,5 @@
-// Which occluders can overlap, seen from the surfaces of a tile of 8×8 pixels: for each occluder a row of bits. A workgroup has a tile.
+// Pairs of occluders that may overlap, seen from the surfaces of a tile of 8×8 pixels: a row of bits for each occluder.
+// A workgroup has one tile.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -13,18 +14,18 @@ layout(binding = 3, scalar) writeonly buffer Pairs { uint pairs[]; };
 
 layout(push_constant, scalar) uniform Push {
     uint occluder_count;
-    uint first; // of those that get a row
-    uint count; // of them
-    uint words; // of a row
+    uint first; // first occluder that gets a row
+    uint count; // number of rows
+    uint words; // words of a row
 };
 
-// Direction of the middle of a disc as seen from the middle of the tile, and how far from it a point of the disc can be, seen from
-// anywhere in the tile, as a chord.
+// Direction of the occluder's centre seen from the middle of the tile, and the greatest distance (chord) of a point of
+// its disc from this direction, seen from anywhere in the tile.
 vec4 cone(uint i, vec4 box) {
     vec3 offset = occluders[i].centre - box.xyz;
     float far = length(offset), radius = occluders[i].radius, nearest = far - box.w;
     if (nearest <= radius) return vec4(0.0, 0.0, 0.0, 4.0);
-    // From a place this part of the distance away, the direction is at most this chord away.
+    // Seen from a point at this share of the distance, the direction differs by at most this chord.
     float part = box.w / far;
     float off = part * sqrt(2.0 / (1.0 + sqrt(max(1.0 - part * part, 0.0))));
     return vec4(offset / far, radius / nearest + off + 1e-4);
@@ -48,7 +49,7 @@ void main() {
                 uint word = 2u * chunk + half_chunk;
                 if (word >= words) break;
                 uint row = 0u, may = counts ? near[tile * words + word] : 0u;
-                // None of them: nothing to look at.
+                // Words without a bit need no test.
                 uint end = may == 0u ? 0u : uint(findMSB(may)) + 1u;
                 for (uint b = 0u; b < end; ++b) {
                     vec4 seen = others[32u * half_chunk + b];

@@ -1,5 +1,6 @@
-// Pictures of an occluder along the directions of rays of the environment's cube, without perspective: how far back it reaches on each
-// line, in sixteen bits. From any point the occluder hides a direction if it reaches farther back on the point's line than the point.
+// Orthographic depth images of an occluder along the directions of rays of the environment's cube map: how far the
+// occluder extends to the back on each line, in sixteen bits. The occluder hides a direction from a point if this depth
+// lies behind the point on the point's line.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -9,18 +10,18 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-layout(binding = 0, scalar) writeonly buffer Depths { uint depths[]; }; // two pixels a word, picture after picture
+layout(binding = 0, scalar) writeonly buffer Depths { uint depths[]; }; // two pixels per word, image after image
 
 layout(push_constant, scalar) uniform Push {
     uint face;
-    uint first;   // direction of the face
+    uint first;   // first direction of the face
     uint side;    // directions along an edge of a face
-    float radius; // of the bounding sphere, metres
+    float radius; // radius of the bounding sphere, metres
 };
 
 uint depth_of(vec3 along, vec2 st) {
     vec2 plane = (2.0 * st - 1.0) * radius * parallel_reach(along);
-    // The line's end, on the farther side of the sphere.
+    // The end of the line on the far side of the sphere.
     vec3 end = vec3(plane + along.xy * radius, radius);
     Hit hit = trace_closest(Ray(parallel_direction(face, end), 0.0, -parallel_direction(face, along), 2.0 * radius), TRACE_SHADOW, 0u);
     if (hit.instance == NONE) return 0u;

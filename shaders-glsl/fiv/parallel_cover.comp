@@ -1,5 +1,5 @@
-// What an occluder hides of some directions of the environment's cube from many points, looked up in its pictures along those directions.
-// An invocation has one point; neighbours look into the same picture.
+// Vectors of the light that an occluder hides from many points in some directions ([FIV 10]), by lookups in its depth
+// images. An invocation has one point. Neighbouring invocations read the same image.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -10,19 +10,19 @@ layout(local_size_x = 64) in;
 
 layout(binding = 0, scalar) readonly buffer Texels { FivTexel texels[]; };
 layout(binding = 1, scalar) readonly buffer Points { FivPoint points[]; };
-layout(binding = 2, scalar) writeonly buffer Partials { float partials[]; }; // ten for each point and chunk
-layout(binding = 3, scalar) readonly buffer Depths { uint depths[]; };       // of this face
+layout(binding = 2, scalar) writeonly buffer Partials { float partials[]; }; // ten floats for each point and chunk
+layout(binding = 3, scalar) readonly buffer Depths { uint depths[]; };       // depth images of this face
 
 layout(push_constant, scalar) uniform Push {
-    uint first;   // point
+    uint first;   // first point
     uint count;
     uint face;
     uint size;    // texels of the environment along an edge
     uint split;   // directions along the edge of a texel
     uint each;    // directions of a chunk
-    uint chunk;   // the first of this face
-    uint chunks;  // of all faces
-    float radius; // of the pictures, metres
+    uint chunk;   // first chunk of this face
+    uint chunks;  // chunks of all faces
+    float radius; // half the width of the depth images, metres
 };
 
 void main() {
@@ -31,7 +31,7 @@ void main() {
     uint side = size * split;
     vec3 at = parallel_coordinates(face, points[first + i].at) / radius;
     float share = 1.0 / float(split * split);
-    // In steps of the pictures' depth, without the one that stands for nothing.
+    // In steps of the stored depth, without the step that marks a miss.
     float depth = (0.5 + 0.5 * at.z) * FIV_PARALLEL_STEPS + 0.5;
     vec3 x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
     float angle = 0.0;
@@ -46,7 +46,7 @@ void main() {
         uint stored = word >> 16u * (pixel.x & 1u) & 0xffffu;
         if (stored == 0u || float(stored) < depth) continue;
         FivTexel t = texels[(face * size + place.y / split) * size + place.x / split];
-        x += t.radiance * (t.area.x * share);
+        x += t.radiance * (t.area.x * share); // [FIV 10]
         y += t.radiance * (t.area.y * share);
         z += t.radiance * (t.area.z * share);
         angle += t.angle * share;

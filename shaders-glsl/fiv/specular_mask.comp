@@ -1,5 +1,5 @@
-// How much of the light of each cell of the environment an occluder hides from many points: a ray for each texel. A workgroup has one
-// point and one tile of 8×8 texels, which are four cells of 4×4.
+// Share of the light of each cell of the environment that an occluder hides from many points: a ray for each texel. A
+// workgroup has one point and one tile of 8×8 texels, which are four cells of 4×4 texels.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -9,22 +9,22 @@
 
 layout(local_size_x = 64) in;
 
-layout(binding = 0, scalar) readonly buffer Weights { float weights[]; }; // of each texel: its part of the light of its cell
+layout(binding = 0, scalar) readonly buffer Weights { float weights[]; }; // share of each texel in the light of its cell
 layout(binding = 1, scalar) readonly buffer Points { FivPoint points[]; };
 layout(binding = 2, scalar) readonly buffer Turns { FivTurn turns[]; };
-layout(binding = 3, scalar) writeonly buffer Shares { uint shares[]; }; // a word for each point and tile: a byte a cell
+layout(binding = 3, scalar) writeonly buffer Shares { uint shares[]; }; // a word for each point and tile, a byte for each cell
 
 layout(push_constant, scalar) uniform Push {
-    uint first; // point
+    uint first; // first point
     uint size;  // texels of the environment along an edge
-    uint words; // of a point
+    uint words; // words of a point
 };
 
 shared float hidden[64];
 
 void main() {
     uint lane = gl_LocalInvocationID.x;
-    // Bits of column and row in turns: the 16 invocations of a cell lie next to each other.
+    // Bits of column and row alternate, so the 16 invocations of a cell lie next to each other.
     uvec2 within = uvec2(lane & 1u | (lane >> 1u & 2u) | (lane >> 2u & 4u), (lane >> 1u & 1u) | (lane >> 2u & 2u) | (lane >> 3u & 4u));
     uint row = size / 8u, tile = gl_WorkGroupID.y, point = gl_WorkGroupID.x;
     uint face = tile / (row * row), place = tile % (row * row);
@@ -36,10 +36,10 @@ void main() {
     float weight = weights[(face * size + at.y) * size + at.x];
     vec3 direction = cube_direction(face, (vec2(at) + 0.5) / float(size));
     float along = -dot(origin, direction), squared = dot(direction, direction);
-    // Only what passes the bounding sphere.
+    // Only rays that meet the bounding sphere can hit the occluder.
     bool met = weight > 0.0 && (rho2 <= radius2 || (along > 0.0 && along * along >= (rho2 - radius2) * squared));
     if (met) {
-        // Whether a blended surface is there is decided for each place anew.
+        // The random number of a blended surface depends only on the point and the ray.
         uint salt = pcg4d(uvec4(floatBitsToUint(origin), at.x + size * (at.y + size * face))).x;
         Ray ray = Ray(start, 0.0, turn.geometry_from_world * direction, 1.01 * (sqrt(rho2) + turn.radius));
         met = trace_any(ray, TRACE_SHADOW, salt);

@@ -1,4 +1,4 @@
-// What occluders leave of the light that visible surfaces reflect glossily, cell by cell of the environment.
+// Glossily reflected light of the visible surfaces that occluders leave visible, cell by cell of the environment.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -11,7 +11,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-layout(constant_id = 0) const uint TRILINEAR = 1; // between samples
+layout(constant_id = 0) const uint TRILINEAR = 1; // interpolation between samples
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D normal;
@@ -20,30 +20,31 @@ layout(binding = 3) uniform sampler2D surface; // reflectance at normal incidenc
 layout(binding = 4) uniform sampler2D identity;
 layout(binding = 5, scalar) readonly buffer Occluders { FivOccluder occluders[]; };
 layout(binding = 6, scalar) readonly buffer Fivs { float fivs[]; };
-layout(binding = 7, scalar) readonly buffer Lobes { FivLobe lobes[]; };   // of each cell
-layout(binding = 8, scalar) readonly buffer Shares { uint shares[]; };    // of each sample and cell: a byte
-layout(binding = 9, scalar) readonly buffer Places { uvec2 places[]; };   // of each occluder: word of its first sample, and of the next turn
-layout(binding = 10, scalar) readonly buffer Near { uint near[]; };       // occluders that may matter to a tile of pixels, a bit each
-layout(binding = 11, rgba32f) uniform image2D whole;                      // reflected light of the cells, W/(sr·m²)
-layout(binding = 12, rgba32f) uniform image2D left;                       // as well without what is hidden
+layout(binding = 7, scalar) readonly buffer Lobes { FivLobe lobes[]; };   // one for each cell
+layout(binding = 8, scalar) readonly buffer Shares { uint shares[]; };    // a byte for each sample and cell
+layout(binding = 9, scalar) readonly buffer Places { uvec2 places[]; };   // first word of each occluder's samples, and of the next rotation sample
+layout(binding = 10, scalar) readonly buffer Near { uint near[]; };       // occluders that may affect a tile of pixels, a bit each
+layout(binding = 11, rgba32f) uniform image2D whole;                      // reflected light of the cells without occluders, W/(sr·m²)
+layout(binding = 12, rgba32f) uniform image2D left;                       // the same with occluders
 
 layout(push_constant, scalar) uniform Push {
-    uint first;  // word of the cells
+    uint first;  // first word of the cells
     uint count;  // a multiple of four
     uint all;    // words of a sample
-    uint words;  // of a tile of pixels
+    uint words;  // words of a tile of pixels
 };
 
 #include "lib/fiv_lookup.glsl"
 
-// What occluder `o` hides of the sixteen cells from word `at` on, as seen from where its centre lies at `offset`: columns are words.
+// Shares that occluder `o` hides of the sixteen cells from word `at` on, if its centre lies at the offset of `cell`.
+// Columns are words.
 mat4 hidden_of(FivOccluder o, uint first_float, uint begin, FivCell cell, float beyond, uint at) {
     mat4 sum = mat4(0.0);
     float weights = 0.0;
     for (uint k = 0u; k < 8u; ++k) {
         uint number;
         float weight = fiv_corner(o, cell, k, number);
-        // Samples inside of the occluder are left out, as for irradiance.
+        // Samples inside the occluder are left out, as for irradiance.
         if (weight <= 0.0 || fivs[first_float + FIV_FLOATS * number] >= FIV_INSIDE) continue;
         uint from = begin + number * all + at;
         sum[0] += weight * unpackUnorm4x8(shares[from]);
@@ -53,7 +54,7 @@ mat4 hidden_of(FivOccluder o, uint first_float, uint begin, FivCell cell, float 
         weights += weight;
     }
     sum *= weights > 0.0 ? beyond / weights : 0.0;
-    // Where most of the samples around lie inside of the occluder, so does the receiver: everything is hidden.
+    // If most of the nearest samples lie inside the occluder, the receiver does too, and all light is hidden.
     float inside = clamp(1.0 - 2.0 * weights, 0.0, 1.0);
     return sum * (1.0 - inside) + mat4(vec4(inside), vec4(inside), vec4(inside), vec4(inside));
 }
@@ -82,7 +83,7 @@ void main() {
         bool front = false;
         for (uint c = 4u * at; c < 4u * at + 16u; ++c) front = front || dot(n, lobes[c].direction) > 0.0;
         if (!front) continue;
-        // What several occluders hide of a cell lies in it as if they had nothing to do with each other.
+        // Several occluders hide independent parts of a cell.
         mat4 seen = mat4(vec4(1.0), vec4(1.0), vec4(1.0), vec4(1.0));
         for (uint w = 0u; w < words; ++w) {
             for (uint bits = near[tile + w]; bits != 0u; bits &= bits - 1u) {
@@ -92,7 +93,7 @@ void main() {
                 vec3 offset = o.centre - p;
                 float rho = length(offset);
                 FivCell cell = fiv_cell(o, offset, TRILINEAR != 0u);
-                // Beyond the last sphere what is hidden shrinks with the solid angle.
+                // Beyond the last sphere the hidden light is proportional to the solid angle of the occluder.
                 float beyond = min(o.farthest / max(rho, 1e-30), 1.0);
                 beyond *= beyond;
                 mat4 hidden = hidden_of(o, o.first, places[i].x, cell, beyond, at);

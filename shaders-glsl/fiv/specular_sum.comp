@@ -1,4 +1,5 @@
-// Glossy reflection of the whole environment at the visible surfaces, without occluders: a sum over the texels that are not black.
+// Glossy reflection of the whole environment at the visible surfaces without occluders: a sum over the texels that are
+// not black.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -19,11 +20,11 @@ layout(binding = 5, scalar) readonly buffer Lit { uint lit[]; }; // texels that 
 layout(binding = 6, rgba32f) uniform image2D reflected;          // W/(sr·m²)
 
 layout(push_constant, scalar) uniform Push {
-    uint first; // of the lit texels
+    uint first; // first of the lit texels
     uint count;
 };
 
-const uint BLOCK = 64u; // sums of sums: rounding grows with the root only
+const uint BLOCK = 64u; // sums of partial sums, so that rounding errors grow with the square root only
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);

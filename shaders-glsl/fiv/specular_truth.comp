@@ -22,10 +22,10 @@ layout(binding = 5, scalar) readonly buffer Lit { uint lit[]; }; // texels that 
 layout(binding = 6, rgba32f) uniform image2D reflected;          // W/(sr·m²)
 
 layout(push_constant, scalar) uniform Push {
-    uint first; // of the lit texels
+    uint first; // first of the lit texels
     uint count;
     uint size;  // texels of the environment along an edge
-    uint seed;  // of blended surfaces
+    uint seed;  // seed for blended surfaces
 };
 
 void main() {

@@ -1,4 +1,5 @@
-// How far an occluder reaches towards a small bright light, on a plane across it: what lies behind is in its shadow.
+// Shadow map of a separated texel: how far the occluder extends towards the light, on a plane across the light's
+// direction. Points behind this depth lie in the shadow.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -13,7 +14,7 @@ layout(push_constant, scalar) uniform Push {
     vec3 direction; // to the light
     vec3 right;
     vec3 up;
-    float radius; // of the bounding sphere, whose centre is the origin, metres
+    float radius; // radius of the bounding sphere, whose centre is the origin, metres
 };
 
 void main() {

@@ -1,4 +1,4 @@
-// Irradiance from a small bright light that was kept out of the vectors: wholly there or hidden, whichever occluder hides it.
+// Irradiance of a separated texel, shadowed by the shadow maps of the occluders.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -16,18 +16,18 @@ layout(binding = 1) uniform sampler2D normal;
 layout(binding = 2) uniform sampler2D depth;
 layout(binding = 3) uniform sampler2D identity;
 layout(binding = 4, scalar) readonly buffer Occluders { FivOccluder occluders[]; };
-layout(binding = 5, scalar) readonly buffer Shades { FivShade shades[]; }; // of the occluders
+layout(binding = 5, scalar) readonly buffer Shades { FivShade shades[]; }; // one for each occluder
 layout(binding = 6, scalar) readonly buffer Depths { float depths[]; };
 layout(binding = 7, scalar) readonly buffer Suns { FivSun suns[]; };
-layout(binding = 8, scalar) readonly buffer Near { uint near[]; }; // occluders that may matter to a tile of pixels, a bit each
+layout(binding = 8, scalar) readonly buffer Near { uint near[]; }; // occluders that may affect a tile of pixels, a bit each
 layout(binding = 9, rgba32f) uniform image2D irradiance;           // W/m²
 
 layout(push_constant, scalar) uniform Push {
     uint sun;
-    uint words; // of a tile
+    uint words; // words of a tile
 };
 
-// The part of the light that occluder `i` hides from `p`: of the four nearest places of its map. `bias`: metres.
+// Share of the light that occluder `i` hides from `p`, from the four nearest texels of its map. `bias`: metres.
 float hides(uint i, vec3 p, float bias) {
     vec3 q = p - occluders[i].centre;
     float radius = occluders[i].radius;
@@ -55,7 +55,7 @@ void main() {
     float z = texelFetch(depth, pixel, 0).r;
     if (z >= 1.0) return;
     vec3 n = decode_normal(texelFetch(normal, pixel, 0));
-    // Where occluders took more than there was, there is nothing.
+    // Occluders may have subtracted more light than there was.
     vec3 sum = max(imageLoad(irradiance, pixel).rgb, vec3(0.0));
     float cosine = dot(n, suns[sun].area);
     if (cosine > 0.0) {
@@ -65,7 +65,8 @@ void main() {
         if (shown.x > 0.5 && abs(shown.y - z) <= 1e-4 * z) self = uint(shown.x + 0.5) - 1u;
         float left = 1.0;
         if (self != FIV_NONE && shades[self].own != 0u) {
-            // A surface is not hidden by its own places in the map, which are as wide as it is steep.
+            // The bias keeps a surface out of its own shadow. The bias is as large as the depth range of a texel on the
+            // steep surface.
             float c = clamp(dot(n, suns[sun].direction), 0.05, 1.0);
             float texel = 2.0 * occluders[self].radius / float(FIV_SUN_SIDE);
             left = 1.0 - hides(self, p, texel * (0.3 + 1.5 * sqrt(1.0 - c * c) / c));

@@ -1,4 +1,4 @@
-// Fullsphere irradiance vector of the whole environment (Michael 2010, eq. 10): one workgroup, an ordered tree.
+// Fullsphere irradiance vector of the whole environment ([FIV 10]): one workgroup, which sums up in a fixed order.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -18,7 +18,7 @@ void main() {
     vec3 x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
     for (uint i = lane; i < count; i += 64u) {
         FivTexel t = texels[i];
-        x += t.radiance * t.area.x;
+        x += t.radiance * t.area.x; // [FIV 10]
         y += t.radiance * t.area.y;
         z += t.radiance * t.area.z;
     }

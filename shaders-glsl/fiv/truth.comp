@@ -1,5 +1,5 @@
 // Irradiance of the visible surfaces by brute force: a shadow ray to every texel of the environment that is not black
-// (Michael 2010, section 5.2.1: the reference of all its figures).
+// ([FIV 6]). It is the reference of all figures of the thesis (Michael 2010, section 5.2.1).
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -19,17 +19,17 @@ layout(binding = 2) uniform sampler2D depth;
 layout(binding = 3, scalar) readonly buffer Texels { FivTexel texels[]; };
 layout(binding = 4, scalar) readonly buffer Lit { uint lit[]; }; // texels that are not black
 layout(binding = 5, rgba32f) uniform image2D irradiance;         // W/m²
-layout(binding = 6, scalar) readonly buffer Boxes { vec3 boxes[]; }; // least and greatest corners around all that stops light
+layout(binding = 6, scalar) readonly buffer Boxes { vec3 boxes[]; }; // least and greatest corners of boxes around all instances that block light
 
 layout(push_constant, scalar) uniform Push {
-    uint first; // of the lit texels
+    uint first; // first of the lit texels
     uint count;
     uint size;  // texels of the environment along an edge
-    uint around; // boxes; 0: there are too many
-    uint seed;  // of blended surfaces
+    uint around; // number of boxes; 0: there are too many
+    uint seed;  // seed for blended surfaces
 };
 
-// Whether anything may lie on a ray: where a few things stand on a ground most rays pass all of them.
+// Whether a box lies on the ray. Where a few objects stand on a ground, most rays pass all boxes.
 bool near_anything(vec3 origin, vec3 direction) {
     if (around == 0u) return true;
     vec3 each = 1.0 / mix(direction, vec3(1e-20), lessThan(abs(direction), vec3(1e-20)));
@@ -61,7 +61,7 @@ void main() {
         uint place = i % (size * size);
         vec3 direction = cube_direction(i / (size * size), (vec2(place % size, place / size) + 0.5) / float(size));
         if (near_anything(origin, direction) && trace_any(Ray(origin, 0.0, direction, 1e30), TRACE_SHADOW, pcg4d(uvec4(pixel, i, seed)).x)) continue;
-        sum += texels[i].radiance * cosine;
+        sum += texels[i].radiance * cosine; // [FIV 6]
     }
     imageStore(irradiance, pixel, vec4(sum, 1.0));
 }

@@ -1,18 +1,19 @@
-// A cell for every surface at the end of a tree. Where a cell lies in the table depends on who comes first; nothing else does.
+// Claims a cache cell for the surface of each ray tree node. The order of the invocations decides in which slot of the hash table a cell
+// lies; it decides nothing else, so results are reproducible.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
-#include "lib/igi_tree.glsl"
+#include "lib/igi_ray_tree.glsl"
 #include "lib/igi_cache.glsl"
 
 layout(local_size_x = 64) in;
 
 layout(push_constant, scalar) uniform Push {
-    vec3 low;   // corner of the cells, metres
-    float side; // of a cell, metres
-    uint first; // number of the first node
+    vec3 low;   // corner of the grid, metres
+    float side; // side of a cell, metres
+    uint first; // number of the first node within the picture
     uint nodes;
-    uint most;  // cells
+    uint most;  // maximum of cells
 };
 
 void main() {
@@ -22,7 +23,7 @@ void main() {
     uint slot = cache_hash(key);
     for (uint i = 0u; i < CACHE_PROBES; ++i) {
         uint there = cache_keys[slot];
-        // More cells than allowed: nobody will look at them.
+        // With more cells than allowed the cache is not used.
         if (there == CACHE_EMPTY && cache_count > most) return;
         if (there == CACHE_EMPTY) there = atomicCompSwap(cache_keys[slot], CACHE_EMPTY, key);
         if (there == CACHE_EMPTY) {
@@ -35,6 +36,6 @@ void main() {
         }
         slot = (slot + 1u) % CACHE_SLOTS;
     }
-    // Nothing free near: as if there were too many.
+    // No free slot was found. A count above the maximum switches the cache off.
     atomicAdd(cache_count, most + 1u);
 }

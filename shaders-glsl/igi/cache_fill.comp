@@ -1,4 +1,4 @@
-// Irradiance of the cells from a range of virtual lights.
+// Adds the irradiance from a range of virtual lights to all cache cells.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -13,9 +13,9 @@ layout(local_size_x = 64) in;
 layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; };
 
 layout(push_constant, scalar) uniform Push {
-    uint first;
+    uint first;      // virtual light
     uint count;
-    uint most;       // cells
+    uint most;       // maximum of cells
     float least;     // min_d of the bounded geometry term, metres; 0: none
     uint seed;
 };

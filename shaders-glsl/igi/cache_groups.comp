@@ -1,4 +1,4 @@
-// Whether surfaces must gather for themselves: groups of the dispatches that let them.
+// Size of the indirect dispatches that gather without the cache: zero workgroups if all cells fit into the cache.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -9,8 +9,8 @@ layout(local_size_x = 1) in;
 layout(binding = 0, scalar) writeonly buffer Groups { uint groups[]; };
 
 layout(push_constant, scalar) uniform Push {
-    uint most; // cells
-    uint full; // groups if there are more
+    uint most; // maximum of cells
+    uint full; // workgroups if there are more cells
 };
 
 void main() {

@@ -1,16 +1,17 @@
-// Where the light of each cell will be gathered: at the first of its nodes.
+// Sets the point at which each cell gathers light: the surface of the cell's node with the lowest number. The choice does not depend on
+// the order of the invocations.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
-#include "lib/igi_tree.glsl"
+#include "lib/igi_ray_tree.glsl"
 #include "lib/igi_cache.glsl"
 
 layout(local_size_x = 64) in;
 
 layout(push_constant, scalar) uniform Push {
-    vec3 low;   // corner of the cells, metres
-    float side; // of a cell, metres
-    uint first; // number of the first node
+    vec3 low;   // corner of the grid, metres
+    float side; // side of a cell, metres
+    uint first; // number of the first node within the picture
     uint nodes;
 };
 

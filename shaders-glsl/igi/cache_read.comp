@@ -1,18 +1,18 @@
-// Light at the surfaces at the ends of the trees between the cells around them.
+// Adds light to the ray tree nodes: interpolates the irradiance of the cache cells around each node's surface.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
 #include "lib/sampling.glsl"
-#include "lib/igi_tree.glsl"
+#include "lib/igi_ray_tree.glsl"
 #include "lib/igi_cache.glsl"
 
 layout(local_size_x = 64) in;
 
 layout(push_constant, scalar) uniform Push {
-    vec3 low;   // corner of the cells, metres
-    float side; // of a cell, metres
+    vec3 low;   // corner of the grid, metres
+    float side; // side of a cell, metres
     uint nodes;
-    uint most;  // cells
+    uint most;  // maximum of cells
 };
 
 void main() {
@@ -25,11 +25,11 @@ void main() {
     vec3 sum = vec3(0.0);
     float weights = 0.0;
     if (own != CACHE_EMPTY) {
-        // Counts next to nothing unless it is alone.
+        // A minimal weight, so that the node's own cell is used where no other cell has a weight.
         sum = 1e-3 * cache_cells[own].light;
         weights = 1e-3;
     }
-    // On curved surfaces also cells that face a little another way; bits of those that were looked at.
+    // On curved surfaces the neighbouring cells may have another facing. `seen` has a bit for each facing that was looked up.
     uint seen = 0u;
     mat3 frame = frame_around(node.normal);
     for (uint tilt = 0u; tilt < 5u; ++tilt) {
@@ -44,7 +44,7 @@ void main() {
             if (slot == CACHE_EMPTY) continue;
             vec3 apart = cache_cells[slot].position - node.position;
             float away = dot(apart, apart) / (side * side);
-            // Off the plane it counts three times as far.
+            // A distance perpendicular to the surface counts three times.
             float lift = abs(dot(node.normal, apart)) / side;
             float alike = dot(node.normal, cache_cells[slot].normal);
             float w = max(1.0 - away - 8.0 * lift * lift, 0.0) * max(10.0 * alike - 9.0, 0.0);

@@ -1,4 +1,4 @@
-// The sum of all light: what is reflected of the irradiance, direct light, and what mirrors and glass show.
+// The sum of all light: reflected irradiance, direct light, and the light in mirrors and glass.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 
@@ -8,9 +8,9 @@ layout(constant_id = 0) const uint SHARP = 0; // 1: there are mirrors or glass
 
 layout(binding = 0) uniform sampler2D albedo;
 layout(binding = 1) uniform sampler2D depth;
-layout(binding = 2, rgba32f) uniform image2D direct; // becomes what of it enters the sum
+layout(binding = 2, rgba32f) uniform image2D direct; // read; then written without the share of mirrors and glass
 layout(binding = 3) uniform sampler2D irradiance;
-layout(binding = 4) uniform sampler2D sharp; // rgb: radiance of the trees; a: share of the surface that is mirror or glass
+layout(binding = 4) uniform sampler2D sharp; // rgb: radiance of the ray trees; a: share of the surface that is mirror or glass
 layout(binding = 5, rgba32f) uniform writeonly image2D total;
 layout(binding = 6, rgba32f) uniform writeonly image2D indirect;
 
@@ -24,7 +24,7 @@ void main() {
     }
     vec4 color = texelFetch(albedo, pixel, 0);
     vec4 tree = SHARP != 0u ? texelFetch(sharp, pixel, 0) : vec4(0.0);
-    vec3 bounced = color.a * color.rgb * texelFetch(irradiance, pixel, 0).rgb * ((1.0 - tree.a) / 3.14159265358979);
+    vec3 bounced = color.a * color.rgb * texelFetch(irradiance, pixel, 0).rgb * ((1.0 - tree.a) / 3.14159265358979); // ρ of [IGI 1]
     vec3 rough = imageLoad(direct, pixel).rgb * (1.0 - tree.a);
     imageStore(direct, pixel, vec4(rough, 1.0));
     imageStore(indirect, pixel, vec4(bounced, 1.0));

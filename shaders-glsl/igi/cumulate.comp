@@ -1,4 +1,5 @@
-// Weights of the candidates and their running sum, by one workgroup: equal ranges, then the sums of the ranges before.
+// Weights of the candidates and their running sum. One workgroup: each invocation sums a range of candidates, then adds the sums of the
+// ranges before it.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -15,7 +16,8 @@ layout(push_constant, scalar) uniform Push {
     uint total;
 };
 
-// Share that goes by flux alone: the seen points are few, and what none of them sees may still matter.
+// Share of the probability that follows the flux alone. There are few visible points; a candidate that lights none of them may still light
+// other parts of the view.
 const float BY_FLUX = 0.5;
 
 shared float important[256];
@@ -38,7 +40,8 @@ void main() {
     flux[lane] = b;
     barrier();
     float all_important = 0.0, all_flux = 0.0;
-    // Sums at the borders of the lane's range: the end of one is the start of the next, to the last bit.
+    // Sums at both borders of the lane's range. All lanes add in the same order, so that the end of one range equals the start of the next
+    // bit for bit.
     vec2 borders[2] = vec2[2](vec2(0.0), vec2(0.0));
     for (uint i = 0u; i < 256u; ++i) {
         if (i == lane) borders[0] = vec2(all_important, all_flux);
@@ -57,7 +60,8 @@ void main() {
         a += importances[i];
         b += strength(i);
         precise float sum = k_important * a + k_flux * b;
-        // Never falling; and the weight is what the rounded sums make of it, for by that candidates are drawn.
+        // Rounding must not make the sum fall. The weight is the difference of the rounded sums, because this difference is the actual
+        // probability of the draw.
         sum = i + 1u == end ? most : clamp(sum, last, most);
         weights[i] = sum - last;
         sums[i] = sum;

@@ -1,4 +1,4 @@
-// Direct light of the visible surfaces by a range of their shadow rays.
+// Adds the direct light of the visible surfaces for a range of their shadow rays.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -61,7 +61,7 @@ void main() {
         p.above = stepped_back(view, p.position, gap) + p.normal * gap;
         p.viewer = to_camera(view, p.position);
         p.brdf = lit_brdf(color.rgb, gloss.rgb, gloss.a, dot(p.normal, p.viewer));
-        // Unlit surfaces are shown as they are.
+        // Unlit surfaces show their colour, which is in the emission buffer.
         uint last = color.a > 0.5 ? min(first + count, direct_rays()) : 0u;
         for (uint i = first; i < last; ++i) {
             Ray ray;

@@ -1,18 +1,18 @@
-// The discontinuity buffer: mean irradiance of the tile around a texel, over those on the same surface (Wald et al. 2002; Marques and
-// Santos, section 4.3). Each of the tile has gathered from another subset of the virtual lights.
+// The discontinuity buffer: mean irradiance of the tile around a texel, over texels on the same surface (Wald et al. 2002; Marques and
+// Santos, section 4.3). Each texel of the tile has gathered from another subset of the virtual lights.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-layout(binding = 0) uniform sampler2D guide; // of igi/guide.comp
+layout(binding = 0) uniform sampler2D guide; // from igi/guide.comp
 layout(binding = 1) uniform sampler2D interleaved;
 layout(binding = 2, rgba32f) uniform writeonly image2D irradiance;
 
 layout(push_constant, scalar) uniform Push {
     uint tile;      // texels along the side of a tile
-    float nearness; // most difference of depth relative to the texel's
-    float likeness; // least cosine between normals
+    float nearness; // maximum difference in depth, relative to the texel's depth
+    float likeness; // minimum cosine between normals
 };
 
 void main() {
@@ -27,7 +27,7 @@ void main() {
     }
     vec4 sum = vec4(0.0);
     float count = 0.0;
-    // As many texels as a tile has, so that each subset comes once.
+    // The window has the size of a tile, so that it contains each subset once.
     int from = -(int(tile) - 1) / 2, to = int(tile) / 2;
     for (int y = from; y <= to; ++y) {
         for (int x = from; x <= to; ++x) {
@@ -39,6 +39,6 @@ void main() {
             count += 1.0;
         }
     }
-    // The texel itself always counts, but for rounding of its own normal.
+    // Rounding of the texel's normal may reject the texel itself, so the count may be 0.
     imageStore(irradiance, texel, count > 0.0 ? sum / count : texelFetch(interleaved, texel, 0));
 }

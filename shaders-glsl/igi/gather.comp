@@ -1,4 +1,4 @@
-// Irradiance from a range of virtual lights at the visible surfaces (Marques and Santos, equation 1 without ρ).
+// Irradiance from a range of virtual lights at the visible surfaces ([IGI 1] without ρ).
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -20,17 +20,17 @@ layout(binding = 1) uniform sampler2D normal;
 layout(binding = 2) uniform sampler2D depth;
 layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; };
 #include "lib/vpl_gather.glsl"
-layout(binding = 4, rgba32f) uniform image2D irradiance; // rgb of a white surface's, W/m²; a: rays traced
+layout(binding = 4, rgba32f) uniform image2D irradiance; // rgb: irradiance, W/m²; a: number of shadow rays
 
 layout(push_constant, scalar) uniform Push {
-    uint first;      // of the pixel's own lights
+    uint first;      // index of the first light within the pixel's subset
     uint count;
     uint total;      // virtual lights
-    uint tile;       // side of the tiles of pixels that share the lights
+    uint tile;       // side of the interleaving tiles, texels
     uint factor;     // pixels along the side of a texel
-    uint scattered;  // 1: its pixel is not the one in the middle
+    uint scattered;  // 1: the texel's pixel changes from texel to texel (lib/igi_texel.glsl)
     float least;     // min_d of the bounded geometry term, metres; 0: none
-    uint stride;     // above 0: tiles have their subsets in different orders, and lights move on by so many subsets from round to round
+    uint stride;     // step of the irregular pattern (vpl_of_subset); 0: regular pattern
     uint seed;
 };
 

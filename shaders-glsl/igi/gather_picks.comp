@@ -1,5 +1,5 @@
-// Irradiance at the visible surfaces from a few virtual lights picked by a tree, each as much stronger as it is rarely picked: the mean
-// over seeds is the sum over all of them.
+// Irradiance at the visible surfaces from a few virtual lights, picked from the light tree. The light of a pick is divided by its
+// probability, so that the mean over seeds is the sum over all virtual lights.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -21,22 +21,22 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D normal;
 layout(binding = 2) uniform sampler2D depth;
-layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; }; // in the order of the leaves
-layout(binding = 4, rgba32f) uniform image2D irradiance; // rgb of a white surface's, W/m²; a: rays traced
+layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; }; // sorted like the leaves of the tree
+layout(binding = 4, rgba32f) uniform image2D irradiance; // rgb: irradiance, W/m²; a: number of shadow rays
 
 #include "lib/vpl_picked.glsl"
 
 layout(push_constant, scalar) uniform Push {
     uint first;      // pick
     uint count;
-    uint picks;      // of a texel
+    uint picks;      // per texel
     uint proposals;  // for each pick
     uint leaves;     // of the tree
-    uint tile;       // side of the tiles of texels whose picks lie between each other
+    uint tile;       // side of the tiles of texels that share stratified picks
     uint factor;     // pixels along the side of a texel
-    uint scattered;  // 1: its pixel is not the one in the middle
+    uint scattered;  // 1: the texel's pixel changes from texel to texel (lib/igi_texel.glsl)
     float least;     // min_d of the bounded geometry term, metres; 0: none
-    uint stride;     // above 0: tiles have their subsets in different orders
+    uint stride;     // above 0: irregular pattern
     uint seed;
 };
 

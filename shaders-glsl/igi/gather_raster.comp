@@ -1,4 +1,4 @@
-// As igi/gather.comp, with shadow maps of a range of virtual lights in place of rays.
+// Like igi/gather.comp, with shadow maps of a range of virtual lights instead of shadow rays.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -19,31 +19,31 @@ layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D normal;
 layout(binding = 2) uniform sampler2D depth;
 layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; };
-layout(binding = 4, rgba32f) uniform image2D irradiance; // rgb of a white surface's, W/m²; a: looked up
-layout(binding = 5) uniform sampler2DArray maps; // VPL_MAPS of each, from light `first` on
+layout(binding = 4, rgba32f) uniform image2D irradiance; // rgb: irradiance, W/m²; a: number of map lookups
+layout(binding = 5) uniform sampler2DArray maps; // VPL_MAPS layers for each light, starting with light `first`
 
 layout(push_constant, scalar) uniform Push {
     uint first;      // virtual light, a multiple of tile²
     uint count;
-    uint tile;       // side of the tiles of pixels that share the lights
+    uint tile;       // side of the interleaving tiles, texels
     uint factor;     // pixels along the side of a texel
-    uint scattered;  // 1: its pixel is not the one in the middle
+    uint scattered;  // 1: the texel's pixel changes from texel to texel (lib/igi_texel.glsl)
     float least;     // min_d of the bounded geometry term, metres; 0: none
-    uint stride;     // above 0: tiles have their subsets in different orders, and lights move on by so many subsets from round to round
+    uint stride;     // step of the irregular pattern (vpl_of_subset); 0: regular pattern
     uint seed;
-    float nearest;   // depth of the maps, metres
+    float nearest;   // near plane of the maps, metres
 };
 
-// Depth of a receiver, relative, that rounding may add.
+// Relative rounding error of a receiver's depth.
 const float SLACK = 1e-3;
 
-// Share of the map's texels around a place that see it.
+// Bilinear share of the four texels around `place` that see it from the light.
 float unhidden(Vpl vpl, uint number, vec3 place) {
     vec3 from = vpl.position + vpl.normal * vpl.gap;
     vec3 d = transpose(vpl_map_axes(vpl.normal)) * (place - from);
     uint face = vpl_map_face(d);
     vec3 v = vpl_map_turned(d, face);
-    // Nearer than the map begins.
+    // The place lies in front of the near plane, where the map has no casters.
     if (v.z <= nearest) return 1.0;
     vec2 ndc = (v.xy / v.z + 0.5) / 1.5;
     vec2 uv = vec2(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y);

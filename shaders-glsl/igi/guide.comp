@@ -1,4 +1,4 @@
-// Normal and depth of the pixels that coarse irradiance is gathered for, decoded once for the filters.
+// The guide image of the filters: decoded normal and depth of the pixel for which each coarse texel gathers.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -13,7 +13,7 @@ layout(binding = 2, rgba32f) uniform writeonly image2D guide; // xyz: unit norma
 
 layout(push_constant, scalar) uniform Push {
     uint factor;    // pixels along the side of a texel
-    uint scattered; // 1: its pixel is not the one in the middle
+    uint scattered; // 1: the texel's pixel changes from texel to texel (lib/igi_texel.glsl)
 };
 
 void main() {

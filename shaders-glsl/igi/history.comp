@@ -1,8 +1,10 @@
-// The irradiance of this frame blended with that of the frames before, where the same surface was seen (reprojection, Nehab et al.
-// 2007) and as far as its light has stayed what it was. Virtual lights are the same for all pixels, and so are their errors: a pixel's
-// neighbours cannot tell chance from change. Probes can: at them the light of the last frame's paths was gathered twice, then and now,
-// and what differs has changed (Schied, Peters and Dachsbacher 2018, for path tracing). Change that goes on, as of a lamp that moves, is
-// smoothed over time and the past carried along with it (as in Holt's and the alpha-beta filter).
+// Blends this frame's irradiance with the average of the frames before, where the same surface was visible (reprojection, Nehab et al.
+// 2007). The less its light has changed, the more the average counts.
+//
+// All pixels share the virtual lights and so have correlated errors: the neighbours of a pixel cannot tell noise from a change of the
+// light. Probes can. At the probes the light of the last frame's paths is gathered twice, in the last frame and in this one, with the same
+// random numbers; a difference is a change of the light (Schied, Peters and Dachsbacher 2018, for path tracing). Continuous change, for
+// example from a moving lamp, is smoothed over time, and the average is extrapolated by it (as in Holt's and the alpha-beta filter).
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -17,16 +19,16 @@ layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1, scalar) readonly buffer Before { HistoryFrame before[]; };
 layout(binding = 2) uniform sampler2D normal;
 layout(binding = 3) uniform sampler2D depth;
-layout(binding = 4) uniform sampler2D motion;     // of igi/motion.frag; w 0: the surface rests
-layout(binding = 5) uniform sampler2D irradiance; // of this frame alone
-layout(binding = 6) uniform sampler2D old;        // of the frames before; a: how many they count
+layout(binding = 4) uniform sampler2D motion;     // from igi/motion.frag; w 0: the surface did not move
+layout(binding = 5) uniform sampler2D irradiance; // of this frame only
+layout(binding = 6) uniform sampler2D old;        // average of the frames before; a: number of frames in it
 layout(binding = 7) uniform sampler2D old_guide;  // xyz: unit normal; w: linear depth / far
-layout(binding = 8, scalar) readonly buffer Probes { HistoryProbe probes[]; }; // of the last frame
-layout(binding = 9, scalar) readonly buffer Lit { vec4 lit[]; };               // by its paths, then
-layout(binding = 10, scalar) readonly buffer Relit { vec4 relit[]; };          // by its paths, now
+layout(binding = 8, scalar) readonly buffer Probes { HistoryProbe probes[]; }; // from the last frame
+layout(binding = 9, scalar) readonly buffer Lit { vec4 lit[]; };               // light of the last frame's paths in the last frame
+layout(binding = 10, scalar) readonly buffer Relit { vec4 relit[]; };          // light of the last frame's paths in this frame
 layout(binding = 11, rgba32f) uniform writeonly image2D blended;
 layout(binding = 12, rgba32f) uniform writeonly image2D guide;
-layout(binding = 13) uniform sampler2D old_trend; // rgb: relative change a frame, smoothed; a: how large it has been
+layout(binding = 13) uniform sampler2D old_trend; // rgb: smoothed relative change per frame; a: its smoothed magnitude
 layout(binding = 14, rgba32f) uniform writeonly image2D trend;
 
 layout(push_constant, scalar) uniform Push {
@@ -34,25 +36,26 @@ layout(push_constant, scalar) uniform Push {
     uint columns; // of probes
     uint rows;
     uint side;    // pixels from probe to probe
-    float most;   // frames that count at most
-    float lag;    // relative error that light may have because it changes
-    float range;  // distance from a surface relative to its depth within which it is the same
+    float most;   // maximum of frames in the average
+    float lag;    // relative error that is allowed because the average lags behind
+    float range;  // maximum distance from the old surface, relative to its depth
 };
 
-// Least cosine between the normals of one surface in two frames.
+// Minimum cosine between the normals of the same surface in two frames.
 const float ALIKE = 0.9;
-// Probes to each side.
+// Probes that are read on each side.
 const int REACH = 2;
-// Relative change below which light rests: rounding.
+// A smaller relative change is rounding.
 const float REST = 1e-4;
-// Share of a frame in the smoothed change.
+// Weight of one frame in the smoothed change.
 const float TURN = 0.125;
-// Change so many times as large as it has been is sudden: no trend explains it.
+// A change that is this many times larger than its smoothed magnitude is sudden, and the trend does not predict it.
 const float SUDDEN = 3.0;
-// Of a trend, that which it does not explain: it is an average, and light does not change evenly.
+// Part of the change that the trend does not predict, because the trend is an average and light changes unevenly.
 const float UNEXPLAINED = 0.35;
 
-// Irradiance and count of the frames before at the place that had world position `was`; count 0: it was not seen. `at`: its pixel.
+// Average irradiance and frame count at the surface point that had world position `was` in the last frame; count 0: the point was not
+// visible. `at`: its pixel in the last frame. `going`: its trend.
 vec4 reproject(vec3 was, vec3 n, out vec2 at, out vec4 going) {
     View then = before[0].view;
     at = vec2(0.0);
@@ -63,7 +66,7 @@ vec4 reproject(vec3 was, vec3 n, out vec2 at, out vec4 going) {
     ivec2 size = textureSize(old, 0);
     at = (vec2(0.5) + vec2(0.5, -0.5) * clip.xy / clip.w) * vec2(size) - 0.5;
     if (any(lessThan(at, vec2(-1.0))) || any(greaterThan(at, vec2(size)))) return vec4(0.0);
-    // Where nothing moves, rounding must not blur.
+    // Without motion, rounding would interpolate between texels and blur the average.
     vec2 whole = floor(at + 0.5);
     if (all(lessThan(abs(at - whole), vec2(2e-3)))) at = whole;
     float near = range * (then.orthographic != 0u ? then.far : depth_of(then, was) * then.far);
@@ -90,7 +93,7 @@ vec4 reproject(vec3 was, vec3 n, out vec2 at, out vec4 going) {
     return sum / weights;
 }
 
-// By how much, relatively, the light around a pixel of the last frame has changed: rgb with its sign, a without.
+// Relative change of the light around a pixel of the last frame: rgb with sign, a its magnitude.
 vec4 change(vec2 at, vec3 n) {
     vec2 place = (at + 0.5) / float(side) - 0.5;
     ivec2 middle = ivec2(floor(place + 0.5));
@@ -139,7 +142,8 @@ void main() {
                 past.rgb *= mix(1.0 + factor, 1.0 / (1.0 - factor), greaterThan(factor, vec3(0.0)));
                 drift = UNEXPLAINED * max(max(abs(factor.r), abs(factor.g)), abs(factor.b));
             }
-            // Light that drifts by d a frame and is blended with share s lags by d (1 - s) / s: lag (1 - d) with this share.
+            // If the light drifts by d per frame and the frame has the weight s, the average lags by d (1 - s) / s. This weight limits the
+            // lag to lag (1 - d).
             share = max(share, drift / (drift + lag * (1.0 - drift)));
         }
     }

@@ -1,4 +1,4 @@
-// What each candidate for a virtual light gives to a range of the seen points.
+// Importance of each candidate: adds the luminance that it sends to a range of the visible points.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -16,7 +16,7 @@ layout(push_constant, scalar) uniform Push {
     uint total; // candidates
     uint first; // point
     uint count;
-    float near; // distance within which light grows no more, metres
+    float near; // distance below which the light is damped, metres
     uint seed;
 };
 

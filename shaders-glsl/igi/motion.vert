@@ -1,4 +1,4 @@
-// Where the surfaces that moved since the last frame were then. What did not move is left out.
+// Draws the surfaces that moved since the last frame, and computes their positions in the last frame. Skips instances that did not move.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -13,11 +13,11 @@ layout(binding = 4, scalar) readonly buffer BeforeInstances { Instance before_in
 layout(binding = 5, scalar) readonly buffer BeforePositions { vec3 before_positions[]; }; // of the deformed vertices
 
 layout(push_constant, scalar) uniform Push {
-    uint first_deformed; // vertex from which on the streams are written anew each frame
+    uint first_deformed; // from this vertex on, the streams are rewritten in each frame
 };
 
 layout(location = 0) out vec3 before;
-layout(location = 1) out float eye_z;
+layout(location = 1) out vec3 seen; // position in view space, metres
 
 void main() {
     uint i = visible[gl_InstanceIndex];
@@ -28,7 +28,7 @@ void main() {
     vec4 world = now * vec4(positions[at], 1.0);
     vec3 was = deformed ? before_positions[at - first_deformed] : positions[at];
     before = (then * vec4(was, 1.0)).xyz;
-    eye_z = -(view.view_from_world * world).z;
-    // Behind the near plane: nothing of a triangle whose instance rests is drawn.
+    seen = (view.view_from_world * world).xyz;
+    // A resting instance is moved outside of the clip volume, so that it is not drawn.
     gl_Position = deformed || now != then ? view.clip_from_world * world : vec4(0.0, 0.0, 2.0, 1.0);
 }

@@ -1,4 +1,4 @@
-// Short paths begin at the visible surfaces.
+// Starts short paths at the visible surfaces.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -17,12 +17,12 @@ layout(binding = 2) uniform sampler2D depth;
 
 layout(push_constant, scalar) uniform Push {
     uvec2 extent; // texels
-    uint first;   // texel
+    uint first;   // first texel
     uint count;   // texels
-    uint number;  // of the path
-    uint paths;   // of a texel
+    uint number;  // which path of the texel
+    uint paths;   // paths per texel
     uint factor;  // pixels along the side of a texel
-    uint scattered; // 1: its pixel is not the one in the middle
+    uint scattered; // 1: the texel's pixel changes from texel to texel (lib/igi_texel.glsl)
 };
 
 void main() {

@@ -1,4 +1,4 @@
-// Short paths begin at the pixels that gather for themselves.
+// Starts short paths at the listed pixels, which gather at full resolution (igi/refine.comp).
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -13,20 +13,20 @@ layout(local_size_x = 64) in;
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D normal;
 layout(binding = 2) uniform sampler2D depth;
-layout(binding = 3, scalar) readonly buffer Unmatched { uint unmatched_count; uint unmatched[]; }; // x, y << 16
+layout(binding = 3, scalar) readonly buffer Unmatched { uint unmatched_count; uint unmatched[]; }; // pixels, x | y << 16
 
 layout(push_constant, scalar) uniform Push {
-    uint first;   // place in the list
-    uint count;   // places
-    uint number;  // of the path
-    uint paths;   // of a pixel
+    uint first;   // first list entry
+    uint count;   // list entries
+    uint number;  // which path of the pixel
+    uint paths;   // paths per pixel
 };
 
 void main() {
     uint slot = gl_GlobalInvocationID.x;
     if (slot >= count) return;
     if (first + slot >= unmatched_count) {
-        // The last workgroup goes on with it all the same.
+        // The passes that follow run whole workgroups, also beyond the end of the list.
         near_paths[slot].alive = 0u;
         return;
     }

@@ -1,17 +1,17 @@
-// Short paths begin at the surfaces at the ends of trees.
+// Starts short paths at the surfaces of the ray tree nodes.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
 #include "lib/random.glsl"
-#include "lib/igi_tree.glsl"
+#include "lib/igi_ray_tree.glsl"
 #include "lib/igi_near.glsl"
 
 layout(local_size_x = 64) in;
 
 layout(push_constant, scalar) uniform Push {
     uint count;  // nodes
-    uint number; // of the path
-    uint paths;  // of a node
+    uint number; // which path of the node
+    uint paths;  // paths per node
 };
 
 void main() {

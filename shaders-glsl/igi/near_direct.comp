@@ -1,4 +1,4 @@
-// What lights the ends of short paths: a sample of direct light.
+// Adds direct light at the ends of short paths, with one shadow ray for each path.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -30,13 +30,13 @@ layout(binding = 13, scalar) uniform SettingsBlock { IgiSettings settings; };
 
 layout(push_constant, scalar) uniform Push {
     uint count;    // paths
-    uint turn;     // segments before the one that led here
-    uint number;
+    uint turn;     // index of the segment that led to the surface
+    uint number;   // which path of the receiver
 };
 
 #include "lib/vpl_direct.glsl"
 
-// Lamps that are looked at; of more some by chance.
+// Maximum of punctual lights that are evaluated. With more lights, this many are chosen at random.
 const uint MOST_LAMPS = 16u;
 
 void main() {
@@ -45,10 +45,10 @@ void main() {
     NearPath path = near_paths[slot];
     vec3 above = path.position + path.side * path.gap;
     uvec4 words = pcg4d(uvec4(path.salt, number, turn, settings.seed ^ 0x11f0u));
-    // Albedo π: radiance is irradiance.
+    // With albedo π the reflected radiance equals the irradiance.
     LitPoint p = LitPoint(path.position, above, path.normal, path.normal, lit_brdf(vec3(BRDF_PI), vec3(0.0), 1.0, 1.0));
-    // A sample of each kind of light, and of these the one that is followed by what it sends if nothing is in the way (Talbot, Cline and
-    // Egbert, Importance Resampling for Global Illumination, 2005).
+    // Each light source proposes a sample. One sample is drawn in proportion to its unoccluded light, and only this one traces a shadow ray
+    // (Talbot, Cline and Egbert, Importance Resampling for Global Illumination, 2005).
     Ray ray;
     vec3 light = vec3(0.0);
     float strength = 0.0, strengths = 0.0;

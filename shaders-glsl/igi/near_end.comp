@@ -1,4 +1,4 @@
-// What short paths have brought to the visible surfaces.
+// Adds the light of the short paths to the irradiance of the visible surfaces.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -9,7 +9,7 @@ layout(local_size_x = 64) in;
 layout(binding = 0, rgba32f) uniform image2D irradiance;
 
 layout(push_constant, scalar) uniform Push {
-    uint first; // texel
+    uint first; // first texel
     uint count; // texels
 };
 

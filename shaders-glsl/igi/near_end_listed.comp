@@ -1,4 +1,4 @@
-// What short paths have brought to the pixels that gather for themselves.
+// Adds the light of the short paths to the irradiance of the listed pixels, and dims specks.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -7,12 +7,12 @@
 
 layout(local_size_x = 64) in;
 
-layout(binding = 0, rgba32f) uniform image2D irradiance; // a: luminance of the brightest coarse texel around
-layout(binding = 1, scalar) readonly buffer Unmatched { uint unmatched_count; uint unmatched[]; }; // x, y << 16
+layout(binding = 0, rgba32f) uniform image2D irradiance; // a: luminance of the brightest coarse texel in the neighbourhood
+layout(binding = 1, scalar) readonly buffer Unmatched { uint unmatched_count; uint unmatched[]; }; // pixels, x | y << 16
 
 layout(push_constant, scalar) uniform Push {
-    uint first;  // place in the list
-    uint count;  // places
+    uint first;  // first list entry
+    uint count;  // list entries
     float limit; // as in igi/refine.comp
 };
 

@@ -1,8 +1,8 @@
-// What short paths have brought to the surfaces at the ends of trees.
+// Adds the light of the short paths to the ray tree nodes.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
-#include "lib/igi_tree.glsl"
+#include "lib/igi_ray_tree.glsl"
 #include "lib/igi_near.glsl"
 
 layout(local_size_x = 64) in;

@@ -1,4 +1,4 @@
-// What lights the ends of short paths: one of the virtual lights that could have sent a path on to there.
+// Adds the light of one virtual light at the ends of short paths, picked from the light tree.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -12,14 +12,14 @@
 
 layout(local_size_x = 64) in;
 
-layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; }; // in the order of the leaves
+layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; }; // sorted like the leaves of the tree
 
 layout(push_constant, scalar) uniform Push {
     uint count;   // paths
-    uint turn;    // segments before the one that led here
-    uint number;
-    uint leaves;  // of the tree over the virtual lights
-    uint bounces; // of light
+    uint turn;    // index of the segment that led to the surface
+    uint number;  // which path of the receiver
+    uint leaves;  // of the light tree
+    uint bounces; // maximum of bounces
     float least;  // min_d of the bounded geometry term, metres
     uint seed;
 };
@@ -32,7 +32,7 @@ void main() {
     uvec4 words = pcg4d(uvec4(path.salt, number, turn, seed ^ 0x91cfu));
     float probability;
     uint k = vpl_pick(unit_float(words.x), path.position, path.normal, least, leaves, probability);
-    // With as many bounces left as there are between the virtual light and where the path began.
+    // Skips a light whose path to the start of the short path would have more than `bounces` bounces.
     if (k == VPL_NO_PICK || vpls[k].depth + turn + 2u > bounces) return;
     Vpl vpl = vpls[k];
     vec3 light = vpl_irradiance(vpl, path.position, path.normal, least) / probability;

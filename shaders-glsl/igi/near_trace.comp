@@ -1,4 +1,4 @@
-// One segment of short paths: a ray by the cosine, as far as the bound takes anything.
+// Traces one segment of the short paths: a cosine-distributed ray, as long as the bound removes light.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -17,11 +17,11 @@ layout(local_size_x = 64) in;
 
 layout(push_constant, scalar) uniform Push {
     uint count;  // paths
-    uint turn;   // segments that were traced before
-    uint number; // of the path, of those from the same place
+    uint turn;   // number of segments traced before
+    uint number; // which path of the receiver
     float least; // min_d of the bounded geometry term, metres
     uint diffuse_only;
-    uint slots;  // TEXTURE_SLOTS, which compilers must not know
+    uint slots;  // TEXTURE_SLOTS; not a constant, because compilers would unroll the loop
     uint seed;
 };
 
@@ -30,7 +30,7 @@ void main() {
     if (slot >= count || near_paths[slot].alive == 0u) return;
     NearPath path = near_paths[slot];
     path.alive = 0u;
-    // Paths from the same place keep apart (Roberts' R2).
+    // The R2 sequence (Roberts) spreads the directions of the paths from the same receiver.
     uvec4 words = pcg4d(uvec4(path.salt, turn, seed, 0x6ea5u));
     vec2 u = fract(unit_floats(words.xy) + float(number) * vec2(0.75487767, 0.56984029));
     vec3 direction = normalize(frame_around(path.normal) * sample_cosine(u));

@@ -1,4 +1,4 @@
-// Some of the visible surfaces, for which virtual lights must be good.
+// Chooses visible points that measure the importance of the candidates.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -22,7 +22,7 @@ layout(push_constant, scalar) uniform Push {
 void main() {
     uint at = gl_GlobalInvocationID.x;
     if (at >= count) return;
-    // Evenly over the picture (Roberts' R2).
+    // The R2 sequence (Roberts) is spread evenly over the picture.
     vec2 u = fract(0.5 + float(at) * vec2(0.75487767, 0.56984029));
     ivec2 pixel = min(ivec2(u * view.extent), ivec2(view.extent) - 1);
     SeenPoint point = SeenPoint(vec3(0.0), 0.0, vec3(0.0), 0.0);
@@ -32,7 +32,8 @@ void main() {
         point.normal = decode_normal(texelFetch(normal, pixel, 0));
         point.gap = surface_step(view, point.position, z);
         point.position = stepped_back(view, point.position, point.gap);
-        // What a black surface shows does not matter; of mirrors the G-buffer knows little. Unlit ones receive nothing.
+        // Irradiance matters in proportion to the albedo. The minimum of 0.05 is for mirrors, whose reflections the G-buffer does not know.
+        // Unlit surfaces receive no light.
         vec4 color = texelFetch(albedo, pixel, 0);
         point.weight = color.a > 0.5 ? max(dot(color.rgb, vec3(0.2126, 0.7152, 0.0722)), 0.05) : 0.0;
     }

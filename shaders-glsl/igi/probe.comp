@@ -1,5 +1,5 @@
-// One visible surface in each square of pixels, for the next frame to look at again. Another pixel of the square in each frame, so
-// that small things are met sooner or later.
+// Chooses one visible point in each square of pixels as a probe of the history. The pixel changes from frame to frame, so that probes also
+// hit small objects.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -21,7 +21,7 @@ layout(push_constant, scalar) uniform Push {
     uint columns; // of squares
     uint rows;
     uint side;    // pixels
-    uint seed;    // another one in each frame
+    uint seed;    // changes in each frame
 };
 
 void main() {

@@ -1,4 +1,4 @@
-// Irradiance at the probes from a range of virtual lights.
+// Adds the irradiance from a range of virtual lights at the probes.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -13,13 +13,13 @@ layout(local_size_x = 64) in;
 
 layout(binding = 0, scalar) readonly buffer Probes { HistoryProbe probes[]; };
 layout(binding = 1, scalar) readonly buffer Vpls { Vpl vpls[]; };
-layout(binding = 2, scalar) buffer Lit { vec4 lit[]; }; // rgb: W/m²; the sum grows from dispatch to dispatch
+layout(binding = 2, scalar) buffer Lit { vec4 lit[]; }; // rgb: irradiance, W/m²
 
 layout(push_constant, scalar) uniform Push {
     uint probe_count;
-    uint first;
-    uint count;
-    uint stride;    // one of so many virtual lights is looked at
+    uint first;     // group of `stride` virtual lights
+    uint count;     // groups
+    uint stride;    // one light of each group of this size is used
     uint total;     // virtual lights
     float least;    // min_d, metres
     uint seed;
@@ -33,8 +33,8 @@ void main() {
     vec3 origin = probe.position + probe.normal * probe.gap;
     vec3 sum = vec3(0.0);
     for (uint i = first; i < first + count; ++i) {
-        // By chance, and another one for each probe: in steps they would lie in one part of a lamp's directions, for neighbours in Halton's
-        // sequence have the same first digits. The same ones when the light of this frame is gathered again in the next one.
+        // A random light of the group, different for each probe. With regular steps all chosen lights would come from one part of a lamp's
+        // directions, because every n-th Halton point has the same first digits. The next frame uses the same seed and so the same lights.
         uint k = i * stride + pcg4d(uvec4(at, i, seed, 0x57e9u)).x % stride;
         if (k >= total) break;
         Vpl vpl = vpls[k];

@@ -1,4 +1,4 @@
-// Opaque casters into one shadow map of a virtual light.
+// Draws opaque casters into one shadow map of a virtual light.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -14,8 +14,8 @@ layout(binding = 4, scalar) readonly buffer Vpls { Vpl vpls[]; };
 
 layout(push_constant, scalar) uniform Push {
     uint light;    // virtual light
-    uint face;     // of its views
-    float nearest; // depth, metres
+    uint face;     // which of the light's three maps
+    float nearest; // near plane, metres
 };
 
 void main() {

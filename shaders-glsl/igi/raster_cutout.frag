@@ -6,9 +6,9 @@
 layout(binding = 1, scalar) readonly buffer Instances { Instance instances[]; };
 layout(push_constant, scalar) uniform Push {
     uint light;    // virtual light
-    uint face;     // of its views
-    float nearest; // depth, metres
-    uint seed;     // of blended surfaces
+    uint face;     // which of the light's three maps
+    float nearest; // near plane, metres
+    uint seed;     // seed for alpha-blended surfaces
 };
 
 #include "lib/shadow_cutout.glsl"

@@ -1,4 +1,4 @@
-// Casters whose alpha cuts holes, into one shadow map of a virtual light.
+// Draws casters with alpha cutouts into one shadow map of a virtual light.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -17,9 +17,9 @@ layout(binding = 7, scalar) readonly buffer Colors { vec4 colors[]; };
 
 layout(push_constant, scalar) uniform Push {
     uint light;    // virtual light
-    uint face;     // of its views
-    float nearest; // depth, metres
-    uint seed;     // of blended surfaces
+    uint face;     // which of the light's three maps
+    float nearest; // near plane, metres
+    uint seed;     // seed for alpha-blended surfaces
 };
 
 layout(location = 0) out vec2 uv;

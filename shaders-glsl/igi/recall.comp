@@ -1,4 +1,4 @@
-// The virtual lights of the last frame, as the same paths leave them in this one.
+// The virtual lights of the last frame, recomputed from the same paths in this frame's scene.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -8,7 +8,7 @@
 
 layout(local_size_x = 64) in;
 
-layout(binding = 0, scalar) readonly buffer Candidates { Vpl candidates[]; }; // of the last frame's numbers, in this frame's scene
+layout(binding = 0, scalar) readonly buffer Candidates { Vpl candidates[]; }; // from the last frame's random numbers, in this frame's scene
 layout(binding = 1, scalar) readonly buffer Kept { HistoryVpl kept[]; };
 layout(binding = 2, scalar) writeonly buffer Vpls { Vpl vpls[]; };
 

@@ -1,4 +1,4 @@
-// Depth of the surfaces for which indirect light is gathered: the others count as background.
+// Depth of the surfaces for which indirect light is gathered. All other surfaces become background.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 
@@ -9,8 +9,8 @@ layout(binding = 1) uniform sampler2D depth;
 layout(binding = 2, r32f) uniform writeonly image2D received; // linear depth / far; 1: nothing is gathered
 
 layout(push_constant, scalar) uniform Push {
-    uint all; // 1: also for surfaces that show none of it (unlit and black ones, mirrors), whose texels others beside them take: a
-              // lamp's pane in a ceiling
+    uint all; // 1: also for surfaces that reflect no diffuse light (unlit and black surfaces, mirrors), because filters read their texels
+              // for the surfaces around them, for example for the ceiling around a lamp
 };
 
 void main() {

@@ -1,4 +1,4 @@
-// Irradiance of the pixels that no coarse texel matches, gathered for themselves.
+// Irradiance of the pixels without a matching coarse texel: each gathers from a subset of the virtual lights.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -18,21 +18,21 @@ layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D normal;
 layout(binding = 2) uniform sampler2D depth;
 layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; };
-layout(binding = 4, rgba32f) uniform image2D irradiance; // a: luminance of the brightest coarse texel around
-layout(binding = 5, scalar) readonly buffer Unmatched { uint unmatched_count; uint unmatched[]; }; // x, y << 16
+layout(binding = 4, rgba32f) uniform image2D irradiance; // a: luminance of the brightest coarse texel in the neighbourhood
+layout(binding = 5, scalar) readonly buffer Unmatched { uint unmatched_count; uint unmatched[]; }; // pixels, x | y << 16
 #include "lib/vpl_gather.glsl"
 
 layout(push_constant, scalar) uniform Push {
-    uint first;      // of the pixel's own lights
+    uint first;      // index of the first light within the pixel's subset
     uint count;
     uint total;      // virtual lights
-    uint tile;       // side of the tiles of pixels that share the lights
+    uint tile;       // side of the interleaving tiles, texels
     float least;     // min_d of the bounded geometry term, metres; 0: none
-    uint stride;     // above 0: tiles have their subsets in different orders, and lights move on by so many subsets from round to round
+    uint stride;     // step of the irregular pattern (vpl_of_subset); 0: regular pattern
     uint seed;
-    uint own;        // lights of a subset
-    uint begin;      // place in the list of the first pixel
-    float limit;     // above 0: brighter than the brightest coarse texel around by this factor is dimmed to it
+    uint own;        // lights per subset
+    uint begin;      // list entry of the first pixel
+    float limit;     // above 0: maximum ratio to the luminance of the brightest coarse texel in the neighbourhood
 };
 
 void main() {

@@ -1,15 +1,15 @@
-// Size of the dispatches over the pixels that no coarse texel matches, one for each range of them.
+// Sizes of the indirect dispatches over the pixels without a matching coarse texel, one for each range of the list.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 
 layout(local_size_x = 64) in;
 
 layout(binding = 0, scalar) readonly buffer Unmatched { uint unmatched_count; uint unmatched[]; };
-layout(binding = 1, scalar) writeonly buffer Groups { uint groups[]; }; // three a range
+layout(binding = 1, scalar) writeonly buffer Groups { uint groups[]; }; // three values per range
 
 layout(push_constant, scalar) uniform Push {
     uint ranges;
-    uint pixels; // of a range: workgroups of them are no more than a device allows
+    uint pixels; // per range; small enough for the device's maximum of workgroups
 };
 
 void main() {

@@ -1,4 +1,4 @@
-// Which of the candidates became virtual lights, and how much stronger.
+// Stores for the next frame which candidate each virtual light is, and the ratio of their fluxes.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -8,7 +8,7 @@
 
 layout(local_size_x = 64) in;
 
-layout(binding = 0, scalar) readonly buffer Candidates { Vpl candidates[]; }; // the first ones of all paths, then the second ones, …
+layout(binding = 0, scalar) readonly buffer Candidates { Vpl candidates[]; }; // first the lights at the first hits of all paths, then those at the second hits, …
 layout(binding = 1, scalar) readonly buffer Vpls { Vpl vpls[]; };
 layout(binding = 2, scalar) writeonly buffer Kept { HistoryVpl kept[]; };
 

@@ -1,4 +1,5 @@
-// Virtual lights out of the candidates, each as often as its weight has it, and as much stronger as it is rarer than in that share.
+// Draws the virtual lights among the candidates by systematic resampling, in proportion to the weights. The flux is divided by the
+// expected number of draws, so that the estimate is unbiased.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -21,7 +22,7 @@ void main() {
     uint at = gl_GlobalInvocationID.x;
     if (at >= count) return;
     float all = sums[total - 1u];
-    // Equal steps through the sum, below all of it: what comes last may have no weight.
+    // Equal steps through the running sum. The position stays below the total, because the last candidates may have no weight.
     float wanted = min((float(at) + offset) / float(count), 0.99999994) * all;
     if (wanted >= all) wanted = 0.0;
     uint low = 0u, high = total - 1u;

@@ -1,4 +1,4 @@
-// One segment of every path of light: from a lamp or from the last surface to the next one, where a virtual light is left.
+// Traces one segment of every light path: from the lamp or the last surface to the next surface, where the path leaves a virtual light.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -22,12 +22,12 @@ layout(local_size_x = 64) in;
 
 layout(binding = 10, scalar) uniform SettingsBlock { IgiSettings settings; };
 layout(binding = 11, scalar) readonly buffer Starts { VplStart starts[]; };
-layout(binding = 12, scalar) readonly buffer Numbers { float numbers[]; }; // rows of VPL_FIRST_NUMBERS + 2 bounces, in [0, 1)
+layout(binding = 12, scalar) readonly buffer Numbers { float numbers[]; }; // Halton table: rows of VPL_FIRST_NUMBERS + 2 bounces numbers in [0, 1)
 layout(binding = 13, scalar) buffer Paths { VplPath paths[]; };
-layout(binding = 14, scalar) buffer Vpls { Vpl vpls[]; }; // the first ones of all paths, then the second ones, …
+layout(binding = 14, scalar) buffer Vpls { Vpl vpls[]; }; // first the lights at the first hits of all paths, then those at the second hits, …
 
 layout(push_constant, scalar) uniform Push {
-    uint turn; // segments that were traced before
+    uint turn; // number of segments traced before
 };
 
 vec2 number_pair(uint path, uint pair) {
@@ -35,24 +35,24 @@ vec2 number_pair(uint path, uint pair) {
     return vec2(numbers[at], numbers[at + 1u]);
 }
 
-// Faces of the scene's box that parallel light along `direction` enters by: the area of each as seen along it, m².
+// Parallel light along `direction` enters the scene's box through three faces; the projected area of each, m².
 vec3 entered_areas(vec3 direction) {
     vec3 size = settings.high - settings.low;
     return abs(direction) * vec3(size.y * size.z, size.z * size.x, size.x * size.y);
 }
 
-// A place where parallel light enters the box, even over its cross-section.
+// A point where parallel light enters the box, distributed uniformly over the box's cross-section.
 vec3 entry(vec3 direction, vec2 u) {
     vec3 areas = entered_areas(direction);
     float pick = u.x * (areas.x + areas.y + areas.z);
     uint axis = pick < areas.x ? 0u : pick < areas.x + areas.y ? 1u : 2u;
-    // The rest of the number is as good as a fresh one.
+    // The remainder of the number is uniformly distributed again and serves as the next number.
     float before = axis == 0u ? 0.0 : axis == 1u ? areas.x : areas.x + areas.y;
     float v = clamp((pick - before) / max(areas[axis], 1e-30), 0.0, 1.0);
     vec3 place = axis == 0u ? vec3(0.0, v, u.y) : axis == 1u ? vec3(v, 0.0, u.y) : vec3(v, u.y, 0.0);
     place[axis] = direction[axis] > 0.0 ? 0.0 : 1.0;
     vec3 size = settings.high - settings.low;
-    // A little before it, so that what lies in the face itself is hit.
+    // The ray starts a little in front of the face, so that it hits surfaces that lie in the face.
     return settings.low + place * size - direction * (1e-3 * length(size));
 }
 
@@ -83,7 +83,7 @@ VplPath begun(uint at) {
     } else if (start.kind == START_ENVIRONMENT) {
         uvec4 words = pcg4d(uvec4(at, settings.seed, 0x5e1fu, 0u));
         float density;
-        // The table's columns keep the order of the numbers; what they leave open is drawn anew.
+        // The Halton numbers choose the column of the environment's table. The remaining choices use hashed random numbers.
         uint bits = uint(second.x * 16777216.0) << 8u | words.w >> 24u;
         vec3 sky = environment_sample(settings.environment, bits, unit_float(words.x), vec2(unit_float(words.y), second.y), density);
         vec3 areas = entered_areas(sky);
@@ -101,7 +101,8 @@ VplPath begun(uint at) {
             path.flux = one.intensity * (areas.x + areas.y + areas.z);
             path.range = 0.0;
         } else if (one.kind == LIGHT_SPOT) {
-            // The square of a line in the cosine from the outer to the inner cone, then 1. In narrow cones the line may end before it is 1.
+            // The intensity is the square of a ramp that is linear in the cosine between the outer and the inner cone, and 1 inside. In
+            // narrow cones rounding may place the inner cosine above 1, and the ramp ends before it reaches 1.
             float outer = clamp(-one.spot_offset / one.spot_scale, -1.0, 1.0);
             float inner = (1.0 - one.spot_offset) / one.spot_scale;
             float end = min(inner, 1.0);
@@ -149,12 +150,13 @@ void main() {
             path.flux *= clamp(1.0 - q * q * q * q, 0.0, 1.0);
             path.range = 0.0;
         }
-        // Of a surface that is partly glass a path takes one part or the other. A virtual light stands for the rough part alone: light that
-        // goes through the rest has not bounced.
+        // On a surface that is partly glass the path chooses the rough part or the sharp part at random. Only the rough part leaves a
+        // virtual light, because light that is transmitted or mirrored has not bounced diffusely.
         bool on = unit_float(words.y) < s.rough;
         bool left = on && s.albedo != vec3(0.0);
         uint depth = path.depth;
-        // Light falls onto the triangle, and is received by the shading normal. Where these part the ratio grows without limit.
+        // The path's flux arrives by the cosine of the geometric normal, but the surface receives by the cosine of the shading normal. At
+        // grazing angles the ratio of the two has no limit, so it is clamped.
         float slant = max(dot(s.normal, -path.direction), 0.0) / max(dot(s.side, -path.direction), 1e-6);
         vec3 reflected = path.flux * s.albedo * min(slant, 4.0);
         if (left) {

@@ -1,5 +1,6 @@
-// One turn of smoothing the coarse irradiance: 5 × 5 texels that lie further apart from turn to turn (Dammertz et al., Edge-Avoiding
-// À-Trous Wavelet Transform for fast Global Illumination Filtering, 2010), those in the same plane with a like normal.
+// One iteration of smoothing the coarse irradiance, or, with a limit, of dimming specks. The filter reads 5 × 5 texels in the same plane
+// with a similar normal; their distance doubles with each iteration (Dammertz et al., Edge-Avoiding À-Trous Wavelet Transform for fast
+// Global Illumination Filtering, 2010).
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -10,20 +11,21 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
-layout(binding = 1) uniform sampler2D guide;  // of igi/guide.comp
+layout(binding = 1) uniform sampler2D guide;  // from igi/guide.comp
 layout(binding = 2) uniform sampler2D coarse; // irradiance of every factor-th pixel
 layout(binding = 3, rgba32f) uniform writeonly image2D irradiance;
 
 layout(push_constant, scalar) uniform Push {
     uint factor;     // pixels along the side of a texel
-    uint scattered;  // 1: its pixel is not the one in the middle
-    uint stride;     // texels from one to the next
+    uint scattered;  // 1: the texel's pixel changes from texel to texel (lib/igi_texel.glsl)
+    uint stride;     // distance of the filter's texels
     float sharpness; // exponent of the cosine between normals
-    float range;     // distance from the texel's plane relative to its depth that weighs 0.6; 0: depth does not count
-    float limit;     // above 0: nothing is smoothed, but what is brighter than its neighbours' mean by this factor is dimmed to it
+    float range;     // distance from the texel's plane, relative to its depth, with weight 0.6; 0: the weight ignores depth
+    float limit;     // above 0: does not smooth, but dims the texel to this ratio to the mean of its neighbours
 };
 
-// Weight of neighbours on the same surface, the texel itself having 1, below which all around say what is usual.
+// Minimum weight of the neighbours on the same surface (the texel itself would have 1). With less weight the texel is compared with the
+// mean of all neighbours.
 const float LEAST_NEIGHBOURS = 0.6;
 
 void main() {
@@ -52,7 +54,7 @@ void main() {
             vec2 place = vec2(texel_pixel(other, factor, scattered != 0u, full)) + 0.5;
             float off = off_plane(plane, place / view.extent, there.w);
             float likeness = max(dot(own.xyz, there.xyz), 1e-12);
-            // 1 4 6 4 1 in both directions, in powers of 2.
+            // The kernel 1 4 6 4 1 in both directions, as exponents of 2.
             vec2 steps = abs(vec2(x, y));
             vec2 narrow = steps * (0.70751875 * steps - 0.12255625);
             float w = exp2(sharpness * log2(likeness) - narrow.x - narrow.y - 0.72134752 * off * off);
@@ -71,6 +73,6 @@ void main() {
         imageStore(irradiance, texel, here);
         return;
     }
-    // The texel itself weighs 1, but for rounding of its normal.
+    // The sum of weights is above 0, because the texel itself has a weight of about 1.
     imageStore(irradiance, texel, vec4(sum.rgb / weights, 0.0));
 }

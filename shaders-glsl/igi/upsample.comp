@@ -1,4 +1,4 @@
-// Joint bilateral upsampling of the irradiance (Marques and Santos, equation 2, after Kopf et al. 2007).
+// Joint bilateral upsampling of the irradiance ([IGI 2], after Kopf et al. 2007).
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -15,25 +15,25 @@ layout(constant_id = 0) const uint REACH = 1; // coarse texels to each side
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D normal;
 layout(binding = 2) uniform sampler2D depth;
-layout(binding = 3) uniform sampler2D guide;   // of igi/guide.comp
+layout(binding = 3) uniform sampler2D guide;   // from igi/guide.comp
 layout(binding = 4) uniform sampler2D coarse;  // irradiance of every factor-th pixel
-layout(binding = 5, rgba32f) uniform writeonly image2D irradiance; // a: luminance of the brightest coarse texel around
-layout(binding = 6, scalar) buffer Unmatched { uint unmatched_count; uint unmatched[]; }; // pixels, in any order: x, y << 16
+layout(binding = 5, rgba32f) uniform writeonly image2D irradiance; // a: luminance of the brightest coarse texel in the neighbourhood
+layout(binding = 6, scalar) buffer Unmatched { uint unmatched_count; uint unmatched[]; }; // pixels in any order, x | y << 16
 
 layout(push_constant, scalar) uniform Push {
     uint factor;
     float sigma;     // of the Gaussian, coarse texels
     float sharpness; // exponent of the cosine between normals; the paper's 1
-    float range;     // distance from the pixel's plane relative to its depth that weighs 0.6; 0: depth does not count (paper)
-    uint scattered;  // 1: the pixel that a texel stands for is not the one in the middle
-    float least;     // share of the Gaussian on coarse texels that match below which a wider one is tried, and then the pixel listed; 0: a
-                     // wider one only where there is no texel at all
+    float range;     // distance from the pixel's plane, relative to its depth, with weight 0.6; 0: the weight ignores depth (paper)
+    uint scattered;  // 1: the texel's pixel changes from texel to texel (lib/igi_texel.glsl)
+    float least;     // minimum share of the Gaussian on matching coarse texels. With less, a wider Gaussian is tried; if this fails too, the
+                     // pixel is listed. 0: the wider Gaussian is tried only if there is no texel at all
 };
 
-// Where less than this share of the Gaussian is on coarse texels that match none does, and the likest is taken.
+// With a smaller share of the Gaussian on matching coarse texels, no texel matches, and the most similar one is used.
 const float NO_MATCH = 1e-4;
 
-// Where too few match a Gaussian so much wider is tried, over so many texels to each side.
+// Factor of the wider Gaussian's standard deviation, and its reach in texels on each side.
 const float WIDER = 3.0;
 const int WIDE_REACH = 3;
 
@@ -50,7 +50,7 @@ void main() {
     vec3 p = screen_position(view, pixel, 1.0, z);
     PixelPlane plane = pixel_plane(view, p, z, n, range);
     ivec2 last = textureSize(coarse, 0) - 1;
-    // A coarse texel holds the light of the pixel in the middle of those it stands for.
+    // A coarse texel holds the irradiance of the pixel in its middle.
     vec2 at = vec2(pixel - int(factor) / 2) / float(factor);
     ivec2 middle = ivec2(floor(at + 0.5));
     float fall = 0.72134752 / (sigma * sigma); // in powers of 2
@@ -80,16 +80,16 @@ void main() {
                 }
             }
         }
-        // Before the sky there may be no texel at all to match.
+        // Next to the background there may be no texel at all in reach.
         matched = least > 0.0 ? all > 0.0 && weights >= least * all : most > -1e29;
         if (matched || turn > 0u) break;
-        // A thin thing may have been met further away.
+        // A texel further away may have hit the same thin object.
         sum = vec4(0.0);
         weights = all = 0.0;
         reach = WIDE_REACH;
         fall *= 1.0 / (WIDER * WIDER);
     }
     if (!matched && least > 0.0) unmatched[atomicAdd(unmatched_count, 1u)] = uint(pixel.x) | uint(pixel.y) << 16u;
-    vec3 found = weights > NO_MATCH * all ? sum.rgb / weights : likest.rgb;
+    vec3 found = weights > NO_MATCH * all ? sum.rgb / weights : likest.rgb; // [IGI 2]
     imageStore(irradiance, pixel, vec4(found, brightest));
 }

@@ -1,5 +1,5 @@
 // Image-space radiosity and ambient occlusion on the coarse buffers (dissertation, listing 6).
-// rgb: gathered radiance for a white receiver; a: accumulated occlusion (equation 26), not clamped.
+// rgb: gathered radiance for a white receiver; a: accumulated occlusion [ISR 26], not clamped.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -10,7 +10,7 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(constant_id = 0) const uint SAMPLES = 48;
-// 0: the dissertation's (2π/N)·F. 1: F alone, with the footprint of the sample's cell.
+// 0: the dissertation's (2π/N)·F [ISR 25]. 1: F alone, with the footprint of the sample's cell.
 layout(constant_id = 1) const uint AREA_ESTIMATOR = 1;
 layout(constant_id = 2) const uint RINGS = 1;
 layout(constant_id = 3) const uint JITTER = 1;
@@ -137,10 +137,10 @@ void main() {
                 vec4 mean = textureLod(filtered, (vec2(at) + 0.5) / vec2(extent), level);
                 l.rgb = mean.a > 1e-3 ? mean.rgb / mean.a : l.rgb;
             }
-            light += f * l.a * l.rgb;
+            light += f * l.a * l.rgb; // F_PX L_X of [ISR 25]
             factors += f;
         }
-        // True form factors sum to at most one, estimates scatter about it.
+        // [ISR 25], or the area estimator: true form factors sum to at most one, estimates scatter about it.
         light *= AREA_ESTIMATOR != 0 ? mask / max(factors / MOST, 1.0) : mask * 2.0 * ISR_PI / float(samples);
     }
 
@@ -159,7 +159,7 @@ void main() {
             float radius = occluder_radius * sqrt(s.z * screen_facing_area(view, factor, xz));
             occlusion += isr_occlusion(p, n, screen_position(view, at, factor, xz), radius, occlusion_bias);
         }
-        occlusion *= 2.0 * ISR_PI / float(samples);
+        occlusion *= 2.0 * ISR_PI / float(samples); // [ISR 26]
     }
     imageStore(gathered, pixel, vec4(light, occlusion));
 }

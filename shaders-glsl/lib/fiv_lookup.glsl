@@ -1,34 +1,35 @@
-// Looking up stored vectors. Needs a buffer `float fivs[]`, unless FIV_NO_VECTORS is defined. Include lib/fiv.glsl before. Twin:
-// reference::fiv::Set.
+// Lookup of vectors. Needs a buffer `float fivs[]`, unless FIV_NO_VECTORS is defined. Include lib/fiv.glsl before.
+// Twin: reference::fiv::Set.
 #ifndef LIB_FIV_LOOKUP
 #define LIB_FIV_LOOKUP
 
 #ifndef FIV_NO_VECTORS
-// Number of the sample, with its fraction, at a part (0..1) of a coordinate; `knots`: float of its table.
+// Sample number with fraction at `part` (0..1) of a coordinate. `knots`: float of its knots.
 float fiv_number(uint knots, float part) {
-    float knot = clamp(part, 0.0, 1.0) * float(FIV_PACE_KNOTS - 1u);
-    uint low = min(uint(knot), FIV_PACE_KNOTS - 2u);
+    float knot = clamp(part, 0.0, 1.0) * float(FIV_SPACING_KNOTS - 1u);
+    uint low = min(uint(knot), FIV_SPACING_KNOTS - 2u);
     return mix(fivs[knots + low], fivs[knots + low + 1u], knot - float(low));
 }
 #endif
 
 // The eight nearest samples of an occluder.
 struct FivCell {
-    uvec3 at;  // azimuth, polar angle and sphere of the first
-    vec3 part; // of the way to the next in each
+    uvec3 at;  // numbers of the azimuth, polar angle and sphere of the first sample
+    vec3 part; // fraction of the way to the next sample along each coordinate
 };
 
-// Where the centre of the occluder lies among its samples, `offset` (metres) from the receiver; not trilinear: at the nearest.
+// The cell of samples that contains the centre of the occluder, `offset` (metres) from the receiver. Without
+// `trilinear` the cell has all weight at the nearest sample.
 FivCell fiv_cell(FivOccluder o, vec3 offset, bool trilinear) {
     precise float azimuth = atan(offset.x, -offset.z) * (0.5 / FIV_PI);
     precise float a = (azimuth - floor(azimuth)) * float(o.azimuths);
     precise float p = atan(length(offset.xz), offset.y) * (float(o.polars - 1u) / FIV_PI);
     precise float r = clamp(log(max(length(offset), o.nearest) / o.nearest) * o.steps, 0.0, float(o.radii - 1u));
 #ifndef FIV_NO_VECTORS
-    if (o.pace != FIV_NONE) {
-        a = fiv_number(o.pace, a / float(o.azimuths));
-        p = fiv_number(o.pace + FIV_PACE_KNOTS, p / float(o.polars - 1u));
-        r = fiv_number(o.pace + 2u * FIV_PACE_KNOTS, r / float(o.radii - 1u));
+    if (o.spacing != FIV_NONE) {
+        a = fiv_number(o.spacing, a / float(o.azimuths));
+        p = fiv_number(o.spacing + FIV_SPACING_KNOTS, p / float(o.polars - 1u));
+        r = fiv_number(o.spacing + 2u * FIV_SPACING_KNOTS, r / float(o.radii - 1u));
     }
 #endif
     if (!trilinear) {
@@ -37,11 +38,11 @@ FivCell fiv_cell(FivOccluder o, vec3 offset, bool trilinear) {
         r = floor(r + 0.5);
     }
     uvec3 at = uvec3(min(uint(a), o.azimuths - 1u), min(uint(p), o.polars - 2u), min(uint(r), o.radii - 2u));
-    // Rounding up at the seam is the whole way to the next sample.
+    // At the seam the rounded azimuth is one full step after the last sample.
     return FivCell(at, clamp(vec3(a, p, r) - vec3(at), 0.0, 1.0));
 }
 
-// Weight of the k-th sample of the cell, and its number among those of the occluder.
+// Weight of the k-th sample of the cell, and its number among the occluder's samples.
 float fiv_corner(FivOccluder o, FivCell cell, uint k, out uint number) {
     uvec3 step = uvec3(k & 1u, k >> 1u & 1u, k >> 2u);
     vec3 weights = mix(1.0 - cell.part, cell.part, vec3(step));
@@ -54,13 +55,14 @@ float fiv_corner(FivOccluder o, FivCell cell, uint k, out uint number) {
 #ifndef FIV_NO_VECTORS
 // Radius of a sphere of samples, metres.
 float fiv_radius(FivOccluder o, uint sphere) {
-    return o.pace != FIV_NONE ? fivs[o.pace + 3u * FIV_PACE_KNOTS + sphere] : o.nearest * exp(float(sphere) / o.steps);
+    return o.spacing != FIV_NONE ? fivs[o.spacing + 3u * FIV_SPACING_KNOTS + sphere] : o.nearest * exp(float(sphere) / o.steps);
 }
 
-// normal · FIV of what occluder `o` hides, seen from where its centre lies at `offset` (metres): trilinear between the eight nearest
-// samples, or the nearest one, of those from the float `first` on. Those inside of the occluder are left out; w: the share of the weight
-// that the others have. `scaled`: what is interpolated along the radius is free of the solid angle of the bounding sphere, which falls
-// with its square.
+// normal · FIV of the light that occluder `o` hides ([FIV 11]). The occluder's centre lies at `offset` (metres) from
+// the receiver. The vectors are those from the float `first` on, interpolated between the eight nearest samples or
+// taken from the nearest sample. Samples inside the occluder are left out. w: the share of the interpolation weight
+// that the other samples have. `scaled`: vectors are interpolated relative to the solid angle of the bounding sphere,
+// which falls with the square of the distance.
 vec4 fiv_dot_turn(FivOccluder o, uint first, vec3 offset, vec3 normal, bool trilinear, bool scaled) {
     FivCell cell = fiv_cell(o, offset, trilinear);
     vec2 growth = vec2(1.0);
@@ -80,15 +82,15 @@ vec4 fiv_dot_turn(FivOccluder o, uint first, vec3 offset, vec3 normal, bool tril
         vec3 y = vec3(fivs[at + 3u], fivs[at + 4u], fivs[at + 5u]);
         vec3 z = vec3(fivs[at + 6u], fivs[at + 7u], fivs[at + 8u]);
         float grown = (k & 4u) == 0u ? growth.x : growth.y;
-        sum += vec4((normal.x * x + normal.y * y + normal.z * z) * grown, 1.0) * weight;
+        sum += vec4((normal.x * x + normal.y * y + normal.z * z) * grown, 1.0) * weight; // [FIV 11]
     }
     if (sum.w > 0.0) sum.rgb /= sum.w;
-    // Beyond the last sphere what is hidden shrinks with the solid angle.
+    // Beyond the last sphere the hidden light is proportional to the solid angle of the occluder.
     float beyond = min(o.farthest / max(length(offset), 1e-30), 1.0);
     return vec4(sum.rgb * (beyond * beyond), sum.w);
 }
 
-// As well between two turns.
+// The same, interpolated between two rotation samples.
 vec4 fiv_dot(FivOccluder o, vec3 offset, vec3 normal, bool trilinear, bool scaled) {
     vec4 hidden = fiv_dot_turn(o, o.first, offset, normal, trilinear, scaled);
     if (o.blend <= 0.0) return hidden;
@@ -96,7 +98,7 @@ vec4 fiv_dot(FivOccluder o, vec3 offset, vec3 normal, bool trilinear, bool scale
 }
 #endif
 
-// Area that two discs have in common: radii and distance of the centres. Twin: reference::fiv::lens.
+// Area that two discs of radii `r1` and `r2` at the distance `d` have in common ([FIV 15]). Twin: reference::fiv::lens.
 float lens_area(float r1, float r2, float d) {
     if (d >= r1 + r2) return 0.0;
     if (d <= abs(r1 - r2)) {
@@ -109,7 +111,7 @@ float lens_area(float r1, float r2, float d) {
     return r1 * r1 * acos(a) + r2 * r2 * acos(b) - 0.5 * sqrt(kite);
 }
 
-// Number of the tile of 8×8 pixels that a pixel of an image of this width is in.
+// Number of the tile of 8×8 pixels that contains a pixel of an image of this width.
 uint fiv_tile(ivec2 pixel, int width) {
     return uint(pixel.y >> 3) * uint((width + 7) >> 3) + uint(pixel.x >> 3);
 }

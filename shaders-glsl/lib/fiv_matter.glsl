@@ -1,15 +1,16 @@
-// How much what looks small can hide at most (techniques::fiv::negligible). Needs a buffer `float matter[]`. Include lib/fiv.glsl before.
+// Upper bound of the light that an occluder of an apparent size can hide (techniques::fiv::negligible). Needs a buffer
+// `float matter[]`. Include lib/fiv.glsl before.
 #ifndef LIB_FIV_MATTER
 #define LIB_FIV_MATTER
 
-// Where a unit direction lies in the table.
+// Coordinates of a unit direction in the table.
 vec2 fiv_matter_place(vec3 direction) {
     float azimuth = atan(direction.x, -direction.z) * (0.5 / FIV_PI);
     return vec2((azimuth - floor(azimuth)) * float(FIV_MATTER_AZIMUTHS),
                 atan(length(direction.xz), direction.y) * (float(FIV_MATTER_POLARS - 1u) / FIV_PI));
 }
 
-// Number of the level, with its fraction, for a disc whose radius is this sine.
+// Level, with its fraction, of a disc whose radius is this sine.
 float fiv_matter_level(float r) {
     return clamp(log2(max(r, 1e-6) / 0.05), 0.0, float(FIV_MATTER_LEVELS - 1u) - 1e-3);
 }
@@ -19,8 +20,8 @@ float fiv_matter_at(int azimuth, uint polar, uint level) {
     return matter[(level * FIV_MATTER_POLARS + polar) * FIV_MATTER_AZIMUTHS + column];
 }
 
-// What a disc of directions around `direction` (unit), whose radius is the sine `r`, can hide at most, in shares of the mean
-// irradiance: without a step in either.
+// Most light that a disc of directions around `direction` (unit) can hide, as a share of the mean irradiance. The disc
+// radius is the sine `r`. The result is continuous in both arguments.
 float fiv_matter(vec3 direction, float r) {
     vec2 place = fiv_matter_place(direction);
     uvec2 at = min(uvec2(place), uvec2(FIV_MATTER_AZIMUTHS - 1u, FIV_MATTER_POLARS - 2u));
@@ -37,11 +38,12 @@ float fiv_matter(vec3 direction, float r) {
     return r * r * mix(sum.x, sum.y, clamp(level - float(low), 0.0, 1.0));
 }
 
-// At least as much as that for every direction that is no farther than `off` (a chord) from this one, and every radius up to `r`.
+// An upper bound of fiv_matter for every direction within the chord `off` of this direction, and for every radius up to
+// `r`.
 float fiv_matter_around(vec3 direction, float off, float r) {
     vec2 place = fiv_matter_place(direction);
     float level = length(direction.xz);
-    // Directions that are so far apart are at most a step apart in the table: not so near the poles.
+    // Directions within this chord are at most a step apart in the table, except near the poles.
     float cell = 2.0 * FIV_PI / float(FIV_MATTER_AZIMUTHS);
     if (1.2 * off > cell * (level - 1.2 * off)) return 1e30;
     uint high = min(uint(fiv_matter_level(r)) + 1u, FIV_MATTER_LEVELS - 1u);

@@ -1,17 +1,17 @@
-// Samples that are needed in a frame: a bit each, words of blocks, blocks of sets.
+// Samples that a frame needs: a bit for each sample. Words form blocks, and blocks form sets.
 #ifndef LIB_FIV_ONLINE
 #define LIB_FIV_ONLINE
 
 const uint FIV_BLOCK_WORDS = 64u; // export
 const uint FIV_BLOCK_SAMPLES = 2048u; // export
 
-// The samples of one occluder, or of several that stand alike.
+// The samples of one occluder, or of several occluders with the same geometry, rotation and scale.
 struct FivSet {
-    uint base;     // first place in the lists of its geometry
-    uint radii_at; // of its spheres' radii
+    uint base;     // first entry in the lists of its geometry
+    uint radii_at; // first entry of its spheres' radii
 };
 
-// All sets that share a geometry.
+// All sets of one geometry.
 struct FivJob {
     uint block; // first
     uint blocks;
@@ -19,7 +19,7 @@ struct FivJob {
     uint batches;
 };
 
-// Workgroups in rows: Vulkan promises 65535 in one direction.
+// Workgroups per row, because Vulkan guarantees only 65535 in one direction.
 const uint FIV_ROW = 32768u; // export
 
 #endif

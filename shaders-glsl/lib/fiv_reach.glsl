@@ -1,11 +1,12 @@
-// How far occluders reach along directions (techniques::fiv::support). Needs a buffer `float reaches[]`. Include lib/fiv.glsl before.
+// Extents of occluders along directions (techniques::fiv::support_function). Needs a buffer `float reaches[]`. Include
+// lib/fiv.glsl before.
 #ifndef LIB_FIV_REACH
 #define LIB_FIV_REACH
 
-// Where a unit normal lies in the tables, for all occluders.
+// Coordinates of a unit normal in the support functions of all occluders.
 struct FivAlong {
     uvec2 at;  // azimuth and polar angle
-    vec2 part; // of the way to the next
+    vec2 part; // fraction of the way to the next entry
 };
 
 FivAlong fiv_along(vec3 n) {
@@ -16,7 +17,7 @@ FivAlong fiv_along(vec3 n) {
     return FivAlong(at, clamp(place - vec2(at), 0.0, 1.0));
 }
 
-// Metres from the centre along the normal (x) and against it (y).
+// Extent from the centre along the normal (x) and against it (y), metres.
 vec2 fiv_reach(uint first, FivAlong along) {
     vec2 sum = vec2(0.0);
     for (uint k = 0u; k < 4u; ++k) {
@@ -30,7 +31,7 @@ vec2 fiv_reach(uint first, FivAlong along) {
     return sum;
 }
 
-// How far an occluder reaches from its centre along the normal (x) and against it (y), metres.
+// Extent of an occluder from its centre along the normal (x) and against it (y), metres.
 vec2 fiv_extent(FivOccluder o, vec3 n, FivAlong along) {
     if (o.reach == FIV_NONE) return vec2(o.radius);
     float scale = 1.0;
@@ -42,7 +43,7 @@ vec2 fiv_extent(FivOccluder o, vec3 n, FivAlong along) {
     return scale * fiv_reach(o.reach, along);
 }
 
-// Share of an occluder in front of a plane at distance `d` of its centre, by the height of what it is told by: by its bounding sphere that
+// Share of an occluder's extent in front of a plane at distance `d` from its centre. For the bounding sphere the share
 // is (d + R) / 2R (Michael, section 3.3.3.1).
 float fiv_front_share(FivOccluder o, float d, vec3 n, FivAlong along) {
     if (abs(d) >= o.radius) return d > 0.0 ? 1.0 : 0.0;
@@ -50,8 +51,9 @@ float fiv_front_share(FivOccluder o, float d, vec3 n, FivAlong along) {
     return clamp((d + reach.x) / max(reach.x + reach.y, 1e-20), 0.0, 1.0);
 }
 
-// Share of the irradiance of even light that is hidden by the part of a ball in front of the plane; its centre is `d` (metres) in front
-// of it, `rho` from the receiver. Exact. Twin: reference::fiv::ball.
+// Share of the irradiance of constant radiance that the part of a ball in front of the plane hides. The centre of the
+// ball is `d` (metres) in front of the plane and `rho` from the receiver. Closed form (Snyder 1996). Twin:
+// reference::fiv::ball.
 float fiv_ball(float d, float rho, float radius) {
     float h = max(rho / radius, 1.0001);
     float c = clamp(d / max(rho, 1e-20), -1.0, 1.0);
@@ -62,18 +64,19 @@ float fiv_ball(float d, float rho, float radius) {
     return ((c * side - sqrt(squared) * g) / (h * h) + atan(sqrt(squared) / g)) / FIV_PI;
 }
 
-// What an occluder that the receiver's plane cuts hides in front of it. normal · FIV, `hidden`, is that less what its part behind hides
-// of the light from behind. So either that is added, from the irradiance `behind`, or what its part in front hides is told by the
-// irradiance in front, `open`: both as if light were even and the occluder a ball of its height with holes. The smaller the one that is
-// guessed, the more that way counts. Twin: reference::fiv::cut.
+// Irradiance that an occluder hides in front of the receiver's plane if the plane cuts it. `hidden`, normal · FIV, is
+// this irradiance minus the irradiance from behind that the part behind the plane hides. Two estimates are possible:
+// add the latter, estimated from the irradiance `behind`, or estimate the former directly from the irradiance in front,
+// `open`. Both assume constant radiance and a ball of the occluder's height with holes. The estimate that is smaller
+// gets the larger weight. Twin: reference::fiv::cut.
 vec3 fiv_cut(FivOccluder o, vec3 offset, vec3 n, FivAlong along, vec3 hidden, vec3 open, vec3 behind) {
     vec2 reach = fiv_extent(o, n, along);
     float radius = max(0.5 * (reach.x + reach.y), 1e-20);
     float d = dot(offset, n), middle = d + 0.5 * (reach.x - reach.y);
     float rho = sqrt(max(dot(offset, offset) - d * d, 0.0) + middle * middle);
-    float body = min(o.body * o.radius * o.radius / (radius * radius), 1.0);
-    vec3 under = behind * (body * fiv_ball(-middle, rho, radius));
-    vec3 over = open * (body * fiv_ball(middle, rho, radius));
+    float fill = min(o.cut_fill * o.radius * o.radius / (radius * radius), 1.0);
+    vec3 under = behind * (fill * fiv_ball(-middle, rho, radius));
+    vec3 over = open * (fill * fiv_ball(middle, rho, radius));
     vec3 ratio = min(under / max(over, vec3(1e-30)), vec3(1e15));
     return min(mix(over, hidden + under, 1.0 / (1.0 + ratio * ratio)), open);
 }

@@ -1,14 +1,15 @@
-// Bright parts of the environment, each of which can be hidden once only (techniques::fiv::spots). Needs a buffer `FivSpot spots[]`.
-// Include lib/fiv.glsl before.
+// Bright parts of the environment, whose light is subtracted at most once (techniques::fiv::spots). Needs a buffer
+// `FivSpot spots[]`. Include lib/fiv.glsl before.
 #ifndef LIB_FIV_SPOTS
 #define LIB_FIV_SPOTS
 
-// Light of a spot on a surface with this normal, W/m².
+// Irradiance of a bright part on a surface with this normal, W/m².
 vec3 fiv_spot_light(uint m, vec3 n) {
     return max(n.x * spots[m].x + n.y * spots[m].y + n.z * spots[m].z, vec3(0.0));
 }
 
-// How much of a spot a disc around `direction`, whose radius is the sine `r`, can hide; `soft`: the disc's edge is as wide.
+// Share of a bright part that a disc around `direction` can hide. The disc radius is the sine `r`. `soft`: width of the
+// disc's soft edge.
 float fiv_spot_share(uint m, vec3 direction, float r, float soft) {
     float b = spots[m].radius;
     float apart = length(spots[m].direction - direction);

@@ -1,5 +1,6 @@
 // Fragment stage of passes/gbuffer, and with BEHIND of passes/gbuffer_behind.
 #include "lib/view.glsl"
+#include "lib/pixel_depth.glsl"
 #include "lib/scene.glsl"
 #include "lib/material.glsl"
 #include "lib/gbuffer.glsl"
@@ -19,7 +20,7 @@ layout(location = 1) in vec4 tangent_in;
 layout(location = 2) in vec4 uv01;
 layout(location = 3) in vec4 uv23;
 layout(location = 4) in vec4 color_in;
-layout(location = 5) in float eye_z;
+layout(location = 5) in vec3 seen; // position in view space, metres
 layout(location = 6) flat in uint instance_in;
 
 layout(location = 0) out vec4 albedo_out;
@@ -43,10 +44,11 @@ const float APART = 1e-4;
 void main() {
     // Before any branch: derivatives need whole quads.
     vec4 dx01 = dFdx(uv01), dy01 = dFdy(uv01), dx23 = dFdx(uv23), dy23 = dFdy(uv23);
+    float linear = pixel_depth(view, seen);
 
 #ifdef BEHIND
     float before = texelFetch(nearer, ivec2(gl_FragCoord.xy), 0).r;
-    if (before >= 1.0 || eye_z / view.far <= before * (1.0 + APART)) discard;
+    if (before >= 1.0 || linear <= before * (1.0 + APART)) discard;
 #endif
     uint m = instances[instance_in].material;
     uint flags = materials[m].flags;
@@ -104,6 +106,6 @@ void main() {
     }
     normal_out = encode_normal(n, OCTAHEDRAL != 0u);
     // Never the background's value.
-    depth_out = min(eye_z / view.far, 0.99999994);
+    depth_out = min(linear, 0.99999994);
     emission_out = vec4(min(emissive, vec3(65504.0)), access);
 }

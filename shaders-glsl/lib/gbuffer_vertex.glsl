@@ -16,7 +16,7 @@ layout(location = 1) out vec4 tangent_out;
 layout(location = 2) out vec4 uv01;
 layout(location = 3) out vec4 uv23;
 layout(location = 4) out vec4 color_out;
-layout(location = 5) out float eye_z;
+layout(location = 5) out vec3 seen; // position in view space, metres
 layout(location = 6) flat out uint instance_out;
 
 vec2 uv_set(uint i, uint set, uint vertex) {
@@ -31,7 +31,7 @@ void main() {
     mat4 world_from_object = instances[i].world_from_object;
     vec4 world = world_from_object * vec4(positions[at], 1.0);
     gl_Position = view.clip_from_world * world;
-    eye_z = -(view.view_from_world * world).z;
+    seen = (view.view_from_world * world).xyz;
     normal_out = instances[i].normal_from_object * normals[at];
     vec4 tangent = tangents[at];
     // A mirroring transform turns the bitangent around.

@@ -1,31 +1,31 @@
-// Irradiance in space for the surfaces at the ends of trees: a hashed grid of cells, each for one place and one way to face, with the
-// irradiance at one point (after the instant caching of Debattista et al., Instant Caching for Interactive Global Illumination, 2009,
-// and the hashed cells of Binder et al., Massively Parallel Path Space Filtering, 2019).
+// The irradiance cache for the surfaces of ray tree nodes: a hashed grid of cells. Each cell stands for a cube of space and a direction of
+// the normal, and holds the irradiance at one point (after the instant caching of Debattista et al., Instant Caching for Interactive Global
+// Illumination, 2009, and the hashed cells of Binder et al., Massively Parallel Path Space Filtering, 2019).
 #ifndef LIB_IGI_CACHE
 #define LIB_IGI_CACHE
 
-// Places in the table: a power of two, and twice as many as there may be cells.
+// Slots of the hash table: a power of two, and twice the maximum of cells.
 const uint CACHE_SLOTS = 262144u; // export
-// Cells at most. With more the cache gives up, and every surface gathers for itself.
+// Maximum of cells. If a frame needs more, the cache is not used, and every surface gathers.
 const uint CACHE_CELLS = 131072u; // export
 const uint CACHE_EMPTY = 0xffffffffu;
-// Places that are looked at for a key.
+// Maximum of slots that are searched for a key.
 const uint CACHE_PROBES = 1024u;
 
 struct CacheCell {
-    vec3 position; // of the node that stands for the cell, metres
-    float gap;
+    vec3 position; // where the cell gathers light, metres
+    float gap;     // step off the surface, metres
     vec3 normal;
-    uint node;     // its number: the least of those in the cell, whatever the order in which they come
+    uint node;     // the lowest number of a node in the cell; independent of the order of invocations
     vec3 light;    // irradiance, W/m²
 };
 
 layout(binding = 80, scalar) buffer CacheKeys { uint cache_keys[]; };
 layout(binding = 81, scalar) buffer CacheCells { CacheCell cache_cells[]; };
-layout(binding = 82, scalar) buffer CacheList { uint cache_count; uint cache_list[]; }; // places of cells, in any order
+layout(binding = 82, scalar) buffer CacheList { uint cache_count; uint cache_list[]; }; // slots of the cells, in any order
 
-// Which of 30 ways a normal looks: for each side of a cube its middle and the four parts around it. Normals along an axis are far
-// from the borders.
+// Class of a normal's direction, 0 to 29: for each side of a cube its middle and the four parts around it. Axis-parallel normals are far
+// from the borders between classes, so that rounding does not change their class.
 uint cache_facing(vec3 n) {
     vec3 size = abs(n);
     uint axis = size.x > size.y && size.x > size.z ? 0u : size.y > size.z ? 1u : 2u;
@@ -36,7 +36,7 @@ uint cache_facing(vec3 n) {
     return (2u * axis + (turned.z < 0.0 ? 1u : 0u)) * 5u + part;
 }
 
-// Nine bits an axis: a cell's side is at least a 500th of the diagonal.
+// Nine bits for each axis: the side of a cell is at least 1/500 of the scene's diagonal.
 uint cache_key(ivec3 cell, uint facing) {
     uvec3 c = uvec3(clamp(cell, ivec3(0), ivec3(511)));
     return c.x | c.y << 9u | c.z << 18u | facing << 27u;
@@ -56,7 +56,7 @@ uint cache_hash(uint key) {
     return key % CACHE_SLOTS;
 }
 
-// Place of a key in the table, or CACHE_EMPTY.
+// Slot of a key in the table, or CACHE_EMPTY.
 uint cache_find(uint key) {
     uint slot = cache_hash(key);
     for (uint i = 0u; i < CACHE_PROBES; ++i) {

@@ -1,25 +1,25 @@
-// What instant global illumination keeps from one frame to the next. Before including: lib/view.glsl.
+// Data of the history, which passes from one frame to the next. Before including: lib/view.glsl.
 #ifndef LIB_IGI_HISTORY
 #define LIB_IGI_HISTORY
 
-// The frame that left the history.
+// The frame that wrote the history.
 struct HistoryFrame {
     View view;
-    uint next; // number of the frame after it
+    uint next; // number of the next frame
 };
 
-// A surface at which light is gathered once more in the next frame, from the same paths, to see whether it changed.
+// A surface point at which the next frame gathers the light of the same paths again, to measure the change of the light.
 struct HistoryProbe {
     vec3 position; // metres
     float gap;     // step off the surface, metres
     vec3 normal;   // unit
-    uint there;    // 0: nothing was seen
+    uint there;    // 0: background, no surface
 };
 
-// Where a virtual light came from, so that the next frame can shoot it again.
+// The origin of a virtual light, with which the next frame can recompute it.
 struct HistoryVpl {
-    uint candidate; // place among all that the paths left
-    float ratio;    // of its flux to the candidate's; 0: there was none
+    uint candidate; // index of the candidate that it is
+    float ratio;    // its flux over the candidate's flux; 0: no light
 };
 
 #endif

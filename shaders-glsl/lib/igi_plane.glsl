@@ -1,8 +1,8 @@
-// How far places of the picture lie from a pixel's plane. Include lib/view.glsl before.
+// The distance of visible points from a pixel's tangent plane. Include lib/view.glsl before.
 #ifndef LIB_IGI_PLANE
 #define LIB_IGI_PLANE
 
-// n · (X - P) / (z range) of what is seen at uv in depth w is base + along uv + (ray + across uv) w.
+// For the point X seen at uv with linear depth w, n · (X - P) / (z range) is base + along · uv + (ray + across · uv) w.
 struct PixelPlane {
     float base;
     float ray;
@@ -10,8 +10,8 @@ struct PixelPlane {
     vec2 across;
 };
 
-// Of a pixel at `position` (metres), linear depth z, with unit normal n. `range`: distance relative to the pixel's depth that counts as 1;
-// 0: everything lies in the plane.
+// The plane of a pixel with world position `position` (metres), linear depth z and unit normal n. `range`: distance, relative to the
+// pixel's depth, at which off_plane returns 1; with 0 it always returns 0.
 PixelPlane pixel_plane(View view, vec3 position, float z, vec3 n, float range) {
     float scale = range > 0.0 ? 1.0 / (z * view.far * range) : 0.0;
     PixelPlane plane;

@@ -9,7 +9,7 @@ float isr_footprint(float facing_area, vec3 axis, vec3 ray, vec3 normal) {
     return facing_area * along / max(abs(dot(normal, ray)), 0.05 * along);
 }
 
-// Equation 6 without dA: cos P · cos X / (π r²), with `extra` (m²) added to π r² against the singularity.
+// [ISR 6] without dA: cos P · cos X / (π r²), with `extra` (m²) added to π r² against the singularity.
 float isr_form_factor(vec3 p, vec3 p_normal, vec3 x, vec3 x_normal, float extra) {
     vec3 to = x - p;
     float r2 = dot(to, to);
@@ -18,7 +18,7 @@ float isr_form_factor(vec3 p, vec3 p_normal, vec3 x, vec3 x_normal, float extra)
     return cosines <= 0.0 ? 0.0 : cosines / (r2 * (ISR_PI * r2 + extra));
 }
 
-// Equation 26 without 2π/N: the spherical cap that an occluder of `radius` at x covers, weighted by the cosine.
+// [ISR 26] without 2π/N: the spherical cap that an occluder of `radius` at x covers, weighted by the cosine.
 // `bias` is subtracted from the cosine: 8-bit normals make flat surfaces occlude themselves.
 float isr_occlusion(vec3 p, vec3 normal, vec3 x, float radius, float bias) {
     vec3 to = x - p;

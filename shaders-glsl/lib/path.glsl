@@ -10,7 +10,7 @@ const uint PATH_SEES_ENVIRONMENT = 8u; // export
 const uint PATH_NO_LIGHT_SAMPLES = 16u; // export
 const uint PATH_NO_BSDF_SAMPLES = 32u; // export
 
-// Ways from a surface: to a light of the tree, to a sun, into the sky, and on to the next surface.
+// Kinds of rays from a surface: to a light of the light tree, to a directional light, to the environment, and on to the next surface.
 const uint TO_LIGHT = 0u; // export
 const uint TO_SUN = 1u; // export
 const uint TO_SKY = 2u; // export
@@ -18,53 +18,53 @@ const uint ON = 3u; // export
 
 // Layers of the sums; see lib/path_sums.glsl.
 const uint PATH_SUMS = 6u; // export
-// Of these, from the first on, the rounding errors are kept too.
+// The first PATH_EXACT_SUMS layers also have layers for their rounding errors.
 const uint PATH_EXACT_SUMS = 3u; // export
 
 struct PathSettings {
     EnvironmentMap environment;
     uvec2 extent;              // pixels
     uint blocks;               // of 8 pixels in a row
-    uint suns;                 // number of columns to pick from
-    uint tree;                 // 1: there are lights in the tree
-    uint bounces;              // scatterings after the first surface
-    uint specular_bounces;     // mirrors and glass along a path
-    uint roulette;             // scatterings before paths may be ended at random
+    uint suns;                 // number of directional lights
+    uint tree;                 // 1: the light tree has lights
+    uint bounces;              // maximum of scatterings after the first surface
+    uint specular_bounces;     // maximum of mirrors and glass surfaces along a path
+    uint roulette;             // scatterings before Russian roulette begins
     uint flags;                // PATH_
     uint seed;
-    // Numbers that compilers must not know, lest they unroll loops and take minutes on CPU drivers.
+    // Loop bounds that are not compile-time constants: compilers of CPU drivers would unroll the loops, which takes minutes.
     uint slots;                // TEXTURE_SLOTS + 2
     uint two;                  // 2
-    uint turns;                // rays from one surface to the next
-    uint turn_ways[4];         // which way each of them goes; the first: ON
+    uint turns;                // rays per surface
+    uint turn_ways[4];         // kind of each of these rays; the first is ON
 };
 
-// A light that counts if nothing is in the way.
+// A light sample whose shadow ray is not traced yet.
 struct WaitingLight {
     vec3 direction;    // of the ray
     float limit;       // in lengths of direction
-    vec3 radiance;     // what it adds
+    vec3 radiance;     // added to the path if the ray is not occluded
 };
 
 struct PathState {
     vec3 origin;
     float limit;       // of the ray, in lengths of direction
     vec3 direction;
-    float density;     // per steradian, of the last scattering; 0: light from there could not be sampled otherwise
+    float density;     // of the last scattering, per steradian; 0: light sampling cannot sample this direction
     vec3 throughput;
     uint alive;
     uint vertex;       // surfaces visited
     uint scattered;    // by Lambert or GGX
     uint specular;     // by mirrors and glass
-    vec3 emission;     // no scattering
-    vec3 direct;       // one
-    vec3 indirect;     // more
-    vec3 side;         // unit normal of the surface of the last scattering, where the path left it
-    uint waiting;      // bit i: the light in way i waits for its ray
-    uint salt;         // for surfaces in the way that are blended
+    vec3 emission;     // radiance without scattering
+    vec3 direct;       // radiance after one scattering
+    vec3 indirect;     // radiance after more scatterings
+    vec3 side;         // geometric normal at the last scattering, unit, on the side where the path left
+    uint waiting;      // bit i: the light sample of kind i needs its shadow ray
+    uint salt;         // seed for alpha-blended surfaces along shadow rays
     vec3 light_origin;
     uint light_scatterings;
-    WaitingLight lamp; // not an array: compilers keep those in memory
+    WaitingLight lamp; // three members, because compilers keep an array in memory and not in registers
     WaitingLight sun;
     WaitingLight sky;
 };

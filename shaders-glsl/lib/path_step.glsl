@@ -7,7 +7,7 @@ PathState camera_path(uvec2 pixel) {
         inside = unit_floats(random_words(pixel, sample_index, 0u, settings.seed).xy);
     }
     vec2 uv = (vec2(pixel) + inside) / vec2(settings.extent);
-    // As the rasteriser clips: from the near to the far plane.
+    // From the near plane to the far plane, like the rasteriser.
     float near = view.near / view.far;
     path.direction = view_ray(view, uv);
     path.origin = view_base(view, uv) + near * path.direction;
@@ -31,15 +31,16 @@ void add_radiance(inout PathState path, uint scatterings, vec3 radiance) {
     else path.indirect += radiance;
 }
 
-// Credit of light that a scattered ray has met by chance, where sampling the lights would have found it with `density`.
+// Weight of the light that a scattered ray hits (multiple importance sampling). `density`: density with which light sampling would choose the
+// same direction, per steradian.
 float met_credit(PathState path, float density) {
     if (path.density == 0.0 || (settings.flags & PATH_NO_LIGHT_SAMPLES) != 0u) return 1.0;
     if ((settings.flags & PATH_NO_BSDF_SAMPLES) != 0u) return 0.0;
     return power_heuristic(path.density, density);
 }
 
-// Light of a triangle that was chosen with probability `chosen`: its density per steradian (0: it does not shine here), and the
-// place of `point` a step towards the viewer, so that it does not hide itself.
+// Samples a triangle that was chosen with probability `chosen`. Returns the density per steradian; 0: the triangle emits no light towards
+// `from`. `target`: the position of `point`, moved a step off its surface, so that the triangle does not occlude itself.
 float sample_triangle_light(float chosen, vec3 from, SurfacePoint point, bool double_sided, out vec3 target) {
     target = point.position;
     vec3 away = from - point.position;
@@ -51,8 +52,8 @@ float sample_triangle_light(float chosen, vec3 from, SurfacePoint point, bool do
     return chosen * 2.0 * distance2 * sqrt(distance2) / abs(facing);
 }
 
-// One ray: to the next surface (`way` is ON), or to the light that waits in that way; nothing if the path has no such ray. One
-// place where rays are traced, so that their code exists once, and all paths of a dispatch go the same way at the same time.
+// Traces one ray: to the next surface (`way` is ON), or the shadow ray of the waiting light sample. Does nothing if the path has no such ray.
+// This is the only place that traces rays, so that the code exists once. All paths of a dispatch trace the same kind of ray at the same time.
 void path_step(uvec2 pixel, uint way, inout PathState path) {
     uint dimension = 1u + 4u * path.vertex;
     bool to_light = way != ON;
@@ -76,16 +77,16 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
     bool missed = hit.instance == NONE;
     bool scatters = !missed && path.scattered <= settings.bounces;
 
-    // What the lights send: over their densities; before visibility.
+    // Unoccluded light over its density, for each kind of light.
     vec3 arriving[3] = vec3[3](vec3(0.0), vec3(0.0), vec3(0.0));
-    // Per steradian; 0: of no extent.
+    // Density per steradian; 0: a light without extent.
     float light_densities[3] = float[3](0.0, 0.0, 0.0);
     vec3 ways[4] = vec3[4](vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
     bool samples_extended = (settings.flags & PATH_NO_LIGHT_SAMPLES) == 0u;
     uvec4 which = random_words(pixel, sample_index, dimension + 1u, settings.seed);
     uvec4 where = random_words(pixel, sample_index, dimension + 2u, settings.seed);
 
-    // The surface and the triangle of a light, in one loop so that their code exists once.
+    // Evaluates the surface and the triangle of a light in one loop, so that the code exists once.
     LightTarget to = LightTarget(NONE, 0u, 0u);
     float chosen = 0.0;
     uint instances[2] = uint[2](hit.instance, NONE);
@@ -113,8 +114,8 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
             vec3 geometric = normalize(points[0].area);
             front = dot(geometric, toward) < 0.0;
             side = front ? geometric : -geometric;
-            // Also a step back along the ray, where nothing lies: a hit on the edge between two surfaces may be a rounding error beyond
-            // the other one, and all light would stop at its back.
+            // The origin also steps back along the ray, where there is free space. At an edge between two surfaces rounding may place the hit
+            // behind the other surface, whose back would occlude all light.
             above = points[0].position + (side - toward) * surface_gap(points[0]);
         }
     }
@@ -164,7 +165,7 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
             ways[TO_LIGHT] = target - above;
         }
     }
-    // A sun, and the point or spot light that the tree gave.
+    // A directional light, and the point or spot light from the light tree.
     for (uint turn_of = 1u; turn_of < settings.turns; ++turn_of) {
         uint i = settings.turn_ways[turn_of];
         uint number = to.index;
@@ -240,17 +241,17 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
     b.thin = (flags & MATERIAL_DOUBLE_SIDED) != 0u;
     b.eta = front || b.thin ? ior : 1.0 / ior;
 
-    // Which ways on are worth going: after the last scattering only light that stands in the way counts.
+    // Which lobes are sampled. After the last scattering a ray is useful only if it can hit an emissive surface or the environment.
     bool sees = (settings.flags & (PATH_SEES_EMISSION | PATH_SEES_ENVIRONMENT)) != 0u;
     float go_rough = scatters && (path.scattered < settings.bounces || sees) ? b.rough : 0.0;
     float go_sharp = path.specular < settings.specular_bounces ? b.glass + b.mirror : 0.0;
     float go = go_rough + go_sharp;
 
-    // The ways to the lights and the way on, again in one loop.
+    // Evaluates the BSDF for the light samples and for the scattered ray in one loop, so that the code exists once.
     uvec4 ahead = random_words(pixel, sample_index, dimension + 3u, settings.seed);
     float pick = unit_float(ahead.x) * go;
     bool on = go > 0.0 && pick < go_rough;
-    // The rest of the number chooses between the lobes.
+    // The remainder of the number chooses between the diffuse and the glossy lobe.
     if (on) ways[ON] = bsdf_sample_rough(b, v, pick / go_rough, unit_floats(ahead.yz));
     vec3 onward = ways[ON];
     vec3 value_on = vec3(0.0);
@@ -276,7 +277,7 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
         if (light_densities[i] > 0.0 && (settings.flags & PATH_NO_BSDF_SAMPLES) == 0u) {
             arrives *= power_heuristic(light_densities[i], density);
         }
-        // A lamp or a triangle itself must not be in the way.
+        // The ray ends a little before the light, so that the light does not occlude itself.
         WaitingLight waits = WaitingLight(ways[i], i == TO_LIGHT ? 0.99999 : 1e30, path.throughput * b.rough * arrives);
         if (i == TO_LIGHT) path.lamp = waits;
         else if (i == TO_SUN) path.sun = waits;
@@ -305,7 +306,7 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
         return;
     }
     path.throughput *= go;
-    // The weights of what goes on sum to `go`; the share of what is left out is lost, not handed to the others.
+    // `go` is the share of the lobes that are sampled. The share of the other lobes is absorbed.
     path.density = 0.0;
     path.specular += 1u;
     float cosine = clamp(dot(b.normal, v), 0.0, 1.0);
@@ -323,7 +324,7 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
             path.throughput *= b.tint;
             path.direction = b.thin ? toward : refract(toward, b.normal, 1.0 / b.eta);
             path.origin = point.position - side * gap;
-            // Radiance is denser where the refractive index is higher.
+            // Refraction scales radiance with the square of the refractive index.
             if (!b.thin) path.throughput /= b.eta * b.eta;
         }
     }

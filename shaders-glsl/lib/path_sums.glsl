@@ -1,14 +1,15 @@
-// Sums over samples. Those of radiance carry their rounding errors along, so that a million samples are as exact as one.
-//   0 emission, luminance of everything     3 albedo, distance along the view axis
-//   1 direct,   its square                  4 shading normal, samples that were not numbers (left out)
-//   2 indirect, samples that met a surface  5 position, —
+// Sums over samples. The sums of radiance have separate sums of their rounding errors, so that a million samples are as exact as one.
+// Each layer has rgb and alpha:
+//   0 emission, luminance of the total      3 albedo, distance along the view axis
+//   1 direct,   its square                  4 shading normal, number of samples left out as not finite
+//   2 indirect, samples that hit a surface  5 position, —
 
 void add_to_sum(uvec2 pixel, uint layer, vec4 value) {
     ivec3 at = ivec3(pixel, layer);
     ivec3 at_error = ivec3(pixel, layer + PATH_SUMS);
     vec4 high = imageLoad(sums, at);
     vec4 low = imageLoad(sums, at_error);
-    // Two-sum (Knuth), then renormalised: high + low is the sum to 48 bits. `precise` keeps the compiler from simplifying.
+    // Two-sum (Knuth), then renormalised: high + low is the sum to 48 bits. `precise` forbids the compiler to simplify the terms.
     precise vec4 sum = high + value;
     precise vec4 back = sum - high;
     precise vec4 rest = (high - (sum - back)) + (value - back);
@@ -40,7 +41,7 @@ void add_light(uvec2 pixel, PathState path) {
     add_to_sum(pixel, 2u, vec4(path.indirect, 0.0));
 }
 
-// What the first surface is.
+// Adds the attributes of the first surface.
 void add_surface(uvec2 pixel, vec3 albedo, vec3 normal, vec3 position, float depth) {
     add_to_sum(pixel, 2u, vec4(0.0, 0.0, 0.0, 1.0));
     add_plainly(pixel, 3u, vec4(albedo, depth));

@@ -26,7 +26,7 @@ struct ShadowSlot {
     float texel;          // metres: size of a texel at one metre (perspective) or everywhere
     uint perspective;
     vec2 half_angle;      // tangent of half the field of view, x and y (perspective)
-    float exponent;       // c of eq. 30 for linear depth 0..1
+    float exponent;       // c of [ISR 30] for linear depth 0..1
 };
 
 struct ShadowLight {
@@ -87,7 +87,7 @@ uint cascade_of(uint first, uint count, vec3 world) {
     return count;
 }
 
-// Exponential test of eq. 30 on linear depths, both 0..1: 1 where the receiver is at or before the occluder.
+// Exponential test [ISR 30] on linear depths, both 0..1: 1 where the receiver is at or before the occluder.
 float exponential_visibility(float receiver, float occluder, float exponent) {
     return exp(-exponent * max(receiver - occluder, 0.0));
 }

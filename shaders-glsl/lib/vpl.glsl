@@ -1,4 +1,4 @@
-// Virtual point lights of instant global illumination: what the passes of igi/ hand to each other.
+// Virtual point lights of instant global illumination: the data that the passes of igi/ share.
 #ifndef LIB_VPL
 #define LIB_VPL
 
@@ -7,55 +7,56 @@ const uint START_PUNCTUAL = 0u; // export
 const uint START_TRIANGLE = 1u; // export
 const uint START_ENVIRONMENT = 2u; // export
 
-// Numbers of a path's row in the table: a pair for the direction (the place, where the light is far), a pair for the place (the
-// direction), and a pair for the way on from each surface.
+// Numbers at the start of a path's row in the Halton table. For near lights the first pair gives the direction and the second pair the
+// position; for distant lights the first pair gives the position and the second pair the direction. Then follows a pair for the direction
+// after each bounce.
 const uint VPL_FIRST_NUMBERS = 4u; // export
 
-// Where a path of light begins.
+// The start of a light path.
 struct VplStart {
     uint kind;     // START_
     uint instance; // of an emissive triangle
     uint index;    // of the punctual light, or of the triangle in its instance
-    float weight;  // 1 over paths and probability of this light
+    float weight;  // 1 / (number of paths × probability of this light)
 };
 
-// A path of light between two dispatches.
+// The state of a light path between two dispatches.
 struct VplPath {
     vec3 origin;
     uint alive;
     vec3 direction; // unit
-    uint depth;     // virtual lights left behind
+    uint depth;     // number of virtual lights that the path has left
     vec3 flux;      // W
-    float range;    // of the punctual light while on the first segment, metres; 0: no cut-off
-    uint specular;  // mirrors and glass passed
+    float range;    // of the punctual light on the first segment, metres; 0: no cut-off
+    uint specular;  // number of mirrors and glass surfaces passed
 };
 
-// A surface that reflects light of a path as Lambert's law has it: π L = flux.
+// A virtual light: a surface point that reflects a path's flux by Lambert's law. Its intensity along the normal is flux / π, W/sr.
 struct Vpl {
     vec3 position; // metres
-    float gap;     // step off the surface that rounding cannot undo, metres
-    vec3 normal;   // of the triangle, unit, on the lit side
+    float gap;     // step off the surface, larger than its rounding error, metres
+    vec3 normal;   // geometric normal, unit, on the lit side
     uint depth;    // 0: first surface of its path
-    vec3 flux;     // reflected, W; zero: there is none
+    vec3 flux;     // reflected, W; zero: no light
     uint path;
 };
 
-// A visible surface that candidates for virtual lights are judged by.
+// A visible point that measures the importance of candidates.
 struct SeenPoint {
     vec3 position; // metres
     float gap;     // step off the surface, metres
     vec3 normal;
-    float weight;  // 0: nothing is seen there
+    float weight;  // luminance of the albedo; 0: background or unlit
 };
 
-// Smooth step of Marques and Santos, section 4: 0 up to 0.8 least, 1 from 1.2 least on.
+// The bound of the geometry term: the smooth step of Marques and Santos, section 4. 0 up to 0.8 least, 1 from 1.2 least on.
 float vpl_bound(float least, float distance) {
     if (least <= 0.0) return 1.0;
     float x = clamp((distance - 0.8 * least) / (0.4 * least), 0.0, 1.0);
     return x * x * (3.0 - 2.0 * x);
 }
 
-// Irradiance (W/m²) from a virtual light at a surface with unit normal, shadows aside (equation 1: L G without V).
+// Unoccluded irradiance (W/m²) from a virtual light at a surface with unit normal ([IGI 1]: L G without V).
 vec3 vpl_irradiance(Vpl vpl, vec3 position, vec3 normal, float least) {
     vec3 to = vpl.position - position;
     float d2 = dot(to, to);
@@ -66,14 +67,15 @@ vec3 vpl_irradiance(Vpl vpl, vec3 position, vec3 normal, float least) {
 }
 
 #ifdef LIB_VIEW
-// How far to step off a surface of the G-buffer at linear depth z: its place is rounded with the depth, its normal is the shading's.
+// Step off a surface of the G-buffer at linear depth z, metres. The step exceeds the rounding error of the position, which grows with the
+// depth.
 float surface_step(View view, vec3 position, float z) {
     vec3 size = abs(position);
     return 1e-5 * max(max(size.x, size.y), size.z) + 2e-5 * z * view.far;
 }
 
-// The same place as far back towards the camera, where nothing lies: a surface whose edge falls on the middle of a pixel is found there a
-// rounding error beyond the surface that it meets, and all rays from there would hit that one from behind.
+// The position, moved by `step` towards the camera, where there is free space. At an edge between two surfaces rounding may place a visible
+// point behind the other surface; all rays from there would hit this surface from behind.
 vec3 stepped_back(View view, vec3 position, float step) {
     return position + to_camera(view, position) * step;
 }

@@ -1,29 +1,29 @@
-// Direct light by shadow rays: every point, spot and directional light, and samples of emissive surfaces and of the sky.
+// Direct light by shadow rays: one ray to each point, spot and directional light, and samples of emissive surfaces and of the environment.
 // Before including: lib/lights.glsl, lib/light_sampling.glsl, lib/hit_surface.glsl, lib/vpl.glsl, lib/vpl_surface.glsl, lib/brdf.glsl;
 // and `settings`.
 #ifndef LIB_VPL_DIRECT
 #define LIB_VPL_DIRECT
 
-// A point that is lit.
+// A receiver of direct light.
 struct LitPoint {
     vec3 position; // metres
-    vec3 above;    // the same a step off the surface
+    vec3 above;    // the position, a step off the surface, metres
     vec3 normal;   // unit
-    vec3 viewer;   // unit, towards where it is seen from
+    vec3 viewer;   // unit, towards the viewer
     Brdf brdf;     // for the viewer
 };
 
-// Base and microfacets as the settings want them.
+// The material's BRDF; without its specular part if the settings switch it off.
 Brdf lit_brdf(vec3 albedo, vec3 f0, float roughness, float nv) {
     return brdf_of(albedo, settings.diffuse_only != 0u ? vec3(0.0) : f0, roughness, nv);
 }
 
-// Shadow rays of a point.
+// Number of shadow rays per point.
 uint direct_rays() {
     return light_count + (settings.tree + settings.sky) * settings.samples;
 }
 
-// Shadow ray number i, and the radiance (W/(sr·m²)) that leaves towards the viewer if nothing is in its way.
+// Shadow ray number i. Returns the radiance (W/(sr·m²)) that the point reflects towards the viewer if the ray is not occluded.
 vec3 direct_ray(uint i, LitPoint p, uvec2 place, out Ray ray) {
     ray = Ray(p.above, 0.0, vec3(0.0, 1.0, 0.0), 0.99999);
     vec3 arrives = vec3(0.0); // irradiance on a plane that faces the light
@@ -38,7 +38,7 @@ vec3 direct_ray(uint i, LitPoint p, uvec2 place, out Ray ray) {
         uvec4 turn = pcg4d(uvec4(place, settings.seed, 0xd12ecu));
         uvec4 words = pcg4d(uvec4(place, settings.seed, i));
         uint number = j % settings.samples;
-        // Even sequences, turned for each pixel: the samples of a pixel keep apart (Roberts' R2).
+        // The R2 sequence (Roberts), with a rotation for each pixel, spreads the samples of a pixel evenly.
         vec2 u = fract(unit_floats(turn.xy) + float(number) * vec2(0.75487767, 0.56984029));
         float strata = fract((float(number) + unit_float(words.w)) / float(settings.samples));
         if (settings.tree != 0u && j < settings.samples) {
@@ -50,7 +50,7 @@ vec3 direct_ray(uint i, LitPoint p, uvec2 place, out Ray ray) {
             float facing = dot(point.area, away);
             float d2 = dot(away, away);
             if ((facing > 0.0 || (both && facing < 0.0)) && d2 > 0.0 && chosen > 0.0) {
-                // The area vector is twice as long as the triangle is large.
+                // The length of `point.area` is twice the triangle's area.
                 float angle = 0.5 * abs(facing) / (d2 * sqrt(d2));
                 arrives = triangle_radiance(to.instance, point, settings.two) * (angle / (chosen * float(settings.samples)));
                 vec3 target = point.position + point.area * (sign(facing) * surface_gap(point) / length(point.area));

@@ -1,5 +1,5 @@
-// Irradiance from virtual lights picked from their tree, with shadow rays. Before including: lib/random.glsl, lib/trace.glsl, lib/vpl.glsl,
-// lib/vpl_tree.glsl with VPL_NODES_BINDING; and `vpls`, in the order of the leaves.
+// Irradiance from virtual lights that are picked from the light tree, with shadow rays. Before including: lib/random.glsl, lib/trace.glsl,
+// lib/vpl.glsl, lib/vpl_tree.glsl with VPL_NODES_BINDING; and `vpls`, sorted like the leaves.
 #ifndef LIB_VPL_PICKED
 #define LIB_VPL_PICKED
 
@@ -8,20 +8,21 @@ struct Receiver {
     vec3 position; // metres
     vec3 normal;   // unit
     vec3 origin;   // of its shadow rays, metres
-    float offset;  // of the numbers of its picks, in [0, 1)
-    uvec2 salt;    // of its random numbers
+    float offset;  // of its stratified numbers, in [0, 1)
+    uvec2 salt;    // seed of its random numbers
 };
 
 struct Picking {
-    uint picks;     // shadow rays of a receiver at most
-    uint proposals; // virtual lights from which each is taken, by what they send if nothing is in the way
-    uint leaves;    // of the tree
+    uint picks;     // maximum of shadow rays per receiver
+    uint proposals; // virtual lights proposed for each pick
+    uint leaves;    // of the light tree
     float least;    // min_d of the bounded geometry term, metres; 0: none
     uint seed;
 };
 
-// rgb: share of `count` of the picks from `first` on in the irradiance; a: rays traced. Of each pick's proposals one is taken in
-// proportion to what it sends, and stands for all of them (Talbot, Cline and Egbert, Importance Resampling for Global Illumination, 2005).
+// rgb: the part of the irradiance that the picks `first` to `first` + `count` - 1 contribute; a: number of shadow rays. For each pick one of
+// the proposals is drawn in proportion to its unoccluded light, and represents all of them (Talbot, Cline and Egbert, Importance Resampling
+// for Global Illumination, 2005).
 vec4 vpl_picked(Receiver at, Picking how, uint first, uint count) {
     vec4 sum = vec4(0.0);
     uint last = VPL_NO_PICK;
@@ -43,7 +44,7 @@ vec4 vpl_picked(Receiver at, Picking how, uint first, uint count) {
             strengths += weight;
             float share = weight / strengths;
             bool takes = u < share;
-            // What is left of the number is as even as it was.
+            // The remainder of the number is uniformly distributed again.
             u = clamp(takes ? u / share : (u - share) / (1.0 - share), 0.0, 0.99999994);
             if (takes) {
                 taken = k;
@@ -52,7 +53,7 @@ vec4 vpl_picked(Receiver at, Picking how, uint first, uint count) {
             }
         }
         if (taken == VPL_NO_PICK) continue;
-        // Picks run through the tree from left to right: equal ones follow each other.
+        // The stratified numbers grow from pick to pick, so equal picks follow each other and share a shadow ray.
         if (taken != last) {
             last = taken;
             vec3 to = vpls[taken].position + vpls[taken].normal * vpls[taken].gap - at.origin;

@@ -1,23 +1,23 @@
-// The surface at a hit, with its textures. Before including: lib/hit_surface.glsl, lib/trace.glsl, lib/sampling.glsl.
+// The textured surface at a ray's hit. Before including: lib/hit_surface.glsl, lib/trace.glsl, lib/sampling.glsl.
 #ifndef LIB_VPL_SURFACE
 #define LIB_VPL_SURFACE
 
 struct HitSurface {
     vec3 position;
-    float gap;       // step off the surface that rounding cannot undo, metres
-    vec3 side;       // of the triangle, unit, towards where the ray came from
+    float gap;       // step off the surface, larger than its rounding error, metres
+    vec3 side;       // geometric normal, unit, towards the ray's origin
     vec3 normal;     // shading normal on the same side
     vec3 albedo;
     vec3 f0;
     float roughness;
-    vec3 emission;   // W/(sr·m²) towards where the ray came from; of unlit surfaces their colour
+    vec3 emission;   // radiance towards the ray's origin, W/(sr·m²); the colour of an unlit surface
     bool unlit;
-    float rough;     // shares: Lambert and GGX, smooth dielectric, mirror
+    float rough;     // probabilities that sum to 1: Lambert and GGX, smooth dielectric, mirror
     float glass;
     float mirror;
-    vec3 tint;       // of what passes the dielectric, and reflectance of the mirror at normal incidence
-    float eta;       // refractive index behind the surface over that in front of it
-    bool thin;       // a sheet with both interfaces
+    vec3 tint;       // transmittance of the dielectric, or reflectance of the mirror at normal incidence
+    float eta;       // ratio of the refractive indices behind and in front of the surface
+    bool thin;       // a thin sheet, with both interfaces at the hit
 };
 
 HitSurface hit_surface(Hit hit, vec3 toward, uint slots, bool diffuse_only) {
@@ -73,7 +73,8 @@ HitSurface hit_surface(Hit hit, vec3 toward, uint slots, bool diffuse_only) {
     return s;
 }
 
-// Radiance that an emissive triangle sends from its front (either side if double-sided) at a point, by the share of it that is there.
+// Radiance, W/(sr·m²), that an emissive triangle emits at a point, from its front side or, if double-sided, from both sides. Multiplied by
+// the coverage that alpha gives.
 vec3 triangle_radiance(uint instance, SurfacePoint point, uint two) {
     uint m = surface_instances[instance].material;
     uint flags = materials[m].flags;

@@ -1,4 +1,4 @@
-// Bilateral upsampling of the coarse result (dissertation, equations 27 and 28) and the sum of all light (equation 29).
+// Bilateral upsampling of the coarse result [ISR 27], [ISR 28] and the sum of all light [ISR 29].
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -15,7 +15,7 @@ layout(constant_id = 0) const uint FACTOR = 2;
 layout(constant_id = 1) const uint PLANE = 1;
 // 0: the gathered radiance is added as it is (dissertation). 1: times the albedo of the pixel.
 layout(constant_id = 2) const uint TINT = 1;
-// 0: occlusion darkens direct light (equation 29). 1: it darkens ambient light only.
+// 0: occlusion darkens direct light [ISR 29]. 1: it darkens ambient light only.
 layout(constant_id = 3) const uint OCCLUDE_AMBIENT = 1;
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
@@ -67,7 +67,7 @@ vec4 upsample(ivec2 pixel, float z, vec3 n, vec3 p) {
             vec3 x = screen_position(view, coarse, float(FACTOR), coarse_z);
             off = bilateral_plane_distance(p, n, x, z * view.far);
         }
-        float w = bilinear / (epsilon + off);
+        float w = bilinear / (epsilon + off); // [ISR 27]
         if (PLANE != 0) {
             vec3 m = texelFetch(coarse_normal, coarse, 0).xyz;
             float like = max(dot(n, m) * inversesqrt(max(dot(m, m), 1e-12)), 0.0);
@@ -80,7 +80,7 @@ vec4 upsample(ivec2 pixel, float z, vec3 n, vec3 p) {
             nearest = value;
         }
     }
-    return weights * epsilon < NO_MATCH ? nearest : sum / weights;
+    return weights * epsilon < NO_MATCH ? nearest : sum / weights; // [ISR 28]
 }
 
 void main() {
@@ -114,7 +114,7 @@ void main() {
     around += max(gloss.rgb - 0.04, 0.0) * ambient_irradiance(mirrored);
     around *= color.a * own.a / 3.14159265358979;
     vec3 direct_part = OCCLUDE_AMBIENT != 0 ? light.rgb : (light.rgb - glow) * lit + glow;
-    vec3 sum = direct_part + around * lit + bounced;
+    vec3 sum = direct_part + around * lit + bounced; // [ISR 29]
     imageStore(total, pixel, vec4(sum, 1.0));
     imageStore(indirect, pixel, vec4(around * lit + bounced, 1.0));
     imageStore(accessibility, pixel, vec4(open));

@@ -14,7 +14,7 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 // 0: radiometry of glTF lights, reflected by a matt base under microfacets (lib/brdf.glsl). 1: the dissertation's k_dl: colour relative to the
-// brightest light, equation 16 over distance, cosine; no π; microfacets are added to it.
+// brightest light, [ISR 16] over distance, cosine; no π; microfacets are added to it.
 layout(constant_id = 0) const uint PAPER_LAW = 0;
 layout(constant_id = 1) const uint SPECULAR = 1; // 0: Lambert's law alone
 
@@ -32,7 +32,7 @@ layout(push_constant, scalar) uniform Push {
     float light_power;   // l_pow
 };
 
-// Equation 16.
+// [ISR 16]
 float paper_attenuation(float distance, float radius) {
     float q = distance / radius;
     return clamp(1.0 - q * q, 0.0, 1.0);

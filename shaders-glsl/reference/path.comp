@@ -1,5 +1,5 @@
-// Path tracing of a tile of pixels, one sample each: up to `rays` rays of each path, then its state is kept for
-// the next dispatch. Radiance is kept apart by the number of scatterings on its way: none, one, more.
+// Path tracing of a tile of pixels, with one sample per pixel. Traces up to `rays` rays of each path; the buffer keeps the path's state
+// for the next dispatch. Radiance is summed separately by the number of scatterings along the path: none, one, more.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -28,21 +28,21 @@ layout(local_size_x = 64) in;
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 13, scalar) uniform SettingsBlock { PathSettings settings; };
 layout(binding = 14, scalar) buffer Paths { PathState paths[]; };
-// Layers 0 to PATH_SUMS - 1: sums over samples; then PATH_EXACT_SUMS layers: what rounding took from the first ones.
+// Layers 0 to PATH_SUMS - 1: sums over samples; then PATH_EXACT_SUMS layers: the rounding errors of the first sums.
 layout(binding = 15, rgba32f) uniform image2DArray sums;
 
 layout(push_constant, scalar) uniform Push {
     uint first;    // slot of the tile's first pixel, in blocks of 8 × 8
     uint count;    // slots
     uint sample_index;
-    uint turn;     // rays that each path may have traced before; 0: new paths
-    uint rays;     // to trace
+    uint turn;     // rays per path in the dispatches before; 0: starts new paths
+    uint rays;     // rays per path in this dispatch
 };
 
 #include "lib/path_sums.glsl"
 #include "lib/path_step.glsl"
 
-// Slots run through blocks of 8 × 8 pixels, so that a workgroup's rays are neighbours.
+// Pixel of a slot. Slots are ordered by blocks of 8 × 8 pixels, so that the rays of a workgroup are close to each other.
 uvec2 pixel_of(uint slot) {
     uint block = slot / 64u;
     uint inside = slot % 64u;

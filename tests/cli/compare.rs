@@ -121,7 +121,7 @@ fn what_is_not_comparable_is_refused_or_said() {
     let [a, b] = [("a.exr", 0.5), ("b.png", 0.25)].map(|(n, v)| write(folder.path(), n, v, SIDE));
     // Light beside screen codes.
     compare(&[&a, &b]).expect(3, &["a.exr", "b.png", "--exposure"]);
-    let shown = compare(&[&a, &b, "-m", "mae,flip", "--exposure", "-1", "--json"]).expect(0, &["shown with -1 stops"]);
+    let shown = compare(&[&a, &b, "-m", "mae,flip", "--exposure", "-1", "--json"]).expect(0, &["exposed by -1 stops"]);
     assert!(value(&shown.json(), 0, "mae") < 1e-3, "half of 0.5 is 0.25: {}", shown.stdout);
     // NaN.
     let mut data = vec![0.5; (SIDE * SIDE * 3) as usize];

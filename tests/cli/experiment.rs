@@ -241,10 +241,10 @@ fn what_was_damaged_or_exchanged_is_made_anew_and_said() {
     for (file, bytes) in changes {
         fs::write(file, bytes).unwrap();
         let name = file.file_name().unwrap().to_str().unwrap();
-        place.run("out", &["-q"]).expect(0, &[name, "made anew"]);
+        place.run("out", &["-q"]).expect(0, &[name, "made again"]);
         assert!(contents(&place.path("out")) == whole, "{name}");
         // Once.
-        assert!(!place.run("out", &["-q"]).expect(0, &[]).stderr.contains("made anew"));
+        assert!(!place.run("out", &["-q"]).expect(0, &[]).stderr.contains("made again"));
     }
 }
 

@@ -47,7 +47,7 @@ fn wrong_calls_are_refused_and_named() {
         precompute(&env, out, more).expect(2, &[part]);
     }
     fiv(&["precompute", "--builtin", "cornell", "-o", out]).expect(2, &["--environment"]);
-    fiv(&["merge", &env, "-o", out]).expect(3, &["sky.exr", "no file of irradiance vectors"]);
+    fiv(&["merge", &env, "-o", out]).expect(3, &["sky.exr", "not a file of irradiance vectors"]);
     assert_eq!(files(folder.path()), ["sky.exr"]);
 }
 
@@ -69,11 +69,12 @@ fn parts_and_stopped_runs_give_the_same_bytes() {
     fiv(&["merge", &at("3.fiv"), &at("1.fiv"), &at("2.fiv"), "-o", &at("joined.fiv")]).expect(0, &[]);
     let bytes = fs::read(&whole).unwrap();
     assert!(fs::read(at("joined.fiv")).unwrap() == bytes);
-    // What a stopped run leaves is a part from the start.
+    // A stopped run leaves a part that begins at the first sample.
     fs::copy(at("1.fiv"), at("again.fiv.part")).unwrap();
     precompute(&env, &at("again.fiv"), &[]).expect(0, &["goes on after"]);
     assert!(fs::read(at("again.fiv")).unwrap() == bytes && !Path::new(&at("again.fiv.part")).exists());
-    // One that is damaged or of other work may be worth hours: it is neither used nor replaced without being told to.
+    // A damaged file or a file of other work may contain hours of work. It is neither used nor replaced unless the user
+    // asks for it.
     let (anew, part) = (at("anew.fiv"), at("anew.fiv.part"));
     fs::write(&part, &bytes[..bytes.len() / 2]).unwrap();
     precompute(&env, &anew, &[]).expect(3, &["anew.fiv.part", "cut off", "--restart"]);
@@ -106,7 +107,7 @@ fn a_killed_run_goes_on_to_the_same_bytes() {
         assert!(child.try_wait().unwrap().is_none(), "it ended before anything was written");
         std::thread::sleep(std::time::Duration::from_millis(2));
     }
-    // SIGKILL: nothing can be tidied up.
+    // SIGKILL leaves no time to clean up.
     child.kill().unwrap();
     child.wait().unwrap();
     assert!(Path::new(&part).exists() && !Path::new(&killed).exists());
@@ -133,34 +134,34 @@ fn pictures_from_files_are_those_without_and_can_be_made_again() {
     let pixels = |name: &str| image::read(at(name), &Default::default()).unwrap().main().unwrap().data.clone();
     assert!(pixels("a.exr") == pixels("b.exr"));
     lucerna(["rerun", &at("a.exr")]).expect(0, &[]);
-    // What the file has decided cannot be asked for otherwise.
+    // Settings must agree with the settings that the file decides.
     let asked = |key: &str| picture(&env, &at("d.exr"), &["--vectors", &vectors, "-D", key]);
     asked("fiv.azimuths=7").expect(2, &["v.fiv", "fiv.azimuths", "7", "6"]);
     asked("fiv.method=brute-force").expect(2, &["v.fiv", "fiv.method", "--vectors"]);
     asked("fiv.azimuths=6").expect(0, &[]);
     precompute(&env, &at("idle.fiv"), &["-D", "fiv.turning=30"]).expect(0, &["do not depend on fiv.turning"]);
-    // That they lie evenly is decided as well; lights are kept apart whatever method is named.
+    // The file also decides the even spacing. Texels are separated for every method that is named.
     precompute(&env, &at("even.fiv"), &["-D", "fiv.adaptive=false"]).expect(0, &[]);
     let even = ["--vectors", &at("even.fiv"), "-D", "fiv.adaptive=true"];
     picture(&env, &at("e.exr"), &even).expect(2, &["even.fiv", "fiv.adaptive"]);
     let suns = ["-D", "fiv.suns=1", "-D", "fiv.method=brute-force"];
     precompute("point", &at("suns.fiv"), &suns).expect(0, &["do not depend on fiv.method"]);
     picture("point", &at("f.exr"), &["--vectors", &at("suns.fiv")]).expect(0, &[]);
-    // What no vector depends on is not in the way of what they do.
+    // Keys that vectors do not depend on are ignored.
     let online = ["-D", "fiv.method=online", "-D", "fiv.turns=2", "-D", "fiv.specular=summed"];
     precompute(&env, &at("turns.fiv"), &online).expect(0, &["do not depend on", "fiv.method", "fiv.specular"]);
     let apart = ["-D", "fiv.suns=1", "-D", "fiv.specular=summed", "-D", "fiv.negligible=0.1"];
     precompute("point", &at("apart.fiv"), &apart).expect(0, &["fiv.negligible", "fiv.specular"]);
     precompute(&env, &at("x.fiv"), &["-D", "fiv.negligible=2"]).expect(2, &["fiv.negligible", "0 to 1"]);
     precompute(&env, &at("x.fiv"), &["-D", "fiv.suns=1", "-D", "fiv.turns=2"]).expect(2, &["fiv.suns"]);
-    // What a file does not have, and what is done without it, is said with its name.
+    // A note names the file and the samples that it lacks.
     let matt = at("without.fiv");
     precompute(&env, &matt, &["-q", "-D", "fiv.self_shadow=false"]).expect(0, &[]);
     let base = ["render", "--builtin", "furnace-sphere", "--env", &env, "--size", "8x8", "-o", &at("g.exr")];
     let noted = ["without.fiv", "samples on surfaces", "fiv.self_samples=surface"];
     fiv(&[&base[..], &["--vectors", &matt]].concat()).expect(0, &noted);
     let other = environment(folder.path(), "other.exr", 2.0);
-    picture(&other, &at("c.exr"), &["--vectors", &vectors]).expect(3, &["v.fiv", "other light"]);
+    picture(&other, &at("c.exr"), &["--vectors", &vectors]).expect(3, &["v.fiv", "different radiance"]);
 }
 
 #[test]
@@ -176,7 +177,7 @@ fn things_stand_on_a_ground_and_the_picture_can_be_made_again() {
     fiv(&[&base[..], &ground, &SMALL, &["-o", &at("a.exr")]].concat()).expect(0, &[]);
     lucerna(["rerun", &at("a.exr")]).expect(0, &[]);
     fiv(&[&base[..], &["--ground", "--sunk=7", "-o", &at("b.exr")]].concat()).expect(2, &["ground.sunk", "7"]);
-    // The camera over the ground sees the ground alone: all of one colour without shadows.
+    // The camera above the ground sees only the ground, which has one colour without shadows.
     let open = ["--camera", "ground", "-D", "fiv.method=unshadowed", "-o", &at("c.exr")];
     fiv(&[&base[..], &ground, &open].concat()).expect(0, &[]);
     let pixels = image::read(at("c.exr"), &Default::default()).unwrap().main().unwrap().rgb_pixels().unwrap();

@@ -104,7 +104,7 @@ fn what_is_not_shown_is_said() {
     let name = folder.path().join("picture.png");
     let small = ["render", "--builtin", "conference", "--size", "8x6", "-D", "igi.vpls=2", "-D", "igi.candidates=1"];
     let ran = ran(command(env!("CARGO_BIN_EXE_igi")).args(small).arg("-o").arg(&name)).expect(0, &[]);
-    for part in ["\"glass\": lamps do not shine through glass", "caustics of lamps are missing"] {
+    for part in ["\"glass\": direct light does not pass through glass", "caustics of direct light are missing"] {
         assert!(ran.stderr.contains(part), "{part} is not in {}", ran.stderr);
     }
     // Not of glass alone, which is shown as glass.

@@ -114,7 +114,7 @@ fn the_shipped_experiment_gives_all_its_tables() {
         let row = rays.iter().find(|row| row["variant"].as_str() == Some(label.as_str())).unwrap();
         assert!((row["shooting"].as_f64().unwrap() - count as f64 * 1e-6).abs() < 1e-12, "{row:?}");
         assert!((row["gathering"].as_f64().unwrap() - PIXELS * count as f64 * 1e-6).abs() < 1e-12, "{row:?}");
-        assert!(row["choosing"].is_null() && row["light put back"].is_null(), "{row:?}");
+        assert!(row["choosing"].is_null() && row["compensation"].is_null(), "{row:?}");
         // One lamp.
         assert!((row["direct"].as_f64().unwrap() - PIXELS * 1e-6).abs() < 1e-12, "{row:?}");
     }

@@ -24,7 +24,7 @@ fn path(folder: &tempfile::TempDir, name: &str) -> String {
 
 #[test]
 fn wrong_usage_is_exit_code_2() {
-    lucerna(["reference"]).expect(2, &["no scene was named"]);
+    lucerna(["reference"]).expect(2, &["no scene was given"]);
     for (arguments, part) in [
         (&["--spp", "0"][..], "--spp"),
         (&["--time-limit", "soon"], "10m"),

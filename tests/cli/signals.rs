@@ -17,7 +17,7 @@ use support::{command, device, files, ran};
 /// Programs end within two seconds; on a machine that does much else besides they may take longer.
 const BOUND: Duration = Duration::from_secs(8);
 /// The answer.
-const WORD: &str = "stopping; what is complete is kept";
+const WORD: &str = "stopping; complete output is kept";
 
 /// A program that works.
 struct Running {

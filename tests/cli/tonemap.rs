@@ -469,7 +469,7 @@ fn last_stage_of_every_technique() {
     }
     let none = name(folder, "o.png");
     let occlusion = [&["render", "-o", &none, "--mode", "occlusion"], &scene[..], &look].concat();
-    support::isr(occlusion).expect(2, &["tonemap: the picture of this mode of isr is no light"]);
+    support::isr(occlusion).expect(2, &["tonemap: tone mapping needs radiance, but the picture of this mode of isr"]);
     support::isr(["render", "--builtin", "cornell", "-o", &none, "-D", "tonemap.operatr=agx"])
         .expect(2, &["tonemap.operator"]);
 }

@@ -204,7 +204,7 @@ impl<'a> Studio<'a> {
     }
 }
 
-/// Normalised root mean square error (eq. 17): per channel by its range in the reference, the mean of three.
+/// Normalised root mean square error [FIV 17]: per channel by its range in the reference, the mean of three.
 pub fn nrmse(reference: &[Vec3], found: &[Vec3]) -> f64 {
     let channel = |c: usize| {
         let values = || reference.iter().map(|p| f64::from(p[c]));

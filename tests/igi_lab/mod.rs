@@ -1,4 +1,4 @@
-//! Pictures of instant global illumination with what lies behind them, for its tests.
+//! Pictures of instant global illumination with their intermediate results, for tests.
 #![allow(dead_code)]
 
 pub mod twins;
@@ -13,29 +13,29 @@ use lucerna::{
     techniques::igi::{Igi, PictureSettings, Settings},
 };
 
-/// A picture, pixel by pixel.
+/// The images of a picture, and its virtual lights.
 pub struct Shown {
     pub total: Vec<[f32; 4]>,
     pub direct: Vec<[f32; 4]>,
     pub indirect: Vec<[f32; 4]>,
     pub irradiance: Vec<[f32; 4]>,
-    /// Before the filters, and in alpha the rays traced.
+    /// Irradiance before the filters; alpha: number of shadow rays.
     pub gathered: Vec<[f32; 4]>,
     pub albedo: Vec<[f32; 4]>,
     pub vpls: Vec<types::Vpl>,
-    /// Of the tree over the virtual lights, where there is one.
+    /// Nodes of the light tree; empty without a tree.
     pub nodes: Vec<types::VplNode>,
-    /// Of the cache behind mirrors and glass, where there is one.
+    /// Number of cells of the irradiance cache; 0 without a cache.
     pub cells: u32,
 }
 
-/// A scene that stays on the device for many pictures.
+/// A scene on the device, for several pictures.
 pub struct Studio<'a> {
     scene: &'a Scene,
     resident: Resident,
     igi: Igi,
     runner: Runner,
-    /// Of the next picture.
+    /// Frame number of the next picture.
     pub frame: u32,
     pub pose: Pose,
 }
@@ -45,7 +45,7 @@ impl<'a> Studio<'a> {
         Self::with(gpu, scene, &Settings::default())
     }
 
-    /// For settings that choose how rays are traced.
+    /// Prepares the scene for settings that choose how rays are traced.
     pub fn with(gpu: &Gpu, scene: &'a Scene, settings: &Settings) -> Self {
         let resident = Resident::new(gpu, scene).unwrap();
         let igi = Igi::new(gpu, scene, &resident, settings).unwrap();
@@ -94,7 +94,7 @@ pub fn room(albedo: Vec3) -> Stage {
     stage
 }
 
-/// Diffuse light alone, no bound, one bounce.
+/// Settings for diffuse surfaces only, without a bound, with one bounce.
 pub fn plain(vpls: u32) -> Settings {
     Settings { vpls, candidates: 1, bounces: 1, bound: 0.0, specular: false, direct_samples: 4, ..Settings::default() }
 }
@@ -104,7 +104,7 @@ pub fn mean(pixels: &[[f32; 4]]) -> f64 {
     pixels.iter().map(|p| f64::from(p[0]) + f64::from(p[1]) + f64::from(p[2])).sum::<f64>() / (3 * pixels.len()) as f64
 }
 
-/// Sum of the flux of virtual lights of one depth.
+/// Sum of the flux of the virtual lights of one depth, W.
 pub fn flux(vpls: &[types::Vpl], depth: u32) -> Vec3 {
     let sum: glam::DVec3 = vpls.iter().filter(|v| v.depth == depth).map(|v| Vec3::from(v.flux).as_dvec3()).sum();
     sum.as_vec3()

@@ -1,4 +1,4 @@
-//! The filters of instant global illumination once more, slowly and in 64 bits, written from their descriptions.
+//! CPU implementations of the filters of instant global illumination, in 64 bits, written from the descriptions of the filters.
 
 use glam::{DMat4, DVec3, DVec4, dvec2, dvec3};
 use lucerna::{
@@ -12,7 +12,7 @@ fn color(texel: [f32; 4]) -> DVec3 {
     dvec3(texel[0].into(), texel[1].into(), texel[2].into())
 }
 
-/// The pixel that a coarse texel stands for: in the middle, or scattered.
+/// The pixel for which a coarse texel gathers: in its middle, or scattered.
 pub fn pixel_of(buffers: &Buffers, (x, y): (usize, usize), s: &Settings) -> (usize, usize) {
     let factor = s.downsample as usize;
     let (a, b) = if s.scattered { ((y + 2 * x) % factor, (x + 2 * y) % factor) } else { (factor / 2, factor / 2) };
@@ -24,7 +24,7 @@ fn place(eye: &Eye, buffers: &Buffers, (x, y): (usize, usize)) -> DVec3 {
     eye.position_at(u, v, buffers.depth[buffers.at(x, y)])
 }
 
-/// Irradiance of a pixel by joint bilateral upsampling; `None` where no texel matches enough to have a mean, or on the background.
+/// Irradiance of a pixel by joint bilateral upsampling; `None` on the background, and if the weights are too small for a mean.
 pub fn upsampled(eye: &Eye, buffers: &Buffers, coarse: &Texels, s: &Settings, (x, y): (usize, usize)) -> Option<DVec3> {
     let factor = s.downsample as usize;
     let (columns, rows) = (buffers.width.div_ceil(factor), buffers.height.div_ceil(factor));
@@ -52,7 +52,7 @@ pub fn upsampled(eye: &Eye, buffers: &Buffers, coarse: &Texels, s: &Settings, (x
             }
             let cosine = n.dot(buffers.normal[i].normalize()).max(1e-12);
             let mut weight = cosine.powf(f64::from(s.upsample_normal));
-            // At the border the pixel in the middle may not be there; the texel stays where it is.
+            // At the border the pixel in the middle may be outside of the picture; the texel's position does not change.
             let apart = match s.scattered {
                 true => (dvec2(there.0 as f64, there.1 as f64) - dvec2(x as f64, y as f64)) / factor as f64,
                 false => texel - centre,
@@ -68,7 +68,7 @@ pub fn upsampled(eye: &Eye, buffers: &Buffers, coarse: &Texels, s: &Settings, (x
             weights += weight;
         }
     }
-    // Near the limit rounding decides, and 32 bits end.
+    // Smaller weights are near the limit, where rounding decides, or below the range of 32 bits.
     (weights > 2e-4 * all && weights > 1e-30).then(|| sum / weights)
 }
 
@@ -103,7 +103,7 @@ pub fn joined(buffers: &Buffers, interleaved: &Texels, s: &Settings, (x, y): (us
     sum / count
 }
 
-/// One turn of smoothing at a texel of every `downsample`-th pixel, with texels `stride` apart.
+/// One iteration of smoothing at a texel of every `downsample`-th pixel, with texels `stride` apart.
 pub fn smoothed(
     eye: &Eye,
     buffers: &Buffers,
@@ -141,24 +141,24 @@ pub fn smoothed(
     sum / weights
 }
 
-/// What the history is made of, for [`blended`].
+/// The data of the history, for [`blended`].
 pub struct Past<'a> {
     pub eye: &'a Eye,
     pub clip_from_world: DMat4,
     pub buffers: &'a Buffers,
-    /// Alpha: frames.
+    /// Alpha: number of frames.
     pub irradiance: &'a Texels,
-    /// Relative change a frame; alpha: its size.
+    /// Relative change per frame; alpha: its magnitude.
     pub trend: &'a Texels,
-    /// World position in the last frame, alpha 0: the surface rests.
+    /// World position in the last frame; alpha 0: the surface did not move.
     pub motion: &'a Texels,
-    /// Normal of each probe, or none; light by the same paths then and now.
+    /// For each probe its normal (`None`: no surface), and the light of the same paths in the last frame and in this one.
     pub probes: Vec<(Option<DVec3>, DVec3, DVec3)>,
     pub columns: usize,
     pub side: usize,
 }
 
-/// This frame's irradiance of a pixel and that of the past, blended, and how many frames count; and the trend of the light.
+/// The blended irradiance of a pixel with its number of frames, and the trend of the light.
 pub fn blended(
     eye: &Eye,
     buffers: &Buffers,
@@ -187,7 +187,7 @@ pub fn blended(
     if clip.w > 0.0 {
         for v in 0..then.height {
             for u in 0..then.width {
-                // The tent of bilinear interpolation.
+                // The weight of bilinear interpolation.
                 let weight = (1.0 - (u as f64 - at.x).abs()).max(0.0) * (1.0 - (v as f64 - at.y).abs()).max(0.0);
                 let i = then.at(u, v);
                 if weight == 0.0 || then.depth[i] >= 1.0 || past.irradiance[i][3] <= 0.0 {
@@ -231,7 +231,7 @@ pub fn blended(
         let mut drift = size;
         if size <= 3.0 * trend.w {
             let step = next.truncate().clamp(DVec3::splat(-0.5), DVec3::splat(0.5));
-            // Of the larger of both moments: growth divides, loss multiplies.
+            // The change is relative to the larger of both values: growth divides by 1 - g, loss multiplies by 1 + g.
             let along = |x: f64, g: f64| if g > 0.0 { x / (1.0 - g) } else { x * (1.0 + g) };
             old = dvec3(along(old.x, step.x), along(old.y, step.y), along(old.z, step.z));
             drift = 0.35 * step.abs().max_element();

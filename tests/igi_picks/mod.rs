@@ -1,4 +1,4 @@
-//! Twin of `lib/vpl_tree.glsl` in double precision: what a node may send, which virtual light a number picks, and how probable each is.
+//! CPU implementation (twin) of `lib/vpl_tree.glsl` in double precision: estimates of nodes, picks of virtual lights, and their probabilities.
 #![allow(dead_code)]
 
 use glam::{DVec3, Vec3};
@@ -17,7 +17,7 @@ pub fn bound(least: f64, distance: f64) -> f64 {
     x * x * (3.0 - 2.0 * x)
 }
 
-/// Irradiance at a surface from a virtual light, shadows aside.
+/// Unoccluded irradiance at a surface from a virtual light.
 pub fn irradiance(vpl: &Vpl, point: DVec3, normal: DVec3, least: f64) -> DVec3 {
     let to = Vec3::from(vpl.position).as_dvec3() - point;
     let (d2, away) = (to.length_squared(), Vec3::from(vpl.normal).as_dvec3());
@@ -28,7 +28,7 @@ pub fn irradiance(vpl: &Vpl, point: DVec3, normal: DVec3, least: f64) -> DVec3 {
     Vec3::from(vpl.flux).as_dvec3() * (cosines / (d2 * d2) / PI * bound(least, d2.sqrt()))
 }
 
-/// a − b of angles given by their cosines, 0 if a is the smaller.
+/// Cosine of a − b for angles given by their cosines; the difference is 0 if a is smaller than b.
 fn less(a: f64, b: f64) -> f64 {
     if a >= b { 1.0 } else { (a.acos() - b.acos()).cos() }
 }
@@ -56,7 +56,7 @@ pub fn estimate(node: &VplNode, point: DVec3, normal: DVec3, least: f64) -> f64 
     f64::from(node.flux) * cosines * bounded / distance2.max(0.25 * radius2).max(0.64 * least * least)
 }
 
-/// Share of the first half; `None`: neither sends anything.
+/// Probability of the first child; `None` if neither child sends light.
 fn first_share(first: f64, second: f64) -> Option<f64> {
     if first + second <= 0.0 {
         return None;
@@ -68,7 +68,7 @@ fn first_share(first: f64, second: f64) -> Option<f64> {
     })
 }
 
-/// A tree as the device has built it, for one surface.
+/// A light tree from the device, evaluated for one surface.
 pub struct Chooser<'a> {
     pub nodes: &'a [VplNode],
     pub point: DVec3,
@@ -96,7 +96,7 @@ impl Chooser<'_> {
         Some((node - leaves, probability))
     }
 
-    /// Irradiance by picks if nothing is hidden.
+    /// Irradiance by picks, without occlusion.
     pub fn picked(&self, vpls: &[Vpl], (picks, proposals): (u32, u32), start: f64, salt: [u32; 2], seed: u32) -> DVec3 {
         let all = f64::from(picks * proposals);
         let mut sum = DVec3::ZERO;
@@ -120,7 +120,7 @@ impl Chooser<'_> {
         sum
     }
 
-    /// Probability of every leaf, and of picking none.
+    /// Probability of every leaf, and of picking no light.
     pub fn probabilities(&self) -> (Vec<f64>, f64) {
         let leaves = self.nodes.len() / 2;
         let (mut out, mut none) = (vec![0.0; leaves], 0.0);
@@ -141,7 +141,7 @@ impl Chooser<'_> {
     }
 }
 
-/// In [0, 1).
+/// A number in [0, 1) from random bits.
 fn unit(bits: u32) -> f64 {
     f64::from(bits >> 8) / 16_777_216.0
 }
@@ -159,7 +159,7 @@ fn pcg4d(mut v: [u32; 4]) -> [u32; 4] {
     v
 }
 
-/// Where the numbers of a texel's picks start.
+/// Offset of the stratified numbers of a texel's picks.
 pub fn offset(tile: [u32; 2], subset: u32, subsets: u32, seed: u32) -> f64 {
     let turn = unit(pcg4d([seed, 0x9e3, 0x51, 0x7c1])[0]);
     let place = tile[0].wrapping_mul(3_242_174_889).wrapping_add(tile[1].wrapping_mul(2_447_445_414));

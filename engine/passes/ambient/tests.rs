@@ -10,7 +10,7 @@ fn painted(width: u32, height: u32, radiance: impl Fn(Vec3) -> Vec3) -> Environm
     Environment { name: String::new(), width, height, pixels, rotation: 0.0, scale: 1.0 }
 }
 
-/// A sky that is like no turned or mirrored one of its kind: no two axes or signs may be exchanged unnoticed.
+/// A sky without any symmetry, so that the tests notice exchanged axes or signs.
 fn odd_sky(width: u32) -> Environment {
     painted(width, width / 2, |d| {
         let blob = |x: f32, y: f32, z: f32, sharp: f32| d.dot(Vec3::new(x, y, z).normalize()).max(0.0).powf(sharp);
@@ -20,7 +20,7 @@ fn odd_sky(width: u32) -> Environment {
     })
 }
 
-/// Sum over all pixels as they stand in the picture: no table, nothing of the module but the definition of irradiance.
+/// Irradiance by its definition: a sum over all pixels of the picture, without any code of the module.
 fn brute_force(sky: &Environment, n: Vec3) -> Vec3 {
     let turned = glam::Quat::from_rotation_y(sky.rotation);
     let mut sum = DVec3::ZERO;
@@ -90,7 +90,7 @@ fn a_sun_of_one_pixel_keeps_its_cosine() {
         let off = normals(500).map(|n| (e.at(n) - brute_force(&sky, n)).abs().x / greatest).fold(0.0, f32::max);
         println!("off by {off} of the brightest");
         assert!(off < 1e-3, "{off}");
-        // Beside a sky that sends a fifth, where the sun rises and sets as well.
+        // With a sky that adds a fifth of the sun's light, also where the sun is near the horizon.
         sky.pixels.iter_mut().for_each(|p| *p += Vec3::splat(0.2 * greatest / std::f32::consts::PI));
         let off = error(&sky, 200);
         println!("with haze {off}");

@@ -1,4 +1,4 @@
-//! Which light gets which maps, and what each map sees.
+//! Assignment of shadow maps to lights, and the projection of each map.
 
 use super::{Kind, Settings};
 use crate::{
@@ -10,18 +10,18 @@ use crate::{
 };
 use glam::{Mat4, Vec2, Vec3, Vec3Swizzles, Vec4Swizzles};
 
-/// Spot lights with a half angle over this many radians get six maps as point lights do.
+/// Spot lights with a larger half angle, radians, get six maps like point lights.
 const WIDEST_SPOT: f32 = 1.2;
-/// Texels around a map's useful part that filters may read.
+/// Width of the border that filters may read around a map's useful part, texels.
 const BORDER: f32 = 3.0;
 
 /// The maps of all lights.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Assignment {
     pub slots: Vec<types::ShadowSlot>,
-    /// One a light.
+    /// One entry for each light.
     pub lights: Vec<types::ShadowLight>,
-    /// Lights that came too late.
+    /// Lights for which no map was left.
     pub unshadowed: Vec<usize>,
 }
 
@@ -80,7 +80,7 @@ fn border(settings: &Settings) -> f32 {
 }
 
 fn looking(at: Vec3, along: Vec3, half: f32, far: f32, settings: &Settings) -> types::ShadowSlot {
-    // Reversed float depth is precise wherever the near plane is.
+    // Reversed floating-point depth is precise for any near plane.
     let near = (far * 1e-3).min(0.02);
     let size = settings.size as f32;
     let half = half * size / (size - 2.0 * border(settings)).max(1.0);
@@ -108,8 +108,8 @@ fn faces(light: &types::Light, bounds: &Aabb, settings: &Settings) -> [types::Sh
     along.map(|along| looking(light.position.into(), along, 1.0, far, settings))
 }
 
-/// Parallel maps around consecutive parts of the view, each of constant size (a sphere around the part) and moved in
-/// whole texels, so that edges stand still while the camera moves.
+/// Cascades: parallel maps around consecutive parts of the view. Each has a constant size (a sphere around the part) and moves in whole
+/// texels, so that shadow edges do not flicker while the camera moves.
 fn cascades(light: &types::Light, bounds: &Aabb, view: &View, settings: &Settings) -> Vec<types::ShadowSlot> {
     let along = Vec3::from(light.direction);
     let light_from_world = looking_along(Vec3::ZERO, along);
@@ -131,7 +131,7 @@ fn cascades(light: &types::Light, bounds: &Aabb, view: &View, settings: &Setting
     let mut out = Vec::new();
     for range in split(start, end, settings.cascades, settings.split) {
         let (centre, radius) = sphere(view, range);
-        // A part larger than the scene is served by one map around the scene, the last.
+        // If a part is larger than the scene, one last map around the whole scene is enough.
         let whole = radius >= scene.1;
         let (centre, radius) = if whole { scene } else { (centre, radius) };
         out.push(parallel(&light_from_world, centre, radius.max(1e-3), near, far, settings));
@@ -168,7 +168,7 @@ fn parallel(
     }
 }
 
-/// Ends of the parts of the view: a mean of even and geometric spacing (Zhang et al. 2006, "practical split scheme").
+/// Start and end of each part of the view: a weighted mean of even and geometric spacing (Zhang et al. 2006, "practical split scheme").
 fn split(start: f32, end: f32, count: u32, geometric: f32) -> Vec<[f32; 2]> {
     let first = start.max(end * 1e-3);
     let at = |i: u32| {
@@ -180,7 +180,7 @@ fn split(start: f32, end: f32, count: u32, geometric: f32) -> Vec<[f32; 2]> {
     (0..count).map(|i| [if i == 0 { start } else { at(i) }, if i + 1 == count { end } else { at(i + 1) }]).collect()
 }
 
-/// A sphere around what the view shows between two distances. Its radius depends on nothing but the camera's lens.
+/// A sphere around the part of the view between two distances. Its radius depends only on the camera's projection.
 fn sphere(view: &View, range: [f32; 2]) -> (Vec3, f32) {
     let corner = |uv: Vec2, distance: f32| view.world_from_depth(uv, distance / view.far);
     let near = corner(Vec2::ZERO, range[0]);
@@ -191,12 +191,12 @@ fn sphere(view: &View, range: [f32; 2]) -> (Vec3, f32) {
     let length = range[1] - range[0];
     let t = ((length * length + rf * rf - rn * rn) / (2.0 * length.max(1e-9))).clamp(0.0, length);
     let radius = (t * t + rn * rn).max((length - t) * (length - t) + rf * rf).sqrt();
-    // Rounded up, so that rounding errors of a moving camera do not change it.
+    // The radius is rounded up to a coarse step, so that rounding errors of a moving camera do not change it.
     let step = 2.0_f32.powf(radius.log2().floor() - 6.0);
     (axis(range[0] + t), (radius / step).ceil() * step)
 }
 
-/// Place of a world point in a slot: x and y in −1..1, linear depth 0..1 (`shadow_linear_depth`), for tests and tools.
+/// Position of a world point in a slot, for tests and tools: x and y in −1..1, linear depth 0..1 (`shadow_linear_depth`).
 pub fn project(slot: &types::ShadowSlot, world: Vec3) -> Option<Vec3> {
     let clip = Mat4::from_cols_array_2d(&slot.clip_from_world) * world.extend(1.0);
     let ndc = clip.xyz() / clip.w;

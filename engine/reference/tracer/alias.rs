@@ -1,8 +1,9 @@
-//! Tables that draw a column in proportion to its weight with two random numbers (Walker 1977; built as by Vose 1991).
+//! Alias tables (Walker 1977; Vose 1991): they draw a column in proportion to its weight with two random numbers.
 
 use crate::shaders::types::AliasEntry;
 
-/// A table over `weights`, none negative. All equal if none is positive; one column if there are none.
+/// A table over `weights`, which must not be negative. If no weight is positive, all columns have the same probability. Without weights the
+/// table has one column.
 pub fn table(weights: &[f64]) -> Vec<AliasEntry> {
     let n = weights.len().max(1);
     let clean = |w: f64| if w.is_finite() { w.max(0.0) } else { 0.0 };
@@ -28,7 +29,7 @@ pub fn table(weights: &[f64]) -> Vec<AliasEntry> {
             low.push(rich);
         }
     }
-    // What is left stands at 1 but for rounding. A column of no weight must not be drawn all the same.
+    // The remaining columns have a share of 1, up to rounding. A column of weight 0 must not become drawable by rounding.
     let fullest = (0..n).max_by(|&a, &b| shares[a].total_cmp(&shares[b])).unwrap_or(0);
     for i in low.into_iter().chain(high) {
         if shares[i] == 0.0 {
@@ -44,7 +45,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Probability of each entry that the columns amount to.
+    /// The probability of each entry, summed over the columns.
     fn amounts(columns: &[AliasEntry]) -> Vec<f64> {
         let mut out = vec![0.0; columns.len()];
         for (i, column) in columns.iter().enumerate() {

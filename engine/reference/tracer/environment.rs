@@ -1,4 +1,4 @@
-//! The environment for sampling: where its light comes from, as a table over cells of exactly known solid angle.
+//! Importance sampling of the environment: a table of probabilities over cells whose solid angle is known exactly.
 
 use crate::{
     Error, ErrorKind, Result,
@@ -9,9 +9,9 @@ use crate::{
 use ash::vk;
 use glam::Vec3;
 
-/// At most this many cells; larger maps are grouped.
+/// Maximum of cells; in larger maps a cell is a group of texels.
 const MOST_CELLS: u64 = 1 << 20;
-/// Share of the samples that goes into all directions alike, so that none is impossible.
+/// Share of the samples that is uniform over all directions, so that every direction has a positive density.
 const UNIFORM: f64 = 0.01;
 
 /// Probabilities of cells of a latitude-longitude map, row by row.
@@ -79,14 +79,14 @@ pub fn radiance_map(gpu: &Gpu, environment: Option<&Environment>) -> Result<Owne
     upload(env.width, env.height, &texels)
 }
 
-/// One number for a colour, the same whatever the order of its channels.
+/// Sum of the colour channels, independent of their order.
 pub fn strength(color: Vec3) -> f64 {
     let mut c = color.to_array().map(|x| f64::from(x.max(0.0)));
     c.sort_by(f64::total_cmp);
     c[0] + c[1] + c[2]
 }
 
-/// What bilinear interpolation leaves in each texel: (1, 6, 1) / 8 along both axes, around the seam and over the poles.
+/// Mean of the bilinearly interpolated map over each texel: the kernel (1, 6, 1) / 8 along both axes, across the seam and the poles.
 fn spread(values: &[f64], w: usize, h: usize) -> Vec<f64> {
     let mut rows = vec![0.0; w * h];
     for (y, row) in values.chunks_exact(w).enumerate() {

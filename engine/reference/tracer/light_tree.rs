@@ -1,5 +1,5 @@
-//! A tree of bounds over lights, with which `lib/light_sampling.glsl` picks one for a place (Conty Estevez and Kulla, Importance
-//! Sampling of Many Lights with Adaptive Tree Splitting, 2018).
+//! The light tree: a bounding hierarchy over lights, from which `lib/light_sampling.glsl` picks a light for a point (Conty Estevez and Kulla,
+//! Importance Sampling of Many Lights with Adaptive Tree Splitting, 2018).
 
 use crate::{
     scene::Aabb,
@@ -10,26 +10,26 @@ use crate::{
 };
 use glam::{Mat3, Vec3};
 
-/// Not there.
+/// An absent node.
 const NONE: u32 = u32::MAX;
-/// Places along each axis where a node may be cut, and one.
+/// Buckets along each axis; a node may be split between any two of them.
 const BUCKETS: usize = 12;
 
-/// One light, or the bounds of some.
+/// A light, or the bounds of several lights.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
     pub around: Aabb,
-    /// What it sends along its axis, W/sr.
+    /// Intensity along the axis, summed over the colour channels, W/sr.
     pub power: f64,
-    /// Nothing arrives beyond, metres; infinite for most.
+    /// Distance beyond which no light arrives, metres; infinite for most lights.
     pub reach: f32,
-    /// Unit.
+    /// Unit vector.
     pub axis: Vec3,
-    /// The lights' own axes lie within this angle of `axis`, radians.
+    /// The axes of all lights lie within this angle of `axis`, radians.
     pub spread: f64,
-    /// How far from its own axis a light shines, radians.
+    /// Maximum angle to its own axis at which a light emits, radians.
     pub edge: f64,
-    /// It shines to both sides.
+    /// The light emits to both sides.
     pub two_sided: bool,
 }
 
@@ -47,7 +47,7 @@ impl Bounds {
         }
     }
 
-    /// Directions that it shines into, weighted (Conty Estevez and Kulla, equation 1).
+    /// The orientation measure (Conty Estevez and Kulla, equation 1).
     fn orientation(&self) -> f64 {
         use std::f64::consts::PI;
         let (o, w) = (self.spread, (self.spread + self.edge).min(PI));
@@ -55,10 +55,10 @@ impl Bounds {
         2.0 * PI * (1.0 - o.cos()) + 0.5 * PI * rim
     }
 
-    /// Cost of a node with these lights: power, area of the box, directions.
+    /// Cost of a node with these bounds: the product of power, surface of the box, and orientation measure.
     fn cost(&self) -> f64 {
         let size = (self.around.max - self.around.min).as_dvec3();
-        // Flat boxes and points have no area; their extent still counts.
+        // Points and lines have no area; the last term makes their extent count.
         let area = size.x * size.y + size.y * size.z + size.z * size.x + 1e-6 * size.length_squared();
         self.power * area * self.orientation()
     }
@@ -72,7 +72,7 @@ impl Bounds {
             low: self.around.min.to_array(),
             power: self.power as f32,
             high: self.around.max.to_array(),
-            // The square must be finite.
+            // The square of the reach must be finite in 32 bits.
             reach: self.reach.min(1e18),
             axis: self.axis.to_array(),
             cos_spread: self.spread.cos() as f32,
@@ -84,7 +84,7 @@ impl Bounds {
     }
 }
 
-/// The smallest cone around two, each an axis and a half angle.
+/// The smallest cone around two cones, each an axis and a half angle (radians).
 fn cone(a: (Vec3, f64), b: (Vec3, f64)) -> (Vec3, f64) {
     use std::f64::consts::PI;
     let (wide, narrow) = if a.1 >= b.1 { (a, b) } else { (b, a) };
@@ -97,13 +97,13 @@ fn cone(a: (Vec3, f64), b: (Vec3, f64)) -> (Vec3, f64) {
     if spread >= PI || pole.length_squared() < 1e-12 {
         return (wide.0, PI);
     }
-    // A little wider: the axis is rounded.
+    // A margin for the rounding of the axis.
     let turned = Mat3::from_axis_angle(pole.normalize(), (spread - wide.1) as f32) * wide.0;
     (turned.normalize(), (spread + 1e-6).min(PI))
 }
 
-/// Nodes, the root first, and the way to each light (`TRAIL_NONE`: it is not in the tree). `lights[i]`: number and bounds.
-/// `count`: how many numbers there are. Without lights there is one node, of no power.
+/// Builds the tree. Returns the nodes, the root first, and for each light the trail of branches to it (`TRAIL_NONE`: the light is not in the
+/// tree). `lights[i]`: number and bounds of a light. `count`: length of the list of trails. Without lights there is one node without power.
 pub fn build(lights: &[(u32, Bounds)], count: usize) -> (Vec<LightNode>, Vec<u32>) {
     let mut trails = vec![TRAIL_NONE; count];
     let mut nodes = Vec::with_capacity(2 * lights.len());
@@ -112,7 +112,7 @@ pub fn build(lights: &[(u32, Bounds)], count: usize) -> (Vec<LightNode>, Vec<u32
         return (nodes, trails);
     }
     let mut order = lights.to_vec();
-    // What is still to be built: a range, its level, the way to it, and the node whose second half it is.
+    // Ranges of lights whose nodes are not built yet, each with its level, its trail, and the node whose second child it is.
     let mut todo = vec![(0..order.len(), 0u32, 0u32, NONE)];
     while let Some((range, level, trail, parent)) = todo.pop() {
         let here = &mut order[range.clone()];
@@ -130,20 +130,20 @@ pub fn build(lights: &[(u32, Bounds)], count: usize) -> (Vec<LightNode>, Vec<u32
         let left = LIGHT_LEVELS - level;
         let cut = range.start + split(here, left);
         nodes.push(all.node(NONE, NONE));
-        // The first half comes off the stack at once, and so lies right behind its parent.
+        // The first child is taken from the stack next, so that it directly follows its parent.
         todo.push((cut..range.end, level + 1, trail | 1 << level, number));
         todo.push((range.start..cut, level + 1, trail, NONE));
     }
     (nodes, trails)
 }
 
-/// Orders at least two lights into two halves, and returns the size of the first. `left`: levels that the halves may have.
+/// Partitions at least two lights into two parts, and returns the size of the first. `left`: maximum of levels below.
 fn split(lights: &mut [(u32, Bounds)], left: u32) -> usize {
     let middle = lights.len() / 2;
     let centres = Aabb::of(lights.iter().map(|l| l.1.centre()));
     let size = centres.max - centres.min;
     let longest = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
-    // With as many levels as an even tree needs there is no room for a better one.
+    // If only as many levels are left as a balanced tree needs, the split must be balanced.
     let even = usize::BITS - (lights.len() - 1).leading_zeros();
     let mut best: Option<(f64, usize, f32)> = None;
     if even + 1 < left {
@@ -161,7 +161,7 @@ fn split(lights: &mut [(u32, Bounds)], left: u32) -> usize {
             let join = |part: &[Option<Bounds>]| part.iter().flatten().copied().reduce(Bounds::union);
             for cut in 1..BUCKETS {
                 let (Some(a), Some(b)) = (join(&filled[..cut]), join(&filled[cut..])) else { continue };
-                // Thin slices of the node cost as much as thick ones to look at (Conty Estevez and Kulla, section 4.3).
+                // Regularisation that avoids thin boxes (Conty Estevez and Kulla, section 4.3).
                 let thin = f64::from(size.max_element() / size[axis]);
                 let cost = thin * (a.cost() + b.cost());
                 if best.is_none_or(|(least, ..)| cost < least) {
@@ -174,7 +174,7 @@ fn split(lights: &mut [(u32, Bounds)], left: u32) -> usize {
         let scale = BUCKETS as f32 / size[axis];
         let first =
             |b: &Bounds| (((b.centre()[axis] - centres.min[axis]) * scale) as usize).min(BUCKETS - 1) < cut as usize;
-        // Stable, so that the same lights give the same tree.
+        // A stable sort, so that the same lights give the same tree.
         lights.sort_by_key(|(_, bounds)| !first(bounds));
         let count = lights.iter().filter(|(_, bounds)| first(bounds)).count();
         if count > 0 && count < lights.len() {
@@ -245,7 +245,7 @@ mod tests {
     #[test]
     fn crowds_in_one_place_and_long_rows_fit_the_levels() {
         let crowd: Vec<(u32, Bounds)> = (0..3000).map(|i| (i, light(Vec3::ONE, Vec3::Y, 0.0, 1.0))).collect();
-        // Each twice as far: a tree by area alone would be as deep as there are lights.
+        // Each light is twice as far away as the one before. A tree that minimises the cost would have one level per light.
         let row: Vec<(u32, Bounds)> =
             (0..120).map(|i| (i, light(Vec3::X * 1e-15 * 2f32.powi(i as i32), Vec3::Y, 0.0, 1.0))).collect();
         for lights in [crowd, row] {

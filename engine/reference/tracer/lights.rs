@@ -1,4 +1,4 @@
-//! All lights of a scene, ready to be picked: suns by their power, the others by a tree.
+//! The light table of a scene: directional lights are picked by their power, all other lights by the light tree.
 
 use super::{
     Sources, alias,
@@ -16,27 +16,27 @@ use crate::{
 use glam::{DVec3, Vec2, Vec3};
 use std::f64::consts::PI;
 
-/// Not there ([`crate::scene::resident`]).
+/// An absent index (as in [`crate::scene::resident`]).
 const NONE: u32 = u32::MAX;
 
-/// What `lib/light_sampling.glsl` reads.
+/// The tables that `lib/light_sampling.glsl` reads.
 #[derive(Debug)]
 pub struct LightTable {
-    /// How many suns there are; the lists have one entry even without any.
+    /// Number of directional lights. The lists have at least one entry even if it is 0.
     pub suns: u32,
-    /// By which suns are picked.
+    /// Alias table that picks a directional light.
     pub columns: Vec<AliasEntry>,
-    /// The suns, then everything else.
+    /// The directional lights, then all other lights.
     pub targets: Vec<LightTarget>,
-    /// Bounds of everything else that shines, the root first.
+    /// The light tree over all other lights, the root first.
     pub nodes: Vec<LightNode>,
-    /// Whether there is anything in the tree.
+    /// Whether the tree has lights.
     pub tree: bool,
-    /// For each instance, number of the light that is its first triangle, or `u32::MAX`.
+    /// For each instance, the number of the light of its first triangle, or `u32::MAX`.
     pub instances: Vec<u32>,
 }
 
-/// The table of what `sources` leaves of the lights. `lights` are those of the pose.
+/// The table of the lights that `sources` includes. `lights`: the scene's lights, placed by the pose.
 pub fn table(scene: &Scene, pose: &Pose, lights: &[Light], sources: Sources) -> LightTable {
     let target = |instance, index: usize| LightTarget { instance, index: index as u32, trail: TRAIL_NONE };
     let punctual = if sources.punctual() { lights } else { &[] };
@@ -46,7 +46,7 @@ pub fn table(scene: &Scene, pose: &Pose, lights: &[Light], sources: Sources) -> 
     let powers: Vec<f64> = suns.iter().map(|(_, light)| strength(light.intensity.into())).collect();
     let mut bounds = Vec::new();
     let mut add = |number: usize, light: Bounds| {
-        // Light of no power or no place is never picked.
+        // A light without power or without a finite position is never picked.
         if light.power > 0.0 && light.power.is_finite() && light.around.is_finite() {
             bounds.push((number as u32, light));
         }
@@ -65,7 +65,7 @@ pub fn table(scene: &Scene, pose: &Pose, lights: &[Light], sources: Sources) -> 
         }
         instances.push(targets.len() as u32);
         let corners = world_vertices(scene, pose, node, primitive).positions;
-        // The order of the corners tells the front, unless the transform mirrors.
+        // The winding of the corners defines the front side; a mirroring transform reverses it.
         let skinned = scene.nodes[node].skin.is_some() && !primitive.joints.is_empty();
         let mirrors = !skinned && pose.world.get(node).is_some_and(|m| m.determinant() < 0.0);
         let glow = Glow::new(scene, material);
@@ -107,7 +107,7 @@ fn punctual_bounds(light: &Light) -> Bounds {
     let all = Bounds {
         around: Aabb { min: at, max: at },
         power: strength(light.intensity.into()),
-        // A little more: distances are rounded.
+        // A margin for the rounding of distances.
         reach: if light.range > 0.0 { light.range * 1.001 } else { f32::INFINITY },
         axis: Vec3::Y,
         spread: PI,
@@ -117,7 +117,7 @@ fn punctual_bounds(light: &Light) -> Bounds {
     if light.kind != LIGHT_SPOT {
         return all;
     }
-    // Cosines at which the cone begins and ends.
+    // Angle at which the linear falloff has the value `at`: 0 at the outer cone, 1 at the inner cone.
     let angle = |at: f32| f64::from((at - light.spot_offset) / light.spot_scale).clamp(-1.0, 1.0).acos();
     let (outer, inner) = (angle(0.0), angle(1.0));
     Bounds {
@@ -136,15 +136,15 @@ fn placed_primitives(scene: &Scene) -> impl Iterator<Item = (usize, &Primitive)>
     })
 }
 
-/// Mean emission of triangles.
+/// Mean emission of the triangles of a material.
 struct Glow<'a> {
-    /// Without texture.
+    /// Emissive factor, summed over the colour channels, without the texture.
     factor: f64,
     emissive: Vec3,
     texture: Option<(&'a crate::scene::Texture, TextureRef)>,
     /// Mean over the whole texture.
     mean: f64,
-    /// The part of the surface that is there.
+    /// Coverage of the surface by its alpha.
     alpha: f64,
 }
 
@@ -158,7 +158,7 @@ impl<'a> Glow<'a> {
         };
         let emissive = material.emissive;
         let mean = texture.map_or(0.0, |(texture, _)| {
-            // Some thousand texels are enough for a floor under the triangles' own means.
+            // The mean only is a lower limit for the triangles' means, so a few thousand texels are enough.
             let step = (texture.rgba.len() / 4096).max(1);
             let picked = texture.rgba.iter().step_by(step);
             let count = picked.clone().count() as f64;
@@ -181,7 +181,7 @@ impl<'a> Glow<'a> {
                 count += 1.0;
             }
         }
-        // Never 0 because of texels between the places looked at.
+        // A part of the texture's mean keeps the result above 0 if the bright texels lie between the sampled points.
         (0.95 * sum / count + 0.05 * self.mean) * self.alpha
     }
 }
@@ -249,7 +249,7 @@ mod tests {
             let mirror = glam::Mat4::from_scale(Vec3::new(-1.0, 1.0, 1.0));
             node.local = crate::scene::Transform::Matrix(mirror * node.local.matrix());
         }
-        // The lamp still looks down.
+        // The lamp still points down.
         assert!(axis(&scene).distance(Vec3::NEG_Y) < 1e-5);
     }
 }

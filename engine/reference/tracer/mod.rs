@@ -1,9 +1,11 @@
 //! Reference pictures: progressive path tracing on the device.
 //!
-//! Unbiased but for the limits on bounces: each sample of a pixel follows one path from the camera, samples a lamp, a sun and the
-//! sky at each surface, and weighs what it meets by chance against that (multiple importance sampling; Veach and Guibas, 1995).
-//! Random numbers are a pure function of (seed, pixel, sample, dimension), and a pixel's samples are summed in order with
-//! their rounding errors, so the bits depend neither on how the work is cut nor on where it was interrupted.
+//! The estimate is unbiased except for the limits on bounces. Each sample of a pixel follows one path from the camera. At each
+//! surface the path samples a light of the light tree, a directional light and the environment, and combines these samples with
+//! the light that its scattered ray hits (multiple importance sampling; Veach and Guibas, 1995).
+//!
+//! Random numbers are a pure function of (seed, pixel, sample, dimension). The samples of a pixel are summed in order, together
+//! with their rounding errors. The result therefore is bit-identical for any division of the work, and after an interruption.
 //!
 //! ```no_run
 //! # use lucerna::{gpu::Gpu, reference::tracer::{Settings, Tracer}, scene::{Pose, Scene, View}};
@@ -16,9 +18,9 @@
 //! # }
 //! ```
 //!
-//! Transport: a matt base under microfacets as in `lib/brdf.glsl`; mirrors (`roughness < 0.05 && metallic > 0.5`) and glass (transmission)
-//! are sharp, and light is followed through them only from the camera's side: what a point light sends through glass is
-//! missing, as is what it sends off a mirror. Emission leaves the front of single-sided surfaces.
+//! Materials have a diffuse base under microfacets as in `lib/brdf.glsl`. Mirrors (`roughness < 0.05 && metallic > 0.5`) and glass
+//! (transmission) are perfectly smooth. Paths pass through them only from the camera's side: the light of a point light through
+//! glass or from a mirror is missing. Single-sided surfaces emit from their front only.
 
 mod alias;
 mod environment;
@@ -34,7 +36,7 @@ pub use settings::{Filter, Settings, Sources, Strategy};
 pub use state::{Head, State};
 pub use sums::Sums;
 
-/// Tables that samples are drawn from, for techniques that sample the same lights, and for tests.
+/// The tables for light sampling. Techniques that sample the same lights use them, and so do tests.
 #[doc(hidden)]
 pub mod tables {
     pub use super::{
@@ -56,7 +58,7 @@ use crate::{
 use std::time::Duration;
 use work::Job;
 
-/// A scene on a device, ready for pictures of it.
+/// A path tracer for one scene on one device.
 #[derive(Debug)]
 pub struct Tracer<'s> {
     gpu: Gpu,
@@ -67,17 +69,17 @@ pub struct Tracer<'s> {
     runner: Runner,
     environment: OwnedImage,
     environment_columns: OwnedBuffer,
-    /// Of the environment's importance map.
+    /// Columns and rows of the environment's importance map.
     cells: [u32; 2],
-    /// Around the scene in this pose.
+    /// Bounding box of the scene in this pose, metres.
     bounds: Aabb,
     punctual: Vec<types::Light>,
     lights: Option<Lights>,
     paths: Option<OwnedBuffer>,
     job: Option<Job>,
-    /// Slots of a tile that took the right time, for the next picture.
+    /// Slots per tile, adapted to the measured time; the next picture starts with this value.
     tile: u64,
-    /// A fixed number of slots instead.
+    /// A fixed number of slots per tile instead.
     fixed_tile: Option<u64>,
 }
 
@@ -93,19 +95,19 @@ struct Lights {
     nodes: OwnedBuffer,
 }
 
-/// How far a picture is.
+/// Progress of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
-    /// Samples that every pixel has, with the part of the next one.
+    /// Samples per pixel; the fraction is the share of pixels that have one sample more.
     pub samples: f64,
-    /// Paths traced so far, one a sample and pixel.
+    /// Paths traced so far, one for each sample of each pixel.
     pub paths: u64,
-    /// On the device in this run.
+    /// Time on the device in this run.
     pub time: Duration,
 }
 
 impl<'s> Tracer<'s> {
-    /// Uploads the scene. It must pass its validation.
+    /// Uploads the scene, which must pass its validation.
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
@@ -136,34 +138,34 @@ impl<'s> Tracer<'s> {
         Ok(tracer)
     }
 
-    /// Moves the scene. A picture that was begun is dropped.
+    /// Changes the scene's pose. Drops an unfinished picture.
     pub fn set_pose(&mut self, pose: &Pose) {
         self.pose = pose.clone();
         self.job = None;
         self.lights = None;
-        // Declared to learn the bounds; not run.
+        // The graph is declared only for the bounds, and never run.
         let handles = self.resident.frame_in(&mut Graph::new("tracer.bounds"), self.scene, &self.pose);
         self.bounds = handles.bounds();
         self.punctual = handles.moment.lights.clone();
     }
 
-    /// Around the scene, world space.
+    /// Bounding box of the scene in its pose, world space, metres.
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
 
-    /// What of the scene is served by something simpler.
+    /// Notes about the parts of the scene that are approximated.
     pub fn notes(&self) -> Vec<Note> {
-        // The rasteriser's notes on glass and blending do not hold for rays.
+        // The rasteriser's notes about glass and blending do not apply to rays.
         self.resident.notes().iter().filter(|note| note.place == "textures").cloned().collect()
     }
 
-    /// Cuts the work into tiles of `slots` pixels and samples instead of by time. The picture does not depend on it.
+    /// Fixes the size of tiles to `slots` pixels instead of adapting it to the measured time. The picture does not depend on it.
     pub fn set_tile(&mut self, slots: Option<u64>) {
         self.fixed_tile = slots;
     }
 
-    /// A picture in one call: `samples` paths a pixel. See [`Sums::layers`] for what it holds.
+    /// Renders a picture with `samples` paths per pixel. [`Sums::layers`] describes its layers.
     ///
     /// # Errors
     /// As [`Self::start`] and [`Self::run`].
@@ -173,7 +175,7 @@ impl<'s> Tracer<'s> {
         self.layers()
     }
 
-    /// Begins a picture. An infinite far plane of the camera moves behind the scene.
+    /// Begins a picture. An infinite far plane of the camera is replaced by a plane behind the scene.
     ///
     /// # Errors
     /// `Usage` if a setting is out of its range, `OutOfMemory`, `DeviceLost`.
@@ -185,7 +187,7 @@ impl<'s> Tracer<'s> {
         Ok(())
     }
 
-    /// Adds `samples` paths to every pixel.
+    /// Adds `samples` paths per pixel.
     ///
     /// # Errors
     /// As [`Self::run`].
@@ -194,8 +196,8 @@ impl<'s> Tracer<'s> {
         self.run(target, |_| true).map(drop)
     }
 
-    /// Goes on until every pixel has `samples` paths, or `go_on` says no; it is asked after every tile, some tens of
-    /// milliseconds. Stopping leaves a valid picture.
+    /// Continues until every pixel has `samples` paths, or `go_on` returns false. `go_on` is called after every tile, which takes
+    /// some tens of milliseconds. The picture is valid at any stop.
     ///
     /// # Errors
     /// `Usage` before [`Self::start`]; `OutOfMemory`, `DeviceLost`, `Runtime` from the device.
@@ -211,7 +213,7 @@ impl<'s> Tracer<'s> {
         Ok(self.sums()?.layers())
     }
 
-    /// The sums behind the picture so far.
+    /// The sums from which the picture is computed.
     ///
     /// # Errors
     /// As [`Self::layers`].
@@ -219,7 +221,7 @@ impl<'s> Tracer<'s> {
         self.job()?.sums()
     }
 
-    /// The view of the picture as it is traced.
+    /// The view of the picture, with the far plane that [`Self::start`] has chosen.
     ///
     /// # Errors
     /// `Usage` before [`Self::start`].
@@ -227,7 +229,7 @@ impl<'s> Tracer<'s> {
         Ok(self.job()?.view)
     }
 
-    /// How far the picture is.
+    /// Progress of the picture.
     ///
     /// # Errors
     /// `Usage` before [`Self::start`].
@@ -235,7 +237,8 @@ impl<'s> Tracer<'s> {
         Ok(self.job()?.progress())
     }
 
-    /// Everything needed to go on later, in another process. `about`: what else the picture depends on (scene, …).
+    /// The state of the unfinished picture, with which another process can continue. `about`: further data on which the picture
+    /// depends (scene, …).
     ///
     /// # Errors
     /// As [`Self::layers`].
@@ -243,10 +246,10 @@ impl<'s> Tracer<'s> {
         self.job()?.save(&self.gpu, about)
     }
 
-    /// Goes on from a state, after [`Self::start`] with the same view and settings.
+    /// Continues from a state. Call [`Self::start`] with the same view and settings first.
     ///
     /// # Errors
-    /// `Input` if the state is of another picture, saying what differs.
+    /// `Input` if the state belongs to another picture; the message lists the differences.
     pub fn restore(&mut self, state: &State, about: &serde_json::Value) -> Result<()> {
         let gpu = self.gpu.clone();
         self.job_mut()?.restore(&gpu, state, about)

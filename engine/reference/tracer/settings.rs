@@ -1,9 +1,9 @@
-//! What can be chosen.
+//! Settings of the path tracer.
 
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-/// Which lights there are. Those left out neither light nor show.
+/// Which light sources are used. The others neither light surfaces nor are visible.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sources {
@@ -11,9 +11,9 @@ pub enum Sources {
     All,
     /// Point, spot and directional lights.
     Punctual,
-    /// Emissive surfaces, and unlit ones.
+    /// Emissive and unlit surfaces.
     Emissive,
-    /// The sky.
+    /// The environment.
     Environment,
 }
 
@@ -31,46 +31,47 @@ impl Sources {
     }
 }
 
-/// Where in its pixel a ray goes.
+/// Position of a camera ray within its pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Filter {
-    /// Anywhere: the pixel is the mean over its square.
+    /// Random, uniform over the pixel: the picture is box-filtered.
     #[default]
     Box,
-    /// Through the centre, as a rasteriser's.
+    /// The pixel's centre, as in rasterisation.
     Centre,
 }
 
-/// How light that has an extent is found. Only [`Strategy::Mis`] is meant for pictures; the others check it.
+/// Sampling strategy for lights with an extent. [`Strategy::Mis`] is meant for pictures; the others are for tests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Strategy {
-    /// By both of the others, each weighted by how well it does (multiple importance sampling, power heuristic).
+    /// Both light and BSDF sampling, combined by multiple importance sampling with the power heuristic.
     #[default]
     Mis,
-    /// By sampling the lights.
+    /// Light sampling only.
     Lights,
-    /// By following scattered rays.
+    /// BSDF sampling only.
     Bsdf,
 }
 
-/// What to trace. The same settings give the same bits on the same device.
+/// Settings of a picture. The same settings give bit-identical results on the same device.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    /// Scatterings after the first surface: 0 is direct light, 1 what one pass of image-space radiosity models. At most 1000.
+    /// Maximum of scatterings after the first surface, 0 to 1000. 0: direct light only; 1: the light that one pass of image-space
+    /// radiosity models.
     pub bounces: u32,
-    /// Mirrors and glass that a path may meet, beside `bounces`. At most 1000.
+    /// Maximum of mirrors and glass surfaces along a path, in addition to `bounces`, 0 to 1000.
     pub specular_bounces: u32,
-    /// Scatterings before a path may be ended at random (Russian roulette).
+    /// Number of scatterings before Russian roulette begins.
     pub roulette: u32,
-    /// Every surface reflects as Lambert's law alone has it: no gloss, no mirrors, no glass.
+    /// Every surface is Lambertian: without gloss, mirrors and glass.
     pub diffuse_only: bool,
     pub sources: Sources,
     pub filter: Filter,
     pub strategy: Strategy,
-    /// Of all random numbers.
+    /// Seed of all random numbers.
     pub seed: u32,
 }
 
@@ -89,7 +90,7 @@ impl Default for Settings {
     }
 }
 
-/// More would only be waiting: what is left of the light is far below rounding.
+/// Maximum of bounces. After as many bounces the light is far below the rounding error.
 const MOST_BOUNCES: u32 = 1000;
 
 impl Settings {

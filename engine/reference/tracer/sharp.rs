@@ -1,4 +1,4 @@
-//! Whether a scene has mirrors or glass, for which rays must be followed that others do without.
+//! Tells whether a scene has mirrors or glass, which need additional rays.
 
 use crate::scene::{Material, Scene};
 
@@ -6,17 +6,17 @@ use crate::scene::{Material, Scene};
 const ROUGHNESS: f32 = 0.05;
 const METALNESS: f32 = 0.5;
 
-/// Whether any surface may be a mirror or glass, by its factors alone: quick, and true of most metals with textures.
+/// Whether any surface may be a mirror or glass, judged by the material factors only. Fast, but also true for most textured metals.
 pub fn may_be_sharp(scene: &Scene) -> bool {
     in_use(scene).any(by_factors)
 }
 
-/// As [`may_be_sharp`], with what is in the textures. Goes through their texels.
+/// Like [`may_be_sharp`], but also reads the texels of the textures.
 pub fn has_sharp(scene: &Scene) -> bool {
     in_use(scene).any(|m| by_factors(m) && (m.transmission > 0.0 || by_texels(scene, m)))
 }
 
-/// Materials that surfaces have and that reflect light.
+/// The materials that surfaces use and that reflect light.
 fn in_use(scene: &Scene) -> impl Iterator<Item = &Material> {
     let primitives = scene.meshes.iter().flat_map(|mesh| &mesh.primitives);
     let mut used: Vec<u32> = primitives.map(|primitive| primitive.material).collect();
@@ -30,7 +30,8 @@ fn by_factors(m: &Material) -> bool {
         || (m.metallic > METALNESS && (m.roughness < ROUGHNESS || m.metallic_roughness_texture.is_some()))
 }
 
-/// Between texels nothing is smoother or more of metal than the smoothest and the most metallic of them.
+/// Whether the material may be a mirror, judged by its texels. Interpolated values are never smoother or more metallic than the texels
+/// around them.
 fn by_texels(scene: &Scene, m: &Material) -> bool {
     let Some(texture) = m.metallic_roughness_texture.as_ref().and_then(|t| scene.textures.get(t.texture as usize))
     else {
@@ -67,7 +68,7 @@ mod tests {
             (metal.clone(), vec![rough_metal], true, false),
             (metal.clone(), vec![smooth_paint], true, false),
             (metal.clone(), vec![rough_metal, mirror], true, true),
-            // Between them both may hold.
+            // Interpolation between these texels may be smooth and metallic.
             (metal.clone(), vec![rough_metal, smooth_paint], true, true),
             (Material { metallic: 0.4, ..metal.clone() }, vec![mirror], false, false),
             (Material { roughness: 0.1, ..metal.clone() }, vec![[0, 100, 255, 255]], true, true),
@@ -79,7 +80,7 @@ mod tests {
             let scene = scene(material, texels);
             assert_eq!((may_be_sharp(&scene), has_sharp(&scene)), (may, has), "{said}");
         }
-        // Of nothing that is there.
+        // A material that no surface uses.
         let mut scene = builtin::load("cornell").unwrap();
         scene.materials.push(Material { transmission: 1.0, ..plain });
         assert!(!may_be_sharp(&scene));

@@ -1,4 +1,4 @@
-//! The state of a picture in the making as bytes, to go on in another process.
+//! The state of an unfinished picture as bytes, with which another process can continue it.
 
 use super::{
     Sums,
@@ -10,32 +10,32 @@ use std::path::Path;
 
 /// First bytes of a state.
 const MAGIC: &[u8; 16] = b"lucerna tracer 1";
-/// Bytes of the magic and of the four numbers behind it.
+/// Bytes of the magic and of the four numbers after it.
 const NUMBERS: usize = 16 + 4 * 8;
-/// Bytes of the text at most; it has some thousands.
+/// Maximum of bytes of the text, which usually has some thousands.
 const MOST_TEXT: u64 = 1 << 24;
-/// Samples of a pixel are numbered with 32 bits.
+/// Maximum of samples per pixel: their indices have 32 bits.
 const MOST_SAMPLES: u64 = u32::MAX as u64;
 
-/// A picture in the making, outside of the device.
+/// The state of an unfinished picture in host memory.
 #[derive(Clone, Debug)]
 pub struct State {
-    /// What the picture depends on.
+    /// All data on which the picture depends.
     about: Value,
     sums: Sums,
 }
 
-/// What stands before the pixels of a state.
+/// The header of a state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Head {
     /// Width and height, pixels.
     pub extent: [u32; 2],
-    /// Samples that every pixel has, at most 2³² − 1.
+    /// Samples of every pixel, at most 2³² − 1.
     pub samples: u64,
-    /// Slots that have one more, fewer than there are.
+    /// Number of slots that have one sample more; less than the number of slots.
     begun: u64,
     about: Value,
-    /// Where the pixels begin, bytes.
+    /// Offset of the pixels, bytes.
     body: usize,
     /// Bytes of the pixels.
     bytes: u64,
@@ -46,7 +46,7 @@ fn broken(what: &str) -> Error {
 }
 
 impl Head {
-    /// From the first bytes of a state, of which there may be more. Numbers that no run writes are refused, whatever the checksum says.
+    /// Decodes the header from the start of a state. Refuses numbers that no run writes, even if the checksum is right.
     fn decode(bytes: &[u8]) -> Result<Self> {
         let mut rest = bytes.strip_prefix(MAGIC).ok_or_else(|| broken("it begins differently"))?;
         let mut number = || -> Result<u64> {
@@ -80,28 +80,28 @@ impl Head {
 }
 
 impl State {
-    /// What a file of a state says of itself; its pixels are not read, and its checksum is not compared.
+    /// Reads the header of a state file. Does not read the pixels and does not check the checksum.
     ///
     /// # Errors
-    /// `Input` if it cannot be read or does not begin as a state does.
+    /// `Input` if the file cannot be read or has no valid header.
     pub fn glance(path: impl AsRef<Path>) -> Result<Head> {
         let path = path.as_ref();
         let bytes = image::read_head_checked(path, NUMBERS as u64 + MOST_TEXT)?;
         Head::decode(&bytes).map_err(|error| error.in_file(path))
     }
 
-    /// Bytes of a state of a picture of this size at most.
+    /// Maximum of bytes of the state of a picture of this size.
     pub fn most_bytes([width, height]: [u32; 2]) -> u64 {
         let pixels = u64::from(width).saturating_mul(height.into()).saturating_mul(16 * u64::from(LAYERS));
         pixels.saturating_add(NUMBERS as u64 + MOST_TEXT + 8)
     }
 
-    /// Samples that every pixel has.
+    /// Samples of every pixel.
     pub fn samples(&self) -> u64 {
         self.sums.samples()
     }
 
-    /// As bytes; the same state gives the same bytes.
+    /// Encodes the state. The same state gives the same bytes.
     ///
     /// # Errors
     /// `Runtime` if `about` cannot be written.
@@ -122,10 +122,10 @@ impl State {
         Ok(out)
     }
 
-    /// From bytes.
+    /// Decodes a state.
     ///
     /// # Errors
-    /// `Input` if they are not a whole state.
+    /// `Input` if the bytes are not a complete and valid state.
     pub fn decode(bytes: &[u8]) -> Result<Self> {
         if !bytes.starts_with(MAGIC) {
             return Err(broken("it begins differently"));
@@ -134,7 +134,7 @@ impl State {
         if checksum(body) != u64::from_le_bytes(*check) {
             return Err(broken("its checksum is wrong"));
         }
-        // The checksum is no secret: what it covers may have been written by anybody.
+        // Anybody can compute the checksum, so the contents are not trusted.
         let Head { extent, samples, begun, about, body: start, bytes: length } = Head::decode(body)?;
         let pixels = &body[start..];
         if pixels.len() as u64 != length {
@@ -150,7 +150,7 @@ impl State {
 }
 
 impl Job {
-    /// What the bits of a picture depend on.
+    /// All data on which the bits of a picture depend.
     fn about(&self, gpu: &Gpu, about: &Value) -> Result<Value> {
         let device = gpu.describe();
         let settings = serde_json::to_value(&self.settings)
@@ -162,7 +162,7 @@ impl Job {
             "camera": self.view.clip_from_world.to_cols_array().map(f32::to_bits),
             "device": device.device,
             "driver": format!("{} {}", device.driver, device.driver_info).trim(),
-            // Hits at edges differ in their last bits.
+            // Ray queries and compute shaders find hits at edges that differ in their last bits.
             "ray_query": gpu.caps().ray_query,
         }))
     }
@@ -177,13 +177,13 @@ impl Job {
         differ("", &state.about, &now, &mut differences);
         if !differences.is_empty() {
             let what = format!("is the state of another picture: {}", differences.join("; "));
-            return Err(Error::input(what).help("Start anew, or give the options that it was begun with"));
+            return Err(Error::input(what).help("Start again, or give the options of that picture"));
         }
         self.set_sums(&state.sums)
     }
 }
 
-/// Names of what differs, with both values where they are short.
+/// Appends the names of the values that differ, with both values if they are short.
 fn differ(name: &str, old: &Value, new: &Value, out: &mut Vec<String>) {
     if let (Value::Object(a), Value::Object(b)) = (old, new) {
         let keys: std::collections::BTreeSet<&String> = a.keys().chain(b.keys()).collect();
@@ -198,7 +198,7 @@ fn differ(name: &str, old: &Value, new: &Value, out: &mut Vec<String>) {
     }
 }
 
-/// FNV-1a over words of eight bytes: notices a torn or damaged file.
+/// FNV-1a over words of eight bytes: detects a truncated or damaged file.
 fn checksum(bytes: &[u8]) -> u64 {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     for chunk in bytes.chunks(8) {
@@ -236,7 +236,7 @@ mod tests {
         }
     }
 
-    /// A state whose numbers were changed by somebody who knows the checksum.
+    /// A state with a changed number and a correct checksum.
     fn forged(number: usize, value: u64) -> Vec<u8> {
         let mut bytes = state().encode().unwrap();
         bytes[16 + 8 * number..24 + 8 * number].copy_from_slice(&value.to_le_bytes());

@@ -1,24 +1,24 @@
-//! From sums over samples to a picture.
+//! The sums over samples, and the picture computed from them.
 
 use crate::{
     image::{Layer, Layers, Precision},
     shaders::consts::PATH_SUMS,
 };
 
-/// Distance that the background gets in the layer `depth`, metres: what Blender writes.
+/// Distance of the background in the layer `depth`, metres; the value that Blender writes.
 const BACKGROUND: f32 = 1e10;
-/// Added to the square of the reference in relative errors, so that black pixels do not count for everything.
+/// Added to the square of the reference in relative errors, so that black pixels do not dominate the mean.
 pub const EPSILON: f64 = 0.01;
 
-/// The sums of a picture, as `lib/path_sums.glsl` keeps them.
+/// The sums of a picture, in the layout of `lib/path_sums.glsl`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sums {
     extent: [u32; 2],
     /// One list of pixels for each image.
     layers: Vec<Vec<[f32; 4]>>,
-    /// Samples that every pixel has.
+    /// Samples of every pixel.
     samples: u64,
-    /// Slots that have one more.
+    /// Number of slots that have one sample more.
     begun: u64,
 }
 
@@ -31,7 +31,7 @@ impl Sums {
         &self.layers
     }
 
-    /// Samples that every pixel has.
+    /// Samples of every pixel.
     pub fn samples(&self) -> u64 {
         self.samples
     }
@@ -44,7 +44,7 @@ impl Sums {
         self.extent[0] as usize * self.extent[1] as usize
     }
 
-    /// Samples of a pixel.
+    /// Number of samples of a pixel.
     fn count(&self, pixel: usize) -> f64 {
         let (x, y) = (pixel as u64 % u64::from(self.extent[0]), pixel as u64 / u64::from(self.extent[0]));
         let block = y / 8 * u64::from(self.extent[0].div_ceil(8)) + x / 8;
@@ -52,7 +52,7 @@ impl Sums {
         (self.samples + u64::from(slot < self.begun)) as f64
     }
 
-    /// Component of a sum.
+    /// A component of a sum, with its rounding error if the layer has one.
     fn sum(&self, layer: u32, pixel: usize, component: usize) -> f64 {
         let value = f64::from(self.layers[layer as usize][pixel][component]);
         match self.layers.get((layer + PATH_SUMS) as usize) {
@@ -66,7 +66,7 @@ impl Sums {
         [0, 1, 2].map(|c| self.sum(layer, pixel, c) / count)
     }
 
-    /// Variance of the mean luminance of a pixel, and that mean.
+    /// Variance of a pixel's mean luminance, and the mean luminance.
     fn variance(&self, pixel: usize) -> (f64, f64) {
         let n = self.count(pixel);
         let mean = self.sum(0, pixel, 3) / n.max(1.0);
@@ -87,25 +87,25 @@ impl Sums {
         (0..self.pixels()).map(|pixel| each(self.variance(pixel))).sum::<f64>() / self.pixels() as f64
     }
 
-    /// Samples that were not numbers and are left out. A bug if there are any.
+    /// Number of samples left out because they were not finite. Any such sample is a bug.
     pub fn lost(&self) -> u64 {
         self.layers[4].iter().map(|p| f64::from(p[3])).sum::<f64>() as u64
     }
 
-    /// The picture: radiance in W/(sr·m²), 32 bits a channel.
+    /// The picture: radiance in W/(sr·m²), 32 bits per channel.
     ///
-    /// | layer | channels | what |
+    /// | layer | channels | contents |
     /// |---|---|---|
     /// | (unnamed) | R G B | total: emission + direct + indirect |
-    /// | `direct` | R G B | light that was scattered once |
-    /// | `indirect` | R G B | light that was scattered more often |
-    /// | `emission` | R G B | what shines itself, seen directly or through mirrors and glass; the background |
+    /// | `direct` | R G B | radiance after one scattering |
+    /// | `indirect` | R G B | radiance after more than one scattering |
+    /// | `emission` | R G B | emitted radiance, seen directly or in mirrors and glass; the background |
     /// | `albedo` | R G B | (1 − metallic) · base colour of the first surface |
     /// | `normal` | X Y Z | unit shading normal of the first surface, world space; 0 for the background |
     /// | `position` | X Y Z | metres, world space |
     /// | `depth` | Z | metres along the view axis; 1e10 for the background |
-    /// | `samples` | Y | paths of the pixel |
-    /// | `variance` | Y | of the mean luminance of the total |
+    /// | `samples` | Y | number of paths of the pixel |
+    /// | `variance` | Y | variance of the mean luminance of the total |
     pub fn layers(&self) -> Layers {
         let all = 0..self.pixels();
         let color =

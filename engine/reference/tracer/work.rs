@@ -1,4 +1,4 @@
-//! One picture in the making, in tiles that no watchdog kills.
+//! The work on one picture, divided into tiles that are short enough for watchdogs.
 
 use super::{Filter, Progress, Settings, Strategy, Sums, Tracer, sharp::may_be_sharp};
 use crate::{
@@ -11,28 +11,28 @@ use crate::{
 use ash::vk;
 use std::time::Duration;
 
-/// Side of the blocks of pixels through which slots run.
+/// Side of the blocks of pixels by which slots are ordered.
 const BLOCK: u32 = 8;
 /// Slots of a block: one workgroup.
 const GRANULE: u32 = BLOCK * BLOCK;
-/// Most slots of one dispatch; the paths in flight are kept for as many.
+/// Maximum of slots per dispatch. The buffer of path states has the same size.
 const MOST_SLOTS: u64 = 1 << 18;
-/// Most dispatches of one submission.
+/// Maximum of dispatches per submission.
 const MOST_PASSES: u64 = 64;
-/// Rays of a path that one invocation traces.
+/// Rays per path that one invocation traces.
 const RAYS: u32 = 32;
-/// The same where a driver ends loops early: two rays of at most 30,000 steps stay below its limit.
+/// The same on drivers that abort long loops: two rays of at most 30,000 steps stay below the limit.
 const RAYS_LIMITED: u32 = 2;
 /// Images of the sums: six sums, and the rounding errors of the first three.
 pub(super) const LAYERS: u32 = consts::PATH_SUMS + consts::PATH_EXACT_SUMS;
 
-/// A picture in the making.
+/// The work on a picture.
 #[derive(Debug)]
 pub(super) struct Job {
     pub view: View,
     pub settings: Settings,
     sums: OwnedImage,
-    /// Slots done, over all samples.
+    /// Finished slots, summed over all samples.
     done: u64,
     time: Duration,
 }
@@ -52,13 +52,13 @@ impl Job {
         Ok(Self { view, settings, sums, done: 0, time: Duration::ZERO })
     }
 
-    /// Slots of one sample: pixels, filled up to whole blocks.
+    /// Slots of one sample: the pixels, rounded up to whole blocks.
     fn slots(&self) -> u64 {
-        // No device has images of which these are too many.
+        // The number of slots of every image that a device supports fits into 64 bits.
         slots_of(self.view.extent).unwrap_or(u64::MAX)
     }
 
-    /// Samples that every pixel has.
+    /// Samples of every pixel.
     pub fn samples_done(&self) -> u64 {
         self.done / self.slots()
     }
@@ -96,13 +96,13 @@ impl Job {
     }
 }
 
-/// Slots of one sample of a picture of this size; `None` if they cannot be counted.
+/// Slots of one sample of a picture of this size; `None` on overflow.
 pub(super) fn slots_of(extent: [u32; 2]) -> Option<u64> {
     let [width, height] = extent.map(|side| u64::from(side.div_ceil(BLOCK)));
     width.checked_mul(height)?.checked_mul(GRANULE.into())
 }
 
-/// Surfaces that the longest path may visit.
+/// Maximum of surfaces along a path.
 fn longest(scene: &Scene, settings: &Settings) -> u32 {
     let sharp = !settings.diffuse_only && may_be_sharp(scene);
     settings.bounces + 3 + if sharp { settings.specular_bounces } else { 0 }
@@ -122,7 +122,7 @@ impl Tracer<'_> {
         let rounds = (turns * longest(self.scene, &job.settings)).div_ceil(rays);
         let capacity = MOST_SLOTS.min(slots);
         self.prepare_paths(capacity)?;
-        // Also when a picture is small and its samples are many passes.
+        // This limit also applies to small pictures, whose samples are many passes.
         let most = (capacity * (MOST_PASSES / u64::from(rounds)).max(1)).max(u64::from(GRANULE));
         let mut tiles = Tiles::new(total, GRANULE).at_most(most).after(done).first(self.tile);
         if let Some(fixed) = self.fixed_tile {
@@ -151,7 +151,7 @@ impl Tracer<'_> {
         Ok(self.job()?.progress())
     }
 
-    /// How many rays a path may trace from one surface to the next, and which way each goes.
+    /// The maximum of rays per surface of a path, and the kind of each ray.
     fn turns(&self) -> Result<(u32, [u32; 4])> {
         let (Some(lights), Some(job)) = (&self.lights, &self.job) else { return Err(super::not_started()) };
         let sky = job.settings.sources.environment() && self.scene.environment.is_some();
@@ -178,7 +178,7 @@ impl Tracer<'_> {
         Ok(())
     }
 
-    /// The passes of a tile, which may lie in several samples.
+    /// Declares the passes of a tile, which may span several samples.
     fn declare(
         &mut self,
         graph: &mut Graph,

@@ -1,10 +1,11 @@
-//! Vectors of what an occluder hides, from many points at once, on the device.
+//! Vectors of the light that an occluder hides, from many points at once, on the device.
 //!
-//! The mask of an occluder on the cube is made by rays through the middles of texels, which sets the same texels as rasterising its
-//! triangles does. A far occluder of a hundred thousand triangles covers a handful of texels: rays cost by texels, not by triangles.
-//! Measured on a CPU driver with the Stanford bunny (69,451 triangles): to rasterise one face of 32×32 takes 75 ms, a sample with all six
-//! faces by rays 3.2 ms, the mean of the 63,360 of the set 64×33×30, under the same load.
-//! What is cut out of surfaces is cut out of the mask.
+//! Rays through the middles of texels make the mask of an occluder on the cube map. They set the same texels as
+//! rasterisation of the triangles. A distant occluder of a hundred thousand triangles covers a few texels. The cost of
+//! rays depends on the number of texels, the cost of rasterisation on the number of triangles. On a CPU driver with the
+//! Stanford bunny (69,451 triangles), one face of 32×32 texels took 75 ms by rasterisation, and a sample of six faces
+//! took 3.2 ms by rays under the same load (mean of the 63,360 samples of the set 64×33×30). Rays respect cutouts of
+//! surfaces.
 
 use glam::{Mat3, Vec3};
 
@@ -21,18 +22,19 @@ use crate::{
     },
 };
 
-/// Points of a dispatch at most: a guaranteed count of work groups.
+/// Most points of a dispatch, below the number of workgroups that Vulkan guarantees.
 const MOST_POINTS: u32 = 16_384;
-/// Rays of a dispatch, about: some milliseconds on a GPU.
+/// Rays of a dispatch, approximately, for some milliseconds on a GPU.
 const MOST_RAYS: u64 = 1 << 22;
-/// Turns of loops of one invocation where a driver ends loops early: two rays of the longest.
+/// Most loop iterations of one invocation on drivers that end loops early: two rays of the longest traversal.
 const TURNS_LIMITED: u64 = 2 * TRACE_STEPS as u64;
-/// Tiles of one invocation otherwise: a face of 32×32.
+/// Tiles of one invocation on other drivers: a face of 32×32 texels.
 const TILES: u64 = 16;
-/// A point from which more than this part of the sphere is hidden lies inside; scans have holes.
+/// A point that sees an occluder in more than this share of the sphere lies inside the occluder. The share is below 1
+/// because scanned meshes have holes.
 const INSIDE: f32 = 0.95;
 
-/// Tiles that an invocation can go through.
+/// Most tiles that an invocation can process.
 pub(super) fn tiles(gpu: &Gpu, rays: &Rays) -> Result<u64> {
     Ok(match gpu.loop_limit()? {
         Some(_) => (TURNS_LIMITED / rays.most_turns().max(1)).clamp(1, TILES),
@@ -40,12 +42,13 @@ pub(super) fn tiles(gpu: &Gpu, rays: &Rays) -> Result<u64> {
     })
 }
 
-/// Radius of the sphere outside of which rays are not traced, metres: rounding must not lose what touches it.
+/// Radius of the sphere outside which no rays are traced, metres. Rounding must not lose surfaces that touch the
+/// bounding sphere.
 pub(super) fn reach(radius: f32) -> f32 {
     radius * 1.0001
 }
 
-/// Solid angle from which on a point counts as inside, sr.
+/// Least hidden solid angle of a point inside an occluder, sr.
 pub(super) fn inside() -> f32 {
     INSIDE * 4.0 * std::f32::consts::PI
 }
@@ -62,16 +65,18 @@ pub struct Cover<'a> {
     parallel: Option<Parallel>,
 }
 
-/// What is hidden from some points, in their order.
+/// Results for a list of points, in their order.
 #[derive(Clone, Copy, Debug)]
 pub struct Covered {
-    /// Nine floats each: x.rgb, y.rgb, z.rgb, W/m²; `FIV_INSIDE` where the point lies inside.
+    /// Nine floats per point: x.rgb, y.rgb, z.rgb, W/m²; `FIV_INSIDE` for points inside the occluder.
     pub fivs: Buffer,
-    /// Solid angle that is hidden, sr.
+    /// Hidden solid angle, sr.
     pub coverage: Buffer,
 }
 
 impl<'a> Cover<'a> {
+    /// Uploads an occluder.
+    ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`; `Runtime` if the occluder is larger than the device's limits.
     pub fn new(gpu: &Gpu, occluder: &'a Occluder) -> Result<Self> {
@@ -83,7 +88,8 @@ impl<'a> Cover<'a> {
         Ok(Self { occluder, resident, rays, pose, tiles, geometry_from_world, parallel: None })
     }
 
-    /// From now on points are looked up in pictures along the rays (`parallel`), where that is possible: not if it is turned.
+    /// Renders depth images along the rays (`parallel`). From now on masks come from these images where possible, which
+    /// is not the case for rotated occluders.
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`.
@@ -92,25 +98,27 @@ impl<'a> Cover<'a> {
         Ok(())
     }
 
-    /// From now on as `matrix`, a rotation, turns it around its centre. Points, places and vectors are in world axes.
+    /// Rotates the occluder about its centre by `matrix`. Points, samples and vectors stay in world axes.
     pub fn turn(&mut self, matrix: Mat3) {
         self.geometry_from_world = matrix.transpose();
     }
 
-    /// Its rays in a frame.
+    /// The acceleration structure in a frame.
     pub(super) fn rays(&mut self, graph: &mut Graph) -> RayHandles {
         let handles = self.resident.frame_in(graph, &self.occluder.scene, &self.pose);
         self.rays.frame(graph, &handles)
     }
 
-    /// Declares the passes for `points`, seen from the centre of the occluder, metres. `split`: rays along the edge of a texel.
+    /// Declares the passes that compute the vectors for `points`, relative to the centre of the occluder, metres.
+    /// `split`: rays along the edge of a texel.
     pub fn declare(&mut self, graph: &mut Graph, light: &Light, points: &[Vec3], split: u32) -> Covered {
         let places: Vec<Place> = points.iter().map(|p| Place { point: *p, normal: Vec3::ZERO }).collect();
         self.passes(graph, light, &places, split, false)
     }
 
-    /// Declares the passes for places on the occluder: what is *seen* from there of the environment in front of their planes, with its
-    /// solid angle. Where that is nothing, `FIV_INSIDE`: such a place lies inside of other parts.
+    /// Declares the passes for samples on the surface. They compute the vector of the light that is *visible* in front
+    /// of the plane of each sample, with the visible solid angle. A sample that sees no light lies inside other parts
+    /// and gets `FIV_INSIDE`.
     pub fn declare_own(&mut self, graph: &mut Graph, light: &Light, places: &[Place], split: u32) -> Covered {
         self.passes(graph, light, places, split, true)
     }
@@ -140,7 +148,8 @@ impl<'a> Cover<'a> {
         let as_it_is = !own && self.geometry_from_world == Mat3::IDENTITY;
         let parallel = self.parallel.as_ref().filter(|parallel| as_it_is && parallel.fits(light, split));
         let chunks = parallel.map_or(all.div_ceil(self.tiles as u32), Parallel::chunks);
-        // A tenth of the sphere from each point, about; half of it from the surface.
+        // Estimate of the rays that reach the bounding sphere: a tenth of the directions from each point, a half from
+        // the surface.
         let part = if own { 2 } else { 10 };
         let each = (MOST_RAYS / (u64::from(all) * 64 / part).max(1)).clamp(1, MOST_POINTS.into()) as u32;
         let partials = graph.buffer("fiv.partials", u64::from(each.min(total)) * u64::from(chunks) * 40);
@@ -176,7 +185,7 @@ impl<'a> Cover<'a> {
         covered
     }
 
-    /// The vectors and the hidden solid angles (sr) of `points`, as [`Self::declare`], at once.
+    /// Computes the vectors and the hidden solid angles (sr) of `points`, as [`Self::declare`], and waits for them.
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`.
@@ -195,7 +204,8 @@ impl<'a> Cover<'a> {
         read(runner, graph, covered)
     }
 
-    /// The vectors and the seen solid angles (sr) of `places`, as [`Self::declare_own`], at once.
+    /// Computes the vectors and the visible solid angles (sr) of `places`, as [`Self::declare_own`], and waits for
+    /// them.
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`.
@@ -214,8 +224,9 @@ impl<'a> Cover<'a> {
         read(runner, graph, covered)
     }
 
-    /// How far the occluder reaches towards a light, metres from its centre, on a plane across it ([`super::suns`]). Unit vectors: to the
-    /// light, the map's axes.
+    /// Renders the shadow map of a separated texel ([`super::suns`]): the extent of the occluder towards the light,
+    /// metres from its centre, on a plane across the light's direction. The argument has unit vectors: to the light,
+    /// and the two axes of the map.
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`.

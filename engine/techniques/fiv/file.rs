@@ -1,40 +1,40 @@
 //! Files of vectors: `.fiv`.
 //!
-//! | bytes | what |
+//! | bytes | content |
 //! |---|---|
 //! | 8 | `lucfiv\r\n` |
-//! | 4 | version, 3; 2 is read too: its turns are about +Y |
+//! | 4 | version, 3; version 2 can be read too and has rotations about +Y |
 //! | 4 | bytes of the header |
-//! | … | header: JSON, the [`Plan`] with the `range` of samples that are here |
+//! | … | header: JSON, the [`Plan`] with the `range` of samples in this file |
 //! | … | the vectors of these samples: nine 32-bit floats each, x.rgb, y.rgb, z.rgb, W/m² |
-//! | 8 | checksum of everything before |
+//! | 8 | checksum of all bytes before |
 //!
-//! Numbers have their low byte first. A part of the samples is a file of the same kind; [`merge`] joins parts.
+//! Numbers are little-endian. A file may contain a part of the samples. [`merge`] joins parts.
 
 use std::{ops::Range, path::Path};
 
 use serde::{Deserialize, Serialize};
 
-use super::{hash::Hash, plan::Plan, room::MOST_SAMPLES};
+use super::{hash::Hash, limits::MOST_SAMPLES, plan::Plan};
 use crate::{Error, Result, image, shaders::consts::FIV_FLOATS};
 
 const MAGIC: &[u8; 8] = b"lucfiv\r\n";
 const VERSION: u32 = 3;
-/// Of the oldest files that are read.
+/// The oldest version that can be read.
 const OLDEST: u32 = 2;
-/// Bytes of a file that is read at most.
+/// Largest size of a file that is read, bytes.
 const MOST_BYTES: u64 = 8 << 30;
-/// Bytes of a header that is read at most.
+/// Largest header that is read, bytes.
 const MOST_HEADER: usize = 16 << 20;
 const FLOATS: u64 = FIV_FLOATS as u64;
 
-/// Vectors of a plan, or of a part of it.
+/// The vectors of a plan, or of a range of its samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stored {
     pub plan: Plan,
-    /// Samples that are here.
+    /// The samples that are present.
     pub range: Range<u64>,
-    /// Nine for each.
+    /// Nine floats for each sample.
     pub fivs: Vec<f32>,
 }
 
@@ -46,23 +46,23 @@ struct Header {
 }
 
 impl Stored {
-    /// No samples yet, of those from `first` on.
+    /// An empty range that begins at sample `first`.
     pub fn empty(plan: Plan, first: u64) -> Self {
         Self { plan, range: first..first, fivs: Vec::new() }
     }
 
-    /// All samples of the plan are here.
+    /// Whether all samples of the plan are present.
     pub fn is_complete(&self) -> bool {
         self.range == (0..self.plan.samples())
     }
 
-    /// Adds the samples that follow.
+    /// Appends the vectors of the samples that follow.
     pub fn push(&mut self, fivs: &[f32]) {
         self.fivs.extend_from_slice(fivs);
         self.range.end = self.range.start + self.fivs.len() as u64 / FLOATS;
     }
 
-    /// The same vectors always give the same bytes.
+    /// The bytes of a file. Equal vectors give equal bytes.
     ///
     /// # Errors
     /// `Runtime` if the header cannot be written.
@@ -88,18 +88,21 @@ impl Stored {
         let damaged = |what: String| Error::input(what).help(again);
         let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
         if !bytes.starts_with(MAGIC) {
-            return Err(Error::input("is no file of irradiance vectors").help("`fiv precompute` writes such files"));
+            return Err(Error::input("is not a file of irradiance vectors").help("`fiv precompute` writes such files"));
         }
         let (Some(version), Some(length)) = (word(8), word(12)) else {
             return Err(damaged(format!("is cut off after {} bytes", bytes.len())));
         };
         if !(OLDEST..=VERSION).contains(&version) {
-            return Err(damaged(format!("has version {version}, versions {OLDEST} to {VERSION} can be read")));
+            return Err(damaged(format!("has version {version}; versions {OLDEST} to {VERSION} can be read")));
         }
         let length = length as usize;
         let header = bytes.get(16..16 + length.min(MOST_HEADER)).filter(|h| h.len() == length);
         let Some(header) = header else {
-            return Err(damaged(format!("is cut off: {} bytes, the header alone has {length}", bytes.len())));
+            return Err(damaged(format!(
+                "is cut off: it has {} bytes, and its header alone has {length}",
+                bytes.len()
+            )));
         };
         let Header { range: [first, last], plan } = serde_json::from_slice(header)
             .map_err(|error| damaged("has a header that cannot be read".into()).caused_by(error))?;
@@ -111,13 +114,13 @@ impl Stored {
         }) {
             return Err(damaged(format!("has an impossible plan: radii of occluder `{}`", kind.name)));
         }
-        if let Some(kind) = plan.occluders.iter().find(|k| !k.paces.fit(&plan.grid)) {
-            let what = format!("has an impossible plan: how samples lie around occluder `{}`", kind.name);
+        if let Some(kind) = plan.occluders.iter().find(|k| !k.spacing.fit(&plan.grid)) {
+            let what = format!("has an impossible plan: the spacing of the samples around occluder `{}`", kind.name);
             return Err(damaged(what));
         }
         let samples = plan.samples();
         if samples > MOST_SAMPLES {
-            let what = format!("has an impossible plan: {samples} samples, at most {MOST_SAMPLES} are allowed");
+            let what = format!("has an impossible plan: {samples} samples; at most {MOST_SAMPLES} are allowed");
             return Err(damaged(what));
         }
         if first > last || last > samples {
@@ -127,25 +130,25 @@ impl Stored {
         let whole = body as u64 + 4 * FLOATS * (last - first) + 8;
         if bytes.len() as u64 != whole {
             let more = if (bytes.len() as u64) < whole { "is cut off" } else { "has something after its end" };
-            return Err(damaged(format!("{more}: {} bytes, by its header {whole}", bytes.len())));
+            return Err(damaged(format!("{more}: it has {} bytes, and its header says {whole}", bytes.len())));
         }
         let (front, end) = bytes.split_at(bytes.len() - 8);
         if checksum(front).to_le_bytes() != *end {
-            return Err(damaged("is damaged: its checksum does not fit".into()));
+            return Err(damaged("is damaged: its checksum is wrong".into()));
         }
         let fivs = front[body..].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
         Ok(Self { plan, range: first..last, fivs })
     }
 
     /// # Errors
-    /// `Input` with the file, if it cannot be read or is not what it should be.
+    /// `Input` with the file, if it cannot be read or is not a valid file of vectors.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = image::read_file_checked(path, MOST_BYTES)?;
         Self::decode(&bytes).map_err(|error| error.in_file(path))
     }
 
-    /// The whole file or none.
+    /// Writes the file atomically.
     ///
     /// # Errors
     /// `Output` if it cannot be written.
@@ -163,18 +166,18 @@ fn checksum(bytes: &[u8]) -> u64 {
 /// Joins parts of one plan, in any order.
 ///
 /// # Errors
-/// `Input` if they are of different plans, if samples are missing, or if some are there twice.
+/// `Input` if the parts belong to different plans, or if samples are missing or occur twice.
 pub fn merge(mut parts: Vec<Stored>) -> Result<Stored> {
     parts.sort_by_key(|part| (part.range.start, part.range.end));
     let Some(first) = parts.first() else { return Err(Error::input("there are no parts")) };
     let mut whole = Stored::empty(first.plan.clone(), 0);
     for part in parts {
         if let Some(difference) = whole.plan.difference(&part.plan) {
-            return Err(Error::input(format!("the parts belong to different wholes: {difference}")));
+            return Err(Error::input(format!("the parts belong to different plans: {difference}")));
         }
         let end = whole.range.end;
         if part.range.start != end {
-            let what = if part.range.start > end { "are missing" } else { "are there twice" };
+            let what = if part.range.start > end { "are missing" } else { "occur twice" };
             let (low, high) = (part.range.start.min(end), part.range.start.max(end));
             return Err(Error::input(format!("samples {low} to {high} {what}")));
         }
@@ -192,9 +195,9 @@ mod tests {
     use super::*;
     use crate::techniques::fiv::{
         Settings,
+        occluder_rotation::Axis,
         plan::Kind,
         samples::{Grid, Shells},
-        turn::Axis,
     };
 
     fn stored() -> Stored {
@@ -205,7 +208,7 @@ mod tests {
             shells: Shells { nearest: 0.012345678, farthest: 1.6 },
             triangles: 12,
             surface: 0,
-            paces: Default::default(),
+            spacing: Default::default(),
         };
         let plan = Plan {
             grid: Grid::of(3, 2, 2),
@@ -231,7 +234,7 @@ mod tests {
         let mut whole = stored();
         whole.plan.turn_axis = Axis::try_from("1,0.5,0".to_owned()).unwrap();
         assert_eq!(Stored::decode(&whole.encode().unwrap()).unwrap(), whole);
-        // With one turn it decides nothing.
+        // With one rotation sample the axis has no effect.
         assert_eq!(whole.plan.difference(&stored().plan), None);
         let [x, y] = ["x", "y"].map(|axis| Plan {
             turns: 3,
@@ -259,10 +262,10 @@ mod tests {
             assert!(error.exit_code() == 3 && error.to_string().contains(part), "{error} without {part:?}");
         };
         for length in 0..bytes.len() {
-            refused(&bytes[..length], if length < 8 { "no file of irradiance" } else { "cut off" });
+            refused(&bytes[..length], if length < 8 { "not a file of irradiance" } else { "cut off" });
         }
         refused(&[&bytes[..], &[0]].concat(), "after its end");
-        refused(b"{}", "no file of irradiance vectors");
+        refused(b"{}", "not a file of irradiance vectors");
         // Every byte counts.
         for at in (0..bytes.len()).step_by(3) {
             let mut wrong = bytes.clone();
@@ -285,8 +288,8 @@ mod tests {
         beyond.range = 20..44;
         refused(&beyond.encode().unwrap(), "20 to 44 of 24");
         let mut bent = stored();
-        bent.plan.occluders[1].paces.polar = vec![0.5; 3];
-        refused(&bent.encode().unwrap(), "how samples lie around occluder `tree`");
+        bent.plan.occluders[1].spacing.polar = vec![0.5; 3];
+        refused(&bent.encode().unwrap(), "the spacing of the samples around occluder `tree`");
         let mut many = stored();
         many.plan.occluders[0].surface = u32::MAX;
         refused(&many.encode().unwrap(), "at most 134217728 are allowed");
@@ -295,13 +298,13 @@ mod tests {
     #[test]
     fn plans_that_differ_in_how_samples_lie_say_so() {
         let (plain, mut bent) = (stored().plan, stored().plan);
-        bent.occluders[1].paces.polar = vec![0.0, 0.2, 1.0];
+        bent.occluders[1].spacing.polar = vec![0.0, 0.2, 1.0];
         let what = plain.difference(&bent).unwrap();
         assert!(what.contains("`tree`") && what.contains("fiv.adaptive") && !what.contains("instead"), "{what}");
         let mut covered = stored().plan;
         covered.occluders[0].surface = 7;
         let what = plain.difference(&covered).unwrap();
-        assert!(what.contains("7 places") && what.contains("0 places"), "{what}");
+        assert!(what.contains("7 samples on") && what.contains("0 samples on"), "{what}");
     }
 
     #[test]
@@ -317,7 +320,7 @@ mod tests {
         for (parts, text) in [
             (vec![part(0, 5), part(6, 24)], "samples 5 to 6 are missing"),
             (vec![part(0, 5), part(5, 20)], "samples 20 to 24 are missing"),
-            (vec![part(0, 8), part(5, 24)], "samples 5 to 8 are there twice"),
+            (vec![part(0, 8), part(5, 24)], "samples 5 to 8 occur twice"),
             (vec![part(3, 24)], "samples 0 to 3 are missing"),
             (vec![], "no parts"),
         ] {
@@ -327,6 +330,6 @@ mod tests {
         let mut other = part(5, 24);
         other.plan.occluders[1].hash = "11".into();
         let error = merge(vec![part(0, 5), other]).unwrap_err();
-        assert!(error.to_string().contains("different wholes") && error.to_string().contains("tree"), "{error}");
+        assert!(error.to_string().contains("different plans") && error.to_string().contains("tree"), "{error}");
     }
 }

@@ -1,4 +1,5 @@
-//! How much of its bounding disc an occluder hides, on average: what the overlap correction must know of bodies that are no balls.
+//! Mean share of the bounding disc that an occluder fills. The overlap correction needs this share for occluders that
+//! are not balls.
 
 use glam::Vec3;
 
@@ -11,15 +12,15 @@ use crate::{
     },
 };
 
-/// Directions that it is looked at from, on half a sphere: the other half sees the same.
+/// Viewing directions, on half a sphere, because opposite directions have equal silhouettes.
 const DIRECTIONS: u32 = 24;
 /// Rays along an edge of the square around the disc.
 const RAYS: u32 = 24;
-/// Turn from one direction to the next, radians: the golden angle.
+/// Rotation from one direction to the next, radians: the golden angle.
 const TURN: f32 = 2.399_963;
 
-/// The mean of its silhouette's area over that of its bounding disc, above 0, at most 1. Where it is cut out there is nothing, and blended
-/// surfaces count by what they stop.
+/// Mean area of the silhouette divided by the area of the bounding disc, above 0, at most 1. Parts that are cut out do
+/// not count, and blended surfaces count by their opacity.
 pub fn fill(occluder: &Occluder) -> f32 {
     let bvh = Bvh::build(&occluder.scene, &Pose::rest(&occluder.scene));
     let radius = occluder.radius;
@@ -54,7 +55,7 @@ pub fn fill(occluder: &Occluder) -> f32 {
             met += stopped(&Ray::new((right * u + up * v - along * 1.5) * radius, along));
         }
     }
-    // What is thinner than the rays are apart is something.
+    // An occluder thinner than the distance of the rays must not have the share 0.
     met.max(1.0) / all.max(1) as f32
 }
 
@@ -104,7 +105,7 @@ mod tests {
         let cut = AlphaMode::Mask { cutoff: 0.5 };
         assert_eq!([with(cut, 0.6), with(AlphaMode::Opaque, 0.1), with(AlphaMode::Blend, 1.0)], [whole; 3]);
         assert!(with(cut, 0.4) < 1e-3, "{}", with(cut, 0.4));
-        // Light passes two sides, each of which stops a half of it.
+        // Light passes two sides, each of which blocks a half of the light.
         let half = with(AlphaMode::Blend, 0.5);
         assert!((half / whole - 0.75).abs() < 0.01, "{half} of {whole}");
     }

@@ -1,6 +1,6 @@
-//! Numbers by which files know what they were made for, and whether they are whole. Not for security.
+//! Hashes that identify the inputs of a file and detect damaged files. They give no security.
 
-/// 64 bits over words.
+/// A 64-bit hash over words.
 #[derive(Clone, Debug)]
 pub(crate) struct Hash(u64);
 
@@ -18,7 +18,7 @@ impl Hash {
         values.iter().for_each(|value| self.word(value.to_bits().into()));
     }
 
-    /// With their number, so that bytes after the end count too.
+    /// Includes the number of bytes, so that bytes after the end change the hash.
     pub fn bytes(&mut self, bytes: &[u8]) {
         self.word(bytes.len() as u64);
         for chunk in bytes.chunks(8) {

@@ -1,4 +1,4 @@
-//! The environment on the device: its texels, the irradiance for every normal, and its whole vector.
+//! The environment on the device: its texels, the irradiance for every normal, and its total vector.
 
 use ash::vk;
 
@@ -15,10 +15,10 @@ use crate::{
     shaders::{consts::FIV_FLOATS, fiv, types},
 };
 
-/// Texels that one invocation sums up at most.
+/// Most texels that one invocation sums up.
 const MOST_TEXELS: u32 = 24_576;
 
-/// Of the irradiance for every normal.
+/// Format of the irradiance map.
 const DIFMAP: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
 /// An environment on a device.
@@ -28,22 +28,22 @@ pub struct Light {
     pub size: u32,
     /// `types::FivTexel`
     pub texels: OwnedBuffer,
-    /// Irradiance for the normal of each texel, W/m²: a cube, to be looked up by `cube_lookup` of lib/fiv.glsl.
+    /// Irradiance for the normal of each texel, W/m² ([FIV 6]): a cube map for `cube_lookup` of lib/fiv.glsl.
     pub difmap: OwnedImage,
-    /// The fullsphere irradiance vector of the whole environment: x.rgb, y.rgb, z.rgb, W/m².
+    /// The fullsphere irradiance vector of the whole environment ([FIV 10]): x.rgb, y.rgb, z.rgb, W/m².
     pub total: [f32; FIV_FLOATS as usize],
-    /// Texels that are not black, without those kept apart.
+    /// Numbers of the texels that are not black, without separated texels.
     pub lit: Vec<u32>,
-    /// Texels that are kept apart: they are in nothing of the above.
+    /// Separated texels. The fields above do not contain their light.
     pub suns: Vec<types::FivSun>,
-    /// Its bright parts.
+    /// Bright parts of the environment.
     pub spots: Vec<Spot>,
-    /// Of the environment.
+    /// Hash of the cube map.
     pub hash: u64,
 }
 
 impl Light {
-    /// Uploads the environment and sums it up.
+    /// Uploads the environment and computes its irradiance map and its total vector.
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`.
@@ -51,7 +51,7 @@ impl Light {
         Self::with(&mut Runner::new(gpu), sky)
     }
 
-    /// As [`Self::new`], with a runner that is there already.
+    /// As [`Self::new`], with an existing runner.
     pub(super) fn with(runner: &mut Runner, sky: &Sky) -> Result<Self> {
         let gpu = &runner.gpu().clone();
         let texels = sky.texels();
@@ -83,22 +83,23 @@ impl Light {
             hash: sky.hash(),
         })
     }
-    /// Its texels, and the numbers of those that are not black.
+    /// The texels, and the numbers of the texels that are not black.
     pub(super) fn import(&self, graph: &mut Graph) -> (Buffer, Buffer) {
         let lit = if self.lit.is_empty() { &[0][..] } else { &self.lit };
         (graph.import_buffer(&self.texels), graph.buffer_from("fiv.lit", lit))
     }
 }
 
-/// What the user should know where the device cannot filter what irradiance is looked up in; Vulkan does not promise that it can.
+/// A note if the device cannot filter the irradiance map. Vulkan does not guarantee filtering for this format.
 pub(super) fn unfiltered(gpu: &Gpu) -> Option<Note> {
     let filters = gpu.format_features(DIFMAP).contains(vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR);
     let text =
-        "the device does not filter 32-bit images: irradiance is that of the nearest of 6 · size² normals".into();
+        "the device does not filter 32-bit images: each pixel takes the irradiance of the nearest of 6 · size² normals"
+            .into();
     (!filters).then(|| Note { kind: NoteKind::Approximated, place: "fiv.size".into(), text })
 }
 
-/// The first of so many, and their number, for calls of `each` at most.
+/// Splits `count` items into calls of at most `each` items: the first item and the number of items of each call.
 pub(super) fn calls(count: u64, each: u64) -> impl Iterator<Item = (u32, u32)> {
     let each = each.max(1);
     (0..count).step_by(each as usize).map(move |first| (first as u32, each.min(count - first) as u32))

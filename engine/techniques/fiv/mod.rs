@@ -1,59 +1,68 @@
 //! Soft shadows under an environment from fullsphere irradiance vectors (Michael 2010, chapter 3).
 //!
-//! The irradiance of a surface is that of the whole environment, looked up by its normal, without what occluders hide. What an occluder
-//! hides is kept as one vector a colour channel, the sum of radiance × direction × solid angle over the part of the environment behind
-//! it, for many places of the occluder around the receiver; its dot product with the normal is the irradiance that is missing, if the
-//! occluder lies in front of the receiver's plane.
+//! The irradiance of a surface point is the irradiance of the whole environment, looked up by the normal, minus the
+//! irradiance that occluders hide ([FIV 12]). The hidden irradiance comes from precomputed vectors. One vector per
+//! colour channel is the sum of radiance × direction × solid angle over the part of the environment that the occluder
+//! hides ([FIV 10]). The vectors of an occluder are stored for many positions of the occluder around a receiver, the
+//! samples. The dot product of vector and normal is the hidden irradiance, if the whole occluder lies in front of the
+//! receiver's plane.
 //!
-//! [`Sky`] is the environment as a cube, [`Light`] the same on the device with its irradiance; [`Occluders`] finds what casts
-//! shadows in a scene; [`Plan`] computes vectors, [`Stored`] keeps them in files; [`Fiv`] draws.
+//! [`Sky`] is the environment as a cube map. [`Light`] is the cube map on the device with its irradiance. [`Occluders`]
+//! finds the nodes of a scene that cast shadows. [`Plan`] computes vectors, [`Stored`] keeps vectors in files, and
+//! [`Fiv`] draws pictures.
 //!
-//! Where this differs from the thesis, and why:
-//! - Solid angles are exact: texels of a cube differ by a factor of five. The thesis writes none (eq. 10).
-//! - Masks are made by rays instead of rasterising ([`cover`]).
-//! - 1/π is explicit: a surface of albedo ρ reflects ρ/π · E; the thesis folds it into its factor (eq. 3).
-//! - The discs of the overlap correction have sin α = R / ρ as radius, so that they stay finite near an occluder.
-//! - How far an occluder reaches over the receiver's plane (cases A, B, C) is asked of its corners, not of its bounding sphere
-//!   ([`support`]); [`Extent::Sphere`] is the thesis' way.
-//! - What an occluder that the receiver's plane cuts hides is its vector and what the part behind hides of the light from behind
-//!   ([`Cut::Light`]). The thesis makes the vector smaller, though it is too small already: [`Cut::Height`].
-//! - An occluder's shadow on itself comes from samples on its surface ([`surface`]); [`SelfSamples::Spheres`] is the thesis' way.
-//! - Samples lie where what is hidden bends, if [`Settings::adaptive`] ([`pace`]).
-//! - What overlapping occluders share is less where they do not fill their bounding discs ([`fill`]), and no bright part of the
-//!   environment is taken away twice ([`spots`]).
-//! - The brightest texels can be kept out of the vectors and get hard shadows ([`suns`]).
-//! - Surfaces may reflect the environment glossily ([`specular`]), and occluders may turn ([`turn`]).
-//! - More than two overlapping occluders: see [`crate::reference::fiv::shares`].
+//! Differences from the thesis, with reasons:
+//! - Solid angles are exact, because the texels of a cube map differ by a factor of five. The thesis leaves the solid
+//!   angle out of [FIV 10].
+//! - Rays make the masks of occluders instead of rasterisation ([`cover`]).
+//! - The factor 1/π is explicit: a surface of albedo ρ reflects ρ/π · E. The thesis includes 1/π in its reflectance
+//!   factor ([FIV 3]).
+//! - The bounding discs of the overlap correction have the radius sin α = R / ρ. This radius stays finite near an
+//!   occluder.
+//! - The extent of an occluder across the receiver's plane (cases A, B and C) is computed from its vertices and not
+//!   from its bounding sphere ([`support_function`]). [`Extent::Sphere`] is the method of the thesis.
+//! - The thesis scales the vector of an occluder that the receiver's plane cuts by the share of its height in front
+//!   ([`Cut::Height`]). This vector is already too small, because the part behind the plane contributes with a negative
+//!   sign. By default the contribution of the part behind the plane is estimated and added back ([`Cut::Light`]).
+//! - Samples on the surface of an occluder give its shadow on itself ([`surface`]). [`SelfSamples::Spheres`] is the
+//!   method of the thesis.
+//! - Samples are denser where the vectors have a high curvature, if [`Settings::adaptive`] is set ([`spacing`]).
+//! - The overlap correction takes into account how much of their bounding discs occluders fill ([`fill`]). It never
+//!   subtracts a bright part of the environment twice ([`spots`]).
+//! - The brightest texels can be separated from the vectors. Their shadows then have hard edges ([`suns`]).
+//! - Surfaces may reflect the environment glossily ([`specular`]), and occluders may rotate ([`occluder_rotation`]).
+//! - The thesis corrects the overlap of two occluders. [`crate::reference::fiv::shares`] has the extension to any
+//!   number.
 
-mod body;
 pub mod cover;
 pub mod file;
 pub mod fill;
 mod hash;
 pub mod light;
+mod limits;
 mod negligible;
 pub mod occluder;
+pub mod occluder_rotation;
 mod online;
-mod online_standing;
-pub mod pace;
+mod online_occluders;
 mod parallel;
 mod picture;
 pub mod plan;
-mod ready;
-mod room;
+mod posed_mesh;
+mod prepared;
 pub mod samples;
 mod settings;
 pub mod sky;
+mod sky_rotation;
+pub mod spacing;
 pub mod specular;
 pub mod spots;
-mod stage;
-mod stored_standing;
+mod state;
+mod stored_occluders;
 pub mod suns;
-pub mod support;
+pub mod support_function;
 pub mod surface;
 mod tiles;
-pub mod turn;
-mod turning;
 
 pub use file::Stored;
 pub use light::Light;
@@ -62,4 +71,4 @@ pub use picture::{Outputs, Picture, PictureSettings};
 pub use plan::Plan;
 pub use settings::{Cut, Extent, Interpolation, Masks, Method, SelfSamples, Settings, Shared, Specular};
 pub use sky::Sky;
-pub use stage::Fiv;
+pub use state::Fiv;

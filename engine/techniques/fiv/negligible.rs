@@ -1,23 +1,24 @@
-//! How much of an environment's light an occluder can hide at most, told by where it is seen and how large it looks.
+//! Upper bound of the irradiance that an occluder can hide, by its direction and its apparent size.
 //!
-//! A disc of directions whose radius is the sine r lets through at most π r² times the greatest radiance in it. So a table of the
-//! greatest radiance around each direction, for discs of a few sizes, bounds what any occluder hides: those whose bound is below a
-//! share of the mean irradiance can be left out, far from the sun near ones, under it none. What the shader reads between entries of the
-//! table is a bound too: each entry holds all that discs around its neighbours can see.
+//! A disc of directions whose radius is the sine r contains at most π r² times the greatest radiance in the disc. A
+//! table of the greatest radiance around each direction, for discs of several sizes, therefore bounds the irradiance
+//! that any occluder hides. Occluders whose bound is below a share of the mean irradiance can be left out. Away from
+//! the sun even a near occluder may be left out, in front of the sun no occluder is. The interpolation between entries
+//! is a bound too, because each entry covers the discs around its neighbours.
 
 use glam::{DVec2, DVec3, Vec3};
 
 use super::sky::{self, Sky};
 use crate::shaders::consts::{FIV_MATTER_AZIMUTHS, FIV_MATTER_LEVELS, FIV_MATTER_POLARS};
 
-/// Sine of the radius of a disc at level 0; each level has twice that of the one before.
+/// Sine of the disc radius at level 0. Each level has twice the sine of the level before.
 const SMALLEST: f64 = 0.05;
 
 /// Entries of the table.
 pub const LENGTH: usize = (FIV_MATTER_AZIMUTHS * FIV_MATTER_POLARS * FIV_MATTER_LEVELS) as usize;
 
-/// π times the greatest radiance around each direction over the mean irradiance, the most of all channels; levels, then polar angles,
-/// then azimuths. Twin of lib/fiv_matter.glsl.
+/// π times the greatest radiance around each direction, divided by the mean irradiance, as the maximum of all channels.
+/// The azimuth changes fastest, then the polar angle, then the level. Twin of lib/fiv_matter.glsl.
 pub fn table(sky: &Sky) -> Vec<f32> {
     let pi = std::f64::consts::PI;
     let lit = (0..sky.radiance.len() as u32).filter(|&t| sky.radiance[t as usize] != Vec3::ZERO);
@@ -28,14 +29,14 @@ pub fn table(sky: &Sky) -> Vec<f32> {
             (area.normalize(), sky.radiance[t as usize].as_dvec3(), area.length())
         })
         .collect();
-    // The irradiance of a normal is a quarter of all power in the mean.
+    // The mean irradiance over all normals is a quarter of the total power.
     let mean = 0.25 * texels.iter().map(|(_, radiance, area)| *radiance * *area).sum::<DVec3>();
     let level = |radiance: DVec3| (pi * radiance / mean.max(DVec3::splat(1e-300))).max_element();
     let mut texels: Vec<(Vec3, f32)> =
         texels.iter().map(|(d, radiance, _)| (d.as_vec3(), level(*radiance) as f32)).collect();
-    // The first one in a disc is then its greatest.
+    // Texels are sorted, so the first texel in a disc is the brightest.
     texels.sort_by(|a, b| b.1.total_cmp(&a.1));
-    // What is read anywhere comes from entries that are up to the diagonal of a cell away; texels reach out of their middles.
+    // A lookup reads entries at a distance of up to the diagonal of a cell, and texels extend beyond their middles.
     let cell = 2.0 * pi / f64::from(FIV_MATTER_AZIMUTHS);
     let around = 2f64.sqrt() * (cell + 1.0 / f64::from(sky.size));
     let within: Vec<f32> = (0..FIV_MATTER_LEVELS)
@@ -52,7 +53,7 @@ pub fn table(sky: &Sky) -> Vec<f32> {
         let place = DVec2::new(column.into(), row.into());
         let (azimuth, polar) = (place.x * cell, place.y * pi / f64::from(FIV_MATTER_POLARS - 1));
         let at = DVec3::new(polar.sin() * azimuth.sin(), polar.cos(), -polar.sin() * azimuth.cos()).as_vec3();
-        // Levels are nested: those from here on are known.
+        // Discs of higher levels contain those of lower levels, so entries from `known` on are done.
         let mut known = within.len();
         for (direction, level) in &texels {
             let cosine = at.dot(*direction);
@@ -123,7 +124,7 @@ mod tests {
             let mut free = 0;
             for (d, r) in directions(120).flat_map(|d| [0.02, 0.11, 0.4, 0.8].map(|r| (d, r))) {
                 let cosine = (1.0f64 - r * r).sqrt();
-                // Of whole texels as much as the disc has, where it has less than them.
+                // A disc smaller than its texels contains only a part of their light.
                 let inside = || texels.iter().filter(|(area, _)| area.normalize().dot(d) > cosine);
                 let hidden: DVec3 = inside().map(|(area, radiance)| *radiance * area.dot(d).max(0.0)).sum();
                 let angle: f64 = inside().map(|(area, _)| area.length()).sum();
@@ -133,7 +134,7 @@ mod tests {
                 assert!(share <= bound(&table, d, r) * 1.3 + slack, "{name} {d} {r}: {share}, {}", bound(&table, d, r));
                 free += u32::from(r == 0.11 && bound(&table, d, r) < 0.02);
             }
-            // And it is of use: in most directions an occluder nine radii away hides little.
+            // The bound is useful: in most directions an occluder at nine radii hides little.
             assert!(free > 40, "{name}: {free}");
         }
     }

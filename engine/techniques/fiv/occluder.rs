@@ -1,50 +1,50 @@
-//! What casts shadows: the geometry of one node as it stands, around the origin.
+//! Occluders: the geometry of a node in a pose, relative to the centre of its bounding sphere.
 
 use std::collections::HashMap;
 
 use glam::{Mat3, Mat4, Vec3, Vec4};
 
 use super::{
-    body::{self, Body, Part, Size, is_unlit},
     hash::Hash,
+    posed_mesh::{self, PosedMesh, PosedPrimitive, Size, is_unlit},
     samples::Shells,
-    support::Support,
+    support_function::SupportFunction,
     surface::{self, Own, Place},
 };
 use crate::scene::{AlphaMode, Material, Mesh, Node, Pose, Primitive, Scene};
 
-/// Geometry is flat if it reaches this part of its radius out of a plane at most.
+/// Geometry is flat if its distance from a plane is at most this share of its radius.
 const FLAT: f32 = 1e-4;
-/// Counts the ways in which blended surfaces have stopped rays (the numbers that [`Cover`](super::cover::Cover) compares alpha with): one
-/// more makes vectors of blended occluders in older files those of others. 0, which was not told apart, took the same numbers for a texel
-/// from all points.
+/// Version of the random numbers with which [`Cover`](super::cover::Cover) compares the alpha of blended surfaces. A
+/// new version changes the hashes of blended occluders, so that vectors in older files are computed again. Version 0,
+/// which was not hashed, took the same random numbers for a texel from all points.
 const BLENDING: u64 = 1;
 
-/// One kind of occluder: all that look the same but for where they stand share it.
+/// A kind of occluder. All occluders with equal geometry at different places share one kind.
 #[derive(Clone, Debug)]
 pub struct Occluder {
     pub name: String,
-    /// Its geometry alone, the centre of its bounding sphere at the origin, with what is needed to know where it is cut out.
+    /// Its geometry alone, with the centre of its bounding sphere at the origin and with the textures of its cutouts.
     pub scene: Scene,
-    /// Of its bounding sphere, metres.
+    /// Radius of the bounding sphere, metres.
     pub radius: f32,
-    /// From the centre to the nearest surface, metres.
+    /// Distance from the centre to the nearest surface, metres.
     pub inner: f32,
-    /// Of all its triangles, m².
+    /// Area of all triangles, m².
     pub area: f32,
     pub triangles: usize,
-    /// Places on the surface of each primitive that has triangles.
+    /// Samples on the surface of each primitive that has triangles.
     pub own: Vec<Own>,
-    /// Changes with the geometry, and with how it stops rays.
+    /// Hash of the geometry and of the way it blocks rays.
     pub hash: u64,
 }
 
 /// An occluder of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placed {
-    /// Into the scene's nodes.
+    /// Number of the node in the scene.
     pub node: u32,
-    /// Into the kinds.
+    /// Number of the kind.
     pub kind: u32,
     /// Centre of the bounding sphere, seen from the node's origin, metres in world axes.
     pub centre: Vec3,
@@ -57,14 +57,16 @@ pub struct Occluders {
     pub placed: Vec<Placed>,
     /// Nodes that only receive shadows, because they are flat or as large as the scene.
     pub receivers: Vec<u32>,
-    /// Nodes whose meshes have no size in this pose (a scale of 0, say): they cast no shadow in any other either.
+    /// Nodes whose meshes have no size in this pose, for example by a scale of 0. They cast no shadow in any pose.
     pub vanished: Vec<u32>,
 }
 
 impl Occluders {
-    /// Every node with a mesh is one, but for flat ones (a ground) unless `flat`, and, where there are several, those whose radius is more
-    /// than `largest` of the scene's (a room, a thick ground): they have no place from which to look at them that is far enough for their
-    /// size. Unlit surfaces stop no light and are part of none. Poses other than `pose` only move them.
+    /// Finds the occluders of a scene. Every node with a mesh is an occluder, except for these nodes. Flat meshes (a
+    /// ground) only receive shadows unless `flat` is set. If there are several occluders, those with a radius of more
+    /// than `largest` times the scene's radius (a room, a thick ground) only receive shadows, because no sample around
+    /// them lies far enough from them. Unlit surfaces block no light and belong to no occluder. Other poses than `pose`
+    /// only move occluders.
     pub fn of(scene: &Scene, pose: &Pose, flat: bool, largest: f32) -> Self {
         let mut still = pose.clone();
         let (mut out, mut found) = (Self::default(), Vec::new());
@@ -101,11 +103,11 @@ impl Occluders {
 }
 
 impl Occluder {
-    /// The occluder and its centre seen from the node's origin; `None` without a triangle that could stop light.
+    /// The occluder and its centre relative to the node's origin. `None` if no triangle could block light.
     pub(super) fn of_node(scene: &Scene, pose: &mut Pose, node: usize, mesh: &Mesh) -> Option<(Self, Vec3)> {
-        let Body { parts, centre, size } = Body::of(scene, pose, node, mesh)?;
+        let PosedMesh { primitives: posed, centre, size } = PosedMesh::of(scene, pose, node, mesh)?;
         let (mut primitives, mut own): (Vec<Primitive>, Vec<Own>) = Default::default();
-        for Part { slot, positions, normals, indices } in parts {
+        for PosedPrimitive { slot, positions, normals, indices } in posed {
             let primitive = &mesh.primitives[slot];
             let backs = scene.materials.get(primitive.material as usize).is_some_and(|m| m.double_sided);
             own.push(Own { slot: slot as u32, corners: positions.len() as u32, backs });
@@ -132,13 +134,13 @@ impl Occluder {
         Some((Self { name, scene, radius, inner, area, triangles, own, hash }, centre))
     }
 
-    /// How far it reaches along every direction.
-    pub fn support(&self) -> Support {
+    /// Its extent along every direction.
+    pub fn support_function(&self) -> SupportFunction {
         let primitives = self.scene.meshes[0].primitives.iter();
-        body::support(primitives.map(|p| (&p.positions[..], &p.indices[..])))
+        posed_mesh::support_function(primitives.map(|p| (&p.positions[..], &p.indices[..])))
     }
 
-    /// Places on its surface, those of [`Self::own`] one after the other.
+    /// The samples on its surface, in the order of [`Self::own`].
     pub fn places(&self) -> Vec<Place> {
         let mut out = Vec::new();
         for (own, p) in self.own.iter().zip(&self.scene.meshes[0].primitives) {
@@ -147,7 +149,7 @@ impl Occluder {
         out
     }
 
-    /// All triangles lie in one plane, nearly.
+    /// Whether all triangles lie nearly in one plane.
     pub fn is_flat(&self) -> bool {
         let triangles = || self.scene.meshes[0].primitives.iter().flat_map(of_primitive);
         let normal = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a);
@@ -158,7 +160,7 @@ impl Occluder {
         triangles().flatten().all(|p| (p - widest[0]).dot(across).abs() <= FLAT * self.radius)
     }
 
-    /// As `turn` squeezes it about its centre; `None` if nothing is left of it.
+    /// Its measures after the linear map `turn` about its centre. `None` if no extent is left.
     pub(super) fn squeezed(&self, turn: &Mat3) -> Option<Size> {
         let squeezed = |corners: [Vec3; 3]| corners.map(|p| *turn * p);
         Size::of(self.scene.meshes[0].primitives.iter().flat_map(of_primitive).map(squeezed))
@@ -168,17 +170,18 @@ impl Occluder {
         Size { radius: self.radius, inner: self.inner, area: self.area }
     }
 
-    /// The spheres around it: the first one touches its surface from within, the last one has `reach` times its radius.
+    /// The spheres of samples around the occluder. The first sphere touches its surface from within, and the last
+    /// sphere has `reach` times its radius.
     pub fn shells(&self, reach: f32) -> Shells {
         self.size().shells(reach)
     }
 }
 
 fn of_primitive(primitive: &Primitive) -> impl Iterator<Item = [Vec3; 3]> + '_ {
-    body::corners(&primitive.positions, &primitive.indices)
+    posed_mesh::corners(&primitive.positions, &primitive.indices)
 }
 
-/// A scene of these primitives; of their materials only what stops rays is kept.
+/// A scene of these primitives with the properties of their materials that decide which rays are blocked.
 fn alone(scene: &Scene, mut primitives: Vec<Primitive>, name: &str) -> Scene {
     let mut out = Scene { name: name.to_owned(), ..Scene::default() };
     keep_cutouts(scene, &mut primitives, &mut out);
@@ -188,7 +191,8 @@ fn alone(scene: &Scene, mut primitives: Vec<Primitive>, name: &str) -> Scene {
     out
 }
 
-/// A scene in which of all meshes that of one node is left, with all that moves and deforms it; its poses are those of `scene`.
+/// A copy of the scene that has no other mesh than that of `node`, with the animations, skins and morph targets that
+/// deform this mesh. Poses of `scene` are valid for the copy.
 pub(super) fn only(scene: &Scene, node: usize) -> Scene {
     let mut mesh = scene.nodes[node].mesh.map(|mesh| scene.meshes[mesh as usize].clone()).unwrap_or_default();
     let mut out = Scene {
@@ -217,7 +221,7 @@ pub(super) fn only(scene: &Scene, node: usize) -> Scene {
     out
 }
 
-/// Gives `out` the materials of these primitives, of which only what stops rays is kept.
+/// Adds to `out` the materials of these primitives, reduced to the properties that decide which rays are blocked.
 fn keep_cutouts(scene: &Scene, primitives: &mut [Primitive], out: &mut Scene) {
     let mut materials = HashMap::new();
     let mut textures = HashMap::new();
@@ -277,7 +281,7 @@ fn hash(alone: &Scene, own: &[Own]) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{body::nearest, *};
+    use super::{posed_mesh::nearest, *};
     use crate::scene::builtin;
     use glam::Quat;
 
@@ -357,7 +361,7 @@ mod tests {
         let scene = stage(&[at(0.0), at(-3.0) * Mat4::from_scale(Vec3::splat(9.0)), at(1.5)]);
         let all = Occluders::of(&scene, &Pose::rest(&scene), false, 0.5);
         assert_eq!((all.receivers, all.placed.len(), all.kinds.len()), (vec![1], 2, 1));
-        // Alone it is no room.
+        // A single occluder is not limited by `largest`.
         let alone = stage(&[at(-3.0)]);
         assert_eq!(Occluders::of(&alone, &Pose::rest(&alone), false, 0.5).placed.len(), 1);
     }

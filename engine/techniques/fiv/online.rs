@@ -1,17 +1,20 @@
-//! Vectors of one frame: computed on the device for the samples that its pixels look up, and for no others.
+//! Vectors of one frame, computed on the device only for the samples that pixels look up.
 //!
-//! Four steps, in which the host never knows how many samples there are:
-//! 1. every pixel marks the samples of each occluder that its lookup reads, a bit each;
-//! 2. the marks of each geometry become a list in the order of their numbers, by sums over blocks: the same in every run;
-//! 3. vectors are computed for the list, as [`cover`](super::cover) does it beforehand;
-//! 4. they are brought to the places where the lookup expects them.
+//! There are four steps. The host never learns the number of samples:
+//! 1. Every pixel marks the samples of each occluder that its lookup reads, a bit each.
+//! 2. The marks of each geometry become a list in the order of sample numbers, by prefix sums over blocks. The order is
+//!    the same in every run.
+//! 3. The vectors of the list are computed as [`cover`](super::cover) computes them before the first frame.
+//! 4. The vectors are copied to the places where the lookup reads them.
 //!
-//! Samples lie around an occluder as it stands, in world axes, so that the picture is that of vectors computed beforehand for this
-//! pose. Rays are carried into the geometry at rest; only what deforms has trees of its own that are brought to each pose.
-//! Occluders of one geometry that stand alike share their samples.
+//! Samples lie around an occluder in its current pose, in world axes. The picture is therefore the same as with vectors
+//! that were precomputed for this pose. Rays are transformed into the geometry at rest. Only occluders that deform have
+//! their own acceleration structures, which are refitted to each pose. Occluders of one geometry with the same rotation
+//! and scale share their samples.
 //!
-//! An occluder's shadow on itself needs no samples: its pixels are few, and each has the light that reaches it past its geometry summed
-//! up. [`SelfSamples::Spheres`](super::SelfSamples::Spheres) is the thesis' way.
+//! The shadow of an occluder on itself needs no samples, because the occluder covers few pixels: each of its pixels
+//! sums up the light that passes its own geometry. [`SelfSamples::Spheres`](super::SelfSamples::Spheres) is the method
+//! of the thesis.
 
 use std::{collections::BTreeMap, ops::Range};
 
@@ -22,7 +25,7 @@ use super::{
     cover::tiles,
     light::Light,
     occluder,
-    online_standing::{Set, Stage, Standing},
+    online_occluders::{FrameOccluders, PlacementInputs, Set},
     samples::Grid,
 };
 use crate::{
@@ -41,68 +44,70 @@ use crate::{
     },
 };
 
-/// Points of a batch at most, and bytes of its partial sums, about.
+/// Most points of a batch, and bytes of its partial sums, approximately.
 const MOST_POINTS: u64 = 32_768;
 const MOST_PARTIALS: u64 = 64 << 20;
-/// Rays that one dispatch traces at most, about, if all pixels show occluders.
+/// Most rays of a dispatch if all pixels show occluders, approximately.
 const MOST_RAYS: u64 = 1 << 26;
-/// Turns of the loop over texels of one invocation; and of all loops where a driver ends them early: two rays of the longest.
+/// Most iterations of the loop over texels in one invocation. On drivers that end loops early, most iterations of all
+/// loops: two rays of the longest traversal.
 const MOST_TURNS: u64 = 20_000;
 const TURNS_LIMITED: u64 = 2 * TRACE_STEPS as u64;
-/// Words of 32 occluders that one invocation goes through.
+/// Words of 32 occluders that one invocation processes.
 const MOST_WORDS: u32 = 64;
 
-/// What outlives a frame: geometries with their trees.
+/// State that outlives a frame: geometries with their acceleration structures.
 #[derive(Debug)]
 pub struct Online {
     shapes: Vec<Shape>,
-    /// The geometry of each placed occluder, and whether it deforms.
+    /// The geometry of each placed occluder, and whether the geometry deforms.
     of_placed: Vec<(usize, bool)>,
-    /// Turns and scales of the placed occluders at rest.
+    /// Linear transforms of the placed occluders at rest.
     rest: Vec<Mat3>,
-    /// Of the samples of a sphere, from the receiver to the occluder.
+    /// Directions of the samples of a sphere, from the receiver to the occluder.
     directions: OwnedBuffer,
     grid: Grid,
     reach: f32,
     split: u32,
-    /// Bytes of a buffer at most.
+    /// Largest size of a storage buffer, bytes.
     limit: u64,
 }
 
 /// A geometry that rays are traced through.
 #[derive(Debug)]
 struct Shape {
-    body: Body,
+    traced: TracedScene,
     resident: Resident,
     rays: Rays,
     tiles: u64,
-    /// Rays of an invocation at most.
+    /// Most rays of an invocation.
     most: u64,
 }
 
 #[derive(Debug)]
-enum Body {
-    /// A kind of occluder at rest, its centre at the origin.
+enum TracedScene {
+    /// A kind of occluder at rest, with its centre at the origin.
     Still(usize),
     /// One node of a scene, in world space.
     Deforming(Box<Scene>),
 }
 
-/// What the pixels of a frame show.
+/// Inputs from the pixels of a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
     pub gbuffer: &'a GBuffer,
-    /// Which occluder each pixel shows.
+    /// Number of the visible occluder of each pixel.
     pub identity: Image,
-    /// [`Standing::list`] on the device.
+    /// [`FrameOccluders::list`] on the device.
     pub occluders: Buffer,
-    /// What the occluder of a pixel leaves itself; known after these passes, if asked for.
+    /// Irradiance that reaches a pixel past its own occluder. These passes write the image if the settings ask for
+    /// shadows from surfaces.
     pub own: Image,
-    /// Which of them may matter to a tile of pixels, a bit each, in so many words.
+    /// Occluders that may affect each tile of pixels, a bit each, and words per tile.
     pub near: (Buffer, u32),
 }
 
-/// Lists of points with their samples, on the device.
+/// Lists of points with their sample numbers, on the device.
 #[derive(Clone, Copy, Debug)]
 struct Lists {
     points: Buffer,
@@ -112,7 +117,7 @@ struct Lists {
 }
 
 impl Online {
-    /// Builds the trees of all geometries.
+    /// Builds the acceleration structures of all geometries.
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`; `Runtime` if an occluder is larger than the device's limits.
@@ -128,15 +133,15 @@ impl Online {
                 of_placed.push((shape, false));
                 continue;
             }
-            let body = match deforms {
-                true => Body::Deforming(Box::new(occluder::only(scene, node))),
-                false => Body::Still(kind),
+            let traced = match deforms {
+                true => TracedScene::Deforming(Box::new(occluder::only(scene, node))),
+                false => TracedScene::Still(kind),
             };
             of_placed.push((shapes.len(), deforms));
             if !deforms {
                 known.insert(kind, shapes.len());
             }
-            let geometry = body.scene(occluders);
+            let geometry = traced.scene(occluders);
             let resident = Resident::new(gpu, geometry)?;
             let rays = Rays::new(gpu, geometry, &resident)?;
             let tiles = tiles(gpu, &rays)?;
@@ -144,7 +149,7 @@ impl Online {
                 Some(_) => (TURNS_LIMITED / rays.most_turns().max(1)).max(1),
                 None => MOST_TURNS,
             };
-            shapes.push(Shape { body, resident, rays, tiles, most });
+            shapes.push(Shape { traced, resident, rays, tiles, most });
         }
         let grid = settings.grid();
         let at = |ring: u32| grid.direction(ring % grid.azimuths, ring / grid.azimuths).as_vec3().to_array();
@@ -162,14 +167,14 @@ impl Online {
         })
     }
 
-    /// Blocks of marks of a set.
+    /// Blocks of marks per set.
     fn blocks(&self) -> u32 {
         self.grid.count().div_ceil(FIV_BLOCK_SAMPLES)
     }
 
-    /// How all occluders stand.
-    pub fn standing(&self, scene: &Scene, pose: &Pose, occluders: &Occluders) -> Standing {
-        let stage = Stage {
+    /// All occluders in their current poses.
+    pub fn in_frame(&self, scene: &Scene, pose: &Pose, occluders: &Occluders) -> FrameOccluders {
+        let inputs = PlacementInputs {
             scene,
             occluders,
             shapes: &self.of_placed,
@@ -178,10 +183,11 @@ impl Online {
             reach: self.reach,
             floats: self.blocks() * FIV_BLOCK_SAMPLES * FIV_FLOATS,
         };
-        Standing::of(&stage, pose)
+        FrameOccluders::of(&inputs, pose)
     }
 
-    /// Declares the passes that compute the vectors that `seen` needs: a buffer in which each set has its place.
+    /// Declares the passes that compute the vectors for the pixels of `seen`. Returns a buffer with a range for each
+    /// set.
     ///
     /// # Errors
     /// `Runtime` if the samples take more memory than the device allows for a buffer.
@@ -189,12 +195,12 @@ impl Online {
         &mut self,
         graph: &mut Graph,
         (occluders, pose): (&Occluders, &Pose),
-        standing: &Standing,
+        in_frame: &FrameOccluders,
         light: &Light,
         seen: &Seen<'_>,
         settings: &Settings,
     ) -> Result<Buffer> {
-        let (blocks, count) = (self.blocks(), standing.sets.len() as u32);
+        let (blocks, count) = (self.blocks(), in_frame.sets.len() as u32);
         let samples = u64::from(count) * u64::from(blocks * FIV_BLOCK_SAMPLES);
         let bytes = 4 * u64::from(FIV_FLOATS) * samples;
         if bytes > self.limit {
@@ -205,28 +211,28 @@ impl Online {
         }
         let extent = graph.extent(seen.gbuffer.depth);
         let fivs = graph.buffer("fiv.online", bytes.max(4));
-        // What was not asked for counts for nothing, should rounding ask for it after all.
+        // A sample that no pixel marked must have no weight if rounding leads a lookup to it.
         graph.fill(fivs, FIV_INSIDE.to_bits());
         if count == 0 {
             return Ok(fivs);
         }
         let marks = self.marks(graph, seen, samples, settings);
-        let jobs = self.jobs(standing, extent, light);
-        let lists = self.lists(graph, standing, marks, &jobs, samples);
+        let jobs = self.jobs(in_frame, extent, light);
+        let lists = self.lists(graph, in_frame, marks, &jobs, samples);
         let found = graph.buffer("fiv.found", bytes);
         let coverage = graph.buffer("fiv.coverage", 4 * samples);
         let texels = graph.import_buffer(&light.texels);
         let normals = graph.buffer_from("fiv.normals", &[[0f32; 3]]);
         for job in &jobs.list {
             let shape = &mut self.shapes[job.shape];
-            let scene = shape.body.scene(occluders);
+            let scene = shape.traced.scene(occluders);
             let rest;
-            let pose = match &shape.body {
-                Body::Still(_) => {
+            let pose = match &shape.traced {
+                TracedScene::Still(_) => {
                     rest = Pose::rest(scene);
                     &rest
                 }
-                Body::Deforming(_) => pose,
+                TracedScene::Deforming(_) => pose,
             };
             let handles = shape.resident.frame_in(graph, scene, pose);
             let rays = shape.rays.frame(graph, &handles);
@@ -275,7 +281,7 @@ impl Online {
         Ok(fivs)
     }
 
-    /// A bit for each sample that is looked up.
+    /// A bit for each sample that a pixel looks up.
     fn marks(&self, graph: &mut Graph, seen: &Seen<'_>, samples: u64, settings: &Settings) -> Buffer {
         let marks = graph.buffer("fiv.marks", samples / 8);
         graph.fill(marks, 0);
@@ -301,22 +307,22 @@ impl Online {
         marks
     }
 
-    /// The work that each geometry can have at most.
-    fn jobs(&self, standing: &Standing, extent: Extent, light: &Light) -> Jobs {
+    /// Upper bound of the work of each geometry.
+    fn jobs(&self, in_frame: &FrameOccluders, extent: Extent, light: &Light) -> Jobs {
         let row = light.size * self.split / 8;
         let all = 6 * row * row;
-        let used = || standing.sets.iter().map(|set| self.shapes[set.shape].tiles);
+        let used = || in_frame.sets.iter().map(|set| self.shapes[set.shape].tiles);
         let tiles = used().min().unwrap_or(1).min(all.into()) as u32;
         let chunks = all.div_ceil(tiles);
         let samples = u64::from(self.blocks() * FIV_BLOCK_SAMPLES);
         let set_of = |first: u32| (first / (self.blocks() * FIV_BLOCK_SAMPLES * FIV_FLOATS)) as usize;
-        let shape_of = |first: u32| standing.sets[set_of(first)].shape;
+        let shape_of = |first: u32| in_frame.sets[set_of(first)].shape;
         let mut occluders = vec![0u64; self.shapes.len()];
-        standing.list.iter().for_each(|occluder| occluders[shape_of(occluder.first)] += 1);
-        // Eight samples for each pixel and occluder.
+        in_frame.list.iter().for_each(|occluder| occluders[shape_of(occluder.first)] += 1);
+        // A lookup reads eight samples for each pixel and occluder.
         let most = |shape: usize, sets: u64| (8 * extent.pixels() * occluders[shape]).min(sets * samples);
         let mut list: Vec<Job> = Vec::new();
-        for (number, set) in standing.sets.iter().enumerate() {
+        for (number, set) in in_frame.sets.iter().enumerate() {
             match list.last_mut() {
                 Some(job) if job.shape == set.shape => job.sets.end += 1,
                 _ => list.push(Job {
@@ -329,7 +335,7 @@ impl Online {
         }
         let largest = list.iter().map(|job| most(job.shape, job.sets.len() as u64)).max().unwrap_or(1);
         let each = (MOST_PARTIALS / (u64::from(chunks) * 40)).clamp(64, MOST_POINTS).min(largest.max(1));
-        // What lies behind the last point of a batch must not be that of another.
+        // Entries after the last point of a batch must not belong to another batch.
         let each = each.next_multiple_of(64);
         let mut batch = 0;
         for job in &mut list {
@@ -341,9 +347,9 @@ impl Online {
     }
 
     /// The marked samples of each geometry in a row, and the workgroups of each batch.
-    fn lists(&self, graph: &mut Graph, standing: &Standing, marks: Buffer, jobs: &Jobs, samples: u64) -> Lists {
+    fn lists(&self, graph: &mut Graph, in_frame: &FrameOccluders, marks: Buffer, jobs: &Jobs, samples: u64) -> Lists {
         let of_set = self.blocks();
-        let blocks = standing.sets.len() as u32 * of_set;
+        let blocks = in_frame.sets.len() as u32 * of_set;
         let counts = graph.buffer("fiv.counts", 4 * u64::from(blocks));
         let starts = graph.buffer("fiv.starts", 4 * u64::from(blocks));
         let groups = graph.buffer("fiv.groups", 24 * u64::from(jobs.batches));
@@ -362,15 +368,15 @@ impl Online {
         graph.compute(args, 64 * list.len() as u32);
 
         let radii = self.grid.radii;
-        // Jobs have all sets, in their order.
+        // The jobs contain all sets in their order.
         let sets_of = |job: &Job| {
             let base = job.first as u32;
             job.sets.clone().map(move |number| types::FivSet { base, radii_at: number as u32 * radii })
         };
         let sets: Vec<types::FivSet> = jobs.list.iter().flat_map(sets_of).collect();
         let spheres = |set: &Set| (0..radii).map(move |r| set.shells.radius(radii, r) as f32).collect::<Vec<f32>>();
-        let distances: Vec<f32> = standing.sets.iter().flat_map(spheres).collect();
-        let turns: Vec<types::FivTurn> = standing.sets.iter().map(turn).collect();
+        let distances: Vec<f32> = in_frame.sets.iter().flat_map(spheres).collect();
+        let turns: Vec<types::FivTurn> = in_frame.sets.iter().map(rotation).collect();
         let lists = Lists {
             points: graph.buffer("fiv.points", 16 * samples),
             samples: graph.buffer("fiv.samples", 4 * samples),
@@ -396,27 +402,28 @@ impl Online {
 #[derive(Debug)]
 struct Jobs {
     list: Vec<Job>,
-    /// Points of a batch at most.
+    /// Most points of a batch.
     each: u64,
-    /// Of an invocation.
+    /// Tiles of an invocation.
     tiles: u32,
-    /// Invocations for a texel's place in a tile.
+    /// Number of invocations that share the tiles of a point.
     chunks: u32,
-    /// In all.
+    /// Number of all batches.
     batches: u32,
 }
 
-/// What one geometry has to do.
+/// The work of one geometry.
 #[derive(Debug)]
 struct Job {
     shape: usize,
     sets: Range<usize>,
-    /// First place in the lists.
+    /// First entry in the lists.
     first: u64,
     batches: Range<u32>,
 }
 
-/// Light that reaches the pixels of the occluders of a geometry past that geometry.
+/// Declares the passes that compute the irradiance at the pixels of the occluders of a geometry, with shadows of this
+/// geometry only.
 fn own(
     graph: &mut Graph,
     seen: &Seen<'_>,
@@ -429,7 +436,7 @@ fn own(
     let count = light.lit.len() as u64;
     let lit = graph.buffer_from("fiv.lit", if count > 0 { &light.lit } else { &[0] });
     let each = (MOST_RAYS / extent.pixels().max(1)).clamp(1, most);
-    // Under a black sky it is known, too.
+    // The shader must run once under a black sky too, so that the irradiance is known to be 0.
     for first in (0..count.max(1)).step_by(each as usize) {
         let args = crate::rays::traced!(
             fiv::online_own::Args {
@@ -458,7 +465,7 @@ fn own(
     }
 }
 
-impl Body {
+impl TracedScene {
     fn scene<'a>(&'a self, occluders: &'a Occluders) -> &'a Scene {
         match self {
             Self::Still(kind) => &occluders.kinds[*kind].scene,
@@ -467,7 +474,7 @@ impl Body {
     }
 }
 
-fn turn(set: &Set) -> types::FivTurn {
+fn rotation(set: &Set) -> types::FivTurn {
     types::FivTurn {
         geometry_from_world: set.geometry_from_world.to_cols_array_2d(),
         centre: set.centre.to_array(),

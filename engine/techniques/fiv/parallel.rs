@@ -1,13 +1,16 @@
-//! Masks of an occluder from many points at once, by pictures of it along the directions of the environment's texels.
+//! Masks of an occluder from many points at once, by orthographic depth images along the directions of the
+//! environment's texels.
 //!
-//! From wherever it is seen, a texel of the environment lies in the same direction: all rays to it are parallel. One picture of the
-//! occluder along that direction, without perspective, which says how far back the occluder reaches on each line, answers all of them: it
-//! hides the texel from a point if it reaches farther back on the point's line than the point. So the cost of a sample falls to a lookup
-//! for each texel, and that of tracing is the same for any number of samples: 6·32² pictures of 128² lines, a hundred million rays;
-//! rays from the points of the set 256×129×30 are two thousand millions.
+//! A texel of the environment lies in the same direction from every point, so all rays to this texel are parallel. One
+//! orthographic depth image of the occluder along this direction answers all these rays. The image stores how far the
+//! occluder extends to the back on each line. The occluder hides the texel from a point if this depth lies behind the
+//! point. A sample then costs one lookup per texel, and the number of rays does not depend on the number of samples:
+//! 6·32² images of 128² lines are a hundred million rays. Rays from the points of the set 256×129×30 are two thousand
+//! million.
 //!
-//! What is given up: lines are looked up at the middles of pixels, a 64th of the radius apart. Edges of masks are off by half of that
-//! at most, in either direction as often; a texel is as wide from a third of the radius away, and wider beyond.
+//! The depth images have a limited resolution: pixels are a 64th of the radius wide, and lookups read the nearest
+//! pixel. Edges of masks are off by at most half a pixel, without bias. From a third of the radius on, a texel is at
+//! least as wide as a pixel.
 
 use super::{cover::reach, light::Light, occluder::Occluder, plan::Plan, settings::Masks};
 use crate::{
@@ -19,14 +22,14 @@ use crate::{
     shaders::{consts::FIV_PARALLEL_SIDE, fiv},
 };
 
-/// Rays of a dispatch, about.
+/// Rays of a dispatch, approximately.
 const MOST_RAYS: u32 = 1 << 22;
 /// Directions that an invocation looks up.
 const EACH: u32 = 512;
-/// Bytes of the pictures of a face.
+/// Most bytes of the depth images of a face.
 const MOST_BYTES: u64 = 1 << 26;
 
-/// The pictures of an occluder.
+/// The depth images of an occluder.
 #[derive(Debug)]
 pub(super) struct Parallel {
     faces: Vec<OwnedBuffer>,
@@ -36,43 +39,43 @@ pub(super) struct Parallel {
     radius: f32,
 }
 
-/// Of the pictures of a face.
+/// Bytes of the depth images of a face.
 fn bytes(size: u32, split: u32) -> u64 {
     u64::from(size * split).pow(2) * u64::from(FIV_PARALLEL_SIDE * FIV_PARALLEL_SIDE) * 2
 }
 
-/// Surfaces let some of the light through, which each ray decides for itself.
+/// Whether some surfaces are blended. Each ray decides anew whether a blended surface blocks light, so depth images
+/// cannot represent them.
 fn blended(occluder: &Occluder) -> bool {
     occluder.scene.materials.iter().any(|m| m.alpha == AlphaMode::Blend)
 }
 
 impl Plan {
-    /// What of these occluders' vectors comes from rays all the same, in words, if masks are to come from pictures.
+    /// Names the vectors that rays compute although `masks` is parallel, in words. `None` if there are none.
     pub fn by_rays(&self, occluders: &[Occluder]) -> Option<String> {
         if self.masks != Masks::Parallel {
             return None;
         }
         if bytes(self.size, self.split) > MOST_BYTES {
-            return Some("by rays after all: pictures are for fiv.size · fiv.split up to 44".into());
+            return Some("rays compute all masks, because depth images need fiv.size · fiv.split up to 44".into());
         }
         let names: Vec<_> = occluders.iter().filter(|o| blended(o)).map(|o| format!("`{}`", o.name)).collect();
         let mut parts = Vec::new();
         if !names.is_empty() {
-            parts.push(format!("what has blended surfaces ({})", names.join(", ")));
+            parts.push(format!("occluders with blended surfaces ({})", names.join(", ")));
         }
         if self.turns > 1 {
-            parts.push("all turns but the first".into());
+            parts.push("all rotation samples but the first".into());
         }
         if self.surface {
             parts.push("samples on surfaces".into());
         }
-        (!parts.is_empty()).then(|| format!("by rays all the same: {}", parts.join("; ")))
+        (!parts.is_empty()).then(|| format!("rays compute the masks of: {}", parts.join("; ")))
     }
 }
 
 impl Parallel {
-    /// Renders the pictures; `None` where they would be too large, or where surfaces let some of the light through, which each ray
-    /// decides for itself.
+    /// Renders the depth images. `None` if they would be too large or if surfaces are blended.
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`.
@@ -109,7 +112,7 @@ impl Parallel {
         Ok(Some(Self { faces, size, split, radius }))
     }
 
-    /// Chunks of directions, each with its own sums.
+    /// Number of chunks of directions, each with its own sums.
     pub(super) fn chunks(&self) -> u32 {
         6 * self.of_face()
     }
@@ -143,7 +146,7 @@ impl Parallel {
         }
     }
 
-    /// The pictures are of this light's texels.
+    /// Whether the depth images belong to the texels of this light.
     pub(super) fn fits(&self, light: &Light, split: u32) -> bool {
         (self.size, self.split) == (light.size, split)
     }

@@ -1,4 +1,4 @@
-//! Everything from a scene on the device to the final picture.
+//! The passes of a frame, from a scene on the device to the final picture.
 
 use std::{collections::HashMap, sync::Arc};
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Extent as Reach, Fiv, Interpolation, Method, Placed, SelfSamples, Settings, Shared, Specular, light, online::Seen,
-    online_standing::Standing, specular::Shadows, spots::Spot, suns, tiles::Tiles,
+    online_occluders::FrameOccluders, specular::Shadows, spots::Spot, suns, tiles::Tiles,
 };
 use crate::{
     Error, Result,
@@ -23,13 +23,13 @@ use crate::{
     shaders::{self, consts::FIV_SPOTS, types},
 };
 
-/// Rays that one dispatch traces at most, about: some milliseconds on a GPU.
+/// Most rays of a dispatch, approximately, so that a dispatch takes some milliseconds on a GPU.
 const MOST_RAYS: u64 = 1 << 22;
-/// Boxes of instances that brute force looks at before it traces a ray; with more, a tree is faster.
+/// Most boxes that brute force tests before a ray is traced. For more boxes the acceleration structure is faster.
 const MOST_BOXES: usize = 8;
-/// Turns of the loop over texels of one invocation.
+/// Most iterations of the loop over texels in one invocation.
 const MOST_TURNS: u64 = 20_000;
-/// No occluder, vector or table.
+/// Marks a missing occluder, vector or table.
 const NONE: u32 = u32::MAX;
 
 /// Settings of all stages.
@@ -53,9 +53,9 @@ impl PictureSettings {
 pub struct Outputs {
     /// Reflected and emitted light with the environment behind, W/(sr·m²).
     pub total: Image,
-    /// Of the visible surfaces, W/m²; 0 on the background.
+    /// Irradiance of the visible surfaces, W/m²; 0 on the background.
     pub irradiance: Image,
-    /// What they reflect glossily, W/(sr·m²), if it was asked for.
+    /// Glossily reflected radiance, W/(sr·m²), if the settings ask for glossy reflection.
     pub specular: Option<Image>,
 }
 
@@ -64,32 +64,35 @@ pub struct Outputs {
 pub struct Picture {
     pub gbuffer: GBuffer,
     pub outputs: Outputs,
-    /// What is approximated in this frame.
+    /// Approximations of this frame.
     pub notes: Vec<Note>,
 }
 
-/// What is known of the pixels of a frame.
+/// Per-pixel inputs of the passes.
 struct Pixels<'a> {
     gbuffer: &'a GBuffer,
     identity: Image,
     occluders: Buffer,
-    /// Bits of tiles, and words of each.
+    /// Bits of the occluders that may affect each tile, and words per tile.
     near: (Buffer, u32),
     irradiance: Image,
 }
 
 impl Fiv {
-    /// Declares a frame: G-buffer, irradiance, reflected light, sky. `handles` are of this graph, for `pose`. The settings that decide
-    /// the vectors are those that [`Fiv::new`] was given. The parts of the method (`trilinear`, `partial`, `cut`, `extent`, `overlap`,
-    /// `shared`, `negligible`, `self_shadow`), the light (`rotation`, `exposure`) and [`Method::Unshadowed`] are chosen by each picture;
-    /// `self_shadow` of stored vectors can only be switched off. Stored vectors are for the environment that [`Fiv::new`] was given. Other methods take that
-    /// of `scene` as it is now, whose pixels they go through to see whether they are others; the sky behind is that of `handles`. A picture
-    /// of another turn than the one before resamples it: pixel by pixel, or, much faster and nearly the same, from means where `turning`
-    /// is not 0.
+    /// Declares a frame: G-buffer, irradiance, reflected light and sky. `handles` belong to this graph and to `pose`.
+    /// The settings that decide the vectors must be those of [`Fiv::new`]. Each picture may choose the parts of the
+    /// method (`trilinear`, `partial`, `cut`, `extent`, `overlap`, `shared`, `negligible`, `self_shadow`), the light
+    /// (`rotation`, `exposure`) and [`Method::Unshadowed`]. With precomputed vectors, pictures can switch `self_shadow`
+    /// off but not on.
+    ///
+    /// Precomputed vectors are valid for the environment that [`Fiv::new`] was given. Other methods use the environment
+    /// that `scene` has now, and they read all its pixels to detect a change. The sky behind the scene is the
+    /// environment of `handles`. If the rotation differs from that of the last picture, the environment is resampled:
+    /// pixel by pixel, or, if `turning` is not 0, from means of pixels, which is much faster and nearly exact.
     ///
     /// # Errors
-    /// `Usage` if a setting is out of its range, or asks for what [`Fiv::new`] was not told of, or if vectors are stored and the
-    /// environment has another size or other pixels (a thousand are looked at).
+    /// `Usage` if a setting is out of its range, if a setting needs data that [`Fiv::new`] did not prepare, or if
+    /// vectors are precomputed and the environment has another size or other pixels (a thousand pixels are compared).
     pub fn picture(
         &mut self,
         graph: &mut Graph,
@@ -99,7 +102,7 @@ impl Fiv {
         view: &View,
         settings: &PictureSettings,
     ) -> Result<Picture> {
-        let settings = &PictureSettings { fiv: self.ready.picture(&settings.fiv)?, ..settings.clone() };
+        let settings = &PictureSettings { fiv: self.prepared.picture(&settings.fiv)?, ..settings.clone() };
         self.follow(scene, &settings.fiv)?;
         let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
         let extent = graph.extent(gbuffer.depth);
@@ -149,7 +152,7 @@ impl Fiv {
         Ok(Picture { gbuffer, outputs, notes })
     }
 
-    /// Irradiance without what occluders hide.
+    /// Irradiance of the environment minus the irradiance that occluders hide ([FIV 12]).
     fn irradiance(
         &mut self,
         graph: &mut Graph,
@@ -162,25 +165,25 @@ impl Fiv {
         let irradiance = graph.image("fiv.irradiance", Format::RGBA32F, extent);
         graph.clear(irradiance, [0.0; 4]);
         let deforming = self.deforming(pose, &handles.moment.instances);
-        let standing = match (settings.method, &self.online) {
-            (Method::Online, Some(online)) => online.standing(scene, pose, &self.occluders),
+        let in_frame = match (settings.method, &self.online) {
+            (Method::Online, Some(online)) => online.in_frame(scene, pose, &self.occluders),
             (Method::Vectors, _) => self.stored(pose, &deforming),
-            _ => Standing::default(),
+            _ => FrameOccluders::default(),
         };
-        let count = standing.list.len() as u32;
+        let count = in_frame.list.len() as u32;
         let stored = graph.import_buffer(&self.fivs);
-        let owners = self.owners((pose, &deforming), &standing.nodes, &handles.moment.instances, settings);
-        let any = !standing.nodes.is_empty();
+        let owners = self.owners((pose, &deforming), &in_frame.nodes, &handles.moment.instances, settings);
+        let any = !in_frame.nodes.is_empty();
         let (identity, own) = identity(graph, handles, view, gbuffer, (&owners, stored, any));
-        let mut list = standing.list.clone();
+        let mut list = in_frame.list.clone();
         if settings.extent == Reach::Sphere {
             list.iter_mut().for_each(|occluder| occluder.reach = NONE);
         }
         let kinds: HashMap<u32, u32> = self.occluders.placed.iter().map(|placed| (placed.node, placed.kind)).collect();
-        for (number, (occluder, node)) in list.iter_mut().zip(&standing.nodes).enumerate() {
+        for (number, (occluder, node)) in list.iter_mut().zip(&in_frame.nodes).enumerate() {
             let fill = kinds.get(node).map_or(1.0, |&kind| self.fill(kind));
-            occluder.body = (fill * standing.fills.get(number).copied().unwrap_or(1.0)).min(1.0);
-            occluder.fill = if settings.shared == Shared::Discs { 1.0 } else { occluder.body };
+            occluder.cut_fill = (fill * in_frame.fills.get(number).copied().unwrap_or(1.0)).min(1.0);
+            occluder.fill = if settings.shared == Shared::Discs { 1.0 } else { occluder.cut_fill };
         }
         list.resize(list.len().max(1), types::FivOccluder::default());
         let occluders = graph.buffer_from("fiv.occluders", &list);
@@ -191,7 +194,7 @@ impl Fiv {
         let fivs = match &mut self.online {
             Some(online) if count > 0 => {
                 let seen = Seen { gbuffer, identity, occluders, own, near: (tiles.near, tiles.words) };
-                online.vectors(graph, (&self.occluders, pose), &standing, &self.light, &seen, settings)?
+                online.vectors(graph, (&self.occluders, pose), &in_frame, &self.light, &seen, settings)?
             }
             _ => stored,
         };
@@ -209,14 +212,14 @@ impl Fiv {
         let mut spots: Vec<_> = self.light.spots.iter().map(Spot::packed).collect();
         spots.resize(FIV_SPOTS as usize, types::FivSpot::default());
         let spots = graph.buffer_from("fiv.spots", &spots);
-        // Only where there are several calls.
+        // Only several calls need to pass these sums on.
         let kept = if shared && tiles.each < count { extent.pixels() * 12 * u64::from(FIV_SPOTS) } else { 4 };
         let taken = graph.buffer("fiv.taken", kept);
         graph.fill(taken, 0);
         let difmap = graph.import_image(&self.light.difmap);
         let mut reaches = graph.import_buffer(&self.reaches);
-        if !standing.reaches.is_empty() {
-            let moved = graph.buffer_from("fiv.reaches.moved", &standing.reaches);
+        if !in_frame.reaches.is_empty() {
+            let moved = graph.buffer_from("fiv.reaches.moved", &in_frame.reaches);
             let all = graph.buffer("fiv.reaches.all", reaches.size + moved.size);
             graph.copy_buffer(reaches, all.range(0..reaches.size));
             graph.copy_buffer(moved, all.range(reaches.size..all.size));
@@ -262,28 +265,28 @@ impl Fiv {
             graph.compute(args, extent);
         }
         let pixels = Pixels { gbuffer, identity, occluders, near: (tiles.near, tiles.words), irradiance };
-        self.suns(graph, &standing, &pixels, settings.self_shadow);
+        self.suns(graph, &in_frame, &pixels, settings.self_shadow);
         Ok((irradiance, Shadows { identity, occluders, fivs, near: (tiles.near, tiles.words), count }))
     }
 
-    /// Adds the light of texels that are kept apart.
-    fn suns(&self, graph: &mut Graph, standing: &Standing, pixels: &Pixels<'_>, own: bool) {
+    /// Adds the light of separated texels.
+    fn suns(&self, graph: &mut Graph, in_frame: &FrameOccluders, pixels: &Pixels<'_>, own: bool) {
         let count = self.light.suns.len() as u32;
         if count == 0 {
             return;
         }
-        // Lights are kept apart for stored vectors alone, which all occluders have, in their order.
+        // Texels are separated only for precomputed vectors, for which all occluders are in the list in their order.
         let shade = |(placed, occluder): (&Placed, &types::FivOccluder)| {
-            let own = own && occluder.stands != 0 && occluder.turned == 0;
+            let own = own && occluder.self_shadows != 0 && occluder.turned == 0;
             types::FivShade { map: placed.kind * count * suns::FLOATS, own: own.into() }
         };
-        let mut shades: Vec<_> = self.occluders.placed.iter().zip(&standing.list).map(shade).collect();
+        let mut shades: Vec<_> = self.occluders.placed.iter().zip(&in_frame.list).map(shade).collect();
         shades.resize(shades.len().max(1), types::FivShade::default());
         let shades = graph.buffer_from("fiv.shades", &shades);
         let suns = graph.buffer_from("fiv.sunlight", &self.light.suns);
         let depths = graph.import_buffer(&self.maps);
         let Pixels { gbuffer, identity, occluders, near: (near, words), irradiance } = *pixels;
-        // One after the other: each may go through all occluders.
+        // One dispatch per texel, because each may loop over all occluders.
         for sun in 0..count {
             let args = shaders::fiv::suns::Args {
                 view: gbuffer.view,
@@ -302,7 +305,7 @@ impl Fiv {
         }
     }
 
-    /// Irradiance by a shadow ray to every texel that is not black.
+    /// Irradiance by one shadow ray to every texel that is not black ([FIV 6] with visibility).
     fn truth(&mut self, graph: &mut Graph, handles: &Handles, gbuffer: &GBuffer) -> Image {
         let extent = graph.extent(gbuffer.depth);
         let irradiance = graph.image("fiv.truth", Format::RGBA32F, extent);
@@ -337,20 +340,20 @@ impl Fiv {
     }
 }
 
-/// Corners of boxes around all that stops light; none if there are too many.
+/// Corners of boxes around all instances that block light. Empty if there are too many.
 fn boxes(handles: &Handles) -> Vec<[f32; 3]> {
     let casting = || handles.moment.instances.iter().filter(|instance| instance.casts);
     if casting().count() > MOST_BOXES {
         return Vec::new();
     }
     let all = handles.bounds();
-    // Rounding must not lose what touches a side.
+    // Rounding must not lose a surface that touches a side of the box.
     let grown = 1e-6 * all.max.abs().max(all.min.abs()).max_element();
     casting().flat_map(|i| [(i.bounds.min - grown).to_array(), (i.bounds.max + grown).to_array()]).collect()
 }
 
-/// Which occluder each pixel shows (plus one; 0: none), with its linear depth; and the irradiance that this one leaves itself.
-/// `any`: there are occluders.
+/// Draws the number of the visible occluder plus one (0: none) with its linear depth, and the irradiance that reaches
+/// the pixel past its own occluder. `any`: there are occluders.
 fn identity(
     graph: &mut Graph,
     handles: &Handles,

@@ -1,4 +1,4 @@
-//! All samples of all occluders in one row, so that any part of it can be computed anywhere and at any time.
+//! The list of all samples of all occluders. Any part of the list can be computed anywhere and at any time.
 
 use std::ops::Range;
 
@@ -10,75 +10,75 @@ use super::{
     cover::Cover,
     light::Light,
     occluder::Occluder,
-    pace::{self, Paces},
+    occluder_rotation::{self, Axis},
     samples::{Grid, Shells},
     settings::{Interpolation, Masks, SelfSamples},
+    spacing::{self, Spacing},
     surface::{Own, Place},
-    turn::{self, Axis},
 };
 use crate::{Result, gpu::Gpu, graph::Runner, shaders::consts::FIV_FLOATS};
 
-/// Points of one run of the device: the finest grain of progress.
+/// Points of one run of the device, which is also the finest step of progress.
 const BATCH: u32 = 4096;
 
-/// What is known of an occluder's vectors without the vectors.
+/// Description of the vectors of one kind of occluder, without the vectors.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Kind {
     pub name: String,
-    /// Of the geometry, in hexadecimal digits.
+    /// Hash of the geometry, in hexadecimal digits.
     pub hash: String,
-    /// Of the bounding sphere, metres.
+    /// Radius of the bounding sphere, metres.
     pub radius: f32,
     #[serde(flatten)]
     pub shells: Shells,
     pub triangles: u64,
-    /// Samples on its surface.
+    /// Number of samples on the surface.
     pub surface: u32,
-    /// How its samples lie.
-    #[serde(default)]
-    pub paces: Paces,
+    /// Spacing of the samples around the occluder.
+    #[serde(default, rename = "paces")]
+    pub spacing: Spacing,
 }
 
 impl Kind {
-    /// Place of the occluder's centre seen from the receiver, metres.
+    /// Offset of the occluder's centre from the receiver, metres.
     pub fn offset(&self, grid: &Grid, index: u32) -> DVec3 {
-        self.paces.offset(grid, &self.shells, index)
+        self.spacing.offset(grid, &self.shells, index)
     }
 }
 
-/// What is to be computed. Everything that decides the numbers is in it.
+/// Everything that decides the values of the vectors.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// Name of the environment.
     pub environment: String,
-    /// Of its texels, in hexadecimal digits.
+    /// Hash of the environment's texels, in hexadecimal digits.
     pub environment_hash: String,
-    /// Texels along an edge of it.
+    /// Texels along an edge of the environment's cube map.
     pub size: u32,
     /// Rays along the edge of a texel.
     pub split: u32,
     /// How masks are made.
     #[serde(default)]
     pub masks: Masks,
-    /// Radius of the last spheres, in radii of the bounding spheres.
+    /// Radius of the last sphere of samples, in radii of the bounding sphere.
     pub reach: f32,
     #[serde(flatten)]
     pub grid: Grid,
-    /// Samples on surfaces follow those around.
+    /// Whether there are samples on surfaces. They follow the samples around each occluder.
     pub surface: bool,
-    /// Samples of turns; all others are there for each.
+    /// Rotation samples. Each of them has all other samples.
     pub turns: u32,
-    /// Bright texels that are kept apart, at most.
+    /// Most separated texels.
     #[serde(default)]
     pub suns: u32,
-    /// What occluders turn about.
+    /// Axis of the rotation samples.
     #[serde(default)]
     pub turn_axis: Axis,
     pub occluders: Vec<Kind>,
 }
 
 impl Plan {
-    /// For these occluders under this environment.
+    /// The plan for these occluders under an environment with this name and hash.
     pub fn new(environment: &str, hash: u64, occluders: &[Occluder], settings: &Settings) -> Self {
         let surface = settings.self_shadow && settings.on_surface();
         let kind = |o: &Occluder| Kind {
@@ -88,7 +88,7 @@ impl Plan {
             shells: o.shells(settings.reach),
             triangles: o.triangles as u64,
             surface: if surface { o.own.iter().map(Own::count).sum() } else { 0 },
-            paces: Paces::default(),
+            spacing: Spacing::default(),
         };
         Self {
             environment: environment.to_owned(),
@@ -106,7 +106,8 @@ impl Plan {
         }
     }
 
-    /// Looks at the occluders that `which` says, in the order of the plan, and chooses how their samples lie, if the settings ask for it.
+    /// Computes the spacing of the samples of the occluders that `which` selects by their number in the plan, if the
+    /// settings ask for adaptive spacing.
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`; `Runtime` if an occluder is larger than the device's limits.
@@ -127,13 +128,13 @@ impl Plan {
             if which(number) {
                 let mut cover = Cover::new(gpu, occluder)?;
                 let place = (&self.grid, &kind.shells);
-                kind.paces = pace::choose(&mut cover, &mut runner, light, place, (kind.radius, scaled))?;
+                kind.spacing = spacing::choose(&mut cover, &mut runner, light, place, (kind.radius, scaled))?;
             }
         }
         Ok(())
     }
 
-    /// These settings with what of them decides these numbers.
+    /// The settings `over` with the values of this plan in all keys that decide the vectors.
     pub fn settings(&self, over: &Settings) -> Settings {
         let Grid { azimuths, polars, radii } = self.grid;
         let (size, split, masks, reach) = (self.size, self.split, self.masks, self.reach);
@@ -141,21 +142,21 @@ impl Plan {
         let self_samples = match (self.surface, over.self_shadow) {
             (true, _) => SelfSamples::Surface,
             (false, true) => SelfSamples::Spheres,
-            // It decides nothing.
+            // Without shadows of occluders on themselves this key has no effect.
             (false, false) => over.self_samples,
         };
-        // Without an occluder nothing is decided.
+        // A plan without occluders has no spacing.
         let adaptive = match self.occluders.is_empty() {
             true => over.adaptive,
-            false => self.occluders.iter().any(|kind| kind.paces != Paces::default()),
+            false => self.occluders.iter().any(|kind| kind.spacing != Spacing::default()),
         };
         let out = Settings { size, split, masks, reach, azimuths, polars, radii, ..over.clone() };
         Settings { turns, turn_axis, suns, self_samples, adaptive, ..out }
     }
 
-    /// How another plan differs in what decides the numbers, in words; `None`: it does not.
+    /// The difference of another plan that changes the vectors, in words. `None` if there is none.
     pub fn difference(&self, other: &Self) -> Option<String> {
-        // One turn is about nothing.
+        // A single rotation sample has no axis.
         let axis = |of: &Self| Some(of.turn_axis).filter(|_| of.turns > 1);
         let plain = |of: &Self| (of.size, of.split, of.grid, of.turns, of.suns, axis(of));
         if plain(self) != plain(other) {
@@ -163,7 +164,7 @@ impl Plan {
                 let about = axis(of).map_or(String::new(), |axis| format!(" about {axis}"));
                 let Self { grid, turns, size, split, suns, .. } = of;
                 format!(
-                    "{grid} samples, {turns} turns{about}, {size} texels, {split} rays along one, {suns} lights apart"
+                    "{grid} samples, {turns} turns{about}, {size} texels to a side, {split} rays along a texel, {suns} separated texels"
                 )
             };
             return Some(format!("{} instead of {}", say(other), say(self)));
@@ -183,34 +184,37 @@ impl Plan {
             return Some(format!("{} instead of {}", say(other), say(self)));
         }
         let same = |(a, b): &(&Kind, &Kind)| {
-            (&a.hash, &a.shells, a.surface, &a.paces) == (&b.hash, &b.shells, b.surface, &b.paces)
+            (&a.hash, &a.shells, a.surface, &a.spacing) == (&b.hash, &b.shells, b.surface, &b.spacing)
         };
         let (a, b) = self.occluders.iter().zip(&other.occluders).find(|pair| !same(pair))?;
         let say = |k: &Kind| {
             let Kind { name, hash, shells, surface, .. } = k;
-            format!("occluder `{name}` ({hash}, {} m to {} m, {surface} places on it)", shells.nearest, shells.farthest)
+            format!(
+                "occluder `{name}` ({hash}, {} m to {} m, {surface} samples on its surface)",
+                shells.nearest, shells.farthest
+            )
         };
         if say(a) == say(b) {
-            let what = "the samples around occluder";
             return Some(format!(
-                "{what} `{}` lie otherwise (fiv.adaptive, fiv.interpolation, or another device)",
+                "the samples around occluder `{}` have another spacing (fiv.adaptive, fiv.interpolation, or another device)",
                 a.name
             ));
         }
         Some(format!("{} instead of {}", say(b), say(a)))
     }
 
-    /// Samples of all occluders.
+    /// Number of samples of all occluders.
     pub fn samples(&self) -> u64 {
         self.first(self.occluders.len())
     }
 
-    /// The first sample of an occluder. For each of its turns come first those around it, then those on its surface.
+    /// The first sample of an occluder. Each of its rotation samples has first the samples around the occluder, then
+    /// the samples on its surface.
     pub fn first(&self, occluder: usize) -> u64 {
         self.occluders.iter().take(occluder).map(|kind| self.of_turn(kind) * u64::from(self.turns)).sum()
     }
 
-    /// [`Self::first`] of all occluders, and behind them [`Self::samples`].
+    /// [`Self::first`] of all occluders, followed by [`Self::samples`].
     pub(super) fn firsts(&self) -> Vec<u64> {
         let mut at = 0;
         let next = |kind: &Kind| {
@@ -220,19 +224,20 @@ impl Plan {
         std::iter::once(0).chain(self.occluders.iter().map(next)).collect()
     }
 
-    /// Samples of one turn of an occluder.
+    /// Number of samples of one rotation sample of an occluder.
     pub fn of_turn(&self, kind: &Kind) -> u64 {
         u64::from(self.grid.count()) + u64::from(kind.surface)
     }
 
-    /// The samples of part `index` of `count` even parts.
+    /// The samples of part `index` of `count` equal parts.
     pub fn part(&self, index: u64, count: u64) -> Range<u64> {
         let at = |i: u64| (u128::from(self.samples()) * u128::from(i) / u128::from(count.max(1))) as u64;
         at(index)..at(index + 1)
     }
 
-    /// Computes the vectors of some samples, nine floats each. Each sample's numbers are the same whichever others are computed with it.
-    /// After every few thousand `done` hears how far it is and gets what is new; it says whether to go on.
+    /// Computes the vectors of a range of samples, nine floats each. The values of a sample do not depend on the range.
+    /// After every few thousand samples `done` receives the number of the next sample and the new vectors. It returns
+    /// whether to go on.
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`; `Runtime` if an occluder is larger than the device's limits; whatever `done` fails with.
@@ -262,12 +267,12 @@ impl Plan {
                 let begin = first + turn * of_turn;
                 let border = begin + u64::from(self.grid.count());
                 let end = last.min(at + u64::from(BATCH)).min(if at < border { border } else { begin + of_turn });
-                let matrix = turn::matrix(turn as u32, self.turns, self.turn_axis).as_mat3();
+                let matrix = occluder_rotation::matrix(turn as u32, self.turns, self.turn_axis).as_mat3();
                 cover.turn(matrix);
                 let fivs = if at < border {
                     let point = |sample: u64| {
                         let number = (sample - begin) as u32;
-                        if kind.paces == Paces::default() {
+                        if kind.spacing == Spacing::default() {
                             -kind.shells.point(&self.grid, number)
                         } else {
                             -kind.offset(&self.grid, number).as_vec3()
@@ -292,7 +297,7 @@ impl Plan {
     }
 }
 
-/// Vectors of what is hidden from `points`; neighbours in one place (all azimuths at the poles) are computed once.
+/// Vectors of the occluder for `points`. Equal neighbours (all azimuths at the poles) are computed once.
 fn around(cover: &mut Cover, runner: &mut Runner, light: &Light, points: &[Vec3], split: u32) -> Result<Vec<f32>> {
     let mut unique = points.to_vec();
     unique.dedup();
@@ -319,7 +324,7 @@ mod tests {
             shells: Shells { nearest: 1.0, farthest: 2.0 },
             triangles: 1,
             surface: 100,
-            paces: Paces::default(),
+            spacing: Spacing::default(),
         };
         let settings = Settings::default();
         let plan = Plan { occluders: vec![kind; 3], ..Plan::new("sky", 1, &[], &settings) };

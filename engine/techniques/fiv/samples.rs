@@ -1,7 +1,9 @@
-//! Where an occluder is put to compute vectors: concentric spheres around the receiver (Michael 2010, section 3.3.2).
+//! Positions of an occluder for which vectors are computed: concentric spheres around the receiver (Michael 2010,
+//! section 3.3.2).
 //!
-//! The thesis writes sizes as (ϑ, φ, ϱ) = 128×65×30; the first number is that of the angle that goes around, the second, odd one that of
-//! the angle from pole to pole, with a sample at both. Our azimuth goes around +Y (0 over −Z, towards +X), the polar angle is that to +Y.
+//! The thesis writes sizes as (ϑ, φ, ϱ) = 128×65×30. The first number counts azimuths. The second, odd number counts
+//! polar angles and includes both poles. The azimuth here goes around +Y (0 over −Z, towards +X), and the polar angle
+//! is the angle to +Y.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,19 +13,19 @@ use serde::{Deserialize, Serialize};
 use super::super::allowed::within;
 use crate::Result;
 
-/// How many samples there are.
+/// Numbers of samples along the three coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Grid {
-    /// Around, without the one at 2π, which is the one at 0.
+    /// Azimuths, without the one at 2π, which equals the one at 0.
     pub azimuths: u32,
-    /// From +Y to −Y, both included.
+    /// Polar angles from +Y to −Y, both included.
     pub polars: u32,
     /// Spheres.
     pub radii: u32,
 }
 
 impl Grid {
-    /// The sets of the thesis' table 2, the smallest first.
+    /// The sets of samples of the thesis' table 2, the smallest first.
     pub const THESIS: [Self; 5] = [
         Self::of(32, 17, 15),
         Self::of(64, 33, 15),
@@ -32,28 +34,28 @@ impl Grid {
         Self::of(256, 129, 30),
     ];
 
-    /// As the thesis writes it.
+    /// A grid in the order in which the thesis writes the numbers.
     pub const fn of(azimuths: u32, polars: u32, radii: u32) -> Self {
         Self { azimuths, polars, radii }
     }
 
-    /// Samples in all.
+    /// Number of samples.
     pub fn count(&self) -> u32 {
         self.azimuths * self.polars * self.radii
     }
 
-    /// Number of a sample: those around lie next to each other, then from pole to pole, then outwards.
+    /// Number of a sample. The azimuth changes fastest, then the polar angle, then the radius.
     pub fn index(&self, azimuth: u32, polar: u32, radius: u32) -> u32 {
         (radius * self.polars + polar) * self.azimuths + azimuth
     }
 
-    /// Azimuth, polar angle and radius of a sample, as numbers.
+    /// Numbers of the azimuth, the polar angle and the radius of a sample.
     pub fn place(&self, index: u32) -> [u32; 3] {
         let ring = index / self.azimuths;
         [index % self.azimuths, ring % self.polars, ring / self.polars]
     }
 
-    /// Unit vector from the receiver to the occluder. At the poles the same for all azimuths.
+    /// Unit vector from the receiver to the occluder. At the poles all azimuths have the same direction.
     pub fn direction(&self, azimuth: u32, polar: u32) -> DVec3 {
         if polar == 0 || polar + 1 >= self.polars {
             return if polar == 0 { DVec3::Y } else { DVec3::NEG_Y };
@@ -76,12 +78,12 @@ impl std::fmt::Display for Grid {
     }
 }
 
-/// Radii of the spheres: each is larger than the one before by the same factor.
+/// Radii of the spheres, which grow by a constant factor.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Shells {
-    /// Of the first one, metres.
+    /// Radius of the first sphere, metres.
     pub nearest: f32,
-    /// Of the last one, metres.
+    /// Radius of the last sphere, metres.
     pub farthest: f32,
 }
 
@@ -98,18 +100,18 @@ impl Shells {
         }
     }
 
-    /// Spheres for each factor of e.
+    /// Number of spheres per factor e of the radius.
     pub fn steps(&self, count: u32) -> f64 {
         f64::from(count - 1) / (f64::from(self.farthest) / f64::from(self.nearest)).ln()
     }
 
-    /// As [`Self::offset`], rounded as the device does it.
+    /// As [`Self::offset`], rounded as on the device.
     pub fn point(&self, grid: &Grid, index: u32) -> Vec3 {
         let [azimuth, polar, sphere] = grid.place(index);
         grid.direction(azimuth, polar).as_vec3() * self.radius(grid.radii, sphere) as f32
     }
 
-    /// Place of the occluder's centre seen from the receiver, metres.
+    /// Offset of the occluder's centre from the receiver, metres.
     pub fn offset(&self, grid: &Grid, index: u32) -> DVec3 {
         let [azimuth, polar, sphere] = grid.place(index);
         grid.direction(azimuth, polar) * self.radius(grid.radii, sphere)

@@ -1,170 +1,210 @@
-//! What can be chosen, and what the thesis chose.
+//! Settings of the technique, with the choices of the thesis.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    super::allowed::{within, wrong},
-    samples::Grid,
-    sky::SIDES,
-    suns,
-    turn::Axis,
+use super::{super::allowed::wrong, occluder_rotation::Axis, samples::Grid, suns};
+use crate::{
+    Error, Result,
+    settings::{Described, described},
 };
-use crate::{Error, Result};
 
-/// How irradiance is found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// How the irradiance of a pixel is computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// From stored vectors.
+    /// From vectors that were computed before the first frame.
     #[default]
     Vectors,
-    /// From vectors computed in each frame where pixels look them up: occluders may turn and deform, the environment may turn.
+    /// From vectors that each frame computes for the samples that its pixels look up. Occluders may rotate and deform,
+    /// and the environment may rotate.
     Online,
-    /// Without occluders.
+    /// The irradiance of the environment without occluders.
     Unshadowed,
-    /// By a shadow ray to every texel of the environment: slow, and what the others are measured against.
+    /// One shadow ray to every texel of the environment. This slow method is the reference for the other methods.
     BruteForce,
 }
 
-/// By what it is told how much of an occluder lies in front of a receiver's plane.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// How the share of an occluder in front of a receiver's plane is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Extent {
-    /// By how far its corners reach along the normal.
+    /// By the extent of its vertices along the normal.
     #[default]
     Hull,
     /// By its bounding sphere, as in the thesis.
     Sphere,
 }
 
-/// What an occluder that the receiver's plane cuts hides.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// How the irradiance is computed that an occluder hides if the receiver's plane cuts it (case B of the thesis).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Cut {
-    /// Its vector along the normal, and what its part behind the plane hides of the light from behind, which the vector has
-    /// subtracted: nothing where no light comes from there.
+    /// normal · FIV plus the irradiance from behind the plane that the part behind the plane hides, because the dot
+    /// product contains that irradiance with a negative sign.
     #[default]
     Light,
-    /// Of its vector the share of its height in front, as in the thesis.
+    /// normal · FIV times the share of the occluder's height in front of the plane, as in the thesis.
     Height,
 }
 
-/// Where the vectors for an occluder's shadow on itself are taken.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Where the samples for an occluder's shadow on itself lie.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SelfSamples {
-    /// On its surface: at the corners of its triangles.
+    /// On its surface, at the vertices of its triangles.
     #[default]
     Surface,
-    /// On the spheres of all other shadows, as in the thesis.
+    /// On the spheres that also hold the samples of all other shadows, as in the thesis.
     Spheres,
 }
 
-/// How it is found what an occluder hides from a sample.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// How the mask of an occluder is computed for a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Masks {
-    /// By rays from the sample.
+    /// By one ray (or `split`² rays) from the sample to each texel.
     #[default]
     Rays,
-    /// From pictures of the occluder along the directions of the rays: the cost of tracing is the same for any number of samples, edges of
-    /// masks are off by up to a 128th of the radius. Rays, where `size` · `split` is more than 44 or surfaces are blended.
+    /// By lookups in orthographic depth images of the occluder, one image per ray direction. The number of rays does
+    /// not depend on the number of samples. The edges of masks are off by up to a 128th of the radius. Rays are used
+    /// instead if `size` · `split` is more than 44 or if surfaces are blended.
     Parallel,
 }
 
-/// What several occluders hide together.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// How the irradiance that several occluders hide together is corrected.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Shared {
-    /// As `Filled`; and of each bright part of the environment no more than it sends.
+    /// As `Filled`. In addition, no more light is subtracted from a bright part of the environment than this part
+    /// sends.
     #[default]
     Lights,
-    /// What their bounding discs have in common, by how much each of them is filled on average.
+    /// By the common area of their bounding discs, weighted by the mean share of each disc that the occluder fills.
     Filled,
-    /// What their bounding discs have in common, as in the thesis: too much for bodies that are no balls.
+    /// By the common area of their bounding discs, as in the thesis. This area is too large for occluders that are not
+    /// balls.
     Discs,
 }
 
-/// What is interpolated between two spheres of samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// The quantity that is interpolated between two spheres of samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Interpolation {
-    /// Vectors, as in the thesis.
+    /// The vectors, as in the thesis.
     #[default]
     Linear,
-    /// Vectors over the solid angle of the occluder's bounding sphere, nearly. Exact far away; near an occluder a small light may be
-    /// taken away more than once.
+    /// The vectors divided by the solid angle of the bounding sphere, approximately. The result is exact for a distant
+    /// occluder. Near an occluder the irradiance of a small light may be subtracted more than once.
     SolidAngle,
 }
 
-/// What surfaces reflect glossily.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Glossy reflection of surfaces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Specular {
-    /// Nothing: they are matt.
+    /// All surfaces are diffuse.
     #[default]
     Off,
-    /// The environment, a sum over its texels, by the share that occluders leave of its cells.
+    /// Surfaces reflect the environment: a sum over its texels, scaled by the share of each cell of texels that
+    /// occluders leave visible.
     Summed,
 }
 
 /// Settings of the technique.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    /// Texels along an edge of the environment's cube: multiples of 8, 8 to 128.
+    /// Texels along an edge of the environment's cube.
+    #[schemars(range(min = 8, max = 128), extend("multipleOf" = 8, "x-unit" = "texels", "x-decides" = "bake"))]
     pub size: u32,
-    /// Samples around, 3 to 1024.
+    /// Samples along the azimuth.
+    #[schemars(range(min = 3, max = 1024), extend("x-decides" = "bake", "x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub azimuths: u32,
-    /// Samples from pole to pole, 2 to 513.
+    /// Samples along the polar angle, with both poles.
+    #[schemars(range(min = 2, max = 513), extend("x-decides" = "bake", "x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub polars: u32,
-    /// Spheres of samples, 2 to 128.
+    /// Spheres of samples.
+    #[schemars(range(min = 2, max = 128), extend("x-decides" = "bake", "x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub radii: u32,
-    /// Samples of turns about an axis, 1 to 64, for occluders that turn so; 1: those at rest only.
+    /// Rotation samples about `turn_axis` for occluders that rotate. With 1 there are vectors for the pose at
+    /// rest only.
+    #[schemars(range(min = 1, max = 64), extend("x-decides" = "bake", "x-needs" = {"method": {"const": "vectors"}}))]
     pub turns: u32,
-    /// What they turn about, in world axes through their nodes' origins: `x`, `y`, `z`, or three numbers with commas between them.
+    /// Axis of the rotation samples, in world axes through the origins of the nodes: `x`, `y`, `z`, or three numbers
+    /// with commas between them.
+    #[schemars(extend("x-decides" = "bake", "x-needs" = {"turns": {"minimum": 2}}), with = "String")]
     pub turn_axis: Axis,
-    /// The brightest texels of the environment are kept out of the vectors, so many at most, 0 to 16, of those of which each sends at least
-    /// a hundredth of all light: their shadows have hard edges, from a map of each occluder for each. Not for occluders that turn, and
-    /// only where vectors are computed beforehand.
+    /// Most texels of the environment that are separated from the vectors. Only texels that send at least a
+    /// hundredth of all light each are separated, the brightest first. Their shadows have hard edges, from one shadow
+    /// map per texel and occluder. This setting needs `method` vectors and occluders that do not rotate.
+    #[schemars(range(min = 0, max = suns::MOST), extend("x-unit" = "texels", "x-decides" = "bake", "x-needs" = {"method": {"const": "vectors"}}))]
     pub suns: u32,
-    /// Radius of the last sphere, in radii of the occluder's bounding sphere, 2 to 1000. Farther away what is hidden shrinks with the
-    /// solid angle.
+    /// Radius of the last sphere of samples, in radii of the occluder's bounding sphere. At greater
+    /// distances the vectors of the last sphere are scaled by the solid angle of the occluder.
+    #[schemars(range(min = 2, max = 1000), extend("x-unit" = "radii", "x-decides" = "bake", "x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub reach: f32,
-    /// Samples lie closer to each other where what is hidden bends; without, directions lie evenly and radii grow by a constant factor, as
-    /// in the thesis.
+    /// Samples are denser where the vectors have a high curvature. Without this setting directions are evenly spaced
+    /// and radii grow by a constant factor, as in the thesis.
+    #[schemars(extend("x-decides" = "bake", "x-needs" = {"method": {"const": "vectors"}}))]
     pub adaptive: bool,
-    /// Rays along the edge of a texel of an occluder's mask, 1 to 4.
+    /// Rays along the edge of a texel of an occluder's mask.
+    #[schemars(range(min = 1, max = 4), extend("x-unit" = "rays", "x-decides" = "bake", "x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub split: u32,
+    /// How the mask of an occluder is found, which says what the occluder hides from a sample.
+    #[schemars(extend("x-decides" = "bake", "x-needs" = {"method": {"const": "vectors"}}))]
     pub masks: Masks,
-    /// Flat occluders cast shadows too.
+    /// Flat meshes cast shadows too.
+    #[schemars(extend("x-decides" = "bake", "x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub flat: bool,
-    /// Where there are several occluders, those of more than this share of the scene's radius only receive shadows, 0 to 1. One that holds
-    /// all others has 0.58.
+    /// If a scene has several occluders, those with a radius of more than this share of the scene's radius only receive
+    /// shadows. An occluder that encloses the whole scene has the share 0.58.
+    #[schemars(range(min = 0, max = 1), extend("x-decides" = "bake", "x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub largest: f32,
-    /// Vectors are interpolated between samples; without, the nearest is taken.
+    /// Vectors are interpolated between the eight nearest samples. Without this setting the nearest sample is used.
+    #[schemars(extend("x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub trilinear: bool,
+    /// The quantity that is interpolated between two spheres of samples.
+    #[schemars(extend("x-decides" = "bake", "x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub interpolation: Interpolation,
-    /// Occluders cut by the receiver's plane are corrected for what lies behind it.
+    /// The irradiance that an occluder hides is corrected if the receiver's plane cuts the occluder.
+    #[schemars(extend("x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub partial: bool,
+    /// Irradiance that an occluder hides if the receiver's plane cuts it.
+    #[schemars(extend("x-needs" = {"partial": {"const": true}}))]
     pub cut: Cut,
+    /// How much of an occluder lies in front of a receiver's plane.
+    #[schemars(extend("x-needs" = {"partial": {"const": true}}))]
     pub extent: Extent,
-    /// What several occluders hide is taken away once.
+    /// The irradiance that several occluders hide together is subtracted once.
+    #[schemars(extend("x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub overlap: bool,
-    /// Occluders are left out where they cannot hide more than this share of the environment's mean irradiance, 0 to 1; 0: nowhere.
+    /// Occluders that cannot hide more than this share of the environment's mean irradiance are left out. With
+    /// 0 no occluder is left out.
+    #[schemars(range(min = 0, max = 1), extend("x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub negligible: f32,
+    /// Irradiance that several occluders hide together.
+    #[schemars(extend("x-needs" = {"overlap": {"const": true}}))]
     pub shared: Shared,
     /// Occluders shadow themselves.
+    #[schemars(extend("x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub self_shadow: bool,
+    /// Where the vectors for an occluder's shadow on itself are taken.
+    #[schemars(extend("x-decides" = "bake", "x-needs" = {"self_shadow": {"const": true}}))]
     pub self_samples: SelfSamples,
+    /// Glossy reflection of the environment.
     pub specular: Specular,
+    /// How irradiance is computed.
     pub method: Method,
-    /// The environment turns by this angle about +Y, degrees counter-clockwise seen from above, -36000 to 36000.
+    /// Rotation of the environment about +Y, counter-clockwise seen from above.
+    #[schemars(range(min = -36000, max = 36000), extend("x-unit" = "°"))]
     pub rotation: f32,
-    /// And by so much more each second of a sequence, degrees, -36000 to 36000. Where it is not 0 the light of other turns than the
-    /// scene's comes from means of pixels, which takes less time and is off by some thousandths.
+    /// Additional rotation of the environment of the environment per second of a sequence. If the value is not
+    /// 0, rotated environments are resampled from means of pixels, which is faster and has errors of some thousandths.
+    #[schemars(range(min = -36000, max = 36000), extend("x-unit" = "°/s"))]
     pub turning: f32,
-    /// Factor on the environment's light as a power of two, -30 to 30.
+    /// Scale of the environment's radiance as a power of two.
+    #[schemars(range(min = -30, max = 30), extend("x-unit" = "stops"))]
     pub exposure: f32,
 }
 
@@ -205,29 +245,29 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Where samples are taken.
+    /// The numbers of samples along the three coordinates.
     pub fn grid(&self) -> Grid {
         Grid { azimuths: self.azimuths, polars: self.polars, radii: self.radii }
     }
 
-    /// Turn (radians about +Y) and factor that the environment gets.
+    /// Rotation (radians about +Y) and scale of the environment.
     pub fn light(&self) -> (f32, f32) {
         ((self.rotation % 360.0).to_radians(), self.exposure.exp2())
     }
 
-    /// Texels of the environment that are kept apart at most.
+    /// Most texels that are separated from the vectors.
     pub(super) fn apart(&self) -> u32 {
         if self.method == Method::Vectors { self.suns } else { 0 }
     }
 
-    /// As they are `seconds` into a sequence.
+    /// The settings with the rotation of the environment at a time of a sequence, seconds.
     #[must_use]
     pub fn after(&self, seconds: f64) -> Self {
         let rotation = f64::from(self.rotation) + f64::from(self.turning) * seconds;
         Self { rotation: (rotation % 360.0) as f32, ..self.clone() }
     }
 
-    /// How shaders know what is done with occluders that are cut.
+    /// The value of the shader constant `PARTIAL`: 0 no correction, 1 [`Cut::Height`], 2 [`Cut::Light`].
     pub(super) fn partial_way(&self) -> u32 {
         match (self.partial, self.cut) {
             (false, _) => 0,
@@ -236,93 +276,43 @@ impl Settings {
         }
     }
 
-    /// Samples on the occluders' surfaces are wanted.
+    /// Whether shadows of occluders on themselves come from samples on their surfaces.
     pub fn on_surface(&self) -> bool {
         self.self_samples == SelfSamples::Surface
     }
 
-    /// What vectors of a frame cannot have.
+    /// Refuses settings that need vectors computed before the first frame.
     fn online(&self) -> Result<()> {
         let beforehand = [
-            ("suns", self.suns > 0, "lights kept apart", "0"),
-            ("turns", self.turns > 1, "samples of turns", "1: vectors of a frame follow all turns"),
-            ("masks", self.masks == Masks::Parallel, "masks from pictures along rays", "rays"),
+            ("suns", self.suns > 0, "separated texels", "0"),
+            ("turns", self.turns > 1, "rotation samples", "1, because this method follows every rotation"),
+            ("masks", self.masks == Masks::Parallel, "masks from depth images", "rays"),
         ];
         beforehand.into_iter().filter(|(_, asked, ..)| *asked).try_for_each(|(key, _, what, allowed)| {
             wrong(key, format!("{what} with fiv.method=online"), &format!("{allowed}, or another method"))
         })
     }
 
-    /// The keys that are not at their defaults and change nothing, with why.
-    pub fn idle(&self) -> Vec<(&'static str, &'static str)> {
-        let by = Self::default();
-        let vectors = self.method == Method::Vectors;
-        let shadows = vectors || self.method == Method::Online;
-        let unused = "fiv.method uses no vectors";
-        // Key, whether it is not at its default, whether it counts, and why it would not.
-        let keys = [
-            ("azimuths", self.azimuths != by.azimuths, shadows, unused),
-            ("polars", self.polars != by.polars, shadows, unused),
-            ("radii", self.radii != by.radii, shadows, unused),
-            ("turns", self.turns != by.turns, vectors, unused),
-            ("turn_axis", self.turn_axis != by.turn_axis, vectors && self.turns > 1, "fiv.turns is 1"),
-            ("suns", self.suns != by.suns, vectors, unused),
-            ("reach", self.reach != by.reach, shadows, unused),
-            ("adaptive", self.adaptive != by.adaptive, vectors, "vectors of a frame lie evenly whatever it says"),
-            ("split", self.split != by.split, shadows, unused),
-            ("masks", self.masks != by.masks, vectors, unused),
-            ("flat", self.flat != by.flat, shadows, unused),
-            ("largest", self.largest != by.largest, shadows, unused),
-            ("trilinear", self.trilinear != by.trilinear, shadows, unused),
-            ("interpolation", self.interpolation != by.interpolation, shadows, unused),
-            ("partial", self.partial != by.partial, shadows, unused),
-            ("cut", self.cut != by.cut, shadows && self.partial, "fiv.partial is off"),
-            ("extent", self.extent != by.extent, shadows && self.partial, "fiv.partial is off"),
-            ("overlap", self.overlap != by.overlap, shadows, unused),
-            ("shared", self.shared != by.shared, shadows && self.overlap, "fiv.overlap is off"),
-            ("negligible", self.negligible != by.negligible, shadows, unused),
-            ("self_shadow", self.self_shadow != by.self_shadow, shadows, unused),
-            (
-                "self_samples",
-                self.self_samples != by.self_samples,
-                shadows && self.self_shadow,
-                "fiv.self_shadow is off",
-            ),
-        ];
-        let idle = keys.into_iter().filter(|(_, changed, counts, _)| *changed && !counts);
-        idle.map(|(key, .., why)| (key, if shadows { why } else { unused })).collect()
-    }
-
     /// # Errors
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
-        if !SIDES.contains(&self.size) || !self.size.is_multiple_of(8) {
-            let (what, least, most) = (self.size, SIDES.start(), SIDES.end());
-            let what = format!("{what} is not allowed; allowed: multiples of 8 from {least} to {most}");
-            return Err(Error::usage(what).at("size"));
-        }
-        self.grid().validate()?;
-        within([("reach", self.reach, 2.0, 1000.0), ("largest", self.largest, 0.0, 1.0)])?;
-        within([("negligible", self.negligible, 0.0, 1.0)])?;
-        within([("rotation", self.rotation, -36e3, 36e3), ("turning", self.turning, -36e3, 36e3)])?;
+        Self::description().check(self)?;
         if self.method == Method::Online && self.specular != Specular::Off {
             return wrong("specular", "glossy reflection with fiv.method=online", "off, or another method");
         }
         if self.suns > 0 && self.specular != Specular::Off {
-            return wrong("specular", "glossy reflection with lights kept apart (fiv.suns)", "off, or fiv.suns=0");
+            return wrong("specular", "glossy reflection with separated texels (fiv.suns)", "off, or fiv.suns=0");
         }
         if self.method == Method::Online {
             self.online()?;
         }
-        within([("exposure", self.exposure, -30.0, 30.0)])?;
-        within([("split", self.split, 1, 4), ("turns", self.turns, 1, 64), ("suns", self.suns, 0, suns::MOST)])?;
         if self.suns > 0 && self.turns > 1 {
-            let error = Error::usage("lights can be kept apart for occluders at rest only").at("suns");
+            let error = Error::usage("texels can be separated for occluders at rest only").at("suns");
             return Err(error.help("Set fiv.suns or fiv.turns to its default"));
         }
         if self.negligible > 0.0 && (self.suns > 0 || self.specular != Specular::Off) {
             let error = Error::usage(
-                "what is negligible for irradiance may hide lights that are kept apart, or seen in surfaces",
+                "an occluder that is negligible for irradiance may hide a separated texel or a reflection",
             );
             return Err(error.at("negligible").help("Set fiv.negligible to 0, or leave out fiv.suns and fiv.specular"));
         }
@@ -330,9 +320,15 @@ impl Settings {
     }
 }
 
+described!(Settings);
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn keys_without_effect(settings: &Settings) -> Vec<String> {
+        Settings::description().idle(settings).unwrap().into_iter().map(|idle| idle.key).collect()
+    }
 
     #[test]
     fn what_changes_nothing_is_refused_or_named() {
@@ -344,10 +340,10 @@ mod tests {
         ] {
             let error = wrong.validate().unwrap_err();
             assert!(error.exit_code() == 2 && error.place() == Some(key), "{error}");
-            // It is for vectors computed beforehand.
+            // The same settings are valid for vectors computed before the first frame.
             let before = Settings { method: Method::Vectors, ..wrong };
             before.validate().unwrap();
-            assert_eq!(before.idle(), []);
+            assert_eq!(keys_without_effect(&before), [""; 0]);
         }
         let good = Settings::default();
         let x = Axis::new(glam::Vec3::X).unwrap();
@@ -365,7 +361,7 @@ mod tests {
             (Settings { reach: 8.0, ..online.clone() }, &[]),
             (Settings { adaptive: false, ..online.clone() }, &["adaptive"]),
         ] {
-            assert_eq!(idle.idle().iter().map(|(key, _)| *key).collect::<Vec<_>>(), keys);
+            assert_eq!(keys_without_effect(&idle), keys);
         }
     }
 

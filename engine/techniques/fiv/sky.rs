@@ -1,9 +1,10 @@
-//! An environment as a cube of texels of even radiance, with exact solid angles.
+//! An environment as a cube map of texels of constant radiance, with exact solid angles.
 //!
-//! Texels lie as in [`scene::environment::Face`](crate::scene::environment::Face): face after face, the top row first.
+//! The order of texels is that of [`scene::environment::Face`](crate::scene::environment::Face): face after face, the
+//! top row first.
 //!
-//! Odd values: a radiance that is no number or below zero counts as 0, an endless one as 65504 (the largest 16-bit float, as when
-//! files are read); [`Sky::repaired`] counts both. A black environment is black.
+//! Invalid radiance is repaired: NaN and negative values become 0, and infinite values become 65504, the largest 16-bit
+//! float, as when files are read. [`Sky::repaired`] counts the repaired pixels.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,13 +12,13 @@ use glam::{DVec2, DVec3, Vec3};
 
 use crate::{Error, Result, scene::Environment, shaders::types};
 
-/// What stands for endless radiance.
+/// The value that replaces infinite radiance.
 const LARGEST: f64 = 65504.0;
-/// Edges that an environment may have, texels.
+/// Texels along an edge that are allowed.
 pub const SIDES: std::ops::RangeInclusive<u32> = 8..=128;
-/// Texels that are kept apart send at least this part of all light.
+/// Least share of all light that a separated texel sends.
 const APART: f64 = 0.01;
-/// Wedges of azimuth around the axis at least, beside the edges of pixels and texels.
+/// Least number of wedges of azimuth, in addition to the edges of pixels and texels.
 const WEDGES: u32 = 1024;
 
 /// An environment as a cube.
@@ -27,13 +28,13 @@ pub struct Sky {
     pub size: u32,
     /// Mean radiance of each of 6·size² texels, W/(sr·m²).
     pub radiance: Vec<Vec3>,
-    /// Texels that are kept apart: they are black in `radiance`.
+    /// Separated texels. They are black in `radiance`.
     pub suns: Vec<Sun>,
-    /// Pixels of the source that were no radiance.
+    /// Number of repaired pixels of the source.
     pub repaired: u64,
 }
 
-/// A bright texel that is kept apart.
+/// A separated bright texel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sun {
     pub texel: u32,
@@ -41,19 +42,19 @@ pub struct Sun {
     pub radiance: Vec3,
 }
 
-/// The light of an environment in each texel, before its scale.
+/// The light of an environment in each texel, without its scale.
 #[derive(Clone, Debug)]
 pub(super) struct Sums {
     /// Texels along an edge.
     pub size: u32,
     /// Radiance × solid angle of the source, W/m², and solid angle, steradians.
     pub texels: Vec<(DVec3, f64)>,
-    /// Pixels of the source that were no radiance.
+    /// Number of repaired pixels of the source.
     pub repaired: u64,
 }
 
 impl Sums {
-    /// Of an environment that is turned by `rotation` radians in place of its own.
+    /// Sums up the light of an environment with the rotation `rotation` (radians) instead of its own.
     ///
     /// # Errors
     /// As [`Sky::new`].
@@ -86,7 +87,7 @@ impl Sums {
         Ok(Self { size, texels, repaired })
     }
 
-    /// With `scale` as a factor on the light.
+    /// The cube map with `scale` as a factor on the light.
     pub fn sky(&self, scale: f32) -> Sky {
         let scale = f64::from(scale);
         let mean =
@@ -96,7 +97,7 @@ impl Sums {
     }
 }
 
-/// A pixel's radiance as it counts, and whether it was none.
+/// The repaired radiance of a pixel, and whether the pixel needed repair.
 pub(super) fn clean(pixel: Vec3) -> (DVec3, bool) {
     let channels = pixel.to_array().map(|value| match value {
         f32::INFINITY => (LARGEST, true),
@@ -106,7 +107,7 @@ pub(super) fn clean(pixel: Vec3) -> (DVec3, bool) {
     (DVec3::from_array(channels.map(|c| c.0)), channels.iter().any(|c| c.1))
 }
 
-/// An environment can be resampled with this turn, radians, and this factor.
+/// Checks that an environment can be resampled with this rotation (radians) and this scale.
 ///
 /// # Errors
 /// `Input`, naming the environment.
@@ -117,15 +118,19 @@ pub(super) fn usable(env: &Environment, rotation: f32, scale: f32) -> Result<()>
         return Err(place(Error::input(what)));
     }
     if !(scale.is_finite() && scale >= 0.0 && rotation.is_finite()) {
-        let what = format!("a scale of {scale} and a rotation of {rotation} are no numbers to use");
-        return Err(place(Error::input(what).help("The scale is a number from 0, the rotation one in radians")));
+        let what = format!("a scale of {scale} and a rotation of {rotation} cannot be used");
+        return Err(place(
+            Error::input(what)
+                .help("The scale must be a finite number from 0, the rotation a finite number in radians"),
+        ));
     }
     Ok(())
 }
 
 impl Sky {
-    /// Resamples an environment with its rotation and scale: each texel gets the mean over the area that it shares with each pixel,
-    /// by solid angle. Pixels are even over their area. `None`: black.
+    /// Resamples an environment with its rotation and scale. Each texel gets the mean radiance of the pixels that it
+    /// overlaps, weighted by the solid angle of each overlap. Pixels have constant radiance. `None` gives a black cube
+    /// map.
     ///
     /// # Errors
     /// `Usage` if `size` is not a multiple of 8 in [`SIDES`]; `Input` if the environment has no numbers that can be used.
@@ -133,7 +138,7 @@ impl Sky {
         Self::changed(environment, (0.0, 1.0), size)
     }
 
-    /// As [`Self::new`], turned by so much more, radians, and with a factor.
+    /// As [`Self::new`], with an additional rotation (radians) and scale.
     fn changed(environment: Option<&Environment>, (turn, factor): (f32, f32), size: u32) -> Result<Self> {
         let (rotation, scale) = environment.map_or((turn, factor), |e| (e.rotation + turn, e.scale * factor));
         if let Some(environment) = environment.filter(|e| !e.pixels.is_empty()) {
@@ -142,7 +147,7 @@ impl Sky {
         Ok(Sums::of(environment, rotation, size)?.sky(scale))
     }
 
-    /// As [`Self::new`], with the size, turn and exposure of `settings`.
+    /// As [`Self::new`], with the size, the rotation and the exposure of `settings`.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -151,7 +156,8 @@ impl Sky {
         Ok(sky.apart(settings.apart()))
     }
 
-    /// With the brightest texels kept apart: `most` of those of which each sends at least a hundredth of all light.
+    /// Separates the brightest texels, at most `most`. Only texels that send at least a hundredth of all light each are
+    /// separated.
     #[must_use]
     pub fn apart(mut self, most: u32) -> Self {
         if most == 0 {
@@ -172,7 +178,7 @@ impl Sky {
         self
     }
 
-    /// As the shaders take it.
+    /// The texels in the form that shaders read.
     pub fn texels(&self) -> Vec<types::FivTexel> {
         let texel = |(i, radiance): (usize, &Vec3)| {
             let (face, x, y) = place(self.size, i as u32);
@@ -185,12 +191,12 @@ impl Sky {
         self.radiance.iter().enumerate().map(texel).collect()
     }
 
-    /// Numbers of the texels that are not black and not kept apart.
+    /// Numbers of the texels that are neither black nor separated.
     pub fn lit(&self) -> Vec<u32> {
         (0..self.radiance.len() as u32).filter(|i| self.radiance[*i as usize] != Vec3::ZERO).collect()
     }
 
-    /// A number that changes with the light: for files made for it.
+    /// A hash of the light, by which files of vectors identify their environment.
     pub fn hash(&self) -> u64 {
         let mut hash = super::hash::Hash::new();
         hash.word(self.size.into());
@@ -222,7 +228,7 @@ pub fn direction(face: u32, st: DVec2) -> DVec3 {
     }
 }
 
-/// The texel that a direction meets.
+/// The texel that contains a direction.
 pub fn texel(size: u32, d: DVec3) -> u32 {
     let a = d.abs();
     let (face, depth) = if a.x >= a.y && a.x >= a.z {
@@ -265,7 +271,7 @@ pub fn area(face: u32, size: u32, x: u32, y: u32) -> DVec3 {
     if sum.dot(corners[0]) < 0.0 { -0.5 * sum } else { 0.5 * sum }
 }
 
-/// Azimuths (0 over −Z, π/2 over +X) between which no edge of a pixel or of a column of texels lies.
+/// Intervals of azimuth (0 over −Z, π/2 over +X), cut at every edge of a pixel and of a column of texels.
 pub(super) fn wedges(width: u32, rotation: f64, size: u32) -> Vec<(f64, f64)> {
     let mut cuts: Vec<f64> = (0..WEDGES).map(|i| TAU * f64::from(i) / f64::from(WEDGES)).collect();
     cuts.extend((0..width).map(|c| TAU * (f64::from(c) / f64::from(width) - 0.5) - rotation));
@@ -279,7 +285,8 @@ pub(super) fn wedges(width: u32, rotation: f64, size: u32) -> Vec<(f64, f64)> {
     cuts.into_iter().zip(ends).filter(|(begin, end)| end - begin > 1e-12).collect()
 }
 
-/// Adds what lies between two azimuths: exact along the meridian in the middle, in sines of the latitude, where areas are even.
+/// Adds the light between two azimuths. The sum is exact along the meridian in the middle. It is taken over sines of
+/// the latitude, because equal differences of the sine have equal areas.
 fn wedge(
     sums: &mut [(DVec3, f64)],
     (env, rotation): (&Environment, f64),
@@ -308,7 +315,7 @@ fn wedge(
     }
 }
 
-/// Sines of the latitudes at which the meridian over (x, z), a unit vector, goes from one row of texels to another; in no order.
+/// Sines of the latitudes at which the meridian over (x, z), a unit vector, crosses edges of texel rows, unsorted.
 pub(super) fn rows(x: f64, z: f64, size: u32) -> Vec<f64> {
     let mut cuts = Vec::new();
     // On the side faces a row of texels ends at a height over the plane at distance one.
@@ -317,7 +324,7 @@ pub(super) fn rows(x: f64, z: f64, size: u32) -> Vec<f64> {
         let edge = 2.0 * f64::from(row) / f64::from(size) - 1.0;
         let height = edge * reach;
         cuts.push(height / (1.0 + height * height).sqrt());
-        // On the caps the meridian is a line from the middle.
+        // On the caps the meridian is a straight line from the middle.
         for run in [edge / x, edge / z].into_iter().filter(|r| *r > 0.0 && *r < 1.0 / reach) {
             let sine = 1.0 / (1.0 + run * run).sqrt();
             cuts.extend([sine, -sine]);
@@ -359,7 +366,7 @@ mod tests {
             assert!((angle - 4.0 * PI).abs() < 1e-12, "{angle}");
             let sum: DVec3 = texels(size).map(|(f, x, y)| area(f, size, x, y)).sum();
             assert!(sum.length() < 1e-12, "{sum}");
-            // A whole face: by symmetry along its axis; half a face towards a side the same however it is cut.
+            // A whole face has a vector along its axis, and the sum over texels does not depend on their number.
             let face: DVec3 = texels(size).filter(|t| t.0 == 2).map(|(f, x, y)| area(f, size, x, y)).sum();
             assert!((face - area(2, 1, 0, 0)).length() < 1e-12 && face.x.abs() < 1e-12, "{face}");
             for (i, (face, x, y)) in texels(size).enumerate() {
@@ -395,7 +402,7 @@ mod tests {
             }
             assert_eq!(sky.repaired, 0);
         }
-        // One pixel of light, wherever it is: as much as it sends.
+        // The power of a single bright pixel is kept wherever it lies.
         for (x, y) in [(0, 0), (63, 31), (17, 3), (40, 16), (5, 30)] {
             let mut one = painted(64, |_| Vec3::ZERO);
             one.pixels[y * 64 + x] = Vec3::new(100.0, 1.0, 0.0);

@@ -1,29 +1,32 @@
 //! Glossy reflection of the environment with shadows of occluders.
 //!
-//! The thesis leaves it to later work (chapter 6): for a fixed view the half vectors of all light are known, and a vector for each power
-//! of their cosine with the normal would give Phong's lobe. A lobe of GGX of roughness 0.3 would take hundreds of powers, for one view.
-//! What is kept here instead is for any view and any roughness: of each cell of the environment (4×4 texels) the share of its light that
-//! the occluder hides, a byte a cell, for the same samples as the vectors. A pixel then reflects
+//! The thesis proposes glossy reflection as future work (chapter 6): for a fixed view the half vectors of all light are
+//! known, and vectors for the powers of their cosine with the normal would give Phong's lobe. A GGX lobe of roughness
+//! 0.3 would need hundreds of powers for a single view. The method here works for any view and any roughness. It stores
+//! for each cell of the environment (4×4 texels) the share of the cell's light that the occluder hides, one byte per
+//! cell, for the same samples as the vectors. A pixel then reflects
 //!
 //!   unshadowed × (Σ cells reflected × Π (1 - share of each occluder)) / (Σ cells reflected),
 //!
-//! channel by channel: the sum over all texels, or the prefiltered environment, tells how much light there is, and the cells which part of
-//! it is left. No light is ever below zero; without occluders nothing changes; an occluder that hides all light leaves none. Cells behind
-//! the surface reflect nothing, so that no correction for cut occluders is needed, and several occluders overlap cell by cell.
+//! channel by channel. The sum over all texels, or the prefiltered environment, gives the unshadowed light. The cells
+//! give the share of this light that is left. The result is never negative, it equals the unshadowed light without
+//! occluders, and it is zero if an occluder hides all light. Cells behind the surface reflect nothing, so cut occluders
+//! need no correction, and several occluders overlap cell by cell.
 //!
-//! Light of a texel or a cell is a lobe: its width makes the distribution of normals wider that it is reflected by, and so surfaces that
-//! are smoother than the environment is fine show it even and not as points. Brute force reflects texels in the same way.
+//! The light of a texel or a cell is a lobe. The width of this lobe widens the distribution of normals, so that
+//! surfaces smoother than the resolution of the environment show texels as areas and not as points. Brute force uses
+//! the same lobes for texels.
 //!
-//! What an occluder hides of its own reflections is left out, as are reflections of occluders.
+//! Shadows of an occluder on its own reflections and reflections of occluders are left out.
 
 use glam::{DVec3, Mat3, Vec3};
 
 use super::{
     Fiv, Occluders, Plan, Sky, Specular,
     cover::{self, Cover},
-    light,
+    light, occluder_rotation,
     settings::Settings,
-    sky, turn,
+    sky,
 };
 use crate::{
     Error, ErrorKind, Result,
@@ -36,48 +39,50 @@ use crate::{
 
 /// Points of a run of the device.
 const BATCH: usize = 4096;
-/// Turns of loops of one invocation.
+/// Most loop iterations of one invocation.
 const MOST_TURNS: u32 = 20_000;
-/// Turns for an occluder: eight samples, of two turns.
+/// Loop iterations for an occluder: eight samples of two rotation samples, and the rest.
 const TURNS_EACH: u32 = 24;
-/// Turns for sixteen cells without occluders.
+/// Loop iterations for sixteen cells without occluders.
 const TURNS_CELLS: u32 = 40;
-/// Rays that one dispatch traces at most, about.
+/// Most rays of a dispatch, approximately.
 const MOST_RAYS: u64 = 1 << 22;
-/// Words of which a dispatch has a multiple.
+/// Each dispatch processes a multiple of this number of words.
 const WORDS: u32 = 4;
-/// Rec. 709.
+/// Luminance of a linear Rec. 709 pixel.
 const LUMINANCE: DVec3 = DVec3::new(0.2126, 0.7152, 0.0722);
 
-/// What it needs to know of where occluders are in a frame.
+/// Images and buffers that describe the occluders of a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Shadows {
-    /// Which occluder each pixel shows.
+    /// Number of the visible occluder of each pixel.
     pub identity: Image,
     pub occluders: Buffer,
     /// Vectors of all samples.
     pub fivs: Buffer,
-    /// Which occluders may matter to a tile of pixels, a bit each, in so many words.
+    /// Occluders that may affect each tile of pixels, a bit each, and words per tile.
     pub near: (Buffer, u32),
     pub count: u32,
 }
 
-/// The cells of an environment: four of 4×4 texels for each tile of 8×8, tiles in the order of texels; within a tile the left ones first,
-/// then the lower ones.
+/// The cells of an environment: four cells of 4×4 texels for each tile of 8×8 texels. Tiles have the order of texels.
+/// Within a tile the order is left top, right top, left bottom, right bottom.
 #[derive(Clone, Debug)]
 pub struct Cells {
-    /// Of each texel: its part of the luminous power of its cell, of the solid angle in a black one.
+    /// For each texel its share of the luminous power of its cell. In a black cell its share of the solid angle.
     pub weights: Vec<f32>,
-    /// The light of each cell; black ones fill it up to a multiple of sixteen.
+    /// The light of each cell. Black cells fill the list up to a multiple of sixteen.
     pub lobes: Vec<types::FivLobe>,
 }
 
 impl Cells {
+    /// Sums up the cells of an environment.
+    ///
     /// # Panics
     /// Never for a sky that [`Sky::new`] made.
     pub fn of(sky: &Sky) -> Self {
         let count = 4 * words(sky.size) as usize;
-        // Power, power × direction of the luminance, power × solid angle, solid angle.
+        // Power, luminous power × direction, luminous power × solid angle, solid angle.
         let mut sums = vec![(DVec3::ZERO, DVec3::ZERO, 0.0, 0.0); count];
         for (i, radiance) in sky.radiance.iter().enumerate() {
             let (face, x, y) = sky::place(sky.size, i as u32);
@@ -91,7 +96,7 @@ impl Cells {
         }
         let lobe = |(power, along, angle, _): &(DVec3, DVec3, f64, f64)| {
             let all = power.dot(LUMINANCE).max(1e-300);
-            // The variance along either axis is the cosine's mean distance from one; half vectors have half the angle.
+            // The variance along each axis is the mean of 1 − cosine. Half vectors have half the angle.
             let apart = (1.0 - along.length() / all).clamp(0.0, 1.0);
             types::FivLobe {
                 power: power.as_vec3().to_array(),
@@ -112,41 +117,41 @@ impl Cells {
     }
 }
 
-/// Number of the cell that a texel is in.
+/// Number of the cell that contains a texel.
 pub fn cell(size: u32, texel: u32) -> u32 {
     let (face, x, y) = sky::place(size, texel);
     let (tile, row) = (2 * FIV_CELL, size / (2 * FIV_CELL));
     4 * ((face * row + y / tile) * row + x / tile) + 2 * (y / FIV_CELL % 2) + x / FIV_CELL % 2
 }
 
-/// Words of a sample, of four cells each.
+/// Words per sample, with four cells each.
 pub fn words(size: u32) -> u32 {
     (6 * (size / (2 * FIV_CELL)).pow(2)).next_multiple_of(WORDS)
 }
 
-/// What is kept for glossy reflection.
+/// Data on the device for glossy reflection.
 #[derive(Debug)]
 pub struct Glossy {
     lobes: OwnedBuffer,
-    /// [`words`] for each sample around the occluders: of all turns of the first kind, of all of the second one …
+    /// [`words`] for each sample around the occluders: all rotation samples of the first kind, all of the second kind …
     shares: OwnedBuffer,
 }
 
 impl Glossy {
-    /// Uploads the cells, and looks at what occluders hide of them. `told` hears how many of the samples are done and says whether to go
-    /// on.
+    /// Uploads the cells and computes the hidden share of each cell for all samples. `progress` receives the number of
+    /// samples that are done and the number of all samples, and returns whether to go on.
     ///
     /// # Errors
-    /// `OutOfMemory`, `DeviceLost`; `Runtime` if told to stop.
+    /// `OutOfMemory`, `DeviceLost`; `Runtime` if `progress` returns false.
     pub fn new(
         gpu: &Gpu,
         sky: &Sky,
         plan: &Plan,
         occluders: &Occluders,
-        told: impl FnMut(u64, u64) -> bool,
+        progress: impl FnMut(u64, u64) -> bool,
     ) -> Result<Self> {
         let cells = Cells::of(sky);
-        let mut all = shares(gpu, sky.size, &cells, plan, occluders, told)?;
+        let mut all = shares(gpu, sky.size, &cells, plan, occluders, progress)?;
         all.resize(all.len().max(1), 0);
         Ok(Self {
             lobes: OwnedBuffer::with_contents(gpu, "fiv.lobes", bytemuck::cast_slice(&cells.lobes))?,
@@ -160,17 +165,17 @@ impl Glossy {
     }
 }
 
-/// Samples around one turn of an occluder.
+/// Samples around one rotation sample of an occluder.
 fn samples(plan: &Plan) -> u64 {
     plan.grid.count().into()
 }
 
-/// Samples of which shares are computed.
+/// Number of samples whose shares are computed.
 pub(super) fn all(plan: &Plan) -> u64 {
     samples(plan) * u64::from(plan.turns) * plan.occluders.len() as u64
 }
 
-/// Whether reflections of so many placed occluders can be drawn, before anything is computed for them.
+/// Checks that reflections with `placed` occluders can be drawn, before anything is computed.
 ///
 /// # Errors
 /// `Runtime` if there is more than the device's limits allow.
@@ -178,7 +183,8 @@ pub(super) fn fits(gpu: &Gpu, plan: &Plan, placed: usize) -> Result<()> {
     turns(u32::try_from(placed).unwrap_or(u32::MAX))?;
     let (bytes, limit) = (4 * u64::from(words(plan.size)) * all(plan), gpu.caps().limits.storage_range);
     if bytes > limit {
-        let what = format!("what occluders hide of reflections has {bytes} bytes; the device allows {limit}");
+        let what =
+            format!("the shares that occluders hide of reflections have {bytes} bytes; the device allows {limit}");
         return Err(Error::new(ErrorKind::Runtime, what)
             .at("fiv.specular")
             .help("Take fewer samples (fiv.azimuths, fiv.polars, fiv.radii)"));
@@ -186,7 +192,7 @@ pub(super) fn fits(gpu: &Gpu, plan: &Plan, placed: usize) -> Result<()> {
     Ok(())
 }
 
-/// Turns of the loops over `count` occluders for a step of the cells.
+/// Loop iterations over `count` occluders for a step of the cells.
 ///
 /// # Errors
 /// `Runtime` with more than a shader can go through.
@@ -198,7 +204,7 @@ fn turns(count: u32) -> Result<u32> {
     let fits = |count: u32| u32::try_from(all(count)).ok().filter(|turns| *turns <= MOST_TURNS);
     fits(count).ok_or_else(|| {
         let most = (0..count).take_while(|count| fits(*count).is_some()).last().unwrap_or(0);
-        let what = format!("{count} occluders, at most {most} can have reflections");
+        let what = format!("{count} occluders; fiv.specular allows at most {most}");
         Error::new(ErrorKind::Runtime, what).at("fiv.specular").help("Join meshes into fewer nodes")
     })
 }
@@ -209,7 +215,7 @@ fn shares(
     cells: &Cells,
     plan: &Plan,
     occluders: &Occluders,
-    mut told: impl FnMut(u64, u64) -> bool,
+    mut progress: impl FnMut(u64, u64) -> bool,
 ) -> Result<Vec<u32>> {
     let words = words(size);
     let all = all(plan);
@@ -218,12 +224,12 @@ fn shares(
     for (occluder, kind) in occluders.kinds.iter().zip(&plan.occluders) {
         let mut cover = Cover::new(gpu, occluder)?;
         for turn in 0..plan.turns {
-            let matrix = turn::matrix(turn, plan.turns, plan.turn_axis).as_mat3();
+            let matrix = occluder_rotation::matrix(turn, plan.turns, plan.turn_axis).as_mat3();
             let points: Vec<Vec3> =
                 (0..plan.grid.count()).map(|sample| -kind.offset(&plan.grid, sample).as_vec3()).collect();
             for points in points.chunks(BATCH) {
                 out.extend(masks(&mut cover, &mut runner, &cells.weights, size, points, (matrix, occluder.radius))?);
-                if !told(out.len() as u64 / u64::from(words), all) {
+                if !progress(out.len() as u64 / u64::from(words), all) {
                     return Err(Error::new(ErrorKind::Runtime, "stopped while computing vectors").at("fiv"));
                 }
             }
@@ -232,7 +238,8 @@ fn shares(
     Ok(out)
 }
 
-/// The shares of all cells that an occluder hides from `points` (seen from its centre, metres): [`words`] for each. `matrix` turns it.
+/// Shares of all cells that an occluder hides from `points` (relative to its centre, metres): [`words`] for each.
+/// `matrix` rotates the occluder.
 ///
 /// # Errors
 /// `OutOfMemory`, `DeviceLost`.
@@ -256,7 +263,7 @@ pub fn masks(
     };
     let (weights, turns) = (graph.buffer_from("fiv.weights", weights), graph.buffer_from("fiv.turns", &[stands]));
     let list = graph.buffer_from("fiv.points", &list);
-    // A tenth of the sphere from each point, about.
+    // Estimate of the rays that reach the bounding sphere: a tenth of the directions.
     let each = (MOST_RAYS / u64::from(tiles * 64 / 10).max(1)).clamp(1, BATCH as u64) as usize;
     let mut tokens = Vec::new();
     for (number, some) in points.chunks(each).enumerate() {
@@ -272,7 +279,7 @@ pub fn masks(
 }
 
 impl Fiv {
-    /// Adds what visible surfaces reflect glossily to `total`; returns it alone, W/(sr·m²).
+    /// Adds glossily reflected light to `total`. Returns this light alone, W/(sr·m²).
     ///
     /// # Errors
     /// `Runtime` with more occluders than a shader can go through.
@@ -307,7 +314,7 @@ impl Fiv {
         Ok(reflected)
     }
 
-    /// Without occluders.
+    /// Reflected light without occluders.
     fn specular_sum(&self, graph: &mut Graph, gbuffer: &GBuffer, reflected: Image) {
         let extent = graph.extent(reflected);
         let (texels, lit) = self.light.import(graph);
@@ -326,7 +333,7 @@ impl Fiv {
         }
     }
 
-    /// By a shadow ray to every texel that is not black.
+    /// Reflected light by one shadow ray to every texel that is not black.
     fn specular_truth(&mut self, graph: &mut Graph, handles: &Handles, gbuffer: &GBuffer, reflected: Image) {
         let extent = graph.extent(reflected);
         let Some((rays, most)) = &mut self.rays else { return };
@@ -354,7 +361,7 @@ impl Fiv {
         }
     }
 
-    /// Light of the cells that is reflected, and what occluders leave of it.
+    /// Reflected light of the cells, and the part of it that occluders leave visible.
     fn specular_share(
         &self,
         graph: &mut Graph,
@@ -397,18 +404,18 @@ impl Fiv {
         Ok((whole, left))
     }
 
-    /// The first word of each occluder, and of its next turn; `words` for each sample.
+    /// First word of each occluder and of its next rotation sample, with `words` words per sample.
     fn share_places(&self, pose: &Pose, words: u32) -> Vec<[u32; 2]> {
         let (turns, samples) = (self.plan.turns, self.plan.grid.count());
         let place = |placed: &super::Placed| {
-            let (first, second, _) = turn::between(self.angle(pose, placed.node).unwrap_or(0.0), turns);
+            let (first, second, _) = occluder_rotation::between(self.angle(pose, placed.node).unwrap_or(0.0), turns);
             [first, second].map(|turn| (placed.kind * turns + turn) * samples * words)
         };
         self.occluders.placed.iter().map(place).collect()
     }
 }
 
-/// Whether these settings need what occluders hide of cells.
-pub fn wanted(settings: &Settings) -> bool {
+/// Whether these settings need the hidden shares of cells.
+pub fn needed(settings: &Settings) -> bool {
     settings.specular != Specular::Off && settings.method == super::Method::Vectors
 }

@@ -1,26 +1,27 @@
-//! Bright parts of an environment. Where one shadow lies on another, a small light must not be taken away twice: what occluders hide of
-//! a bright part is counted apart from all other light, and at most all of it is taken.
+//! Bright parts of an environment. Where two shadows overlap, the light of a small source must not be subtracted twice.
+//! The light that occluders hide from a bright part is therefore summed up separately, and at most all light of this
+//! part is subtracted.
 
 use glam::{DVec3, Vec3};
 
 use super::sky::{self, Sky};
 use crate::shaders::{consts::FIV_SPOTS, types};
 
-/// A texel is bright if a channel has this many times its mean over all directions.
+/// A texel is bright if the radiance of a channel is at least this multiple of the channel's mean over all directions.
 const BRIGHT: f64 = 4.0;
-/// A part that has no more than this share of any channel's power is left out.
+/// Parts with at most this share of every channel's power are left out.
 const LEAST: f64 = 0.02;
-/// Cosine of how far the texels of a part are from its brightest one at most: 45 degrees.
+/// Cosine of the largest angle between a texel of a part and its brightest texel: 45 degrees.
 const WIDEST: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// A bright part.
+/// A bright part of the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spot {
-    /// Unit, the mean by power.
+    /// Mean direction weighted by power, unit length.
     pub direction: DVec3,
-    /// Steradians.
+    /// Solid angle, sr.
     pub angle: f64,
-    /// Its light as a vector a channel: colours of x, y and z, W/m².
+    /// Fullsphere irradiance vectors of its light: the colours of x, y and z, W/m².
     pub vectors: [DVec3; 3],
 }
 
@@ -29,12 +30,12 @@ struct Texel {
     area: DVec3,
     angle: f64,
     radiance: DVec3,
-    /// Against the mean of each channel, the most of all.
+    /// Radiance relative to the mean, the maximum of all channels.
     level: f64,
 }
 
-/// The bright parts of an environment with the most power, the strongest first: at most [`FIV_SPOTS`]. Each grows from a bright texel to
-/// its bright neighbours.
+/// The bright parts of an environment with the most power, the strongest first, at most [`FIV_SPOTS`]. Each part grows
+/// from a bright texel to its bright neighbours.
 pub fn spots(sky: &Sky) -> Vec<Spot> {
     let mut texels: Vec<Texel> = (0..sky.radiance.len() as u32)
         .filter(|&texel| sky.radiance[texel as usize] != Vec3::ZERO)
@@ -51,13 +52,13 @@ pub fn spots(sky: &Sky) -> Vec<Spot> {
     let share = |color: DVec3, of: DVec3| (color / of.max(DVec3::splat(1e-300))).max_element();
     texels.iter_mut().for_each(|t| t.level = share(t.radiance, mean));
     texels.retain(|t| t.level >= BRIGHT);
-    // Sorting is stable: the same in every run.
+    // The sort is stable, so each run gives the same parts.
     texels.sort_by(|a, b| b.level.total_cmp(&a.level));
-    // Neighbours touch at least at a corner; texels in the middle of a face are the widest.
+    // Neighbours touch at least at a corner. Texels in the middle of a face are the widest.
     let near = (1.6 * 2.0 / f64::from(sky.size)).cos();
     let mut free = vec![true; texels.len()];
     let mut found = Vec::new();
-    // Those that are brighter than all that is left come first: a limit on the work where nearly all texels are alike.
+    // Seeds go from bright to dark. The limit bounds the work if nearly all texels are equally bright.
     for seed in 0..texels.len().min(512) {
         if !free[seed] {
             continue;
@@ -96,7 +97,7 @@ pub fn spots(sky: &Sky) -> Vec<Spot> {
 }
 
 impl Spot {
-    /// As the shaders take it.
+    /// The part in the form that shaders read.
     pub fn packed(&self) -> types::FivSpot {
         let [x, y, z] = self.vectors.map(|v| v.as_vec3().to_array());
         // A cap has the solid angle 2π (1 - cos).
@@ -127,7 +128,7 @@ mod tests {
     #[test]
     fn lights_of_built_in_environments_are_found_whole() {
         for size in [8, 32] {
-            // Nothing else shines, or hardly.
+            // No other part sends light, or hardly any.
             for (name, count) in [("point", 1), ("area", 1), ("areas", 2)] {
                 let (sky, spots) = of(name, size);
                 // Coarse texels may part a light in two.

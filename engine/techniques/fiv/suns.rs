@@ -1,8 +1,9 @@
-//! Small bright lights, kept out of the vectors.
+//! Separated texels: small bright lights that the vectors do not contain.
 //!
-//! A light of one texel has a shadow with a hard edge; between samples it becomes as wide as these are apart. Where an occluder only
-//! moves, what it hides of one direction depends on two coordinates across it: a map of how far it reaches towards the light tells
-//! exactly, up to its texels, whether a place lies in its shadow. Several occluders hide such a light once, without any guess.
+//! The shadow of a one-texel light has a hard edge. Interpolation between samples makes the edge as wide as the
+//! distance of the samples. If an occluder only moves, its shadow for one direction depends on two coordinates across
+//! this direction. A shadow map for this direction therefore gives the shadow up to the resolution of the map. Several
+//! occluders hide such a light once, without an estimate of their overlap.
 
 use glam::{DVec2, Vec3};
 
@@ -19,12 +20,12 @@ use crate::{
     shaders::{consts::FIV_SUN_SIDE, types},
 };
 
-/// Texels that can be kept apart.
+/// Most texels that can be separated.
 pub const MOST: u32 = 16;
-/// Floats of a map.
+/// Floats of a shadow map.
 pub const FLOATS: u32 = FIV_SUN_SIDE * FIV_SUN_SIDE;
 
-/// As shaders take those of an environment.
+/// The separated texels in the form that shaders read.
 pub fn of(sky: &Sky) -> Vec<types::FivSun> {
     let sun = |sun: &sky::Sun| {
         let (face, x, y) = sky::place(sky.size, sun.texel);
@@ -42,7 +43,8 @@ pub fn of(sky: &Sky) -> Vec<types::FivSun> {
     sky.suns.iter().map(sun).collect()
 }
 
-/// The maps of all kinds, those of one next to each other, each as far as the kind reaches towards the light, metres from its centre.
+/// The shadow maps of all kinds, those of one kind next to each other. Each entry is the extent of the kind towards the
+/// light, metres from its centre.
 ///
 /// # Errors
 /// `Runtime` if they or an occluder are larger than the device's limits; `OutOfMemory`, `DeviceLost`.
@@ -50,8 +52,8 @@ pub fn maps(gpu: &Gpu, light: &Light, kinds: &[Occluder]) -> Result<OwnedBuffer>
     let bytes = 4 * u64::from(FLOATS) * light.suns.len() as u64 * kinds.len() as u64;
     let limit = gpu.caps().limits.storage_range;
     if bytes > limit {
-        let what = format!("the maps of lights kept apart have {bytes} bytes; the device allows {limit}");
-        return Err(Error::new(ErrorKind::Runtime, what).at("fiv.suns").help("Keep fewer lights apart"));
+        let what = format!("the shadow maps of separated texels have {bytes} bytes; the device allows {limit}");
+        return Err(Error::new(ErrorKind::Runtime, what).at("fiv.suns").help("Separate fewer texels"));
     }
     let mut all: Vec<f32> = Vec::new();
     let mut runner = Runner::new(gpu);

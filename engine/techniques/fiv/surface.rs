@@ -1,41 +1,45 @@
-//! Places on an occluder's own surface, where the light that it leaves itself is kept: the corners of its triangles.
+//! Samples on the surface of an occluder, at the vertices of its triangles. Each sample stores the light that reaches
+//! the vertex past the occluder itself.
 //!
-//! The thesis looks up an occluder's shadow on itself in the same samples around it as others' (section 3.3.3.2). Those lie over the
-//! surface, by as much as spheres are apart: from there light behind the surface is seen, and taken away (eq. 13 holds only where
-//! everything behind the receiver is hidden). Its last chapter asks for samples along the outline of the occluder (figure 43): that is
-//! what these are. Only light in front of the surface is counted, so that eq. 13 holds at every edge and corner too.
+//! The thesis computes the shadow of an occluder on itself from the samples around the occluder, which also hold all
+//! other shadows (section 3.3.3.2). These samples lie off the surface by as much as the distance of two spheres. From
+//! such a position light behind the surface is visible and is subtracted, although [FIV 13] requires that everything
+//! behind the receiver is hidden. The last chapter of the thesis proposes samples along the outline of the occluder
+//! (figure 43), which are these samples. Only light in front of the surface is counted, so that [FIV 13] holds at every
+//! edge and corner.
 
 use glam::Vec3;
 
-/// Distance of a place from the surface, in radii of the bounding sphere.
+/// Distance of a sample from the surface, in radii of the bounding sphere.
 const OVER: f32 = 5e-4;
 
-/// Where light is summed up: in front of a plane.
+/// A position with the normal of the half space whose light is summed up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
-    /// Seen from the centre of the occluder, metres.
+    /// Position relative to the centre of the occluder, metres.
     pub point: Vec3,
-    /// Unit length; zero: no light is counted.
+    /// Unit length; zero if no light is counted.
     pub normal: Vec3,
 }
 
-/// The places of one primitive: those of its corners' fronts, in their order, then those of their backs, if they can be seen.
+/// The samples of one primitive: the front sides of its vertices in their order, then the back sides, if they are
+/// visible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Own {
-    /// Of the node's mesh.
+    /// Number of the primitive in the node's mesh.
     pub slot: u32,
     pub corners: u32,
     pub backs: bool,
 }
 
 impl Own {
-    /// Places.
+    /// Number of samples.
     pub fn count(&self) -> u32 {
         self.corners * if self.backs { 2 } else { 1 }
     }
 }
 
-/// Appends the places of a primitive. `radius`: of the bounding sphere, metres.
+/// Appends the samples of a primitive. `radius`: radius of the bounding sphere, metres.
 pub fn places(own: &Own, positions: &[Vec3], normals: &[Vec3], radius: f32, out: &mut Vec<Place>) {
     let sides: &[f32] = if own.backs { &[1.0, -1.0] } else { &[1.0] };
     for side in sides {

@@ -1,4 +1,5 @@
-//! What is known of tiles of pixels before light is: which occluders may matter to them, and which of those can overlap.
+//! Lists for tiles of pixels that precede the irradiance pass: the occluders that may affect a tile, and the pairs of
+//! them that may overlap.
 
 use super::{Settings, Specular};
 use crate::{
@@ -7,24 +8,25 @@ use crate::{
     shaders::fiv,
 };
 
-/// Pixels along the edge of a tile of `near.comp`.
+/// Pixels along an edge of a tile of `near.comp`.
 const TILE: u32 = 8;
-/// Turns of the loops over occluders of one invocation: some milliseconds on a GPU; and where a driver ends loops early.
+/// Most iterations of the loops over occluders in one invocation: for some milliseconds on a GPU, and for drivers that
+/// end loops early.
 const MOST_TURNS: u32 = 1 << 20;
 const TURNS_LIMITED: u32 = 20_000;
-/// Occluders of which a pixel keeps how it sees them, 28 bytes each.
+/// Most occluders whose direction and size a pixel keeps, 28 bytes each.
 const MOST_HELD: u32 = 128;
-/// Bytes of the rows of occluders that can overlap, about.
+/// Bytes of the rows of overlapping occluders, approximately.
 const MOST_PAIRS: u64 = 64 << 20;
 
 /// Lists of the tiles of a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Tiles {
-    /// Occluders that may matter, a bit each.
+    /// Occluders that may affect a tile, a bit each.
     pub near: Buffer,
-    /// Of the bits of a tile.
+    /// Words of a tile.
     pub words: u32,
-    /// Occluders for which light can be summed up in one call.
+    /// Occluders that one call of the irradiance pass can process.
     pub each: u32,
     occluders: Buffer,
     count: u32,
@@ -34,8 +36,9 @@ pub struct Tiles {
 }
 
 impl Tiles {
-    /// Declares the pass that lists what may matter among the first `count` of `occluders`; `matter`: the table of
-    /// [`negligible`](super::negligible), if something is negligible; `limited`: the driver ends loops early.
+    /// Declares the pass that lists the occluders among the first `count` of `occluders` that may affect each tile.
+    /// `matter`: the table of [`negligible`](super::negligible), and whether occluders may be negligible. `limited`:
+    /// the driver ends loops early.
     pub fn new(
         graph: &mut Graph,
         gbuffer: &GBuffer,
@@ -50,8 +53,9 @@ impl Tiles {
         let row = 4 * tiles.pixels() * u64::from(words);
         let near = graph.buffer("fiv.near", row);
         let boxes = graph.buffer("fiv.tiles", 16 * tiles.pixels());
-        // Without the correction for partial occluders those whose centres are in front matter to others; but a surface has the centre of
-        // its own occluder behind it, and lights kept apart and reflections ask for all that is in front.
+        // Without the correction for partial occluders, occluders with their centres behind the plane do not affect a
+        // surface. But a surface lies in front of the centre of its own occluder, and separated texels and reflections
+        // need every occluder that reaches in front of the plane.
         let whole = settings.suns > 0 || settings.specular != Specular::Off;
         let partial = settings.partial || whole || settings.self_shadow && !settings.on_surface();
         let args = fiv::near::Args {
@@ -66,7 +70,7 @@ impl Tiles {
             spec: fiv::near::Spec { partial: partial.into(), negligible: matter.1.into() },
         };
         graph.compute(args, extent);
-        // With the correction each occluder looks at all others at most.
+        // The overlap correction compares each occluder with all others at most.
         let turns = if settings.overlap { count + words + 8 } else { 8 };
         let most = if limited { TURNS_LIMITED } else { MOST_TURNS };
         let mut each = (most / turns).max(1);
@@ -82,14 +86,16 @@ impl Tiles {
         Self { near, words, each, occluders, count, boxes, pairs, extent: tiles }
     }
 
-    /// Of how many occluders a pixel keeps how it sees them, for the correction; 1: of none. On a CPU driver pairs cost less so. It takes
-    /// memory of each invocation, which ends with [`MOST_HELD`], and of which a GPU, with its thousands of invocations, has little.
+    /// The number of occluders whose direction and size each pixel keeps for the overlap correction; 1 for none. On a
+    /// CPU driver the overlap of pairs is then cheaper to compute. The list needs memory in each invocation, which
+    /// [`MOST_HELD`] limits. A GPU with its thousands of invocations has little memory for such lists.
     pub fn held(&self, settings: &Settings) -> u32 {
         let overlap = settings.overlap && self.count > 1;
         if overlap && self.count <= MOST_HELD { self.count.next_power_of_two().max(8) } else { 1 }
     }
 
-    /// Declares the pass that finds which occluders can overlap one of these, and gives its rows of bits.
+    /// Declares the pass that finds which occluders may overlap one of these occluders. Returns a row of bits for each
+    /// of them.
     pub fn pairs(&self, graph: &mut Graph, (first, count): (u32, u32), settings: &Settings) -> Buffer {
         if settings.overlap && self.count > 1 {
             let args = fiv::pairs::Args {

@@ -1,4 +1,5 @@
-//! Irradiance in space for what mirrors and glass show: cells of a hashed grid, each lit once, instead of every surface by itself.
+//! The irradiance cache for surfaces that mirrors and glass show: a hashed grid in world space. The light of the virtual lights is
+//! gathered once for each cell, and not for each surface (sources: `shaders-glsl/lib/igi_cache.glsl`).
 
 use super::{Igi, LEAST_CELL, Settings, Shared, Vpls, rays};
 use crate::{
@@ -13,31 +14,32 @@ use crate::{
 
 use glam::Vec3;
 
-/// Invocations of a workgroup that gathers for nodes of trees.
+/// Invocations per workgroup of the passes that gather for ray tree nodes.
 const GROUP: u32 = 64;
 
-/// Cells of a frame.
+/// The irradiance cache of a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Cache {
     keys: Buffer,
     cells: Buffer,
-    /// Number of cells, then their places.
+    /// u32 values: the number of cells that the frame needs, then the slots of the cells in the hash table.
     pub list: Buffer,
     low: [f32; 3],
     side: f32,
     most: u32,
 }
 
-/// Corner and side of cells of about `side` metres around the box from `low` to `high`, metres. What moves stretches the box; where
-/// cells lie is the same for all boxes, lest light in mirrors jumps with them.
+/// Corner and side, metres, of a grid of cells that covers the box from `low` to `high`. The side is `side`, doubled until the keys
+/// cover the box. Moving objects stretch the box. The cells do not move with it, because light in mirrors would then jump.
 fn grid(low: Vec3, high: Vec3, side: f32) -> (Vec3, f32) {
-    // Keys must reach all over a scene that has grown: as few steps as will do.
+    // A key has nine bits for each axis, which limits the number of cells along the box.
     let least = LEAST_CELL * (high - low).length();
     let mut side = side.max(1e-12);
     while side < least {
         side *= 2.0;
     }
-    // Half a cell aside: what stands at 0, as many a floor does, is in the middle of cells.
+    // The grid is shifted by half a cell. Many scenes have a floor at height 0, which now lies in the middle of cells and not on
+    // their border.
     (((low / side).floor() - 0.5) * side, side)
 }
 
@@ -60,16 +62,17 @@ impl Cache {
         cache
     }
 
-    /// What there is to say if a frame has claimed `count` cells, the first number of [`Cache::list`].
+    /// A note if `count` cells, the first value of [`Cache::list`], are more than the cache holds.
     pub fn note(&self, count: u32) -> Option<Note> {
         let text = format!(
-            "more than {} cells (igi.cache_cells) would be needed: every surface behind mirrors and glass gathers for itself",
+            "the frame needs more than {} cells (igi.cache_cells): the cache is not used, and every surface that mirrors and glass \
+             show gathers light",
             self.most
         );
         (count > self.most).then(|| Note { kind: NoteKind::Ignored, place: "igi.cache".to_owned(), text })
     }
 
-    /// Makes cells for surfaces of `nodes` nodes; `first` is the number of the first of them in the picture.
+    /// Makes a cell for the surface of each of `nodes` ray tree nodes. `first`: number of the first node within the picture.
     pub(super) fn claim(&self, graph: &mut Graph, tree_nodes: Buffer, first: u32, nodes: u32) {
         let Self { keys: cache_keys, cells: cache_cells, list: cache_list, low, side, most } = *self;
         let push = cache_claim::Push { low, side, first, nodes, most };
@@ -78,15 +81,15 @@ impl Cache {
         graph.compute(cache_keep::Args { tree_nodes, cache_keys, cache_cells, cache_list, push }, nodes);
     }
 
-    /// Lights the surfaces of the nodes.
+    /// Adds the light of the cells to the nodes.
     pub(super) fn read(&self, graph: &mut Graph, tree_nodes: Buffer, nodes: u32) {
         let Self { keys: cache_keys, cells: cache_cells, list: cache_list, low, side, most } = *self;
         let push = cache_read::Push { low, side, nodes, most };
         graph.compute(cache_read::Args { tree_nodes, cache_keys, cache_cells, cache_list, push }, nodes);
     }
 
-    /// Size of dispatches that gather for `nodes` nodes if there are more cells than allowed, else empty.
-    pub(super) fn otherwise(&self, graph: &mut Graph, nodes: u32) -> Buffer {
+    /// Workgroups for the passes that gather for `nodes` nodes: all of them if there are more cells than allowed, else none.
+    pub(super) fn fallback_groups(&self, graph: &mut Graph, nodes: u32) -> Buffer {
         let groups = graph.buffer("igi.cache-groups", 12);
         let push = cache_groups::Push { most: self.most, full: nodes.div_ceil(GROUP) };
         let Self { keys: cache_keys, cells: cache_cells, list: cache_list, .. } = *self;
@@ -96,7 +99,7 @@ impl Cache {
 }
 
 impl Igi {
-    /// Gathers for the cells; there are no more than `nodes`.
+    /// Gathers the light of the virtual lights for all cells. There are at most as many cells as `nodes`.
     pub(super) fn fill(
         &self,
         graph: &mut Graph,
@@ -163,7 +166,7 @@ mod tests {
             let (corner, wide) = grid(low, high, side);
             let last = ((high - corner) / wide).floor();
             assert!(wide >= side && last.cmple(Vec3::splat(511.0)).all(), "{last} of {wide} m");
-            // No wider than need be.
+            // The side is not doubled more often than necessary.
             assert!(wide <= side.max(1e-12) || 0.5 * wide < LEAST_CELL * (high - low).length());
         }
     }

@@ -1,6 +1,7 @@
-//! Puts back what the bound of the geometry term takes (Kollig and Keller 2004): light from surfaces nearer than the bound is gathered by
-//! short rays instead of virtual lights, each weighted by the share that was taken. What lights those surfaces is bounded in its turn, and
-//! put back by the next segment, as often as light bounces.
+//! Compensation of the bounded geometry term (Kollig and Keller 2004). The bound removes light that comes from virtual lights near
+//! the receiver. Short rays, as long as the bound reaches, hit the near surfaces instead; their radiance is weighted by the share that
+//! the bound removes. The light of virtual lights on these surfaces is bounded as well. The next segment of the short path
+//! compensates this bound, up to the number of bounces.
 
 use super::{Igi, LightTree, Settings, Shared, Vpls, dispatch, gather::listed_groups};
 use crate::{
@@ -17,10 +18,10 @@ use crate::{
     },
 };
 
-/// Paths that are held at once.
+/// Short paths that are in memory at one time.
 pub(super) const HELD: u32 = 1 << 18;
 
-/// `types::NearPath` of `paths` paths, undefined until they begin.
+/// A buffer of `paths` values of `types::NearPath`. They are zero until the paths begin.
 fn held(graph: &mut Graph, paths: u32) -> Buffer {
     let near_paths = graph.buffer("igi.near", u64::from(paths.max(1)) * size_of::<types::NearPath>() as u64);
     graph.fill(near_paths, 0);
@@ -28,7 +29,7 @@ fn held(graph: &mut Graph, paths: u32) -> Buffer {
 }
 
 impl Igi {
-    /// Adds to the irradiance of every [`Settings::downsample`]-th pixel.
+    /// Adds the compensated light to the coarse irradiance, which has every [`Settings::downsample`]-th pixel.
     #[allow(clippy::too_many_arguments)]
     pub(super) fn compensate(
         &self,
@@ -65,7 +66,7 @@ impl Igi {
         }
     }
 
-    /// Adds to the irradiance of the pixels that gathered for themselves ([`Igi::refine`]), and dims specks among them.
+    /// Adds the compensated light to the pixels of [`Igi::refine`], and dims specks among them ([`Settings::despeckle`]).
     pub(super) fn compensate_listed(
         &self,
         graph: &mut Graph,
@@ -80,7 +81,7 @@ impl Igi {
         let count = HELD.min(pixels);
         let near_paths = held(graph, count);
         let ranges = pixels.div_ceil(count.max(1));
-        // Whole workgroups of a range come from the list: few of its places are taken.
+        // The device computes the number of workgroups from the list's length, because most lists are short.
         let groups = listed_groups(graph, unmatched, count, ranges);
         for range in 0..ranges {
             let (first, groups) = (range * count, Some((groups, 12 * u64::from(range))));
@@ -102,7 +103,7 @@ impl Igi {
         }
     }
 
-    /// Adds to what reaches the pixels from the ends of their trees.
+    /// Adds the compensated light to the ray tree nodes.
     pub(super) fn compensate_trees(
         &self,
         graph: &mut Graph,
@@ -123,7 +124,8 @@ impl Igi {
         graph.compute(near_end_tree::Args { tree_nodes, near_paths, push }, count);
     }
 
-    /// Traces and lights paths that have begun. `groups`: size of the dispatches where only the device knows it.
+    /// Traces short paths that have begun, and adds the light at their surfaces. `groups`: number of workgroups, where only the
+    /// device knows it.
     fn follow(
         &self,
         graph: &mut Graph,
@@ -142,7 +144,7 @@ impl Igi {
             let push = near_direct::Push { count, turn, number };
             let args = traced_lit!(near_direct::Args { near_paths, push }, shared.rays, handles, shared, lamps);
             dispatch(graph, args, groups, count).rays(count.into());
-            // Light that has bounced less often than it may.
+            // At the last segment the light of a virtual light would exceed the maximum number of bounces.
             if turn + 1 < settings.bounces {
                 let (leaves, bounces) = (tree.leaves, settings.bounces);
                 let push = near_pick::Push { count, turn, number, leaves, bounces, least, seed };

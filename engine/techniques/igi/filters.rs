@@ -1,4 +1,5 @@
-//! What brings sparse irradiance back to every pixel: the discontinuity buffer, smoothing, and joint bilateral upsampling.
+//! Filters that compute the irradiance of every pixel from coarse or interleaved irradiance: the discontinuity buffer, edge-avoiding
+//! smoothing, and joint bilateral upsampling.
 
 use super::Settings;
 use crate::{
@@ -7,7 +8,7 @@ use crate::{
     shaders::igi::{discontinuity, guide, smooth, upsample},
 };
 
-/// Normals and depths of every [`Settings::downsample`]-th pixel, which all filters read.
+/// Guide image for all filters, one texel for every [`Settings::downsample`]-th pixel: rgb unit normal, a linear depth / far.
 pub fn guide(graph: &mut Graph, g: &GBuffer, settings: &Settings) -> Image {
     let extent = graph.extent(g.depth).div_ceil(settings.downsample);
     let guide = graph.image("igi.guide", Format::RGBA32F, extent);
@@ -17,8 +18,9 @@ pub fn guide(graph: &mut Graph, g: &GBuffer, settings: &Settings) -> Image {
     guide
 }
 
-/// Mean over the tile around each texel of `interleaved` (irradiance of every `downsample`-th pixel), over texels on the same surface
-/// by [`Settings::discontinuity_depth`] and [`Settings::discontinuity_normal`].
+/// The discontinuity buffer (section 4.3): each texel's mean of `interleaved` over the tile around it. `interleaved` is the irradiance
+/// of every [`Settings::downsample`]-th pixel, W/m². Only texels on the same surface count, by [`Settings::discontinuity_depth`] and
+/// [`Settings::discontinuity_normal`].
 pub fn join(graph: &mut Graph, guide: Image, interleaved: Image, settings: &Settings) -> Image {
     let extent = graph.extent(interleaved);
     let irradiance = graph.image("igi.joined", Format::RGBA32F, extent);
@@ -36,9 +38,9 @@ pub fn join(graph: &mut Graph, guide: Image, interleaved: Image, settings: &Sett
     irradiance
 }
 
-/// `coarse` (irradiance of every `downsample`-th pixel) without bright specks, by [`Settings::despeckle`], smoothed in
-/// [`Settings::smoothing`] turns, over texels with like normals in the same plane by [`Settings::upsample_normal`] and
-/// [`Settings::upsample_range`].
+/// Dims specks in `coarse` by [`Settings::despeckle`], then smooths it in [`Settings::smoothing`] iterations (Dammertz et al. 2010).
+/// `coarse` is the irradiance of every [`Settings::downsample`]-th pixel, W/m². Weights follow normals and planes by
+/// [`Settings::upsample_normal`] and [`Settings::upsample_range`].
 pub fn smooth(graph: &mut Graph, g: &GBuffer, guide: Image, coarse: Image, settings: &Settings) -> Image {
     let extent = graph.extent(coarse);
     let limits = (settings.despeckle > 0.0).then_some((0, settings.despeckle));
@@ -59,9 +61,12 @@ pub fn smooth(graph: &mut Graph, g: &GBuffer, guide: Image, coarse: Image, setti
     smoothed
 }
 
-/// Irradiance of every pixel from that of every `downsample`-th (equation 2): weights are a Gaussian of the distance in the picture,
-/// the cosine between normals, and nearness to the pixel's plane where [`Settings::upsample_range`] is above 0. And a list of the pixels of which a share below
-/// [`Settings::refine`] of the weight is on texels that match: their number, then x + 65,536 y of each, in any order.
+/// Irradiance of every pixel, W/m², from `coarse`, the irradiance of every [`Settings::downsample`]-th pixel [IGI 2]. The weights
+/// are a Gaussian of the distance in the picture, a power of the cosine between normals, and, if [`Settings::upsample_range`] is above
+/// 0, a Gaussian of the distance from the pixel's plane.
+///
+/// The buffer lists the pixels for which less than [`Settings::refine`] of the weight falls on matching texels: their number, then
+/// x + 65,536 y for each, in any order.
 pub fn upsample(graph: &mut Graph, g: &GBuffer, guide: Image, coarse: Image, settings: &Settings) -> (Image, Buffer) {
     let extent = graph.extent(g.depth);
     let irradiance = graph.image("igi.upsampled", Format::RGBA32F, extent);
@@ -84,7 +89,7 @@ pub fn upsample(graph: &mut Graph, g: &GBuffer, guide: Image, coarse: Image, set
             scattered: settings.scattered.into(),
             least: settings.refine,
         },
-        // Until the Gaussian is a tenth.
+        // At this distance the Gaussian has fallen to about a tenth.
         spec: upsample::Spec { reach: (2.2 * settings.upsample_sigma - 0.5).ceil().max(1.0) as u32 },
     };
     graph.compute(args, extent);

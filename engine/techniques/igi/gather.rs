@@ -1,4 +1,4 @@
-//! Irradiance from virtual lights at the visible surfaces: from all of them, or from a few picked by the tree over them.
+//! Gathering: irradiance of the visible surfaces from all virtual lights, or from a few that each receiver picks from the light tree.
 
 use super::{Igi, LightTree, Settings, Shared, Vpls, rays};
 use crate::{
@@ -7,18 +7,19 @@ use crate::{
     shaders::igi::{gather, gather_picks, refine, refine_groups},
 };
 
-/// Invocations of a workgroup that gathers for single pixels.
+/// Invocations per workgroup of the pass that gathers for listed pixels.
 const GROUP: u64 = 64;
-/// Workgroups of a dispatch on every device.
+/// Workgroups per dispatch that every device allows.
 const MOST_GROUPS: u64 = 65_535;
 
-/// Ranges of `pixels` pixels, `most` to a range, about: how many a range has, and how many ranges there are.
+/// Splits `pixels` pixels into ranges of about `most` pixels. Returns the pixels per range and the number of ranges.
 fn ranges(pixels: u64, most: u64) -> (u32, u32) {
     let groups = (most / GROUP).clamp(1, MOST_GROUPS);
     ((groups * GROUP) as u32, pixels.div_ceil(groups * GROUP).max(1) as u32)
 }
 
-/// Sizes of the dispatches over `ranges` ranges of `pixels` pixels each of a list that only the device knows.
+/// Indirect dispatch sizes (three u32 per range) for `ranges` ranges of `pixels` pixels of the list `unmatched`, whose length only the
+/// device knows.
 pub(super) fn listed_groups(graph: &mut Graph, unmatched: Buffer, pixels: u32, ranges: u32) -> Buffer {
     let groups = graph.buffer("igi.refine-groups", 12 * u64::from(ranges));
     let push = refine_groups::Push { ranges, pixels };
@@ -27,7 +28,7 @@ pub(super) fn listed_groups(graph: &mut Graph, unmatched: Buffer, pixels: u32, r
 }
 
 impl Igi {
-    /// Irradiance of every [`Settings::downsample`]-th pixel; alpha: shadow rays.
+    /// Irradiance of every [`Settings::downsample`]-th pixel, W/m² (equation 1 without ρ); alpha: number of shadow rays.
     pub(super) fn gather(
         &self,
         graph: &mut Graph,
@@ -89,18 +90,18 @@ impl Igi {
         }
     }
 
-    /// Ranges of lights for [`Self::refine`], then pixels of a range of pixels, and how many such ranges there are. `own`: lights of a
-    /// pixel.
+    /// How [`Self::refine`] splits its work: ranges (first, count) of lights, pixels per range of pixels, and number of these ranges.
+    /// `own`: lights per pixel.
     pub(super) fn refined(&self, extent: Extent, own: u32) -> (Vec<(u32, u32)>, u32, u32) {
-        // Of a few hundred lights at once, and so of ranges of thousands of pixels. Most of these will be empty.
+        // A dispatch gathers a few hundred lights for thousands of pixels. Most ranges of pixels are empty.
         let lights = self.batches(Extent::new(1 << 14, 1), own);
         let most = lights.first().map_or(1, |&(_, count)| count);
         let (pixels, ranges) = ranges(extent.pixels(), self.rays_at_once / u64::from(most.max(1)));
         (lights, pixels, ranges)
     }
 
-    /// Gathers for the pixels that `unmatched` of [`filters::upsample`](super::filters::upsample) lists, each from a subset. What the
-    /// bound takes is put back by [`Self::compensate_listed`], which then dims specks too.
+    /// Gathers for the pixels in the list `unmatched` of [`filters::upsample`](super::filters::upsample), each from one subset. If the
+    /// bound is compensated, [`Self::compensate_listed`] runs afterwards and dims the specks.
     pub(super) fn refine(
         &self,
         graph: &mut Graph,

@@ -1,15 +1,16 @@
-//! The quasi-random numbers that light paths are built from (Halton 1960, as the paper has them), made on the host.
+//! The Halton sequence (Halton 1960), from which light paths take their quasi-random numbers as in the paper. The host computes it.
 
-/// Bases of the sequence, one a dimension.
+/// Bases of the sequence, one for each dimension.
 const PRIMES: [u32; 24] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71, 73, 79, 83, 89];
 
-/// Dimensions there are.
+/// Number of dimensions.
 pub const DIMENSIONS: usize = PRIMES.len();
 
-/// Digits of `index` in a base mirrored at the point: exact, rounded once. In [0, 1).
+/// Radical inverse: the digits of `index` in `base`, mirrored at the radix point. In [0, 1). The value is exact but for one final
+/// rounding.
 pub fn radical_inverse(base: u32, index: u32) -> f64 {
     let (base, mut rest) = (u64::from(base.max(2)), u64::from(index));
-    // 32 bits in any base mirror into a fraction of at most 2³² · base: exact in 64 bits.
+    // The denominator is at most 2³² · base and fits into 64 bits, so that integer arithmetic is exact.
     let (mut mirrored, mut scale) = (0u64, 1u64);
     while rest > 0 {
         mirrored = mirrored * base + rest % base;
@@ -19,20 +20,14 @@ pub fn radical_inverse(base: u32, index: u32) -> f64 {
     mirrored as f64 / scale as f64
 }
 
-/// Row by row: for each of `paths` points its first `dimensions` numbers in [0, 1). Point 0 is number 1 of the sequence, for
-/// number 0 lies in the corner in every dimension. A seed other than 0 turns each dimension by an amount of its own (Cranley
-/// and Patterson 1976): means over seeds are then free of bias.
-///
-/// # Panics
-/// Never; dimensions beyond [`DIMENSIONS`] repeat the last base.
+/// The first `paths` points of the sequence, row by row: `paths` × `dimensions` numbers in [0, 1). The first point has index 1, because
+/// the point with index 0 is 0 in every dimension. A seed other than 0 adds an offset to each dimension, modulo 1 (Cranley and
+/// Patterson 1976); the mean over all seeds is then unbiased. Dimensions beyond [`DIMENSIONS`] repeat the last base.
 pub fn table(paths: u32, dimensions: usize, seed: u32) -> Vec<f32> {
     table_from(0, paths, dimensions, seed)
 }
 
-/// As [`table`], from point `first` on; past the end of 32 bits the points begin anew.
-///
-/// # Panics
-/// Never.
+/// Like [`table`], but the first point has index `first` + 1. Indices wrap around at 2³².
 pub fn table_from(first: u32, paths: u32, dimensions: usize, seed: u32) -> Vec<f32> {
     let shifts: Vec<f64> = (0..dimensions).map(|dimension| shift(seed, dimension as u32)).collect();
     let mut out = Vec::with_capacity(paths as usize * dimensions);
@@ -40,22 +35,23 @@ pub fn table_from(first: u32, paths: u32, dimensions: usize, seed: u32) -> Vec<f
         for (dimension, shift) in shifts.iter().enumerate() {
             let base = PRIMES[dimension.min(DIMENSIONS - 1)];
             let value = (radical_inverse(base, first.wrapping_add(path).wrapping_add(1)) + shift).fract() as f32;
-            // Rounding to 32 bits may reach 1.
+            // Rounding to 32 bits may yield 1, which is outside of the range.
             out.push(value.min(1.0 - f32::EPSILON / 2.0));
         }
     }
     out
 }
 
-/// Numbers from the rows of one frame to those of the next: the least from `paths` on that shares no factor with the bases of the first
-/// `dimensions`. Then a path that has the same place in every frame comes by all digits in each base, and among any bases together: its
-/// numbers are as even as the sequence. With `paths` itself, 720 say, a path's first four binary digits would be the same in all frames.
+/// Offset between the first points of consecutive frames: the smallest number from `paths` on that has no common factor with the bases
+/// of the first `dimensions`. Path i of all frames then uses every digit in each base, and every combination of digits in several bases:
+/// its points over the frames are as evenly distributed as the sequence. With an offset of 720, for example, the first four binary digits
+/// of path i would be the same in all frames.
 pub fn step(paths: u32, dimensions: usize) -> u32 {
     let bases = &PRIMES[..dimensions.min(DIMENSIONS)];
     (paths..).find(|step| *step > 0 && bases.iter().all(|base| step % base != 0)).unwrap_or(paths)
 }
 
-/// Turn of a dimension, in [0, 1); 0 for seed 0.
+/// Offset of the Cranley-Patterson rotation for a dimension, in [0, 1); 0 for seed 0.
 pub fn shift(seed: u32, dimension: u32) -> f64 {
     if seed == 0 {
         return 0.0;
@@ -81,7 +77,7 @@ mod tests {
         first(2, &[(0, 1), (1, 2), (1, 4), (3, 4), (1, 8), (5, 8), (3, 8), (7, 8), (1, 16)]);
         first(3, &[(0, 1), (1, 3), (2, 3), (1, 9), (4, 9), (7, 9), (2, 9), (5, 9), (8, 9), (1, 27)]);
         first(5, &[(0, 1), (1, 5), (2, 5), (3, 5), (4, 5), (1, 25)]);
-        // All ones in base 2, and the last digit of base 89.
+        // The extremes: 32 ones in base 2, and the largest digit of the largest base.
         assert_eq!(radical_inverse(2, u32::MAX), f64::from(u32::MAX) / 4294967296.0);
         assert_eq!(radical_inverse(89, 88), 88.0 / 89.0);
         let row = &table(2, 4, 0)[4..];
@@ -90,8 +86,8 @@ mod tests {
 
     #[test]
     fn every_elementary_box_holds_its_share() {
-        // Among 2^a 3^b consecutive numbers each box of 2^-a × 3^-b has exactly one, wherever the row starts; in three
-        // dimensions the same with 5^c.
+        // Of 2^a 3^b consecutive points, exactly one lies in each box of 2^-a × 3^-b, for any first point. In three dimensions the
+        // boxes are 2^-a × 3^-b × 5^-c.
         for (a, b, c) in [(1u32, 1u32, 0u32), (3, 2, 0), (5, 1, 0), (2, 4, 0), (3, 2, 1), (2, 1, 2)] {
             let sides = [2u32.pow(a), 3u32.pow(b), 5u32.pow(c)];
             let count: u32 = sides.iter().product();
@@ -99,7 +95,7 @@ mod tests {
                 let mut hits = vec![0u32; count as usize];
                 for i in start..start + count {
                     let cell = |k: usize| {
-                        // Whole arithmetic: the mirrored digits, not their rounded quotient.
+                        // Integer arithmetic on the mirrored digits avoids the rounding of their quotient.
                         let (base, digits) = ([2u32, 3, 5][k], [a, b, c][k]);
                         let (mut rest, mut out) = (i, 0);
                         for _ in 0..digits {
@@ -122,7 +118,7 @@ mod tests {
         for (paths, dimensions) in [(1u32, 6), (16, 6), (720, 8), (90, 8), (30_030, 20), (640_000, 20)] {
             let step = step(paths, dimensions);
             assert!(step >= paths && step - paths < 200, "{paths}: {step}");
-            // 2^5 and 3^3, alone and together.
+            // Boxes of five binary digits, of three ternary digits, and of both.
             for box_count in [32u32, 27, 32 * 27] {
                 for path in [0, paths - 1] {
                     let mut seen = vec![false; box_count as usize];
@@ -132,7 +128,7 @@ mod tests {
             }
         }
         assert_eq!((step(720, 8), step(0, 4)), (727, 1));
-        // Past the end of 32 bits.
+        // Indices wrap around at 2^32.
         assert_eq!(table_from(u32::MAX - 1, 3, 1, 0)[1..], [0.0, 0.5]);
     }
 
@@ -146,7 +142,7 @@ mod tests {
             assert!(!(1e-6..=1.0 - 1e-6).contains(&apart), "{apart}");
         }
         assert_ne!(table(4, 2, 1), table(4, 2, 2));
-        // One frame after the other takes the row of numbers in pieces.
+        // Consecutive parts of the table are the whole table.
         assert_eq!([table_from(0, 3, 4, 5), table_from(3, 7, 4, 5)].concat(), table(10, 4, 5));
     }
 }

@@ -1,18 +1,19 @@
-//! Indirect light over time: each frame's paths take other numbers, and what they give is averaged over the frames in which a surface
-//! is seen.
+//! The history: indirect light averaged over time. The light paths of each frame have other random numbers. The irradiance of a
+//! surface is averaged over the frames in which the surface is visible.
 //!
-//! Three things keep this from ghosting and from flickering:
-//! - Each pixel looks up where its surface was in the last frame, with the camera of that frame and the surface's own motion (nodes,
-//!   skins, morph targets), and takes from there only what lay in the same plane with a like normal.
-//! - The last frame's paths are shot again in this frame's scene, and at one pixel of each square of pixels their light is gathered
-//!   again. What differs from what they gave in the last frame has changed: it is no chance, for the numbers are the same. The more
-//!   has changed the fewer frames count, so that the average lags by about [`Settings::history_lag`] at most; change that goes on for
-//!   some frames is smoothed, and the average carried along with it.
-//! - With the scene at rest the average goes over [`Settings::history`] frames, and the frames together are as many virtual lights, of
-//!   each lamp and each path spread evenly.
+//! Three measures prevent ghosting and flicker:
+//! - Each pixel looks up the position of its surface in the last frame, from that frame's camera and the surface's own motion (nodes,
+//!   skins, morph targets). It reuses irradiance only from surfaces in the same plane with a similar normal (reprojection, Nehab et
+//!   al. 2007).
+//! - The light paths of the last frame are shot again in this frame's scene, and their light is gathered again at one pixel of each
+//!   square of pixels (a probe). The random numbers are the same, so a difference is a change of the light and not noise (Schied,
+//!   Peters and Dachsbacher 2018). The larger the change, the fewer frames count, so that the average lags by at most about
+//!   [`Settings::history_lag`]. Change that continues over some frames is smoothed, and the average is extrapolated by it.
+//! - In a resting scene the average goes over [`Settings::history`] frames. All frames together have as many virtual lights as one
+//!   frame with `history` times the paths, evenly distributed for each lamp and each path.
 //!
-//! Nothing is kept on the host: what a frame leaves to the next one is [`Graph::history`] of the runner. The frames must follow each
-//! other in `graph.frame`; where a number is left out, or history was forgotten, a frame stands for itself.
+//! The host keeps no data: [`Graph::history`] passes data from frame to frame through the runner. `graph.frame` must grow by one from
+//! frame to frame. If a number is skipped, or the history is forgotten, the next frame has no past.
 
 use super::{Igi, Settings, Shared, Vpls, halton};
 use crate::{
@@ -30,55 +31,55 @@ use crate::{
     },
 };
 
-/// Virtual lights that a probe looks at, at most.
+/// Maximum of virtual lights whose light is gathered at a probe.
 const PROBE_LIGHTS: u32 = 256;
 /// Bytes of a position.
 const POSITION: u64 = 12;
 
-/// What the last frame left, and what this one found out about it.
+/// The data of the last frame, and the light of its paths in this frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Past {
-    /// `types::HistoryFrame`, one.
+    /// One `types::HistoryFrame`.
     pub frame: Buffer,
-    /// Irradiance, W/m²; alpha: how many frames it counts, 0: none.
+    /// Average irradiance, W/m²; alpha: number of averaged frames, 0 for none.
     pub irradiance: Image,
-    /// Normal, and linear depth / far in alpha.
+    /// Unit normal; alpha: linear depth / far.
     pub guide: Image,
-    /// Relative change of irradiance a frame, smoothed over time; alpha: how large it has been, without sign.
+    /// Relative change of the irradiance per frame, smoothed over time; alpha: its smoothed magnitude.
     pub trend: Image,
-    /// `types::HistoryProbe`, row by row.
+    /// `types::HistoryProbe` values, row by row.
     pub probes: Buffer,
-    /// Light at the probes by the last frame's paths in the last frame, W/m², alpha unused.
+    /// Irradiance at the probes from the last frame's paths in the last frame, W/m²; alpha is unused.
     pub lit: Buffer,
-    /// The same in this frame.
+    /// Irradiance at the probes from the last frame's paths, shot again in this frame, W/m²; alpha is unused.
     pub relit: Buffer,
 }
 
-/// Where the probes lie.
+/// The grid of the probes: one probe in each square of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Grid {
     pub columns: u32,
     pub rows: u32,
-    /// Pixels from probe to probe.
+    /// Side of a square, pixels.
     pub side: u32,
 }
 
 impl Grid {
-    /// For an image of `extent` pixels; farther apart where gathering itself is sparse.
+    /// The grid for an image of `extent` pixels. With `downsample` the squares are larger, because gathering costs less as well.
     pub fn new(extent: Extent, downsample: u32) -> Self {
         let side = if downsample > 1 { 16 } else { 8 };
         Self { columns: extent.width.div_ceil(side), rows: extent.height.div_ceil(side), side }
     }
 
-    /// How many there are.
+    /// Number of probes.
     pub fn count(&self) -> u32 {
         self.columns * self.rows
     }
 }
 
-/// Blends `fresh`, this frame's irradiance, with that of the `past` into `blended` (alpha: how many frames count), and keeps normals
-/// and depths in `guide`, and how light changes in `trend`: the three images that the next frame's `past` holds. `motion`: world position in the last frame of what moved,
-/// alpha 0 elsewhere.
+/// Blends `fresh`, this frame's irradiance, with the average irradiance of `past`. Writes the three images that are part of the next
+/// frame's past: `blended` (irradiance; alpha: number of averaged frames), `guide` (normals and depths) and `trend` (change of the
+/// light). `motion`: world position in the last frame of surfaces that moved, alpha 1; alpha 0 elsewhere.
 pub fn blend(
     graph: &mut Graph,
     g: &GBuffer,
@@ -117,23 +118,24 @@ pub fn blend(
     graph.compute(args, extent);
 }
 
-/// Halton numbers of a path.
+/// Number of Halton dimensions of a path.
 pub(super) fn dimensions(settings: &Settings) -> usize {
     (consts::VPL_FIRST_NUMBERS + 2 * settings.bounces) as usize
 }
 
-/// Seed of the random choices of a frame; that of the run in frame 0.
+/// Seed of the random numbers of a frame. Frame 0 has the seed of the run.
 fn seed_of(seed: u32, frame: u32) -> u32 {
     if frame == 0 {
         return seed;
     }
-    // Never 0, which stands for no turn.
+    // Not 0, because seed 0 means no rotation.
     ((halton::shift(seed ^ 0x9e37_79b9, frame) * f64::from(u32::MAX)) as u32).max(1)
 }
 
 impl Igi {
-    /// The same with the random numbers of `frame`: each frame takes the next ones of the sequence, and a few are left
-    /// out so that in the long run every path has numbers of all kinds: each lamp has the same few paths in every frame.
+    /// `shared` with the random numbers of `frame`. Each frame uses the next points of the Halton sequence. Some points are skipped
+    /// between frames ([`halton::step`]). A lamp has the same few paths in every frame; skipping gives these paths points from the
+    /// whole sequence.
     pub(super) fn numbered(graph: &mut Graph, shared: &Shared, settings: &Settings, frame: u32) -> Shared {
         if frame == 0 {
             return *shared;
@@ -144,8 +146,8 @@ impl Igi {
         Shared { settings: settings_block, seed, first, ..*shared }
     }
 
-    /// The mean of `fresh`, this frame's irradiance, and what is left of the frames before. `candidates` is what the paths left, `vpls`
-    /// what was drawn from it; `shared` has the numbers of frame 0.
+    /// Blends `fresh`, this frame's irradiance, with the history. `candidates`: the virtual lights that the paths left; `vpls`: the virtual
+    /// lights drawn among them. `shared` must have the random numbers of frame 0.
     pub(super) fn accumulate(
         &self,
         graph: &mut Graph,
@@ -230,7 +232,7 @@ impl Igi {
         blended
     }
 
-    /// Sums the light of some of the virtual lights at the probes, from zero.
+    /// Computes the irradiance at the probes from at most [`PROBE_LIGHTS`] of the virtual lights.
     fn light_probes(
         &self,
         graph: &mut Graph,
@@ -266,14 +268,14 @@ impl Igi {
     }
 }
 
-/// World positions that the visible surfaces had in the last frame, alpha 1, where they moved; alpha 0 elsewhere. Keeps instances and
-/// deformed vertices for the next frame.
+/// Motion image: the world position in the last frame of each visible surface that moved, alpha 1; alpha 0 elsewhere. Stores instances
+/// and deformed vertices for the next frame.
 pub fn motion_of(graph: &mut Graph, handles: &Handles, g: &GBuffer, view: &View) -> Image {
     let extent = graph.extent(g.depth);
     let motion = graph.image("igi.motion", Format::RGBA32F, extent);
     let (before_instances, next) = graph.history_buffer("igi.history.instances", handles.instances.bytes());
     graph.copy_buffer(handles.instances, next);
-    // Copies of deformed primitives stand behind all others in the streams.
+    // In the vertex streams, deformed primitives are stored after all undeformed ones.
     let deformed = handles.moment.instances.iter().filter(|i| i.deformed).map(|i| i.first_vertex).min();
     let before_positions = match deformed {
         Some(first) => {
@@ -282,7 +284,7 @@ pub fn motion_of(graph: &mut Graph, handles: &Handles, g: &GBuffer, view: &View)
             graph.copy_buffer(written, next);
             before
         }
-        // Never read.
+        // Without deformed primitives the shader does not read this buffer.
         None => handles.positions,
     };
     let frustum = Frustum::new(view);

@@ -1,5 +1,6 @@
-//! More paths of light than there will be virtual lights, and of what they leave that which matters to the view (after Georgiev and
-//! Slusallek 2010, who reject candidates; here they are drawn in equal steps through the sum of their weights).
+//! Importance resampling of virtual lights: light paths leave more candidates than needed, and the frame draws its virtual lights among
+//! them with a probability that follows the light that they send to the view. Georgiev and Slusallek 2010 reject candidates; this
+//! implementation draws by systematic resampling, in equal steps through the running sum of the weights.
 
 use super::{Igi, Settings, Shared, Vpls, halton, rays};
 use crate::{
@@ -11,11 +12,13 @@ use crate::{
     },
 };
 
-/// Distance within which light on a point grows no more, of the scene's diagonal: a candidate next to a point is not all that matters.
+/// Distance to a point below which a candidate's light is damped, as share of the scene's diagonal. Without it a candidate next to a
+/// point would get nearly all the probability.
 const NEAR: f32 = 0.03;
 
 impl Igi {
-    /// Draws virtual lights from candidates: unbiased, for each is stronger by as much as it is rarer.
+    /// Draws the virtual lights among the candidates. The flux of a drawn light is divided by its expected number of draws, so that the
+    /// estimate is unbiased.
     pub(super) fn choose(
         &self,
         graph: &mut Graph,
@@ -53,7 +56,7 @@ impl Igi {
         graph.compute(cumulate::Args { candidates: candidates.buffer, importances, weights, sums, push }, 1);
         let vpls = graph.buffer("igi.vpls", u64::from(count) * size_of::<types::Vpl>() as u64);
         let offset = if shared.seed == 0 { 0.5 } else { halton::shift(shared.seed, u32::MAX - 1) as f32 };
-        // Rounding to 32 bits may reach 1.
+        // Rounding to 32 bits may yield 1, which is outside of the range.
         let offset = offset.min(1.0 - f32::EPSILON / 2.0);
         let push = resample::Push { total, count, offset };
         graph.compute(resample::Args { candidates: candidates.buffer, weights, sums, vpls, push }, count);

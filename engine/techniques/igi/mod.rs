@@ -1,18 +1,25 @@
 //! Instant global illumination with ray-traced virtual point lights (Marques and Santos 2010, after Keller 1997 and Wald et al. 2002).
 //!
-//! Paths of light leave a virtual point light at every surface with a diffuse part that they meet; every visible point then
-//! gathers from all of them, a shadow ray each. Further light is direct, by shadow rays too.
+//! Light paths start at the lamps. They leave a virtual point light on every surface with a diffuse part that they hit. Every
+//! visible point then gathers the light of all virtual lights, with one shadow ray to each. Direct light is added, also by
+//! shadow rays.
 //!
-//! [`Igi`] holds what lives as long as a scene; [`Igi::picture`] declares a frame, with paths of light shot anew.
+//! [`Igi`] holds the data that lives as long as a scene. [`Igi::picture`] declares the passes of one frame, which shoots new
+//! light paths.
 //!
 //! Where this differs from the paper, and why:
-//! - Beside the sum over all virtual lights there are picks by a tree over them ([`Settings::picks`]); what the bound takes can be put
-//!   back ([`Settings::compensation`]).
-//! - More paths are shot than needed, and of what they leave that is drawn which matters to the view ([`Settings::candidates`]).
-//! - Every kind of light sends paths: point, spot and directional lights, emissive surfaces, the environment. The paper has points.
+//! - A receiver can pick some virtual lights from a light tree instead of gathering from all ([`Settings::picks`]).
+//! - The bound of the geometry term removes light near corners. Short rays can add this light back
+//!   ([`Settings::compensation`]).
+//! - More paths are shot than needed. Their virtual lights are candidates, and the frame draws its virtual lights among them
+//!   with a probability that follows the light that they send to the view ([`Settings::candidates`]).
+//! - Every kind of light sends paths: point, spot and directional lights, emissive surfaces, the environment. The paper has
+//!   point lights only.
 //! - 1/π is explicit: a virtual light has a flux Φ and sends Φ cos θ / π W/sr; the paper's L is Φ/π, its ρ our ρ/π.
-//! - Light is received by shading normals and sent on by the triangle's, which is what a path tracer sees from the other end.
-//! - The table's first two dimensions are the directions of paths from near lights, and the places of paths from far ones.
+//! - A surface receives light by its shading normal and reflects it by its geometric normal. A path tracer, which works from
+//!   the camera's end of the same path, uses the two normals in this way.
+//! - The first two dimensions of the Halton table give the directions of paths from near lights, and the starting points of
+//!   paths from distant lights.
 
 #[macro_use]
 mod traced;
@@ -24,18 +31,18 @@ mod gather;
 pub mod halton;
 pub mod history;
 mod importance;
+mod light_tree;
 mod notes;
-mod order;
-mod passes;
+mod pass_budget;
 mod picture;
 mod raster;
+mod ray_tree;
 mod settings;
 pub mod starts;
-mod tree;
 
 pub use cache::Cache;
+pub use light_tree::LightTree;
 pub use notes::notes;
-pub use order::LightTree;
 pub use picture::{Picture, PictureSettings};
 use settings::LEAST_CELL;
 pub use settings::{Pattern, Settings, Visibility};
@@ -55,18 +62,19 @@ use crate::{
     shaders::{self, consts, types},
 };
 
-/// Rays that one dispatch traces at most, about: seconds on a CPU driver.
+/// Approximate maximum of rays per dispatch on a CPU driver, which takes seconds for them.
 const MOST_RAYS: u64 = 1 << 22;
-/// On a GPU: tens of milliseconds, half of what a submission holds. Fewer passes for the host to plan.
+/// The same on a GPU, which takes tens of milliseconds: half of the time that one submission may take. Larger dispatches mean
+/// fewer passes for the host to plan.
 const MOST_RAYS_GPU: u64 = 1 << 25;
-/// Turns of loops of one invocation where a driver ends loops early: two rays of the longest.
+/// Maximum of loop iterations per invocation on drivers that abort long loops. Two of the longest rays fit.
 const TURNS_LIMITED: u64 = 60_000;
 
-/// What instant global illumination keeps of a scene.
+/// The data of a scene that instant global illumination needs in every frame.
 #[derive(Debug)]
 pub struct Igi {
     rays: Rays,
-    /// Trees of our own for imperfect visibility, where `rays` are ray queries.
+    /// Compute acceleration structures for [`Settings::imperfect`]; `None` if `rays` already is in compute, or nothing needs them.
     boxes: Option<Rays>,
     /// `rays` are traced in compute.
     in_compute: bool,
@@ -74,34 +82,35 @@ pub struct Igi {
     queries: bool,
     environment: OwnedImage,
     environment_columns: OwnedBuffer,
-    /// Of the environment's table: columns and rows of directions that are drawn alike.
+    /// Columns and rows of the environment's importance table. Directions within one cell have equal probability density.
     cells: [u32; 2],
-    /// Of the environment: what it sends through a box.
+    /// [`starts::sky_moments`] of the environment, W/m²; `None` without an environment.
     moments: Option<[f64; 3]>,
-    /// Of each instance of the scene.
+    /// Whether the material of each instance is double-sided.
     double_sided: Vec<bool>,
-    /// Emissive triangles as they stood in a pose.
+    /// The emissive triangles, and the pose for which the table was built.
     lights: Option<(Pose, LightTable)>,
-    /// There may be mirrors or glass.
+    /// The scene may have mirrors or glass.
     sharp: bool,
-    /// Diagonal of the box at rest around what light meets, metres: what shares of the scene's size are of, whatever moves.
+    /// Diagonal of the bounding box of all lit surfaces in the rest pose, metres. Settings that are shares of the scene's size
+    /// refer to this length, so that animation does not change them.
     size: f32,
-    /// Rays of an invocation.
+    /// Maximum of rays per invocation.
     most_rays: u64,
-    /// Rays of a dispatch, about.
+    /// Approximate maximum of rays per dispatch.
     rays_at_once: u64,
-    /// Of an image.
+    /// Maximum of layers per image on this device.
     most_layers: u32,
 }
 
-/// What the passes of a frame share.
+/// Resources and numbers that all passes of a frame share.
 #[derive(Clone, Copy, Debug)]
 struct Shared {
     settings: Uniform<types::IgiSettings>,
     /// Contents of `settings`.
     block: types::IgiSettings,
     rays: RayHandles,
-    /// For the shadow rays of virtual lights.
+    /// Acceleration structures for the shadow rays of virtual lights.
     hidden_by: RayHandles,
     environment: Image,
     environment_columns: Buffer,
@@ -109,28 +118,29 @@ struct Shared {
     light_targets: Buffer,
     instance_lights: Buffer,
     light_nodes: Buffer,
-    /// Shadow rays of a point.
+    /// Shadow rays per point for direct light.
     direct_rays: u32,
-    /// min_d, metres.
+    /// min_d of the bounded geometry term, metres.
     least: f32,
-    /// Of the box at rest around what light meets, metres.
+    /// Diagonal of the bounding box of all lit surfaces in the rest pose, metres.
     diagonal: f32,
-    /// Of random choices.
+    /// Seed of the random numbers.
     seed: u32,
-    /// By which the Halton points are turned.
+    /// Seed of the Cranley-Patterson rotation of the Halton points.
     turn: u32,
-    /// Of the Halton points, that of the first path.
+    /// Index of the Halton point of the first path.
     first: u32,
 }
 
-/// Virtual lights of a frame.
+/// The virtual lights of a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Vpls {
-    /// `types::Vpl`: the first ones of all paths, then the second ones, ….
+    /// `count` values of `types::Vpl`: first the lights at the first hits of all paths, then those at the second hits, and so on.
+    /// With a tree they are sorted like its leaves.
     pub buffer: Buffer,
-    /// Places in the buffer; some may be empty.
+    /// Slots in the buffer. A slot with zero flux holds no light.
     pub count: u32,
-    /// Over the virtual lights, which are then in its order. `None`: nothing picks from them.
+    /// The light tree; `None` if no receiver picks lights from a tree.
     pub tree: Option<LightTree>,
 }
 
@@ -143,29 +153,30 @@ pub struct Outputs {
     pub direct: Image,
     /// Indirect light as it enters the sum.
     pub indirect: Image,
-    /// What mirrors and glass show; alpha: the share of the surface that they are. `None`: the scene has none, or they are off.
+    /// Radiance that mirrors and glass reflect and transmit, W/(sr·m²); alpha: the share of the surface that is mirror or glass.
+    /// `None` if the scene has neither, or [`Settings::specular`] is off.
     pub sharp: Option<Image>,
-    /// Irradiance from virtual lights, W/m², of every pixel.
+    /// Irradiance from virtual lights at every pixel, W/m².
     pub irradiance: Image,
-    /// The same as gathered: of the size of `extent / downsample`; alpha: shadow rays.
+    /// The same irradiance before the filters, of size `extent / downsample`; alpha: number of shadow rays.
     pub gathered: Image,
-    /// `None`: indirect light is off.
+    /// `None` if indirect light is off.
     pub vpls: Option<Vpls>,
-    /// Cells of irradiance behind mirrors and glass; `None`: there are none.
+    /// The irradiance cache for surfaces that mirrors and glass show; `None` if it is off or nothing needs it.
     pub cache: Option<Cache>,
 }
 
-/// Metres; 0 if there is nothing.
+/// Length of the box's diagonal, metres; 0 for an empty box.
 fn diagonal(bounds: &Aabb) -> f32 {
     if bounds.is_empty() { 0.0 } else { (bounds.max - bounds.min).length() }
 }
 
-/// Rays of a dispatch that traces `each` for every pixel.
+/// Rays of a dispatch that traces `each` rays for every pixel.
 fn rays(extent: Extent, each: u32) -> u64 {
     extent.pixels() * u64::from(each)
 }
 
-/// With `threads` threads, or with the workgroups that lie at an offset in a buffer.
+/// Dispatches `threads` threads, or the number of workgroups that `groups` (buffer and byte offset) holds.
 fn dispatch<A: ComputeArgs>(graph: &mut Graph, args: A, groups: Option<(Buffer, u64)>, threads: u32) -> PassRef<'_> {
     match groups {
         Some((groups, offset)) => graph.compute_indirect(args, groups, offset),
@@ -174,11 +185,12 @@ fn dispatch<A: ComputeArgs>(graph: &mut Graph, args: A, groups: Option<(Buffer, 
 }
 
 impl Igi {
-    /// `settings` decide how rays are traced ([`Settings::visibility`], [`Settings::imperfect`]).
+    /// Builds acceleration structures and light tables. [`Settings::visibility`] and [`Settings::imperfect`] choose how rays are
+    /// traced; the other settings do not matter here.
     ///
     /// # Errors
-    /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits; `Usage` if ray queries are asked for
-    /// that the device does not have.
+    /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits; `Usage` if the settings ask for
+    /// ray queries and the device has none.
     pub fn new(gpu: &Gpu, scene: &Scene, resident: &Resident, settings: &Settings) -> Result<Self> {
         let queries = gpu.caps().ray_query;
         let in_compute = settings.visibility.in_compute(queries)?;
@@ -212,7 +224,7 @@ impl Igi {
         })
     }
 
-    /// Tables and trees of the frame.
+    /// Imports or uploads the resources that all passes of the frame share.
     fn shared(
         &mut self,
         graph: &mut Graph,
@@ -240,7 +252,7 @@ impl Igi {
         let table = self.lights.as_ref().map_or(&empty, |(_, table)| table);
         let bounds = handles.moment.lit_bounds();
         let (low, high) = if bounds.is_empty() { Default::default() } else { (bounds.min, bounds.max) };
-        // Something that has no size at rest has one now.
+        // A scene may be empty or flat in the rest pose and have a size in this pose.
         let diagonal = if self.size > 0.0 { self.size } else { diagonal(&bounds) };
         let sky = self.moments.is_some();
         let environment = scene.environment.as_ref();
@@ -285,7 +297,7 @@ impl Igi {
         }
     }
 
-    /// Shoots the paths of light of a frame.
+    /// Shoots the light paths of a frame and returns the virtual lights that they leave.
     fn shoot(&self, graph: &mut Graph, handles: &Handles, shared: &Shared, settings: &Settings) -> Vpls {
         let paths = settings.paths() * settings.candidates;
         let table = self.lights.as_ref().map(|(_, table)| table);
@@ -324,7 +336,7 @@ impl Igi {
         vpls
     }
 
-    /// Direct light of the visible surfaces, with what they emit.
+    /// Direct and emitted radiance of the visible surfaces, W/(sr·m²).
     fn direct(&self, graph: &mut Graph, handles: &Handles, g: &GBuffer, shared: &Shared) -> Image {
         let extent = graph.extent(g.depth);
         let direct = graph.image("igi.direct", Format::RGBA32F, extent);
@@ -351,8 +363,8 @@ impl Igi {
         direct
     }
 
-    /// Ranges of `rays` rays for the dispatches of an image: short enough for watchdogs and for limits on loops. One even
-    /// without rays.
+    /// Splits `rays` rays per pixel into ranges (first, count), one for each dispatch. Each dispatch is short enough for watchdogs
+    /// and for drivers that limit loops. Without rays there still is one range, so that the image is written.
     fn batches(&self, extent: Extent, rays: u32) -> Vec<(u32, u32)> {
         let pixels = u64::from(extent.width) * u64::from(extent.height);
         let each = (self.rays_at_once / pixels.max(1)).clamp(1, self.most_rays) as u32;

@@ -1,7 +1,7 @@
-//! Everything from a scene on the device to the final picture.
+//! All stages of a picture: G-buffer, virtual lights, direct and indirect light, sum and sky.
 
 use super::super::allowed::radiance;
-use super::{Igi, Outputs, Settings, Shared, Visibility, Vpls, filters, order, raster};
+use super::{Igi, Outputs, Settings, Shared, Visibility, Vpls, filters, light_tree, raster};
 use crate::{
     Error, Result,
     graph::{Format, Graph, Image},
@@ -20,13 +20,13 @@ use serde::{Deserialize, Serialize};
 pub struct PictureSettings {
     pub igi: Settings,
     pub gbuffer: gbuffer::Settings,
-    /// Radiance behind everything, added to that of an environment, linear RGB, not below 0. Seen directly and in mirrors; it lights
-    /// nothing.
+    /// Background radiance, W/(sr·m²), linear RGB, not below 0. The camera and mirrors see it, added to the environment's radiance;
+    /// it lights no surface.
     pub background: [f32; 3],
 }
 
 impl PictureSettings {
-    /// The paper's: [`Settings::paper`].
+    /// The paper's settings ([`Settings::paper`]).
     pub fn paper() -> Self {
         Self { igi: Settings::paper(), ..Self::default() }
     }
@@ -47,7 +47,7 @@ pub struct Picture {
 }
 
 impl Igi {
-    /// What paths leave, and what of it becomes virtual lights.
+    /// The candidates that the light paths leave, and the virtual lights drawn among them.
     fn virtual_lights(
         &self,
         graph: &mut Graph,
@@ -61,12 +61,14 @@ impl Igi {
         (all, chosen)
     }
 
-    /// Declares a frame: G-buffer, paths of light, direct and indirect light, sum and sky. `handles` are of this graph, for `pose`.
-    /// `graph.seed` is the seed of the paths; with 0 they are the paper's Halton points as they are. For [`Settings::history`] count
-    /// `graph.frame` up by one from frame to frame and run all frames with one `Runner`; `Runner::forget_history` starts anew.
+    /// Declares the passes of a frame: G-buffer, light paths, direct and indirect light, sum and sky. `handles` must belong to
+    /// `graph` and `pose`. `graph.seed` is the seed of the light paths; with seed 0 they use the paper's Halton points without a
+    /// rotation. [`Settings::history`] needs `graph.frame` to grow by one from frame to frame, and one `Runner` for all frames;
+    /// `Runner::forget_history` starts a new sequence.
     ///
     /// # Errors
-    /// `Usage` if a setting is out of its range, or asks for rays or boxes that [`Igi::new`] was not told of.
+    /// `Usage` if a setting is out of its range, if the settings need acceleration structures that [`Igi::new`] did not build, or
+    /// if the frame would need too many passes or draws.
     pub fn picture(
         &mut self,
         graph: &mut Graph,
@@ -80,11 +82,11 @@ impl Igi {
         settings.validate()?;
         if igi.visibility.in_compute(self.queries)? != self.in_compute {
             let how = if self.in_compute { "in compute" } else { "by ray queries" };
-            let what = format!("the scene was prepared for rays that are traced {how}");
+            let what = format!("Igi::new prepared the scene for rays that are traced {how}");
             return Err(Error::usage(what).at("igi.visibility").help("Give Igi::new the same settings"));
         }
         if igi.imperfect && !self.in_compute && self.boxes.is_none() {
-            let what = "there are no boxes: the scene was prepared for exact ray queries";
+            let what = "there are no boxes: Igi::new prepared the scene for exact ray queries";
             return Err(Error::usage(what).at("igi.imperfect").help("Give Igi::new the same settings"));
         }
         if igi.indirect && igi.visibility == Visibility::Raster {
@@ -94,11 +96,11 @@ impl Igi {
         let outputs = graph.scope("igi", |graph| -> Result<Outputs> {
             let shared = self.shared(graph, scene, pose, handles, igi);
             self.few_enough(graph.extent(gbuffer.depth), handles, &shared, igi)?;
-            // With a history every frame takes numbers of its own.
+            // With a history each frame uses other random numbers.
             let frame = if igi.history > 0 { graph.frame } else { 0 };
             let own = Self::numbered(graph, &shared, igi, frame);
             let shot = igi.indirect.then(|| self.virtual_lights(graph, handles, &gbuffer, &own, igi));
-            let vpls = shot.map(|(_, chosen)| order::ordered_if_asked(graph, chosen, igi));
+            let vpls = shot.map(|(_, chosen)| light_tree::with_light_tree(graph, chosen, igi));
             let direct = self.direct(graph, handles, &gbuffer, &shared);
             let seen = if igi.indirect { receivers(graph, &gbuffer, igi) } else { gbuffer };
             let gathered = match vpls {
@@ -116,11 +118,12 @@ impl Igi {
                 irradiance = self.accumulate(graph, handles, (&seen, view), &shared, light, igi);
             }
             let trees = (self.sharp && igi.specular).then(|| {
-                // What mirrors show has no history: it takes the same numbers in each frame, lest it flickers.
+                // Light in mirrors has no history. It uses the same random numbers in every frame, because other numbers would make it
+                // flicker.
                 let steady = match shot {
                     Some(_) if frame > 0 => {
                         let (_, chosen) = self.virtual_lights(graph, handles, &gbuffer, &shared, igi);
-                        Some(order::ordered_if_asked(graph, chosen, igi))
+                        Some(light_tree::with_light_tree(graph, chosen, igi))
                     }
                     _ => vpls,
                 };
@@ -133,7 +136,8 @@ impl Igi {
         skybox::draw(graph, handles, &gbuffer, settings.background.into(), outputs.total);
         Ok(Picture { gbuffer, outputs })
     }
-    /// Irradiance of every pixel from what was gathered for some of them, or from some of the virtual lights.
+
+    /// Irradiance of every pixel, computed by the filters from the coarse or interleaved irradiance `gathered`.
     fn filtered(
         &self,
         graph: &mut Graph,
@@ -168,8 +172,8 @@ impl Igi {
     }
 }
 
-/// The G-buffer as indirect light is gathered for it: surfaces that can show none (unlit and black ones, mirrors) are background, but where
-/// others take light from their texels.
+/// The G-buffer without the surfaces that reflect no diffuse light (unlit and black surfaces, mirrors): its depth marks them as
+/// background. If a filter runs, they stay, because their neighbours read the irradiance of their texels.
 fn receivers(graph: &mut Graph, g: &GBuffer, settings: &Settings) -> GBuffer {
     let extent = graph.extent(g.depth);
     let received = graph.image("igi.received", Format::R32F, extent);
@@ -179,7 +183,7 @@ fn receivers(graph: &mut Graph, g: &GBuffer, settings: &Settings) -> GBuffer {
     GBuffer { depth: received, ..*g }
 }
 
-/// The sum of all light, and what of it is indirect. `direct` becomes what of it enters the sum.
+/// The sum of all light, and the indirect light in it. Multiplies `direct` by the share of the surface that is not mirror or glass.
 fn composed(graph: &mut Graph, g: &GBuffer, direct: Image, irradiance: Image, sharp: Option<Image>) -> (Image, Image) {
     let extent = graph.extent(g.depth);
     let total = graph.image("igi.total", Format::RGBA32F, extent);
@@ -189,7 +193,7 @@ fn composed(graph: &mut Graph, g: &GBuffer, direct: Image, irradiance: Image, sh
         depth: g.depth,
         direct,
         irradiance,
-        // Not read where there is none.
+        // A binding needs an image; without mirrors the shader does not read it.
         sharp: sharp.unwrap_or(irradiance),
         total,
         indirect,

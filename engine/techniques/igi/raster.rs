@@ -1,9 +1,11 @@
 //! Visibility of virtual lights by shadow maps instead of rays.
 //!
-//! Each virtual light has three maps ([`consts::VPL_MAPS`]), drawn by the rasteriser from where the light stands, which only the device
-//! knows. Maps are drawn for as many lights at once as [`MOST_BYTES`] holds; what they hide is summed, and the next lights take their
-//! place. Paraboloid maps (Brabec et al. 2002) need one or two maps a light and bend edges, so that a wall of two triangles would end up
-//! somewhere else; imperfect shadow maps (Ritschel et al. 2008) need points on all surfaces. Three flat views hold the hemisphere, too.
+//! Each virtual light has three maps ([`consts::VPL_MAPS`]) with planar projections, which together cover its hemisphere. The rasteriser
+//! draws them from the light's position, which only the device knows. [`MOST_BYTES`] limits the number of lights whose maps are in memory
+//! at one time: a batch of lights is drawn and gathered, then the next batch reuses the maps.
+//!
+//! Paraboloid maps (Brabec et al. 2002) need one or two maps per light, but bend straight edges, so that a wall of two triangles would be
+//! displaced. Imperfect shadow maps (Ritschel et al. 2008) need points on all surfaces.
 
 use super::{Igi, Settings, Shared, Vpls, rays};
 use crate::{
@@ -19,32 +21,35 @@ use crate::{
 use glam::Vec3;
 use std::sync::Arc;
 
-/// Bytes of all maps that are there at once.
+/// Maximum of bytes of all maps in memory.
 const MOST_BYTES: u64 = 384 << 20;
-/// Virtual lights of a frame: each takes three passes over the scene.
+/// Maximum of virtual lights per frame: each needs three passes over the scene.
 pub const MOST_LIGHTS: u32 = 2048;
-/// Draws of a frame into maps: seconds of recording.
+/// Maximum of draws into maps per frame. The host takes seconds to record them.
 const MOST_DRAWS: u64 = 10_000_000;
-/// Factor on a caster's own slope that it moves away by: the four texels around a place lie within one texel of it in both axes.
+/// Slope-scaled depth bias. The lookup reads four texels, each at most one texel away along both axes, so twice the slope covers them.
 const SLOPE: f32 = 2.0;
-/// Nearest depth of a map, of the scene's diagonal. Depth of a triangle that reaches from there to the far end is interpolated to within
-/// a few ten-thousandths there.
+/// Near plane of a map, as share of the scene's diagonal. With this value the depth of a triangle that spans the whole scene is
+/// interpolated to within a few 10⁻⁴.
 const NEAREST: f32 = 2e-4;
 
-/// Refuses what maps cannot serve, beside more than [`MOST_LIGHTS`].
+/// Refuses settings that shadow maps do not support. The caller checks [`MOST_LIGHTS`].
+///
+/// # Errors
+/// `Usage`, naming the key.
 pub(super) fn validate(settings: &Settings) -> Result<()> {
     if settings.imperfect {
-        let what = "boxes of triangles need rays, and visibility is \"raster\"";
+        let what = "imperfect visibility needs shadow rays, but visibility is \"raster\"";
         return Err(Error::usage(what).at("imperfect").help("Choose imperfect = false or visibility = \"compute\""));
     }
     Ok(())
 }
 
-/// Refuses what would take minutes to record and gigabytes to hold: every primitive is drawn into three maps of every light, lit or not,
-/// for how many paths met nothing only the device knows.
+/// Refuses frames with more than [`MOST_DRAWS`] draws, which would take minutes to record and gigabytes of memory. Every primitive is
+/// drawn into three maps for every light. The host cannot skip lights without flux, because only the device knows them.
 ///
 /// # Errors
-/// `Usage`, naming both numbers.
+/// `Usage`, naming the number of lights and of draws.
 pub(super) fn affordable(handles: &Handles, settings: &Settings) -> Result<()> {
     let calls = Batches::of_casters(&handles.moment, None, Vec3::ZERO).list.iter().map(|batch| batch.calls.len()).sum();
     few_draws(calls, settings.paths() * settings.bounces)
@@ -56,7 +61,7 @@ fn few_draws(calls: usize, lights: u32) -> Result<()> {
         return Ok(());
     }
     let what = format!(
-        "{lights} virtual lights take {} draws with visibility = \"raster\", for the scene has {calls}; allowed: {MOST_DRAWS}",
+        "{lights} virtual lights take {} draws with visibility = \"raster\", because the scene has {calls} draws; allowed: {MOST_DRAWS}",
         each * u64::from(lights)
     );
     let help = match MOST_DRAWS / each {
@@ -66,22 +71,24 @@ fn few_draws(calls: usize, lights: u32) -> Result<()> {
     Err(Error::usage(what).at("vpls").help(help))
 }
 
-/// Lights whose maps of `size`² are there at once: a multiple of `subsets`, whatever fits.
+/// Number of lights whose maps of `size`² texels are in memory at one time. It is a multiple of `subsets` and at least `subsets`, even if
+/// this exceeds [`MOST_BYTES`].
 fn at_once(size: u32, layers: u32, subsets: u32) -> u32 {
     let each = u64::from(VPL_MAPS) * u64::from(size) * u64::from(size) * 4;
     let most = (MOST_BYTES / each).min(u64::from(layers / VPL_MAPS)) as u32;
     (most / subsets * subsets).max(subsets)
 }
 
-/// Passes for `lights` virtual lights on a device whose images have `layers` layers at most. `holed`: some things have holes, which take a
-/// pass of their own.
+/// Number of passes for `lights` virtual lights on a device with at most `layers` image layers. `holed`: some surfaces have alpha cutouts,
+/// which are drawn in a second pass.
 pub(super) fn passes(settings: &Settings, lights: u32, layers: u32, holed: bool) -> u64 {
     let batch = at_once(settings.raster_size, layers, settings.interleave * settings.interleave);
     u64::from(lights * VPL_MAPS * (1 + u32::from(holed)) + lights.div_ceil(batch))
 }
 
 impl Igi {
-    /// Irradiance from the virtual lights at the visible surfaces, hidden by what their maps show.
+    /// Irradiance of every [`Settings::downsample`]-th pixel from the virtual lights, W/m², with visibility from shadow maps; alpha: number
+    /// of map lookups.
     pub(super) fn gather_raster(
         &self,
         graph: &mut Graph,
@@ -106,7 +113,7 @@ impl Igi {
             of.flat_map(|b| b.calls.iter().copied()).collect()
         };
         let (solid, holed) = (calls(false), calls(true));
-        // A texel to clear, or a triangle to set up, takes about as long as a ray.
+        // For the runner's time estimate: clearing a texel or setting up a triangle takes about as long as tracing a ray.
         let work = |calls: &[IndexedCall]| {
             let triangles = calls.iter().map(|call| u64::from(call.indices / 3) * u64::from(call.instances));
             triangles.sum::<u64>() + u64::from(size) * u64::from(size)
@@ -180,7 +187,7 @@ mod tests {
         assert_eq!(at_once(256, 2048, 1), 512);
         assert_eq!(at_once(64, 2048, 1), 682);
         assert_eq!(at_once(256, 2048, 9), 504);
-        // One of each subset even where that is more than was meant.
+        // Each subset needs one light, even if the maps then exceed the limit.
         assert_eq!(at_once(2048, 2048, 16), 16);
     }
 
@@ -188,7 +195,7 @@ mod tests {
     fn more_draws_than_a_frame_can_hold_are_refused() {
         few_draws(1000, 2048).unwrap();
         let error = few_draws(5000, 2048).unwrap_err();
-        for part in ["vpls", "2048 virtual lights take 30720000 draws", "has 5000", "10000000", "vpls = 666"] {
+        for part in ["vpls", "2048 virtual lights take 30720000 draws", "has 5000 draws", "10000000", "vpls = 666"] {
             assert!(error.to_string().contains(part), "{error}");
         }
         assert!(error.exit_code() == 2 && few_draws(4_000_000, 1).unwrap_err().to_string().contains("compute"));

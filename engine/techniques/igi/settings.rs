@@ -1,31 +1,32 @@
-//! What can be chosen in instant global illumination, and what the paper chose.
+//! The settings of instant global illumination, their defaults, and the paper's values.
 
-use super::{
-    super::allowed::{within, wrong},
-    raster,
+use super::{super::allowed::wrong, raster};
+use crate::{
+    Error, Result,
+    settings::{Described, described},
+    shaders::consts::CACHE_CELLS,
 };
-use crate::{Error, Result, shaders::consts::CACHE_CELLS};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Least side of a cell: keys have nine bits an axis.
+/// Smallest side of a cache cell, as share of the scene's diagonal: a key has nine bits for each axis.
 pub(super) const LEAST_CELL: f32 = 0.002;
-const MOST_CELL: f32 = 0.2;
-/// Virtual lights of a frame.
+/// Maximum of virtual lights per frame.
 const MOST_LIGHTS: u32 = 10_000;
 
 /// How rays are traced.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Visibility {
-    /// By ray queries where the device has them and is no CPU driver (there: where they are asked for), else in compute.
+    /// By ray queries if the device has them, else in compute. CPU drivers use ray queries only if `LUCERNA_RAY_QUERY` is `on`.
     #[default]
     Auto,
-    /// Through our own trees in a compute shader, on any device.
+    /// In a compute shader, through this library's own acceleration structures. Works on every device.
     Compute,
-    /// By ray queries; an error of kind `Usage` where the device has none.
+    /// By ray queries; an error of kind `Usage` on a device without them.
     Query,
-    /// Virtual lights by shadow maps that the rasteriser draws, three each. Everything else (paths of light, direct light, what mirrors
-    /// and glass show) as with `Auto`.
+    /// Three shadow maps for each virtual light, drawn by the rasteriser. Light paths, direct light, mirrors and glass use rays as
+    /// with `Auto`.
     Raster,
 }
 
@@ -43,104 +44,144 @@ impl Visibility {
     }
 }
 
-/// Where the subsets of interleaved sampling lie.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// How interleaved sampling assigns subsets of the virtual lights to the pixels of a tile.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Pattern {
-    /// The same in every tile (paper).
+    /// The same assignment in every tile, as in the paper.
     #[default]
     Regular,
-    /// In another order in every tile, so that no pattern repeats. The tile around a pixel may then have a subset twice. Each subset has
-    /// light from all directions, where in the regular pattern with 3 × 3 it has a ninth of them.
+    /// Another assignment in every tile, so that no pattern repeats in the picture. The tile around a pixel may then contain a
+    /// subset twice. Each subset has light paths in all directions; a subset of the regular 3 × 3 pattern has a ninth of the
+    /// directions.
     Irregular,
 }
 
-/// Settings of the technique.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Settings of the technique. [`Settings::validate`] checks the ranges given here.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    /// Virtual point lights at most, 1 to 10,000 and no less than `bounces`. There are ⌊vpls / bounces⌋ paths of light; those that leave
-    /// the scene, or end on something black, leave fewer.
+    /// Maximum of virtual point lights, and at least `bounces`. There are ⌊vpls / bounces⌋ light paths. A path that
+    /// leaves the scene or ends on a black surface leaves fewer lights.
+    #[schemars(range(min = 1, max = MOST_LIGHTS), extend("x-unit" = "lights", "x-needs" = {"indirect": {"const": true}}))]
     pub vpls: u32,
-    /// Paths that are shot for each that virtual lights are kept of, 1 to 64: of what they leave, that is kept which matters to the view.
-    /// 1: whatever they leave, as in the paper.
+    /// Candidates for each virtual light: the number of light paths is multiplied by it. The frame draws its virtual lights
+    /// among the candidates, with a probability that follows the light that they send to the view. 1: every virtual light is used,
+    /// as in the paper.
+    #[schemars(range(min = 1, max = 64), extend("x-needs" = {"indirect": {"const": true}}))]
     pub candidates: u32,
-    /// Virtual lights along a path at most, 1 to 8: bounces of indirect light.
+    /// Maximum of virtual lights along a path: the bounces of indirect light.
+    #[schemars(range(min = 1, max = 8), extend("x-needs" = {"indirect": {"const": true}}))]
     pub bounces: u32,
-    /// Visible surfaces that candidates are judged by, 1 to 1024, a shadow ray for each from each. With few, what matters to a small part
-    /// of the view is missed and counts as rarely as is safe.
+    /// Visible points that measure the importance of the candidates. Each point traces a shadow ray to each candidate.
+    /// If there are few points, a candidate that lights a small part of the view may look unimportant. Half of the probability
+    /// follows the flux alone, so that such a candidate still is drawn.
+    #[schemars(range(min = 1, max = 1024), extend("x-unit" = "points", "x-needs" = {"candidates": {"minimum": 2}}))]
     pub judges: u32,
-    /// Bounding distance min_d of the geometry term, as share of the diagonal of the box around the scene at rest, without
-    /// unlit surfaces, which light passes; 0 switches the bound off. Virtual lights nearer than 0.8 of it give nothing, from 1.2 of it on
-    /// they give everything.
+    /// Bounding distance min_d of the geometry term, as share of the scene's diagonal: the diagonal of the bounding box of
+    /// all surfaces except unlit ones, in the rest pose. A virtual light nearer than 0.8 min_d sends no light, beyond 1.2 min_d it
+    /// sends all its light. 0: no bound.
+    #[schemars(range(min = 0, max = 1), extend("x-needs" = {"indirect": {"const": true}}))]
     pub bound: f32,
-    /// Virtual lights that each pixel picks by what they may send to it, 1 to 1024, instead of gathering from all: cost grows with the
-    /// logarithm of their number, for noise. Tiles of interleaved pixels share the picks. Where there are no more than four virtual lights for
-    /// each pick, all are gathered. 0: all, no picks.
+    /// Virtual lights that each pixel picks from the light tree, with a probability that follows the light that they may
+    /// send to it. The cost grows with the logarithm of `vpls`; the picture gets noise. The pixels of an interleaved tile share the
+    /// picks. With four virtual lights or fewer for each pick, every pixel gathers from all lights. 0: always from all.
+    #[schemars(range(min = 0, max = 1024), extend("x-unit" = "lights", "x-needs" = {"indirect": {"const": true}}))]
     pub picks: u32,
-    /// Virtual lights proposed for each pick, 1 to 16: of these that is taken, at random, which sends more if nothing is in the way.
+    /// Virtual lights proposed for each pick. One of the proposals is drawn, in proportion to the unoccluded light that it
+    /// sends.
+    #[schemars(range(min = 1, max = 16), extend("x-unit" = "lights", "x-needs" = {"picks": {"minimum": 1}}))]
     pub proposals: u32,
-    /// Short rays of each gathered pixel that put back the light which the bound takes, 0 to 64. 0: it is lost.
+    /// Short rays per gathered pixel that add back the light that the bound removes. 0: this light is missing.
+    #[schemars(range(min = 0, max = 64), extend("x-unit" = "rays", "x-needs" = {"bound": {"exclusiveMinimum": 0}}))]
     pub compensation: u32,
-    /// Side of the cells in which the light of virtual lights on what mirrors and glass show is kept, as share of the same diagonal,
-    /// 0.002 to 0.2; 0: every surface that they show gathers for itself.
+    /// Side of a cell of the irradiance cache, as share of the scene's diagonal. The cache holds the light of virtual
+    /// lights on surfaces that mirrors and glass show. 0: no cache; each of these surfaces gathers.
+    #[schemars(range(min = 0.002, max = 0.2), extend("x-zero" = true, "x-needs" = {"indirect": {"const": true}, "specular": {"const": true}}))]
     pub cache: f32,
-    /// Such cells at most, 1 to 131,072. With more, every surface gathers for itself ([`Cache::note`](super::Cache::note)).
+    /// Maximum of cache cells. If the frame needs more, it does not use the cache
+    /// ([`Cache::note`](super::Cache::note)).
+    #[schemars(range(min = 1, max = CACHE_CELLS), extend("x-unit" = "cells", "x-needs" = {"cache": {"exclusiveMinimum": 0}}))]
     pub cache_cells: u32,
-    /// Shadow rays of virtual lights test the boxes of triangles instead of triangles.
+    /// Shadow rays of virtual lights test the bounding boxes of triangles instead of the triangles.
+    #[schemars(extend("x-needs" = {"indirect": {"const": true}}))]
     pub imperfect: bool,
-    /// Pixels along the side of a texel on which indirect light is gathered, 1 to 4.
+    /// Pixels along the side of a coarse texel. Indirect light is gathered once for each coarse texel.
+    #[schemars(range(min = 1, max = 4), extend("x-unit" = "pixels", "x-needs" = {"indirect": {"const": true}}))]
     pub downsample: u32,
-    /// The pixel that a texel stands for is not the one in the middle of those that it covers, but another one from texel to texel, so that
-    /// thin things are met by some.
+    /// The pixel for which a coarse texel gathers changes from texel to texel, so that some texels hit a thin object. Otherwise it
+    /// is the pixel in the middle of the texel.
+    #[schemars(extend("x-needs" = {"downsample": {"minimum": 2}}))]
     pub scattered: bool,
-    /// Side of the tiles of pixels that share the virtual lights, 1 to 4, with `fused` to 32: each pixel gathers from one of side² subsets.
-    /// With more virtual lights in larger tiles each pixel has as many shadow rays as before, and its neighbours have others.
+    /// Side of the interleaving tiles; above 4 only with `fused`. The pixels of a tile share the virtual lights: each pixel
+    /// gathers from one of side² subsets. Larger tiles allow more virtual lights for the same number of shadow rays per pixel.
+    #[schemars(range(min = 1, max = 32), extend("x-unit" = "pixels", "x-needs" = {"indirect": {"const": true}}))]
     pub interleave: u32,
+    /// Where the subsets of interleaved sampling lie.
+    #[schemars(extend("x-needs" = {"interleave": {"minimum": 2}}))]
     pub pattern: Pattern,
-    /// Virtual lights are sorted by place and normal before tiles of pixels share them, so that each subset has some from every part of
-    /// the scene. With `picks` and with `compensation` they are sorted anyway.
+    /// Sorts the virtual lights by position and normal before they are split into subsets, so that each subset has lights from
+    /// every part of the scene. `picks` and `compensation` always sort them.
+    #[schemars(extend("x-needs" = {"interleave": {"minimum": 2}}))]
     pub sorted: bool,
-    /// One filter instead of two: upsampling reads the interleaved texels themselves.
+    /// One filter instead of two: the upsampling filter reads the interleaved texels, and the discontinuity buffer is not used.
+    #[schemars(extend("x-needs" = {"interleave": {"minimum": 2}}))]
     pub fused: bool,
-    /// Turns, 0 to 5, in which what was gathered is smoothed before it is upsampled, by the same weights for normals and distance from the
-    /// plane: n turns are about a Gaussian of standard deviation 1, 2.2, 4.6, 9.2, 18 texels of the coarse picture. 0: none.
+    /// Iterations of the edge-avoiding filter that smooths the coarse irradiance before upsampling. Its weights for normals
+    /// and planes are those of the upsampling filter. The result is about a Gaussian with a standard deviation of 1, 2.2, 4.6, 9.2
+    /// or 18 coarse texels. 0: no smoothing.
+    #[schemars(range(min = 0, max = 5), extend("x-unit" = "iterations", "x-needs" = {"indirect": {"const": true}}))]
     pub smoothing: u32,
-    /// A texel brighter than the mean of its neighbours on the same surface by more than this factor is dimmed to it before smoothing, 1 to
-    /// 1000: few virtual lights near a surface make specks that no filter can hide. 0: none is.
+    /// Maximum ratio of a coarse texel's luminance to the mean of its neighbours on the same surface. Brighter texels are
+    /// dimmed to this ratio before smoothing, because a virtual light close to a surface makes a speck that no filter hides. 0: no
+    /// limit.
+    #[schemars(range(min = 1, max = 1000), extend("x-zero" = true, "x-needs" = {"indirect": {"const": true}}))]
     pub despeckle: f32,
-    /// Where less than this share of the Gaussian of upsampling falls on texels that match in normal and plane one three times as wide is
-    /// tried, and where that fails too the pixel gathers for itself, from one subset: thin things that no texel met. 0 to 1; 0: nowhere. Not
-    /// with `picks`, nor with `visibility` `raster`.
+    /// Minimum share of the upsampling Gaussian that must fall on coarse texels with a matching normal and plane. With a
+    /// smaller share a Gaussian three times as wide is tried. If this fails too, the pixel gathers from one subset; this happens on
+    /// thin objects that no coarse texel hit. 0: never. Not with `picks`, and not with `visibility` `raster`.
+    #[schemars(range(min = 0, max = 1), extend("x-needs" = {"indirect": {"const": true}}))]
     pub refine: f32,
-    /// Standard deviation of the Gaussian of upsampling, texels of the coarse picture, 0.1 to 4.
+    /// Standard deviation of the upsampling Gaussian, in coarse texels.
+    #[schemars(range(min = 0.1, max = 4), extend("x-unit" = "texels", "x-needs" = {"indirect": {"const": true}}))]
     pub upsample_sigma: f32,
-    /// Exponent of the cosine between normals in upsampling, 0 to 64; the paper has 1.
+    /// Exponent of the cosine between normals in upsampling; the paper has 1.
+    #[schemars(range(min = 0, max = 64), extend("x-needs" = {"indirect": {"const": true}}))]
     pub upsample_normal: f32,
-    /// Distance from the pixel's plane, relative to its depth, at which a coarse texel weighs 0.6; 0: depth does not count (paper).
+    /// Distance of a coarse texel from the pixel's plane, relative to the pixel's depth, at which its weight falls to 0.6; 0: the
+    /// weight does not depend on depth, as in the paper.
+    #[schemars(range(min = 0, max = 1e6), extend("x-needs" = {"indirect": {"const": true}}))]
     pub upsample_range: f32,
-    /// Most difference of depth, relative to the texel's, over which interleaved texels are joined.
+    /// Maximum difference in depth, relative to the texel's depth, over which the discontinuity buffer averages interleaved texels.
+    #[schemars(range(min = 0, max = 1e6), extend("x-needs" = {"fused": {"const": false}, "interleave": {"minimum": 2}}))]
     pub discontinuity_depth: f32,
-    /// Least cosine between their normals.
+    /// Minimum cosine between the normals of texels that the discontinuity buffer averages.
+    #[schemars(range(min = -1, max = 1), extend("x-needs" = {"fused": {"const": false}, "interleave": {"minimum": 2}}))]
     pub discontinuity_normal: f32,
-    /// Frames of a sequence whose indirect light counts, 0 to 10,000; the virtual lights of each are others. 1: none but the frame's own.
-    /// 0: no history, and the same random numbers in every frame.
+    /// Maximum of frames over which indirect light is averaged. Each frame has other virtual lights. 1: no average. 0: no
+    /// history, and every frame uses the same random numbers.
+    #[schemars(range(min = 0, max = 10000), extend("x-unit" = "frames", "x-needs" = {"indirect": {"const": true}}))]
     pub history: u32,
-    /// Relative error that indirect light may have because it changes faster than the history forgets, 0.001 to 10.
+    /// Relative error of indirect light that is allowed because the average lags behind changing light.
+    #[schemars(range(min = 0.001, max = 10), extend("x-needs" = {"history": {"minimum": 2}}))]
     pub history_lag: f32,
-    /// Distance from a surface of the last frame, relative to its depth, within which it counts as the same.
+    /// Maximum distance from a surface of the last frame, relative to its depth, at which a pixel reuses that surface's light.
+    #[schemars(range(min = 0, max = 1e6), extend("x-needs" = {"history": {"minimum": 2}}))]
     pub history_range: f32,
-    /// For the shadow rays of virtual lights with `imperfect` always in compute.
+    /// How rays are traced. With `imperfect` the shadow rays of virtual lights are always traced in compute.
     pub visibility: Visibility,
-    /// Texels of a side of the shadow maps of virtual lights with `visibility` `raster`, 16 to 1024.
+    /// Side of the shadow maps of virtual lights.
+    #[schemars(range(min = 16, max = 1024), extend("x-unit" = "texels", "x-needs" = {"visibility": {"const": "raster"}}))]
     pub raster_size: u32,
-    /// Gather indirect light.
+    /// Computes indirect light.
     pub indirect: bool,
-    /// Mirrors, glass, and GGX highlights of direct light. Without, every surface reflects its diffuse part alone.
+    /// Mirrors, glass, and GGX highlights of direct light. If off, every surface reflects its diffuse part only.
     pub specular: bool,
-    /// Mirrors and glass one behind the other, 0 to 16, seen by the camera and passed by light.
+    /// Maximum of mirrors and glass surfaces in a row, along camera rays and along light paths.
+    #[schemars(range(min = 0, max = 16), extend("x-unit" = "surfaces", "x-needs" = {"specular": {"const": true}}))]
     pub specular_depth: u32,
-    /// Shadow rays a pixel for emissive surfaces, and as many for the environment, 1 to 4096. Other lights have one each.
+    /// Shadow rays per pixel to emissive surfaces, and as many to the environment. Each punctual light has one ray.
+    #[schemars(range(min = 1, max = 4096), extend("x-unit" = "rays"))]
     pub direct_samples: u32,
 }
 
@@ -186,8 +227,8 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The paper's fastest variant: 180 virtual lights, boxes, a quarter of the resolution, tiles of 3×3. It states neither the
-    /// bounces of a path nor min_d; taken here are the defaults.
+    /// The paper's fastest variant: 180 virtual lights, boxes, a quarter of the resolution, tiles of 3×3. The paper states neither
+    /// the number of bounces nor min_d, so these have the default values.
     pub fn paper() -> Self {
         Self {
             candidates: 1,
@@ -200,18 +241,19 @@ impl Settings {
         }
     }
 
-    /// Paths of light.
+    /// Number of light paths whose virtual lights are kept.
     pub fn paths(&self) -> u32 {
         (self.vpls / self.bounces.max(1)).max(1)
     }
 
-    /// Surfaces pick from so many virtual lights. From few it costs less to gather from all, without noise.
+    /// Whether receivers pick from `vpls` virtual lights. If there are few lights, gathering from all costs less and has no noise.
     pub fn picks_from(&self, vpls: u32) -> bool {
         self.picks > 0 && vpls > 4 * self.picks
     }
 
-    /// Subsets by which the virtual lights of an irregular subset move on from round to round: about the golden ratio of their number,
-    /// and without a common factor, so that in the end a subset has had all of them. 0: the pattern is regular.
+    /// Step of the irregular pattern: in round r a pixel of subset s gathers from subset (s + r·step) mod side². The step is about 0.62
+    /// side², so that consecutive rounds are far apart. It has no common factor with side², so that a pixel gathers from every subset
+    /// in turn. 0 for the regular pattern.
     pub(super) fn stride(&self) -> u32 {
         let subsets = self.interleave * self.interleave;
         if self.pattern == Pattern::Regular || subsets <= 1 {
@@ -226,27 +268,27 @@ impl Settings {
         (((633 * subsets) >> 10)..).find(|&stride| stride > 0 && common(stride, subsets) == 1).unwrap_or(1)
     }
 
-    /// Picks of a texel: pixels of a tile share them.
+    /// Picks per texel: the texels of an interleaving tile share [`Settings::picks`].
     pub fn texel_picks(&self) -> u32 {
         self.picks.div_ceil(self.interleave.max(1).pow(2))
     }
 
-    /// The discontinuity buffer joins the pixels of tiles.
+    /// The discontinuity buffer averages the texels of each tile.
     pub(super) fn joins(&self) -> bool {
         self.interleave > 1 && !self.fused
     }
 
-    /// What was gathered is smoothed.
+    /// The coarse irradiance is smoothed or despeckled.
     pub(super) fn smooths(&self) -> bool {
         self.smoothing > 0 || self.despeckle > 0.0
     }
 
-    /// Pixels take light from texels around.
+    /// The upsampling filter runs.
     pub(super) fn upsamples(&self) -> bool {
         self.downsample > 1 || (self.fused && self.interleave > 1)
     }
 
-    /// Short rays put light back: there is a bound that takes some.
+    /// Short rays compensate the bound. Without a bound there is nothing to compensate.
     pub fn compensates(&self) -> bool {
         self.compensation > 0 && self.bound > 0.0
     }
@@ -255,66 +297,37 @@ impl Settings {
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
         let raster = self.visibility == Visibility::Raster;
-        within([
-            ("candidates", self.candidates, 1, 64),
-            ("judges", self.judges, 1, 1024),
-            ("bounces", self.bounces, 1, 8),
-            ("picks", self.picks, 0, 1024),
-            ("proposals", self.proposals, 1, 16),
-            ("compensation", self.compensation, 0, 64),
-            ("cache_cells", self.cache_cells, 1, CACHE_CELLS),
-            ("downsample", self.downsample, 1, 4),
-            ("interleave", self.interleave, 1, 32),
-            ("smoothing", self.smoothing, 0, 5),
-            ("history", self.history, 0, 10_000),
-            ("specular_depth", self.specular_depth, 0, 16),
-            ("direct_samples", self.direct_samples, 1, 4096),
-            ("raster_size", self.raster_size, 16, 1024),
-        ])?;
         let most = if raster { raster::MOST_LIGHTS } else { MOST_LIGHTS };
         if !(self.bounces..=most).contains(&self.vpls) {
             let why = match (raster, self.bounces) {
                 (true, _) => {
-                    ", one for each bounce of a path at least, and with visibility = \"raster\" three passes over the scene for each"
+                    ", at least one for each bounce of a path; with visibility = \"raster\" each virtual light takes three passes over the \
+                     scene"
                 }
                 (false, 1) => "",
-                (false, _) => ", for a path leaves one at each of its bounces",
+                (false, _) => ", because a path leaves one virtual light at each bounce",
             };
             return wrong("vpls", self.vpls, &format!("{} to {most}{why}", self.bounces));
         }
         if raster {
             raster::validate(self)?;
             if self.picks > 0 {
-                let what = "picks need rays, and visibility is \"raster\"";
+                let what = "picks need shadow rays, but visibility is \"raster\"";
                 return Err(Error::usage(what).at("picks").help("Choose picks = 0 or visibility = \"compute\""));
             }
         }
         if self.interleave > 4 && (!self.fused || raster) {
-            let allowed = "1 to 4, up to 32 with fused = true and virtual lights by rays";
+            let allowed = "1 to 4, or 1 to 32 with fused = true and visibility other than \"raster\"";
             return wrong("interleave", self.interleave, allowed);
-        }
-        if self.despeckle != 0.0 && !(1.0..=1000.0).contains(&self.despeckle) {
-            return wrong("despeckle", self.despeckle, "0, or 1 to 1000");
         }
         if self.refine > 0.0 && (self.picks > 0 || raster) {
             return wrong("refine", self.refine, "0 with picks or visibility = \"raster\"");
         }
-        if self.cache != 0.0 && !(LEAST_CELL..=MOST_CELL).contains(&self.cache) {
-            return wrong("cache", self.cache, &format!("0, or {LEAST_CELL} to {MOST_CELL}"));
-        }
-        within([
-            ("bound", self.bound, 0.0, 1.0),
-            ("refine", self.refine, 0.0, 1.0),
-            ("upsample_sigma", self.upsample_sigma, 0.1, 4.0),
-            ("upsample_normal", self.upsample_normal, 0.0, 64.0),
-            ("upsample_range", self.upsample_range, 0.0, 1e6),
-            ("discontinuity_depth", self.discontinuity_depth, 0.0, 1e6),
-            ("discontinuity_normal", self.discontinuity_normal, -1.0, 1.0),
-            ("history_lag", self.history_lag, 0.001, 10.0),
-            ("history_range", self.history_range, 0.0, 1e6),
-        ])
+        Self::description().check(self)
     }
 }
+
+described!(Settings);
 
 #[cfg(test)]
 mod tests {
@@ -340,7 +353,7 @@ mod tests {
             assert!(interleave < 4 || (share - 0.618).abs() < 0.06, "{interleave}: {share}");
             assert_eq!(Settings { pattern: Pattern::Regular, ..settings }.stride(), 0);
         }
-        // As it was where that was right.
+        // These strides are part of the results that are compared from version to version.
         let stride = |interleave| Settings { interleave, pattern: Pattern::Irregular, ..Settings::default() }.stride();
         assert_eq!([1, 2, 3, 4, 6, 12].map(stride), [0, 3, 5, 9, 23, 89]);
     }
@@ -351,19 +364,20 @@ mod tests {
         let error = message(Settings { vpls: 0, bounces: 1, ..Settings::default() });
         assert_eq!(error, "vpls: 0 is not allowed; allowed: 1 to 10000");
         let error = message(Settings { bound: f32::NAN, ..Settings::default() });
-        assert_eq!(error, "bound: NaN is not allowed; allowed: 0 to 1");
+        assert_eq!(error, "bound: NaN or infinity is not allowed; allowed: 0 to 1");
         let error = message(Settings { vpls: 2, bounces: 3, ..Settings::default() });
         assert!(error.starts_with("vpls: 2 is not allowed; allowed: 3 to 10000"), "{error}");
-        // The same range, whichever end is missed.
+        // The message gives the same range for a value below it and a value above it.
         let raster = Settings { visibility: Visibility::Raster, ..Settings::default() };
         for vpls in [0, 1, 2049] {
             let error = message(Settings { vpls, ..raster.clone() });
             assert!(error.starts_with(&format!("vpls: {vpls} is not allowed; allowed: 2 to 2048")), "{error}");
         }
-        for cache in [0.3, 0.001, -1.0, f32::NAN] {
+        for cache in [0.3, 0.001, -1.0] {
             let error = message(Settings { cache, ..Settings::default() });
             assert_eq!(error, format!("cache: {cache} is not allowed; allowed: 0, or 0.002 to 0.2"));
         }
+        Settings { cache: LEAST_CELL, ..Settings::default() }.validate().unwrap();
         for wrong in [
             Settings { bounces: 9, ..Settings::default() },
             Settings { downsample: 0, ..Settings::default() },

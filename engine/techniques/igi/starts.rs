@@ -1,4 +1,4 @@
-//! Where paths of light begin: as many at each light as it has of the power of all.
+//! The starts of light paths: each light source gets paths in proportion to its share of the total power.
 
 use super::halton;
 use crate::{
@@ -11,18 +11,20 @@ use crate::{
 use glam::{Mat3, Vec3};
 use std::f64::consts::PI;
 
-/// Not there.
+/// An absent instance or child node.
 const NONE: u32 = u32::MAX;
 
-/// A light and the power that it is chosen by, summed over channels, W.
+/// A light source, and its power summed over the colour channels, W.
 #[derive(Clone, Copy, Debug)]
 pub struct Source {
     start: VplStart,
     pub power: f64,
 }
 
-/// Of a map, W/m² summed over channels: ∫ L |ωₖ| dω for the three axes. With the areas of a box's faces across the axes it gives the
-/// power that enters the box (W): parallel light from ω meets Σ |ωₖ| Aₖ of a box, whose mean over directions is a quarter of its
+/// Moments of an environment map, one for each axis k: ∫ L |ωₖ| dω, W/m², summed over the colour channels.
+///
+/// The power that enters a box is the sum over k of moment k times Aₖ, the area of a face perpendicular to axis k (W). This holds because
+/// parallel light from direction ω sees the projected area Σ |ωₖ| Aₖ. The mean of this area over all directions is a quarter of the box's
 /// surface (Cauchy 1841).
 pub fn sky_moments(environment: &Environment) -> [f64; 3] {
     let mut sum = [0.0; 3];
@@ -40,7 +42,8 @@ pub fn sky_moments(environment: &Environment) -> [f64; 3] {
     sum
 }
 
-/// All that shines, with its power. `emissive`: targets and tree of the emissive triangles.
+/// All light sources with a positive power. `targets`, `nodes`: the emissive triangles and the tree over them. `two_sided`: whether a
+/// triangle emits from both sides. `sky`: [`sky_moments`]. `bounds`: the box around the scene, metres.
 pub fn sources(
     lights: &[Light],
     (targets, nodes): (&[LightTarget], &[LightNode]),
@@ -60,7 +63,8 @@ pub fn sources(
         let angle = match light.kind {
             LIGHT_DIRECTIONAL => light.direction.iter().zip(faces).map(|(d, face)| f64::from(d.abs()) * face).sum(),
             LIGHT_SPOT => {
-                // In narrow cones the line from the outer to the inner one may end before it is 1.
+                // The falloff is linear in the cosine from the outer to the inner cone. In narrow cones rounding may place the inner
+                // cosine above 1, where the cone ends.
                 let cosine = |at: f32| f64::from((at - light.spot_offset) / light.spot_scale);
                 let (outer, inner) = (cosine(0.0).clamp(-1.0, 1.0), cosine(1.0));
                 let end = inner.min(1.0);
@@ -74,7 +78,7 @@ pub fn sources(
     for node in nodes.iter().filter(|node| node.second == NONE) {
         let Some(target) = targets.get(node.light as usize) else { continue };
         let sides = if two_sided(target) { 2.0 } else { 1.0 };
-        // The tree knows what a triangle sends along its axis; Lambert's law has π times as much in all.
+        // `power` is the intensity along the triangle's normal. The flux of a Lambertian emitter is π times its normal intensity.
         add(START_TRIANGLE, target.instance, target.index, PI * sides * f64::from(node.power));
     }
     if let Some(moments) = sky {
@@ -83,7 +87,7 @@ pub fn sources(
     out
 }
 
-/// Areas of a box's faces, across each axis, m².
+/// Area of a face of the box, perpendicular to each axis, m².
 fn faces(bounds: &Aabb) -> [f64; 3] {
     if bounds.is_empty() {
         return [0.0; 3];
@@ -92,13 +96,14 @@ fn faces(bounds: &Aabb) -> [f64; 3] {
     [size.y * size.z, size.z * size.x, size.x * size.y]
 }
 
-/// The start of each of `paths` paths. Equal steps through the powers in a row: every light has its share of the paths to within
-/// one, and a path of it carries the same part of its power as any other.
+/// The start of each of `paths` paths, by systematic sampling: equal steps through the running sum of the powers. The number of paths of
+/// a light differs from its expected number by less than one. The weight of a path is the inverse of this expected number, so that the
+/// light's paths together carry its power.
 pub fn starts(sources: &[Source], paths: u32, seed: u32) -> Vec<VplStart> {
     let total: f64 = sources.iter().map(|s| s.power).sum();
     let mut out = Vec::with_capacity(paths as usize);
     let (mut at, mut before) = (0, 0.0);
-    // Seed 0 takes the middle of each step.
+    // With seed 0 the samples lie in the middle of each step.
     let offset = if seed == 0 { 0.5 } else { halton::shift(seed, u32::MAX) };
     for path in 0..paths {
         let wanted = (f64::from(path) + offset) / f64::from(paths) * total;
@@ -117,7 +122,7 @@ pub fn starts(sources: &[Source], paths: u32, seed: u32) -> Vec<VplStart> {
     out
 }
 
-/// One number for a colour.
+/// Sum of the colour channels; negative channels count as 0.
 fn strength(color: Vec3) -> f64 {
     color.to_array().iter().map(|&c| f64::from(c.max(0.0))).sum()
 }
@@ -140,7 +145,7 @@ mod tests {
                 let mine: Vec<_> = starts.iter().filter(|s| s.index == source.start.index).collect();
                 let share = source.power / 10.01 * f64::from(paths);
                 assert!((mine.len() as f64 - share).abs() < 1.0, "{} of {paths}, share {share}", mine.len());
-                // Weighted, a light's paths carry its power.
+                // The weight is the inverse of the light's expected number of paths.
                 for start in mine {
                     assert!((f64::from(start.weight) * share - 1.0).abs() < 1e-5);
                 }
@@ -163,7 +168,7 @@ mod tests {
             spot_offset: -0.5 / (0.9 - 0.5),
             ..Light::default()
         };
-        // One degree: the line is a tenth of the way up in the middle.
+        // A cone of one degree: on the axis the linear falloff has only reached about 0.15.
         let edge = 1f32.to_radians().cos();
         let narrow = Light { spot_scale: 1e3, spot_offset: -1e3 * edge, ..spot };
         let sun = Light { intensity: [0.0, 3.0, 0.0], direction: [0.6, 0.0, -0.8], ..Light::default() };
@@ -185,7 +190,7 @@ mod tests {
 
     #[test]
     fn an_even_sky_sends_pi_times_half_the_surface() {
-        // Mean cross-section of a convex body is a quarter of its surface (Cauchy): power 4π L S/4.
+        // The mean projected area of a convex body is a quarter of its surface S (Cauchy), so the power is 4π L S/4.
         let sky = Environment {
             width: 64,
             height: 32,

@@ -1,7 +1,7 @@
-//! `Args` of passes that trace rays and light what they meet.
+//! `Args` of passes that trace rays and light the surfaces that they hit.
 
-/// As [`traced!`](crate::rays::traced), with the environment and the pass's settings from `shared`; with `lamps` in the last place also the
-/// bindings of `lib/lights.glsl` and `lib/light_sampling.glsl`.
+/// Like [`traced!`](crate::rays::traced), and also fills in the environment and the settings block from `shared`. With `lamps` as the last
+/// argument it fills in the bindings of `lib/lights.glsl` and `lib/light_sampling.glsl`, too.
 macro_rules! traced_lit {
     ($($name:ident)::+ { $($fields:tt)* }, $rays:expr, $handles:expr, $shared:expr $(,)?) => {
         $crate::rays::traced!(

@@ -46,7 +46,7 @@ use crate::{
 /// Images of a frame, at full resolution unless stated. Radiance in W/(sr·m²).
 #[derive(Clone, Copy, Debug)]
 pub struct Outputs {
-    /// Sum of all light (equation 29); alpha 1 on geometry, 0 on background, where rgb is 0 until a sky is drawn.
+    /// Sum of all light [ISR 29]; alpha 1 on geometry, 0 on background, where rgb is 0 until a sky is drawn.
     pub total: Image,
     /// Direct light with emission.
     pub direct: Image,

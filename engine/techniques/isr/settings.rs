@@ -20,14 +20,14 @@ pub enum Sender {
 
 /// What one sample of the gather stands for.
 ///
-/// Equation 25 sums (2π/N)·F over N samples. The area integral that it stands for is the sum of F alone, F the form factor to
+/// The paper's estimator [ISR 25] sums (2π/N)·F over N samples. The area integral that it stands for is the sum of F alone, F the form factor to
 /// the whole [`Patch`] that a sample represents. So the dissertation's sum is 2π/N of the true irradiance from within reach
 /// (0.26, 0.13, 0.08 for 24, 48, 80 samples), and with single texels as patches 2π/(N s²), s the spacing of the grid in texels:
 /// more samples make it darker, and `k_isr` balances it for one choice only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
-    /// Equation 25 as written.
+    /// The estimator [ISR 25] as written.
     Paper,
     /// F to the footprint of the whole cell of the image that a sample represents: converges to the one-bounce irradiance from
     /// all senders in reach, whatever N, reach and resolution.
@@ -101,7 +101,7 @@ pub enum Blur {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Upsample {
-    /// Difference of linear depth / far (equation 27).
+    /// Difference of linear depth / far [ISR 27].
     Depth,
     /// Normal, and distance from the pixel's plane relative to its depth: steep surfaces are one surface, creases part them.
     Plane,
@@ -121,7 +121,7 @@ pub enum Receiver {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Occlude {
-    /// Direct light, as in equation 29.
+    /// Direct light, as in [ISR 29].
     Direct,
     /// Light of the environment only: direct light has its own shadows.
     Ambient,
@@ -131,7 +131,7 @@ pub enum Occlude {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LightLaw {
-    /// Equation 16 and k_dl: colours relative to the brightest light times `light_power`, no π.
+    /// Attenuation [ISR 16] and k_dl: colours relative to the brightest light times `light_power`, no π.
     Paper,
     /// W/sr over squared distance, ρ/π.
     Physical,
@@ -208,10 +208,10 @@ pub struct Settings {
     /// How far occluders are looked for, in the full image.
     #[schemars(range(min = 1, max = 16384), extend("x-unit" = "pixels", "x-needs" = {"occlusion": {"const": true}}))]
     pub occlusion_reach: f32,
-    /// Radius of the sphere that a sample stands for in equation 26, in sides of its cell.
+    /// Radius of the sphere that a sample stands for in [ISR 26], in sides of its cell.
     #[schemars(range(min = 0, max = 16), extend("x-needs" = {"occlusion": {"const": true}}))]
     pub occluder_radius: f32,
-    /// Subtracted from the cosine of equation 26, against flat surfaces that occlude themselves by rounded normals.
+    /// Subtracted from the cosine of [ISR 26], against flat surfaces that occlude themselves by rounded normals.
     #[schemars(range(min = 0, max = 1), extend("x-needs" = {"occlusion": {"const": true}}))]
     pub occlusion_bias: f32,
     /// Filter of the gathered light.
@@ -225,7 +225,7 @@ pub struct Settings {
     /// What tells surfaces apart when coarse light is brought to full resolution.
     #[schemars(extend("x-needs" = {"resolution": {"const": "half"}}))]
     pub upsample: Upsample,
-    /// ε of equation 27, in the unit that `upsample` compares.
+    /// ε of [ISR 27], in the unit that `upsample` compares.
     #[schemars(range(min = 1e-9, max = 1), extend("x-needs" = {"resolution": {"const": "half"}}))]
     pub upsample_epsilon: f32,
     /// What the receiver does with gathered light.
@@ -234,7 +234,7 @@ pub struct Settings {
     /// Power of indirect light. The area estimator needs no balancing: 1.
     #[schemars(range(min = 0, max = 1000), extend("x-needs" = {"indirect": {"const": true}}))]
     pub k_isr: f32,
-    /// Power of occlusion: light is multiplied by accessibility + 1 − k_ssao, at most 1 (equation 29). With 1 this is
+    /// Power of occlusion: light is multiplied by accessibility + 1 − k_ssao, at most 1 [ISR 29]. With 1 this is
     /// accessibility itself; with the dissertation's 0.5, light is darkened only where more than half is occluded.
     #[schemars(range(min = 0, max = 1), extend("x-needs" = {"occlusion": {"const": true}}))]
     pub k_ssao: f32,
@@ -433,7 +433,7 @@ mod tests {
         let error = message(Settings { samples: 50, ..Settings::default() });
         assert_eq!(error, "samples: 50 is not allowed; allowed: 24, 48, 80");
         let error = message(Settings { k_ssao: f32::NAN, ..Settings::default() });
-        assert_eq!(error, "k_ssao: NaN is not allowed; allowed: 0 to 1");
+        assert_eq!(error, "k_ssao: NaN or infinity is not allowed; allowed: 0 to 1");
         let error = message(Settings { bounces: 0, ..Settings::default() });
         assert_eq!(error, "bounces: 0 is not allowed; allowed: 1 to 4");
     }

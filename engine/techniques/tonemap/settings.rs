@@ -359,7 +359,7 @@ mod tests {
         let wanted =
             "mode: local is not allowed; allowed: global, for the operator aces is a curve without local component";
         assert_eq!(message(curve), wanted);
-        let wanted = "exposure: NaN is not allowed; allowed: -40 to 40";
+        let wanted = "exposure: NaN or infinity is not allowed; allowed: -40 to 40";
         assert_eq!(message(Settings { exposure: f32::NAN, ..Settings::default() }), wanted);
         let wanted = "radius: 17 is not allowed; allowed: 1 to 16";
         assert_eq!(message(Settings { radius: 17, ..Settings::default() }), wanted);

@@ -12,13 +12,13 @@ use crate::args::TalkArgs;
 
 const VIEWING: &str = "Viewing conditions";
 const DETAILS: &str = "Details of measures";
-const HDR: &str = "From light to screen";
+const HDR: &str = "Conversion of light to screen values";
 
 /// The arguments of `lucerna compare`.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = HELP)]
 pub struct CompareArgs {
-    /// What is right: .exr, .hdr, .pfm, .png or .jpg; FILE:LAYER takes a layer of an EXR file
+    /// The reference image: .exr, .hdr, .pfm, .png or .jpg; FILE:LAYER selects a layer of an EXR file
     #[arg(value_name = "REFERENCE")]
     pub reference: String,
 
@@ -26,12 +26,12 @@ pub struct CompareArgs {
     #[arg(required = true, value_name = "TEST")]
     pub tests: Vec<String>,
 
-    /// Measures, separated by commas; `all` (that the images are large enough for), or `default`: mae, rmse, rel-mse, psnr, pearson,
+    /// Measures, separated by commas; `all` (those for which the images are large enough), or `default`: mae, rmse, rel-mse, psnr, pearson,
     /// ssim and flip (hdr-flip for HDR)
     #[arg(short, long, value_name = "NAME", value_delimiter = ',')]
     pub metric: Vec<String>,
 
-    /// The image that each TEST should be better than: for fq, gain and improved
+    /// The image with which the measures fq, gain and improved compare each TEST
     #[arg(long, value_name = "FILE")]
     pub baseline: Option<String>,
 
@@ -43,7 +43,7 @@ pub struct CompareArgs {
     #[arg(long, value_name = "RECTANGLE", value_parser = crop)]
     pub crop: Option<([u32; 2], [u32; 2])>,
 
-    /// Put this value where a sample is NaN or infinite, instead of refusing the image
+    /// Replace NaN and infinite samples by this value, instead of refusing the image
     #[arg(long, value_name = "VALUE", value_parser = finite)]
     pub nan_as: Option<f64>,
 
@@ -51,12 +51,12 @@ pub struct CompareArgs {
     #[arg(long, value_name = "DIR")]
     pub map: Option<PathBuf>,
 
-    /// Kinds of maps: `magma` on a fixed scale, `exr` with the numbers, `difference` and `negative`: |R-T| of what a screen shows, and
-    /// 1 minus that
+    /// Kinds of maps: `magma` on a fixed scale, `exr` with the numbers, `difference`: |R-T| of screen values, `negative`: 1 minus
+    /// |R-T|
     #[arg(long, value_enum, value_delimiter = ',', default_value = "magma", requires = "map")]
     pub map_style: Vec<MapStyle>,
 
-    /// Replace maps that exist
+    /// Overwrite existing maps
     #[arg(long)]
     pub overwrite: bool,
 
@@ -64,11 +64,11 @@ pub struct CompareArgs {
     #[arg(long)]
     pub json: bool,
 
-    /// Exit code 7 if a measure is on the bad side of VALUE (below it where more is better); may be repeated
+    /// Exit with code 7 if a measure is worse than VALUE (below it for measures where more is better); may be repeated
     #[arg(long, value_name = "METRIC=VALUE", value_delimiter = ',')]
     pub fail_over: Vec<Threshold>,
 
-    /// The same as a warning
+    /// Print a warning if a measure is worse than VALUE
     #[arg(long, value_name = "METRIC=VALUE", value_delimiter = ',')]
     pub warn_over: Vec<Threshold>,
 
@@ -77,15 +77,15 @@ pub struct CompareArgs {
     #[arg(long)]
     pub idiff_codes: bool,
 
-    /// Stops of exposure for measures of what a screen shows, the same for all images; `auto`: found on the reference
+    /// Exposure for measures of screen values, stops, the same for all images; `auto`: computed from the reference
     #[arg(long, value_name = "EV|auto", allow_hyphen_values = true, value_parser = exposure, default_value = "auto", help_heading = HDR)]
     pub exposure: Stops,
 
-    /// What is done with values that a screen cannot show
+    /// Tone curve for values above the screen's white
     #[arg(long, value_enum, default_value = "clip", help_heading = HDR)]
     pub tone_curve: Curve,
 
-    /// What arithmetic measures compare: linear light, or sRGB codes of 0 to 1 after exposure and tone curve [default: linear, psnr
+    /// Values that arithmetic measures compare: linear light, or sRGB codes of 0 to 1 after exposure and tone curve [default: linear; psnr
     /// display]
     #[arg(long, value_enum, help_heading = HDR)]
     pub space: Option<SpaceName>,
@@ -106,7 +106,7 @@ pub struct CompareArgs {
     #[arg(long, value_enum, default_value = "rgb", help_heading = DETAILS)]
     pub ssim_channels: Channels,
 
-    /// By whose range nrmse divides
+    /// The image whose range nrmse divides by
     #[arg(long, value_enum, default_value = "reference", help_heading = DETAILS)]
     pub nrmse_range: Range,
 
@@ -130,7 +130,7 @@ pub struct CompareArgs {
     #[arg(long, value_enum, default_value = "aces", help_heading = DETAILS)]
     pub flip_curve: Curve,
 
-    /// How pdiff makes light of codes: a power, or `srgb`
+    /// Conversion of codes to light in pdiff: a power, or `srgb`
     #[arg(long, value_name = "G|srgb", default_value = "2.2", value_parser = gamma, help_heading = DETAILS)]
     pub pdiff_gamma: Gamma,
 
@@ -142,7 +142,7 @@ pub struct CompareArgs {
     #[arg(long, value_name = "W", default_value_t = 1.0, help_heading = DETAILS)]
     pub pdiff_color: f64,
 
-    /// Failing pixels from which on pdiff says "visibly different"
+    /// Minimum of failing pixels for which pdiff reports "visibly different"
     #[arg(long, value_name = "PIXELS", default_value_t = 100, help_heading = DETAILS)]
     pub pdiff_threshold: u64,
 
@@ -154,7 +154,7 @@ pub struct CompareArgs {
     #[arg(long, value_name = "P", default_value_t = 0.75, help_heading = DETAILS)]
     pub vdp_threshold: f64,
 
-    /// Threads [default: all cores]; the numbers do not depend on it
+    /// Number of threads [default: all cores]; the results do not depend on it
     #[arg(long, value_name = "N")]
     pub threads: Option<usize>,
 
@@ -163,28 +163,28 @@ pub struct CompareArgs {
 }
 
 const HELP: &str = "\
-Every TEST is compared pixel by pixel with REFERENCE: one line a test, one column a measure. Images of different sizes, images with
-NaN or infinite pixels, and light beside screen codes (unless --exposure says how it is shown) are refused.
+Compares every TEST with REFERENCE pixel by pixel, and prints one line for each test and one column for each measure. Refuses images of
+different sizes, images with NaN or infinite pixels, and HDR images together with screen codes (unless --exposure is given).
 
 Measures:
-  mae rmse nrmse rms-percent mean-percent rel-mse pearson   linear values as they are
-  psnr ssim ms-ssim flip pdiff vdp                          what a screen shows: exposure, tone curve, sRGB
+  mae rmse nrmse rms-percent mean-percent rel-mse pearson   compare linear values
+  psnr ssim ms-ssim flip pdiff vdp                          compare screen values: exposure, tone curve, sRGB
   hdr-flip                                                  chooses its own exposures
-  fq gain improved                                          against --baseline; fq is -1 where TEST is nearer than the baseline
+  fq gain improved                                          compare with --baseline; fq is -1 where TEST is nearer than the baseline
 
-Exit codes: 0 measured and nothing over a threshold, 7 over a threshold, 2 wrong usage, 3 unreadable or not comparable, 1 a map could not
-be written.
+Exit codes: 0 no measure is over its threshold, 7 a measure is over its threshold, 2 wrong usage, 3 an image is unreadable or not
+comparable, 1 a map could not be written.
 
 Examples:
   lucerna compare reference.exr isr.exr                            the usual measures
   lucerna compare reference.exr a.exr b.exr c.exr -m flip,ssim     a table
-  lucerna compare reference.exr isr.exr --baseline isr.exr:direct  is it better than direct light alone?
+  lucerna compare reference.exr isr.exr --baseline isr.exr:direct  is it better than direct light only?
   lucerna compare golden.png new.png --fail-over flip=0.02         for CI: exit code 7 if it looks different
   lucerna compare a.exr b.exr -m all --map maps --json             everything, with maps
 
-docs/measures.md has each measure's formula, source, range and what it is good for.";
+docs/measures.md has the formula, source, range and purpose of each measure.";
 
-/// A measure and the value that it may not pass.
+/// A measure and its threshold.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Threshold {
     pub measure: Measure,
@@ -304,7 +304,7 @@ impl CompareArgs {
         Ok(options)
     }
 
-    /// `--fail-over`; with `--idiff-codes` and none given: any difference.
+    /// The thresholds of `--fail-over`. With `--idiff-codes` and without thresholds, any difference fails.
     pub(super) fn thresholds(&self) -> Vec<Threshold> {
         if self.idiff_codes && self.fail_over.is_empty() {
             return vec![Threshold { measure: Measure::Mae, value: 0.0 }];

@@ -10,10 +10,10 @@ use lucerna::{
 use super::CompareArgs;
 use crate::console::Console;
 
-/// Why there is nothing to show.
+/// An error that ends the comparison.
 pub(super) struct Stop {
     pub error: Error,
-    /// The reason has an exit code of its own in idiff.
+    /// The images have different sizes, for which idiff has its own exit code.
     pub sizes_differ: bool,
 }
 
@@ -23,7 +23,7 @@ impl From<Error> for Stop {
     }
 }
 
-/// A picture as the user named it.
+/// An image, and its name on the command line.
 pub(super) struct Image {
     pub name: String,
     pub picture: Picture,
@@ -35,15 +35,15 @@ pub(super) struct Images {
     pub tests: Vec<Image>,
     pub baseline: Option<Image>,
     pub notes: Vec<String>,
-    /// Light was exposed because it stands beside screen codes.
+    /// HDR images were converted to screen codes, because other images are screen codes.
     pub developed: bool,
 }
 
 impl Images {
-    /// Reads all of them and puts them on common ground.
+    /// Reads all images and converts them to comparable values.
     ///
     /// # Errors
-    /// `Input` for files that cannot be read, layers that are not there, and light compared with screen codes.
+    /// `Input` for files that cannot be read, for missing layers, and for HDR images compared with screen codes without an exposure.
     pub fn read(args: &CompareArgs, console: Console) -> Result<Self, Stop> {
         let mut notes = Vec::new();
         let mut one = |name: &String| image(name, args, &mut notes);
@@ -63,7 +63,7 @@ impl Images {
         std::iter::once(&mut self.reference).chain(&mut self.tests).chain(&mut self.baseline)
     }
 
-    /// Light and screen codes are compared only when it is said how the light is shown.
+    /// Converts HDR images to screen codes if other images are screen codes. This needs an exposure from the user.
     fn common_ground(&mut self, args: &CompareArgs) -> Result<()> {
         let (mut light, mut codes) = (None, None);
         for image in self.each() {
@@ -72,16 +72,15 @@ impl Images {
         }
         let (Some(light), Some(codes)) = (light, codes) else { return Ok(()) };
         let Some(stops) = args.exposure.0 else {
-            return Err(Error::input(format!("{light} holds light of any range, {codes} what a screen shows"))
-                .help("Say with --exposure EV (and --tone-curve) how the light was shown; 0 takes 1 as white"));
+            return Err(Error::input(format!("{light} is an HDR image, but {codes} holds screen values"))
+                .help("Give the exposure of the HDR image with --exposure EV (and --tone-curve); with 0, a value of 1 is white"));
         };
         let curve = args.tone_curve.curve();
         for image in self.each().filter(|image| !image.picture.display_referred) {
             image.picture = measure::develop(&image.picture, stops, curve);
         }
-        let note = format!(
-            "{light} and others with light of any range are shown with {stops} stops and compared as screen values"
-        );
+        let note =
+            format!("HDR images ({light} and others) are exposed by {stops} stops and compared as screen values");
         self.notes.push(note);
         self.developed = true;
         Ok(())
@@ -109,7 +108,7 @@ fn image(name: &str, args: &CompareArgs, notes: &mut Vec<String>) -> Result<Imag
     Ok(Image { name: name.to_owned(), picture })
 }
 
-/// File and layer of `FILE:LAYER`; a file that is there with a colon in its name is a file.
+/// Splits `FILE:LAYER`. An existing file with a colon in its name is not split.
 pub(crate) fn split(name: &str) -> (&str, Option<&str>) {
     if Path::new(name).exists() {
         return (name, None);

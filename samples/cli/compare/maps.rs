@@ -18,7 +18,7 @@ use super::{
 };
 use crate::program;
 
-/// Where maps go, or nowhere.
+/// The folder for maps, if any.
 pub(super) struct Folder<'a> {
     args: &'a CompareArgs,
     path: Option<PathBuf>,
@@ -27,7 +27,7 @@ pub(super) struct Folder<'a> {
 }
 
 impl<'a> Folder<'a> {
-    /// Makes the folder and checks that nothing is overwritten unasked, before anything is computed.
+    /// Makes the folder and checks, before the comparison, that no existing file would be overwritten without permission.
     ///
     /// # Errors
     /// `Output` if a map cannot be written.
@@ -45,7 +45,7 @@ impl<'a> Folder<'a> {
         Ok(folder)
     }
 
-    /// Style, measure (for styles that show one) and file.
+    /// Style, measure (for styles that show a measure) and file of each map.
     fn names(&self, path: &Path, stem: &str, measures: &[Measure]) -> Vec<(MapStyle, Option<usize>, PathBuf)> {
         let mut names = Vec::new();
         for style in &self.args.map_style {
@@ -69,7 +69,7 @@ impl<'a> Folder<'a> {
     /// Writes the maps of a test and returns their names.
     ///
     /// # Errors
-    /// `Output`: that file is not there, the ones before it are complete.
+    /// `Output`: the named file was not written; the files before it are complete.
     pub fn write(&self, test: usize, pair: &Pair<'_>, values: &[Measured], options: &Options) -> Result<Vec<String>> {
         let Some(path) = &self.path else { return Ok(Vec::new()) };
         let measures: Vec<Measure> = values.iter().map(|v| v.measure).collect();
@@ -99,7 +99,7 @@ impl<'a> Folder<'a> {
             extra.insert("meaning".to_owned(), measured.map.meaning.to_owned());
             extra.insert("scale".to_owned(), format!("magma from {low} (darkest) to {high} (brightest)"));
         } else {
-            extra.insert("meaning".to_owned(), "|R-T| of what a screen shows, or 1 minus that".to_owned());
+            extra.insert("meaning".to_owned(), "|R-T| of screen values, or 1 minus |R-T|".to_owned());
         }
         Metadata {
             program: "lucerna compare".into(),

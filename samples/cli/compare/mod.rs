@@ -19,7 +19,7 @@ use input::{Images, Stop};
 
 use crate::console::{self, Console};
 
-/// What was measured of one image.
+/// The measurements of one image.
 struct Compared {
     name: String,
     values: Vec<Measured>,
@@ -27,24 +27,24 @@ struct Compared {
     maps: Vec<String>,
 }
 
-/// All of a run.
+/// The results of a run.
 struct Comparison {
     reference: String,
     baseline: Option<String>,
     size: [u32; 2],
     measures: Vec<Measure>,
     tests: Vec<Compared>,
-    /// What was over its threshold, in words.
+    /// Messages about exceeded thresholds.
     over: Vec<String>,
     warnings: Vec<String>,
-    /// What a reader must know of the inputs.
+    /// Notes about the inputs.
     notes: Vec<String>,
 }
 
-/// Compares. The exit code is 0, or with `--idiff-codes` what idiff would say.
+/// Runs `lucerna compare`. The exit code is 0, or with `--idiff-codes` the exit code of idiff.
 ///
 /// # Errors
-/// `Usage` and `Input` for what cannot be compared; `Comparison` if a threshold is passed; `Output` for maps.
+/// `Usage` and `Input` for images that cannot be compared; `Comparison` if a threshold is exceeded; `Output` for maps.
 pub fn run(args: &CompareArgs, console: Console) -> Result<ExitCode> {
     match compare(args, console) {
         Ok(comparison) => {
@@ -62,7 +62,7 @@ pub fn run(args: &CompareArgs, console: Console) -> Result<ExitCode> {
     }
 }
 
-/// From thresholds to the exit code.
+/// Checks the thresholds and decides the exit code.
 fn verdict(args: &CompareArgs, console: Console, comparison: &Comparison) -> Result<ExitCode> {
     for warning in &comparison.warnings {
         console.warning(warning);
@@ -84,7 +84,7 @@ fn compare(args: &CompareArgs, console: Console) -> Result<Comparison, Stop> {
     let (fail, warn) = (args.thresholds(), args.warn_over.clone());
     let images = Images::read(args, console)?;
     if images.developed {
-        // They are what a screen shows already.
+        // The images already are screen values, so they are compared unchanged.
         options.display = Display { exposure: Exposure::Stops(0.0), curve: ToneCurve::Clip };
     }
     let measures = chosen(args, &images, &fail, &warn)?;
@@ -131,7 +131,8 @@ fn pair(images: &Images, test: usize) -> Result<Pair<'_>, Stop> {
     })
 }
 
-/// The measures in the order of the table: those that were named, else a selection that fits the inputs; thresholds add theirs.
+/// The measures in the order of the table: the measures that the user named, else a selection that fits the inputs; then the measures of the
+/// thresholds.
 fn chosen(args: &CompareArgs, images: &Images, fail: &[Threshold], warn: &[Threshold]) -> Result<Vec<Measure>> {
     let mut list: Vec<Measure> = Vec::new();
     let with_baseline = images.baseline.is_some();
@@ -158,8 +159,8 @@ fn chosen(args: &CompareArgs, images: &Images, fail: &[Threshold], warn: &[Thres
         }
     });
     if let Some(measure) = list.iter().find(|m| m.info().needs_baseline && !with_baseline) {
-        return Err(Error::usage(format!("{measure} asks whether an image is better than a third one"))
-            .help("Name the image to beat with --baseline FILE, for example direct light alone"));
+        return Err(Error::usage(format!("{measure} compares each image with a baseline"))
+            .help("Give the baseline with --baseline FILE, for example a picture with direct light only"));
     }
     Ok(list)
 }

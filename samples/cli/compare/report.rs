@@ -25,7 +25,7 @@ pub(super) fn number(value: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// For people: a list for one image, a table for several.
+/// Text for terminals: a list for one image, a table for several images.
 pub(super) fn text(comparison: &Comparison) -> String {
     let [w, h] = comparison.size;
     let mut lines = vec![format!("{w}×{h}, reference {}", comparison.reference)];
@@ -59,7 +59,7 @@ pub(super) fn text(comparison: &Comparison) -> String {
     lines.join("\n")
 }
 
-/// The first column to the left, numbers to the right; a third column of a list to the left again.
+/// Aligns columns: the first to the left, numbers to the right, and the third column of a list to the left.
 fn align(rows: &[Vec<String>]) -> Vec<String> {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |c: usize| rows.iter().filter_map(|row| row.get(c)).map(|cell| cell.chars().count()).max().unwrap_or(0);
@@ -109,7 +109,7 @@ fn remarks(comparison: &Comparison) -> Vec<String> {
     lines
 }
 
-/// One document: what was compared, how, and the numbers. Values that JSON cannot hold are null, with `note` saying why.
+/// The JSON document: the images, the options and the results. A value that JSON cannot hold is null, and `note` gives the reason.
 pub(super) fn json(comparison: &Comparison, args: &CompareArgs) -> Value {
     let measures: Vec<Value> = comparison
         .measures

@@ -1,9 +1,8 @@
-//! Pictures by what decided them: `runs/KEY.exr` and `runs/KEY.json` in the folder of a report.
+//! The cache of pictures: `runs/KEY.exr` and `runs/KEY.json` in the folder of a report. The key is a digest of all inputs of the picture.
 //!
-//! The text file is written after the picture: a picture counts once its text is there, so that whenever the program is killed,
-//! what is there is complete. It holds the digest of the picture's file, and its own: what was damaged or put there by somebody else
-//! does not count, which is said once, and is made anew. Times stand in the text file; the picture's bytes depend on nothing but what the
-//! key names.
+//! The text file is written after the picture. A picture without its text file does not count, so that an interrupted program leaves no incomplete
+//! picture. The text file holds the digest of the picture's file, and its own digest. A damaged or foreign file is reported once and replaced.
+//! Times are in the text file, so that the bytes of the picture depend on the inputs only.
 
 use std::{
     collections::HashMap,
@@ -27,27 +26,27 @@ use crate::program;
 /// ([`super::sources`]).
 pub const SOURCES: &str = env!("LUCERNA_SOURCES");
 
-/// What a picture depends on besides the kind and the sources.
+/// The inputs of a picture, besides its kind and the sources.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Inputs {
     /// Fingerprint of its files.
     pub scene: String,
     pub view: Value,
-    /// All of them, those at their defaults too.
+    /// All settings, including those with default values.
     pub settings: Value,
     pub seed: u32,
     pub repeat: u32,
-    /// Those that are kept.
+    /// Layers that the file keeps.
     pub layers: Vec<String>,
 }
 
-/// Device and driver, as keys name them.
+/// Device and driver, as text for keys.
 pub fn device(gpu: &Gpu) -> String {
     let about = gpu.describe();
     format!("{}, {} {}", about.device, about.driver, about.driver_info)
 }
 
-/// What decides a picture, as text.
+/// The key of a picture, with its inputs as text.
 #[derive(Clone, Debug)]
 pub struct Key {
     pub name: String,
@@ -76,7 +75,7 @@ fn name_of(text: &Value) -> String {
     Digest::of(text.to_string().as_bytes()).hex()
 }
 
-/// What stands beside a picture.
+/// The contents of a picture's text file.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Record {
     key: Value,
@@ -89,12 +88,12 @@ struct Record {
 #[derive(Clone, Debug)]
 pub struct Cache {
     folder: PathBuf,
-    /// Keys that were looked at: a file is read whole once in a run, however often it is asked for.
+    /// Records by key, so that each file is read only once per run.
     seen: Arc<Mutex<HashMap<String, Option<Record>>>>,
 }
 
 impl Cache {
-    /// Makes the folder if it is not there.
+    /// Makes the folder if it does not exist.
     ///
     /// # Errors
     /// `Output` if it cannot be made.
@@ -108,7 +107,7 @@ impl Cache {
         Ok(Self::open(folder))
     }
 
-    /// One that exists.
+    /// Opens an existing folder.
     pub fn open(folder: &Path) -> Self {
         Self { folder: folder.to_path_buf(), seen: Arc::default() }
     }
@@ -121,7 +120,7 @@ impl Cache {
         self.folder.join("runs").join(format!("{key}.json"))
     }
 
-    /// The record of a picture that is there and is the one that was kept.
+    /// The record of a picture, if the picture exists and its digests are right.
     fn record(&self, key: &str) -> Option<Record> {
         let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = seen.get(key) {
@@ -143,22 +142,22 @@ impl Cache {
         }
         let bytes = image::read_file_checked(&picture, Limits::default().max_file)?;
         if Digest::of(&bytes).hex() != record.picture {
-            return Err(Error::input("is not the picture that was kept: damaged, or another one").in_file(&picture));
+            return Err(Error::input("is damaged, or is not the stored picture").in_file(&picture));
         }
         Ok(Some(record))
     }
 
-    /// Times of a picture that is there.
+    /// Times of an existing picture.
     pub fn times(&self, key: &str) -> Option<Times> {
         self.record(key).map(|record| record.times)
     }
 
-    /// Digest of a picture that is there.
+    /// Digest of an existing picture.
     pub fn content(&self, key: &str) -> Option<String> {
         self.record(key).map(|record| record.picture)
     }
 
-    /// Keeps a picture.
+    /// Stores a picture.
     ///
     /// # Errors
     /// `Output` if it cannot be written.
@@ -176,9 +175,9 @@ impl Cache {
     /// # Errors
     /// `Input` if it is gone or damaged.
     pub fn layers(&self, key: &str) -> Result<Layers> {
-        let help = "Run the experiment again; what is missing is rendered anew";
+        let help = "Run the experiment again; missing pictures are rendered again";
         if self.record(key).is_none() {
-            return Err(Error::input("is gone or damaged").in_file(self.picture(key)).help(help));
+            return Err(Error::input("is missing or damaged").in_file(self.picture(key)).help(help));
         }
         image::read(self.picture(key), &Limits::default()).map_err(|error| error.help(help))
     }
@@ -187,7 +186,7 @@ impl Cache {
         self.folder.join("measures").join(format!("{pair}.json"))
     }
 
-    /// Measures of a pair, by their names: those that are there and are what they were.
+    /// The stored measures of a pair of pictures, by their names.
     pub fn measures(&self, pair: &str) -> Map<String, Value> {
         let path = self.values(pair);
         let mut known: Map<String, Value> = match sealed::read(&path) {
@@ -207,7 +206,7 @@ impl Cache {
         known
     }
 
-    /// Keeps them.
+    /// Stores the measures of a pair.
     ///
     /// # Errors
     /// `Output` if they cannot be written.
@@ -215,23 +214,23 @@ impl Cache {
         sealed::write(&self.values(pair), values)
     }
 
-    /// The folder of what scenes share; it need not exist.
+    /// The folder for data that scenes share. It may not exist yet.
     pub fn shared(&self) -> PathBuf {
         self.folder.join("shared")
     }
 }
 
-/// Says why a file is not taken.
+/// Logs why a file is ignored.
 pub fn does_not_count(error: &Error) {
-    log::warn!("{error}; it does not count and is made anew");
+    log::warn!("{error}; the file is ignored and made again");
 }
 
-/// A measure as JSON, which has no infinity: its text.
+/// A measure as JSON. JSON has no infinity, so infinite values are stored as text.
 pub fn to_json(value: f64) -> Value {
     if value.is_finite() { json!(value) } else { json!(value.to_string()) }
 }
 
-/// What [`to_json`] was given.
+/// The inverse of [`to_json`].
 pub fn number(value: &Value) -> Option<f64> {
     match value {
         Value::String(text) => text.parse().ok().filter(|value: &f64| !value.is_finite() && value.to_string() == *text),

@@ -41,7 +41,7 @@ fn a_key_changes_with_everything_that_it_is_made_of() {
     names.sort();
     names.dedup();
     assert_eq!(names.len(), count);
-    // A path tracer on the CPU gives the same bits beside any device.
+    // The path tracer on the CPU does not depend on the device.
     assert_eq!(key("path", "gpu", "", &inputs()).name, key("path", "cpu", "", &inputs()).name);
     let text = key("isr", "gpu", "", &inputs()).text;
     assert_eq!((text["sources"].as_str(), text["version"].as_str()), (Some(SOURCES), Some(program::VERSION)));
@@ -102,7 +102,7 @@ fn only_the_picture_that_was_kept_counts() {
     let gone = Place::new();
     fs::remove_file(gone.file("exr")).unwrap();
     assert!(!gone.is_there());
-    // Made anew, it counts again.
+    // After it is made again, the picture counts.
     Cache::open(gone.folder.path()).put(&gone.key, &picture(0.25), &Times::default()).unwrap();
     assert!(gone.is_there());
 }
@@ -150,7 +150,7 @@ fn only_measures_that_are_numbers_count() {
         fs::write(&file, text.replace(from, to)).unwrap();
         assert!(cache.measures("pair").is_empty(), "{from} as {to}");
     }
-    // Sealed by whoever, and no number.
+    // A file with a right digest and wrong values.
     sealed::write(&file, &json!({ "mae": "x", "psnr": "inf", "ssim": [1], "hue": "1.5", "gmsd": 0.5 })).unwrap();
     let names: Vec<String> = cache.measures("pair").keys().cloned().collect();
     assert_eq!(names, ["gmsd", "psnr"]);
@@ -185,10 +185,10 @@ fn every_source_that_can_change_a_picture_is_in_the_digest() {
         "samples/cli/experiment/place.rs",
         "samples/cli/experiment/run.rs",
         "samples/cli/export_pov/material.rs",
+        "samples/cli/frame_output.rs",
         "samples/cli/framing.rs",
         "samples/cli/ground.rs",
         "samples/cli/lights.rs",
-        "samples/cli/shown.rs",
         "samples/cli/stage.rs",
         "samples/fiv.rs",
     ] {

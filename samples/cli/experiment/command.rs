@@ -27,27 +27,27 @@ use crate::{
 /// Options of `lucerna reproduce`.
 #[derive(clap::Args, Clone, Debug)]
 pub struct ReproduceArgs {
-    /// An experiment that comes with the program (`--list` names them), or a .toml file
+    /// A built-in experiment (`--list` lists them), or a .toml file
     #[arg(value_name = "NAME|FILE.toml", required_unless_present = "list")]
     pub experiment: Option<String>,
 
-    /// Fewer views, smaller pictures, fewer samples, as the experiment says
+    /// Quick mode: fewer views, smaller pictures or fewer samples, as the experiment defines
     #[arg(long)]
     pub quick: bool,
 
-    /// Folder for the report and the pictures; what is there is not rendered again [default: NAME-report]
+    /// Folder for the report and the pictures; existing pictures are not rendered again [default: NAME-report]
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
 
-    /// Where scenes are that do not come with the program [default: $LUCERNA_ASSETS, else ../shared/assets]
+    /// Folder of scenes that are not built in [default: $LUCERNA_ASSETS, else ../shared/assets]
     #[arg(long, value_name = "DIR")]
     pub assets: Option<PathBuf>,
 
-    /// List the experiments that come with the program, then stop
+    /// List the built-in experiments, then stop
     #[arg(long)]
     pub list: bool,
 
-    /// List what would be rendered, and what is there already, then stop
+    /// List the pictures to render, and the existing pictures, then stop
     #[arg(long)]
     pub dry_run: bool,
 
@@ -69,7 +69,7 @@ pub struct ReproduceArgs {
 /// Options of `lucerna report`.
 #[derive(clap::Args, Clone, Debug)]
 pub struct ReportArgs {
-    /// A folder that `lucerna reproduce` wrote
+    /// A folder written by `lucerna reproduce`
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
 
@@ -84,7 +84,7 @@ pub struct ReportArgs {
 /// Runs an experiment and writes its report.
 ///
 /// # Errors
-/// `Usage` and `Input` for what was asked; whatever fails while rendering.
+/// `Usage` and `Input` for wrong options and experiments; any error of rendering.
 pub fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCode> {
     let Some(asked) = args.experiment.as_deref().filter(|_| !args.list) else {
         list(args.json)?;
@@ -117,11 +117,11 @@ pub fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCode> {
     interrupt.keep();
     let all = results.runs.len() + results.missing;
     if interrupt.requested() && results.missing > 0 {
-        // Who stops an experiment does not wait for the measures of a page.
+        // After a stop no report is written, because its measures may take long.
         let done = results.runs.len();
         let folder = folder.display();
         console.info(&format!(
-            "stopped: {done} of {all} runs are done; the same command goes on, `lucerna report {folder}` shows them"
+            "stopped: {done} of {all} runs are done; the same command continues, `lucerna report {folder}` shows the finished runs"
         ));
         return Ok(ExitCode::from(STOPPED_EARLY));
     }
@@ -179,7 +179,7 @@ fn dry(planned: &[Planned], as_json: bool) -> Result<()> {
         let mark = if run.there { "there " } else { "render" };
         console::print(&format!("{mark}  {}/{}  {}", run.done.scene, run.done.view, run.done.label()))?;
     }
-    console::print(&format!("{} runs, {there} are there already", planned.len()))
+    console::print(&format!("{} runs, {there} of them exist", planned.len()))
 }
 
 #[cfg(test)]

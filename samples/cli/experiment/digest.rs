@@ -1,6 +1,6 @@
-//! Names for contents.
+//! Digests of contents, used as names.
 
-/// FNV-1a of 128 bits (Fowler, Noll, Vo): the same bytes give the same name on every machine. Not for security.
+/// A 128-bit FNV-1a hash (Fowler, Noll, Vo): the same bytes give the same digest on every machine. It is not cryptographic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Digest(u128);
 
@@ -17,14 +17,14 @@ impl Digest {
         }
     }
 
-    /// Of some bytes.
+    /// The digest of some bytes.
     pub fn of(bytes: &[u8]) -> Self {
         let mut digest = Self::default();
         digest.add(bytes);
         digest
     }
 
-    /// Whether a text is what [`Self::hex`] gives.
+    /// Whether a text has the form of [`Self::hex`].
     pub fn is_hex(text: &str) -> bool {
         text.len() == 32 && text.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))
     }

@@ -1,4 +1,4 @@
-//! How pictures are made: the techniques and references that experiments can name.
+//! The kinds of techniques and references that experiments can name.
 
 mod fiv;
 mod igi;
@@ -27,28 +27,28 @@ use crate::{
     args::Size,
     config,
     export_pov::{self, Pov, povray},
+    frame_output::FrameOutput,
     gbuffer_layers,
-    shown::Shown,
     signals::Interrupt,
 };
 
-/// A way to make a picture.
+/// A kind of technique or reference.
 pub struct Kind {
     pub name: &'static str,
     pub description: &'static str,
-    /// Its pictures depend on device and driver.
+    /// The pictures depend on device and driver.
     pub on_device: bool,
-    /// It also takes pictures in place of scenes.
+    /// The kind also accepts pictures instead of scenes.
     pub of_images: bool,
     settings: fn(paper: bool, changes: &Changes) -> Result<Value>,
     /// The picture, or `None` if it was interrupted.
     pub render: fn(&mut Warm<'_>, &Job<'_>) -> Result<Option<Rendered>>,
-    /// Version of the program that it needs, or why it is not available.
+    /// The version of an external program that the kind needs, or the reason why it is not available.
     pub available: fn() -> std::result::Result<String, String>,
 }
 
 impl Kind {
-    /// All settings of a variant, those that are not named included.
+    /// All settings of a variant, including those with default values.
     ///
     /// # Errors
     /// `Usage` for unknown keys and values out of range.
@@ -59,7 +59,7 @@ impl Kind {
     }
 }
 
-/// What is to be rendered.
+/// A picture to render.
 pub struct Job<'a> {
     pub view: &'a View,
     /// All settings.
@@ -69,23 +69,23 @@ pub struct Job<'a> {
     pub interrupt: &'a Interrupt,
 }
 
-/// A picture and what it cost.
+/// A picture and its times.
 pub struct Rendered {
     pub layers: Layers,
     pub times: Times,
 }
 
-/// What a picture cost. Milliseconds.
+/// The times of a picture, milliseconds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Times {
-    /// Wall clock of each repetition, with reading back in the first.
+    /// Wall-clock time of each repetition; the first includes the readback.
     pub wall: Vec<f64>,
-    /// On the device, each repetition; empty if there is no clock.
+    /// Device time of each repetition; empty if the device has no timestamps.
     pub device: Vec<f64>,
-    /// Passes by their names, median over repetitions (without the first, if there are more).
+    /// Times of the passes by their names: medians over the repetitions (without the first, if there are more).
     pub passes: Vec<(String, f64)>,
-    /// What else is known of the run, by name: what was computed before, bytes, things.
+    /// Further facts about the run, by name: time of precomputation, bytes, numbers of objects.
     pub facts: Vec<(String, f64)>,
 }
 
@@ -95,7 +95,7 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
 }
 
 impl Times {
-    /// Median of the repetitions; the first, which makes pipelines, does not count if there are more.
+    /// Median over the repetitions. The first repetition creates pipelines, so it does not count if there are more.
     pub fn frame(&self) -> Option<f64> {
         let list = if self.device.is_empty() { &self.wall } else { &self.device };
         median(list.iter().skip(usize::from(list.len() > 1)).copied().collect())
@@ -106,24 +106,24 @@ impl Times {
         self.facts.iter().find(|(known, _)| known == name).map(|(_, value)| *value)
     }
 
-    /// Sum of the passes whose names begin so.
+    /// Sum over the passes whose names begin with `prefix`.
     pub fn of_passes(&self, prefix: &str) -> f64 {
         self.passes.iter().filter(|(name, _)| name.starts_with(prefix)).map(|(_, ms)| ms).sum()
     }
 }
 
-/// Device and scene, and what was made for them, kept from picture to picture.
+/// Device and scene, with data that is kept from picture to picture.
 pub struct Warm<'a> {
     pub gpu: &'a Gpu,
     pub scene: &'a Scene,
     pub pose: &'a Pose,
-    /// A picture in place of a scene.
+    /// The picture of an entry without a scene.
     pub image: Option<&'a Layers>,
-    /// For what scenes share, in the folder of the report; it need not exist.
+    /// Folder for data that scenes share, in the folder of the report. It may not exist yet.
     pub folder: PathBuf,
-    /// Of this scene.
+    /// Data of this scene, by name.
     kept: HashMap<&'static str, Box<dyn Any>>,
-    /// Borrows the scene, so it cannot be among these.
+    /// The path tracer borrows the scene, so it cannot be in `kept`.
     tracer: Option<tracer::Tracer<'a>>,
 }
 
@@ -133,15 +133,15 @@ impl<'a> Warm<'a> {
         Self { gpu, scene, pose, image: image.as_ref(), folder, kept: HashMap::new(), tracer: None }
     }
 
-    /// Drops what was made for the scene under this name.
+    /// Drops the scene's data of this name.
     pub fn forget(&mut self, name: &'static str) {
         self.kept.remove(name);
     }
 
-    /// Something made once for the scene.
+    /// The scene's data of this name; `make` creates it on the first call.
     ///
     /// # Errors
-    /// Those of `make`.
+    /// The errors of `make`.
     pub fn keep<T: 'static>(
         &mut self,
         name: &'static str,
@@ -151,7 +151,7 @@ impl<'a> Warm<'a> {
             self.kept.insert(name, Box::new(make(self.gpu, self.scene, self.pose)?));
         }
         let kept = self.kept.get_mut(name).and_then(|kept| kept.downcast_mut());
-        kept.ok_or_else(|| Error::new(lucerna::ErrorKind::Runtime, format!("'{name}' is kept as something else")))
+        kept.ok_or_else(|| Error::new(lucerna::ErrorKind::Runtime, format!("'{name}' has another type")))
     }
 }
 
@@ -207,7 +207,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "povray",
-        description: "the program povray, with radiosity as the dissertation has it; the picture alone",
+        description: "the program povray, with the dissertation's radiosity settings; the picture without layers",
         on_device: false,
         of_images: false,
         settings: |_, changes| {
@@ -250,7 +250,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "tonemap-cpu",
-        description: "the same by the slow program that it is held against",
+        description: "the same by the CPU reference implementation",
         on_device: true,
         of_images: true,
         settings: tonemap::settings,
@@ -271,20 +271,20 @@ pub fn find(name: &str) -> Result<&'static Kind> {
     })
 }
 
-/// Settings as their type.
+/// Deserialises settings.
 fn read<S: DeserializeOwned>(settings: &Value) -> Result<S> {
     serde_json::from_value(settings.clone()).map_err(|error| Error::input(format!("settings: {error}")))
 }
 
-/// Fact of a run: shadow rays from visible surfaces to virtual lights, as counted by the pass that gathers.
+/// Name of a fact of a run: the number of shadow rays from visible surfaces to virtual lights, counted by the gathering pass.
 pub const GATHERED: &str = "gathered rays";
 
-/// Renders `repeat` times what `compose` declares; the picture is the first one.
+/// Renders the frame that `compose` declares `repeat` times. The picture is the first one.
 pub fn on_device(
     runner: &mut Runner,
     job: &Job<'_>,
     name: &'static str,
-    mut compose: impl FnMut(&mut Graph) -> Result<Shown>,
+    mut compose: impl FnMut(&mut Graph) -> Result<FrameOutput>,
 ) -> Result<Option<Rendered>> {
     let (mut layers, mut times) = (None, Times::default());
     let mut reports: Vec<Report> = Vec::new();
@@ -295,8 +295,8 @@ pub fn on_device(
         let begun = Instant::now();
         let mut graph = Graph::new(name);
         graph.seed = job.seed;
-        let shown = compose(&mut graph)?;
-        let reading = layers.is_none().then(|| shown.read(&mut graph, true));
+        let output = compose(&mut graph)?;
+        let reading = layers.is_none().then(|| output.read(&mut graph, true));
         let frame = runner.run(&graph)?;
         if let Some(reading) = reading {
             layers = Some(reading.layers(&frame));
@@ -329,9 +329,9 @@ fn isr_picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
         let view = job.view.fit_far(&handles.bounds());
         let picture = isr::picture(graph, &handles, &view, ambient.clone(), &settings)?;
         let out = picture.outputs;
-        let shown = Shown::new(out.total).color("direct", out.direct).color("indirect", out.indirect);
-        let shown = shown.layer("occlusion", &["Y"], out.occlusion, |pixel| pixel);
-        Ok(gbuffer_layers::add(shown, &picture.gbuffer, &view))
+        let output = FrameOutput::new(out.total).color("direct", out.direct).color("indirect", out.indirect);
+        let output = output.layer("occlusion", &["Y"], out.occlusion, |pixel| pixel);
+        Ok(gbuffer_layers::add(output, &picture.gbuffer, &view))
     })
 }
 
@@ -374,9 +374,9 @@ fn path_picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> 
     Ok(Some(Rendered { layers, times }))
 }
 
-/// More paths a pixel are no experiment.
+/// Maximum of paths per pixel.
 const MOST_SAMPLES: u32 = 1 << 24;
-/// As for the path tracer on the device.
+/// Maximum of bounces, as for the path tracer on the device.
 const MOST_BOUNCES: u32 = 1000;
 
 /// Settings of the path tracer on the device.
@@ -389,7 +389,7 @@ struct TracerSettings {
 }
 
 impl Default for TracerSettings {
-    /// What a rasterised picture with one bounce is held against.
+    /// Settings of a reference for rasterised pictures with one bounce.
     fn default() -> Self {
         let tracer = tracer::Settings { bounces: 1, filter: tracer::Filter::Centre, ..tracer::Settings::default() };
         Self { samples: 64, tracer }
@@ -398,7 +398,7 @@ impl Default for TracerSettings {
 
 fn traced(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
     let TracerSettings { samples, mut tracer } = read(job.settings)?;
-    // Two references may have two seeds, to tell their noise.
+    // Two references with different seeds allow to measure their noise.
     tracer.seed = tracer.seed.wrapping_add(job.seed);
     if warm.tracer.is_none() {
         warm.tracer = Some(tracer::Tracer::new(warm.gpu, warm.scene, warm.pose)?);
@@ -417,11 +417,11 @@ fn traced(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct PovSettings {
-    /// Rays a pixel are the square of this; 1: one, through the centre.
+    /// The number of rays per pixel is the square of this value; 1: one ray, through the centre.
     subpixels: u32,
     /// With more than one, POV-Ray's radiosity differs from run to run.
     threads: u32,
-    /// Seconds after which it is stopped.
+    /// Time after which POV-Ray is stopped, seconds.
     time_limit: u64,
     pov: Pov,
 }
@@ -438,7 +438,7 @@ fn by_povray(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
     let [width, height] = job.view.extent;
     let options = povray::Options { subpixels, threads, time_limit: std::time::Duration::from_secs(time_limit) };
     match povray::render(&export, Size { width, height }, &options) {
-        // The signal reaches the other program too.
+        // The signal also reaches the child process, so its error is no error of the experiment.
         Err(_) if job.interrupt.requested() => Ok(None),
         rendered => rendered.map(|rendered| {
             let times = Times { wall: vec![rendered.seconds * 1e3], ..Times::default() };

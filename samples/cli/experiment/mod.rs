@@ -1,11 +1,11 @@
-//! Experiments: a TOML file names scenes, views, techniques with matrices of settings, references and measures; running it gives
-//! pictures, kept by what decided them, and a report.
+//! Experiments: a TOML file names scenes, views, techniques with matrices of settings, references and measures. Running the experiment
+//! renders pictures, stores them by a digest of their inputs, and writes a report.
 //!
-//! What is generic is here: reading the file ([`mod@file`]), rendering what is not there yet ([`run`]), asking for pictures and
-//! measures ([`results`]). What the numbers of one experiment mean is a function in [`analysis`].
+//! This module has the generic parts: reading the file ([`mod@file`]), rendering missing pictures ([`run`]), access to pictures and
+//! measures ([`results`]). [`analysis`] has the functions that interpret the numbers of an experiment.
 //!
-//! To add an experiment: a file in `samples/experiments/`, named in [`file::BUILTIN`]; if the generic tables do not do, a function
-//! `fn(&Results, &mut Page) -> Result<()>` in [`analysis`]. To add a technique: an entry in [`kinds::KINDS`].
+//! To add an experiment, add a file to `samples/experiments/` and name it in [`file::BUILTIN`]. If the generic tables are not enough, add
+//! a function `fn(&Results, &mut Page) -> Result<()>` to [`analysis`]. To add a technique, add an entry to [`kinds::KINDS`].
 
 pub mod analysis;
 pub mod cache;

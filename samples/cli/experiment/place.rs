@@ -17,12 +17,12 @@ use crate::{
     views::{self, ViewList},
 };
 
-/// Where relative file names are looked for.
+/// The folders in which relative file names are searched.
 #[derive(Clone, Debug)]
 pub struct Folders(Vec<PathBuf>);
 
 impl Folders {
-    /// Beside the experiment's file; in `assets` or, without it, in `$LUCERNA_ASSETS` or `../shared/assets`; and here.
+    /// The folder of the experiment's file; `assets` or, without it, `$LUCERNA_ASSETS` or `../shared/assets`; and the current folder.
     pub fn new(experiment: &Experiment, assets: Option<&Path>) -> Self {
         let beside = experiment.path.as_ref().and_then(|path| path.parent()).map(Path::to_path_buf);
         let assets = assets.map(Path::to_path_buf).or_else(|| std::env::var_os("LUCERNA_ASSETS").map(PathBuf::from));
@@ -30,7 +30,7 @@ impl Folders {
         Self(beside.into_iter().chain([assets, PathBuf::from(".")]).collect())
     }
 
-    /// The first that exists.
+    /// The first existing file of this name.
     pub fn find(&self, name: &str) -> Option<PathBuf> {
         self.0.iter().map(|folder| folder.join(name)).find(|path| path.is_file())
     }
@@ -38,7 +38,7 @@ impl Folders {
     fn missing(&self, name: &str) -> Error {
         let places: Vec<String> = self.0.iter().map(|folder| folder.display().to_string()).collect();
         Error::input(format!("no file '{name}' in {}", places.join(", ")))
-            .help("Say where with --assets DIR, or let it be skipped with if_missing = \"skip\"")
+            .help("Give the folder with --assets DIR, or allow to skip the scene with if_missing = \"skip\"")
     }
 }
 
@@ -46,10 +46,10 @@ impl Folders {
 #[derive(Clone, Debug)]
 pub struct Placed {
     pub name: String,
-    /// Instead of the experiment's.
+    /// Size that replaces the experiment's size.
     size: Option<Size>,
     camera: Camera,
-    /// The node that carries the camera, or where it stands.
+    /// The node that carries the camera; `None` if the camera is not part of the scene.
     node: Option<usize>,
     world_from_camera: Mat4,
 }
@@ -60,7 +60,7 @@ impl Placed {
         Self { name, size: None, camera, node: None, world_from_camera: file.world_from_view() }
     }
 
-    /// A whole picture, which no camera sees.
+    /// The view of an entry that is a picture.
     fn still(image: &Layers) -> Self {
         let projection = Projection::Orthographic { xmag: 1.0, ymag: 1.0, znear: 0.0, zfar: 1.0 };
         let camera = Camera { name: STILL.into(), projection };
@@ -68,7 +68,7 @@ impl Placed {
         Self { name: STILL.into(), size, camera, node: None, world_from_camera: Mat4::IDENTITY }
     }
 
-    /// What it sees; `size` unless it has one of its own.
+    /// The view in a pose, at its own size or else at `size`.
     pub fn view(&self, pose: &Pose, size: Size) -> View {
         let size = self.size.unwrap_or(size);
         let world = self.node.map_or(self.world_from_camera, |node| pose.world[node]);
@@ -86,11 +86,11 @@ pub struct Loaded {
     pub fingerprint: String,
     pub triangles: usize,
     pub views: Vec<Placed>,
-    /// EV that suits it, if known.
+    /// A fitting exposure, EV, if known.
     pub exposure: Option<f64>,
 }
 
-/// Reads a scene and makes its views; `None` if it is not there and may be skipped.
+/// Reads a scene and makes its views; `None` if a file is missing and the scene may be skipped.
 ///
 /// # Errors
 /// `Input`, naming the experiment's file and the line of the scene.
@@ -98,7 +98,7 @@ pub fn load(experiment: &Experiment, entry: &Entry, folders: &Folders) -> Result
     let named = |error: Error| {
         let file = experiment.path.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", experiment.name)));
         let place = format!("line {}: scene '{}'", entry.line, entry.name);
-        // What was wrong with another file stands in the text.
+        // The text of the error names the other file.
         match error.file() {
             Some(_) => Error::new(error.kind(), error.to_string()).at(place).in_file(file),
             None => error.at(place).in_file(file),
@@ -162,7 +162,7 @@ fn still(path: &Path, entry: &Entry) -> Result<Loaded> {
     })
 }
 
-/// Views of a scene at most.
+/// Maximum of views per scene.
 const MOST_VIEWS: usize = 100_000;
 
 /// Every view at every size.
@@ -233,7 +233,7 @@ fn one(asked: &str, scene: &scene::Scene, folders: &Folders) -> Result<Placed> {
     })
 }
 
-/// At most `most` of a list, spread evenly, the first always among them.
+/// At most `most` elements of a list, evenly spread, including the first.
 pub fn spread<T>(list: &[T], most: Option<usize>) -> Vec<&T> {
     match most {
         Some(most) if most < list.len() => (0..most).map(|i| &list[i * list.len() / most]).collect(),
@@ -241,7 +241,7 @@ pub fn spread<T>(list: &[T], most: Option<usize>) -> Vec<&T> {
     }
 }
 
-/// Everything of a view that decides a picture.
+/// All data of a view that can change a picture.
 pub fn view_key(view: &View) -> Result<serde_json::Value> {
     let camera = [view.view_from_world, view.clip_from_view].map(|m| m.to_cols_array().to_vec());
     config::to_value(&(camera, view.extent))

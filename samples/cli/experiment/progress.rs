@@ -1,4 +1,4 @@
-//! Progress over runs of different cost.
+//! Progress over runs of different duration.
 
 use std::{
     collections::BTreeMap,
@@ -8,15 +8,15 @@ use std::{
 
 use crate::progress::ProgressMode;
 
-/// Counts runs and guesses the time left from what runs of the same method took.
+/// Counts runs, and estimates the remaining time from the times of runs of the same method.
 #[derive(Debug)]
 pub struct Progress {
     mode: ProgressMode,
     total: usize,
     done: usize,
-    /// Runs to come, by method.
+    /// Number of remaining runs, by method.
     left: BTreeMap<String, usize>,
-    /// Seconds spent on how many runs, by method.
+    /// Time in seconds and number of finished runs, by method.
     spent: BTreeMap<String, (f64, usize)>,
 }
 
@@ -32,7 +32,7 @@ impl Progress {
         Self { mode, total: runs.values().sum(), done: 0, left: runs, spent: BTreeMap::new() }
     }
 
-    /// Time for what is left, if anything is known of it.
+    /// Estimated remaining time; `None` without finished runs.
     pub fn time_left(&self) -> Option<Duration> {
         let (seconds, count) = self.spent.values().fold((0.0, 0), |(s, c), (seconds, count)| (s + seconds, c + count));
         (count > 0).then(|| {
@@ -44,7 +44,7 @@ impl Progress {
         })
     }
 
-    /// One more run: `seconds` if it was rendered, `None` if it was there.
+    /// Reports a finished run: its time in `seconds` if it was rendered, `None` if the picture existed.
     pub fn run(&mut self, method: &str, what: &str, seconds: Option<f64>) {
         self.done += 1;
         if let Some(left) = self.left.get_mut(method) {
@@ -64,7 +64,7 @@ impl Progress {
                 let bar = format!("{}{}", "█".repeat(filled), "░".repeat(30 - filled.min(30)));
                 write!(err, "\r\x1b[K{bar} {done}/{total}{left}  {what}").and_then(|()| err.flush())
             }
-            // What was there already would hide what is done now.
+            // Lines about existing pictures would hide the lines about rendered pictures.
             ProgressMode::Plain if seconds.is_none() && done < total => Ok(()),
             ProgressMode::Plain => writeln!(err, "run {done}/{total}: {what}: {took}{left}"),
             ProgressMode::Json => {

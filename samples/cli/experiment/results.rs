@@ -1,4 +1,4 @@
-//! What an experiment gave: runs, their pictures and times, and measures between them.
+//! The results of an experiment: runs, their pictures and times, and measures between them.
 
 use std::path::{Path, PathBuf};
 
@@ -19,12 +19,12 @@ use super::{
 };
 use crate::{config, report};
 
-/// What lights a scene.
+/// The light sources of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shining {
-    /// Point, spot and directional lights that nodes carry.
+    /// Number of point, spot and directional lights.
     pub lamps: u32,
-    /// Some surface emits light.
+    /// The scene has emissive surfaces.
     pub surfaces: bool,
     pub sky: bool,
 }
@@ -42,29 +42,29 @@ impl Shining {
         }
     }
 
-    /// Shadow rays of a point that takes `samples` of emissive surfaces and as many of the sky.
+    /// Shadow rays per point, with `samples` rays to emissive surfaces and as many to the environment.
     pub fn rays(self, samples: u32) -> u32 {
         self.lamps + (u32::from(self.surfaces) + u32::from(self.sky)) * samples
     }
 }
 
-/// A picture that is there.
+/// A finished run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Done {
     pub scene: String,
-    /// Of the scene: `simple`, `complex`…
+    /// Group of the scene: `simple`, `complex`…
     pub group: String,
     pub triangles: usize,
     pub view: String,
     pub method: String,
     /// Values of the matrix.
     pub variant: Changes,
-    /// What lights the scene; not known of old results.
+    /// Light sources of the scene; `None` in old results.
     #[serde(default)]
     pub shining: Option<Shining>,
     /// Name of its files.
     pub key: String,
-    /// EV that suits the scene, if known.
+    /// A fitting exposure, EV, if known.
     pub exposure: Option<f64>,
 }
 
@@ -98,7 +98,7 @@ fn shown(value: &Value) -> String {
 #[derive(Clone, Copy, Debug)]
 pub struct Layer<'a>(pub &'a Done, pub &'a str);
 
-/// What `manifest.json` holds: enough to make the report again.
+/// The contents of `manifest.json`, from which the report can be made again.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Manifest {
     pub name: String,
@@ -117,9 +117,9 @@ pub struct Results {
     pub experiment: Experiment,
     /// In the order of the file: scene, view, method, variant.
     pub runs: Vec<Done>,
-    /// Scenes and methods that were left out, and why.
+    /// Skipped scenes and methods, each with the reason.
     pub skipped: Vec<(String, String)>,
-    /// Runs that were not done yet.
+    /// Number of missing runs.
     pub missing: usize,
     /// Device, driver, versions, seed, command line.
     pub facts: Vec<(String, String)>,
@@ -135,10 +135,10 @@ pub fn known_measure(name: &str) -> Result<Measure> {
 }
 
 impl Results {
-    /// Reads what an experiment left in a folder.
+    /// Reads the results in a folder.
     ///
     /// # Errors
-    /// `Input` if there is nothing.
+    /// `Input` if the folder has no results.
     pub fn open(folder: &Path) -> Result<Self> {
         let manifest_path = folder.join("manifest.json");
         let fail = |error: Error| error.help("`lucerna reproduce` writes such a folder");
@@ -146,7 +146,7 @@ impl Results {
         let manifest: Manifest = serde_json::from_slice(&text)
             .map_err(|error| fail(Error::input(error.to_string()).in_file(&manifest_path)))?;
         let Manifest { name, path, quick, text, runs, skipped, missing, facts } = manifest;
-        // Keys become names of files in this folder.
+        // Keys are used as file names in this folder, so they are checked.
         if let Some(run) = runs.iter().find(|run| !Digest::is_hex(&run.key)) {
             return Err(fail(
                 Error::input(format!("{:?} is no key of a picture", run.key)).at("runs").in_file(&manifest_path),
@@ -182,17 +182,17 @@ impl Results {
         self.runs.iter().filter(move |run| methods.iter().any(|m| m.role == role && m.name == run.method))
     }
 
-    /// The run of another method on the same view; of several variants the first.
+    /// The run of another method for the same view; the first one, if there are several variants.
     pub fn beside(&self, run: &Done, method: &str) -> Option<&Done> {
         self.runs.iter().find(|other| other.method == method && other.scene == run.scene && other.view == run.view)
     }
 
-    /// Scene and view of everything that was rendered, in order.
+    /// All pairs of scene and view, in order.
     pub fn views(&self) -> Vec<(&str, &str)> {
         let mut views: Vec<(&str, &str)> = Vec::new();
         for run in &self.runs {
             let view = (run.scene.as_str(), run.view.as_str());
-            // Runs of a view lie together.
+            // The runs of a view are consecutive.
             if views.last() != Some(&view) {
                 views.push(view);
             }
@@ -205,30 +205,30 @@ impl Results {
         self.runs.iter().filter(move |run| run.scene == scene && run.view == view)
     }
 
-    /// What a run cost.
+    /// The times of a run.
     ///
     /// # Errors
-    /// `Input` if its files are gone.
+    /// `Input` if its files are missing.
     pub fn times(&self, run: &Done) -> Result<Times> {
         self.cache.times(&run.key).ok_or_else(|| {
-            let what = format!("the files of {}/{} {} are gone", run.scene, run.view, run.label());
-            Error::input(what).help("Run the experiment again; what is missing is rendered anew")
+            let what = format!("the files of {}/{} {} are missing", run.scene, run.view, run.label());
+            Error::input(what).help("Run the experiment again; missing pictures are rendered again")
         })
     }
 
     /// Pixels of a layer.
     ///
     /// # Errors
-    /// `Input` if the file is gone or has no such layer.
+    /// `Input` if the file is missing or has no such layer.
     pub fn picture(&self, Layer(run, layer): Layer<'_>) -> Result<Picture> {
         let named = |error: Error| error.at(format!("{}/{} {}", run.scene, run.view, run.label()));
         Picture::from_layers(&self.cache.layers(&run.key)?, Some(layer)).map_err(named)
     }
 
-    /// A measure, computed once and kept. `baseline`: for measures of three images.
+    /// A measure. It is computed once and stored. `baseline`: the third image, for measures that need one.
     ///
     /// # Errors
-    /// `Input` if a picture is gone or holds values that are not finite.
+    /// `Input` if a picture is missing or holds values that are not finite.
     pub fn measure(
         &self,
         measure: Measure,
@@ -295,7 +295,7 @@ impl Results {
         Ok(measures.iter().map(value).collect())
     }
 
-    /// Times 2^EV a picture is bright enough to be seen.
+    /// The exposure, EV, at which a picture fits a screen's range.
     ///
     /// # Errors
     /// As [`picture`](Self::picture).

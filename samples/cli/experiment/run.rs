@@ -1,4 +1,4 @@
-//! Renders what an experiment asks for and is not there yet.
+//! Renders the missing pictures of an experiment.
 
 use std::{collections::BTreeMap, time::Instant};
 
@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{config, console::Console, program, progress::ProgressMode, signals::Interrupt};
 
-/// One picture to be made.
+/// A picture to render.
 #[derive(Clone, Debug)]
 struct Step {
     /// Index into the scene's views.
@@ -28,7 +28,7 @@ struct Step {
     variant: Changes,
 }
 
-/// What belongs to a run of the program and not to the experiment.
+/// Options of this run of the program, which do not belong to the experiment.
 #[derive(Debug)]
 pub struct Context<'a> {
     pub gpu: &'a Gpu,
@@ -37,28 +37,28 @@ pub struct Context<'a> {
     pub console: Console,
     pub progress: ProgressMode,
     pub interrupt: &'a Interrupt,
-    /// For the report.
+    /// The command line, for the report.
     pub command: String,
-    /// Only says what would be rendered.
+    /// Lists the pictures without rendering them.
     pub dry: bool,
 }
 
-/// A run and whether its picture is there.
+/// A planned run, and whether its picture exists.
 #[derive(Clone, Debug)]
 pub struct Planned {
     pub done: Done,
     pub there: bool,
 }
 
-/// Everything that is to be rendered, scene after scene; with `dry` nothing is.
+/// Renders all missing pictures, scene after scene. With `dry` it renders none.
 ///
 /// # Errors
-/// `Input` for scenes that cannot be read, and whatever fails while rendering.
+/// `Input` for scenes that cannot be read; any error of rendering.
 pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Vec<Planned>)> {
     let Context { gpu, cache: kept, console, .. } = context;
     let mut skipped = Vec::new();
     let needs = available(&experiment, &mut skipped)?;
-    // All scenes are looked at first: what is missing shows at once, and how much there is to do.
+    // All scenes are read first, so that missing files are reported at once and the amount of work is known.
     let mut steps: Vec<(&Scene, Vec<Step>)> = Vec::new();
     let mut counts = BTreeMap::<String, usize>::new();
     let mut first = None;
@@ -66,19 +66,19 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
         let Some(loaded) = place::load(&experiment, entry, &context.folders)? else {
             let files: Vec<String> = entry.files().filter(|name| context.folders.find(name).is_none()).collect();
             let file = files.join(", ");
-            console.warning(&format!("scene '{}' is skipped: {file} is not there", entry.name));
-            skipped.push((format!("scene {}", entry.name), format!("a file is not there: {file}")));
+            console.warning(&format!("scene '{}' is skipped: {file} does not exist", entry.name));
+            skipped.push((format!("scene {}", entry.name), format!("a file does not exist: {file}")));
             continue;
         };
         let list = of_scene(&experiment, entry, &loaded, &needs);
         list.iter().for_each(|step| *counts.entry(experiment.methods[step.method].name.clone()).or_default() += 1);
         steps.push((entry, list));
-        // The first one is needed next.
+        // Keeps the first scene, because it is rendered next.
         first.get_or_insert(loaded);
     }
     let total: usize = counts.values().sum();
     if total == 0 {
-        return Err(Error::input("nothing is left to be rendered").help("Scenes or programs were skipped; see above"));
+        return Err(Error::input("there is no picture to render").help("Scenes or programs were skipped; see above"));
     }
     console.info(&format!(
         "{}: {total} runs, {} scenes, {} on {}",
@@ -97,7 +97,7 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
                 Some(loaded) => loaded,
                 None => {
                     return Err(
-                        Error::input("went away while the experiment ran").at(format!("scene '{}'", entry.name))
+                        Error::input("was removed while the experiment ran").at(format!("scene '{}'", entry.name))
                     );
                 }
             },
@@ -122,7 +122,7 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
                     }
                     Ok(false) => break 'all,
                     Err(error) if context.interrupt.requested() && program::by_request(&error) => break 'all,
-                    // Hours of other work must not be lost with one picture of a program that may be missing anyway.
+                    // A failed picture of an optional program must not end an experiment that takes hours.
                     Err(error) if method.if_missing == IfMissing::Skip && error.kind() != ErrorKind::DeviceLost => {
                         console.warning(&format!("{what} is skipped: {error}"));
                         skipped.push((what.clone(), error.to_string()));
@@ -142,7 +142,7 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
     Ok((Results { experiment, runs, skipped, missing, facts, cache: (*kept).clone() }, planned))
 }
 
-/// Versions of the programs that methods need; `None` where one is missing and may be skipped.
+/// Versions of the programs that methods need; `None` if a program is missing and its method may be skipped.
 fn available(experiment: &Experiment, skipped: &mut Vec<(String, String)>) -> Result<Vec<Option<String>>> {
     let mut list = Vec::new();
     for method in &experiment.methods {
@@ -161,7 +161,7 @@ fn available(experiment: &Experiment, skipped: &mut Vec<(String, String)>) -> Re
     Ok(list)
 }
 
-/// The runs of a scene: view after view, so that a stopped experiment has whole views.
+/// The runs of a scene, view after view, so that an interrupted experiment has complete views.
 fn of_scene(experiment: &Experiment, entry: &Scene, loaded: &Loaded, needs: &[Option<String>]) -> Vec<Step> {
     let indices: Vec<usize> = (0..loaded.views.len()).collect();
     let mut steps = Vec::new();
@@ -220,7 +220,7 @@ impl One<'_> {
         Ok((done, key))
     }
 
-    /// Renders and keeps the picture; false if it was interrupted.
+    /// Renders and stores the picture. Returns false if it was interrupted.
     fn render(&self, warm: &mut Warm<'_>, context: &Context<'_>, key: &Key) -> Result<bool> {
         let Self { experiment, entry, loaded, method, step, .. } = self;
         let view = self.placed().view(&loaded.pose, experiment.size);

@@ -1,4 +1,5 @@
-//! Text files that say themselves whether they are whole: `{ "digest": …, "holds": … }`, the digest of the compact text of what it holds.
+//! Text files with a digest of their contents, which detects damage: `{ "digest": …, "holds": … }`. The digest is that of the compact JSON text
+//! of `holds`.
 
 use std::path::Path;
 
@@ -9,22 +10,22 @@ use serde_json::{Value, json};
 use super::digest::Digest;
 use crate::config;
 
-/// Writes it, over one that is there.
+/// Writes a file; overwrites an existing file.
 ///
 /// # Errors
-/// `Output` if it cannot be written.
+/// `Output` if the file cannot be written.
 pub fn write(path: &Path, value: &impl Serialize) -> Result<()> {
     let value = config::to_value(value)?;
     let digest = digest(&value);
     image::write_atomic(path, format!("{:#}\n", json!({ "digest": digest, "holds": value })).as_bytes(), true)
 }
 
-/// Reads it; `None`: it is not there.
+/// Reads a file; `None` if it does not exist.
 ///
 /// # Errors
-/// `Input`, naming the file, if it is damaged or is something else.
+/// `Input`, naming the file, if it is damaged or is not such a file.
 pub fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
-    // A link that leads nowhere is there, and cannot be read.
+    // A dangling symbolic link exists, but cannot be read.
     if path.symlink_metadata().is_err() {
         return Ok(None);
     }

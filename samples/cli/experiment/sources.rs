@@ -1,7 +1,7 @@
-//! Which source files can change a picture, a measure, or what experiments keep beside them. Shared by the build script, which takes
-//! their digest, and by tests.
+//! The source files that can change a picture, a measure, or other data that experiments store. The build script computes their digest; tests
+//! use the same list.
 //!
-//! All files of the engine and of the programs count but those named here, so that a new one counts without being named.
+//! All files of the engine and of the programs count, except those named here. A new file therefore counts without being named.
 
 use std::{
     fs, io,
@@ -13,10 +13,10 @@ use super::digest::Digest;
 /// Folders and files, from the root of the repository.
 pub const ROOTS: &[&str] =
     &["engine", "shaders-glsl", "samples", "build.rs", "Cargo.toml", "Cargo.lock", "rust-toolchain.toml"];
-/// What only shows pictures, after they were made.
+/// Code that only shows finished pictures.
 const PAGES: &[&str] = &["samples/cli/experiment/analysis", "samples/cli/report"];
 
-/// The files, in the order of their names. A root that is not there is left out.
+/// The files, sorted by name. A root that does not exist is skipped.
 ///
 /// # Errors
 /// A folder that cannot be read.
@@ -48,7 +48,7 @@ fn below(root: &Path, folder: &Path, found: &mut Vec<PathBuf>) -> io::Result<()>
     Ok(())
 }
 
-/// From the root, with slashes.
+/// The path relative to the root, with slashes.
 fn name(root: &Path, path: &Path) -> String {
     path.strip_prefix(root).unwrap_or(path).to_string_lossy().replace('\\', "/")
 }
@@ -56,7 +56,7 @@ fn name(root: &Path, path: &Path) -> String {
 fn counts(name: &str) -> bool {
     let last = name.rsplit('/').next().unwrap_or(name);
     let test = last == "tests" || last.ends_with("tests.rs");
-    // Of experiments and cameras it is their contents that decide, wherever they are read from.
+    // Experiments and camera files are inputs of a picture: their contents are part of its key.
     let described = name.starts_with("samples/") && last.ends_with(".toml") && last != "Cargo.toml";
     !test && !described && !last.ends_with(".md") && !last.starts_with('.') && !PAGES.contains(&name)
 }

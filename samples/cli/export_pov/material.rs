@@ -1,4 +1,4 @@
-//! Materials as POV-Ray textures, their images, and emissive surfaces as patches of light.
+//! Export of materials as POV-Ray textures and images, and of emissive surfaces as point samples.
 
 use std::fmt::Write;
 
@@ -14,23 +14,23 @@ use super::{
     text::{number, vector},
 };
 
-/// How a material looks.
+/// A material as POV-Ray statements.
 #[derive(Clone, Debug, Default)]
 pub struct Look {
     /// `texture { … }` without vertex colours.
     pub texture: String,
     /// `interior { … }` of glass.
     pub interior: String,
-    /// Words that the object gets: `no_shadow` and such.
+    /// Keywords for the object, for example `no_shadow`.
     pub flags: String,
-    /// What the image's coordinates come from.
+    /// The texture reference that defines the image's coordinates.
     pub uv: Option<TextureRef>,
-    /// A plain matt colour that vertex colours can multiply.
+    /// The colour of an untextured matt material, which vertex colours can multiply.
     pub plain: Option<Vec4>,
     pub double_sided: bool,
 }
 
-/// The looks of all materials; images go into `export`.
+/// Converts all materials; adds their images to `export`.
 pub fn looks(scene: &Scene, stem: &str, lamps: bool, export: &mut Export) -> Result<Vec<Look>> {
     let used: Vec<u32> = scene.meshes.iter().flat_map(|mesh| &mesh.primitives).map(|p| p.material).collect();
     let mut looks = Vec::new();
@@ -83,7 +83,7 @@ fn look(
         finish += " diffuse 1";
     }
     if emits != Vec3::ZERO && lamps {
-        // It is a lamp already; radiosity would count it again.
+        // The surface is already exported as lights, and radiosity would count its light again.
         out.flags += " no_radiosity";
     }
     let albedo = match () {
@@ -160,7 +160,7 @@ fn look(
     }
     out.texture = match &layers[..] {
         [only] => only.clone(),
-        // The mean of both, each twice as strong.
+        // An average of two textures, each with doubled values.
         both => {
             let twice: Vec<String> = both.iter().map(|t| t.replace("diffuse 1", "diffuse 2")).collect();
             format!("texture {{ average texture_map {{ [1 {}] [1 {}] }} }}", inner(&twice[0]), inner(&twice[1]))
@@ -179,7 +179,7 @@ impl OrRepeat for Option<[Wrap; 2]> {
     }
 }
 
-/// Finish of the glowing half of an average: emission counts twice there.
+/// Finish of the emissive texture in an average of two textures, with doubled emission.
 fn glow(emits: Vec3) -> String {
     format!("ambient 0 diffuse 0 emission rgb {}", vector(emits * 2.0))
 }
@@ -258,7 +258,7 @@ pub fn texture_uv(primitive: &Primitive, reference: &TextureRef, vertex: usize) 
 pub struct Patch {
     /// Metres.
     pub position: Vec3,
-    /// Unit, the side that shines.
+    /// Unit, on the emitting side.
     pub normal: Vec3,
     /// W/(sr·m²).
     pub radiance: Vec3,
@@ -266,7 +266,7 @@ pub struct Patch {
     pub area: f32,
 }
 
-/// About `count` patches of equal power over all emissive triangles, in their order. Both sides of double-sided ones shine.
+/// About `count` patches of equal power over all emissive triangles, in their order. Double-sided triangles emit from both sides.
 pub fn patches(scene: &Scene, pose: &Pose, bvh: &Bvh, count: u32) -> Vec<Patch> {
     let mut lamps = Vec::new();
     for (index, corners) in bvh.triangles().iter().enumerate() {

@@ -13,7 +13,7 @@ use super::{
     text::{comment, number, vector},
 };
 
-/// Most colours of vertices that become textures of their own.
+/// Maximum of vertex colours that are exported as separate textures.
 const MAX_COLORS: usize = 4096;
 
 /// All surfaces of the scene.
@@ -44,7 +44,7 @@ pub fn all(
     }
 }
 
-/// Triangles that the camera sees, and backs of single-sided ones, which a rasteriser leaves out.
+/// Triangles that the camera sees, and back-facing single-sided triangles, which a rasteriser does not draw.
 fn sides(primitive: &Primitive, vertices: &Vertices, view: &View, double_sided: bool) -> [Vec<[u32; 3]>; 2] {
     let [.., forward] = view.axes();
     let mut out = [Vec::new(), Vec::new()];
@@ -63,7 +63,7 @@ fn sides(primitive: &Primitive, vertices: &Vertices, view: &View, double_sided: 
     out
 }
 
-/// What vertex colours become.
+/// The export of vertex colours.
 enum Colors {
     None,
     /// Textures, and the one of every vertex.

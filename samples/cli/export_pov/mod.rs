@@ -26,7 +26,7 @@ use crate::{
     stage::{Stage, StageArgs},
 };
 
-/// What is written beside the scene. The defaults of the radiosity block are table 1 of the dissertation.
+/// Settings besides the scene. The defaults of the radiosity block are table 1 of the dissertation.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
@@ -37,7 +37,7 @@ pub struct Settings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Pov {
-    /// Whether indirect light is computed at all.
+    /// Computes indirect light.
     pub radiosity: bool,
     /// Factor on gathered light at every bounce; 1 keeps energy, 2.4 is the paper's.
     pub brightness: f32,
@@ -51,8 +51,8 @@ pub struct Pov {
     pub error_bound: f32,
     /// Bounces.
     pub recursion_limit: u32,
-    /// Point samples that stand for emissive surfaces as lights (spread by power); 0: they only glow, and light others by
-    /// radiosity alone.
+    /// Number of point lights that replace emissive surfaces, distributed by power; 0: emissive surfaces light other surfaces by
+    /// radiosity only.
     pub emissive_lights: u32,
 }
 
@@ -72,7 +72,7 @@ impl Default for Pov {
 }
 
 impl Pov {
-    /// One or more bounces that keep energy, gathered more finely than the paper's: for comparison with path tracing.
+    /// Energy-conserving bounces, gathered more finely than in the paper, for comparison with path tracing.
     pub fn physical(bounces: u32) -> Self {
         Self {
             brightness: 1.0,
@@ -102,17 +102,17 @@ impl Pov {
     }
 }
 
-/// A scene file, the images that it names, and what it could not say.
+/// A scene file, its images, and notes about differences.
 #[derive(Clone, Debug, Default)]
 pub struct Export {
     pub text: String,
     /// Names relative to the scene file, and contents.
     pub images: Vec<(String, Vec<u8>)>,
-    /// What POV-Ray will show differently.
+    /// Notes about parts that POV-Ray renders differently.
     pub notes: Vec<String>,
 }
 
-/// Writes out `scene` as it stands in `pose`, seen through `view`. `stem` begins the names of images.
+/// Exports `scene` in `pose`, seen through `view`. `stem`: start of the images' names.
 ///
 /// # Errors
 /// `Usage` for settings out of range, `Input` for a scene without surfaces.
@@ -121,7 +121,7 @@ pub fn export(scene: &Scene, pose: &Pose, view: &View, settings: &Pov, stem: &st
     let bvh = Bvh::build(scene, pose);
     let (low, high) = bvh.bounds().ok_or_else(|| Error::input("the scene has no surface"))?;
     let units = text::units_per_metre((high - low).length());
-    // It stands between quotes in the file.
+    // The stem is written between quotes in the file.
     let stem: String = stem.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
     let stem = stem.as_str();
     let mut out = Export::default();
@@ -133,7 +133,7 @@ pub fn export(scene: &Scene, pose: &Pose, view: &View, settings: &Pov, stem: &st
     if settings.emissive_lights > 0 {
         stage::emitters(&mut body, scene, pose, &bvh, units, settings.emissive_lights, &mut out.notes);
     } else if scene.materials.iter().any(|m| m.emissive.max_element() > 0.0 && !m.unlit) {
-        out.notes.push("emissive surfaces light others by radiosity alone".into());
+        out.notes.push("emissive surfaces light other surfaces by radiosity only".into());
     }
     let looks = material::looks(scene, stem, settings.emissive_lights > 0, &mut out)?;
     mesh::all(&mut body, scene, pose, view, units, &looks, &mut out.notes);
@@ -177,7 +177,7 @@ pub struct ExportPovArgs {
     /// File to write, ending in .pov; images that it needs are written beside it
     #[arg(short, long, value_name = "FILE.pov")]
     pub output: Option<PathBuf>,
-    /// Replace files that exist
+    /// Overwrite existing files
     #[arg(long)]
     pub overwrite: bool,
     #[command(flatten)]
@@ -195,7 +195,7 @@ pub struct ExportPovArgs {
 /// Runs `lucerna export-pov`.
 ///
 /// # Errors
-/// Whatever fails, with the kind that decides the exit code.
+/// Any error of the run. Its kind decides the exit code.
 pub fn run(args: &ExportPovArgs) -> Result<()> {
     let console = args.talk.console();
     let settings: Settings = args.settings.effective(&Settings::default())?;

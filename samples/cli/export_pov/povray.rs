@@ -1,4 +1,4 @@
-//! Runs POV-Ray, where it is installed.
+//! Runs POV-Ray, if it is installed.
 
 use std::{
     fs::File,
@@ -12,14 +12,14 @@ use lucerna::{Error, ErrorKind, Result, image, scene::Limits};
 use super::Export;
 use crate::{args::Size, signals::Interrupt};
 
-/// How to run it.
+/// Options of a run of POV-Ray.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// It is stopped after this time.
+    /// POV-Ray is stopped after this time.
     pub time_limit: Duration,
     /// Threads; 0: as many as there are cores. The radiosity of POV-Ray depends on their number and timing.
     pub threads: u32,
-    /// Rays a pixel are the square of this; 1: one, through the centre.
+    /// The number of rays per pixel is the square of this value; 1: one ray, through the centre.
     pub subpixels: u32,
 }
 
@@ -29,7 +29,7 @@ impl Default for Options {
     }
 }
 
-/// What it made.
+/// The result of a run of POV-Ray.
 #[derive(Clone, Debug)]
 pub struct Rendered {
     /// Linear radiance, W/(sr·m²), in half precision.
@@ -90,7 +90,7 @@ pub fn render(export: &Export, size: Size, options: &Options) -> Result<Rendered
     if options.threads > 0 {
         command.arg(format!("+WT{}", options.threads.min(512)));
     }
-    // The other program and the folder of both must not be left behind.
+    // On a stop, the child process and the temporary folder must be removed.
     let stop = Interrupt::stop();
     let begun = Instant::now();
     let mut child = command
@@ -107,7 +107,7 @@ pub fn render(export: &Export, size: Size, options: &Options) -> Result<Rendered
         }
         let asked = stop.check();
         if asked.is_err() || begun.elapsed() > options.time_limit {
-            // It may have ended just now; then there is nothing to stop.
+            // Ignores the error if the process has just ended.
             let _ = child.kill();
             let _ = child.wait();
             asked?;
@@ -118,7 +118,7 @@ pub fn render(export: &Export, size: Size, options: &Options) -> Result<Rendered
         std::thread::sleep(Duration::from_millis(20));
     };
     if !status.success() {
-        // The first lines say what was wrong, however long it went on.
+        // The first lines of the log have the error message; the log may be long.
         let text = image::read_head_checked(&log, 1 << 20).unwrap_or_default();
         let text = String::from_utf8_lossy(&text);
         return Err(failed(format!("POV-Ray ended with {status}: {}", message(&text))));
@@ -131,7 +131,7 @@ fn failed(what: impl Into<String>) -> Error {
     Error::new(ErrorKind::Runtime, what)
 }
 
-/// The lines of the log that say what was wrong.
+/// The lines of the log with error messages.
 fn message(log: &str) -> String {
     let wrong = |line: &&str| line.contains("Error") || line.contains("error") || line.contains("Fatal");
     let lines: Vec<&str> = log.lines().map(str::trim).filter(|l| !l.is_empty()).collect();

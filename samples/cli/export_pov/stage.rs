@@ -61,7 +61,7 @@ pub fn sky(out: &mut String, scene: &Scene, stem: &str, export: &mut Export) -> 
     if environment.pixels.iter().all(|p| *p == environment.pixels[0]) {
         let _ = writeln!(out, "sky_sphere {{ pigment {{ color rgb {} }} }}", vector(mean));
     } else {
-        // The turned and scaled sky is sampled anew in POV-Ray's spherical mapping: the file then needs no transform.
+        // The rotated and scaled sky is resampled to POV-Ray's spherical mapping, so that the file needs no transform.
         let (width, height) = (environment.width.clamp(64, MAX_SKY), environment.height.clamp(32, MAX_SKY / 2));
         let mut pixels = Vec::with_capacity(width as usize * height as usize * 3);
         for y in 0..height {
@@ -78,7 +78,7 @@ pub fn sky(out: &mut String, scene: &Scene, stem: &str, export: &mut Export) -> 
         );
         export.images.push((name, bytes));
     }
-    export.notes.push("the environment lights surfaces by radiosity alone; without radiosity it is only seen".into());
+    export.notes.push("the environment lights surfaces by radiosity only; without radiosity it is only visible".into());
     Ok(())
 }
 

@@ -1,4 +1,4 @@
-//! How numbers, vectors and comments look in a scene file, and the formulas of its light.
+//! Numbers, vectors and comments in a scene file, and the formulas for its lights.
 
 use glam::Vec3;
 
@@ -6,7 +6,7 @@ use glam::Vec3;
 /// square but for a share (f/d)².
 pub const FADE: f64 = 1e-3;
 
-/// `<x,y,z>`; what is not finite becomes 0.
+/// `<x,y,z>`; values that are not finite become 0.
 pub fn vector(v: Vec3) -> String {
     let [x, y, z] = v.to_array().map(number);
     format!("<{x},{y},{z}>")
@@ -23,8 +23,8 @@ pub fn comment(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
-/// Units that stand for a metre: a power of ten that makes the scene at least 10 units large, because POV-Ray takes hits
-/// within a thousandth of a unit as the surface itself.
+/// Number of units per metre: a power of ten such that the scene is at least 10 units large. POV-Ray ignores hits within a thousandth of a
+/// unit, because it takes them for the surface itself.
 pub fn units_per_metre(diagonal: f32) -> f32 {
     let mut units = 1.0;
     while diagonal * units < 10.0 && units < 1e6 {

@@ -1,4 +1,4 @@
-//! What a file of vectors has decided, and what vectors do not ask for.
+//! Settings that a file of vectors decides, and settings that vectors do not depend on.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::config;
 
-/// Keys that decide pictures and no vectors.
+/// Keys that change pictures but no vectors.
 const OF_PICTURES: [&str; 10] =
     ["trilinear", "partial", "cut", "extent", "overlap", "negligible", "shared", "specular", "method", "turning"];
 
@@ -26,7 +26,7 @@ fn differences(a: &Settings, b: &Settings) -> Result<Vec<(String, Value, Value)>
     Ok(a.into_iter().filter_map(pair).collect())
 }
 
-/// Whether settings leave to the file of vectors what it has decided.
+/// Checks that settings agree with the settings that the file of vectors was computed with.
 ///
 /// # Errors
 /// `Usage`, naming the file, the key and both values.
@@ -37,12 +37,12 @@ pub fn decided(file: &Path, stored: &Stored, settings: &Settings) -> Result<()> 
     }
     let wrong = differences(settings, &stored.plan.settings(settings))?.into_iter().next();
     wrong.map_or(Ok(()), |(key, asked, has)| {
-        let error = Error::usage(format!("{asked} is asked for, the vectors were computed with {has}"));
+        let error = Error::usage(format!("the settings ask for {asked}, the vectors were computed with {has}"));
         Err(error.at(format!("fiv.{key}")).in_file(file).help("Leave the key out, or compute the vectors again"))
     })
 }
 
-/// Keys that were set and that vectors do not depend on.
+/// Keys that differ from their defaults and that vectors do not depend on.
 ///
 /// # Errors
 /// As [`config::to_value`].
@@ -51,8 +51,8 @@ pub(super) fn idle(settings: &Settings) -> Result<Vec<String>> {
     Ok(set.filter(|key| OF_PICTURES.contains(&key.as_str())).map(|key| format!("fiv.{key}")).collect())
 }
 
-/// As vectors take them: keys that they do not depend on are not in the way of others that pictures could not have beside these. Values out
-/// of their range stay.
+/// The settings from which vectors are computed. Keys that vectors do not depend on get values that are valid in every
+/// combination. Values out of their range stay, so that validation reports them.
 pub(super) fn of_vectors(settings: &Settings) -> Settings {
     let negligible = if (0.0..=1.0).contains(&settings.negligible) { 0.0 } else { settings.negligible };
     Settings { method: Method::Vectors, specular: Specular::Off, negligible, ..settings.clone() }

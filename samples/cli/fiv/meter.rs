@@ -1,33 +1,33 @@
-//! How far computing vectors is, on stderr.
+//! Progress of the computation of vectors, on stderr.
 
 use std::time::{Duration, Instant};
 
 use crate::progress::{ProgressMode, span};
 
-/// Shows progress from time to time.
+/// Shows progress at intervals.
 #[derive(Debug)]
 pub struct Meter {
     mode: ProgressMode,
     started: Instant,
     shown: Instant,
-    /// Done before this run.
+    /// Samples that earlier runs have computed.
     before: u64,
     total: u64,
 }
 
 impl Meter {
-    /// Towards `total` samples, of which `before` were done earlier.
+    /// A meter for `total` samples, of which earlier runs have computed `before`.
     pub fn new(mode: ProgressMode, quiet: bool, before: u64, total: u64) -> Self {
         let mode = mode.here(quiet, false);
         Self { mode, started: Instant::now(), shown: Instant::now(), before, total }
     }
 
-    /// Seconds of this run.
+    /// Duration of this run so far, seconds.
     pub fn seconds(&self) -> f64 {
         self.started.elapsed().as_secs_f64()
     }
 
-    /// So many are done, with those done earlier. The last line is always shown.
+    /// Shows that `done` samples are done, including those of earlier runs. The last line is always shown.
     pub fn show(&mut self, done: u64) {
         let last = done >= self.total;
         let pause = if self.mode == ProgressMode::Bar { 200 } else { 5000 };
@@ -47,11 +47,11 @@ impl Meter {
                 format!("{done}/{} samples ({percent:.0} %), {rate:.0} samples/s, {} left", self.total, span(left))
             }
         };
-        self.mode.meter_line(&text, last);
+        self.mode.progress_line(&text, last);
     }
 }
 
-/// Samples a second, and seconds that are left at this pace.
+/// Samples per second, and the seconds left at this rate.
 fn rate(before: u64, done: u64, total: u64, seconds: f64) -> (f64, f64) {
     let rate = done.saturating_sub(before) as f64 / seconds.max(1e-9);
     (rate, total.saturating_sub(done) as f64 / rate.max(1e-9))

@@ -1,4 +1,5 @@
-//! `fiv precompute`, `fiv merge` and `fiv environment`: what `fiv render` takes, as files; `fiv steady`: what is wrong with what it gives.
+//! The commands `fiv precompute`, `fiv merge` and `fiv environment`, which write the input files of `fiv render`, and
+//! `fiv steady`, which measures its output.
 
 mod decided;
 mod meter;
@@ -43,7 +44,8 @@ pub struct MergeArgs {
 /// Joins the parts of a file.
 ///
 /// # Errors
-/// `Input` if parts are damaged, missing, there twice, or of different wholes; `Output` if the file cannot be written.
+/// `Input` if parts are damaged, if samples are missing or occur twice, or if the parts belong to different plans;
+/// `Output` if the file cannot be written.
 pub fn merge(args: &MergeArgs, console: Console) -> Result<ExitCode> {
     image::probe_output(&args.output, args.overwrite)?;
     let parts = args.parts.iter().map(Stored::read).collect::<Result<Vec<_>>>()?;
@@ -85,7 +87,7 @@ pub fn environment(args: &EnvironmentArgs, console: Console) -> Result<ExitCode>
     Ok(ExitCode::SUCCESS)
 }
 
-/// One of several even parts of the work: `2/5` is the second of five.
+/// One of several equal parts of the work: `2/5` is the second of five.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     /// From 0.
@@ -106,7 +108,7 @@ impl std::str::FromStr for Shard {
     }
 }
 
-/// The name of the file that keeps what is done of another.
+/// The name of the file that keeps the finished part of another file.
 fn partial(path: &std::path::Path) -> Result<PathBuf> {
     let name = path.file_name().ok_or_else(|| Error::usage("is not a file name").in_file(path))?;
     Ok(path.with_file_name(format!("{}.part", name.to_string_lossy())))

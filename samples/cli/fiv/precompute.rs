@@ -1,4 +1,4 @@
-//! `fiv precompute`: the vectors of occluders under an environment, into a file.
+//! `fiv precompute`: computes the vectors of occluders under an environment and writes them to a file.
 
 use std::{
     ops::Range,
@@ -26,6 +26,7 @@ use crate::{
     program::{self, STOPPED_EARLY},
     progress::ProgressMode,
     render::unless_stopped,
+    settings_list,
     signals::Interrupt,
     source,
 };
@@ -33,8 +34,8 @@ use crate::{
 /// Options of `fiv precompute`.
 #[derive(clap::Args, Clone, Debug)]
 pub struct PrecomputeArgs {
-    /// Scene files: .gltf, .glb or .obj. Every node with a mesh is an occluder, as it stands at rest; flat ones and those as
-    /// large as their scene are left out
+    /// Scene files: .gltf, .glb or .obj. Every node with a mesh is an occluder in its pose at rest; flat meshes and meshes
+    /// as large as their scene are left out
     #[arg(value_name = "MESH", required_unless_present = "builtin")]
     pub meshes: Vec<PathBuf>,
 
@@ -65,11 +66,12 @@ pub struct PrecomputeArgs {
     #[arg(long, value_name = "I/N", help_heading = "Output")]
     pub shard: Option<Shard>,
 
-    /// Start anew, even if a stopped run has left FILE.part
+    /// Start again, even if a stopped run has left FILE.part
     #[arg(long, help_heading = "Output")]
     pub restart: bool,
 
-    /// Seconds after which what is done is written to FILE.part; more where writing takes more than a tenth of that
+    /// Seconds between writes of the finished samples to FILE.part; the interval is longer if a write takes more than a
+    /// tenth of it
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, help_heading = "Output")]
     pub checkpoint: f64,
 
@@ -96,7 +98,7 @@ fn seconds(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(good).ok_or_else(|| "expected seconds from 0 to 86400".into())
 }
 
-/// The keys have the names that `fiv render` has.
+/// The settings, with the same keys as `fiv render`.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Keys {
@@ -112,21 +114,21 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
     let checked = |keys: &Keys| decided::of_vectors(&keys.fiv).validate().map_err(|error| error.at("fiv"));
     args.settings.blamed(checked(&keys), || checked(&args.settings.file_alone().effective(&Keys::default())?))?;
     if args.settings.print_config {
-        console::print(config::to_toml(&keys)?.trim_end())?;
+        console::print(settings_list::with_docs(&config::to_toml(&keys)?).trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
     let idle = decided::idle(&keys.fiv)?;
     if !idle.is_empty() {
         console.info(&format!("note: vectors do not depend on {}", idle.join(", ")));
     }
-    // Which lights are kept apart does depend on it.
+    // Texels are separated only for this method.
     keys.fiv.method = Method::Vectors;
     image::probe_output(&args.output, args.overwrite)?;
     let interrupt = Interrupt::install();
     let (occluders, environment) = load(args, &keys.fiv, console)?;
     let sky = Sky::of(Some(&environment), &keys.fiv)?;
     if sky.repaired > 0 {
-        console.info(&format!("note: {} pixels of the environment are no radiance", sky.repaired));
+        console.info(&format!("note: {} pixels of the environment are not valid radiance", sky.repaired));
     }
     let mut plan = Plan::new(&environment.name, sky.hash(), &occluders, &keys.fiv);
     let gpu = Gpu::new(args.device.options()?)?;
@@ -157,7 +159,7 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
     let computed = plan.compute(&gpu, &light, &occluders, stored.range.end..range.end, |done, new| {
         stored.push(new);
         meter.show(done - range.start);
-        // All is written anew each time: at most a tenth of the time goes into it.
+        // Each checkpoint writes the whole file. At most a tenth of the time is spent on checkpoints.
         if saved.elapsed() >= checkpoint.max(9 * took) {
             let begun = Instant::now();
             let _saving = interrupt.saving();
@@ -167,7 +169,7 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
         }
         Ok(!interrupt.requested())
     });
-    // What was computed before it was asked to stop counts.
+    // Samples that were computed before the interrupt are kept.
     unless_stopped(computed, &interrupt)?;
     if stored.range.end < range.end {
         let _saving = interrupt.saving();
@@ -198,7 +200,7 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The occluders of all files, those that look the same once, and the environment.
+/// The occluders of all files without duplicates, and the environment.
 fn load(args: &PrecomputeArgs, settings: &Settings, console: Console) -> Result<(Vec<Occluder>, Environment)> {
     let options = source::in_unit(args.unit);
     let mut environment = match &args.environment {
@@ -217,9 +219,9 @@ fn load(args: &PrecomputeArgs, settings: &Settings, console: Console) -> Result<
         scene.notes.iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
         let found = Occluders::of(&scene, &Pose::rest(&scene), settings.flat, settings.largest);
         if found.kinds.is_empty() {
-            let error = Error::input("has no occluder: no mesh that is not flat");
+            let error = Error::input("has no occluder: there is no mesh, or all meshes are flat, large or unlit");
             let place = file.unwrap_or_else(|| Path::new(name.unwrap_or_default()));
-            return Err(error.in_file(place).help("Flat meshes are taken with -D fiv.flat=true"));
+            return Err(error.in_file(place).help("Include flat meshes with -D fiv.flat=true"));
         }
         if !found.receivers.is_empty() {
             let names: Vec<_> = found.receivers.iter().map(|&n| scene.nodes[n as usize].name.as_str()).collect();
@@ -245,15 +247,16 @@ fn load(args: &PrecomputeArgs, settings: &Settings, console: Console) -> Result<
     Ok((kinds, environment))
 }
 
-/// What an earlier run has left.
+/// The samples that a stopped run has left.
 ///
 /// # Errors
-/// `Output` if it is of other work or damaged: it may be worth hours.
+/// `Output` if the file belongs to other work, `Input` if it is damaged. The file may contain hours of work, so it is never replaced
+/// unless the user asks for it.
 fn resumed(part: &Path, plan: &Plan, range: &Range<u64>, restart: bool) -> Result<Option<Stored>> {
     if restart || !part.exists() {
         return Ok(None);
     }
-    let help = "Give --restart to start anew over it, or name another file with -o";
+    let help = "Use --restart to replace it, or name another file with -o";
     let stored = Stored::read(part).map_err(|error| error.help(help))?;
     let difference = plan.difference(&stored.plan).or_else(|| {
         let (first, last) = (stored.range.start, stored.range.end);
@@ -263,7 +266,7 @@ fn resumed(part: &Path, plan: &Plan, range: &Range<u64>, restart: bool) -> Resul
     match difference {
         None => Ok(Some(stored)),
         Some(difference) => {
-            let what = format!("a stopped run has left other work: {difference}");
+            let what = format!("a stopped run with other work has left this file: {difference}");
             Err(Error::new(ErrorKind::Output, what).in_file(part).help(help))
         }
     }

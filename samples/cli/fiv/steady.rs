@@ -1,4 +1,4 @@
-//! `fiv steady`: whether a sequence pops.
+//! `fiv steady`: compares the changes between the frames of a sequence with those of a sequence by brute force.
 
 use std::{
     path::{Path, PathBuf},
@@ -68,15 +68,15 @@ pub fn steady(args: &SteadyArgs, console: Console) -> Result<ExitCode> {
         ))?;
     }
     if measured.parts == 0 {
-        console.info("note: no part of 8×8 pixels stands still throughout");
+        console.info("note: no block of 8×8 pixels stands still in all frames");
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// What is to be compared.
+/// Help text on the frames that can be compared.
 const SAME: &str = "Both folders must have the same frames under the same names, of the same size";
 
-/// Two sequences, each of one size, are of the same frames.
+/// Checks that two sequences have the same frames.
 ///
 /// # Errors
 /// `Input`, naming both folders and what differs.

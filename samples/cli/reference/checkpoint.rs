@@ -1,4 +1,4 @@
-//! The state of a picture in the making, in a file beside the picture.
+//! The checkpoint file: the state of an unfinished picture, next to the picture's file.
 
 use std::{
     path::PathBuf,
@@ -12,12 +12,12 @@ use lucerna::{
 };
 use serde_json::Value;
 
-/// Time between two states at least.
+/// Minimum time between two checkpoints.
 const PAUSE: Duration = Duration::from_secs(20);
-/// Of the time, at most this share goes into writing states.
+/// Maximum share of the time for writing checkpoints.
 const SHARE: f64 = 0.05;
 
-/// Where the state is kept, and when it is due.
+/// The checkpoint file, and the time at which the next write is due.
 #[derive(Debug)]
 pub struct Checkpoint {
     path: Option<PathBuf>,
@@ -26,7 +26,8 @@ pub struct Checkpoint {
 }
 
 impl Checkpoint {
-    /// Beside `image`: `image.exr.state`. `None`: nowhere. `LUCERNA_CHECKPOINT_SECONDS` shortens the first pause, for tests.
+    /// A checkpoint next to `image`: `image.exr.state`. `None`: no checkpoint. `LUCERNA_CHECKPOINT_SECONDS` shortens the first pause, for
+    /// tests.
     pub fn new(image: Option<PathBuf>, about: Value) -> Self {
         let path = image.map(|image| {
             let mut name = image.into_os_string();
@@ -36,11 +37,10 @@ impl Checkpoint {
         Self { path, about, next: Instant::now() + pause() }
     }
 
-    /// Whether there is room for a state: that of a stopped run may be worth hours, and is neither replaced nor removed unless `restart`
-    /// says so.
+    /// Checks that there is no checkpoint. A checkpoint may hold hours of work, so only `restart` allows to overwrite it.
     ///
     /// # Errors
-    /// `Output` if there is one, saying how far it is.
+    /// `Output` if there is one; the message gives its progress.
     pub fn probe(&self, restart: bool) -> Result<()> {
         let Some(path) = self.path.as_ref().filter(|path| !restart && path.symlink_metadata().is_ok()) else {
             return Ok(());
@@ -53,37 +53,39 @@ impl Checkpoint {
             Err(error) => format!("a stopped run has left a state that cannot be read ({})", error.what()),
         };
         Err(Error::new(ErrorKind::Output, what).in_file(path).help(
-            "Give --resume to go on with the options that it was begun with, --restart to start anew over it, or name another image with -o",
+            "Give --resume to continue with the same options, --restart to start again and overwrite it, or give another image with -o",
         ))
     }
 
-    /// Goes on from the state, if there is one.
+    /// Continues from the checkpoint, if there is one.
     ///
     /// # Errors
-    /// `Input` if it is of another picture or damaged.
+    /// `Input` if the checkpoint belongs to another picture or is damaged.
     pub fn resume(&self, tracer: &mut Tracer<'_>) -> Result<bool> {
         let Some(path) = self.path.as_ref().filter(|path| path.exists()) else { return Ok(false) };
         let [width, height] = tracer.view()?.extent;
         if let Some([w, h]) = State::glance(path).ok().map(|head| head.extent).filter(|of| *of != [width, height]) {
             let what = format!("is the state of another picture: of {w}×{h} pixels, this one has {width}×{height}");
-            return Err(Error::input(what).in_file(path).help("Start anew, or give the size that it was begun with"));
+            return Err(Error::input(what)
+                .in_file(path)
+                .help("Start again with --restart, or give the size of that picture"));
         }
-        // No more than the state of this picture takes, whatever the length of the file.
+        // Reads at most the size of this picture's state, even if the file is longer.
         let bytes = read_file_checked(path, State::most_bytes([width, height]))?;
         let state = State::decode(&bytes).map_err(|error| error.in_file(path))?;
         tracer.restore(&state, &self.about).map_err(|error| error.in_file(path))?;
         Ok(true)
     }
 
-    /// Whether it is time to write.
+    /// Whether a checkpoint is due.
     pub fn is_due(&self) -> bool {
         self.path.is_some() && Instant::now() >= self.next
     }
 
-    /// Writes the state, whole or not at all. False if there is no place for it.
+    /// Writes the checkpoint as a whole or not at all. Returns false if checkpoints are off.
     ///
     /// # Errors
-    /// `Output`; what was there stays.
+    /// `Output`; the previous checkpoint stays.
     pub fn write(&mut self, tracer: &Tracer<'_>) -> Result<bool> {
         let Some(path) = &self.path else { return Ok(false) };
         let begun = Instant::now();
@@ -92,10 +94,10 @@ impl Checkpoint {
         Ok(true)
     }
 
-    /// The picture is done.
+    /// Removes the checkpoint of a finished picture.
     pub fn remove(&self) {
         if let Some(path) = &self.path {
-            // Not there in most cases.
+            // In most cases the file does not exist.
             let _ = std::fs::remove_file(path);
         }
     }

@@ -1,8 +1,8 @@
-//! `lucerna reference`: a picture by path tracing, better the longer it runs.
+//! `lucerna reference`: progressive path tracing of a picture.
 
 mod checkpoint;
-mod meter;
 mod options;
+mod progress_line;
 
 pub use options::{ReferenceArgs, Settings, Show, Span};
 
@@ -32,9 +32,9 @@ use crate::{
     stage::Stage,
 };
 use checkpoint::Checkpoint;
-use meter::{Goals, Meter};
+use progress_line::{Goals, ProgressLine};
 
-/// Why the work ended.
+/// The reason for the end of the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum End {
     Samples,
@@ -58,13 +58,14 @@ impl End {
     }
 }
 
-/// Seconds that finishing the current sample may take after a stop; a part of a sample is valid, but cannot be made again.
+/// Time for finishing the current sample after a stop, seconds. A picture with a partial sample is valid, but `lucerna rerun` cannot make it
+/// again.
 const FINISH: f64 = 1.0;
 
 /// Runs the command.
 ///
 /// # Errors
-/// Whatever fails, with the kind that decides the exit code.
+/// Any error of the run. Its kind decides the exit code.
 pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
     let staged = args.effective()?;
     if args.settings.print_config {
@@ -75,10 +76,10 @@ pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
     picture(args, staged, console, None, &interrupt).map(|(code, _)| code)
 }
 
-/// Makes a picture again, in memory; `None`: interrupted. Nothing is written, no state is read.
+/// Makes a picture again, in memory; `None`: interrupted. Writes no file and reads no checkpoint.
 ///
 /// # Errors
-/// Whatever fails while rendering; `Input` for what the record says.
+/// Any error of rendering; `Input` for wrong values in the record.
 pub fn again(asked: &Again<'_>) -> Result<Option<Fresh>> {
     let check = |settings: &Settings| {
         settings.validate()?;
@@ -107,7 +108,7 @@ pub fn again(asked: &Again<'_>) -> Result<Option<Fresh>> {
     picture(&args, staged, asked.console(), Some(asked.format), asked.interrupt).map(|(_, fresh)| fresh)
 }
 
-/// Makes the picture; with `memory` it is kept as a file of that format, and nothing is written.
+/// Makes the picture. With `memory` it is kept as the bytes of a file of this format, and no file is written.
 fn picture(
     args: &ReferenceArgs,
     Staged { technique: settings, tonemap }: Staged<Settings>,
@@ -141,34 +142,34 @@ fn picture(
     if !args.resume {
         checkpoint.probe(args.restart)?;
     }
-    // What techniques of the picture alone cannot do with emissive surfaces does not concern rays.
+    // The note about emissive surfaces is for image-space techniques and does not apply to path tracing.
     for note in stage.notes().iter().filter(|n| n.kind != NoteKind::Repaired && n.text != framing::EMISSIVE_ALONE) {
         console.info(&format!("note: {}: {}", note.place, note.text));
     }
-    // Between two tiles it stops by itself, with all that was computed: the device must not be left in the middle of one.
+    // The device does not get the stop request. The tracer stops between two tiles and keeps all results; an interrupted tile would be lost.
     let gpu = Gpu::new(GpuOptions { stop: None, ..args.device.options()? })?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
     let (pose, view) = stage.at(args.stage.time, args.stage.size)?;
     let mut tracer = Tracer::new(&gpu, &stage.scene, &pose)?;
     tracer.start(&view, &settings.reference)?;
     if args.resume && checkpoint.resume(&mut tracer)? {
-        console.info(&format!("goes on after {:.0} samples a pixel", tracer.progress()?.samples));
+        console.info(&format!("resumes after {:.0} samples per pixel", tracer.progress()?.samples));
     }
 
     let goals =
         Goals { samples: settings.samples, error: args.target_error, time: args.time_limit.map(|limit| limit.0) };
-    let mut meter = Meter::new(args.progress, console.is_quiet(), goals, tracer.progress()?);
-    // Hours of work may be in the sums from now on.
+    let mut line = ProgressLine::new(args.progress, console.is_quiet(), goals, tracer.progress()?);
+    // From now on the sums may hold hours of work, which must be saved.
     let _saving = interrupt.saving();
-    let end = work(args, &settings, &mut tracer, &mut checkpoint, &mut meter, interrupt)?;
+    let end = work(args, &settings, &mut tracer, &mut checkpoint, &mut line, interrupt)?;
     let done = tracer.progress()?;
     if done.paths == 0 && end == End::Interrupt {
         return Ok((ExitCode::from(interrupt.exit_code()), None));
     }
     let sums = tracer.sums()?;
-    meter.finish(&done, sums.relative_error());
+    line.finish(&done, sums.relative_error());
     if sums.lost() > 0 {
-        console.warning(&format!("{} paths gave no number and are left out", sums.lost()));
+        console.warning(&format!("{} paths gave values that are not finite and are left out", sums.lost()));
     }
     let mut layers = sums.layers();
     args.show.apply(&mut layers);
@@ -177,15 +178,15 @@ fn picture(
         Source::File(_) => None,
     };
     let fitting = || suits.unwrap_or_else(|| exposure::fitting(&layers));
-    // What suits the scene means nothing to a picture that is normalised.
+    // A normalised picture needs no automatic exposure.
     let normal = tonemap.as_ref().is_some_and(|tonemap| tonemap.normalize);
     let ev = args.exposure.unwrap_or_else(|| if normal { 0.0 } else { fitting() });
-    // Tone mapping takes the exposure itself.
+    // Tone mapping applies the exposure, so that the file must not apply it again.
     match &tonemap {
         Some(tonemap) => last_stage::still(&gpu, tonemap, ev, &mut layers)?,
         None => outputs.expose(ev),
     }
-    // What a run with exactly these samples would say as well.
+    // The metadata are those of a run with exactly this number of samples.
     let made = Settings { samples: done.samples.floor() as u64, ..settings.clone() };
     let made = Staged { technique: made, tonemap };
     layers.metadata = metadata(args, &stage, &gpu, &tracer.view()?, &made, ev)?;
@@ -201,13 +202,13 @@ fn picture(
     }
     if end.is_early() {
         if checkpoint.write(&tracer)? {
-            console.info(&format!("stopped by {}; --resume goes on", end.text()));
+            console.info(&format!("stopped by {}; --resume continues", end.text()));
         }
     } else {
         checkpoint.remove();
     }
     if args.json {
-        console::print_json(&report(&layers, &done, &meter, sums.relative_error(), end, &files))?;
+        console::print_json(&report(&layers, &done, &line, sums.relative_error(), end, &files))?;
     }
     let code = if end.is_early() { ExitCode::from(STOPPED_EARLY) } else { ExitCode::SUCCESS };
     Ok((code, outputs.fresh().filter(|_| !end.is_early())))
@@ -218,19 +219,19 @@ fn work(
     settings: &Settings,
     tracer: &mut Tracer<'_>,
     checkpoint: &mut Checkpoint,
-    meter: &mut Meter,
+    line: &mut ProgressLine,
     interrupt: &Interrupt,
 ) -> Result<End> {
     let started = Instant::now();
-    // The error is looked at after so many samples, each time a little later: reading the sums takes time.
+    // The next number of samples at which the error is estimated. The intervals grow, because reading the sums takes time.
     let mut look = 16.0f64.max(tracer.progress()?.samples);
     loop {
         let mut reason = None;
         let mut stopped: Option<Instant> = None;
         let save = &mut *checkpoint;
-        let shown = &mut *meter;
+        let line = &mut *line;
         tracer.run(settings.samples, |progress: &Progress| {
-            shown.show(progress);
+            line.show(progress);
             let whole = progress.samples.fract() == 0.0;
             if reason.is_none() {
                 if interrupt.requested() {
@@ -243,8 +244,8 @@ fn work(
                 let since = stopped.get_or_insert_with(Instant::now);
                 return !whole && since.elapsed().as_secs_f64() < FINISH;
             }
-            // Out of the loop to read the sums.
-            let looks = progress.samples >= look && (args.target_error.is_some() || shown.wants_error());
+            // Leaves the loop to read the sums.
+            let looks = progress.samples >= look && (args.target_error.is_some() || line.wants_error());
             !looks && !save.is_due()
         })?;
         let progress = tracer.progress()?;
@@ -259,10 +260,10 @@ fn work(
         }
         if progress.samples >= look {
             let error = tracer.sums()?.relative_error();
-            meter.error(&progress, error);
+            line.error(&progress, error);
             look = (progress.samples * 1.25).ceil();
             if args.target_error.is_some_and(|target| error <= target) {
-                // To whole samples, so that the picture can be made again.
+                // Finishes the current sample, so that the picture can be made again.
                 tracer.run(progress.samples.ceil() as u64, |_| !interrupt.requested())?;
                 return Ok(End::Error);
             }
@@ -270,7 +271,7 @@ fn work(
     }
 }
 
-/// What the bits of a picture depend on besides view and settings.
+/// The data on which the bits of a picture depend, besides view and settings.
 fn about(args: &ReferenceArgs, stage: &Stage) -> Value {
     json!({
         "scene": stage.fingerprint,
@@ -319,7 +320,7 @@ fn metadata(
     })
 }
 
-fn report(layers: &Layers, done: &Progress, meter: &Meter, error: f64, end: End, files: &[&str]) -> Value {
+fn report(layers: &Layers, done: &Progress, line: &ProgressLine, error: f64, end: End, files: &[&str]) -> Value {
     json!({
         "program": layers.metadata.program,
         "version": layers.metadata.version,
@@ -328,8 +329,8 @@ fn report(layers: &Layers, done: &Progress, meter: &Meter, error: f64, end: End,
         "config": layers.metadata.config,
         "samples": done.samples,
         "paths": done.paths,
-        "paths_per_second": meter.rate(done),
-        "seconds": meter.seconds(),
+        "paths_per_second": line.rate(done),
+        "seconds": line.seconds(),
         "device_seconds": done.time.as_secs_f64(),
         "relative_error": if error.is_finite() { json!(error) } else { Value::Null },
         "ended_by": end.text(),
@@ -339,7 +340,7 @@ fn report(layers: &Layers, done: &Progress, meter: &Meter, error: f64, end: End,
 }
 
 impl Show {
-    /// Puts the layer in the place of the picture; the total stays as a layer.
+    /// Replaces the picture by the layer; the total becomes a layer.
     fn apply(self, layers: &mut Layers) {
         if self == Self::Total {
             return;

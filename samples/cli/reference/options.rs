@@ -24,11 +24,11 @@ pub struct ReferenceArgs {
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     pub output: Vec<String>,
 
-    /// Replace images that exist
+    /// Overwrite existing images
     #[arg(long, help_heading = "Output")]
     pub overwrite: bool,
 
-    /// What the picture is; .exr files have the other layers as well
+    /// The layer that the picture shows; .exr files also have the other layers
     #[arg(long, alias = "mode", value_enum, default_value_t, value_name = "LAYER", help_heading = "Output")]
     pub show: Show,
 
@@ -36,35 +36,35 @@ pub struct ReferenceArgs {
     #[arg(long, help_heading = "Output")]
     pub json: bool,
 
-    /// Paths for each pixel [default: 256]
+    /// Paths per pixel [default: 256]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=u64::from(u32::MAX)), help_heading = "Quality")]
     pub spp: Option<u64>,
 
-    /// Stop after this time with what is there: 90, 90s, 10m, 1h30m; exit code 8
+    /// Stop after this time with the samples so far: 90, 90s, 10m, 1h30m; exit code 8
     #[arg(long, value_name = "TIME", help_heading = "Quality")]
     pub time_limit: Option<Span>,
 
-    /// Stop when the estimated relative mean squared error of luminance is no more than this: 0.01
+    /// Stop when the estimated relative mean squared error of luminance is at most this value, for example 0.01
     #[arg(long, value_name = "X", value_parser = positive, help_heading = "Quality")]
     pub target_error: Option<f64>,
 
-    /// Scatterings after the first surface: 0 is direct light, 1 what one pass of isr models [default: 8]
+    /// Maximum of scatterings after the first surface: 0 for direct light, 1 for the light that one pass of isr models [default: 8]
     #[arg(long, value_name = "N", help_heading = "Quality")]
     pub bounces: Option<u32>,
 
-    /// Go on from the state that a run with the same options left beside the image
+    /// Continue from the state that a run with the same options has left next to the image
     #[arg(long, help_heading = "Quality")]
     pub resume: bool,
 
-    /// Start anew, even if a stopped run has left a state beside the image
+    /// Start from the beginning, even if a stopped run has left a state next to the image
     #[arg(long, conflicts_with = "resume", help_heading = "Quality")]
     pub restart: bool,
 
-    /// Exposure: colours of .png files are multiplied by 2^EV [default: what suits the scene]
+    /// Exposure: colours of .png files are multiplied by 2^EV [default: 0, or chosen from the picture if it is very dark or bright]
     #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
     pub exposure: Option<f64>,
 
-    /// Seed of everything random [default: 0]
+    /// Seed of the random numbers [default: 0]
     #[arg(long, value_name = "N", help_heading = "Picture")]
     pub seed: Option<u32>,
 
@@ -82,11 +82,11 @@ pub struct ReferenceArgs {
     pub progress: ProgressMode,
 }
 
-/// Everything that can be set in a file or with `-D`.
+/// The settings for files and `-D`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    /// Paths for each pixel.
+    /// Paths per pixel.
     pub samples: u64,
     pub reference: tracer::Settings,
 }
@@ -99,7 +99,7 @@ impl Default for Settings {
 
 impl Settings {
     /// # Errors
-    /// `Usage` if there are no samples, or more than can be numbered.
+    /// `Usage` if the number of samples is 0 or above 2³² − 1.
     pub fn validate(&self) -> Result<()> {
         match self.samples {
             1..=MOST_SAMPLES => Ok(()),
@@ -108,16 +108,16 @@ impl Settings {
     }
 }
 
-/// Samples of a pixel that can be numbered.
+/// Maximum of samples per pixel.
 const MOST_SAMPLES: u64 = u32::MAX as u64;
 
 impl ReferenceArgs {
-    /// The settings in effect: defaults, file, `-D`, then the options that have names of their own.
+    /// The settings in effect: defaults, file, `-D`, then the options with their own names.
     ///
     /// # Errors
     /// `Usage` or `Input`, naming the key.
     pub fn effective(&self) -> Result<Staged<Settings>> {
-        // Options win over what a file says, so that it is checked with them.
+        // Options override the file, so the file is checked together with them.
         let with_options = |settings: &Settings| {
             let mut settings = settings.clone();
             settings.samples = self.spp.unwrap_or(settings.samples).clamp(1, u32::MAX.into());
@@ -137,16 +137,16 @@ impl ReferenceArgs {
 pub enum Show {
     #[default]
     Total,
-    /// What was scattered once
+    /// Light after one scattering
     Direct,
-    /// What was scattered more often
+    /// Light after more than one scattering
     Indirect,
-    /// What shines itself
+    /// Emitted light
     Emission,
 }
 
 impl Show {
-    /// As the layer.
+    /// Name of the layer.
     pub fn name(self) -> &'static str {
         match self {
             Self::Total => "total",
@@ -157,7 +157,7 @@ impl Show {
     }
 }
 
-/// A time as people write it.
+/// A time span such as `90s` or `1h30m`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span(pub Duration);
 

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 use super::{Block, Cell, Page, Plot, Table};
 
-/// Whether anything was measured with a clock.
+/// Whether the page has measured times.
 pub(super) fn has_times(page: &Page) -> bool {
     page.blocks()
         .any(|block| matches!(block, Block::Table(Table { timed: true, .. }) | Block::Plot(Plot { timed: true, .. })))

@@ -1,8 +1,8 @@
 //! Images in a page, with their linear values.
 //!
-//! Values are kept as 16-bit floats of which 8 significant bits are stored (relative steps below 0.4 %), high bytes first, then
-//! low bytes, each the difference to its left neighbour, deflated. The page unpacks them, so that exposure, difference and the
-//! values under the cursor work on radiance and not on what a screen showed.
+//! Values are stored as 16-bit floats with 8 significant bits (relative steps below 0.4 %): first all high bytes, then all low bytes, each as
+//! the difference from its left neighbour, deflated. The page unpacks them, so that exposure, difference and the values under the cursor use
+//! radiance and not screen values.
 
 use std::io::Write;
 
@@ -21,7 +21,7 @@ pub struct Image {
     pub pixels: Vec<[f32; 3]>,
 }
 
-/// Images of one size that are looked at together: flipped, split, subtracted.
+/// Images of one size for comparison: the page flips, splits and subtracts them.
 #[derive(Clone, Debug)]
 pub struct Comparison {
     /// Unique within the page.
@@ -30,11 +30,11 @@ pub struct Comparison {
     pub width: u32,
     pub height: u32,
     pub images: Vec<Image>,
-    /// Exposure at the beginning: what is shown is multiplied by 2^EV.
+    /// Initial exposure, EV: the page multiplies values by 2^EV.
     pub exposure: f64,
-    /// What the values are, for the caption.
+    /// Meaning of the values, for the caption.
     pub values: &'static str,
-    /// How often each side was halved ([`Comparison::at_most`]).
+    /// Number of times that each side was halved ([`Comparison::at_most`]).
     halved: u32,
 }
 
@@ -45,7 +45,7 @@ impl Comparison {
         Self { id, caption, width, height, images: Vec::new(), exposure: 0.0, values, halved: 0 }
     }
 
-    /// With one more image. It is left out if it does not have the size of the others.
+    /// Adds an image. Ignores it if it has another size.
     #[must_use]
     pub fn with(mut self, name: impl Into<String>, pixels: Vec<[f32; 3]>) -> Self {
         if pixels.len() == self.width as usize * self.height as usize {
@@ -54,19 +54,19 @@ impl Comparison {
         self
     }
 
-    /// Shown with 2^EV at the beginning.
+    /// Sets the initial exposure, EV.
     #[must_use]
     pub fn exposure(self, exposure: f64) -> Self {
         Self { exposure, ..self }
     }
 
-    /// Of other values than radiance.
+    /// Sets the meaning of the values, if they are not radiance.
     #[must_use]
     pub fn values(self, values: &'static str) -> Self {
         Self { values, ..self }
     }
 
-    /// Halves the size, averaging 2×2 pixels, until no side is longer than `side` pixels. The page says so.
+    /// Halves the size, averaging 2×2 pixels, until no side is longer than `side` pixels. The caption mentions this.
     #[must_use]
     pub fn at_most(mut self, side: u32) -> Self {
         while self.width.max(self.height) > side.max(1) {
@@ -88,19 +88,19 @@ impl Comparison {
         self
     }
 
-    /// How often each side was halved.
+    /// Number of times that each side was halved.
     pub fn halved(&self) -> u32 {
         self.halved
     }
 }
 
-/// A value as the page gets it.
+/// A value in the page's encoding.
 fn stored(value: f32) -> u16 {
     let bits = f16::from_f32(value.clamp(-65504.0, 65504.0)).to_bits();
     if value.is_nan() {
         return f16::NAN.to_bits();
     }
-    // Round to the kept bits; a carry into the exponent is right, one into infinity is not.
+    // Rounds to the kept bits. A carry into the exponent is correct; a carry to infinity is not.
     let drop = 10 - KEPT_BITS;
     let rounded = ((bits & 0x7fff) + (1 << (drop - 1))) & !((1 << drop) - 1);
     (bits & 0x8000) | rounded.min(0x7bff & !((1 << drop) - 1))

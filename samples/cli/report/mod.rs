@@ -1,9 +1,9 @@
 //! Reports: one self-contained HTML file, and the same data as JSON and CSV.
 //!
-//! A [`Page`] is a list of sections of texts, [`Table`]s, [`Plot`]s and [`Comparison`]s of images. [`Page::write`] makes of it
-//! `report.html`, `report.json` and `report.csv`. What was measured with a clock differs from run to run: tables and plots
-//! that are marked so ([`Table::timed`], [`Plot::timed`]) go into `times.json` and `times.csv` instead, so that the files
-//! named `report` are the same bytes whenever the pictures are.
+//! A [`Page`] is a list of sections with texts, [`Table`]s, [`Plot`]s and [`Comparison`]s of images. [`Page::write`] writes it as
+//! `report.html`, `report.json` and `report.csv`. Measured times differ from run to run. Tables and plots of times
+//! ([`Table::timed`], [`Plot::timed`]) therefore go into `times.json` and `times.csv`, so that the other data files are
+//! bit-identical for the same pictures.
 //!
 //! ```
 //! use lucerna_samples::report::{Axis, Page, Plot, Section, Table};
@@ -34,16 +34,16 @@ pub use images::{Comparison, Image};
 pub use plot::{Axis, Kind, Plot, Rule, Series};
 pub use table::{Cell, Table, number};
 
-/// Everything that a report says.
+/// The contents of a report.
 #[derive(Clone, Debug, Default)]
 pub struct Page {
     pub title: String,
     /// A sentence or two under the title.
     pub summary: String,
     pub sections: Vec<Section>,
-    /// Device, driver, versions, seeds, command line: name and value. They stand at the end of the page.
+    /// Device, driver, versions, seeds, command line: name and value. Shown at the end of the page.
     pub facts: Vec<(String, String)>,
-    /// Why the report is not complete, if so; shown at the top.
+    /// Reasons why the report is not complete, if any; shown at the top.
     pub warnings: Vec<String>,
 }
 
@@ -54,10 +54,10 @@ pub struct Section {
     pub blocks: Vec<Block>,
 }
 
-/// What a section consists of.
+/// A part of a section.
 #[derive(Clone, Debug)]
 pub enum Block {
-    /// A paragraph. `*emphasis*` and `` `code` `` are understood; everything else is text.
+    /// A paragraph. `*emphasis*` and `` `code` `` are markup; everything else is text.
     Text(String),
     Table(Table),
     Plot(Plot),
@@ -120,7 +120,7 @@ impl Page {
     }
 
     /// Writes `report.html`, `report.json`, `report.csv` and, if anything was timed, `times.json` and `times.csv` into a folder.
-    /// Each file is complete or not there. Returns their paths, the page first.
+    /// Each file is written as a whole or not at all. Returns their paths, the page first.
     ///
     /// # Errors
     /// `Output` if a file cannot be written.
@@ -144,8 +144,7 @@ impl Page {
     }
 }
 
-/// Writes a file of a report's folder. One that is a symbolic link may lead anywhere: a folder from elsewhere must not choose which file
-/// is replaced.
+/// Writes a file of a report's folder. Refuses symbolic links: an untrusted folder must not decide which file is overwritten.
 ///
 /// # Errors
 /// `Output` if it is a link or cannot be written.

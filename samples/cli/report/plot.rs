@@ -1,4 +1,4 @@
-//! What a plot shows; `svg` draws it.
+//! The contents of a plot; `svg` draws it.
 
 /// One axis.
 #[derive(Clone, Debug, Default)]
@@ -7,9 +7,9 @@ pub struct Axis {
     pub label: String,
     /// Logarithmic; values that are not positive are left out.
     pub log: bool,
-    /// Shows at least these values.
+    /// Values that the axis always includes.
     pub include: Vec<f64>,
-    /// Names of the places 0, 1, 2… instead of numbers.
+    /// Names of the positions 0, 1, 2… instead of numbers.
     pub names: Vec<String>,
 }
 
@@ -24,14 +24,14 @@ impl Axis {
         Self { log: true, ..self }
     }
 
-    /// Always shows `value`.
+    /// Always includes `value`.
     #[must_use]
     pub fn with(mut self, value: f64) -> Self {
         self.include.push(value);
         self
     }
 
-    /// Names instead of numbers: place 0, 1, 2…
+    /// Shows names instead of numbers, at the positions 0, 1, 2…
     #[must_use]
     pub fn names<N: Into<String>>(self, names: impl IntoIterator<Item = N>) -> Self {
         Self { names: names.into_iter().map(Into::into).collect(), ..self }
@@ -56,7 +56,7 @@ pub enum Kind {
 pub struct Series {
     pub name: String,
     pub kind: Kind,
-    /// x, y; the third is what the tooltip says, or empty.
+    /// x, y, and the text of the tooltip, which may be empty.
     pub points: Vec<(f64, f64, String)>,
 }
 
@@ -64,22 +64,22 @@ pub struct Series {
 #[derive(Clone, Debug)]
 pub struct Rule {
     pub at: f64,
-    /// At y = `at` across, else at x = `at` upright.
+    /// True for a horizontal line at y = `at`, false for a vertical line at x = `at`.
     pub across: bool,
     pub label: String,
 }
 
-/// Axes and what is drawn between them.
+/// A plot: axes, series and lines.
 #[derive(Clone, Debug)]
 pub struct Plot {
-    /// In the data files; unique within the page.
+    /// Identifier in the data files; unique within the page.
     pub id: String,
     pub caption: String,
     pub x: Axis,
     pub y: Axis,
     pub series: Vec<Series>,
     pub rules: Vec<Rule>,
-    /// Its numbers come from a clock.
+    /// The numbers are measured times.
     pub timed: bool,
 }
 
@@ -94,19 +94,19 @@ impl Plot {
         self
     }
 
-    /// With a line through points.
+    /// Adds a line through points.
     #[must_use]
     pub fn line(self, name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         self.series(name, Kind::Line, points)
     }
 
-    /// With dots.
+    /// Adds dots.
     #[must_use]
     pub fn points(self, name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         self.series(name, Kind::Points, points)
     }
 
-    /// With dots that have a name each (the third), seen when the mouse rests on them.
+    /// Adds dots with names, which the tooltips show.
     #[must_use]
     pub fn named_points(
         mut self,
@@ -117,13 +117,13 @@ impl Plot {
         self
     }
 
-    /// With bars at 0, 1, 2…; names of the places belong to the x axis.
+    /// Adds bars at 0, 1, 2…; the x axis has the names of these positions.
     #[must_use]
     pub fn bars(self, name: impl Into<String>, heights: impl IntoIterator<Item = f64>) -> Self {
         self.series(name, Kind::Bars, heights.into_iter().enumerate().map(|(i, y)| (i as f64, y)))
     }
 
-    /// With a histogram of `values` in `bins` bins of one width, from the smallest value to the largest.
+    /// Adds a histogram of `values` with `bins` bins of equal width, from the smallest value to the largest.
     #[must_use]
     pub fn histogram(self, name: impl Into<String>, values: &[f64], bins: usize) -> Self {
         let finite = || values.iter().copied().filter(|v| v.is_finite());
@@ -141,21 +141,21 @@ impl Plot {
         self.series(name, Kind::Steps, points)
     }
 
-    /// With a line across at `y`.
+    /// Adds a horizontal line at `y`.
     #[must_use]
     pub fn across(mut self, at: f64, label: impl Into<String>) -> Self {
         self.rules.push(Rule { at, across: true, label: label.into() });
         self
     }
 
-    /// With an upright line at `x`.
+    /// Adds a vertical line at `x`.
     #[must_use]
     pub fn upright(mut self, at: f64, label: impl Into<String>) -> Self {
         self.rules.push(Rule { at, across: false, label: label.into() });
         self
     }
 
-    /// Its numbers come from a clock: they go into the `times` files.
+    /// Marks the numbers as measured times, which go into the `times` files.
     #[must_use]
     pub fn timed(self) -> Self {
         Self { timed: true, ..self }

@@ -48,14 +48,14 @@ impl<T: Into<Cell>> From<Option<T>> for Cell {
 /// Rows of cells under named columns.
 #[derive(Clone, Debug)]
 pub struct Table {
-    /// In the data files; unique within the page.
+    /// Identifier in the data files; unique within the page.
     pub id: String,
     pub caption: String,
     pub columns: Vec<String>,
     pub rows: Vec<Vec<Cell>>,
-    /// Digits that numbers are shown with.
+    /// Significant digits of shown numbers.
     pub digits: usize,
-    /// Its numbers come from a clock.
+    /// The numbers are measured times.
     pub timed: bool,
 }
 
@@ -69,12 +69,12 @@ impl Table {
         Self { id: id.into(), caption: caption.into(), columns, rows: Vec::new(), digits: 4, timed: false }
     }
 
-    /// For figures of a paper beside ours: quantity, unit, paper, ours, ratio of ours to the paper's. Rows by [`Table::figure`].
+    /// A table that compares figures of a paper with ours: quantity, unit, paper, ours, ratio of ours to the paper's. [`Table::figure`] adds rows.
     pub fn figures(id: impl Into<String>, caption: impl Into<String>) -> Self {
         Self::new(id, caption, ["quantity", "unit", "paper", "ours", "ours / paper"])
     }
 
-    /// A row of [`Table::figures`]. The ratio stays empty where it means nothing.
+    /// Adds a row to [`Table::figures`]. The ratio is empty if it is not defined.
     #[must_use]
     pub fn figure(
         self,
@@ -88,40 +88,40 @@ impl Table {
         self.row([quantity.into(), unit.into(), paper.into(), ours.into(), ratio.into()])
     }
 
-    /// With one more row; missing cells at its end are empty.
+    /// Adds a row; missing cells at its end are empty.
     #[must_use]
     pub fn row(mut self, cells: impl IntoIterator<Item = Cell>) -> Self {
         self.push(cells);
         self
     }
 
-    /// Adds a row; missing cells at its end are empty, surplus ones are left out.
+    /// Adds a row; missing cells at its end are empty, surplus cells are ignored.
     pub fn push(&mut self, cells: impl IntoIterator<Item = Cell>) {
         let mut row: Vec<Cell> = cells.into_iter().take(self.columns.len()).collect();
         row.resize(self.columns.len(), Cell::Empty);
         self.rows.push(row);
     }
 
-    /// Numbers are shown with `digits` digits.
+    /// Shows numbers with `digits` significant digits.
     #[must_use]
     pub fn digits(self, digits: usize) -> Self {
         Self { digits, ..self }
     }
 
-    /// Its numbers come from a clock: they go into the `times` files.
+    /// Marks the numbers as measured times, which go into the `times` files.
     #[must_use]
     pub fn timed(self) -> Self {
         Self { timed: true, ..self }
     }
 
-    /// Whether a column holds numbers, and nothing else but gaps.
+    /// Whether a column holds only numbers and empty cells.
     pub(super) fn is_numeric(&self, column: usize) -> bool {
         let mut cells = self.rows.iter().map(|row| &row[column]).filter(|cell| **cell != Cell::Empty).peekable();
         cells.peek().is_some() && cells.all(|cell| matches!(cell, Cell::Number(_)))
     }
 }
 
-/// A number with `digits` significant digits, without an exponent where that is legible; a true minus sign; `—` for NaN.
+/// A number with `digits` significant digits and a typographic minus sign; `—` for NaN. It has an exponent only if it is very large or small.
 pub fn number(value: f64, digits: usize) -> String {
     let text = if value.is_nan() {
         return "—".into();
@@ -132,7 +132,7 @@ pub fn number(value: f64, digits: usize) -> String {
     } else {
         let magnitude = value.abs();
         let exponent = magnitude.log10().floor() as i32;
-        // Rounding may carry into the next power of ten, where one decimal less is right.
+        // Rounding may carry into the next power of ten, which needs one decimal less.
         let rounded: f64 = format!("{magnitude:.*e}", digits.saturating_sub(1)).parse().unwrap_or(magnitude);
         let exponent = if rounded >= 10f64.powi(exponent + 1) { exponent + 1 } else { exponent };
         if rounded.fract() == 0.0 && exponent < 9 {

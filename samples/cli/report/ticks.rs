@@ -1,4 +1,4 @@
-//! Where an axis has its marks.
+//! The range and the tick marks of an axis.
 
 use super::table::number;
 
@@ -13,7 +13,7 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// For `values`, ending at marks. `about`: how many marks are wanted.
+    /// The range for `values`, which begins and ends at marks. `about`: approximate number of marks.
     pub fn of(values: impl Iterator<Item = f64>, log: bool, about: usize) -> Self {
         let fits = |v: &f64| v.is_finite() && (!log || *v > 0.0);
         let (mut low, mut high) =
@@ -52,7 +52,7 @@ impl Scale {
         let (first, last) = ((low.log10() + 1e-9).floor() as i32, (high.log10() - 1e-9).ceil() as i32);
         let decades = last - first;
         if decades <= 2 {
-            // Less than two decades: ends at 1, 2 or 5 times a power of ten.
+            // A range of less than two decades begins and ends at 1, 2 or 5 times a power of ten.
             let all: Vec<f64> =
                 (first - 1..=last + 1).flat_map(|e| [1.0, 2.0, 5.0].map(|f| f * 10f64.powi(e))).collect();
             let low = all.iter().copied().filter(|m| *m <= low * 1.000_001).fold(all[0], f64::max);
@@ -66,7 +66,7 @@ impl Scale {
         Self { low: 10f64.powi(first), high: 10f64.powi(last), log: true, marks }
     }
 
-    /// Where `value` lies: 0 at the low end, 1 at the high end.
+    /// Position of `value` on the axis: 0 at the low end, 1 at the high end.
     pub fn place(&self, value: f64) -> f64 {
         if self.log {
             (value.log10() - self.low.log10()) / (self.high.log10() - self.low.log10())

@@ -1,41 +1,42 @@
-//! How much work a picture may ask for unasked.
+//! Limits on the work that a picture's metadata may cause without `--long`.
 
 use lucerna::{Error, Result, techniques::fiv};
 
 use crate::record::Record;
 
-/// Frames from the first of its run to its own.
+/// Maximum of frames, from the first frame of the run to the recorded frame.
 const FRAMES: u64 = 1000;
-/// Paths of a reference: some minutes of a GPU.
+/// Maximum of paths of a reference picture: some minutes on a GPU.
 const PATHS: u64 = 10_000_000_000;
-/// Rays that vectors of an occluder take: some minutes of a GPU.
+/// Maximum of rays for the vectors of an occluder: some minutes on a GPU.
 const RAYS: u64 = 100_000_000_000;
-/// Pixels where those of the file do not say how many were rendered.
+/// Maximum of rendered pixels, if the file's size does not tell their number.
 const PIXELS: u64 = 1 << 24;
-/// Lights that were added, and things beside the first on a ground.
+/// Maximum of added lights, and of further objects on a ground.
 const THINGS: u64 = 256;
 
-/// An error if the picture asks for `asked` of something, more than `allowed`.
+/// Returns an error if the picture needs more than `allowed` of something.
 fn over(place: &str, asked: u64, allowed: u64, what: &str) -> Result<()> {
     if asked <= allowed {
         return Ok(());
     }
-    Err(Error::input(format!("asks for {asked} {what}; at most {allowed} are made unasked"))
+    Err(Error::input(format!("needs {asked} {what}; without --long at most {allowed} are allowed"))
         .at(place)
-        .help("Give --long if the picture is from somebody you trust, and there is time"))
+        .help("Give --long if you trust the source of the picture and have enough time"))
 }
 
-/// Whether a record asks for no more than its picture needs, and for nothing that takes hours unless `long` allows it. `extent`: of the file.
+/// Checks that a record does not need more than its picture justifies, and, without `long`, no work that takes hours. `extent`: size of the
+/// file's picture.
 ///
 /// # Errors
-/// `Input`, with the number.
+/// `Input`, with the number that is too large.
 pub fn check(record: &Record, extent: [u32; 2], long: bool) -> Result<()> {
     let [width, height] = [record.width, record.height];
     // An image of the graph may have any size.
     if record.view.is_none() && [width, height] != extent {
         let [w, h] = extent;
         return Err(
-            Error::input(format!("{width}×{height} pixels are said to be in the file, it has {w}×{h}")).at("width")
+            Error::input(format!("the metadata state {width}×{height} pixels, but the file has {w}×{h}")).at("width")
         );
     }
     if long {
@@ -51,10 +52,10 @@ pub fn check(record: &Record, extent: [u32; 2], long: bool) -> Result<()> {
     over("settings.samples", samples.saturating_mul(pixels), PATHS, "paths")?;
     over("light", record.light.len() as u64, THINGS, "lights")?;
     let beside = record.ground.as_ref().map_or(0, |ground| ground.beside.len());
-    over("ground.beside", beside as u64, THINGS, "things")
+    over("ground.beside", beside as u64, THINGS, "objects")
 }
 
-/// The same for vectors that are computed anew, which `settings` decide.
+/// The same check for vectors that must be computed again with `settings`.
 ///
 /// # Errors
 /// `Input`, with the number.

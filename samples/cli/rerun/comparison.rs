@@ -1,4 +1,4 @@
-//! A picture beside the one that was made again: bit by bit.
+//! Bitwise comparison of a picture with the picture that was made again.
 
 use std::path::Path;
 
@@ -8,26 +8,26 @@ use lucerna::{
 };
 use serde::Serialize;
 
-/// What came out of the comparison.
+/// The result of the comparison.
 #[derive(Debug, Serialize)]
 pub struct Comparison {
     /// Every byte of the file is the same.
     pub same_file: bool,
     /// Every sample has the same bits.
     pub same_pixels: bool,
-    /// Samples with other bits.
+    /// Number of samples with different bits.
     pub different: u64,
     pub samples: u64,
     /// Largest difference of two samples; `null` if one of them is not a number.
     pub largest: Option<f32>,
     /// Layer, channel and pixel of the largest difference.
     pub place: Option<String>,
-    /// What the metadata say differently: device, driver, version, …
+    /// Differences in the metadata: device, driver, version, …
     pub metadata: Vec<String>,
 }
 
 impl Comparison {
-    /// For people.
+    /// As text for terminals.
     pub fn text(&self, path: &Path) -> String {
         let mut lines = vec![match (self.same_file, self.same_pixels) {
             (true, _) => format!("{}: identical, every byte of the file", path.display()),
@@ -43,7 +43,7 @@ impl Comparison {
         lines.join("\n")
     }
 
-    /// An error with exit code 7 if the pictures differ by more than `tolerance`; none: by any bit.
+    /// Returns an error with exit code 7 if the pictures differ by more than `tolerance`; without a tolerance, if any bit differs.
     pub fn verdict(&self, path: &Path, tolerance: Option<f32>) -> Result<()> {
         let close = tolerance.is_some_and(|allowed| self.largest.is_some_and(|largest| largest <= allowed));
         if self.same_pixels || close {
@@ -55,7 +55,7 @@ impl Comparison {
     }
 }
 
-/// What became of a picture.
+/// Compares two pictures.
 pub(super) fn compare(old: &Layers, new: &Layers, same_file: bool) -> Comparison {
     let mut result = Comparison {
         same_file,

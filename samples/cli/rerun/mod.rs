@@ -1,9 +1,9 @@
 //! `lucerna rerun`: makes a picture again from its metadata, in memory, and compares.
 //!
-//! A picture is data from elsewhere. What it says of its making is read into the settings that the command line would have been read
-//! into, and rendered in this process: no program is started, nothing is written, and no option comes from the picture. The files that
-//! it names are the scene, what the scene names in its folder, the environment, and for `tonemap` the picture that was developed; each is
-//! said before it is read. What would take hours is refused unless `--long` asks for it.
+//! A picture is untrusted data. Its metadata are parsed into the same settings as the command line, and rendered in this process. No
+//! program is started, no file is written, and the picture cannot set command line options. The picture may name these files: the scene,
+//! further files in the scene's folder, the environment, and for `tonemap` its input. Each file is printed before it is read. Work that
+//! would take hours is refused without `--long`.
 
 pub mod bounds;
 mod comparison;
@@ -37,11 +37,11 @@ pub struct RerunArgs {
     /// An image that `isr`, `igi` or `fiv render`, `lucerna reference` or `tonemap` wrote
     pub image: PathBuf,
 
-    /// Largest difference of two samples that is accepted [default: the same bits]
+    /// Largest accepted difference between two samples [default: the bits must be the same]
     #[arg(long, value_name = "X", value_parser = tolerance)]
     pub tolerance: Option<f32>,
 
-    /// Also make again what may take hours: more than 1000 frames, or 10^10 paths
+    /// Allow work that may take hours: more than 1000 frames, or 10^10 paths
     #[arg(long)]
     pub long: bool,
 
@@ -60,7 +60,7 @@ fn tolerance(text: &str) -> Result<f32, String> {
     text.parse().ok().filter(|x: &f32| x.is_finite() && *x >= 0.0).ok_or_else(|| "expected a number from 0 on".into())
 }
 
-/// Who made a picture.
+/// The program that made a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Maker {
     Isr,
@@ -70,7 +70,7 @@ enum Maker {
     Tonemap,
 }
 
-/// What may stand as `command` in a picture, word by word.
+/// The values of `command` in the metadata that are accepted.
 const MAKERS: [(&[&str], Maker); 5] = [
     (&["isr", "render"], Maker::Isr),
     (&["igi", "render"], Maker::Igi),
@@ -96,10 +96,10 @@ impl Maker {
     }
 }
 
-/// Makes the picture again and says what is different.
+/// Makes the picture again and reports the differences.
 ///
 /// # Errors
-/// `Input` for what the picture says and what it names; `Comparison` if it is another picture.
+/// `Input` for wrong metadata and for the files that they name; `Comparison` if the pictures differ.
 pub fn run(args: &RerunArgs, console: Console) -> Result<ExitCode> {
     let (path, limits) = (&args.image, Limits::default());
     let bytes = image::read_file_checked(path, limits.max_file)?;
@@ -108,11 +108,11 @@ pub fn run(args: &RerunArgs, console: Console) -> Result<ExitCode> {
     if format == Format::Pfm {
         old.metadata = image::metadata(path)?;
     }
-    // What is wrong with these is wrong with this call.
+    // Errors of these options are usage errors of this call.
     args.device.options()?;
     let interrupt = Interrupt::install();
     let fresh = again(args, &old, format, console, &interrupt).map_err(|error| {
-        // What is wrong with a call is wrong with the picture that says it.
+        // A usage error of the recorded command is an error of the picture.
         let kind = if error.kind() == ErrorKind::Usage { ErrorKind::Input } else { error.kind() };
         match error.file() {
             Some(_) => Error::new(kind, error.to_string().trim_end_matches('.')).in_file(path),

@@ -13,13 +13,13 @@ use lucerna::{
 use crate::{
     args::RenderArgs,
     fiv::{Meter, decided},
+    frame_output::FrameOutput,
     gbuffer_layers,
     last_stage::Staged,
     outputs::Fresh,
     progress::ProgressMode,
     render::{self, Again, Input, Renderer, Technique},
     rerun::bounds,
-    shown::Shown,
     signals::Interrupt,
 };
 
@@ -29,18 +29,18 @@ pub struct FivArgs {
     #[command(flatten)]
     pub common: RenderArgs,
 
-    /// Vectors of `fiv precompute`; those that it does not have are computed
+    /// File of `fiv precompute`; vectors that the file does not contain are computed
     #[arg(long, value_name = "FILE.fiv", help_heading = "Technique")]
     pub vectors: Option<PathBuf>,
 }
 
-/// The technique, with the vectors that were computed before.
+/// The technique, with the file of precomputed vectors.
 struct ByVectors<'a> {
     stored: Option<(&'a PathBuf, Stored)>,
     progress: ProgressMode,
     quiet: bool,
     interrupt: Interrupt,
-    /// It was interrupted before there was a frame.
+    /// Whether the run was interrupted before the first frame.
     stopped: Cell<bool>,
 }
 
@@ -52,7 +52,7 @@ pub fn run(args: &FivArgs) -> Result<ExitCode> {
     let stored = args.vectors.as_ref().map(|file| Stored::read(file).map(|stored| (file, stored))).transpose()?;
     let mut base = PictureSettings::default();
     if let Some((_, stored)) = &stored {
-        // What is written about the picture is then enough to make it again.
+        // The settings in the picture's metadata are then sufficient to render the picture again.
         base.fiv = stored.plan.settings(&base.fiv);
     }
     let technique = ByVectors {
@@ -69,7 +69,8 @@ pub fn run(args: &FivArgs) -> Result<ExitCode> {
     }
 }
 
-/// Makes a picture again, in memory; `None`: interrupted. Vectors are computed: the settings of the picture say all of them.
+/// Renders a picture again in memory. `None` if interrupted. All vectors are computed, because the settings of the
+/// picture determine them.
 ///
 /// # Errors
 /// As [`render::again`].
@@ -92,7 +93,7 @@ pub fn again(asked: &Again<'_>) -> Result<Option<Fresh>> {
 }
 
 impl ByVectors<'_> {
-    /// Errors and notes about the file of vectors name it.
+    /// Adds the file of vectors to errors about it.
     fn named(&self, error: Error) -> Error {
         match &self.stored {
             Some((file, _)) if error.kind() == ErrorKind::Input => error.in_file(file),
@@ -143,12 +144,12 @@ impl Renderer for ByVectors<'_> {
         (resident, fiv, notes): &mut Self::Kept,
         input: &Input<'_>,
         settings: &PictureSettings,
-    ) -> Result<Shown> {
+    ) -> Result<FrameOutput> {
         let scene = resident.frame_in(graph, input.scene, input.pose);
         let view = input.view.fit_far(&scene.bounds());
         let settings = PictureSettings { fiv: settings.fiv.after(input.seconds), ..settings.clone() };
         let picture = fiv.picture(graph, input.scene, input.pose, &scene, &view, &settings)?;
-        let shown = Shown::new(picture.outputs.total).color("irradiance", picture.outputs.irradiance);
+        let shown = FrameOutput::new(picture.outputs.total).color("irradiance", picture.outputs.irradiance);
         let notes = [resident.notes(), notes, &picture.notes].concat();
         Ok(gbuffer_layers::add(shown, &picture.gbuffer, &view).seen_by(view).noting(notes))
     }

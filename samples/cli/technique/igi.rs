@@ -13,10 +13,10 @@ use lucerna::{
 
 use crate::{
     args::RenderArgs,
+    frame_output::FrameOutput,
     gbuffer_layers,
     outputs::Fresh,
     render::{self, Again, Input, Renderer, Technique},
-    shown::Shown,
 };
 
 /// Options of `igi render`.
@@ -36,9 +36,9 @@ pub enum Mode {
     /// Direct and indirect light
     #[default]
     Igi,
-    /// Direct light alone
+    /// Direct light only
     Direct,
-    /// Indirect light alone
+    /// Indirect light only
     Indirect,
 }
 
@@ -59,7 +59,7 @@ struct ByLights(Mode);
 /// Renders the frames of a command line.
 ///
 /// # Errors
-/// Whatever fails, with the kind that decides the exit code.
+/// Any error of the run. Its kind decides the exit code.
 pub fn run(args: &IgiArgs) -> Result<ExitCode> {
     let base = if args.common.paper { PictureSettings::paper() } else { PictureSettings::default() };
     render::render(&ByLights(args.mode), &args.common, &base)
@@ -97,10 +97,10 @@ impl Renderer for ByLights {
         (resident, igi): &mut Self::Kept,
         input: &Input<'_>,
         settings: &PictureSettings,
-    ) -> Result<Shown> {
+    ) -> Result<FrameOutput> {
         let scene = resident.frame_in(graph, input.scene, input.pose);
         let view = input.view.fit_far(&scene.bounds());
-        // Nobody looks at indirect light then.
+        // Indirect light is not computed if no output shows it.
         let direct = self.0 == Mode::Direct && !input.layers;
         let served = PictureSettings {
             igi: igi::Settings { indirect: settings.igi.indirect && !direct, ..settings.igi.clone() },
@@ -108,22 +108,22 @@ impl Renderer for ByLights {
         };
         let picture = igi.picture(graph, input.scene, input.pose, &scene, &view, &served)?;
         let out = picture.outputs;
-        let shown = match self.0 {
-            Mode::Igi => Shown::new(out.total),
-            Mode::Direct => Shown::new(out.direct),
-            Mode::Indirect => Shown::new(out.indirect),
+        let output = match self.0 {
+            Mode::Igi => FrameOutput::new(out.total),
+            Mode::Direct => FrameOutput::new(out.direct),
+            Mode::Indirect => FrameOutput::new(out.indirect),
         };
-        let shown = shown.color("direct", out.direct).color("indirect", out.indirect);
-        // What mirrors and glass show.
-        let shown = match out.sharp {
-            Some(sharp) => shown.color("specular", sharp),
-            None => shown,
+        let output = output.color("direct", out.direct).color("indirect", out.indirect);
+        // The light in mirrors and glass.
+        let output = match out.sharp {
+            Some(sharp) => output.color("specular", sharp),
+            None => output,
         };
-        let shown = match out.cache {
-            Some(cache) => shown.remarking(cache.list.range(0..4), move |count| cache.note(count)),
-            None => shown,
+        let output = match out.cache {
+            Some(cache) => output.remarking(cache.list.range(0..4), move |count| cache.note(count)),
+            None => output,
         };
-        Ok(gbuffer_layers::add(shown, &picture.gbuffer, &view).seen_by(view).noting(igi::notes(
+        Ok(gbuffer_layers::add(output, &picture.gbuffer, &view).seen_by(view).noting(igi::notes(
             input.scene,
             resident.notes(),
             settings,

@@ -18,10 +18,10 @@ use lucerna::{
 
 use crate::{
     args::RenderArgs,
+    frame_output::FrameOutput,
     gbuffer_layers,
     outputs::Fresh,
     render::{self, Again, Input, Renderer, Technique},
-    shown::Shown,
 };
 
 /// Options of `isr render`.
@@ -30,7 +30,7 @@ pub struct IsrArgs {
     #[command(flatten)]
     pub common: RenderArgs,
 
-    /// Start from choices that go together: fast, balanced or best; -D and --settings win over it
+    /// Settings preset: fast, balanced or best; -D and --settings override it
     #[arg(long, value_name = "NAME", help_heading = "Technique", conflicts_with = "paper")]
     pub preset: Option<Preset>,
 
@@ -45,11 +45,11 @@ pub enum Mode {
     /// Direct and indirect light
     #[default]
     Isr,
-    /// Direct light only; nothing is gathered
+    /// Direct light only; no light is gathered
     Direct,
-    /// Indirect light alone
+    /// Indirect light only
     Indirect,
-    /// Ambient occlusion alone: 1 open, 0 occluded
+    /// Ambient occlusion only: 1 open, 0 occluded
     Occlusion,
 }
 
@@ -71,7 +71,7 @@ struct Isr(Mode);
 /// Renders the frames of a command line.
 ///
 /// # Errors
-/// Whatever fails, with the kind that decides the exit code.
+/// Any error of the run. Its kind decides the exit code.
 pub fn run(args: &IsrArgs) -> Result<ExitCode> {
     let base = match args.preset {
         _ if args.common.paper => PictureSettings::paper(),
@@ -112,27 +112,27 @@ impl Renderer for Isr {
         (resident, ambient): &mut Self::Kept,
         input: &Input<'_>,
         settings: &PictureSettings,
-    ) -> Result<Shown> {
+    ) -> Result<FrameOutput> {
         let scene = resident.frame_in(graph, input.scene, input.pose);
         let view = input.view.fit_far(&scene.bounds());
-        let (shown, gbuffer, shadows) = if self.0 == Mode::Direct {
+        let (output, gbuffer, shadows) = if self.0 == Mode::Direct {
             let gbuffer = gbuffer::draw(graph, &scene, &view, &settings.gbuffer);
             let shadows = shadow::draw(graph, &scene, &view, &settings.shadow);
             let lit = direct::light(graph, &gbuffer, Lights::from(&shadows), &settings.isr.direct());
             skybox::draw(graph, &scene, &gbuffer, settings.background.into(), lit.direct);
-            (Shown::new(lit.direct), gbuffer, shadows)
+            (FrameOutput::new(lit.direct), gbuffer, shadows)
         } else {
             let picture = isr::picture(graph, &scene, &view, ambient.clone(), settings)?;
             let out = picture.outputs;
-            let shown = match self.0 {
-                Mode::Indirect => Shown::new(out.indirect),
-                Mode::Occlusion => Shown::grey(out.occlusion),
-                Mode::Isr | Mode::Direct => Shown::new(out.total),
+            let output = match self.0 {
+                Mode::Indirect => FrameOutput::new(out.indirect),
+                Mode::Occlusion => FrameOutput::grey(out.occlusion),
+                Mode::Isr | Mode::Direct => FrameOutput::new(out.total),
             };
-            let shown = shown.color("direct", out.direct).color("indirect", out.indirect);
-            (shown.layer("occlusion", &["Y"], out.occlusion, |pixel| pixel), picture.gbuffer, picture.shadows)
+            let output = output.color("direct", out.direct).color("indirect", out.indirect);
+            (output.layer("occlusion", &["Y"], out.occlusion, |pixel| pixel), picture.gbuffer, picture.shadows)
         };
         let notes = [resident.notes(), &shadows.notes].concat();
-        Ok(gbuffer_layers::add(shown, &gbuffer, &view).seen_by(view).noting(notes))
+        Ok(gbuffer_layers::add(output, &gbuffer, &view).seen_by(view).noting(notes))
     }
 }

@@ -19,7 +19,7 @@ use crate::{
 const LOOK: &str = "Look";
 const OUTPUT: &str = "Output";
 const INPUT: &str = "Input";
-const WORK: &str = "How local work is done";
+const WORK: &str = "Local and selective operators";
 
 /// The arguments of `tonemap`.
 #[derive(Args, Clone, Debug)]
@@ -30,17 +30,17 @@ pub struct TonemapArgs {
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<String>,
 
-    /// File to write; may be given more than once. The ending chooses the format: .png .jpg for screens, .exr .hdr .pfm for further work
-    /// (linear). A folder takes NAME.png. `-` is standard output. Placeholders: {name} {frame:04} {operator} {mode}
+    /// File to write; may be given more than once. The extension chooses the format: .png .jpg for screens, .exr .hdr .pfm for further work
+    /// (linear). In a folder the file is NAME.png. `-` is standard output. Placeholders: {name} {frame:04} {operator} {mode}
     #[arg(short, long, value_name = "OUT", required_unless_present = "print_config", help_heading = OUTPUT)]
     pub output: Vec<String>,
 
-    /// How light becomes what a screen shows
+    /// Tone mapping operator
     #[arg(long, value_name = "NAME", value_parser = operators(), help_heading = LOOK)]
     pub operator: Option<String>,
 
-    /// global: one curve for the whole picture; local: shadows and lights are each developed for themselves; selective: local only where
-    /// there is detail [default: local if the operator can]
+    /// global: one curve for the whole picture; local: the curve adapts to the neighbourhood of each pixel; selective: local only where
+    /// there is detail [default: local if the operator supports it]
     #[arg(long, value_enum, value_name = "MODE", help_heading = LOOK)]
     pub mode: Option<ModeName>,
 
@@ -49,7 +49,7 @@ pub struct TonemapArgs {
     #[arg(long, value_name = "EV|auto", allow_hyphen_values = true, help_heading = LOOK)]
     pub exposure: Option<Exposure>,
 
-    /// How codes of .png and .jpg are made of light: the sRGB curve of nearly all screens, or a power
+    /// Encoding of light in .png and .jpg files: the sRGB curve of nearly all screens, or a power
     #[arg(long, value_name = "G|srgb", default_value = "srgb", help_heading = LOOK)]
     pub gamma: Gamma,
 
@@ -77,28 +77,29 @@ pub struct TonemapArgs {
     #[arg(long, value_name = "P", value_parser = finite, help_heading = LOOK)]
     pub percentile: Option<f64>,
 
-    /// fast: exact averages; pyramid: several times faster, hardly to be told apart; literal: the definition as it stands, far slower
+    /// fast: exact averages; pyramid: several times faster, with nearly the same result; literal: the definition, far slower
     #[arg(long, value_enum, value_name = "HOW", help_heading = WORK)]
     pub local: Option<LocalName>,
 
-    /// selective: what counts as detail
+    /// selective: measure of detail
     #[arg(long, value_enum, value_name = "WHAT", help_heading = WORK)]
     pub identify: Option<IdentifyName>,
 
-    /// selective: how much of it counts; less marks more [default: 0.1 for sobel (luminance), 0.4 for saliency (0 to 1)]
+    /// selective: threshold of the measure; a lower threshold marks more pixels [default: 0.1 for sobel (luminance), 0.4 for saliency (0 to
+    /// 1)]
     #[arg(long, value_name = "T", value_parser = finite, help_heading = WORK)]
     pub threshold: Option<f64>,
 
-    /// selective: how unimportant pixels are left out; the picture is the same
+    /// selective: how unimportant pixels are skipped; the picture does not depend on it
     #[arg(long, value_enum, value_name = "HOW", help_heading = WORK)]
     pub mark: Option<MarkName>,
 
-    /// selective: a picture of the same size; pixels with red over one half are important whatever they look like
+    /// selective: a picture of the same size; pixels with red above one half count as detail
     #[arg(long, value_name = "FILE", help_heading = WORK)]
     pub mask: Option<PathBuf>,
 
-    /// What becomes of NaN, infinite and negative samples: zero; clamp (infinite: the brightest finite one); neighbour (the mean around
-    /// them); error (refuse the picture) [default: zero]
+    /// Treatment of NaN, infinite and negative samples: zero; clamp (infinite: the brightest finite sample); neighbour (the mean of the
+    /// neighbours); error (refuse the picture) [default: zero]
     #[arg(long, value_enum, value_name = "POLICY", help_heading = INPUT)]
     pub bad_values: Option<BadName>,
 
@@ -110,11 +111,11 @@ pub struct TonemapArgs {
     #[arg(long, help_heading = INPUT)]
     pub sequence: bool,
 
-    /// Frames A to B−1 of numbered sequences (A..=B: to B) [default: all that are there]
+    /// Frames A to B−1 of numbered sequences (A..=B: to B) [default: all existing frames]
     #[arg(long, value_name = "A..B", help_heading = INPUT)]
     pub frames: Option<Frames>,
 
-    /// Frames per second of sequences: how fast the eye adapts
+    /// Frames per second of sequences, for the eye's adaptation
     #[arg(long, value_name = "N", default_value_t = 25.0, value_parser = positive, help_heading = INPUT)]
     pub fps: f64,
 
@@ -134,7 +135,7 @@ pub struct TonemapArgs {
     #[arg(long, help_heading = OUTPUT)]
     pub f32: bool,
 
-    /// Replace files that exist
+    /// Overwrite existing files
     #[arg(long, help_heading = OUTPUT)]
     pub overwrite: bool,
 
@@ -158,22 +159,22 @@ pub struct TonemapArgs {
 
 const HELP: &str = "\
 Operators:
-  ashikhmin        (default) keeps the contrast that the eye would see in the scene; light is taken as cd/m²
-  reinhard         as a photographer dodges and burns a print; needs no units: start here if a picture comes out dark
+  ashikhmin        (default) keeps the contrast that the eye would see in the scene; needs light in cd/m²
+  reinhard         photographic dodging and burning; needs no units: try it first if a picture is too dark
   bilateral        compresses large areas and keeps fine detail; needs no units
-  linear           nothing but exposure; what is over white is cut
-  reinhard-global  a soft shoulder: lights are not cut off below --white
+  linear           exposure only; clips values above white
+  reinhard-global  a soft shoulder: does not clip lights below --white
   aces, agx        film-like curves of games and films; they expect a well exposed picture (--exposure auto)
-  neutral          Khronos PBR Neutral: colours of products stay as they are
+  neutral          Khronos PBR Neutral: does not change the colours of products
 
-Colour: pictures are taken to linear Rec. 709 by what they say of themselves (EXR chromaticities, XYZ, luminance with chroma; \
-PRIMARIES and XYZE of .hdr; sRGB or gAMA of .png; .jpg is sRGB); without a word they are Rec. 709. Colours outside of it become \
-negative and fall under --bad-values. White is not adapted. .png and .jpg are written in sRGB, .exr .hdr .pfm as linear light \
-relative to the screen's white. Alpha is kept in .png and .exr; .jpg shows the picture over black.
+Colour: pictures are converted to linear Rec. 709 by their metadata (EXR chromaticities, XYZ, luminance with chroma; PRIMARIES and XYZE \
+of .hdr; sRGB or gAMA of .png; .jpg is sRGB). Without metadata they are taken as Rec. 709. Colours outside of Rec. 709 become negative, \
+and --bad-values applies to them. White is not adapted. .png and .jpg are written in sRGB, .exr .hdr .pfm as linear light relative to \
+the screen's white. .png and .exr keep alpha; .jpg shows the picture over black.
 
 Exit codes: 0 all done; 2 wrong usage; 3 a picture cannot be read; 1 a file cannot be written; 4 no device; 5 out of memory; 6 device \
-lost; 8 stopped early, what was written is complete; 130 stopped before anything was written. A picture that fails does not stop the \
-ones after it; the first failure decides the code.
+lost; 8 stopped early, with complete files; 130 stopped before any file was written. After a failed picture the other pictures are \
+still processed; the first failure decides the code.
 
 Examples:
   tonemap church.hdr -o church.png
@@ -181,9 +182,9 @@ Examples:
   tonemap photos/*.exr -o developed/               a folder, one device for all
   tonemap shot-####.exr -o out-####.png --fps 24   a sequence: the eye adapts from frame to frame
   isr render room.gltf -o - | tonemap - -o a.png   in a pipe
-  tonemap a.exr -o a.png -D tonemap.radius=6       any setting; --print-config shows all";
+  tonemap a.exr -o a.png -D tonemap.radius=6       any setting; --print-config shows all settings";
 
-/// Settings as they stand in files and after `-D`: `tonemap.key`.
+/// Settings in files and after `-D`, with the keys `tonemap.key`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
@@ -237,7 +238,7 @@ impl From<FormatName> for Format {
     }
 }
 
-/// `--exposure`: stops, over what was measured if `auto`.
+/// `--exposure`: stops; with `auto` they are added to the measured exposure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exposure {
     pub auto: bool,
@@ -285,12 +286,12 @@ impl TonemapArgs {
         let config = self.with(&self.settings.define)?;
         self.settings.blamed(check(&config), || check(&self.with(&[])?))?;
         if self.mask.is_some() && config.tonemap.mode() != Mode::Selective {
-            return Err(Error::usage("--mask names important pixels, which only --mode selective knows"));
+            return Err(Error::usage("--mask needs --mode selective"));
         }
         Ok(config)
     }
 
-    /// The same with these `-D`, unchecked.
+    /// The settings with these `-D`, not checked.
     fn with(&self, define: &[String]) -> Result<Config> {
         let mut config = config::effective(&Config::default(), self.settings.file.as_deref(), &[])?;
         let s = &mut config.tonemap;

@@ -1,7 +1,7 @@
-//! `tonemap`: pictures of light in, pictures for a screen out; one device for all of them.
+//! `tonemap`: tone maps HDR pictures, all on one device.
 
 mod args;
-mod meter;
+mod auto_exposure;
 mod names;
 mod picture;
 mod recipe;
@@ -36,6 +36,7 @@ use crate::{
     console::{self, Console},
     program::{self, STOPPED_EARLY},
     progress::Progress,
+    settings_list,
     signals::Interrupt,
 };
 
@@ -49,7 +50,7 @@ const LIMITS: Limits = Limits {
     max_depth: 0,
 };
 
-/// How pictures are made and written, beside the settings.
+/// The configuration of a run: settings and output options.
 #[derive(Clone, Debug)]
 struct Making {
     /// The exposure is measured.
@@ -78,36 +79,36 @@ impl Making {
     }
 }
 
-/// What all pictures of a run share.
+/// The state that all pictures of a run share.
 struct Run {
     making: Making,
     console: Console,
     config: Config,
     outputs: Vec<(OutputName, Format)>,
     mask: Option<Layers>,
-    /// What `--exposure auto` found for the sequence that is being worked on, stops.
+    /// The exposure that `--exposure auto` measured for the current sequence, stops.
     metered: Option<f32>,
-    /// Number of the frame before.
+    /// Number of the previous frame.
     before: Option<u32>,
 }
 
-/// A picture that was read, and how long that took.
+/// A picture, and the time of reading it.
 type Loaded = (Result<Layers>, Duration);
 
-/// What writes the files of a picture.
+/// A thread that writes the files of a picture.
 type Writer<'scope> = std::thread::ScopedJoinHandle<'scope, Result<(Vec<String>, Duration)>>;
 
 fn join(writer: Writer<'_>) -> Result<(Vec<String>, Duration)> {
     writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }
 
-/// What became of the pictures.
+/// The results of all pictures.
 struct Results {
     console: Console,
     progress: Progress,
     done: Vec<Done>,
     failed: Vec<(String, Error)>,
-    /// The sequence that is being worked on lacks a frame.
+    /// A frame of the current sequence has failed.
     lost: bool,
 }
 
@@ -117,8 +118,10 @@ impl Results {
         Self { console, progress, done: Vec::new(), failed: Vec::new(), lost: false }
     }
 
+    /// Records the result of a picture.
+    ///
     /// # Errors
-    /// What concerns all pictures.
+    /// Errors that concern all pictures.
     fn take(&mut self, input: &Input, result: Result<Done>) -> Result<()> {
         match result {
             Ok(done) => {
@@ -142,11 +145,11 @@ impl Results {
 /// Tone maps all pictures.
 ///
 /// # Errors
-/// What concerns all of them: usage, the device, memory. A single picture that fails is told and decides the exit code.
+/// Errors that concern all pictures: usage, the device, memory. The error of a single picture is printed and decides the exit code.
 pub fn run(args: &TonemapArgs, console: Console) -> Result<ExitCode> {
     let config = args.config()?;
     if args.settings.print_config {
-        console::print(config::to_toml(&config)?.trim_end())?;
+        console::print(settings_list::with_docs(&config::to_toml(&config)?).trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
     let (inputs, notes) = names::inputs(&args.inputs, args.layer.as_deref(), args.frames.as_ref(), args.sequence)?;
@@ -160,14 +163,14 @@ pub fn run(args: &TonemapArgs, console: Console) -> Result<ExitCode> {
     let interrupt = Interrupt::install();
     let mut results = Results::new(args, console, inputs.len());
     let about = std::thread::scope(|scope| -> Result<Description> {
-        // The next picture is read while this one is worked on; no more, for memory's sake. The first is read while the device starts.
+        // Only the next picture is read while this one is processed, to save memory. The first picture is read while the device starts.
         let (sender, pictures) = mpsc::sync_channel::<Loaded>(0);
         let list = &inputs;
         scope.spawn(move || {
             for input in list {
                 let begun = Instant::now();
                 let picture = read(input);
-                // Nobody listens any more: the run has ended.
+                // The receiver is gone: the run has ended.
                 if sender.send((picture, begun.elapsed())).is_err() {
                     return;
                 }
@@ -177,14 +180,14 @@ pub fn run(args: &TonemapArgs, console: Console) -> Result<ExitCode> {
         let about = gpu.describe().clone();
         console.info(&format!("lucerna {}, {about}", program::VERSION));
         let mut still = Still::new(&gpu, &run.config.tonemap)?;
-        // The picture before, whose files are written while this one is worked on.
+        // The previous picture, whose files are written while this one is processed.
         let mut writing: Option<(&Input, Done, Writer<'_>)> = None;
         for input in &inputs {
             if interrupt.requested() {
                 break;
             }
             let Ok((picture, reading)) = pictures.recv() else { break };
-            // A sequence without one of its frames would adapt to what nobody sees.
+            // After a failed frame the adaptation of the sequence would be wrong, so its other frames are skipped.
             results.lost &= input.sequence == Some(false);
             if results.lost {
                 continue;
@@ -199,7 +202,7 @@ pub fn run(args: &TonemapArgs, console: Console) -> Result<ExitCode> {
             if let Some((before, done, writer)) = writing.take() {
                 results.take(before, join(writer).map(|written| done.with(written)))?;
                 interrupt.keep();
-                // What failed may be of another sequence.
+                // The failed picture may belong to another sequence.
                 results.lost &= input.sequence == Some(false);
             }
             match mapped {
@@ -212,7 +215,7 @@ pub fn run(args: &TonemapArgs, console: Console) -> Result<ExitCode> {
                         interrupt.keep();
                     }
                 }
-                // Asked to stop: it is neither done nor has it failed.
+                // After a request to stop the picture counts neither as done nor as failed.
                 Err(error) if interrupt.requested() && program::by_request(&error) => break,
                 Err(error) => results.take(input, Err(error))?,
             }
@@ -282,7 +285,7 @@ impl Run {
         self.outputs.iter().map(|(name, format)| (name.fill(input, operator, mode), *format)).collect()
     }
 
-    /// Everything can be written, and nothing twice: before any work.
+    /// Checks before the work that all files can be written, and that no two outputs have the same name.
     fn probe(&self, inputs: &[Input]) -> Result<()> {
         let read: HashSet<_> = inputs.iter().filter_map(|input| input.path.as_ref()?.canonicalize().ok()).collect();
         let mut seen = HashSet::new();

@@ -1,4 +1,4 @@
-//! Names of many pictures: what is read, and what is written for it.
+//! Names of input and output pictures.
 
 use std::path::{Path, PathBuf};
 
@@ -18,13 +18,13 @@ pub struct Input {
     /// `None`: standard input.
     pub path: Option<PathBuf>,
     pub layer: Option<String>,
-    /// For output names: the file name without its ending.
+    /// The file name without its extension, for output names.
     pub stem: String,
-    /// Its number in a sequence, else its position.
+    /// The number in a sequence, else the position in the list of inputs.
     pub frame: u32,
-    /// `Some`: a frame of a sequence; true for its first.
+    /// `Some` for a frame of a sequence; true for its first frame.
     pub sequence: Option<bool>,
-    /// Of a numbered sequence: its name, and the number of its first frame.
+    /// For a numbered sequence: its name, and the number of its first frame.
     pub pattern: Option<(String, u32)>,
 }
 
@@ -64,7 +64,7 @@ impl Numbered {
         format!("{}{frame:0width$}{}", self.before, self.after, width = self.digits)
     }
 
-    /// Numbers of the files that are there, ascending.
+    /// Numbers of the existing files, ascending.
     fn on_disk(&self) -> Result<Vec<u32>> {
         let (folder, start) = match self.before.rsplit_once('/') {
             Some(("", start)) => ("/", start),
@@ -78,7 +78,7 @@ impl Numbered {
             let number = name.to_str().and_then(|name| name.strip_prefix(start)?.strip_suffix(self.after.as_str()));
             let all_digits = |n: &&str| n.len() >= self.digits && n.bytes().all(|b| b.is_ascii_digit());
             if let Some(number) = number.filter(all_digits).and_then(|n| n.parse().ok())
-                // 7 and 0007 are not both frame 7.
+                // Only the spelling of the pattern counts: of 7 and 0007 one is frame 7.
                 && Path::new(&self.fill(number)).file_name() == Some(&name)
             {
                 numbers.push(number);
@@ -89,7 +89,7 @@ impl Numbered {
     }
 }
 
-/// All pictures that the command line names, and what is odd about them.
+/// All pictures that the command line names, and notes about missing numbers.
 ///
 /// # Errors
 /// `Usage` for standard input named twice, `Input` for sequences without frames.
@@ -163,10 +163,10 @@ pub fn inputs(
     Ok((list, notes))
 }
 
-/// The frames of a numbered sequence from `first` to `last`, for the same work once more.
+/// The frames of a numbered sequence from `first` to `last`, for making a picture again.
 ///
 /// # Errors
-/// `Input` if there are none, or if `last` is not there.
+/// `Input` if the first or the last frame does not exist.
 pub fn frames(pattern: &str, layer: Option<&str>, first: u32, last: u32) -> Result<Vec<Input>> {
     let numbered = Numbered::parse(pattern).ok_or_else(|| {
         Error::input(format!("{pattern:?} has no ####, %04d or {{frame}} in its name")).at("sequence")
@@ -231,12 +231,12 @@ impl OutputName {
     /// The name for a picture. Names of inputs never add a folder.
     pub fn fill(&self, input: &Input, operator: &str, mode: &str) -> String {
         let numbered = Numbered::parse(&self.0).map_or_else(|| self.0.clone(), |pattern| pattern.fill(input.frame));
-        // As it is: two inputs of different names have different outputs.
+        // Other characters are kept, so that inputs with different names have different outputs.
         let stem = input.stem.replace(['/', '\\', '\0'], "-");
         numbered
             .replace("{operator}", operator)
             .replace("{mode}", mode)
-            // Last, for a file may be called anything.
+            // The name is inserted last, because a file name may contain placeholders.
             .replace("{name}", &stem)
     }
 }

@@ -1,4 +1,4 @@
-//! One picture: from its file's layer to the operator, and what comes out to files.
+//! One picture: from a layer of its file through the operator to the output files.
 
 use std::{
     io::Write,
@@ -14,7 +14,7 @@ use lucerna::{
 };
 use serde_json::{Value, json};
 
-use super::{Config, PIPE, Run, meter, names::Input, recipe::Recipe};
+use super::{Config, PIPE, Run, auto_exposure, names::Input, recipe::Recipe};
 use crate::{config, console::Console, outputs::ALPHA_LEFT_OUT, program};
 
 /// A picture that was written.
@@ -26,20 +26,20 @@ pub(super) struct Done {
     alpha: bool,
     pub files: Vec<String>,
     bad: BadCounts,
-    /// Stops, as they were used.
+    /// The exposure that was used, stops.
     exposure: f32,
-    /// Darkest and brightest luminance and log-average after the exposure, as the operator used them.
+    /// Minimum, maximum and log-average of the luminance after the exposure, as the operator used them.
     light: [f32; 3],
-    /// Pixels with a channel over the screen's white, which .png and .jpg cut.
+    /// Number of pixels with a channel above the screen's white, which .png and .jpg clip.
     over_white: u64,
     pub reading: Duration,
     mapping: Duration,
-    /// All of it but reading and writing.
+    /// Time without reading and writing.
     pub working: Duration,
     pub writing: Duration,
 }
 
-/// A mapped picture, and the files that it goes to.
+/// A mapped picture, and its output files.
 #[derive(Debug)]
 pub(super) struct Unwritten {
     files: Vec<(String, Format)>,
@@ -49,7 +49,7 @@ pub(super) struct Unwritten {
 }
 
 impl Unwritten {
-    /// Writes all files. What was written, and how long that took.
+    /// Writes all files. Returns their names and the time.
     pub(super) fn write(self) -> Result<(Vec<String>, Duration)> {
         let begun = Instant::now();
         for (name, format) in &self.files {
@@ -70,18 +70,18 @@ impl Unwritten {
         Ok((self.files.into_iter().map(|(name, _)| name).collect(), begun.elapsed()))
     }
 
-    /// The picture, and how it is written.
+    /// The picture as layers, with the options for writing it.
     pub(super) fn into_layers(self) -> (Layers, WriteOptions) {
         (self.layers, self.options)
     }
 
-    /// Small enough to be kept while the next picture is worked on.
+    /// Whether the picture is small enough to stay in memory while the next picture is processed.
     pub(super) fn is_small(&self) -> bool {
         u64::from(self.layers.width) * u64::from(self.layers.height) <= KEPT_PIXELS
     }
 }
 
-/// Pixels of the largest picture that is written while the next one is worked on.
+/// Maximum of pixels of a picture that is written while the next one is processed.
 const KEPT_PIXELS: u64 = 1 << 25;
 
 /// As `--mode` takes it.
@@ -115,7 +115,7 @@ pub(super) fn pixels(picture: &Layers, asked: Option<&str>) -> Result<(Vec<[f32;
 }
 
 impl Run {
-    /// Maps a picture; what is left is to write its files.
+    /// Tone maps a picture. The caller writes its files.
     pub(super) fn develop(
         &mut self,
         still: &mut Still,
@@ -127,7 +127,7 @@ impl Run {
         let (width, height) = (picture.width, picture.height);
         let (pixels, alpha) = pixels(&picture, input.layer.as_deref())?;
         picture.warnings.iter().for_each(|what| self.console.warning(&format!("{}: {what}", input.name)));
-        // Pictures can be as large as memory.
+        // Frees the input, because pictures can be very large.
         picture.layers.clear();
         let settings = self.exposed(input, &pixels);
         still.tonemap().set(&settings)?;
@@ -174,7 +174,7 @@ impl Run {
         Ok((done, Unwritten { files, layers, options: self.write_options(), console: self.console }))
     }
 
-    /// The settings of a picture: with the exposure that was measured, if that was asked for.
+    /// The settings of a picture, including a measured exposure with `--exposure auto`.
     fn exposed(&mut self, input: &Input, pixels: &[[f32; 4]]) -> Settings {
         let mut settings = self.settings().clone();
         if !self.making.auto {
@@ -182,7 +182,7 @@ impl Run {
         }
         let metered = match self.metered.filter(|_| input.sequence == Some(false)) {
             Some(stops) => stops,
-            None => meter::stops(pixels, settings.operator),
+            None => auto_exposure::stops(pixels, settings.operator),
         };
         self.metered = Some(metered);
         self.console.detail(&format!("{}: measured exposure {metered:+.2} EV", input.name));
@@ -217,7 +217,7 @@ impl Run {
             BadValues::Error => "refused",
         };
         let text = format!("{}: samples: {}; {policy}; the first at ({x}, {y})", input.name, parts.join(", "));
-        // Colours out of gamut are usual and harmless.
+        // Negative samples are usual for colours outside of the gamut, so they are no reason for a warning.
         if bad.nan + bad.infinite > 0 { self.console.warning(&text) } else { self.console.detail(&text) }
     }
 
@@ -237,13 +237,13 @@ impl Run {
     }
 }
 
-/// What is written: three channels, or four if the picture came with alpha.
+/// The layer to write: three channels, or four if the input has alpha.
 fn layer_of(mapped: Mapped, alpha: bool) -> Layer {
     let mut data = mapped.pixels.into_flattened();
     if alpha {
         return Layer::new("", &["R", "G", "B", "A"], data);
     }
-    // In place: pictures can be as large as memory.
+    // Converts in place, because pictures can be very large.
     let count = data.len() / 4;
     for i in 1..count {
         data.copy_within(4 * i..4 * i + 3, 3 * i);
@@ -253,12 +253,12 @@ fn layer_of(mapped: Mapped, alpha: bool) -> Layer {
 }
 
 impl Done {
-    /// With the files that were written, and how long that took.
+    /// Adds the names of the written files, and the time of writing.
     pub(super) fn with(self, (files, writing): (Vec<String>, Duration)) -> Self {
         Self { files, writing, ..self }
     }
 
-    /// From the file to the files, on whatever thread.
+    /// Time from reading to writing, summed over all threads.
     pub(super) fn milliseconds(&self) -> f64 {
         (self.reading + self.working + self.writing).as_secs_f64() * 1e3
     }

@@ -1,4 +1,4 @@
-//! What a developed picture remembers of its making, and the same picture once more.
+//! The record of a tone mapped picture in its metadata, and making the same picture again.
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{args::DeviceArgs, config, console::Console, outputs::Fresh, program, signals::Interrupt};
 
-/// The `config` of a picture's metadata. What is as it usually is, is left out.
+/// The `config` of a picture's metadata. Values equal to their default are left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Recipe {
     command: Vec<String>,
@@ -29,13 +29,13 @@ pub(super) struct Recipe {
     settings: Value,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     sequence: Option<Sequence>,
-    /// What the picture that was developed says of itself.
+    /// The metadata of the input picture.
     #[serde(default, skip_serializing_if = "Value::is_null")]
     source: Value,
-    /// Of the file that was developed.
+    /// Layer of the input file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     layer: Option<String>,
-    /// Pixels that are important whatever they look like.
+    /// The mask file of important pixels (`--mask`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     mask: Option<PathBuf>,
     #[serde(default = "usual_bits", skip_serializing_if = "is_usual_bits")]
@@ -46,7 +46,7 @@ pub(super) struct Recipe {
     f32: bool,
 }
 
-/// The curve of .png and .jpg: `srgb`, or the power.
+/// The encoding of .png and .jpg files: `srgb`, or a power.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 enum Curve {
@@ -54,12 +54,12 @@ enum Curve {
     Named(String),
 }
 
-/// A frame to which the eye has adapted from the ones before.
+/// A frame of a sequence, whose adaptation depends on the frames before it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Sequence {
     frame: u32,
     fps: f64,
-    /// The name with its number left open, and the first frame; none if the sequence was a list of names.
+    /// The numbered name and the first frame; `None` if the sequence was a list of names.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pattern: Option<(String, u32)>,
 }
@@ -80,7 +80,7 @@ fn is_usual_quality(quality: &u8) -> bool {
     *quality == usual_quality()
 }
 
-/// Frames of a sequence that are developed unasked.
+/// Maximum of frames of a sequence without `--long`.
 const FRAMES: usize = 1000;
 
 impl Recipe {
@@ -102,7 +102,7 @@ impl Recipe {
         })
     }
 
-    /// How it was made; the exposure that was measured stands in the settings.
+    /// The configuration of the run. A measured exposure is part of the settings.
     fn making(&self) -> Result<Making> {
         let wrong = |key: &str, found: String, allowed: &str| {
             Error::input(format!("{found} is not allowed; allowed: {allowed}")).at(key)
@@ -134,13 +134,13 @@ impl Recipe {
         })
     }
 
-    /// The pictures that are developed, the last of which is the one that is made again.
+    /// The pictures to tone map. The last one is the picture that is made again.
     fn inputs(&self, long: bool) -> Result<Vec<Input>> {
         let layer = self.layer.as_deref();
         let Some(Sequence { frame, pattern, .. }) = &self.sequence else {
             let path = PathBuf::from(&self.input);
             if self.input == names::STDIN {
-                return Err(Error::input("the picture that was developed came from standard input").at("input"));
+                return Err(Error::input("the input picture came from standard input").at("input"));
             }
             let (stem, layer, name) = (String::new(), self.layer.clone(), self.input.clone());
             return Ok(vec![Input { name, path: Some(path), layer, stem, frame: 0, sequence: None, pattern: None }]);
@@ -152,32 +152,35 @@ impl Recipe {
         };
         let list = names::frames(pattern, layer, *first, *frame)?;
         if list.len() > FRAMES && !long {
-            return Err(Error::input(format!("asks for {} frames; at most {FRAMES} are made unasked", list.len()))
-                .at("sequence")
-                .help("Give --long if the picture is from somebody you trust, and there is time"));
+            return Err(Error::input(format!(
+                "needs {} frames; without --long at most {FRAMES} are allowed",
+                list.len()
+            ))
+            .at("sequence")
+            .help("Give --long if you trust the source of the picture and have enough time"));
         }
         Ok(list)
     }
 }
 
-/// What is asked beside the recipe.
+/// The request besides the recipe.
 #[derive(Debug)]
 pub struct Again<'a> {
     /// Width and height of the picture, which are those of its input.
     pub extent: [u32; 2],
-    /// Of the file.
+    /// Format of the file.
     pub format: Format,
     pub device: &'a DeviceArgs,
     pub console: Console,
-    /// Hours of work were asked for.
+    /// The user allows work that takes hours.
     pub long: bool,
     pub interrupt: &'a Interrupt,
 }
 
-/// Develops a picture again, in memory; `None`: interrupted. Of the words of `config` the input and the mask alone name files.
+/// Makes a picture again, in memory; `None`: interrupted. Reads only the files that `config` names as input and as mask.
 ///
 /// # Errors
-/// `Input` for what `config` says and names; whatever fails while developing.
+/// `Input` for wrong values in `config` and for its files; any error of tone mapping.
 pub fn again(config: &Value, asked: &Again<'_>) -> Result<Option<Fresh>> {
     let recipe: Recipe = serde_json::from_value(config.clone())
         .map_err(|error| Error::input("does not say how it was developed").caused_by(error))?;
@@ -202,7 +205,7 @@ pub fn again(config: &Value, asked: &Again<'_>) -> Result<Option<Fresh>> {
         metered: None,
         before: None,
     };
-    // What cannot be read shows before there is a device.
+    // Errors of reading are reported before the device is opened.
     let mut first = inputs.first().and_then(|input| input.path.as_deref()).map(read).transpose()?;
     let gpu = Gpu::new(asked.device.options()?)?;
     let about = gpu.describe().clone();

@@ -20,7 +20,7 @@ pub struct ViewsArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
 
-    /// How many views in all; recorded ones come first, the rest is drawn
+    /// Number of views; recorded views come first, the others are random
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub count: u32,
 
@@ -28,7 +28,7 @@ pub struct ViewsArgs {
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
 
-    /// A recorded camera (.toml) that belongs to the list; may be given more than once
+    /// A recorded camera (.toml) to add to the list; may be given more than once
     #[arg(long, value_name = "FILE")]
     pub camera: Vec<PathBuf>,
 
@@ -40,7 +40,7 @@ pub struct ViewsArgs {
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
 
-    /// Replace a list that exists
+    /// Overwrite an existing list
     #[arg(long)]
     pub overwrite: bool,
 
@@ -48,16 +48,16 @@ pub struct ViewsArgs {
     pub talk: TalkArgs,
 }
 
-/// Draws and writes.
+/// Draws the views and writes the list.
 ///
 /// # Errors
-/// `Input` if the scene or a camera cannot be read, or shows too little for that many views; `Output` if the list cannot be written.
+/// `Input` if the scene or a camera cannot be read, or too few views are found; `Output` if the list cannot be written.
 pub fn run(args: &ViewsArgs, console: Console) -> Result<()> {
     if let Some(path) = &args.output {
         image::probe_output(path, args.overwrite)?;
     }
     let (mut scene, _) = args.scene.open()?;
-    // The light that `render` adds to dark scenes, as it decides what is seen.
+    // `render` adds lights to dark scenes. The rule for dark views needs the same lights.
     framing::add_missing_light(&mut scene, DefaultLight::Auto);
     let list = list(&scene, args)?;
     let heading = "# Written by `lucerna views`; `render --camera FILE.toml#NAME` takes one view. Lengths in metres.\n";
@@ -77,7 +77,7 @@ fn list(scene: &lucerna::scene::Scene, args: &ViewsArgs) -> Result<ViewList> {
     let (named, stem) = match (&args.scene.builtin, &args.scene.scene) {
         (Some(name), _) => (name.clone(), name.clone()),
         (None, Some(path)) => (path.to_string_lossy().into_owned(), stem(path)),
-        (None, None) => return Err(Error::usage("no scene was named")),
+        (None, None) => return Err(Error::usage("no scene was given")),
     };
     let mut views = Vec::new();
     for path in &args.camera {

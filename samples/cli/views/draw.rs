@@ -1,16 +1,16 @@
 //! Random views that show something.
 //!
-//! A place is drawn evenly in the box around the scene (the box is [`ROOM`] larger to the sides and above), a direction evenly
-//! in azimuth and between [`PITCH`] degrees in elevation, a vertical angle of view between [`YFOV`] degrees. CPU rays then
-//! decide; all lengths are relative to the diagonal of the scene's box:
+//! Positions are uniform in the scene's bounding box, enlarged by [`ROOM`] to the sides and above. Directions are uniform in azimuth
+//! and in elevation ([`PITCH`] degrees); the vertical angle of view is uniform in [`YFOV`] degrees. CPU rays then reject views for
+//! these reasons; all lengths are relative to the diagonal of the scene's box:
 //!
-//! - *inside geometry*: of [`AROUND`] rays evenly around the place, more than [`MOST_BACKS`] meet the back of a single-sided
-//!   surface, or one meets any surface nearer than [`CLEARANCE`];
-//! - *mostly sky*: of [`RAYS`] rays through the picture more than [`MOST_SKY`] meet nothing;
-//! - *seen from behind*: more than [`MOST_BEHIND`] of them meet the back of a single-sided surface, which a rasteriser leaves out;
-//! - *into a wall*: the nearest hit is nearer than [`NEAREST`], the median farther than [`FARTHEST`] or nearer than [`MEDIAN`], or
-//!   fewer than [`SURFACES`] different planes each show on at least [`SHARE`] of the picture;
-//! - *in the dark*: in scenes with lights, less than [`LEAST_LIT`] of what the rays meet gets light from one, or is a lamp.
+//! - *inside geometry*: of [`AROUND`] rays evenly around the position, more than [`MOST_BACKS`] hit the back of a single-sided
+//!   surface, or one hits any surface nearer than [`CLEARANCE`];
+//! - *mostly sky*: of [`RAYS`] rays through the picture, more than [`MOST_SKY`] hit no surface;
+//! - *seen from behind*: more than [`MOST_BEHIND`] of them hit the back of a single-sided surface, which a rasteriser does not draw;
+//! - *into a wall*: the nearest hit is nearer than [`NEAREST`], the median is farther than [`FARTHEST`] or nearer than [`MEDIAN`], or
+//!   fewer than [`SURFACES`] different planes cover at least [`SHARE`] of the picture each;
+//! - *in the dark*: in scenes with lights, less than [`LEAST_LIT`] of the hit surfaces receive light or are lamps.
 
 use std::collections::HashMap;
 
@@ -31,35 +31,35 @@ pub const ROOM: f32 = 0.1;
 pub const PITCH: [f32; 2] = [-45.0, 20.0];
 /// Smallest and largest vertical angle of view, degrees.
 pub const YFOV: [f32; 2] = [40.0, 65.0];
-/// Rays around the place.
+/// Number of rays around the position.
 pub const AROUND: u32 = 64;
-/// Largest share of them that may meet backs.
+/// Maximum share of the rays around the position that may hit backs.
 pub const MOST_BACKS: f32 = 0.45;
-/// Least distance to any surface around.
+/// Minimum distance to any surface around.
 pub const CLEARANCE: f32 = 0.01;
 /// Rays through the picture, across and down.
 pub const RAYS: [u32; 2] = [16, 12];
-/// Largest share of them that may meet nothing.
+/// Maximum share of the rays through the picture that may hit no surface.
 pub const MOST_SKY: f32 = 0.4;
-/// Largest share of them that may meet backs.
+/// Maximum share of the rays through the picture that may hit backs.
 pub const MOST_BEHIND: f32 = 0.01;
-/// Least distance of the nearest hit.
+/// Minimum distance of the nearest hit.
 pub const NEAREST: f32 = 0.015;
-/// Least and largest median distance.
+/// Minimum median distance; the maximum is [`FARTHEST`].
 pub const MEDIAN: f32 = 0.05;
 pub const FARTHEST: f32 = 1.5;
-/// How many planes must show …
+/// Minimum number of planes in the picture.
 pub const SURFACES: usize = 6;
-/// … on what share of the picture each.
+/// Minimum share of the picture that each of these planes covers.
 pub const SHARE: f32 = 0.015;
-/// Least share of what is seen that must be lit.
+/// Minimum share of the hit surfaces that must be lit.
 pub const LEAST_LIT: f32 = 0.15;
 /// Width over height of the pictures.
 pub const ASPECT: f32 = 4.0 / 3.0;
-/// Places tried for each view wanted.
+/// Maximum of positions that are tried per requested view.
 const PATIENCE: u64 = 4000;
 
-/// Why a view was not taken.
+/// The reason for rejecting a view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refusal {
     InsideGeometry,
@@ -86,7 +86,7 @@ impl Random {
     }
 }
 
-/// What the rays know.
+/// Decides which views are good, by tracing rays through the scene.
 pub struct Judge<'a> {
     scene: &'a Scene,
     bvh: Bvh,
@@ -95,7 +95,7 @@ pub struct Judge<'a> {
     max: Vec3,
 }
 
-/// A light in world space: its place, or the direction to it from everywhere, and where a spot shines.
+/// A light in world space: its position, or the direction to a distant light, and the cone of a spot light.
 enum Lamp {
     At(Vec3, Option<(Vec3, f32)>),
     Towards(Vec3),
@@ -115,7 +115,7 @@ fn lamps(scene: &Scene, pose: &Pose) -> Vec<Lamp> {
     scene.nodes.iter().zip(&pose.world).filter_map(lit).collect()
 }
 
-/// What a ray meets.
+/// The hit of a ray.
 struct Seen {
     distance: f32,
     /// Unit, towards the ray.
@@ -138,7 +138,7 @@ impl<'a> Judge<'a> {
         (self.max - self.min).length().max(1e-6)
     }
 
-    /// The nearest surface along a unit direction.
+    /// The nearest hit along a unit direction.
     fn look(&self, origin: Vec3, direction: Vec3) -> Option<Seen> {
         let hit = self.bvh.closest(&Ray::new(origin, direction))?;
         let [a, b, c] = self.bvh.triangles()[hit.triangle as usize];
@@ -174,10 +174,10 @@ impl<'a> Judge<'a> {
         })
     }
 
-    /// Whether the view shows something, by the rule above.
+    /// Checks a view by the rules above.
     ///
     /// # Errors
-    /// Which part of the rule it breaks.
+    /// The rule that the view breaks.
     pub fn judge(&self, view: &NamedView) -> Result<(), Refusal> {
         let diagonal = self.diagonal();
         let eye = view.position;
@@ -237,7 +237,7 @@ impl<'a> Judge<'a> {
         Ok(())
     }
 
-    /// A view anywhere, good or not.
+    /// A random view, which may break the rules.
     fn any(&self, random: &mut Random) -> NamedView {
         let diagonal = self.diagonal();
         let margin = Vec3::splat(ROOM * diagonal);
@@ -249,7 +249,7 @@ impl<'a> Judge<'a> {
         let elevation = random.between(PITCH).to_radians();
         let level = Vec3::new(azimuth.sin(), 0.0, -azimuth.cos()) * elevation.cos();
         let yfov_degrees = random.between(YFOV).round();
-        // Files hold millimetres of a scene of metres: what is written is what was judged.
+        // Positions are rounded like in the written file, so that the written view is the view that was checked.
         let digits = 10f32.powi(3 - diagonal.log10().floor().clamp(-30.0, 30.0) as i32);
         let round = |v: Vec3| (v * digits).round() / digits;
         let position = round(position);

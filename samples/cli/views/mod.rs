@@ -1,4 +1,4 @@
-//! Lists of views of a scene: recorded cameras, and random ones that show something.
+//! Lists of views of a scene: recorded cameras, and random views that pass the rules of [`draw`].
 //!
 //! A list is a TOML file, which `lucerna views` writes and experiments read; `render --camera FILE.toml#NAME` takes one view.
 //!
@@ -33,19 +33,19 @@ use crate::{camera::CameraFile, config};
 pub struct ViewList {
     /// Name of the built-in scene, or the path of its file.
     pub scene: String,
-    /// What the random ones were drawn with.
+    /// Seed of the random views.
     pub seed: u64,
     #[serde(rename = "view")]
     pub views: Vec<NamedView>,
 }
 
-/// Where a view comes from.
+/// The origin of a view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Origin {
-    /// A camera that someone placed: in the scene or in a camera file.
+    /// A camera of the scene, or from a camera file.
     Recorded,
-    /// Drawn ([`draw::views`]).
+    /// A random view ([`draw::views`]).
     Random,
 }
 
@@ -63,7 +63,7 @@ pub struct NamedView {
     /// Full vertical angle of view.
     pub yfov_degrees: f32,
     pub znear: f32,
-    /// None: infinitely far.
+    /// `None`: at infinity.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zfar: Option<f32>,
 }
@@ -139,7 +139,7 @@ pub fn recorded(scene: &Scene, pose: &Pose) -> Vec<NamedView> {
         let position = world.w_axis.truncate();
         let forward = -world.z_axis.truncate().normalize_or(Vec3::Z);
         let up = world.y_axis.truncate().normalize_or(Vec3::Y);
-        // Upright cameras stay legible.
+        // Omits the up vector of upright cameras, so that the file stays readable.
         let upright = forward.cross(Vec3::Y).normalize_or_zero().dot(up).abs() < 1e-4 && up.y > 0.0;
         let mut name = if camera.name.is_empty() { format!("camera{index}") } else { camera.name.clone() };
         if found.iter().any(|view| view.name == name) {

@@ -1,8 +1,8 @@
 //! Fullsphere irradiance vectors: tables 2 to 4, 17, 18 and figures 18 to 27 of Michael's thesis (sections 5.2 and 5.4).
 //!
-//! Scenes and techniques are known by their names: [`paper`] says which of them stands for which figure. Techniques named
-//! `32x17x15` are sets of samples; the reference is `brute force`. Errors are those of the irradiance of the ground seen from straight above
-//! without what stands on it (view [`GROUND`]); ground that a thing covers from close above is never seen and left out.
+//! The analysis finds scenes and techniques by their names: [`paper`] assigns them to figures. Techniques named like `32x17x15` are sets of
+//! samples; the reference is `brute force`. Errors are errors of the irradiance of the ground, seen from straight above without the objects on
+//! it (view [`GROUND`]). Ground closely below an object is not visible, and does not count.
 
 mod images;
 mod paper;
@@ -23,9 +23,9 @@ use crate::{
     report::{Cell, Page},
 };
 
-/// The view of the ground without what stands on it.
+/// The view of the ground without the objects on it.
 const GROUND: &str = "ground";
-/// The view with it.
+/// The view with the objects.
 const FRONT: &str = "front";
 const TRUTH: &str = "brute force";
 const UNSHADOWED: &str = "unshadowed";
@@ -52,7 +52,7 @@ pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// Results with what all parts ask of them.
+/// The results, with queries that all parts of the analysis use.
 struct Lab<'a> {
     results: &'a Results,
 }
@@ -62,7 +62,7 @@ impl<'a> Lab<'a> {
         self.results.runs.iter().find(|run| run.scene == scene && run.view == view && run.method == method)
     }
 
-    /// The technique, or the next coarser set of samples that there is: quick mode leaves the finer ones out.
+    /// The technique, or the next coarser existing set of samples, because quick mode leaves out the finer sets.
     fn nearest(&self, scene: &str, view: &str, wanted: &'static str) -> &'static str {
         let from = SETS.iter().position(|set| *set == wanted);
         let coarser = from.into_iter().flat_map(|from| &SETS[from..]);
@@ -78,7 +78,7 @@ impl<'a> Lab<'a> {
         run.map(|run| self.results.times(run)).transpose()
     }
 
-    /// NRMSE (eq. 17) of the irradiance of a view, over the pixels that are not covered.
+    /// NRMSE [FIV 17] of the irradiance of a view, over the pixels that are not covered.
     fn nrmse(&self, scene: &str, view: &str, method: &str) -> Result<Option<f64>> {
         let Some((truth, run)) = self.run(scene, view, TRUTH).zip(self.run(scene, view, method)) else {
             return Ok(None);
@@ -95,7 +95,7 @@ impl<'a> Lab<'a> {
         Ok(Some(value).filter(|value| value.is_finite()))
     }
 
-    /// Which pixels are not covered by what stands on the ground; `None`: all, or it is not known.
+    /// For each pixel, whether the ground is visible; `None` if all of it is, or if it is not known.
     fn open(&self, truth: &Done) -> Result<Option<Vec<bool>>> {
         if truth.view != GROUND {
             return Ok(None);
@@ -117,7 +117,7 @@ impl<'a> Lab<'a> {
     }
 }
 
-/// Milliseconds of the technique's own passes; of the frame where passes have no clock.
+/// Time of the technique's own passes, milliseconds; the time of the frame, if the device has no timestamps.
 fn own(times: &Times) -> Option<f64> {
     let sum = times.of_passes(PASSES);
     if sum > 0.0 { Some(sum) } else { times.frame() }

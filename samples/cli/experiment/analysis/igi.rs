@@ -1,9 +1,8 @@
-//! Instant global illumination: figures 4 to 7 of Marques and Santos, with the errors that the paper does not give.
+//! Instant global illumination: figures 4 to 7 of Marques and Santos, with errors, which the paper does not give.
 //!
-//! Techniques are known by their names: `exact` with a matrix of `igi.vpls`, and the variants, whatever they are called, with the number of
-//! virtual lights that [`COUNT`] states; these have diffuse surfaces alone, as the reference has, which is the first one.
-//! `exact, specular` and `paper, specular` show mirrors, glass and highlights too, as the paper does: figures 4 to 7 have both.
-//! What came after the paper: [`beyond`].
+//! The analysis finds techniques by their names. `exact` has a matrix of `igi.vpls`. All other techniques are variants with [`COUNT`] virtual
+//! lights. They have diffuse surfaces only, like the reference, which is the first one. `exact, specular` and `paper, specular` also have
+//! mirrors, glass and highlights, like the paper; figures 4 to 7 show both. [`beyond`] has the ideas after the paper.
 
 mod beyond;
 mod rays;
@@ -23,7 +22,7 @@ use crate::{
 };
 use stages::{STAGES, spent};
 
-/// Virtual lights of the variants.
+/// Number of virtual lights of the variants.
 const COUNT: &str = "180";
 /// Longest side of an image in the page, pixels.
 const SIDE: u32 = 640;
@@ -44,7 +43,7 @@ pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// The table `beside` of the parameters names techniques that there are.
+/// Checks that the table `beside` of the parameters names existing techniques.
 pub(super) fn check(experiment: &Experiment) -> Result<()> {
     let techniques = experiment.methods.iter().filter(|method| method.role == Role::Technique);
     let known: Vec<&str> = techniques.map(|method| method.name.as_str()).collect();
@@ -71,14 +70,14 @@ pub(super) fn check(experiment: &Experiment) -> Result<()> {
 fn counts(results: &Results) -> Result<Section> {
     let mut section = Section::new("Figure 4: time against the number of virtual lights");
     section.text(
-        "Exact visibility at full resolution. *All* surfaces: with mirrors, glass and highlights, as in the paper, where the specular objects of the \
-         conference room put much of the growth into the stage *direct and specular*; *diffuse*: without, as for the errors below. The paper has 30, \
-         90 and 180 virtual lights on a GTX 480: there too the indirect stage grows with their number.",
+        "Exact visibility at full resolution. *All*: all surfaces, with mirrors, glass and highlights, as in the paper; in the paper's conference \
+         room, specular objects cause much of the growth in the stage *direct and specular*. *Diffuse*: diffuse surfaces only, as for the errors \
+         below. The paper has 30, 90 and 180 virtual lights on a GTX 480; its indirect stage also grows with their number.",
     );
     section.text(
-        "Shares are of the time of all passes. *Shooting*: paths of light, and which of them become virtual lights. *Direct and specular*: visible \
-         surfaces, shadow rays to lights, and all light on what mirrors and glass show. *Indirect*: gathering by rays or maps, refinement, and light \
-         put back. *Filters*: of the picture, and over time. *Other*: the sum, the sky, uploads, memory that is cleared.",
+        "Shares are of the time of all passes. *Shooting*: light paths, and the choice of the virtual lights. *Direct and specular*: visible \
+         surfaces, shadow rays to light sources, and all light on surfaces that mirrors and glass show. *Indirect*: gathering by rays or maps, \
+         refinement, and compensation of the bound. *Filters*: filters of the picture, and over time. *Other*: the sum, the sky, uploads, clears.",
     );
     let heads = ["scene", "surfaces", "virtual lights", "frames/s"].into_iter().chain(STAGES);
     let mut table = Table::new("figure-4", "Frames per second and shares of the time", heads).timed();
@@ -108,12 +107,12 @@ fn name((scene, view): (&str, &str)) -> String {
     format!("{scene}, {view}")
 }
 
-/// The run of a technique with [`COUNT`] virtual lights, or with none stated.
+/// The run of a technique with [`COUNT`] virtual lights, or without a matrix of their number.
 fn counted<'a>(results: &'a Results, view: (&'a str, &'a str), method: &str) -> Option<&'a Done> {
     results.at(view).find(|run| run.method == method && run.value("igi.vpls").is_none_or(|count| count == COUNT))
 }
 
-/// What is held against the exact variant, that one first.
+/// The runs to compare with the exact variant; the exact variant is the first.
 fn others<'a>(results: &'a Results, view: (&'a str, &'a str)) -> Vec<&'a Done> {
     let technique = |run: &&Done| results.with_role(Role::Technique).any(|known| known.key == run.key);
     let own = |method: &str| method == EXACT || SPECULAR.contains(&method) || beyond::OWN.contains(&method);
@@ -121,7 +120,7 @@ fn others<'a>(results: &'a Results, view: (&'a str, &'a str)) -> Vec<&'a Done> {
     counted(results, view, EXACT).into_iter().chain(others).collect()
 }
 
-/// The same with all surfaces as they are.
+/// The runs with specular surfaces; the exact variant is the first.
 fn specular<'a>(results: &'a Results, view: (&'a str, &'a str)) -> Vec<&'a Done> {
     SPECULAR.iter().filter_map(|method| counted(results, view, method)).collect()
 }
@@ -130,14 +129,15 @@ fn reference<'a>(results: &'a Results, view: (&'a str, &'a str)) -> Option<&'a D
     results.with_role(Role::Reference).find(|run| (run.scene.as_str(), run.view.as_str()) == view)
 }
 
-/// Figure 5 and what it costs.
+/// Figure 5, with the errors of its variants.
 fn variants(results: &Results) -> Result<Section> {
     let mut section = Section::new("Figure 5: the accelerations");
     section.text(format!(
-        "{COUNT} virtual lights, but where a variant has its own number. *Speed* is the frame's, over the exact variant with the same surfaces; \
-         *indirect* that of the stages indirect and filters together: gathering, refinement, light put back, despeckling, smoothing, upsampling. The paper \
-         has 1.5 to 2.0 for imperfect visibility, about 5 for downsampling, and 2.8 frames per second with all three. `{EXACT_SPECULAR}` and \
-         `{PAPER_SPECULAR}` show mirrors, glass and highlights; all others, and all errors, are of diffuse surfaces alone, for the reference has no more.",
+        "{COUNT} virtual lights, unless a variant has its own number. *Speed* is the speed of the frame relative to the exact variant with the same \
+         surfaces; *indirect, speed* is the same for the stages indirect and filters together: gathering, refinement, compensation, despeckling, \
+         smoothing, upsampling. The paper has 1.5 to 2.0 for imperfect visibility, about 5 for downsampling, and 2.8 frames per second with all three. \
+         `{EXACT_SPECULAR}` and `{PAPER_SPECULAR}` show mirrors, glass and highlights; all other variants, and all errors, are for diffuse surfaces \
+         only, like the reference.",
     ));
     let heads = ["scene", "variant", "frames/s"].into_iter().chain(STAGES);
     let heads = heads.chain(["speed", "indirect, speed"]);
@@ -162,7 +162,7 @@ fn variants(results: &Results) -> Result<Section> {
             continue;
         };
         for list in [specular(results, view), others(results, view)] {
-            // Relative to the first.
+            // Speeds are relative to the first run, the exact variant.
             let Some(base) = list.first().map(|run| spent(results, run)).transpose()? else { continue };
             for run in list {
                 let spent = spent(results, run)?;
@@ -194,9 +194,9 @@ fn variants(results: &Results) -> Result<Section> {
     }
     section.add(table);
     section.text(
-        "Errors are of the whole picture; the reference traces paths with as many bounces and diffuse surfaces alone. *Light* is the \
-         mean of the indirect light over that of the reference. One seed: where few virtual lights reach the view, as in the office with evenly shot paths, \
-         another seed gives other figures.",
+        "Errors are for the whole picture; the reference is path traced with the same number of bounces and diffuse surfaces only. *Light* is the \
+         mean of the indirect light over the reference's mean. All figures are for one seed: if few virtual lights reach the view, as in the office \
+         without importance resampling, another seed gives other figures.",
     );
     section.add(errors);
     Ok(section)
@@ -212,7 +212,7 @@ fn mean(results: &Results, run: &Done, layer: &str) -> Result<f64> {
 /// Figures 6 and 7.
 fn images(results: &Results) -> Result<Section> {
     let mut section = Section::new("Figures 6 and 7: images");
-    section.text("First with mirrors, glass and highlights, as in the paper; then all variants with diffuse surfaces alone, beside the reference.");
+    section.text("First the variants with mirrors, glass and highlights, as in the paper; then the reference and all variants with diffuse surfaces only.");
     for view in spread(&results.views(), Some(results.experiment.images)) {
         let (scene, camera) = *view;
         let diffuse = reference(results, *view).into_iter().chain(others(results, *view)).collect();

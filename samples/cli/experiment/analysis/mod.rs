@@ -1,4 +1,4 @@
-//! What the results of an experiment mean: functions that turn them into tables, plots and images.
+//! Analyses: functions that turn the results of an experiment into tables, plots and images.
 
 mod compare;
 mod fiv;
@@ -11,7 +11,7 @@ use lucerna::{Error, Result};
 use super::{file::Experiment, results::Results};
 use crate::{config, report::Page};
 
-/// Fills the page. Title, summary, warnings and facts are there already.
+/// Fills the page, which already has title, summary, warnings and facts.
 pub type Analysis = fn(&Results, &mut Page) -> Result<()>;
 
 /// All analyses, by the name that a file gives.
@@ -35,7 +35,7 @@ pub fn find(name: &str) -> Result<Analysis> {
     })
 }
 
-/// What an analysis asks of an experiment beyond what all do.
+/// Checks the additional requirements of an analysis on its experiment.
 ///
 /// # Errors
 /// `Input`, naming the key.
@@ -59,7 +59,7 @@ pub fn report(results: &Results) -> Result<Page> {
     if results.missing > 0 {
         let (there, missing) = (results.runs.len(), results.missing);
         page.warnings.push(format!(
-            "Not complete: {missing} of {} runs are still to be done. Run the same command again to go on.",
+            "Not complete: {missing} of {} runs are missing. Run the same command again to continue.",
             there + missing
         ));
     }

@@ -1,6 +1,6 @@
-//! Tone mapping: the tables of Michael's thesis (section 5.3), and what a better local operator leaves of selection.
+//! Tone mapping: the tables of Michael's thesis (section 5.3), and the gain of selection with faster local operators.
 //!
-//! Techniques are known by their names: `gtm`, `ltm`, `stm` (global, local and selective tone mapping by the literal operator; `stm` with
+//! The analysis finds techniques by their names: `gtm`, `ltm`, `stm` (global, local and selective tone mapping by the literal operator; `stm` with
 //! a matrix of `tonemap.mark`), `ltm-fast`, `stm-fast`, `ltm-pyramid`, `stm-pyramid`,
 //! `stm-threshold` (a matrix of `tonemap.threshold`), `stm-saliency`, `stm-half`; and the reference `cpu`. Scenes of the group `still` are pictures, all others frames.
 
@@ -23,16 +23,16 @@ use crate::{
 const THRESHOLD: f64 = 0.1;
 /// Group of pictures.
 const STILL: &str = "still";
-/// Pixels of the largest frame whose losses are measured.
+/// Maximum of pixels of a frame whose losses are measured.
 const MEASURED: usize = 1 << 20;
 
-/// Who looks at the pictures, on a screen as they are. The thesis names neither the program that computed its VDP nor its settings. An
-/// observer who does not know what to look for (slope of masking 1), and only what he is all but sure to see (p > 0.95).
+/// VDP options for an inexperienced observer, who does not know the differences to look for (slope of masking 1). Only differences that are
+/// detected almost certainly count (p > 0.95). The thesis names neither the program that computed its VDP nor its settings.
 fn casual() -> Options {
     Options { vdp_masking_slope: 1.0, vdp_threshold: 0.95, ..practised() }
 }
 
-/// Daly's practised observer, and what he sees more often than not.
+/// VDP options for Daly's practised observer, with differences that are detected in three of four cases.
 fn practised() -> Options {
     Options { display: Display { exposure: Exposure::Stops(0.0), curve: ToneCurve::Clip }, ..Options::default() }
 }
@@ -56,7 +56,7 @@ pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// A picture or a frame with everything that was made of it.
+/// A picture or a frame, with all its runs.
 #[derive(Clone, Copy)]
 struct View<'a> {
     results: &'a Results,
@@ -140,7 +140,7 @@ impl<'a> View<'a> {
     }
 }
 
-/// Two numbers' ratio.
+/// The ratio of two numbers.
 fn over(a: Option<f64>, b: Option<f64>) -> Option<f64> {
     a.zip(b).map(|(a, b)| a / b).filter(|ratio| ratio.is_finite())
 }

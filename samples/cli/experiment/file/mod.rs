@@ -50,7 +50,7 @@ use crate::{
     source,
 };
 
-/// The experiments that come with the program: name and text.
+/// The built-in experiments: name and text.
 pub const BUILTIN: &[(&str, &str)] = &[
     ("fiv", include_str!("../../../experiments/fiv.toml")),
     ("igi", include_str!("../../../experiments/igi.toml")),
@@ -59,25 +59,25 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ("tonemap", include_str!("../../../experiments/tonemap.toml")),
 ];
 
-/// Settings that are changed, by their keys.
+/// Changed settings, by their keys.
 pub type Changes = BTreeMap<String, Value>;
 
-/// An experiment, checked, with the overrides of quick mode applied where asked for.
+/// A checked experiment. In quick mode its overrides are applied.
 #[derive(Clone, Debug)]
 pub struct Experiment {
     pub name: String,
-    /// The file, for errors and for what lies beside it; `None`: comes with the program.
+    /// The file, for error messages and for files next to it; `None` for a built-in experiment.
     pub path: Option<PathBuf>,
     pub quick: bool,
     pub title: String,
     pub summary: String,
     pub analysis: String,
-    /// For the analysis.
+    /// Parameters for the analysis.
     pub parameters: serde_json::Map<String, Value>,
     pub size: Size,
     pub seed: u32,
     pub measures: Vec<String>,
-    /// Views that the report shows as images.
+    /// Number of views that the report shows as images.
     pub images: usize,
     pub scenes: Vec<Scene>,
     /// Techniques, then references.
@@ -86,13 +86,13 @@ pub struct Experiment {
     pub text: String,
 }
 
-/// What to do about a file that is not there.
+/// What to do if a file does not exist.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum IfMissing {
     #[default]
     Fail,
-    /// Go on without, and say so in the report.
+    /// Continue without it; the report mentions this.
     Skip,
 }
 
@@ -103,20 +103,20 @@ pub struct Scene {
     pub name: String,
     pub builtin: Option<String>,
     pub file: Option<String>,
-    /// A picture in place of a scene, for what works on pictures.
+    /// A picture instead of a scene, for techniques that work on pictures.
     pub image: Option<String>,
-    /// Metres of one unit of the file.
+    /// Length of one unit of the file, metres.
     pub unit: Option<f64>,
-    /// For tables: `simple`, `complex`…
+    /// Group in tables: `simple`, `complex`…
     #[serde(default)]
     pub group: String,
     #[serde(default)]
     pub if_missing: IfMissing,
-    /// A file, or the name of a built-in one.
+    /// A file, or the name of a built-in environment.
     pub environment: Option<String>,
     /// Puts the scene on a ground.
     pub ground: Option<GroundOptions>,
-    /// Whether there is light from all around; `false` takes it away, and leaves the lights.
+    /// `false` removes the environment and keeps the lights.
     #[serde(default = "yes")]
     pub sky: bool,
     #[serde(default)]
@@ -124,28 +124,28 @@ pub struct Scene {
     pub sun: Option<Sun>,
     #[serde(default)]
     pub default_light: DefaultLight,
-    /// Of images in the report, EV; default: what suits the scene.
+    /// Exposure of images in the report, EV; default: chosen by the picture.
     pub exposure: Option<f64>,
     /// Cameras by index, name, file, or view of a list (`LIST.toml#NAME`).
     #[serde(default)]
     pub cameras: Vec<String>,
     /// All views of this list.
     pub list: Option<String>,
-    /// All cameras that stand in the scene.
+    /// All cameras of the scene.
     #[serde(default)]
     pub recorded: bool,
-    /// Number of views drawn at random.
+    /// Number of random views.
     #[serde(default)]
     pub random: usize,
-    /// Seed of these.
+    /// Seed of the random views.
     #[serde(default = "one")]
     pub seed: u64,
-    /// Every view at each of these sizes, instead of the experiment's.
+    /// Each view is rendered at each of these sizes, instead of the experiment's size.
     #[serde(default)]
     pub sizes: Vec<String>,
-    /// Only so many views, spread evenly.
+    /// Maximum of views, evenly spread over all views.
     pub most_views: Option<usize>,
-    /// In the file; 0 is unknown.
+    /// Line in the file; 0 if unknown.
     #[serde(skip)]
     pub line: usize,
 }
@@ -159,7 +159,7 @@ fn one() -> u64 {
 }
 
 impl Scene {
-    /// Files that must be there.
+    /// The files that the scene needs.
     pub fn files(&self) -> impl Iterator<Item = String> {
         let environment = self.environment.iter().filter(|name| !source::is_built_in_environment(Path::new(name)));
         let files = [&self.file, &self.image, &self.list].into_iter().flatten().chain(environment);
@@ -169,7 +169,7 @@ impl Scene {
     }
 }
 
-/// Techniques are what is examined, references what they are held against.
+/// Techniques are examined; references are the pictures with which they are compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Role {
     #[default]
@@ -182,9 +182,9 @@ pub enum Role {
 #[serde(deny_unknown_fields)]
 pub struct Method {
     pub name: String,
-    /// How it is rendered ([`super::kinds`]).
+    /// The kind that renders it ([`super::kinds`]).
     pub kind: String,
-    /// Starts from the paper's settings.
+    /// Uses the paper's settings as defaults.
     #[serde(default)]
     pub paper: bool,
     #[serde(default)]
@@ -192,17 +192,17 @@ pub struct Method {
     /// Every combination of these values is a variant.
     #[serde(default)]
     pub matrix: BTreeMap<String, Vec<Value>>,
-    /// How often a frame is rendered, for its time.
+    /// Number of repetitions of a frame, for time measurements.
     #[serde(default = "once")]
     pub repeat: u32,
-    /// Layers that are kept beside the picture; default: direct and indirect.
+    /// Layers that are stored besides the picture; default: direct and indirect.
     #[serde(default = "kept_layers")]
     pub layers: Vec<String>,
     /// Only these scenes.
     pub scenes: Option<Vec<String>>,
-    /// Only so many views of each scene, spread evenly.
+    /// Maximum of views per scene, evenly spread over all views.
     pub most_views: Option<usize>,
-    /// Where the program that it needs is not installed.
+    /// What to do if a program that it needs is not installed.
     #[serde(default)]
     pub if_missing: IfMissing,
     #[serde(skip)]
@@ -220,7 +220,7 @@ fn kept_layers() -> Vec<String> {
 }
 
 impl Method {
-    /// Every combination of the matrix, the last key changing fastest; one without entries if there is no matrix.
+    /// All combinations of the matrix; the last key changes fastest. Without a matrix, one empty combination.
     pub fn variants(&self) -> Vec<Changes> {
         self.matrix.iter().fold(vec![Changes::new()], |variants, (key, values)| {
             let extended = |variant: &Changes| {
@@ -239,18 +239,18 @@ impl Method {
         })
     }
 
-    /// How many there are, without making them.
+    /// Number of combinations of the matrix.
     pub fn variant_count(&self) -> usize {
         self.matrix.values().fold(1, |count, values| count.saturating_mul(values.len()))
     }
 
-    /// Whether it is run on a scene.
+    /// Whether the method renders a scene.
     pub fn takes(&self, scene: &str) -> bool {
         self.scenes.as_ref().is_none_or(|scenes| scenes.iter().any(|name| name == scene))
     }
 }
 
-/// Finds an experiment by the name of one that comes with the program, or by its file.
+/// Finds an experiment by the name of a built-in experiment, or by its file.
 ///
 /// # Errors
 /// `Usage` if there is no such name, `Input` if the file has a mistake; the message names the line.

@@ -50,15 +50,15 @@ fn few() -> usize {
     6
 }
 
-/// What quick mode changes.
+/// The changes of quick mode.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Quick {
     size: Option<Spanned<String>>,
     images: Option<usize>,
-    /// Of each scene.
+    /// Maximum of views per scene.
     most_views: Option<usize>,
-    /// Only these.
+    /// Renders only these scenes.
     scenes: Option<Vec<Spanned<String>>>,
     #[serde(default)]
     scene: BTreeMap<Spanned<String>, QuickScene>,
@@ -150,7 +150,7 @@ pub fn parse(name: &str, path: Option<&Path>, text: &str, quick: bool) -> Result
         let line = line_at(text, entry.span().start);
         experiment.methods.push(Method { role, line, ..entry.into_inner() });
     }
-    // Before quick mode leaves out any.
+    // Checked before quick mode removes techniques.
     analysis::check(&experiment).map_err(|error| error.in_file(&shown))?;
     if let Some(changes) = raw.quick.filter(|_| quick) {
         let line = line_at(text, changes.span().start);
@@ -164,7 +164,7 @@ pub fn parse(name: &str, path: Option<&Path>, text: &str, quick: bool) -> Result
     Ok(experiment)
 }
 
-/// Whether a scene is one thing, and has only what belongs to it.
+/// Checks that a scene has exactly one source, and only the keys that this source allows.
 fn what_it_is(scene: &Scene) -> Result<()> {
     let name = &scene.name;
     if [&scene.builtin, &scene.file, &scene.image].iter().filter(|source| source.is_some()).count() != 1 {
@@ -237,12 +237,12 @@ fn apply_quick(
     Ok(())
 }
 
-/// Variants of a technique at most.
+/// Maximum of variants per technique.
 const MOST_VARIANTS: usize = 10_000;
-/// Views of a scene that are drawn at most, as by `lucerna views`.
+/// Maximum of random views per scene, as for `lucerna views`.
 const MOST_DRAWN: usize = 10_000;
 
-/// What can only be said once everything is read.
+/// Checks that need the whole experiment.
 fn check(
     experiment: &Experiment,
     wrong: &dyn Fn(usize, Error) -> Error,

@@ -25,7 +25,7 @@ use super::{Job, Rendered, Warm, on_device, read};
 use crate::{
     config,
     experiment::{cache, digest::Digest, file::Changes, sealed},
-    shown::Shown,
+    frame_output::FrameOutput,
 };
 
 pub(super) fn settings(_paper: bool, changes: &Changes) -> Result<Value> {
@@ -34,10 +34,10 @@ pub(super) fn settings(_paper: bool, changes: &Changes) -> Result<Value> {
     config::to_value(&settings)
 }
 
-/// Height up to which a thing covers the ground below it, in radii of the largest: what is under it there is never seen.
+/// Height below which an occluder hides the ground under it, in radii of the largest occluder.
 const COVERS: f32 = 0.1;
 
-/// What is kept of a scene for one set of vectors.
+/// The technique's data for a scene and one set of vectors.
 struct Kept {
     resident: Resident,
     fiv: Fiv,
@@ -46,16 +46,16 @@ struct Kept {
     facts: Vec<(String, f64)>,
 }
 
-/// What stands beside the vectors of one thing.
+/// The contents of the text file next to the vectors of an occluder.
 #[derive(Serialize, Deserialize)]
 struct Cost {
-    /// Digest of their file.
+    /// Digest of the vectors' file.
     vectors: String,
-    /// Time of computing them.
+    /// Time of computing the vectors.
     seconds: f64,
 }
 
-/// Settings without those that a picture can change.
+/// The settings that decide the vectors; all other settings have default values.
 fn making(settings: &Settings) -> Settings {
     let Settings { trilinear, partial, overlap, self_shadow, .. } = Settings::default();
     Settings { trilinear, partial, overlap, self_shadow, ..settings.clone() }
@@ -81,7 +81,7 @@ pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rende
         let handles = resident.frame_in(graph, scene, pose);
         let view = job.view.fit_far(&handles.bounds());
         let picture = fiv.picture(graph, scene, pose, &handles, &view, &settings)?;
-        Ok(Shown::new(picture.outputs.total).color("irradiance", picture.outputs.irradiance))
+        Ok(FrameOutput::new(picture.outputs.total).color("irradiance", picture.outputs.irradiance))
     })?;
     let facts = facts.clone();
     let radius = fiv.occluders().kinds.iter().map(|kind| kind.radius).fold(0f32, f32::max);
@@ -97,14 +97,14 @@ pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rende
             Some(data) => Layers { ..rendered.layers }.with(Layer::new("covered", &["Y"], data)),
             None => rendered.layers,
         };
-        // Errors of a hundredth are looked at.
+        // The analysis measures errors of a hundredth, so all layers are stored in 32 bits.
         rendered.layers.layers.iter_mut().for_each(|layer| layer.precision = Precision::Full);
         rendered.times.facts = facts;
         rendered
     }))
 }
 
-/// 1 for every pixel above which something is nearer than `height`, metres, or which lies inside of something; seen without perspective.
+/// For every pixel of an orthographic view: 1 if a surface is less than `height` metres above it, or if it is inside of an object.
 fn covered(scene: &Scene, bvh: &Bvh, view: &View, height: f32) -> Vec<f32> {
     let [width, rows] = view.extent;
     let along = view.axes()[2];
@@ -122,7 +122,7 @@ fn covered(scene: &Scene, bvh: &Bvh, view: &View, height: f32) -> Vec<f32> {
     (0..rows).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect()
 }
 
-/// Seen from both sides: a leaf has no inside.
+/// Whether a triangle is double-sided, and so has no inside (a leaf).
 fn is_thin(scene: &Scene, triangle: TriangleId) -> bool {
     let mesh = scene.nodes[triangle.node as usize].mesh.map(|mesh| &scene.meshes[mesh as usize]);
     let primitive = mesh.and_then(|mesh| mesh.primitives.get(triangle.primitive as usize));
@@ -153,8 +153,8 @@ fn vertices(scene: &Scene, node: u32) -> usize {
     mesh.map_or(0, |mesh| mesh.primitives.iter().map(|p| p.positions.len()).sum())
 }
 
-/// Vectors of all kinds, and the seconds that they cost when they were computed: each kind has a file in the folder of the report, so
-/// that scenes share them and a stopped experiment keeps them.
+/// The vectors of all kinds of occluders, and the time of computing them, seconds. Each kind has a file in the folder of the report, so that
+/// scenes share the vectors and a stopped experiment keeps them.
 fn vectors(
     gpu: &Gpu,
     scene: &Scene,
@@ -200,30 +200,30 @@ fn vectors(
     Ok((Some(whole), seconds))
 }
 
-/// Of everything that decides vectors.
+/// Name of the file: a digest of all data that decide the vectors.
 fn name(gpu: &Gpu, plan: &Plan, settings: &Settings) -> Result<String> {
-    // How samples lie is chosen from these; all else that decides them is in the plan.
-    let paces = (settings.adaptive, settings.interpolation);
-    let text = json!([cache::SOURCES, cache::device(gpu), config::to_value(plan)?, config::to_value(&paces)?]);
+    // These settings choose the positions of the samples. All other data that decide the vectors are in the plan.
+    let spacing = (settings.adaptive, settings.interpolation);
+    let text = json!([cache::SOURCES, cache::device(gpu), config::to_value(plan)?, config::to_value(&spacing)?]);
     Ok(Digest::of(text.to_string().as_bytes()).hex())
 }
 
-/// Vectors that are there.
+/// The stored vectors; `None` if they do not exist.
 ///
 /// # Errors
-/// `Input`, naming the file, if they are not those that were kept.
+/// `Input`, naming the file, if they are damaged or were replaced.
 fn known(file: &Path, cost: &Path, plan: &Plan) -> Result<Option<(Stored, f64)>> {
     let Some(known) = sealed::read::<Cost>(cost)? else { return Ok(None) };
     let bytes = whole_file(file)?;
     if Digest::of(&bytes).hex() != known.vectors {
-        return Err(Error::input("are not the vectors that were kept: damaged, or others").in_file(file));
+        return Err(Error::input("does not hold the stored vectors: it is damaged or was replaced").in_file(file));
     }
     let stored = Stored::decode(&bytes).map_err(|error| error.in_file(file))?;
-    // Its name is that of everything else.
+    // The file's name is a digest of the other inputs, so only the hashes are compared.
     let hashes =
         |of: &Plan| (of.environment_hash.clone(), of.occluders.iter().map(|k| k.hash.clone()).collect::<Vec<_>>());
     if !stored.is_complete() || hashes(&stored.plan) != hashes(plan) {
-        return Err(Error::input("are the vectors of something else").in_file(file));
+        return Err(Error::input("holds the vectors of another occluder").in_file(file));
     }
     Ok(Some((stored, known.seconds)))
 }

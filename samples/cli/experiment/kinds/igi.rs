@@ -9,7 +9,7 @@ use lucerna::{
 use serde_json::Value;
 
 use super::{GATHERED, Job, Rendered, Warm, on_device, read};
-use crate::{config, experiment::file::Changes, gbuffer_layers, shown::Shown};
+use crate::{config, experiment::file::Changes, frame_output::FrameOutput, gbuffer_layers};
 
 pub(super) fn settings(paper: bool, changes: &Changes) -> Result<Value> {
     let base = if paper { PictureSettings::paper() } else { PictureSettings::default() };
@@ -18,7 +18,7 @@ pub(super) fn settings(paper: bool, changes: &Changes) -> Result<Value> {
     config::to_value(&settings)
 }
 
-/// What is kept of a scene, for one way to trace rays.
+/// The technique's data for a scene, for one choice of ray tracing.
 struct Kept {
     resident: Resident,
     igi: Igi,
@@ -28,14 +28,14 @@ struct Kept {
 pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
     let settings: PictureSettings = read(job.settings)?;
     let (scene, pose) = (warm.scene, warm.pose);
-    // Boxes and rays of another kind need trees of their own.
+    // Imperfect visibility and other choices of ray tracing need other acceleration structures.
     let name = if settings.igi.imperfect { "igi, imperfect" } else { "igi" };
     let name = match settings.igi.visibility {
         Visibility::Auto => name,
         _ => "igi, chosen rays",
     };
     if name == "igi, chosen rays" {
-        // Not kept: the next one may choose others.
+        // The data is not kept, because the next variant may choose another kind of ray tracing.
         warm.forget(name);
     }
     let Kept { resident, igi, runner } = warm.keep(name, |gpu, scene, _| {
@@ -48,13 +48,13 @@ pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rende
         let view = job.view.fit_far(&handles.bounds());
         let picture = igi.picture(graph, scene, pose, &handles, &view, &settings)?;
         let out = picture.outputs;
-        let mut shown = Shown::new(out.total).color("direct", out.direct).color("indirect", out.indirect);
+        let mut output = FrameOutput::new(out.total).color("direct", out.direct).color("indirect", out.indirect);
         if let Some(sharp) = out.sharp {
-            shown = shown.color("specular", sharp);
+            output = output.color("specular", sharp);
         }
         if settings.igi.indirect && settings.igi.visibility != Visibility::Raster {
-            shown = shown.sum(GATHERED, out.gathered, |pixel| pixel[3]);
+            output = output.sum(GATHERED, out.gathered, |pixel| pixel[3]);
         }
-        Ok(gbuffer_layers::add(shown, &picture.gbuffer, &view))
+        Ok(gbuffer_layers::add(output, &picture.gbuffer, &view))
     })
 }

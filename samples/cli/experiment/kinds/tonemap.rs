@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::{Job, Rendered, Times, Warm, isr_picture, on_device, read};
-use crate::{config, experiment::file::Changes, shown::Shown};
+use crate::{config, experiment::file::Changes, frame_output::FrameOutput};
 
 /// Settings of both kinds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -32,15 +32,15 @@ pub(super) fn settings(_paper: bool, changes: &Changes) -> Result<Value> {
     config::to_value(&settings)
 }
 
-/// A linear picture in main memory and on the device.
+/// A linear picture in host memory and on the device.
 struct Source {
-    /// The view that was rendered; null for a picture.
+    /// The rendered view; null for a picture.
     of: Value,
     pixels: Vec<[f32; 4]>,
     image: OwnedImage,
 }
 
-/// What both kinds keep for a scene.
+/// The data of both kinds for a scene.
 struct Kept {
     runner: Runner,
     source: Option<Source>,
@@ -89,10 +89,10 @@ pub(super) fn on_gpu(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Render
     let rendered = on_device(runner, job, "tonemap", |graph| {
         let picture = graph.import_image(&source.image);
         let out = tonemap.frame(graph, picture, None)?;
-        let shown = Shown::new(out.mapped).layer("luminance", &["Y"], out.luminance, |pixel| pixel);
+        let output = FrameOutput::new(out.mapped).layer("luminance", &["Y"], out.luminance, |pixel| pixel);
         Ok(match out.important {
-            Some(map) => shown.layer("important", &["Y"], map, |pixel| pixel),
-            None => shown,
+            Some(map) => output.layer("important", &["Y"], map, |pixel| pixel),
+            None => output,
         })
     })?;
     Ok(rendered.map(|rendered| Rendered { layers: precise(rendered.layers), ..rendered }))
@@ -110,7 +110,7 @@ pub(super) fn on_cpu(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Render
     Ok(Some(Rendered { layers, times }))
 }
 
-/// Differences of a hundredth of a percent are looked at: 16 bits do not hold them.
+/// Stores all layers in 32 bits, because the analysis needs differences of a hundredth of a percent.
 fn precise(mut layers: Layers) -> Layers {
     layers.layers.iter_mut().for_each(|layer| layer.precision = Precision::Full);
     layers

@@ -57,7 +57,7 @@ const FIGURES: &[(&str, &str, &str)] = &[
 pub(super) fn figures(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("Figures 18 to 27: images");
     section.text(
-        "Views named *ground* are those that errors are measured in: from straight above, without what stands on it. The difference of two \
+        "Errors are measured in the views named *ground*: from straight above, without the objects on it. The difference of two \
          images is shown by `D`, amplified by `G`.",
     );
     for (caption, scene, view) in FIGURES {

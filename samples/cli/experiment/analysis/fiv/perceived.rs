@@ -1,4 +1,4 @@
-//! Tables 17 and 18: what is seen of the errors before and after tone mapping.
+//! Tables 17 and 18: visibility of the errors before and after tone mapping.
 
 use lucerna::{
     Result,
@@ -13,9 +13,9 @@ use crate::{
     report::{Section, Table},
 };
 
-/// What the brightest of a picture becomes on the screen, but for one pixel in a hundred.
+/// Screen value to which the 99th percentile of a picture is mapped.
 const BRIGHT: f64 = 0.9;
-/// Luminance that the log-average becomes for an operator that works in cd/m².
+/// Luminance to which the log-average is scaled for an operator that works in cd/m².
 const GREY: f32 = 18.0;
 
 /// Five of 255 steps to the screen's white.
@@ -24,13 +24,13 @@ const CODES: f64 = 5.0 / 255.0;
 pub(super) fn tables(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("Tables 17 and 18: before and after tone mapping");
     section.text(
-        "Share of pixels whose difference to brute force is seen (VDP, an observer who does not know what to look for, p > 0.75), of the \
-         ground without what stands on it, as in the thesis: before tone mapping at an exposure at which the picture spans \
-         the screen, and after Ashikhmin's local operator. The thesis names neither the program that computed its VDP nor its settings. \
-         *Differ* is the share of pixels that differ before tone mapping by more than 5/255 of the screen's white. The measure marks more than \
-         that: for 32×17×15 samples in 96×96 under one point light 44 % where 6.6 % differ by 1/255, 25 % where each pixel is shown as 5×5. Its settings \
-         move that between 38 % (p > 0.95) and 72 % (masking of a practised observer); a white of 40 or 300 cd/m², or a fourth of the pixels in a degree, by \
-         a tenth. For 64×33×30 under one area light: 5.8 %, between 3.9 % and 14 %, where 0.9 % differ. No setting gives the thesis' 0.2 %.",
+        "Share of pixels with a visible difference to brute force (VDP for an inexperienced observer, p > 0.75), for the ground without the objects on \
+         it, as in the thesis: before tone mapping, at an exposure at which the picture spans the screen's range, and after Ashikhmin's local \
+         operator. The thesis names neither the program that computed its VDP nor its settings. *Differ* is the share of pixels that differ before \
+         tone mapping by more than 5/255 of the screen's white. VDP marks more pixels. For 32×17×15 samples in 96×96 under one point light it marks \
+         44 %, although 6.6 % differ by 1/255; it marks 25 % if each pixel is shown as 5×5. Its settings change this value to between 38 % (p > 0.95) and \
+         72 % (masking of a practised observer); a white of 40 or 300 cd/m², or a fourth of the pixels per degree, changes it by a tenth. For \
+         64×33×30 under one area light it marks 5.8 %, or 3.9 % to 14 % with other settings, although 0.9 % differ. No setting gives the thesis' 0.2 %.",
     );
     let columns = ["samples", "before (thesis)", "before", "after (thesis)", "after", "differ"];
     let mut table =
@@ -63,7 +63,7 @@ fn seen(lab: &Lab<'_>, scene: &str, technique: &str) -> Result<Option<[f64; 3]>>
     let picture = |run: &Done| lab.results.picture(Layer(run, ""));
     let open = lab.open(truth)?;
     let (truth, mut test) = (picture(truth)?, picture(run)?);
-    // What is never seen is no difference.
+    // Pixels that are never visible do not count as different.
     for (i, _) in open.iter().flatten().enumerate().filter(|(_, open)| !**open) {
         test.pixels[i] = truth.pixels[i];
     }

@@ -1,16 +1,16 @@
-//! Why a case has more error than the thesis says, as far as the pictures themselves tell: where the error lies, and what changes it.
+//! Reasons for larger errors than in the thesis, as far as the pictures show them: the location of the error, and settings that change it.
 
 use lucerna::Result;
 
 use super::{DEFAULT, GROUND, Lab, SETS, TRUTH, paper::Case};
 use crate::experiment::results::Layer;
 
-/// The part of the ground that counts as steep: where the reference changes most from pixel to pixel.
+/// Share of the ground that counts as steep: the pixels with the largest change of the reference from pixel to pixel.
 const STEEP: f64 = 0.1;
-/// Ground this close to what is covered counts as touched, of the picture's width.
+/// Maximum distance of touched ground from covered ground, as share of the picture's width.
 const TOUCHED: f64 = 1.0 / 64.0;
 
-/// In words; `technique`: that of the case's row, `ours`: its NRMSE.
+/// The reasons in words. `technique`: the technique of the case's row; `ours`: its NRMSE.
 pub(super) fn of(lab: &Lab<'_>, case: &Case, technique: &str, ours: f64) -> Result<String> {
     let mut parts = Vec::new();
     let beside = |name: &str| lab.nrmse(case.scene, GROUND, name);
@@ -34,21 +34,21 @@ pub(super) fn of(lab: &Lab<'_>, case: &Case, technique: &str, ours: f64) -> Resu
     if let Some([steep, touched, rest]) = shares(lab, case.scene, technique)? {
         let part = 100.0 * STEEP;
         parts.push(format!(
-            "of the squared error {:.0} % lie on the {part:.0} % of the ground where light changes most, {:.0} % next to ground that is covered \
-             (on 1/64 of the width), without which it is {:.3}",
+            "{:.0} % of the squared error is on the {part:.0} % of the ground with the largest change of light, {:.0} % within 1/64 of the width \
+             from covered ground, without which the NRMSE is {:.3}",
             100.0 * steep,
             100.0 * touched,
             ours * rest.sqrt(),
         ));
     }
     if parts.is_empty() {
-        parts.push("nothing else was rendered that would tell why".to_owned());
+        parts.push("there are no other pictures that would show the reason".to_owned());
     }
     Ok(parts.join("; "))
 }
 
-/// The shares of the squared error on the part of the ground where the reference changes most, and on ground next to what is covered;
-/// and the mean squared error without the latter, over that of all.
+/// Shares of the squared error on steep ground and on touched ground, and the ratio of the mean squared error without touched ground to the mean
+/// squared error of all ground.
 fn shares(lab: &Lab<'_>, scene: &str, technique: &str) -> Result<Option<[f64; 3]>> {
     let Some((truth, run)) = lab.run(scene, GROUND, TRUTH).zip(lab.run(scene, GROUND, technique)) else {
         return Ok(None);
@@ -67,7 +67,7 @@ fn shares(lab: &Lab<'_>, scene: &str, technique: &str) -> Result<Option<[f64; 3]
             touched[row * width + x.saturating_sub(near)..row * width + (x + near + 1).min(width)].fill(true);
         }
     }
-    // Change, squared error, next to what is covered.
+    // For each pixel: change of the reference, squared error, whether the ground is touched.
     let mut pixels = Vec::new();
     for i in (0..width * height).filter(|i| is_open(*i)) {
         let (x, y) = (i % width, i / width);

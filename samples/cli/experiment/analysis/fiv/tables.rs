@@ -1,4 +1,4 @@
-//! Errors, cost of precomputing, cost of a frame.
+//! Tables of errors, of the time of precomputation, and of the time of a frame.
 
 use lucerna::Result;
 
@@ -12,12 +12,12 @@ const MEGABYTE: f64 = (1 << 20) as f64;
 pub(super) fn errors(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("Figures 18 to 23: errors against brute force");
     section.text(
-        "NRMSE (eq. 17): for each channel the root of the mean squared difference of irradiance over the range of the reference, the mean of \
-         the three channels; over the ground seen from straight above without what stands on it, as the thesis' shadow images are; ground that \
-         a thing covers from closer than a tenth of its radius or that lies inside of it is left out, for it is never seen. The \
-         reference casts a shadow ray from every pixel to every texel of the environment that is not black. *Unshadowed* is the error \
-         of leaving shadows out. The thesis says neither its views nor, but for figure 19, which environment was used; where its \
-         Eucalyptus Grove is not at hand, a grove made by code and a photographed forest stand in.",
+        "NRMSE (eq. 17): for each channel, the root mean square difference of irradiance divided by the range of the reference; then the mean of \
+         the three channels. It is computed on the ground seen from straight above without the objects on it, like the thesis' shadow images. Ground \
+         that is closer below an object than a tenth of its radius, or inside of it, is never visible and does not count. The reference casts a \
+         shadow ray from every pixel to every texel of the environment that is not black. *Unshadowed* is the error without shadows. The thesis does \
+         not state its views, and it states the environment for figure 19 only. If its Eucalyptus Grove is not available, a procedural grove and a \
+         photographed forest replace it.",
     );
     let columns = [
         "figure",
@@ -107,7 +107,7 @@ pub(super) fn precompute(lab: &Lab<'_>) -> Result<Section> {
 pub(super) fn frames(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("Table 3: time of a frame for 1 to 60 things");
     section.text(
-        "Frames a second of the illumination alone, as in the thesis (its passes without the G-buffer and the sky), and of the whole frame. The \
+        "Frames per second of the illumination only, as in the thesis (its passes without the G-buffer and the sky), and of the whole frame. The \
          thesis had a GeForce 8800 GTS.",
     );
     let columns = [
@@ -151,12 +151,12 @@ pub(super) fn frames(lab: &Lab<'_>) -> Result<Section> {
     Ok(section)
 }
 
-/// What the cost does not depend on.
+/// Independence of the time from vertices and lights.
 pub(super) fn independence(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("What the cost depends on");
     section.text(
-        "Time of the illumination from straight above the ground, where every pixel is a receiver. The number of vertices and the number of \
-         lights are all that differs within a table.",
+        "Time of the illumination, seen from straight above the ground, where every pixel is a receiver. Within a table only the number of vertices \
+         or the number of lights differs.",
     );
     let columns = ["things", "vertices", "illumination (ms)", "over the fastest"];
     let mut table = Table::new("vertices", lab.caption("Ten things of 2,000 to 36,000 vertices each"), columns).timed();
@@ -192,8 +192,8 @@ pub(super) fn independence(lab: &Lab<'_>) -> Result<Section> {
 pub(super) fn online(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("Without computing beforehand");
     section.text(
-        "The thesis' future work: vectors computed in each frame, where pixels look them up. Times are those of the illumination; where a \
-         scene stands still each of its frames costs as much, for nothing is kept.",
+        "The thesis' future work: each frame computes the vectors that its pixels look up. Times are for the illumination. Frames of a resting scene \
+         cost the same, because no vectors are kept.",
     );
     let columns =
         ["scene", "view", "online (ms)", "vectors (ms)", "computing all vectors (s)", "NRMSE", "NRMSE of vectors"];
@@ -220,8 +220,9 @@ pub(super) fn online(lab: &Lab<'_>) -> Result<Section> {
 /// Table 4.
 pub(super) fn methods(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("Table 4: other methods");
-    section
-        .text("As the thesis has them, with ours in the last row. Times of other machines are no measure of methods.");
+    section.text(
+        "The figures of the thesis, with ours in the last row. Times on different machines do not compare methods.",
+    );
     let columns = ["method", "environment's frequencies", "what may move", "memory", "frames a second"];
     let mut table = Table::new("table-4", lab.caption("Table 4"), columns).timed();
     for row in paper::TABLE_4 {

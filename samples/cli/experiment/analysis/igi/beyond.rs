@@ -1,7 +1,7 @@
-//! What came after Marques and Santos: each idea beside what it is meant to improve on.
+//! Ideas after Marques and Santos, each compared with the technique that it improves.
 //!
-//! Techniques are known by their names: the table `beside` of the experiment's parameters names pairs of them; `all` and `picked` have a matrix of
-//! `igi.vpls`; `mirrors` and `mirrors, cache` have specular surfaces.
+//! The analysis finds techniques by their names. The table `beside` of the experiment's parameters names pairs of techniques. `all` and `picked`
+//! have a matrix of `igi.vpls`. `mirrors` and `mirrors, cache` have specular surfaces.
 
 use lucerna::{Result, measure::Measure};
 
@@ -11,16 +11,16 @@ use crate::{
     report::{Axis, Plot, Section, Table},
 };
 
-/// Techniques that have a section of their own.
+/// Techniques with their own sections.
 pub(super) const OWN: [&str; 4] = [ALL, PICKED, MIRRORS, CACHE];
-/// Those of many virtual lights.
+/// Techniques of the section on many virtual lights.
 pub(super) const MANY: [&str; 2] = [ALL, PICKED];
 const ALL: &str = "all";
 const PICKED: &str = "picked";
 const MIRRORS: &str = "mirrors";
 const CACHE: &str = "mirrors, cache";
 
-/// Of the variants by name: the one with the number of virtual lights that all have.
+/// A run by the name of its technique. Of the exact variants, the run with the usual number of virtual lights.
 fn run<'a>(results: &'a Results, view: (&'a str, &'a str), method: &str) -> Option<&'a Done> {
     match method {
         super::EXACT | super::EXACT_SPECULAR => super::counted(results, view, method),
@@ -33,19 +33,19 @@ fn error(results: &Results, truth: &Done, layer: &'static str, run: &Done) -> Re
     Ok(values.first().copied())
 }
 
-/// A ratio that is a number.
+/// The ratio, if it is finite.
 fn over(a: Option<f64>, b: Option<f64>) -> Option<f64> {
     a.zip(b).map(|(a, b)| a / b).filter(|ratio| ratio.is_finite())
 }
 
-/// What each idea buys.
+/// Errors and times of each idea, relative to the technique that it improves.
 pub(super) fn successors(results: &Results) -> Result<Section> {
     let mut section = Section::new("What the ideas after the paper buy");
     section.text(
-        "Each beside what it improves on. *Error*: relative mean squared error of the indirect light against the path tracer, over that of the \
-         other; below 1 is better. *Time*: of the stages indirect and filters (gathering, refinement, light put back, despeckling, smoothing, \
-         upsampling), and of the whole frame, over the other's. *Light*: mean of the indirect light \
-         over the reference's, of the other and of the idea.",
+        "Each idea is compared with the technique in the column *beside*. *Error*: ratio of their relative mean squared errors of the indirect light \
+         against the path tracer; below 1 is better. *Time*: ratio of their times for the stages indirect and filters (gathering, refinement, \
+         compensation, despeckling, smoothing, upsampling), and for the whole frame. *Light*: mean of the indirect light over the reference's mean, \
+         before and with the idea.",
     );
     let columns = ["scene", "idea", "beside", "error", "light before", "light"];
     let mut errors = Table::new("successors", "Errors", columns);
@@ -81,8 +81,9 @@ pub(super) fn successors(results: &Results) -> Result<Section> {
 pub(super) fn many(results: &Results) -> Result<Section> {
     let mut section = Section::new("Many virtual lights");
     section.text(
-        "*All*: a shadow ray to each. *Picked*: a fixed number of picks in each pixel, by a tree over the virtual lights. Both against the path tracer \
-         (relative mean squared error of the indirect light), no downsampling or interleaving. *Exponent*: of the growth of the time since the row above; 1 is linear.",
+        "*All*: a shadow ray to each virtual light. *Picked*: a fixed number of picks per pixel from the light tree. Errors are relative mean squared \
+         errors of the indirect light against the path tracer, without downsampling and interleaving. *Exponent*: exponent of the growth in time since \
+         the row above; 1 is linear.",
     );
     let columns = ["scene", "way", "virtual lights", "gathering (ms)", "exponent"];
     let mut times = Table::new("many-times", "Time against the number of virtual lights", columns).timed();
@@ -122,12 +123,12 @@ pub(super) fn many(results: &Results) -> Result<Section> {
     Ok(section)
 }
 
-/// Light behind mirrors and glass, kept in cells.
+/// The irradiance cache for surfaces that mirrors and glass show.
 pub(super) fn cached(results: &Results) -> Result<Section> {
     let mut section = Section::new("Behind mirrors and glass");
     section.text(
-        "What mirrors and glass show gathers from all virtual lights too; kept in cells in space it costs less. Time of the stage *direct and specular* \
-         and of the frame, over those without the cache; errors of the whole picture against that without.",
+        "Surfaces that mirrors and glass show also gather from all virtual lights. The irradiance cache makes this faster. Times of the stage *direct \
+         and specular* and of the frame are relative to the times without the cache; errors are for the whole picture against the picture without it.",
     );
     let columns = ["scene", "direct and specular", "frame"];
     let mut times = Table::new("cache-times", "Time with the cache over time without", columns).timed();

@@ -1,4 +1,4 @@
-//! Rays a second of the stages of a frame.
+//! Rays per second in the stages of a frame.
 
 use lucerna::{
     Result,
@@ -15,19 +15,19 @@ use crate::{
     report::{Cell, Section, Table},
 };
 
-/// Parts whose rays are known, with the heads of their columns.
+/// Parts whose number of rays is known, with the heads of their columns.
 const COLUMNS: [(Part, &str); 5] = [
     (Part::Shooting, "shooting"),
     (Part::Choosing, "choosing"),
     (Part::Direct, "direct"),
     (Part::Gathering, "gathering"),
-    (Part::PutBack, "light put back"),
+    (Part::Compensation, "compensation"),
 ];
 
-/// Rays that each part of [`COLUMNS`] traces at most; `None`: none, or it is not known.
+/// Maximum of rays for each part of [`COLUMNS`]; `None` if the part traces no rays, or their number is not known.
 type Rays = [Option<f64>; COLUMNS.len()];
 
-/// From the settings, the number of pixels, and what shines in the scene.
+/// Maximum of rays, from the settings, the size of the picture, and the direct light's rays per pixel.
 fn at_most(settings: &PictureSettings, [width, height]: [u32; 2], direct_rays: Option<u32>) -> Rays {
     let igi = &settings.igi;
     let pixels = f64::from(width) * f64::from(height);
@@ -38,7 +38,7 @@ fn at_most(settings: &PictureSettings, [width, height]: [u32; 2], direct_rays: O
     let lights = igi.paths() * igi.bounces;
     let each = if igi.picks_from(lights) { igi.texel_picks() } else { lights.div_ceil(igi.interleave.pow(2)) };
     let by_rays = igi.visibility != Visibility::Raster;
-    // A segment and a sample of direct light, and but for the last one a virtual light.
+    // Each segment has a ray, a shadow ray for direct light and, except for the last segment, a shadow ray to a virtual light.
     let back = f64::from(igi.compensation) * (3.0 * bounces - 1.0);
     [
         igi.indirect.then_some(shot * segments),
@@ -49,7 +49,7 @@ fn at_most(settings: &PictureSettings, [width, height]: [u32; 2], direct_rays: O
     ]
 }
 
-/// All settings of a run of this technique; `None`: it is of another kind.
+/// All settings of a run; `None` for a run of another kind.
 fn settings(results: &Results, run: &Done) -> Result<Option<PictureSettings>> {
     let Some(method) = results.experiment.methods.iter().find(|method| method.name == run.method) else {
         return Ok(None);
@@ -61,19 +61,19 @@ fn settings(results: &Results, run: &Done) -> Result<Option<PictureSettings>> {
     Ok(serde_json::from_value(value).ok())
 }
 
-/// Rays, and rays a second.
+/// Numbers of rays, and rays per second.
 pub(super) fn rates(results: &Results) -> Result<Section> {
-    let mut section = Section::new("Rays a second");
+    let mut section = Section::new("Rays per second");
     section.text(
-        "Millions of rays of a frame, from settings, pixels and what shines: *at most* so many, for paths that leave the scene end, and \
-         no ray is traced from the background, to what lies behind the surface, or where no light arrives. *Counted*: as many shadow \
-         rays as the gathering pass did trace. So a rate is at most the one given, but for the counted one, which is exact. Trees of mirrors and \
-         glass and refinement trace more that are not counted; raster has no rays to virtual lights.",
+        "Millions of rays per frame, computed from the settings, the pixels and the light sources. They are an upper limit: paths that leave the scene \
+         end, and no ray is traced from the background, to lights behind the surface, or if no light arrives. The rates therefore are upper limits, too. \
+         *Counted* is the number of shadow rays that the gathering pass has traced, so its rate is exact. The rays of ray trees (mirrors and glass) and of \
+         refinement are not counted; *raster* has no rays to virtual lights.",
     );
     let heads = ["scene", "variant"].into_iter().chain(COLUMNS.map(|column| column.1)).chain(["gathering, counted"]);
     let heads: Vec<&str> = heads.collect();
     let mut counts = Table::new("rays", "Rays of a frame, at most (millions)", heads.clone());
-    let mut rates = Table::new("rays-times", "Rays a second, at most (millions)", heads).timed();
+    let mut rates = Table::new("rays-times", "Rays per second, at most (millions)", heads).timed();
     for view in results.views() {
         for run in results.at(view).filter(|run| !super::beyond::MANY.contains(&run.method.as_str())) {
             let Some(settings) = settings(results, run)? else { continue };

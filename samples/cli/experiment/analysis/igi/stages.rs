@@ -1,4 +1,4 @@
-//! Which stage of the paper's figures a pass of a frame belongs to.
+//! Assignment of the passes of a frame to the stages of the paper's figures.
 
 use lucerna::Result;
 
@@ -11,22 +11,22 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Part {
     Shooting,
-    /// Which of the candidates become virtual lights.
+    /// Importance resampling: the choice of virtual lights among the candidates.
     Choosing,
-    /// Virtual lights in the order of a tree over them.
+    /// Sorting virtual lights and building the light tree.
     Sorting,
     Visible,
     Direct,
-    /// What mirrors and glass show, its light included.
+    /// Ray trees of mirrors and glass, and all light at their surfaces.
     Trees,
     Gathering,
-    /// Gathered once more where the coarse picture has nothing.
+    /// Gathering at full resolution for pixels without a matching coarse texel.
     Refining,
-    /// What the bound takes, by short rays.
-    PutBack,
+    /// Compensation of the bound by short rays.
+    Compensation,
     Filters,
     History,
-    /// The sum, the sky, uploads and what clears memory.
+    /// The sum, the sky, uploads and clears.
     Other,
 }
 
@@ -40,27 +40,27 @@ impl Part {
         match self {
             Self::Shooting | Self::Choosing | Self::Sorting => 0,
             Self::Visible | Self::Direct | Self::Trees => 1,
-            Self::Gathering | Self::Refining | Self::PutBack => 2,
+            Self::Gathering | Self::Refining | Self::Compensation => 2,
             Self::Filters | Self::History => 3,
             Self::Other => 4,
         }
     }
 }
 
-/// Names of passes, whole ones, or with a star beginnings.
+/// Names of passes. A name with a star stands for all names with this beginning.
 const PARTS: &[(Part, &[&str])] = &[
     (Part::Shooting, &["igi.shoot", "fill igi.candidates", "fill igi.paths"]),
     (Part::Choosing, &["igi.points", "igi.importance", "igi.cumulate", "igi.resample", "fill igi.importances"]),
-    (Part::Sorting, &["igi.order_*"]),
+    (Part::Sorting, &["igi.light_tree_*"]),
     (Part::Visible, &["passes.gbuffer*"]),
     (Part::Direct, &["igi.direct", "clear igi.direct"]),
     (
         Part::Trees,
         &[
-            "igi.grow",
-            "igi.reap",
-            "igi.direct_tree",
-            "igi.gather_tree*",
+            "igi.ray_tree_grow",
+            "igi.ray_tree_sum",
+            "igi.ray_tree_direct",
+            "igi.ray_tree_gather*",
             "igi.cache*",
             "igi.near_begin_tree",
             "igi.near_end_tree",
@@ -81,7 +81,7 @@ const PARTS: &[(Part, &[&str])] = &[
         ],
     ),
     (Part::Refining, &["igi.refine*"]),
-    (Part::PutBack, &["igi.near*", "fill igi.near"]),
+    (Part::Compensation, &["igi.near*", "fill igi.near"]),
     (Part::Filters, &["igi.guide", "igi.discontinuity", "igi.smooth", "igi.upsample", "fill igi.unmatched"]),
     (
         Part::History,
@@ -98,8 +98,8 @@ const PARTS: &[(Part, &[&str])] = &[
     (Part::Other, &["igi.compose"]),
 ];
 
-/// Part of a pass by its name, without its number and how its rays are traced; the longest name that fits counts. `None`: nothing is
-/// known of it.
+/// The part of a pass, by its name without its number and its kind of ray tracing. The longest matching name counts. `None`: the pass belongs to
+/// no part.
 fn part_of(name: &str) -> Option<Part> {
     let name = name.split('#').next().unwrap_or(name);
     let name = name.strip_suffix(" (ray query)").unwrap_or(name);
@@ -115,20 +115,20 @@ fn part_of(name: &str) -> Option<Part> {
 /// Milliseconds of a frame by its parts.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Spent {
-    /// Of the whole frame; `None`: nothing was measured.
+    /// Time of the whole frame; `None` if it was not measured.
     pub frame: Option<f64>,
     parts: Vec<(Part, f64)>,
 }
 
 impl Spent {
-    /// From passes in the order in which they ran. Passes that serve both the picture and what mirrors show belong to that for
-    /// which they were begun.
+    /// Sums the times of passes, given in the order in which they ran. Passes of short paths belong to the part that has started the paths: the
+    /// visible surfaces, or the ray trees.
     fn of<'a>(frame: Option<f64>, passes: impl IntoIterator<Item = (&'a str, f64)>) -> Self {
         let (mut parts, mut in_trees) = (Vec::<(Part, f64)>::new(), false);
         for (name, ms) in passes {
             let mut part = part_of(name).unwrap_or(Part::Other);
             in_trees |= name.starts_with("igi.near_begin_tree");
-            if in_trees && part == Part::PutBack {
+            if in_trees && part == Part::Compensation {
                 part = Part::Trees;
             }
             in_trees &= !name.starts_with("igi.near_end_tree");
@@ -140,17 +140,17 @@ impl Spent {
         Self { frame, parts }
     }
 
-    /// Of some parts. (The sum of no numbers is −0, which a table would show.)
+    /// Sum over some parts. (The sum of an empty list is −0, which a table would show.)
     fn sum(&self, of: impl Fn(Part) -> bool) -> f64 {
         self.parts.iter().filter(|(part, _)| of(*part)).fold(0.0, |sum, (_, ms)| sum + ms)
     }
 
-    /// Of one part.
+    /// Time of a part.
     pub fn part(&self, part: Part) -> f64 {
         self.sum(|known| known == part)
     }
 
-    /// Of one of [`STAGES`].
+    /// Time of one of [`STAGES`].
     fn stage(&self, stage: usize) -> f64 {
         self.sum(|part| part.stage() == stage)
     }
@@ -165,19 +165,19 @@ impl Spent {
         self.stage(2)
     }
 
-    /// Gathering with all that it needs to become a picture: refinement, what is put back, filters.
+    /// The time from gathering to the irradiance of every pixel: gathering, refinement, compensation, filters.
     pub fn gathering_and_filters(&self) -> f64 {
         self.stage(2) + self.stage(3)
     }
 
-    /// Percent of the time of all passes, for [`STAGES`]; they add up to 100.
+    /// Percentages of [`STAGES`] of the time of all passes; their sum is 100.
     pub fn shares(&self) -> [Cell; STAGES.len()] {
         let all = self.sum(|_| true);
         std::array::from_fn(|stage| (all > 0.0).then(|| 100.0 * self.stage(stage) / all).into())
     }
 }
 
-/// What a run spent its time on.
+/// The time of a run by parts.
 pub(super) fn spent(results: &Results, run: &Done) -> Result<Spent> {
     let times = results.times(run)?;
     Ok(Spent::of(times.frame(), times.passes.iter().map(|(name, ms)| (name.as_str(), *ms))))
@@ -199,9 +199,9 @@ mod tests {
         for (name, part) in [
             ("igi.gather#3", Part::Gathering),
             ("igi.gather (ray query)#3", Part::Gathering),
-            ("igi.gather_tree#3", Part::Trees),
-            ("igi.gather_tree_picks", Part::Trees),
-            ("igi.direct_tree", Part::Trees),
+            ("igi.ray_tree_gather#3", Part::Trees),
+            ("igi.ray_tree_gather_picks", Part::Trees),
+            ("igi.ray_tree_direct", Part::Trees),
             ("igi.raster#12", Part::Gathering),
             ("igi.raster_cutout#12", Part::Gathering),
             ("igi.refine#2", Part::Refining),
@@ -232,7 +232,7 @@ mod tests {
             ("passes.skybox", 11.0),
         ];
         let spent = Spent::of(Some(70.0), passes);
-        assert_eq!(spent.part(Part::PutBack), 15.0);
+        assert_eq!(spent.part(Part::Compensation), 15.0);
         assert_eq!(spent.direct(), 18.0);
         assert_eq!(spent.indirect(), 25.0);
         assert_eq!(spent.gathering_and_filters(), 34.0);

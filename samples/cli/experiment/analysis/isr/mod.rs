@@ -1,4 +1,4 @@
-//! The experiment of the dissertation on image-space radiosity (chapter 5): table 2 and figures 5.6 to 5.10, and what lies beyond.
+//! The experiment of the dissertation on image-space radiosity (chapter 5): table 2, figures 5.6 to 5.10, and settings beyond the dissertation.
 
 mod page;
 mod rows;
@@ -16,12 +16,12 @@ use crate::{
     report::Page,
 };
 
-/// The technique that the figures are about.
+/// The technique of the figures.
 const JUDGED: &str = "lit";
 /// Largest number of triangles of a simple scene.
 const SIMPLE: usize = 25_000;
 
-/// All rows of one label.
+/// All rows with the same label.
 struct Labelled {
     label: String,
     rows: Vec<Row>,
@@ -40,16 +40,16 @@ pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
     page::fill(results, page, &all)
 }
 
-/// Compares a picture and its direct light with the reference; `None` where there is no reference of the view.
+/// Compares a picture and its direct light with the reference; `None` if the view has no reference.
 fn row(results: &Results, run: &Done) -> Result<Option<Row>> {
     let bounces = run.method == "bounces";
     let Some(truth) = results.beside(run, if bounces { "path-3" } else { "path" }) else { return Ok(None) };
     let (total, direct) = (Layer(run, ""), Layer(run, "direct"));
-    // Pictures of the dissertation's light law have units of their own: one factor a view, from direct light alone.
+    // The dissertation's light law has other units. One factor per view, from direct light, converts them.
     let own_law = results.experiment.methods.iter().any(|method| method.name == run.method && method.paper);
     let reference = results.picture(Layer(truth, ""))?.pixels;
     let bounced = results.picture(Layer(truth, "indirect"))?.pixels;
-    // What shines itself is direct light here, as in the pictures under test.
+    // Emission counts as direct light, as in the pictures under test.
     let reference_direct: Vec<[f32; 3]> =
         reference.iter().zip(&bounced).map(|(all, indirect)| [0, 1, 2].map(|c| all[c] - indirect[c])).collect();
     let shown = results.picture(total)?;

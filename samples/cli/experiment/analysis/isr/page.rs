@@ -38,15 +38,15 @@ fn of(rows: &[Row], value: impl Fn(&Row) -> f64) -> Option<Spread> {
     Spread::of(rows.iter().map(value))
 }
 
-/// Everything that the dissertation states in numbers.
+/// The dissertation's figures, compared with ours.
 pub(super) fn figures(lit: &[Row], albedo: &[Row], weaker: &[Row]) -> Section {
     let mut section = Section::new("The dissertation's figures");
     section.text(
-        "Gain is the percentage of the mean absolute error of direct light (equation 19, all pixels and channels) that is gone \
-         with image-space radiosity. It is taken of linear radiance unless stated; *8 bits* are sRGB codes at the exposure that \
-         brings the 95th percentile of the reference to 0.8, which is nearer to how the dissertation compared images. The \
-         sender `lit` is the direct light that a surface reflects; `albedo` stands for all of the dissertation's choices, with one \
-         brightness factor a view so that its direct light has the reference's mean.",
+        "Gain is the reduction of the mean absolute error of direct light by image-space radiosity, in percent (equation 19, all \
+         pixels and channels). Errors are for linear radiance unless stated. *8 bits*: errors for sRGB codes, at the exposure that \
+         maps the 95th percentile of the reference to 0.8; this is closer to the dissertation's comparison. The sender `lit` is the \
+         direct light that a surface reflects; `albedo` has all of the dissertation's choices, with one brightness factor per view, so \
+         that its direct light has the reference's mean.",
     );
     let select =
         |rows: &[Row], complex: bool| rows.iter().filter(|r| r.complex == complex).cloned().collect::<Vec<_>>();
@@ -99,14 +99,13 @@ pub(super) fn figures(lit: &[Row], albedo: &[Row], weaker: &[Row]) -> Section {
         mended += usize::from(same.is_some_and(|other| other.correlation_gain() >= row.correlation_gain()));
     }
     section.text(
-        "A pixel is *improved* if its error is smaller than before; black background and what no indirect light reaches stay as \
-         they are and do not count as improved. Where direct light is already brighter than the reference by noise or by a texture \
-         that one of the two filters, any light makes it worse: so the indirect light alone is also held against the \
-         reference's.",
+        "A pixel is *improved* if indirect light makes its error smaller. Black background and surfaces without indirect light do not \
+         change, and do not count as improved. If noise or texture filtering makes direct light brighter than the reference, any \
+         indirect light increases the error. Therefore the indirect light itself is also compared with the reference's indirect light.",
     );
     section.text(format!(
-        "With the dissertation's choices the correlation falls on {worse} of {} views; with k_ISR = 0.1 instead of 0.5, as the \
-         dissertation repairs such views, it is better than with 0.5 on {mended} of these.",
+        "With the dissertation's choices the correlation falls on {worse} of {} views. On {mended} of these views it is better with \
+         k_ISR = 0.1, the dissertation's remedy for such views, than with 0.5.",
         albedo.len()
     ));
     section
@@ -116,8 +115,8 @@ pub(super) fn figures(lit: &[Row], albedo: &[Row], weaker: &[Row]) -> Section {
 fn cost(results: &Results) -> Result<Section> {
     let mut section = Section::new("Cost");
     section.text(
-        "Times on the device named at the end of the page; the dissertation's are of a Radeon HD 4870 at 1024 × 768 and of a \
-         quad-core processor. Only ratios between rows of one device mean something.",
+        "Our times are for the device named at the end of the page; the dissertation's times are for a Radeon HD 4870 at 1024 × 768 and for \
+         a quad-core processor. Only ratios between rows of one device are comparable.",
     );
     let mut frames = (Vec::new(), Vec::new(), Vec::new());
     for run in results.of(JUDGED) {
@@ -163,7 +162,7 @@ fn cost(results: &Results) -> Result<Section> {
     Ok(section)
 }
 
-/// What image-space radiosity adds to direct light: everything of its own but G-buffer, shadow maps and direct light.
+/// Time of image-space radiosity without G-buffer, shadow maps and direct light.
 fn gathering(times: &crate::experiment::kinds::Times) -> f64 {
     let own = |name: &str| {
         let last = name.rsplit('/').next().unwrap_or(name);
@@ -174,7 +173,7 @@ fn gathering(times: &crate::experiment::kinds::Times) -> f64 {
 
 fn views(lit: &[Row], albedo: &[Row]) -> Section {
     let mut section = Section::new("View by view");
-    section.text("Simple scenes first, then complex ones; rest the mouse on a dot for its name.");
+    section.text("Simple scenes come first, then complex scenes. Hover over a dot to see its name.");
     let mut order: Vec<&Row> = lit.iter().collect();
     order.sort_by_key(|row| row.complex);
     let simple = order.iter().filter(|row| !row.complex).count() as f64 - 0.5;
@@ -218,7 +217,7 @@ const COLUMNS: [&str; 9] = [
     "light found",
 ];
 
-/// Percent of the pixels of all views.
+/// Percentage of the pixels of all views.
 fn share(rows: &[Row], of: impl Fn(&Row) -> usize) -> Option<f64> {
     let sum = |of: &dyn Fn(&Row) -> usize| rows.iter().map(of).sum::<usize>() as f64;
     (!rows.is_empty()).then(|| 100.0 * sum(&of) / sum(&|row| row.pixels))
@@ -241,7 +240,9 @@ fn summary(rows: &[Row]) -> Vec<Cell> {
 
 fn scenes(lit: &[Row]) -> Section {
     let mut section = Section::new("Scene by scene");
-    section.text("*Light found* is the mean of the indirect light over the reference's, median over views.");
+    section.text(
+        "*Light found* is the ratio of the means of the indirect light, ours over the reference's; median over views.",
+    );
     let mut table = Table::new("scenes", "Sender `lit`", ["scene"].into_iter().chain(COLUMNS));
     let mut names: Vec<&str> = Vec::new();
     for row in lit.iter().filter(|row| !names.contains(&row.scene.as_str())).collect::<Vec<_>>() {
@@ -261,9 +262,9 @@ fn scenes(lit: &[Row]) -> Section {
 fn small_gains(lit: &[Row]) -> Section {
     let mut section = Section::new("Where it gains least");
     section.text(
-        "What the error that is left consists of: *direct*, that of direct light against the reference's direct light, which no \
-         indirect light can mend; *missing* and *excess*, indirect light that was not found and that is not in the reference, \
-         over blocks of 8 × 8 pixels; *fine*, the rest, which is the reference's noise, and detail. *Why* names the largest.",
+        "Parts of the remaining error. *Direct*: the error of direct light, which indirect light cannot correct. *Missing* and *excess*: too \
+         little and too much indirect light, as means over blocks of 8 × 8 pixels. *Fine*: the rest, which is noise of the reference and detail. \
+         *Why* names the largest part.",
     );
     let mut order: Vec<&Row> = lit.iter().collect();
     order.sort_by(|a, b| a.gain().total_cmp(&b.gain()));
@@ -289,12 +290,12 @@ fn small_gains(lit: &[Row]) -> Section {
     section
 }
 
-/// Options and presets: cost and error on the views that all of them were rendered for.
+/// Options and presets: time and error on the views that all of them have.
 fn beyond(results: &Results, all: &[Labelled]) -> Result<Section> {
     let mut section = Section::new("Beyond the dissertation");
     section.text(
-        "Its future work (chapter 6), one thing at a time, and the presets of `isr render --preset`, on the views that all of them \
-         were rendered for. `bounces` is compared with a reference of three bounces, everything else with one.",
+        "The ideas of the dissertation's future work (chapter 6), one at a time, and the presets of `isr render --preset`. The table has the \
+         views that all of them rendered. `bounces` is compared with a reference of three bounces, all others with one bounce.",
     );
     let options = ["full", "by-depth", "layers", "border", "cameras", "bounces", "fast", "balanced", "best"];
     let common = |row: &Row| {
@@ -327,7 +328,7 @@ fn beyond(results: &Results, all: &[Labelled]) -> Result<Section> {
     Ok(section)
 }
 
-/// Against POV-Ray, where it is installed: with the dissertation's settings, and without its factor on gathered light.
+/// Comparison with POV-Ray, if it is installed: with the dissertation's settings, and without its factor on gathered light.
 fn povray(results: &Results, lit: &[Row]) -> Result<Option<Section>> {
     use lucerna::measure::Measure::{Gain, Mae, Pearson};
     let columns = [
@@ -376,9 +377,9 @@ fn povray(results: &Results, lit: &[Row]) -> Result<Option<Section>> {
     let mut section = Section::new("Against POV-Ray");
     section.text(
         "POV-Ray with the dissertation's radiosity settings (table 1). Their `brightness` of 2.4 multiplies gathered light at every \
-         bounce: such pictures are brighter than light makes them (the last column), and a method that finds too little indirect light \
-         or too much seems better or worse than it is. With a brightness of 1 the picture keeps the energy. It gathers two bounces \
-         as `recursion_limit` counts them.",
+         bounce. Such pictures are brighter than physically correct ones (the last column), so the gain of a method depends on whether it \
+         finds too much or too little indirect light. A brightness of 1 conserves energy. POV-Ray gathers two bounces, as its \
+         `recursion_limit` counts them.",
     );
     let mut summary =
         Table::new("povray-gain", "Gain against POV-Ray", ["brightness", "views", "median (%)", "positive (%)"]);

@@ -1,4 +1,4 @@
-//! One row a view and technique, and what the rows say together. Nothing here knows where the numbers come from.
+//! Rows of errors, one for each view and technique, and statistics over rows. This module does not know the source of the numbers.
 
 /// Errors of direct light alone and of a technique on one view, against one reference.
 #[derive(Clone, Debug, PartialEq)]
@@ -7,48 +7,48 @@ pub struct Row {
     pub view: String,
     /// More than 25,000 triangles.
     pub complex: bool,
-    /// Mean absolute error over pixels and channels (equation 19), linear radiance, W/(sr·m²).
+    /// Mean absolute error over pixels and channels [ISR 19], linear radiance, W/(sr·m²).
     pub direct: f64,
     pub technique: f64,
-    /// The same of 8-bit sRGB codes at the exposure that shows the reference.
+    /// The same error for 8-bit sRGB codes, at an exposure that fits the reference.
     pub direct_codes: f64,
     pub technique_codes: f64,
     /// Pearson's correlation with the reference.
     pub direct_correlation: f64,
     pub correlation: f64,
-    /// Pixels whose error the technique makes smaller, and larger; the rest is as it was.
+    /// Number of pixels whose error the technique makes smaller, and larger; the others do not change.
     pub better: usize,
     pub worse: usize,
     pub pixels: usize,
-    /// Share of the reference's indirect light that the technique finds, as means over the picture.
+    /// Ratio of the means of the indirect light, technique over reference.
     pub found: f64,
-    /// Pixels where the indirect light alone is nearer to the reference's than none is, where it is farther, and where the reference
-    /// has any.
+    /// Number of pixels where the indirect light is nearer to the reference's than zero is, where it is farther, and where the reference
+    /// has indirect light.
     pub indirect_better: usize,
     pub indirect_worse: usize,
     pub reached: usize,
-    /// What the error that is left consists of.
+    /// Parts of the remaining error.
     pub parts: Parts,
 }
 
-/// What an error that is left consists of, sums of |·| over pixels and channels.
+/// Parts of the remaining error: sums of absolute values over pixels and channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Parts {
-    /// Of direct light against the reference's direct light: no indirect light can mend it (shadow maps, filtered textures).
+    /// Error of the direct light, which indirect light cannot correct (shadow maps, filtered textures).
     pub direct: f64,
-    /// Indirect light of the reference that was not found, and light where the reference has less, as means over blocks of pixels, so
-    /// that the reference's noise averages out.
+    /// Missing and excess indirect light compared with the reference, as means over blocks of pixels, so that the reference's noise averages
+    /// out.
     pub missing: f64,
     pub excess: f64,
-    /// What is left of the indirect light's error within blocks: the reference's noise, and detail.
+    /// The rest of the indirect light's error, within blocks: the reference's noise, and detail.
     pub fine: f64,
 }
 
-/// Sides of the blocks, pixels.
+/// Side of the blocks, pixels.
 const BLOCK: usize = 8;
 
 impl Parts {
-    /// Of pictures `width` wide, row by row.
+    /// The parts for pictures of `width` pixels per row.
     pub fn of(
         width: usize,
         direct: (&[[f32; 3]], &[[f32; 3]]),
@@ -84,7 +84,7 @@ impl Parts {
     }
 }
 
-/// Percent of an error that is gone. NaN where there was none.
+/// Reduction of an error in percent. NaN if the error was 0.
 pub fn gain(before: f64, after: f64) -> f64 {
     if before > 0.0 { 100.0 * (before - after) / before } else { f64::NAN }
 }
@@ -104,10 +104,10 @@ impl Row {
         self.correlation - self.direct_correlation
     }
 
-    /// What most of the error that is left is; empty where little of it is left.
+    /// The main part of the remaining error, in words; empty if the remaining error is small.
     pub fn reason(&self) -> &'static str {
         if !self.gain().is_finite() {
-            return "direct light alone has no error";
+            return "direct light has no error";
         }
         if self.gain() > 20.0 {
             return "";
@@ -126,21 +126,21 @@ impl Row {
     }
 }
 
-/// Means and ends over a list.
+/// Statistics over a list.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
     pub count: usize,
     pub mean: f64,
-    /// Of an even number the mean of the middle two.
+    /// For an even number of values, the mean of the two middle values.
     pub median: f64,
     pub least: f64,
     pub most: f64,
-    /// Percent above zero.
+    /// Percentage of values above zero.
     pub positive: f64,
 }
 
 impl Spread {
-    /// Of the finite values; `None` if there are none.
+    /// Statistics over the finite values; `None` if there are none.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut list: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
         list.sort_by(f64::total_cmp);
@@ -153,14 +153,14 @@ impl Spread {
     }
 }
 
-/// Percent of all pixels of all views that are nearer to the reference, and that are farther.
+/// Percentages of all pixels of all views that become nearer to the reference, and farther from it.
 pub fn improved(rows: &[Row]) -> (f64, f64) {
     let sum = |of: fn(&Row) -> usize| rows.iter().map(of).sum::<usize>() as f64;
     let all = sum(|row| row.pixels);
     (100.0 * sum(|row| row.better) / all, 100.0 * sum(|row| row.worse) / all)
 }
 
-/// Factor that makes the codes of a picture fill an 8-bit image: its 95th percentile of the brightest channel becomes 0.8.
+/// Factor that maps a picture to the range of 8-bit codes: the 95th percentile of the brightest channel becomes 0.8.
 pub fn exposure(pixels: &[[f32; 3]]) -> f32 {
     let mut brightest: Vec<f32> =
         pixels.iter().map(|p| p[0].max(p[1]).max(p[2])).filter(|l| l.is_finite() && *l > 0.0).collect();

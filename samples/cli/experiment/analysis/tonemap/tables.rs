@@ -32,20 +32,20 @@ const TABLES_12_13: [(&str, f64, f64); 2] = [("memorial", 3.28, 2.48), ("desk", 
 const TABLES_14_16: [(&str, f64, f64, f64, f64); 2] =
     [("memorial", 2.41, 3.62, 0.9876, 5.44), ("desk", 2.72, 2.05, 0.9925, 17.66)];
 
-/// Where selection pays today.
+/// The gain of selection, for each way of averaging.
 pub(super) fn payoff(views: &[View<'_>]) -> Result<Section> {
     let mut section = Section::new("Does selection still pay?");
     section.text(
-        "The local operator as it is defined averages every neighbourhood of every pixel anew (*literal*). Then doing it only where it \
-         matters saves what it does not do. Computed along rows and columns (*fast*) the same averages cost so little that there is \
-         less to save, and with large averages from halved pictures (*pyramid*, not quite the same: FLIP against the literal operator) still \
-         less. The first table has the time of local over that of selective tone mapping, both averaging in the same way: above 1 \
-         selection pays.",
+        "By its definition, the local operator averages every neighbourhood of every pixel separately (*literal*). Selection then saves the \
+         time of all unselected pixels. If the averages are computed along rows and columns (*fast*), they cost so little that selection saves \
+         less. If large averages are computed from halved pictures (*pyramid*; the result differs slightly, see FLIP against the literal \
+         operator), it saves even less. The first table has the ratio of the times of local and selective tone mapping with the same kind of \
+         averages. Above 1 selection is faster.",
     );
-    let title = "What selection gains over local tone mapping, by way to average";
+    let title = "Speed of selective over local tone mapping, by kind of averages";
     let columns = ["picture", "important (%)", "literal", "marked by", "fast", "pyramid"];
     let mut gains = Table::new("payoff", title, columns).timed();
-    let title = "Local tone mapping: what a better way to average gains";
+    let title = "Local tone mapping: speed of better averages";
     let columns = ["picture", "literal (ms)", "literal / fast", "literal / pyramid", "FLIP of pyramid"];
     let mut ways = Table::new("payoff-ways", title, columns).timed();
     let mut points = [const { Vec::new() }; 3];
@@ -97,7 +97,7 @@ pub(super) fn payoff(views: &[View<'_>]) -> Result<Section> {
 /// Table 7.
 pub(super) fn agreement(views: &[View<'_>]) -> Result<Section> {
     let mut section = Section::new("Table 7: the device against the CPU");
-    section.text("Errors of display luminance (equations 18 and 19), the slow program on the CPU being the truth.");
+    section.text("Errors of display luminance (equations 18 and 19), against the reference implementation on the CPU.");
     let columns = ["picture", "RMS % (thesis)", "mean % (thesis)", "RMS %", "mean %", "fast: RMS %", "fast: mean %"];
     let mut table = Table::new("table-7", "Table 7", columns);
     for view in views {
@@ -131,8 +131,8 @@ fn rate(ms: Option<f64>) -> Cell {
 pub(super) fn frames(views: &[View<'_>]) -> Result<Section> {
     let mut section = Section::new("Tables 5 and 8 to 10: frames by size");
     section.text(
-        "Frames a second of tone mapping alone on the device named at the end of the page; the thesis' are of a GeForce 6600 (4:3) and an \
-         8800 GTX (squares). Only ratios between columns mean something.",
+        "Frames per second of tone mapping only. Ours are for the device named at the end of the page; the thesis' figures are for a GeForce 6600 \
+         (4:3) and an 8800 GTX (squares). Only ratios between columns are comparable.",
     );
     let columns = ["frame", "thesis", "thesis, with LTM", "rendering", "with LTM", "with LTM fast", "with LTM pyramid"];
     let title = "Table 5: frames a second of rendering, and of rendering with tone mapping";
@@ -211,7 +211,9 @@ fn number(text: &str) -> f64 {
 /// Tables 11 to 13.
 pub(super) fn stills(views: &[View<'_>]) -> Result<Section> {
     let mut section = Section::new("Tables 11 to 13: pictures");
-    section.text(format!("Threshold {THRESHOLD}. STM/LTM is how many times faster selective tone mapping is, each way to mark for itself."));
+    section.text(format!(
+        "Threshold {THRESHOLD}. STM/LTM is the speed of selective over local tone mapping, for each way to mark pixels."
+    ));
     let mut table = Table::new("table-11", "Table 11", ["picture", "pixels", "dynamic range (log₁₀)", "important (%)"]);
     let heads = ["picture", "GTM (ms)", "LTM (ms)", "fast LTM (ms)", "pyramid LTM (ms)"].map(str::to_owned);
     let marks = MARKS.iter().map(|mark| (*mark).to_owned());
@@ -254,12 +256,12 @@ pub(super) fn stills(views: &[View<'_>]) -> Result<Section> {
 pub(super) fn quality(views: &[View<'_>]) -> Result<Section> {
     let mut section = Section::new("Tables 14 to 16: what selection loses");
     section.text(
-        "Against local tone mapping by the literal operator. VDP %: pixels that are seen to differ (lower is better); gain: frames a second \
-         over VDP % (equations 20, 21; higher is better), with early-z. The thesis names neither the program that computed its VDP nor its \
-         settings: here an observer looks who does not know what to look for (slope of masking 1), at a screen of 100 cd/m² with 67 pixels \
-         in a degree, and a pixel counts where he is all but sure to see a difference (p > 0.95). Daly's practised observer (slope 0.7), \
-         counted where he sees one more often than not (p > 0.75), sees differences in up to ten times as many pixels; his shares stand in the \
-         second table. Where the global operator is a hundred times as fast as the local one, its gain is larger, whatever it loses.",
+        "Losses against local tone mapping by the literal operator. VDP %: share of pixels with a visible difference (lower is better). Gain: frames per \
+         second over VDP % (equations 20, 21; higher is better), with early-z. The thesis names neither the program that computed its VDP nor its \
+         settings. The first table is for an inexperienced observer (slope of masking 1), a screen of 100 cd/m² with 67 pixels per degree, and \
+         differences that are detected almost certainly (p > 0.95). The second table is for Daly's practised observer (slope 0.7) and p > 0.75, who \
+         sees differences in up to ten times as many pixels. If the global operator is a hundred times as fast as the local one, its gain is larger, \
+         regardless of its losses.",
     );
     let names = [
         "picture",
@@ -321,7 +323,7 @@ pub(super) fn quality(views: &[View<'_>]) -> Result<Section> {
     Ok(section)
 }
 
-/// The same for the other operators.
+/// Losses and times of the other operators.
 pub(super) fn operators(views: &[View<'_>]) -> Result<Section> {
     let mut section = Section::new("Other operators in the same framework");
     let columns = ["picture", "operator", "VDP % global", "VDP % selective", "SSIM selective"];

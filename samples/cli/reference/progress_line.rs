@@ -1,0 +1,165 @@
+//! The progress of a reference picture, on stderr.
+
+use std::time::{Duration, Instant};
+
+use lucerna::reference::tracer::Progress;
+
+use crate::progress::{ProgressMode, span};
+
+/// The goals of a run. The first one that is reached ends it.
+#[derive(Clone, Copy, Debug)]
+pub struct Goals {
+    /// Paths per pixel.
+    pub samples: u64,
+    /// Estimated relative mean squared error.
+    pub error: Option<f64>,
+    /// Time of this run.
+    pub time: Option<Duration>,
+}
+
+impl Goals {
+    /// Estimated remaining time in seconds, and the goal that will be reached first. `samples`: all samples; `done`: samples of this run,
+    /// which took `seconds`. `error`: the last estimated error, and the number of samples at that time. The error is a variance, so it is
+    /// inversely proportional to the number of samples.
+    fn left(&self, samples: f64, done: f64, seconds: f64, error: Option<(f64, f64)>) -> (f64, &'static str) {
+        let each = seconds / done.max(1e-12);
+        let mut first = ((self.samples as f64 - samples).max(0.0) * each, "samples");
+        if let (Some(goal), Some((error, at))) = (self.error, error.filter(|(e, _)| e.is_finite())) {
+            let left = (at * error / goal - samples).max(0.0) * each;
+            first = if left < first.0 { (left, "error") } else { first };
+        }
+        if let Some(limit) = self.time {
+            let left = (limit.as_secs_f64() - seconds).max(0.0);
+            first = if left < first.0 { (left, "time") } else { first };
+        }
+        first
+    }
+}
+
+/// Shows progress from time to time.
+#[derive(Debug)]
+pub struct ProgressLine {
+    mode: ProgressMode,
+    goals: Goals,
+    started: Instant,
+    /// Progress at the start of this run.
+    before: Progress,
+    shown: Option<Instant>,
+    /// The last estimated error, and the number of samples at that time.
+    error: Option<(f64, f64)>,
+}
+
+impl ProgressLine {
+    /// A progress line for a run with `goals`. `before`: the progress of earlier runs.
+    pub fn new(mode: ProgressMode, quiet: bool, goals: Goals, before: Progress) -> Self {
+        let mode = mode.here(quiet, false);
+        Self { mode, goals, started: Instant::now(), before, shown: None, error: None }
+    }
+
+    /// Whether the line shows the error.
+    pub fn wants_error(&self) -> bool {
+        self.mode != ProgressMode::None
+    }
+
+    /// Records an estimated error.
+    pub fn error(&mut self, now: &Progress, error: f64) {
+        self.error = Some((error, now.samples));
+    }
+
+    /// Seconds of this run.
+    pub fn seconds(&self) -> f64 {
+        self.started.elapsed().as_secs_f64()
+    }
+
+    /// Paths per second in this run.
+    pub fn rate(&self, now: &Progress) -> f64 {
+        (now.paths - self.before.paths) as f64 / self.seconds().max(1e-9)
+    }
+
+    /// Prints the line, unless it was printed a short time ago.
+    pub fn show(&mut self, now: &Progress) {
+        let pause = match self.mode {
+            ProgressMode::Bar => Duration::from_millis(200),
+            _ => Duration::from_secs(5),
+        };
+        if self.mode == ProgressMode::None || self.shown.is_some_and(|at| at.elapsed() < pause) {
+            return;
+        }
+        if self.shown.is_none() && self.mode != ProgressMode::Bar {
+            // Short runs print only the last line.
+            self.shown = Some(Instant::now());
+            return;
+        }
+        self.shown = Some(Instant::now());
+        self.line(now, false);
+    }
+
+    /// Prints the last line.
+    pub fn finish(&mut self, now: &Progress, error: f64) {
+        self.error(now, error);
+        if self.mode != ProgressMode::None {
+            self.line(now, true);
+        }
+    }
+
+    fn line(&self, now: &Progress, last: bool) {
+        let done = now.samples - self.before.samples;
+        let (left, by) = self.goals.left(now.samples, done, self.seconds(), self.error);
+        let error = self.error.map(|(error, _)| error).filter(|e| e.is_finite());
+        if self.mode == ProgressMode::Json {
+            let text = serde_json::json!({
+                "samples": now.samples, "target": self.goals.samples, "paths_per_second": self.rate(now),
+                "relative_error": error, "target_error": self.goals.error,
+                "seconds_left": if last { 0.0 } else { left }, "ends_by": by, "done": last,
+            });
+            self.mode.progress_line(&text.to_string(), last);
+            return;
+        }
+        let samples = if now.samples < 10.0 { format!("{:.1}", now.samples) } else { format!("{:.0}", now.samples) };
+        let mut text = format!("{samples}/{} samples, {} samples/s", self.goals.samples, count(self.rate(now)));
+        if let Some(error) = error {
+            text += &format!(", relative error {error:.2e}");
+            if let Some(goal) = self.goals.error {
+                text += &format!(" of {goal:.2e}");
+            }
+        }
+        match last {
+            true => text += &format!(", {:.1} s", self.seconds()),
+            false => text += &format!(", {} left", span(left)),
+        }
+        self.mode.progress_line(&text, last);
+    }
+}
+
+fn count(rate: f64) -> String {
+    match rate {
+        r if r >= 1e6 => format!("{:.1} M", r * 1e-6),
+        r if r >= 1e3 => format!("{:.0} k", r * 1e-3),
+        r => format!("{r:.0}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_goal_that_comes_first_tells_the_time_left() {
+        let goals = Goals { samples: 1_000_000, error: None, time: None };
+        // 100 samples in ten seconds.
+        assert_eq!(goals.left(100.0, 100.0, 10.0, Some((0.5, 80.0))), (99_990.0, "samples"));
+        // An error of 0.04 after 80 samples is one of 0.01 after 320: 220 more.
+        let goals = Goals { error: Some(0.01), ..goals };
+        let (left, by) = goals.left(100.0, 100.0, 10.0, Some((0.04, 80.0)));
+        assert!((left - 22.0).abs() < 1e-9 && by == "error", "{left} {by}");
+        assert_eq!(goals.left(100.0, 100.0, 10.0, None).1, "samples");
+        assert_eq!(goals.left(100.0, 100.0, 10.0, Some((f64::INFINITY, 1.0))).1, "samples");
+        // The error goal is already reached; the run ends at the next estimate.
+        assert_eq!(goals.left(100.0, 100.0, 10.0, Some((0.001, 80.0))), (0.0, "error"));
+        let goals = Goals { time: Some(Duration::from_secs(15)), ..goals };
+        assert_eq!(goals.left(100.0, 100.0, 10.0, Some((0.04, 80.0))), (5.0, "time"));
+        // Samples of an earlier run count for the goals, but not for the speed.
+        let (left, _) = Goals { time: None, ..goals }.left(100.0, 50.0, 10.0, Some((0.04, 80.0)));
+        assert!((left - 44.0).abs() < 1e-9);
+    }
+}
