@@ -62,6 +62,7 @@ pub mod passes;
 pub mod rays;
 pub mod reference;
 pub mod scene;
+pub mod settings;
 pub mod shader;
 mod stop;
 pub mod techniques;

@@ -14,6 +14,7 @@ use lucerna_samples::{
     info, inspect, program,
     reference::{self, ReferenceArgs},
     rerun::{self, RerunArgs},
+    settings_list,
     source::SceneArgs,
     tonemap::{self, TonemapArgs},
     views::{self, command::ViewsArgs},
@@ -78,6 +79,19 @@ enum Command {
     Reproduce(Box<ReproduceArgs>),
     /// Write the report of an experiment again, from the pictures that are there
     Report(ReportArgs),
+    /// List all settings of the techniques (-D KEY=VALUE): what they do, their values, units, defaults, and what they need
+    Settings {
+        /// One technique alone
+        #[arg(value_parser = clap::builder::PossibleValuesParser::new(settings_list::names()))]
+        technique: Option<String>,
+        /// Print one JSON document: the schema of the settings
+        #[arg(long, conflicts_with = "form")]
+        json: bool,
+        #[arg(long, value_enum, default_value_t, value_name = "FORM")]
+        form: settings_list::Form,
+        #[command(flatten)]
+        talk: TalkArgs,
+    },
     /// List the built-in scenes, and the things that can be put on a ground (--ground)
     List {
         #[command(flatten)]
@@ -101,6 +115,7 @@ impl Command {
             Self::Inspect { talk, .. }
             | Self::Info { talk, .. }
             | Self::Devices { talk, .. }
+            | Self::Settings { talk, .. }
             | Self::List { talk, .. } => talk.console(),
             Self::ExportPov(args) => args.talk.console(),
         }
@@ -145,6 +160,10 @@ fn serve(command: Command, console: Console) -> Result<()> {
                 true => console::print_json(&devices::json(&list)),
                 false => console::print(&devices::text(&list)),
             }
+        }
+        Command::Settings { technique, json, form, .. } => {
+            let form = if json { settings_list::Form::Json } else { form };
+            settings_list::print(technique.as_deref(), form)
         }
         Command::Compare(args) => compare::run(&args, console).map(drop),
         Command::Tonemap(args) => tonemap::run(&args, console).map(drop),

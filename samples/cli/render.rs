@@ -23,6 +23,7 @@ use crate::{
     progress::Progress,
     record::Record,
     run::Run,
+    settings_list,
     signals::Interrupt,
 };
 
@@ -106,7 +107,7 @@ pub fn render<R: Renderer>(renderer: &R, args: &RenderArgs, base: &R::Settings) 
     let started = Instant::now();
     let staged = Staged::effective(&args.settings, base, R::check)?;
     if args.settings.print_config {
-        console::print(config::to_toml(&staged)?.trim_end())?;
+        console::print(settings_list::with_docs(&config::to_toml(&staged)?).trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
     let interrupt = Interrupt::install();

@@ -1,18 +1,16 @@
 //! Settings of the technique, with the choices of the thesis.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    super::allowed::{within, wrong},
-    occluder_rotation::Axis,
-    samples::Grid,
-    sky::SIDES,
-    suns,
+use super::{super::allowed::wrong, occluder_rotation::Axis, samples::Grid, suns};
+use crate::{
+    Error, Result,
+    settings::{Described, described},
 };
-use crate::{Error, Result};
 
 /// How the irradiance of a pixel is computed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// From vectors that were computed before the first frame.
@@ -28,7 +26,7 @@ pub enum Method {
 }
 
 /// How the share of an occluder in front of a receiver's plane is measured.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Extent {
     /// By the extent of its vertices along the normal.
@@ -39,7 +37,7 @@ pub enum Extent {
 }
 
 /// How the irradiance is computed that an occluder hides if the receiver's plane cuts it (case B of the thesis).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Cut {
     /// normal · FIV plus the irradiance from behind the plane that the part behind the plane hides, because the dot
@@ -51,7 +49,7 @@ pub enum Cut {
 }
 
 /// Where the samples for an occluder's shadow on itself lie.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SelfSamples {
     /// On its surface, at the vertices of its triangles.
@@ -62,7 +60,7 @@ pub enum SelfSamples {
 }
 
 /// How the mask of an occluder is computed for a sample.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Masks {
     /// By one ray (or `split`² rays) from the sample to each texel.
@@ -75,7 +73,7 @@ pub enum Masks {
 }
 
 /// How the irradiance that several occluders hide together is corrected.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Shared {
     /// As `Filled`. In addition, no more light is subtracted from a bright part of the environment than this part
@@ -90,7 +88,7 @@ pub enum Shared {
 }
 
 /// The quantity that is interpolated between two spheres of samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Interpolation {
     /// The vectors, as in the thesis.
@@ -102,7 +100,7 @@ pub enum Interpolation {
 }
 
 /// Glossy reflection of surfaces.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Specular {
     /// All surfaces are diffuse.
@@ -114,65 +112,99 @@ pub enum Specular {
 }
 
 /// Settings of the technique.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    /// Texels along an edge of the environment's cube: multiples of 8, 8 to 128.
+    /// Texels along an edge of the environment's cube.
+    #[schemars(range(min = 8, max = 128), extend("multipleOf" = 8, "x-unit" = "texels", "x-decides" = "bake"))]
     pub size: u32,
-    /// Samples along the azimuth, 3 to 1024.
+    /// Samples along the azimuth.
+    #[schemars(range(min = 3, max = 1024), extend("x-decides" = "bake", "x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub azimuths: u32,
-    /// Samples along the polar angle, with both poles, 2 to 513.
+    /// Samples along the polar angle, with both poles.
+    #[schemars(range(min = 2, max = 513), extend("x-decides" = "bake", "x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub polars: u32,
-    /// Spheres of samples, 2 to 128.
+    /// Spheres of samples.
+    #[schemars(range(min = 2, max = 128), extend("x-decides" = "bake", "x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub radii: u32,
-    /// Rotation samples about `turn_axis` for occluders that rotate, 1 to 64. With 1 there are vectors for the pose at
+    /// Rotation samples about `turn_axis` for occluders that rotate. With 1 there are vectors for the pose at
     /// rest only.
+    #[schemars(range(min = 1, max = 64), extend("x-decides" = "bake", "x-needs" = {"method": {"const": "vectors"}}))]
     pub turns: u32,
     /// Axis of the rotation samples, in world axes through the origins of the nodes: `x`, `y`, `z`, or three numbers
     /// with commas between them.
+    #[schemars(extend("x-decides" = "bake", "x-needs" = {"turns": {"minimum": 2}}), with = "String")]
     pub turn_axis: Axis,
-    /// Most texels of the environment that are separated from the vectors, 0 to 16. Only texels that send at least a
+    /// Most texels of the environment that are separated from the vectors. Only texels that send at least a
     /// hundredth of all light each are separated, the brightest first. Their shadows have hard edges, from one shadow
     /// map per texel and occluder. This setting needs `method` vectors and occluders that do not rotate.
+    #[schemars(range(min = 0, max = suns::MOST), extend("x-unit" = "texels", "x-decides" = "bake", "x-needs" = {"method": {"const": "vectors"}}))]
     pub suns: u32,
-    /// Radius of the last sphere of samples, in radii of the occluder's bounding sphere, 2 to 1000. At greater
+    /// Radius of the last sphere of samples, in radii of the occluder's bounding sphere. At greater
     /// distances the vectors of the last sphere are scaled by the solid angle of the occluder.
+    #[schemars(range(min = 2, max = 1000), extend("x-unit" = "radii", "x-decides" = "bake", "x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub reach: f32,
     /// Samples are denser where the vectors have a high curvature. Without this setting directions are evenly spaced
     /// and radii grow by a constant factor, as in the thesis.
+    #[schemars(extend("x-decides" = "bake", "x-needs" = {"method": {"const": "vectors"}}))]
     pub adaptive: bool,
-    /// Rays along the edge of a texel of an occluder's mask, 1 to 4.
+    /// Rays along the edge of a texel of an occluder's mask.
+    #[schemars(range(min = 1, max = 4), extend("x-unit" = "rays", "x-decides" = "bake", "x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub split: u32,
+    /// How the mask of an occluder is found, which says what the occluder hides from a sample.
+    #[schemars(extend("x-decides" = "bake", "x-needs" = {"method": {"const": "vectors"}}))]
     pub masks: Masks,
     /// Flat meshes cast shadows too.
+    #[schemars(extend("x-decides" = "bake", "x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub flat: bool,
     /// If a scene has several occluders, those with a radius of more than this share of the scene's radius only receive
-    /// shadows, 0 to 1. An occluder that encloses the whole scene has the share 0.58.
+    /// shadows. An occluder that encloses the whole scene has the share 0.58.
+    #[schemars(range(min = 0, max = 1), extend("x-decides" = "bake", "x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub largest: f32,
     /// Vectors are interpolated between the eight nearest samples. Without this setting the nearest sample is used.
+    #[schemars(extend("x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub trilinear: bool,
+    /// The quantity that is interpolated between two spheres of samples.
+    #[schemars(extend("x-decides" = "bake", "x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub interpolation: Interpolation,
     /// The irradiance that an occluder hides is corrected if the receiver's plane cuts the occluder.
+    #[schemars(extend("x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub partial: bool,
+    /// Irradiance that an occluder hides if the receiver's plane cuts it.
+    #[schemars(extend("x-needs" = {"partial": {"const": true}}))]
     pub cut: Cut,
+    /// How much of an occluder lies in front of a receiver's plane.
+    #[schemars(extend("x-needs" = {"partial": {"const": true}}))]
     pub extent: Extent,
     /// The irradiance that several occluders hide together is subtracted once.
+    #[schemars(extend("x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub overlap: bool,
-    /// Occluders that cannot hide more than this share of the environment's mean irradiance are left out, 0 to 1. With
+    /// Occluders that cannot hide more than this share of the environment's mean irradiance are left out. With
     /// 0 no occluder is left out.
+    #[schemars(range(min = 0, max = 1), extend("x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub negligible: f32,
+    /// Irradiance that several occluders hide together.
+    #[schemars(extend("x-needs" = {"overlap": {"const": true}}))]
     pub shared: Shared,
     /// Occluders shadow themselves.
+    #[schemars(extend("x-needs" = {"method": {"enum": ["vectors", "online"]}}))]
     pub self_shadow: bool,
+    /// Where the vectors for an occluder's shadow on itself are taken.
+    #[schemars(extend("x-decides" = "bake", "x-needs" = {"self_shadow": {"const": true}}))]
     pub self_samples: SelfSamples,
+    /// Glossy reflection of the environment.
     pub specular: Specular,
+    /// How irradiance is computed.
     pub method: Method,
-    /// Rotation of the environment about +Y, degrees counter-clockwise seen from above, -36000 to 36000.
+    /// Rotation of the environment about +Y, counter-clockwise seen from above.
+    #[schemars(range(min = -36000, max = 36000), extend("x-unit" = "°"))]
     pub rotation: f32,
-    /// Additional rotation of the environment per second of a sequence, degrees, -36000 to 36000. If the value is not
+    /// Additional rotation of the environment of the environment per second of a sequence. If the value is not
     /// 0, rotated environments are resampled from means of pixels, which is faster and has errors of some thousandths.
+    #[schemars(range(min = -36000, max = 36000), extend("x-unit" = "°/s"))]
     pub turning: f32,
-    /// Scale of the environment's radiance as a power of two, -30 to 30.
+    /// Scale of the environment's radiance as a power of two.
+    #[schemars(range(min = -30, max = 30), extend("x-unit" = "stops"))]
     pub exposure: f32,
 }
 
@@ -261,59 +293,10 @@ impl Settings {
         })
     }
 
-    /// The keys that differ from their defaults without any effect, each with the reason.
-    pub fn idle(&self) -> Vec<(&'static str, &'static str)> {
-        let by = Self::default();
-        let vectors = self.method == Method::Vectors;
-        let shadows = vectors || self.method == Method::Online;
-        let unused = "fiv.method uses no vectors";
-        // Key, whether the value differs from the default, whether the key has an effect, and the reason if it has
-        // none.
-        let keys = [
-            ("azimuths", self.azimuths != by.azimuths, shadows, unused),
-            ("polars", self.polars != by.polars, shadows, unused),
-            ("radii", self.radii != by.radii, shadows, unused),
-            ("turns", self.turns != by.turns, vectors, unused),
-            ("turn_axis", self.turn_axis != by.turn_axis, vectors && self.turns > 1, "fiv.turns is 1"),
-            ("suns", self.suns != by.suns, vectors, unused),
-            ("reach", self.reach != by.reach, shadows, unused),
-            ("adaptive", self.adaptive != by.adaptive, vectors, "fiv.method=online spaces samples evenly"),
-            ("split", self.split != by.split, shadows, unused),
-            ("masks", self.masks != by.masks, vectors, unused),
-            ("flat", self.flat != by.flat, shadows, unused),
-            ("largest", self.largest != by.largest, shadows, unused),
-            ("trilinear", self.trilinear != by.trilinear, shadows, unused),
-            ("interpolation", self.interpolation != by.interpolation, shadows, unused),
-            ("partial", self.partial != by.partial, shadows, unused),
-            ("cut", self.cut != by.cut, shadows && self.partial, "fiv.partial is off"),
-            ("extent", self.extent != by.extent, shadows && self.partial, "fiv.partial is off"),
-            ("overlap", self.overlap != by.overlap, shadows, unused),
-            ("shared", self.shared != by.shared, shadows && self.overlap, "fiv.overlap is off"),
-            ("negligible", self.negligible != by.negligible, shadows, unused),
-            ("self_shadow", self.self_shadow != by.self_shadow, shadows, unused),
-            (
-                "self_samples",
-                self.self_samples != by.self_samples,
-                shadows && self.self_shadow,
-                "fiv.self_shadow is off",
-            ),
-        ];
-        let idle = keys.into_iter().filter(|(_, changed, counts, _)| *changed && !counts);
-        idle.map(|(key, .., why)| (key, if shadows { why } else { unused })).collect()
-    }
-
     /// # Errors
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
-        if !SIDES.contains(&self.size) || !self.size.is_multiple_of(8) {
-            let (what, least, most) = (self.size, SIDES.start(), SIDES.end());
-            let what = format!("{what} is not allowed; allowed: multiples of 8 from {least} to {most}");
-            return Err(Error::usage(what).at("size"));
-        }
-        self.grid().validate()?;
-        within([("reach", self.reach, 2.0, 1000.0), ("largest", self.largest, 0.0, 1.0)])?;
-        within([("negligible", self.negligible, 0.0, 1.0)])?;
-        within([("rotation", self.rotation, -36e3, 36e3), ("turning", self.turning, -36e3, 36e3)])?;
+        Self::description().check(self)?;
         if self.method == Method::Online && self.specular != Specular::Off {
             return wrong("specular", "glossy reflection with fiv.method=online", "off, or another method");
         }
@@ -323,8 +306,6 @@ impl Settings {
         if self.method == Method::Online {
             self.online()?;
         }
-        within([("exposure", self.exposure, -30.0, 30.0)])?;
-        within([("split", self.split, 1, 4), ("turns", self.turns, 1, 64), ("suns", self.suns, 0, suns::MOST)])?;
         if self.suns > 0 && self.turns > 1 {
             let error = Error::usage("texels can be separated for occluders at rest only").at("suns");
             return Err(error.help("Set fiv.suns or fiv.turns to its default"));
@@ -339,9 +320,15 @@ impl Settings {
     }
 }
 
+described!(Settings);
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn keys_without_effect(settings: &Settings) -> Vec<String> {
+        Settings::description().idle(settings).unwrap().into_iter().map(|idle| idle.key).collect()
+    }
 
     #[test]
     fn what_changes_nothing_is_refused_or_named() {
@@ -356,7 +343,7 @@ mod tests {
             // The same settings are valid for vectors computed before the first frame.
             let before = Settings { method: Method::Vectors, ..wrong };
             before.validate().unwrap();
-            assert_eq!(before.idle(), []);
+            assert_eq!(keys_without_effect(&before), [""; 0]);
         }
         let good = Settings::default();
         let x = Axis::new(glam::Vec3::X).unwrap();
@@ -374,7 +361,7 @@ mod tests {
             (Settings { reach: 8.0, ..online.clone() }, &[]),
             (Settings { adaptive: false, ..online.clone() }, &["adaptive"]),
         ] {
-            assert_eq!(idle.idle().iter().map(|(key, _)| *key).collect::<Vec<_>>(), keys);
+            assert_eq!(keys_without_effect(&idle), keys);
         }
     }
 

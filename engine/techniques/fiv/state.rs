@@ -18,6 +18,7 @@ use crate::{
     graph::Runner,
     rays::Rays,
     scene::{Environment, Material, Note, NoteKind, Pose, Scene, resident::Resident},
+    settings::Described,
     shaders::consts::{FIV_FLOATS, TRACE_STEPS},
 };
 
@@ -435,9 +436,10 @@ fn emissive(material: &Material) -> bool {
 /// Notes on settings that have no effect, and on masks that rays compute although `masks` is parallel.
 fn ignored_settings(settings: &Settings, plan: &Plan, kinds: &[Occluder]) -> Vec<Note> {
     let note = |place: String, text: String| Note { kind: NoteKind::Ignored, place, text };
-    let idle = settings.idle().into_iter();
-    let mut notes: Vec<_> =
-        idle.map(|(key, why)| note(format!("fiv.{key}"), format!("has no effect, because {why}"))).collect();
+    let idle = Settings::description().idle(settings).unwrap_or_default().into_iter();
+    let mut notes: Vec<_> = idle
+        .map(|idle| note(format!("fiv.{}", idle.key), format!("has no effect, because fiv.{}", idle.because)))
+        .collect();
     if settings.method == Method::Vectors {
         notes.extend(plan.by_rays(kinds).map(|what| note("fiv.masks".into(), what)));
     }

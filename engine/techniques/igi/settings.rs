@@ -1,20 +1,21 @@
 //! The settings of instant global illumination, their defaults, and the paper's values.
 
-use super::{
-    super::allowed::{within, wrong},
-    raster,
+use super::{super::allowed::wrong, raster};
+use crate::{
+    Error, Result,
+    settings::{Described, described},
+    shaders::consts::CACHE_CELLS,
 };
-use crate::{Error, Result, shaders::consts::CACHE_CELLS};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Smallest side of a cache cell, as share of the scene's diagonal: a key has nine bits for each axis.
 pub(super) const LEAST_CELL: f32 = 0.002;
-const MOST_CELL: f32 = 0.2;
 /// Maximum of virtual lights per frame.
 const MOST_LIGHTS: u32 = 10_000;
 
 /// How rays are traced.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Visibility {
     /// By ray queries if the device has them, else in compute. CPU drivers use ray queries only if `LUCERNA_RAY_QUERY` is `on`.
@@ -44,7 +45,7 @@ impl Visibility {
 }
 
 /// How interleaved sampling assigns subsets of the virtual lights to the pixels of a tile.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Pattern {
     /// The same assignment in every tile, as in the paper.
@@ -57,98 +58,130 @@ pub enum Pattern {
 }
 
 /// Settings of the technique. [`Settings::validate`] checks the ranges given here.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    /// Maximum of virtual point lights, 1 to 10,000, and at least `bounces`. There are ⌊vpls / bounces⌋ light paths. A path that
+    /// Maximum of virtual point lights, and at least `bounces`. There are ⌊vpls / bounces⌋ light paths. A path that
     /// leaves the scene or ends on a black surface leaves fewer lights.
+    #[schemars(range(min = 1, max = MOST_LIGHTS), extend("x-unit" = "lights", "x-needs" = {"indirect": {"const": true}}))]
     pub vpls: u32,
-    /// Candidates for each virtual light, 1 to 64: the number of light paths is multiplied by it. The frame draws its virtual lights
+    /// Candidates for each virtual light: the number of light paths is multiplied by it. The frame draws its virtual lights
     /// among the candidates, with a probability that follows the light that they send to the view. 1: every virtual light is used,
     /// as in the paper.
+    #[schemars(range(min = 1, max = 64), extend("x-needs" = {"indirect": {"const": true}}))]
     pub candidates: u32,
-    /// Maximum of virtual lights along a path, 1 to 8: the bounces of indirect light.
+    /// Maximum of virtual lights along a path: the bounces of indirect light.
+    #[schemars(range(min = 1, max = 8), extend("x-needs" = {"indirect": {"const": true}}))]
     pub bounces: u32,
-    /// Visible points that measure the importance of the candidates, 1 to 1024. Each point traces a shadow ray to each candidate.
+    /// Visible points that measure the importance of the candidates. Each point traces a shadow ray to each candidate.
     /// If there are few points, a candidate that lights a small part of the view may look unimportant. Half of the probability
     /// follows the flux alone, so that such a candidate still is drawn.
+    #[schemars(range(min = 1, max = 1024), extend("x-unit" = "points", "x-needs" = {"candidates": {"minimum": 2}}))]
     pub judges: u32,
-    /// Bounding distance min_d of the geometry term, 0 to 1, as share of the scene's diagonal: the diagonal of the bounding box of
+    /// Bounding distance min_d of the geometry term, as share of the scene's diagonal: the diagonal of the bounding box of
     /// all surfaces except unlit ones, in the rest pose. A virtual light nearer than 0.8 min_d sends no light, beyond 1.2 min_d it
     /// sends all its light. 0: no bound.
+    #[schemars(range(min = 0, max = 1), extend("x-needs" = {"indirect": {"const": true}}))]
     pub bound: f32,
-    /// Virtual lights that each pixel picks from the light tree, 1 to 1024, with a probability that follows the light that they may
+    /// Virtual lights that each pixel picks from the light tree, with a probability that follows the light that they may
     /// send to it. The cost grows with the logarithm of `vpls`; the picture gets noise. The pixels of an interleaved tile share the
     /// picks. With four virtual lights or fewer for each pick, every pixel gathers from all lights. 0: always from all.
+    #[schemars(range(min = 0, max = 1024), extend("x-unit" = "lights", "x-needs" = {"indirect": {"const": true}}))]
     pub picks: u32,
-    /// Virtual lights proposed for each pick, 1 to 16. One of the proposals is drawn, in proportion to the unoccluded light that it
+    /// Virtual lights proposed for each pick. One of the proposals is drawn, in proportion to the unoccluded light that it
     /// sends.
+    #[schemars(range(min = 1, max = 16), extend("x-unit" = "lights", "x-needs" = {"picks": {"minimum": 1}}))]
     pub proposals: u32,
-    /// Short rays per gathered pixel that add back the light that the bound removes, 0 to 64. 0: this light is missing.
+    /// Short rays per gathered pixel that add back the light that the bound removes. 0: this light is missing.
+    #[schemars(range(min = 0, max = 64), extend("x-unit" = "rays", "x-needs" = {"bound": {"exclusiveMinimum": 0}}))]
     pub compensation: u32,
-    /// Side of a cell of the irradiance cache, as share of the scene's diagonal, 0.002 to 0.2. The cache holds the light of virtual
+    /// Side of a cell of the irradiance cache, as share of the scene's diagonal. The cache holds the light of virtual
     /// lights on surfaces that mirrors and glass show. 0: no cache; each of these surfaces gathers.
+    #[schemars(range(min = 0.002, max = 0.2), extend("x-zero" = true, "x-needs" = {"indirect": {"const": true}, "specular": {"const": true}}))]
     pub cache: f32,
-    /// Maximum of cache cells, 1 to 131,072. If the frame needs more, it does not use the cache
+    /// Maximum of cache cells. If the frame needs more, it does not use the cache
     /// ([`Cache::note`](super::Cache::note)).
+    #[schemars(range(min = 1, max = CACHE_CELLS), extend("x-unit" = "cells", "x-needs" = {"cache": {"exclusiveMinimum": 0}}))]
     pub cache_cells: u32,
     /// Shadow rays of virtual lights test the bounding boxes of triangles instead of the triangles.
+    #[schemars(extend("x-needs" = {"indirect": {"const": true}}))]
     pub imperfect: bool,
-    /// Pixels along the side of a coarse texel, 1 to 4. Indirect light is gathered once for each coarse texel.
+    /// Pixels along the side of a coarse texel. Indirect light is gathered once for each coarse texel.
+    #[schemars(range(min = 1, max = 4), extend("x-unit" = "pixels", "x-needs" = {"indirect": {"const": true}}))]
     pub downsample: u32,
     /// The pixel for which a coarse texel gathers changes from texel to texel, so that some texels hit a thin object. Otherwise it
     /// is the pixel in the middle of the texel.
+    #[schemars(extend("x-needs" = {"downsample": {"minimum": 2}}))]
     pub scattered: bool,
-    /// Side of the interleaving tiles, 1 to 4, or to 32 with `fused`. The pixels of a tile share the virtual lights: each pixel
+    /// Side of the interleaving tiles; above 4 only with `fused`. The pixels of a tile share the virtual lights: each pixel
     /// gathers from one of side² subsets. Larger tiles allow more virtual lights for the same number of shadow rays per pixel.
+    #[schemars(range(min = 1, max = 32), extend("x-unit" = "pixels", "x-needs" = {"indirect": {"const": true}}))]
     pub interleave: u32,
+    /// Where the subsets of interleaved sampling lie.
+    #[schemars(extend("x-needs" = {"interleave": {"minimum": 2}}))]
     pub pattern: Pattern,
     /// Sorts the virtual lights by position and normal before they are split into subsets, so that each subset has lights from
     /// every part of the scene. `picks` and `compensation` always sort them.
+    #[schemars(extend("x-needs" = {"interleave": {"minimum": 2}}))]
     pub sorted: bool,
     /// One filter instead of two: the upsampling filter reads the interleaved texels, and the discontinuity buffer is not used.
+    #[schemars(extend("x-needs" = {"interleave": {"minimum": 2}}))]
     pub fused: bool,
-    /// Iterations of the edge-avoiding filter that smooths the coarse irradiance before upsampling, 0 to 5. Its weights for normals
+    /// Iterations of the edge-avoiding filter that smooths the coarse irradiance before upsampling. Its weights for normals
     /// and planes are those of the upsampling filter. The result is about a Gaussian with a standard deviation of 1, 2.2, 4.6, 9.2
     /// or 18 coarse texels. 0: no smoothing.
+    #[schemars(range(min = 0, max = 5), extend("x-unit" = "iterations", "x-needs" = {"indirect": {"const": true}}))]
     pub smoothing: u32,
-    /// Maximum ratio of a coarse texel's luminance to the mean of its neighbours on the same surface, 1 to 1000. Brighter texels are
+    /// Maximum ratio of a coarse texel's luminance to the mean of its neighbours on the same surface. Brighter texels are
     /// dimmed to this ratio before smoothing, because a virtual light close to a surface makes a speck that no filter hides. 0: no
     /// limit.
+    #[schemars(range(min = 1, max = 1000), extend("x-zero" = true, "x-needs" = {"indirect": {"const": true}}))]
     pub despeckle: f32,
-    /// Minimum share of the upsampling Gaussian that must fall on coarse texels with a matching normal and plane, 0 to 1. With a
+    /// Minimum share of the upsampling Gaussian that must fall on coarse texels with a matching normal and plane. With a
     /// smaller share a Gaussian three times as wide is tried. If this fails too, the pixel gathers from one subset; this happens on
     /// thin objects that no coarse texel hit. 0: never. Not with `picks`, and not with `visibility` `raster`.
+    #[schemars(range(min = 0, max = 1), extend("x-needs" = {"indirect": {"const": true}}))]
     pub refine: f32,
-    /// Standard deviation of the upsampling Gaussian, coarse texels, 0.1 to 4.
+    /// Standard deviation of the upsampling Gaussian, in coarse texels.
+    #[schemars(range(min = 0.1, max = 4), extend("x-unit" = "texels", "x-needs" = {"indirect": {"const": true}}))]
     pub upsample_sigma: f32,
-    /// Exponent of the cosine between normals in upsampling, 0 to 64; the paper has 1.
+    /// Exponent of the cosine between normals in upsampling; the paper has 1.
+    #[schemars(range(min = 0, max = 64), extend("x-needs" = {"indirect": {"const": true}}))]
     pub upsample_normal: f32,
     /// Distance of a coarse texel from the pixel's plane, relative to the pixel's depth, at which its weight falls to 0.6; 0: the
     /// weight does not depend on depth, as in the paper.
+    #[schemars(range(min = 0, max = 1e6), extend("x-needs" = {"indirect": {"const": true}}))]
     pub upsample_range: f32,
     /// Maximum difference in depth, relative to the texel's depth, over which the discontinuity buffer averages interleaved texels.
+    #[schemars(range(min = 0, max = 1e6), extend("x-needs" = {"fused": {"const": false}, "interleave": {"minimum": 2}}))]
     pub discontinuity_depth: f32,
     /// Minimum cosine between the normals of texels that the discontinuity buffer averages.
+    #[schemars(range(min = -1, max = 1), extend("x-needs" = {"fused": {"const": false}, "interleave": {"minimum": 2}}))]
     pub discontinuity_normal: f32,
-    /// Maximum of frames over which indirect light is averaged, 0 to 10,000. Each frame has other virtual lights. 1: no average. 0: no
+    /// Maximum of frames over which indirect light is averaged. Each frame has other virtual lights. 1: no average. 0: no
     /// history, and every frame uses the same random numbers.
+    #[schemars(range(min = 0, max = 10000), extend("x-unit" = "frames", "x-needs" = {"indirect": {"const": true}}))]
     pub history: u32,
-    /// Relative error of indirect light that is allowed because the average lags behind changing light, 0.001 to 10.
+    /// Relative error of indirect light that is allowed because the average lags behind changing light.
+    #[schemars(range(min = 0.001, max = 10), extend("x-needs" = {"history": {"minimum": 2}}))]
     pub history_lag: f32,
     /// Maximum distance from a surface of the last frame, relative to its depth, at which a pixel reuses that surface's light.
+    #[schemars(range(min = 0, max = 1e6), extend("x-needs" = {"history": {"minimum": 2}}))]
     pub history_range: f32,
     /// How rays are traced. With `imperfect` the shadow rays of virtual lights are always traced in compute.
     pub visibility: Visibility,
-    /// Side of the shadow maps of virtual lights, texels, with `visibility` `raster`, 16 to 1024.
+    /// Side of the shadow maps of virtual lights.
+    #[schemars(range(min = 16, max = 1024), extend("x-unit" = "texels", "x-needs" = {"visibility": {"const": "raster"}}))]
     pub raster_size: u32,
     /// Computes indirect light.
     pub indirect: bool,
     /// Mirrors, glass, and GGX highlights of direct light. If off, every surface reflects its diffuse part only.
     pub specular: bool,
-    /// Maximum of mirrors and glass surfaces in a row, 0 to 16, along camera rays and along light paths.
+    /// Maximum of mirrors and glass surfaces in a row, along camera rays and along light paths.
+    #[schemars(range(min = 0, max = 16), extend("x-unit" = "surfaces", "x-needs" = {"specular": {"const": true}}))]
     pub specular_depth: u32,
-    /// Shadow rays per pixel to emissive surfaces, 1 to 4096, and as many to the environment. Each punctual light has one ray.
+    /// Shadow rays per pixel to emissive surfaces, and as many to the environment. Each punctual light has one ray.
+    #[schemars(range(min = 1, max = 4096), extend("x-unit" = "rays"))]
     pub direct_samples: u32,
 }
 
@@ -264,22 +297,6 @@ impl Settings {
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
         let raster = self.visibility == Visibility::Raster;
-        within([
-            ("candidates", self.candidates, 1, 64),
-            ("judges", self.judges, 1, 1024),
-            ("bounces", self.bounces, 1, 8),
-            ("picks", self.picks, 0, 1024),
-            ("proposals", self.proposals, 1, 16),
-            ("compensation", self.compensation, 0, 64),
-            ("cache_cells", self.cache_cells, 1, CACHE_CELLS),
-            ("downsample", self.downsample, 1, 4),
-            ("interleave", self.interleave, 1, 32),
-            ("smoothing", self.smoothing, 0, 5),
-            ("history", self.history, 0, 10_000),
-            ("specular_depth", self.specular_depth, 0, 16),
-            ("direct_samples", self.direct_samples, 1, 4096),
-            ("raster_size", self.raster_size, 16, 1024),
-        ])?;
         let most = if raster { raster::MOST_LIGHTS } else { MOST_LIGHTS };
         if !(self.bounces..=most).contains(&self.vpls) {
             let why = match (raster, self.bounces) {
@@ -303,28 +320,14 @@ impl Settings {
             let allowed = "1 to 4, or 1 to 32 with fused = true and visibility other than \"raster\"";
             return wrong("interleave", self.interleave, allowed);
         }
-        if self.despeckle != 0.0 && !(1.0..=1000.0).contains(&self.despeckle) {
-            return wrong("despeckle", self.despeckle, "0, or 1 to 1000");
-        }
         if self.refine > 0.0 && (self.picks > 0 || raster) {
             return wrong("refine", self.refine, "0 with picks or visibility = \"raster\"");
         }
-        if self.cache != 0.0 && !(LEAST_CELL..=MOST_CELL).contains(&self.cache) {
-            return wrong("cache", self.cache, &format!("0, or {LEAST_CELL} to {MOST_CELL}"));
-        }
-        within([
-            ("bound", self.bound, 0.0, 1.0),
-            ("refine", self.refine, 0.0, 1.0),
-            ("upsample_sigma", self.upsample_sigma, 0.1, 4.0),
-            ("upsample_normal", self.upsample_normal, 0.0, 64.0),
-            ("upsample_range", self.upsample_range, 0.0, 1e6),
-            ("discontinuity_depth", self.discontinuity_depth, 0.0, 1e6),
-            ("discontinuity_normal", self.discontinuity_normal, -1.0, 1.0),
-            ("history_lag", self.history_lag, 0.001, 10.0),
-            ("history_range", self.history_range, 0.0, 1e6),
-        ])
+        Self::description().check(self)
     }
 }
+
+described!(Settings);
 
 #[cfg(test)]
 mod tests {
@@ -361,7 +364,7 @@ mod tests {
         let error = message(Settings { vpls: 0, bounces: 1, ..Settings::default() });
         assert_eq!(error, "vpls: 0 is not allowed; allowed: 1 to 10000");
         let error = message(Settings { bound: f32::NAN, ..Settings::default() });
-        assert_eq!(error, "bound: NaN is not allowed; allowed: 0 to 1");
+        assert_eq!(error, "bound: NaN or infinity is not allowed; allowed: 0 to 1");
         let error = message(Settings { vpls: 2, bounces: 3, ..Settings::default() });
         assert!(error.starts_with("vpls: 2 is not allowed; allowed: 3 to 10000"), "{error}");
         // The message gives the same range for a value below it and a value above it.
@@ -370,10 +373,11 @@ mod tests {
             let error = message(Settings { vpls, ..raster.clone() });
             assert!(error.starts_with(&format!("vpls: {vpls} is not allowed; allowed: 2 to 2048")), "{error}");
         }
-        for cache in [0.3, 0.001, -1.0, f32::NAN] {
+        for cache in [0.3, 0.001, -1.0] {
             let error = message(Settings { cache, ..Settings::default() });
             assert_eq!(error, format!("cache: {cache} is not allowed; allowed: 0, or 0.002 to 0.2"));
         }
+        Settings { cache: LEAST_CELL, ..Settings::default() }.validate().unwrap();
         for wrong in [
             Settings { bounces: 9, ..Settings::default() },
             Settings { downsample: 0, ..Settings::default() },

@@ -1,11 +1,15 @@
 //! What can be chosen in image-space radiosity, and what the dissertation chose.
 
-use super::super::allowed::{within, wrong};
-use crate::{Error, Result, passes::direct::Direct};
+use crate::{
+    Error, Result,
+    passes::direct::Direct,
+    settings::{Described, described},
+};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What a pixel sends to others.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sender {
     /// Its colour, as in the dissertation: no light needed, and none considered.
@@ -20,7 +24,7 @@ pub enum Sender {
 /// the whole [`Patch`] that a sample represents. So the dissertation's sum is 2π/N of the true irradiance from within reach
 /// (0.26, 0.13, 0.08 for 24, 48, 80 samples), and with single texels as patches 2π/(N s²), s the spacing of the grid in texels:
 /// more samples make it darker, and `k_isr` balances it for one choice only.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
     /// The estimator [ISR 25] as written.
@@ -31,7 +35,7 @@ pub enum Estimator {
 }
 
 /// The area dA in the form factor of [`Estimator::Paper`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Patch {
     /// The footprint of one texel of the buffers.
@@ -42,7 +46,7 @@ pub enum Patch {
 }
 
 /// Where the samples lie around the pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Pattern {
     /// A square grid without its centre, as in the dissertation.
@@ -52,11 +56,12 @@ pub enum Pattern {
 }
 
 /// Size of the buffers on which light is gathered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Resolution {
     /// Half width and height, as in the dissertation.
     Half,
+    /// The size of the picture.
     Full,
 }
 
@@ -71,7 +76,7 @@ impl Resolution {
 }
 
 /// How four texels become one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Downsample {
     /// Their mean, as in the dissertation; at a silhouette it lies between the surfaces.
@@ -81,18 +86,19 @@ pub enum Downsample {
 }
 
 /// Filter of the gathered light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Blur {
+    /// Light as it was gathered.
     None,
-    /// As in the dissertation.
+    /// The same weights everywhere, as in the dissertation.
     Gaussian,
     /// Stops at depth steps and creases.
     Bilateral,
 }
 
 /// What tells surfaces apart when coarse light is brought to full resolution.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Upsample {
     /// Difference of linear depth / far [ISR 27].
@@ -102,7 +108,7 @@ pub enum Upsample {
 }
 
 /// What the receiver does with gathered light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Receiver {
     /// ρ_P is the radiation mask, as in the dissertation: receivers are white.
@@ -112,7 +118,7 @@ pub enum Receiver {
 }
 
 /// What occlusion darkens.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Occlude {
     /// Direct light, as in [ISR 29].
@@ -122,7 +128,7 @@ pub enum Occlude {
 }
 
 /// How punctual lights fall off and how surfaces reflect them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LightLaw {
     /// Attenuation [ISR 16] and k_dl: colours relative to the brightest light times `light_power`, no π.
@@ -132,77 +138,116 @@ pub enum LightLaw {
 }
 
 /// All choices. `Default` is physically lit; [`Settings::paper`] is the dissertation's.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
+    /// What a pixel sends to other pixels.
+    #[schemars(extend("x-needs" = {"indirect": {"const": true}}))]
     pub sender: Sender,
+    /// What one sample of the gather stands for.
+    #[schemars(extend("x-needs" = {"indirect": {"const": true}}))]
     pub estimator: Estimator,
-    /// With `estimator = "paper"`.
+    /// The area dA in the form factor of the paper's estimator.
+    #[schemars(extend("x-needs" = {"estimator": {"const": "paper"}}))]
     pub patch: Patch,
+    /// Where the samples lie around the pixel.
     pub pattern: Pattern,
-    /// 24, 48 or 80.
+    /// Samples of the gather around each pixel.
+    #[schemars(extend("enum" = [24, 48, 80]))]
     pub samples: u32,
-    /// How far senders are looked for, pixels of the full image; 0: three quarters of its longer side.
+    /// How far senders are looked for, in the full image; 0: three quarters of its longer side.
+    #[schemars(range(min = 0, max = 16384), extend("x-unit" = "pixels", "x-needs" = {"indirect": {"const": true}}))]
     pub reach: f32,
-    /// Rings: exponent of their radii, 1 to 4. 1 is uniform.
+    /// Exponent of the radii of rings; 1 is uniform.
+    #[schemars(range(min = 1, max = 4), extend("x-needs" = {"pattern": {"const": "rings"}}))]
     pub spread: f32,
     /// Moves samples within their cells, differently from texel to texel; the blur averages.
     pub jitter: bool,
     /// A sample sends the mean radiance around it, over a quarter of the side of its cell, instead of that of one texel: less noise
     /// where senders are small and bright, and light of the wrong surface where surfaces meet.
+    #[schemars(extend("x-needs" = {"indirect": {"const": true}}))]
     pub prefilter: bool,
-    /// Depth-buffer tests between receiver and sender, 0 to 16. 0: every sender in the image counts, as in the dissertation.
+    /// Depth-buffer tests between receiver and sender. 0: every sender in the image counts, as in the dissertation.
+    #[schemars(range(min = 0, max = 16), extend("x-needs" = {"indirect": {"const": true}}))]
     pub visibility_steps: u32,
-    /// Thickness that a surface in the depth buffer is taken to have, relative to its depth, when `visibility_steps` > 0.
+    /// Thickness that a surface in the depth buffer is taken to have, relative to its depth.
+    #[schemars(range(min = 0, max = 1), extend("x-needs" = {"visibility_steps": {"minimum": 1}}))]
     pub thickness: f32,
-    /// Diffuse bounces after the direct light, 1 to 4. Each takes a gather, and the views of `border`, `layers` and `cameras` then gather
+    /// Diffuse bounces after the direct light. Each takes a gather, and the views of `border`, `layers` and `cameras` then gather
     /// from each other and from the picture: their surfaces send on what they got.
+    #[schemars(range(min = 1, max = 4), extend("x-needs" = {"indirect": {"const": true}}))]
     pub bounces: u32,
     /// A number of samples for each pixel by its depth: one step of 24, 48, 80 more where it is nearer than half the mean depth of the
     /// picture, one less where it is farther than one and a half of it.
+    #[schemars(extend("x-needs" = {"indirect": {"const": true}}))]
     pub samples_by_depth: bool,
-    /// Surfaces around the picture send too: share of its width and height that a view behind it reaches further on each side, 0 (none)
-    /// to 4.
+    /// Surfaces around the picture send too: share of its width and height that a view behind it reaches further on each side. 0: none.
+    #[schemars(range(min = 0, max = 4), extend("x-needs" = {"indirect": {"const": true}}))]
     pub border: f32,
-    /// Layers of surfaces behind each other that send and block light, 1 (the visible one) to 4.
+    /// Layers of surfaces behind each other that send and block light; 1: the visible one alone.
+    #[schemars(range(min = 1, max = 4), extend("x-needs" = {"indirect": {"const": true}}))]
     pub layers: u32,
-    /// Further views that look for senders, 0 to 4: backwards, from the far side of the scene, from the left, from the right.
+    /// Further views that look for senders: backwards, from the far side of the scene, from the left, from the right.
+    #[schemars(range(min = 0, max = 4), extend("x-needs" = {"indirect": {"const": true}}))]
     pub cameras: u32,
-    /// Pixels of the picture along the side of a texel of the views of `border`, `layers` and `cameras`, 1 to 16.
+    /// Pixels of the picture along the side of a texel of the views of `border`, `layers` and `cameras`.
+    #[schemars(range(min = 1, max = 16), extend("x-unit" = "pixels"))]
     pub sender_scale: u32,
-    /// Samples in each of these views, 8 to 96.
+    /// Samples in each of these views.
+    #[schemars(range(min = 8, max = 96))]
     pub sender_samples: u32,
+    /// Size of the buffers on which light is gathered.
     pub resolution: Resolution,
+    /// How four texels become one.
+    #[schemars(extend("x-needs" = {"resolution": {"const": "half"}}))]
     pub downsample: Downsample,
     /// Gather light.
     pub indirect: bool,
     /// Gather occlusion.
     pub occlusion: bool,
-    /// How far occluders are looked for, pixels of the full image.
+    /// How far occluders are looked for, in the full image.
+    #[schemars(range(min = 1, max = 16384), extend("x-unit" = "pixels", "x-needs" = {"occlusion": {"const": true}}))]
     pub occlusion_reach: f32,
     /// Radius of the sphere that a sample stands for in [ISR 26], in sides of its cell.
+    #[schemars(range(min = 0, max = 16), extend("x-needs" = {"occlusion": {"const": true}}))]
     pub occluder_radius: f32,
     /// Subtracted from the cosine of [ISR 26], against flat surfaces that occlude themselves by rounded normals.
+    #[schemars(range(min = 0, max = 1), extend("x-needs" = {"occlusion": {"const": true}}))]
     pub occlusion_bias: f32,
+    /// Filter of the gathered light.
     pub blur: Blur,
-    /// Texels of the coarse buffers to each side, 0 to 16; the standard deviation is half of it.
+    /// Reach of the blur to each side, in the coarse buffers; the standard deviation is half of it.
+    #[schemars(range(min = 0, max = 16), extend("x-unit" = "texels", "x-needs" = {"blur": {"not": {"const": "none"}}}))]
     pub blur_radius: u32,
-    /// Bilateral: distance from a texel's plane, relative to its depth, at which another weighs 0.6.
+    /// Distance from a texel's plane, relative to its depth, at which another weighs 0.6.
+    #[schemars(range(min = 1e-6, max = 1e6), extend("x-needs" = {"blur": {"const": "bilateral"}}))]
     pub blur_range: f32,
+    /// What tells surfaces apart when coarse light is brought to full resolution.
+    #[schemars(extend("x-needs" = {"resolution": {"const": "half"}}))]
     pub upsample: Upsample,
     /// ε of [ISR 27], in the unit that `upsample` compares.
+    #[schemars(range(min = 1e-9, max = 1), extend("x-needs" = {"resolution": {"const": "half"}}))]
     pub upsample_epsilon: f32,
+    /// What the receiver does with gathered light.
+    #[schemars(extend("x-needs" = {"indirect": {"const": true}}))]
     pub receiver: Receiver,
     /// Power of indirect light. The area estimator needs no balancing: 1.
+    #[schemars(range(min = 0, max = 1000), extend("x-needs" = {"indirect": {"const": true}}))]
     pub k_isr: f32,
-    /// Power of occlusion, 0 to 1: light is multiplied by accessibility + 1 − k_ssao, at most 1 [ISR 29]. With 1 this is
+    /// Power of occlusion: light is multiplied by accessibility + 1 − k_ssao, at most 1 [ISR 29]. With 1 this is
     /// accessibility itself; with the dissertation's 0.5, light is darkened only where more than half is occluded.
+    #[schemars(range(min = 0, max = 1), extend("x-needs" = {"occlusion": {"const": true}}))]
     pub k_ssao: f32,
+    /// What occlusion darkens.
+    #[schemars(extend("x-needs" = {"occlusion": {"const": true}}))]
     pub occlude: Occlude,
+    /// How punctual lights fall off and how surfaces reflect them.
     pub light_law: LightLaw,
-    /// Paper law: radius l_r of lights without a range, metres; 0: the far distance of the camera.
+    /// Radius l_r of lights without a range; 0: the far distance of the camera.
+    #[schemars(range(min = 0, max = 1e9), extend("x-unit" = "m", "x-needs" = {"light_law": {"const": "paper"}}))]
     pub light_radius: f32,
-    /// Paper law: l_pow of the brightest light.
+    /// l_pow of the brightest light.
+    #[schemars(range(min = 0, max = 1e9), extend("x-needs" = {"light_law": {"const": "paper"}}))]
     pub light_power: f32,
     /// Light of the environment, times accessibility: on matt surfaces, and blurred on metals. The dissertation has none.
     pub environment: bool,
@@ -257,7 +302,7 @@ impl Default for Settings {
 }
 
 /// Choices that go together, from cheap to near the reference. What each costs and gains: `samples/isr/README.md`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Preset {
     /// Half of the samples, and light passes through what stands between.
@@ -348,36 +393,11 @@ impl Settings {
     /// # Errors
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
-        if ![24, 48, 80].contains(&self.samples) {
-            return wrong("samples", self.samples, "24, 48, 80");
-        }
-        within([
-            ("bounces", self.bounces, 1, 4),
-            ("layers", self.layers, 1, 4),
-            ("cameras", self.cameras, 0, 4),
-            ("sender_scale", self.sender_scale, 1, 16),
-            ("sender_samples", self.sender_samples, 8, 96),
-            ("visibility_steps", self.visibility_steps, 0, 16),
-            ("blur_radius", self.blur_radius, 0, 16),
-        ])?;
-        within([
-            ("reach", self.reach, 0.0, 16384.0),
-            ("border", self.border, 0.0, 4.0),
-            ("spread", self.spread, 1.0, 4.0),
-            ("thickness", self.thickness, 0.0, 1.0),
-            ("occlusion_reach", self.occlusion_reach, 1.0, 16384.0),
-            ("occluder_radius", self.occluder_radius, 0.0, 16.0),
-            ("occlusion_bias", self.occlusion_bias, 0.0, 1.0),
-            ("blur_range", self.blur_range, 1e-6, 1e6),
-            ("upsample_epsilon", self.upsample_epsilon, 1e-9, 1.0),
-            ("k_isr", self.k_isr, 0.0, 1000.0),
-            ("k_ssao", self.k_ssao, 0.0, 1.0),
-            ("light_radius", self.light_radius, 0.0, 1e9),
-            ("light_power", self.light_power, 0.0, 1e9),
-        ])?;
-        Ok(())
+        Self::description().check(self)
     }
 }
+
+described!(Settings);
 
 #[cfg(test)]
 mod tests {
@@ -413,7 +433,7 @@ mod tests {
         let error = message(Settings { samples: 50, ..Settings::default() });
         assert_eq!(error, "samples: 50 is not allowed; allowed: 24, 48, 80");
         let error = message(Settings { k_ssao: f32::NAN, ..Settings::default() });
-        assert_eq!(error, "k_ssao: NaN is not allowed; allowed: 0 to 1");
+        assert_eq!(error, "k_ssao: NaN or infinity is not allowed; allowed: 0 to 1");
         let error = message(Settings { bounces: 0, ..Settings::default() });
         assert_eq!(error, "bounces: 0 is not allowed; allowed: 1 to 4");
     }

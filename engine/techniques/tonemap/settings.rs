@@ -1,13 +1,17 @@
 //! What can be chosen in tone mapping.
 
-use super::super::allowed::{within, wrong};
+use super::super::allowed::wrong;
 use super::identify;
-use crate::Result;
+use crate::{
+    Result,
+    settings::{Described, described},
+};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How luminances become display luminances. L is the luminance of a pixel after [`Settings::exposure`], L_a its local adaptation,
 /// which is L itself in [`Mode::Global`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Operator {
     /// Ashikhmin, "A tone mapping algorithm for high contrast images", 2002: L_d = TM(L_a) + TVI(TM(L_a)) / TVI(L_a) · (L − L_a),
@@ -66,7 +70,7 @@ impl Operator {
 }
 
 /// Which pixels get local adaptation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
     /// None: every pixel adapts to itself.
@@ -78,7 +82,7 @@ pub enum Mode {
 }
 
 /// How local adaptation is computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Local {
     /// Ashikhmin, Reinhard: the averages along rows and then along columns, which is the same sum in another order (relative difference of
@@ -106,7 +110,7 @@ pub enum Local {
 }
 
 /// What makes a pixel important.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Identify {
     /// Magnitude of the Sobel gradient √(Gx² + Gy²) of L, weights 1 2 1 unscaled.
@@ -116,7 +120,7 @@ pub enum Identify {
 }
 
 /// How the work on unimportant pixels is avoided. All give the same picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mark {
     /// A branch in the fragment shader.
@@ -130,7 +134,7 @@ pub enum Mark {
 }
 
 /// What becomes of NaN, infinite and negative values before anything else.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BadValues {
     /// NaN and infinity become 0, negative values 0.
@@ -151,68 +155,94 @@ pub enum BadValues {
 /// makes everything else too bright); 10⁻⁶ if all are. The brightest luminance of a picture is white to the global operators, also where it
 /// is the only one: a picture of one luminance is white by Ashikhmin's and the bilateral operator (0 counts as its L_min) and by Reinhard's
 /// global curve without [`Settings::white`]; by Reinhard's local one it is key / (1 + key). A black picture stays black. A display luminance below 0 is 0; the result is relative to the display's white, and may be over 1.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
+    /// How luminances become display luminances.
     pub operator: Operator,
     /// None: local if the operator has a local component, else global.
     pub mode: Option<Mode>,
     /// Stops (EV) before the operator: values are multiplied by 2^exposure.
+    #[schemars(range(min = -40, max = 40), extend("x-unit" = "stops"))]
     pub exposure: f32,
     /// Divides luminance by its log-average before the exposure, for pictures in no known unit.
     pub normalize: bool,
-    /// Percent of the pixels left out at each end when L_min and L_max are looked for; 0: the true minimum and maximum. Otherwise, of n
+    /// Share of the pixels left out at each end when L_min and L_max are looked for; 0: the true minimum and maximum. Otherwise, of n
     /// luminances in ascending order, L_min is number ⌈n · percentile/100⌉ (at least 1) and L_max number n + 1 − that.
+    #[schemars(range(min = 0, max = 49), extend("x-unit" = "percent"))]
     pub percentile: f32,
     /// Ashikhmin: luminance of the display's white L_dmax, cd/m².
+    #[schemars(range(min = 1, max = 1e5), extend("x-unit" = "cd/m²", "x-needs" = {"operator": {"const": "ashikhmin"}}))]
     pub display: f32,
-    /// Ashikhmin: largest radius s of the averages G_s, pixels, 1 to 16. G_s: weights exp(−d² / 2σ²) with σ = s/2 along each axis, s pixels
+    /// Ashikhmin: largest radius s of the averages G_s, pixels. G_s: weights exp(−d² / 2σ²) with σ = s/2 along each axis, s pixels
     /// to each side, divided by their sum.
+    #[schemars(range(min = 1, max = 16), extend("x-unit" = "pixels", "x-needs" = {"operator": {"const": "ashikhmin"}, "mode": {"not": {"const": "global"}}}))]
     pub radius: u32,
     /// Ashikhmin: s grows from 1 as long as |G_s − G_2s| < contrast · G_s; L_a is the last G_s for which that held, or G_1.
+    #[schemars(range(min = 0, max = 1e6), extend("x-needs" = {"operator": {"const": "ashikhmin"}, "mode": {"not": {"const": "global"}}}))]
     pub contrast: f32,
     /// Reinhard: what the log-average becomes.
+    #[schemars(range(min = 1e-6, max = 1e6), extend("x-needs" = {"operator": {"const": "reinhard"}}))]
     pub key: f32,
     /// Reinhard (in units of l) and extended Reinhard (in units of L): the smallest luminance that becomes white; 0: the largest of the
     /// picture ([`Settings::percentile`]).
+    #[schemars(range(min = 0, max = 1e18), extend("x-needs" = {"operator": {"enum": ["reinhard", "reinhard-global"]}}))]
     pub white: f32,
-    /// Reinhard: scales s of dodging and burning, 1 to 8. s = 1.6^i for i = 0, 1, …; V_i is the Gaussian average of σ = s/4, ⌈3σ⌉ pixels
+    /// Reinhard: scales s of dodging and burning. s = 1.6^i for i = 0, 1, …; V_i is the Gaussian average of σ = s/4, ⌈3σ⌉ pixels
     /// to each side, of l. l_a is V_i of the largest i < scales before |V_i − V_(i+1)| / (2^phi · key / s² + V_i) ≥ epsilon, or V_0.
+    #[schemars(range(min = 1, max = 8), extend("x-needs" = {"operator": {"const": "reinhard"}, "mode": {"not": {"const": "global"}}}))]
     pub scales: u32,
     /// Reinhard: sharpening φ.
+    #[schemars(range(min = 0, max = 32), extend("x-needs" = {"operator": {"const": "reinhard"}, "mode": {"not": {"const": "global"}}}))]
     pub phi: f32,
     /// Reinhard: largest activity ε.
+    #[schemars(range(min = 0, max = 1e6), extend("x-needs" = {"operator": {"const": "reinhard"}, "mode": {"not": {"const": "global"}}}))]
     pub epsilon: f32,
     /// Bilateral: σ in space, share of the longer side; at least half a pixel. Weights are exp(−d² / 2σ²) of the distance, the filter
     /// reaches ⌈2σ⌉ pixels along each axis; literal: at most 80 pixels. Fast: a block of ⌈σ/3⌉² pixels that the reach touches stands for
     /// its pixels by two samples at its centre, the mean of the logarithms up to the block's mean and the mean of those above it, each
     /// with the weight of the number of its pixels; the pixel itself is added once more. The same as literal up to σ = 3.
+    #[schemars(range(min = 0, max = 0.25), extend("x-needs" = {"operator": {"const": "bilateral"}, "mode": {"not": {"const": "global"}}}))]
     pub spatial: f32,
     /// Bilateral: σ of log₁₀ L.
+    #[schemars(range(min = 1e-3, max = 1e3), extend("x-needs" = {"operator": {"const": "bilateral"}, "mode": {"not": {"const": "global"}}}))]
     pub range: f32,
     /// Bilateral: contrast of the base on the display.
+    #[schemars(range(min = 1, max = 1e6), extend("x-needs" = {"operator": {"const": "bilateral"}}))]
     pub base_contrast: f32,
     /// Bilateral: factor of the detail.
+    #[schemars(range(min = 0, max = 16), extend("x-needs" = {"operator": {"const": "bilateral"}, "mode": {"not": {"const": "global"}}}))]
     pub detail: f32,
     /// Exponent of the ratios of colour to luminance; 1: as the papers.
+    #[schemars(range(min = 0, max = 4))]
     pub saturation: f32,
+    #[schemars(extend("x-needs" = {"operator": {"enum": ["ashikhmin", "reinhard", "bilateral"]}, "mode": {"not": {"const": "global"}}}))]
+    /// How local adaptation is computed.
     pub local: Local,
     /// Selective: what makes a pixel important.
+    #[schemars(extend("x-needs" = {"mode": {"const": "selective"}}))]
     pub identify: Identify,
     /// Selective: a pixel is important above this. None: 0.1 for Sobel, as in the thesis; 0.4 for saliency, of which the thesis names none
     /// (0.1 of it would be four fifths of a photograph, 0.4 is a quarter to a third).
+    #[schemars(range(min = 0, max = 1e18), extend("x-needs" = {"mode": {"const": "selective"}}))]
     pub threshold: Option<f32>,
-    /// Selective: identification on the picture reduced so many times: 1, 2 or 4.
+    /// Selective: identification on the picture reduced so many times.
+    #[schemars(extend("enum" = [1, 2, 4], "x-needs" = {"mode": {"const": "selective"}}))]
     pub identify_scale: u32,
     /// Selective: how the important ones are marked.
+    #[schemars(extend("x-needs" = {"mode": {"const": "selective"}}))]
     pub mark: Mark,
+    /// What becomes of NaN, infinite and negative values before anything else.
     pub bad_values: BadValues,
     /// Seconds in which adaptation to a brighter picture comes within 1/e, in sequences; 0: at once.
+    #[schemars(range(min = 0, max = 3600), extend("x-unit" = "s"))]
     pub adapt_up: f32,
     /// The same to a darker one.
+    #[schemars(range(min = 0, max = 3600), extend("x-unit" = "s"))]
     pub adapt_down: f32,
     /// Adaptation changes by at most so many stops a second; 0: no limit. What is left of a way of w stops after t seconds does not depend
     /// on the number of frames: dw/dt = −min(w / adapt_…, adapt_limit).
+    #[schemars(range(min = 0, max = 1e6), extend("x-unit" = "stops/s"))]
     pub adapt_limit: f32,
 }
 
@@ -300,32 +330,11 @@ impl Settings {
                 format!("global, for the operator {} is a curve without local component", self.operator.name());
             return wrong("mode", mode, &allowed);
         }
-        if ![1, 2, 4].contains(&self.identify_scale) {
-            return wrong("identify_scale", self.identify_scale, "1, 2, 4");
-        }
-        within([("radius", self.radius, 1, 16), ("scales", self.scales, 1, 8)])?;
-        within([
-            ("exposure", self.exposure, -40.0, 40.0),
-            ("percentile", self.percentile, 0.0, 49.0),
-            ("display", self.display, 1.0, 1e5),
-            ("contrast", self.contrast, 0.0, 1e6),
-            ("key", self.key, 1e-6, 1e6),
-            ("white", self.white, 0.0, 1e18),
-            ("phi", self.phi, 0.0, 32.0),
-            ("epsilon", self.epsilon, 0.0, 1e6),
-            ("spatial", self.spatial, 0.0, 0.25),
-            ("range", self.range, 1e-3, 1e3),
-            ("base_contrast", self.base_contrast, 1.0, 1e6),
-            ("detail", self.detail, 0.0, 16.0),
-            ("saturation", self.saturation, 0.0, 4.0),
-            ("threshold", self.threshold(), 0.0, 1e18),
-            ("adapt_up", self.adapt_up, 0.0, 3600.0),
-            ("adapt_down", self.adapt_down, 0.0, 3600.0),
-            ("adapt_limit", self.adapt_limit, 0.0, 1e6),
-        ])?;
-        Ok(())
+        Self::description().check(self)
     }
 }
+
+described!(Settings);
 
 #[cfg(test)]
 mod tests {
@@ -350,7 +359,7 @@ mod tests {
         let wanted =
             "mode: local is not allowed; allowed: global, for the operator aces is a curve without local component";
         assert_eq!(message(curve), wanted);
-        let wanted = "exposure: NaN is not allowed; allowed: -40 to 40";
+        let wanted = "exposure: NaN or infinity is not allowed; allowed: -40 to 40";
         assert_eq!(message(Settings { exposure: f32::NAN, ..Settings::default() }), wanted);
         let wanted = "radius: 17 is not allowed; allowed: 1 to 16";
         assert_eq!(message(Settings { radius: 17, ..Settings::default() }), wanted);

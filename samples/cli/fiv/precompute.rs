@@ -26,6 +26,7 @@ use crate::{
     program::{self, STOPPED_EARLY},
     progress::ProgressMode,
     render::unless_stopped,
+    settings_list,
     signals::Interrupt,
     source,
 };
@@ -113,7 +114,7 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
     let checked = |keys: &Keys| decided::of_vectors(&keys.fiv).validate().map_err(|error| error.at("fiv"));
     args.settings.blamed(checked(&keys), || checked(&args.settings.file_alone().effective(&Keys::default())?))?;
     if args.settings.print_config {
-        console::print(config::to_toml(&keys)?.trim_end())?;
+        console::print(settings_list::with_docs(&config::to_toml(&keys)?).trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
     let idle = decided::idle(&keys.fiv)?;

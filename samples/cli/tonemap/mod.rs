@@ -36,6 +36,7 @@ use crate::{
     console::{self, Console},
     program::{self, STOPPED_EARLY},
     progress::Progress,
+    settings_list,
     signals::Interrupt,
 };
 
@@ -148,7 +149,7 @@ impl Results {
 pub fn run(args: &TonemapArgs, console: Console) -> Result<ExitCode> {
     let config = args.config()?;
     if args.settings.print_config {
-        console::print(config::to_toml(&config)?.trim_end())?;
+        console::print(settings_list::with_docs(&config::to_toml(&config)?).trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
     let (inputs, notes) = names::inputs(&args.inputs, args.layer.as_deref(), args.frames.as_ref(), args.sequence)?;
