@@ -395,7 +395,9 @@ fn scenes_with_next_to_nothing() {
             &Settings { interleave: 1, downsample: 1, ..every.clone() },
             0,
         );
-        assert!(mean(&shown.direct) > 0.01 && mean(&shown.indirect) == 0.0);
+        // Rounding may lift a pixel off the plane, so that virtual lights on it send next to nothing to it.
+        let (direct, indirect) = (mean(&shown.direct), mean(&shown.indirect));
+        assert!(direct > 0.01 && indirect < 1e-4 * direct, "{direct} {indirect}");
         // Only mirrors: light paths leave no virtual lights.
         let mut stage = Stage::new();
         let mirror =

@@ -156,6 +156,10 @@ fn huge_and_tiny_scenes_are_hit_as_by_brute_force() {
     with_gpu(|gpu| {
         let mut numbers = Numbers(5);
         for scale in [1e-12f32, 1e-6, 1e-3, 1e3, 1e6, 1e12] {
+            // Products of three such lengths are near the smallest normal number, and GPUs take what is below it for 0.
+            if scale == 1e-12 && !is_exact(gpu) {
+                continue;
+            }
             let triangles = awkward(&mut numbers, 60, scale);
             let mut rays = awkward_rays(&mut numbers, 600, &triangles, scale);
             // Directions of any length.
