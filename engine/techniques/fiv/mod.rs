@@ -54,6 +54,7 @@ pub mod surface;
 mod tiles;
 pub mod turn;
 mod turning;
+pub mod units;
 
 pub use file::Stored;
 pub use light::Light;
