@@ -1,6 +1,7 @@
 //! What the executables share: command line, settings, the loop over frames, output names, messages, exit codes.
 
 pub mod args;
+pub mod bake;
 pub mod camera;
 pub mod compare;
 pub mod config;
