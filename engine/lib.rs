@@ -45,6 +45,7 @@
 //! | [`reference`](mod@reference) | slow CPU versions that tests hold the shaders against; a path tracer |
 //! | [`image`](mod@image) | linear images in and out |
 //! | [`measure`] | how far an image is from a reference |
+//! | [`bake`] | long computations in units: stopped, continued, spread, joined; principal components |
 //!
 //! # Conventions
 //! Right-handed, +Y up, metres; cameras look down −Z. Linear Rec. 709. Radiance in W/(sr·m²), irradiance in W/m², intensity in
@@ -53,6 +54,7 @@
 #![deny(unsafe_code)]
 #![warn(missing_debug_implementations)]
 
+pub mod bake;
 pub mod error;
 pub mod gpu;
 pub mod graph;

@@ -4,7 +4,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use lucerna_samples::{
-    fiv::{self, EnvironmentArgs, MergeArgs, PrecomputeArgs, SteadyArgs},
+    bake::{self, JoinArgs},
+    fiv::{self, EnvironmentArgs, PrecomputeArgs, SteadyArgs},
     program,
     technique::fiv::{self as technique, FivArgs},
 };
@@ -22,8 +23,8 @@ enum Command {
     /// Compute the vectors of occluders under an environment and write them to a file
     #[command(args_override_self = true)]
     Precompute(Box<PrecomputeArgs>),
-    /// Join the parts of a file
-    Merge(MergeArgs),
+    /// Join the parts of a file (as `lucerna merge`)
+    Merge(JoinArgs),
     /// Write a built-in environment into a file
     Environment(EnvironmentArgs),
     /// Compare the changes between the frames of a sequence with those of a sequence by brute force, where surfaces
@@ -42,7 +43,7 @@ fn main() -> ExitCode {
         }
         Command::Merge(args) => {
             let console = args.talk.console();
-            program::run(console, || fiv::merge(&args, console))
+            program::run(console, || bake::join(&args, console))
         }
         Command::Environment(args) => {
             let console = args.talk.console();

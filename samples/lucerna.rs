@@ -6,6 +6,7 @@ use clap::{Parser, Subcommand};
 use lucerna::{Result, scene::builtin};
 use lucerna_samples::{
     args::TalkArgs,
+    bake::{self, BakeCommand, JoinArgs},
     compare::{self, CompareArgs},
     console::{self, Console},
     devices,
@@ -92,6 +93,11 @@ enum Command {
         #[command(flatten)]
         talk: TalkArgs,
     },
+    /// Look into the units of a long computation, and spread one over machines
+    #[command(subcommand)]
+    Bake(BakeCommand),
+    /// Join what shards of a long computation have computed, into one folder or into the file that it is for
+    Merge(JoinArgs),
     /// List the built-in scenes, and the things that can be put on a ground (--ground)
     List {
         #[command(flatten)]
@@ -108,6 +114,8 @@ impl Command {
             Self::Views(args) => args.talk.console(),
             Self::Reproduce(args) => args.talk.console(),
             Self::Report(args) => args.talk.console(),
+            Self::Bake(command) => command.talk().console(),
+            Self::Merge(args) => args.talk.console(),
             Self::Compare(args) => args.talk.console(),
             Self::Tonemap(args) => args.talk.console(),
             Self::Reference(args) => args.talk.console(),
@@ -132,6 +140,8 @@ fn main() -> ExitCode {
         Command::Tonemap(args) => tonemap::run(args, console),
         Command::Reference(args) => reference::run(args, console),
         Command::Rerun(args) => rerun::run(args, console),
+        Command::Bake(command) => command.run(),
+        Command::Merge(args) => bake::join(args, console),
         _ => serve(command, console).map(|()| ExitCode::SUCCESS),
     })
 }
@@ -169,6 +179,8 @@ fn serve(command: Command, console: Console) -> Result<()> {
         Command::Tonemap(args) => tonemap::run(&args, console).map(drop),
         Command::Reference(args) => reference::run(&args, console).map(drop),
         Command::Rerun(args) => rerun::run(&args, console).map(drop),
+        Command::Bake(command) => command.run().map(drop),
+        Command::Merge(args) => bake::join(&args, console).map(drop),
         Command::Views(args) => views::command::run(&args, console),
         // It chooses its exit code itself.
         Command::Reproduce(args) => experiment::reproduce(&args, console).map(|_| ()),

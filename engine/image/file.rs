@@ -221,6 +221,11 @@ fn exists(path: &Path) -> Error {
         .help("Name another file, or allow it to be overwritten")
 }
 
+/// Whether a file of this name is one that is being written, or was when its process was killed.
+pub fn is_temporary(name: &std::ffi::OsStr) -> bool {
+    name.to_str().is_some_and(|name| name.starts_with(PREFIX) && name.ends_with(SUFFIX))
+}
+
 const PREFIX: &str = ".lucerna-";
 const SUFFIX: &str = ".tmp";
 
@@ -288,8 +293,7 @@ fn sweep(folder: &Path) {
 fn sweep_older_than(folder: &Path, age: Duration) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
-        let name = entry.file_name();
-        let ours = name.to_str().is_some_and(|name| name.starts_with(PREFIX) && name.ends_with(SUFFIX));
+        let ours = is_temporary(&entry.file_name());
         let old = || {
             let modified = entry.metadata().ok().filter(fs::Metadata::is_file)?.modified().ok()?;
             SystemTime::now().duration_since(modified).ok().filter(|passed| *passed > age)

@@ -1,6 +1,7 @@
 //! The code that the executables share: command line, settings, the loop over frames, output names, messages, exit codes.
 
 pub mod args;
+pub mod bake;
 pub mod camera;
 pub mod compare;
 pub mod config;

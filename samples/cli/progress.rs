@@ -16,6 +16,9 @@ pub enum ProgressMode {
     Plain,
     /// One JSON object per line.
     Json,
+    /// Lines that Open Job Description schedulers read (openjd_progress, openjd_status).
+    #[value(name = "openjd")]
+    OpenJd,
     None,
 }
 
@@ -41,8 +44,17 @@ impl ProgressMode {
             (Self::None, _) => Ok(()),
             (Self::Bar, false) => write!(err, "\r\x1b[K{text}").and_then(|()| err.flush()),
             (Self::Bar, true) => writeln!(err, "\r\x1b[K{text}"),
+            (Self::OpenJd, _) => writeln!(err, "openjd_status: {text}"),
             _ => writeln!(err, "{text}"),
         };
+    }
+
+    /// Says how much of all is done, from 0 to 1, where somebody reads that apart from the line.
+    pub fn share(self, done: f64) {
+        if self == Self::OpenJd {
+            let percent = if done.is_finite() { 100.0 * done.clamp(0.0, 1.0) } else { 0.0 };
+            let _ = writeln!(std::io::stderr().lock(), "openjd_progress: {percent:.1}");
+        }
     }
 }
 
@@ -86,6 +98,7 @@ impl Progress {
 
     fn step(&mut self, what: &str, frame: serde_json::Value, milliseconds: f64, files: &[String]) {
         self.done += 1;
+        self.mode.share(self.done as f64 / self.total.max(1) as f64);
         let mut err = std::io::stderr().lock();
         let _ = match self.mode {
             ProgressMode::Bar => {
@@ -108,6 +121,7 @@ impl Progress {
                 "{}",
                 json!({ "frame": frame, "done": self.done, "total": self.total, "ms": milliseconds, "files": files })
             ),
+            ProgressMode::OpenJd => writeln!(err, "openjd_status: {what} ({}/{})", self.done, self.total),
             ProgressMode::Auto | ProgressMode::None => Ok(()),
         };
     }

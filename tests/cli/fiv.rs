@@ -1,11 +1,14 @@
-//! `fiv` from the outside: files of vectors in parts and after a stop, what is wrong with them, pictures. Needs a device (each test
+//! `fiv` from the outside: files of vectors, also those of earlier versions, what is wrong with them, pictures. Needs a device (each test
 //! says so when there is none).
 
 mod support;
 
 use std::{fs, path::Path};
 
-use lucerna::image::{self, Layers, WriteOptions};
+use lucerna::{
+    image::{self, Layers, WriteOptions},
+    techniques::fiv::Stored,
+};
 use support::{command, device, files, lucerna, ran};
 
 const SMALL: [&str; 8] = ["-D", "fiv.azimuths=6", "-D", "fiv.polars=5", "-D", "fiv.radii=4", "-D", "fiv.size=8"];
@@ -41,7 +44,8 @@ fn wrong_calls_are_refused_and_named() {
         (&["-D", "fiv.size=12"], "multiples of 8"),
         (&["-D", "fiv.azimut=2"], "fiv.azimuths"),
         (&["--shard", "3/2"], "I/N"),
-        (&["--checkpoint", "99999"], "0 to 86400"),
+        (&["--shard", "auto"], "array job"),
+        (&["--time-limit", "0"], "90s"),
         (&["-D", "fiv.self_samples=inside"], "surface"),
     ] {
         precompute(&env, out, more).expect(2, &[part]);
@@ -49,6 +53,14 @@ fn wrong_calls_are_refused_and_named() {
     fiv(&["precompute", "--builtin", "cornell", "-o", out]).expect(2, &["--environment"]);
     fiv(&["merge", &env, "-o", out]).expect(3, &["sky.exr", "not a file of irradiance vectors"]);
     assert_eq!(files(folder.path()), ["sky.exr"]);
+}
+
+/// Some of the samples of a file, as earlier versions wrote parts and what a stopped run left.
+fn part(whole: &str, path: &str, samples: std::ops::Range<u64>) {
+    let whole = Stored::read(whole).unwrap();
+    let mut part = Stored::empty(whole.plan.clone(), samples.start);
+    part.push(&whole.fivs[9 * samples.start as usize..9 * samples.end as usize]);
+    part.write(path, true).unwrap();
 }
 
 #[test]
@@ -61,59 +73,35 @@ fn parts_and_stopped_runs_give_the_same_bytes() {
     let (env, whole) = (environment(folder.path(), "sky.exr", 1.0), at("whole.fiv"));
     let told = precompute(&env, &whole, &["--json"]).expect(0, &["6×5×4"]).json();
     assert_eq!(told["bytes"].as_u64(), fs::metadata(&whole).ok().map(|m| m.len()));
+    assert_eq!(files(folder.path()), ["sky.exr", "whole.fiv"]);
     precompute(&env, &whole, &[]).expect(1, &["whole.fiv", "exists"]);
-    for part in 1..=3 {
-        precompute(&env, &at(&format!("{part}.fiv")), &["-q", "--shard", &format!("{part}/3")]).expect(0, &[]);
+    let bytes = fs::read(&whole).unwrap();
+    // Parts of earlier versions are joined as before.
+    let samples = told["samples"].as_u64().unwrap();
+    for (name, range) in [("1.fiv", 0..50), ("2.fiv", 50..51), ("3.fiv", 51..samples)] {
+        part(&whole, &at(name), range);
     }
     fiv(&["merge", &at("3.fiv"), &at("1.fiv"), "-o", &at("joined.fiv")]).expect(3, &["missing"]);
     fiv(&["merge", &at("3.fiv"), &at("1.fiv"), &at("2.fiv"), "-o", &at("joined.fiv")]).expect(0, &[]);
-    let bytes = fs::read(&whole).unwrap();
     assert!(fs::read(at("joined.fiv")).unwrap() == bytes);
-    // A stopped run leaves a part that begins at the first sample.
-    fs::copy(at("1.fiv"), at("again.fiv.part")).unwrap();
-    precompute(&env, &at("again.fiv"), &[]).expect(0, &["goes on after"]);
+    // And what a stopped run of theirs has left is taken up.
+    fs::copy(&whole, at("again.fiv.part")).unwrap();
+    let told = precompute(&env, &at("again.fiv"), &["--json"]).expect(0, &["again.fiv.part: 2 units are taken"]).json();
+    assert_eq!(told["computed"], 0);
     assert!(fs::read(at("again.fiv")).unwrap() == bytes && !Path::new(&at("again.fiv.part")).exists());
-    // A damaged file or a file of other work may contain hours of work. It is neither used nor replaced unless the user
-    // asks for it.
-    let (anew, part) = (at("anew.fiv"), at("anew.fiv.part"));
-    fs::write(&part, &bytes[..bytes.len() / 2]).unwrap();
+    // One that is damaged or of other work may be worth hours: it is neither used nor replaced without being told to.
+    let (anew, left) = (at("anew.fiv"), at("anew.fiv.part"));
+    fs::write(&left, &bytes[..bytes.len() / 2]).unwrap();
     precompute(&env, &anew, &[]).expect(3, &["anew.fiv.part", "cut off", "--restart"]);
-    fs::copy(at("1.fiv"), &part).unwrap();
-    precompute(&env, &anew, &["-D", "fiv.split=2"]).expect(1, &["anew.fiv.part", "other work", "--restart"]);
-    precompute(&env, &anew, &["--shard", "1/4"]).expect(1, &["samples 0 to"]);
-    assert!(fs::read(&part).unwrap() == fs::read(at("1.fiv")).unwrap());
+    fs::copy(at("1.fiv"), &left).unwrap();
+    precompute(&env, &at("other.fiv"), &["-D", "fiv.split=2"]).expect(0, &[]);
+    let error = ["anew.fiv.parts", "other work", "`split` is `1` instead of `2`", "--restart"];
+    precompute(&env, &anew, &["-D", "fiv.split=2"]).expect(1, &error);
+    fs::remove_dir_all(at("anew.fiv.parts")).unwrap();
+    precompute(&env, &anew, &["-D", "fiv.split=2"]).expect(1, &["anew.fiv.part:", "other work", "--restart"]);
+    assert!(fs::read(&left).unwrap() == fs::read(at("1.fiv")).unwrap());
     precompute(&env, &anew, &["--restart"]).expect(0, &[]);
-    assert!(fs::read(&anew).unwrap() == bytes && !Path::new(&part).exists());
-}
-
-#[test]
-fn a_killed_run_goes_on_to_the_same_bytes() {
-    if !device() {
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let env = environment(folder.path(), "sky.exr", 1.0);
-    let more = ["-D", "fiv.azimuths=64", "-D", "fiv.polars=33", "-D", "fiv.radii=12", "-D", "fiv.size=8", "-q"];
-    let arguments = |out: &str| {
-        let base = ["precompute", "--builtin", "furnace-sphere", "--env", &env, "--checkpoint", "0", "-o", out];
-        base.iter().chain(&more).map(|a| (*a).to_owned()).collect::<Vec<_>>()
-    };
-    let (whole, killed) = (at("whole.fiv"), at("killed.fiv"));
-    ran(command(env!("CARGO_BIN_EXE_fiv")).args(arguments(&whole))).expect(0, &[]);
-    let part = at("killed.fiv.part");
-    let mut child = command(env!("CARGO_BIN_EXE_fiv")).args(arguments(&killed)).spawn().unwrap();
-    while !Path::new(&part).exists() {
-        assert!(child.try_wait().unwrap().is_none(), "it ended before anything was written");
-        std::thread::sleep(std::time::Duration::from_millis(2));
-    }
-    // SIGKILL leaves no time to clean up.
-    child.kill().unwrap();
-    child.wait().unwrap();
-    assert!(Path::new(&part).exists() && !Path::new(&killed).exists());
-    let told = ran(command(env!("CARGO_BIN_EXE_fiv")).args(arguments(&killed)).arg("--json")).expect(0, &[]).json();
-    assert!(told["computed"].as_u64() < told["samples"].as_u64(), "{told}");
-    assert!(fs::read(&killed).unwrap() == fs::read(&whole).unwrap() && !Path::new(&part).exists());
+    assert!(fs::read(&anew).unwrap() == bytes && !Path::new(&left).exists());
 }
 
 #[test]

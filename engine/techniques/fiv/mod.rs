@@ -63,6 +63,7 @@ pub mod suns;
 pub mod support_function;
 pub mod surface;
 mod tiles;
+pub mod units;
 
 pub use file::Stored;
 pub use light::Light;

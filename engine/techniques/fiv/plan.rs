@@ -247,19 +247,31 @@ impl Plan {
         light: &Light,
         occluders: &[Occluder],
         range: Range<u64>,
+        done: impl FnMut(u64, &[f32]) -> Result<bool>,
+    ) -> Result<()> {
+        self.compute_with(&mut OnDevice::new(gpu), light, occluders, range, done)
+    }
+
+    /// As [`Self::compute`], for ranges one after the other: what the last one had on the device is used again.
+    ///
+    /// # Errors
+    /// As [`Self::compute`].
+    pub fn compute_with<'a>(
+        &self,
+        on_device: &mut OnDevice<'a>,
+        light: &Light,
+        occluders: &'a [Occluder],
+        range: Range<u64>,
         mut done: impl FnMut(u64, &[f32]) -> Result<bool>,
     ) -> Result<()> {
-        let mut runner = Runner::new(gpu);
         let firsts = self.firsts();
-        for ((occluder, kind), ends) in occluders.iter().zip(&self.occluders).zip(firsts.windows(2)) {
+        let all = occluders.iter().zip(&self.occluders).zip(firsts.windows(2)).enumerate();
+        for (number, ((occluder, kind), ends)) in all {
             let (first, mut at, last) = (ends[0], range.start.max(ends[0]), range.end.min(ends[1]));
             if at >= last {
                 continue;
             }
-            let mut cover = Cover::new(gpu, occluder)?;
-            if self.masks == Masks::Parallel {
-                cover.look_up(gpu, self.size, self.split)?;
-            }
+            let (cover, runner) = on_device.occluder(number, occluder, self)?;
             let places = occluder.places();
             while at < last {
                 let of_turn = self.of_turn(kind);
@@ -279,12 +291,12 @@ impl Plan {
                         }
                     };
                     let points: Vec<Vec3> = (at..end).map(point).collect();
-                    around(&mut cover, &mut runner, light, &points, self.split)?
+                    around(cover, runner, light, &points, self.split)?
                 } else {
                     let places = places.get((at - border) as usize..(end - border) as usize).unwrap_or_default();
                     let turned = |p: &Place| Place { point: matrix * p.point, normal: matrix * p.normal };
                     let places: Vec<Place> = places.iter().map(turned).collect();
-                    cover.run_own(&mut runner, light, &places, self.split)?.0
+                    cover.run_own(runner, light, &places, self.split)?.0
                 };
                 debug_assert_eq!(fivs.len() as u64, (end - at) * u64::from(FIV_FLOATS));
                 if !done(end, &fivs)? {
@@ -294,6 +306,39 @@ impl Plan {
             }
         }
         Ok(())
+    }
+}
+
+/// What computing vectors has on the device: the last occluder.
+#[derive(Debug)]
+pub struct OnDevice<'a> {
+    gpu: Gpu,
+    runner: Runner,
+    occluder: Option<(usize, Cover<'a>)>,
+}
+
+impl<'a> OnDevice<'a> {
+    pub fn new(gpu: &Gpu) -> Self {
+        Self { gpu: gpu.clone(), runner: Runner::new(gpu), occluder: None }
+    }
+
+    fn occluder(
+        &mut self,
+        number: usize,
+        occluder: &'a Occluder,
+        plan: &Plan,
+    ) -> Result<(&mut Cover<'a>, &mut Runner)> {
+        let cover = match self.occluder.take() {
+            Some(last) if last.0 == number => last,
+            _ => {
+                let mut cover = Cover::new(&self.gpu, occluder)?;
+                if plan.masks == Masks::Parallel {
+                    cover.look_up(&self.gpu, plan.size, plan.split)?;
+                }
+                (number, cover)
+            }
+        };
+        Ok((&mut self.occluder.insert(cover).1, &mut self.runner))
     }
 }
 

@@ -57,6 +57,7 @@ impl Progress {
         let (done, total) = (self.done, self.total);
         let took = seconds.map_or("there already".to_owned(), |seconds| format!("{seconds:.1} s"));
         let left = self.time_left().map(|left| format!(", {} left", spoken(left))).unwrap_or_default();
+        self.mode.share(done as f64 / total.max(1) as f64);
         let mut err = std::io::stderr().lock();
         let _ = match self.mode {
             ProgressMode::Bar => {
@@ -72,6 +73,7 @@ impl Progress {
                 let line = serde_json::json!({ "done": done, "total": total, "run": what, "seconds": seconds, "seconds_left": left });
                 writeln!(err, "{line}")
             }
+            ProgressMode::OpenJd => writeln!(err, "openjd_status: run {done}/{total}{left}"),
             ProgressMode::Auto | ProgressMode::None => Ok(()),
         };
     }

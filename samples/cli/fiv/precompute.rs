@@ -1,31 +1,31 @@
 //! `fiv precompute`: computes the vectors of occluders under an environment and writes them to a file.
 
 use std::{
-    ops::Range,
     path::{Path, PathBuf},
     process::ExitCode,
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use lucerna::{
     Error, ErrorKind, Result,
+    bake::{self as engine_bake, End, Needed, Store},
     gpu::Gpu,
     image,
     scene::{Environment, Pose},
-    techniques::fiv::{Light, Method, Occluder, Occluders, Plan, Settings, Sky, Stored},
+    techniques::fiv::{Light, Method, Occluder, Occluders, Plan, Settings, Sky, Stored, plan::OnDevice, units},
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::{Meter, Shard, decided, partial};
+use super::{decided, partial};
 use crate::{
     args::{DeviceArgs, TalkArgs, positive},
+    bake::{self, Meter, UnitsArgs},
     config::{self, SettingsArgs},
     console::{self, Console},
     ground::GroundArgs,
     program::{self, STOPPED_EARLY},
     progress::ProgressMode,
-    render::unless_stopped,
     settings_list,
     signals::Interrupt,
     source,
@@ -62,22 +62,12 @@ pub struct PrecomputeArgs {
     #[arg(long, help_heading = "Output")]
     pub overwrite: bool,
 
-    /// Compute only part I of N; `fiv merge` joins the parts
-    #[arg(long, value_name = "I/N", help_heading = "Output")]
-    pub shard: Option<Shard>,
-
-    /// Start again, even if a stopped run has left FILE.part
-    #[arg(long, help_heading = "Output")]
-    pub restart: bool,
-
-    /// Seconds between writes of the finished samples to FILE.part; the interval is longer if a write takes more than a
-    /// tenth of it
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, help_heading = "Output")]
-    pub checkpoint: f64,
-
     /// Print one JSON document about the run on stdout
     #[arg(long, help_heading = "Output")]
     pub json: bool,
+
+    #[command(flatten)]
+    pub units: UnitsArgs,
 
     #[command(flatten)]
     pub settings: SettingsArgs,
@@ -93,11 +83,6 @@ pub struct PrecomputeArgs {
     pub progress: ProgressMode,
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
-    let good = |s: &f64| (0.0..=86_400.0).contains(s);
-    text.parse().ok().filter(good).ok_or_else(|| "expected seconds from 0 to 86400".into())
-}
-
 /// The settings, with the same keys as `fiv render`.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -110,6 +95,7 @@ struct Keys {
 /// # Errors
 /// Whatever fails, with the kind that decides the exit code.
 pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
+    let begun = Instant::now();
     let mut keys = args.settings.effective(&Keys::default())?;
     let checked = |keys: &Keys| decided::of_vectors(&keys.fiv).validate().map_err(|error| error.at("fiv"));
     args.settings.blamed(checked(&keys), || checked(&args.settings.file_alone().effective(&Keys::default())?))?;
@@ -124,7 +110,8 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
     // Texels are separated only for this method.
     keys.fiv.method = Method::Vectors;
     image::probe_output(&args.output, args.overwrite)?;
-    let interrupt = Interrupt::install();
+    // From here on the program ends by itself when it is asked to.
+    let _ = Interrupt::install();
     let (occluders, environment) = load(args, &keys.fiv, console)?;
     let sky = Sky::of(Some(&environment), &keys.fiv)?;
     if sky.repaired > 0 {
@@ -141,60 +128,106 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
     plan.fits(None)?;
     let light = Light::new(&gpu, &sky)?;
     plan.adapt(&gpu, &light, &occluders, &keys.fiv, |_| true)?;
-    let range = args.shard.map_or(0..plan.samples(), |shard| plan.part(shard.index, shard.count));
-    let part = partial(&args.output)?;
-    let mut stored = match resumed(&part, &plan, &range, args.restart)? {
-        Some(stored) => stored,
-        None => Stored::empty(plan.clone(), range.start),
-    };
-    let total = range.end - range.start;
-    let before = stored.range.end - range.start;
-    if before > 0 {
-        console.info(&format!("{}: goes on after {before} of {total} samples", part.display()));
-    }
+    compute(args, console, begun, &keys, (&gpu, &light, &occluders, &plan))
+}
 
-    let mut meter = Meter::new(args.progress, console.is_quiet(), before, total);
-    let (mut saved, mut took) = (Instant::now(), Duration::ZERO);
-    let checkpoint = Duration::from_secs_f64(args.checkpoint);
-    let computed = plan.compute(&gpu, &light, &occluders, stored.range.end..range.end, |done, new| {
-        stored.push(new);
-        meter.show(done - range.start);
-        // Each checkpoint writes the whole file. At most a tenth of the time is spent on checkpoints.
-        if saved.elapsed() >= checkpoint.max(9 * took) {
-            let begun = Instant::now();
-            let _saving = interrupt.saving();
-            stored.write(&part, true)?;
-            saved = Instant::now();
-            took = saved - begun;
+/// Computes the units that are not there, and joins them to the file if all are.
+fn compute(
+    args: &PrecomputeArgs,
+    console: Console,
+    begun: Instant,
+    keys: &Keys,
+    (gpu, light, occluders, plan): (&Gpu, &Light, &[Occluder], &Plan),
+) -> Result<ExitCode> {
+    let interrupt = Interrupt::install();
+    let about = gpu.describe();
+    let device = format!("{}, {} {}", about.device, about.driver, about.driver_info);
+    let folder = bake::parts(&args.output)?;
+    let store = args.units.store(&folder, units::job(plan, &device)?, console)?;
+    let part = partial(&args.output)?;
+    take(&part, &store, plan, args.units.restart, console)?;
+    let mut on_device = OnDevice::new(gpu);
+    let unit = |unit, _: Needed<'_>| {
+        let range = units::range(store.job(), unit);
+        let (mut fivs, last) = (Vec::new(), range.end);
+        let mut done = range.start;
+        plan.compute_with(&mut on_device, light, occluders, range, |at, new| {
+            fivs.extend_from_slice(new);
+            done = at;
+            Ok(!interrupt.requested())
+        })?;
+        match done == last {
+            true => Ok(units::bytes(&fivs)),
+            false => Err(Error::new(ErrorKind::Interrupted, "stopped on request")),
         }
-        Ok(!interrupt.requested())
-    });
-    // Samples that were computed before the interrupt are kept.
-    unless_stopped(computed, &interrupt)?;
-    if stored.range.end < range.end {
-        let _saving = interrupt.saving();
-        stored.write(&part, true)?;
-        let done = stored.range.end - range.start;
-        console.info(&format!("stopped after {done} of {total} samples; the same command goes on"));
-        return Ok(ExitCode::from(STOPPED_EARLY));
+    };
+    let mut meter = None;
+    let outcome = engine_bake::run(&store, &args.units.options(begun), unit, |progress| {
+        let [done, total] = progress.cost;
+        if meter.is_none() && done > 0 {
+            let shown = folder.display();
+            console.info(&format!("{shown}: goes on after {done} of {total} samples"));
+        }
+        let new = || Meter::new(args.progress, console.is_quiet(), "samples", done, total);
+        let fresh = meter.is_none();
+        let meter = meter.get_or_insert_with(new);
+        if done > 0 {
+            interrupt.keep();
+        }
+        if !fresh || done < total {
+            meter.show(done, progress.bytes);
+        }
+    })?;
+    let [done, total] = outcome.progress.cost;
+    let shard = args.units.shard;
+    match &outcome.end {
+        End::Stopped if done == 0 => return Err(Error::new(ErrorKind::Interrupted, "stopped on request")),
+        End::Stopped | End::TimeLimit => {
+            let why = if outcome.end == End::Stopped { "stopped" } else { "time limit: stopped" };
+            console.info(&format!("{why} after {done} of {total} samples; the same command goes on"));
+            return Ok(ExitCode::from(STOPPED_EARLY));
+        }
+        End::Waits(units) => {
+            console.info(&bake::waits(store.job(), units));
+            return Ok(ExitCode::from(STOPPED_EARLY));
+        }
+        End::Done => {}
     }
-    let saving = interrupt.saving();
-    stored.write(&args.output, args.overwrite)?;
-    interrupt.keep();
-    drop(saving);
-    let _ = std::fs::remove_file(&part);
-    let bytes = std::fs::metadata(&args.output).map_or(0, |m| m.len());
-    console.info(&format!("wrote {}: {bytes} bytes", args.output.display()));
+    let missing = store.survey(false)?.missing.len();
+    let bytes = match shard {
+        Some(shard) => {
+            let (shown, units) = (folder.display(), outcome.progress.units[1]);
+            let rest = match missing {
+                0 => "all units are there; the same command without --shard joins them".into(),
+                missing => format!("{missing} units of other shards are missing"),
+            };
+            console.info(&format!("{shown}: shard {shard} is done, {units} units; {rest}"));
+            None
+        }
+        None => {
+            let saving = interrupt.saving();
+            let bytes = bake::joined(&store, &args.output, args.overwrite)?;
+            drop(saving);
+            bake::remove(store, console)?;
+            let _ = std::fs::remove_file(&part);
+            console.info(&format!("wrote {}: {bytes} bytes", args.output.display()));
+            Some(bytes)
+        }
+    };
     if args.json {
         console::print_json(&json!({
-            "file": args.output,
+            "file": bytes.map(|_| &args.output),
             "bytes": bytes,
+            "folder": shard.map(|_| &folder),
+            "shard": shard.map(|shard| shard.to_string()),
+            "units": outcome.progress.units[1],
+            "missing": missing,
             "samples": total,
-            "computed": total - before,
-            "seconds": meter.seconds(),
+            "computed": total - outcome.progress.before,
+            "seconds": outcome.progress.seconds,
             "environment": plan.environment,
             "occluders": console::to_json(&plan.occluders)?,
-            "settings": config::to_value(&keys)?,
+            "settings": config::to_value(keys)?,
         }))?;
     }
     Ok(ExitCode::SUCCESS)
@@ -247,27 +280,19 @@ fn load(args: &PrecomputeArgs, settings: &Settings, console: Console) -> Result<
     Ok((kinds, environment))
 }
 
-/// The samples that a stopped run has left.
+/// Takes what an earlier version of this program has left.
 ///
 /// # Errors
-/// `Output` if the file belongs to other work, `Input` if it is damaged. The file may contain hours of work, so it is never replaced
-/// unless the user asks for it.
-fn resumed(part: &Path, plan: &Plan, range: &Range<u64>, restart: bool) -> Result<Option<Stored>> {
+/// `Input` if it is damaged, `Output` if it is of other work: it may be worth hours.
+fn take(part: &Path, store: &Store, plan: &Plan, restart: bool, console: Console) -> Result<()> {
     if restart || !part.exists() {
-        return Ok(None);
+        return Ok(());
     }
     let help = "Use --restart to replace it, or name another file with -o";
     let stored = Stored::read(part).map_err(|error| error.help(help))?;
-    let difference = plan.difference(&stored.plan).or_else(|| {
-        let (first, last) = (stored.range.start, stored.range.end);
-        let fits = first == range.start && last <= range.end;
-        (!fits).then(|| format!("samples {first} to {last} instead of {} to {}", range.start, range.end))
-    });
-    match difference {
-        None => Ok(Some(stored)),
-        Some(difference) => {
-            let what = format!("a stopped run with other work has left this file: {difference}");
-            Err(Error::new(ErrorKind::Output, what).in_file(part).help(help))
-        }
+    let taken = units::take(store, plan, &stored).map_err(|error| error.in_file(part).help(help))?;
+    if taken > 0 {
+        console.info(&format!("{}: {taken} units are taken from what an earlier version has left", part.display()));
     }
+    Ok(())
 }

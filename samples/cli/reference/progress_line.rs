@@ -115,6 +115,7 @@ impl ProgressLine {
             self.mode.progress_line(&text.to_string(), last);
             return;
         }
+        self.mode.share(if last { 1.0 } else { now.samples / self.goals.samples as f64 });
         let samples = if now.samples < 10.0 { format!("{:.1}", now.samples) } else { format!("{:.0}", now.samples) };
         let mut text = format!("{samples}/{} samples, {} samples/s", self.goals.samples, count(self.rate(now)));
         if let Some(error) = error {

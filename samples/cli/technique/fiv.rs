@@ -12,7 +12,8 @@ use lucerna::{
 
 use crate::{
     args::RenderArgs,
-    fiv::{Meter, decided},
+    bake::Meter,
+    fiv::decided,
     frame_output::FrameOutput,
     gbuffer_layers,
     last_stage::Staged,
@@ -121,8 +122,8 @@ impl Renderer for ByVectors<'_> {
         let resident = Resident::new(gpu, scene)?;
         let mut meter = None;
         let told = |done: u64, total: u64| {
-            let meter = meter.get_or_insert_with(|| Meter::new(self.progress, self.quiet, 0, total));
-            meter.show(done);
+            let meter = meter.get_or_insert_with(|| Meter::new(self.progress, self.quiet, "samples", 0, total));
+            meter.show(done, 0);
             self.stopped.set(self.interrupt.requested());
             !self.stopped.get()
         };
