@@ -243,7 +243,7 @@ fn the_motion_of_nodes_and_of_deforming_meshes_is_known() {
                 found += 1;
                 let told = Vec3::from_slice(&motion[..3]);
                 // GPUs interpolate up to 1/256 pixel beside the middle of the pixel.
-                assert!(told.distance(before) < 4e-4, "pixel {i}: {told} instead of {before}");
+                assert!(told.distance(before) < 1e-3, "pixel {i}: {told} instead of {before}");
             }
         }
         assert!(found > 100, "{found} pixels of the block");

@@ -179,7 +179,7 @@ fn jobs_of_other_keys_are_not_joined() {
     assert!(error.exit_code() == 3 && said.contains("`seed` is `7` instead of `0`") && !into.exists(), "{said}");
     assert!(merge(&[a], &b).unwrap_err().to_string().contains("belongs to other work"));
     assert_eq!(merge(&[], &into).unwrap_err().exit_code(), 2);
-    assert_eq!(merge(&[into.clone()], &into).unwrap_err().exit_code(), 3);
+    assert_eq!(merge(std::slice::from_ref(&into), &into).unwrap_err().exit_code(), 3);
 }
 
 #[test]
