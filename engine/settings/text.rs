@@ -93,7 +93,7 @@ fn paragraphs(doc: &str) -> impl Iterator<Item = String> {
 }
 
 impl Key {
-    /// What a person has to know who writes the key into a TOML file, as comment lines of at most [`WIDTH`] characters.
+    /// What a person has to know who writes the key into a TOML file, as comment lines of at most 100 characters.
     pub fn comment(&self) -> Vec<String> {
         let mut about = self.lines();
         about.extend(
