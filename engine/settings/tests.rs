@@ -131,7 +131,9 @@ fn comments_say_what_keys_do() {
         "# Allowed: multiples of 8 from 1 to 96 lights.",
     ];
     assert_eq!(comment("vpls"), vpls);
+    // A field without docs of its own has those of its type.
     let rays = [
+        "# How rays are traced.",
         "# trees: Through trees.",
         "# by-device: By the device.",
         "# Allowed: trees, by-device.",
