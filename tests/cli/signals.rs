@@ -217,7 +217,7 @@ fn an_experiment_is_left_and_goes_on() {
         .arg(&out)
         .arg("--dry-run")
         .output();
-    assert!(String::from_utf8_lossy(&dry.unwrap().stdout).contains("2 runs, 1 are there"));
+    assert!(String::from_utf8_lossy(&dry.unwrap().stdout).contains("2 runs, 1 of them exist"));
 }
 
 /// A program that nobody waits for, and that says nothing: it ends at once, as by default, but tidies up.
