@@ -57,19 +57,19 @@ pub struct Need {
 pub struct Stage {
     /// Part of the names of files: 1 to 40 of `a` to `z`, `0` to `9` and `_`.
     pub name: String,
-    /// How much work each unit is, in whatever counts for this stage (samples, rays); at least 1.
+    /// Work of each unit in this stage's measure (samples, rays); at least 1.
     pub costs: Vec<u64>,
     #[serde(default)]
     pub needs: Vec<Need>,
 }
 
 impl Stage {
-    /// A stage whose units need no others.
+    /// A stage whose units do not depend on other units.
     pub fn new(name: &str, costs: Vec<u64>) -> Self {
         Self { name: name.to_owned(), costs, needs: Vec::new() }
     }
 
-    /// Its units need units of an earlier stage.
+    /// Adds a dependency of the stage's units on units of an earlier stage.
     #[must_use]
     pub fn needs(mut self, stage: u32, units: Which) -> Self {
         self.needs.push(Need { stage, units });
@@ -77,26 +77,26 @@ impl Stage {
     }
 }
 
-/// Work that is cut into units: what decides their bytes, and which units need which.
+/// A computation divided into units: the key of its inputs, and the dependencies between units.
 ///
-/// A stage's units may need units of earlier stages alone, so that there is always an order. How many units there are is known when
-/// the job begins; work that is cut by what earlier units have found is a second job, whose key has a part that those decide.
+/// Units may depend on units of earlier stages only, so that an order always exists. The number of units is fixed when the job begins. If the
+/// results of units decide how further work is divided, this work is a second job, and its key has those results as a part.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Job {
     version: u32,
     key: Key,
     stages: Vec<Stage>,
-    /// What whoever joins the units to a result needs besides them.
+    /// Data that joining the units needs in addition to the units.
     #[serde(default)]
     pub about: Value,
 }
 
 impl Job {
-    /// How the work is cut counts into the key, as its part `units`.
+    /// The division into units becomes the part `units` of the key.
     ///
     /// # Errors
-    /// `Runtime`, naming the stage, if there are too many units, or if one needs what does not come before it.
+    /// `Runtime`, naming the stage, if there are too many units, or if a unit depends on a stage that is not earlier.
     pub fn new(key: Key, stages: Vec<Stage>) -> Result<Self> {
         let cut = serde_json::to_vec(&stages)
             .map_err(|error| Error::new(ErrorKind::Runtime, "has no text").caused_by(error))?;
@@ -106,7 +106,7 @@ impl Job {
         Ok(job)
     }
 
-    /// Adds what is needed besides the units.
+    /// Adds the data that joining needs in addition to the units.
     #[must_use]
     pub fn about(mut self, about: Value) -> Self {
         self.about = about;
@@ -154,7 +154,7 @@ impl Job {
                 Which::Listed(lists) => {
                     listed += lists.iter().map(Vec::len).sum::<usize>();
                     if lists.len() != ours || lists.iter().flatten().any(|&unit| unit as usize >= theirs) {
-                        return Err(format!("the lists of what it needs do not fit {ours} and {theirs} units"));
+                        return Err(format!("the lists of dependencies do not fit {ours} and {theirs} units"));
                     }
                     if listed > MOST_LISTED {
                         return Err(format!("lists {listed} needs, at most {MOST_LISTED} are allowed"));
@@ -166,7 +166,7 @@ impl Job {
         Ok(())
     }
 
-    /// What decides the bytes.
+    /// The inputs that decide the bytes.
     pub fn key(&self) -> &Key {
         &self.key
     }
@@ -175,7 +175,7 @@ impl Job {
         &self.stages
     }
 
-    /// All units, stage by stage: each comes after those that it needs.
+    /// All units, stage by stage. Each unit comes after its dependencies.
     pub fn units(&self) -> impl Iterator<Item = UnitId> + '_ {
         let of = |(stage, s): (usize, &Stage)| {
             (0..s.costs.len() as u32).map(move |index| UnitId { stage: stage as u32, index })
@@ -188,12 +188,12 @@ impl Job {
         self.stages.iter().flat_map(|stage| stage.costs.iter().copied())
     }
 
-    /// How much work a unit is; 0 if there is no such unit.
+    /// Work of a unit; 0 if the unit does not exist.
     pub fn cost(&self, unit: UnitId) -> u64 {
         self.stages.get(unit.stage as usize).and_then(|s| s.costs.get(unit.index as usize)).copied().unwrap_or(0)
     }
 
-    /// The units that one needs.
+    /// The dependencies of a unit.
     pub fn needs(&self, unit: UnitId) -> Vec<UnitId> {
         let mut out = Vec::new();
         for need in self.stages.get(unit.stage as usize).map_or(&[][..], |stage| &stage.needs) {
@@ -267,7 +267,7 @@ impl Job {
     }
 
     /// # Errors
-    /// `Input`, saying what is wrong.
+    /// `Input` if the text is damaged, is no job, or has another version.
     pub fn decode(bytes: &[u8]) -> Result<Self> {
         let damaged = || Error::input("is damaged, or is no description of a job");
         let text = std::str::from_utf8(bytes).map_err(|error| damaged().caused_by(error))?;
@@ -276,7 +276,7 @@ impl Job {
         if Digest::parse(digest) != Some(Digest::of(job.as_bytes())) {
             return Err(damaged());
         }
-        // Before anything else: what another version wrote need not parse.
+        // The version comes first, because the text of another version may not parse.
         let version = serde_json::from_str::<Versioned>(job).map_err(|error| damaged().caused_by(error))?.version;
         if version != VERSION {
             return Err(Error::input(format!("has version {version}, version {VERSION} can be read")));

@@ -1,4 +1,4 @@
-//! What decides the bytes of a job, in named parts.
+//! The inputs that decide the bytes of a job, as named parts.
 
 use std::fmt;
 
@@ -14,7 +14,7 @@ impl Digest {
         Self(*blake3::hash(bytes).as_bytes())
     }
 
-    /// Reads what [`fmt::Display`] writes: 64 hexadecimal digits.
+    /// Reads the 64 hexadecimal digits that [`fmt::Display`] writes.
     pub fn parse(text: &str) -> Option<Self> {
         let lower = |b: u8| matches!(b, b'0'..=b'9' | b'a'..=b'f');
         if text.len() != 64 || !text.bytes().all(lower) {
@@ -58,7 +58,7 @@ impl<'de> Deserialize<'de> for Digest {
 pub struct Part {
     pub name: String,
     pub digest: Digest,
-    /// What a reader knows it by. Only the digest decides.
+    /// A description for messages. Equality depends on the digest alone.
     pub text: String,
 }
 

@@ -9,28 +9,29 @@ use std::{
 use super::{State, Store, UnitId};
 use crate::{Error, Result};
 
-/// What a merge has found.
+/// The result of a merge.
 #[derive(Debug, Default)]
 pub struct Merged {
-    /// Units that were there already.
+    /// Units that the target had already.
     pub there: u64,
-    /// Units that the folder now has as hard links.
+    /// Units that were added as hard links.
     pub linked: u64,
-    /// Units that were copied, where there are no hard links.
+    /// Units that were copied, because the file system refused a hard link.
     pub copied: u64,
     /// Units that no folder has.
     pub missing: Vec<UnitId>,
-    /// Files that do not count, and why.
+    /// Why some files were rejected.
     pub faulty: Vec<Error>,
-    /// What no job knows, by folder.
+    /// Files that do not belong to the job: folder and name.
     pub unknown: Vec<(PathBuf, OsString)>,
 }
 
-/// Brings the units of all folders into one, which may be there already. All must be of one job. Units are gone through before they
-/// count; nothing is removed from any folder.
+/// Collects the units of all folders in one folder, which may exist already. All folders must belong to one job. Each unit is verified before it
+/// is accepted. No file is removed from any folder.
 ///
 /// # Errors
-/// `Input` if a folder is of another job, saying in which parts, or cannot be read; `Output` if a unit cannot be written.
+/// `Input` if a folder cannot be read, or belongs to another job (the message names the parts that differ); `Output` if a unit cannot be
+/// written.
 pub fn merge(from: &[PathBuf], into: &Path) -> Result<(Store, Merged)> {
     let Some((first, rest)) = from.split_first() else { return Err(Error::usage("there are no folders to join")) };
     let first = Store::open(first)?;
@@ -49,7 +50,7 @@ pub fn merge(from: &[PathBuf], into: &Path) -> Result<(Store, Merged)> {
         let survey = store.survey(false)?;
         merged.unknown.extend(survey.unknown.into_iter().map(|name| (store.folder().to_owned(), name)));
     }
-    // A folder that is both source and target is looked at once.
+    // The target may be one of the sources.
     let real = |folder: &Path| fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
     let home = real(into);
     stores.retain(|store| real(store.folder()) != home);

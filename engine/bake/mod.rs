@@ -1,8 +1,8 @@
-//! Long computations in units that can be stopped, continued, spread over machines and joined, with the same bytes whichever way.
+//! Long computations in units. They can be stopped, continued, spread over machines and joined; the bytes are the same in every case.
 //!
-//! A [`Job`] is a list of units in stages, and a [`Key`]: all that decides its bytes. A unit is a pure function of the key and of the units
-//! that it needs; [`run()`] computes it and a [`Store`] keeps its bytes, one file a unit, written whole or not at all. A unit that is there is
-//! not computed again: the same command goes on where it was stopped, and a [`Shard`] of it on another machine computes others.
+//! A [`Job`] is a list of units in stages, with a [`Key`] of all inputs that decide the bytes. A unit is a pure function of the key and of the
+//! units that it needs. [`run()`] computes the units, and a [`Store`] keeps one file for each, which is complete or absent. A finished unit is
+//! not computed again: the same command continues after a stop, and each [`Shard`] computes its own units on its own machine.
 //! [`merge()`] joins folders of one job.
 //!
 //! ```

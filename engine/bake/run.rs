@@ -8,22 +8,22 @@ use std::{
 use super::{Payload, Shard, State, Store, UnitId};
 use crate::{Error, ErrorKind, Result, Stop};
 
-/// Units whose times foretell that of the next one.
+/// Number of past units from which the time of the next unit is predicted.
 const REMEMBERED: usize = 8;
-/// Between two looks for units of other shards.
+/// Interval between checks for units of other shards.
 const PAUSE: Duration = Duration::from_millis(500);
 
-/// How much of a job is to be done.
+/// Limits of a run.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Which units.
+    /// The units to compute.
     pub shard: Shard,
-    /// No unit is begun that would not be done so long after `begun`, by the times of the units before it.
+    /// No unit is started that would end later than this time after `begun`, as predicted from the times of earlier units.
     pub time_limit: Option<Duration>,
     pub begun: Instant,
-    /// Asks to stop. A unit that ends nevertheless is kept, one that fails by being asked is dropped.
+    /// Request to stop. The unit in progress is kept if it completes, and dropped if it stops.
     pub stop: Stop,
-    /// So long units of other shards are waited for, if nothing else is to be done.
+    /// How long the run waits for units of other shards, when no other unit can be computed.
     pub wait: Duration,
 }
 
@@ -35,14 +35,14 @@ impl Default for Options {
     }
 }
 
-/// How far a run is.
+/// Progress of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Progress {
-    /// Units of the shard that are done, and all of them.
+    /// Finished units of the shard, and all its units.
     pub units: [u64; 2],
-    /// Their costs.
+    /// Work of these units, as in [`super::Stage::costs`].
     pub cost: [u64; 2],
-    /// Costs that were done before this run.
+    /// Work that was finished before this run.
     pub before: u64,
     /// Bytes that this run has computed.
     pub bytes: u64,
@@ -51,12 +51,12 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Work a second, of this run alone.
+    /// Work per second of this run.
     pub fn rate(&self) -> f64 {
         self.cost[0].saturating_sub(self.before) as f64 / self.seconds.max(1e-9)
     }
 
-    /// Seconds that are left at this rate; `None` before anything is done.
+    /// Remaining seconds at this rate; `None` before the first unit.
     pub fn seconds_left(&self) -> Option<f64> {
         let left = self.cost[1].saturating_sub(self.cost[0]) as f64;
         (self.cost[0] > self.before || left == 0.0).then(|| left / self.rate().max(1e-9))
@@ -66,17 +66,17 @@ impl Progress {
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum End {
-    /// All units of the shard are there.
+    /// All units of the shard are finished.
     Done,
-    /// It was asked to stop.
+    /// A stop was requested.
     Stopped,
-    /// The next unit would not have been done in time.
+    /// The next unit would have exceeded the time limit.
     TimeLimit,
-    /// The rest needs these units of other shards.
+    /// The remaining units depend on these units of other shards.
     Waits(Vec<UnitId>),
 }
 
-/// What a run has done.
+/// The result of a run.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     pub end: End,
@@ -85,7 +85,7 @@ pub struct Outcome {
     pub computed: u64,
 }
 
-/// The units that one needs; all are there, and their bytes were gone through.
+/// The dependencies of a unit. All exist, and their bytes are verified.
 #[derive(Clone, Copy, Debug)]
 pub struct Needed<'a> {
     store: &'a Store,
@@ -159,7 +159,7 @@ pub fn run(
             }
             let started = Instant::now();
             let payload = match unit(id, Needed { store, units: &needs }) {
-                // A device that was left in the middle of its work serves nobody any more.
+                // The request interrupted the device in the middle of the unit.
                 Err(error) if options.stop.requested() && by_request(&error) => break End::Stopped,
                 result => result.map_err(|error| error.at(store.job().name(id)))?,
             };
@@ -182,7 +182,7 @@ pub fn run(
         if put_off < left.len() {
             continue;
         }
-        // All that is left needs units of others.
+        // All remaining units depend on units of other shards.
         let since = *waits_since.get_or_insert_with(Instant::now);
         let over = options.time_limit.is_some_and(|limit| options.begun.elapsed() >= limit);
         if since.elapsed() >= options.wait || over {

@@ -1,4 +1,4 @@
-//! Parts of a job's work that machines do beside each other.
+//! Parts of a job for several machines.
 
 use std::str::FromStr;
 
@@ -105,15 +105,15 @@ impl Shard {
         })
     }
 
-    /// The units of a shard: of each stage a row of neighbours, so that all shards have nearly the same work. Who has which unit follows from
-    /// the job and the number of shards alone, and changes no unit's bytes.
+    /// The units of a shard: consecutive units of each stage, so that all shards have nearly the same work. The assignment depends only on the
+    /// job and the number of shards, and does not change the bytes of a unit.
     pub fn units(self, job: &Job) -> Vec<UnitId> {
         let mut out = Vec::new();
         for (stage, units) in job.stages().iter().enumerate() {
             let total: u128 = units.costs.iter().map(|&cost| u128::from(cost)).sum();
             let mut before = 0u128;
             for (index, &cost) in units.costs.iter().enumerate() {
-                // Whoever has the middle of a unit has it whole.
+                // A unit belongs to the shard that its middle falls into.
                 let owner = (2 * before + u128::from(cost)) * u128::from(self.count) / (2 * total);
                 before += u128::from(cost);
                 if owner == u128::from(self.index) {

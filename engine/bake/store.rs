@@ -10,8 +10,8 @@ use std::{
 use super::{Digest, Job, MANIFEST, Payload, UnitId, unit};
 use crate::{Error, ErrorKind, Result, image};
 
-/// A job's folder: its description (`job.json`) and a file for each unit that is done. Several processes may work in it at once, on one
-/// machine or on several: files appear whole, and a unit has the same bytes whoever has computed it.
+/// The folder of a job: its description (`job.json`) and one file for each finished unit. Several processes, also on several machines, may use
+/// the folder at the same time: files appear whole, and the bytes of a unit do not depend on the process that computed it.
 #[derive(Clone, Debug)]
 pub struct Store {
     folder: PathBuf,
@@ -19,36 +19,36 @@ pub struct Store {
     key: Digest,
 }
 
-/// What is there of a unit.
+/// The state of a unit's file.
 #[derive(Debug)]
 pub enum State {
     Missing,
     /// Its bytes.
     Whole(u64),
-    /// A file that is damaged, cut off, or of another job: it does not count and is made anew.
+    /// The file is damaged, cut off, or belongs to another job. The unit is computed again.
     Faulty(Error),
 }
 
-/// What is in a job's folder.
+/// The content of a job's folder.
 #[derive(Debug, Default)]
 pub struct Survey {
-    /// Units that are there, in order.
+    /// Finished units, in order.
     pub whole: Vec<UnitId>,
     /// In order.
     pub missing: Vec<UnitId>,
-    /// Why they do not count.
+    /// Rejected units, each with the reason.
     pub faulty: Vec<(UnitId, Error)>,
-    /// Bytes of the units that are there.
+    /// Bytes of the finished units.
     pub bytes: u64,
-    /// Names that no file of a job has. Nothing reads or removes them.
+    /// Files that do not belong to the job. They are neither read nor removed.
     pub unknown: Vec<OsString>,
 }
 
 impl Store {
-    /// Opens the folder of a job, or makes it.
+    /// Opens the folder of a job, or creates it.
     ///
     /// # Errors
-    /// `Output` if the folder is that of another job, saying in which parts it differs, or if it cannot be written.
+    /// `Output` if the folder belongs to another job (the message names the parts that differ), or if it cannot be written.
     pub fn create(folder: &Path, job: Job) -> Result<Self> {
         let bytes = job.encode()?;
         fs::create_dir_all(folder).map_err(|error| {
@@ -56,7 +56,7 @@ impl Store {
         })?;
         let store = Self { folder: folder.to_owned(), key: job.key().digest(), job };
         let path = folder.join(MANIFEST);
-        // Another process may describe the same job at the same time: whoever comes second reads what is there.
+        // Another process may write the description at the same time. The second process reads the description of the first.
         for _ in 0..3 {
             if path.symlink_metadata().is_ok() {
                 match Job::read(folder) {
@@ -77,7 +77,7 @@ impl Store {
                 Err(error) => return Err(error),
             }
         }
-        Err(Error::new(ErrorKind::Output, "is written and removed by others").in_file(path))
+        Err(Error::new(ErrorKind::Output, "is written and removed by other processes").in_file(path))
     }
 
     fn same_as(&self, there: &Job) -> Result<()> {
@@ -90,7 +90,7 @@ impl Store {
         }
     }
 
-    /// Opens a folder that is there, as it describes itself.
+    /// Opens an existing folder with the job that its description gives.
     ///
     /// # Errors
     /// `Input` if it has no description, or one that cannot be read.
@@ -116,19 +116,19 @@ impl Store {
         self.folder.join(self.job.file_name(unit))
     }
 
-    /// Looks at a unit's header and length.
+    /// Checks the header and the length of a unit's file.
     pub fn look(&self, unit: UnitId) -> State {
         self.state(unit, |_| Ok(()))
     }
 
-    /// Goes through all bytes of a unit.
+    /// Checks all bytes of a unit's file.
     pub fn check(&self, unit: UnitId) -> State {
         self.state(unit, Payload::verify)
     }
 
     fn state(&self, unit: UnitId, more: impl Fn(&Payload) -> Result<()>) -> State {
         let path = self.path(unit);
-        // A link that leads nowhere is there, and cannot be read.
+        // A link without a target exists, but cannot be read.
         match path.symlink_metadata() {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return State::Missing,
             _ => {}
@@ -139,7 +139,7 @@ impl Store {
         }
     }
 
-    /// Opens a unit; its bytes are not gone through.
+    /// Opens a unit without verifying its bytes.
     ///
     /// # Errors
     /// `Input`, naming the file, if it is missing, damaged, cut off, or of another job.
@@ -147,20 +147,20 @@ impl Store {
         Payload::open(&self.path(unit), self.key, unit)
     }
 
-    /// Keeps a unit's bytes, over a file that does not count.
+    /// Writes a unit's file, over a rejected one.
     ///
     /// # Errors
-    /// `Output` if it cannot be written, or if a link has its name: what that leads to is not ours to replace.
+    /// `Output` if the file cannot be written, or if its name is a link: the link's target does not belong to the job.
     pub fn put(&self, unit: UnitId, payload: &[u8]) -> Result<()> {
         let path = self.path(unit);
         if path.symlink_metadata().is_ok_and(|metadata| metadata.is_symlink()) {
-            let error = Error::new(ErrorKind::Output, "is a link, and what it leads to is not this unit");
+            let error = Error::new(ErrorKind::Output, "is a link, and its target does not belong to this job");
             return Err(error.in_file(path).help("Remove it"));
         }
         image::write_atomic(&path, &unit::encode(self.key, unit, payload)?, true)
     }
 
-    /// Lists the folder. `all`: goes through all bytes; otherwise through headers and lengths.
+    /// Lists the folder. `all`: checks all bytes; otherwise headers and lengths only.
     ///
     /// # Errors
     /// `Input` if the folder cannot be read.
@@ -198,7 +198,7 @@ impl Store {
         fs::read_dir(&self.folder).map_err(cannot)?.map(|entry| Ok(entry.map_err(cannot)?.file_name())).collect()
     }
 
-    /// Removes the folder of work that is done, as far as it is ours: what nobody knows stays, and is returned.
+    /// Removes the files of the job and, if it is empty then, the folder. Returns the names of all other files, which stay.
     ///
     /// # Errors
     /// `Output` if a file cannot be removed.
@@ -206,7 +206,7 @@ impl Store {
         let names = self.names()?;
         let ours =
             |name: &OsString| name == MANIFEST || name.to_str().is_some_and(|name| self.job.of_file(name).is_some());
-        // The description last: a folder that is half removed still says what it is.
+        // The description is removed last, so that a partly removed folder can still be identified.
         let units = names.iter().filter(|name| ours(name) && *name != MANIFEST);
         for name in units.chain(names.iter().filter(|name| *name == MANIFEST)) {
             let path = self.folder.join(name);

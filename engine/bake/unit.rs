@@ -1,6 +1,6 @@
-//! Files of units: what one unit has computed.
+//! The file of a unit, which holds its result.
 //!
-//! | bytes | what |
+//! | bytes | content |
 //! |---|---|
 //! | 8 | `lucbake\n` |
 //! | 4 | version, 1 |
@@ -25,13 +25,13 @@ use crate::{Error, ErrorKind, Result};
 
 const MAGIC: &[u8; 8] = b"lucbake\n";
 const VERSION: u32 = 1;
-/// What the digest covers of the header.
+/// Bytes of the header that the digest covers.
 const COVERED: usize = 64;
 /// Bytes before the payload.
 pub const HEADER: usize = COVERED + 32;
 /// Bytes of a payload at most.
 pub const MOST_BYTES: u64 = 64 << 30;
-/// Bytes that are read at once where a file is gone through.
+/// Bytes per read while a file is verified.
 const CHUNK: usize = 1 << 20;
 
 /// The whole file of a unit.
@@ -60,8 +60,8 @@ pub fn encode(key: Digest, unit: UnitId, payload: &[u8]) -> Result<Vec<u8>> {
     Ok(out)
 }
 
-/// A unit's file that is open. Bytes are read from where they are asked for: of a large file only what is needed comes into memory, as
-/// if it were mapped, without the undefined behaviour of a mapping whose file is cut off meanwhile (and `unsafe` has no place here).
+/// The open file of a unit. Ranges are read on demand, so that a large file does not have to fit into memory. Memory maps would do the same,
+/// but they need `unsafe`, and their behaviour is undefined if the file is truncated while it is mapped.
 #[derive(Debug)]
 pub struct Payload {
     path: PathBuf,

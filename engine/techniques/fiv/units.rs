@@ -1,4 +1,5 @@
-//! Vectors as a job of [`crate::bake`]: each unit is a row of samples, its bytes their vectors, nine 32-bit floats each, low byte first.
+//! The vectors as a job of [`crate::bake`]. A unit is a range of samples. Its bytes are their vectors, nine 32-bit floats per sample, low byte
+//! first.
 
 use std::ops::Range;
 
@@ -13,16 +14,16 @@ use crate::{
 
 /// The name of such jobs.
 pub const KIND: &str = "fiv";
-/// Counts the changes of how vectors are computed.
+/// Increased whenever the computation of vectors changes.
 const VERSION: u32 = 1;
-/// Samples of a unit: what one run of the device computes. It takes seconds on a CPU driver.
+/// Samples of a unit, which the device computes in one submission. It takes seconds on a CPU driver.
 const SAMPLES: u64 = 4096;
-/// Units of a job, about: above, each has more samples.
+/// About the maximum of units. Larger jobs have more samples per unit.
 const UNITS: u64 = 4096;
 /// Bytes of a sample.
 const BYTES: u64 = 4 * FIV_FLOATS as u64;
 
-/// The job that computes a plan's vectors on a device. Everything that the plan says is in its key: two jobs with one key give the same file.
+/// The job that computes a plan's vectors on a device. Its key contains the whole plan, so that jobs with equal keys give the same file.
 ///
 /// # Errors
 /// `Runtime` if the plan cannot be text.
@@ -102,10 +103,10 @@ pub fn join(store: &Store) -> Result<Stored> {
     Ok(stored)
 }
 
-/// Takes the units of a part of a file, as far as they are whole in it and not there yet. How many were taken.
+/// Copies the units that a partial file contains completely and that are missing in the store. Returns their number.
 ///
 /// # Errors
-/// `Output` if the part is of other work, saying what differs, or if a unit cannot be written.
+/// `Output` if the partial file belongs to another plan (the message names the difference), or if a unit cannot be written.
 pub fn take(store: &Store, plan: &Plan, part: &Stored) -> Result<u64> {
     if let Some(difference) = plan.difference(&part.plan) {
         return Err(Error::new(ErrorKind::Output, format!("is of other work: {difference}")));

@@ -35,7 +35,7 @@ pub struct JoinArgs {
     #[arg(long, help_heading = "Output")]
     pub overwrite: bool,
 
-    /// Print one JSON document about what was joined on stdout
+    /// Print one JSON document about the joined units on stdout
     #[arg(long, help_heading = "Output")]
     pub json: bool,
 
@@ -61,7 +61,7 @@ pub fn join(args: &JoinArgs, console: Console) -> Result<ExitCode> {
         return files(&folders, args, console);
     }
     if let Some(file) = folders.iter().find(|path| !path.is_dir()) {
-        let error = Error::usage("is no folder, and others are").in_file(file);
+        let error = Error::usage("is no folder, but other parts are folders").in_file(file);
         return Err(error.help("Join folders with folders and files with files"));
     }
     let into = if to_file { parts(&args.output)? } else { args.output.clone() };
@@ -91,7 +91,7 @@ pub fn join(args: &JoinArgs, console: Console) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let bytes = joined(&store, &args.output, args.overwrite)?;
-    // Those that were joined stay; what was made for this does not, if it is not one of them.
+    // The joined folders stay. The folder that was created for the merge is removed, unless it is one of them.
     let real = |path: &Path| std::fs::canonicalize(path).ok();
     if folders.iter().all(|folder| real(folder) != real(&into)) {
         remove(store, console)?;

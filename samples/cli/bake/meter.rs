@@ -1,4 +1,4 @@
-//! How far a computation is, on stderr.
+//! The progress of a computation, on stderr.
 
 use std::time::{Duration, Instant};
 
@@ -7,11 +7,11 @@ use serde_json::json;
 use super::size;
 use crate::progress::{ProgressMode, span};
 
-/// Shows progress from time to time: how much is done, how fast, how many bytes, and the time that is left.
+/// Shows the finished share, the rate, the bytes and the remaining time at intervals.
 #[derive(Debug)]
 pub struct Meter {
     mode: ProgressMode,
-    /// What is counted: `samples`.
+    /// Noun for the counted items: `samples`.
     what: &'static str,
     started: Instant,
     shown: Instant,
@@ -21,7 +21,7 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// Towards `total` of something, of which `before` were done earlier.
+    /// Counts up to `total` items; `before` of them were finished earlier.
     pub fn new(mode: ProgressMode, quiet: bool, what: &'static str, before: u64, total: u64) -> Self {
         let mode = mode.here(quiet, false);
         Self { mode, what, started: Instant::now(), shown: Instant::now(), before, total }
@@ -32,7 +32,7 @@ impl Meter {
         self.started.elapsed().as_secs_f64()
     }
 
-    /// So many are done, with those done earlier, and this run has computed so many bytes (0: nobody counts them). The last line is always
+    /// `done`: finished items, with earlier ones. `bytes`: bytes that this run has computed; 0 if they are not counted. The last line is always
     /// shown.
     pub fn show(&mut self, done: u64, bytes: u64) {
         let last = done >= self.total;

@@ -1,5 +1,4 @@
-//! What commands that compute units share ([`lucerna::bake`]): their options, how far they are, and `lucerna bake` and `lucerna merge`
-//! around them.
+//! Command line of [`lucerna::bake`]: the options and the progress of commands that compute units, `lucerna bake` and `lucerna merge`.
 
 mod join;
 mod meter;
@@ -29,21 +28,21 @@ use crate::{args::TalkArgs, console::Console, reference::Span, signals::Interrup
 /// Options of commands that compute units.
 #[derive(clap::Args, Clone, Debug)]
 pub struct UnitsArgs {
-    /// Compute only the units of part I of N. `auto`: the part that an array job of Slurm, Grid Engine or Kubernetes says; `auto/N`: of N.
-    /// The same command without it joins what all parts have computed, and computes what is missing
+    /// Compute only the units of part I of N. `auto`: the part of this task in an array job of Slurm, Grid Engine or Kubernetes; `auto/N`: of
+    /// N parts. The same command without --shard computes the missing units and joins all units
     #[arg(long, value_name = "I/N|auto", value_parser = shard, help_heading = "Units")]
     pub shard: Option<Shard>,
 
-    /// Begin no unit that would not be done after this time: 90, 90s, 10m, 1h30m; exit code 8 if some are missing
+    /// Start no unit that would end after this time: 90, 90s, 10m, 1h30m. Exit code 8 if units are missing then
     #[arg(long, value_name = "TIME", help_heading = "Units")]
     pub time_limit: Option<Span>,
 
-    /// Start anew, even if a stopped run has left units of this or other work
+    /// Start again, even if a stopped run has left units of this or another job
     #[arg(long, help_heading = "Units")]
     pub restart: bool,
 }
 
-/// What `--restart` is offered for.
+/// Help for a folder of another job.
 const RESTART: &str = "Give --restart to start anew over it, or name another file with -o";
 
 impl UnitsArgs {
@@ -60,7 +59,7 @@ impl UnitsArgs {
         Store::create(folder, job).map_err(|error| error.help(RESTART))
     }
 
-    /// How a run is to go that began at `begun`.
+    /// Limits of a run that began at `begun`.
     pub fn options(&self, begun: Instant) -> Options {
         Options {
             shard: self.shard.unwrap_or_default(),
@@ -124,7 +123,7 @@ pub fn remove(store: Store, console: Console) -> Result<()> {
 /// Options of `lucerna bake`.
 #[derive(clap::Subcommand, Clone, Debug)]
 pub enum BakeCommand {
-    /// Say what of a job is done
+    /// List the finished, missing and damaged units of a job
     Status(StatusArgs),
     /// Read all bytes of a job's units; exit code 3 if some are damaged, 8 if some are missing
     Verify(StatusArgs),
@@ -168,7 +167,7 @@ fn size(bytes: f64) -> String {
     }
 }
 
-/// Says why units are missing that others have to compute.
+/// The message for units that depend on units of other shards.
 pub fn waits(job: &Job, units: &[bake::UnitId]) -> String {
     format!("the rest needs units of other shards that are not there yet: {}", job.list(units))
 }

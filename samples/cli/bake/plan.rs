@@ -1,4 +1,4 @@
-//! `lucerna bake plan`: who computes what.
+//! `lucerna bake plan`: the shards of a job, as text for an engine that runs them.
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -100,7 +100,7 @@ fn list(store: &Store, shards: u64) -> Value {
     json!({ "kind": key.kind(), "key": key.digest().to_string(), "shards": shards, "units": units.collect::<Vec<_>>() })
 }
 
-/// What is wrong with a command.
+/// Why a command cannot be planned.
 pub(super) fn wrong(what: impl Into<String>) -> Error {
     Error::usage(what).at("COMMAND")
 }

@@ -1,4 +1,4 @@
-//! `lucerna bake status` and `lucerna bake verify`: what of a job is there.
+//! `lucerna bake status` and `lucerna bake verify`: the finished, missing and damaged units of a job.
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -29,7 +29,7 @@ pub struct StatusArgs {
     pub talk: TalkArgs,
 }
 
-/// Says what is there. `all`: reads all bytes, and the exit code says whether they are good.
+/// Prints the state of the units. `all`: checks all bytes; the exit code says whether they are intact.
 ///
 /// # Errors
 /// `Input` if the folder is that of no job.
