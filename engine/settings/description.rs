@@ -125,11 +125,6 @@ impl Description {
         self.keys.iter().find(|key| key.name == name)
     }
 
-    /// Names of the keys that decide `what`.
-    pub fn deciding(&self, what: Decides) -> impl Iterator<Item = &str> {
-        self.keys.iter().filter(move |key| key.decides == what).map(|key| key.name.as_str())
-    }
-
     /// Checks each number against its range.
     ///
     /// # Errors

@@ -1,9 +1,10 @@
 //! The settings that a scene was prepared with, and the settings that its pictures may choose.
 
-use serde_json::Value;
-
 use super::{Method, Settings, Specular};
-use crate::{Error, ErrorKind, Result};
+use crate::{
+    Error, Result,
+    settings::{Decides, Described},
+};
 
 /// The settings that a scene was prepared with.
 #[derive(Clone, Debug)]
@@ -51,16 +52,15 @@ impl PreparedSettings {
         if shadowed && asked.self_shadow && !made.self_shadow && made.on_surface() {
             return self.refused("self_shadow", asked);
         }
-        let (fixed, given) = (chosen(asked, made), chosen(&self.given, made));
-        if fixed != *made && fixed != given {
-            let other = differing(&fixed, &given)?;
-            let wrong =
-                differing(&fixed, made)?.into_iter().find(|key| other.contains(key) && self.decides(key, asked.method));
-            if let Some(key) = wrong {
-                return self.refused(&key, asked);
+        let from_made = baked_differences(asked, made)?;
+        if !from_made.is_empty() {
+            let from_given = baked_differences(asked, &self.given)?;
+            let wrong = |key: &&&str| from_given.contains(key) && self.decides(key, asked.method);
+            if let Some(key) = from_made.iter().find(wrong) {
+                return self.refused(key, asked);
             }
         }
-        let mut taken = chosen(made, asked);
+        let mut taken = Settings::description().taking(made, asked, |key| key.decides == Decides::Picture)?;
         if !self.decides("interpolation", asked.method) {
             taken.interpolation = asked.interpolation;
         }
@@ -77,33 +77,8 @@ impl PreparedSettings {
     }
 }
 
-/// `of` with the keys of `picture` that each picture may choose.
-fn chosen(of: &Settings, picture: &Settings) -> Settings {
-    Settings {
-        trilinear: picture.trilinear,
-        partial: picture.partial,
-        cut: picture.cut,
-        extent: picture.extent,
-        overlap: picture.overlap,
-        shared: picture.shared,
-        negligible: picture.negligible,
-        self_shadow: picture.self_shadow,
-        specular: picture.specular,
-        method: picture.method,
-        rotation: picture.rotation,
-        turning: picture.turning,
-        exposure: picture.exposure,
-        ..of.clone()
-    }
-}
-
-/// The keys in which two settings differ.
-fn differing(a: &Settings, b: &Settings) -> Result<Vec<String>> {
-    let all = |of: &Settings| match serde_json::to_value(of) {
-        Ok(Value::Object(all)) => Ok(all),
-        Ok(_) => Err(Error::new(ErrorKind::Runtime, "settings are no table")),
-        Err(error) => Err(Error::new(ErrorKind::Runtime, "settings cannot be written").caused_by(error)),
-    };
-    let (a, b) = (all(a)?, all(b)?);
-    Ok(a.into_iter().filter(|(key, value)| b.get(key) != Some(value)).map(|(key, _)| key).collect())
+/// The keys in which two settings differ, without those that decide pictures alone.
+fn baked_differences(a: &Settings, b: &Settings) -> Result<Vec<&'static str>> {
+    let all = Settings::description().differences(a, b)?;
+    Ok(all.iter().map(|d| d.key).filter(|key| key.decides == Decides::Bake).map(|key| key.name.as_str()).collect())
 }

@@ -4,27 +4,13 @@ use std::path::Path;
 
 use lucerna::{
     Error, Result,
+    settings::{Described, Difference},
     techniques::fiv::{Method, Settings, Specular, Stored},
 };
-use serde_json::Value;
-
-use crate::config;
 
 /// Keys that change pictures but no vectors.
 const OF_PICTURES: [&str; 10] =
     ["trilinear", "partial", "cut", "extent", "overlap", "negligible", "shared", "specular", "method", "turning"];
-
-/// The keys in which two settings differ, with the values of both.
-fn differences(a: &Settings, b: &Settings) -> Result<Vec<(String, Value, Value)>> {
-    let (Value::Object(a), Value::Object(b)) = (config::to_value(a)?, config::to_value(b)?) else {
-        return Ok(Vec::new());
-    };
-    let pair = |(key, value): (String, Value)| {
-        let other = b.get(&key).cloned().unwrap_or_default();
-        (value != other).then_some((key, value, other))
-    };
-    Ok(a.into_iter().filter_map(pair).collect())
-}
 
 /// Checks that settings agree with the settings that the file of vectors was computed with.
 ///
@@ -35,19 +21,19 @@ pub fn decided(file: &Path, stored: &Stored, settings: &Settings) -> Result<()> 
         let error = Error::usage("--vectors is for fiv.method=vectors").at("fiv.method").in_file(file);
         return Err(error.help("Leave out --vectors or fiv.method"));
     }
-    let wrong = differences(settings, &stored.plan.settings(settings))?.into_iter().next();
-    wrong.map_or(Ok(()), |(key, asked, has)| {
+    let wrong = Settings::description().differences(settings, &stored.plan.settings(settings))?.into_iter().next();
+    wrong.map_or(Ok(()), |Difference { key, first: asked, second: has }| {
         let error = Error::usage(format!("the settings ask for {asked}, the vectors were computed with {has}"));
-        Err(error.at(format!("fiv.{key}")).in_file(file).help("Leave the key out, or compute the vectors again"))
+        Err(error.at(format!("fiv.{}", key.name)).in_file(file).help("Leave the key out, or compute the vectors again"))
     })
 }
 
 /// Keys that differ from their defaults and that vectors do not depend on.
 ///
 /// # Errors
-/// As [`config::to_value`].
+/// `Runtime` if the settings cannot be written.
 pub(super) fn idle(settings: &Settings) -> Result<Vec<String>> {
-    let set = differences(settings, &Settings::default())?.into_iter().map(|(key, ..)| key);
+    let set = Settings::description().differences(settings, &Settings::default())?.into_iter().map(|set| &set.key.name);
     Ok(set.filter(|key| OF_PICTURES.contains(&key.as_str())).map(|key| format!("fiv.{key}")).collect())
 }
 
@@ -64,8 +50,7 @@ mod tests {
 
     #[test]
     fn keys_of_pictures_are_keys() {
-        let Value::Object(all) = config::to_value(&Settings::default()).unwrap() else { panic!() };
-        OF_PICTURES.iter().for_each(|key| assert!(all.contains_key(*key), "{key}"));
+        OF_PICTURES.iter().for_each(|key| assert!(Settings::description().key(key).is_some(), "{key}"));
         let settings = Settings { turning: 3.0, azimuths: 9, ..Settings::default() };
         assert_eq!(idle(&settings).unwrap(), ["fiv.turning"]);
     }
