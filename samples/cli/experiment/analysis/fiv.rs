@@ -1,8 +1,8 @@
 //! Fullsphere irradiance vectors: tables 2 to 4, 17, 18 and figures 18 to 27 of Michael's thesis (sections 5.2 and 5.4).
 //!
-//! The analysis finds scenes and techniques by their names: [`paper`] assigns them to figures. Techniques named like `32x17x15` are sets of
-//! samples; the reference is `brute force`. Errors are errors of the irradiance of the ground, seen from straight above without the objects on
-//! it (view [`GROUND`]). Ground closely below an object is not visible, and does not count.
+//! The analysis finds scenes and techniques by their names. [`paper`] assigns them to figures. Techniques with names like `32x17x15` are sets of
+//! samples. The reference is `brute force`. Errors are for the irradiance of the ground, seen from straight above without the objects on it
+//! (view [`GROUND`]). Ground closely below an object is not visible, and does not count.
 
 mod images;
 mod paper;
@@ -36,7 +36,7 @@ const DEFAULT: &str = "64x33x30";
 const DENSE: &str = "128x65x30";
 /// Sets of samples, the densest first.
 const SETS: [&str; 5] = [paper::DENSEST, DENSE, DEFAULT, "64x33x15", "32x17x15"];
-/// Passes of the technique itself.
+/// Beginning of the names of the technique's own passes.
 const PASSES: &str = "fiv.";
 
 pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
@@ -62,14 +62,14 @@ impl<'a> Lab<'a> {
         self.results.runs.iter().find(|run| run.scene == scene && run.view == view && run.method == method)
     }
 
-    /// The technique, or the next coarser existing set of samples, because quick mode leaves out the finer sets.
+    /// The wanted technique. If it has no run, the next coarser set of samples with a run, because quick mode leaves out the finer sets.
     fn nearest(&self, scene: &str, view: &str, wanted: &'static str) -> &'static str {
         let from = SETS.iter().position(|set| *set == wanted);
         let coarser = from.into_iter().flat_map(|from| &SETS[from..]);
         coarser.copied().find(|set| self.run(scene, view, set).is_some()).unwrap_or(wanted)
     }
 
-    /// The run of a technique in the first view of a scene that it has.
+    /// The run of a technique in the first view of a scene that has one.
     fn any(&self, scene: &str, method: &str) -> Option<&'a Done> {
         self.results.runs.iter().find(|run| run.scene == scene && run.method == method)
     }
@@ -95,7 +95,7 @@ impl<'a> Lab<'a> {
         Ok(Some(value).filter(|value| value.is_finite()))
     }
 
-    /// For each pixel, whether the ground is visible; `None` if all of it is, or if it is not known.
+    /// For each pixel of the ground, whether it is visible. `None` for other views, and if no ground is visible: then all pixels count.
     fn open(&self, truth: &Done) -> Result<Option<Vec<bool>>> {
         if truth.view != GROUND {
             return Ok(None);
@@ -117,13 +117,13 @@ impl<'a> Lab<'a> {
     }
 }
 
-/// Time of the technique's own passes, milliseconds; the time of the frame, if the device has no timestamps.
+/// Time of the technique's own passes, milliseconds. If the device has no timestamps, the time of the frame.
 fn own(times: &Times) -> Option<f64> {
     let sum = times.of_passes(PASSES);
     if sum > 0.0 { Some(sum) } else { times.frame() }
 }
 
-/// Ours over theirs.
+/// The ratio of two values; empty if a value is missing or the ratio is not finite.
 fn over(ours: Option<f64>, paper: Option<f64>) -> Cell {
     ours.zip(paper).map(|(ours, paper)| ours / paper).filter(|ratio| ratio.is_finite()).into()
 }

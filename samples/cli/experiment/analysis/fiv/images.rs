@@ -14,7 +14,7 @@ const SIDE: u32 = 512;
 /// The technique with samples on surfaces.
 const SURFACE: &str = "surface";
 
-/// What a figure shows: caption, scene, view.
+/// The figures: caption, scene, view.
 const FIGURES: &[(&str, &str, &str)] = &[
     ("Figure 18: the bunny's shadow at different samplings", "bunny, area", GROUND),
     ("Figure 18: the bunny", "bunny, area", FRONT),
@@ -39,8 +39,8 @@ const FIGURES: &[(&str, &str, &str)] = &[
     ("Figure 23: a fifth of the queen is below the ground", "queen, sunk", GROUND),
     ("Figure 23: a fifth of the queen is below the ground", "queen, sunk", FRONT),
     ("Figure 25: a receiver that changes its shape", "waves", FRONT),
-    ("Figure 25: the same a third of a period later", "waves, later", FRONT),
-    ("Figure 26: many things", "5 bunnies and trees", FRONT),
+    ("Figure 25: this receiver a third of a period later", "waves, later", FRONT),
+    ("Figure 26: many objects", "5 bunnies and trees", FRONT),
     ("Figure 27: a bunny that casts and receives shadows", "bunny and tree", FRONT),
     ("The queen of a chess set under coloured lights", "chess queen, areas", GROUND),
     ("The queen of a chess set under coloured lights", "chess queen, areas", FRONT),
@@ -57,8 +57,8 @@ const FIGURES: &[(&str, &str, &str)] = &[
 pub(super) fn figures(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("Figures 18 to 27: images");
     section.text(
-        "Errors are measured in the views named *ground*: from straight above, without the objects on it. The difference of two \
-         images is shown by `D`, amplified by `G`.",
+        "Errors are measured in the views named *ground*, which show the ground from straight above, without the objects on it. Press `D` to see \
+         the difference of two images, and `G` to amplify it.",
     );
     for (caption, scene, view) in FIGURES {
         let runs: Vec<&Done> = lab.results.at((scene, view)).collect();
@@ -79,7 +79,7 @@ pub(super) fn figures(lab: &Lab<'_>) -> Result<Section> {
     Ok(section)
 }
 
-/// Figure 24: without, with, and the shadow alone.
+/// Figure 24: an object without its shadow on itself, the object with this shadow, and the shadow alone.
 fn own_shadow(lab: &Lab<'_>) -> Result<Option<Comparison>> {
     let Some((scene, without, with)) = ["bunny, area", "bunny", "hare"].into_iter().find_map(|scene| {
         let with = lab.run(scene, FRONT, DEFAULT).or_else(|| lab.run(scene, FRONT, SURFACE));
@@ -94,8 +94,8 @@ fn own_shadow(lab: &Lab<'_>) -> Result<Option<Comparison>> {
     let caption = format!("Figure 24: the shadow of the {scene} on itself");
     let mut set = Comparison::new("own-shadow", caption, open.width, open.height)
         .exposure(lab.results.exposure(with)?)
-        .with("without", open.pixels)
-        .with("with", shaded.pixels)
+        .with("without the shadow", open.pixels)
+        .with("with the shadow", shaded.pixels)
         .with("the shadow alone", alone);
     if let Some(truth) = lab.run(scene, FRONT, TRUTH) {
         set = set.with(TRUTH, lab.results.picture(Layer(truth, ""))?.pixels);

@@ -1,4 +1,4 @@
-//! What the thesis says.
+//! Values of the thesis.
 
 use super::{DEFAULT, DENSE};
 
@@ -22,7 +22,7 @@ const fn case(
     Case { figure, what, scene, technique, nrmse }
 }
 
-/// The densest set.
+/// The densest set of samples.
 pub(super) const DENSEST: &str = "256x129x30";
 
 pub(super) const CASES: &[Case] = &[
@@ -39,7 +39,7 @@ pub(super) const CASES: &[Case] = &[
     case("19", "Eucalyptus Grove", "bunny, eucalyptus", DEFAULT, 0.022),
     case("19", "a photographed forest, bright texels separated", "bunny, forest", "suns", 0.022),
     case("20", "coloured lights, one occluder", "queen, areas", DEFAULT, 0.019),
-    case("20", "the same with the queen of a chess set", "chess queen, areas", DEFAULT, 0.019),
+    case("20", "coloured lights, the queen of a chess set", "chess queen, areas", DEFAULT, 0.019),
     case("20", "coloured lights, two occluders", "two, areas", DEFAULT, 0.019),
     case("21", "overlap, correction off", "queens, area", "no overlap", 0.027),
     case("21, 22", "overlap, correction on; one area light", "queens, area", DEFAULT, 0.019),
@@ -47,8 +47,8 @@ pub(super) const CASES: &[Case] = &[
     case("21, 22", "queens of a chess set, correction on", "chess queens, area", DEFAULT, 0.019),
     case("21, 22", "all as in the thesis", "queens, area", "thesis", 0.019),
     case("22", "three occluders, grove", "queens", DEFAULT, 0.015),
-    case("22", "the same, its sun separated", "queens", "suns", 0.015),
-    case("22", "the same, closer", "queens, close", DEFAULT, 0.013),
+    case("22", "three occluders, grove, its sun separated", "queens", "suns", 0.015),
+    case("22", "three occluders closer together, grove", "queens, close", DEFAULT, 0.013),
     case("23", "a fifth below the ground, correction off", "queen, sunk", "no partial", 0.026),
     case("23", "a fifth below the ground, correction on", "queen, sunk", DEFAULT, 0.019),
     case("23", "a chess set's queen, correction off", "chess queen, sunk", "no partial", 0.026),
@@ -65,7 +65,7 @@ pub(super) const TABLE_2: [(&str, f64, Option<f64>, f64); 5] = [
     ("32x17x15", 3.0, None, 0.28),
 ];
 
-/// Table 3: scene, things, vertices, megabytes, frames a second.
+/// Table 3: scene, number of objects, vertices, megabytes, frames per second.
 pub(super) const TABLE_3: [(&str, usize, usize, f64, f64); 9] = [
     ("1 bunny", 1, 35_947, 8.56, 112.0),
     ("1 tree", 1, 20_614, 8.56, 112.0),
@@ -91,7 +91,7 @@ pub(super) const TABLE_18: [(&str, &str, f64, f64); 5] = [
     ("Eucalyptus Grove", "bunny, eucalyptus", 11.42, 8.31),
 ];
 
-/// Table 4: method, frequencies of the environment, what may move, memory, frames a second.
+/// Table 4: method, frequencies of the environment, objects that may move, memory, frames per second.
 pub(super) const TABLE_4: [[&str; 5]; 4] = [
     [
         "precomputed radiance transfer (Sloan et al.)",
@@ -102,12 +102,12 @@ pub(super) const TABLE_4: [[&str; 5]; 4] = [
     ],
     [
         "precomputed shadow fields (Zhou et al.)",
-        "low; high if nothing moves",
+        "low; high if no object moves",
         "rigid bodies",
         "50 to 500 MB",
         "0.1 to 20",
     ],
-    ["spheres in place of bodies (Ren et al.)", "low", "everything", "not said", "about 25 for 2, 12 for 8 bodies"],
+    ["spheres in place of bodies (Ren et al.)", "low", "all objects", "not stated", "about 25 for 2, 12 for 8 bodies"],
     [
         "irradiance vectors (the thesis)",
         "all",

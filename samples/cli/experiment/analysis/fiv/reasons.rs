@@ -1,4 +1,4 @@
-//! Reasons for larger errors than in the thesis, as far as the pictures show them: the location of the error, and settings that change it.
+//! Reasons for errors that are larger than in the thesis, if the pictures show them: the location of the error, and settings that change it.
 
 use lucerna::Result;
 
@@ -7,14 +7,14 @@ use crate::experiment::results::Layer;
 
 /// Share of the ground that counts as steep: the pixels with the largest change of the reference from pixel to pixel.
 const STEEP: f64 = 0.1;
-/// Maximum distance of touched ground from covered ground, as share of the picture's width.
+/// Maximum distance between touched ground and covered ground, as share of the picture's width.
 const TOUCHED: f64 = 1.0 / 64.0;
 
 /// The reasons in words. `technique`: the technique of the case's row; `ours`: its NRMSE.
 pub(super) fn of(lab: &Lab<'_>, case: &Case, technique: &str, ours: f64) -> Result<String> {
     let mut parts = Vec::new();
     let beside = |name: &str| lab.nrmse(case.scene, GROUND, name);
-    // Without a correction, or with the defaults in place of the thesis' choices.
+    // The error without a correction, or with our defaults instead of the thesis' choices.
     for (name, what) in [("no overlap", "without the correction"), ("no partial", "without the correction")] {
         if let (false, Some(value)) = (technique == name, beside(name)?) {
             parts.push(format!("{value:.3} {what}"));
@@ -24,7 +24,7 @@ pub(super) fn of(lab: &Lab<'_>, case: &Case, technique: &str, ours: f64) -> Resu
     if let (true, Some(value)) = (technique == "thesis", beside(set)?) {
         parts.push(format!("{value:.3} with {set} and our defaults"));
     }
-    // With samples closer together.
+    // The error with denser samples.
     let at = SETS.iter().position(|set| *set == technique).unwrap_or(0);
     for denser in SETS[..at].iter().rev() {
         if let Some(value) = beside(denser)? {
@@ -34,15 +34,15 @@ pub(super) fn of(lab: &Lab<'_>, case: &Case, technique: &str, ours: f64) -> Resu
     if let Some([steep, touched, rest]) = shares(lab, case.scene, technique)? {
         let part = 100.0 * STEEP;
         parts.push(format!(
-            "{:.0} % of the squared error is on the {part:.0} % of the ground with the largest change of light, {:.0} % within 1/64 of the width \
-             from covered ground, without which the NRMSE is {:.3}",
+            "{:.0} % of the squared error is on the {part:.0} % of the ground with the largest change of light; {:.0} % is on ground within 1/64 of \
+             the width from covered ground, and without this ground the NRMSE is {:.3}",
             100.0 * steep,
             100.0 * touched,
             ours * rest.sqrt(),
         ));
     }
     if parts.is_empty() {
-        parts.push("there are no other pictures that would show the reason".to_owned());
+        parts.push("the experiment has no other pictures that show the reason".to_owned());
     }
     Ok(parts.join("; "))
 }

@@ -5,19 +5,19 @@ use lucerna::Result;
 use super::{DEFAULT, DENSE, FRONT, GROUND, Lab, ONLINE, TRUTH, UNSHADOWED, over, own, paper, reasons};
 use crate::report::{Axis, Cell, Plot, Section, Table};
 
-/// Bytes of a megabyte, as the thesis counts.
+/// Bytes of a megabyte, as in the thesis.
 const MEGABYTE: f64 = (1 << 20) as f64;
 
 /// Figures 18 to 23 as numbers.
 pub(super) fn errors(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("Figures 18 to 23: errors against brute force");
     section.text(
-        "NRMSE (eq. 17): for each channel, the root mean square difference of irradiance divided by the range of the reference; then the mean of \
-         the three channels. It is computed on the ground seen from straight above without the objects on it, like the thesis' shadow images. Ground \
-         that is closer below an object than a tenth of its radius, or inside of it, is never visible and does not count. The reference casts a \
-         shadow ray from every pixel to every texel of the environment that is not black. *Unshadowed* is the error without shadows. The thesis does \
-         not state its views, and it states the environment for figure 19 only. If its Eucalyptus Grove is not available, a procedural grove and a \
-         photographed forest replace it.",
+        "NRMSE (eq. 17) is computed for each channel: the root mean square difference of irradiance, divided by the range of the reference. The tables \
+         have the mean of the three channels. The error is computed on the ground, seen from straight above without the objects on it, like the \
+         thesis' shadow images. Some ground is never visible and does not count: ground inside an object, and ground below an object at a distance \
+         of less than a tenth of the radius of the largest object. The reference casts a shadow ray from every pixel to every texel of the \
+         environment that is not black. *Unshadowed* is the error without shadows. The thesis does not state its views, and it states the \
+         environment for figure 19 only. If its Eucalyptus Grove is not available, a procedural grove and a photographed forest replace it.",
     );
     let columns = [
         "figure",
@@ -28,7 +28,7 @@ pub(super) fn errors(lab: &Lab<'_>) -> Result<Section> {
         "ours / thesis",
         "verdict",
         "unshadowed",
-        "with the things, from the front",
+        "with the objects, from the front",
     ];
     let mut table = Table::new("errors", lab.caption("NRMSE against brute force"), columns);
     let mut above = Vec::new();
@@ -72,11 +72,11 @@ pub(super) fn errors(lab: &Lab<'_>) -> Result<Section> {
 pub(super) fn precompute(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("Table 2: computing the vectors");
     section.text(
-        "Once for each kind of thing and environment. The thesis' times are those of a CPU of 2007 with two cores; its memory is that \
-         of three 32-bit floats a colour channel and sample, and ours the same.",
+        "The vectors are computed once for each kind of object and each environment. The thesis' times are for a CPU of 2007 with two cores. In the \
+         thesis and here, a sample takes the memory of three 32-bit floats per colour channel.",
     );
     let columns =
-        ["thing", "vertices", "samples", "thesis (min)", "ours (min)", "times faster", "thesis (MB)", "ours (MB)"];
+        ["object", "vertices", "samples", "thesis (min)", "ours (min)", "times faster", "thesis (MB)", "ours (MB)"];
     let mut table = Table::new("table-2", lab.caption("Table 2"), columns).timed();
     for (scene, vertices) in [("bunny, area", 35_947), ("bunny", 35_947), ("tree", 20_614), ("hare", 0)] {
         for (samples, bunny, tree, megabytes) in paper::TABLE_2 {
@@ -105,14 +105,14 @@ pub(super) fn precompute(lab: &Lab<'_>) -> Result<Section> {
 
 /// Table 3.
 pub(super) fn frames(lab: &Lab<'_>) -> Result<Section> {
-    let mut section = Section::new("Table 3: time of a frame for 1 to 60 things");
+    let mut section = Section::new("Table 3: time of a frame for 1 to 60 objects");
     section.text(
-        "Frames per second of the illumination only, as in the thesis (its passes without the G-buffer and the sky), and of the whole frame. The \
-         thesis had a GeForce 8800 GTS.",
+        "Frames per second of the illumination only, as in the thesis (the passes of the technique, without the G-buffer and the sky), and the time of \
+         the whole frame. The thesis used a GeForce 8800 GTS.",
     );
     let columns = [
         "scene",
-        "things",
+        "objects",
         "vertices",
         "samples",
         "thesis (frames/s)",
@@ -145,21 +145,21 @@ pub(super) fn frames(lab: &Lab<'_>) -> Result<Section> {
         ]);
     }
     section.add(table);
-    let axes = (Axis::new("things").with(0.0), Axis::new("ms").with(0.0));
-    let plot = Plot::new("table-3-plot", "Time of the illumination against the number of things", axes.0, axes.1);
+    let axes = (Axis::new("objects").with(0.0), Axis::new("ms").with(0.0));
+    let plot = Plot::new("table-3-plot", "Time of the illumination against the number of objects", axes.0, axes.1);
     section.add(plot.points("ours", ours).points("thesis", thesis).timed());
     Ok(section)
 }
 
-/// Independence of the time from vertices and lights.
+/// Dependence of the time on the numbers of vertices and lights.
 pub(super) fn independence(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("What the cost depends on");
     section.text(
-        "Time of the illumination, seen from straight above the ground, where every pixel is a receiver. Within a table only the number of vertices \
-         or the number of lights differs.",
+        "Time of the illumination for the ground, seen from straight above. Every pixel is a receiver. The rows of the first table differ in the \
+         object and its number of vertices, and the rows of the second table in the environment and its number of lights.",
     );
-    let columns = ["things", "vertices", "illumination (ms)", "over the fastest"];
-    let mut table = Table::new("vertices", lab.caption("Ten things of 2,000 to 36,000 vertices each"), columns).timed();
+    let columns = ["objects", "vertices", "illumination (ms)", "over the fastest"];
+    let mut table = Table::new("vertices", lab.caption("10 objects of 2,000 to 36,000 vertices each"), columns).timed();
     let mut rows = Vec::new();
     for scene in ["10 bunnies", "10 trees", "10 queens", "10 hares"] {
         if let Some(times) = lab.times(lab.run(scene, GROUND, lab.nearest(scene, GROUND, DENSE)))? {
@@ -188,12 +188,12 @@ pub(super) fn independence(lab: &Lab<'_>) -> Result<Section> {
     Ok(section)
 }
 
-/// Beyond the thesis: no vectors beforehand.
+/// Beyond the thesis: vectors of each frame, without precomputation.
 pub(super) fn online(lab: &Lab<'_>) -> Result<Section> {
-    let mut section = Section::new("Without computing beforehand");
+    let mut section = Section::new("Without precomputation");
     section.text(
-        "The thesis' future work: each frame computes the vectors that its pixels look up. Times are for the illumination. Frames of a resting scene \
-         cost the same, because no vectors are kept.",
+        "The thesis leaves this to future work: each frame computes the vectors that its pixels look up. Times are for the illumination. Frames of a \
+         resting scene take the same time, because no vectors are kept.",
     );
     let columns =
         ["scene", "view", "online (ms)", "vectors (ms)", "computing all vectors (s)", "NRMSE", "NRMSE of vectors"];
@@ -221,9 +221,9 @@ pub(super) fn online(lab: &Lab<'_>) -> Result<Section> {
 pub(super) fn methods(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("Table 4: other methods");
     section.text(
-        "The figures of the thesis, with ours in the last row. Times on different machines do not compare methods.",
+        "The values of the thesis, with ours in the last row. Times on different machines do not allow a comparison of the methods.",
     );
-    let columns = ["method", "environment's frequencies", "what may move", "memory", "frames a second"];
+    let columns = ["method", "environment's frequencies", "objects that may move", "memory", "frames per second"];
     let mut table = Table::new("table-4", lab.caption("Table 4"), columns).timed();
     for row in paper::TABLE_4 {
         table.push(row.map(Cell::from));
@@ -243,7 +243,7 @@ pub(super) fn methods(lab: &Lab<'_>) -> Result<Section> {
     table.push([
         "irradiance vectors (ours)".into(),
         "all".into(),
-        "receivers; occluders; what turns or deforms and the environment by vectors of each frame".into(),
+        "receivers; occluders; with vectors of each frame also rotations, deformations and the environment".into(),
         "0.28 to 34 MB a kind".into(),
         speeds.join(", ").into(),
     ]);
