@@ -105,8 +105,11 @@ float lens_area(float r1, float r2, float d) {
         float r = min(r1, r2);
         return FIV_PI * r * r;
     }
-    float a = clamp((d * d + r1 * r1 - r2 * r2) / (2.0 * d * r1), -1.0, 1.0);
-    float b = clamp((d * d + r2 * r2 - r1 * r1) / (2.0 * d * r2), -1.0, 1.0);
+    // The difference of the squares is computed as a product. A GPU may fuse one of the two squares into a sum; the
+    // difference of equal radii would then not be 0, and large compared with d.
+    float squares = (r1 - r2) * (r1 + r2);
+    float a = clamp((d * d + squares) / (2.0 * d * r1), -1.0, 1.0);
+    float b = clamp((d * d - squares) / (2.0 * d * r2), -1.0, 1.0);
     float kite = max((r1 + r2 - d) * (d + r1 - r2) * (d - r1 + r2) * (d + r1 + r2), 0.0);
     return r1 * r1 * acos(a) + r2 * r2 * acos(b) - 0.5 * sqrt(kite);
 }
