@@ -132,7 +132,7 @@ fn photographed_skies_light_every_normal_within_a_hundredth() {
         let table = Irradiance::of(&sky);
         let spent = begun.elapsed();
         let mut worst = 0.0f32;
-        for i in 0..60 {
+        for i in 0..150 {
             let (u, v) = ((i as f32 * 0.754_877_7 + 0.31).fract(), (i as f32 * 0.569_840_3 + 0.77).fract());
             let (y, phi) = (2.0 * u - 1.0, 2.0 * PI * v);
             let r = (1.0 - y * y).max(0.0).sqrt();
@@ -140,8 +140,6 @@ fn photographed_skies_light_every_normal_within_a_hundredth() {
             worst = worst.max((table.at(n) / brute_force(&sky, n) - 1.0).abs().max_element());
         }
         println!("{name}: {}×{}, off by {worst}, {spent:?}", sky.width, sky.height);
-        // A room lit through its windows: they rise and set over normals that hardly any other light reaches.
-        let most = if name.starts_with("ennis") { 0.03 } else { 0.01 };
-        assert!(worst < most, "{name}: {worst}");
+        assert!(worst < 0.01, "{name}: {worst}");
     }
 }

@@ -24,7 +24,7 @@ const BRIGHT: f64 = 0.01;
 /// Irradiance in W/m² as a function of the normal. Default: no environment.
 ///
 /// At a node the value is exact except for cells (2.8°) that the node's horizon cuts. Between nodes it is interpolated linearly. The error is
-/// at most 0.7 % on four photographed skies, and 2.2 % in the darkest direction of a room lit through its windows (ennis).
+/// at most 0.3 % on five photographed environments, among them a room lit through its windows.
 ///
 /// A cell with a hundredth of all light or more, such as the sun's, would cause a large error near the horizon. The brightest of these cells
 /// are stored and summed separately.

@@ -1,7 +1,7 @@
 // Irradiance of a distant environment as a function of the normal: linear between the nodes of a finely divided octahedron
 // (engine/passes/ambient.rs), and small bright lights by themselves. Before including: a buffer `ambient` of vec3, W/m².
 
-const uint AMBIENT_STEPS = 32u; // export
+const uint AMBIENT_STEPS = 64u; // export
 // Bright lights that stand behind the nodes, three vectors each: direction times irradiance of red, green, blue.
 const uint AMBIENT_SUNS = 8u; // export
 

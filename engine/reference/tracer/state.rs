@@ -101,6 +101,11 @@ impl State {
         self.sums.samples()
     }
 
+    /// The sums of all finished paths.
+    pub fn sums(&self) -> &Sums {
+        &self.sums
+    }
+
     /// Encodes the state. The same state gives the same bytes.
     ///
     /// # Errors
@@ -108,8 +113,10 @@ impl State {
     pub fn encode(&self) -> Result<Vec<u8>> {
         let about = serde_json::to_vec(&self.about)
             .map_err(|error| Error::new(ErrorKind::Runtime, "the state cannot be written").caused_by(error))?;
-        let mut out = MAGIC.to_vec();
         let raw = self.sums.raw();
+        let pixels: usize = raw.iter().map(|layer| size_of_val(layer.as_slice())).sum();
+        let mut out = Vec::with_capacity(NUMBERS + about.len() + pixels + 8);
+        out.extend(MAGIC);
         for number in [about.len() as u64, self.sums.samples(), self.sums.begun(), raw.len() as u64] {
             out.extend(number.to_le_bytes());
         }

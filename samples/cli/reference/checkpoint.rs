@@ -82,14 +82,22 @@ impl Checkpoint {
         self.path.is_some() && Instant::now() >= self.next
     }
 
+    /// The state of the tracer for [`Self::write`].
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`.
+    pub fn state(&self, tracer: &Tracer<'_>) -> Result<State> {
+        tracer.save(&self.about)
+    }
+
     /// Writes the checkpoint as a whole or not at all. Returns false if checkpoints are off.
     ///
     /// # Errors
     /// `Output`; the previous checkpoint stays.
-    pub fn write(&mut self, tracer: &Tracer<'_>) -> Result<bool> {
+    pub fn write(&mut self, state: &State) -> Result<bool> {
         let Some(path) = &self.path else { return Ok(false) };
         let begun = Instant::now();
-        write_atomic(path, &tracer.save(&self.about)?.encode()?, true)?;
+        write_atomic(path, &state.encode()?, true)?;
         self.next = Instant::now() + pause().max(begun.elapsed().div_f64(SHARE));
         Ok(true)
     }

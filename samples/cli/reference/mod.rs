@@ -60,7 +60,7 @@ impl End {
 
 /// Time for finishing the current sample after a stop, seconds. A picture with a partial sample is valid, but `lucerna rerun` cannot make it
 /// again.
-const FINISH: f64 = 1.0;
+const FINISH: f64 = 0.5;
 
 /// Runs the command.
 ///
@@ -166,45 +166,51 @@ fn picture(
     if done.paths == 0 && end == End::Interrupt {
         return Ok((ExitCode::from(interrupt.exit_code()), None));
     }
-    let sums = tracer.sums()?;
-    line.finish(&done, sums.relative_error());
-    if sums.lost() > 0 {
-        console.warning(&format!("{} paths gave values that are not finite and are left out", sums.lost()));
-    }
-    let mut layers = sums.layers();
-    args.show.apply(&mut layers);
-    let suits = match &stage.source {
-        Source::Builtin(name) => builtin::exposure(name).map(f64::from),
-        Source::File(_) => None,
-    };
-    let fitting = || suits.unwrap_or_else(|| exposure::fitting(&layers));
-    // A normalised picture needs no automatic exposure.
-    let normal = tonemap.as_ref().is_some_and(|tonemap| tonemap.normalize);
-    let ev = args.exposure.unwrap_or_else(|| if normal { 0.0 } else { fitting() });
-    // Tone mapping applies the exposure, so that the file must not apply it again.
-    match &tonemap {
-        Some(tonemap) => last_stage::still(&gpu, tonemap, ev, &mut layers)?,
-        None => outputs.expose(ev),
-    }
-    // The metadata are those of a run with exactly this number of samples.
-    let made = Settings { samples: done.samples.floor() as u64, ..settings.clone() };
-    let made = Staged { technique: made, tonemap };
-    layers.metadata = metadata(args, &stage, &gpu, &tracer.view()?, &made, ev)?;
-    let whole = done.samples.fract() == 0.0;
-    if !whole {
-        layers.metadata.extra.insert("part of a sample".into(), format!("{:.6}", done.samples.fract()));
-    }
-    let written = outputs.write(&values, &layers)?;
+    let state = checkpoint.state(&tracer)?;
+    let sums = state.sums();
+    // The state holds the work, so it is written first, while this thread makes the picture.
+    let (written, layers, saved) = std::thread::scope(|scope| {
+        let saving = end.is_early().then(|| scope.spawn(|| checkpoint.write(&state)));
+        line.finish(&done, sums.relative_error());
+        if sums.lost() > 0 {
+            console.warning(&format!("{} paths gave values that are not finite and are left out", sums.lost()));
+        }
+        let mut layers = sums.layers();
+        args.show.apply(&mut layers);
+        let suits = match &stage.source {
+            Source::Builtin(name) => builtin::exposure(name).map(f64::from),
+            Source::File(_) => None,
+        };
+        let fitting = || suits.unwrap_or_else(|| exposure::fitting(&layers));
+        // A normalised picture needs no automatic exposure.
+        let normal = tonemap.as_ref().is_some_and(|tonemap| tonemap.normalize);
+        let ev = args.exposure.unwrap_or_else(|| if normal { 0.0 } else { fitting() });
+        // Tone mapping applies the exposure, so that the file must not apply it again.
+        match &tonemap {
+            Some(tonemap) => last_stage::still(&gpu, tonemap, ev, &mut layers)?,
+            None => outputs.expose(ev),
+        }
+        // The metadata are those of a run with exactly this number of samples.
+        let made = Settings { samples: done.samples.floor() as u64, ..settings.clone() };
+        let made = Staged { technique: made, tonemap };
+        layers.metadata = metadata(args, &stage, &gpu, &tracer.view()?, &made, ev)?;
+        let part = done.samples.fract();
+        if part != 0.0 {
+            layers.metadata.extra.insert("part of a sample".into(), format!("{part:.6}"));
+        }
+        let written = outputs.write(&values, &layers)?;
+        let saved = saving.map(|saving| saving.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        Ok::<_, Error>((written, layers, saved.transpose()?.unwrap_or(false)))
+    })?;
     interrupt.keep();
     let files: Vec<&str> = written.iter().map(|(name, _)| name.as_str()).collect();
     if memory.is_none() {
         console.info(&format!("wrote {}", files.join(" ")));
     }
-    if end.is_early() {
-        if checkpoint.write(&tracer)? {
-            console.info(&format!("stopped by {}; --resume continues", end.text()));
-        }
-    } else {
+    if saved {
+        console.info(&format!("stopped by {}; --resume continues", end.text()));
+    }
+    if !end.is_early() {
         checkpoint.remove();
     }
     if args.json {
@@ -256,7 +262,7 @@ fn work(
             return Ok(End::Samples);
         }
         if checkpoint.is_due() {
-            checkpoint.write(tracer)?;
+            checkpoint.write(&checkpoint.state(tracer)?)?;
         }
         if progress.samples >= look {
             let error = tracer.sums()?.relative_error();
