@@ -5,9 +5,8 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use lucerna_samples::{
     bake::{self, JoinArgs},
-    fiv::{self, EnvironmentArgs, PrecomputeArgs, SteadyArgs},
+    fiv::{self, EnvironmentArgs, FivArgs, PrecomputeArgs, SteadyArgs},
     program,
-    technique::fiv::{self as technique, FivArgs},
 };
 
 /// Soft shadows under an environment from fullsphere irradiance vectors.
@@ -53,6 +52,6 @@ fn main() -> ExitCode {
             let console = args.talk.console();
             program::run(console, || fiv::steady(&args, console))
         }
-        Command::Render(args) => program::run(args.common.talk.console(), || technique::run(&args)),
+        Command::Render(args) => program::run(args.common.talk.console(), || fiv::render(&args)),
     }
 }

@@ -2,10 +2,12 @@
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
+use lucerna::techniques::igi::{Igi, Mode};
 use lucerna_samples::{
+    args::RenderArgs,
     program,
-    technique::igi::{self, IgiArgs},
+    render::{self, Given},
 };
 
 /// Instant global illumination: direct light by shadow rays, indirect light by ray-traced virtual point lights.
@@ -23,7 +25,19 @@ enum Command {
     Render(Box<IgiArgs>),
 }
 
+#[derive(Args, Debug)]
+struct IgiArgs {
+    #[command(flatten)]
+    common: RenderArgs,
+
+    /// What the picture shows
+    #[arg(long, value_parser = render::mode::<Mode>(), default_value = "igi", help_heading = "Technique")]
+    mode: Mode,
+}
+
 fn main() -> ExitCode {
-    let Command::Render(render) = Arguments::parse().command;
-    program::run(render.common.talk.console(), || igi::run(&render))
+    let Command::Render(args) = Arguments::parse().command;
+    program::run(args.common.talk.console(), || {
+        render::render(&args.common, &Given::<Igi>::by(&args.common, args.mode)?)
+    })
 }

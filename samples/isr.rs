@@ -2,10 +2,12 @@
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
+use lucerna::techniques::isr::{Isr, Mode, PictureSettings, Preset};
 use lucerna_samples::{
+    args::RenderArgs,
     program,
-    technique::isr::{self, IsrArgs},
+    render::{self, Given},
 };
 
 /// Image-space radiosity: one bounce of indirect light and ambient occlusion from what the camera sees.
@@ -23,7 +25,27 @@ enum Command {
     Render(Box<IsrArgs>),
 }
 
+#[derive(Args, Debug)]
+struct IsrArgs {
+    #[command(flatten)]
+    common: RenderArgs,
+
+    /// Settings preset: fast, balanced or best; -D and --settings override it
+    #[arg(long, value_name = "NAME", help_heading = "Technique", conflicts_with = "paper")]
+    preset: Option<Preset>,
+
+    /// What the picture shows
+    #[arg(long, value_parser = render::mode::<Mode>(), default_value = "isr", help_heading = "Technique")]
+    mode: Mode,
+}
+
 fn main() -> ExitCode {
-    let Command::Render(render) = Arguments::parse().command;
-    program::run(render.common.talk.console(), || isr::run(&render))
+    let Command::Render(args) = Arguments::parse().command;
+    program::run(args.common.talk.console(), || {
+        let mut given = Given::<Isr>::by(&args.common, args.mode)?;
+        if let Some(preset) = args.preset {
+            given.base = PictureSettings { isr: preset.settings(), ..given.base };
+        }
+        render::render(&args.common, &given)
+    })
 }

@@ -6,14 +6,44 @@ pub mod igi;
 pub mod isr;
 pub mod tonemap;
 
-use crate::settings::{Described, Description};
+use crate::{
+    settings::{Described, Description},
+    technique::Technique,
+};
 
-/// The techniques by their names in `-D igi.vpls=500`, with the description of their settings.
-pub fn descriptions() -> [(&'static str, &'static Description); 4] {
-    [
-        ("isr", isr::Settings::description()),
-        ("igi", igi::Settings::description()),
-        ("fiv", fiv::Settings::description()),
-        ("tonemap", tonemap::Settings::description()),
-    ]
+/// Work that is the same for all techniques, for [`visit`].
+pub trait Visitor {
+    type Output;
+
+    fn visit<T: Technique + 'static>(self) -> Self::Output;
+}
+
+/// Makes [`NAMES`], [`visit`] and the descriptions from one list of the techniques that render scenes.
+macro_rules! techniques {
+    ($($technique:ty, $settings:ty;)*) => {
+        /// Names of the techniques that render scenes.
+        pub const NAMES: &[&str] = &[$(<$technique as Technique>::NAME),*];
+
+        /// Calls the visitor with the technique of this name. `None` if there is none.
+        pub fn visit<V: Visitor>(name: &str, visitor: V) -> Option<V::Output> {
+            $(if name == <$technique as Technique>::NAME {
+                return Some(visitor.visit::<$technique>());
+            })*
+            None
+        }
+
+        /// The techniques by their names in `-D igi.vpls=500`, with the description of their settings. The tone mapping after them is last.
+        pub fn descriptions() -> Vec<(&'static str, &'static Description)> {
+            vec![
+                $((<$technique as Technique>::NAME, <$settings>::description()),)*
+                ("tonemap", tonemap::Settings::description()),
+            ]
+        }
+    };
+}
+
+techniques! {
+    isr::Isr, isr::Settings;
+    igi::Igi, igi::Settings;
+    fiv::Fiv, fiv::Settings;
 }

@@ -2,57 +2,84 @@
 
 use std::{process::ExitCode, time::Instant};
 
-use clap::ValueEnum;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lucerna::{
     Error, Result,
     gpu::Gpu,
     graph::{Graph, Runner},
     image::Format,
-    scene::{Pose, Scene, View},
+    scene::Scene,
+    technique::{self, Mode, Readback, Ready, Settings, Shot, Technique},
 };
-use serde::{Serialize, de::DeserializeOwned};
 
 use crate::{
     args::{DeviceArgs, RenderArgs, TalkArgs},
+    bake::Meter,
     config,
     console::{self, Console},
-    frame_output::{self, FrameOutput, Readback},
     last_stage::{LastStage, Staged},
     outputs::Fresh,
     program::{self, STOPPED_EARLY},
     progress::Progress,
     record::Record,
+    rerun::bounds,
     run::Run,
     settings_list,
     signals::Interrupt,
 };
 
-/// The technique that renders.
+/// What a technique shows, for file names and metadata.
 #[derive(Clone, Copy, Debug)]
-pub struct Technique {
+pub struct Label {
     /// Name of the executable, and of the technique in file names and metadata, for example `isr`.
     pub name: &'static str,
-    /// The value of `--mode`; `None` for the mode with all light, which file names leave out.
+    /// The value of `--mode`; `None` for techniques without modes.
     pub mode: Option<&'static str>,
     /// The picture is radiance, which the exposure scales. Otherwise its values are shown unscaled.
     pub radiance: bool,
 }
 
-/// The input of a technique for a frame.
+impl Label {
+    fn of<T: Technique>(mode: T::Mode) -> Self {
+        let named = T::Mode::ALL.len() > 1;
+        Self { name: T::NAME, mode: named.then(|| mode.name()), radiance: mode.is_radiance() }
+    }
+}
+
+/// The choices of a command line besides those that all techniques have.
 #[derive(Debug)]
-pub struct Input<'a> {
-    pub gpu: &'a Gpu,
-    pub scene: &'a Scene,
-    /// The pose at the frame's time.
-    pub pose: &'a Pose,
-    pub view: &'a View,
-    pub frame: u32,
-    /// Number of frames of the run.
-    pub frames: u32,
-    /// Time of the frame, seconds.
-    pub seconds: f64,
-    /// The run needs more than the picture: layers, other images of the graph, or the list of passes.
-    pub layers: bool,
+pub struct Given<T: Technique> {
+    /// The settings before the settings file and `-D` change them.
+    pub base: T::Settings,
+    pub mode: T::Mode,
+    /// Data from the file of a bake.
+    pub baked: Option<T::Baked>,
+}
+
+impl<T: Technique> Given<T> {
+    /// The defaults, or the paper's settings with `--paper`.
+    ///
+    /// # Errors
+    /// `Usage` if there are no settings of the paper.
+    pub fn by(args: &RenderArgs, mode: T::Mode) -> Result<Self> {
+        let base = match args.paper {
+            false => T::Settings::default(),
+            true => T::Settings::paper().ok_or_else(|| {
+                Error::usage(format!("{} has no preset with the settings of the paper", T::NAME)).at("--paper")
+            })?,
+        };
+        Ok(Self { base, mode, baked: None })
+    }
+}
+
+/// Reads a mode from the command line.
+pub fn mode<M: Mode>() -> impl TypedValueParser<Value = M> {
+    let names = M::ALL.iter().map(|mode| PossibleValue::new(mode.name()).help(mode.doc()));
+    PossibleValuesParser::new(names).map(|name| named(&name).unwrap_or_default())
+}
+
+fn named<M: Mode>(name: &str) -> Option<M> {
+    M::ALL.iter().copied().find(|mode| mode.name() == name)
 }
 
 /// The result of some work; `None` if the user has requested a stop meanwhile and the work failed because of it or did not.
@@ -66,53 +93,20 @@ pub fn unless_stopped<T>(result: Result<T>, interrupt: &Interrupt) -> Result<Opt
     }
 }
 
-/// The interface of a technique for `render` and `rerun`. Only the programs use it; in the engine techniques are functions.
-pub trait Renderer {
-    type Settings: Serialize + DeserializeOwned + Clone;
-    /// Data that lives as long as the run.
-    type Kept;
-
-    fn technique(&self) -> Technique;
-
-    /// Checks that the settings are in their ranges. Called before any other work.
-    ///
-    /// # Errors
-    /// `Usage`, naming the setting.
-    fn check(settings: &Self::Settings) -> Result<()>;
-
-    /// Makes the data that lives as long as the run.
-    ///
-    /// # Errors
-    /// `OutOfMemory`, `DeviceLost`; `Input` if the technique does not support the scene.
-    fn prepare(&self, gpu: &Gpu, scene: &Scene, settings: &Self::Settings) -> Result<Self::Kept>;
-
-    /// Declares the passes of one frame.
-    ///
-    /// # Errors
-    /// `Usage` or `Input` for settings or scenes that the technique does not support.
-    fn compose(
-        &self,
-        graph: &mut Graph,
-        kept: &mut Self::Kept,
-        input: &Input<'_>,
-        settings: &Self::Settings,
-    ) -> Result<FrameOutput>;
-}
-
-/// Runs `render` for one technique. `base`: the settings before the settings file and `-D` change them.
+/// Runs `render` for one technique.
 ///
 /// # Errors
 /// Any error of the run. Its kind decides the exit code.
-pub fn render<R: Renderer>(renderer: &R, args: &RenderArgs, base: &R::Settings) -> Result<ExitCode> {
+pub fn render<T: Technique>(args: &RenderArgs, given: &Given<T>) -> Result<ExitCode> {
     let started = Instant::now();
-    let staged = Staged::effective(&args.settings, base, R::check)?;
+    let staged = Staged::effective(&args.settings, &given.base, T::Settings::validate)?;
     if args.settings.print_config {
         console::print(settings_list::with_docs(&config::to_toml(&staged)?).trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
     let interrupt = Interrupt::install();
-    let mut run = Run::new(renderer.technique(), args, args.talk.console(), &staged, None)?;
-    frames(renderer, args, staged, &mut run, &interrupt, started)?;
+    let mut run = Run::new(Label::of::<T>(given.mode), args, args.talk.console(), &staged, None)?;
+    frames(given, args, staged, &mut run, &interrupt, started)?;
     Ok(match run.progress() {
         _ if args.list_passes => ExitCode::SUCCESS,
         (done, asked) if done == asked => ExitCode::SUCCESS,
@@ -145,24 +139,15 @@ impl Again<'_> {
     ///
     /// # Errors
     /// `Input` if the technique has no mode of this name.
-    pub fn mode<M: ValueEnum + Default>(&self) -> Result<M> {
+    pub fn mode<M: Mode>(&self) -> Result<M> {
         let Some(asked) = &self.record.mode else { return Ok(M::default()) };
-        M::from_str(asked, false).map_err(|_| {
-            let names = M::value_variants().iter().filter_map(ValueEnum::to_possible_value);
-            let names: Vec<String> = names.map(|value| value.get_name().to_owned()).collect();
+        if M::ALL.len() == 1 {
+            return Err(Error::input(format!("{asked:?}, but this technique has no modes")).at("mode"));
+        }
+        named(asked).ok_or_else(|| {
+            let names: Vec<&str> = M::ALL.iter().map(|mode| mode.name()).collect();
             Error::input(format!("{asked:?} is not a mode; allowed are {}", names.join(", "))).at("mode")
         })
-    }
-
-    /// For techniques without modes.
-    ///
-    /// # Errors
-    /// `Input` if the record has a mode.
-    pub fn no_mode(&self) -> Result<()> {
-        match &self.record.mode {
-            None => Ok(()),
-            Some(mode) => Err(Error::input(format!("{mode:?}, but this technique has no modes")).at("mode")),
-        }
     }
 }
 
@@ -171,19 +156,43 @@ impl Again<'_> {
 ///
 /// # Errors
 /// Any error of rendering; `Input` for wrong values in the record.
-pub fn again<R: Renderer>(renderer: &R, asked: &Again<'_>, base: &R::Settings) -> Result<Option<Fresh>> {
-    let staged = Staged::recorded(&asked.record.settings, base, R::check)?;
+pub fn again<T: Technique>(asked: &Again<'_>) -> Result<Option<Fresh>> {
+    let given = Given::<T> { base: T::Settings::default(), mode: asked.mode()?, baked: None };
+    let staged = Staged::recorded(&asked.record.settings, &given.base, T::Settings::validate)?;
+    bounds::rays(T::NAME, T::rays(&staged.technique), asked.long)?;
     let args = asked.record.render_args(asked)?;
-    let mut run = Run::new(renderer.technique(), &args, asked.console(), &staged, Some(asked.format))?;
-    frames(renderer, &args, staged, &mut run, asked.interrupt, Instant::now())?;
+    let mut run = Run::new(Label::of::<T>(given.mode), &args, asked.console(), &staged, Some(asked.format))?;
+    frames(&given, &args, staged, &mut run, asked.interrupt, Instant::now())?;
     Ok(run.fresh())
 }
 
-/// Renders the frames of a run.
-fn frames<R: Renderer>(
-    renderer: &R,
+/// Prepares a technique. `None` if the user has requested a stop meanwhile.
+fn ready<T: Technique>(
+    gpu: &Gpu,
+    scene: &Scene,
+    (given, settings): (&Given<T>, &T::Settings),
     args: &RenderArgs,
-    staged: Staged<R::Settings>,
+    interrupt: &Interrupt,
+) -> Result<Option<Ready<T>>> {
+    let (mut meter, mut stopped) = (None, false);
+    let quiet = args.talk.console().is_quiet();
+    let mut told = |done: u64, total: u64| {
+        let meter = meter.get_or_insert_with(|| Meter::new(args.progress, quiet, T::UNITS, 0, total));
+        meter.show(done, 0);
+        stopped = interrupt.requested();
+        !stopped
+    };
+    match Ready::new(gpu, scene, settings, given.baked.as_ref(), &mut told) {
+        Err(_) if stopped => Ok(None),
+        ready => ready.map(Some),
+    }
+}
+
+/// Renders the frames of a run.
+fn frames<T: Technique>(
+    given: &Given<T>,
+    args: &RenderArgs,
+    staged: Staged<T::Settings>,
     run: &mut Run<'_>,
     interrupt: &Interrupt,
     started: Instant,
@@ -196,12 +205,12 @@ fn frames<R: Renderer>(
     let opened = started.elapsed();
     let settings = staged.technique;
     let mut last = LastStage::new(&gpu, staged.tonemap.as_ref(), run.exposure())?;
-    let mut resources = renderer.prepare(&gpu, &run.stage.scene, &settings)?;
+    let Some(mut ready) = ready(&gpu, &run.stage.scene, (given, &settings), args, interrupt)? else { return Ok(()) };
     let uploaded = started.elapsed();
     run.phases = vec![("load", loaded), ("device", opened - loaded), ("upload", uploaded - opened)];
 
     let all = run.outputs.wants_layers() || args.view.is_some() || args.dump.is_some() || args.list_passes;
-    let (name, frames) = (renderer.technique().name, run.frames.len() as u32);
+    let frames = run.frames.len() as u32;
     let mut runner = Runner::new(&gpu);
     let mut progress = Progress::new(args.progress, console.is_quiet(), run.frames.len() as u64);
     'frames: for frame in run.frames.clone() {
@@ -213,22 +222,21 @@ fn frames<R: Renderer>(
         let begun = Instant::now();
         let seconds = args.stage.time + f64::from(frame) / args.fps;
         let (pose, view) = run.stage.at(seconds, args.stage.size)?;
-        let mut graph = Graph::new(name);
+        let mut graph = Graph::new(T::NAME);
         (graph.frame, graph.seed) = (frame, args.seed);
-        let input =
-            Input { gpu: &gpu, scene: &run.stage.scene, pose: &pose, view: &view, frame, frames, seconds, layers: all };
-        let output = renderer.compose(&mut graph, &mut resources, &input, &settings);
-        let Some(mut output) = unless_stopped(output, interrupt)? else { break };
-        output.develop(|picture| last.frame(&mut graph, picture, (1.0 / args.fps) as f32))?;
+        let shot = Shot { seconds, frames, mode: given.mode, layers: all };
+        let picture = ready.frame(&mut graph, (&run.stage.scene, &pose), &view, shot, &settings);
+        let Some(mut picture) = unless_stopped(picture, interrupt)? else { break };
+        picture.develop(|picture| last.frame(&mut graph, picture, (1.0 / args.fps) as f32))?;
         if args.list_passes {
             console::print(graph.plan()?.list_passes().trim_end())?;
             return Ok(());
         }
-        run.note(&output.notes);
-        let seen = output.view.unwrap_or(view);
+        run.note(&picture.notes);
+        let seen = picture.view.unwrap_or(view);
         let reading = match &args.view {
-            Some(name) => Readback::view(&mut graph, name)?,
-            None => output.read(&mut graph, run.outputs.wants_layers()),
+            Some(name) => Readback::view(&mut graph, name).map_err(|error| error.at("--view"))?,
+            None => picture.read(&mut graph, run.outputs.wants_layers(), false),
         };
         let dump = args.dump.as_ref().map(|folder| (folder, graph.dump()));
         // Repetitions must not advance the history: the next frame follows the first run of this frame.
@@ -244,7 +252,7 @@ fn frames<R: Renderer>(
         interrupt.keep();
         for (folder, images) in dump.iter() {
             for (name, token) in images {
-                run.dump(folder, frame, name, frame_output::raw(&result.image(*token)))?;
+                run.dump(folder, frame, name, technique::raw(&result.image(*token)))?;
             }
         }
         progress.frame(frame, milliseconds, &files);
@@ -254,21 +262,11 @@ fn frames<R: Renderer>(
                 break;
             }
             let begun = Instant::now();
-            let mut graph = Graph::new(name);
+            let mut graph = Graph::new(T::NAME);
             (graph.frame, graph.seed) = (frame, args.seed);
-            let input = Input {
-                gpu: &gpu,
-                scene: &run.stage.scene,
-                pose: &pose,
-                view: &view,
-                frame,
-                frames,
-                seconds,
-                layers: all,
-            };
-            let mut output = renderer.compose(&mut graph, &mut resources, &input, &settings)?;
+            let mut picture = ready.frame(&mut graph, (&run.stage.scene, &pose), &view, shot, &settings)?;
             // A time step of 0 leaves the adaptation unchanged.
-            output.develop(|picture| last.frame(&mut graph, picture, 0.0))?;
+            picture.develop(|picture| last.frame(&mut graph, picture, 0.0))?;
             let last = repeat + 1 == args.repeat;
             let result = if last { runner.run(&graph) } else { runner.run_held(&graph) };
             let Some(result) = unless_stopped(result, interrupt)? else { break 'frames };

@@ -22,7 +22,7 @@ use crate::{
     pattern::Values,
     program,
     record::{Record, Source},
-    render::Technique,
+    render::Label,
     stage::Stage,
     timings::Timings,
 };
@@ -70,7 +70,7 @@ impl<'a> Run<'a> {
     /// Reads the scene and checks that all outputs can be written. With `memory` the run writes no files, and keeps the last picture as the
     /// bytes of a file of this format.
     pub fn new<S: Serialize>(
-        technique: Technique,
+        technique: Label,
         args: &'a RenderArgs,
         console: Console,
         settings: &Staged<S>,

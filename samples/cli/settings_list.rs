@@ -39,7 +39,7 @@ pub fn print(technique: Option<&str>, form: Form) -> Result<()> {
 
 /// Names of the techniques that have settings.
 pub fn names() -> Vec<&'static str> {
-    descriptions().map(|(name, _)| name).to_vec()
+    descriptions().into_iter().map(|(name, _)| name).collect()
 }
 
 fn toml(name: &str, description: &Description) -> String {

@@ -62,6 +62,7 @@ mod stored_occluders;
 pub mod suns;
 pub mod support_function;
 pub mod surface;
+mod technique;
 mod tiles;
 pub mod units;
 
@@ -73,3 +74,4 @@ pub use plan::Plan;
 pub use settings::{Cut, Extent, Interpolation, Masks, Method, SelfSamples, Settings, Shared, Specular};
 pub use sky::Sky;
 pub use state::Fiv;
+pub use technique::Baked;

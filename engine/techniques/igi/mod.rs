@@ -39,6 +39,7 @@ mod raster;
 mod ray_tree;
 mod settings;
 pub mod starts;
+mod technique;
 
 pub use cache::Cache;
 pub use light_tree::LightTree;
@@ -46,6 +47,7 @@ pub use notes::notes;
 pub use picture::{Picture, PictureSettings};
 use settings::LEAST_CELL;
 pub use settings::{Pattern, Settings, Visibility};
+pub use technique::{GATHERED, Mode};
 
 use crate::{
     Result,

@@ -23,12 +23,14 @@
 mod picture;
 pub mod senders;
 mod settings;
+mod technique;
 
 pub use picture::{Picture, PictureSettings, picture};
 pub use settings::{
     Blur, Downsample, Estimator, LightLaw, Occlude, Patch, Pattern, Preset, Receiver, Resolution, Sender, Settings,
     Upsample,
 };
+pub use technique::{Isr, Mode};
 
 use crate::{
     Result,

@@ -185,7 +185,7 @@ fn every_source_that_can_change_a_picture_is_in_the_digest() {
         "samples/cli/experiment/place.rs",
         "samples/cli/experiment/run.rs",
         "samples/cli/export_pov/material.rs",
-        "samples/cli/frame_output.rs",
+        "samples/cli/render.rs",
         "samples/cli/framing.rs",
         "samples/cli/ground.rs",
         "samples/cli/lights.rs",

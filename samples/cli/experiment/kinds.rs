@@ -1,7 +1,7 @@
 //! The kinds of techniques and references that experiments can name.
 
 mod fiv;
-mod igi;
+mod technique;
 mod tonemap;
 
 use std::{any::Any, collections::HashMap, path::PathBuf, time::Instant};
@@ -11,10 +11,10 @@ use lucerna::{
     gpu::Gpu,
     graph::{Graph, Report, Runner},
     image::{Layer, Layers},
-    passes::ambient::Irradiance,
     reference::{path, tracer},
-    scene::{Pose, Scene, View, bvh::Bvh, resident::Resident},
-    techniques::isr::{self, PictureSettings},
+    scene::{Pose, Scene, View, bvh::Bvh},
+    technique::Picture,
+    techniques::{fiv::Fiv, igi::Igi, isr::Isr},
 };
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
@@ -27,8 +27,6 @@ use crate::{
     args::Size,
     config,
     export_pov::{self, Pov, povray},
-    frame_output::FrameOutput,
-    gbuffer_layers,
     signals::Interrupt,
 };
 
@@ -157,38 +155,9 @@ impl<'a> Warm<'a> {
 
 /// All kinds.
 pub const KINDS: &[Kind] = &[
-    Kind {
-        name: "isr",
-        description: "image-space radiosity; layers direct, indirect, occlusion, albedo, normal, depth",
-        on_device: true,
-        of_images: false,
-        settings: |paper, changes| {
-            let base = if paper { PictureSettings::paper() } else { PictureSettings::default() };
-            let settings: PictureSettings = config::with(&base, changes)?;
-            settings.validate()?;
-            config::to_value(&settings)
-        },
-        render: isr_picture,
-        available: || Ok(String::new()),
-    },
-    Kind {
-        name: "igi",
-        description: "instant global illumination; layers direct, indirect, specular, albedo, normal, depth",
-        on_device: true,
-        of_images: false,
-        settings: igi::settings,
-        render: igi::picture,
-        available: || Ok(String::new()),
-    },
-    Kind {
-        name: "fiv",
-        description: "shadows from fullsphere irradiance vectors, and by brute force; layer irradiance",
-        on_device: true,
-        of_images: false,
-        settings: fiv::settings,
-        render: fiv::picture,
-        available: || Ok(String::new()),
-    },
+    technique::of::<Isr>(),
+    technique::of::<Igi>(),
+    Kind { render: fiv::picture, ..technique::of::<Fiv>() },
     Kind {
         name: "tracer",
         description: "path tracer on the device; layers emission, direct, indirect, albedo, normal, depth, samples, variance",
@@ -276,15 +245,12 @@ fn read<S: DeserializeOwned>(settings: &Value) -> Result<S> {
     serde_json::from_value(settings.clone()).map_err(|error| Error::input(format!("settings: {error}")))
 }
 
-/// Name of a fact of a run: the number of shadow rays from visible surfaces to virtual lights, counted by the gathering pass.
-pub const GATHERED: &str = "gathered rays";
-
 /// Renders the frame that `compose` declares `repeat` times. The picture is the first one.
 pub fn on_device(
     runner: &mut Runner,
     job: &Job<'_>,
     name: &'static str,
-    mut compose: impl FnMut(&mut Graph) -> Result<FrameOutput>,
+    mut compose: impl FnMut(&mut Graph) -> Result<Picture>,
 ) -> Result<Option<Rendered>> {
     let (mut layers, mut times) = (None, Times::default());
     let mut reports: Vec<Report> = Vec::new();
@@ -295,8 +261,8 @@ pub fn on_device(
         let begun = Instant::now();
         let mut graph = Graph::new(name);
         graph.seed = job.seed;
-        let output = compose(&mut graph)?;
-        let reading = layers.is_none().then(|| output.read(&mut graph, true));
+        let picture = compose(&mut graph)?;
+        let reading = layers.is_none().then(|| picture.read(&mut graph, true, true));
         let frame = runner.run(&graph)?;
         if let Some(reading) = reading {
             layers = Some(reading.layers(&frame));
@@ -314,25 +280,6 @@ pub fn on_device(
         times.passes = passes.collect();
     }
     Ok(layers.map(|layers| Rendered { layers, times }))
-}
-
-fn isr_picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
-    let settings: PictureSettings = read(job.settings)?;
-    let (scene, pose) = (warm.scene, warm.pose);
-    let kept = warm.keep("isr", |gpu, scene, _| {
-        let ambient = scene.environment.as_ref().map(Irradiance::of).unwrap_or_default();
-        Ok((Resident::new(gpu, scene)?, ambient, Runner::new(gpu)))
-    })?;
-    let (resident, ambient, runner) = kept;
-    on_device(runner, job, "isr", |graph| {
-        let handles = resident.frame_in(graph, scene, pose);
-        let view = job.view.fit_far(&handles.bounds());
-        let picture = isr::picture(graph, &handles, &view, ambient.clone(), &settings)?;
-        let out = picture.outputs;
-        let output = FrameOutput::new(out.total).color("direct", out.direct).color("indirect", out.indirect);
-        let output = output.layer("occlusion", &["Y"], out.occlusion, |pixel| pixel);
-        Ok(gbuffer_layers::add(output, &picture.gbuffer, &view))
-    })
 }
 
 /// Settings of the path tracer on the CPU.

@@ -1,9 +1,10 @@
-//! The commands `fiv precompute`, `fiv merge` and `fiv environment`, which write the input files of `fiv render`, and
-//! `fiv steady`, which measures its output.
+//! The commands of `fiv`: `precompute` and `environment` write the input files of `render`, and `steady` measures its
+//! output.
 
-mod decided;
 mod precompute;
+mod render;
 mod steady;
+mod vector_settings;
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -13,8 +14,8 @@ use lucerna::{
     scene::builtin,
 };
 
-pub use decided::decided;
 pub use precompute::{PrecomputeArgs, precompute};
+pub use render::{FivArgs, render};
 pub use steady::{SteadyArgs, steady};
 
 use crate::{args::TalkArgs, console::Console};

@@ -17,7 +17,7 @@ use lucerna::{
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::{decided, partial};
+use super::{partial, vector_settings};
 use crate::{
     args::{DeviceArgs, TalkArgs, positive},
     bake::{self, Meter, UnitsArgs},
@@ -97,13 +97,13 @@ struct Keys {
 pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
     let begun = Instant::now();
     let mut keys = args.settings.effective(&Keys::default())?;
-    let checked = |keys: &Keys| decided::of_vectors(&keys.fiv).validate().map_err(|error| error.at("fiv"));
+    let checked = |keys: &Keys| vector_settings::of_vectors(&keys.fiv).validate().map_err(|error| error.at("fiv"));
     args.settings.blamed(checked(&keys), || checked(&args.settings.file_alone().effective(&Keys::default())?))?;
     if args.settings.print_config {
         console::print(settings_list::with_docs(&config::to_toml(&keys)?).trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
-    let idle = decided::idle(&keys.fiv)?;
+    let idle = vector_settings::idle(&keys.fiv)?;
     if !idle.is_empty() {
         console.info(&format!("note: vectors do not depend on {}", idle.join(", ")));
     }

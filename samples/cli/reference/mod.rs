@@ -14,6 +14,7 @@ use lucerna::{
     image::{Format, Layer, Layers, Metadata, WriteOptions},
     reference::tracer::{Progress, Tracer},
     scene::{NoteKind, View, builtin},
+    technique::Mode,
 };
 use serde_json::{Value, json};
 

@@ -2,8 +2,7 @@
 
 use std::{str::FromStr, time::Duration};
 
-use clap::ValueEnum;
-use lucerna::{Error, Result, reference::tracer};
+use lucerna::{Error, Result, reference::tracer, technique::Mode};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -11,6 +10,7 @@ use crate::{
     config::SettingsArgs,
     last_stage::Staged,
     progress::ProgressMode,
+    render,
     stage::StageArgs,
 };
 
@@ -29,7 +29,7 @@ pub struct ReferenceArgs {
     pub overwrite: bool,
 
     /// The layer that the picture shows; .exr files also have the other layers
-    #[arg(long, alias = "mode", value_enum, default_value_t, value_name = "LAYER", help_heading = "Output")]
+    #[arg(long, alias = "mode", value_parser = render::mode::<Show>(), default_value = "total", value_name = "LAYER", help_heading = "Output")]
     pub show: Show,
 
     /// Print one JSON document about the run on stdout
@@ -133,26 +133,33 @@ impl ReferenceArgs {
 }
 
 /// Which light the picture shows.
-#[derive(ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Show {
     #[default]
     Total,
-    /// Light after one scattering
     Direct,
-    /// Light after more than one scattering
     Indirect,
-    /// Emitted light
     Emission,
 }
 
-impl Show {
-    /// Name of the layer.
-    pub fn name(self) -> &'static str {
+impl Mode for Show {
+    const ALL: &'static [Self] = &[Self::Total, Self::Direct, Self::Indirect, Self::Emission];
+
+    fn name(self) -> &'static str {
         match self {
             Self::Total => "total",
             Self::Direct => "direct",
             Self::Indirect => "indirect",
             Self::Emission => "emission",
+        }
+    }
+
+    fn doc(self) -> &'static str {
+        match self {
+            Self::Total => "All light",
+            Self::Direct => "Light after one scattering",
+            Self::Indirect => "Light after more than one scattering",
+            Self::Emission => "Emitted light",
         }
     }
 }

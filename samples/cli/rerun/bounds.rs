@@ -1,6 +1,6 @@
 //! Limits on the work that a picture's metadata may cause without `--long`.
 
-use lucerna::{Error, Result, techniques::fiv};
+use lucerna::{Error, Result};
 
 use crate::record::Record;
 
@@ -8,7 +8,7 @@ use crate::record::Record;
 const FRAMES: u64 = 1000;
 /// Maximum of paths of a reference picture: some minutes on a GPU.
 const PATHS: u64 = 10_000_000_000;
-/// Maximum of rays for the vectors of an occluder: some minutes on a GPU.
+/// Maximum of rays for each object before the first frame, such as for the vectors of an occluder: some minutes on a GPU.
 const RAYS: u64 = 100_000_000_000;
 /// Maximum of rendered pixels, if the file's size does not tell their number.
 const PIXELS: u64 = 1 << 24;
@@ -55,19 +55,20 @@ pub fn check(record: &Record, extent: [u32; 2], long: bool) -> Result<()> {
     over("ground.beside", beside as u64, THINGS, "objects")
 }
 
-/// The same check for vectors that must be computed again with `settings`.
+/// The same check for the rays of each object that a technique must trace before the first frame.
 ///
 /// # Errors
 /// `Input`, with the number.
-pub fn vectors(settings: &fiv::Settings, long: bool) -> Result<()> {
-    let numbers = [settings.azimuths, settings.polars, settings.radii, settings.turns, 6];
-    let texel = [settings.size, settings.size, settings.split, settings.split];
-    let rays = numbers.iter().chain(&texel).fold(1u64, |rays, &n| rays.saturating_mul(n.into()));
-    if long { Ok(()) } else { over("settings.fiv", rays, RAYS, "rays for each occluder") }
+pub fn rays(technique: &str, rays: u64, long: bool) -> Result<()> {
+    if long { Ok(()) } else { over(&format!("settings.{technique}"), rays, RAYS, "rays for each object") }
 }
 
 #[cfg(test)]
 mod tests {
+    use lucerna::{
+        technique::Technique,
+        techniques::fiv::{self, Fiv},
+    };
     use serde_json::json;
 
     use super::*;
@@ -111,10 +112,13 @@ mod tests {
 
     #[test]
     fn vectors_are_counted() {
-        vectors(&fiv::Settings::default(), false).unwrap();
+        let counted = |fiv: fiv::Settings, long| {
+            rays("fiv", Fiv::rays(&fiv::PictureSettings { fiv, ..Default::default() }), long)
+        };
+        counted(fiv::Settings::default(), false).unwrap();
         let many = fiv::Settings { azimuths: 1024, polars: 513, radii: 128, ..fiv::Settings::default() };
-        assert!(vectors(&many, false).is_err() && vectors(&many, true).is_ok());
+        assert!(counted(many.clone(), false).is_err() && counted(many.clone(), true).is_ok());
         let most = fiv::Settings { azimuths: u32::MAX, size: u32::MAX, split: u32::MAX, ..many };
-        assert!(vectors(&most, false).unwrap_err().to_string().contains(&u64::MAX.to_string()));
+        assert!(counted(most, false).unwrap_err().to_string().contains(&u64::MAX.to_string()));
     }
 }

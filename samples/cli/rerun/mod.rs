@@ -14,6 +14,8 @@ use lucerna::{
     Error, ErrorKind, Result,
     image::{self, Format, Layers},
     scene::Limits,
+    technique::Technique,
+    techniques::{self, Visitor},
 };
 use serde_json::Value;
 
@@ -25,9 +27,8 @@ use crate::{
     outputs::Fresh,
     record::Record,
     reference,
-    render::Again,
+    render::{self, Again},
     signals::Interrupt,
-    technique::{fiv, igi, isr},
     tonemap,
 };
 
@@ -63,21 +64,18 @@ fn tolerance(text: &str) -> Result<f32, String> {
 /// The program that made a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Maker {
-    Isr,
-    Igi,
-    Fiv,
+    /// A technique by its name.
+    Technique(&'static str),
     Reference,
     Tonemap,
 }
 
 /// The values of `command` in the metadata that are accepted.
-const MAKERS: [(&[&str], Maker); 5] = [
-    (&["isr", "render"], Maker::Isr),
-    (&["igi", "render"], Maker::Igi),
-    (&["fiv", "render"], Maker::Fiv),
-    (&["lucerna", "reference"], Maker::Reference),
-    (&["tonemap"], Maker::Tonemap),
-];
+fn makers() -> Vec<(Vec<&'static str>, Maker)> {
+    let techniques = techniques::NAMES.iter().map(|name| (vec![*name, "render"], Maker::Technique(name)));
+    let more = [(vec!["lucerna", "reference"], Maker::Reference), (vec!["tonemap"], Maker::Tonemap)];
+    techniques.chain(more).collect()
+}
 
 impl Maker {
     fn of(config: &Value) -> Result<Self> {
@@ -87,12 +85,23 @@ impl Maker {
         };
         let words = command.as_array().map(Vec::as_slice).unwrap_or_default();
         let same = |known: &[&str]| known.iter().copied().map(Some).eq(words.iter().map(Value::as_str));
-        MAKERS.iter().find(|(known, _)| same(known)).map(|(_, maker)| *maker).ok_or_else(|| {
-            let known: Vec<String> = MAKERS.iter().map(|(words, _)| words.join(" ")).collect();
+        makers().into_iter().find(|(known, _)| same(known)).map(|(_, maker)| maker).ok_or_else(|| {
+            let known: Vec<String> = makers().iter().map(|(words, _)| words.join(" ")).collect();
             let shown: String = command.to_string().chars().take(100).collect();
             Error::input(format!("{shown} is no command that is made again; those are {}", known.join(", ")))
                 .at("command")
         })
+    }
+}
+
+/// Renders the picture of a technique again.
+struct ByTechnique<'a>(&'a Again<'a>);
+
+impl Visitor for ByTechnique<'_> {
+    type Output = Result<Option<Fresh>>;
+
+    fn visit<T: Technique + 'static>(self) -> Self::Output {
+        render::again::<T>(self.0)
     }
 }
 
@@ -162,9 +171,7 @@ fn again(
         interrupt,
     };
     match maker {
-        Maker::Isr => isr::again(&asked),
-        Maker::Igi => igi::again(&asked),
-        Maker::Fiv => fiv::again(&asked),
+        Maker::Technique(name) => techniques::visit(name, ByTechnique(&asked)).unwrap_or(Ok(None)),
         Maker::Reference | Maker::Tonemap => reference::again(&asked),
     }
 }
@@ -177,7 +184,8 @@ mod tests {
 
     #[test]
     fn only_whole_commands_of_the_list_are_made_again() {
-        for (words, maker) in MAKERS {
+        assert_eq!(makers().len(), 5);
+        for (words, maker) in makers() {
             assert_eq!(Maker::of(&json!({ "command": words })).unwrap(), maker);
         }
         for odd in [

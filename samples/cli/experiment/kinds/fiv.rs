@@ -14,35 +14,27 @@ use lucerna::{
     scene::{
         Limits, Pose, Scene, View,
         bvh::{Bvh, Ray, TriangleId},
-        resident::Resident,
     },
-    techniques::fiv::{Fiv, Light, Method, Occluder, Occluders, PictureSettings, Plan, Settings, Sky, Stored},
+    technique::{Ready, Shot, Technique},
+    techniques::fiv::{Baked, Fiv, Light, Method, Occluder, Occluders, PictureSettings, Plan, Settings, Sky, Stored},
 };
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::{Job, Rendered, Warm, on_device, read};
 use crate::{
     config,
-    experiment::{cache, digest::Digest, file::Changes, sealed},
-    frame_output::FrameOutput,
+    experiment::{cache, digest::Digest, sealed},
 };
-
-pub(super) fn settings(_paper: bool, changes: &Changes) -> Result<Value> {
-    let settings: PictureSettings = config::with(&PictureSettings::default(), changes)?;
-    settings.validate()?;
-    config::to_value(&settings)
-}
 
 /// Height below which an occluder hides the ground under it, in radii of the largest occluder.
 const COVERS: f32 = 0.1;
 
 /// The technique's data for a scene and one set of vectors.
 struct Kept {
-    resident: Resident,
-    fiv: Fiv,
+    ready: Ready<Fiv>,
     runner: Runner,
-    made: Settings,
+    made: PictureSettings,
     facts: Vec<(String, f64)>,
 }
 
@@ -55,16 +47,10 @@ struct Cost {
     seconds: f64,
 }
 
-/// The settings that decide the vectors; all other settings have default values.
-fn making(settings: &Settings) -> Settings {
-    let Settings { trilinear, partial, overlap, self_shadow, .. } = Settings::default();
-    Settings { trilinear, partial, overlap, self_shadow, ..settings.clone() }
-}
-
 pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
     let settings: PictureSettings = read(job.settings)?;
     let (scene, pose, folder) = (warm.scene, warm.pose, warm.folder.clone());
-    let making = making(&settings.fiv);
+    let making = Fiv::prepared_by(&settings);
     if warm.keep("fiv", |_, _, _| Ok(None::<Kept>))?.as_ref().is_none_or(|kept| kept.made != making) {
         warm.forget("fiv");
         let made = make(warm.gpu, scene, &making, folder, &|| job.interrupt.requested());
@@ -74,19 +60,17 @@ pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rende
         };
         warm.keep("fiv", |_, _, _| Ok(Some(made)))?;
     }
-    let Some(Kept { resident, fiv, runner, facts, .. }) = warm.keep("fiv", |_, _, _| Ok(None::<Kept>))? else {
+    let Some(Kept { ready, runner, facts, .. }) = warm.keep("fiv", |_, _, _| Ok(None::<Kept>))? else {
         return Ok(None);
     };
     let rendered = on_device(runner, job, "fiv", |graph| {
-        let handles = resident.frame_in(graph, scene, pose);
-        let view = job.view.fit_far(&handles.bounds());
-        let picture = fiv.picture(graph, scene, pose, &handles, &view, &settings)?;
-        Ok(FrameOutput::new(picture.outputs.total).color("irradiance", picture.outputs.irradiance))
+        let picture = ready.frame(graph, (scene, pose), job.view, Shot::default(), &settings)?;
+        Ok(picture.only(&["irradiance"]))
     })?;
     let facts = facts.clone();
-    let radius = fiv.occluders().kinds.iter().map(|kind| kind.radius).fold(0f32, f32::max);
+    let radius = ready.technique().occluders().kinds.iter().map(|kind| kind.radius).fold(0f32, f32::max);
     let covered = match &rendered {
-        Some(_) if making.method == Method::BruteForce && job.view.is_orthographic() => {
+        Some(_) if making.fiv.method == Method::BruteForce && job.view.is_orthographic() => {
             let bvh = warm.keep("fiv bvh", |_, scene, pose| Ok(Bvh::build(scene, pose)))?;
             Some(covered(scene, bvh, job.view, COVERS * radius))
         }
@@ -129,23 +113,30 @@ fn is_thin(scene: &Scene, triangle: TriangleId) -> bool {
     primitive.is_some_and(|primitive| scene.materials[primitive.material as usize].double_sided)
 }
 
-fn make(gpu: &Gpu, scene: &Scene, settings: &Settings, folder: PathBuf, stop: &dyn Fn() -> bool) -> Result<Kept> {
-    let resident = Resident::new(gpu, scene)?;
-    let (stored, seconds) = match settings.method {
-        Method::Vectors => vectors(gpu, scene, settings, folder, stop)?,
+fn make(
+    gpu: &Gpu,
+    scene: &Scene,
+    settings: &PictureSettings,
+    folder: PathBuf,
+    stop: &dyn Fn() -> bool,
+) -> Result<Kept> {
+    let (stored, seconds) = match settings.fiv.method {
+        Method::Vectors => vectors(gpu, scene, &settings.fiv, folder, stop)?,
         _ => (None, 0.0),
     };
-    let fiv = Fiv::new(gpu, scene, &resident, settings, stored.as_ref(), |_, _| !stop())?;
+    let baked = stored.map(|stored| Baked { stored, file: None });
+    let ready = Ready::<Fiv>::new(gpu, scene, settings, baked.as_ref(), &mut |_, _| !stop())?;
+    let fiv = ready.technique();
     let occluders = fiv.occluders();
     let facts = vec![
         ("seconds before".to_owned(), seconds),
-        ("bytes".to_owned(), if stored.is_some() { fiv.bytes() as f64 } else { 0.0 }),
+        ("bytes".to_owned(), if baked.is_some() { fiv.bytes() as f64 } else { 0.0 }),
         ("things".to_owned(), occluders.placed.len() as f64),
         ("kinds".to_owned(), occluders.kinds.len() as f64),
         ("vertices".to_owned(), occluders.placed.iter().map(|p| vertices(scene, p.node)).sum::<usize>() as f64),
         ("lights".to_owned(), (fiv.light().lit.len() + fiv.light().suns.len()) as f64),
     ];
-    Ok(Kept { resident, fiv, runner: Runner::new(gpu), made: settings.clone(), facts })
+    Ok(Kept { ready, runner: Runner::new(gpu), made: settings.clone(), facts })
 }
 
 fn vertices(scene: &Scene, node: u32) -> usize {

@@ -8,16 +8,17 @@ use lucerna::{
     graph::{Format, Runner},
     image::{Layer, Layers, Precision},
     reference,
+    technique::Picture,
     techniques::{
-        isr::PictureSettings,
+        isr::{Isr, PictureSettings},
         tonemap::{self, Tonemap},
     },
 };
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{Job, Rendered, Times, Warm, isr_picture, on_device, read};
-use crate::{config, experiment::file::Changes, frame_output::FrameOutput};
+use super::{Job, Rendered, Times, Warm, on_device, read, technique};
+use crate::{config, experiment::file::Changes};
 
 /// Settings of both kinds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -57,7 +58,7 @@ fn source<'k>(warm: &'k mut Warm<'_>, job: &Job<'_>) -> Result<Option<&'k mut Ke
             None => {
                 let settings = config::to_value(&PictureSettings::default())?;
                 let frame = Job { settings: &settings, repeat: 1, ..*job };
-                let Some(rendered) = isr_picture(warm, &frame)? else { return Ok(None) };
+                let Some(rendered) = technique::picture::<Isr>(warm, &frame)? else { return Ok(None) };
                 rendered.layers
             }
         };
@@ -89,10 +90,10 @@ pub(super) fn on_gpu(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Render
     let rendered = on_device(runner, job, "tonemap", |graph| {
         let picture = graph.import_image(&source.image);
         let out = tonemap.frame(graph, picture, None)?;
-        let output = FrameOutput::new(out.mapped).layer("luminance", &["Y"], out.luminance, |pixel| pixel);
+        let shown = Picture::new(out.mapped).values("luminance", &["Y"], out.luminance);
         Ok(match out.important {
-            Some(map) => output.layer("important", &["Y"], map, |pixel| pixel),
-            None => output,
+            Some(map) => shown.values("important", &["Y"], map),
+            None => shown,
         })
     })?;
     Ok(rendered.map(|rendered| Rendered { layers: precise(rendered.layers), ..rendered }))

@@ -2,14 +2,14 @@
 
 use lucerna::{
     Result,
-    techniques::igi::{PictureSettings, Visibility},
+    techniques::igi::{GATHERED, PictureSettings, Visibility},
 };
 use serde_json::Value;
 
 use super::{name, stages, stages::Part};
 use crate::{
     experiment::{
-        kinds::{self, GATHERED},
+        kinds,
         results::{Done, Layer, Results},
     },
     report::{Cell, Section, Table},

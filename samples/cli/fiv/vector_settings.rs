@@ -1,32 +1,14 @@
-//! Settings that a file of vectors decides, and settings that vectors do not depend on.
-
-use std::path::Path;
+//! Settings that vectors depend on, and settings that they do not depend on.
 
 use lucerna::{
-    Error, Result,
-    settings::{Described, Difference},
-    techniques::fiv::{Method, Settings, Specular, Stored},
+    Result,
+    settings::Described,
+    techniques::fiv::{Method, Settings, Specular},
 };
 
 /// Keys that change pictures but no vectors.
 const OF_PICTURES: [&str; 10] =
     ["trilinear", "partial", "cut", "extent", "overlap", "negligible", "shared", "specular", "method", "turning"];
-
-/// Checks that settings agree with the settings that the file of vectors was computed with.
-///
-/// # Errors
-/// `Usage`, naming the file, the key and both values.
-pub fn decided(file: &Path, stored: &Stored, settings: &Settings) -> Result<()> {
-    if settings.method != Method::Vectors {
-        let error = Error::usage("--vectors is for fiv.method=vectors").at("fiv.method").in_file(file);
-        return Err(error.help("Leave out --vectors or fiv.method"));
-    }
-    let wrong = Settings::description().differences(settings, &stored.plan.settings(settings))?.into_iter().next();
-    wrong.map_or(Ok(()), |Difference { key, first: asked, second: has }| {
-        let error = Error::usage(format!("the settings ask for {asked}, the vectors were computed with {has}"));
-        Err(error.at(format!("fiv.{}", key.name)).in_file(file).help("Leave the key out, or compute the vectors again"))
-    })
-}
 
 /// Keys that differ from their defaults and that vectors do not depend on.
 ///

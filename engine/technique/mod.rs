@@ -1,0 +1,224 @@
+//! One interface for all techniques, for programs that drive more than one: command line, experiments, viewers, bindings.
+//!
+//! [`Technique`] is the interface, at the edge only: inside, a technique is functions from handles to handles, which a program may call
+//! directly. [`Ready`] holds a technique with the scene that it was prepared for, and declares frames. [`Picture`] is the result of a frame:
+//! the total, named layers, sums and notes. [`crate::techniques::visit`] finds a technique by its name.
+
+mod gbuffer_layers;
+mod picture;
+mod readback;
+
+pub use picture::{Decode, Picture};
+pub use readback::{Readback, raw};
+
+use std::fmt::Debug;
+
+use serde::{Serialize, de::DeserializeOwned};
+
+use crate::{
+    Result,
+    gpu::Gpu,
+    graph::Graph,
+    scene::{
+        Note, Pose, Scene, View,
+        resident::{Handles, Resident},
+    },
+};
+
+/// The settings of a technique, with those of the passes before it.
+pub trait Settings: Serialize + DeserializeOwned + Clone + Default + PartialEq + Debug {
+    /// The paper's own settings; `None` if the technique has no such preset.
+    fn paper() -> Option<Self>;
+
+    /// Checks that all values are in their ranges.
+    ///
+    /// # Errors
+    /// `Usage`, naming the key, the value found and the values allowed.
+    fn validate(&self) -> Result<()>;
+}
+
+/// What the picture shows: all light, or a part of it.
+pub trait Mode: Copy + Debug + Default + PartialEq + Send + Sync + 'static {
+    /// All modes; the first is the default and shows all light.
+    const ALL: &'static [Self];
+
+    /// Name on the command line and in files.
+    fn name(self) -> &'static str;
+
+    /// One line for help texts.
+    fn doc(self) -> &'static str;
+
+    /// The picture is radiance, which an exposure scales. Otherwise its values are shown unscaled.
+    fn is_radiance(self) -> bool {
+        true
+    }
+}
+
+/// For techniques whose pictures always show all light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AllLight;
+
+impl Mode for AllLight {
+    const ALL: &'static [Self] = &[Self];
+
+    fn name(self) -> &'static str {
+        "all"
+    }
+
+    fn doc(self) -> &'static str {
+        "All light"
+    }
+}
+
+/// The inputs of [`Technique::ready`].
+pub struct Making<'a, B> {
+    pub gpu: &'a Gpu,
+    pub scene: &'a Scene,
+    pub resident: &'a Resident,
+    /// Data from the file of a bake.
+    pub baked: Option<&'a B>,
+    /// Called with the finished and the whole number of units of long work. Returns false to stop the work.
+    pub told: &'a mut dyn FnMut(u64, u64) -> bool,
+}
+
+impl<B> Debug for Making<'_, B> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Making(baked: {})", self.baked.is_some())
+    }
+}
+
+/// The inputs of [`Technique::frame`]. `graph.frame` and `graph.seed` are the number of the frame and the seed of its random numbers.
+#[derive(Clone, Debug)]
+pub struct Moment<'a, M> {
+    pub scene: &'a Scene,
+    /// The pose at the time of the frame.
+    pub pose: &'a Pose,
+    /// The scene's buffers and images in this graph and pose.
+    pub handles: &'a Handles,
+    /// The camera, with the far plane fitted to the scene.
+    pub view: View,
+    /// Time of the frame, seconds.
+    pub seconds: f64,
+    /// Number of frames of the run.
+    pub frames: u32,
+    pub mode: M,
+    /// The program needs all layers or the list of passes, not only the total.
+    pub layers: bool,
+    /// Notes of the scene's upload.
+    pub notes: &'a [Note],
+}
+
+/// A technique that is prepared for a scene.
+pub trait Technique: Sized {
+    /// Name of the technique in commands, settings, file names and metadata, for example `isr`.
+    const NAME: &'static str;
+    /// One line for lists.
+    const ABOUT: &'static str;
+    /// The units of long work in [`Self::ready`], for progress.
+    const UNITS: &'static str = "units";
+
+    type Settings: Settings;
+    type Mode: Mode;
+    /// Data from the file of a bake. [`std::convert::Infallible`] for techniques without bakes.
+    type Baked;
+
+    /// The settings on which [`Self::ready`] depends. All other keys have values that are the same for all settings.
+    fn prepared_by(settings: &Self::Settings) -> Self::Settings;
+
+    /// Number of rays that [`Self::ready`] traces for each object, for limits on the work that untrusted settings may cause.
+    fn rays(_: &Self::Settings) -> u64 {
+        0
+    }
+
+    /// Prepares the technique for a scene. May run graphs.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`, `Interrupted` if `told` stopped it; `Usage` or `Input` if the technique does not support the settings or
+    /// the scene, or if the bake is for others.
+    fn ready(making: Making<'_, Self::Baked>, settings: &Self::Settings) -> Result<Self>;
+
+    /// Declares the passes of one frame. Writes no file.
+    ///
+    /// # Errors
+    /// `Usage` or `Input` for settings or scenes that the technique does not support.
+    fn frame(
+        &mut self,
+        graph: &mut Graph,
+        moment: &Moment<'_, Self::Mode>,
+        settings: &Self::Settings,
+    ) -> Result<Picture>;
+}
+
+/// A technique with the scene that it is prepared for, in device memory.
+#[derive(Debug)]
+pub struct Ready<T> {
+    resident: Resident,
+    technique: T,
+}
+
+/// The choices for one frame of [`Ready::frame`] besides pose, view and settings.
+#[derive(Clone, Copy, Debug)]
+pub struct Shot<M> {
+    /// Time of the frame, seconds.
+    pub seconds: f64,
+    /// Number of frames of the run.
+    pub frames: u32,
+    pub mode: M,
+    /// As [`Moment::layers`].
+    pub layers: bool,
+}
+
+impl<M: Mode> Default for Shot<M> {
+    /// One frame at second 0 with all layers.
+    fn default() -> Self {
+        Self { seconds: 0.0, frames: 1, mode: M::default(), layers: true }
+    }
+}
+
+impl<T: Technique> Ready<T> {
+    /// Uploads the scene and prepares the technique. `told`: as [`Making::told`].
+    ///
+    /// # Errors
+    /// As [`Technique::ready`].
+    pub fn new(
+        gpu: &Gpu,
+        scene: &Scene,
+        settings: &T::Settings,
+        baked: Option<&T::Baked>,
+        told: &mut dyn FnMut(u64, u64) -> bool,
+    ) -> Result<Self> {
+        let resident = Resident::new(gpu, scene)?;
+        let technique = T::ready(Making { gpu, scene, resident: &resident, baked, told }, settings)?;
+        Ok(Self { resident, technique })
+    }
+
+    /// The technique.
+    pub fn technique(&self) -> &T {
+        &self.technique
+    }
+
+    /// Declares one frame of the scene. The far plane of `view` is fitted to the scene in `pose`.
+    ///
+    /// # Errors
+    /// As [`Technique::frame`].
+    pub fn frame(
+        &mut self,
+        graph: &mut Graph,
+        (scene, pose): (&Scene, &Pose),
+        view: &View,
+        shot: Shot<T::Mode>,
+        settings: &T::Settings,
+    ) -> Result<Picture> {
+        let handles = self.resident.frame_in(graph, scene, pose);
+        let view = view.fit_far(&handles.bounds());
+        let Shot { seconds, frames, mode, layers } = shot;
+        let notes = self.resident.notes();
+        let moment = Moment { scene, pose, handles: &handles, view, seconds, frames, mode, layers, notes };
+        let mut picture = self.technique.frame(graph, &moment, settings)?;
+        if let Some(gbuffer) = picture.gbuffer.take() {
+            gbuffer_layers::add(&mut picture, &gbuffer, &view);
+        }
+        picture.view = Some(view);
+        Ok(picture)
+    }
+}
