@@ -125,7 +125,8 @@ fn pictures_from_files_are_those_without_and_can_be_made_again() {
     // Settings must agree with the settings that the file decides.
     let asked = |key: &str| picture(&env, &at("d.exr"), &["--vectors", &vectors, "-D", key]);
     asked("fiv.azimuths=7").expect(2, &["v.fiv", "fiv.azimuths", "7", "6"]);
-    asked("fiv.method=brute-force").expect(2, &["v.fiv", "fiv.method", "--vectors"]);
+    asked("fiv.method=brute-force").expect(2, &["v.fiv", "fiv.method", "Leave out the vectors"]);
+    picture(&env, &at("p.exr"), &["--paper"]).expect(2, &["--paper", "no preset"]);
     asked("fiv.azimuths=6").expect(0, &[]);
     precompute(&env, &at("idle.fiv"), &["-D", "fiv.turning=30"]).expect(0, &["do not depend on fiv.turning"]);
     // The file also decides the even spacing. Texels are separated for every method that is named.
