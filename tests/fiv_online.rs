@@ -378,6 +378,46 @@ fn lists_of_what_is_near_leave_out_nothing_that_matters() {
 }
 
 #[test]
+fn the_light_of_a_point_does_not_depend_on_the_pixels_around_it() {
+    with_gpu(|gpu| {
+        // Of one tile of eight by eight pixels, and of tiles a ninth of its size with pixels at the same places.
+        let same = |studio: &mut Studio, size: f32, settings: &Settings| {
+            let eye = |extent: u32| flat_view(vec3(0.0, 0.002, 0.0), Vec3::ZERO, size, [extent; 2]);
+            let [coarse, fine] = [8, 72].map(|extent| studio.irradiance(&eye(extent), settings));
+            let at = |i: usize| (9 * (i / 8) + 4) * 72 + 9 * (i % 8) + 4;
+            let off = |i: usize| (coarse[i] - fine[at(i)]).length() / fine[at(i)].length().max(1e-6);
+            (0..64).map(off).fold(0.0, f32::max)
+        };
+        let body = |radius: f32, at: Vec3| {
+            let (positions, indices) = ball(radius, 6);
+            (positions, indices, Transform::Matrix(Mat4::from_translation(at)))
+        };
+        // A terrace: the ball lies below the middle of the tile, and above the lower half of its surfaces.
+        let mut terrace = stage(&[body(0.2, vec3(0.6, -1.6, 0.1))]);
+        let half = |x: f32, y: f32| {
+            [(0.0, -1.0), (0.0, 1.0), (1.0, 1.0), (1.0, -1.0)].map(|(u, z)| vec3(x + 2.0 * u, y, 2.0 * z))
+        };
+        terrace.meshes[0].primitives[0].positions = [half(-2.0, 0.0), half(0.0, -2.0)].concat();
+        terrace.meshes[0].primitives[0].normals = vec![Vec3::Y; 8];
+        terrace.meshes[0].primitives[0].tangents = vec![glam::Vec4::ZERO; 8];
+        terrace.meshes[0].primitives[0].indices = vec![0, 1, 2, 0, 2, 3, 4, 5, 6, 4, 6, 7];
+        let settings = Settings { self_shadow: false, ..few(Method::Vectors) };
+        let off = same(&mut Studio::new(gpu, &terrace, &settings, None), 2.6, &settings);
+        println!("terrace: {off}");
+        assert!(off < 1e-3, "terrace: {off}");
+        // Balls all around, of which some are left out at some pixels of the tile.
+        let scene = stage(&scattered().into_iter().map(|at| body(0.2, at)).collect::<Vec<_>>());
+        let settings = Settings { overlap: false, negligible: 0.05, ..few(Method::Vectors) };
+        let mut studio = Studio::new(gpu, &scene, &settings, None);
+        for size in [0.5, 1.5, 5.0] {
+            let off = same(&mut studio, size, &settings);
+            println!("scattered, {size} m: {off}");
+            assert!(off < 1e-3, "scattered, {size} m: {off}");
+        }
+    });
+}
+
+#[test]
 fn what_is_negligible_is_left_out_without_a_step() {
     with_gpu(|gpu| {
         let body = |at: Vec3| {

@@ -88,6 +88,44 @@ fn upsampling_is_a_partition_of_unity_within_bounds_and_does_not_leak() {
 }
 
 #[test]
+fn a_pixel_without_a_texel_on_its_surface_takes_the_light_of_the_nearest_surface() {
+    with_gpu(|gpu| {
+        // A strip that no coarse texel sees, between a wall close behind it and a wall far behind it.
+        let (width, height) = (24, 24);
+        let eye = Eye::look_at(dvec3(0.0, 0.0, 3.0), DVec3::ZERO, 0.9, 10.0, width, height);
+        let settings = Settings { downsample: 4, upsample_range: 0.01, upsample_normal: 8.0, ..Settings::default() };
+        let small = Extent::new(6, 6);
+        for close_at_left in [true, false] {
+            let depth = |x: usize| match x {
+                12 | 13 => 0.3,
+                _ if (x < 12) == close_at_left => 0.3 * 1.08,
+                _ => 0.3 * 1.3,
+            };
+            let all = width * height;
+            let buffers = Buffers {
+                depth: (0..all).map(|i| depth(i % width)).collect(),
+                normal: vec![DVec3::Z; all],
+                albedo: vec![DVec3::ONE; all],
+                mask: vec![1.0; all],
+                sender: vec![DVec3::ZERO; all],
+                ..Buffers { width, height, factor: 1.0, ..Buffers::default() }
+            };
+            let mut graph = Graph::new("strip");
+            let g = gbuffer(&mut graph, &eye, &buffers);
+            let guide = filters::guide(&mut graph, &g, &settings);
+            let lit: Vec<_> = (0..36).map(|i| [f32::from(u8::from((i % 6 < 3) == close_at_left)); 4]).collect();
+            let coarse = image(&mut graph, "lit", small, &lit);
+            let (fine, _) = filters::upsample(&mut graph, &g, guide, coarse, &settings);
+            let [fine] = read(gpu, graph, [fine]);
+            for (i, texel) in fine.iter().enumerate() {
+                let own = f32::from(u8::from(matches!(i % width, 12 | 13) || (i % width < 12) == close_at_left));
+                assert!((texel[0] - own).abs() < 1e-3, "{close_at_left}, pixel {i}: {texel:?} instead of {own}");
+            }
+        }
+    });
+}
+
+#[test]
 fn the_discontinuity_buffer_is_the_mean_of_the_tile_on_one_surface() {
     with_gpu(|gpu| {
         let (width, height) = (40, 24);

@@ -8,7 +8,7 @@ use igi_lab::{Studio, flux, mean, plain, room};
 use lucerna::{
     gpu::testing::{with_gpu, with_ray_query},
     reference::tracer::{self, Tracer},
-    scene::{Environment, LightKind, Material, Pose, Scene, builtin},
+    scene::{AlphaMode, Environment, LightKind, Material, Pose, Scene, builtin},
     shaders::types,
     techniques::igi::{Settings, Visibility},
 };
@@ -108,6 +108,14 @@ fn lamps() -> Vec<(&'static str, Scene, f64, f64)> {
         stage.quad(lamp, vec3(-0.2, 0.1, -0.1), Vec3::X * 0.4, Vec3::Z * 0.2);
         add(if double_sided { "two sided lamp" } else { "lamp" }, stage, 5.0 * PI * 0.08 * sides, 1e-4);
     }
+
+    // A lamp that is there to two fifths.
+    let mut stage = room(Vec3::splat(0.5));
+    let emitter = Material::emitter("veil", Vec3::splat(5.0));
+    let base_color = emitter.base_color.truncate().extend(0.4);
+    let lamp = stage.material(Material { alpha: AlphaMode::Blend, base_color, ..emitter });
+    stage.quad(lamp, vec3(-0.2, 0.1, -0.1), Vec3::X * 0.4, Vec3::Z * 0.2);
+    add("veil", stage, 0.4 * 5.0 * PI * 0.08, 1e-4);
 
     // A disc of triangles.
     let mut stage = room(Vec3::splat(0.5));

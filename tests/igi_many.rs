@@ -301,11 +301,13 @@ fn what_is_put_back_is_the_matt_share_of_a_wall_and_the_light_of_every_lamp() {
         let once = f64::from(rho * intensity / (radius * radius));
         let seen = view(vec3(0.1, 0.2, 0.0), vec3(1.0, 0.4, 0.3), 80.0, [32, 32]);
         // More lamps than a short path looks at, weak and strong ones, as bright together as the one.
-        let lamps = 40;
-        let strengths = (0..lamps).map(|i| [0.5, 1.5][i % 2] * intensity / lamps as f32).collect();
-        for (name, share, strengths) in
-            [("half glass", 0.5f32, vec![intensity]), ("matt", 1.0, vec![intensity]), ("forty lamps", 1.0, strengths)]
-        {
+        let strengths = (0..40).map(|i| [0.5, 1.5][i % 2] * intensity / 40.0).collect();
+        for (name, share, strengths) in [
+            ("half glass", 0.5f32, vec![intensity]),
+            ("matt", 1.0, vec![intensity]),
+            ("forty lamps", 1.0, strengths),
+            ("glowing ball", 1.0, vec![]),
+        ] {
             let mut stage = Stage::new();
             // An index of 1: half of the light leaves as if there were nothing.
             let matt = Material::diffuse("wall", Vec3::splat(rho));
@@ -316,9 +318,14 @@ fn what_is_put_back_is_the_matt_share_of_a_wall_and_the_light_of_every_lamp() {
                 let at = 0.01 * vec3((i % 3) as f32 - 1.0, (i / 3 % 3) as f32 - 1.0, (i % 7) as f32 / 3.0 - 1.0);
                 stage.point(if strengths.len() == 1 { Vec3::ZERO } else { at }, Vec3::splat(*strength));
             }
+            if strengths.is_empty() {
+                // A ball is as strong from all sides as its disc: radiance π r².
+                let glow = stage.emitter(Vec3::splat(intensity / (std::f32::consts::PI * 0.04 * 0.04)));
+                stage.sphere(glow, Vec3::ZERO, 0.04, 32, false);
+            }
             let mut studio = Studio::new(gpu, &stage.scene);
             // Most of the light comes by short paths.
-            let settings = Settings { bound: 0.45, picks: 16, specular: true, direct_samples: 1, ..plain(3000) };
+            let settings = Settings { bound: 0.45, picks: 16, specular: true, direct_samples: 3, ..plain(3000) };
             let without = mean(&studio.render(&seen, &settings, 0).irradiance) / (once * f64::from(share));
             let settings = Settings { compensation: 4, ..settings };
             let with = mean(&studio.render(&seen, &settings, 0).irradiance) / (once * f64::from(share));

@@ -3,12 +3,12 @@
 mod igi_lab;
 mod tracer_lab;
 
-use glam::{Vec3, vec3};
+use glam::{Mat4, Quat, Vec3, vec3};
 use igi_lab::{Studio, flux, mean, plain, room};
 use lucerna::{
     gpu::testing::with_gpu,
     reference::tracer::{Filter, Settings as Tracing},
-    scene::{AlphaMode, Material},
+    scene::{AlphaMode, LightKind, Material},
     techniques::igi::Settings,
 };
 use tracer_lab::{Stage, flat_view, render, view};
@@ -206,5 +206,80 @@ fn a_surface_that_is_glass_in_part_reflects_by_the_rest() {
                 assert!((found - expected).abs() < 2e-3 * whole, "{transmission}: {found} instead of {expected}");
             }
         }
+    });
+}
+
+/// What a smooth surface of index 1.5 reflects at this cosine.
+fn fresnel(cosine: f64) -> f64 {
+    let inside = (1.0 - (1.0 - cosine * cosine) / 2.25).sqrt();
+    let [s, p] = [(cosine - 1.5 * inside) / (cosine + 1.5 * inside), (1.5 * cosine - inside) / (1.5 * cosine + inside)];
+    0.5 * (s * s + p * p)
+}
+
+#[test]
+fn a_narrow_beam_is_divided_as_by_fresnel_and_takes_the_tint_of_what_it_passes() {
+    with_gpu(|gpu| {
+        let (tint, outer) = (vec3(0.9, 0.6, 0.3), 0.05f32);
+        let sheet = Material { base_color: tint.extend(1.0), ..glass(true) };
+        let metal = Material { base_color: tint.extend(1.0), double_sided: true, ..mirror() };
+        let in_half = Material { transmission: 0.5, ior: 1.0, ..metal.clone() };
+        for cosine in [0.25f32, 0.5, 0.95] {
+            let f = fresnel(cosine.into());
+            let reflects = 2.0 * f / (1.0 + f);
+            let metallic = tint + (1.0 - tint) * (1.0 - cosine).powi(5);
+            for (name, matter, back, through) in [
+                ("sheet", &sheet, Vec3::splat(reflects as f32), tint * (1.0 - reflects) as f32),
+                ("mirror", &metal, metallic, Vec3::ZERO),
+                // With an index of 1 the half that is glass passes all light.
+                ("half a mirror", &in_half, 0.5 * metallic, 0.5 * tint),
+            ] {
+                let mut stage = room(Vec3::splat(0.5));
+                let matter = stage.material(matter.clone());
+                stage.quad(matter, vec3(-1.0, -1.0, 0.0), 2.0 * Vec3::X, 2.0 * Vec3::Y);
+                // A beam that meets the middle of the plane z = 0.
+                let along = vec3(0.0, (1.0 - cosine * cosine).sqrt(), -cosine);
+                let lamp = Mat4::from_rotation_translation(Quat::from_rotation_arc(Vec3::NEG_Z, along), -0.5 * along);
+                stage.light(LightKind::Spot { range: None, inner: 0.0, outer }, Vec3::ONE, 1e4, lamp);
+                let seen = view(vec3(0.0, 0.0, 0.9), vec3(0.3, 0.2, 1.0), 60.0, [2, 2]);
+                let settings = Settings { specular: true, specular_depth: 1, ..plain(10000) };
+                let vpls = Studio::new(gpu, &stage.scene).render(&seen, &settings, 0).vpls;
+                let side = |front: bool| {
+                    let there: Vec<_> = vpls.iter().filter(|v| (v.position[2] > 0.0) == front).copied().collect();
+                    flux(&there, 0)
+                };
+                let sent = 0.5 * 1e4 * 2.0 * std::f32::consts::PI * (1.0 - outer.cos()) / 3.0;
+                let found = [side(true) / sent, side(false) / sent];
+                println!("{name}, cosine {cosine}: back {} of {back}, through {} of {through}", found[0], found[1]);
+                for (found, exact) in found.into_iter().zip([back, through]) {
+                    assert!(
+                        (found - exact).abs().max_element() < 0.012,
+                        "{name}, cosine {cosine}: {found} not {exact}"
+                    );
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn a_rough_metal_keeps_its_highlight_beside_a_mirror() {
+    with_gpu(|gpu| {
+        // The mirror lies out of the picture and out of the light.
+        let shown = |beside: bool| {
+            let mut stage = Stage::new();
+            let rough = Material { metallic: 1.0, roughness: 0.3, ..Material::diffuse("metal", vec3(0.9, 0.8, 0.7)) };
+            let (rough, smooth) = (stage.material(rough), stage.material(mirror()));
+            stage.quad(rough, vec3(-1.0, 0.0, -1.0), 2.0 * Vec3::Z, 2.0 * Vec3::X);
+            if beside {
+                stage.quad(smooth, vec3(4.0, 0.0, -1.0), 2.0 * Vec3::Z, 2.0 * Vec3::X);
+            }
+            stage.point(vec3(0.2, 1.0, -0.1), Vec3::splat(3.0));
+            let seen = flat_view(vec3(0.0, 2.0, 0.4), Vec3::ZERO, 0.8, [24, 24]);
+            let settings = Settings { indirect: false, ..Settings::default() };
+            mean(&Studio::new(gpu, &stage.scene).render(&seen, &settings, 0).total)
+        };
+        let (alone, beside) = (shown(false), shown(true));
+        println!("highlight {alone:.4}, beside a mirror {beside:.4}");
+        assert!(alone > 0.1 && (beside / alone - 1.0).abs() < 1e-3, "{beside} instead of {alone}");
     });
 }

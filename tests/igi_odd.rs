@@ -292,6 +292,61 @@ fn lamps_in_walls_and_in_corners_give_no_more_than_they_have() {
 }
 
 #[test]
+fn a_lamp_of_two_sides_lights_the_eight_corners_of_a_room_alike() {
+    with_gpu(|gpu| {
+        // Far from the origin, where the step off a surface is larger than the least part of a shadow ray.
+        let middle = vec3(20.0, -10.0, 0.0);
+        let mut stage = Stage::new();
+        let wall = stage.material(Material { ior: 1.0, ..Material::diffuse("wall", Vec3::splat(0.5)) });
+        stage.cuboid(wall, middle - Vec3::ONE, middle + Vec3::ONE, true);
+        let lamp = Material { double_sided: true, ..Material::emitter("lamp", Vec3::splat(5.0)) };
+        let lamp = stage.material(lamp);
+        stage.quad(lamp, middle - vec3(0.2, 0.0, 0.2), Vec3::X * 0.4, Vec3::Z * 0.4);
+        let mut studio = Studio::new(gpu, &stage.scene);
+        let settings = Settings { direct_samples: 16, ..plain(4000) };
+        let shown = [1.0f32, -1.0].map(|up| {
+            let seen = view(middle + vec3(0.0, 0.5 * up, 0.0), middle + up * Vec3::Y, 90.0, [16, 16]);
+            studio.render(&seen, &settings, 0)
+        });
+        let mut corners = [0.0; 8];
+        for vpl in &shown[0].vpls {
+            let at = Vec3::from(vpl.position) - middle;
+            corners[usize::from(at.x > 0.0) + 2 * usize::from(at.y > 0.0) + 4 * usize::from(at.z > 0.0)] += vpl.flux[0];
+        }
+        // Half of what it sends to both sides.
+        let each = 0.5 * 2.0 * 5.0 * std::f32::consts::PI * 0.16 / 8.0;
+        println!("corners {corners:?}, each {each}");
+        assert!(corners.iter().all(|flux| (flux / each - 1.0).abs() < 0.02), "{corners:?} instead of {each}");
+        let [ceiling, floor] = shown.map(|shown| mean(&shown.direct));
+        println!("ceiling {ceiling}, floor {floor}");
+        assert!(floor > 0.01 && (ceiling / floor - 1.0).abs() < 0.02, "ceiling {ceiling}, floor {floor}");
+    });
+}
+
+#[test]
+fn a_leaning_normal_receives_by_its_own_cosine_but_four_times_what_arrives_at_most() {
+    with_gpu(|gpu| {
+        // A plate under a sun that stands low, with normals that lean towards the sun.
+        for (sun, lean) in [(0.5f32, 0.4f32), (1.2, 0.5), (1.5, 0.3), (1.45, 1.4)] {
+            let mut stage = Stage::new();
+            let matt = stage.material(Material::diffuse("plate", Vec3::splat(0.5)));
+            let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)].map(|(x, z)| vec3(x, 0.0, z));
+            let normal = vec3(lean.sin(), lean.cos(), 0.0);
+            stage.mesh(matt, corners.to_vec(), vec![normal; 4], vec![0, 1, 2, 0, 2, 3]);
+            let from = vec3(sun.sin(), sun.cos(), 0.0);
+            let turn = Quat::from_rotation_arc(Vec3::NEG_Z, -from);
+            stage.light(LightKind::Directional, Vec3::ONE, 3.0, Mat4::from_quat(turn));
+            let seen = view(vec3(0.0, 1.0, 1.0), Vec3::ZERO, 60.0, [2, 2]);
+            let found = flux(&Studio::new(gpu, &stage.scene).render(&seen, &plain(500), 0).vpls, 0).x;
+            let arrives = 3.0 * 4.0 * sun.cos();
+            let exact = 0.5 * (3.0 * 4.0 * normal.dot(from)).min(4.0 * arrives);
+            println!("sun at {sun}, normals at {lean}: {found} instead of {exact}");
+            assert!((found / exact - 1.0).abs() < 2e-3, "sun at {sun}, normals at {lean}: {found} instead of {exact}");
+        }
+    });
+}
+
+#[test]
 fn pictures_smaller_than_tiles_and_few_lights() {
     with_gpu(|gpu| {
         let scene = builtin::load("cornell").unwrap();

@@ -12,7 +12,7 @@ use lucerna::{
     reference::isr_scene::{Buffers, Eye, Patch},
     scene::{Camera, Material, Pose, Projection, Scene, View, resident::Resident},
     techniques::isr::{
-        Blur, Inputs, Settings, frame,
+        Blur, Inputs, Pattern, Resolution, Settings, frame,
         senders::{SenderView, Senders},
     },
 };
@@ -132,6 +132,194 @@ fn what_the_frame_shows_is_not_counted_again() {
     });
 }
 
+/// Mean share of the closed form of `wall` on those pixels of the floor that `counts` takes.
+fn share_where(found: &[[f32; 4]], eye: &Eye, buffers: &Buffers, wall: &Patch, counts: impl Fn(DVec3) -> bool) -> f64 {
+    let (mut sum, mut exact) = (0.0, 0.0);
+    for (i, texel) in found.iter().enumerate() {
+        let p = buffers.position(eye, i % eye.width, i / eye.width);
+        if buffers.depth[i] < 1.0 && p.y.abs() < 1e-6 && counts(p) {
+            sum += f64::from(texel[0]);
+            exact += wall.reflected_by_white(p, DVec3::Y).x;
+        }
+    }
+    assert!(exact > 5.0, "{exact}");
+    sum / exact
+}
+
+/// A patch that neither reflects nor glows.
+fn screen(corner: DVec3, a: DVec3, b: DVec3) -> Patch {
+    Patch { corner, a, b, albedo: DVec3::ZERO, radiance: DVec3::ZERO }
+}
+
+#[test]
+fn a_surface_close_behind_another_or_across_it_is_not_the_one_that_the_frame_shows() {
+    with_gpu(|gpu| {
+        let settings = Settings { blur_radius: 4, visibility_steps: 0, sender_samples: 96, ..Settings::default() };
+        // The wall stands 0.2 m behind a screen, at 4 m.
+        let patches = isr_lab::floor_and_wall(1.0);
+        let (floor, wall) = (patches[0], patches[1]);
+        let eye = Eye::look_at(dvec3(0.0, 1.5, 2.0), dvec3(0.0, 0.3, -1.3), 0.9, 10.0, 120, 96);
+        let before = screen(dvec3(-1.5, 0.0, -1.8), 3.0 * DVec3::X, 1.3 * DVec3::Y);
+        let (own, layer) = (Buffers::cast(&eye, &[floor, before], 1), Buffers::cast(&eye, &[floor, wall], 1));
+        let found = indirect(gpu, (&eye, &own), &[(&eye, &layer, 0.0)], &settings);
+        let counts = |p: DVec3| p.x.abs() < 0.8 && (-1.6..-0.2).contains(&p.z);
+        let parallel = share_where(&found, &eye, &own, &wall, counts);
+
+        // A wall that the frame would see nearly from its edge, behind a screen that faces the camera.
+        let eye = Eye::look_at(dvec3(0.0, 1.0, 2.0), dvec3(0.4, 0.2, -1.0), 1.0, 10.0, 120, 96);
+        let white = Patch { corner: dvec3(-0.2, 0.0, 1.0), a: 2.0 * DVec3::X, b: -2.4 * DVec3::Z, ..floor };
+        let wall = Patch { corner: dvec3(-0.2, 0.0, -3.0), a: DVec3::Y, b: 1.2 * DVec3::Z, ..wall };
+        let before = screen(dvec3(-1.0, 0.0, -1.5), 3.0 * DVec3::X, 1.3 * DVec3::Y);
+        let own = Buffers::cast(&eye, &[white, before], 1);
+        assert!(own.sender.iter().all(|sent| *sent == DVec3::ZERO), "the frame shows the wall");
+        let aside = Eye::look_at(dvec3(2.5, 0.8, -1.2), dvec3(-0.2, 0.4, -2.4), 0.9, 10.0, 100, 80);
+        let from_aside = Buffers::cast(&aside, &[white, wall], 1);
+        let found = indirect(gpu, (&eye, &own), &[(&aside, &from_aside, 0.0)], &settings);
+        let counts = |p: DVec3| (0.1..1.4).contains(&p.x) && (-1.2..0.6).contains(&p.z);
+        let across = share_where(&found, &eye, &own, &wall, counts);
+        println!("behind {parallel:.3}, across {across:.3} of the closed form");
+        assert!((parallel - 1.0).abs() < 0.1 && (across - 1.0).abs() < 0.1, "{parallel} {across}");
+    });
+}
+
+#[test]
+fn a_screen_before_a_wall_takes_its_light_and_the_floor_itself_takes_nothing() {
+    with_gpu(|gpu| {
+        let settings = Settings { blur_radius: 4, sender_samples: 96, thickness: 0.5, ..Settings::default() };
+        let eye = Eye::look_at(dvec3(0.0, 1.5, 2.0), dvec3(0.0, 0.3, -1.3), 0.9, 10.0, 120, 96);
+        let patches = isr_lab::floor_and_wall(1.0);
+        let (floor, wall) = (patches[0], patches[1]);
+        // A tenth nearer to the camera than the wall, and higher than it.
+        let before = screen(dvec3(-1.5, 0.0, -1.6), 3.0 * DVec3::X, 1.3 * DVec3::Y);
+        let layer = Buffers::cast(&eye, &patches, 1);
+        let share = |shown: &[Patch], visibility_steps: u32| {
+            let own = Buffers::cast(&eye, shown, 1);
+            let settings = Settings { visibility_steps, ..settings.clone() };
+            let found = indirect(gpu, (&eye, &own), &[(&eye, &layer, 0.0)], &settings);
+            let counts = |p: DVec3| p.x.abs() < 0.8 && (-1.4..-0.2).contains(&p.z);
+            share_where(&found, &eye, &own, &wall, counts)
+        };
+        let (all, open, hidden) = (share(&[floor], 0), share(&[floor], 16), share(&[floor, before], 16));
+        println!("{all:.3} of the closed form, {open:.3} by visibility, {hidden:.4} behind a screen");
+        assert!((all - 1.0).abs() < 0.15 && (open / all - 1.0).abs() < 0.05, "{all}, {open} by visibility");
+        assert!(hidden < 0.02, "{hidden} behind a screen");
+    });
+}
+
+/// What the buffers send as the mean over two by two texels, weighted by the mask, linear between the means.
+fn coarsened(buffers: &Buffers) -> Buffers {
+    let (width, height) = (buffers.width / 2, buffers.height / 2);
+    let mean = |x: usize, y: usize| {
+        let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| (2 * y + j) * buffers.width + 2 * x + i);
+        let sum = |f: &dyn Fn(usize) -> DVec3| four.iter().map(|&i| f(i)).sum::<DVec3>();
+        (sum(&|i| buffers.sender[i] * buffers.mask[i]), sum(&|i| DVec3::splat(buffers.mask[i])).x)
+    };
+    let mut blurred = buffers.clone();
+    for (i, sent) in blurred.sender.iter_mut().enumerate() {
+        let (x, y) = (i % buffers.width, i / buffers.width);
+        let pair = |at: usize, end: usize| {
+            let next = if at.is_multiple_of(2) { (at / 2).saturating_sub(1) } else { (at / 2 + 1).min(end - 1) };
+            [(at / 2, 0.75), (next, 0.25)]
+        };
+        let (mut sum, mut masks) = (DVec3::ZERO, 0.0);
+        for (u, a) in pair(x, width) {
+            for (v, b) in pair(y, height) {
+                let (light, mask) = mean(u, v);
+                sum += a * b * light;
+                masks += a * b * mask;
+            }
+        }
+        *sent = if masks > 0.0 { sum / masks } else { DVec3::ZERO };
+    }
+    blurred
+}
+
+/// A frame at full resolution without blur: what each of its texels gathers.
+fn gathered(gpu: &Gpu, eye: &Eye, own: &Buffers, other: Option<(&Eye, &Buffers)>, settings: &Settings) -> Vec<f64> {
+    let mut graph = Graph::new("gathered");
+    let gbuffer = gbuffer(&mut graph, eye, own);
+    let views: Vec<_> = other
+        .iter()
+        .map(|(eye, buffers)| {
+            let gbuffer = isr_lab::gbuffer(&mut graph, eye, buffers);
+            SenderView { gbuffer, color: gbuffer.emission, uniform: view(eye).uniform(), hole: 0.0 }
+        })
+        .collect();
+    let senders = Senders::pack(&mut graph, &views, None);
+    let inputs = Inputs { gbuffer, lights: lights(&mut graph, &[]), ambient: Irradiance::default(), senders };
+    let settings = Settings {
+        resolution: Resolution::Full,
+        blur: Blur::None,
+        visibility_steps: 0,
+        occlusion: false,
+        ..settings.clone()
+    };
+    let out = frame(&mut graph, &inputs, &settings).unwrap();
+    let [gathered] = read(gpu, graph, [out.gathered]);
+    gathered.iter().map(|texel| f64::from(texel[0])).collect()
+}
+
+/// A cloud of small surfaces that face anywhere.
+fn cloud(width: usize, height: usize, seed: u64, radiance: impl Fn(&mut isr_lab::Random) -> f64) -> Buffers {
+    let mut random = isr_lab::Random(seed);
+    let mut buffers = Buffers { width, height, factor: 1.0, ..Buffers::default() };
+    for _ in 0..width * height {
+        buffers.depth.push(0.2 + 0.03 * random.next());
+        buffers.normal.push((random.vector() + 0.5 * DVec3::Z).normalize());
+        buffers.albedo.push(DVec3::ONE);
+        buffers.mask.push(1.0);
+        buffers.sender.push(DVec3::splat(radiance(&mut random)));
+    }
+    buffers
+}
+
+#[test]
+fn with_the_prefilter_a_sample_sends_the_mean_over_a_quarter_of_its_cells_side() {
+    with_gpu(|gpu| {
+        // 64 texels a sample: the mean is over two by two.
+        let eye = Eye::look_at(DVec3::ZERO, -DVec3::Z, 0.9, 10.0, 64, 48);
+        let own = cloud(64, 48, 3, |_| 0.0);
+        let mut sending = cloud(64, 48, 4, |random| random.next());
+        for (i, mask) in sending.mask.iter_mut().enumerate() {
+            *mask = [1.0, 0.25, 0.5, 1.0, 0.75][(i / 3) % 5];
+        }
+        let near = Settings { pattern: Pattern::Grid, jitter: false, samples: 24, reach: 16.0, ..Settings::default() };
+        let settings = |prefilter| Settings { prefilter, sender_samples: 48, ..near.clone() };
+        for by_view in [false, true] {
+            let light = |from: &Buffers, prefilter: bool| {
+                let settings = settings(prefilter);
+                match by_view {
+                    false => gathered(gpu, &eye, from, None, &settings),
+                    true => gathered(gpu, &eye, &own, Some((&eye, from)), &settings),
+                }
+            };
+            let (plain, found) = (light(&sending, false), light(&sending, true));
+            let expected = light(&coarsened(&sending), false);
+            let apart = |a: &[f64]| {
+                let squares = a.iter().zip(&expected).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+                (squares / expected.iter().map(|b| b * b).sum::<f64>()).sqrt()
+            };
+            println!("by view: {by_view}; {:.4} off, {:.4} without the filter", apart(&found), apart(&plain));
+            assert!(apart(&plain) > 0.05 && apart(&found) < 0.005, "{by_view}: {}", apart(&found));
+        }
+    });
+}
+
+#[test]
+fn estimates_of_what_a_view_sends_sum_to_two_at_most() {
+    with_gpu(|gpu| {
+        let eye = Eye::look_at(DVec3::ZERO, -DVec3::Z, 0.9, 10.0, 96, 72);
+        let (own, sending) = (cloud(96, 72, 5, |_| 0.0), cloud(96, 72, 6, |_| 1.0));
+        let settings = Settings { sender_samples: 24, prefilter: false, ..Settings::default() };
+        let sums = gathered(gpu, &eye, &own, Some((&eye, &sending)), &settings);
+        let [between, most] =
+            [1.05..1.95, 1.995..2.005].map(|range| sums.iter().filter(|s| range.contains(*s)).count());
+        println!("{between} of {} between one and two, {most} at two", sums.len());
+        assert!(between * 20 > sums.len() && most * 100 > sums.len(), "{between} and {most} of {}", sums.len());
+        assert!(sums.iter().all(|sum| *sum < 2.005), "{}", sums.iter().fold(0.0, |a: f64, b| a.max(*b)));
+    });
+}
+
 #[test]
 fn samples_follow_the_depth() {
     with_gpu(|gpu| {
@@ -152,8 +340,7 @@ fn samples_follow_the_depth() {
             let gbuffer = gbuffer(&mut graph, &eye, &buffers);
             let lights = lights(&mut graph, &[]);
             let inputs = Inputs { gbuffer, lights, ambient: Irradiance::default(), senders: None };
-            let settings =
-                Settings { resolution: lucerna::techniques::isr::Resolution::Full, blur: Blur::None, ..settings };
+            let settings = Settings { resolution: Resolution::Full, blur: Blur::None, ..settings };
             let out = frame(&mut graph, &inputs, &settings).unwrap();
             let [gathered] = read(gpu, graph, [out.gathered]);
             gathered

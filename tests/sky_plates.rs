@@ -102,6 +102,23 @@ fn a_ball_under_a_sky_without_symmetry_has_its_irradiance() {
 }
 
 #[test]
+fn small_lights_of_several_colours_light_a_ball_by_their_cosines() {
+    let (width, height) = (128, 64);
+    let mut pixels = vec![Vec3::new(0.2, 0.3, 0.4); (width * height) as usize];
+    // Two pixels that send more than all others, each mostly of one colour.
+    for (x, y, light) in [(70, 12, Vec3::new(900.0, 60.0, 0.0)), (20, 25, Vec3::new(0.0, 40.0, 700.0))] {
+        pixels[y * width as usize + x] = light;
+    }
+    let sky = Environment { name: String::new(), width, height, pixels, rotation: 0.3, scale: 1.5 };
+    with_gpu(|gpu| {
+        let lit = ball(gpu, &sky);
+        let off = worst(&lit, |n| brute_force(&sky, n));
+        println!("off by {off}");
+        assert!(off < 0.02, "{off}");
+    });
+}
+
+#[test]
 fn a_ball_under_the_least_of_skies_is_evenly_lit() {
     with_gpu(|gpu| {
         for (width, height) in [(1, 1), (2, 1), (4, 2)] {

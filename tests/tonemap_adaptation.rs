@@ -79,6 +79,19 @@ fn the_limit_holds_until_the_exponential_is_slower() {
     });
 }
 
+#[test]
+fn the_way_from_black_begins_forty_stops_below_one() {
+    with_gpu(|gpu| {
+        let limited = Settings { adapt_limit: 10.0, adapt_up: 0.4, ..settings(Operator::Reinhard) };
+        for (seconds, stops) in [(0.5f32, -35.0f32), (1.5, -25.0), (3.0, -10.0)] {
+            let mut still = still(gpu, &limited);
+            assert_eq!(after(&mut still, 0.0, 1, 0.1), 0.0);
+            let found = after(&mut still, 1.0, 1, seconds).log2();
+            assert!((found - stops).abs() < 1e-3, "{seconds} s from black: {found} stops");
+        }
+    });
+}
+
 /// Twice the frames, half of the time between them: the same picture, in every mode, with and without the limit.
 #[test]
 fn twice_the_frames_of_half_the_time_are_the_same_picture() {

@@ -87,6 +87,60 @@ fn fast_bilateral_filter_is_near_its_definition() {
 }
 
 #[test]
+fn a_pixel_unlike_all_blocks_keeps_its_own_luminance() {
+    with_gpu(|gpu| {
+        // The upper mean of their block lies between both bright pixels, a decade and a half from each.
+        let (width, height) = (90, 60);
+        let mut pixels = vec![[1.0, 1.0, 1.0, 1.0]; 90 * 60];
+        let bright = [(42, 30, 1e3), (43, 30, 1e6)].map(|(x, y, l)| (y * 90 + x, l));
+        bright.iter().for_each(|(i, l)| pixels[*i] = [*l, *l, *l, 1.0]);
+        // The base alone.
+        let fast = Settings { spatial: 0.08, detail: 0.0, ..with(Operator::Bilateral, Mode::Local) };
+        let literal = Settings { local: Local::Literal, ..fast.clone() };
+        let [fast, literal] = [fast, literal].map(|settings| run(gpu, width, height, &pixels, &settings));
+        for (i, _) in bright {
+            let (found, exact) = (fast[i][1], literal[i][1]);
+            println!("{found} and {exact}");
+            assert!((found / exact - 1.0).abs() < 0.05, "pixel {i}: {found} instead of {exact}");
+        }
+    });
+}
+
+#[test]
+fn the_edge_repeats_beyond_the_border_whatever_blocks_it_cuts() {
+    with_gpu(|gpu| {
+        // A brighter column that is all of the last block weighs as all that repeat it.
+        for (width, height) in [(88u32, 60), (91, 60), (94, 60)] {
+            let last = |i: usize| i % width as usize == width as usize - 1;
+            let light = |i: usize| if last(i) { 1.5 } else { 1.0 };
+            let pixels: Vec<_> = (0..(width * height) as usize).map(|i| [light(i); 3]).collect();
+            let pixels: Vec<_> = pixels.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect();
+            // The base alone.
+            let fast = Settings { spatial: 0.08, detail: 0.0, ..with(Operator::Bilateral, Mode::Local) };
+            let literal = Settings { local: Local::Literal, ..fast.clone() };
+            let [fast, literal] = [fast, literal].map(|settings| run(gpu, width, height, &pixels, &settings));
+            let offs = fast.iter().zip(&literal).map(|(f, l)| f64::from(f[1] / l[1] - 1.0));
+            let (mean, most) =
+                offs.clone().fold((0.0, 0f64), |(s, m), off| (s + off / offs.len() as f64, m.max(off.abs())));
+            println!("{width}: {mean:.5} off in the mean, {most:.4} at most");
+            assert!(mean.abs() < 0.003 && most < 0.03, "{width}: {mean} off in the mean, {most} at most");
+        }
+    });
+}
+
+#[test]
+fn the_bilateral_operator_never_raises_the_contrast_of_the_base() {
+    with_gpu(|gpu| {
+        // Luminances within a factor of two: less than what the display has.
+        let pixels: Vec<_> = (0..64).map(|i| [1.0 + i as f32 / 63.0; 3]).map(|[r, g, b]| [r, g, b, 1.0]).collect();
+        let shown = run(gpu, 8, 8, &pixels, &with(Operator::Bilateral, Mode::Global));
+        for (shown, pixel) in shown.iter().zip(&pixels) {
+            assert!((shown[1] / (pixel[1] / 2.0) - 1.0).abs() < 1e-4, "{} of {}", shown[1], pixel[1]);
+        }
+    });
+}
+
+#[test]
 fn images_without_anything_to_adapt_to() {
     with_gpu(|gpu| {
         for (operator, mode) in [Operator::Ashikhmin, Operator::Reinhard, Operator::Bilateral]

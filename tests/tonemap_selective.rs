@@ -260,6 +260,9 @@ fn sobel_marks_steps_by_their_height_and_not_by_chance() {
         assert_eq!(map(gpu, size, &step(1.5, 1.0), None, &with(1.999)), columns);
         assert_eq!(map(gpu, size, &step(1.0, 1.5), None, &with(2.0)), vec![false; 117], "over, not at, the threshold");
         assert_eq!(map(gpu, size, &[7.0; 117], None, &with(0.0)), vec![false; 117], "a constant image has no edge");
+        // A thousandth of the light around is an edge, a hundred-thousandth is rounding.
+        assert_eq!(map(gpu, size, &step(1e4, 1.001e4), None, &with(0.1)), columns);
+        assert_eq!(map(gpu, size, &step(1e4, 1.00001e4), None, &with(0.1)), vec![false; 117]);
         // Nothing overflows.
         assert_eq!(map(gpu, size, &step(0.0, 1e18), None, &with(0.1)), columns);
         assert_eq!(map(gpu, [1, 1], &[1e18], None, &with(0.0)), [false]);

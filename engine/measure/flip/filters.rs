@@ -88,4 +88,26 @@ mod tests {
         }
         assert!(filters.features(&planes[0], size, 2).concat().iter().all(|v| *v < 1e-5));
     }
+
+    #[test]
+    fn an_impulse_spreads_by_the_contrast_sensitivity_of_its_channel() {
+        let (side, pixels_per_degree) = (31, 67.02);
+        let mut impulse = vec![0.0; side * side];
+        impulse[15 * side + 15] = 1000.0;
+        let filters = Filters::new(pixels_per_degree);
+        let spread = filters.seen(&[impulse.clone(), impulse.clone(), impulse], [side, side], 1);
+        // The paper's table 1: heights a and widths b of Gaussians a √(π/b) exp(−π² r²/b), r in degrees.
+        let terms: [&[[f64; 2]]; 3] = [&[[1.0, 0.0047]], &[[1.0, 0.0053]], &[[34.1, 0.04], [13.5, 0.025]]];
+        for (channel, (spread, terms)) in spread.iter().zip(terms).enumerate() {
+            let weight = |x: f64, y: f64| -> f64 {
+                let r2 = (x * x + y * y) / (pixels_per_degree * pixels_per_degree);
+                terms.iter().map(|[a, b]| a * (PI / b).sqrt() * (-PI * PI * r2 / b).exp()).sum()
+            };
+            for (x, y) in [(1, 0), (2, 3), (5, 0), (4, 6), (9, 2)] {
+                let found = f64::from(spread[(15 + y) * side + 15 + x] / spread[15 * side + 15]);
+                let exact = weight(x as f64, y as f64) / weight(0.0, 0.0);
+                assert!((found - exact).abs() < 1e-4 * exact + 1e-7, "{channel}, {x} {y}: {found} instead of {exact}");
+            }
+        }
+    }
 }
