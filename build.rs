@@ -1,7 +1,8 @@
 //! Compiles every entry shader under `shaders-glsl/`, reads its interface and writes one typed Rust module per pass.
 //!
 //! `<folder>/<pass>.comp` becomes `shaders::<folder>::<pass>`; `.vert` and `.frag` of the same stem become one raster pass.
-//! A `.frag` alone is drawn by `common/fullscreen.vert`. Only shaders whose text (with includes) changed are compiled again.
+//! A `.frag` alone is drawn by `common/fullscreen.vert`. `.glsl` files are included: those in `lib` by all folders, others by the shaders of
+//! their own folder and by `test`. Only shaders whose text (with includes) changed are compiled again.
 
 #[path = "engine/shader/codegen.rs"]
 mod codegen;
@@ -48,18 +49,22 @@ fn run() -> Result<(), String> {
         for file in sorted(&folder)? {
             let text = file_name(&file);
             let relative = format!("{name}/{text}");
-            if name == "lib" {
-                exports.extend(exported(&file)?);
-                continue;
-            }
             let (stem, extension) = text.rsplit_once('.').unwrap_or((&text, ""));
             let stage = match extension {
                 "comp" => "Compute",
                 "vert" => "Vertex",
                 "frag" => "Fragment",
-                "glsl" => return Err(format!("shaders-glsl/{relative}: includes belong into shaders-glsl/lib")),
-                _ => return Err(format!("shaders-glsl/{relative}: unknown kind of file; .comp, .vert or .frag")),
+                "glsl" => {
+                    exports.extend(exported(&file)?);
+                    continue;
+                }
+                _ => {
+                    return Err(format!("shaders-glsl/{relative}: unknown kind of file; .comp, .vert, .frag or .glsl"));
+                }
             };
+            if name == "lib" {
+                return Err(format!("shaders-glsl/{relative}: shaders belong into the folder of their technique"));
+            }
             if relative != FULLSCREEN {
                 passes.entry((name.clone(), stem.to_owned())).or_default().push((stage, relative));
             }

@@ -16,13 +16,14 @@ use lucerna::{
     Result,
     gpu::{Gpu, GpuOptions},
     graph::{Graph, Report, Runner},
+    resident::Resident,
     scene::{
-        Environment, Pose, Primitive, Scene, View, builtin,
+        Environment, Pose, Primitive, Scene, View,
         ground::{self, Ground},
-        resident::Resident,
     },
     techniques::fiv::{Fiv, Light, Method, Occluders, PictureSettings, Plan, SelfSamples, Settings, Sky, Stored},
 };
+use lucerna_scenes as builtin;
 
 fn main() -> std::process::ExitCode {
     common::end(run())

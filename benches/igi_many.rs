@@ -11,10 +11,12 @@ use lucerna::{
     Result,
     gpu::{Gpu, GpuOptions},
     graph::{Graph, Report, Runner},
-    reference::tracer::{self, Filter, Tracer},
-    scene::{Material, Pose, Scene, View, builtin, resident::Resident},
+    resident::Resident,
+    scene::{Material, Pose, Scene, View},
     techniques::igi::{Igi, PictureSettings, Settings},
+    tracer::{self, Filter, Tracer},
 };
+use lucerna_scenes as builtin;
 
 fn main() -> std::process::ExitCode {
     common::end(run())

@@ -12,13 +12,15 @@ use lucerna::{
     gpu::{Gpu, GpuOptions},
     graph::{Graph, ImageRead, Report, Runner},
     rays::Rays,
-    scene::{self, LoadOptions, Pose, Scene, View, builtin, resident::Resident},
+    resident::Resident,
+    scene::{self, LoadOptions, Pose, Scene, View},
     shaders::{
         test::{trace, vpl_rays},
         types,
     },
     techniques::igi::{Igi, PictureSettings, Settings, Visibility},
 };
+use lucerna_scenes as builtin;
 use std::collections::BTreeMap;
 
 fn main() -> std::process::ExitCode {
@@ -193,7 +195,7 @@ fn direct_rays(scene: &Scene, pose: &Pose, samples: u32) -> u32 {
     let mut meshes = scene.nodes.iter().filter_map(|node| scene.meshes.get(node.mesh? as usize));
     let surfaces = meshes.any(|mesh| mesh.primitives.iter().any(emits));
     let sky = scene.environment.as_ref().is_some_and(|sky| !sky.pixels.is_empty());
-    scene::resident::lights(scene, pose).len() as u32 + (u32::from(surfaces) + u32::from(sky)) * samples
+    lucerna::resident::lights(scene, pose).len() as u32 + (u32::from(surfaces) + u32::from(sky)) * samples
 }
 
 /// Milliseconds of the ray benchmark's pass for a list of rays.

@@ -15,12 +15,11 @@ use lucerna::{
     gpu::{Gpu, GpuOptions},
     graph::{Graph, Report, Runner},
     passes::ambient::Irradiance,
-    scene::{
-        Camera, Light, LightKind, Material, Mesh, Node, Pose, Primitive, Projection, Scene, Transform, View, builtin,
-        resident::Resident,
-    },
+    resident::Resident,
+    scene::{Camera, Light, LightKind, Material, Mesh, Node, Pose, Primitive, Projection, Scene, Transform, View},
     techniques::isr::{PictureSettings, Resolution, Settings, picture},
 };
+use lucerna_scenes as builtin;
 
 fn main() -> std::process::ExitCode {
     common::verdict(run())

@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import time
@@ -101,24 +102,36 @@ def sync(root, tree):
     return digest.hexdigest()
 
 
-def cargo(tree, target, test, more, limit=None):
+# Shaders are replaced at run time, without a build. Rust code is built for each bug, so it is built fast.
+SHADERS = ["--features", "lucerna/replaceable-shaders"]
+RUST = ["--config", "profile.dev.opt-level=0"]
+
+
+def cargo(tree, target, test, how, more, limit=None, shaders=None):
     """Runs `cargo test` for one target. Exit code (None: stopped after `limit` seconds) and what it printed."""
     which = ["--lib"] if test in ("lib", "samples-lib") else ["--test", test]
-    command = ["cargo", "test", "--quiet", "-p", package(test), *which, *more]
+    return run(tree, target, ["test", "--quiet", "-p", package(test), *how, *which, *more], limit, shaders)
+
+
+def run(tree, target, arguments, limit=None, shaders=None):
+    """Runs cargo, as `cargo`."""
+    command = ["cargo", *arguments]
     environment = dict(os.environ, CARGO_TARGET_DIR=str(target), CARGO_TERM_COLOR="never", CI="1", RUST_BACKTRACE="0")
+    if shaders:
+        environment["LUCERNA_SHADERS"] = str(shaders)
     # A group of its own, so that programs that the test has started end with it.
-    run = subprocess.Popen(
+    process = subprocess.Popen(
         command, cwd=tree, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", start_new_session=True
     )
     try:
-        out, _ = run.communicate(timeout=limit)
-        return run.returncode, out
+        out, _ = process.communicate(timeout=limit)
+        return process.returncode, out
     except subprocess.TimeoutExpired:
-        os.killpg(run.pid, 9)
-        out, _ = run.communicate()
+        os.killpg(process.pid, 9)
+        out, _ = process.communicate()
         return None, out
     except KeyboardInterrupt:
-        os.killpg(run.pid, 9)
+        os.killpg(process.pid, 9)
         raise
 
 
@@ -126,34 +139,61 @@ def tail(text, lines=25):
     return "\n".join("    " + line for line in text.strip().splitlines()[-lines:])
 
 
-def unmutated(tree, target, test, cases):
+def unmutated(tree, target, test, how, cases):
     """Seconds of each test without a bug. Ends the run if one does not pass: it would catch anything."""
-    code, out = cargo(tree, target, test, ["--no-run"])
+    code, out = cargo(tree, target, test, how, ["--no-run"])
     if code != 0:
         fail(f"{test} does not build as it is\n{tail(out)}")
     seconds = {}
     for case in sorted(cases):
         begun = time.monotonic()
-        code, out = cargo(tree, target, test, ["--", "--exact", case])
+        code, out = cargo(tree, target, test, how, ["--", "--exact", case])
         if code != 0 or not re.search(r"^test result: ok\. 1 passed", out, re.M):
             fail(f"{test}: {case} must pass as it is\n{tail(out)}")
         seconds[case] = time.monotonic() - begun
     return seconds
 
 
-def answer(tree, target, mutant, seconds):
+def of_shader(mutant):
+    return mutant["file"].startswith("shaders-glsl/")
+
+
+def compiled(tree, target, mutant, out):
+    """Compiles the shaders that a bug changes into the folder `out`. `None`: they have another interface. Otherwise exit code and output."""
+    bugged = out.parent / "bugged"
+    shutil.rmtree(bugged, ignore_errors=True)
+    shutil.rmtree(out, ignore_errors=True)
+    shutil.copytree(tree / "shaders-glsl", bugged)
+    out.mkdir()
+    path = bugged / Path(mutant["file"]).relative_to("shaders-glsl")
+    path.write_text(path.read_text().replace(mutant["old"], mutant["new"]))
+    program = target / "debug/examples/compile_shaders"
+    done = subprocess.run([program, tree / "shaders-glsl", bugged, out], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    return None if done.returncode == 3 else (done.returncode, done.stdout)
+
+
+def answer(tree, target, mutant, how, seconds):
     """Plants one bug, runs its test, and takes the bug out again."""
-    path = tree / mutant["file"]
-    text = path.read_text()
-    try:
-        path.write_text(text.replace(mutant["old"], mutant["new"]))
-        code, out = cargo(tree, target, mutant["test"], ["--no-run"])
+    limit = max(LEAST, PATIENCE * seconds)
+    test = [mutant["test"], how, ["--", "--exact", mutant["case"]], limit]
+    modules = target.parent / "modules"
+    replaced = compiled(tree, target, mutant, modules) if of_shader(mutant) else None
+    if replaced:
+        code, out = replaced
         if code != 0:
             return BROKEN, out
-        limit = max(LEAST, PATIENCE * seconds)
-        code, out = cargo(tree, target, mutant["test"], ["--", "--exact", mutant["case"]], limit)
-    finally:
-        path.write_text(text)
+        code, out = cargo(tree, target, *test, modules)
+    else:
+        path = tree / mutant["file"]
+        text = path.read_text()
+        try:
+            path.write_text(text.replace(mutant["old"], mutant["new"]))
+            code, out = cargo(tree, target, mutant["test"], how, ["--no-run"])
+            if code != 0:
+                return BROKEN, out
+            code, out = cargo(tree, target, *test)
+        finally:
+            path.write_text(text)
     if code is None:
         return HUNG, out
     if code == 0:
@@ -220,13 +260,19 @@ def main():
     results += [known[digest, m["name"]] for m in mutants if (digest, m["name"]) in known]
     if results:
         print(f"{len(results)} were answered by an earlier run of this tree", flush=True)
-    for test in dict.fromkeys(m["test"] for m in todo):
-        group = [m for m in todo if m["test"] == test]
-        print(f"\n== {test}: {len(group)} mutations", flush=True)
-        seconds = unmutated(tree, target, test, {m["case"] for m in group})
+    todo.sort(key=of_shader)
+    if any(of_shader(m) for m in todo):
+        code, out = run(tree, target, ["build", "--quiet", "-p", "lucerna", *SHADERS, "--example", "compile_shaders"])
+        if code != 0:
+            fail(f"tests/tools/compile_shaders.rs does not build\n{tail(out)}")
+    for shader, test in dict.fromkeys((of_shader(m), m["test"]) for m in todo):
+        group = [m for m in todo if (of_shader(m), m["test"]) == (shader, test)]
+        print(f"\n== {test}: {len(group)} mutations of {'shaders' if shader else 'Rust'}", flush=True)
+        how = SHADERS if shader else RUST
+        seconds = unmutated(tree, target, test, how, {m["case"] for m in group})
         for m in group:
             start = time.monotonic()
-            verdict, out = answer(tree, target, m, seconds[m["case"]])
+            verdict, out = answer(tree, target, m, how, seconds[m["case"]])
             took = time.monotonic() - start
             print(f"{verdict:14} {took:6.0f} s  {m['name']}", flush=True)
             if verdict != CAUGHT:

@@ -8,8 +8,9 @@ use lucerna::{
     Error, Result,
     image::{self, Layer, Layers, WriteOptions},
     reference::path,
-    scene::{self, Pose, View, builtin, bvh::Bvh},
+    scene::{self, Pose, View, bvh::Bvh},
 };
+use lucerna_scenes as builtin;
 
 fn main() -> std::process::ExitCode {
     match run() {

@@ -10,9 +10,11 @@ use lucerna::{
     gpu::{Gpu, GpuOptions},
     graph::{Graph, Runner},
     image::{self, Layers, WriteOptions},
-    scene::{Pose, View, builtin, ground, resident::Resident},
+    resident::Resident,
+    scene::{Pose, View, ground},
     techniques::fiv::{Fiv, PictureSettings},
 };
+use lucerna_scenes as builtin;
 
 fn main() -> std::process::ExitCode {
     match run() {

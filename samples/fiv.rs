@@ -30,7 +30,8 @@ enum Command {
     /// stand still
     Steady(SteadyArgs),
     /// Render a scene into images
-    #[command(args_override_self = true)]
+    // There are no settings of the thesis as a preset, so the help does not offer them.
+    #[command(args_override_self = true, mut_arg("paper", |arg| arg.hide(true)))]
     Render(Box<FivArgs>),
 }
 

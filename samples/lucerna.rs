@@ -3,7 +3,7 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::{Parser, Subcommand};
-use lucerna::{Result, scene::builtin};
+use lucerna::Result;
 use lucerna_samples::{
     args::TalkArgs,
     bake::{self, BakeCommand, JoinArgs},
@@ -20,6 +20,7 @@ use lucerna_samples::{
     tonemap::{self, TonemapArgs},
     views::{self, command::ViewsArgs},
 };
+use lucerna_scenes as builtin;
 
 /// Looks into scenes and images, lists devices and built-in scenes, makes pictures again.
 #[derive(Parser, Debug)]

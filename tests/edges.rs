@@ -7,9 +7,9 @@ use glam::{Vec3, vec3};
 use igi_lab::Studio;
 use lucerna::{
     gpu::testing::with_gpu,
-    reference::tracer::{Filter, Settings as Traced},
     scene::{Material, View},
     techniques::igi::Settings,
+    tracer::{Filter, Settings as Traced},
 };
 use tracer_lab::{Stage, render, view};
 

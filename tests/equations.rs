@@ -6,6 +6,8 @@ use std::{
     path::Path,
 };
 
+mod common;
+
 /// Tag, number and content of the equations that the engine computes, or from which it says to deviate.
 const EQUATIONS: &[(&str, u32, &str)] = &[
     // Image-space radiosity, the dissertation.
@@ -67,7 +69,7 @@ fn collect(folder: &Path, found: &mut BTreeMap<(String, u32), Vec<String>>) {
 fn every_equation_has_its_place_and_every_tag_its_equation() {
     let mut found = BTreeMap::new();
     for folder in ["engine", "shaders-glsl"] {
-        collect(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut found);
+        collect(&common::root().join(folder), &mut found);
     }
     let known: BTreeMap<_, _> = EQUATIONS.iter().map(|(paper, n, what)| (((*paper).to_owned(), *n), *what)).collect();
     assert_eq!(known.len(), EQUATIONS.len(), "an equation is listed twice");

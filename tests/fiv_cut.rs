@@ -7,7 +7,8 @@ use fiv_lab::{Studio, ball, ground, nrmse, painted, thing};
 use glam::{DVec3, Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
-    scene::{Environment, Pose, Scene, View, resident::Resident},
+    resident::Resident,
+    scene::{Environment, Pose, Scene, View},
     techniques::fiv::{Cut, Fiv, Method, Settings, Sky, sky},
 };
 use tracer_lab::flat_view;

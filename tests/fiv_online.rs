@@ -10,9 +10,10 @@ use glam::{Mat4, Quat, Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
     measure::steady::{Frame, Steadiness},
-    scene::{self, Environment, LoadOptions, Pose, Scene, Transform, View, builtin},
+    scene::{self, Environment, LoadOptions, Pose, Scene, Transform, View},
     techniques::fiv::{Method, SelfSamples, Settings},
 };
+use lucerna_scenes as builtin;
 use tracer_lab::{flat_view, view};
 
 fn few(method: Method) -> Settings {
@@ -380,7 +381,7 @@ fn lists_of_what_is_near_leave_out_nothing_that_matters() {
 #[test]
 fn the_light_of_a_point_does_not_depend_on_the_pixels_around_it() {
     with_gpu(|gpu| {
-        // Of one tile of eight by eight pixels, and of tiles a ninth of its size with pixels at the same places.
+        // The light of one tile of eight by eight pixels, and of tiles a ninth of its size with pixels at the same places.
         let same = |studio: &mut Studio, size: f32, settings: &Settings| {
             let eye = |extent: u32| flat_view(vec3(0.0, 0.002, 0.0), Vec3::ZERO, size, [extent; 2]);
             let [coarse, fine] = [8, 72].map(|extent| studio.irradiance(&eye(extent), settings));
@@ -405,7 +406,7 @@ fn the_light_of_a_point_does_not_depend_on_the_pixels_around_it() {
         let off = same(&mut Studio::new(gpu, &terrace, &settings, None), 2.6, &settings);
         println!("terrace: {off}");
         assert!(off < 1e-3, "terrace: {off}");
-        // Balls all around, of which some are left out at some pixels of the tile.
+        // Balls all around. Some of them are left out at some pixels of the tile.
         let scene = stage(&scattered().into_iter().map(|at| body(0.2, at)).collect::<Vec<_>>());
         let settings = Settings { overlap: false, negligible: 0.05, ..few(Method::Vectors) };
         let mut studio = Studio::new(gpu, &scene, &settings, None);

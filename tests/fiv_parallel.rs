@@ -12,10 +12,11 @@ use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::Runner,
     reference::fiv as twin,
-    scene::{AlphaMode, Environment, Scene, builtin},
+    scene::{AlphaMode, Environment, Scene},
     shaders::consts::FIV_INSIDE,
     techniques::fiv::{Light, Masks, Method, Occluder, Plan, Settings, Sky, cover::Cover},
 };
+use lucerna_scenes as builtin;
 
 /// Vectors and solid angle of the hidden light.
 type Found = (twin::Vectors, f64);

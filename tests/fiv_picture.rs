@@ -10,7 +10,8 @@ use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
     reference::fiv as twin,
-    scene::{Environment, Light, LightKind, Node, Pose, Scene, View, resident::Resident},
+    resident::Resident,
+    scene::{Environment, Light, LightKind, Node, Pose, Scene, View},
     techniques::fiv::{Cut, Extent, Fiv, Interpolation, Method, SelfSamples, Settings, Shared, Sky},
 };
 use tracer_lab::flat_view;

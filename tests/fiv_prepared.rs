@@ -8,12 +8,14 @@ use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::{Graph, Runner},
-    scene::{AlphaMode, Environment, Pose, Scene, View, builtin, resident::Resident},
+    resident::Resident,
+    scene::{AlphaMode, Environment, Pose, Scene, View},
     techniques::fiv::{
         Cut, Extent, Fiv, Interpolation, Masks, Method, PictureSettings, SelfSamples, Settings, Shared, Specular,
         Stored, occluder_rotation::Axis,
     },
 };
+use lucerna_scenes as builtin;
 use tracer_lab::flat_view;
 
 fn coarse() -> Settings {

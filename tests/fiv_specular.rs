@@ -10,13 +10,15 @@ use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::Runner,
     reference::fiv_specular::{self as twin, Surface},
-    scene::{Environment, Pose, Scene, View, builtin, ground as grounds, resident::Resident},
+    resident::Resident,
+    scene::{Environment, Pose, Scene, View, ground as grounds},
     techniques::fiv::{
         Fiv, Method, Settings, Sky, Specular,
         cover::Cover,
         specular::{Cells, masks, words},
     },
 };
+use lucerna_scenes as builtin;
 use tracer_lab::flat_view;
 
 fn by(method: Method) -> Settings {
@@ -121,7 +123,8 @@ fn the_device_reflects_and_shades_as_the_twin_does() {
         let geometry = lucerna::scene::bvh::Bvh::build(&scene, &Pose::rest(&scene));
         let (cells, mut truth) = (Cells::of(&sky), truth);
         // With the smaller reach most points lie beyond the last sphere of samples.
-        for reach in [by(Method::Vectors).reach, 2.0] {
+        let reaches = [by(Method::Vectors).reach, 2.0];
+        for reach in reaches {
             let settings = Settings { reach, ..by(Method::Vectors) };
             let mut studio = Studio::new(gpu, &scene, &settings, None);
             let (plan, occluders) = (studio.fiv.plan().clone(), studio.fiv.occluders().clone());
@@ -144,12 +147,15 @@ fn the_device_reflects_and_shades_as_the_twin_does() {
                 for eye in EYES {
                     let (view, surface) = glance(at, eye, (0.4, 1.0));
                     let open = twin::reflected(&sky, &surface, None);
-                    let found = truth.gloss(&Pose::rest(&scene), &view, &by(Method::BruteForce))[0].as_dvec3();
-                    let exact = twin::reflected(&sky, &surface, Some(&geometry));
-                    assert!(
-                        (found - exact).length() < 0.02 * open.length(),
-                        "truth {at} {eye}: {found} instead of {exact}"
-                    );
+                    // Brute force has no samples.
+                    if reach == reaches[0] {
+                        let found = truth.gloss(&Pose::rest(&scene), &view, &by(Method::BruteForce))[0].as_dvec3();
+                        let exact = twin::reflected(&sky, &surface, Some(&geometry));
+                        assert!(
+                            (found - exact).length() < 0.02 * open.length(),
+                            "truth {at} {eye}: {found} instead of {exact}"
+                        );
+                    }
                     let hidden: Vec<Vec<f64>> = occluders
                         .placed
                         .iter()

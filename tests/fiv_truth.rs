@@ -8,10 +8,11 @@ use fiv_lab::{Studio, nrmse, painted};
 use glam::Vec3;
 use lucerna::{
     gpu::testing::with_gpu,
-    reference::tracer::Tracer,
-    scene::{Environment, Pose, Scene, View, builtin, ground},
+    scene::{Environment, Pose, Scene, View, ground},
     techniques::fiv::{Method, Settings, Shared},
+    tracer::Tracer,
 };
+use lucerna_scenes as builtin;
 
 /// Smooth coloured radiance with a sun of 20 degrees, which 32 texels resolve.
 fn light() -> Environment {

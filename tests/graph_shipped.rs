@@ -5,12 +5,14 @@ use lucerna::{
     gpu::testing::with_gpu,
     graph::{Graph, Runner, testing::every_barrier_matters},
     passes::{ambient::Irradiance, shadow},
-    scene::{Pose, View, builtin, resident::Resident},
+    resident::Resident,
+    scene::{Pose, View},
     techniques::{
         fiv::{self, Fiv, Method},
         isr::{Blur, PictureSettings, Resolution, picture},
     },
 };
+use lucerna_scenes as builtin;
 
 fn settings() -> Vec<PictureSettings> {
     let default = PictureSettings::default();

@@ -18,9 +18,9 @@ struct Pair {
     wall: f32,
     /// Height of the left and of the right surface at the wall.
     height: [f32; 2],
-    /// How far they go down for each metre away from it.
+    /// How far the surfaces go down for each metre away from the wall.
     slope: f32,
-    /// How wide they are.
+    /// Width of each surface, metres.
     width: f32,
 }
 
@@ -44,9 +44,9 @@ fn sides(studio: &mut Studio, pair: &Pair, settings: &Settings) -> [Vec3; 2] {
 fn light_of_a_cell_stays_on_surfaces_of_its_plane_and_direction() {
     with_gpu(|gpu| {
         let level = Pair { name: "levels", wall: 0.0, height: [-0.875, -0.825], slope: 0.0, width: 1.0 };
-        // Both slopes are of the same class of directions, and one cell ends at the wall.
+        // Both slopes belong to the same class of directions, and one cell ends at the wall.
         let roof = Pair { name: "gentle roof", wall: 0.5 * CELL, height: [-0.5; 2], slope: 0.364, width: 0.9 };
-        // Of different classes, and both in the cells that the wall parts.
+        // The slopes belong to different classes. Both lie in the cells that the wall divides.
         let ridge = Pair { name: "steep ridge", wall: 0.0, height: [-0.5; 2], slope: 0.7, width: 0.045 };
         for pair in [level, roof, ridge] {
             let mut stage = room(Vec3::splat(0.7));

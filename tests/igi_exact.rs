@@ -8,10 +8,8 @@ use igi_lab::{Studio, flux, mean, plain, room};
 use lucerna::{
     gpu::testing::with_gpu,
     graph::Graph,
-    scene::{
-        AlphaMode, Environment, LightKind, Material, Pose, Transform, environment::uv_from_direction,
-        resident::Resident,
-    },
+    resident::Resident,
+    scene::{AlphaMode, Environment, LightKind, Material, Pose, Transform, environment::uv_from_direction},
     techniques::igi::{Igi, PictureSettings, Settings, Visibility},
 };
 use std::f64::consts::PI;

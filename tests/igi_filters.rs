@@ -11,9 +11,11 @@ use lucerna::{
     gpu::testing::with_gpu,
     graph::{Extent, Graph, Runner, testing::every_barrier_matters},
     reference::isr_scene::{Buffers, Eye, Patch},
-    scene::{Material, Pose, View, builtin, resident::Resident},
+    resident::Resident,
+    scene::{Material, Pose, View},
     techniques::igi::{Igi, Pattern, PictureSettings, Settings, filters},
 };
+use lucerna_scenes as builtin;
 use tracer_lab::{Stage, flat_view};
 
 fn patch(corner: DVec3, a: DVec3, b: DVec3) -> Patch {

@@ -7,11 +7,12 @@ use glam::{DVec3, Mat4, Quat, Vec3, vec3};
 use igi_lab::{Studio, flux, mean, plain, room};
 use lucerna::{
     gpu::testing::{with_gpu, with_ray_query},
-    reference::tracer::{self, Tracer},
-    scene::{AlphaMode, Environment, LightKind, Material, Pose, Scene, builtin},
+    scene::{AlphaMode, Environment, LightKind, Material, Pose, Scene},
     shaders::types,
     techniques::igi::{Settings, Visibility},
+    tracer::{self, Tracer},
 };
+use lucerna_scenes as builtin;
 use std::f64::consts::PI;
 use tracer_lab::{Stage, flat_view, matt, view};
 
@@ -109,7 +110,7 @@ fn lamps() -> Vec<(&'static str, Scene, f64, f64)> {
         add(if double_sided { "two sided lamp" } else { "lamp" }, stage, 5.0 * PI * 0.08 * sides, 1e-4);
     }
 
-    // A lamp that is there to two fifths.
+    // A lamp with an opacity of two fifths.
     let mut stage = room(Vec3::splat(0.5));
     let emitter = Material::emitter("veil", Vec3::splat(5.0));
     let base_color = emitter.base_color.truncate().extend(0.4);

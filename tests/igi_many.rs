@@ -10,11 +10,13 @@ use igi_picks::{Chooser, irradiance, offset};
 use lucerna::{
     gpu::testing::with_gpu,
     graph::{Graph, testing::every_barrier_matters},
-    reference::tracer::{self, Tracer},
-    scene::{Material, Pose, View, builtin, resident::Resident},
+    resident::Resident,
+    scene::{Material, Pose, View},
     shaders::types,
     techniques::igi::{Igi, PictureSettings, Settings},
+    tracer::{self, Tracer},
 };
+use lucerna_scenes as builtin;
 use tracer_lab::{Stage, flat_view, matt, view};
 
 /// A closed box of half side 1 around the origin with a lamp.

@@ -7,9 +7,9 @@ use glam::{Mat4, Quat, Vec3, vec3};
 use igi_lab::{Studio, flux, mean, plain, room};
 use lucerna::{
     gpu::testing::with_gpu,
-    reference::tracer::{Filter, Settings as Tracing},
     scene::{AlphaMode, LightKind, Material},
     techniques::igi::Settings,
+    tracer::{Filter, Settings as Tracing},
 };
 use tracer_lab::{Stage, flat_view, render, view};
 
@@ -209,7 +209,7 @@ fn a_surface_that_is_glass_in_part_reflects_by_the_rest() {
     });
 }
 
-/// What a smooth surface of index 1.5 reflects at this cosine.
+/// Share of light that a smooth surface of index 1.5 reflects at this cosine.
 fn fresnel(cosine: f64) -> f64 {
     let inside = (1.0 - (1.0 - cosine * cosine) / 2.25).sqrt();
     let [s, p] = [(cosine - 1.5 * inside) / (cosine + 1.5 * inside), (1.5 * cosine - inside) / (1.5 * cosine + inside)];

@@ -8,9 +8,10 @@ use glam::{Mat4, Quat, Vec3, vec3};
 use igi_lab::{Studio, flux, mean, plain, room};
 use lucerna::{
     gpu::testing::with_gpu,
-    scene::{Environment, LightKind, Material, Pose, Scene, Transform, View, builtin},
+    scene::{Environment, LightKind, Material, Pose, Scene, Transform, View},
     techniques::igi::Settings,
 };
+use lucerna_scenes as builtin;
 use tracer_lab::{Stage, flat_view, view};
 
 /// The default settings with fewer lights and rays.
@@ -313,7 +314,7 @@ fn a_lamp_of_two_sides_lights_the_eight_corners_of_a_room_alike() {
             let at = Vec3::from(vpl.position) - middle;
             corners[usize::from(at.x > 0.0) + 2 * usize::from(at.y > 0.0) + 4 * usize::from(at.z > 0.0)] += vpl.flux[0];
         }
-        // Half of what it sends to both sides.
+        // Half of the light that the lamp sends to both sides.
         let each = 0.5 * 2.0 * 5.0 * std::f32::consts::PI * 0.16 / 8.0;
         println!("corners {corners:?}, each {each}");
         assert!(corners.iter().all(|flux| (flux / each - 1.0).abs() < 0.02), "{corners:?} instead of {each}");

@@ -7,9 +7,11 @@ use glam::{Vec3, Vec4, vec3};
 use igi_lab::{Studio, mean, plain};
 use lucerna::{
     gpu::testing::with_gpu,
-    scene::{AlphaMode, Material, Pose, Scene, View, builtin, resident::Resident},
+    resident::Resident,
+    scene::{AlphaMode, Material, Pose, Scene, View},
     techniques::igi::{Igi, Pattern, PictureSettings, Settings, Visibility},
 };
+use lucerna_scenes as builtin;
 use tracer_lab::{Stage, view};
 
 fn raster(settings: &Settings, raster_size: u32) -> Settings {

@@ -5,9 +5,11 @@ use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::{Graph, Runner},
-    scene::{Light, LightKind, Node, Pose, Scene, View, builtin, resident::Resident},
+    resident::Resident,
+    scene::{Light, LightKind, Node, Pose, Scene, View},
     techniques::igi::{Igi, PictureSettings, Settings},
 };
+use lucerna_scenes as builtin;
 
 const SIZE: [u32; 2] = [48, 32];
 const FRAMES: usize = 60;

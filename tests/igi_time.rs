@@ -9,9 +9,11 @@ use igi_lab::plain;
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::{Graph, Runner},
-    scene::{Material, Pose, Scene, View, builtin, resident::Resident},
+    resident::Resident,
+    scene::{Material, Pose, Scene, View},
     techniques::igi::{Igi, PictureSettings, Settings, history::motion_of},
 };
+use lucerna_scenes as builtin;
 use tracer_lab::{Stage, view};
 
 type Texels = Vec<[f32; 4]>;

@@ -1,6 +1,6 @@
 //! OpenEXR files of odd kinds, written by OpenEXR itself: `golden/exr/README.md` says what is in them.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use half::f16;
 use lucerna::{
@@ -9,10 +9,12 @@ use lucerna::{
     scene::Limits,
 };
 
+mod common;
+
 const SIZE: [u32; 2] = [53, 37];
 
 fn path(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/exr").join(name)
+    common::root().join("tests/golden/exr").join(name)
 }
 
 fn read(name: &str) -> Result<Layers, Error> {

@@ -6,9 +6,11 @@ use lucerna::{
     graph::{Graph, Runner},
     passes::{ambient::Irradiance, shadow},
     reference::path,
-    scene::{Pose, Scene, View, builtin, bvh::Bvh, resident::Resident},
+    resident::Resident,
+    scene::{Pose, Scene, View, bvh::Bvh},
     techniques::isr::{Estimator, Pattern, PictureSettings, Resolution, Settings, picture},
 };
+use lucerna_scenes as builtin;
 
 const EXTENT: [u32; 2] = [160, 120];
 

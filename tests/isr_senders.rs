@@ -10,7 +10,8 @@ use lucerna::{
     graph::{Graph, Runner},
     passes::{ambient::Irradiance, gbuffer as layers},
     reference::isr_scene::{Buffers, Eye, Patch},
-    scene::{Camera, Material, Pose, Projection, Scene, View, resident::Resident},
+    resident::Resident,
+    scene::{Camera, Material, Pose, Projection, Scene, View},
     techniques::isr::{
         Blur, Inputs, Pattern, Resolution, Settings, frame,
         senders::{SenderView, Senders},
@@ -206,7 +207,7 @@ fn a_screen_before_a_wall_takes_its_light_and_the_floor_itself_takes_nothing() {
     });
 }
 
-/// What the buffers send as the mean over two by two texels, weighted by the mask, linear between the means.
+/// The light that the buffers send, as the mean over two by two texels, weighted by the mask, linear between the means.
 fn coarsened(buffers: &Buffers) -> Buffers {
     let (width, height) = (buffers.width / 2, buffers.height / 2);
     let mean = |x: usize, y: usize| {
@@ -234,7 +235,7 @@ fn coarsened(buffers: &Buffers) -> Buffers {
     blurred
 }
 
-/// A frame at full resolution without blur: what each of its texels gathers.
+/// A frame at full resolution without blur: the light that each of its texels gathers.
 fn gathered(gpu: &Gpu, eye: &Eye, own: &Buffers, other: Option<(&Eye, &Buffers)>, settings: &Settings) -> Vec<f64> {
     let mut graph = Graph::new("gathered");
     let gbuffer = gbuffer(&mut graph, eye, own);
@@ -259,7 +260,7 @@ fn gathered(gpu: &Gpu, eye: &Eye, own: &Buffers, other: Option<(&Eye, &Buffers)>
     gathered.iter().map(|texel| f64::from(texel[0])).collect()
 }
 
-/// A cloud of small surfaces that face anywhere.
+/// A cloud of small surfaces that face in random directions.
 fn cloud(width: usize, height: usize, seed: u64, radiance: impl Fn(&mut isr_lab::Random) -> f64) -> Buffers {
     let mut random = isr_lab::Random(seed);
     let mut buffers = Buffers { width, height, factor: 1.0, ..Buffers::default() };

@@ -12,14 +12,11 @@ use lucerna::{
     graph::{Extent, Graph},
     image::srgb,
     passes::direct::{self, Direct},
-    reference::{
-        brdf::Matter,
-        isr_scene::Buffers,
-        tracer::{Filter, Settings as Tracing},
-    },
+    reference::{brdf::Matter, isr_scene::Buffers},
     scene::{Environment, LightKind, Material, Pose, Scene, View},
     shaders::{consts, types},
     techniques::{fiv, igi},
+    tracer::{Filter, Settings as Tracing},
 };
 use std::f64::consts::PI;
 use tracer_lab::{Stage, deviation, flat_view, mean, render};

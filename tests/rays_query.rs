@@ -6,17 +6,18 @@
 mod rays_kit;
 mod scene_kit;
 
-use std::path::PathBuf;
-
 use glam::{Mat4, Vec3, Vec4};
 use lucerna::{
     gpu::{DeviceKind, Gpu, testing::with_ray_query},
     graph::{Graph, testing::every_barrier_matters},
-    scene::{self, Aabb, AlphaMode, LoadOptions, Material, Node, Pose, Primitive, Scene, Transform, builtin, bvh::Bvh},
+    scene::{self, Aabb, AlphaMode, LoadOptions, Material, Node, Pose, Primitive, Scene, Transform, bvh::Bvh},
     shaders::types::{Hit, Ray},
 };
+use lucerna_scenes as builtin;
 use rays_kit::*;
 use scene_kit::mesh;
+
+mod common;
 
 const NONE: u32 = u32::MAX;
 /// Largest difference of places along the ray, as a part of the scene's extent.
@@ -114,7 +115,7 @@ fn compare(gpu: &Gpu, scene: &Scene, count: usize) -> Vec<usize> {
 }
 
 fn asset(name: &str) -> Option<Scene> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/assets").join(name);
+    let path = common::root().join("../shared/assets").join(name);
     if !path.exists() {
         assert!(std::env::var_os("CI").is_none(), "{} is missing", path.display());
         eprintln!("SKIPPED: {} is missing", path.display());

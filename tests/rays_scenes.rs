@@ -7,11 +7,12 @@ use glam::{Mat4, Quat, Vec3};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::{
-        AlphaMode, LoadOptions, Pose, Scene, builtin,
+        AlphaMode, LoadOptions, Pose, Scene,
         bvh::{self, Bvh},
         load,
     },
 };
+use lucerna_scenes as builtin;
 use rays_kit::*;
 
 /// Compares closest and any hits of random rays, and says how many hit something.

@@ -8,8 +8,8 @@ mod tracer_lab;
 use glam::{Mat4, Vec2, Vec3, Vec4};
 use lucerna::{
     gpu::testing::with_gpu,
-    reference::tracer::Sources,
     scene::{AlphaMode, LightKind, Material, Pose, Texture, TextureRef, Transform, View, load},
+    tracer::Sources,
 };
 use reference_kit::{Task, corner, disagreements, expect_agreement, eye, panel, point, sky, spot_and_sun};
 

@@ -82,7 +82,7 @@ fn skinned_and_morphed_vertices_are_those_of_the_cpu() {
 fn deforming_twice_starts_from_the_rest_each_time() {
     let scene = figure();
     with_gpu(|gpu| {
-        let mut resident = lucerna::scene::resident::Resident::new(gpu, &scene).unwrap();
+        let mut resident = lucerna::resident::Resident::new(gpu, &scene).unwrap();
         let mut runner = lucerna::graph::Runner::new(gpu);
         let mut run = || {
             let mut graph = lucerna::graph::Graph::new("twice");
@@ -141,7 +141,7 @@ fn animated_files_deform_as_on_the_cpu() {
         let scene = lucerna::scene::load(&path, &Default::default()).unwrap();
         let pose = Pose::playing(&scene, seconds);
         with_gpu(|gpu| {
-            let mut resident = lucerna::scene::resident::Resident::new(gpu, &scene).unwrap();
+            let mut resident = lucerna::resident::Resident::new(gpu, &scene).unwrap();
             let mut graph = lucerna::graph::Graph::new("animated");
             let handles = resident.frame(&mut graph, &scene, seconds);
             let reads = [handles.positions, handles.instances].map(|b| graph.read_buffer(b));

@@ -7,13 +7,13 @@ use lucerna::{
     gpu::testing::with_gpu,
     graph::{Graph, Runner},
     passes::ambient::Irradiance,
-    reference::tracer::Settings,
+    resident::Resident,
     scene::{
         Camera, Material, Projection, View,
         extent::{FARTHEST, SMALLEST},
-        resident::Resident,
     },
     techniques::isr,
+    tracer::Settings,
 };
 use tracer_lab::{Stage, render};
 

@@ -7,7 +7,8 @@ use lucerna::{
     gpu::testing::with_gpu,
     graph::{Extent, Format, Graph, Runner, testing::every_barrier_matters},
     passes::{gbuffer, shadow, skybox},
-    scene::{AlphaMode, LightKind, Material, MorphTarget, Scene, resident::Resident},
+    resident::Resident,
+    scene::{AlphaMode, LightKind, Material, MorphTarget, Scene},
 };
 use scene_kit::*;
 

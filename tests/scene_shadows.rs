@@ -8,9 +8,8 @@ use lucerna::{
     gpu::{ImageDesc, OwnedImage, Region, testing::with_gpu},
     graph::{Extent, Format, Graph, Runner},
     passes::shadow::{self, Kind, Settings},
-    scene::{
-        AlphaMode, LightKind, Material, MipFilter, Sampler, Scene, Texture, TextureRef, View, Wrap, resident::Resident,
-    },
+    resident::Resident,
+    scene::{AlphaMode, LightKind, Material, MipFilter, Sampler, Scene, Texture, TextureRef, View, Wrap},
     shaders::{passes::shadow_blur, test::exponential, test::shadow as shadow_probe, types},
 };
 use scene_kit::*;

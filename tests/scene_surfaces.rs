@@ -6,8 +6,8 @@ use glam::{Mat3, Mat4, Vec3, Vec4};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     passes::gbuffer,
-    reference::tracer::{Filter, Settings, Tracer},
     scene::{AlphaMode, Material, Pose, Primitive, Sampler, Scene, Texture, TextureRef, View},
+    tracer::{Filter, Settings, Tracer},
 };
 use scene_kit::{mesh, place, sphere, square, surfaces};
 

@@ -7,16 +7,14 @@ use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::{Graph, Image, Runner},
     passes::{ambient::Irradiance, gbuffer},
-    reference::tracer::{self, Filter, Tracer},
-    scene::{
-        AlphaMode, Environment, LightKind, Material, Pose, Scene, View,
-        resident::{Handles, Resident},
-    },
+    resident::{Handles, Resident},
+    scene::{AlphaMode, Environment, LightKind, Material, Pose, Scene, View},
     techniques::{
         fiv::{self, Fiv},
         igi::{self, Igi},
         isr,
     },
+    tracer::{self, Filter, Tracer},
 };
 use scene_kit::{light, mesh, place, square};
 

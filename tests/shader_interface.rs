@@ -1,11 +1,13 @@
 //! The interface of every shader as text: a change shows as a line in review.
 
-use std::{fs, path::Path};
+use std::fs;
+
+mod common;
 
 /// `UPDATE_GOLDENS=1 cargo test --test shader_interface` writes the file again.
 #[test]
 fn the_listing_of_all_interfaces_is_the_reviewed_one() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/interfaces.txt");
+    let path = common::root().join("tests/golden/interfaces.txt");
     let now = lucerna::shaders::LISTING;
     if std::env::var_os("UPDATE_GOLDENS").is_some() {
         fs::write(&path, now).unwrap();

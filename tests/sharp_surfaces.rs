@@ -6,12 +6,10 @@ mod tracer_lab;
 use glam::{DVec3, Vec2, Vec3, Vec4, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
-    reference::{
-        path,
-        tracer::{Filter, Settings as Tracing},
-    },
+    reference::path,
     scene::{Environment, LoadOptions, Material, Pose, Scene, Texture, TextureRef, View, bvh::Bvh, load},
     techniques::igi,
+    tracer::{Filter, Settings as Tracing},
 };
 use std::fmt::Write;
 use tracer_lab::{Stage, flat_view, render, view};

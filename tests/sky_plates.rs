@@ -2,21 +2,21 @@
 
 mod scene_kit;
 
-use std::path::Path;
-
 use glam::{DVec3, Mat4, Quat, Vec2, Vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::{Graph, Runner},
     passes::ambient::Irradiance,
+    resident::Resident,
     scene::{
         Environment, Material, Scene,
         environment::{self, direction_from_uv, solid_angle},
-        resident::Resident,
     },
     techniques::isr,
 };
 use scene_kit::{PI, mesh, place, sphere};
+
+mod common;
 
 /// ∫ L max(n·d, 0) dω over the pixels as they stand in the picture, W/m².
 fn brute_force(sky: &Environment, n: Vec3) -> Vec3 {
@@ -136,7 +136,7 @@ fn a_ball_under_the_least_of_skies_is_evenly_lit() {
 
 #[test]
 fn photographed_skies_light_every_normal_within_a_hundredth() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets/environments");
+    let folder = common::root().join("../shared/assets/environments");
     if !folder.is_dir() {
         assert!(std::env::var_os("CI").is_none(), "{} is missing, and CI is set", folder.display());
         eprintln!("SKIPPED: {} is missing", folder.display());

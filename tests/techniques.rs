@@ -1,13 +1,14 @@
-//! The interface of all techniques: each is found by its name, renders, and says by what it is prepared.
+//! The interface of all techniques: each is found by its name, renders, and names the settings that it is prepared by.
 
 use lucerna::{
     Result,
     gpu::{Gpu, testing::with_gpu},
     graph::{Graph, Runner},
-    scene::{Pose, Scene, View, builtin},
+    scene::{Pose, Scene, View},
     technique::{Mode, Ready, Settings, Shot, Technique},
     techniques::{self, Visitor, fiv::Fiv, igi::Igi, isr::Isr},
 };
+use lucerna_scenes as builtin;
 use serde_json::{Value, json};
 
 /// A chess queen under a built-in environment, which all techniques can render.

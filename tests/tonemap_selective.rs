@@ -234,7 +234,7 @@ fn modes(shader: &lucerna::shader::Shader) -> Vec<u32> {
 #[test]
 fn early_tests_are_forced_in_the_shader_and_depth_is_not_written() {
     const EARLY_FRAGMENT_TESTS: u32 = 9;
-    use lucerna::shader::Args;
+    use lucerna::graph::Args;
     assert!(modes(shaders::tonemap::marked_early_z::Args::SHADER).contains(&EARLY_FRAGMENT_TESTS));
     assert!(modes(tonemap_early::Args::SHADER).contains(&EARLY_FRAGMENT_TESTS));
     assert!(!modes(tonemap_late::Args::SHADER).contains(&EARLY_FRAGMENT_TESTS));

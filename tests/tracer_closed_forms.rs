@@ -5,8 +5,8 @@ mod tracer_lab;
 use glam::{Mat4, Vec2, Vec3, Vec4, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
-    reference::tracer::{Filter, Settings},
     scene::{AlphaMode, Environment, LightKind, Material, Texture, TextureRef},
+    tracer::{Filter, Settings},
 };
 use std::f64::consts::PI;
 use tracer_lab::{Stage, deviation, expect_mean, flat_view, luminance, matt, mean, render, view};

@@ -7,8 +7,8 @@ use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     image::Layers,
-    reference::tracer::{Filter, Settings, Sources, State, Strategy, Tracer},
     scene::{AlphaMode, Environment, LightKind, Material, Pose, Scene, View},
+    tracer::{Filter, Settings, Sources, State, Strategy, Tracer},
 };
 use tracer_lab::{Stage, luminance, matt, mean, render, view};
 

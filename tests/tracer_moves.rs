@@ -7,11 +7,9 @@ use glam::{Mat4, Quat, Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
     image::Layers,
-    reference::{
-        path,
-        tracer::{Settings, Sources, Tracer},
-    },
+    reference::path,
     scene::{Material, MorphTarget, Pose, Scene, bvh::Bvh},
+    tracer::{Settings, Sources, Tracer},
 };
 use tracer_lab::{Stage, deviation, luminance, mean, view};
 

@@ -6,13 +6,13 @@ use glam::{DVec3, Mat4, Vec3};
 use lucerna::{
     gpu::{Gpu, ImageDesc, OwnedImage, Region, testing::with_gpu},
     graph::{Graph, Runner},
-    reference::{
-        brdf::Matter,
-        tracer::{Sources, tables},
-    },
-    scene::{Environment, Light, LightKind, Material, Node, Pose, Scene, builtin, resident},
+    reference::brdf::Matter,
+    resident,
+    scene::{Environment, Light, LightKind, Material, Node, Pose, Scene},
     shaders::{consts, test::samplers as shader, types},
+    tracer::{Sources, tables},
 };
+use lucerna_scenes as builtin;
 use std::f64::consts::PI;
 use tracer_lab::{Stage, chi_square, chi_square_tail, sidak};
 

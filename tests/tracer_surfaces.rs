@@ -6,8 +6,8 @@ use glam::{Mat4, Vec2, Vec3, Vec4, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
     image::srgb,
-    reference::tracer::{Filter, Settings, Strategy},
     scene::{Material, Primitive, Texture, TextureRef, Transform},
+    tracer::{Filter, Settings, Strategy},
 };
 use tracer_lab::{Stage, deviation, flat_view, matt, mean, render};
 

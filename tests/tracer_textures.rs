@@ -5,8 +5,8 @@ mod scene_kit;
 use glam::{Mat4, Vec3};
 use lucerna::{
     gpu::testing::with_gpu,
-    reference::tracer::{Filter, Settings, Tracer},
     scene::{Camera, Material, Pose, Projection, Sampler, Scene, Texture, TextureRef, View},
+    tracer::{Filter, Settings, Tracer},
 };
 use scene_kit::{look, mesh, place, square};
 

@@ -14,9 +14,11 @@ use lucerna::{
     gpu::{Gpu, GpuOptions},
     graph::{Graph, Runner},
     rays::Rays,
-    scene::{self, LoadOptions, Pose, Scene, builtin, resident::Resident},
+    resident::Resident,
+    scene::{self, LoadOptions, Pose, Scene},
     shaders::{test::trace as shader, types},
 };
+use lucerna_scenes as builtin;
 use std::path::PathBuf;
 
 fn main() -> std::process::ExitCode {

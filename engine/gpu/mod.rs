@@ -32,7 +32,6 @@ mod format;
 mod image;
 mod image_desc;
 mod instance;
-mod loops;
 mod memory;
 mod options;
 mod pipeline;

@@ -392,6 +392,24 @@ fn alpha_factor(factor: vk::BlendFactor) -> vk::BlendFactor {
     }
 }
 
+/// The SPIR-V of a stage.
+#[cfg(not(feature = "replaceable-shaders"))]
+fn module_of(code: &StageCode) -> Result<std::borrow::Cow<'static, [u8]>> {
+    Ok(code.spirv.into())
+}
+
+/// The SPIR-V of a stage: a file of its name in the folder that the variable `LUCERNA_SHADERS` names, if there is one, takes its place.
+#[cfg(feature = "replaceable-shaders")]
+fn module_of(code: &StageCode) -> Result<std::borrow::Cow<'static, [u8]>> {
+    let Some(folder) = std::env::var_os("LUCERNA_SHADERS") else { return Ok(code.spirv.into()) };
+    let file = std::path::Path::new(&folder).join(code.file);
+    match std::fs::read(&file) {
+        Ok(bytes) => Ok(bytes.into()),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(code.spirv.into()),
+        Err(error) => Err(Error::input("a shader cannot be read").caused_by(error).in_file(file)),
+    }
+}
+
 /// Shader modules, needed only while a pipeline is made.
 struct Modules<'a> {
     context: &'a Context,
@@ -401,7 +419,8 @@ struct Modules<'a> {
 impl<'a> Modules<'a> {
     fn new(context: &'a Context, shader: &Shader) -> Result<Self> {
         let mut modules = Self { context, list: Vec::new() };
-        for StageCode { stage, spirv } in shader.stages {
+        for code in shader.stages {
+            let (stage, spirv) = (code.stage, module_of(code)?);
             if spirv.len() % 4 != 0 {
                 return Err(Error::new(
                     ErrorKind::Runtime,

@@ -9,13 +9,14 @@ use bytemuck::{NoUninit, Pod};
 
 use super::{
     Graph,
+    args::{Args, ComputeArgs, RangedArgs, RasterArgs},
     format::{Extent, Format, ImageDesc, Threads},
     handles::{Buffer, BufferRead, GraphId, Image, ImageRead, Sampler, Uniform, UniformSlice},
+    over::{Items, Over},
     pass::{Bound, BufferEntry, Groups, ImageEntry, Imported, Origin, Owner, Pass, ReadEntry, ReadWhat, Work},
     raster::{Draw, Raster, Targets},
     vocab::{Layout, Resource},
 };
-use crate::shader::{Args, ComputeArgs, RasterArgs};
 
 /// Uniform blocks start at multiples of this: the largest alignment a Vulkan device may ask for.
 const UNIFORM_ALIGNMENT: usize = 256;
@@ -47,6 +48,16 @@ impl PassRef<'_> {
     /// that no watchdog takes the whole for a device that hangs.
     pub fn rays(self, rays: u64) -> Self {
         self.graph.passes[self.index].rays = rays;
+        self
+    }
+
+    /// Cuts it into dispatches.
+    fn over(self, items: Items, range: [usize; 2]) -> Self {
+        let pass = &mut self.graph.passes[self.index];
+        pass.rays = items.all_rays();
+        if let Work::Compute { over, .. } = &mut pass.work {
+            *over = Some(Over { items, range });
+        }
         self
     }
 
@@ -257,13 +268,32 @@ impl Graph {
         let size = A::SHADER.workgroup;
         let threads = threads.into().0;
         let groups = [0, 1, 2].map(|i| threads[i].div_ceil(size[i].max(1)));
-        self.pass(A::SHADER.name, Work::Compute { bound: bound(&args), groups: Groups::Direct(groups) })
+        self.pass(A::SHADER.name, Work::Compute { bound: bound(&args), groups: Groups::Direct(groups), over: None })
+    }
+
+    /// As [`Graph::compute`], for a shader whose invocations loop over many items. The pass is cut into as many dispatches as watchdogs and
+    /// drivers that limit loops ask for; each has other `first` and `count` in its push constants, whose values in `args` have no effect.
+    /// The shader adds its items to the values that the dispatch before wrote.
+    pub fn compute_over<A: RangedArgs>(&mut self, args: A, threads: impl Into<Threads>, items: Items) -> PassRef<'_> {
+        let pass = self.compute(args, threads);
+        pass.over(items, A::RANGE)
+    }
+
+    /// As [`Graph::compute_over`], with the group counts (three `u32`) that lie at `offset` in `groups`.
+    pub fn compute_indirect_over<A: RangedArgs>(
+        &mut self,
+        args: A,
+        (groups, offset): (Buffer, u64),
+        items: Items,
+    ) -> PassRef<'_> {
+        let pass = self.compute_indirect(args, groups, offset);
+        pass.over(items, A::RANGE)
     }
 
     /// Runs a compute shader with the group counts (three `u32`) that lie at `offset` in `groups`.
     pub fn compute_indirect<A: ComputeArgs>(&mut self, args: A, groups: Buffer, offset: u64) -> PassRef<'_> {
         let groups = Groups::Indirect { buffer: groups, offset };
-        self.pass(A::SHADER.name, Work::Compute { bound: bound(&args), groups })
+        self.pass(A::SHADER.name, Work::Compute { bound: bound(&args), groups, over: None })
     }
 
     /// Draws with a vertex shader and (if there is one) a fragment shader.

@@ -31,6 +31,7 @@
 //! | an image, a buffer, a uniform block for this frame | [`Graph::image`], [`Graph::buffer`], [`Graph::buffer_from`], [`Graph::uniform`] |
 //! | one that outlives the frame | [`Graph::history`], [`Graph::import_image`], [`Graph::import_buffer`] |
 //! | a part of it, another sampler | [`Image::mip`], [`Image::layer`], [`Image::nearest`], [`Buffer::range`] … |
+//! | a pass whose shader loops for long | [`Graph::compute_over`] |
 //! | a pass | [`Graph::compute`], [`Graph::raster`] with [`Targets`], [`Raster`] and [`Draw`], [`Graph::clear`], [`Graph::copy`], [`Graph::mips`] … |
 //! | acceleration structures for ray queries | [`Graph::import_accel`], [`Graph::build_bottoms`], [`Graph::build_top`] |
 //! | results on the CPU | [`Graph::read_image`], [`Graph::read_buffer`] |
@@ -47,6 +48,7 @@
 
 mod accel;
 mod access;
+mod args;
 mod build;
 mod execute;
 mod format;
@@ -55,7 +57,9 @@ mod grid;
 mod handles;
 mod import;
 mod list;
+mod loops;
 pub mod oracle;
+mod over;
 mod pass;
 mod pixels;
 mod plan;
@@ -66,11 +70,14 @@ mod vocab;
 mod vulkan;
 
 pub use accel::{BottomBuild, TopInstance};
+pub use args::{Args, Bind, ComputeArgs, RangedArgs, RasterArgs};
 pub use build::PassRef;
 pub use execute::Runner;
 pub use format::{Class, Extent, Format, ImageDesc, Threads};
 pub use frame::{Frame, PassTime, Report};
 pub use handles::{Accel, Buffer, BufferRead, GraphId, Image, ImageRead, Sampler, Uniform, UniformSlice};
+pub use loops::loop_limit;
+pub use over::Items;
 pub use pixels::Pixels;
 pub use plan::{Barrier, Physical, Plan, PlannedPass, Shape, Source};
 pub use raster::{

@@ -2,15 +2,17 @@
 
 use super::{
     accel::BottomBuild,
+    args::Bind,
     format::{Format, ImageDesc},
     handles::{Accel, Buffer, Image},
+    over::Over,
     raster::{Draw, Raster, Targets},
     vocab::{Layout, Usage},
 };
 use std::sync::Arc;
 
 use crate::gpu::{AccelLayout, OwnedAccel, OwnedBuffer, OwnedImage};
-use crate::shader::{Resource, Shader};
+use crate::shader::Shader;
 
 /// Where a resource comes from and how long it lives.
 #[derive(Clone, Debug)]
@@ -79,7 +81,7 @@ pub(crate) enum Groups {
 #[derive(Clone, Debug)]
 pub(crate) struct Bound {
     pub shader: &'static Shader,
-    pub resources: Vec<Resource>,
+    pub resources: Vec<Bind>,
     pub push: Vec<u8>,
     pub spec: Vec<u32>,
 }
@@ -93,6 +95,8 @@ pub(crate) enum Work {
     Compute {
         bound: Bound,
         groups: Groups,
+        /// The dispatches of a pass with a long loop; `None`: one.
+        over: Option<Over>,
     },
     Raster {
         bound: Bound,

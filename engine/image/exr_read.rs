@@ -23,7 +23,7 @@ use super::{
     exr_write::{self, JSON, PREFIX},
     zeroed,
 };
-use crate::{Error, Result, scene::Limits};
+use crate::{Error, Result, limits::Limits};
 
 /// Channels of all parts together. Cryptomatte files have a few dozen.
 const MAX_CHANNELS: usize = 1024;

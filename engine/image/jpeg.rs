@@ -7,7 +7,7 @@ use image::{
 };
 
 use super::{Layer, Layers, Metadata, WriteOptions, check_size, encoding, orientation, srgb};
-use crate::{Error, ErrorKind, Result, scene::Limits};
+use crate::{Error, ErrorKind, Result, limits::Limits};
 
 /// Longest side that the format holds, pixels.
 const MAX_SIDE: u32 = 65535;

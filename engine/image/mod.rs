@@ -40,7 +40,7 @@ pub use metadata::Metadata;
 pub use picture::{Layer, Layers, Precision};
 pub use probe::from_angular_map;
 
-use crate::{Error, ErrorKind, Result, scene::Limits};
+use crate::{Error, ErrorKind, Result, limits::Limits};
 
 /// How to write.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 use image::metadata::Orientation;
 
 use super::{check_size, zeroed};
-use crate::{Result, scene::Limits};
+use crate::{Result, limits::Limits};
 
 /// Pixels of `channels` values as they are stored become those of the upright picture, with its width and height.
 ///

@@ -1,7 +1,7 @@
 //! Portable float map: `PF` (RGB) or `Pf` (grey), 32-bit floats, bottom row first. No metadata.
 
 use super::{Layer, Layers, Precision, check_size};
-use crate::{Error, Result, scene::Limits};
+use crate::{Error, Result, limits::Limits};
 
 pub(super) fn encode(picture: &Layers, layer: &Layer) -> Result<Vec<u8>> {
     let grey = layer.channels.len() == 1;

@@ -9,7 +9,7 @@ use super::{
     encoding::{self, clamp},
     orientation, srgb, zeroed,
 };
-use crate::{Error, ErrorKind, Result, scene::Limits};
+use crate::{Error, ErrorKind, Result, limits::Limits};
 
 /// Keyword of the iTXt chunk with the metadata.
 const KEYWORD: &str = "lucerna";

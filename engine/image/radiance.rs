@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use super::{Layer, Layers, Metadata, check_size, color::Chromaticities, zeroed};
-use crate::{Error, Result, scene::Limits};
+use crate::{Error, Result, limits::Limits};
 
 const MAGIC: [&[u8]; 2] = [b"#?RADIANCE", b"#?RGBE"];
 /// Our metadata stands in comments of this prefix, broken where old readers would overrun their line buffers.

@@ -1,13 +1,11 @@
 //! The G-buffer: attributes of the nearest visible surface of every pixel, in one pass over the culled scene
 //! (ISR dissertation, section 4.2: CLR, NRM, DPT), and further attributes of physical materials.
 
+use crate::settings::{JsonSchema, described};
 use crate::{
     graph::{Compare, Cull, Depth, Extent, Format, Graph, Image, Load, Raster, Stencil, StencilLoad, Targets, Uniform},
-    scene::{
-        View,
-        cull::Frustum,
-        resident::{Batches, Cutout, Handles},
-    },
+    resident::{Batches, Cutout, Handles},
+    scene::{View, cull::Frustum},
     shaders::{
         passes::{gbuffer as shader, gbuffer_behind as behind_shader},
         types,
@@ -16,7 +14,7 @@ use crate::{
 use serde::{Deserialize, Serialize};
 
 /// How normals are stored.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Normals {
     /// The dissertation's: 8 bits a component, decoded as 2c/255 − 1.
@@ -27,7 +25,7 @@ pub enum Normals {
 }
 
 /// Treatment of alpha-blended surfaces. A G-buffer holds one surface per pixel, so it cannot hold them together with the surface behind.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Blended {
     /// Each pixel shows the surface with probability alpha. Only the graph's seed changes the pattern.
@@ -39,18 +37,22 @@ pub enum Blended {
     Hidden,
 }
 
-/// Choices of [`draw`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Settings of the G-buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct Settings {
+    /// How normals are stored.
     pub normals: Normals,
+    /// Treatment of alpha-blended surfaces. A G-buffer holds one surface per pixel, so it cannot hold them together with the surface behind.
     pub blended: Blended,
     /// Textures are read at the mip level that fits the pixel's size. Off: always at the finest level, like a path tracer without ray
     /// differentials reads them. This makes pictures comparable with such a path tracer.
     pub mips: bool,
-    /// Frustum culling. Tests switch it off to check that it does not change the picture.
+    /// Frustum culling, which does not change the picture.
     pub culling: bool,
 }
+
+described!(Settings);
 
 impl Default for Settings {
     fn default() -> Self {

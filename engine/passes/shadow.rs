@@ -5,13 +5,12 @@ mod slots;
 
 pub use slots::{Assignment, assign, project};
 
+use crate::settings::{Described, JsonSchema, described};
+use crate::{Error, Result};
 use crate::{
     graph::{Buffer, Depth, Draw, Extent, Format, Graph, Image, ImageDesc, Raster, Targets},
-    scene::{
-        Note, NoteKind, View,
-        cull::Frustum,
-        resident::{Batches, Cutout, Handles},
-    },
+    resident::{Batches, Cutout, Handles},
+    scene::{Note, NoteKind, View, cull::Frustum},
     shaders::{
         consts,
         passes::{shadow as opaque, shadow_blur as blur, shadow_cutout as cutout},
@@ -21,7 +20,7 @@ use crate::{
 use serde::{Deserialize, Serialize};
 
 /// How the depth in a map is compared with the receiver's depth.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// No shadows.
@@ -35,33 +34,46 @@ pub enum Kind {
     Exponential,
 }
 
-/// Choices of [`draw`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Settings of shadow maps.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct Settings {
+    /// How the depth in a map is compared with the receiver's depth.
     pub kind: Kind,
-    /// Side of each map, texels.
+    /// Side of each map.
+    #[schemars(range(min = 16, max = 8192), extend("x-unit" = "texels", "x-needs" = {"kind": {"not": {"const": "off"}}}))]
     pub size: u32,
-    /// Maps of a directional light, 1 to 8.
+    /// Maps of a directional light.
+    #[schemars(range(min = 1, max = 8), extend("x-needs" = {"kind": {"not": {"const": "off"}}}))]
     pub cascades: u32,
     /// Distribution of the cascades: 0 evenly spaced, 1 in geometric progression.
+    #[schemars(range(min = 0, max = 1), extend("x-needs" = {"kind": {"not": {"const": "off"}}}))]
     pub split: f32,
-    /// Metres from the camera after which directional lights cast no shadow; 0: as far as the scene reaches.
+    /// Distance from the camera after which directional lights cast no shadow; 0: as far as the scene reaches.
+    #[schemars(range(min = 0, max = 1e9), extend("x-unit" = "m", "x-needs" = {"kind": {"not": {"const": "off"}}}))]
     pub distance: f32,
     /// c of [ISR 30], for depths from 0 (at the light) to 1 (at the light's range, or at the end of the scene).
+    #[schemars(range(min = 0.001, max = 1e6), extend("x-needs" = {"kind": {"const": "exponential"}}))]
     pub exponent: f32,
-    /// Metres. For lights that reach farther than this, c grows in proportion, so that no light leaks through thin walls in large
-    /// scenes. 0: c is the same for all lights, as in the dissertation.
+    /// For lights that reach farther than this, c grows in proportion, so that no light leaks through thin walls in large scenes. 0: c is the
+    /// same for all lights, as in the dissertation.
+    #[schemars(range(min = 0, max = 1e9), extend("x-unit" = "m", "x-needs" = {"kind": {"const": "exponential"}}))]
     pub exponent_reach: f32,
-    /// Exponential: minimum share of c at grazing angles. 0: c falls with the cosine, as in listing 8, which leaks light along walls.
+    /// Minimum share of c at grazing angles. 0: c falls with the cosine, as in listing 8, which leaks light along walls.
+    #[schemars(range(min = 0, max = 1), extend("x-needs" = {"kind": {"const": "exponential"}}))]
     pub grazing: f32,
-    /// Standard deviation of the logarithmic Gaussian prefilter, texels; 0: no filter.
+    /// Standard deviation of the logarithmic Gaussian prefilter; 0: no filter.
+    #[schemars(range(min = 0, max = 16), extend("x-unit" = "texels", "x-needs" = {"kind": {"const": "exponential"}}))]
     pub blur: f32,
-    /// Offset of the receiver towards the light before the comparison, texels (plain and PCF).
+    /// Offset of the receiver towards the light before the comparison.
+    #[schemars(range(min = 0, max = 1000), extend("x-unit" = "texels", "x-needs" = {"kind": {"enum": ["plain", "pcf"]}}))]
     pub depth_bias: f32,
-    /// Offset of the receiver along its normal at grazing angles, texels.
+    /// Offset of the receiver along its normal at grazing angles.
+    #[schemars(range(min = 0, max = 1000), extend("x-unit" = "texels", "x-needs" = {"kind": {"not": {"const": "off"}}}))]
     pub normal_bias: f32,
 }
+
+described!(Settings);
 
 impl Default for Settings {
     fn default() -> Self {
@@ -85,6 +97,12 @@ impl Settings {
     /// As in the dissertation: exponential with c = 90 everywhere, weakened by the cosine (listing 8), maps of 512².
     pub fn dissertation() -> Self {
         Self { kind: Kind::Exponential, size: 512, exponent_reach: 0.0, grazing: 0.0, ..Self::default() }
+    }
+
+    /// # Errors
+    /// `Usage`, naming the key, the value found and the values allowed.
+    pub fn validate(&self) -> Result<()> {
+        Self::description().check(self).map_err(|error: Error| error.at("shadow"))
     }
 }
 
@@ -118,6 +136,7 @@ pub fn draw(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings
     ShadowMaps { lights: scene.lights, shadows, maps, notes: notes.collect() }
 }
 
+/// The nearest settings that are allowed: [`draw`] has no errors, and callers may not have called [`Settings::validate`].
 fn sane(settings: &Settings) -> Settings {
     let positive = |x: f32, or: f32| if x.is_finite() && x >= 0.0 { x } else { or };
     Settings {

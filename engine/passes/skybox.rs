@@ -3,7 +3,7 @@
 use crate::{
     graph::{Depth, Draw, Graph, Image, Load, Raster, Stencil, StencilLoad, Targets},
     passes::gbuffer::GBuffer,
-    scene::resident::Handles,
+    resident::Handles,
     shaders::passes::skybox as shader,
 };
 use glam::Vec3;

@@ -28,10 +28,8 @@ use crate::{
     Error, ErrorKind, Result,
     gpu::{Gpu, OwnedBuffer},
     graph::{Accel, Buffer, Graph, Image},
-    scene::{
-        Aabb, Scene,
-        resident::{Handles, Resident},
-    },
+    resident::{Handles, Resident},
+    scene::{Aabb, Scene},
     shaders::{
         consts::{MAX_TEXTURE_ARRAYS, TRACE_DEPTH, TRACE_NODE_WORDS, TRACE_STEPS},
         types,

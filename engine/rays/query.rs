@@ -7,7 +7,7 @@ use crate::{
     Result,
     gpu::{BottomDesc, Gpu, OwnedAccel},
     graph::{Accel, BottomBuild, Graph, TopInstance},
-    scene::resident::{Cutout, Handles, Instance, Resident, Sided},
+    resident::{Cutout, Handles, Instance, Resident, Sided},
     shaders::consts::{TRACE_SEES_LIT, TRACE_SEES_UNLIT},
 };
 

@@ -4,7 +4,7 @@
 use super::shapes::Shape;
 use crate::{
     graph::{Buffer, Graph},
-    scene::resident::Handles,
+    resident::Handles,
     shaders::rays::{records, refit},
 };
 

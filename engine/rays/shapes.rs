@@ -5,7 +5,8 @@ use super::{
     tree::Tree,
 };
 use crate::{
-    scene::{Aabb, AlphaMode, Material, Pose, Primitive, Scene, resident::deforms},
+    resident::deforms,
+    scene::{Aabb, AlphaMode, Material, Pose, Primitive, Scene},
     shaders::consts::{TRACE_CUTOUT, TRACE_REVERSED, TRACE_SINGLE_SIDED, TRACE_UNLIT},
 };
 use glam::{Mat3, Mat4, Vec3};

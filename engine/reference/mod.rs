@@ -1,5 +1,4 @@
-//! Slow and obvious CPU versions of what the shaders compute, written from the papers and not from the shaders; and the
-//! progressive path tracer that makes reference pictures on the device.
+//! Slow and obvious CPU versions of what the shaders compute, written from the papers and not from the shaders.
 
 pub mod brdf;
 pub mod fiv;
@@ -9,4 +8,3 @@ pub mod isr_scene;
 pub mod overlap;
 pub mod path;
 pub mod tonemap;
-pub mod tracer;

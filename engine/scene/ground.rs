@@ -91,9 +91,9 @@ struct Fit {
 /// `Usage` if a number is out of its range; `Input` if a thing has no triangles.
 ///
 /// ```
-/// use lucerna::scene::{builtin, ground};
+/// use lucerna::scene::ground;
 ///
-/// let stage = ground::on_ground(&[builtin::load("hare")?], &ground::Ground { copies: 10, ..Default::default() })?;
+/// let stage = ground::on_ground(&[lucerna_scenes::load("hare")?], &ground::Ground { copies: 10, ..Default::default() })?;
 /// assert_eq!(stage.nodes.iter().filter(|node| node.mesh.is_some()).count(), 11);
 /// # Ok::<(), lucerna::Error>(())
 /// ```
@@ -299,7 +299,8 @@ fn waves(half: f32, deep: f32, phase: f32, size: f32) -> Primitive {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{View, builtin};
+    use crate::builtin;
+    use crate::scene::View;
 
     fn stage(things: &[&str], ground: &Ground) -> Scene {
         let things: Vec<Scene> = things.iter().map(|name| builtin::load(name).unwrap()).collect();

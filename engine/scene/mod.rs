@@ -4,7 +4,6 @@
 
 pub mod animate;
 mod budget;
-pub mod builtin;
 pub mod bvh;
 pub mod c_arrays;
 pub mod cull;
@@ -18,13 +17,14 @@ mod load;
 pub mod normals;
 mod notes;
 mod obj;
-pub mod resident;
 mod surface;
+pub(crate) mod surfaces;
 mod tangents;
 pub mod texture;
 mod validate;
 pub mod view;
 
+pub use crate::limits::Limits;
 pub use animate::Pose;
 pub use cull::Aabb;
 pub use load::{LoadOptions, load};
@@ -431,33 +431,4 @@ pub enum NoteKind {
     Approximated,
     /// Repaired while reading (degenerate triangles dropped, weights normalised).
     Repaired,
-}
-
-/// Limits on what a scene file may ask for. Reading never allocates more than these allow.
-#[derive(Clone, Debug)]
-pub struct Limits {
-    /// Bytes of one file.
-    pub max_file: u64,
-    /// Bytes of one decoded buffer or image, and of all decoded texels together ×4.
-    pub max_alloc: u64,
-    /// Texels of one image.
-    pub max_image_pixels: u64,
-    /// Vertices and indices of a scene, each.
-    pub max_vertices: u64,
-    pub max_nodes: u64,
-    /// Depth of the node hierarchy.
-    pub max_depth: u32,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Self {
-            max_file: 2 << 30,
-            max_alloc: 1 << 30,
-            max_image_pixels: 1 << 28,
-            max_vertices: 1 << 28,
-            max_nodes: 1 << 20,
-            max_depth: 256,
-        }
-    }
 }

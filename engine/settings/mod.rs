@@ -14,10 +14,12 @@
 //! The default is that of the type's `Default`.
 
 mod description;
+mod notes;
 mod schema;
 mod text;
 
 pub use description::{Allowed, Choice, Decides, Description, Difference, Idle, Key, Kind};
+pub use notes::idle_notes;
 pub use schemars::JsonSchema;
 
 /// A settings type with its description.

@@ -229,17 +229,17 @@ fn write_pass(out: &mut String, listing: &mut String, pass: &Pass, structs: &[St
 
     let _ = writeln!(
         out,
-        "        impl crate::shader::Args for Args {{\n            const SHADER: &'static crate::shader::Shader = &SHADER;"
+        "        impl crate::graph::Args for Args {{\n            const SHADER: &'static crate::shader::Shader = &SHADER;"
     );
     let unused = if bindings.is_empty() { "_out" } else { "out" };
-    let _ = writeln!(out, "            fn resources(&self, {unused}: &mut Vec<crate::shader::Resource>) {{");
+    let _ = writeln!(out, "            fn resources(&self, {unused}: &mut Vec<crate::graph::Bind>) {{");
     write_resources(out, &bindings);
     let _ = writeln!(out, "            }}");
     if let Some(traced) = traced {
         let _ = writeln!(
             out,
-            "            fn variant(&self, out: &mut Vec<crate::shader::Resource>) -> &'static crate::shader::Shader {{\n                \
-             if self.{}.is_none() {{\n                    crate::shader::Args::resources(self, out);\n                    return &SHADER;\n                }}",
+            "            fn variant(&self, out: &mut Vec<crate::graph::Bind>) -> &'static crate::shader::Shader {{\n                \
+             if self.{}.is_none() {{\n                    crate::graph::Args::resources(self, out);\n                    return &SHADER;\n                }}",
             traced.binding.name
         );
         write_resources(out, &query);
@@ -260,8 +260,21 @@ fn write_pass(out: &mut String, listing: &mut String, pass: &Pass, structs: &[St
         let _ = writeln!(out, "            fn spec(&self) -> Vec<u32> {{ vec![{}] }}", list.join(", "));
     }
     let which = if compute { "ComputeArgs" } else { "RasterArgs" };
-    let _ = writeln!(out, "        }}\n        impl crate::shader::{which} for Args {{}}\n    }}");
+    let _ = writeln!(out, "        }}\n        impl crate::graph::{which} for Args {{}}");
+    if let (true, Some([first, count])) = (compute, push.and_then(range)) {
+        let _ = writeln!(
+            out,
+            "        impl crate::graph::RangedArgs for Args {{ const RANGE: [usize; 2] = [{first}, {count}]; }}"
+        );
+    }
+    let _ = writeln!(out, "    }}");
     Ok(())
+}
+
+/// Byte offsets of the members `first` and `count` of push constants, if both are unsigned integers.
+fn range(push: &Struct) -> Option<[u32; 2]> {
+    let offset = |name| push.members.iter().find(|m| m.name == name && m.ty == Type::U32).map(|m| m.offset);
+    Some([offset("first")?, offset("count")?])
 }
 
 /// Pushes the resources of these bindings.
@@ -278,17 +291,18 @@ fn write_resources(out: &mut String, bindings: &[Merged]) {
         if b.count > 1 {
             let _ = writeln!(
                 out,
-                "                out.extend(self.{}.iter().map(|r| crate::shader::Resource::{variant}(*r)));",
+                "                out.extend(self.{}.iter().map(|r| crate::graph::Bind::{variant}(*r)));",
                 b.name
             );
         } else {
-            let _ = writeln!(
-                out,
-                "                out.push(crate::shader::Resource::{variant}(self.{}{convert}));",
-                b.name
-            );
+            let _ = writeln!(out, "                out.push(crate::graph::Bind::{variant}(self.{}{convert}));", b.name);
         }
     }
+}
+
+/// The last part of a path.
+fn file_name(path: &str) -> &str {
+    path.rsplit('/').next().unwrap_or(path)
 }
 
 /// One variant of a pass, as a `Shader`.
@@ -317,8 +331,9 @@ impl Written<'_> {
         for s in &pass.stages {
             let _ = writeln!(
                 out,
-                "                crate::shader::StageCode {{ stage: crate::shader::Stage::{}, spirv: include_bytes!({:?}) }},",
+                "                crate::shader::StageCode {{ stage: crate::shader::Stage::{}, file: {:?}, spirv: include_bytes!({:?}) }},",
                 s.stage,
+                file_name(s.variant(*query).1),
                 s.variant(*query).1
             );
         }

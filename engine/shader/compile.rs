@@ -28,6 +28,16 @@ pub fn traces(root: &Path, file: &str) -> bool {
 /// Includes deeper than this are taken for a cycle.
 const MAX_INCLUDE_DEPTH: usize = 16;
 
+/// The folder whose includes all other folders may use.
+const SHARED: &str = "lib";
+/// The folder that may use the includes of all others.
+const TESTS: &str = "test";
+
+/// Whether a file of folder `from` may include a file of folder `to`.
+fn may_include(from: &str, to: &str) -> bool {
+    to == SHARED || from == to || from == TESTS
+}
+
 /// Resolves `#include "name"`: from the root of the shader tree, or beside the file that includes it.
 fn resolve(root: &Path, requesting: &str, name: &str) -> Result<(PathBuf, String), String> {
     if Path::new(name).components().any(|c| !matches!(c, Component::Normal(_))) {
@@ -36,7 +46,14 @@ fn resolve(root: &Path, requesting: &str, name: &str) -> Result<(PathBuf, String
     let beside = root.join(requesting).parent().map(|folder| folder.join(name));
     for path in [Some(root.join(name)), beside].into_iter().flatten() {
         if let Ok(text) = fs::read_to_string(&path) {
-            return Ok((path, text));
+            let folder = |path: &Path| path.components().next().map(|c| c.as_os_str().to_string_lossy().into_owned());
+            let (from, to) = (folder(Path::new(requesting)), folder(path.strip_prefix(root).unwrap_or(&path)));
+            return match (from, to) {
+                (Some(from), Some(to)) if !may_include(&from, &to) => Err(format!(
+                    "#include \"{name}\": a file of {to}/ for the shaders of {to}/ alone; files that {from}/ needs too belong into {SHARED}/"
+                )),
+                _ => Ok((path, text)),
+            };
         }
     }
     Err(format!("#include \"{name}\": no such file in {} or beside {requesting}", root.display()))
@@ -146,6 +163,29 @@ mod tests {
         let dir = tree(&[("a/x.comp", &main)]);
         let error = compile(dir.path(), "a/x.comp", shaderc::ShaderKind::Compute, false).unwrap_err();
         assert!(error.contains("must stay inside"), "{error}");
+    }
+
+    #[test]
+    fn includes_beside_a_techniques_shaders_are_its_own() {
+        let main = |include: &str| {
+            format!("{HEAD}#include \"{include}\"\nlayout(local_size_x = 1) in;\nvoid main() {{ float f = own(); }}\n")
+        };
+        let dir = tree(&[
+            ("a/x.comp", &main("a/own.glsl")),
+            ("a/beside.comp", &main("own.glsl")),
+            ("test/x.comp", &main("a/own.glsl")),
+            ("b/x.comp", &main("a/own.glsl")),
+            ("b/through.comp", &main("lib/through.glsl")),
+            ("a/own.glsl", "float own() { return 1.0; }\n"),
+            ("lib/through.glsl", "#include \"a/own.glsl\"\n"),
+        ]);
+        let compile = |file: &str| compile(dir.path(), file, shaderc::ShaderKind::Compute, false).map(|_| ());
+        for file in ["a/x.comp", "a/beside.comp", "test/x.comp"] {
+            compile(file).unwrap_or_else(|error| panic!("{file}: {error}"));
+        }
+        let error = compile("b/x.comp").unwrap_err();
+        assert!(error.contains("b/x.comp:3") && error.contains("files that b/ needs too belong into lib/"), "{error}");
+        assert!(compile("b/through.comp").unwrap_err().contains("files that lib/ needs too"));
     }
 
     #[test]

@@ -5,8 +5,6 @@
 //! binding), `Push`, `Spec` and the workgroup size. A forgotten binding is a missing field and does not compile.
 //! `readonly` and `writeonly` in the GLSL are the access declarations from which the render graph derives barriers.
 
-use crate::graph::{Accel, Buffer, Image, UniformSlice};
-
 // Used by build.rs as well; in the library only their tests and the types below are needed.
 #[cfg(test)]
 mod codegen;
@@ -45,6 +43,8 @@ pub struct Shader {
 #[derive(Debug)]
 pub struct StageCode {
     pub stage: Stage,
+    /// Name of the module's file, for example `igi.gather.comp.spv`.
+    pub file: &'static str,
     /// Optimised SPIR-V, little endian, a multiple of four bytes, entry point `main`.
     pub spirv: &'static [u8],
 }
@@ -123,43 +123,3 @@ pub struct SpecConstant {
     pub name: &'static str,
     pub id: u32,
 }
-
-/// What a generated `Args` gives to a binding.
-#[derive(Clone, Copy, Debug)]
-pub enum Resource {
-    Image(Image),
-    Buffer(Buffer),
-    Uniform(UniformSlice),
-    Accel(Accel),
-}
-
-/// Implemented by every generated `Args`: constructing it is declaring the accesses of a pass.
-pub trait Args {
-    const SHADER: &'static Shader;
-
-    /// The resources in the order of [`Shader::bindings`], arrays element by element.
-    fn resources(&self, out: &mut Vec<Resource>);
-
-    /// The variant for these resources, and its resources as [`Self::resources`] has them: the one that traces by ray query
-    /// where there is an acceleration structure to trace.
-    fn variant(&self, out: &mut Vec<Resource>) -> &'static Shader {
-        self.resources(out);
-        Self::SHADER
-    }
-
-    /// The bytes of the push-constant block; empty if there is none.
-    fn push(&self) -> &[u8] {
-        &[]
-    }
-
-    /// The values of [`Shader::spec`], as bits.
-    fn spec(&self) -> Vec<u32> {
-        Vec::new()
-    }
-}
-
-/// `Args` of a compute shader.
-pub trait ComputeArgs: Args {}
-
-/// `Args` of a vertex shader with or without a fragment shader.
-pub trait RasterArgs: Args {}

@@ -19,10 +19,9 @@ use crate::{
     Result,
     gpu::Gpu,
     graph::Graph,
-    scene::{
-        Note, Pose, Scene, View,
-        resident::{Handles, Resident},
-    },
+    resident::{Handles, Resident},
+    scene::{Note, Pose, Scene, View},
+    settings::Description,
 };
 
 /// The settings of a technique, with those of the passes before it.
@@ -70,7 +69,7 @@ impl Mode for AllLight {
     }
 }
 
-/// The inputs of [`Technique::ready`].
+/// The inputs of [`Technique::ready`]; `B` is [`Technique::Baked`].
 pub struct Making<'a, B> {
     pub gpu: &'a Gpu,
     pub scene: &'a Scene,
@@ -87,6 +86,25 @@ impl<B> Debug for Making<'_, B> {
     }
 }
 
+/// The choices for one frame besides pose, view and settings.
+#[derive(Clone, Copy, Debug)]
+pub struct Shot<M> {
+    /// Time of the frame, seconds.
+    pub seconds: f64,
+    /// Number of frames of the run.
+    pub frames: u32,
+    pub mode: M,
+    /// The program needs all layers or the list of passes, not only the total.
+    pub layers: bool,
+}
+
+impl<M: Mode> Default for Shot<M> {
+    /// One frame at second 0 with all layers.
+    fn default() -> Self {
+        Self { seconds: 0.0, frames: 1, mode: M::default(), layers: true }
+    }
+}
+
 /// The inputs of [`Technique::frame`]. `graph.frame` and `graph.seed` are the number of the frame and the seed of its random numbers.
 #[derive(Clone, Debug)]
 pub struct Moment<'a, M> {
@@ -97,13 +115,7 @@ pub struct Moment<'a, M> {
     pub handles: &'a Handles,
     /// The camera, with the far plane fitted to the scene.
     pub view: View,
-    /// Time of the frame, seconds.
-    pub seconds: f64,
-    /// Number of frames of the run.
-    pub frames: u32,
-    pub mode: M,
-    /// The program needs all layers or the list of passes, not only the total.
-    pub layers: bool,
+    pub shot: Shot<M>,
     /// Notes of the scene's upload.
     pub notes: &'a [Note],
 }
@@ -122,7 +134,11 @@ pub trait Technique: Sized {
     /// Data from the file of a bake. [`std::convert::Infallible`] for techniques without bakes.
     type Baked;
 
-    /// The settings on which [`Self::ready`] depends. All other keys have values that are the same for all settings.
+    /// The technique's own settings, without those of the passes before it.
+    fn description() -> &'static Description;
+
+    /// The settings on which [`Self::ready`] depends. All other keys have the same values for all settings, so two settings can share what
+    /// is ready if these are equal.
     fn prepared_by(settings: &Self::Settings) -> Self::Settings;
 
     /// Number of rays that [`Self::ready`] traces for each object, for limits on the work that untrusted settings may cause.
@@ -134,7 +150,7 @@ pub trait Technique: Sized {
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`, `Interrupted` if `told` stopped it; `Usage` or `Input` if the technique does not support the settings or
-    /// the scene, or if the bake is for others.
+    /// the scene, or if the bake is for another scene or for other settings.
     fn ready(making: Making<'_, Self::Baked>, settings: &Self::Settings) -> Result<Self>;
 
     /// Declares the passes of one frame. Writes no file.
@@ -154,25 +170,6 @@ pub trait Technique: Sized {
 pub struct Ready<T> {
     resident: Resident,
     technique: T,
-}
-
-/// The choices for one frame of [`Ready::frame`] besides pose, view and settings.
-#[derive(Clone, Copy, Debug)]
-pub struct Shot<M> {
-    /// Time of the frame, seconds.
-    pub seconds: f64,
-    /// Number of frames of the run.
-    pub frames: u32,
-    pub mode: M,
-    /// As [`Moment::layers`].
-    pub layers: bool,
-}
-
-impl<M: Mode> Default for Shot<M> {
-    /// One frame at second 0 with all layers.
-    fn default() -> Self {
-        Self { seconds: 0.0, frames: 1, mode: M::default(), layers: true }
-    }
 }
 
 impl<T: Technique> Ready<T> {
@@ -211,9 +208,7 @@ impl<T: Technique> Ready<T> {
     ) -> Result<Picture> {
         let handles = self.resident.frame_in(graph, scene, pose);
         let view = view.fit_far(&handles.bounds());
-        let Shot { seconds, frames, mode, layers } = shot;
-        let notes = self.resident.notes();
-        let moment = Moment { scene, pose, handles: &handles, view, seconds, frames, mode, layers, notes };
+        let moment = Moment { scene, pose, handles: &handles, view, shot, notes: self.resident.notes() };
         let mut picture = self.technique.frame(graph, &moment, settings)?;
         if let Some(gbuffer) = picture.gbuffer.take() {
             gbuffer_layers::add(&mut picture, &gbuffer, &view);

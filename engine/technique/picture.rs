@@ -76,11 +76,6 @@ impl Picture {
         Self { grey: true, ..Self::new(total) }
     }
 
-    /// The image with the total.
-    pub fn total(&self) -> Image {
-        self.total
-    }
-
     /// Adds a layer of colours, `NAME.R` `NAME.G` `NAME.B`.
     #[must_use]
     pub fn color(self, name: &'static str, image: Image) -> Self {

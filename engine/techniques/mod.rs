@@ -7,11 +7,12 @@ pub mod isr;
 pub mod tonemap;
 
 use crate::{
+    passes,
     settings::{Described, Description},
     technique::Technique,
 };
 
-/// Work that is the same for all techniques, for [`visit`].
+/// Code that is the same for all techniques, for [`visit`].
 pub trait Visitor {
     type Output;
 
@@ -20,7 +21,7 @@ pub trait Visitor {
 
 /// Makes [`NAMES`], [`visit`] and the descriptions from one list of the techniques that render scenes.
 macro_rules! techniques {
-    ($($technique:ty, $settings:ty;)*) => {
+    ($($technique:ty,)*) => {
         /// Names of the techniques that render scenes.
         pub const NAMES: &[&str] = &[$(<$technique as Technique>::NAME),*];
 
@@ -32,10 +33,13 @@ macro_rules! techniques {
             None
         }
 
-        /// The techniques by their names in `-D igi.vpls=500`, with the description of their settings. The tone mapping after them is last.
+        /// The techniques by their names in `-D igi.vpls=500`, with the description of their settings; then the passes before them and the
+        /// tone mapping after them.
         pub fn descriptions() -> Vec<(&'static str, &'static Description)> {
             vec![
-                $((<$technique as Technique>::NAME, <$settings>::description()),)*
+                $((<$technique as Technique>::NAME, <$technique as Technique>::description()),)*
+                ("gbuffer", passes::gbuffer::Settings::description()),
+                ("shadow", passes::shadow::Settings::description()),
                 ("tonemap", tonemap::Settings::description()),
             ]
         }
@@ -43,7 +47,7 @@ macro_rules! techniques {
 }
 
 techniques! {
-    isr::Isr, isr::Settings;
-    igi::Igi, igi::Settings;
-    fiv::Fiv, fiv::Settings;
+    isr::Isr,
+    igi::Igi,
+    fiv::Fiv,
 }

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use lucerna::{
     Result,
     scene::{
-        Scene, builtin,
+        Scene,
         ground::{self, Ground},
     },
 };
+use lucerna_scenes as builtin;
 use serde::{Deserialize, Serialize};
 
 use crate::{args::finite, args::positive, source};

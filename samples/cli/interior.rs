@@ -96,7 +96,7 @@ pub fn opening(scene: &Scene) -> Option<Vec3> {
 
 #[cfg(test)]
 mod tests {
-    use lucerna::scene::builtin;
+    use lucerna_scenes as builtin;
 
     use super::*;
 

@@ -22,6 +22,7 @@ pub mod lights;
 pub mod notes;
 pub mod outputs;
 pub mod pattern;
+mod placed;
 pub mod program;
 pub mod progress;
 pub mod record;

@@ -6,7 +6,7 @@ use glam::{Mat4, Quat, Vec3};
 use lucerna::scene::{Animation, Channel, Interpolation, Keys, Light, LightKind, Scene, Transform};
 use serde::{Deserialize, Serialize};
 
-use crate::framing;
+use crate::framing::{self, DefaultLight};
 
 /// Default irradiance of a sun, W/m².
 const SUN: f32 = 2.0;
@@ -120,8 +120,14 @@ impl Sun {
     }
 }
 
+/// Adds lights, and default lights as `when` says.
+pub fn light(scene: &mut Scene, points: &[Point], sun: Option<&Sun>, when: DefaultLight) {
+    add(scene, points, sun);
+    framing::add_missing_light(scene, when);
+}
+
 /// Adds the lights. With a sun it also adds the default sky, if the scene has no environment.
-pub fn add(scene: &mut Scene, points: &[Point], sun: Option<&Sun>) {
+fn add(scene: &mut Scene, points: &[Point], sun: Option<&Sun>) {
     for (i, point) in points.iter().enumerate() {
         let name = format!("light {i}");
         let kind = LightKind::Point { range: None };

@@ -62,20 +62,24 @@ impl<T: Technique> Given<T> {
     /// # Errors
     /// `Usage` if there are no settings of the paper.
     pub fn by(args: &RenderArgs, mode: T::Mode) -> Result<Self> {
-        let base = match args.paper {
-            false => T::Settings::default(),
-            true => T::Settings::paper().ok_or_else(|| {
-                Error::usage(format!("{} has no preset with the settings of the paper", T::NAME)).at("--paper")
-            })?,
-        };
+        let base = if args.paper { paper::<T>().map_err(|e| e.at("--paper"))? } else { T::Settings::default() };
         Ok(Self { base, mode, baked: None })
     }
+}
+
+/// The paper's settings of a technique.
+///
+/// # Errors
+/// `Usage` if there are none.
+pub fn paper<T: Technique>() -> Result<T::Settings> {
+    T::Settings::paper()
+        .ok_or_else(|| Error::usage(format!("{} has no preset with the settings of the paper", T::NAME)))
 }
 
 /// Reads a mode from the command line.
 pub fn mode<M: Mode>() -> impl TypedValueParser<Value = M> {
     let names = M::ALL.iter().map(|mode| PossibleValue::new(mode.name()).help(mode.doc()));
-    PossibleValuesParser::new(names).map(|name| named(&name).unwrap_or_default())
+    PossibleValuesParser::new(names).try_map(|name| named(&name).ok_or("is not a mode"))
 }
 
 fn named<M: Mode>(name: &str) -> Option<M> {

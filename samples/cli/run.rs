@@ -7,8 +7,9 @@ use lucerna::{
     gpu::Gpu,
     graph::Report,
     image::{self, Format, Layers, Metadata, WriteOptions},
-    scene::{Note, NoteKind, View, builtin},
+    scene::{Note, NoteKind, View},
 };
+use lucerna_scenes as builtin;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -168,7 +169,7 @@ impl<'a> Run<'a> {
         let (lights, materials) = (scene.lights.len(), scene.materials.len());
         self.console.info(&format!(
             "{}: {triangles} triangles, {materials} materials, {lights} lights, camera '{}'",
-            scene.name, self.stage.camera_name
+            scene.name, self.stage.placed.name
         ));
         self.stage.notes().iter().for_each(|note| self.tell_note(note));
     }
@@ -192,7 +193,7 @@ impl<'a> Run<'a> {
     }
 
     fn values(&self, frame: u32) -> Values<'_> {
-        let (scene, camera) = (&self.stage.scene.name, &self.stage.camera_name);
+        let (scene, camera) = (&self.stage.scene.name, &self.stage.placed.name);
         Values { scene, camera, technique: &self.label, frame, layer: "" }
     }
 
@@ -205,7 +206,7 @@ impl<'a> Run<'a> {
             revision: program::revision().map(str::to_owned),
             scene: self.stage.scene.name.clone(),
             scene_hash: self.record.fingerprint.clone(),
-            camera: self.stage.camera_name.clone(),
+            camera: self.stage.placed.name.clone(),
             technique: self.label.clone(),
             seed: self.args.seed.into(),
             device: about.device.clone(),
@@ -243,7 +244,7 @@ impl<'a> Run<'a> {
 
     /// Writes the files of a frame and returns their names.
     pub fn write(&mut self, layers: &Layers, frame: u32) -> Result<Vec<String>> {
-        let (scene, camera) = (&self.stage.scene.name, &self.stage.camera_name);
+        let (scene, camera) = (&self.stage.scene.name, &self.stage.placed.name);
         let values = Values { scene, camera, technique: &self.label, frame, layer: "" };
         let written = self.outputs.write(&values, layers)?;
         for (name, report) in &written {
@@ -330,7 +331,7 @@ impl<'a> Run<'a> {
             "device": about.device,
             "driver": format!("{} {}", about.driver, about.driver_info).trim(),
             "scene": self.stage.scene.name,
-            "camera": self.stage.camera_name,
+            "camera": self.stage.placed.name,
             "technique": self.label,
             "config": config::to_value(&self.record)?,
             "phases_ms": phases,

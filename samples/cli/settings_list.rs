@@ -114,6 +114,27 @@ mod tests {
     }
 
     #[test]
+    fn the_pages_of_the_techniques_have_the_same_tables() {
+        let pages = [
+            ("isr", include_str!("../isr/README.md")),
+            ("igi", include_str!("../igi/README.md")),
+            ("fiv", include_str!("../fiv/README.md")),
+            ("tonemap", include_str!("../tonemap/README.md")),
+        ];
+        for (name, description) in descriptions() {
+            let mark = format!("<!-- written by `lucerna settings {name} --form markdown` -->\n\n");
+            let with: Vec<_> =
+                pages.iter().filter_map(|(page, text)| Some((page, text.split_once(&mark)?.1))).collect();
+            assert!(!with.is_empty(), "no page has the table of {name}");
+            for (page, rest) in with {
+                assert!(rest.starts_with(&description.table()), "samples/{page}/README.md: other keys of {name}");
+            }
+        }
+        let without = pages.iter().find(|(page, text)| !text.contains(&format!("`lucerna settings {page} ")));
+        assert!(without.is_none(), "{without:?}");
+    }
+
+    #[test]
     fn the_page_is_up_to_date() {
         let page = include_str!("../../docs/settings.md");
         let (_, tables) = page.split_once("<!-- written by `lucerna settings --form markdown` -->\n\n").unwrap();

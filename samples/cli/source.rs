@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use lucerna::{
     Error, Result, image,
-    scene::{self, Environment, Limits, LoadOptions, Note, Scene, builtin, environment},
+    scene::{self, Environment, Limits, LoadOptions, Note, Scene, environment},
 };
+use lucerna_scenes as builtin;
 
 use crate::{args::positive, ground::GroundArgs, record::Source};
 

@@ -2,11 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use glam::Mat4;
 use lucerna::{
     Result,
     scene::{
-        Camera, Note, Pose, Scene, View,
+        Note, Pose, Scene, View,
         extent::{self, Extents},
     },
 };
@@ -17,6 +16,7 @@ use crate::{
     fingerprint,
     framing::{self, DefaultLight},
     lights::{self, Point, Sun},
+    placed::Placed,
     record::{self, Source},
     source::{self, SceneArgs},
 };
@@ -27,14 +27,9 @@ pub struct Stage {
     pub scene: Scene,
     pub source: Source,
     pub fingerprint: String,
-    /// Name of the camera for file names and metadata, never empty.
-    pub camera_name: String,
+    pub placed: Placed,
     pub eye: record::View,
     extents: Extents,
-    camera: Camera,
-    /// The node that carries the camera; `None` if the camera is not part of the scene.
-    node: Option<usize>,
-    world_from_camera: Mat4,
 }
 
 /// The options for the scene: its lights, camera, size and time.
@@ -101,8 +96,7 @@ impl Stage {
             scene.notes.extend(notes);
         }
         let fingerprint = fingerprint::scene(&scene);
-        lights::add(&mut scene, &args.light, args.sun.as_ref());
-        framing::add_missing_light(&mut scene, args.default_light);
+        lights::light(&mut scene, &args.light, args.sun.as_ref(), args.default_light);
         let extents = Extents::of(&scene);
         let named_file = || {
             args.camera.as_deref().is_some_and(|asked| {
@@ -124,35 +118,17 @@ impl Stage {
             (None, Some(asked)) => camera::choose(asked, &names)?,
             (None, None) => Choice::Scene(first_placed(&scene)),
         };
-        Ok(match choice {
-            Choice::Scene(index) => {
-                let camera = scene.cameras[index].clone();
-                let node = scene.nodes.iter().position(|node| node.camera == Some(index as u32));
-                let camera_name = if camera.name.is_empty() { format!("camera{index}") } else { camera.name.clone() };
-                let eye = record::View::Scene(index);
-                Self {
-                    source,
-                    fingerprint,
-                    camera_name,
-                    eye,
-                    extents,
-                    camera,
-                    node,
-                    world_from_camera: Mat4::IDENTITY,
-                    scene,
-                }
-            }
+        let (placed, eye) = match choice {
+            Choice::Scene(index) => (Placed::of_scene(&scene, index), record::View::Scene(index)),
             Choice::File(file) => {
-                let world_from_camera = file.world_from_view();
-                let camera_name = match &args.eye {
+                let name = match &args.eye {
                     Some(eye) => eye.name.clone(),
                     None => name_of(args.camera.as_deref().unwrap_or_default()),
                 };
-                let camera = Camera { name: camera_name.clone(), projection: file.projection() };
-                let eye = record::View::File(file);
-                Self { source, fingerprint, camera_name, eye, extents, camera, node: None, world_from_camera, scene }
+                (Placed::from_file(name, &file), record::View::File(file))
             }
-        })
+        };
+        Ok(Self { scene, source, fingerprint, placed, eye, extents })
     }
 
     /// Notes about the scene for the user.
@@ -167,10 +143,9 @@ impl Stage {
     pub fn at(&self, seconds: f64, size: Size) -> Result<(Pose, View)> {
         let pose = Pose::playing(&self.scene, seconds as f32);
         self.extents.check(&self.scene, &pose)?;
-        let world_from_camera = self.node.map_or(self.world_from_camera, |node| pose.world[node]);
-        let view = View::new(&self.camera, world_from_camera, [size.width, size.height]);
+        let view = self.placed.view(&pose, size);
         extent::near(view.position.abs().max_element())
-            .map_err(|error| error.at(format!("camera '{}'", self.camera_name)))?;
+            .map_err(|error| error.at(format!("camera '{}'", self.placed.name)))?;
         Ok((pose, view))
     }
 }

@@ -2,7 +2,7 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
-#include "lib/fiv.glsl"
+#include "fiv/fiv.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 

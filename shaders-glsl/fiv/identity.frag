@@ -6,7 +6,7 @@
 #include "lib/view.glsl"
 #include "lib/pixel_depth.glsl"
 #include "lib/gbuffer.glsl"
-#include "lib/fiv.glsl"
+#include "fiv/fiv.glsl"
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 4, scalar) readonly buffer Owners { FivOwner owners[]; }; // of each instance

@@ -4,7 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/view.glsl"
 #include "lib/scene.glsl"
-#include "lib/fiv.glsl"
+#include "fiv/fiv.glsl"
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1, scalar) readonly buffer Instances { Instance instances[]; };

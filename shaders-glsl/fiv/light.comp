@@ -7,7 +7,7 @@
 #include "lib/screen.glsl"
 #include "lib/spread.glsl"
 #include "lib/gbuffer.glsl"
-#include "lib/fiv.glsl"
+#include "fiv/fiv.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -54,10 +54,10 @@ layout(push_constant, scalar) uniform Push {
     uint words; // words of a tile
 };
 
-#include "lib/fiv_lookup.glsl"
-#include "lib/fiv_reach.glsl"
-#include "lib/fiv_spots.glsl"
-#include "lib/fiv_matter.glsl"
+#include "fiv/lookup.glsl"
+#include "fiv/reach.glsl"
+#include "fiv/spots.glsl"
+#include "fiv/matter.glsl"
 
 // Advances to the next word with an occluder, up to the word `last`. `tile`: first word of the tile.
 bool fiv_next(inout uint w, inout uint bits, uint tile, uint last) {

@@ -6,7 +6,7 @@
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
 #include "lib/gbuffer.glsl"
-#include "lib/fiv.glsl"
+#include "fiv/fiv.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -27,7 +27,7 @@ layout(push_constant, scalar) uniform Push {
     float negligible; // share of the mean irradiance
 };
 
-#include "lib/fiv_matter.glsl"
+#include "fiv/matter.glsl"
 
 shared vec3 low[64];
 shared vec3 high[64];

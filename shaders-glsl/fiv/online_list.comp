@@ -2,8 +2,8 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
-#include "lib/fiv.glsl"
-#include "lib/fiv_online.glsl"
+#include "fiv/fiv.glsl"
+#include "fiv/online.glsl"
 
 layout(local_size_x = 64) in;
 

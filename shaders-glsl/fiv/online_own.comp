@@ -7,7 +7,7 @@
 #include "lib/screen.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/trace.glsl"
-#include "lib/fiv.glsl"
+#include "fiv/fiv.glsl"
 #include "lib/vpl.glsl"
 #include "lib/spread.glsl"
 

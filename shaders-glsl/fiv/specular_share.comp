@@ -6,8 +6,8 @@
 #include "lib/screen.glsl"
 #include "lib/spread.glsl"
 #include "lib/gbuffer.glsl"
-#include "lib/fiv.glsl"
-#include "lib/fiv_specular.glsl"
+#include "fiv/fiv.glsl"
+#include "fiv/specular.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -28,13 +28,13 @@ layout(binding = 11, rgba32f) uniform image2D whole;                      // ref
 layout(binding = 12, rgba32f) uniform image2D left;                       // the same with occluders
 
 layout(push_constant, scalar) uniform Push {
-    uint first;  // first word of the cells
-    uint count;  // a multiple of four
+    uint first;  // first group of sixteen cells, four words
+    uint count;
     uint all;    // words of a sample
     uint words;  // words of a tile of pixels
 };
 
-#include "lib/fiv_lookup.glsl"
+#include "fiv/lookup.glsl"
 
 // Shares that occluder `o` hides of the sixteen cells from word `at` on, if its centre lies at the offset of `cell`.
 // Columns are words.
@@ -79,7 +79,7 @@ void main() {
     uint tile = fiv_tile(pixel, imageSize(left).x) * words;
     vec3 all_light = first == 0u ? vec3(0.0) : imageLoad(whole, pixel).rgb;
     vec3 left_light = first == 0u ? vec3(0.0) : imageLoad(left, pixel).rgb;
-    for (uint at = first; at < first + count; at += 4u) {
+    for (uint at = 4u * first; at < 4u * (first + count); at += 4u) {
         bool front = false;
         for (uint c = 4u * at; c < 4u * at + 16u; ++c) front = front || dot(n, lobes[c].direction) > 0.0;
         if (!front) continue;

@@ -6,8 +6,8 @@
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
 #include "lib/gbuffer.glsl"
-#include "lib/fiv.glsl"
-#include "lib/fiv_specular.glsl"
+#include "fiv/fiv.glsl"
+#include "fiv/specular.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 

@@ -5,9 +5,9 @@
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
 #include "lib/gbuffer.glsl"
-#include "lib/fiv.glsl"
+#include "fiv/fiv.glsl"
 #define FIV_NO_VECTORS
-#include "lib/fiv_lookup.glsl"
+#include "fiv/lookup.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 

@@ -8,7 +8,7 @@
 #include "lib/spread.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/trace.glsl"
-#include "lib/fiv.glsl"
+#include "fiv/fiv.glsl"
 #include "lib/vpl.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;

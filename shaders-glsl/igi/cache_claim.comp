@@ -3,8 +3,8 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
-#include "lib/igi_ray_tree.glsl"
-#include "lib/igi_cache.glsl"
+#include "igi/ray_tree.glsl"
+#include "igi/cache.glsl"
 
 layout(local_size_x = 64) in;
 

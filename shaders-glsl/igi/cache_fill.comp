@@ -6,7 +6,7 @@
 #include "lib/random.glsl"
 #include "lib/trace.glsl"
 #include "lib/vpl.glsl"
-#include "lib/igi_cache.glsl"
+#include "igi/cache.glsl"
 
 layout(local_size_x = 64) in;
 

@@ -23,9 +23,9 @@
 #define SURFACE_BINDING 60
 #include "lib/hit_surface.glsl"
 #include "lib/trace.glsl"
-#include "lib/igi.glsl"
+#include "igi/igi.glsl"
 #include "lib/vpl.glsl"
-#include "lib/vpl_surface.glsl"
+#include "igi/vpl_surface.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -43,7 +43,7 @@ layout(push_constant, scalar) uniform Push {
     uint count;
 };
 
-#include "lib/vpl_direct.glsl"
+#include "igi/vpl_direct.glsl"
 
 void main() {
     ivec2 pixel = spread_texel();

@@ -7,11 +7,11 @@
 #include "lib/screen.glsl"
 #include "lib/spread.glsl"
 #include "lib/gbuffer.glsl"
-#include "lib/igi_texel.glsl"
+#include "igi/texel.glsl"
 #include "lib/random.glsl"
 #include "lib/trace.glsl"
 #include "lib/vpl.glsl"
-#include "lib/vpl_subset.glsl"
+#include "igi/vpl_subset.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -19,7 +19,7 @@ layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D normal;
 layout(binding = 2) uniform sampler2D depth;
 layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; };
-#include "lib/vpl_gather.glsl"
+#include "igi/vpl_gather.glsl"
 layout(binding = 4, rgba32f) uniform image2D irradiance; // rgb: irradiance, W/m²; a: number of shadow rays
 
 layout(push_constant, scalar) uniform Push {
@@ -28,7 +28,7 @@ layout(push_constant, scalar) uniform Push {
     uint total;      // virtual lights
     uint tile;       // side of the interleaving tiles, texels
     uint factor;     // pixels along the side of a texel
-    uint scattered;  // 1: the texel's pixel changes from texel to texel (lib/igi_texel.glsl)
+    uint scattered;  // 1: the texel's pixel changes from texel to texel (igi/texel.glsl)
     float least;     // min_d of the bounded geometry term, metres; 0: none
     uint stride;     // step of the irregular pattern (vpl_of_subset); 0: regular pattern
     uint seed;

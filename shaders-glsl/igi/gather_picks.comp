@@ -8,13 +8,13 @@
 #include "lib/screen.glsl"
 #include "lib/spread.glsl"
 #include "lib/gbuffer.glsl"
-#include "lib/igi_texel.glsl"
+#include "igi/texel.glsl"
 #include "lib/random.glsl"
 #include "lib/trace.glsl"
 #include "lib/vpl.glsl"
-#include "lib/vpl_subset.glsl"
+#include "igi/vpl_subset.glsl"
 #define VPL_NODES_BINDING 5
-#include "lib/vpl_tree.glsl"
+#include "igi/vpl_tree.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -24,7 +24,7 @@ layout(binding = 2) uniform sampler2D depth;
 layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; }; // sorted like the leaves of the tree
 layout(binding = 4, rgba32f) uniform image2D irradiance; // rgb: irradiance, W/m²; a: number of shadow rays
 
-#include "lib/vpl_picked.glsl"
+#include "igi/vpl_picked.glsl"
 
 layout(push_constant, scalar) uniform Push {
     uint first;      // pick
@@ -34,7 +34,7 @@ layout(push_constant, scalar) uniform Push {
     uint leaves;     // of the tree
     uint tile;       // side of the tiles of texels that share stratified picks
     uint factor;     // pixels along the side of a texel
-    uint scattered;  // 1: the texel's pixel changes from texel to texel (lib/igi_texel.glsl)
+    uint scattered;  // 1: the texel's pixel changes from texel to texel (igi/texel.glsl)
     float least;     // min_d of the bounded geometry term, metres; 0: none
     uint stride;     // above 0: irregular pattern
     uint seed;

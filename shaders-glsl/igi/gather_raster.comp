@@ -6,12 +6,12 @@
 #include "lib/screen.glsl"
 #include "lib/spread.glsl"
 #include "lib/gbuffer.glsl"
-#include "lib/igi_texel.glsl"
+#include "igi/texel.glsl"
 #include "lib/random.glsl"
 #include "lib/vpl.glsl"
-#include "lib/vpl_subset.glsl"
+#include "igi/vpl_subset.glsl"
 #include "lib/sampling.glsl"
-#include "lib/vpl_map.glsl"
+#include "igi/vpl_map.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -27,7 +27,7 @@ layout(push_constant, scalar) uniform Push {
     uint count;
     uint tile;       // side of the interleaving tiles, texels
     uint factor;     // pixels along the side of a texel
-    uint scattered;  // 1: the texel's pixel changes from texel to texel (lib/igi_texel.glsl)
+    uint scattered;  // 1: the texel's pixel changes from texel to texel (igi/texel.glsl)
     float least;     // min_d of the bounded geometry term, metres; 0: none
     uint stride;     // step of the irregular pattern (vpl_of_subset); 0: regular pattern
     uint seed;

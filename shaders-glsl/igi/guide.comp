@@ -3,7 +3,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
 #include "lib/gbuffer.glsl"
-#include "lib/igi_texel.glsl"
+#include "igi/texel.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -13,7 +13,7 @@ layout(binding = 2, rgba32f) uniform writeonly image2D guide; // xyz: unit norma
 
 layout(push_constant, scalar) uniform Push {
     uint factor;    // pixels along the side of a texel
-    uint scattered; // 1: the texel's pixel changes from texel to texel (lib/igi_texel.glsl)
+    uint scattered; // 1: the texel's pixel changes from texel to texel (igi/texel.glsl)
 };
 
 void main() {

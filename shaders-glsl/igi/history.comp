@@ -11,7 +11,7 @@
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
 #include "lib/gbuffer.glsl"
-#include "lib/igi_history.glsl"
+#include "igi/history.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 

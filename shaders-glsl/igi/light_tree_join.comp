@@ -3,7 +3,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
 #include "lib/vpl.glsl"
-#include "lib/vpl_tree.glsl"
+#include "igi/vpl_tree.glsl"
 
 layout(local_size_x = 64) in;
 

@@ -5,9 +5,9 @@
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
 #include "lib/gbuffer.glsl"
-#include "lib/igi_texel.glsl"
+#include "igi/texel.glsl"
 #include "lib/vpl.glsl"
-#include "lib/igi_near.glsl"
+#include "igi/near.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -22,7 +22,7 @@ layout(push_constant, scalar) uniform Push {
     uint number;  // which path of the texel
     uint paths;   // paths per texel
     uint factor;  // pixels along the side of a texel
-    uint scattered; // 1: the texel's pixel changes from texel to texel (lib/igi_texel.glsl)
+    uint scattered; // 1: the texel's pixel changes from texel to texel (igi/texel.glsl)
 };
 
 void main() {

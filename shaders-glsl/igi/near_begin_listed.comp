@@ -6,7 +6,7 @@
 #include "lib/screen.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/vpl.glsl"
-#include "lib/igi_near.glsl"
+#include "igi/near.glsl"
 
 layout(local_size_x = 64) in;
 

@@ -19,10 +19,10 @@
 #define SURFACE_BINDING 60
 #include "lib/hit_surface.glsl"
 #include "lib/trace.glsl"
-#include "lib/igi.glsl"
+#include "igi/igi.glsl"
 #include "lib/vpl.glsl"
-#include "lib/vpl_surface.glsl"
-#include "lib/igi_near.glsl"
+#include "igi/vpl_surface.glsl"
+#include "igi/near.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -34,7 +34,7 @@ layout(push_constant, scalar) uniform Push {
     uint number;   // which path of the receiver
 };
 
-#include "lib/vpl_direct.glsl"
+#include "igi/vpl_direct.glsl"
 
 // Maximum of punctual lights that are evaluated. With more lights, this many are chosen at random.
 const uint MOST_LAMPS = 16u;

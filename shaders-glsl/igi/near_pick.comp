@@ -7,8 +7,8 @@
 #include "lib/trace.glsl"
 #include "lib/vpl.glsl"
 #define VPL_NODES_BINDING 4
-#include "lib/vpl_tree.glsl"
-#include "lib/igi_near.glsl"
+#include "igi/vpl_tree.glsl"
+#include "igi/near.glsl"
 
 layout(local_size_x = 64) in;
 

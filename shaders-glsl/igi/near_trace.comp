@@ -10,8 +10,8 @@
 #include "lib/hit_surface.glsl"
 #include "lib/trace.glsl"
 #include "lib/vpl.glsl"
-#include "lib/vpl_surface.glsl"
-#include "lib/igi_near.glsl"
+#include "igi/vpl_surface.glsl"
+#include "igi/near.glsl"
 
 layout(local_size_x = 64) in;
 

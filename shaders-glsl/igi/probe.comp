@@ -8,7 +8,7 @@
 #include "lib/gbuffer.glsl"
 #include "lib/random.glsl"
 #include "lib/vpl.glsl"
-#include "lib/igi_history.glsl"
+#include "igi/history.glsl"
 
 layout(local_size_x = 64) in;
 

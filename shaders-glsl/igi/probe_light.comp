@@ -7,7 +7,7 @@
 #include "lib/random.glsl"
 #include "lib/trace.glsl"
 #include "lib/vpl.glsl"
-#include "lib/igi_history.glsl"
+#include "igi/history.glsl"
 
 layout(local_size_x = 64) in;
 

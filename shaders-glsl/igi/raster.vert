@@ -5,7 +5,7 @@
 #include "lib/scene.glsl"
 #include "lib/vpl.glsl"
 #include "lib/sampling.glsl"
-#include "lib/vpl_map.glsl"
+#include "igi/vpl_map.glsl"
 
 layout(binding = 1, scalar) readonly buffer Instances { Instance instances[]; };
 layout(binding = 2, scalar) readonly buffer Visible { uint visible[]; };

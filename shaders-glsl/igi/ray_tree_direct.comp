@@ -19,9 +19,9 @@
 #define SURFACE_BINDING 60
 #include "lib/hit_surface.glsl"
 #include "lib/trace.glsl"
-#include "lib/igi.glsl"
-#include "lib/vpl_surface.glsl"
-#include "lib/igi_ray_tree.glsl"
+#include "igi/igi.glsl"
+#include "igi/vpl_surface.glsl"
+#include "igi/ray_tree.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -33,7 +33,7 @@ layout(push_constant, scalar) uniform Push {
     uint nodes;
 };
 
-#include "lib/vpl_direct.glsl"
+#include "igi/vpl_direct.glsl"
 
 void main() {
     uint at = gl_GlobalInvocationID.x;

@@ -6,15 +6,15 @@
 #include "lib/random.glsl"
 #include "lib/trace.glsl"
 #include "lib/vpl.glsl"
-#include "lib/igi_ray_tree.glsl"
+#include "igi/ray_tree.glsl"
 #define VPL_NODES_BINDING 4
-#include "lib/vpl_tree.glsl"
+#include "igi/vpl_tree.glsl"
 
 layout(local_size_x = 64) in;
 
 layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; };
 
-#include "lib/vpl_picked.glsl"
+#include "igi/vpl_picked.glsl"
 
 layout(push_constant, scalar) uniform Push {
     uint first;      // pick

@@ -9,8 +9,8 @@
 #include "lib/random.glsl"
 #include "lib/trace.glsl"
 #include "lib/vpl.glsl"
-#include "lib/vpl_subset.glsl"
-#include "lib/igi_speck.glsl"
+#include "igi/vpl_subset.glsl"
+#include "igi/speck.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -20,7 +20,7 @@ layout(binding = 2) uniform sampler2D depth;
 layout(binding = 3, scalar) readonly buffer Vpls { Vpl vpls[]; };
 layout(binding = 4, rgba32f) uniform image2D irradiance; // a: luminance of the brightest coarse texel in the neighbourhood
 layout(binding = 5, scalar) readonly buffer Unmatched { uint unmatched_count; uint unmatched[]; }; // pixels, x | y << 16
-#include "lib/vpl_gather.glsl"
+#include "igi/vpl_gather.glsl"
 
 layout(push_constant, scalar) uniform Push {
     uint first;      // index of the first light within the pixel's subset

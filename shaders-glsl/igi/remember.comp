@@ -4,7 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/view.glsl"
 #include "lib/vpl.glsl"
-#include "lib/igi_history.glsl"
+#include "igi/history.glsl"
 
 layout(local_size_x = 64) in;
 

@@ -14,9 +14,9 @@
 #define SURFACE_BINDING 1
 #include "lib/hit_surface.glsl"
 #include "lib/trace.glsl"
-#include "lib/igi.glsl"
+#include "igi/igi.glsl"
 #include "lib/vpl.glsl"
-#include "lib/vpl_surface.glsl"
+#include "igi/vpl_surface.glsl"
 
 layout(local_size_x = 64) in;
 

@@ -5,8 +5,8 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
 #include "lib/view.glsl"
-#include "lib/igi_texel.glsl"
-#include "lib/igi_plane.glsl"
+#include "igi/texel.glsl"
+#include "igi/plane.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -17,7 +17,7 @@ layout(binding = 3, rgba32f) uniform writeonly image2D irradiance;
 
 layout(push_constant, scalar) uniform Push {
     uint factor;     // pixels along the side of a texel
-    uint scattered;  // 1: the texel's pixel changes from texel to texel (lib/igi_texel.glsl)
+    uint scattered;  // 1: the texel's pixel changes from texel to texel (igi/texel.glsl)
     uint stride;     // distance of the filter's texels
     float sharpness; // exponent of the cosine between normals
     float range;     // distance from the texel's plane, relative to its depth, with weight 0.6; 0: the weight ignores depth

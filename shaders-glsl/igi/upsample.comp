@@ -5,8 +5,8 @@
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
 #include "lib/gbuffer.glsl"
-#include "lib/igi_texel.glsl"
-#include "lib/igi_plane.glsl"
+#include "igi/texel.glsl"
+#include "igi/plane.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -25,7 +25,7 @@ layout(push_constant, scalar) uniform Push {
     float sigma;     // of the Gaussian, coarse texels
     float sharpness; // exponent of the cosine between normals; the paper's 1
     float range;     // distance from the pixel's plane, relative to its depth, with weight 0.6; 0: the weight ignores depth (paper)
-    uint scattered;  // 1: the texel's pixel changes from texel to texel (lib/igi_texel.glsl)
+    uint scattered;  // 1: the texel's pixel changes from texel to texel (igi/texel.glsl)
     float least;     // minimum share of the Gaussian on matching coarse texels. With less, a wider Gaussian is tried; if this fails too, the
                      // pixel is listed. 0: the wider Gaussian is tried only if there is no texel at all
 };

@@ -7,8 +7,8 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
-#include "lib/isr.glsl"
-#include "lib/isr_views.glsl"
+#include "isr/isr.glsl"
+#include "isr/views.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 

@@ -13,7 +13,7 @@ struct EnvironmentMap {
 layout(binding = ENVIRONMENT_BINDING) uniform sampler2D environment_radiance_map; // W/(sr m2), latitude-longitude
 layout(binding = ENVIRONMENT_COLUMNS_BINDING, scalar) readonly buffer EnvironmentColumns { AliasEntry environment_columns[]; };
 
-// Azimuth and polar angle as fractions of their ranges, in the map's own frame. As lib/environment.glsl has it, but
+// Azimuth and polar angle as fractions of their ranges, in the map's own frame. As passes/environment.glsl has it, but
 // precise at the poles.
 vec2 environment_place(EnvironmentMap map, vec3 direction) {
     float s = sin(map.rotation), c = cos(map.rotation);

@@ -5,7 +5,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
-#include "lib/bilateral.glsl"
+#include "passes/bilateral.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 

@@ -5,7 +5,7 @@
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
 #include "lib/gbuffer.glsl"
-#include "lib/bilateral.glsl"
+#include "passes/bilateral.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -39,7 +39,7 @@ layout(push_constant, scalar) uniform Push {
     float epsilon;  // of the depth weight; same unit as the depth difference
 };
 
-#include "lib/ambient.glsl"
+#include "passes/ambient.glsl"
 
 // Below this share of the largest possible weight no coarse texel matches, and the nearest in depth is taken.
 const float NO_MATCH = 0.01;

@@ -3,7 +3,7 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
-#include "lib/downsample.glsl"
+#include "passes/downsample.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 

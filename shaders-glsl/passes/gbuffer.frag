@@ -2,4 +2,4 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
-#include "lib/gbuffer_fragment.glsl"
+#include "passes/gbuffer_fragment.glsl"

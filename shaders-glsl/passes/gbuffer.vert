@@ -1,4 +1,4 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
-#include "lib/gbuffer_vertex.glsl"
+#include "passes/gbuffer_vertex.glsl"

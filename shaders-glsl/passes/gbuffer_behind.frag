@@ -3,4 +3,4 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
 #define BEHIND
-#include "lib/gbuffer_fragment.glsl"
+#include "passes/gbuffer_fragment.glsl"

@@ -3,7 +3,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
 #include "lib/view.glsl"
-#include "lib/environment.glsl"
+#include "passes/environment.glsl"
 
 layout(location = 0) in vec2 uv;
 layout(location = 0) out vec4 radiance_out;

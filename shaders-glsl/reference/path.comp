@@ -21,7 +21,7 @@
 #define SURFACE_BINDING 1
 #include "lib/hit_surface.glsl"
 #include "lib/trace.glsl"
-#include "lib/path.glsl"
+#include "reference/path.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -39,8 +39,8 @@ layout(push_constant, scalar) uniform Push {
     uint rays;     // rays per path in this dispatch
 };
 
-#include "lib/path_sums.glsl"
-#include "lib/path_step.glsl"
+#include "reference/path_sums.glsl"
+#include "reference/path_step.glsl"
 
 // Pixel of a slot. Slots are ordered by blocks of 8 × 8 pixels, so that the rays of a workgroup are close to each other.
 uvec2 pixel_of(uint slot) {

@@ -1,8 +1,8 @@
-// The terms of lib/isr.glsl at given points: for comparison with the CPU reference.
+// The terms of isr/isr.glsl at given points: for comparison with the CPU reference.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
-#include "lib/isr.glsl"
+#include "isr/isr.glsl"
 layout(local_size_x = 64) in;
 struct TermQuery {
     vec3 p;

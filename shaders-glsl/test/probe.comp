@@ -1,7 +1,7 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
-#include "lib/probe.glsl"
+#include "test/probe.glsl"
 layout(local_size_x = 8, local_size_y = 4) in;
 layout(constant_id = 3) const uint SAMPLES = 48;
 layout(binding = 0) uniform sampler2DArray textures[3];

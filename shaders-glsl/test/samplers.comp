@@ -14,8 +14,8 @@
 #define INSTANCE_LIGHTS_BINDING 4
 #define LIGHT_NODES_BINDING 8
 #include "lib/light_sampling.glsl"
-#include "lib/path.glsl"
-#include "lib/sampler_names.glsl"
+#include "reference/path.glsl"
+#include "test/sampler_names.glsl"
 
 layout(local_size_x = 64) in;
 

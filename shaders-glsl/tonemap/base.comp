@@ -8,7 +8,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0) uniform sampler2D logarithm;
 layout(binding = 1) uniform sampler2D blocks;
 layout(binding = 2, r32f) uniform writeonly image2D base;
-#include "lib/tonemap_bilateral.glsl"
+#include "tonemap/bilateral.glsl"
 
 layout(push_constant, scalar) uniform Push { TonemapBilateral bilateral; };
 

@@ -3,7 +3,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-#include "lib/tonemap.glsl"
+#include "tonemap/tonemap.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -11,14 +11,14 @@ layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint HAS_MAP = 0;
 
 layout(binding = 0) uniform sampler2D luminance;
-#include "lib/tonemap_search.glsl"
+#include "tonemap/search.glsl"
 layout(binding = 1, scalar) readonly buffer Search { TonemapSearch search; };
 layout(binding = 2, scalar) uniform Kernels { TonemapKernels kernels; };
 layout(binding = 3) uniform sampler2D rows;
 layout(binding = 4, scalar) readonly buffer Statistics { TonemapStatistics statistics; };
 layout(binding = 5, r32f) uniform writeonly image2D adaptation;
 layout(binding = 6) uniform sampler2D importance;
-#include "lib/tonemap_span.glsl"
+#include "tonemap/span.glsl"
 
 layout(push_constant, scalar) uniform Push {
     int first;   // row in `rows`

@@ -2,9 +2,9 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
-#include "lib/tonemap.glsl"
-#include "lib/tonemap_ashikhmin.glsl"
-#include "lib/tonemap_curves.glsl"
+#include "tonemap/tonemap.glsl"
+#include "tonemap/ashikhmin.glsl"
+#include "tonemap/curves.glsl"
 
 // An invocation has a column of TONEMAP_CURVE_ROWS pixels.
 layout(local_size_x = 64) in;

@@ -5,7 +5,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-#include "lib/tonemap.glsl"
+#include "tonemap/tonemap.glsl"
 
 layout(local_size_x = 64) in;
 

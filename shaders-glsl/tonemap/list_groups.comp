@@ -3,7 +3,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
 
-#include "lib/tonemap_list.glsl"
+#include "tonemap/list.glsl"
 
 layout(local_size_x = 1) in;
 

@@ -2,17 +2,17 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
-#include "lib/tonemap.glsl"
+#include "tonemap/tonemap.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(binding = 0) uniform sampler2D luminance;
-#include "lib/tonemap_search.glsl"
+#include "tonemap/search.glsl"
 layout(binding = 1, scalar) readonly buffer Search { TonemapSearch search; };
 layout(binding = 2, scalar) readonly buffer Weights { float weights[]; };
 layout(binding = 3, scalar) readonly buffer Statistics { TonemapStatistics statistics; };
 layout(binding = 4, r32f) uniform writeonly image2D adaptation;
-#include "lib/tonemap_literal.glsl"
+#include "tonemap/literal.glsl"
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);

@@ -3,7 +3,7 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
-#include "lib/tonemap.glsl"
+#include "tonemap/tonemap.glsl"
 
 // An invocation has a column of TONEMAP_ROWS pixels.
 layout(local_size_x = 64) in;

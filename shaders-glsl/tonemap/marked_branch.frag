@@ -5,7 +5,7 @@
 
 layout(location = 0) out float adapted;
 layout(binding = 2) uniform sampler2D importance;
-#include "lib/tonemap_local.glsl"
+#include "tonemap/local.glsl"
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);

@@ -8,8 +8,8 @@ layout(local_size_x = 64) in;
 layout(binding = 2, scalar) readonly buffer Count { uint count; };
 layout(binding = 3, scalar) readonly buffer Pixels { uint pixels[]; };  // x in the low 16 bits, y in the high ones
 layout(binding = 4, r32f) uniform writeonly image2D adapted;
-#include "lib/tonemap_list.glsl"
-#include "lib/tonemap_local.glsl"
+#include "tonemap/list.glsl"
+#include "tonemap/local.glsl"
 
 void main() {
     uint index = list_group() * 64u + gl_LocalInvocationID.x;

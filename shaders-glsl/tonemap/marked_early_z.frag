@@ -6,7 +6,7 @@
 
 layout(early_fragment_tests) in;
 layout(location = 0) out float adapted;
-#include "lib/tonemap_local.glsl"
+#include "tonemap/local.glsl"
 
 void main() {
     adapted = tonemap_local(ivec2(gl_FragCoord.xy));

@@ -9,8 +9,8 @@ layout(binding = 2) uniform sampler2D importance;
 layout(binding = 3, scalar) readonly buffer Count { uint count; };
 layout(binding = 4, scalar) readonly buffer Tiles { uint tiles[]; };
 layout(binding = 5, r32f) uniform writeonly image2D adapted;
-#include "lib/tonemap_list.glsl"
-#include "lib/tonemap_local.glsl"
+#include "tonemap/list.glsl"
+#include "tonemap/local.glsl"
 
 void main() {
     uint index = list_group();

@@ -4,8 +4,8 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-#include "lib/tonemap.glsl"
-#include "lib/tonemap_kernels.glsl"
+#include "tonemap/tonemap.glsl"
+#include "tonemap/kernels.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 

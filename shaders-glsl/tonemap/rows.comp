@@ -8,10 +8,10 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(binding = 0) uniform sampler2D luminance;
-#include "lib/tonemap_search.glsl"
+#include "tonemap/search.glsl"
 layout(binding = 1, scalar) uniform Kernels { TonemapKernels kernels; };
 layout(binding = 2, rgba32f) uniform writeonly image2D rows;  // row of the band + group · rows of the band
-#include "lib/tonemap_span.glsl"
+#include "tonemap/span.glsl"
 
 layout(push_constant, scalar) uniform Push {
     int first;  // row of the band

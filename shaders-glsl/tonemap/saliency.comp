@@ -9,7 +9,7 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(binding = 0) uniform sampler2D levels[7];
-#include "lib/tonemap_importance.glsl"
+#include "tonemap/importance.glsl"
 
 // Level K at the centre of `pixel` of level 0, bilinearly, beyond the border the border.
 #define LEVEL(K)                                                                       \

@@ -3,13 +3,13 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
-#include "lib/tonemap.glsl"
+#include "tonemap/tonemap.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(binding = 0) uniform sampler2D luminance;
 layout(binding = 1, scalar) readonly buffer Statistics { TonemapStatistics statistics; };
-#include "lib/tonemap_importance.glsl"
+#include "tonemap/importance.glsl"
 
 float at(ivec2 pixel) {
     return texelFetch(luminance, clamp(pixel, ivec2(0), textureSize(luminance, 0) - 1), 0).r;

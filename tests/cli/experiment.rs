@@ -328,6 +328,14 @@ fn files_from_elsewhere_ask_for_no_work_without_bound() {
     }
 }
 
+#[test]
+fn settings_of_a_paper_are_refused_where_there_are_none() {
+    let place = Place::new();
+    let from = "settings = { bounces = 1 }";
+    place.file(&EXPERIMENT.replace(from, &format!("{from}\npaper = true")));
+    place.run("out", &[]).expect(3, &["no preset with the settings of the paper", "line"]);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_folder_from_elsewhere_names_no_file_outside_of_it() {

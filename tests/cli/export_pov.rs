@@ -7,13 +7,14 @@ use lucerna::{
     reference::path,
     scene::{
         Camera, Environment, Light, LightKind, Material, Mesh, Node, Pose, Primitive, Projection, Scene, Transform,
-        View, builtin, bvh::Bvh,
+        View, bvh::Bvh,
     },
 };
 use lucerna_samples::{
     args::Size,
     export_pov::{self, Export, Pov, povray},
 };
+use lucerna_scenes as builtin;
 use support::lucerna;
 
 /// Whether POV-Ray is there. Under CI it must be.

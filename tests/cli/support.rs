@@ -68,7 +68,9 @@ impl Ran {
 
 /// A file of the test assets. Without them: fails if `CI` is set, else says that the test is skipped.
 pub fn asset(path: &str) -> Option<PathBuf> {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/assets").join(path);
+    let file = Path::new(&std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into()))
+        .join("../../shared/assets")
+        .join(path);
     if file.exists() {
         return Some(file);
     }

@@ -8,7 +8,8 @@ use lucerna::{
     gpu::Gpu,
     graph::{Graph, Runner},
     reference::fiv::Vectors,
-    scene::{Environment, Material, Mesh, Node, Pose, Primitive, Scene, Transform, View, bvh::Bvh, resident::Resident},
+    resident::Resident,
+    scene::{Environment, Material, Mesh, Node, Pose, Primitive, Scene, Transform, View, bvh::Bvh},
     techniques::fiv::{Fiv, Occluder, Occluders, PictureSettings, Settings, Stored},
 };
 

@@ -45,7 +45,7 @@ pub fn compute(name: &'static str, source: &str) -> &'static Shader {
     };
     Box::leak(Box::new(Shader {
         name,
-        stages: Box::leak(Box::new([StageCode { stage: Stage::Compute, spirv }])),
+        stages: Box::leak(Box::new([StageCode { stage: Stage::Compute, file: "", spirv }])),
         bindings: Box::leak(Box::new([binding("from", 0, Access::Read), binding("to", 1, Access::Write)])),
         push_size: 0,
         workgroup: [64, 1, 1],

@@ -8,7 +8,8 @@ use glam::Vec3;
 use lucerna::{
     gpu::Gpu,
     graph::{Graph, Runner},
-    scene::{Material, Pose, Scene, View, resident::Resident},
+    resident::Resident,
+    scene::{Material, Pose, Scene, View},
     shaders::types,
     techniques::igi::{Igi, PictureSettings, Settings},
 };

@@ -1,4 +1,4 @@
-//! CPU implementation (twin) of `lib/vpl_tree.glsl` in double precision: estimates of nodes, picks of virtual lights, and their probabilities.
+//! CPU implementation (twin) of `igi/vpl_tree.glsl` in double precision: estimates of nodes, picks of virtual lights, and their probabilities.
 #![allow(dead_code)]
 
 use glam::{DVec3, Vec3};

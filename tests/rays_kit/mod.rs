@@ -6,7 +6,8 @@ use lucerna::{
     gpu::Gpu,
     graph::{BufferRead, Graph, Runner},
     rays::Rays,
-    scene::{Pose, Scene, bvh, resident::Resident},
+    resident::Resident,
+    scene::{Pose, Scene, bvh},
     shaders::{test::trace, types},
 };
 

@@ -5,11 +5,9 @@ use glam::{DVec3, Mat4, Vec3};
 use lucerna::{
     gpu::Gpu,
     image::Layers,
-    reference::{
-        path,
-        tracer::{self, Filter, Tracer},
-    },
+    reference::path,
     scene::{LightKind, Material, Pose, Scene, View, bvh::Bvh},
+    tracer::{self, Filter, Tracer},
 };
 
 use crate::tracer_lab::Stage;

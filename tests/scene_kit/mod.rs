@@ -6,10 +6,8 @@ use lucerna::{
     gpu::Gpu,
     graph::{Frame, Graph, ImageRead, Runner},
     passes::gbuffer::{self, GBuffer, Normals, Settings},
-    scene::{
-        Camera, Light, LightKind, Material, Mesh, Node, Primitive, Projection, Scene, Transform, View,
-        resident::Resident,
-    },
+    resident::Resident,
+    scene::{Camera, Light, LightKind, Material, Mesh, Node, Primitive, Projection, Scene, Transform, View},
 };
 
 pub const PI: f32 = std::f32::consts::PI;
@@ -90,7 +88,7 @@ pub fn view(eye: Vec3, target: Vec3, extent: [u32; 2]) -> View {
 pub fn frame<T>(
     gpu: &Gpu,
     scene: &Scene,
-    declare: impl FnOnce(&mut Graph, &lucerna::scene::resident::Handles) -> T,
+    declare: impl FnOnce(&mut Graph, &lucerna::resident::Handles) -> T,
 ) -> (Frame, T) {
     let mut resident = Resident::new(gpu, scene).unwrap();
     let mut runner = Runner::new(gpu);

@@ -5,8 +5,8 @@ use glam::{Mat4, Vec3, Vec4};
 use lucerna::{
     gpu::Gpu,
     image::Layers,
-    reference::tracer::{Filter, Settings, Tracer},
     scene::{Camera, Light, LightKind, Material, Mesh, Node, Pose, Primitive, Projection, Scene, Transform, View},
+    tracer::{Filter, Settings, Tracer},
 };
 
 /// Builds scenes of a few triangles.

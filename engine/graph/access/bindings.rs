@@ -3,6 +3,7 @@
 use super::Collector;
 use crate::{
     graph::{
+        args::Bind,
         format::{Class, Format},
         handles::{Image, Sampler},
         pass::Bound,
@@ -29,17 +30,17 @@ impl Collector<'_> {
             for element in 0..binding.count {
                 let role = if binding.count > 1 { format!("{}[{element}]", binding.name) } else { binding.name.into() };
                 let resource = resources.next();
-                if let Some(shader::Resource::Image(image)) = resource {
+                if let Some(Bind::Image(image)) = resource {
                     self.texels(*image, binding, &role);
                 }
                 match (binding.kind, resource) {
-                    (BindingKind::Sampled(dim), Some(shader::Resource::Image(image))) => {
+                    (BindingKind::Sampled(dim), Some(Bind::Image(image))) => {
                         self.sampled(*image, dim, stages, &role);
                     }
-                    (BindingKind::Storage(dim), Some(shader::Resource::Image(image))) => {
+                    (BindingKind::Storage(dim), Some(Bind::Image(image))) => {
                         self.storage(*image, dim, stages, binding.access, &role);
                     }
-                    (BindingKind::Buffer, Some(shader::Resource::Buffer(buffer))) => {
+                    (BindingKind::Buffer, Some(Bind::Buffer(buffer))) => {
                         self.buffer(*buffer, stages, storage_access(binding.access), Usage::STORAGE, &role);
                         if !buffer.offset.is_multiple_of(BINDING_ALIGNMENT) {
                             let what = format!(
@@ -49,13 +50,13 @@ impl Collector<'_> {
                             self.mistake(MistakeKind::Range, self.buffer_name(*buffer), what);
                         }
                     }
-                    (BindingKind::Uniform { size }, Some(shader::Resource::Uniform(slice))) => {
+                    (BindingKind::Uniform { size }, Some(Bind::Uniform(slice))) => {
                         if self.own(slice.graph, "uniform block") && slice.size < size {
                             let what = format!("the shader reads {size} bytes, but it has {}", slice.size);
                             self.mistake(MistakeKind::Shape, role, what);
                         }
                     }
-                    (BindingKind::AccelerationStructure, Some(shader::Resource::Accel(accel))) => {
+                    (BindingKind::AccelerationStructure, Some(Bind::Accel(accel))) => {
                         self.traced(*accel, stages, &role);
                     }
                     _ => self.mistake(MistakeKind::Shape, role, "this kind of resource cannot be bound"),

@@ -30,7 +30,7 @@ impl<'a> Collector<'a> {
                     c.buffer(*b, Stages::TRANSFER, Access::TRANSFER_WRITE, Usage::COPY_TO, "upload");
                 }
             }
-            Work::Compute { bound, groups } => {
+            Work::Compute { bound, groups, .. } => {
                 c.bound(bound);
                 if let Groups::Indirect { buffer, offset } = groups {
                     c.commands(*buffer, *offset, 12);

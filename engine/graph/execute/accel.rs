@@ -51,7 +51,7 @@ impl Recorder<'_> {
             });
             scratch += bottom_scratch(layout, build);
         }
-        owned.record_bottoms(self.commands, &inputs);
+        owned.record_bottoms(&mut self.commands, &inputs);
         Ok(())
     }
 
@@ -59,7 +59,7 @@ impl Recorder<'_> {
         let owned = self.owned_accel(accel)?.clone();
         let scratch = self.address(scratch)?.next_multiple_of(owned.layout().scratch_alignment);
         let instances = self.address(instances)?;
-        owned.record_top(self.commands, instances, count, scratch);
+        owned.record_top(&mut self.commands, instances, count, scratch);
         Ok(())
     }
 }

@@ -4,6 +4,7 @@ use ash::vk;
 
 use super::{
     super::{
+        args::Bind,
         format::Class,
         handles::{Image, Sampler},
         pass::Bound,
@@ -16,7 +17,7 @@ use super::{
 use crate::{
     Error, ErrorKind, Result,
     gpu::{Pipeline, SamplerDesc, ViewDesc},
-    shader::{BindingKind, Dim, Resource},
+    shader::{BindingKind, Dim},
 };
 
 /// Descriptors of one binding: position in the list of image or buffer infos.
@@ -27,7 +28,7 @@ enum Place {
 }
 
 impl Recorder<'_> {
-    /// Binds pipeline, descriptors and push constants of pass `pass`.
+    /// Binds pipeline and descriptors of pass `pass`.
     pub fn bind(&mut self, pass: usize, bound: &Bound, pipeline: &Pipeline) -> Result<()> {
         let device = self.gpu.device();
         let raw = self.commands.raw();
@@ -41,12 +42,23 @@ impl Recorder<'_> {
                 device.cmd_bind_descriptor_sets(raw, pipeline.bind_point, pipeline.layout, 0, &[set], &[]);
             }
         }
-        if !bound.push.is_empty() {
-            let device = self.gpu.device();
-            // SAFETY: as many bytes as the layout has, for the stages it has them for.
-            unsafe { device.cmd_push_constants(raw, pipeline.layout, pipeline.push_stages, 0, &bound.push) };
-        }
         Ok(())
+    }
+
+    /// Sets the push constants.
+    pub fn push(&mut self, bound: &Bound, pipeline: &Pipeline) {
+        self.push_bytes(&bound.push, pipeline);
+    }
+
+    /// Sets the push constants to `bytes`, as many as the pass declared.
+    pub fn push_bytes(&mut self, bytes: &[u8], pipeline: &Pipeline) {
+        if !bytes.is_empty() {
+            let device = self.gpu.device();
+            // SAFETY: in recording; as many bytes as the layout has, for the stages it has them for.
+            unsafe {
+                device.cmd_push_constants(self.commands.raw(), pipeline.layout, pipeline.push_stages, 0, bytes);
+            }
+        }
     }
 
     fn descriptors(&mut self, pass: usize, bound: &Bound, pipeline: &Pipeline) -> Result<vk::DescriptorSet> {
@@ -68,7 +80,7 @@ impl Recorder<'_> {
             });
             for _ in 0..binding.count {
                 match (binding.kind, resources.next()) {
-                    (BindingKind::Sampled(dim), Some(Resource::Image(image))) => {
+                    (BindingKind::Sampled(dim), Some(Bind::Image(image))) => {
                         let layout = uses.next().map_or(Layout::ShaderRead, |u| u.layout);
                         images.push(
                             vk::DescriptorImageInfo::default()
@@ -77,7 +89,7 @@ impl Recorder<'_> {
                                 .sampler(self.sampler(*image)?),
                         );
                     }
-                    (BindingKind::Storage(dim), Some(Resource::Image(image))) => {
+                    (BindingKind::Storage(dim), Some(Bind::Image(image))) => {
                         uses.next();
                         images.push(
                             vk::DescriptorImageInfo::default()
@@ -85,7 +97,7 @@ impl Recorder<'_> {
                                 .image_layout(vk::ImageLayout::GENERAL),
                         );
                     }
-                    (BindingKind::Uniform { size }, Some(Resource::Uniform(slice))) => {
+                    (BindingKind::Uniform { size }, Some(Bind::Uniform(slice))) => {
                         let Some(arena) = &self.uniforms else { return Err(mismatch(binding.name)) };
                         let limit = self.gpu.caps().limits.uniform_range;
                         if u64::from(size) > limit {
@@ -101,7 +113,7 @@ impl Recorder<'_> {
                                 .range(size.into()),
                         );
                     }
-                    (BindingKind::Buffer, Some(Resource::Buffer(buffer))) => {
+                    (BindingKind::Buffer, Some(Bind::Buffer(buffer))) => {
                         uses.next();
                         let raw = self.raw_buffer(*buffer)?;
                         let limit = self.gpu.caps().limits.storage_range;
@@ -118,7 +130,7 @@ impl Recorder<'_> {
                                 .range(buffer.size.max(4)),
                         );
                     }
-                    (BindingKind::AccelerationStructure, Some(Resource::Accel(accel))) => {
+                    (BindingKind::AccelerationStructure, Some(Bind::Accel(accel))) => {
                         uses.next();
                         accels.push(self.owned_accel(*accel)?.raw());
                     }

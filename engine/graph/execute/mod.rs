@@ -3,6 +3,7 @@
 
 mod accel;
 mod bind;
+mod over;
 mod parts;
 mod pool;
 mod record;
@@ -15,7 +16,7 @@ use std::{borrow::Borrow, sync::Arc, time::Instant};
 use ash::vk;
 
 use self::{
-    parts::Parts,
+    parts::{Pace, Parts},
     pool::{Memory, Pool, device_format},
     record::Recorder,
 };
@@ -33,6 +34,8 @@ use crate::{
     gpu::{BufferDesc, DescriptorArena, Gpu, OwnedBuffer, Statistics, Timestamps},
 };
 
+/// Timestamps are taken when all commands before them have ended.
+const END: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::ALL_COMMANDS;
 /// Contents of uploaded buffers start at multiples of this in the staging buffer.
 const STAGING_ALIGNMENT: u64 = 16;
 
@@ -46,6 +49,8 @@ pub struct Runner {
     staging: Option<OwnedBuffer>,
     timestamps: Option<Timestamps>,
     statistics: Option<Statistics>,
+    pace: Pace,
+    dispatch_rays: Option<u64>,
 }
 
 impl Runner {
@@ -59,12 +64,21 @@ impl Runner {
             staging: None,
             timestamps: None,
             statistics: None,
+            pace: Pace::default(),
+            dispatch_rays: None,
         }
     }
 
     /// The device it runs on.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
+    }
+
+    /// Dispatches of passes with long loops ([`Graph::compute_over`]) have about `rays` rays. By default a dispatch takes up to about a
+    /// second on a CPU driver, and tens of milliseconds on a GPU. Another limit rounds sums of light otherwise.
+    #[must_use]
+    pub fn dispatch_rays(self, rays: u64) -> Self {
+        Self { dispatch_rays: Some(rays.max(1)), ..self }
     }
 
     /// Forgets all history: the next frame is a first one.
@@ -117,81 +131,64 @@ impl Runner {
         if counted > 0 && self.statistics.as_ref().is_none_or(|s| s.count() < counted) {
             self.statistics = Some(Statistics::new(&self.gpu, counted.next_power_of_two())?);
         }
+        let statistics = self.statistics.as_ref().filter(|_| counted > 0);
         let held = (memory.clone(), self.uniforms.clone(), self.staging.clone());
-        let mut parts = Parts::new(&self.gpu, graph.name(), Arc::new(held));
+        let parts = Parts::new(&self.gpu, graph.name(), Arc::new(held), &mut self.pace);
         let mut commands = parts.begin()?;
         transfer::clear_fresh(&self.gpu, &mut commands, &fresh);
-        let end = vk::PipelineStageFlags2::ALL_COMMANDS;
         if let Some(timestamps) = &self.timestamps {
             timestamps.reset(&mut commands);
-            timestamps.write(&mut commands, 0, end);
+            timestamps.write(&mut commands, 0, END);
         }
-        let statistics = self.statistics.as_ref().filter(|_| counted > 0);
         if let Some(statistics) = statistics {
             statistics.reset(&mut commands);
         }
-        // Of each pass, the query that counts it.
-        let mut queries = Vec::with_capacity(plan.passes.len());
+        let limits = over::limits(&self.gpu, graph, self.dispatch_rays)?;
+        // For each pass, the query that counts it.
+        let mut queries: Vec<Option<u32>> = Vec::with_capacity(plan.passes.len());
         let mut times = Vec::with_capacity(plan.passes.len());
-        let mut recorder = Recorder {
-            gpu: &self.gpu,
-            graph,
-            plan,
-            memory: &memory,
-            uniforms: self.uniforms.clone(),
-            staging: self.staging.clone(),
-            sets: &mut self.sets,
-            commands: &mut commands,
-        };
-        let declared = plan.upload.iter().chain(&graph.passes);
-        let mut open: &[String] = &[];
-        for (index, (pass, Pass { work, counted, rays, .. })) in plan.passes.iter().zip(declared).enumerate() {
-            if parts.is_full(*rays) {
-                open = labels(recorder.commands, open, &[]);
-                let next = parts.begin()?;
-                parts.push(std::mem::replace(recorder.commands, next));
-            }
-            let begun = Instant::now();
-            open = labels(recorder.commands, open, &pass.scope);
-            recorder.barriers(plan.barriers_before(index));
-            recorder.commands.begin_pass(&pass.name);
-            let query = counted.then(|| queries.iter().flatten().count() as u32);
+        let (uniforms, staging, sets) = (self.uniforms.clone(), self.staging.clone(), &mut self.sets);
+        let gpu = &self.gpu;
+        let open: &[String] = &[];
+        let mut recorder =
+            Recorder { gpu, graph, plan, memory: &memory, uniforms, staging, sets, commands, parts, open, limits };
+        let mut ran = Ok(());
+        for (index, declared) in plan.upload.iter().chain(&graph.passes).enumerate() {
+            let (begun, waited) = (Instant::now(), recorder.parts.waited());
+            let query = declared.counted.then(|| queries.iter().flatten().count() as u32);
             queries.push(query);
-            if let (Some(statistics), Some(query)) = (statistics, query) {
-                statistics.begin(recorder.commands, query);
+            match recorder.pass(index, declared, statistics.zip(query)) {
+                Ok(launches) => {
+                    if let Some(timestamps) = &self.timestamps {
+                        timestamps.write(&mut recorder.commands, index as u32 + 1, END);
+                    }
+                    let Pass { name, scope, .. } = declared;
+                    let spent = begun.elapsed().saturating_sub(recorder.parts.waited() - waited);
+                    let (cpu_ms, name, scope) = (spent.as_secs_f64() * 1e3, name.clone(), scope.clone());
+                    times.push(PassTime { name, scope, launches, gpu_ms: None, cpu_ms, started: None });
+                }
+                Err(error) => {
+                    ran = Err(error);
+                    break;
+                }
             }
-            let recorded = recorder.work(index, work);
-            if let (Some(statistics), Some(query)) = (statistics, query) {
-                statistics.end(recorder.commands, query);
-            }
-            recorder.commands.end_pass();
-            recorded.map_err(|e| e.at(&pass.name))?;
-            if let Some(timestamps) = &self.timestamps {
-                timestamps.write(recorder.commands, index as u32 + 1, end);
-            }
-            let (name, scope) = (pass.name.clone(), pass.scope.clone());
-            times.push(PassTime {
-                name,
-                scope,
-                launches: work.launches(),
-                gpu_ms: None,
-                cpu_ms: milliseconds(begun),
-                started: None,
-            });
         }
-        labels(recorder.commands, open, &[]);
-        recorder.barriers(plan.barriers_before(plan.passes.len()));
-        parts.push(commands);
-        let cpu_ms = milliseconds(begun);
-        let submitted = Instant::now();
-        let (submissions, ran) = parts.run();
+        if ran.is_ok() {
+            recorder.end(plan.passes.len());
+        }
+        let Recorder { commands, mut parts, .. } = recorder;
+        let ran = ran.and_then(|()| parts.finish(commands));
+        let (submissions, waited) = (parts.given(), parts.waited());
+        // Parts that are still running are waited for here.
+        drop(parts);
         if let Err(error) = ran {
             if submissions > 0 {
                 self.forget_where_things_are(plan, &memory);
             }
             return Err(error);
         }
-        let wait_ms = milliseconds(submitted);
+        let wait_ms = waited.as_secs_f64() * 1e3;
+        let cpu_ms = milliseconds(begun) - wait_ms;
 
         accel::remember_built(graph);
         if turn {

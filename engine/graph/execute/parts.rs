@@ -1,36 +1,96 @@
-//! A long graph in parts, each a submission of its own: a system that takes a device for stuck counts by submissions, and so does
-//! [`Submission::wait`].
+//! A long graph in parts, each a submission of its own: an operating system resets a GPU that works for seconds on one submission, and
+//! [`Submission::wait`] gives up a submission that does not end. Measured times of parts decide the length of those that follow.
 
-use std::{any::Any, collections::VecDeque, sync::Arc};
+use std::{
+    any::Any,
+    collections::VecDeque,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use crate::{
     Result,
     gpu::{Commands, Gpu, Submission},
 };
 
-/// Rays of a part, about: tenths of a second on a GPU, some seconds on a CPU driver.
-const MOST: u64 = 1 << 26;
-/// What a pass counts for that says less of itself. Each of so many passes in a part has a mark of its own for messages.
-const LEAST: u64 = MOST / 1024;
-
-/// Parts that the device is given before it has done the first: it is never idle.
+/// Passes of a part. Each has a mark of its own for messages.
+const MOST_PASSES: u32 = 1024;
+/// Parts that the device has at one time: it is never idle, and little is left to be done when it is asked to stop.
 const AHEAD: usize = 2;
+/// The time that a part should take.
+const AIM: Duration = Duration::from_millis(200);
+/// A part has at most this many times the rays of a part whose time is known.
+const GROWTH: u64 = 4;
+/// Rays of the first part: milliseconds on a GPU, about a second on a CPU driver.
+const START: u64 = 1 << 22;
+/// Passes that say nothing about their rays would otherwise cause parts of a few milliseconds.
+const LEAST: u64 = 1 << 18;
+/// An upper limit.
+const MOST: u64 = 1 << 36;
+
+/// The number of rays per part, for all graphs of a runner.
+#[derive(Debug)]
+pub(super) struct Pace {
+    rays: u64,
+}
+
+impl Default for Pace {
+    fn default() -> Self {
+        Self { rays: START }
+    }
+}
+
+impl Pace {
+    #[cfg(test)]
+    pub fn of(rays: u64) -> Self {
+        Self { rays }
+    }
+
+    /// Takes account of a part of `rays` rays that ran for `time`. A part that ended with its graph has fewer rays than allowed, and shows only
+    /// that a part may be too long. The time of a part with very few rays is that of other work.
+    fn took(&mut self, rays: u64, time: Duration) {
+        if rays < self.rays / 16 {
+            return;
+        }
+        let ideal = u128::from(rays) * AIM.as_nanos() / time.as_nanos().max(1);
+        let ideal = u64::try_from(ideal).unwrap_or(u64::MAX);
+        let full = rays >= self.rays / 2;
+        if full || ideal < self.rays {
+            self.rays = ideal.min(self.rays.saturating_mul(GROWTH)).clamp(LEAST, MOST);
+        }
+    }
+}
+
+/// A part that the device has.
+struct Running {
+    submission: Submission,
+    submitted: Instant,
+    rays: u64,
+}
 
 /// The parts of one graph.
 pub(super) struct Parts<'a> {
     gpu: &'a Gpu,
     name: &'a str,
-    /// What all parts use.
+    /// The resources of all parts.
     held: Arc<dyn Any + Send + Sync>,
-    /// Rays of the part in recording.
+    pace: &'a mut Pace,
+    /// Rays and passes of the part in recording.
     rays: u64,
-    recorded: Vec<Commands>,
+    passes: u32,
+    running: VecDeque<Running>,
+    /// Number of parts that the device was given.
+    given: usize,
+    /// When the last part that was waited for had ended.
+    ended: Option<Instant>,
+    waited: Duration,
 }
 
 impl<'a> Parts<'a> {
-    /// None yet. `held` lives until the last is done.
-    pub fn new(gpu: &'a Gpu, name: &'a str, held: Arc<dyn Any + Send + Sync>) -> Self {
-        Self { gpu, name, held, rays: 0, recorded: Vec::new() }
+    /// None yet. `held` lives until the last part has ended.
+    pub fn new(gpu: &'a Gpu, name: &'a str, held: Arc<dyn Any + Send + Sync>, pace: &'a mut Pace) -> Self {
+        let running = VecDeque::with_capacity(AHEAD);
+        Self { gpu, name, held, pace, rays: 0, passes: 0, running, given: 0, ended: None, waited: Duration::ZERO }
     }
 
     /// Begins recording a part.
@@ -40,38 +100,97 @@ impl<'a> Parts<'a> {
         Ok(commands)
     }
 
-    /// Counts a pass of `rays` rays; true if it begins a new part.
+    /// Whether the part is full before a pass, or a dispatch of a pass, of `rays` rays. If it is not, the rays are counted; if it is,
+    /// [`Self::submit`] must follow.
     pub fn is_full(&mut self, rays: u64) -> bool {
-        let rays = rays.max(LEAST);
-        let full = self.rays > 0 && self.rays.saturating_add(rays) > MOST;
-        self.rays = if full { rays } else { self.rays.saturating_add(rays) };
+        let all = self.rays.saturating_add(rays);
+        let full = self.passes > 0 && (all > self.pace.rays || self.passes == MOST_PASSES);
+        if !full {
+            (self.rays, self.passes) = (all, self.passes + 1);
+        }
         full
     }
 
-    /// Keeps a part until all are recorded: where recording fails the device has done nothing.
-    pub fn push(&mut self, commands: Commands) {
-        self.recorded.push(commands);
+    /// Gives the part to the device, and waits for an earlier one if it has enough. The next part begins with `rays` rays.
+    ///
+    /// # Errors
+    /// `Interrupted`, `DeviceLost`, `OutOfMemory`.
+    pub fn submit(&mut self, commands: Commands, rays: u64) -> Result<()> {
+        if self.running.len() == AHEAD {
+            self.wait()?;
+        }
+        self.gpu.stop().map_or(Ok(()), crate::Stop::check)?;
+        let submission = commands.submit()?;
+        self.running.push_back(Running { submission, submitted: Instant::now(), rays: self.rays });
+        self.given += 1;
+        (self.rays, self.passes) = (rays, 1);
+        Ok(())
     }
 
-    /// Hands all parts to the device and waits for them in their order, so that the time that one may take is its own. At most
-    /// [`AHEAD`] are in flight, so that little is left to be done when it is asked to stop. Gives how many the device was given, and
-    /// whether all are done.
-    pub fn run(self) -> (usize, Result<()>) {
-        let stop = self.gpu.stop();
-        let mut running = VecDeque::with_capacity(AHEAD);
-        let mut given = 0;
-        for commands in self.recorded {
-            let ready = match running.len() {
-                AHEAD => running.pop_front().map_or(Ok(()), Submission::wait),
-                _ => Ok(()),
-            };
-            // Those before are waited for where they are dropped.
-            match ready.and_then(|()| stop.map_or(Ok(()), crate::Stop::check)).and_then(|()| commands.submit()) {
-                Ok(submission) => running.push_back(submission),
-                Err(error) => return (given, Err(error)),
-            }
-            given += 1;
+    /// Waits for the oldest part.
+    fn wait(&mut self) -> Result<()> {
+        let Some(Running { submission, submitted, rays }) = self.running.pop_front() else { return Ok(()) };
+        let begun = Instant::now();
+        let done = submission.wait();
+        let now = Instant::now();
+        self.waited += now - begun;
+        done?;
+        // It began when it was submitted, or when the part before it had ended.
+        let from = self.ended.map_or(submitted, |ended| ended.max(submitted));
+        self.pace.took(rays, now - from);
+        self.ended = Some(now);
+        Ok(())
+    }
+
+    /// Number of parts that the device was given.
+    pub fn given(&self) -> usize {
+        self.given
+    }
+
+    /// Time spent waiting.
+    pub fn waited(&self) -> Duration {
+        self.waited
+    }
+
+    /// Submits the last part and waits for all.
+    ///
+    /// # Errors
+    /// As [`Self::submit`].
+    pub fn finish(&mut self, commands: Commands) -> Result<()> {
+        self.submit(commands, 0)?;
+        while !self.running.is_empty() {
+            self.wait()?;
         }
-        (given, running.into_iter().try_for_each(Submission::wait))
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_approach_the_time_that_they_should_take() {
+        for rays_per_second in [1e6, 2e7, 1e9, 3e10] {
+            let mut pace = Pace::default();
+            for _ in 0..12 {
+                let time = Duration::from_secs_f64(pace.rays as f64 / rays_per_second);
+                pace.took(pace.rays, time);
+            }
+            let seconds = pace.rays as f64 / rays_per_second;
+            let least = LEAST as f64 / rays_per_second;
+            assert!((seconds - AIM.as_secs_f64().max(least)).abs() < 0.01, "{seconds} s at {rays_per_second} rays/s");
+        }
+    }
+
+    #[test]
+    fn short_graphs_do_not_change_the_pace_and_slow_ones_do() {
+        let mut pace = Pace::default();
+        pace.took(10, Duration::from_micros(1));
+        assert_eq!(pace.rays, START);
+        pace.took(1 << 20, Duration::from_millis(800));
+        assert_eq!(pace.rays, LEAST);
+        pace.took(LEAST, Duration::from_nanos(0));
+        assert_eq!(pace.rays, 4 * LEAST);
     }
 }

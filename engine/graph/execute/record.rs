@@ -7,6 +7,7 @@ use super::{
         Graph,
         format::{Class, Extent, Format},
         handles::{Buffer, Image},
+        over::Limits,
         pass::{Bound, Groups, Work},
         plan::{Barrier, Plan},
         raster::{Depth, Draw, DrawKind, Load, Raster, StencilLoad, Targets},
@@ -14,11 +15,12 @@ use super::{
         vulkan,
     },
     bind::mismatch,
+    parts::Parts,
     pool::{Memory, device_format},
 };
 use crate::{
     Error, ErrorKind, Result,
-    gpu::{Commands, DescriptorArena, Gpu, OwnedBuffer, RasterState, Stencil, ViewDesc},
+    gpu::{Commands, DescriptorArena, Gpu, OwnedBuffer, Pipeline, RasterState, Stencil, ViewDesc},
 };
 
 /// Everything that recording needs.
@@ -32,7 +34,11 @@ pub(super) struct Recorder<'a> {
     /// Contents of the buffers of the upload pass, one after the other.
     pub staging: Option<OwnedBuffer>,
     pub sets: &'a mut DescriptorArena,
-    pub commands: &'a mut Commands,
+    pub commands: Commands,
+    pub parts: Parts<'a>,
+    /// Labels that are open.
+    pub open: &'a [String],
+    pub limits: Limits,
 }
 
 impl Recorder<'_> {
@@ -119,7 +125,11 @@ impl Recorder<'_> {
     /// Records what pass `index` does.
     pub fn work(&mut self, index: usize, work: &Work) -> Result<()> {
         match work {
-            Work::Compute { bound, groups } => self.compute(index, bound, groups),
+            Work::Compute { bound, groups, .. } => {
+                let pipeline = self.prepare(index, bound)?;
+                self.push(bound, &pipeline);
+                self.dispatch(groups)
+            }
             Work::Raster { bound, targets, state, draw } => self.raster(index, bound, targets, state, draw),
             Work::BuildBottoms { accel, builds, scratch } => self.build_bottoms(*accel, builds, *scratch),
             Work::BuildTop { accel, instances, count, scratch } => self.build_top(*accel, *instances, *count, *scratch),
@@ -127,9 +137,27 @@ impl Recorder<'_> {
         }
     }
 
-    fn compute(&mut self, index: usize, bound: &Bound, groups: &Groups) -> Result<()> {
+    /// Binds pipeline and descriptors of a compute pass.
+    pub fn prepare(&mut self, index: usize, bound: &Bound) -> Result<Pipeline> {
         let pipeline = self.gpu.compute_pipeline(bound.shader, &bound.spec)?;
         self.bind(index, bound, &pipeline)?;
+        Ok(pipeline)
+    }
+
+    /// A dispatch waits for the one before it in the same pass.
+    pub fn between_dispatches(&mut self) {
+        let barrier = [vk::MemoryBarrier2::default()
+            .src_stage_mask(vk::PipelineStageFlags2::COMPUTE_SHADER)
+            .src_access_mask(vk::AccessFlags2::SHADER_WRITE)
+            .dst_stage_mask(vk::PipelineStageFlags2::COMPUTE_SHADER)
+            .dst_access_mask(vk::AccessFlags2::SHADER_READ | vk::AccessFlags2::SHADER_WRITE)];
+        let info = vk::DependencyInfo::default().memory_barriers(&barrier);
+        // SAFETY: in recording, outside of rendering.
+        unsafe { self.gpu.device().cmd_pipeline_barrier2(self.commands.raw(), &info) };
+    }
+
+    /// Records the dispatch of what [`Self::prepare`] bound.
+    pub fn dispatch(&mut self, groups: &Groups) -> Result<()> {
         let raw = self.commands.raw();
         match groups {
             Groups::Direct(groups) => {
@@ -191,6 +219,7 @@ impl Recorder<'_> {
         }
         // Descriptors first: an error must not leave rendering open.
         self.bind(index, bound, &pipeline)?;
+        self.push(bound, &pipeline);
         let raw = self.commands.raw();
         let [x, y, w, h] = targets.area.unwrap_or([0, 0, full.width, full.height]);
         let (near, far) = draw.depth.map_or((0.0, 1.0), |d| (d, d));

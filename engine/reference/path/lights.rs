@@ -1,6 +1,6 @@
 //! What shines: punctual lights and emissive triangles.
 
-use super::surface::Surfaces;
+use crate::scene::surfaces::Surfaces;
 use crate::scene::{Light, LightKind, Node, Pose, Scene, bvh::Bvh};
 use glam::{Mat4, Vec3};
 

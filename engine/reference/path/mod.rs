@@ -9,18 +9,17 @@
 mod lights;
 mod random;
 mod scatter;
-pub(crate) mod surface;
 
 use crate::scene::{
     Pose, Scene, View,
     bvh::{Bvh, Hit, Ray, Step},
+    surfaces::{self, Face, Surfaces},
 };
 use glam::{Mat4, Vec3};
 use lights::{Lamps, Placed};
 use random::{Random, hash_to_unit};
 use scatter::Event;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use surface::{Face, Surfaces};
 
 /// Which lights there are. Those left out neither light nor show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -477,7 +476,7 @@ impl Tracer<'_> {
     }
 
     fn environment(&self, direction: Vec3) -> Vec3 {
-        self.scene.environment.as_ref().map_or(Vec3::ZERO, |e| surface::environment(e, direction.normalize()))
+        self.scene.environment.as_ref().map_or(Vec3::ZERO, |e| surfaces::environment(e, direction.normalize()))
     }
 }
 

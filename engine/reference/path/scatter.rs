@@ -1,9 +1,7 @@
 //! How surfaces send light on.
 
-use super::{
-    random::{Random, cosine_direction, facet},
-    surface::Face,
-};
+use super::random::{Random, cosine_direction, facet};
+use crate::{reference::brdf::Matter, scene::surfaces::Face};
 use glam::Vec3;
 use std::f32::consts::PI;
 
@@ -18,6 +16,11 @@ pub enum Event {
 }
 
 impl Face {
+    /// What light is scattered by.
+    pub fn matter(&self) -> Matter {
+        Matter { albedo: self.albedo.as_dvec3(), f0: self.f0.as_dvec3(), roughness: self.roughness.into() }
+    }
+
     /// Decides by chance between the rough and the sharp part of the surface.
     pub fn event(&self, diffuse_only: bool, random: &mut Random) -> Event {
         if diffuse_only {

@@ -7,7 +7,9 @@ use crate::{
 };
 
 fn asset(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets/environments").join(name);
+    let path = Path::new(&std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into()))
+        .join("../shared/assets/environments")
+        .join(name);
     if path.exists() {
         return Some(path);
     }

@@ -4,7 +4,10 @@ use super::*;
 
 /// A file of the shared assets; `None`, said aloud, where a user's checkout has none.
 fn asset(name: &str) -> Option<Vec<u8>> {
-    let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets").join(name);
+    let path: PathBuf =
+        Path::new(&std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into()))
+            .join("../shared/assets")
+            .join(name);
     match std::fs::read(&path) {
         Ok(bytes) => Some(bytes),
         Err(error) if std::env::var_os("CI").is_some() => panic!("{}: {error}", path.display()),

@@ -13,9 +13,10 @@ use super::{light::Light, occluder::Occluder, parallel::Parallel, suns, surface:
 use crate::{
     Result,
     gpu::Gpu,
-    graph::{Buffer, Graph, Runner},
+    graph::{Buffer, Graph, Runner, loop_limit},
     rays::{RayHandles, Rays},
-    scene::{Pose, resident::Resident},
+    resident::Resident,
+    scene::Pose,
     shaders::{
         consts::{FIV_FLOATS, FIV_SUN_SIDE, TRACE_STEPS},
         fiv, types,
@@ -36,7 +37,7 @@ const INSIDE: f32 = 0.95;
 
 /// Most tiles that an invocation can process.
 pub(super) fn tiles(gpu: &Gpu, rays: &Rays) -> Result<u64> {
-    Ok(match gpu.loop_limit()? {
+    Ok(match loop_limit(gpu)? {
         Some(_) => (TURNS_LIMITED / rays.most_turns().max(1)).clamp(1, TILES),
         None => TILES,
     })

@@ -4,12 +4,10 @@
 use glam::Vec3;
 
 use super::Occluder;
-use crate::{
-    reference::path::surface::Surfaces,
-    scene::{
-        AlphaMode, Pose,
-        bvh::{Bvh, Ray, Step},
-    },
+use crate::scene::{
+    AlphaMode, Pose,
+    bvh::{Bvh, Ray, Step},
+    surfaces::Surfaces,
 };
 
 /// Viewing directions, on half a sphere, because opposite directions have equal silhouettes.
@@ -64,8 +62,9 @@ mod tests {
     use glam::Vec4;
 
     use super::*;
+    use crate::builtin;
     use crate::{
-        scene::{Material, Mesh, Node, Primitive, Scene, builtin},
+        scene::{Material, Mesh, Node, Primitive, Scene},
         techniques::fiv::Occluders,
     };
 

@@ -28,7 +28,7 @@ pub struct Light {
     pub size: u32,
     /// `types::FivTexel`
     pub texels: OwnedBuffer,
-    /// Irradiance for the normal of each texel, W/m² ([FIV 6]): a cube map for `cube_lookup` of lib/fiv.glsl.
+    /// Irradiance for the normal of each texel, W/m² ([FIV 6]): a cube map for `cube_lookup` of fiv/fiv.glsl.
     pub difmap: OwnedImage,
     /// The fullsphere irradiance vector of the whole environment ([FIV 10]): x.rgb, y.rgb, z.rgb, W/m².
     pub total: [f32; FIV_FLOATS as usize],
@@ -97,10 +97,4 @@ pub(super) fn unfiltered(gpu: &Gpu) -> Option<Note> {
         "the device does not filter 32-bit images: each pixel takes the irradiance of the nearest of 6 · size² normals"
             .into();
     (!filters).then(|| Note { kind: NoteKind::Approximated, place: "fiv.size".into(), text })
-}
-
-/// Splits `count` items into calls of at most `each` items: the first item and the number of items of each call.
-pub(super) fn calls(count: u64, each: u64) -> impl Iterator<Item = (u32, u32)> {
-    let each = each.max(1);
-    (0..count).step_by(each as usize).map(move |first| (first as u32, each.min(count - first) as u32))
 }

@@ -18,7 +18,7 @@ const SMALLEST: f64 = 0.05;
 pub const LENGTH: usize = (FIV_MATTER_AZIMUTHS * FIV_MATTER_POLARS * FIV_MATTER_LEVELS) as usize;
 
 /// π times the greatest radiance around each direction, divided by the mean irradiance, as the maximum of all channels.
-/// The azimuth changes fastest, then the polar angle, then the level. Twin of lib/fiv_matter.glsl.
+/// The azimuth changes fastest, then the polar angle, then the level. Twin of fiv/matter.glsl.
 pub fn table(sky: &Sky) -> Vec<f32> {
     let pi = std::f64::consts::PI;
     let lit = (0..sky.radiance.len() as u32).filter(|&t| sky.radiance[t as usize] != Vec3::ZERO);
@@ -72,9 +72,10 @@ pub fn table(sky: &Sky) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Environment, builtin};
+    use crate::builtin;
+    use crate::scene::Environment;
 
-    /// As lib/fiv_matter.glsl.
+    /// As fiv/matter.glsl.
     fn bound(table: &[f32], d: DVec3, r: f64) -> f64 {
         let (azimuths, polars) = (FIV_MATTER_AZIMUTHS as usize, FIV_MATTER_POLARS as usize);
         let azimuth = (d.x.atan2(-d.z) / std::f64::consts::TAU).rem_euclid(1.0) * azimuths as f64;

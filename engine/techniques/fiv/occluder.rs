@@ -282,7 +282,7 @@ fn hash(alone: &Scene, own: &[Own]) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::{posed_mesh::nearest, *};
-    use crate::scene::builtin;
+    use crate::builtin;
     use glam::Quat;
 
     fn tetrahedron() -> Primitive {

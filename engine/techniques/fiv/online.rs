@@ -31,15 +31,13 @@ use super::{
 use crate::{
     Error, ErrorKind, Result,
     gpu::{Gpu, OwnedBuffer},
-    graph::{Buffer, Extent, Graph, Image},
+    graph::{Buffer, Extent, Graph, Image, Items},
     passes::gbuffer::GBuffer,
     rays::{RayHandles, Rays},
-    scene::{
-        Pose, Scene,
-        resident::{Resident, deforms},
-    },
+    resident::{Resident, deforms},
+    scene::{Pose, Scene},
     shaders::{
-        consts::{FIV_BLOCK_SAMPLES, FIV_BLOCK_WORDS, FIV_FLOATS, FIV_INSIDE, FIV_ROW, TRACE_STEPS},
+        consts::{FIV_BLOCK_SAMPLES, FIV_BLOCK_WORDS, FIV_FLOATS, FIV_INSIDE, FIV_ROW},
         fiv, types,
     },
 };
@@ -47,15 +45,6 @@ use crate::{
 /// Most points of a batch, and bytes of its partial sums, approximately.
 const MOST_POINTS: u64 = 32_768;
 const MOST_PARTIALS: u64 = 64 << 20;
-/// Most rays of a dispatch if all pixels show occluders, approximately.
-const MOST_RAYS: u64 = 1 << 26;
-/// Most iterations of the loop over texels in one invocation. On drivers that end loops early, most iterations of all
-/// loops: two rays of the longest traversal.
-const MOST_TURNS: u64 = 20_000;
-const TURNS_LIMITED: u64 = 2 * TRACE_STEPS as u64;
-/// Words of 32 occluders that one invocation processes.
-const MOST_WORDS: u32 = 64;
-
 /// State that outlives a frame: geometries with their acceleration structures.
 #[derive(Debug)]
 pub struct Online {
@@ -80,8 +69,6 @@ struct Shape {
     resident: Resident,
     rays: Rays,
     tiles: u64,
-    /// Most rays of an invocation.
-    most: u64,
 }
 
 #[derive(Debug)]
@@ -145,11 +132,7 @@ impl Online {
             let resident = Resident::new(gpu, geometry)?;
             let rays = Rays::new(gpu, geometry, &resident)?;
             let tiles = tiles(gpu, &rays)?;
-            let most = match gpu.loop_limit()? {
-                Some(_) => (TURNS_LIMITED / rays.most_turns().max(1)).max(1),
-                None => MOST_TURNS,
-            };
-            shapes.push(Shape { traced, resident, rays, tiles, most });
+            shapes.push(Shape { traced, resident, rays, tiles });
         }
         let grid = settings.grid();
         let at = |ring: u32| grid.direction(ring % grid.azimuths, ring / grid.azimuths).as_vec3().to_array();
@@ -239,7 +222,7 @@ impl Online {
             if settings.self_shadow && settings.on_surface() {
                 let sets = (job.sets.start as u32, job.sets.len() as u32);
                 let floats = blocks * FIV_BLOCK_SAMPLES * FIV_FLOATS;
-                own(graph, seen, light, (texels, lists.turns, rays), (sets, floats), shape.most);
+                own(graph, seen, light, (texels, lists.turns, rays), (sets, floats), shape.rays.most_turns());
             }
             let partials = graph.buffer("fiv.partials", jobs.each * u64::from(jobs.chunks) * 40);
             for batch in job.batches.clone() {
@@ -286,24 +269,23 @@ impl Online {
         let marks = graph.buffer("fiv.marks", samples / 8);
         graph.fill(marks, 0);
         let (extent, (near, words)) = (graph.extent(seen.gbuffer.depth), seen.near);
-        for first in (0..words).step_by(MOST_WORDS as usize) {
-            let args = fiv::online_mark::Args {
-                view: seen.gbuffer.view,
-                normal: seen.gbuffer.normal,
-                depth: seen.gbuffer.depth,
-                identity: seen.identity,
-                occluders: seen.occluders,
-                marks,
-                near,
-                push: fiv::online_mark::Push { first, count: MOST_WORDS.min(words - first), words },
-                spec: fiv::online_mark::Spec {
-                    partial: settings.partial.into(),
-                    own: (settings.self_shadow && !settings.on_surface()).into(),
-                    trilinear: settings.trilinear.into(),
-                },
-            };
-            graph.compute(args, extent);
-        }
+        let args = fiv::online_mark::Args {
+            view: seen.gbuffer.view,
+            normal: seen.gbuffer.normal,
+            depth: seen.gbuffer.depth,
+            identity: seen.identity,
+            occluders: seen.occluders,
+            marks,
+            near,
+            push: fiv::online_mark::Push { words, ..Default::default() },
+            spec: fiv::online_mark::Spec {
+                partial: settings.partial.into(),
+                own: (settings.self_shadow && !settings.on_surface()).into(),
+                trilinear: settings.trilinear.into(),
+            },
+        };
+        // A word has 32 occluders, each with at most eight samples.
+        graph.compute_over(args, extent, Items::new(words).rays(extent.pixels()).turns(512));
         marks
     }
 
@@ -430,39 +412,36 @@ fn own(
     light: &Light,
     (texels, turns, rays): (Buffer, Buffer, RayHandles),
     ((set, sets), set_floats): ((u32, u32), u32),
-    most: u64,
+    turns_of_ray: u64,
 ) {
     let extent = graph.extent(seen.gbuffer.depth);
     let count = light.lit.len() as u64;
     let lit = graph.buffer_from("fiv.lit", if count > 0 { &light.lit } else { &[0] });
-    let each = (MOST_RAYS / extent.pixels().max(1)).clamp(1, most);
-    // The shader must run once under a black sky too, so that the irradiance is known to be 0.
-    for first in (0..count.max(1)).step_by(each as usize) {
-        let args = crate::rays::traced!(
-            fiv::online_own::Args {
-                view: seen.gbuffer.view,
-                normal: seen.gbuffer.normal,
-                depth: seen.gbuffer.depth,
-                identity: seen.identity,
-                occluders: seen.occluders,
-                texels,
-                lit,
-                turns,
-                own: seen.own,
-                push: fiv::online_own::Push {
-                    first: first as u32,
-                    count: each.min(count.saturating_sub(first)) as u32,
-                    size: light.size,
-                    set,
-                    sets,
-                    set_floats,
-                    seed: graph.seed,
-                },
+    let args = crate::rays::traced!(
+        fiv::online_own::Args {
+            view: seen.gbuffer.view,
+            normal: seen.gbuffer.normal,
+            depth: seen.gbuffer.depth,
+            identity: seen.identity,
+            occluders: seen.occluders,
+            texels,
+            lit,
+            turns,
+            own: seen.own,
+            push: fiv::online_own::Push {
+                size: light.size,
+                set,
+                sets,
+                set_floats,
+                seed: graph.seed,
+                ..Default::default()
             },
-            rays
-        );
-        graph.compute(args, extent);
-    }
+        },
+        rays
+    );
+    // Most pixels show no occluder. Under a black sky the pass runs once, so that the irradiance is known to be 0.
+    let texels = Items::new(count as u32).rays(extent.pixels() / 16).turns(turns_of_ray);
+    graph.compute_over(args, extent, texels);
 }
 
 impl TracedScene {

@@ -191,7 +191,7 @@ mod tests {
     use glam::{Mat4, Quat, vec3};
 
     use super::*;
-    use crate::scene::builtin;
+    use crate::builtin;
 
     #[test]
     fn a_turn_keeps_the_size_and_a_squeeze_is_measured() {

@@ -18,7 +18,8 @@ use crate::{
     gpu::{BufferDesc, Gpu, OwnedBuffer},
     graph::{Buffer, Graph, Runner},
     rays::Rays,
-    scene::{AlphaMode, Pose, resident::Resident},
+    resident::Resident,
+    scene::{AlphaMode, Pose},
     shaders::{consts::FIV_PARALLEL_SIDE, fiv},
 };
 

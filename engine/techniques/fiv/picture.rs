@@ -5,30 +5,23 @@ use std::{collections::HashMap, sync::Arc};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Extent as Reach, Fiv, Interpolation, Method, Placed, SelfSamples, Settings, Shared, Specular, light, online::Seen,
+    Extent as Reach, Fiv, Interpolation, Method, Placed, SelfSamples, Settings, Shared, Specular, online::Seen,
     online_occluders::FrameOccluders, specular::Shadows, spots::Spot, suns, tiles::Tiles,
 };
 use crate::{
     Error, Result,
-    graph::{Buffer, Depth, Extent, Format, Graph, Image, Load, Raster, Targets},
+    graph::{Buffer, Depth, Extent, Format, Graph, Image, Items, Load, Raster, Targets},
     passes::{
         gbuffer::{self, GBuffer},
         skybox,
     },
-    scene::{
-        Note, Pose, Scene, View,
-        cull::Frustum,
-        resident::{Batches, Handles},
-    },
+    resident::{Batches, Handles},
+    scene::{Note, Pose, Scene, View, cull::Frustum},
     shaders::{self, consts::FIV_SPOTS, types},
 };
 
-/// Most rays of a dispatch, approximately, so that a dispatch takes some milliseconds on a GPU.
-const MOST_RAYS: u64 = 1 << 22;
 /// Most boxes that brute force tests before a ray is traced. For more boxes the acceleration structure is faster.
 const MOST_BOXES: usize = 8;
-/// Most iterations of the loop over texels in one invocation.
-const MOST_TURNS: u64 = 20_000;
 /// Marks a missing occluder, vector or table.
 const NONE: u32 = u32::MAX;
 
@@ -310,32 +303,36 @@ impl Fiv {
         let extent = graph.extent(gbuffer.depth);
         let irradiance = graph.image("fiv.truth", Format::RGBA32F, extent);
         graph.clear(irradiance, [0.0; 4]);
-        let Some((rays, most)) = &mut self.rays else { return irradiance };
+        let Some(rays) = &mut self.rays else { return irradiance };
         if self.light.lit.is_empty() {
             return irradiance;
         }
+        let turns = rays.most_turns();
         let rays_of = rays.frame(graph, handles);
-        let each = (MOST_RAYS / extent.pixels().max(1)).clamp(1, (*most).min(MOST_TURNS));
         let (texels, lit) = self.light.import(graph);
         let boxes = boxes(handles);
         let around = boxes.len() as u32 / 2;
         let boxes = graph.buffer_from("fiv.boxes", if boxes.is_empty() { &[[0.0; 3]] } else { &boxes[..] });
-        for (first, count) in light::calls(self.light.lit.len() as u64, each) {
-            let args = crate::rays::traced!(
-                shaders::fiv::truth::Args {
-                    view: gbuffer.view,
-                    normal: gbuffer.normal,
-                    depth: gbuffer.depth,
-                    texels,
-                    lit,
-                    irradiance,
-                    boxes,
-                    push: shaders::fiv::truth::Push { first, count, size: self.light.size, around, seed: graph.seed },
+        let args = crate::rays::traced!(
+            shaders::fiv::truth::Args {
+                view: gbuffer.view,
+                normal: gbuffer.normal,
+                depth: gbuffer.depth,
+                texels,
+                lit,
+                irradiance,
+                boxes,
+                push: shaders::fiv::truth::Push {
+                    size: self.light.size,
+                    around,
+                    seed: graph.seed,
+                    ..Default::default()
                 },
-                rays_of
-            );
-            graph.compute(args, extent);
-        }
+            },
+            rays_of
+        );
+        let texels = Items::new(self.light.lit.len() as u32).rays(extent.pixels()).turns(turns);
+        graph.compute_over(args, extent, texels);
         irradiance
     }
 }

@@ -213,7 +213,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::scene::builtin;
+    use crate::builtin;
 
     /// Mean difference of two cube maps relative to the mean of the first.
     fn apart(a: &Sky, b: &Sky) -> f32 {

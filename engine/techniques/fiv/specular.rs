@@ -24,16 +24,17 @@ use glam::{DVec3, Mat3, Vec3};
 use super::{
     Fiv, Occluders, Plan, Sky, Specular,
     cover::{self, Cover},
-    light, occluder_rotation,
+    occluder_rotation,
     settings::Settings,
     sky,
 };
 use crate::{
     Error, ErrorKind, Result,
     gpu::{Gpu, OwnedBuffer},
-    graph::{Buffer, Format, Graph, Image, Runner},
+    graph::{Buffer, Format, Graph, Image, Items, Runner},
     passes::gbuffer::GBuffer,
-    scene::{Pose, resident::Handles},
+    resident::Handles,
+    scene::Pose,
     shaders::{consts::FIV_CELL, fiv, types},
 };
 
@@ -47,7 +48,7 @@ const TURNS_EACH: u32 = 24;
 const TURNS_CELLS: u32 = 40;
 /// Most rays of a dispatch, approximately.
 const MOST_RAYS: u64 = 1 << 22;
-/// Each dispatch processes a multiple of this number of words.
+/// Words of sixteen cells, which an invocation processes together.
 const WORDS: u32 = 4;
 /// Luminance of a linear Rec. 709 pixel.
 const LUMINANCE: DVec3 = DVec3::new(0.2126, 0.7152, 0.0722);
@@ -318,8 +319,33 @@ impl Fiv {
     fn specular_sum(&self, graph: &mut Graph, gbuffer: &GBuffer, reflected: Image) {
         let extent = graph.extent(reflected);
         let (texels, lit) = self.light.import(graph);
-        for (first, count) in light::calls(self.light.lit.len() as u64, MOST_TURNS.into()) {
-            let args = fiv::specular_sum::Args {
+        let args = fiv::specular_sum::Args {
+            view: gbuffer.view,
+            normal: gbuffer.normal,
+            depth: gbuffer.depth,
+            surface: gbuffer.specular,
+            texels,
+            lit,
+            reflected,
+            push: fiv::specular_sum::Push::default(),
+        };
+        // Sixteen texels take about as long as a ray.
+        let texels = Items::new(self.light.lit.len() as u32).rays(extent.pixels() / 16);
+        graph.compute_over(args, extent, texels);
+    }
+
+    /// Reflected light by one shadow ray to every texel that is not black.
+    fn specular_truth(&mut self, graph: &mut Graph, handles: &Handles, gbuffer: &GBuffer, reflected: Image) {
+        let extent = graph.extent(reflected);
+        let Some(rays) = &mut self.rays else { return };
+        if self.light.lit.is_empty() {
+            return;
+        }
+        let turns = rays.most_turns();
+        let rays = rays.frame(graph, handles);
+        let (texels, lit) = self.light.import(graph);
+        let args = crate::rays::traced!(
+            fiv::specular_truth::Args {
                 view: gbuffer.view,
                 normal: gbuffer.normal,
                 depth: gbuffer.depth,
@@ -327,38 +353,12 @@ impl Fiv {
                 texels,
                 lit,
                 reflected,
-                push: fiv::specular_sum::Push { first, count },
-            };
-            graph.compute(args, extent);
-        }
-    }
-
-    /// Reflected light by one shadow ray to every texel that is not black.
-    fn specular_truth(&mut self, graph: &mut Graph, handles: &Handles, gbuffer: &GBuffer, reflected: Image) {
-        let extent = graph.extent(reflected);
-        let Some((rays, most)) = &mut self.rays else { return };
-        if self.light.lit.is_empty() {
-            return;
-        }
-        let rays = rays.frame(graph, handles);
-        let each = (MOST_RAYS / extent.pixels().max(1)).clamp(1, (*most).min(MOST_TURNS.into()));
-        let (texels, lit) = self.light.import(graph);
-        for (first, count) in light::calls(self.light.lit.len() as u64, each) {
-            let args = crate::rays::traced!(
-                fiv::specular_truth::Args {
-                    view: gbuffer.view,
-                    normal: gbuffer.normal,
-                    depth: gbuffer.depth,
-                    surface: gbuffer.specular,
-                    texels,
-                    lit,
-                    reflected,
-                    push: fiv::specular_truth::Push { first, count, size: self.light.size, seed: graph.seed },
-                },
-                rays
-            );
-            graph.compute(args, extent);
-        }
+                push: fiv::specular_truth::Push { size: self.light.size, seed: graph.seed, ..Default::default() },
+            },
+            rays
+        );
+        let texels = Items::new(self.light.lit.len() as u32).rays(extent.pixels()).turns(turns);
+        graph.compute_over(args, extent, texels);
     }
 
     /// Reflected light of the cells, and the part of it that occluders leave visible.
@@ -378,29 +378,28 @@ impl Fiv {
         }
         let turns = turns(shadows.count)?;
         let all = words(self.light.size);
-        let each = WORDS * (MOST_TURNS / turns);
         let (lobes, shares) = (graph.import_buffer(&glossy.lobes), graph.import_buffer(&glossy.shares));
         let places = graph.buffer_from("fiv.places", &self.share_places(pose, all));
-        for first in (0..all).step_by(each as usize) {
-            let args = fiv::specular_share::Args {
-                view: gbuffer.view,
-                normal: gbuffer.normal,
-                depth: gbuffer.depth,
-                surface: gbuffer.specular,
-                identity: shadows.identity,
-                occluders: shadows.occluders,
-                fivs: shadows.fivs,
-                lobes,
-                shares,
-                places,
-                near: shadows.near.0,
-                whole,
-                left,
-                push: fiv::specular_share::Push { first, count: each.min(all - first), all, words: shadows.near.1 },
-                spec: fiv::specular_share::Spec { trilinear: settings.trilinear.into() },
-            };
-            graph.compute(args, extent);
-        }
+        let args = fiv::specular_share::Args {
+            view: gbuffer.view,
+            normal: gbuffer.normal,
+            depth: gbuffer.depth,
+            surface: gbuffer.specular,
+            identity: shadows.identity,
+            occluders: shadows.occluders,
+            fivs: shadows.fivs,
+            lobes,
+            shares,
+            places,
+            near: shadows.near.0,
+            whole,
+            left,
+            push: fiv::specular_share::Push { all, words: shadows.near.1, ..Default::default() },
+            spec: fiv::specular_share::Spec { trilinear: settings.trilinear.into() },
+        };
+        // Sixteen cells and eight occluders take about as long as a ray.
+        let rays = extent.pixels() * u64::from(1 + shadows.count / 8);
+        graph.compute_over(args, extent, Items::new(all / WORDS).rays(rays).turns(turns.into()));
         Ok((whole, left))
     }
 

@@ -110,7 +110,8 @@ impl Spot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Environment, builtin};
+    use crate::builtin;
+    use crate::scene::Environment;
 
     fn of(name: &str, size: u32) -> (Sky, Vec<Spot>) {
         let sky = Sky::new(Some(&builtin::environment(name).unwrap()), size).unwrap();

@@ -17,13 +17,12 @@ use crate::{
     gpu::{DeviceKind, Gpu, OwnedBuffer},
     graph::Runner,
     rays::Rays,
-    scene::{Environment, Material, Note, NoteKind, Pose, Scene, resident::Resident},
-    settings::Described,
-    shaders::consts::{FIV_FLOATS, TRACE_STEPS},
+    resident::Resident,
+    scene::{Environment, Material, Note, NoteKind, Pose, Scene},
+    settings::idle_notes,
+    shaders::consts::FIV_FLOATS,
 };
 
-/// Most loop iterations of one invocation on drivers that end loops early: two rays of the longest traversal.
-const TURNS_LIMITED: u64 = 2 * TRACE_STEPS as u64;
 /// Most occluders that the loops of a shader can process.
 const MOST_OCCLUDERS: usize = 16_384;
 /// Least number of pixels that the quick fingerprint of an environment contains, if the environment has so many.
@@ -68,8 +67,8 @@ pub struct Fiv {
     /// The pose for which the vectors were computed.
     pub(super) at_rest: Pose,
     pub(super) notes: Vec<Note>,
-    /// For brute force: the acceleration structure, and the most rays of one invocation.
-    pub(super) rays: Option<(Rays, u64)>,
+    /// For brute force: the acceleration structure.
+    pub(super) rays: Option<Rays>,
     /// For vectors that each frame computes.
     pub(super) online: Option<Online>,
     /// For glossy reflection with shadows of occluders.
@@ -183,14 +182,7 @@ impl Fiv {
         };
         let bytes = bytemuck::cast_slice::<f32, u8>(&fivs);
         let rays = match settings.method {
-            Method::BruteForce => {
-                let rays = Rays::new(gpu, scene, resident)?;
-                let most = match gpu.loop_limit()? {
-                    Some(_) => (TURNS_LIMITED / rays.most_turns().max(1)).max(1),
-                    None => u64::MAX,
-                };
-                Some((rays, most))
-            }
+            Method::BruteForce => Some(Rays::new(gpu, scene, resident)?),
             _ => None,
         };
         Ok(Self {
@@ -213,7 +205,7 @@ impl Fiv {
             sky,
             rotating_sky,
             runner,
-            limited: gpu.loop_limit()?.is_some(),
+            limited: crate::graph::loop_limit(gpu)?.is_some(),
             on_cpu: gpu.caps().kind == DeviceKind::Cpu,
             occluders,
             firsts: plan.firsts(),
@@ -436,10 +428,7 @@ fn emissive(material: &Material) -> bool {
 /// Notes on settings that have no effect, and on masks that rays compute although `masks` is parallel.
 fn ignored_settings(settings: &Settings, plan: &Plan, kinds: &[Occluder]) -> Vec<Note> {
     let note = |place: String, text: String| Note { kind: NoteKind::Ignored, place, text };
-    let idle = Settings::description().idle(settings).unwrap_or_default().into_iter();
-    let mut notes: Vec<_> = idle
-        .map(|idle| note(format!("fiv.{}", idle.key), format!("has no effect, because fiv.{}", idle.because)))
-        .collect();
+    let mut notes = idle_notes("fiv", settings);
     if settings.method == Method::Vectors {
         notes.extend(plan.by_rays(kinds).map(|what| note("fiv.masks".into(), what)));
     }

@@ -6,7 +6,8 @@ use super::{
     Fiv, Method, Settings, occluder_rotation, online_occluders::FrameOccluders, spacing::Spacing, support_function,
 };
 use crate::{
-    scene::{Note, NoteKind, Pose, Scene, resident::Instance},
+    resident::Instance,
+    scene::{Note, NoteKind, Pose, Scene},
     shaders::{
         consts::{FIV_FLOATS, FIV_SPACING_KNOTS},
         types,

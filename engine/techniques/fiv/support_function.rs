@@ -55,7 +55,7 @@ impl SupportFunction {
         Self(table)
     }
 
-    /// Extent along a unit vector, metres, interpolated between four grid directions. Twin of lib/fiv_reach.glsl.
+    /// Extent along a unit vector, metres, interpolated between four grid directions. Twin of fiv/reach.glsl.
     pub fn along(&self, n: Vec3) -> f32 {
         let n = n.as_dvec3();
         let (azimuths, polars) = (FIV_REACH_AZIMUTHS, FIV_REACH_POLARS);

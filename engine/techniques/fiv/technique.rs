@@ -7,7 +7,7 @@ use crate::{
     Error, ErrorKind, Result,
     graph::Graph,
     scene::Note,
-    settings::{Described, Difference},
+    settings::{Described, Description, Difference},
     technique::{self, AllLight, Making, Moment, Picture, Technique},
 };
 
@@ -79,6 +79,10 @@ impl Technique for Fiv {
     type Mode = AllLight;
     type Baked = Baked;
 
+    fn description() -> &'static Description {
+        Settings::description()
+    }
+
     fn prepared_by(settings: &PictureSettings) -> PictureSettings {
         let Settings { trilinear, partial, overlap, self_shadow, .. } = Settings::default();
         let fiv = Settings { trilinear, partial, overlap, self_shadow, ..settings.fiv.clone() };
@@ -109,7 +113,7 @@ impl Technique for Fiv {
         moment: &Moment<'_, AllLight>,
         settings: &PictureSettings,
     ) -> Result<Picture> {
-        let settings = PictureSettings { fiv: settings.fiv.after(moment.seconds), ..settings.clone() };
+        let settings = PictureSettings { fiv: settings.fiv.after(moment.shot.seconds), ..settings.clone() };
         let made = self.picture(graph, moment.scene, moment.pose, moment.handles, &moment.view, &settings)?;
         let shown = Picture::new(made.outputs.total).color("irradiance", made.outputs.irradiance);
         let notes: Vec<Note> = [moment.notes, self.notes(), &made.notes].concat();

@@ -1,9 +1,9 @@
 //! The irradiance cache for surfaces that mirrors and glass show: a hashed grid in world space. The light of the virtual lights is
-//! gathered once for each cell, and not for each surface (sources: `shaders-glsl/lib/igi_cache.glsl`).
+//! gathered once for each cell, and not for each surface (sources: `shaders-glsl/igi/cache.glsl`).
 
-use super::{Igi, LEAST_CELL, Settings, Shared, Vpls, rays};
+use super::{Igi, LEAST_CELL, Settings, Shared, Vpls};
 use crate::{
-    graph::{Buffer, Extent, Graph},
+    graph::{Buffer, Graph},
     scene::{Note, NoteKind},
     shaders::{
         consts::CACHE_SLOTS,
@@ -110,21 +110,19 @@ impl Igi {
         nodes: u32,
     ) {
         let cells = cache.most.min(nodes);
-        for (first, count) in self.batches(Extent::new(cells, 1), vpls.count) {
-            let push = cache_fill::Push { first, count, most: cache.most, least: shared.least, seed: shared.seed };
-            let args = crate::rays::traced!(
-                cache_fill::Args {
-                    vpls: vpls.buffer,
-                    cache_keys: cache.keys,
-                    cache_cells: cache.cells,
-                    cache_list: cache.list,
-                    push,
-                    spec: cache_fill::Spec { imperfect: settings.imperfect.into() },
-                },
-                shared.hidden_by
-            );
-            graph.compute(args, cells).rays(rays(Extent::new(cells, 1), count));
-        }
+        let push = cache_fill::Push { most: cache.most, least: shared.least, seed: shared.seed, ..Default::default() };
+        let args = crate::rays::traced!(
+            cache_fill::Args {
+                vpls: vpls.buffer,
+                cache_keys: cache.keys,
+                cache_cells: cache.cells,
+                cache_list: cache.list,
+                push,
+                spec: cache_fill::Spec { imperfect: settings.imperfect.into() },
+            },
+            shared.hidden_by
+        );
+        graph.compute_over(args, cells, self.items(vpls.count, cells.into()));
     }
 }
 

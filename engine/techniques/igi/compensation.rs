@@ -5,9 +5,10 @@
 
 use super::{Igi, LightTree, Settings, Shared, Vpls, dispatch, gather::listed_groups};
 use crate::{
-    graph::{Buffer, Graph, Image},
+    Error, Result,
+    graph::{Buffer, Extent, Graph, Image},
     passes::gbuffer::GBuffer,
-    scene::resident::Handles,
+    resident::Handles,
     shaders::{
         consts::TEXTURE_SLOTS,
         igi::{
@@ -19,7 +20,9 @@ use crate::{
 };
 
 /// Short paths that are in memory at one time.
-pub(super) const HELD: u32 = 1 << 18;
+const HELD: u32 = 1 << 18;
+/// Maximum of passes of a picture. The host takes some seconds and a hundred megabytes to plan and record them.
+const MOST_PASSES: u64 = 50_000;
 
 /// A buffer of `paths` values of `types::NearPath`. They are zero until the paths begin.
 fn held(graph: &mut Graph, paths: u32) -> Buffer {
@@ -29,6 +32,24 @@ fn held(graph: &mut Graph, paths: u32) -> Buffer {
 }
 
 impl Igi {
+    /// Refuses pictures whose short paths would take more passes than a host can plan and record in seconds.
+    ///
+    /// # Errors
+    /// `Usage`, naming the number of passes.
+    pub(super) fn few_paths(&self, extent: Extent, settings: &Settings) -> Result<()> {
+        if !(settings.indirect && settings.compensates()) {
+            return Ok(());
+        }
+        // Those of the coarse picture, of the pixels without a coarse texel, and of the ray trees.
+        let ranges = 2 * extent.pixels().div_ceil(HELD.into()) + self.tree_ranges(extent, settings);
+        let passes = ranges * (2 + u64::from(settings.compensation) * 3 * u64::from(settings.bounces));
+        if passes <= MOST_PASSES {
+            return Ok(());
+        }
+        let what = format!("a picture of {extent} pixels would need about {passes} passes; allowed: {MOST_PASSES}");
+        Err(Error::usage(what).at("igi.compensation").help("Choose fewer, or a smaller picture"))
+    }
+
     /// Adds the compensated light to the coarse irradiance, which has every [`Settings::downsample`]-th pixel.
     #[allow(clippy::too_many_arguments)]
     pub(super) fn compensate(

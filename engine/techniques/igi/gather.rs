@@ -1,22 +1,14 @@
 //! Gathering: irradiance of the visible surfaces from all virtual lights, or from a few that each receiver picks from the light tree.
 
-use super::{Igi, LightTree, Settings, Shared, Vpls, rays};
+use super::{Igi, LightTree, Settings, Shared, Vpls};
 use crate::{
     graph::{Buffer, Extent, Format, Graph, Image},
     passes::gbuffer::GBuffer,
     shaders::igi::{gather, gather_picks, refine, refine_groups},
 };
 
-/// Invocations per workgroup of the pass that gathers for listed pixels.
-const GROUP: u64 = 64;
-/// Workgroups per dispatch that every device allows.
-const MOST_GROUPS: u64 = 65_535;
-
-/// Splits `pixels` pixels into ranges of about `most` pixels. Returns the pixels per range and the number of ranges.
-fn ranges(pixels: u64, most: u64) -> (u32, u32) {
-    let groups = (most / GROUP).clamp(1, MOST_GROUPS);
-    ((groups * GROUP) as u32, pixels.div_ceil(groups * GROUP).max(1) as u32)
-}
+/// Pixels of the list per pass: a multiple of the workgroup, and few enough groups for every device.
+const LISTED: u32 = 1 << 16;
 
 /// Indirect dispatch sizes (three u32 per range) for `ranges` ranges of `pixels` pixels of the list `unmatched`, whose length only the
 /// device knows.
@@ -61,43 +53,22 @@ impl Igi {
     ) {
         let extent = graph.extent(irradiance);
         let own = vpls.count.div_ceil(settings.interleave * settings.interleave);
-        for (first, count) in self.batches(extent, own) {
-            let push = gather::Push {
-                first,
-                count,
-                total: vpls.count,
-                tile: settings.interleave,
-                factor: settings.downsample,
-                scattered: settings.scattered.into(),
-                least: shared.least,
-                stride: settings.stride(),
-                seed: shared.seed,
-            };
-            let spec = gather::Spec { imperfect: settings.imperfect.into() };
-            let args = crate::rays::traced!(
-                gather::Args {
-                    view: g.view,
-                    normal: g.normal,
-                    depth: g.depth,
-                    vpls: vpls.buffer,
-                    irradiance,
-                    push,
-                    spec
-                },
-                shared.hidden_by
-            );
-            graph.compute(args, extent).rays(rays(extent, count));
-        }
-    }
-
-    /// How [`Self::refine`] splits its work: ranges (first, count) of lights, pixels per range of pixels, and number of these ranges.
-    /// `own`: lights per pixel.
-    pub(super) fn refined(&self, extent: Extent, own: u32) -> (Vec<(u32, u32)>, u32, u32) {
-        // A dispatch gathers a few hundred lights for thousands of pixels. Most ranges of pixels are empty.
-        let lights = self.batches(Extent::new(1 << 14, 1), own);
-        let most = lights.first().map_or(1, |&(_, count)| count);
-        let (pixels, ranges) = ranges(extent.pixels(), self.rays_at_once / u64::from(most.max(1)));
-        (lights, pixels, ranges)
+        let push = gather::Push {
+            total: vpls.count,
+            tile: settings.interleave,
+            factor: settings.downsample,
+            scattered: settings.scattered.into(),
+            least: shared.least,
+            stride: settings.stride(),
+            seed: shared.seed,
+            ..Default::default()
+        };
+        let spec = gather::Spec { imperfect: settings.imperfect.into() };
+        let args = crate::rays::traced!(
+            gather::Args { view: g.view, normal: g.normal, depth: g.depth, vpls: vpls.buffer, irradiance, push, spec },
+            shared.hidden_by
+        );
+        graph.compute_over(args, extent, self.items(own, extent.pixels()));
     }
 
     /// Gathers for the pixels in the list `unmatched` of [`filters::upsample`](super::filters::upsample), each from one subset. If the
@@ -112,20 +83,20 @@ impl Igi {
         (irradiance, unmatched): (Image, Buffer),
     ) {
         let own = vpls.count.div_ceil(settings.interleave * settings.interleave);
-        let (lights, pixels, ranges) = self.refined(graph.extent(irradiance), own);
-        let groups = listed_groups(graph, unmatched, pixels, ranges);
-        for (range, (first, count)) in (0..ranges).flat_map(|range| lights.iter().map(move |&lights| (range, lights))) {
+        // Most ranges of the list are empty.
+        let ranges = graph.extent(irradiance).pixels().div_ceil(LISTED.into()).max(1) as u32;
+        let groups = listed_groups(graph, unmatched, LISTED, ranges);
+        for range in 0..ranges {
             let push = refine::Push {
-                first,
-                count,
                 total: vpls.count,
                 tile: settings.interleave,
                 least: shared.least,
                 stride: settings.stride(),
                 seed: shared.seed,
                 own,
-                begin: range * pixels,
+                begin: range * LISTED,
                 limit: if settings.compensates() { 0.0 } else { settings.despeckle },
+                ..Default::default()
             };
             let args = crate::rays::traced!(
                 refine::Args {
@@ -140,7 +111,7 @@ impl Igi {
                 },
                 shared.hidden_by
             );
-            graph.compute_indirect(args, groups, 12 * u64::from(range)).rays(u64::from(pixels) * u64::from(count));
+            graph.compute_indirect_over(args, (groups, 12 * u64::from(range)), self.items(own, LISTED.into()));
         }
     }
 
@@ -155,52 +126,92 @@ impl Igi {
     ) {
         let extent: Extent = graph.extent(irradiance);
         let picks = settings.texel_picks();
-        for (first, count) in self.batches(extent, picks) {
-            let push = gather_picks::Push {
-                first,
-                count,
-                picks,
-                proposals: settings.proposals,
-                leaves: tree.leaves,
-                tile: settings.interleave,
-                factor: settings.downsample,
-                scattered: settings.scattered.into(),
-                least: shared.least,
-                stride: settings.stride(),
-                seed: shared.seed,
-            };
-            let args = crate::rays::traced!(
-                gather_picks::Args {
-                    view: g.view,
-                    normal: g.normal,
-                    depth: g.depth,
-                    vpls: vpls.buffer,
-                    irradiance,
-                    vpl_nodes: tree.nodes,
-                    push,
-                    spec: gather_picks::Spec { imperfect: settings.imperfect.into() },
-                },
-                shared.hidden_by
-            );
-            graph.compute(args, extent).rays(rays(extent, count));
-        }
+        let push = gather_picks::Push {
+            picks,
+            proposals: settings.proposals,
+            leaves: tree.leaves,
+            tile: settings.interleave,
+            factor: settings.downsample,
+            scattered: settings.scattered.into(),
+            least: shared.least,
+            stride: settings.stride(),
+            seed: shared.seed,
+            ..Default::default()
+        };
+        let args = crate::rays::traced!(
+            gather_picks::Args {
+                view: g.view,
+                normal: g.normal,
+                depth: g.depth,
+                vpls: vpls.buffer,
+                irradiance,
+                vpl_nodes: tree.nodes,
+                push,
+                spec: gather_picks::Spec { imperfect: settings.imperfect.into() },
+            },
+            shared.hidden_by
+        );
+        graph.compute_over(args, extent, self.items(picks, extent.pixels()));
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::builtin;
+    use crate::{
+        gpu::testing::with_gpu,
+        graph::{Graph, Runner},
+        resident::Resident,
+        scene::{Material, Pose, View},
+        techniques::igi::{Igi, PictureSettings, Settings},
+    };
 
     #[test]
-    fn ranges_hold_all_pixels_in_dispatches_that_every_device_allows() {
-        for (width, height) in [(1u64, 1u64), (64, 1), (65, 1), (800, 600), (3840, 2160), (16384, 16384)] {
-            for rays in [1u64, 2, 180, 10_000, u64::MAX] {
-                let (pixels, ranges) = ranges(width * height, super::super::MOST_RAYS / rays);
-                let (of_range, ranges) = (u64::from(pixels), u64::from(ranges));
-                assert!(of_range * ranges >= width * height && of_range * (ranges - 1) < width * height);
-                assert!(of_range % GROUP == 0 && of_range / GROUP <= MOST_GROUPS);
-                assert!(rays == u64::MAX || of_range * rays <= super::super::MOST_RAYS.max(GROUP * rays));
+    fn any_number_of_lights_takes_the_same_passes_and_short_dispatches_show_nowhere() {
+        with_gpu(|gpu| {
+            let mut scene = builtin::load("cornell-area").unwrap();
+            // Metal walls have ray trees.
+            scene.materials[0] = Material { metallic: 1.0, roughness: 0.0, ..scene.materials[0].clone() };
+            let mut resident = Resident::new(gpu, &scene).unwrap();
+            let mut igi = Igi::new(gpu, &scene, &resident, &Settings::default()).unwrap();
+            let pose = Pose::rest(&scene);
+            let view = View::of_camera(&scene, &pose, 0, [70, 50]).unwrap();
+            let mut render = |settings: &Settings, rays: Option<u64>| {
+                let mut graph = Graph::new("passes");
+                let handles = resident.frame_in(&mut graph, &scene, &pose);
+                let all = PictureSettings { igi: settings.clone(), ..Default::default() };
+                let picture = igi.picture(&mut graph, &scene, &pose, &handles, &view, &all).unwrap();
+                let read = graph.read_image(picture.outputs.total);
+                let runner = Runner::new(gpu);
+                let mut runner = rays.map_or_else(|| Runner::new(gpu), |rays| runner.dispatch_rays(rays));
+                let mut frame = runner.run(&graph).unwrap();
+                let launches: usize = frame.report.passes.iter().map(|pass| pass.launches).sum();
+                (frame.take_floats(read), graph.pass_count(), launches)
+            };
+            let base = Settings { vpls: 400, candidates: 1, direct_samples: 4, ..Settings::default() };
+            for (settings, more) in [
+                (base.clone(), Settings { vpls: 800, ..base.clone() }),
+                (Settings { picks: 50, ..base.clone() }, Settings { picks: 100, direct_samples: 8, ..base.clone() }),
+                (
+                    Settings { cache: 0.05, downsample: 3, refine: 0.1, ..base.clone() },
+                    Settings { cache: 0.05, downsample: 3, refine: 0.1, vpls: 800, ..base.clone() },
+                ),
+                (
+                    Settings { vpls: 60, candidates: 8, judges: 50, ..base.clone() },
+                    Settings { vpls: 60, candidates: 8, judges: 500, ..base.clone() },
+                ),
+            ] {
+                let (whole, passes, launches) = render(&settings, None);
+                let (cut, same, dispatches) = render(&settings, Some(1 << 14));
+                assert!(passes == same && dispatches > launches + 20, "{launches} dispatches, then {dispatches}");
+                // Partial sums are rounded otherwise.
+                let sum = |image: &[[f32; 4]]| image.iter().flat_map(|p| &p[..3]).map(|v| f64::from(*v)).sum::<f64>();
+                let difference =
+                    whole.iter().flatten().zip(cut.iter().flatten()).map(|(a, b)| f64::from((a - b).abs()));
+                let (difference, all) = (difference.sum::<f64>(), sum(&whole));
+                assert!(all > 0.0 && difference < 2e-5 * all, "{difference} of {all} with {settings:?}");
+                assert_eq!(render(&more, None).1, passes, "{more:?}");
             }
-        }
+        });
     }
 }

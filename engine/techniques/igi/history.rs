@@ -19,11 +19,8 @@ use super::{Igi, Settings, Shared, Vpls, halton};
 use crate::{
     graph::{Buffer, Draw, Extent, Format, Graph, Image, Load, Raster, Targets},
     passes::gbuffer::GBuffer,
-    scene::{
-        View,
-        cull::Frustum,
-        resident::{Batches, Handles},
-    },
+    resident::{Batches, Handles},
+    scene::{View, cull::Frustum},
     shaders::{
         consts,
         igi::{history, motion, probe, probe_light, recall, remember},
@@ -244,27 +241,25 @@ impl Igi {
         graph.fill(lit, 0);
         let stride = vpls.count.div_ceil(PROBE_LIGHTS).max(1);
         let rays = &shared.hidden_by;
-        for (first, count) in self.batches(Extent::new(grid.count(), 1), vpls.count.div_ceil(stride)) {
-            let args = crate::rays::traced!(
-                probe_light::Args {
-                    probes,
-                    vpls: vpls.buffer,
-                    lit,
-                    push: probe_light::Push {
-                        probe_count: grid.count(),
-                        first,
-                        count,
-                        stride,
-                        total: vpls.count,
-                        least: shared.least,
-                        seed,
-                    },
-                    spec: probe_light::Spec { imperfect: settings.imperfect.into() },
+        let args = crate::rays::traced!(
+            probe_light::Args {
+                probes,
+                vpls: vpls.buffer,
+                lit,
+                push: probe_light::Push {
+                    probe_count: grid.count(),
+                    stride,
+                    total: vpls.count,
+                    least: shared.least,
+                    seed,
+                    ..Default::default()
                 },
-                *rays
-            );
-            graph.compute(args, grid.count()).rays(super::rays(Extent::new(grid.count(), 1), count));
-        }
+                spec: probe_light::Spec { imperfect: settings.imperfect.into() },
+            },
+            *rays
+        );
+        let lights = self.items(vpls.count.div_ceil(stride), grid.count().into());
+        graph.compute_over(args, grid.count(), lights);
     }
 }
 

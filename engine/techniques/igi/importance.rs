@@ -2,9 +2,9 @@
 //! them with a probability that follows the light that they send to the view. Georgiev and Slusallek 2010 reject candidates; this
 //! implementation draws by systematic resampling, in equal steps through the running sum of the weights.
 
-use super::{Igi, Settings, Shared, Vpls, halton, rays};
+use super::{Igi, Settings, Shared, Vpls, halton};
 use crate::{
-    graph::{Extent, Graph},
+    graph::Graph,
     passes::gbuffer::GBuffer,
     shaders::{
         igi::{cumulate, importance, points, resample},
@@ -42,15 +42,12 @@ impl Igi {
         let floats = 4 * u64::from(total);
         let importances = graph.buffer("igi.importances", floats);
         graph.fill(importances, 0);
-        for (first, points) in self.batches(Extent::new(total, 1), settings.judges) {
-            let push =
-                importance::Push { total, first, count: points, near: NEAR * shared.diagonal, seed: shared.seed };
-            let args = crate::rays::traced!(
-                importance::Args { candidates: candidates.buffer, points: seen, importances, push },
-                shared.rays
-            );
-            graph.compute(args, total).rays(rays(Extent::new(total, 1), points));
-        }
+        let push = importance::Push { total, near: NEAR * shared.diagonal, seed: shared.seed, ..Default::default() };
+        let args = crate::rays::traced!(
+            importance::Args { candidates: candidates.buffer, points: seen, importances, push },
+            shared.rays
+        );
+        graph.compute_over(args, total, self.items(settings.judges, total.into()));
         let (weights, sums) = (graph.buffer("igi.weights", floats), graph.buffer("igi.sums", floats));
         let push = cumulate::Push { total };
         graph.compute(cumulate::Args { candidates: candidates.buffer, importances, weights, sums, push }, 1);

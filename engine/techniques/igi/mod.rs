@@ -33,7 +33,6 @@ pub mod history;
 mod importance;
 mod light_tree;
 mod notes;
-mod pass_budget;
 mod picture;
 mod raster;
 mod ray_tree;
@@ -51,26 +50,18 @@ pub use technique::{GATHERED, Mode};
 
 use crate::{
     Result,
-    gpu::{DeviceKind, Gpu, OwnedBuffer, OwnedImage},
-    graph::{Buffer, Extent, Format, Graph, Image, PassRef, Uniform},
+    gpu::{Gpu, OwnedBuffer, OwnedImage},
+    graph::{Buffer, ComputeArgs, Format, Graph, Image, Items, PassRef, RangedArgs, Uniform},
     passes::gbuffer::GBuffer,
     rays::{RayHandles, Rays},
-    reference::tracer::{
+    resident::{Handles, Resident},
+    scene::{Aabb, Pose, Scene},
+    shaders::{self, consts, types},
+    tracer::{
         Sources,
         tables::{self, LightTable},
     },
-    scene::{Aabb, Pose, Scene, resident::Handles, resident::Resident},
-    shader::ComputeArgs,
-    shaders::{self, consts, types},
 };
-
-/// Approximate maximum of rays per dispatch on a CPU driver, which takes seconds for them.
-const MOST_RAYS: u64 = 1 << 22;
-/// The same on a GPU, which takes tens of milliseconds: half of the time that one submission may take. Larger dispatches mean
-/// fewer passes for the host to plan.
-const MOST_RAYS_GPU: u64 = 1 << 25;
-/// Maximum of loop iterations per invocation on drivers that abort long loops. Two of the longest rays fit.
-const TURNS_LIMITED: u64 = 60_000;
 
 /// The data of a scene that instant global illumination needs in every frame.
 #[derive(Debug)]
@@ -97,10 +88,8 @@ pub struct Igi {
     /// Diagonal of the bounding box of all lit surfaces in the rest pose, metres. Settings that are shares of the scene's size
     /// refer to this length, so that animation does not change them.
     size: f32,
-    /// Maximum of rays per invocation.
-    most_rays: u64,
-    /// Approximate maximum of rays per dispatch.
-    rays_at_once: u64,
+    /// Maximum of loop iterations of a ray.
+    turns: u64,
     /// Maximum of layers per image on this device.
     most_layers: u32,
 }
@@ -173,17 +162,20 @@ fn diagonal(bounds: &Aabb) -> f32 {
     if bounds.is_empty() { 0.0 } else { (bounds.max - bounds.min).length() }
 }
 
-/// Rays of a dispatch that traces `each` rays for every pixel.
-fn rays(extent: Extent, each: u32) -> u64 {
-    extent.pixels() * u64::from(each)
-}
-
 /// Dispatches `threads` threads, or the number of workgroups that `groups` (buffer and byte offset) holds.
 fn dispatch<A: ComputeArgs>(graph: &mut Graph, args: A, groups: Option<(Buffer, u64)>, threads: u32) -> PassRef<'_> {
     match groups {
         Some((groups, offset)) => graph.compute_indirect(args, groups, offset),
         None => graph.compute(args, threads),
     }
+}
+
+/// As [`dispatch`], for a loop over `items`.
+fn dispatch_over<A: RangedArgs>(graph: &mut Graph, args: A, groups: Option<Buffer>, threads: u32, items: Items) {
+    match groups {
+        Some(groups) => graph.compute_indirect_over(args, (groups, 0), items),
+        None => graph.compute_over(args, threads, items),
+    };
 }
 
 impl Igi {
@@ -203,10 +195,7 @@ impl Igi {
         };
         let meshes = scene.nodes.iter().filter_map(|node| scene.meshes.get(node.mesh? as usize));
         let rays = if in_compute { Rays::in_compute(gpu, scene, resident)? } else { Rays::new(gpu, scene, resident)? };
-        let most_rays = match gpu.loop_limit()? {
-            Some(_) => (TURNS_LIMITED / rays.most_turns().max(1)).max(1),
-            None => u64::MAX,
-        };
+        let turns = rays.most_turns();
         Ok(Self {
             rays,
             boxes: (!in_compute && settings.imperfect).then(|| Rays::in_compute(gpu, scene, resident)).transpose()?,
@@ -220,8 +209,7 @@ impl Igi {
             lights: None,
             sharp: tables::has_sharp(scene),
             size: diagonal(&resident.lit_bounds_in(scene, &Pose::rest(scene))),
-            most_rays,
-            rays_at_once: if gpu.caps().kind == DeviceKind::Cpu { MOST_RAYS } else { MOST_RAYS_GPU },
+            turns,
             most_layers: gpu.caps().limits.array_layers,
         })
     }
@@ -343,33 +331,28 @@ impl Igi {
         let extent = graph.extent(g.depth);
         let direct = graph.image("igi.direct", Format::RGBA32F, extent);
         graph.clear(direct, [0.0; 4]);
-        for (first, count) in self.batches(extent, shared.direct_rays) {
-            let args = traced_lit!(
-                shaders::igi::direct::Args {
-                    view: g.view,
-                    albedo: g.albedo,
-                    normal: g.normal,
-                    depth: g.depth,
-                    specular: g.specular,
-                    emission: g.emission,
-                    direct,
-                    push: shaders::igi::direct::Push { first, count },
-                },
-                shared.rays,
-                handles,
-                shared,
-                lamps
-            );
-            graph.compute(args, extent).rays(rays(extent, count));
-        }
+        let args = traced_lit!(
+            shaders::igi::direct::Args {
+                view: g.view,
+                albedo: g.albedo,
+                normal: g.normal,
+                depth: g.depth,
+                specular: g.specular,
+                emission: g.emission,
+                direct,
+                push: shaders::igi::direct::Push::default(),
+            },
+            shared.rays,
+            handles,
+            shared,
+            lamps
+        );
+        graph.compute_over(args, extent, self.items(shared.direct_rays, extent.pixels()));
         direct
     }
 
-    /// Splits `rays` rays per pixel into ranges (first, count), one for each dispatch. Each dispatch is short enough for watchdogs
-    /// and for drivers that limit loops. Without rays there still is one range, so that the image is written.
-    fn batches(&self, extent: Extent, rays: u32) -> Vec<(u32, u32)> {
-        let pixels = u64::from(extent.width) * u64::from(extent.height);
-        let each = (self.rays_at_once / pixels.max(1)).clamp(1, self.most_rays) as u32;
-        (0..rays.max(1)).step_by(each as usize).map(|first| (first, each.min(rays.max(1) - first))).collect()
+    /// A loop of `count` rays in each of `invocations` invocations.
+    fn items(&self, count: u32, invocations: u64) -> Items {
+        Items::new(count).rays(invocations).turns(self.turns)
     }
 }

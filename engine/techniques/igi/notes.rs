@@ -3,8 +3,9 @@
 use super::{PictureSettings, Settings, Visibility};
 use crate::{
     passes::gbuffer::Blended,
-    reference::tracer::tables,
-    scene::{AlphaMode, Environment, Material, Note, NoteKind, Scene, resident::told},
+    resident::told,
+    scene::{AlphaMode, Environment, Material, Note, NoteKind, Scene},
+    tracer::tables,
 };
 
 /// Maximum of material names in a note.
@@ -12,7 +13,7 @@ const NAMED: usize = 3;
 /// Maximum of emitted radiance in the G-buffer, W/(sr·m²): the largest 16-bit float.
 const BRIGHTEST: f32 = 65504.0;
 
-/// Notes about a scene and settings. `of_device`: [`Resident::notes`](crate::scene::resident::Resident::notes). `frames`: number of
+/// Notes about a scene and settings. `of_device`: [`Resident::notes`](crate::resident::Resident::notes). `frames`: number of
 /// pictures of the sequence, 1 for a single picture.
 pub fn notes(scene: &Scene, of_device: &[Note], settings: &PictureSettings, frames: u32) -> Vec<Note> {
     let PictureSettings { igi: settings, gbuffer, .. } = settings;

@@ -7,12 +7,12 @@
 //! Paraboloid maps (Brabec et al. 2002) need one or two maps per light, but bend straight edges, so that a wall of two triangles would be
 //! displaced. Imperfect shadow maps (Ritschel et al. 2008) need points on all surfaces.
 
-use super::{Igi, Settings, Shared, Vpls, rays};
+use super::{Igi, Settings, Shared, Vpls};
 use crate::{
     Error, Result,
     graph::{Depth, Draw, Extent, Format, Graph, Image, ImageDesc, IndexedCall, Raster, Targets},
     passes::gbuffer::GBuffer,
-    scene::resident::{Batches, Cutout, Handles},
+    resident::{Batches, Cutout, Handles},
     shaders::{
         consts::VPL_MAPS,
         igi::{gather_raster, raster as opaque, raster_cutout as cutout},
@@ -77,13 +77,6 @@ fn at_once(size: u32, layers: u32, subsets: u32) -> u32 {
     let each = u64::from(VPL_MAPS) * u64::from(size) * u64::from(size) * 4;
     let most = (MOST_BYTES / each).min(u64::from(layers / VPL_MAPS)) as u32;
     (most / subsets * subsets).max(subsets)
-}
-
-/// Number of passes for `lights` virtual lights on a device with at most `layers` image layers. `holed`: some surfaces have alpha cutouts,
-/// which are drawn in a second pass.
-pub(super) fn passes(settings: &Settings, lights: u32, layers: u32, holed: bool) -> u64 {
-    let batch = at_once(settings.raster_size, layers, settings.interleave * settings.interleave);
-    u64::from(lights * VPL_MAPS * (1 + u32::from(holed)) + lights.div_ceil(batch))
 }
 
 impl Igi {
@@ -171,7 +164,7 @@ impl Igi {
                     nearest,
                 },
             };
-            graph.compute(args, extent).rays(rays(extent, count));
+            graph.compute(args, extent).rays(extent.pixels() * u64::from(count));
         }
         irradiance
     }

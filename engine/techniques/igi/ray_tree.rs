@@ -1,10 +1,10 @@
 //! Mirrors and glass: a tree of reflected and refracted rays for each pixel that shows a mirror or glass (Whitted 1980).
 
-use super::{Igi, Settings, Shared, Vpls, cache::Cache, dispatch, rays};
+use super::{Igi, Settings, Shared, Vpls, cache::Cache, dispatch_over};
 use crate::{
     graph::{Buffer, Extent, Format, Graph, Image},
     passes::gbuffer::GBuffer,
-    scene::resident::Handles,
+    resident::Handles,
     shaders::{
         consts::TREE_WIDTH,
         igi::{ray_tree_direct, ray_tree_gather, ray_tree_gather_picks, ray_tree_grow, ray_tree_sum},
@@ -39,11 +39,6 @@ impl Range {
     fn nodes(&self) -> u32 {
         self.slots * TREE_WIDTH
     }
-
-    /// The nodes as an image with one node per pixel, as [`Igi::batches`] needs it.
-    fn lit(&self) -> Extent {
-        Extent::new(self.nodes(), 1)
-    }
 }
 
 /// Slots for a picture: its pixels, rounded up to whole blocks of 8 × 8.
@@ -52,11 +47,9 @@ fn slots(extent: Extent) -> u32 {
 }
 
 impl Igi {
-    /// For a picture of `extent` pixels, the number of pixel ranges and the nodes of each range. `None` if the scene has no mirrors
-    /// and no glass.
-    pub(super) fn trees_of(&self, extent: Extent) -> Option<(u64, u32)> {
-        let slots = slots(extent);
-        self.sharp.then(|| (u64::from(slots.div_ceil(SLOTS)), slots.min(SLOTS) * TREE_WIDTH))
+    /// Number of ranges of pixels of a picture that have ray trees; 0 if the scene has no mirrors and no glass, or they are off.
+    pub(super) fn tree_ranges(&self, extent: Extent, settings: &Settings) -> u64 {
+        if self.sharp && settings.specular { slots(extent).div_ceil(SLOTS).into() } else { 0 }
     }
 
     /// For each range of pixels, traces the ray trees and computes the light at the surfaces where their rays end.
@@ -143,17 +136,15 @@ impl Igi {
 
     /// Adds direct light at the ends of the ray trees.
     fn direct_of_trees(&self, graph: &mut Graph, handles: &Handles, shared: &Shared, range: &Range) {
-        for (first, count) in self.batches(range.lit(), shared.direct_rays) {
-            let push = ray_tree_direct::Push { first, count, nodes: range.nodes() };
-            let args = traced_lit!(
-                ray_tree_direct::Args { tree_nodes: range.tree_nodes, push },
-                shared.rays,
-                handles,
-                shared,
-                lamps
-            );
-            graph.compute(args, range.nodes()).rays(rays(range.lit(), count));
-        }
+        let push = ray_tree_direct::Push { nodes: range.nodes(), ..Default::default() };
+        let args = traced_lit!(
+            ray_tree_direct::Args { tree_nodes: range.tree_nodes, push },
+            shared.rays,
+            handles,
+            shared,
+            lamps
+        );
+        graph.compute_over(args, range.nodes(), self.items(shared.direct_rays, range.nodes().into()));
     }
 
     /// Adds the light of the virtual lights at the ends of the ray trees. `groups`: number of workgroups, where the device computes it.
@@ -170,25 +161,20 @@ impl Igi {
         let (least, imperfect, seed) = (shared.least, settings.imperfect.into(), shared.seed);
         if let (Some(tree), true) = (vpls.tree, settings.picks_from(vpls.count)) {
             let (picks, proposals, leaves) = (settings.picks, settings.proposals, tree.leaves);
-            for (first, count) in self.batches(range.lit(), picks) {
-                let push = ray_tree_gather_picks::Push { first, count, picks, proposals, leaves, nodes, least, seed };
-                let spec = ray_tree_gather_picks::Spec { imperfect };
-                let args = crate::rays::traced!(
-                    ray_tree_gather_picks::Args { vpls: vpls.buffer, vpl_nodes: tree.nodes, tree_nodes, push, spec },
-                    shared.hidden_by
-                );
-                dispatch(graph, args, groups.map(|groups| (groups, 0)), nodes).rays(rays(range.lit(), count));
-            }
-            return;
-        }
-        for (first, count) in self.batches(range.lit(), vpls.count) {
-            let push = ray_tree_gather::Push { first, count, nodes, least, seed };
-            let spec = ray_tree_gather::Spec { imperfect };
+            let push =
+                ray_tree_gather_picks::Push { picks, proposals, leaves, nodes, least, seed, ..Default::default() };
+            let spec = ray_tree_gather_picks::Spec { imperfect };
             let args = crate::rays::traced!(
-                ray_tree_gather::Args { vpls: vpls.buffer, tree_nodes, push, spec },
+                ray_tree_gather_picks::Args { vpls: vpls.buffer, vpl_nodes: tree.nodes, tree_nodes, push, spec },
                 shared.hidden_by
             );
-            dispatch(graph, args, groups.map(|groups| (groups, 0)), nodes).rays(rays(range.lit(), count));
+            dispatch_over(graph, args, groups, nodes, self.items(picks, nodes.into()));
+            return;
         }
+        let push = ray_tree_gather::Push { nodes, least, seed, ..Default::default() };
+        let spec = ray_tree_gather::Spec { imperfect };
+        let args =
+            crate::rays::traced!(ray_tree_gather::Args { vpls: vpls.buffer, tree_nodes, push, spec }, shared.hidden_by);
+        dispatch_over(graph, args, groups, nodes, self.items(vpls.count, nodes.into()));
     }
 }

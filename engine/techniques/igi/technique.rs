@@ -6,6 +6,7 @@ use super::{Igi, PictureSettings, Settings, Visibility, notes};
 use crate::{
     Result,
     graph::Graph,
+    settings::{Described, Description},
     technique::{self, Making, Mode as Modes, Moment, Picture, Technique},
 };
 
@@ -59,6 +60,10 @@ impl Technique for Igi {
     type Mode = Mode;
     type Baked = Infallible;
 
+    fn description() -> &'static Description {
+        Settings::description()
+    }
+
     fn prepared_by(settings: &PictureSettings) -> PictureSettings {
         let Settings { visibility, imperfect, .. } = settings.igi;
         let igi = Settings { visibility, imperfect, ..Settings::default() };
@@ -71,12 +76,12 @@ impl Technique for Igi {
 
     fn frame(&mut self, graph: &mut Graph, moment: &Moment<'_, Mode>, settings: &PictureSettings) -> Result<Picture> {
         // Indirect light is not computed if no output shows it.
-        let direct = moment.mode == Mode::Direct && !moment.layers;
+        let direct = moment.shot.mode == Mode::Direct && !moment.shot.layers;
         let indirect = settings.igi.indirect && !direct;
         let served = PictureSettings { igi: Settings { indirect, ..settings.igi.clone() }, ..settings.clone() };
         let made = self.picture(graph, moment.scene, moment.pose, moment.handles, &moment.view, &served)?;
         let out = made.outputs;
-        let mut shown = match moment.mode {
+        let mut shown = match moment.shot.mode {
             Mode::Igi => Picture::new(out.total),
             Mode::Direct => Picture::new(out.direct),
             Mode::Indirect => Picture::new(out.indirect),
@@ -92,7 +97,7 @@ impl Technique for Igi {
         if indirect && settings.igi.visibility != Visibility::Raster {
             shown = shown.sum(GATHERED, out.gathered, 3);
         }
-        let notes = notes(moment.scene, moment.notes, settings, moment.frames);
+        let notes = notes(moment.scene, moment.notes, settings, moment.shot.frames);
         Ok(shown.showing(made.gbuffer).noting(notes))
     }
 }

@@ -12,7 +12,8 @@ use crate::{
         shadow::{self, ShadowMaps},
         skybox,
     },
-    scene::{View, resident::Handles},
+    resident::Handles,
+    scene::View,
 };
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +43,7 @@ impl PictureSettings {
     /// `Usage`, naming the key with its group, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
         self.isr.validate().map_err(|error| error.at("isr"))?;
+        self.shadow.validate()?;
         radiance("background", self.background)
     }
 }

@@ -16,7 +16,8 @@ use crate::{
         gbuffer::{self, GBuffer},
         shadow,
     },
-    scene::{Camera, Projection, View, resident::Handles},
+    resident::Handles,
+    scene::{Camera, Projection, View},
     shaders::{self, types},
 };
 use glam::{Mat4, Vec3};

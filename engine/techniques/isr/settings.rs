@@ -181,7 +181,8 @@ pub struct Settings {
     /// picture, one less where it is farther than one and a half of it.
     #[schemars(extend("x-needs" = {"indirect": {"const": true}}))]
     pub samples_by_depth: bool,
-    /// Surfaces around the picture send too: share of its width and height that a view behind it reaches further on each side. 0: none.
+    /// Surfaces around the picture send too: share of its width and height by which a further view is wider and higher, half of it on each
+    /// side. 0: none.
     #[schemars(range(min = 0, max = 4), extend("x-needs" = {"indirect": {"const": true}}))]
     pub border: f32,
     /// Layers of surfaces behind each other that send and block light; 1: the visible one alone.

@@ -11,6 +11,7 @@ use crate::{
         direct::{self, Lights},
         gbuffer, shadow, skybox,
     },
+    settings::{Described, Description, idle_notes},
     technique::{Making, Mode as Modes, Moment, Picture, Settings, Technique},
 };
 
@@ -74,6 +75,10 @@ impl Technique for Isr {
     type Mode = Mode;
     type Baked = Infallible;
 
+    fn description() -> &'static Description {
+        super::Settings::description()
+    }
+
     fn prepared_by(_: &PictureSettings) -> PictureSettings {
         PictureSettings::default()
     }
@@ -84,7 +89,7 @@ impl Technique for Isr {
 
     fn frame(&mut self, graph: &mut Graph, moment: &Moment<'_, Mode>, settings: &PictureSettings) -> Result<Picture> {
         let Moment { handles, view, .. } = moment;
-        let (shown, gbuffer, shadows) = if moment.mode == Mode::Direct {
+        let (shown, gbuffer, shadows) = if moment.shot.mode == Mode::Direct {
             let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
             let shadows = shadow::draw(graph, handles, view, &settings.shadow);
             let lit = direct::light(graph, &gbuffer, Lights::from(&shadows), &settings.isr.direct());
@@ -93,7 +98,7 @@ impl Technique for Isr {
         } else {
             let made = picture(graph, handles, view, self.ambient.clone(), settings)?;
             let out = made.outputs;
-            let shown = match moment.mode {
+            let shown = match moment.shot.mode {
                 Mode::Indirect => Picture::new(out.indirect),
                 Mode::Occlusion => Picture::grey(out.occlusion),
                 Mode::Isr | Mode::Direct => Picture::new(out.total),
@@ -101,6 +106,11 @@ impl Technique for Isr {
             let shown = shown.color("direct", out.direct).color("indirect", out.indirect);
             (shown.values("occlusion", &["Y"], out.occlusion), made.gbuffer, made.shadows)
         };
-        Ok(shown.showing(gbuffer).noting([moment.notes, &shadows.notes].concat()))
+        let of_settings = match moment.shot.mode {
+            Mode::Direct => Vec::new(),
+            _ => idle_notes("isr", &settings.isr),
+        };
+        let of_shadows = idle_notes("shadow", &settings.shadow);
+        Ok(shown.showing(gbuffer).noting([moment.notes, &shadows.notes, &of_settings, &of_shadows].concat()))
     }
 }

@@ -56,7 +56,7 @@ struct Band {
 const BAND_BYTES: u64 = 32 << 20;
 /// Rows of an image that every device can have.
 const IMAGE_ROWS: u32 = 4096;
-/// Pixels that one invocation has: `SPAN` of lib/tonemap_span.glsl.
+/// Pixels that one invocation has: `SPAN` of tonemap/span.glsl.
 const SPAN: u32 = 8;
 
 /// Bands of an image of `extent`, of which each needs `reach` rows more on either side, for so many groups of Gaussians.

@@ -11,10 +11,11 @@ use lucerna::{
     gpu::Gpu,
     graph::{Graph, Report, Runner},
     image::{Layer, Layers},
-    reference::{path, tracer},
+    reference::path,
     scene::{Pose, Scene, View, bvh::Bvh},
     technique::Picture,
     techniques::{fiv::Fiv, igi::Igi, isr::Isr},
+    tracer,
 };
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
@@ -163,7 +164,8 @@ pub const KINDS: &[Kind] = &[
         description: "path tracer on the device; layers emission, direct, indirect, albedo, normal, depth, samples, variance",
         on_device: true,
         of_images: false,
-        settings: |_, changes| {
+        settings: |paper, changes| {
+            no_paper("tracer", paper)?;
             let settings: TracerSettings = config::with(&TracerSettings::default(), changes)?;
             settings.tracer.validate()?;
             match settings.samples {
@@ -179,7 +181,8 @@ pub const KINDS: &[Kind] = &[
         description: "the program povray, with the dissertation's radiosity settings; the picture without layers",
         on_device: false,
         of_images: false,
-        settings: |_, changes| {
+        settings: |paper, changes| {
+            no_paper("povray", paper)?;
             let settings: PovSettings = config::with(&PovSettings::default(), changes)?;
             settings.pov.check()?;
             config::to_value(&settings)
@@ -195,7 +198,8 @@ pub const KINDS: &[Kind] = &[
         description: "path tracer on the CPU; layers direct, indirect, albedo",
         on_device: false,
         of_images: false,
-        settings: |_, changes| {
+        settings: |paper, changes| {
+            no_paper("path", paper)?;
             let settings: PathSettings = config::with(&PathSettings::default(), changes)?;
             match (settings.samples, settings.bounces) {
                 (1..=MOST_SAMPLES, 0..=MOST_BOUNCES) => config::to_value(&settings),
@@ -227,6 +231,14 @@ pub const KINDS: &[Kind] = &[
         available: || Ok(String::new()),
     },
 ];
+
+/// Refuses `paper = true` for a kind that has no settings of a paper.
+fn no_paper(kind: &str, paper: bool) -> Result<()> {
+    match paper {
+        true => Err(Error::usage(format!("{kind} has no preset with the settings of the paper"))),
+        false => Ok(()),
+    }
+}
 
 /// Finds a kind.
 ///

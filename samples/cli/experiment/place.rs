@@ -6,14 +6,17 @@ use glam::Mat4;
 use lucerna::{
     Error, ErrorKind, Result,
     image::{self, Layers},
-    scene::{self, Camera, Limits, Pose, Projection, View, builtin},
+    scene::{self, Camera, Limits, Pose, Projection, extent::Extents},
 };
+use lucerna_scenes as builtin;
 
 use super::file::{Experiment, IfMissing, Scene as Entry};
 use crate::{
     args::Size,
     camera::{self, CameraFile, Choice},
-    config, fingerprint, framing, lights, source,
+    config, fingerprint, framing, lights,
+    placed::Placed,
+    source,
     views::{self, ViewList},
 };
 
@@ -44,35 +47,32 @@ impl Folders {
 
 /// A view of a scene.
 #[derive(Clone, Debug)]
-pub struct Placed {
+pub struct View {
     pub name: String,
     /// Size that replaces the experiment's size.
     size: Option<Size>,
-    camera: Camera,
-    /// The node that carries the camera; `None` if the camera is not part of the scene.
-    node: Option<usize>,
-    world_from_camera: Mat4,
+    placed: Placed,
 }
 
-impl Placed {
-    fn from_file(name: String, file: &CameraFile) -> Self {
-        let camera = Camera { name: name.clone(), projection: file.projection() };
-        Self { name, size: None, camera, node: None, world_from_camera: file.world_from_view() }
+impl View {
+    fn new(placed: Placed) -> Self {
+        Self { name: placed.name.clone(), size: None, placed }
+    }
+
+    fn from_file(name: &str, file: &CameraFile) -> Self {
+        Self::new(Placed::from_file(name.to_owned(), file))
     }
 
     /// The view of an entry that is a picture.
     fn still(image: &Layers) -> Self {
         let projection = Projection::Orthographic { xmag: 1.0, ymag: 1.0, znear: 0.0, zfar: 1.0 };
-        let camera = Camera { name: STILL.into(), projection };
-        let size = Some(Size { width: image.width, height: image.height });
-        Self { name: STILL.into(), size, camera, node: None, world_from_camera: Mat4::IDENTITY }
+        let placed = Placed::fixed(Camera { name: STILL.into(), projection }, Mat4::IDENTITY);
+        Self { size: Some(Size { width: image.width, height: image.height }), ..Self::new(placed) }
     }
 
     /// The view in a pose, at its own size or else at `size`.
-    pub fn view(&self, pose: &Pose, size: Size) -> View {
-        let size = self.size.unwrap_or(size);
-        let world = self.node.map_or(self.world_from_camera, |node| pose.world[node]);
-        View::new(&self.camera, world, [size.width, size.height])
+    pub fn at(&self, pose: &Pose, size: Size) -> scene::View {
+        self.placed.view(pose, self.size.unwrap_or(size))
     }
 }
 
@@ -85,7 +85,7 @@ pub struct Loaded {
     pub image: Option<Layers>,
     pub fingerprint: String,
     pub triangles: usize,
-    pub views: Vec<Placed>,
+    pub views: Vec<View>,
     /// A fitting exposure, EV, if known.
     pub exposure: Option<f64>,
 }
@@ -129,8 +129,7 @@ fn read(experiment: &Experiment, entry: &Entry, folders: &Folders) -> Result<Loa
         let path = if source::is_built_in_environment(path) { path.to_path_buf() } else { found(name)? };
         scene.environment = Some(source::environment(&path)?.0);
     }
-    lights::add(&mut scene, &entry.light, entry.sun.as_ref());
-    framing::add_missing_light(&mut scene, entry.default_light);
+    lights::light(&mut scene, &entry.light, entry.sun.as_ref(), entry.default_light);
     if !entry.sky {
         scene.environment = None;
     }
@@ -138,6 +137,7 @@ fn read(experiment: &Experiment, entry: &Entry, folders: &Folders) -> Result<Loa
         framing::add_missing_camera(&mut scene, experiment.size.aspect());
     }
     let pose = Pose::playing(&scene, 0.0);
+    Extents::of(&scene).check(&scene, &pose)?;
     let views = sized(all_views(entry, &scene, &pose, folders)?, entry)?;
     let triangles =
         scene.meshes.iter().flat_map(|mesh| &mesh.primitives).map(|primitive| primitive.indices.len() / 3).sum();
@@ -156,7 +156,7 @@ fn still(path: &Path, entry: &Entry) -> Result<Loaded> {
         pose: Pose::rest(&scene),
         scene,
         triangles: 0,
-        views: vec![Placed::still(&image)],
+        views: vec![View::still(&image)],
         exposure: entry.exposure,
         image: Some(image),
     })
@@ -166,7 +166,7 @@ fn still(path: &Path, entry: &Entry) -> Result<Loaded> {
 const MOST_VIEWS: usize = 100_000;
 
 /// Every view at every size.
-fn sized(views: Vec<Placed>, entry: &Entry) -> Result<Vec<Placed>> {
+fn sized(views: Vec<View>, entry: &Entry) -> Result<Vec<View>> {
     if entry.sizes.is_empty() {
         return Ok(views);
     }
@@ -176,34 +176,33 @@ fn sized(views: Vec<Placed>, entry: &Entry) -> Result<Vec<Placed>> {
         let what = format!("{} views at {} sizes are {all}; at most {MOST_VIEWS} are made", views.len(), sizes.len());
         return Err(Error::input(what));
     }
-    let at =
-        |view: &Placed, size: Size| Placed { name: format!("{} {size}", view.name), size: Some(size), ..view.clone() };
+    let at = |view: &View, size: Size| View { name: format!("{} {size}", view.name), size: Some(size), ..view.clone() };
     Ok(views.iter().flat_map(|view| sizes.iter().map(move |&size| at(view, size))).collect())
 }
 
-fn all_views(entry: &Entry, scene: &scene::Scene, pose: &Pose, folders: &Folders) -> Result<Vec<Placed>> {
-    let mut list: Vec<Placed> = Vec::new();
+fn all_views(entry: &Entry, scene: &scene::Scene, pose: &Pose, folders: &Folders) -> Result<Vec<View>> {
+    let mut list: Vec<View> = Vec::new();
     let found = |name: &str| folders.find(name).ok_or_else(|| folders.missing(name));
     for asked in &entry.cameras {
         list.push(match camera::in_list(asked) {
             Some((file, view)) => {
                 let views = ViewList::read(&found(file)?)?;
                 let view = views.find(view)?;
-                Placed::from_file(view.name.clone(), &view.camera())
+                View::from_file(&view.name, &view.camera())
             }
             None => one(asked, scene, folders)?,
         });
     }
     if let Some(name) = &entry.list {
         let views = ViewList::read(&found(name)?)?;
-        list.extend(views.views.iter().map(|view| Placed::from_file(view.name.clone(), &view.camera())));
+        list.extend(views.views.iter().map(|view| View::from_file(&view.name, &view.camera())));
     }
     if entry.recorded {
-        list.extend(views::recorded(scene, pose).iter().map(|v| Placed::from_file(v.name.clone(), &v.camera())));
+        list.extend(views::recorded(scene, pose).iter().map(|v| View::from_file(&v.name, &v.camera())));
     }
     if entry.random > 0 {
         let drawn = views::draw::views(scene, pose, &entry.name, entry.random, entry.seed)?;
-        list.extend(drawn.iter().map(|view| Placed::from_file(view.name.clone(), &view.camera())));
+        list.extend(drawn.iter().map(|view| View::from_file(&view.name, &view.camera())));
     }
     if let Some(twice) = list.iter().enumerate().find(|(i, view)| list[..*i].iter().any(|v| v.name == view.name)) {
         return Err(Error::input(format!("two views are named '{}'", twice.1.name)));
@@ -215,21 +214,16 @@ fn all_views(entry: &Entry, scene: &scene::Scene, pose: &Pose, folders: &Folders
 }
 
 /// One camera by index, name or file.
-fn one(asked: &str, scene: &scene::Scene, folders: &Folders) -> Result<Placed> {
+fn one(asked: &str, scene: &scene::Scene, folders: &Folders) -> Result<View> {
     if asked.ends_with(".toml") {
         let path = folders.find(asked).ok_or_else(|| folders.missing(asked))?;
         let name = path.file_stem().map_or_else(|| "camera".into(), |stem| stem.to_string_lossy().into_owned());
-        return Ok(Placed::from_file(name, &CameraFile::read(&path)?));
+        return Ok(View::from_file(&name, &CameraFile::read(&path)?));
     }
     let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
     Ok(match camera::choose(asked, &names)? {
-        Choice::Scene(index) => {
-            let camera = scene.cameras[index].clone();
-            let node = scene.nodes.iter().position(|node| node.camera == Some(index as u32));
-            let name = if camera.name.is_empty() { format!("camera{index}") } else { camera.name.clone() };
-            Placed { name, size: None, camera, node, world_from_camera: Mat4::IDENTITY }
-        }
-        Choice::File(file) => Placed::from_file(asked.to_owned(), &file),
+        Choice::Scene(index) => View::new(Placed::of_scene(scene, index)),
+        Choice::File(file) => View::from_file(asked, &file),
     })
 }
 
@@ -242,7 +236,7 @@ pub fn spread<T>(list: &[T], most: Option<usize>) -> Vec<&T> {
 }
 
 /// All data of a view that can change a picture.
-pub fn view_key(view: &View) -> Result<serde_json::Value> {
+pub fn view_key(view: &scene::View) -> Result<serde_json::Value> {
     let camera = [view.view_from_world, view.clip_from_view].map(|m| m.to_cols_array().to_vec());
     config::to_value(&(camera, view.extent))
 }

@@ -13,7 +13,7 @@ use super::{
     cache::{self, Cache, Inputs, Key},
     file::{Changes, Experiment, IfMissing, Method, Scene},
     kinds::{self, Job, Kind, Warm},
-    place::{self, Folders, Loaded, Placed},
+    place::{self, Folders, Loaded},
     progress::Progress,
     results::{Done, Results, Shining, label},
 };
@@ -186,7 +186,7 @@ struct One<'a> {
 }
 
 impl One<'_> {
-    fn placed(&self) -> &Placed {
+    fn view(&self) -> &place::View {
         &self.loaded.views[self.step.view]
     }
 
@@ -196,7 +196,7 @@ impl One<'_> {
 
     fn describe(&self, device: &str) -> Result<(Done, Key)> {
         let Self { experiment, entry, loaded, method, step, .. } = self;
-        let view = self.placed().view(&loaded.pose, experiment.size);
+        let view = self.view().at(&loaded.pose, experiment.size);
         let inputs = Inputs {
             scene: loaded.fingerprint.clone(),
             view: place::view_key(&view)?,
@@ -211,7 +211,7 @@ impl One<'_> {
             group: entry.group.clone(),
             triangles: loaded.triangles,
             shining: loaded.image.is_none().then(|| Shining::of(&loaded.scene)),
-            view: self.placed().name.clone(),
+            view: self.view().name.clone(),
             method: method.name.clone(),
             variant: step.variant.clone(),
             key: key.name.clone(),
@@ -223,7 +223,7 @@ impl One<'_> {
     /// Renders and stores the picture. Returns false if it was interrupted.
     fn render(&self, warm: &mut Warm<'_>, context: &Context<'_>, key: &Key) -> Result<bool> {
         let Self { experiment, entry, loaded, method, step, .. } = self;
-        let view = self.placed().view(&loaded.pose, experiment.size);
+        let view = self.view().at(&loaded.pose, experiment.size);
         let settings = self.kind()?.effective(method, &step.variant)?;
         let job = Job {
             view: &view,
@@ -245,7 +245,7 @@ impl One<'_> {
                 version: program::VERSION.into(),
                 scene: entry.name.clone(),
                 scene_hash: loaded.fingerprint.clone(),
-                camera: self.placed().name.clone(),
+                camera: self.view().name.clone(),
                 technique: label(&method.name, &step.variant),
                 seed: experiment.seed.into(),
                 device: about.device.clone(),

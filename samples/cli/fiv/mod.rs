@@ -11,8 +11,8 @@ use std::{path::PathBuf, process::ExitCode};
 use lucerna::{
     Error, Result,
     image::{self, Layers, WriteOptions},
-    scene::builtin,
 };
+use lucerna_scenes as builtin;
 
 pub use precompute::{PrecomputeArgs, precompute};
 pub use render::{FivArgs, render};

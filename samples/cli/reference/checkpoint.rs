@@ -8,7 +8,7 @@ use std::{
 use lucerna::{
     Error, ErrorKind, Result,
     image::{read_file_checked, write_atomic},
-    reference::tracer::{State, Tracer},
+    tracer::{State, Tracer},
 };
 use serde_json::Value;
 

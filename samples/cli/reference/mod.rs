@@ -12,10 +12,11 @@ use lucerna::{
     Error, Result,
     gpu::{Gpu, GpuOptions},
     image::{Format, Layer, Layers, Metadata, WriteOptions},
-    reference::tracer::{Progress, Tracer},
-    scene::{NoteKind, View, builtin},
+    scene::{NoteKind, View},
     technique::Mode,
+    tracer::{Progress, Tracer},
 };
+use lucerna_scenes as builtin;
 use serde_json::{Value, json};
 
 use crate::{
@@ -128,7 +129,7 @@ fn picture(
     if outputs.uses_stdout() && args.json {
         return Err(Error::usage("--json and an image both want standard output").help("Give the image a name"));
     }
-    let names = (stage.scene.name.clone(), stage.camera_name.clone());
+    let names = (stage.scene.name.clone(), stage.placed.name.clone());
     let values = Values { scene: &names.0, camera: &names.1, technique: "reference", frame: 0, layer: "" };
     outputs.probe(&values, &["picture"])?;
     let first = args.output.first().filter(|name| *name != "-");
@@ -315,7 +316,7 @@ fn metadata(
         revision: program::revision().map(str::to_owned),
         scene: stage.scene.name.clone(),
         scene_hash: stage.fingerprint.clone(),
-        camera: stage.camera_name.clone(),
+        camera: stage.placed.name.clone(),
         technique: "reference".into(),
         seed: settings.technique.reference.seed.into(),
         device: about.device.clone(),

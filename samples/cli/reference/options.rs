@@ -2,7 +2,7 @@
 
 use std::{str::FromStr, time::Duration};
 
-use lucerna::{Error, Result, reference::tracer, technique::Mode};
+use lucerna::{Error, Result, technique::Mode, tracer};
 use serde::{Deserialize, Serialize};
 
 use crate::{

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use lucerna::reference::tracer::Progress;
+use lucerna::tracer::Progress;
 
 use crate::progress::{ProgressMode, span};
 

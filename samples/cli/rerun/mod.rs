@@ -171,7 +171,8 @@ fn again(
         interrupt,
     };
     match maker {
-        Maker::Technique(name) => techniques::visit(name, ByTechnique(&asked)).unwrap_or(Ok(None)),
+        Maker::Technique(name) => techniques::visit(name, ByTechnique(&asked))
+            .unwrap_or_else(|| Err(Error::new(ErrorKind::Runtime, format!("there is no technique {name}")))),
         Maker::Reference | Maker::Tonemap => reference::again(&asked),
     }
 }

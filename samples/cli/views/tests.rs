@@ -1,5 +1,6 @@
 use glam::{Vec3, Vec4};
-use lucerna::scene::{Material, Mesh, Node, Pose, Primitive, Scene, builtin};
+use lucerna::scene::{Material, Mesh, Node, Pose, Primitive, Scene};
+use lucerna_scenes as builtin;
 
 use super::{NamedView, Origin, ViewList, draw, recorded};
 use crate::views::draw::{Judge, Refusal};

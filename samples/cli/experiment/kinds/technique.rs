@@ -1,16 +1,16 @@
 //! The kinds that are techniques of the engine.
 
 use lucerna::{
-    Error, Result,
+    Result,
     graph::Runner,
     technique::{Ready, Settings, Shot, Technique},
 };
 use serde_json::Value;
 
 use super::{Job, Kind, Rendered, Warm, on_device, read};
-use crate::{config, experiment::file::Changes};
+use crate::{config, experiment::file::Changes, render};
 
-/// Most preparations of a technique for one scene that are kept. Variants often alternate between two.
+/// Maximum number of preparations of a technique for one scene that stay in memory. Variants often alternate between two.
 const KEPT: usize = 2;
 
 /// The kind of a technique.
@@ -27,12 +27,7 @@ pub(super) const fn of<T: Technique + 'static>() -> Kind {
 }
 
 fn settings<T: Technique>(paper: bool, changes: &Changes) -> Result<Value> {
-    let base = match paper {
-        false => T::Settings::default(),
-        true => T::Settings::paper().ok_or_else(|| {
-            Error::input(format!("{} has no preset with the settings of the paper", T::NAME)).at("paper")
-        })?,
-    };
+    let base = if paper { render::paper::<T>()? } else { T::Settings::default() };
     let settings: T::Settings = config::with(&base, changes)?;
     settings.validate()?;
     config::to_value(&settings)
@@ -53,9 +48,9 @@ pub(super) fn picture<T: Technique + 'static>(warm: &mut Warm<'_>, job: &Job<'_>
     let index = match list.iter().position(|kept| kept.by == by) {
         Some(index) => index,
         None => {
-            // The one that was made first goes before the next is made, so that no more than these are in memory.
+            // The oldest is dropped before the next is made, so that memory never holds more.
             list.truncate(KEPT - 1);
-            let ready = match Ready::new(gpu, scene, &settings, None, &mut |_, _| !job.interrupt.requested()) {
+            let ready = match Ready::new(gpu, scene, &by, None, &mut |_, _| !job.interrupt.requested()) {
                 Err(_) if job.interrupt.requested() => return Ok(None),
                 ready => ready?,
             };

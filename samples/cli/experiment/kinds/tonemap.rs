@@ -17,7 +17,7 @@ use lucerna::{
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{Job, Rendered, Times, Warm, on_device, read, technique};
+use super::{Job, Rendered, Times, Warm, no_paper, on_device, read, technique};
 use crate::{config, experiment::file::Changes};
 
 /// Settings of both kinds.
@@ -27,7 +27,8 @@ struct Settings {
     tonemap: tonemap::Settings,
 }
 
-pub(super) fn settings(_paper: bool, changes: &Changes) -> Result<Value> {
+pub(super) fn settings(paper: bool, changes: &Changes) -> Result<Value> {
+    no_paper("tonemap", paper)?;
     let settings: Settings = config::with(&Settings::default(), changes)?;
     settings.tonemap.validate()?;
     config::to_value(&settings)

@@ -1,7 +1,5 @@
-use lucerna::{
-    scene::builtin,
-    techniques::isr::{PictureSettings, Preset, Settings},
-};
+use lucerna::techniques::isr::{PictureSettings, Preset, Settings};
+use lucerna_scenes as builtin;
 
 use super::{
     Errors, page,

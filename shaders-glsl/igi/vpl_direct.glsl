@@ -1,0 +1,74 @@
+// Direct light by shadow rays: one ray to each point, spot and directional light, and samples of emissive surfaces and of the environment.
+// Before including: lib/lights.glsl, lib/light_sampling.glsl, lib/hit_surface.glsl, lib/vpl.glsl, igi/vpl_surface.glsl, lib/brdf.glsl;
+// and `settings`.
+#ifndef LIB_VPL_DIRECT
+#define LIB_VPL_DIRECT
+
+// A receiver of direct light.
+struct LitPoint {
+    vec3 position; // metres
+    vec3 above;    // the position, a step off the surface, metres
+    vec3 normal;   // unit
+    vec3 viewer;   // unit, towards the viewer
+    Brdf brdf;     // for the viewer
+};
+
+// The material's BRDF; without its specular part if the settings switch it off.
+Brdf lit_brdf(vec3 albedo, vec3 f0, float roughness, float nv) {
+    return brdf_of(albedo, settings.diffuse_only != 0u ? vec3(0.0) : f0, roughness, nv);
+}
+
+// Number of shadow rays per point.
+uint direct_rays() {
+    return light_count + (settings.tree + settings.sky) * settings.samples;
+}
+
+// Shadow ray number i. Returns the radiance (W/(sr·m²)) that the point reflects towards the viewer if the ray is not occluded.
+vec3 direct_ray(uint i, LitPoint p, uvec2 place, out Ray ray) {
+    ray = Ray(p.above, 0.0, vec3(0.0, 1.0, 0.0), 0.99999);
+    vec3 arrives = vec3(0.0); // irradiance on a plane that faces the light
+    vec3 to_light = p.normal;
+    if (i < light_count) {
+        Light one = light(i);
+        arrives = light_irradiance(one, p.position, to_light);
+        ray.direction = one.kind == LIGHT_DIRECTIONAL ? to_light : one.position - p.above;
+        ray.t_max = one.kind == LIGHT_DIRECTIONAL ? 1e30 : 0.99999;
+    } else {
+        uint j = i - light_count;
+        uvec4 turn = pcg4d(uvec4(place, settings.seed, 0xd12ecu));
+        uvec4 words = pcg4d(uvec4(place, settings.seed, i));
+        uint number = j % settings.samples;
+        // The R2 sequence (Roberts), with a rotation for each pixel, spreads the samples of a pixel evenly.
+        vec2 u = fract(unit_floats(turn.xy) + float(number) * vec2(0.75487767, 0.56984029));
+        float strata = fract((float(number) + unit_float(words.w)) / float(settings.samples));
+        if (settings.tree != 0u && j < settings.samples) {
+            float chosen;
+            LightTarget to = light_targets[pick_light(p.above, p.normal, words.xy, chosen)];
+            SurfacePoint point = surface_point(to.instance, to.index, sample_triangle(u));
+            bool both = (materials[surface_instances[to.instance].material].flags & MATERIAL_DOUBLE_SIDED) != 0u;
+            vec3 away = p.position - point.position;
+            float facing = dot(point.area, away);
+            float d2 = dot(away, away);
+            if ((facing > 0.0 || (both && facing < 0.0)) && d2 > 0.0 && chosen > 0.0) {
+                // The length of `point.area` is twice the triangle's area.
+                float angle = 0.5 * abs(facing) / (d2 * sqrt(d2));
+                arrives = triangle_radiance(to.instance, point, settings.two) * (angle / (chosen * float(settings.samples)));
+                vec3 target = point.position + point.area * (sign(facing) * surface_gap(point) / length(point.area));
+                ray.direction = target - p.above;
+                to_light = -away * inversesqrt(d2);
+            }
+        } else {
+            float density;
+            uint bits = uint(strata * 16777216.0) << 8u;
+            to_light = environment_sample(settings.environment, bits, unit_float(words.z), u, density);
+            if (density > 0.0) arrives = environment_radiance(settings.environment, to_light) / (density * float(settings.samples));
+            ray.direction = to_light;
+            ray.t_max = 1e30;
+        }
+    }
+    float cosine = dot(p.normal, to_light);
+    if (cosine <= 0.0 || arrives == vec3(0.0)) return vec3(0.0);
+    return arrives * brdf_cosine(p.brdf, p.normal, p.viewer, to_light);
+}
+
+#endif

@@ -1,0 +1,77 @@
+// The path tracer's settings, the state of a path between dispatches, and its random numbers.
+// Before including: lib/environment_sampling.glsl, lib/random.glsl, lib/sampling.glsl.
+#ifndef LIB_PATH
+#define LIB_PATH
+
+const uint PATH_DIFFUSE_ONLY = 1u; // export
+const uint PATH_JITTER = 2u; // export
+const uint PATH_SEES_EMISSION = 4u; // export
+const uint PATH_SEES_ENVIRONMENT = 8u; // export
+const uint PATH_NO_LIGHT_SAMPLES = 16u; // export
+const uint PATH_NO_BSDF_SAMPLES = 32u; // export
+
+// Kinds of rays from a surface: to a light of the light tree, to a directional light, to the environment, and on to the next surface.
+const uint TO_LIGHT = 0u; // export
+const uint TO_SUN = 1u; // export
+const uint TO_SKY = 2u; // export
+const uint ON = 3u; // export
+
+// Layers of the sums; see reference/path_sums.glsl.
+const uint PATH_SUMS = 6u; // export
+// The first PATH_EXACT_SUMS layers also have layers for their rounding errors.
+const uint PATH_EXACT_SUMS = 3u; // export
+
+struct PathSettings {
+    EnvironmentMap environment;
+    uvec2 extent;              // pixels
+    uint blocks;               // of 8 pixels in a row
+    uint suns;                 // number of directional lights
+    uint tree;                 // 1: the light tree has lights
+    uint bounces;              // maximum of scatterings after the first surface
+    uint specular_bounces;     // maximum of mirrors and glass surfaces along a path
+    uint roulette;             // scatterings before Russian roulette begins
+    uint flags;                // PATH_
+    uint seed;
+    // Loop bounds that are not compile-time constants: compilers of CPU drivers would unroll the loops, which takes minutes.
+    uint slots;                // TEXTURE_SLOTS + 2
+    uint two;                  // 2
+    uint turns;                // rays per surface
+    uint turn_ways[4];         // kind of each of these rays; the first is ON
+};
+
+// A light sample whose shadow ray is not traced yet.
+struct WaitingLight {
+    vec3 direction;    // of the ray
+    float limit;       // in lengths of direction
+    vec3 radiance;     // added to the path if the ray is not occluded
+};
+
+struct PathState {
+    vec3 origin;
+    float limit;       // of the ray, in lengths of direction
+    vec3 direction;
+    float density;     // of the last scattering, per steradian; 0: light sampling cannot sample this direction
+    vec3 throughput;
+    uint alive;
+    uint vertex;       // surfaces visited
+    uint scattered;    // by Lambert or GGX
+    uint specular;     // by mirrors and glass
+    vec3 emission;     // radiance without scattering
+    vec3 direct;       // radiance after one scattering
+    vec3 indirect;     // radiance after more scatterings
+    vec3 side;         // geometric normal at the last scattering, unit, on the side where the path left
+    uint waiting;      // bit i: the light sample of kind i needs its shadow ray
+    uint salt;         // seed for alpha-blended surfaces along shadow rays
+    vec3 light_origin;
+    uint light_scatterings;
+    WaitingLight lamp; // three members, because compilers keep an array in memory and not in registers
+    WaitingLight sun;
+    WaitingLight sky;
+};
+
+// Four independent random words: a pure function of seed, pixel, sample and dimension.
+uvec4 random_words(uvec2 pixel, uint sample_number, uint dimension, uint seed) {
+    return pcg4d(uvec4(pixel.x | pixel.y << 16u, sample_number, dimension, seed));
+}
+
+#endif
