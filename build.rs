@@ -29,6 +29,7 @@ fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=engine/shader");
     println!("cargo:rerun-if-env-changed=SHADERC_LIB_DIR");
+    println!("cargo:rustc-env=LUCERNA_SHADER_COMPILER={}", compiler());
     if let Err(message) = run() {
         // One line each, so that cargo shows `file:line: error: …` as the compiler wrote it.
         for line in message.lines() {
@@ -37,6 +38,13 @@ fn main() {
         eprintln!("{message}");
         exit(1);
     }
+}
+
+/// Name of the shader compiler, for the metadata of pictures: the folder of the library, which ci/setup names by its versions.
+fn compiler() -> String {
+    let folder = env::var_os("SHADERC_LIB_DIR").map(PathBuf::from);
+    let name = folder.as_deref().map(file_name).filter(|name| name.starts_with("shaderc"));
+    name.unwrap_or_else(|| "shaderc of the system, or built from source".to_owned())
 }
 
 fn run() -> Result<(), String> {

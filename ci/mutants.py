@@ -75,7 +75,7 @@ def test_is_there(root, mutant):
 
 
 def sync(root, tree):
-    """Makes `tree` equal to what git sees of `root`, and gives its digest. Files that are equal keep their times."""
+    """Makes `tree` equal to what git sees of `root`, and gives a digest of what answers depend on. Files that are equal keep their times."""
     listed = subprocess.run(["git", "-C", root, "ls-files", "-z", "-co", "--exclude-standard"], check=True, stdout=subprocess.PIPE)
     names = sorted(name for name in listed.stdout.decode().split("\0") if name and (root / name).is_file())
     # Written by ci/setup: where the shader compiler lies.
@@ -83,7 +83,9 @@ def sync(root, tree):
     digest = hashlib.sha256()
     for name in names:
         data = (root / name).read_bytes()
-        digest.update(f"{name}\0{len(data)}\0".encode() + data)
+        # Pages and this table change no answer.
+        if not name.endswith(".md") and not name.startswith(("docs/", "ci/mut")):
+            digest.update(f"{name}\0{len(data)}\0".encode() + data)
         to = tree / name
         if not to.is_file() or to.read_bytes() != data:
             to.parent.mkdir(parents=True, exist_ok=True)
@@ -154,6 +156,11 @@ def unmutated(tree, target, test, how, cases):
     return seconds
 
 
+def bug(mutant):
+    """What an answer is for: the bug and its test."""
+    return "\0".join(mutant[key] for key in ("file", "old", "new", "test", "case"))
+
+
 def of_shader(mutant):
     return mutant["file"].startswith("shaders-glsl/")
 
@@ -194,6 +201,8 @@ def answer(tree, target, mutant, how, seconds):
             code, out = cargo(tree, target, *test)
         finally:
             path.write_text(text)
+            if replaced is None and of_shader(mutant):
+                cargo(tree, target, mutant["test"], how, ["--no-run"])
     if code is None:
         return HUNG, out
     if code == 0:
@@ -251,13 +260,13 @@ def main():
                 entry = json.loads(line)
                 # What went wrong otherwise may have been the machine.
                 if entry["verdict"] in (CAUGHT, SURVIVED):
-                    known[entry["tree"], entry["name"]] = entry
+                    known[entry["tree"], entry["bug"]] = entry
             except (ValueError, KeyError, TypeError):
                 continue  # the last line of a run that was killed
 
     results, begun = [], time.monotonic()
-    todo = [m for m in mutants if (digest, m["name"]) not in known]
-    results += [known[digest, m["name"]] for m in mutants if (digest, m["name"]) in known]
+    todo = [m for m in mutants if (digest, bug(m)) not in known]
+    results += [known[digest, bug(m)] | {"name": m["name"]} for m in mutants if (digest, bug(m)) in known]
     if results:
         print(f"{len(results)} were answered by an earlier run of this tree", flush=True)
     todo.sort(key=of_shader)
@@ -277,7 +286,7 @@ def main():
             print(f"{verdict:14} {took:6.0f} s  {m['name']}", flush=True)
             if verdict != CAUGHT:
                 print(tail(out), flush=True)
-            results.append({"tree": digest, "name": m["name"], "verdict": verdict, "seconds": round(took, 1)})
+            results.append({"tree": digest, "bug": bug(m), "name": m["name"], "verdict": verdict, "seconds": round(took, 1)})
             with open(answers, "a") as file:
                 file.write(json.dumps(results[-1]) + "\n")
 

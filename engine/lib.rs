@@ -80,6 +80,9 @@ pub mod tracer;
 pub mod shaders {
     #![allow(missing_docs, clippy::derivable_impls)]
     include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+
+    /// The compiler of all shaders.
+    pub const COMPILER: &str = env!("LUCERNA_SHADER_COMPILER");
 }
 
 // The unit tests use the built-in scenes, whose package depends on this one.

@@ -1,10 +1,7 @@
 //! Images, buffers, submissions and timestamps on a device with validation.
 
 use ash::vk;
-use lucerna::{
-    gpu::{self, BufferDesc, ImageDesc, OwnedBuffer, OwnedImage, Region, Timestamps, testing::with_gpu},
-    graph::loop_limit,
-};
+use lucerna::gpu::{self, BufferDesc, ImageDesc, OwnedBuffer, OwnedImage, Region, Timestamps, testing::with_gpu};
 
 mod gpu_common;
 
@@ -229,8 +226,8 @@ fn eight_threads_may_use_one_device() {
 #[test]
 fn the_loop_limit_of_old_cpu_drivers_is_found() {
     with_gpu(|gpu| {
-        let limit = loop_limit(gpu).unwrap();
-        assert_eq!(limit, loop_limit(gpu).unwrap());
+        let limit = gpu.loop_limit().unwrap();
+        assert_eq!(limit, gpu.loop_limit().unwrap());
         let driver = gpu.describe();
         if driver.driver_info.contains("Mesa 22.") {
             let limit = limit.expect("Mesa 22 stops loops early");

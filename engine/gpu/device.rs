@@ -99,7 +99,7 @@ pub(crate) struct Context {
     pub shells: Mutex<Vec<Shell>>,
     pub samplers: Mutex<HashMap<SamplerKey, vk::Sampler>>,
     pub pipelines: Mutex<PipelineCache>,
-    /// Answer of [`crate::graph::loop_limit`].
+    /// Answer of [`Gpu::loop_limit`].
     pub loop_limit: OnceLock<Option<u32>>,
     /// Last: the instance goes after the device.
     pub instance: Arc<Instance>,
@@ -148,11 +148,6 @@ impl Drop for Context {
 }
 
 impl Gpu {
-    /// Where [`crate::graph::loop_limit`] keeps its answer.
-    pub(crate) fn known_loop_limit(&self) -> &OnceLock<Option<u32>> {
-        &self.0.loop_limit
-    }
-
     /// Opens the device that `options` choose.
     ///
     /// # Errors

@@ -32,6 +32,7 @@ mod format;
 mod image;
 mod image_desc;
 mod instance;
+mod loops;
 mod memory;
 mod options;
 mod pipeline;

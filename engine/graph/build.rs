@@ -51,7 +51,7 @@ impl PassRef<'_> {
         self
     }
 
-    /// Cuts it into dispatches.
+    /// Notes its loop.
     fn over(self, items: Items, range: [usize; 2]) -> Self {
         let pass = &mut self.graph.passes[self.index];
         pass.rays = items.all_rays();
@@ -271,9 +271,10 @@ impl Graph {
         self.pass(A::SHADER.name, Work::Compute { bound: bound(&args), groups: Groups::Direct(groups), over: None })
     }
 
-    /// As [`Graph::compute`], for a shader whose invocations loop over many items. The pass is cut into as many dispatches as watchdogs and
-    /// drivers that limit loops ask for; each has other `first` and `count` in its push constants, whose values in `args` have no effect.
-    /// The shader adds its items to the values that the dispatch before wrote.
+    /// As [`Graph::compute`], for a shader whose invocations loop over many items. The runner cuts the pass into as many dispatches as
+    /// watchdogs and drivers that limit loops ask for; each has other `first` and `count` in its push constants, whose values in `args` have
+    /// no effect. The shader adds its items to the values that the dispatch before wrote; with `first == 0` it may begin with zero. Without
+    /// items it runs once, with `count == 0`. A pass that is [counted](PassRef::counted) is one submission, however long.
     pub fn compute_over<A: RangedArgs>(&mut self, args: A, threads: impl Into<Threads>, items: Items) -> PassRef<'_> {
         let pass = self.compute(args, threads);
         pass.over(items, A::RANGE)

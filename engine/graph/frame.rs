@@ -126,7 +126,7 @@ pub struct Report {
     pub plan_ms: f64,
     /// Milliseconds to record and to make what was missing: memory, pipelines.
     pub record_ms: f64,
-    /// Milliseconds from submission to the end.
+    /// Milliseconds for which the host waited for the device.
     pub wait_ms: f64,
     pub barriers: usize,
     /// Parts in which the device had it: more than one where it is long.

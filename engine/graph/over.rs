@@ -9,7 +9,7 @@ pub struct Items {
 }
 
 impl Items {
-    /// `count` items, each as short as one ray of the whole dispatch and one loop iteration. The pass runs once if there are none.
+    /// `count` items. Each takes the time of one ray and one loop iteration, unless [`Self::rays`] and [`Self::turns`] say more.
     pub fn new(count: u32) -> Self {
         Self { count, rays: 1, turns: 1 }
     }
@@ -21,7 +21,7 @@ impl Items {
     }
 
     /// Number of loop iterations that one item takes in an invocation. It matters for drivers that end long loops
-    /// ([`super::loop_limit`]).
+    /// ([`crate::gpu::Gpu::loop_limit`]).
     #[must_use]
     pub fn turns(self, turns: u64) -> Self {
         Self { turns: turns.max(1), ..self }

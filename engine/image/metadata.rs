@@ -29,6 +29,9 @@ pub struct Metadata {
     /// Names of the Vulkan device and its driver with version.
     pub device: String,
     pub driver: String,
+    /// The compiler of the shaders. Compilers round constants and order sums otherwise.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub shader_compiler: String,
     /// Rendering time. Varies between runs: `None` unless the user asked for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seconds: Option<f64>,
@@ -88,6 +91,7 @@ impl Metadata {
             ("seed", self.seed.to_string()),
             ("device", self.device.clone()),
             ("driver", self.driver.clone()),
+            ("shaderCompiler", self.shader_compiler.clone()),
             ("seconds", self.seconds.map(|s| s.to_string()).unwrap_or_default()),
         ];
         all.into_iter().filter(|(_, value)| !value.is_empty()).collect()

@@ -136,7 +136,7 @@ pub fn draw(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings
     ShadowMaps { lights: scene.lights, shadows, maps, notes: notes.collect() }
 }
 
-/// The nearest settings that are allowed: [`draw`] has no errors, and callers may not have called [`Settings::validate`].
+/// Settings without values that [`draw`], which has no errors, cannot use. Callers that need an error call [`Settings::validate`].
 fn sane(settings: &Settings) -> Settings {
     let positive = |x: f32, or: f32| if x.is_finite() && x >= 0.0 { x } else { or };
     Settings {

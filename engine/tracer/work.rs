@@ -116,7 +116,7 @@ impl Tracer<'_> {
             return Err(Error::usage(format!("{samples} samples a pixel; at most {} are numbered", u32::MAX)));
         }
         let total = samples.saturating_mul(slots).max(done);
-        let limited = crate::graph::loop_limit(&self.gpu)?.is_some();
+        let limited = self.gpu.loop_limit()?.is_some();
         let rays = if limited { RAYS_LIMITED } else { RAYS };
         let (turns, _) = self.turns()?;
         let rounds = (turns * longest(self.scene, &job.settings)).div_ceil(rays);

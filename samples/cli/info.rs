@@ -106,6 +106,7 @@ pub fn text(path: &Path, layers: &Layers) -> String {
         ("seed", metadata.seed.to_string()),
         ("device", metadata.device.clone()),
         ("driver", metadata.driver.clone()),
+        ("shader compiler", metadata.shader_compiler.clone()),
         ("seconds", metadata.seconds.map(|s| format!("{s:.3}")).unwrap_or_default()),
     ];
     for (name, value) in singles.iter().filter(|(_, value)| !value.trim().is_empty()) {

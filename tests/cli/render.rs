@@ -123,6 +123,8 @@ fn the_same_command_twice_gives_the_same_bytes_and_rerun_agrees() {
         let report = lucerna(["rerun", "--json", "-q", &a]).expect(0, &[]).json();
         assert_eq!(report["same_file"], true, "{report}");
         assert_eq!(report["metadata"], serde_json::json!([]), "{report}");
+        let metadata = image::metadata(Path::new(&a)).unwrap();
+        assert!(metadata.shader_compiler.starts_with("shaderc"), "{metadata:?}");
     }
     // Another picture under the same name must be noticed.
     let a = path(&folder, "a.exr");

@@ -75,7 +75,8 @@ impl Runner {
     }
 
     /// Dispatches of passes with long loops ([`Graph::compute_over`]) have about `rays` rays. By default a dispatch takes up to about a
-    /// second on a CPU driver, and tens of milliseconds on a GPU. Another limit rounds sums of light otherwise.
+    /// second on a CPU driver, and tens of milliseconds on a GPU. Sums over the items of a loop may be rounded differently with another
+    /// limit.
     #[must_use]
     pub fn dispatch_rays(self, rays: u64) -> Self {
         Self { dispatch_rays: Some(rays.max(1)), ..self }
@@ -86,11 +87,12 @@ impl Runner {
         self.pool.forget();
     }
 
-    /// Runs all passes and waits for them.
+    /// Runs all passes and waits for them. A long graph is given to the device in parts while later passes are recorded.
     ///
     /// # Errors
-    /// `Runtime` with every mistake of the graph, or a limit of the device that a pass is over; `OutOfMemory`;
-    /// `DeviceLost`, naming the pass.
+    /// `Runtime` with every mistake of the graph, or a limit of the device that a pass is over; `OutOfMemory`; `Interrupted`;
+    /// `DeviceLost`, naming the pass. Earlier parts may have run then: the next frame has no history, and imported images whose layout
+    /// changes have no contents.
     pub fn run(&mut self, graph: impl Borrow<Graph>) -> Result<Frame> {
         self.run_then(graph.borrow(), true)
     }

@@ -9,9 +9,9 @@ use super::{
     record::Recorder,
 };
 use crate::{
-    Result,
+    Error, Result,
     gpu::{DeviceKind, Gpu, Statistics},
-    graph::{Graph, loop_limit},
+    graph::Graph,
 };
 
 /// Approximate maximum of rays per dispatch on a CPU driver, which takes about a second for them.
@@ -19,17 +19,17 @@ const MOST_RAYS: u64 = 1 << 22;
 /// The same on a GPU, which takes tens of milliseconds for them.
 const MOST_RAYS_GPU: u64 = 1 << 25;
 /// Maximum of loop iterations per invocation on drivers that end long loops, which do so after 65,535. Two of the longest rays fit.
-const TURNS_LIMITED: u64 = 60_000;
+const TURNS_LIMITED: u64 = 62_000;
 
 /// The limits of a dispatch on this device. `asked`: [`Runner::dispatch_rays`](super::Runner::dispatch_rays).
 ///
 /// # Errors
-/// As [`loop_limit`].
+/// As [`Gpu::loop_limit`].
 pub(super) fn limits(gpu: &Gpu, graph: &Graph, asked: Option<u64>) -> Result<Limits> {
     let most = if gpu.caps().kind == DeviceKind::Cpu { MOST_RAYS } else { MOST_RAYS_GPU };
     let rays = asked.unwrap_or(most);
     let long = graph.passes.iter().any(|pass| matches!(pass.work, Work::Compute { over: Some(_), .. }));
-    let limited = long && loop_limit(gpu)?.is_some();
+    let limited = long && gpu.loop_limit()?.is_some();
     Ok(Limits { rays, turns: limited.then_some(TURNS_LIMITED) })
 }
 
@@ -54,17 +54,18 @@ impl<'a> Recorder<'a> {
         if let Some((statistics, query)) = query {
             statistics.begin(&mut self.commands, query);
         }
-        let recorded = match (&pass.work, over) {
+        // After an error the commands are thrown away.
+        let launches = match (&pass.work, over) {
             (Work::Compute { bound, groups, .. }, Some(over)) => {
-                self.dispatches(index, pass, (bound, groups), over, query.is_none())
+                self.dispatches(index, pass, (bound, groups), over, query.is_none())?
             }
-            (work, _) => self.work(index, work).map(|()| work.launches()),
+            (work, _) => self.work(index, work).map(|()| work.launches()).map_err(|error| error.at(&pass.name))?,
         };
         if let Some((statistics, query)) = query {
             statistics.end(&mut self.commands, query);
         }
         self.commands.end_pass();
-        recorded.map_err(|error| error.at(&pass.name))
+        Ok(launches)
     }
 
     /// Records the dispatches of a pass that loops over items. `cut`: they may be in several parts.
@@ -76,7 +77,8 @@ impl<'a> Recorder<'a> {
         over: Over,
         cut: bool,
     ) -> Result<usize> {
-        let mut pipeline = self.prepare(index, bound)?;
+        let named = |error: Error| error.at(&pass.name);
+        let mut pipeline = self.prepare(index, bound).map_err(named)?;
         let mut push = bound.push.clone();
         let mut launches = 0;
         for piece in over.pieces(self.limits) {
@@ -86,13 +88,13 @@ impl<'a> Recorder<'a> {
                     self.next_part(piece.rays)?;
                     self.open = labels(&mut self.commands, self.open, &pass.scope);
                     self.commands.begin_pass(&pass.name);
-                    pipeline = self.prepare(index, bound)?;
+                    pipeline = self.prepare(index, bound).map_err(named)?;
                 }
                 self.between_dispatches();
             }
             over.set(&mut push, piece);
             self.push_bytes(&push, &pipeline);
-            self.dispatch(groups)?;
+            self.dispatch(groups).map_err(named)?;
             launches += 1;
         }
         Ok(launches)

@@ -15,18 +15,19 @@ use crate::{
 
 /// Passes of a part. Each has a mark of its own for messages.
 const MOST_PASSES: u32 = 1024;
-/// Parts that the device has at one time: it is never idle, and little is left to be done when it is asked to stop.
+/// Parts that the device has at one time: it is never idle, and only these are left to be done when it is asked to stop.
 const AHEAD: usize = 2;
 /// The time that a part should take.
 const AIM: Duration = Duration::from_millis(200);
 /// A part has at most this many times the rays of a part whose time is known.
-const GROWTH: u64 = 4;
+const GROWTH: u64 = 2;
 /// Rays of the first part: milliseconds on a GPU, about a second on a CPU driver.
 const START: u64 = 1 << 22;
-/// Passes that say nothing about their rays would otherwise cause parts of a few milliseconds.
+/// Fewest rays of a part that is cut: each submission costs time.
 const LEAST: u64 = 1 << 18;
-/// An upper limit.
-const MOST: u64 = 1 << 36;
+/// Most rays of a part. Passes may trace far fewer rays than they state, for example where most pixels show the sky, and then say little about
+/// the time of the passes that follow.
+const MOST: u64 = 1 << 27;
 
 /// The number of rays per part, for all graphs of a runner.
 #[derive(Debug)]
@@ -47,15 +48,17 @@ impl Pace {
     }
 
     /// Takes account of a part of `rays` rays that ran for `time`. A part that ended with its graph has fewer rays than allowed, and shows only
-    /// that a part may be too long. The time of a part with very few rays is that of other work.
-    fn took(&mut self, rays: u64, time: Duration) {
+    /// that a part may be too long. The time of a part with very few rays is that of other work. `late`: the part had ended before the host
+    /// looked, so `time` is too long and shows only that a part may be longer.
+    fn took(&mut self, rays: u64, time: Duration, late: bool) {
         if rays < self.rays / 16 {
             return;
         }
         let ideal = u128::from(rays) * AIM.as_nanos() / time.as_nanos().max(1);
         let ideal = u64::try_from(ideal).unwrap_or(u64::MAX);
-        let full = rays >= self.rays / 2;
-        if full || ideal < self.rays {
+        let (full, shorter) = (rays >= self.rays / 2, ideal < self.rays);
+        let counts = if shorter { !late } else { full };
+        if counts {
             self.rays = ideal.min(self.rays.saturating_mul(GROWTH)).clamp(LEAST, MOST);
         }
     }
@@ -133,11 +136,12 @@ impl<'a> Parts<'a> {
         let begun = Instant::now();
         let done = submission.wait();
         let now = Instant::now();
-        self.waited += now - begun;
+        let blocked = now - begun;
+        self.waited += blocked;
         done?;
         // It began when it was submitted, or when the part before it had ended.
         let from = self.ended.map_or(submitted, |ended| ended.max(submitted));
-        self.pace.took(rays, now - from);
+        self.pace.took(rays, now - from, blocked < (now - from) / 8);
         self.ended = Some(now);
         Ok(())
     }
@@ -171,11 +175,11 @@ mod tests {
 
     #[test]
     fn parts_approach_the_time_that_they_should_take() {
-        for rays_per_second in [1e6, 2e7, 1e9, 3e10] {
+        for rays_per_second in [1e6, 2e7, 1e8, 5e8] {
             let mut pace = Pace::default();
             for _ in 0..12 {
                 let time = Duration::from_secs_f64(pace.rays as f64 / rays_per_second);
-                pace.took(pace.rays, time);
+                pace.took(pace.rays, time, false);
             }
             let seconds = pace.rays as f64 / rays_per_second;
             let least = LEAST as f64 / rays_per_second;
@@ -186,11 +190,26 @@ mod tests {
     #[test]
     fn short_graphs_do_not_change_the_pace_and_slow_ones_do() {
         let mut pace = Pace::default();
-        pace.took(10, Duration::from_micros(1));
+        pace.took(10, Duration::from_micros(1), false);
         assert_eq!(pace.rays, START);
-        pace.took(1 << 20, Duration::from_millis(800));
+        pace.took(1 << 20, Duration::from_millis(800), false);
         assert_eq!(pace.rays, LEAST);
-        pace.took(LEAST, Duration::from_nanos(0));
-        assert_eq!(pace.rays, 4 * LEAST);
+        // The host looked late: the part was not as slow as that.
+        pace.took(LEAST, Duration::from_secs(9), true);
+        assert_eq!(pace.rays, LEAST);
+        pace.took(LEAST, Duration::from_nanos(0), true);
+        assert_eq!(pace.rays, GROWTH * LEAST);
+    }
+
+    #[test]
+    fn passes_that_state_too_many_rays_do_not_make_the_next_part_endless() {
+        let mut pace = Pace::default();
+        for _ in 0..100 {
+            pace.took(pace.rays, Duration::from_micros(10), false);
+        }
+        // A GPU of 2e8 rays a second, a slow one, then takes less than a watchdog's two seconds.
+        assert!(pace.rays as f64 / 2e8 < 1.0, "{} rays", pace.rays);
+        pace.took(pace.rays, Duration::from_millis(670), false);
+        assert!(pace.rays as f64 / 2e8 < 0.25, "{} rays", pace.rays);
     }
 }

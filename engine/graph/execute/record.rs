@@ -28,7 +28,7 @@ pub(super) struct Recorder<'a> {
     pub gpu: &'a Gpu,
     pub graph: &'a Graph,
     pub plan: &'a Plan,
-    /// Of each physical resource.
+    /// The memory of each physical resource.
     pub memory: &'a [Memory],
     pub uniforms: Option<OwnedBuffer>,
     /// Contents of the buffers of the upload pass, one after the other.

@@ -13,7 +13,7 @@ use super::{light::Light, occluder::Occluder, parallel::Parallel, suns, surface:
 use crate::{
     Result,
     gpu::Gpu,
-    graph::{Buffer, Graph, Runner, loop_limit},
+    graph::{Buffer, Graph, Runner},
     rays::{RayHandles, Rays},
     resident::Resident,
     scene::Pose,
@@ -37,7 +37,7 @@ const INSIDE: f32 = 0.95;
 
 /// Most tiles that an invocation can process.
 pub(super) fn tiles(gpu: &Gpu, rays: &Rays) -> Result<u64> {
-    Ok(match loop_limit(gpu)? {
+    Ok(match gpu.loop_limit()? {
         Some(_) => (TURNS_LIMITED / rays.most_turns().max(1)).clamp(1, TILES),
         None => TILES,
     })

@@ -440,7 +440,7 @@ fn own(
         rays
     );
     // Most pixels show no occluder. Under a black sky the pass runs once, so that the irradiance is known to be 0.
-    let texels = Items::new(count as u32).rays(extent.pixels() / 16).turns(turns_of_ray);
+    let texels = Items::new(count as u32).rays(extent.pixels() / 4).turns(turns_of_ray);
     graph.compute_over(args, extent, texels);
 }
 

@@ -205,7 +205,7 @@ impl Fiv {
             sky,
             rotating_sky,
             runner,
-            limited: crate::graph::loop_limit(gpu)?.is_some(),
+            limited: gpu.loop_limit()?.is_some(),
             on_cpu: gpu.caps().kind == DeviceKind::Cpu,
             occluders,
             firsts: plan.firsts(),

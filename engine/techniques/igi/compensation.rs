@@ -32,22 +32,34 @@ fn held(graph: &mut Graph, paths: u32) -> Buffer {
 }
 
 impl Igi {
-    /// Refuses pictures whose short paths would take more passes than a host can plan and record in seconds.
+    /// Number of passes of a picture of `extent` pixels for short paths and for ray trees; the other passes are few.
+    fn many_passes(&self, extent: Extent, settings: &Settings) -> u64 {
+        let trees = self.tree_ranges(extent, settings);
+        let grown = trees * (1 + u64::from(settings.cache > 0.0)) * u64::from(settings.specular_depth + 1);
+        if !(settings.indirect && settings.compensates()) {
+            return grown;
+        }
+        let held = |extent: Extent| extent.pixels().div_ceil(HELD.into());
+        let listed = if settings.refine > 0.0 && settings.upsamples() { held(extent) } else { 0 };
+        let ranges = held(extent.div_ceil(settings.downsample)) + listed + trees;
+        grown + ranges * (2 + u64::from(settings.compensation) * 3 * u64::from(settings.bounces))
+    }
+
+    /// Refuses pictures that would take more passes than a host can plan and record in seconds.
     ///
     /// # Errors
     /// `Usage`, naming the number of passes.
-    pub(super) fn few_paths(&self, extent: Extent, settings: &Settings) -> Result<()> {
-        if !(settings.indirect && settings.compensates()) {
-            return Ok(());
-        }
-        // Those of the coarse picture, of the pixels without a coarse texel, and of the ray trees.
-        let ranges = 2 * extent.pixels().div_ceil(HELD.into()) + self.tree_ranges(extent, settings);
-        let passes = ranges * (2 + u64::from(settings.compensation) * 3 * u64::from(settings.bounces));
+    pub(super) fn few_passes(&self, extent: Extent, settings: &Settings) -> Result<()> {
+        let passes = self.many_passes(extent, settings);
         if passes <= MOST_PASSES {
             return Ok(());
         }
         let what = format!("a picture of {extent} pixels would need about {passes} passes; allowed: {MOST_PASSES}");
-        Err(Error::usage(what).at("igi.compensation").help("Choose fewer, or a smaller picture"))
+        let (key, less) = match settings.compensates() {
+            true => ("igi.compensation", "Choose fewer, or a smaller picture"),
+            false => ("igi.specular_depth", "Choose less, or a smaller picture"),
+        };
+        Err(Error::usage(what).at(key).help(less))
     }
 
     /// Adds the compensated light to the coarse irradiance, which has every [`Settings::downsample`]-th pixel.
@@ -176,5 +188,56 @@ impl Igi {
                 dispatch(graph, args, groups, count).rays(count.into());
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        builtin,
+        gpu::testing::with_gpu,
+        resident::Resident,
+        scene::{Material, Pose, View},
+        techniques::igi::PictureSettings,
+    };
+
+    #[test]
+    fn pictures_of_too_many_passes_are_refused_before_they_are_declared() {
+        with_gpu(|gpu| {
+            let mut scene = builtin::load("cornell-area").unwrap();
+            scene.materials[0] = Material { metallic: 1.0, roughness: 0.0, ..scene.materials[0].clone() };
+            let mut resident = Resident::new(gpu, &scene).unwrap();
+            let mut igi = Igi::new(gpu, &scene, &resident, &Settings::default()).unwrap();
+            let pose = Pose::rest(&scene);
+            let mut declare = |settings: &Settings, [width, height]: [u32; 2]| {
+                let view = View::of_camera(&scene, &pose, 0, [width, height]).unwrap();
+                let mut graph = Graph::new("passes");
+                let handles = resident.frame_in(&mut graph, &scene, &pose);
+                let all = PictureSettings { igi: settings.clone(), ..Default::default() };
+                let before = graph.pass_count() as u64;
+                let result = igi.picture(&mut graph, &scene, &pose, &handles, &view, &all).map(|_| ());
+                (result, graph.pass_count() as u64 - before, igi.many_passes(Extent::new(width, height), settings))
+            };
+            // The estimate is near what is declared.
+            let base = Settings { vpls: 60, compensation: 8, bounces: 3, ..Settings::default() };
+            for settings in [
+                base.clone(),
+                Settings { downsample: 4, ..base.clone() },
+                Settings { downsample: 4, refine: 0.1, ..base.clone() },
+                Settings { compensation: 0, specular_depth: 8, cache: 0.05, ..base.clone() },
+            ] {
+                let (result, declared, counted) = declare(&settings, [900, 700]);
+                result.unwrap();
+                assert!(counted <= declared && declared < counted + 120, "{declared} passes, counted {counted}");
+            }
+            let many = Settings { compensation: 64, bounces: 8, ..base.clone() };
+            let (result, declared, _) = declare(&many, [9000, 8000]);
+            let error = result.unwrap_err();
+            assert!(error.exit_code() == 2 && declared < 60, "{declared} passes");
+            for part in ["igi.compensation: ", "9000×8000 pixels", "allowed: 50000"] {
+                assert!(error.to_string().contains(part), "{part} is not in {error}");
+            }
+        });
     }
 }

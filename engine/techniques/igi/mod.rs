@@ -63,6 +63,11 @@ use crate::{
     },
 };
 
+/// Maximum of loop iterations that choosing one light takes, besides its ray: one descent of the path tracer's light tree.
+const LIGHT_TURNS: u64 = 64;
+/// Maximum of loop iterations of one proposal for a pick: a descent of the tree of virtual lights, three iterations a level.
+const PROPOSAL_TURNS: u64 = 43;
+
 /// The data of a scene that instant global illumination needs in every frame.
 #[derive(Debug)]
 pub struct Igi {
@@ -353,6 +358,12 @@ impl Igi {
 
     /// A loop of `count` rays in each of `invocations` invocations.
     fn items(&self, count: u32, invocations: u64) -> Items {
-        Items::new(count).rays(invocations).turns(self.turns)
+        Items::new(count).rays(invocations).turns(self.turns + LIGHT_TURNS)
+    }
+
+    /// As [`Self::items`], for rays to lights that each pixel picks from the light tree.
+    fn picked(&self, picks: u32, invocations: u64, settings: &Settings) -> Items {
+        let descents = u64::from(settings.proposals) * PROPOSAL_TURNS;
+        Items::new(picks).rays(invocations).turns(self.turns + descents)
     }
 }

@@ -96,7 +96,7 @@ impl Igi {
         let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
         let outputs = graph.scope("igi", |graph| -> Result<Outputs> {
             let shared = self.shared(graph, scene, pose, handles, igi);
-            self.few_paths(graph.extent(gbuffer.depth), igi)?;
+            self.few_passes(graph.extent(gbuffer.depth), igi)?;
             // With a history each frame uses other random numbers.
             let frame = if igi.history > 0 { graph.frame } else { 0 };
             let own = Self::numbered(graph, &shared, igi, frame);

@@ -168,7 +168,7 @@ impl Igi {
                 ray_tree_gather_picks::Args { vpls: vpls.buffer, vpl_nodes: tree.nodes, tree_nodes, push, spec },
                 shared.hidden_by
             );
-            dispatch_over(graph, args, groups, nodes, self.items(picks, nodes.into()));
+            dispatch_over(graph, args, groups, nodes, self.picked(picks, nodes.into(), settings));
             return;
         }
         let push = ray_tree_gather::Push { nodes, least, seed, ..Default::default() };

@@ -250,6 +250,7 @@ impl One<'_> {
                 seed: experiment.seed.into(),
                 device: about.device.clone(),
                 driver: format!("{} {}", about.driver, about.driver_info).trim().to_owned(),
+                shader_compiler: lucerna::shaders::COMPILER.to_owned(),
                 config: json!({ "kind": method.kind, "settings": settings }),
                 world_to_camera: Some(view.view_from_world.to_cols_array()),
                 world_to_ndc: Some(view.clip_from_world.to_cols_array()),

@@ -321,6 +321,7 @@ fn metadata(
         seed: settings.technique.reference.seed.into(),
         device: about.device.clone(),
         driver: format!("{} {}", about.driver, about.driver_info).trim().to_owned(),
+        shader_compiler: lucerna::shaders::COMPILER.to_owned(),
         config: config::to_value(&record)?,
         world_to_camera: Some(view.view_from_world.to_cols_array()),
         world_to_ndc: Some(view.clip_from_world.to_cols_array()),

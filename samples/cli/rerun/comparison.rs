@@ -103,6 +103,7 @@ fn differences(old: &Metadata, new: &Metadata) -> Vec<String> {
         field("revision", old.revision.as_deref().unwrap_or(""), new.revision.as_deref().unwrap_or("")),
         field("device", &old.device, &new.device),
         field("driver", &old.driver, &new.driver),
+        field("shader compiler", &old.shader_compiler, &new.shader_compiler),
         field("scene (fingerprint)", &print(old), &print(new)),
     ]
     .into_iter()

@@ -231,6 +231,7 @@ impl Run {
             technique: format!("{}-{}", self.settings().operator.name(), mode_name(self.settings())),
             device: about.device.clone(),
             driver: format!("{} {}", about.driver, about.driver_info).trim().to_owned(),
+            shader_compiler: lucerna::shaders::COMPILER.to_owned(),
             config: config::to_value(&recipe)?,
             ..source.clone()
         })
