@@ -4,7 +4,7 @@
 //! over the instances. All objects that never move are merged into one shape in world space. The top tree is rebuilt each frame.
 //!
 //! ```no_run
-//! # use lucerna::{gpu::Gpu, graph::Graph, rays::Rays, scene::{Scene, resident::Resident}};
+//! # use lucerna::{gpu::Gpu, graph::Graph, rays::Rays, resident::Resident, scene::Scene};
 //! # fn example(gpu: &Gpu, scene: &Scene) -> lucerna::Result<()> {
 //! let mut resident = Resident::new(gpu, scene)?;
 //! let mut rays = Rays::new(gpu, scene, &resident)?;

@@ -1,7 +1,7 @@
 //! The scene on the device: streams, materials, textures and lights, uploaded once; poses and instances, every frame.
 //!
 //! ```no_run
-//! # use lucerna::{gpu::Gpu, graph::Graph, scene::{Scene, resident::Resident}};
+//! # use lucerna::{gpu::Gpu, graph::Graph, resident::Resident, scene::Scene};
 //! # fn example(gpu: &Gpu, scene: &Scene) -> lucerna::Result<()> {
 //! let mut resident = Resident::new(gpu, scene)?;
 //! let mut graph = Graph::new("frame");
