@@ -30,6 +30,27 @@ locked_version() {
         "$root/Cargo.lock"
 }
 
+# The options of `cargo test` that run the tests of a file: program_of tests/edges. Most files are modules of a program.
+program_of() {
+    local name=${1##*/} found programs
+    mapfile -t programs < <(ls "$root"/tests/programs/*.rs)
+    case $1 in
+    tests/cli/*) programs=("$root/tests/programs/cli.rs") ;;
+    *) programs=("${programs[@]/*\/cli.rs/}") ;;
+    esac
+    for found in "${programs[@]}"; do
+        if [ -n "$found" ] && grep -q "^mod $name;" "$found"; then
+            found=${found##*/}
+            say "--test=${found%.rs} $name::"
+            return
+        fi
+    done
+    case $1 in
+    tests/cli/*) say "--test=cli_$name" ;;
+    *) say "--test=$name" ;;
+    esac
+}
+
 # Where the manifests of installed Vulkan drivers lie.
 icd_folders=(/usr/share/vulkan/icd.d /etc/vulkan/icd.d /usr/local/share/vulkan/icd.d)
 

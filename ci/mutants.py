@@ -51,13 +51,24 @@ def read_table(root):
             wrong.append(f"{m['name']}: a mutation changes one line")
         if not test_is_there(root, m):
             wrong.append(f"{m['name']}: there is no test {m['case']} in {m['test']}")
+        m["test"], before = program(root, m["test"])
+        m["case"] = before + m["case"]
     if wrong:
         fail("ci/mutations does not fit the tree:\n  " + "\n  ".join(wrong))
     return sorted(mutants, key=lambda m: (package(m["test"]), m["test"]))
 
 
 def package(test):
-    return "lucerna-samples" if test.startswith("cli_") or test == "samples-lib" else "lucerna"
+    return "lucerna-samples" if test.startswith("cli") or test == "samples-lib" else "lucerna"
+
+
+def program(root, test):
+    """The program that has a file of tests, and how the names of its tests begin there."""
+    module = test.removeprefix("cli_")
+    for path in sorted((root / "tests/programs").glob("*.rs")):
+        if (path.stem == "cli") == test.startswith("cli_") and re.search(rf"^mod {module};$", path.read_text(), re.M):
+            return path.stem, f"{module}::"
+    return test, ""
 
 
 def test_is_there(root, mutant):

@@ -1,17 +1,14 @@
 //! Pixels whose middle falls on the edge between two surfaces are lit as their neighbours are.
 
-mod igi_lab;
-mod tracer_lab;
-
+use crate::igi_lab::Studio;
+use crate::tracer_lab::{Stage, render, view};
 use glam::{Vec3, vec3};
-use igi_lab::Studio;
 use lucerna::{
     gpu::testing::with_gpu,
     scene::{Material, View},
     techniques::igi::Settings,
     tracer::{Filter, Settings as Traced},
 };
-use tracer_lab::{Stage, render, view};
 
 /// A floor and a wall that meet where x = 1, and a lamp that every point of them sees.
 fn corner() -> Stage {

@@ -1,12 +1,11 @@
 //! Every numbered equation of the papers is tagged where it is computed, as `[ISR 25]`, and every tag names a known equation.
 
+use crate::common;
 use std::{
     collections::{BTreeMap, BTreeSet},
     fs,
     path::Path,
 };
-
-mod common;
 
 /// Tag, number and content of the equations that the engine computes, or from which it says to deviate.
 const EQUATIONS: &[(&str, u32, &str)] = &[

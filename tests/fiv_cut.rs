@@ -1,9 +1,7 @@
 //! Occluders that the receiver's plane cuts, and separated texels, against brute force.
 
-mod fiv_lab;
-mod tracer_lab;
-
-use fiv_lab::{Studio, ball, ground, nrmse, painted, thing};
+use crate::fiv_lab::{Studio, ball, ground, nrmse, painted, thing};
+use crate::tracer_lab::flat_view;
 use glam::{DVec3, Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
@@ -11,7 +9,6 @@ use lucerna::{
     scene::{Environment, Pose, Scene, View},
     techniques::fiv::{Cut, Fiv, Method, Settings, Sky, sky},
 };
-use tracer_lab::flat_view;
 
 fn base() -> Settings {
     Settings { size: 16, azimuths: 24, polars: 13, radii: 12, ..Settings::default() }

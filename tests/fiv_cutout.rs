@@ -1,16 +1,13 @@
 //! Surfaces that are cut out, blended or unlit: in the picture and among the occluders.
 
-mod fiv_lab;
-mod tracer_lab;
-
-use fiv_lab::{Studio, ball, colourful, ground, painted, thing};
+use crate::fiv_lab::{Studio, ball, colourful, ground, painted, thing};
+use crate::tracer_lab::{flat_view, view};
 use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::{AlphaMode, Environment, Pose, Scene},
     techniques::fiv::{Extent, Method, SelfSamples, Settings},
 };
-use tracer_lab::{flat_view, view};
 
 fn few() -> Settings {
     Settings { size: 16, azimuths: 16, polars: 9, radii: 8, largest: 1.0, adaptive: false, ..Settings::default() }

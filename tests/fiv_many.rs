@@ -1,10 +1,9 @@
 //! Many occluders: the lists of relevant occluders and of overlapping pairs are complete, light is hidden once, and
 //! negligible occluders fade out continuously.
 
-mod fiv_lab;
-mod tracer_lab;
-
-use fiv_lab::{Studio, ball, ground, thing};
+use crate::fiv_lab;
+use crate::fiv_lab::{Studio, ball, ground, thing};
+use crate::tracer_lab::flat_view;
 use glam::{DVec3, Mat4, Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
@@ -15,7 +14,6 @@ use lucerna::{
     scene::{Environment, Pose, Scene},
     techniques::fiv::{Cut, Extent, Light, Settings, Shared, Sky, fill, spots},
 };
-use tracer_lab::flat_view;
 
 const RADIUS: f32 = 0.3;
 

@@ -1,20 +1,17 @@
 //! Occluders whose pose differs from the pose of their vectors, and occluders that are scaled non-uniformly in the
 //! frame.
 
-mod common;
-mod fiv_lab;
-mod tracer_lab;
-
+use crate::common;
 use std::f32::consts::TAU;
 
-use fiv_lab::{Studio, ball, colourful, ground, nrmse, thing};
+use crate::fiv_lab::{Studio, ball, colourful, ground, nrmse, thing};
+use crate::tracer_lab::{flat_view, view};
 use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::{self, LoadOptions, Pose, Scene, View},
     techniques::fiv::{Cut, Method, SelfSamples, Settings},
 };
-use tracer_lab::{flat_view, view};
 
 fn few(method: Method) -> Settings {
     Settings {

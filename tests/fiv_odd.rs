@@ -1,16 +1,13 @@
 //! Unusual scenes and environments: precomputed vectors and vectors of the frame give physically right results.
 
-mod fiv_lab;
-mod tracer_lab;
-
-use fiv_lab::{Studio, ball, colourful, ground, nrmse, painted, thing};
+use crate::fiv_lab::{Studio, ball, colourful, ground, nrmse, painted, thing};
+use crate::tracer_lab::flat_view;
 use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     scene::{Environment, Scene, Transform, View},
     techniques::fiv::{Method, Settings},
 };
-use tracer_lab::flat_view;
 
 const TECHNIQUES: [Method; 2] = [Method::Vectors, Method::Online];
 

@@ -1,11 +1,9 @@
 //! Vectors of the frame: they give the same picture as precomputed vectors, and they stay right for occluders that
 //! rotate and deform and for environments that change.
 
-mod common;
-mod fiv_lab;
-mod tracer_lab;
-
-use fiv_lab::{Studio, ball, colourful, ground, nrmse, thing};
+use crate::common;
+use crate::fiv_lab::{Studio, ball, colourful, ground, nrmse, thing};
+use crate::tracer_lab::{flat_view, view};
 use glam::{Mat4, Quat, Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
@@ -14,7 +12,6 @@ use lucerna::{
     techniques::fiv::{Method, SelfSamples, Settings},
 };
 use lucerna_scenes as builtin;
-use tracer_lab::{flat_view, view};
 
 fn few(method: Method) -> Settings {
     Settings {

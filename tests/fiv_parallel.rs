@@ -1,12 +1,10 @@
 //! Masks from depth images along the directions of the texels, against closed forms and rays. And brute force with and
 //! without its boxes.
 
-mod fiv_lab;
-mod tracer_lab;
-
+use crate::tracer_lab;
 use std::f64::consts::PI;
 
-use fiv_lab::{Studio, apart, ball, cap, colourful, ground, length, nrmse, occluder, one_ball, thing, vectors};
+use crate::fiv_lab::{Studio, apart, ball, cap, colourful, ground, length, nrmse, occluder, one_ball, thing, vectors};
 use glam::{DVec3, Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},

@@ -1,11 +1,9 @@
 //! Pictures by fullsphere irradiance vectors against brute force, closed forms and symmetries.
 
-mod fiv_lab;
-mod tracer_lab;
-
 use std::f64::consts::PI;
 
-use fiv_lab::{Studio, ball, colourful, ground, nrmse, thing};
+use crate::fiv_lab::{Studio, ball, colourful, ground, nrmse, thing};
+use crate::tracer_lab::flat_view;
 use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
@@ -14,7 +12,6 @@ use lucerna::{
     scene::{Environment, Light, LightKind, Node, Pose, Scene, View},
     techniques::fiv::{Cut, Extent, Fiv, Interpolation, Method, SelfSamples, Settings, Shared, Sky},
 };
-use tracer_lab::flat_view;
 
 fn coarse() -> Settings {
     Settings { size: 16, azimuths: 32, polars: 17, radii: 15, largest: 1.0, ..Settings::default() }

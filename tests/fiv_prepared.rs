@@ -1,9 +1,7 @@
 //! Settings that a scene was prepared with, settings of its pictures, and notes on everything that is not supported.
 
-mod fiv_lab;
-mod tracer_lab;
-
-use fiv_lab::{Studio, ball, colourful, ground, occluder, thing};
+use crate::fiv_lab::{Studio, ball, colourful, ground, occluder, thing};
+use crate::tracer_lab::flat_view;
 use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
@@ -16,7 +14,6 @@ use lucerna::{
     },
 };
 use lucerna_scenes as builtin;
-use tracer_lab::flat_view;
 
 fn coarse() -> Settings {
     Settings { size: 8, azimuths: 8, polars: 5, radii: 4, largest: 1.0, ..Settings::default() }

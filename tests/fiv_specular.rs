@@ -1,10 +1,8 @@
 //! Glossy reflection of an environment with the shadows of occluders: against closed forms, the slow twin, and brute
 //! force.
 
-mod fiv_lab;
-mod tracer_lab;
-
-use fiv_lab::{Studio, ball, cap, colourful, ground, hierarchy, nrmse, occluder, one_ball, painted, thing};
+use crate::fiv_lab::{Studio, ball, cap, colourful, ground, hierarchy, nrmse, occluder, one_ball, painted, thing};
+use crate::tracer_lab::flat_view;
 use glam::{DVec3, Mat3, Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
@@ -19,7 +17,6 @@ use lucerna::{
     },
 };
 use lucerna_scenes as builtin;
-use tracer_lab::flat_view;
 
 fn by(method: Method) -> Settings {
     Settings { method, specular: Specular::Summed, ..coarse() }

@@ -1,10 +1,8 @@
 //! Brute force, the reference for irradiance vectors, against the path tracer, with which it shares only the rays:
 //! direct light of an environment on diffuse surfaces.
 
-mod fiv_lab;
-mod tracer_lab;
-
-use fiv_lab::{Studio, nrmse, painted};
+use crate::fiv_lab::{Studio, nrmse, painted};
+use crate::tracer_lab;
 use glam::Vec3;
 use lucerna::{
     gpu::testing::with_gpu,

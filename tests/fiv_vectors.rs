@@ -1,10 +1,8 @@
 //! The environment's sums and the vectors of occluders on the device, against closed forms and the slow twins.
 
-mod fiv_lab;
-
 use std::f64::consts::PI;
 
-use fiv_lab::{apart, ball, cap, colourful, hierarchy, length, occluder, one_ball, painted, thing, vectors};
+use crate::fiv_lab::{apart, ball, cap, colourful, hierarchy, length, occluder, one_ball, painted, thing, vectors};
 use glam::{DMat3, DVec2, DVec3, Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},

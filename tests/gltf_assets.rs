@@ -1,7 +1,6 @@
 //! Every glTF model of the asset collection, against what its list says about it.
 
-mod common;
-
+use crate::common;
 use glam::Mat4;
 use lucerna::scene::{LoadOptions, Scene, load};
 

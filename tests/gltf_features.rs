@@ -1,10 +1,7 @@
 //! What the glTF front end makes of each feature, on small files made here.
 
-#[path = "common/gltf.rs"]
-mod gltf;
-
+use crate::gltf::{File, PNG, bytes};
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
-use gltf::{File, PNG, bytes};
 use lucerna::scene::{
     AlphaMode, Interpolation, Keys, LightKind, MipFilter, NoteKind, Primitive, Projection, Scene, Transform, Wrap,
 };

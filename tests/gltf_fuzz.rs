@@ -1,11 +1,7 @@
 //! Random damage to small valid files never makes the reader panic, and what is still read is valid.
 
-mod common;
-#[path = "common/gltf.rs"]
-#[allow(dead_code)]
-mod gltf;
-
-use gltf::{File, PNG, load_bytes};
+use crate::common;
+use crate::gltf::{File, PNG, load_bytes};
 use proptest::prelude::*;
 use serde_json::json;
 

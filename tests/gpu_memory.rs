@@ -1,9 +1,8 @@
 //! Images, buffers, submissions and timestamps on a device with validation.
 
+use crate::gpu_common;
 use ash::vk;
 use lucerna::gpu::{self, BufferDesc, ImageDesc, OwnedBuffer, OwnedImage, Region, Timestamps, testing::with_gpu};
-
-mod gpu_common;
 
 #[test]
 fn buffers_keep_their_contents() {

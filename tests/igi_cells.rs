@@ -1,12 +1,9 @@
 //! The irradiance cache on two surfaces beside a wall, in a mirror: the light on this side of it is not shown on the other.
 
-mod igi_lab;
-mod tracer_lab;
-
+use crate::igi_lab::{Studio, room};
+use crate::tracer_lab::flat_view;
 use glam::{Vec3, vec3};
-use igi_lab::{Studio, room};
 use lucerna::{gpu::testing::with_gpu, scene::Material, techniques::igi::Settings};
-use tracer_lab::flat_view;
 
 /// Side of a cell, metres. Cells begin at odd multiples of its half.
 const CELL: f32 = 0.1;

@@ -1,11 +1,9 @@
 //! Shooting and gathering of virtual lights against a CPU reference that shares no code with the shaders: it uses other formulas and
 //! double precision, and tests every triangle for every ray.
 
-mod igi_lab;
-mod tracer_lab;
-
+use crate::igi_lab::{Studio, plain};
+use crate::tracer_lab::{Stage, view};
 use glam::{DMat3, DVec3, Mat4, Quat, Vec3, vec3};
-use igi_lab::{Studio, plain};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::{LightKind, Material, Scene, View},
@@ -13,7 +11,6 @@ use lucerna::{
     techniques::igi::Settings,
 };
 use std::f64::consts::PI;
-use tracer_lab::{Stage, view};
 
 /// A triangle in world space, with its albedo.
 struct Triangle {

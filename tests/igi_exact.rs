@@ -1,10 +1,8 @@
 //! Instant global illumination against closed forms, and against the same picture computed in another way.
 
-mod igi_lab;
-mod tracer_lab;
-
+use crate::igi_lab::{Studio, flux, mean, plain, room};
+use crate::tracer_lab::{Stage, flat_view, view};
 use glam::{Mat4, Quat, Vec3, vec3, vec4};
-use igi_lab::{Studio, flux, mean, plain, room};
 use lucerna::{
     gpu::testing::with_gpu,
     graph::Graph,
@@ -13,7 +11,6 @@ use lucerna::{
     techniques::igi::{Igi, PictureSettings, Settings, Visibility},
 };
 use std::f64::consts::PI;
-use tracer_lab::{Stage, flat_view, view};
 
 #[test]
 fn a_wire_before_the_sky_gathers_for_itself() {

@@ -1,12 +1,9 @@
 //! Upsampling and the discontinuity buffer on known texels, interleaving as a whole, and the graphs of the program.
 
-mod igi_lab;
-mod isr_lab;
-mod tracer_lab;
-
+use crate::igi_lab::{Studio, mean, plain};
+use crate::isr_lab::{Random, gbuffer, image, read};
+use crate::tracer_lab::{Stage, flat_view};
 use glam::{DVec3, Vec3, dvec3, vec3};
-use igi_lab::{Studio, mean, plain};
-use isr_lab::{Random, gbuffer, image, read};
 use lucerna::{
     gpu::testing::with_gpu,
     graph::{Extent, Graph, Runner, testing::every_barrier_matters},
@@ -16,7 +13,6 @@ use lucerna::{
     techniques::igi::{Igi, Pattern, PictureSettings, Settings, filters},
 };
 use lucerna_scenes as builtin;
-use tracer_lab::{Stage, flat_view};
 
 fn patch(corner: DVec3, a: DVec3, b: DVec3) -> Patch {
     Patch { corner, a, b, albedo: DVec3::splat(0.5), radiance: DVec3::ZERO }

@@ -1,10 +1,8 @@
 //! Instant global illumination against closed forms and the path tracer.
 
-mod igi_lab;
-mod tracer_lab;
-
+use crate::igi_lab::{Studio, flux, mean, plain, room};
+use crate::tracer_lab::{Stage, flat_view, matt, view};
 use glam::{DVec3, Mat4, Quat, Vec3, vec3};
-use igi_lab::{Studio, flux, mean, plain, room};
 use lucerna::{
     gpu::testing::{with_gpu, with_ray_query},
     scene::{AlphaMode, Environment, LightKind, Material, Pose, Scene},
@@ -14,7 +12,6 @@ use lucerna::{
 };
 use lucerna_scenes as builtin;
 use std::f64::consts::PI;
-use tracer_lab::{Stage, flat_view, matt, view};
 
 #[test]
 fn virtual_lights_inside_a_sphere_light_it_evenly() {

@@ -1,12 +1,9 @@
 //! Picks from the light tree, compensation of the bound, and the irradiance cache.
 
-mod igi_lab;
-mod igi_picks;
-mod tracer_lab;
-
+use crate::igi_lab::{Shown, Studio, mean, plain};
+use crate::igi_picks::{Chooser, irradiance, offset};
+use crate::tracer_lab::{Stage, flat_view, matt, view};
 use glam::{DVec3, Vec3, vec3};
-use igi_lab::{Shown, Studio, mean, plain};
-use igi_picks::{Chooser, irradiance, offset};
 use lucerna::{
     gpu::testing::with_gpu,
     graph::{Graph, testing::every_barrier_matters},
@@ -17,7 +14,6 @@ use lucerna::{
     tracer::{self, Tracer},
 };
 use lucerna_scenes as builtin;
-use tracer_lab::{Stage, flat_view, matt, view};
 
 /// A closed box of half side 1 around the origin with a lamp.
 fn room() -> Stage {

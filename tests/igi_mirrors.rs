@@ -1,17 +1,14 @@
 //! Mirrors and glass of instant global illumination against the path tracer.
 
-mod igi_lab;
-mod tracer_lab;
-
+use crate::igi_lab::{Studio, flux, mean, plain, room};
+use crate::tracer_lab::{Stage, flat_view, render, view};
 use glam::{Mat4, Quat, Vec3, vec3};
-use igi_lab::{Studio, flux, mean, plain, room};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::{AlphaMode, LightKind, Material},
     techniques::igi::Settings,
     tracer::{Filter, Settings as Tracing},
 };
-use tracer_lab::{Stage, flat_view, render, view};
 
 /// A material without gloss: with a refractive index of 1, F0 is 0.
 fn matt(albedo: Vec3) -> Material {

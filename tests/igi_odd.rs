@@ -1,18 +1,15 @@
 //! Instant global illumination of unusual scenes: every picture must be finite (the studio checks each pixel), and must agree with a closed
 //! form if there is one.
 
-mod igi_lab;
-mod tracer_lab;
-
+use crate::igi_lab::{Studio, flux, mean, plain, room};
+use crate::tracer_lab::{Stage, flat_view, view};
 use glam::{Mat4, Quat, Vec3, vec3};
-use igi_lab::{Studio, flux, mean, plain, room};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::{Environment, LightKind, Material, Pose, Scene, Transform, View},
     techniques::igi::Settings,
 };
 use lucerna_scenes as builtin;
-use tracer_lab::{Stage, flat_view, view};
 
 /// The default settings with fewer lights and rays.
 fn small() -> Settings {

@@ -1,10 +1,8 @@
 //! Virtual lights with shadow maps: the picture agrees with that of shadow rays, up to the resolution of the maps.
 
-mod igi_lab;
-mod tracer_lab;
-
+use crate::igi_lab::{Studio, mean, plain};
+use crate::tracer_lab::{Stage, view};
 use glam::{Vec3, Vec4, vec3};
-use igi_lab::{Studio, mean, plain};
 use lucerna::{
     gpu::testing::with_gpu,
     resident::Resident,
@@ -12,7 +10,6 @@ use lucerna::{
     techniques::igi::{Igi, Pattern, PictureSettings, Settings, Visibility},
 };
 use lucerna_scenes as builtin;
-use tracer_lab::{Stage, view};
 
 fn raster(settings: &Settings, raster_size: u32) -> Settings {
     Settings { visibility: Visibility::Raster, raster_size, ..settings.clone() }

@@ -1,11 +1,9 @@
 //! Instant global illumination over time: the gain of the history while the scene rests, its error while objects move, and the cases in which
 //! it must be discarded.
 
-mod igi_lab;
-mod tracer_lab;
-
+use crate::igi_lab::plain;
+use crate::tracer_lab::{Stage, view};
 use glam::{Mat4, Vec3, vec3};
-use igi_lab::plain;
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::{Graph, Runner},
@@ -14,7 +12,6 @@ use lucerna::{
     techniques::igi::{Igi, PictureSettings, Settings, history::motion_of},
 };
 use lucerna_scenes as builtin;
-use tracer_lab::{Stage, view};
 
 type Texels = Vec<[f32; 4]>;
 

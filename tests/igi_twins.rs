@@ -1,13 +1,9 @@
 //! The filters of instant global illumination against CPU implementations (twins), on random irradiance over surfaces with edges, steps and
 //! background.
 
-mod igi_lab;
-mod isr_lab;
-mod tracer_lab;
-
+use crate::igi_lab::twins::{self, Texels, blended, joined, smoothed, upsampled};
+use crate::isr_lab::{Random, gbuffer, image, read, scene, view};
 use glam::{DVec3, dvec3};
-use igi_lab::twins::{self, Texels, blended, joined, smoothed, upsampled};
-use isr_lab::{Random, gbuffer, image, read, scene, view};
 use lucerna::{
     gpu::testing::with_gpu,
     graph::{Extent, Graph},

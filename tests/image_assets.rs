@@ -1,7 +1,6 @@
 //! Images of other programs are read as they were meant.
 
-mod common;
-
+use crate::common;
 use std::path::{Path, PathBuf};
 
 use half::f16;

@@ -1,5 +1,6 @@
 //! OpenEXR files of odd kinds, written by OpenEXR itself: `golden/exr/README.md` says what is in them.
 
+use crate::common;
 use std::path::PathBuf;
 
 use half::f16;
@@ -8,8 +9,6 @@ use lucerna::{
     image::{self, Layers},
     scene::Limits,
 };
-
-mod common;
 
 const SIZE: [u32; 2] = [53, 37];
 

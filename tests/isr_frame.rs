@@ -1,9 +1,8 @@
 //! Whole frames of image-space radiosity on known surfaces: against closed forms, and that light scales as light must.
 
-mod isr_lab;
-
+use crate::isr_lab;
+use crate::isr_lab::{close, gbuffer, gbuffer_seen, lights, point, read};
 use glam::{DVec2, DVec3, Mat4, Vec3, dvec3, vec3};
-use isr_lab::{close, gbuffer, gbuffer_seen, lights, point, read};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::Graph,

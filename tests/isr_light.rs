@@ -1,9 +1,7 @@
 //! Direct light, upsampling and the sum of all light on the device, against closed forms and the CPU reference.
 
-mod isr_lab;
-
+use crate::isr_lab::{Random, close, gbuffer, image, lights, point, read, scene};
 use glam::{DVec3, Vec3, dvec3, vec3};
-use isr_lab::{Random, close, gbuffer, image, lights, point, read, scene};
 use lucerna::{
     gpu::testing::with_gpu,
     graph::{Extent, Graph},

@@ -1,9 +1,8 @@
 //! The passes of image-space radiosity on the device, each against closed forms or the CPU reference.
 
-mod isr_lab;
-
+use crate::isr_lab;
+use crate::isr_lab::{Random, close, coarse, gbuffer, image, read, scene, view};
 use glam::DVec3;
-use isr_lab::{Random, close, coarse, gbuffer, image, read, scene, view};
 use lucerna::{
     gpu::testing::with_gpu,
     graph::{Extent, Format, Graph},

@@ -1,10 +1,9 @@
 //! Senders beside the frame's, and numbers of samples that follow the depth.
 
-mod isr_lab;
-mod scene_kit;
-
+use crate::isr_lab;
+use crate::isr_lab::{gbuffer, lights, read, view};
+use crate::scene_kit::{mesh, square};
 use glam::{DVec3, Mat4, Quat, Vec3, dvec3, vec3};
-use isr_lab::{gbuffer, lights, read, view};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::{Graph, Runner},
@@ -17,7 +16,6 @@ use lucerna::{
         senders::{SenderView, Senders},
     },
 };
-use scene_kit::{mesh, square};
 
 /// A floor that reflects everything, and behind it a wall that glows. The camera looks down: the frame shows no wall.
 fn floor_and_wall(width: usize, height: usize, yfov: f64) -> (Eye, Vec<Patch>) {

@@ -1,8 +1,7 @@
 //! Light of further layers, further cameras and further bounces, drawn from a scene, beside closed forms on the CPU.
 
-mod isr_lab;
-mod scene_kit;
-
+use crate::isr_lab;
+use crate::scene_kit;
 use glam::{DVec3, Vec2, Vec4, dvec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},

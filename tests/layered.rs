@@ -1,11 +1,10 @@
 //! Gloss over a matt base in every technique: absolute radiance at the angle of the mirror, and what is reflected of light from
 //! everywhere, against closed forms, the integrals of `reference::brdf`, and the path tracer.
 
-mod fiv_lab;
-mod igi_lab;
-mod isr_lab;
-mod tracer_lab;
-
+use crate::fiv_lab;
+use crate::igi_lab;
+use crate::isr_lab;
+use crate::tracer_lab::{Stage, deviation, flat_view, mean, render};
 use glam::{DVec3, Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
@@ -19,7 +18,6 @@ use lucerna::{
     tracer::{Filter, Settings as Tracing},
 };
 use std::f64::consts::PI;
-use tracer_lab::{Stage, deviation, flat_view, mean, render};
 
 /// Angles of the viewer to the normal, degrees. The last two are those under which gloss added to Lambert's law made light.
 const ANGLES: [f64; 3] = [0.0, 53.0, 78.0];

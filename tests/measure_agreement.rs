@@ -2,9 +2,7 @@
 //!
 //! `cargo test --test measure_agreement -- --nocapture` prints the table of agreement.
 
-#[path = "agreement/images.rs"]
-mod images;
-
+use crate::images;
 use std::{collections::BTreeMap, fmt::Write};
 
 use lucerna::{

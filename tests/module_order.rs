@@ -1,12 +1,11 @@
 //! The modules of the engine import one another in one direction.
 
+use crate::common;
 use std::{
     collections::{BTreeMap, BTreeSet},
     fs,
     path::Path,
 };
-
-mod common;
 
 /// The first names in `use crate::…` and in paths `crate::name::…`, without those of unit tests.
 fn imports(text: &str) -> BTreeSet<String> {
@@ -88,4 +87,30 @@ fn modules_do_not_import_one_another_in_circles() {
         edges.values_mut().for_each(|imported| imported.retain(|name| !free.contains(name)));
     }
     assert!(edges.is_empty(), "modules that import one another in a circle, or one of those: {edges:#?}");
+}
+
+/// A file of tests that no program names would never run.
+#[test]
+fn every_file_of_tests_is_in_one_program() {
+    let tests = common::root().join("tests");
+    let read = |path: &Path| fs::read_to_string(path).unwrap();
+    let mut said = read(&common::root().join("Cargo.toml")) + &read(&common::root().join("samples/Cargo.toml"));
+    for entry in fs::read_dir(tests.join("programs")).unwrap() {
+        said += &read(&entry.unwrap().path()).replace("\"../", "\"tests/");
+    }
+    let mut count = 0;
+    for folder in [tests.clone(), tests.join("cli")] {
+        for path in fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file()) {
+            let name = path.strip_prefix(common::root()).unwrap().to_string_lossy().into_owned();
+            if path.extension().is_some_and(|e| e == "rs") && read(&path).contains("#[test]")
+                || name.ends_with("malformed.rs")
+            {
+                let times =
+                    said.matches(&format!("\"{name}\"")).count() + said.matches(&format!("\"../{name}\"")).count();
+                assert_eq!(times, 1, "{name} is in {times} programs of tests");
+                count += 1;
+            }
+        }
+    }
+    assert!(count > 100, "{count} files");
 }

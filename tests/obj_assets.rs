@@ -1,7 +1,6 @@
 //! The OBJ scenes of the asset collection, compared with what another reader makes of them.
 
-mod common;
-
+use crate::common;
 use glam::{DVec3, Vec3};
 use lucerna::scene::{LoadOptions, Scene, load};
 use std::{collections::BTreeMap, path::Path};

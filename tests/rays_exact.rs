@@ -1,16 +1,13 @@
 //! The compute traversal against brute force with the same arithmetic, on triangles and rays that break careless ones.
 
-mod rays_kit;
-mod scene_kit;
-
+use crate::rays_kit::*;
+use crate::scene_kit::mesh;
 use glam::{EulerRot, Mat4, Quat, Vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     scene::{Animation, Channel, Interpolation, Keys, Material, Node, Pose, Primitive, Scene, Transform},
     shaders::types,
 };
-use rays_kit::*;
-use scene_kit::mesh;
 
 /// One mesh of these triangles, double-sided.
 fn scene_of(triangles: &[[Vec3; 3]]) -> Scene {

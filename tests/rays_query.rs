@@ -3,9 +3,9 @@
 //! A hit counts as the same if it is the same triangle of the same instance, or a tie: another triangle in the same place
 //! (a shared edge, coplanar surfaces), of which each way of tracing may take either.
 
-mod rays_kit;
-mod scene_kit;
-
+use crate::common;
+use crate::rays_kit::*;
+use crate::scene_kit::mesh;
 use glam::{Mat4, Vec3, Vec4};
 use lucerna::{
     gpu::{DeviceKind, Gpu, testing::with_ray_query},
@@ -14,10 +14,6 @@ use lucerna::{
     shaders::types::{Hit, Ray},
 };
 use lucerna_scenes as builtin;
-use rays_kit::*;
-use scene_kit::mesh;
-
-mod common;
 
 const NONE: u32 = u32::MAX;
 /// Largest difference of places along the ray, as a part of the scene's extent.

@@ -1,8 +1,7 @@
 //! Rays through whole scenes on the device against the hierarchy of the CPU.
 
-mod common;
-mod rays_kit;
-
+use crate::common;
+use crate::rays_kit::*;
 use glam::{Mat4, Quat, Vec3};
 use lucerna::{
     gpu::testing::with_gpu,
@@ -13,7 +12,6 @@ use lucerna::{
     },
 };
 use lucerna_scenes as builtin;
-use rays_kit::*;
 
 /// Compares closest and any hits of random rays, and says how many hit something.
 fn compare(traceable: &mut Traceable<'_>, pose: &Pose, count: usize, seed: u64) -> usize {

@@ -1,9 +1,8 @@
 //! What counts as a surface for rays: masks of camera and shadow rays, cut out, blended, coloured and unlit triangles, mirrored
 //! instances. The compute traversal against a walk over the CPU's tree with the rules written again here.
 
-mod rays_kit;
-mod scene_kit;
-
+use crate::rays_kit::*;
+use crate::scene_kit;
 use glam::{Mat3, Mat4, Quat, Vec2, Vec3, Vec4};
 use lucerna::{
     gpu::testing::with_gpu,
@@ -13,7 +12,6 @@ use lucerna::{
     },
     shaders::types,
 };
-use rays_kit::*;
 
 /// lib/trace_common.glsl
 const CAMERA: u32 = 1;

@@ -1,17 +1,15 @@
 //! The device's path tracer against the CPU's, which was written apart from it and has neither weights between strategies nor
 //! importance sampling of lights: layer by layer, for every light and material.
 
-mod common;
-mod reference_kit;
-mod tracer_lab;
-
+use crate::common;
+use crate::reference_kit::{Task, corner, disagreements, expect_agreement, eye, panel, point, sky, spot_and_sun};
+use crate::tracer_lab;
 use glam::{Mat4, Vec2, Vec3, Vec4};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::{AlphaMode, LightKind, Material, Pose, Texture, TextureRef, Transform, View, load},
     tracer::Sources,
 };
-use reference_kit::{Task, corner, disagreements, expect_agreement, eye, panel, point, sky, spot_and_sun};
 
 fn matt() -> Material {
     Material::diffuse("floor", Vec3::new(0.6, 0.65, 0.5))

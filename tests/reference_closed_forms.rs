@@ -1,14 +1,12 @@
 //! The CPU's path tracer against light that is known in closed form (form factors from Howell's catalogue; Siegel and Howell).
 
-mod tracer_lab;
-
+use crate::tracer_lab::{Stage, flat_view, view};
 use glam::Vec3;
 use lucerna::{
     reference::path::{Layers, Settings, trace},
     scene::{Material, Pose, View, bvh::Bvh},
 };
 use std::f32::consts::PI;
-use tracer_lab::{Stage, flat_view, view};
 
 /// W/(sr·m²) of all emitters.
 const L: f32 = 3.0;

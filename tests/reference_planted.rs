@@ -1,11 +1,8 @@
 //! The comparison of the two path tracers notices errors that are planted into the device's pictures.
 
-mod reference_kit;
-mod tracer_lab;
-
+use crate::reference_kit::{Task, corner, disagreements_after, eye, panel, point};
 use glam::Vec3;
 use lucerna::{gpu::testing::with_gpu, image::Layers, scene::Material};
-use reference_kit::{Task, corner, disagreements_after, eye, panel, point};
 use std::f32::consts::PI;
 
 /// Multiplies a layer and changes the sum of all by as much.

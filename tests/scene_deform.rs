@@ -1,15 +1,12 @@
 //! Skinning and morphing on the GPU against the CPU.
 
-#[allow(dead_code)]
-mod common;
-mod scene_kit;
-
+use crate::common;
+use crate::scene_kit::*;
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::{Material, MorphTarget, Node, Pose, Scene, Skin, Transform, deform::world_vertices},
 };
-use scene_kit::*;
 
 /// A cylinder of two bones that bends and bulges; two nodes share its mesh.
 fn figure() -> Scene {

@@ -1,7 +1,6 @@
 //! Scenes near the bounds of `scene::extent` look as they do at usual sizes.
 
-mod tracer_lab;
-
+use crate::tracer_lab::{Stage, render};
 use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
@@ -15,7 +14,6 @@ use lucerna::{
     techniques::isr,
     tracer::Settings,
 };
-use tracer_lab::{Stage, render};
 
 /// A floor and a wall of `size` metres under a lamp that lights them as at any other size, and a view of them.
 fn stage(size: f32) -> (Stage, View) {

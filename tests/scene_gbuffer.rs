@@ -1,7 +1,6 @@
 //! The G-buffer of known scenes against closed forms.
 
-mod scene_kit;
-
+use crate::scene_kit::*;
 use glam::{Mat4, Quat, Vec2, Vec3};
 use lucerna::{
     gpu::testing::with_gpu,
@@ -10,7 +9,6 @@ use lucerna::{
     scene::{AlphaMode, Camera, Material, Projection, Sampler, Scene, Texture, TextureRef, View},
     shaders::{test::view as view_shader, types},
 };
-use scene_kit::*;
 
 const EXTENT: [u32; 2] = [96, 64];
 

@@ -1,7 +1,6 @@
 //! The graphs of the scene's passes: every barrier of their plans is needed.
 
-mod scene_kit;
-
+use crate::scene_kit::*;
 use glam::{Mat4, Vec3};
 use lucerna::{
     gpu::testing::with_gpu,
@@ -10,7 +9,6 @@ use lucerna::{
     resident::Resident,
     scene::{AlphaMode, LightKind, Material, MorphTarget, Scene},
 };
-use scene_kit::*;
 
 /// Something of everything: masked, blended, mirrored, double-sided, morphed; three kinds of light.
 fn all_sorts() -> Scene {

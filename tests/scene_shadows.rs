@@ -1,7 +1,6 @@
 //! Shadow maps against analytic shadows, and the exponential test against its closed form.
 
-mod scene_kit;
-
+use crate::scene_kit::*;
 use ash::vk;
 use glam::{Mat4, Quat, Vec3};
 use lucerna::{
@@ -12,7 +11,6 @@ use lucerna::{
     scene::{AlphaMode, LightKind, Material, MipFilter, Sampler, Scene, Texture, TextureRef, View, Wrap},
     shaders::{passes::shadow_blur, test::exponential, test::shadow as shadow_probe, types},
 };
-use scene_kit::*;
 
 const KINDS: [Kind; 3] = [Kind::Plain, Kind::Pcf, Kind::Exponential];
 

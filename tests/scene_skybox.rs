@@ -1,7 +1,6 @@
 //! The environment behind a scene: right directions, only where nothing stands.
 
-mod scene_kit;
-
+use crate::scene_kit::*;
 use glam::{Mat4, Vec2, Vec3};
 use lucerna::{
     gpu::testing::with_gpu,
@@ -9,7 +8,6 @@ use lucerna::{
     passes::{gbuffer, skybox},
     scene::{Environment, Material, Scene},
 };
-use scene_kit::*;
 
 /// Radiance that names its direction: (d + 1) as a colour, in a map fine enough to be read back.
 fn compass(rotation: f32) -> Environment {

@@ -1,7 +1,7 @@
 //! The rasteriser and rays show the same surface: where two lie in one place, and under a normal map.
 
-mod scene_kit;
-
+use crate::scene_kit;
+use crate::scene_kit::{mesh, place, sphere, square, surfaces};
 use glam::{Mat3, Mat4, Vec3, Vec4};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
@@ -9,7 +9,6 @@ use lucerna::{
     scene::{AlphaMode, Material, Pose, Primitive, Sampler, Scene, Texture, TextureRef, View},
     tracer::{Filter, Settings, Tracer},
 };
-use scene_kit::{mesh, place, sphere, square, surfaces};
 
 const EXTENT: [u32; 2] = [32, 24];
 

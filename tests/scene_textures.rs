@@ -1,14 +1,12 @@
 //! Material textures on the device: filtering and wrapping by the glTF sampler against a direct evaluation.
 
-mod scene_kit;
-
+use crate::scene_kit::*;
 use glam::{Vec2, Vec4};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::{Material, MipFilter, Sampler, Scene, Texture, TextureRef, Wrap},
     shaders::{test::texture as probe, types},
 };
-use scene_kit::*;
 
 const W: i32 = 5;
 const H: i32 = 3;

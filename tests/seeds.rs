@@ -1,7 +1,7 @@
 //! The seed of a graph decides every random choice of a picture, and nothing else.
 
-mod scene_kit;
-
+use crate::scene_kit;
+use crate::scene_kit::{light, mesh, place, square};
 use glam::{Mat4, Vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
@@ -16,7 +16,6 @@ use lucerna::{
     },
     tracer::{self, Filter, Tracer},
 };
-use scene_kit::{light, mesh, place, square};
 
 const EXTENT: [u32; 2] = [24, 18];
 

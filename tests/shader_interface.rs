@@ -1,8 +1,7 @@
 //! The interface of every shader as text: a change shows as a line in review.
 
+use crate::common;
 use std::fs;
-
-mod common;
 
 /// `UPDATE_GOLDENS=1 cargo test --test shader_interface` writes the file again.
 #[test]

@@ -1,8 +1,7 @@
 //! Glass read from OBJ, and mirrors under strong normal maps: the path tracer, its CPU twin, and the Whitted rays of igi.
 
-mod igi_lab;
-mod tracer_lab;
-
+use crate::igi_lab;
+use crate::tracer_lab::{Stage, flat_view, render, view};
 use glam::{DVec3, Vec2, Vec3, Vec4, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
@@ -12,7 +11,6 @@ use lucerna::{
     tracer::{Filter, Settings as Tracing},
 };
 use std::fmt::Write;
-use tracer_lab::{Stage, flat_view, render, view};
 
 /// The picture by each of the three, three numbers a pixel.
 fn pictures(gpu: &Gpu, scene: &Scene, view: &View, samples: u32) -> [(&'static str, Vec<DVec3>); 3] {

@@ -1,7 +1,8 @@
 //! Light of the environment on bare surfaces by image-space radiosity against brute force over the pixels of the environment.
 
-mod scene_kit;
-
+use crate::common;
+use crate::scene_kit;
+use crate::scene_kit::{PI, mesh, place, sphere};
 use glam::{DVec3, Mat4, Quat, Vec2, Vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
@@ -14,9 +15,6 @@ use lucerna::{
     },
     techniques::isr,
 };
-use scene_kit::{PI, mesh, place, sphere};
-
-mod common;
 
 /// ∫ L max(n·d, 0) dω over the pixels as they stand in the picture, W/m².
 fn brute_force(sky: &Environment, n: Vec3) -> Vec3 {

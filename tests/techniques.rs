@@ -75,6 +75,7 @@ fn each_technique_renders_by_its_name_in_all_its_modes() {
             ("isr", json!({}), vec!["direct", "indirect", "occlusion"]),
             ("igi", json!({ "igi": { "vpls": 16, "candidates": 1 } }), vec!["direct", "indirect"]),
             ("fiv", json!({ "fiv": { "method": "unshadowed" } }), vec!["irradiance"]),
+            ("reference", json!({ "samples": 8 }), vec!["direct", "indirect", "emission", "position", "variance"]),
         ] {
             let layers = techniques::visit(name, Render { gpu, settings }).unwrap().unwrap();
             for layer in own.iter().chain(&["albedo", "normal", "depth"]) {

@@ -3,10 +3,8 @@
 //!
 //! `cargo test --test tonemap_agreement -- --nocapture` prints how far they are apart.
 
-mod common;
-#[path = "agreement/pyramids.rs"]
-mod pyramids;
-
+use crate::common;
+use crate::pyramids;
 use std::{collections::BTreeMap, fs, path::Path};
 
 use lucerna::{

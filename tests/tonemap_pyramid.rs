@@ -3,8 +3,7 @@
 //! `cargo test --test tonemap_pyramid -- --nocapture` prints the table for parts of photographs;
 //! `cargo test --release --test tonemap_pyramid -- --ignored --nocapture` for whole ones.
 
-mod common;
-
+use crate::common;
 use std::path::Path;
 
 use lucerna::{

@@ -1,8 +1,7 @@
 //! Selective tone mapping: which pixels are important, and is the local component spent on those alone? On a device; every value
 //! is exact.
 
-mod common;
-
+use crate::common;
 use lucerna::{
     gpu::{DeviceKind, Gpu, ImageDesc as OwnedDesc, OwnedImage, Region, Started, testing::with_gpu},
     graph::*,

@@ -3,8 +3,7 @@
 //! `cargo test --test tonemap_twin -- --nocapture` prints the table for parts of all images of the collection;
 //! `cargo test --release --test tonemap_twin -- --ignored --nocapture` for whole images.
 
-mod common;
-
+use crate::common;
 use std::path::Path;
 
 use lucerna::{

@@ -1,7 +1,6 @@
 //! Pictures of the path tracer where the light is known exactly.
 
-mod tracer_lab;
-
+use crate::tracer_lab::{Stage, deviation, expect_mean, flat_view, luminance, matt, mean, render, view};
 use glam::{Mat4, Vec2, Vec3, Vec4, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
@@ -9,7 +8,6 @@ use lucerna::{
     tracer::{Filter, Settings},
 };
 use std::f64::consts::PI;
-use tracer_lab::{Stage, deviation, expect_mean, flat_view, luminance, matt, mean, render, view};
 
 /// Everything, rays through the centres.
 fn full(bounces: u32) -> Settings {

@@ -1,8 +1,8 @@
 //! What must not change a picture, or change it in a known way: light twice as bright, colours exchanged, how samples are
 //! drawn, how the work is cut; and how fast the error falls.
 
-mod tracer_lab;
-
+use crate::tracer_lab;
+use crate::tracer_lab::{Stage, luminance, matt, mean, render, view};
 use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
@@ -10,7 +10,6 @@ use lucerna::{
     scene::{AlphaMode, Environment, LightKind, Material, Pose, Scene, View},
     tracer::{Filter, Settings, Sources, State, Strategy, Tracer},
 };
-use tracer_lab::{Stage, luminance, matt, mean, render, view};
 
 /// Something of everything: a glossy floor, a coloured box, a ball of glass, a mirror; a lamp, a point light, a sky.
 fn mixed() -> (Scene, View) {

@@ -1,8 +1,7 @@
 //! Lamps that are moved, mirrored and deformed by `Tracer::set_pose` shine from where they are: against a tracer made for the
 //! pose, and against the CPU's path tracer.
 
-mod tracer_lab;
-
+use crate::tracer_lab::{Stage, deviation, luminance, mean, view};
 use glam::{Mat4, Quat, Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
@@ -11,7 +10,6 @@ use lucerna::{
     scene::{Material, MorphTarget, Pose, Scene, bvh::Bvh},
     tracer::{Settings, Sources, Tracer},
 };
-use tracer_lab::{Stage, deviation, luminance, mean, view};
 
 /// A floor and a wall under a panel that can grow to four times its area, a ball that shines, and a point light.
 fn room() -> Scene {

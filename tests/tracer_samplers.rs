@@ -1,7 +1,6 @@
 //! Every sampler draws with the density that it says, and all of it: chi-square over bins, and E[g / density] = ∫ g.
 
-mod tracer_lab;
-
+use crate::tracer_lab::{Stage, chi_square, chi_square_tail, sidak};
 use glam::{DVec3, Mat4, Vec3};
 use lucerna::{
     gpu::{Gpu, ImageDesc, OwnedImage, Region, testing::with_gpu},
@@ -14,7 +13,6 @@ use lucerna::{
 };
 use lucerna_scenes as builtin;
 use std::f64::consts::PI;
-use tracer_lab::{Stage, chi_square, chi_square_tail, sidak};
 
 const COUNT: u32 = 1 << 17;
 

@@ -1,7 +1,6 @@
 //! What the path tracer's layers tell of the first surface, and what of its textures decides the light, against closed forms.
 
-mod tracer_lab;
-
+use crate::tracer_lab::{Stage, deviation, flat_view, matt, mean, render};
 use glam::{Mat4, Vec2, Vec3, Vec4, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
@@ -9,7 +8,6 @@ use lucerna::{
     scene::{Material, Primitive, Texture, TextureRef, Transform},
     tracer::{Filter, Settings, Strategy},
 };
-use tracer_lab::{Stage, deviation, flat_view, matt, mean, render};
 
 /// One row of texels.
 fn texture(rgba: &[[u8; 4]]) -> Texture {

@@ -1,14 +1,12 @@
 //! Textures as the path tracer reads them.
 
-mod scene_kit;
-
+use crate::scene_kit::{look, mesh, place, square};
 use glam::{Mat4, Vec3};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::{Camera, Material, Pose, Projection, Sampler, Scene, Texture, TextureRef, View},
     tracer::{Filter, Settings, Tracer},
 };
-use scene_kit::{look, mesh, place, square};
 
 /// Light of all 256 codes, each of a texel of its own; `linear` filters between them, at the middle of each.
 fn ramp(linear: bool) -> Vec<f32> {

@@ -1,12 +1,37 @@
 //! Tests on a device: [`with_gpu`] opens one with validation and fails on any message or leak.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
 use super::{Gpu, GpuOptions, RayQuery, Validation};
 use crate::ErrorKind;
 
-/// One device test at a time in a process: the layers cost memory, and a CPU driver uses all cores anyway.
-static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+/// Device tests that a process runs at a time: the layers cost memory, and a CPU driver uses all cores. A second test uses them while the
+/// first computes on the host.
+const AT_ONCE: usize = 2;
+
+/// The number of device tests that run.
+static RUNNING: Mutex<usize> = Mutex::new(0);
+static ENDED: Condvar = Condvar::new();
+
+/// The turn of a device test.
+struct Turn;
+
+impl Turn {
+    /// Waits until fewer than [`AT_ONCE`] run.
+    fn take() -> Self {
+        let running = RUNNING.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut running = ENDED.wait_while(running, |n| *n >= AT_ONCE).unwrap_or_else(PoisonError::into_inner);
+        *running += 1;
+        Self
+    }
+}
+
+impl Drop for Turn {
+    fn drop(&mut self) {
+        *RUNNING.lock().unwrap_or_else(PoisonError::into_inner) -= 1;
+        ENDED.notify_one();
+    }
+}
 
 /// Runs `body` on a device with validation and synchronisation validation, closes the device, and panics if validation,
 /// loader or driver said anything that is not on the allow-list ([`super::ALLOWED`]), or if anything made from the device
@@ -42,7 +67,7 @@ pub fn with_ray_query(body: impl FnOnce(&Gpu)) {
 /// As [`with_gpu_options`], but hands back what was wrong, so that the checks themselves can be tested.
 #[doc(hidden)]
 pub fn run(options: GpuOptions, body: impl FnOnce(&Gpu)) -> Result<(), String> {
-    let _one = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let _turn = Turn::take();
     let ci = std::env::var_os("CI").is_some();
     for silencer in ["VK_LAYER_DISABLES", "VK_LAYER_MESSAGE_ID_FILTER"] {
         if std::env::var_os(silencer).is_some() {

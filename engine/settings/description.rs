@@ -82,6 +82,8 @@ pub struct Key {
     /// Empty: the number has no unit.
     pub unit: String,
     pub decides: Decides,
+    /// The key has a command line option of its own, under this heading.
+    pub option: Option<String>,
     /// Conditions on other keys: key and schema that its value meets. Without them the key has no effect.
     pub needs: Vec<(String, Value)>,
 }
@@ -200,7 +202,7 @@ impl Description {
             .map_err(|error| Error::new(ErrorKind::Runtime, "settings cannot be read back").caused_by(error))
     }
 
-    /// The JSON schema (draft 2020-12) of the settings, with `x-unit`, `x-decides`, `x-needs` and `x-zero`.
+    /// The JSON schema (draft 2020-12) of the settings, with `x-unit`, `x-decides`, `x-needs`, `x-option` and `x-zero`.
     pub fn schema(&self) -> &Value {
         &self.schema
     }

@@ -9,6 +9,7 @@
 //!   `extend("x-zero" = true)` allows 0 beside the range;
 //! * `extend("x-unit" = "W/(sr·m²)")` is the unit;
 //! * `extend("x-decides" = "bake")` marks a key that what is computed beforehand depends on; other keys decide pictures alone;
+//! * `extend("x-option" = "Look")` gives a key a command line option of its own, under this heading;
 //! * `extend("x-needs" = {"picks": {"minimum": 1}})` are conditions on other keys, written as schemas; without them the key has no effect.
 //!
 //! The default is that of the type's `Default`.

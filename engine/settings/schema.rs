@@ -37,6 +37,7 @@ fn key(field: &Value, name: String) -> Key {
         default: field["default"].clone(),
         allowed: allowed(field),
         unit: text(field, "x-unit"),
+        option: field["x-option"].as_str().map(str::to_owned),
         decides,
         needs: needs.map(|(key, condition)| (key.clone(), condition.clone())).collect(),
         name,

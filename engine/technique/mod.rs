@@ -146,6 +146,14 @@ pub trait Technique: Sized {
         0
     }
 
+    /// Uploads the scene for this technique.
+    ///
+    /// # Errors
+    /// As [`Resident::new`].
+    fn upload(gpu: &Gpu, scene: &Scene) -> Result<Resident> {
+        Resident::new(gpu, scene)
+    }
+
     /// Prepares the technique for a scene. May run graphs.
     ///
     /// # Errors
@@ -184,7 +192,7 @@ impl<T: Technique> Ready<T> {
         baked: Option<&T::Baked>,
         told: &mut dyn FnMut(u64, u64) -> bool,
     ) -> Result<Self> {
-        let resident = Resident::new(gpu, scene)?;
+        let resident = T::upload(gpu, scene)?;
         let technique = T::ready(Making { gpu, scene, resident: &resident, baked, told }, settings)?;
         Ok(Self { resident, technique })
     }

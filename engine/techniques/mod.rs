@@ -10,6 +10,7 @@ use crate::{
     passes,
     settings::{Described, Description},
     technique::Technique,
+    tracer::Reference,
 };
 
 /// Code that is the same for all techniques, for [`visit`].
@@ -50,4 +51,5 @@ techniques! {
     isr::Isr,
     igi::Igi,
     fiv::Fiv,
+    Reference,
 }

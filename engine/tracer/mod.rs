@@ -23,18 +23,22 @@
 //! glass or from a mirror is missing. Single-sided surfaces emit from their front only.
 
 mod alias;
+pub mod bands;
 mod environment;
+mod job;
+mod kernel;
 mod light_tree;
 mod lights;
 mod settings;
 mod sharp;
 mod state;
 mod sums;
-mod work;
+mod technique;
 
-pub use settings::{Filter, Settings, Sources, Strategy};
+pub use settings::{Filter, PictureSettings, Settings, Sources, Strategy};
 pub use state::{Head, State};
 pub use sums::Sums;
+pub use technique::{Mode, Reference};
 
 /// The tables for light sampling. Techniques that sample the same lights use them, and so do tests.
 #[doc(hidden)]
@@ -46,54 +50,36 @@ pub mod tables {
     };
 }
 
+use std::{ops::Range, time::Duration};
+
 use crate::{
     Error, Result,
-    gpu::{Gpu, OwnedBuffer, OwnedImage},
+    gpu::{Gpu, Tiles},
     graph::{Graph, Runner},
     image::Layers,
-    rays::Rays,
     resident::Resident,
     scene::{Aabb, Note, Pose, Scene, View},
     shaders::types,
 };
-use std::time::Duration;
-use work::Job;
+use job::{GRANULE, Job};
+use kernel::Kernel;
 
 /// A path tracer for one scene on one device.
 #[derive(Debug)]
 pub struct Tracer<'s> {
-    gpu: Gpu,
     scene: &'s Scene,
     pose: Pose,
     resident: Resident,
-    rays: Rays,
+    kernel: Kernel,
     runner: Runner,
-    environment: OwnedImage,
-    environment_columns: OwnedBuffer,
-    /// Columns and rows of the environment's importance map.
-    cells: [u32; 2],
     /// Bounding box of the scene in this pose, metres.
     bounds: Aabb,
     punctual: Vec<types::Light>,
-    lights: Option<Lights>,
-    paths: Option<OwnedBuffer>,
     job: Option<Job>,
     /// Slots per tile, adapted to the measured time; the next picture starts with this value.
     tile: u64,
     /// A fixed number of slots per tile instead.
     fixed_tile: Option<u64>,
-}
-
-/// The light table of the chosen sources.
-#[derive(Debug)]
-struct Lights {
-    sources: Sources,
-    suns: u32,
-    tree: bool,
-    columns: OwnedBuffer,
-    targets: OwnedBuffer,
-    instances: OwnedBuffer,
-    nodes: OwnedBuffer,
 }
 
 /// Progress of a picture.
@@ -114,23 +100,14 @@ impl<'s> Tracer<'s> {
     /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
     pub fn new(gpu: &Gpu, scene: &'s Scene, pose: &Pose) -> Result<Self> {
         let resident = Resident::for_rays(gpu, scene)?;
-        let importance = environment::importance(scene.environment.as_ref());
-        let environment_columns =
-            OwnedBuffer::with_contents(gpu, "tracer.environment", bytemuck::cast_slice(&importance.columns))?;
         let mut tracer = Self {
-            gpu: gpu.clone(),
             scene,
             pose: pose.clone(),
-            rays: Rays::new(gpu, scene, &resident)?,
+            kernel: Kernel::new(gpu, scene, &resident)?,
             resident,
             runner: Runner::new(gpu),
-            environment: tables::radiance_map(gpu, scene.environment.as_ref())?,
-            environment_columns,
-            cells: importance.cells,
             bounds: Aabb::EMPTY,
             punctual: Vec::new(),
-            lights: None,
-            paths: None,
             job: None,
             tile: 0,
             fixed_tile: None,
@@ -143,7 +120,7 @@ impl<'s> Tracer<'s> {
     pub fn set_pose(&mut self, pose: &Pose) {
         self.pose = pose.clone();
         self.job = None;
-        self.lights = None;
+        self.kernel.moved();
         // The graph is declared only for the bounds, and never run.
         let handles = self.resident.frame_in(&mut Graph::new("tracer.bounds"), self.scene, &self.pose);
         self.bounds = handles.bounds();
@@ -157,8 +134,7 @@ impl<'s> Tracer<'s> {
 
     /// Notes about the parts of the scene that are approximated.
     pub fn notes(&self) -> Vec<Note> {
-        // The rasteriser's notes about glass and blending do not apply to rays.
-        self.resident.notes().iter().filter(|note| note.place == "textures").cloned().collect()
+        notes(self.resident.notes())
     }
 
     /// Fixes the size of tiles to `slots` pixels instead of adapting it to the measured time. The picture does not depend on it.
@@ -183,8 +159,19 @@ impl<'s> Tracer<'s> {
     pub fn start(&mut self, view: &View, settings: &Settings) -> Result<()> {
         settings.validate()?;
         let view = view.fit_far(&self.bounds);
-        self.prepare_lights(settings.sources)?;
-        self.job = Some(Job::new(&self.gpu, view, settings.clone())?);
+        self.kernel.light(self.scene, &self.pose, &self.punctual, settings.sources)?;
+        self.job = Some(Job::new(self.kernel.gpu(), view, settings.clone())?);
+        Ok(())
+    }
+
+    /// Begins the picture again with a band of its rows alone: one of [`bands::of`].
+    ///
+    /// # Errors
+    /// `Usage` before [`Self::start`], and for rows that are no band.
+    pub fn restrict(&mut self, rows: Range<u32>) -> Result<()> {
+        let job = self.job_mut()?;
+        bands::check(job.view.extent, &rows)?;
+        job.restrict(rows);
         Ok(())
     }
 
@@ -203,7 +190,41 @@ impl<'s> Tracer<'s> {
     /// # Errors
     /// `Usage` before [`Self::start`]; `OutOfMemory`, `DeviceLost`, `Runtime` from the device.
     pub fn run(&mut self, samples: u64, mut go_on: impl FnMut(&Progress) -> bool) -> Result<Progress> {
-        self.advance(samples, &mut go_on)
+        let job = self.job.as_ref().ok_or_else(not_started)?;
+        let (slots, done) = (job.slots(), job.done);
+        if samples > u64::from(u32::MAX) {
+            return Err(Error::usage(format!("{samples} samples a pixel; at most {} are numbered", u32::MAX)));
+        }
+        let total = samples.saturating_mul(slots).max(done);
+        let cut = self.kernel.cut(self.scene, job)?;
+        let most = cut.most().max(u64::from(GRANULE));
+        let mut tiles = Tiles::new(total, GRANULE).at_most(most).after(done).first(self.tile);
+        if let Some(fixed) = self.fixed_tile {
+            tiles = tiles.first(fixed);
+        }
+        while let Some(tile) = tiles.next_tile() {
+            let mut graph = Graph::new("tracer");
+            let handles = self.resident.frame_in(&mut graph, self.scene, &self.pose);
+            let job = self.job.as_ref().ok_or_else(not_started)?;
+            self.kernel.declare(&mut graph, (self.scene, &handles), job, tile.clone(), cut)?;
+            let frame = self.runner.run(&graph)?;
+            let time = Duration::from_secs_f64(frame.report.wait_ms.max(0.0) * 1e-3);
+            match self.fixed_tile {
+                Some(fixed) => tiles = Tiles::new(total, GRANULE).at_most(most).after(tile.end).first(fixed),
+                None => tiles.took(time),
+            }
+            let job = self.job_mut()?;
+            job.done = tile.end;
+            job.time += time;
+            let progress = job.progress();
+            if !go_on(&progress) {
+                break;
+            }
+        }
+        if self.fixed_tile.is_none() {
+            self.tile = tiles.size();
+        }
+        Ok(self.job()?.progress())
     }
 
     /// The picture so far.
@@ -244,7 +265,7 @@ impl<'s> Tracer<'s> {
     /// # Errors
     /// As [`Self::layers`].
     pub fn save(&self, about: &serde_json::Value) -> Result<State> {
-        self.job()?.save(&self.gpu, about)
+        self.job()?.save(self.kernel.gpu(), about)
     }
 
     /// Continues from a state. Call [`Self::start`] with the same view and settings first.
@@ -252,7 +273,7 @@ impl<'s> Tracer<'s> {
     /// # Errors
     /// `Input` if the state belongs to another picture; the message lists the differences.
     pub fn restore(&mut self, state: &State, about: &serde_json::Value) -> Result<()> {
-        let gpu = self.gpu.clone();
+        let gpu = self.kernel.gpu().clone();
         self.job_mut()?.restore(&gpu, state, about)
     }
 
@@ -263,24 +284,11 @@ impl<'s> Tracer<'s> {
     fn job_mut(&mut self) -> Result<&mut Job> {
         self.job.as_mut().ok_or_else(not_started)
     }
+}
 
-    fn prepare_lights(&mut self, sources: Sources) -> Result<()> {
-        if self.lights.as_ref().is_some_and(|l| l.sources == sources) {
-            return Ok(());
-        }
-        let table = lights::table(self.scene, &self.pose, &self.punctual, sources);
-        let buffer = |name, bytes: &[u8]| OwnedBuffer::with_contents(&self.gpu, name, bytes);
-        self.lights = Some(Lights {
-            sources,
-            suns: table.suns,
-            tree: table.tree,
-            columns: buffer("tracer.light columns", bytemuck::cast_slice(&table.columns))?,
-            targets: buffer("tracer.light targets", bytemuck::cast_slice(&table.targets))?,
-            instances: buffer("tracer.instance lights", bytemuck::cast_slice(&table.instances))?,
-            nodes: buffer("tracer.light tree", bytemuck::cast_slice(&table.nodes))?,
-        });
-        Ok(())
-    }
+/// The notes about a scene's upload that apply to rays. Those about glass and blending are for rasterisers.
+fn notes(of_upload: &[Note]) -> Vec<Note> {
+    of_upload.iter().filter(|note| note.place == "textures").cloned().collect()
 }
 
 fn not_started() -> Error {

@@ -1,13 +1,19 @@
 //! Settings of the path tracer.
 
-use crate::{Error, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::{
+    Error, Result,
+    settings::{Described, described},
+};
+
 /// Which light sources are used. The others neither light surfaces nor are visible.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sources {
     #[default]
+    /// All light sources.
     All,
     /// Point, spot and directional lights.
     Punctual,
@@ -32,7 +38,7 @@ impl Sources {
 }
 
 /// Position of a camera ray within its pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Filter {
     /// Random, uniform over the pixel: the picture is box-filtered.
@@ -43,7 +49,7 @@ pub enum Filter {
 }
 
 /// Sampling strategy for lights with an extent. [`Strategy::Mis`] is meant for pictures; the others are for tests.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Strategy {
     /// Both light and BSDF sampling, combined by multiple importance sampling with the power heuristic.
@@ -56,22 +62,31 @@ pub enum Strategy {
 }
 
 /// Settings of a picture. The same settings give bit-identical results on the same device.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    /// Maximum of scatterings after the first surface, 0 to 1000. 0: direct light only; 1: the light that one pass of image-space
-    /// radiosity models.
+    /// Maximum of scatterings after the first surface. 0: direct light only; 1: the light that one pass of image-space radiosity models.
+    #[schemars(extend("x-option" = "Quality"))]
+    // After as many bounces the light is far below the rounding error.
+    #[schemars(range(min = 0, max = 1000))]
     pub bounces: u32,
-    /// Maximum of mirrors and glass surfaces along a path, in addition to `bounces`, 0 to 1000.
+    /// Maximum of mirrors and glass surfaces along a path, in addition to `bounces`.
+    #[schemars(range(min = 0, max = 1000))]
     pub specular_bounces: u32,
     /// Number of scatterings before Russian roulette begins.
+    #[schemars(range(min = 0, max = 1000))]
     pub roulette: u32,
     /// Every surface is Lambertian: without gloss, mirrors and glass.
     pub diffuse_only: bool,
+    /// The light sources that are used.
     pub sources: Sources,
+    /// Position of a camera ray within its pixel.
     pub filter: Filter,
+    /// Sampling of lights that have an extent.
     pub strategy: Strategy,
     /// Seed of all random numbers.
+    #[schemars(extend("x-option" = "Picture"))]
+    #[schemars(range(min = 0, max = 4_294_967_295_u32))]
     pub seed: u32,
 }
 
@@ -90,18 +105,42 @@ impl Default for Settings {
     }
 }
 
-/// Maximum of bounces. After as many bounces the light is far below the rounding error.
-const MOST_BOUNCES: u32 = 1000;
-
 impl Settings {
     /// # Errors
-    /// `Usage` if a setting is out of its range.
+    /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
-        for (name, value) in [("bounces", self.bounces), ("specular_bounces", self.specular_bounces)] {
-            if value > MOST_BOUNCES {
-                return Err(Error::usage(format!("{value}; at most {MOST_BOUNCES} are allowed")).at(name));
-            }
+        Self::description().check(self)
+    }
+}
+
+described!(Settings);
+
+/// The settings of a frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PictureSettings {
+    /// Paths per pixel that a frame adds, 1 to 65536. Frames of the same pose, view and settings add to one picture.
+    pub samples: u32,
+    pub reference: Settings,
+}
+
+impl Default for PictureSettings {
+    fn default() -> Self {
+        Self { samples: 16, reference: Settings::default() }
+    }
+}
+
+/// Maximum of paths per pixel in one frame.
+const MOST_SAMPLES: u32 = 1 << 16;
+
+impl PictureSettings {
+    /// # Errors
+    /// `Usage`, naming the key, the value found and the values allowed.
+    pub fn validate(&self) -> Result<()> {
+        if !(1..=MOST_SAMPLES).contains(&self.samples) {
+            let what = format!("{} is not allowed; allowed: 1 to {MOST_SAMPLES}", self.samples);
+            return Err(Error::usage(what).at("samples"));
         }
-        Ok(())
+        self.reference.validate().map_err(|error| error.at("reference"))
     }
 }

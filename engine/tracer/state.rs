@@ -2,7 +2,7 @@
 
 use super::{
     Sums,
-    work::{Job, LAYERS, slots_of},
+    job::{Job, LAYERS, slots_of},
 };
 use crate::{Error, ErrorKind, Result, gpu::Gpu, image};
 use serde_json::{Value, json};
@@ -158,7 +158,7 @@ impl State {
 
 impl Job {
     /// All data on which the bits of a picture depend.
-    fn about(&self, gpu: &Gpu, about: &Value) -> Result<Value> {
+    pub fn about(&self, gpu: &Gpu, about: &Value) -> Result<Value> {
         let device = gpu.describe();
         let settings = serde_json::to_value(&self.settings)
             .map_err(|error| Error::new(ErrorKind::Runtime, "the settings cannot be written").caused_by(error))?;

@@ -32,6 +32,7 @@ pub mod report;
 pub mod rerun;
 pub mod run;
 pub mod scene_bounds;
+pub mod setting_options;
 pub mod settings_list;
 pub mod signals;
 pub mod source;

@@ -120,6 +120,7 @@ mod tests {
             ("igi", include_str!("../igi/README.md")),
             ("fiv", include_str!("../fiv/README.md")),
             ("tonemap", include_str!("../tonemap/README.md")),
+            ("reference", include_str!("../../docs/reference.md")),
         ];
         for (name, description) in descriptions() {
             let mark = format!("<!-- written by `lucerna settings {name} --form markdown` -->\n\n");
@@ -127,7 +128,7 @@ mod tests {
                 pages.iter().filter_map(|(page, text)| Some((page, text.split_once(&mark)?.1))).collect();
             assert!(!with.is_empty(), "no page has the table of {name}");
             for (page, rest) in with {
-                assert!(rest.starts_with(&description.table()), "samples/{page}/README.md: other keys of {name}");
+                assert!(rest.starts_with(&description.table()), "the page of {page} has other keys of {name}");
             }
         }
         let without = pages.iter().find(|(page, text)| !text.contains(&format!("`lucerna settings {page} ")));

@@ -16,10 +16,7 @@ const uint TO_SUN = 1u; // export
 const uint TO_SKY = 2u; // export
 const uint ON = 3u; // export
 
-// Layers of the sums; see reference/path_sums.glsl.
-const uint PATH_SUMS = 6u; // export
-// The first PATH_EXACT_SUMS layers also have layers for their rounding errors.
-const uint PATH_EXACT_SUMS = 3u; // export
+#include "reference/path_layers.glsl"
 
 struct PathSettings {
     EnvironmentMap environment;

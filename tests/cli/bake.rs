@@ -1,15 +1,13 @@
 //! Computations in units from the outside: killed at any unit, in any number of shards, in one folder or in several, with the same bytes.
 
-mod support;
-
 use std::{
     fs,
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
+use crate::support::{Ran, command, device, files, lucerna, ran};
 use lucerna::image::{self, Layers, WriteOptions};
-use support::{Ran, command, device, files, lucerna, ran};
 
 /// A folder with an environment, and a job of eight units in it.
 struct Lab(tempfile::TempDir);
@@ -185,4 +183,40 @@ fn plans_are_text_and_nothing_is_started() {
     let none = folder.path().to_str().unwrap();
     lucerna(["bake", "status", none]).expect(3, &["job.json", "fiv precompute"]);
     lucerna(["merge", none, "-o", "x"]).expect(3, &["job.json"]);
+}
+
+#[test]
+fn shards_of_a_reference_join_to_the_picture_of_one_run() {
+    if !device() {
+        return;
+    }
+    let lab = Lab::new();
+    let base = ["reference", "--builtin", "cornell", "--size", "256x192", "--spp", "2"];
+    let words = |out: &'static str, more: &[&'static str]| [&base[..], &["-o", out], more].concat();
+    let whole = lab.lucerna(&words("whole.exr", &[]));
+    whole.expect(0, &["wrote whole.exr"]);
+    for (number, shard) in ["2/2", "1/2"].into_iter().enumerate() {
+        let said = if number == 0 { "units of other shards are missing" } else { "all units are there" };
+        lab.lucerna(&words("shards.exr", &["--shard", shard])).expect(0, &[&format!("shard {shard} is done"), said]);
+        assert!(!lab.at("shards.exr").exists());
+    }
+    lab.lucerna(&["bake", "verify", "shards.exr"]).expect(0, &[]);
+    lab.lucerna(&["merge", "shards.exr.parts", "-o", "b.exr"]).expect(2, &["b.exr", "PICTURE.parts"]);
+    assert!(!lab.at("b.exr").exists());
+    lab.lucerna(&["merge", "shards.exr.parts", "-o", "b.exr.parts"]).expect(0, &["all 3 units are there"]);
+    lab.lucerna(&words("b.exr", &[])).expect(0, &["wrote b.exr"]);
+    // Another picture does not mix with these units, and an error estimate needs the whole picture.
+    let other = lab.lucerna(&[&words("shards.exr", &[])[..], &["--bounces", "1"]].concat());
+    other.expect(1, &["shards.exr.parts", "bounces"]);
+    let error = lab.lucerna(&words("shards.exr", &["--target-error", "0.1"]));
+    error.expect(2, &["--target-error", "--restart"]);
+    // The command without --shard joins, and a missing unit is traced.
+    let unit = files(&lab.at("shards.exr.parts")).into_iter().find(|name| name.ends_with(".unit")).unwrap();
+    fs::remove_file(lab.at("shards.exr.parts").join(unit)).unwrap();
+    lab.lucerna(&words("shards.exr", &[])).expect(0, &["goes on after", "wrote shards.exr"]);
+    assert!(fs::read(lab.at("whole.exr")).unwrap() == fs::read(lab.at("shards.exr")).unwrap());
+    assert!(fs::read(lab.at("whole.exr")).unwrap() == fs::read(lab.at("b.exr")).unwrap());
+    assert!(!lab.at("shards.exr.parts").exists());
+    lab.lucerna(&["rerun", "shards.exr"]).expect(0, &[]);
+    lab.lucerna(&words("-", &["--shard", "1/2"])).expect(2, &["--shard", "file"]);
 }

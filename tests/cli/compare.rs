@@ -1,11 +1,9 @@
 //! `lucerna compare` from the outside: tables, JSON, maps, thresholds and every exit code.
 
-mod support;
-
 use std::path::Path;
 
+use crate::support::{Ran, files, lucerna};
 use lucerna::image::{self, Layer, Layers, WriteOptions, srgb};
-use support::{Ran, files, lucerna};
 
 const SIDE: u32 = 24;
 

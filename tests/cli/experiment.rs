@@ -1,7 +1,6 @@
 //! `lucerna reproduce` and `lucerna report`: what is kept, what is rendered again, and what mistakes are told.
 
-mod support;
-
+use crate::support;
 use std::{
     collections::BTreeMap,
     fs,
@@ -10,8 +9,8 @@ use std::{
     process::{Child, Stdio},
 };
 
+use crate::support::{command, lucerna};
 use serde_json::Value;
-use support::{command, lucerna};
 
 const EXPERIMENT: &str = r#"
 title = "Test"

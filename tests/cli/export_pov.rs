@@ -1,7 +1,7 @@
 //! The POV-Ray export: rendered by `povray` and held beside our own path tracer, in linear light.
 
-mod support;
-
+use crate::support;
+use crate::support::lucerna;
 use glam::{Mat4, Vec3, Vec4};
 use lucerna::{
     reference::path,
@@ -15,7 +15,6 @@ use lucerna_samples::{
     export_pov::{self, Export, Pov, povray},
 };
 use lucerna_scenes as builtin;
-use support::lucerna;
 
 /// Whether POV-Ray is there. Under CI it must be.
 fn povray_is_there() -> bool {

@@ -3,10 +3,7 @@
 
 use std::process::Command;
 
-use fault::{Case, have_device};
-
-#[path = "../gpu_common/fault.rs"]
-mod fault;
+use crate::fault::{Case, have_device};
 
 /// A small picture of a small scene, in two formats, in the case's folder.
 fn render(rule: &str) -> Case {

@@ -1,15 +1,14 @@
 //! `fiv` from the outside: files of vectors, also those of earlier versions, what is wrong with them, pictures. Needs a device (each test
 //! says so when there is none).
 
-mod support;
-
+use crate::support;
 use std::{fs, path::Path};
 
+use crate::support::{command, device, files, lucerna, ran};
 use lucerna::{
     image::{self, Layers, WriteOptions},
     techniques::fiv::Stored,
 };
-use support::{command, device, files, lucerna, ran};
 
 const SMALL: [&str; 8] = ["-D", "fiv.azimuths=6", "-D", "fiv.polars=5", "-D", "fiv.radii=4", "-D", "fiv.size=8"];
 

@@ -1,10 +1,9 @@
 //! `igi render` from the outside: settings and what is wrong with them, layers, the same picture again. Needs a device (each test
 //! says so when there is none).
 
-mod support;
-
+use crate::support;
+use crate::support::{command, device, files, lucerna, ran};
 use lucerna::{image, scene::Limits};
-use support::{command, device, files, lucerna, ran};
 
 const SMALL: [&str; 6] = ["render", "--builtin", "cornell", "--size", "32x24", "-q"];
 

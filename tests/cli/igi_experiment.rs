@@ -1,12 +1,11 @@
 //! `lucerna reproduce` with the experiment of instant global illumination as it is shipped, at a size of a few pixels; and its mistakes.
 //! Needs a device (it says so when there is none).
 
-mod support;
-
+use crate::support;
 use std::{collections::BTreeMap, fs, path::Path};
 
+use crate::support::{device, lucerna};
 use serde_json::Value;
-use support::{device, lucerna};
 use toml::{Table, Value as Toml};
 
 const SHIPPED: &str = include_str!("../../samples/experiments/igi.toml");

@@ -1,11 +1,9 @@
 //! `lucerna inspect`, `info`, `rerun`, `devices` and `list` from the outside: exit codes, messages, JSON.
 
-mod support;
-
 use std::path::Path;
 
+use crate::support::{asset, command, lucerna, ran};
 use lucerna::image::{self, Layer, Layers, Metadata, WriteOptions};
-use support::{asset, command, lucerna, ran};
 
 fn picture(folder: &Path, name: &str, metadata: Metadata) -> String {
     let path = folder.join(name);

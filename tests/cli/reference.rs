@@ -1,7 +1,5 @@
 //! `lucerna reference` from the outside: exit codes, the same bytes whatever happens on the way. Needs a device.
 
-mod support;
-
 use std::{
     fs,
     path::Path,
@@ -9,8 +7,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use crate::support::{Ran, command, device, files, lucerna};
 use lucerna::{image, scene::Limits};
-use support::{Ran, command, device, files, lucerna};
 
 const SMALL: [&str; 6] = ["reference", "--builtin", "cornell-area", "--size", "48x40", "-q"];
 
@@ -29,7 +27,7 @@ fn wrong_usage_is_exit_code_2() {
         (&["--spp", "0"][..], "--spp"),
         (&["--time-limit", "soon"], "10m"),
         (&["--target-error", "0"], "above zero"),
-        (&["--bounces", "1001"], "at most 1000"),
+        (&["--bounces", "1001"], "0 to 1000"),
         (&["-D", "reference.bouncs=1"], "reference.bounces"),
         (&["-D", "reference.sources=moon"], "environment"),
         (&["-o", "x.tga"], ".exr"),

@@ -1,8 +1,6 @@
 //! `isr render` from the outside: every exit code, the same bytes twice, nothing half written. Needs a device (each test says
 //! so when there is none).
 
-mod support;
-
 use std::{
     fs,
     path::Path,
@@ -10,8 +8,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use crate::support::{command, device, files, isr, lucerna, ran};
 use lucerna::{image, scene::Limits};
-use support::{command, device, files, isr, lucerna, ran};
 
 const SMALL: [&str; 6] = ["render", "--builtin", "cornell", "--size", "48x40", "-q"];
 

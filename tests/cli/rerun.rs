@@ -1,20 +1,18 @@
 //! `lucerna rerun` from the outside: pictures of every program are made again bit by bit, and no picture does more than that. Most of it
 //! needs a device (each test says so when there is none).
 
-mod support;
-
 use std::{
     fs,
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
+use crate::support::{Ran, command, device, files, lucerna, ran};
 use lucerna::{
     image::{self, Layers, Metadata, WriteOptions},
     scene::Limits,
 };
 use serde_json::{Value, json};
-use support::{Ran, command, device, files, lucerna, ran};
 
 /// A picture of 8×8 pixels that says this of its making.
 fn forged(folder: &Path, name: &str, changes: &Value) -> PathBuf {

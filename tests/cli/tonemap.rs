@@ -1,7 +1,6 @@
 //! `tonemap` from the outside: formats, names, sequences, pipes, policies, exit codes, the same bytes each time.
 
-mod support;
-
+use crate::support;
 use std::{
     fs,
     io::Write,
@@ -9,11 +8,11 @@ use std::{
     process::{Output, Stdio},
 };
 
+use crate::support::{Ran, asset, command, device, files, ran};
 use lucerna::{
     image::{self, Format, Layer, Layers, WriteOptions, srgb},
     scene::Limits,
 };
-use support::{Ran, asset, command, device, files, ran};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_tonemap");
 

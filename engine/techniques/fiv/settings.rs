@@ -199,7 +199,7 @@ pub struct Settings {
     /// Rotation of the environment about +Y, counter-clockwise seen from above.
     #[schemars(range(min = -36000, max = 36000), extend("x-unit" = "°"))]
     pub rotation: f32,
-    /// Additional rotation of the environment of the environment per second of a sequence. If the value is not
+    /// Additional rotation of the environment per second of a sequence. If the value is not
     /// 0, rotated environments are resampled from means of pixels, which is faster and has errors of some thousandths.
     #[schemars(range(min = -36000, max = 36000), extend("x-unit" = "°/s"))]
     pub turning: f32,

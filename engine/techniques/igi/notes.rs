@@ -5,6 +5,7 @@ use crate::{
     passes::gbuffer::Blended,
     resident::told,
     scene::{AlphaMode, Environment, Material, Note, NoteKind, Scene},
+    settings::idle_notes,
     tracer::tables,
 };
 
@@ -92,29 +93,52 @@ pub fn notes(scene: &Scene, of_device: &[Note], settings: &PictureSettings, fram
     out
 }
 
-/// A setting: its key, whether it differs from its default, and the condition for an effect if this condition is not met.
-type Use = (&'static str, bool, Option<String>);
-
-/// Notes about settings that differ from their default but have no effect, with the unmet condition. `frames` as in [`notes`].
+/// Notes about settings that differ from their default but have no effect. The description of the settings has the conditions on other settings;
+/// here are those on the scene, on the sequence and on several settings together. `frames` as in [`notes`].
 fn unused(scene: &Scene, s: &Settings, frames: u32) -> Vec<Note> {
+    let mut out = idle_notes("igi", s);
     let ignored = |key: &str, text: String| Note { kind: NoteKind::Ignored, place: format!("igi.{key}"), text };
-    let idle = |(key, chosen, missing): Use| {
-        missing.filter(|_| chosen).map(|what| ignored(key, format!("has no effect: it needs {what}")))
-    };
-    let mut out: Vec<Note> = of_all_light(scene, s).into_iter().filter_map(idle).collect();
-    let of_indirect = of_indirect_light(scene, s, frames);
-    if !s.indirect {
-        let chosen: Vec<&str> = of_indirect.into_iter().filter(|(_, chosen, _)| *chosen).map(|(key, ..)| key).collect();
-        if !chosen.is_empty() {
-            out.push(ignored("indirect", format!("with indirect = false these have no effect: {}", chosen.join(", "))));
+    let default = Settings::default();
+    let lit = scene.environment.as_ref().is_some_and(shines)
+        || places(scene, &|m| m.emissive.max_element() > 0.0 && !m.unlit).is_some();
+    let dull = s.specular && !tables::may_be_sharp(scene);
+    let lights = s.paths() * s.bounces;
+    let sparse = "downsample above 1, or fused = true with interleave above 1";
+    let many = format!("vpls above {}, four for each pick; with {lights} every pixel gathers from all", 4 * s.picks);
+    let even = s.indirect && !s.upsamples();
+    // The key, whether it is set and has no effect, and the missing condition.
+    for (key, idle, missing) in [
+        (
+            "specular_depth",
+            s.specular_depth != default.specular_depth && dull,
+            "mirrors or glass, and the scene has none",
+        ),
+        ("cache", s.cache != default.cache && dull && s.indirect, "mirrors or glass, and the scene has none"),
+        (
+            "direct_samples",
+            s.direct_samples != default.direct_samples && !lit,
+            "emissive surfaces or an environment, and the scene has none",
+        ),
+        ("picks", s.picks != default.picks && s.indirect && !s.picks_from(lights), &many),
+        ("refine", s.refine != default.refine && even, sparse),
+        ("upsample_sigma", s.upsample_sigma != default.upsample_sigma && even, sparse),
+        ("upsample_normal", s.upsample_normal != default.upsample_normal && even && !s.smooths(), sparse),
+        ("upsample_range", s.upsample_range != default.upsample_range && even && !s.smooths(), sparse),
+        ("history", s.history != default.history && s.indirect && frames < 2, "a sequence of pictures (--frames)"),
+        // The other values of `visibility` choose how all rays are traced, also those of direct light.
+        ("visibility", s.visibility == Visibility::Raster && !s.indirect, "indirect = true"),
+    ] {
+        if idle {
+            out.push(ignored(key, format!("has no effect: it needs {missing}")));
         }
+    }
+    if !s.indirect {
         return out;
     }
-    out.extend(of_indirect.into_iter().filter_map(idle));
-    if s.sorted && (s.picks > 0 || s.compensates()) {
+    if s.sorted && s.interleave > 1 && (s.picks > 0 || s.compensates()) {
         out.push(ignored("sorted", "has no effect: picks and compensation always sort the virtual lights".into()));
     }
-    let (lights, subsets) = (s.paths() * s.bounces, s.interleave * s.interleave);
+    let subsets = s.interleave * s.interleave;
     if subsets > lights && !s.picks_from(lights) {
         let least = subsets.next_multiple_of(s.bounces.max(1));
         let none = subsets - lights;
@@ -123,82 +147,6 @@ fn unused(scene: &Scene, s: &Settings, frames: u32) -> Vec<Note> {
         );
         out.push(ignored("interleave", text));
     }
-    out
-}
-
-/// `what` as an unmet condition, unless it is there.
-fn unless(there: bool, what: &str) -> Option<String> {
-    (!there).then(|| what.to_owned())
-}
-
-/// A setting's key, and whether it differs from its default.
-macro_rules! chosen {
-    ($settings:ident . $key:ident) => {
-        (stringify!($key), $settings.$key != Settings::default().$key)
-    };
-}
-
-/// A list of [`Use`], each with the unmet condition or `None`.
-macro_rules! uses {
-    ($settings:ident, $($key:ident: $missing:expr,)*) => {
-        vec![$({ let (key, chosen) = chosen!($settings.$key); (key, chosen, $missing) },)*]
-    };
-}
-
-/// Settings of direct light and of mirrors.
-fn of_all_light(scene: &Scene, s: &Settings) -> Vec<Use> {
-    let sharp = || unless(tables::may_be_sharp(scene), "mirrors or glass, and the scene has none");
-    let lit = scene.environment.as_ref().is_some_and(shines)
-        || places(scene, &|m| m.emissive.max_element() > 0.0 && !m.unlit).is_some();
-    uses!(s,
-        specular_depth: unless(s.specular, "specular = true").or_else(sharp),
-        direct_samples: unless(lit, "emissive surfaces or an environment, and the scene has none"),
-    )
-}
-
-/// Settings that have no effect without indirect light.
-fn of_indirect_light(scene: &Scene, s: &Settings, frames: u32) -> Vec<Use> {
-    let lights = s.paths() * s.bounces;
-    let sparse = || unless(s.upsamples(), "downsample above 1, or fused = true with interleave above 1");
-    let weighs = || if s.smooths() { None } else { sparse() };
-    let tiles = || unless(s.interleave > 1, "interleave above 1");
-    let apart = || unless(s.joins(), "interleave above 1 without fused");
-    let past = || unless(s.history > 1, "history above 1");
-    let sharp = || unless(tables::may_be_sharp(scene), "mirrors or glass, and the scene has none");
-    let many = format!("vpls above {}, four for each pick; with {lights} every pixel gathers from all", 4 * s.picks);
-    let mut out = uses!(s,
-        vpls: None,
-        candidates: None,
-        bounces: None,
-        judges: unless(s.candidates > 1, "candidates above 1"),
-        bound: None,
-        picks: unless(s.picks_from(lights), &many),
-        proposals: unless(s.picks > 0, "picks above 0"),
-        compensation: unless(s.bound > 0.0, "bound above 0, which removes light"),
-        cache: unless(s.specular, "specular = true").or_else(sharp),
-        cache_cells: unless(s.cache > 0.0, "cache above 0"),
-        imperfect: None,
-        downsample: None,
-        scattered: unless(s.downsample > 1, "downsample above 1"),
-        interleave: None,
-        pattern: tiles(),
-        sorted: tiles(),
-        fused: tiles(),
-        smoothing: None,
-        despeckle: None,
-        refine: sparse(),
-        upsample_sigma: sparse(),
-        upsample_normal: weighs(),
-        upsample_range: weighs(),
-        discontinuity_depth: apart(),
-        discontinuity_normal: apart(),
-        history: unless(frames > 1, "a sequence of pictures (--frames)"),
-        history_lag: past(),
-        history_range: past(),
-        raster_size: unless(s.visibility == Visibility::Raster, "visibility = \"raster\""),
-    );
-    // The other values of `visibility` choose how all rays are traced, also those of direct light.
-    out.push(("visibility", s.visibility == Visibility::Raster, None));
     out
 }
 
@@ -352,15 +300,18 @@ mod tests {
         let of = Settings::default;
         for (settings, note) in [
             (Settings { refine: 0.1, ..of() }, "igi.refine: has no effect: it needs downsample above 1"),
-            (Settings { fused: true, ..of() }, "igi.fused: has no effect: it needs interleave above 1"),
-            (Settings { pattern: Pattern::Irregular, ..of() }, "igi.pattern: has no effect: it needs interleave"),
-            (Settings { scattered: true, ..of() }, "igi.scattered: has no effect: it needs downsample"),
-            (Settings { proposals: 2, ..of() }, "igi.proposals: has no effect: it needs picks"),
+            (Settings { fused: true, ..of() }, "igi.fused: has no effect, because igi.interleave is 1"),
+            (
+                Settings { pattern: Pattern::Irregular, ..of() },
+                "igi.pattern: has no effect, because igi.interleave is 1",
+            ),
+            (Settings { scattered: true, ..of() }, "igi.scattered: has no effect, because igi.downsample is 1"),
+            (Settings { proposals: 2, ..of() }, "igi.proposals: has no effect, because igi.picks is 0"),
             (Settings { picks: 45, ..of() }, "igi.picks: has no effect: it needs vpls above 180"),
-            (Settings { judges: 9, candidates: 1, ..of() }, "igi.judges: has no effect: it needs candidates"),
-            (Settings { raster_size: 64, ..of() }, "igi.raster_size: has no effect: it needs visibility"),
+            (Settings { judges: 9, candidates: 1, ..of() }, "igi.judges: has no effect, because igi.candidates is 1"),
+            (Settings { raster_size: 64, ..of() }, "igi.raster_size: has no effect, because igi.visibility is "),
             (Settings { cache: 0.1, ..of() }, "igi.cache: has no effect: it needs mirrors"),
-            (Settings { sorted: true, ..of() }, "igi.sorted: has no effect: it needs interleave above 1"),
+            (Settings { sorted: true, ..of() }, "igi.sorted: has no effect, because igi.interleave is 1"),
             (
                 Settings { sorted: true, interleave: 2, compensation: 1, ..of() },
                 "igi.sorted: has no effect: picks and compensation",
@@ -368,23 +319,29 @@ mod tests {
             (Settings { specular_depth: 2, ..of() }, "igi.specular_depth: has no effect: it needs mirrors or glass"),
             (
                 Settings { indirect: false, fused: true, vpls: 9, cache: 0.1, history: 4, ..of() },
-                "igi.indirect: with indirect = false these have no effect: vpls, cache, fused, history",
+                "igi.vpls, igi.cache, igi.fused, igi.history: have no effect, because igi.indirect is false",
             ),
             (
                 Settings { indirect: false, visibility: Visibility::Raster, ..of() },
-                "igi.indirect: with indirect = false these have no effect: visibility",
+                "igi.visibility: has no effect: it needs indirect = true",
             ),
-            (Settings { cache_cells: 9, ..of() }, "igi.cache_cells: has no effect: it needs cache"),
-            (Settings { compensation: 1, bound: 0.0, ..of() }, "igi.compensation: has no effect: it needs bound"),
+            (Settings { cache_cells: 9, ..of() }, "igi.cache_cells: has no effect, because igi.cache is 0"),
+            (
+                Settings { compensation: 1, bound: 0.0, ..of() },
+                "igi.compensation: has no effect, because igi.bound is 0",
+            ),
             (
                 Settings { discontinuity_depth: 1.0, ..of() },
-                "igi.discontinuity_depth: has no effect: it needs interleave",
+                "igi.discontinuity_depth: has no effect, because igi.interleave is 1",
             ),
-            (Settings { history_lag: 1.0, history: 1, ..of() }, "igi.history_lag: has no effect: it needs history"),
+            (
+                Settings { history_lag: 1.0, history: 1, ..of() },
+                "igi.history_lag: has no effect, because igi.history is 1",
+            ),
             (Settings { upsample_sigma: 1.0, ..of() }, "igi.upsample_sigma: has no effect: it needs downsample"),
             (
                 Settings { specular: false, specular_depth: 2, ..of() },
-                "igi.specular_depth: has no effect: it needs specular",
+                "igi.specular_depth: has no effect, because igi.specular is false",
             ),
             (
                 Settings { interleave: 14, fused: true, bounces: 3, ..of() },

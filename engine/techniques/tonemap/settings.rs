@@ -158,20 +158,27 @@ pub enum BadValues {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    /// How luminances become display luminances.
+    /// Tone mapping operator: how luminances become display luminances.
+    #[schemars(extend("x-option" = "Look"))]
     pub operator: Operator,
-    /// None: local if the operator has a local component, else global.
+    /// global: one curve for the whole picture; local: the curve adapts to the neighbourhood of each pixel; selective: local only where there is
+    /// detail. Left out: local if the operator supports it.
+    #[schemars(extend("x-option" = "Look"))]
     pub mode: Option<Mode>,
     /// Stops (EV) before the operator: values are multiplied by 2^exposure.
     #[schemars(range(min = -40, max = 40), extend("x-unit" = "stops"))]
     pub exposure: f32,
     /// Divides luminance by its log-average before the exposure, for pictures in no known unit.
     pub normalize: bool,
-    /// Share of the pixels left out at each end when L_min and L_max are looked for; 0: the true minimum and maximum. Otherwise, of n
-    /// luminances in ascending order, L_min is number ⌈n · percentile/100⌉ (at least 1) and L_max number n + 1 − that.
+    /// Percent of the darkest and of the brightest pixels that may be lost; 0: none, so that one hot pixel decides.
+    ///
+    /// With n luminances in ascending order, L_min is number ⌈n · percentile/100⌉ (at least 1) and L_max number n + 1 − that; with 0 they are the
+    /// true minimum and maximum.
+    #[schemars(extend("x-option" = "Look"))]
     #[schemars(range(min = 0, max = 49), extend("x-unit" = "percent"))]
     pub percentile: f32,
-    /// Ashikhmin: luminance of the display's white L_dmax, cd/m².
+    /// Ashikhmin: luminance of the screen's white L_dmax, cd/m².
+    #[schemars(extend("x-option" = "Look"))]
     #[schemars(range(min = 1, max = 1e5), extend("x-unit" = "cd/m²", "x-needs" = {"operator": {"const": "ashikhmin"}}))]
     pub display: f32,
     /// Ashikhmin: largest radius s of the averages G_s, pixels. G_s: weights exp(−d² / 2σ²) with σ = s/2 along each axis, s pixels
@@ -181,11 +188,15 @@ pub struct Settings {
     /// Ashikhmin: s grows from 1 as long as |G_s − G_2s| < contrast · G_s; L_a is the last G_s for which that held, or G_1.
     #[schemars(range(min = 0, max = 1e6), extend("x-needs" = {"operator": {"const": "ashikhmin"}, "mode": {"not": {"const": "global"}}}))]
     pub contrast: f32,
-    /// Reinhard: what the log-average becomes.
+    /// Reinhard: brightness of the middle; the log-average becomes this value. 0.18 is normal, 0.36 for bright scenes such as snow, 0.09 for dark
+    /// ones.
+    #[schemars(extend("x-option" = "Look"))]
     #[schemars(range(min = 1e-6, max = 1e6), extend("x-needs" = {"operator": {"const": "reinhard"}}))]
     pub key: f32,
-    /// Reinhard (in units of l) and extended Reinhard (in units of L): the smallest luminance that becomes white; 0: the largest of the
-    /// picture ([`Settings::percentile`]).
+    /// Reinhard and reinhard-global: the light that becomes pure white; 0: the brightest of the picture.
+    ///
+    /// Reinhard: in units of l. Extended Reinhard: in units of L. 0 depends on [`Settings::percentile`].
+    #[schemars(extend("x-option" = "Look"))]
     #[schemars(range(min = 0, max = 1e18), extend("x-needs" = {"operator": {"enum": ["reinhard", "reinhard-global"]}}))]
     pub white: f32,
     /// Reinhard: scales s of dodging and burning. s = 1.6^i for i = 0, 1, …; V_i is the Gaussian average of σ = s/4, ⌈3σ⌉ pixels
@@ -210,29 +221,40 @@ pub struct Settings {
     /// Bilateral: contrast of the base on the display.
     #[schemars(range(min = 1, max = 1e6), extend("x-needs" = {"operator": {"const": "bilateral"}}))]
     pub base_contrast: f32,
-    /// Bilateral: factor of the detail.
+    /// Bilateral: strength of fine detail; 1 leaves it.
+    #[schemars(extend("x-option" = "Look"))]
     #[schemars(range(min = 0, max = 16), extend("x-needs" = {"operator": {"const": "bilateral"}, "mode": {"not": {"const": "global"}}}))]
     pub detail: f32,
-    /// Exponent of the ratios of colour to luminance; 1: as the papers.
+    /// Strength of colours: 1 leaves them, as in the papers; 0 is grey.
+    ///
+    /// The exponent of the ratios of colour to luminance.
+    #[schemars(extend("x-option" = "Look"))]
     #[schemars(range(min = 0, max = 4))]
     pub saturation: f32,
     #[schemars(extend("x-needs" = {"operator": {"enum": ["ashikhmin", "reinhard", "bilateral"]}, "mode": {"not": {"const": "global"}}}))]
-    /// How local adaptation is computed.
+    /// How local adaptation is computed. fast: exact averages; pyramid: several times faster, with nearly the same result; literal: the
+    /// definition, far slower.
+    #[schemars(extend("x-option" = "Local and selective operators"))]
     pub local: Local,
-    /// Selective: what makes a pixel important.
+    /// Selective: the measure of detail.
+    #[schemars(extend("x-option" = "Local and selective operators"))]
     #[schemars(extend("x-needs" = {"mode": {"const": "selective"}}))]
     pub identify: Identify,
-    /// Selective: a pixel is important above this. None: 0.1 for Sobel, as in the thesis; 0.4 for saliency, of which the thesis names none
-    /// (0.1 of it would be four fifths of a photograph, 0.4 is a quarter to a third).
+    /// Selective: threshold of the measure; a lower threshold marks more pixels. Left out: 0.1 for sobel (luminance), 0.4 for saliency (0 to 1).
+    ///
+    /// The thesis names 0.1 for Sobel and no threshold for saliency: 0.1 would be four fifths of a photograph, 0.4 is a quarter to a third.
+    #[schemars(extend("x-option" = "Local and selective operators"))]
     #[schemars(range(min = 0, max = 1e18), extend("x-needs" = {"mode": {"const": "selective"}}))]
     pub threshold: Option<f32>,
     /// Selective: identification on the picture reduced so many times.
     #[schemars(extend("enum" = [1, 2, 4], "x-needs" = {"mode": {"const": "selective"}}))]
     pub identify_scale: u32,
-    /// Selective: how the important ones are marked.
+    /// Selective: how unimportant pixels are skipped; the picture does not depend on it.
+    #[schemars(extend("x-option" = "Local and selective operators"))]
     #[schemars(extend("x-needs" = {"mode": {"const": "selective"}}))]
     pub mark: Mark,
-    /// What becomes of NaN, infinite and negative values before anything else.
+    /// Treatment of NaN, infinite and negative samples, before anything else.
+    #[schemars(extend("x-option" = "Input"))]
     pub bad_values: BadValues,
     /// Seconds in which adaptation to a brighter picture comes within 1/e, in sequences; 0: at once.
     #[schemars(range(min = 0, max = 3600), extend("x-unit" = "s"))]

@@ -10,6 +10,7 @@ use lucerna::{
     bake::{self, Store},
     image,
     techniques::fiv::{Stored, file, units},
+    tracer::bands,
 };
 use serde_json::json;
 
@@ -63,6 +64,13 @@ pub fn join(args: &JoinArgs, console: Console) -> Result<ExitCode> {
     if let Some(file) = folders.iter().find(|path| !path.is_dir()) {
         let error = Error::usage("is no folder, but other parts are folders").in_file(file);
         return Err(error.help("Join folders with folders and files with files"));
+    }
+    let pictures = |folder: &PathBuf| Store::open(folder).is_ok_and(|store| store.job().key().kind() == bands::KIND);
+    if args.output.extension().is_none_or(|ending| ending != "parts") && folders.iter().any(pictures) {
+        let error = Error::usage("the parts are of a picture, which `lucerna reference` joins").in_file(&args.output);
+        return Err(
+            error.help("Name the folder PICTURE.parts, and then run the command without --shard and with -o PICTURE")
+        );
     }
     let into = if to_file { parts(&args.output)? } else { args.output.clone() };
     let (store, merged) = bake::merge(&folders, &into)?;

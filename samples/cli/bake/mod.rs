@@ -1,5 +1,6 @@
 //! Command line of [`lucerna::bake`]: the options and the progress of commands that compute units, `lucerna bake` and `lucerna merge`.
 
+mod compute;
 mod join;
 mod meter;
 mod plan;
@@ -18,6 +19,7 @@ use lucerna::{
     bake::{self, Job, Options, Shard, Store},
 };
 
+pub use compute::{Ended, Work};
 pub use join::{JoinArgs, join, joined};
 pub use meter::Meter;
 pub use plan::PlanArgs;
@@ -72,7 +74,7 @@ impl UnitsArgs {
 }
 
 /// Reads `--shard`.
-fn shard(text: &str) -> Result<Shard, String> {
+pub fn shard(text: &str) -> Result<Shard, String> {
     let variable = |name: &str| std::env::var(name).ok();
     let auto = |count| Shard::auto(variable, count).map_err(|error| error.to_string());
     match text.strip_prefix("auto") {

@@ -173,7 +173,7 @@ fn every_source_that_can_change_a_picture_is_in_the_digest() {
         "engine/passes/gbuffer.rs",
         "engine/reference/path/mod.rs",
         "engine/reference/tonemap/mod.rs",
-        "engine/tracer/work.rs",
+        "engine/tracer/kernel.rs",
         "engine/scene/bvh.rs",
         "engine/scene/gltf/materials.rs",
         "engine/shader/compile.rs",

@@ -8,7 +8,7 @@ use std::{
 
 use lucerna::{
     Error, ErrorKind, Result,
-    bake::{self as engine_bake, End, Needed, Store},
+    bake::{Needed, Store},
     gpu::Gpu,
     image,
     scene::{Environment, Pose},
@@ -20,11 +20,11 @@ use serde_json::json;
 use super::{partial, vector_settings};
 use crate::{
     args::{DeviceArgs, TalkArgs, positive},
-    bake::{self, Meter, UnitsArgs},
+    bake::{self, Ended, UnitsArgs, Work},
     config::{self, SettingsArgs},
     console::{self, Console},
     ground::GroundArgs,
-    program::{self, STOPPED_EARLY},
+    program,
     progress::ProgressMode,
     settings_list,
     signals::Interrupt,
@@ -161,70 +161,34 @@ fn compute(
             false => Err(Error::new(ErrorKind::Interrupted, "stopped on request")),
         }
     };
-    let mut meter = None;
-    let outcome = engine_bake::run(&store, &args.units.options(begun), unit, |progress| {
-        let [done, total] = progress.cost;
-        if meter.is_none() && done > 0 {
-            let shown = folder.display();
-            console.info(&format!("{shown}: goes on after {done} of {total} samples"));
-        }
-        let new = || Meter::new(args.progress, console.is_quiet(), "samples", done, total);
-        let fresh = meter.is_none();
-        let meter = meter.get_or_insert_with(new);
-        if done > 0 {
-            interrupt.keep();
-        }
-        if !fresh || done < total {
-            meter.show(done, progress.bytes);
-        }
-    })?;
-    let [done, total] = outcome.progress.cost;
-    let shard = args.units.shard;
-    match &outcome.end {
-        End::Stopped if done == 0 => return Err(Error::new(ErrorKind::Interrupted, "stopped on request")),
-        End::Stopped | End::TimeLimit => {
-            let why = if outcome.end == End::Stopped { "stopped" } else { "time limit: stopped" };
-            console.info(&format!("{why} after {done} of {total} samples; the same command goes on"));
-            return Ok(ExitCode::from(STOPPED_EARLY));
-        }
-        End::Waits(units) => {
-            console.info(&bake::waits(store.job(), units));
-            return Ok(ExitCode::from(STOPPED_EARLY));
-        }
-        End::Done => {}
-    }
-    let missing = store.survey(false)?.missing.len();
-    let bytes = match shard {
-        Some(shard) => {
-            let (shown, units) = (folder.display(), outcome.progress.units[1]);
-            let rest = match missing {
-                0 => "all units are there; the same command without --shard joins them".into(),
-                missing => format!("{missing} units of other shards are missing"),
-            };
-            console.info(&format!("{shown}: shard {shard} is done, {units} units; {rest}"));
-            None
-        }
-        None => {
+    let (units, what) = (&args.units, "samples");
+    let work =
+        Work { store: &store, args: units, begun, progress: args.progress, what, console, interrupt: &interrupt };
+    let (progress, missing, bytes) = match work.compute(unit)? {
+        Ended::Early(code) => return Ok(code),
+        Ended::Shard(progress, missing) => (progress, missing, None),
+        Ended::Whole(progress) => {
             let saving = interrupt.saving();
             let bytes = bake::joined(&store, &args.output, args.overwrite)?;
             drop(saving);
             bake::remove(store, console)?;
             let _ = std::fs::remove_file(&part);
             console.info(&format!("wrote {}: {bytes} bytes", args.output.display()));
-            Some(bytes)
+            (progress, 0, Some(bytes))
         }
     };
+    let (shard, total) = (args.units.shard, progress.cost[1]);
     if args.json {
         console::print_json(&json!({
             "file": bytes.map(|_| &args.output),
             "bytes": bytes,
             "folder": shard.map(|_| &folder),
             "shard": shard.map(|shard| shard.to_string()),
-            "units": outcome.progress.units[1],
+            "units": progress.units[1],
             "missing": missing,
             "samples": total,
-            "computed": total - outcome.progress.before,
-            "seconds": outcome.progress.seconds,
+            "computed": total - progress.before,
+            "seconds": progress.seconds,
             "environment": plan.environment,
             "occluders": console::to_json(&plan.occluders)?,
             "settings": config::to_value(keys)?,

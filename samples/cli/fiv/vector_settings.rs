@@ -2,21 +2,21 @@
 
 use lucerna::{
     Result,
-    settings::Described,
+    settings::{Decides, Described},
     techniques::fiv::{Method, Settings, Specular},
 };
 
-/// Keys that change pictures but no vectors.
-const OF_PICTURES: [&str; 10] =
-    ["trilinear", "partial", "cut", "extent", "overlap", "negligible", "shared", "specular", "method", "turning"];
+/// Keys of pictures on which vectors depend, too: the light of the environment, and whether surfaces have vectors of their own.
+const ALSO_OF_VECTORS: [&str; 3] = ["rotation", "exposure", "self_shadow"];
 
 /// Keys that differ from their defaults and that vectors do not depend on.
 ///
 /// # Errors
 /// `Runtime` if the settings cannot be written.
 pub(super) fn idle(settings: &Settings) -> Result<Vec<String>> {
-    let set = Settings::description().differences(settings, &Settings::default())?.into_iter().map(|set| &set.key.name);
-    Ok(set.filter(|key| OF_PICTURES.contains(&key.as_str())).map(|key| format!("fiv.{key}")).collect())
+    let set = Settings::description().differences(settings, &Settings::default())?.into_iter().map(|set| set.key);
+    let idle = set.filter(|key| key.decides == Decides::Picture && !ALSO_OF_VECTORS.contains(&key.name.as_str()));
+    Ok(idle.map(|key| format!("fiv.{}", key.name)).collect())
 }
 
 /// The settings from which vectors are computed. Keys that vectors do not depend on get values that are valid in every
@@ -32,8 +32,14 @@ mod tests {
 
     #[test]
     fn keys_of_pictures_are_keys() {
-        OF_PICTURES.iter().for_each(|key| assert!(Settings::description().key(key).is_some(), "{key}"));
-        let settings = Settings { turning: 3.0, azimuths: 9, ..Settings::default() };
-        assert_eq!(idle(&settings).unwrap(), ["fiv.turning"]);
+        ALSO_OF_VECTORS.iter().for_each(|key| assert!(Settings::description().key(key).is_some(), "{key}"));
+        let settings = Settings {
+            turning: 3.0,
+            azimuths: 9,
+            rotation: 5.0,
+            trilinear: !Settings::default().trilinear,
+            ..Settings::default()
+        };
+        assert_eq!(idle(&settings).unwrap(), ["fiv.trilinear", "fiv.turning"]);
     }
 }

@@ -3,8 +3,9 @@
 mod checkpoint;
 mod options;
 mod progress_line;
+mod units;
 
-pub use options::{ReferenceArgs, Settings, Show, Span};
+pub use options::{ReferenceArgs, Settings, Span};
 
 use std::{path::PathBuf, process::ExitCode, time::Instant};
 
@@ -13,13 +14,14 @@ use lucerna::{
     gpu::{Gpu, GpuOptions},
     image::{Format, Layer, Layers, Metadata, WriteOptions},
     scene::{NoteKind, View},
-    technique::Mode,
-    tracer::{Progress, Tracer},
+    technique::Mode as _,
+    tracer::{Mode, Progress, Tracer},
 };
 use lucerna_scenes as builtin;
 use serde_json::{Value, json};
 
 use crate::{
+    bake::Ended,
     config::{self, SettingsArgs},
     console::{self, Console},
     exposure, framing,
@@ -30,11 +32,14 @@ use crate::{
     progress::ProgressMode,
     record::{Record, Source},
     render::Again,
+    setting_options::SettingOptions,
+    settings_list,
     signals::Interrupt,
     stage::Stage,
 };
 use checkpoint::Checkpoint;
 use progress_line::{Goals, ProgressLine};
+use units::Bands;
 
 /// The reason for the end of the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,7 +76,7 @@ const FINISH: f64 = 0.5;
 pub fn run(args: &ReferenceArgs, console: Console) -> Result<ExitCode> {
     let staged = args.effective()?;
     if args.settings.print_config {
-        console::print(config::to_toml(&staged)?.trim_end())?;
+        console::print(settings_list::with_docs(&config::to_toml(&staged)?).trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
     let interrupt = Interrupt::install();
@@ -97,11 +102,11 @@ pub fn again(asked: &Again<'_>) -> Result<Option<Fresh>> {
         spp: None,
         time_limit: None,
         target_error: None,
-        bounces: None,
+        options: SettingOptions::default(),
         resume: false,
         restart: false,
+        shard: None,
         exposure: Some(asked.record.exposure),
-        seed: None,
         settings: SettingsArgs::default(),
         device: asked.device.clone(),
         talk: asked.talk.clone(),
@@ -118,6 +123,7 @@ fn picture(
     memory: Option<Format>,
     interrupt: &Interrupt,
 ) -> Result<(ExitCode, Option<Fresh>)> {
+    let begun = Instant::now();
     let options = WriteOptions { overwrite: args.overwrite || args.resume, f32: true, ..WriteOptions::default() };
     let outputs = |options: WriteOptions| match memory {
         Some(format) => Ok(Outputs::in_memory(format, options)),
@@ -140,7 +146,8 @@ fn picture(
         None if args.output.is_empty() => Some(PathBuf::from(Pattern::parse(outputs::SINGLE)?.fill(&values))),
         None => None,
     };
-    let mut checkpoint = Checkpoint::new(path, about(args, &stage));
+    let about = about(args, &stage);
+    let mut checkpoint = Checkpoint::new(path.clone(), about.clone());
     if !args.resume {
         checkpoint.probe(args.restart)?;
     }
@@ -154,6 +161,19 @@ fn picture(
     let (pose, view) = stage.at(args.stage.time, args.stage.size)?;
     let mut tracer = Tracer::new(&gpu, &stage.scene, &pose)?;
     tracer.start(&view, &settings.reference)?;
+    let bands = Bands::of(args, path.as_deref(), &tracer, &settings, &about, console)?;
+    if let Some(bands) = &bands {
+        match bands.compute(&mut tracer, args, begun, console, interrupt)? {
+            Ended::Early(code) => return Ok((code, None)),
+            Ended::Shard(progress, missing) => {
+                if args.json {
+                    console::print_json(&bands.report(&progress, missing))?;
+                }
+                return Ok((ExitCode::SUCCESS, None));
+            }
+            Ended::Whole(_) => bands.join(&mut tracer)?,
+        }
+    }
     if args.resume && checkpoint.resume(&mut tracer)? {
         console.info(&format!("resumes after {:.0} samples per pixel", tracer.progress()?.samples));
     }
@@ -178,7 +198,7 @@ fn picture(
             console.warning(&format!("{} paths gave values that are not finite and are left out", sums.lost()));
         }
         let mut layers = sums.layers();
-        args.show.apply(&mut layers);
+        show(args.show, &mut layers);
         let suits = match &stage.source {
             Source::Builtin(name) => builtin::exposure(name).map(f64::from),
             Source::File(_) => None,
@@ -214,6 +234,7 @@ fn picture(
     }
     if !end.is_early() {
         checkpoint.remove();
+        bands.map_or(Ok(()), |bands| bands.remove(console))?;
     }
     if args.json {
         console::print_json(&report(&layers, &done, &line, sums.relative_error(), end, &files))?;
@@ -305,7 +326,7 @@ fn metadata(
     let record = Record {
         exposure,
         seed: settings.technique.reference.seed,
-        mode: (args.show != Show::Total).then(|| args.show.name().to_owned()),
+        mode: (args.show != Mode::Total).then(|| args.show.name().to_owned()),
         f32: true,
         settings: config::to_value(settings)?,
         ..Record::new(&["lucerna", "reference"], &args.stage, stage)
@@ -348,15 +369,13 @@ fn report(layers: &Layers, done: &Progress, line: &ProgressLine, error: f64, end
     })
 }
 
-impl Show {
-    /// Replaces the picture by the layer; the total becomes a layer.
-    fn apply(self, layers: &mut Layers) {
-        if self == Self::Total {
-            return;
-        }
-        let Some(chosen) = layers.layer(self.name()).cloned() else { return };
-        if let Some(picture) = layers.layers.iter_mut().find(|l| l.name.is_empty()) {
-            *picture = Layer { name: String::new(), ..chosen };
-        }
+/// Replaces the picture by the layer; the total becomes a layer.
+fn show(mode: Mode, layers: &mut Layers) {
+    if mode == Mode::Total {
+        return;
+    }
+    let Some(chosen) = layers.layer(mode.name()).cloned() else { return };
+    if let Some(picture) = layers.layers.iter_mut().find(|l| l.name.is_empty()) {
+        *picture = Layer { name: String::new(), ..chosen };
     }
 }

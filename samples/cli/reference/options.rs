@@ -2,15 +2,17 @@
 
 use std::{str::FromStr, time::Duration};
 
-use lucerna::{Error, Result, technique::Mode, tracer};
+use lucerna::{Error, Result, bake::Shard, tracer};
 use serde::{Deserialize, Serialize};
 
 use crate::{
     args::{DeviceArgs, TalkArgs, finite, positive},
+    bake,
     config::SettingsArgs,
     last_stage::Staged,
     progress::ProgressMode,
     render,
+    setting_options::SettingOptions,
     stage::StageArgs,
 };
 
@@ -29,8 +31,8 @@ pub struct ReferenceArgs {
     pub overwrite: bool,
 
     /// The layer that the picture shows; .exr files also have the other layers
-    #[arg(long, alias = "mode", value_parser = render::mode::<Show>(), default_value = "total", value_name = "LAYER", help_heading = "Output")]
-    pub show: Show,
+    #[arg(long, alias = "mode", value_parser = render::mode::<tracer::Mode>(), default_value = "total", value_name = "LAYER", help_heading = "Output")]
+    pub show: tracer::Mode,
 
     /// Print one JSON document about the run on stdout
     #[arg(long, help_heading = "Output")]
@@ -48,10 +50,6 @@ pub struct ReferenceArgs {
     #[arg(long, value_name = "X", value_parser = positive, help_heading = "Quality")]
     pub target_error: Option<f64>,
 
-    /// Maximum of scatterings after the first surface: 0 for direct light, 1 for the light that one pass of isr models [default: 8]
-    #[arg(long, value_name = "N", help_heading = "Quality")]
-    pub bounces: Option<u32>,
-
     /// Continue from the state that a run with the same options has left next to the image
     #[arg(long, help_heading = "Quality")]
     pub resume: bool,
@@ -60,13 +58,18 @@ pub struct ReferenceArgs {
     #[arg(long, conflicts_with = "resume", help_heading = "Quality")]
     pub restart: bool,
 
+    /// Trace only the bands of part I of N of the picture, for several machines; -o names the picture. `auto`: the part of this task in an array
+    /// job of Slurm, Grid Engine or Kubernetes; `auto/N`: of N parts. The same command without --shard joins them
+    #[arg(long, value_name = "I/N|auto", value_parser = bake::shard, conflicts_with_all = ["target_error", "resume"], help_heading = "Quality")]
+    pub shard: Option<Shard>,
+
     /// Exposure: colours of .png files are multiplied by 2^EV [default: 0, or chosen from the picture if it is very dark or bright]
     #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
     pub exposure: Option<f64>,
 
-    /// Seed of the random numbers [default: 0]
-    #[arg(long, value_name = "N", help_heading = "Picture")]
-    pub seed: Option<u32>,
+    /// The options that are settings: --bounces, --seed.
+    #[command(flatten)]
+    pub options: SettingOptions<tracer::Settings>,
 
     #[command(flatten)]
     pub settings: SettingsArgs,
@@ -117,50 +120,13 @@ impl ReferenceArgs {
     /// # Errors
     /// `Usage` or `Input`, naming the key.
     pub fn effective(&self) -> Result<Staged<Settings>> {
-        // Options override the file, so the file is checked together with them.
-        let with_options = |settings: &Settings| {
-            let mut settings = settings.clone();
-            settings.samples = self.spp.unwrap_or(settings.samples).clamp(1, u32::MAX.into());
-            settings.reference.bounces = self.bounces.unwrap_or(settings.reference.bounces);
-            settings.reference.seed = self.seed.unwrap_or(settings.reference.seed);
-            settings
-        };
-        let check =
-            |settings: &Settings| with_options(settings).reference.validate().map_err(|error| error.at("reference"));
-        let staged = Staged::effective(&self.settings, &Settings::default(), check)?;
-        Ok(Staged { technique: with_options(&staged.technique), ..staged })
-    }
-}
-
-/// Which light the picture shows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Show {
-    #[default]
-    Total,
-    Direct,
-    Indirect,
-    Emission,
-}
-
-impl Mode for Show {
-    const ALL: &'static [Self] = &[Self::Total, Self::Direct, Self::Indirect, Self::Emission];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Total => "total",
-            Self::Direct => "direct",
-            Self::Indirect => "indirect",
-            Self::Emission => "emission",
-        }
-    }
-
-    fn doc(self) -> &'static str {
-        match self {
-            Self::Total => "All light",
-            Self::Direct => "Light after one scattering",
-            Self::Indirect => "Light after more than one scattering",
-            Self::Emission => "Emitted light",
-        }
+        let mut args = self.settings.clone();
+        args.define.extend(self.options.defines("reference"));
+        args.define.extend(self.spp.map(|samples| format!("samples={samples}")));
+        Staged::effective(&args, &Settings::default(), |settings: &Settings| {
+            settings.validate()?;
+            settings.reference.validate().map_err(|error| error.at("reference"))
+        })
     }
 }
 

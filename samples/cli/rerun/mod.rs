@@ -16,6 +16,7 @@ use lucerna::{
     scene::Limits,
     technique::Technique,
     techniques::{self, Visitor},
+    tracer::Reference,
 };
 use serde_json::Value;
 
@@ -72,7 +73,9 @@ enum Maker {
 
 /// The values of `command` in the metadata that are accepted.
 fn makers() -> Vec<(Vec<&'static str>, Maker)> {
-    let techniques = techniques::NAMES.iter().map(|name| (vec![*name, "render"], Maker::Technique(name)));
+    // Programs write pictures of the path tracer by a command of its own.
+    let rendered = techniques::NAMES.iter().filter(|name| **name != Reference::NAME);
+    let techniques = rendered.map(|name| (vec![*name, "render"], Maker::Technique(name)));
     let more = [(vec!["lucerna", "reference"], Maker::Reference), (vec!["tonemap"], Maker::Tonemap)];
     techniques.chain(more).collect()
 }

@@ -6,14 +6,15 @@ use clap::{Args, ValueEnum, builder::PossibleValuesParser};
 use lucerna::{
     Error, Result,
     image::Format,
-    techniques::tonemap::{BadValues, Identify, Local, Mark, Mode, Operator, Settings},
+    techniques::tonemap::{Mode, Settings},
 };
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    args::{DeviceArgs, Frames, TalkArgs, finite, positive},
+    args::{DeviceArgs, Frames, TalkArgs, positive},
     config::{self, SettingsArgs},
     progress::ProgressMode,
+    setting_options::SettingOptions,
 };
 
 const LOOK: &str = "Look";
@@ -35,15 +36,6 @@ pub struct TonemapArgs {
     #[arg(short, long, value_name = "OUT", required_unless_present = "print_config", help_heading = OUTPUT)]
     pub output: Vec<String>,
 
-    /// Tone mapping operator
-    #[arg(long, value_name = "NAME", value_parser = operators(), help_heading = LOOK)]
-    pub operator: Option<String>,
-
-    /// global: one curve for the whole picture; local: the curve adapts to the neighbourhood of each pixel; selective: local only where
-    /// there is detail [default: local if the operator supports it]
-    #[arg(long, value_enum, value_name = "MODE", help_heading = LOOK)]
-    pub mode: Option<ModeName>,
-
     /// Brightness in stops: +1 is twice as much light; auto measures the picture (auto+0.5: half a stop more), of a sequence its first frame
     /// [default: 0]
     #[arg(long, value_name = "EV|auto", allow_hyphen_values = true, help_heading = LOOK)]
@@ -53,55 +45,13 @@ pub struct TonemapArgs {
     #[arg(long, value_name = "G|srgb", default_value = "srgb", help_heading = LOOK)]
     pub gamma: Gamma,
 
-    /// The light that becomes pure white; 0: the brightest of the picture (reinhard, reinhard-global)
-    #[arg(long, value_name = "L", value_parser = finite, help_heading = LOOK)]
-    pub white: Option<f64>,
-
-    /// Brightness of the middle: 0.18 is normal, 0.36 for bright scenes such as snow, 0.09 for dark ones (reinhard)
-    #[arg(long, value_name = "K", value_parser = finite, help_heading = LOOK)]
-    pub key: Option<f64>,
-
-    /// Strength of colours: 1 leaves them, 0 is grey (ashikhmin, reinhard, bilateral, reinhard-global)
-    #[arg(long, value_name = "S", value_parser = finite, help_heading = LOOK)]
-    pub saturation: Option<f64>,
-
-    /// Strength of fine detail: 1 leaves it (bilateral)
-    #[arg(long, value_name = "D", value_parser = finite, help_heading = LOOK)]
-    pub detail: Option<f64>,
-
-    /// White of the screen in cd/m² (ashikhmin)
-    #[arg(long, value_name = "CD", value_parser = finite, help_heading = LOOK)]
-    pub display: Option<f64>,
-
-    /// Percent of the darkest and of the brightest pixels that may be lost; 0: none, so that one hot pixel decides
-    #[arg(long, value_name = "P", value_parser = finite, help_heading = LOOK)]
-    pub percentile: Option<f64>,
-
-    /// fast: exact averages; pyramid: several times faster, with nearly the same result; literal: the definition, far slower
-    #[arg(long, value_enum, value_name = "HOW", help_heading = WORK)]
-    pub local: Option<LocalName>,
-
-    /// selective: measure of detail
-    #[arg(long, value_enum, value_name = "WHAT", help_heading = WORK)]
-    pub identify: Option<IdentifyName>,
-
-    /// selective: threshold of the measure; a lower threshold marks more pixels [default: 0.1 for sobel (luminance), 0.4 for saliency (0 to
-    /// 1)]
-    #[arg(long, value_name = "T", value_parser = finite, help_heading = WORK)]
-    pub threshold: Option<f64>,
-
-    /// selective: how unimportant pixels are skipped; the picture does not depend on it
-    #[arg(long, value_enum, value_name = "HOW", help_heading = WORK)]
-    pub mark: Option<MarkName>,
+    /// The options that are settings, such as --operator.
+    #[command(flatten)]
+    pub options: SettingOptions<Settings>,
 
     /// selective: a picture of the same size; pixels with red above one half count as detail
     #[arg(long, value_name = "FILE", help_heading = WORK)]
     pub mask: Option<PathBuf>,
-
-    /// Treatment of NaN, infinite and negative samples: zero; clamp (infinite: the brightest finite sample); neighbour (the mean of the
-    /// neighbours); error (refuse the picture) [default: zero]
-    #[arg(long, value_enum, value_name = "POLICY", help_heading = INPUT)]
-    pub bad_values: Option<BadName>,
 
     /// Layer of EXR files that do not name their own
     #[arg(long, value_name = "NAME", help_heading = INPUT)]
@@ -191,31 +141,6 @@ pub struct Config {
     pub tonemap: Settings,
 }
 
-fn operators() -> PossibleValuesParser {
-    PossibleValuesParser::new(Operator::ALL.map(|(name, _)| name))
-}
-
-/// Gives names of the command line the values of a setting.
-macro_rules! names {
-    ($name:ident for $of:ty { $($variant:ident),* }) => {
-        #[doc = concat!("Names of [`", stringify!($of), "`].")]
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-        pub enum $name { $($variant),* }
-
-        impl From<$name> for $of {
-            fn from(name: $name) -> Self {
-                match name { $($name::$variant => Self::$variant),* }
-            }
-        }
-    };
-}
-
-names!(ModeName for Mode { Global, Local, Selective });
-names!(LocalName for Local { Fast, Pyramid, Literal });
-names!(IdentifyName for Identify { Sobel, Saliency });
-names!(MarkName for Mark { Branch, Tiles, EarlyZ, Compact });
-names!(BadName for BadValues { Zero, Clamp, Neighbour, Error });
-
 /// `--format`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum FormatName {
@@ -293,29 +218,10 @@ impl TonemapArgs {
 
     /// The settings with these `-D`, not checked.
     fn with(&self, define: &[String]) -> Result<Config> {
-        let mut config = config::effective(&Config::default(), self.settings.file.as_deref(), &[])?;
-        let s = &mut config.tonemap;
-        if let Some(name) = &self.operator {
-            s.operator = Operator::ALL.iter().find(|(n, _)| n == name).map_or(s.operator, |(_, operator)| *operator);
-        }
-        s.mode = self.mode.map(Mode::from).or(s.mode);
-        for (option, value) in [
-            (self.white, &mut s.white),
-            (self.key, &mut s.key),
-            (self.saturation, &mut s.saturation),
-            (self.detail, &mut s.detail),
-            (self.display, &mut s.display),
-            (self.percentile, &mut s.percentile),
-        ] {
-            *value = option.map_or(*value, |option| option as f32);
-        }
-        s.threshold = self.threshold.map(|t| t as f32).or(s.threshold);
-        s.local = self.local.map_or(s.local, Local::from);
-        s.identify = self.identify.map_or(s.identify, Identify::from);
-        s.mark = self.mark.map_or(s.mark, Mark::from);
-        s.bad_values = self.bad_values.map_or(s.bad_values, BadValues::from);
+        let file = self.settings.file.as_deref();
+        let mut config: Config = config::effective(&Config::default(), file, &self.options.defines("tonemap"))?;
         if let Some(exposure) = self.exposure {
-            s.exposure = exposure.stops;
+            config.tonemap.exposure = exposure.stops;
         }
         config::effective(&config, None, define)
     }

@@ -1,0 +1,109 @@
+//! The work on one picture: its sums, and how far they are.
+
+use std::{ops::Range, time::Duration};
+
+use ash::vk;
+
+use super::{Progress, Settings, Sums};
+use crate::{
+    Error, ErrorKind, Result,
+    gpu::{Gpu, ImageDesc, OwnedImage, Region},
+    scene::View,
+    shaders::consts,
+};
+
+/// Side of the blocks of pixels by which slots are ordered.
+pub(super) const BLOCK: u32 = 8;
+/// Slots of a block: one workgroup.
+pub(super) const GRANULE: u32 = BLOCK * BLOCK;
+/// Images of the sums: six sums, and the rounding errors of the first three.
+pub(super) const LAYERS: u32 = consts::PATH_SUMS + consts::PATH_EXACT_SUMS;
+
+/// The work on a picture.
+#[derive(Debug)]
+pub(super) struct Job {
+    pub view: View,
+    pub settings: Settings,
+    pub sums: OwnedImage,
+    /// The rows of pixels that are traced: whole blocks, except at the lower end of the picture.
+    rows: Range<u32>,
+    /// Finished slots, summed over all samples.
+    pub done: u64,
+    pub time: Duration,
+}
+
+impl Job {
+    pub fn new(gpu: &Gpu, view: View, settings: Settings) -> Result<Self> {
+        let [width, height] = view.extent;
+        let most = gpu.caps().limits.image_2d;
+        if width.max(height) > most {
+            let what = format!("a picture of {width}×{height}; the device allows sides of {most}");
+            return Err(Error::new(ErrorKind::Runtime, what));
+        }
+        let mut desc = ImageDesc::new(vk::Format::R32G32B32A32_SFLOAT, width, height).layers(LAYERS);
+        desc.usage =
+            vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
+        let sums = OwnedImage::new(gpu, "tracer.sums", desc)?;
+        Ok(Self { view, settings, sums, rows: 0..height, done: 0, time: Duration::ZERO })
+    }
+
+    /// Begins again with these rows alone. They are those of whole blocks.
+    pub fn restrict(&mut self, rows: Range<u32>) {
+        (self.rows, self.done) = (rows, 0);
+    }
+
+    /// Slots of one sample: the pixels, rounded up to whole blocks.
+    pub fn slots(&self) -> u64 {
+        // The number of slots of every image that a device supports fits into 64 bits.
+        slots_of([self.view.extent[0], self.rows.end - self.rows.start]).unwrap_or(u64::MAX)
+    }
+
+    /// The slot of the first pixel that is traced.
+    pub fn first_slot(&self) -> u64 {
+        slots_of([self.view.extent[0], self.rows.start]).unwrap_or(u64::MAX)
+    }
+
+    /// Samples of every pixel.
+    pub fn samples_done(&self) -> u64 {
+        self.done / self.slots()
+    }
+
+    pub fn progress(&self) -> Progress {
+        let pixels = u64::from(self.view.extent[0]) * u64::from(self.rows.end - self.rows.start);
+        let samples = self.done as f64 / self.slots() as f64;
+        Progress { samples, paths: (samples * pixels as f64) as u64, time: self.time }
+    }
+
+    pub fn sums(&self) -> Result<Sums> {
+        let empty = self.sums.layout() == vk::ImageLayout::UNDEFINED;
+        let [width, height] = self.view.extent;
+        let layer = |layer| -> Result<Vec<[f32; 4]>> {
+            if empty {
+                return Ok(vec![[0.0; 4]; width as usize * height as usize]);
+            }
+            Ok(self.sums.read(0, layer)?.chunks_exact(16).map(bytemuck::pod_read_unaligned).collect())
+        };
+        let layers = (0..LAYERS).map(layer).collect::<Result<_>>()?;
+        Ok(Sums::new([width, height], layers, self.done / self.slots(), self.done % self.slots()))
+    }
+
+    /// Replaces the sums of the whole picture.
+    pub fn set_sums(&mut self, sums: &Sums) -> Result<()> {
+        let regions: Vec<Region<'_>> = sums
+            .raw()
+            .iter()
+            .enumerate()
+            .map(|(layer, texels)| Region { mip: 0, layer: layer as u32, bytes: bytemuck::cast_slice(texels) })
+            .collect();
+        self.sums.upload(&regions)?;
+        self.rows = 0..self.view.extent[1];
+        self.done = sums.samples() * self.slots() + sums.begun();
+        Ok(())
+    }
+}
+
+/// Slots of one sample of a picture of this size; `None` on overflow.
+pub(super) fn slots_of(extent: [u32; 2]) -> Option<u64> {
+    let [width, height] = extent.map(|side| u64::from(side.div_ceil(BLOCK)));
+    width.checked_mul(height)?.checked_mul(GRANULE.into())
+}

@@ -1,0 +1,33 @@
+//! One program for the tests of the command line: linking the engine once saves minutes.
+
+#[path = "../gpu_common/fault.rs"]
+mod fault;
+#[path = "../cli/support.rs"]
+mod support;
+
+#[path = "../cli/bake.rs"]
+mod bake;
+#[path = "../cli/compare.rs"]
+mod compare;
+#[path = "../cli/experiment.rs"]
+mod experiment;
+#[path = "../cli/export_pov.rs"]
+mod export_pov;
+#[path = "../cli/faults.rs"]
+mod faults;
+#[path = "../cli/fiv.rs"]
+mod fiv;
+#[path = "../cli/igi.rs"]
+mod igi;
+#[path = "../cli/igi_experiment.rs"]
+mod igi_experiment;
+#[path = "../cli/lucerna.rs"]
+mod lucerna;
+#[path = "../cli/reference.rs"]
+mod reference;
+#[path = "../cli/render.rs"]
+mod render;
+#[path = "../cli/rerun.rs"]
+mod rerun;
+#[path = "../cli/tonemap.rs"]
+mod tonemap;
