@@ -88,6 +88,24 @@ fn what_is_squeezed_on_its_ground_reaches_as_far_as_it_does() {
 }
 
 #[test]
+fn what_grows_in_the_frame_is_cut_by_the_ground_as_one_that_was_made_as_large() {
+    with_gpu(|gpu| {
+        // Sunk into the ground: the cut depends on how far the body reaches along the normal.
+        let sunk = |scale: f32| Mat4::from_translation(Vec3::Y * -0.3) * Mat4::from_scale(Vec3::splat(scale));
+        let (scene, made) = (stage(odd_body(), sunk(1.0)), stage(odd_body(), sunk(1.8)));
+        let eye = flat_view(vec3(0.9, 0.002, 0.4), vec3(0.9, 0.0, 0.4), 1.6, [16; 2]);
+        for cut in [Cut::Light, Cut::Height] {
+            let settings = Settings { cut, ..few(Method::Online) };
+            let exact = Studio::new(gpu, &made, &settings, None).irradiance(&eye, &settings);
+            let found = Studio::new(gpu, &scene, &settings, None).shot(&Pose::rest(&made), &eye, &settings).0;
+            let apart = nrmse(&exact, &found);
+            eprintln!("{cut:?}: grown in the frame {apart:.5} from one that was made as large");
+            assert!(apart < 0.01, "{cut:?}: {apart}");
+        }
+    });
+}
+
+#[test]
 fn own_shadows_of_what_does_not_stand_as_its_vectors_are_left_out() {
     with_gpu(|gpu| {
         let scene = stage(odd_body(), Mat4::from_translation(Vec3::Y));

@@ -205,6 +205,47 @@ fn a_body_with_a_hollow_shadows_itself_as_by_brute_force() {
     });
 }
 
+/// A box with its own vertices for each side.
+fn box_of(low: Vec3, high: Vec3) -> (Vec<Vec3>, Vec<u32>) {
+    let (mut positions, mut indices) = (Vec::new(), Vec::new());
+    for axis in 0..3 {
+        for upper in [false, true] {
+            let first = positions.len() as u32;
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            for (a, b) in [(false, false), (true, false), (true, true), (false, true)] {
+                let mut corner = if upper { high } else { low };
+                corner[u] = if a { high[u] } else { low[u] };
+                corner[v] = if b { high[v] } else { low[v] };
+                positions.push(corner);
+            }
+            let order = if upper { [0, 1, 2, 0, 2, 3] } else { [0, 2, 1, 0, 3, 2] };
+            indices.extend(order.map(|k| first + k));
+        }
+    }
+    (positions, indices)
+}
+
+#[test]
+fn a_corner_inside_another_part_leaves_the_light_of_the_surface_as_it_is() {
+    with_gpu(|gpu| {
+        // A slab, and a low post around one of its corners: the light there is not known.
+        let (mut positions, mut indices) = box_of(vec3(-1.0, -0.1, -1.0), vec3(1.0, 0.0, 1.0));
+        let (post, triangles) = box_of(vec3(0.9, -0.2, 0.9), vec3(1.1, 0.1, 1.1));
+        indices.extend(triangles.iter().map(|i| i + positions.len() as u32));
+        positions.extend(post);
+        let mut scene = Scene { environment: Some(Environment::constant(vec3(1.0, 0.8, 0.6))), ..Scene::default() };
+        thing(&mut scene, "slab", positions, indices, Mat4::IDENTITY);
+        let view = flat_view(vec3(0.0, 3.0, 0.0), Vec3::ZERO, 1.6, [16, 16]);
+        let picture = |settings: &Settings| Studio::new(gpu, &scene, settings, None).irradiance(&view, settings);
+        let open = picture(&by(Method::Unshadowed));
+        let found = picture(&coarse());
+        for (e, o) in found.iter().zip(&open) {
+            let share = *e / *o;
+            assert!(share.min_element() > 0.97 && share.max_element() < 1.001, "{share} of the open light");
+        }
+    });
+}
+
 #[test]
 fn light_that_a_bowl_keeps_from_itself_is_hidden_less_by_what_stands_beside_it() {
     with_gpu(|gpu| {
@@ -363,6 +404,38 @@ fn occluders_turn_between_samples_of_turns() {
                 "turned by {angle}: {apart:.4} from a mesh that is turned, {error:.4} from brute force, {rest:.4} at rest"
             );
             assert!(apart < slack && error < 0.6 * rest, "{angle}");
+        }
+    });
+}
+
+#[test]
+fn the_light_on_a_body_turns_between_samples_of_turns() {
+    with_gpu(|gpu| {
+        // A bowl that opens to the side: its own shadow turns with it.
+        let body = |turn: f32| {
+            let (bowl, triangles) = ball(0.6, 16);
+            let open = |i: &u32| bowl[*i as usize].x < 0.2;
+            let triangles = triangles.chunks_exact(3).filter(|c| c.iter().all(open)).flatten().copied().collect();
+            let turned = glam::Mat3::from_rotation_y(turn);
+            let mut scene = Scene { environment: Some(colourful()), ..Scene::default() };
+            thing(&mut scene, "bowl", bowl.iter().map(|p| turned * *p).collect(), triangles, Mat4::IDENTITY);
+            scene.materials[0].double_sided = true;
+            scene
+        };
+        // Halfway between two samples, whose bowls open to both sides of the view.
+        let angle = 2.5 * PI as f32 / 4.0;
+        let settings = Settings { turns: 8, ..coarse() };
+        let still = body(0.0);
+        let mut pose = Pose::rest(&still);
+        pose.world[0] = Mat4::from_rotation_y(angle);
+        for from in [vec3(0.3, 1.0, -2.0), vec3(2.0, 0.8, 0.3), vec3(-0.4, 2.0, 0.2)] {
+            let view = flat_view(from, Vec3::ZERO, 1.1, [24, 24]);
+            let found = Studio::new(gpu, &still, &settings, None).shot(&pose, &view, &settings).0;
+            let one = Settings { turns: 1, adaptive: false, ..settings.clone() };
+            let exact = Studio::new(gpu, &body(angle), &one, None).irradiance(&view, &one);
+            let apart = nrmse(&exact, &found);
+            eprintln!("seen from {from}: {apart:.4} from a mesh that is turned");
+            assert!(apart < 0.05, "{from}: {apart}");
         }
     });
 }

@@ -1,6 +1,6 @@
 //! Measures against the numbers of independent programs, recorded in agreement/values.tsv by agreement/regenerate.py.
 //!
-//! `cargo test --test measure_agreement -- --nocapture` prints the table of agreement.
+//! `cargo test --test image measure_agreement -- --nocapture` prints the table of agreement.
 
 use crate::images;
 use std::{collections::BTreeMap, fmt::Write};

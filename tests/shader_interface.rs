@@ -3,7 +3,7 @@
 use crate::common;
 use std::fs;
 
-/// `UPDATE_GOLDENS=1 cargo test --test shader_interface` writes the file again.
+/// `UPDATE_GOLDENS=1 cargo test --test files shader_interface` writes the file again.
 #[test]
 fn the_listing_of_all_interfaces_is_the_reviewed_one() {
     let path = common::root().join("tests/golden/interfaces.txt");

@@ -1,7 +1,7 @@
 //! Tone mapping against the values of independent programs, recorded in agreement/tonemap.tsv by
 //! agreement/regenerate_tonemap.py.
 //!
-//! `cargo test --test tonemap_agreement -- --nocapture` prints how far they are apart.
+//! `cargo test --test tonemap tonemap_agreement -- --nocapture` prints how far they are apart.
 
 use crate::common;
 use crate::pyramids;

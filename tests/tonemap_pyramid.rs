@@ -1,7 +1,7 @@
 //! How far `local = "pyramid"` is from the definition: averages, and the pictures they lead to. Both on the CPU, in 64 bits.
 //!
-//! `cargo test --test tonemap_pyramid -- --nocapture` prints the table for parts of photographs;
-//! `cargo test --release --test tonemap_pyramid -- --ignored --nocapture` for whole ones.
+//! `cargo test --test tonemap tonemap_pyramid -- --nocapture` prints the table for parts of photographs;
+//! `cargo test --release --test tonemap tonemap_pyramid -- --ignored --nocapture` for whole ones.
 
 use crate::common;
 use std::path::Path;

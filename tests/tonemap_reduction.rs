@@ -166,7 +166,7 @@ fn more_than_two_to_the_24_pixels_are_all_counted() {
     });
 }
 
-/// `cargo test --release --test tonemap_reduction -- --ignored`: 10 GiB of memory, minutes on a CPU driver.
+/// `cargo test --release --test tonemap tonemap_reduction -- --ignored`: 10 GiB of memory, minutes on a CPU driver.
 #[test]
 #[ignore = "takes 10 GiB and minutes"]
 fn the_largest_picture() {

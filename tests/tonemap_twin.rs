@@ -1,7 +1,7 @@
 //! Tone mapping on the device against its CPU twin: RMS % and mean % of luminance ([TM 18], [TM 19]).
 //!
-//! `cargo test --test tonemap_twin -- --nocapture` prints the table for parts of all images of the collection;
-//! `cargo test --release --test tonemap_twin -- --ignored --nocapture` for whole images.
+//! `cargo test --test tonemap tonemap_twin -- --nocapture` prints the table for parts of all images of the collection;
+//! `cargo test --release --test tonemap tonemap_twin -- --ignored --nocapture` for whole images.
 
 use crate::common;
 use std::path::Path;

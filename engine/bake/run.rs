@@ -18,7 +18,8 @@ const PAUSE: Duration = Duration::from_millis(500);
 pub struct Options {
     /// The units to compute.
     pub shard: Shard,
-    /// No unit is started that would end later than this time after `begun`, as predicted from the times of earlier units.
+    /// No unit is started that would end later than this time after `begun`, as predicted from the times of earlier units. A unit that stops
+    /// at this time with an error of the kind `Interrupted` is dropped.
     pub time_limit: Option<Duration>,
     pub begun: Instant,
     /// Request to stop. The unit in progress is kept if it completes, and dropped if it stops.
@@ -161,6 +162,8 @@ pub fn run(
             let payload = match unit(id, Needed { store, units: &needs }) {
                 // The request interrupted the device in the middle of the unit.
                 Err(error) if options.stop.requested() && by_request(&error) => break End::Stopped,
+                // The unit stopped by itself at the limit.
+                Err(error) if error.kind() == ErrorKind::Interrupted && over(options) => break End::TimeLimit,
                 result => result.map_err(|error| error.at(store.job().name(id)))?,
             };
             store.put(id, &payload)?;
@@ -184,8 +187,7 @@ pub fn run(
         }
         // All remaining units depend on units of other shards.
         let since = *waits_since.get_or_insert_with(Instant::now);
-        let over = options.time_limit.is_some_and(|limit| options.begun.elapsed() >= limit);
-        if since.elapsed() >= options.wait || over {
+        if since.elapsed() >= options.wait || over(options) {
             let mut wanted: Vec<UnitId> = left.iter().flat_map(|&id| store.job().needs(id)).collect();
             wanted.retain(|id| !known.whole.contains(id));
             wanted.sort();
@@ -197,6 +199,11 @@ pub fn run(
     };
     progress.seconds = begun.elapsed().as_secs_f64();
     Ok(Outcome { end, progress, computed })
+}
+
+/// Whether the time limit has passed.
+fn over(options: &Options) -> bool {
+    options.time_limit.is_some_and(|limit| options.begun.elapsed() >= limit)
 }
 
 fn by_request(error: &Error) -> bool {

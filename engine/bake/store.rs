@@ -97,7 +97,7 @@ impl Store {
     pub fn open(folder: &Path) -> Result<Self> {
         let missing = |error: Error| match folder.join(MANIFEST).symlink_metadata() {
             Ok(_) => error.help("Run the command that made the folder again: it writes the description anew"),
-            Err(_) => error.help("Name the folder of a job, as `fiv precompute -o FILE.fiv` makes FILE.fiv.parts"),
+            Err(_) => error.help("Name the folder of a job, such as FILE.fiv.parts of `fiv precompute -o FILE.fiv`"),
         };
         let job = Job::read(folder).map_err(missing)?;
         Ok(Self { folder: folder.to_owned(), key: job.key().digest(), job })

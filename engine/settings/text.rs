@@ -30,7 +30,10 @@ impl Display for Allowed {
 
 /// Large and small numbers as powers of ten.
 fn number(value: f64) -> String {
-    if value != 0.0 && !(1e-4..1e6).contains(&value.abs()) { format!("{value:e}") } else { value.to_string() }
+    let power = format!("{value:e}");
+    // All digits of a whole number are shorter than a power of ten with as many.
+    let plain = value == 0.0 || (1e-4..1e6).contains(&value.abs()) || (value.fract() == 0.0 && power.len() > 8);
+    if plain { value.to_string() } else { power }
 }
 
 impl Key {

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::{
     Sums, Tracer,
-    job::{BLOCK, LAYERS, slots_of},
+    job::{BLOCK, Job as Work, LAYERS, slots_of},
 };
 use crate::{
     Error, ErrorKind, Result,
@@ -33,15 +33,6 @@ pub fn of([width, height]: [u32; 2]) -> Vec<Range<u32>> {
     let count = (slots / LEAST).clamp(1, MOST.min(blocks.max(1)));
     let row = |band: u64| ((blocks * band / count) as u32).saturating_mul(BLOCK).min(height);
     (0..count).map(|band| row(band)..row(band + 1)).collect()
-}
-
-/// # Errors
-/// `Usage` if these rows are no band of a picture of this size.
-pub(super) fn check(extent: [u32; 2], rows: &Range<u32>) -> Result<()> {
-    match of(extent).contains(rows) {
-        true => Ok(()),
-        false => Err(Error::usage(format!("rows {} to {} are no band of the picture", rows.start, rows.end))),
-    }
 }
 
 impl Tracer<'_> {
@@ -70,21 +61,25 @@ impl Tracer<'_> {
         Job::new(key, vec![Stage::new("bands", of(picture.view.extent).iter().map(paths).collect())])
     }
 
-    /// Traces a band; its bytes.
+    /// Traces a band of the picture that [`Self::start`] has begun; its bytes. Samples that the picture had are dropped.
     ///
     /// # Errors
     /// As [`Tracer::run`]; `Interrupted` if `go_on` returned false before the last sample; `Usage` if the picture has no such band.
     pub fn band(&mut self, unit: UnitId, samples: u64, mut go_on: impl FnMut() -> bool) -> Result<Vec<u8>> {
-        let extent = self.job()?.view.extent;
+        let (view, settings) = (self.job()?.view, self.job()?.settings.clone());
         let none = || Error::usage(format!("the picture has no band {}", unit.index));
-        let rows = of(extent).into_iter().nth(unit.index as usize).ok_or_else(none)?;
-        self.restrict(rows.clone())?;
-        if self.run(samples, |_| go_on())?.samples < samples as f64 {
+        let rows = of(view.extent).into_iter().nth(unit.index as usize).ok_or_else(none)?;
+        // The sums of the whole picture are not needed while there are those of the band.
+        self.job = None;
+        self.job = Some(Work::of_rows(self.kernel.gpu(), view, settings.clone(), rows)?);
+        let traced = self.run(samples, |_| go_on()).and_then(|progress| Ok((progress, self.sums()?)));
+        self.job = None;
+        self.job = Some(Work::new(self.kernel.gpu(), view, settings)?);
+        let (progress, sums) = traced?;
+        if progress.samples < samples as f64 {
             return Err(Error::new(ErrorKind::Interrupted, "stopped on request"));
         }
-        let row = extent[0] as usize;
-        let pixels = row * rows.start as usize..row * rows.end as usize;
-        Ok(self.sums()?.raw().iter().flat_map(|layer| bytemuck::cast_slice(&layer[pixels.clone()]).to_vec()).collect())
+        Ok(sums.raw().iter().flat_map(|layer| bytemuck::cast_slice(layer).to_vec()).collect())
     }
 
     /// Puts the picture together from a job whose units are all there.
@@ -125,6 +120,5 @@ mod tests {
             assert!(bands.windows(2).all(|pair| pair[0].end == pair[1].start), "{extent:?}: {bands:?}");
         }
         assert_eq!(of([640, 480]).len(), 18);
-        assert!(check([640, 480], &(0..8)).is_err() && check([640, 480], &of([640, 480])[3]).is_ok());
     }
 }

@@ -25,7 +25,7 @@ pub(super) struct Job {
     pub view: View,
     pub settings: Settings,
     pub sums: OwnedImage,
-    /// The rows of pixels that are traced: whole blocks, except at the lower end of the picture.
+    /// The rows of pixels that are traced, for which there are sums: whole blocks, except at the lower end of the picture.
     rows: Range<u32>,
     /// Finished slots, summed over all samples.
     pub done: u64,
@@ -34,7 +34,13 @@ pub(super) struct Job {
 
 impl Job {
     pub fn new(gpu: &Gpu, view: View, settings: Settings) -> Result<Self> {
-        let [width, height] = view.extent;
+        let rows = 0..view.extent[1];
+        Self::of_rows(gpu, view, settings, rows)
+    }
+
+    /// The work on these rows alone, which are those of whole blocks.
+    pub fn of_rows(gpu: &Gpu, view: View, settings: Settings, rows: Range<u32>) -> Result<Self> {
+        let [width, height] = [view.extent[0], rows.end - rows.start];
         let most = gpu.caps().limits.image_2d;
         if width.max(height) > most {
             let what = format!("a picture of {width}×{height}; the device allows sides of {most}");
@@ -44,18 +50,23 @@ impl Job {
         desc.usage =
             vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
         let sums = OwnedImage::new(gpu, "tracer.sums", desc)?;
-        Ok(Self { view, settings, sums, rows: 0..height, done: 0, time: Duration::ZERO })
+        Ok(Self { view, settings, sums, rows, done: 0, time: Duration::ZERO })
     }
 
-    /// Begins again with these rows alone. They are those of whole blocks.
-    pub fn restrict(&mut self, rows: Range<u32>) {
-        (self.rows, self.done) = (rows, 0);
+    /// Columns and rows of the pixels that are traced.
+    pub fn extent(&self) -> [u32; 2] {
+        [self.view.extent[0], self.rows.end - self.rows.start]
+    }
+
+    /// The first row that is traced.
+    pub fn first_row(&self) -> u32 {
+        self.rows.start
     }
 
     /// Slots of one sample: the pixels, rounded up to whole blocks.
     pub fn slots(&self) -> u64 {
         // The number of slots of every image that a device supports fits into 64 bits.
-        slots_of([self.view.extent[0], self.rows.end - self.rows.start]).unwrap_or(u64::MAX)
+        slots_of(self.extent()).unwrap_or(u64::MAX)
     }
 
     /// The slot of the first pixel that is traced.
@@ -69,14 +80,14 @@ impl Job {
     }
 
     pub fn progress(&self) -> Progress {
-        let pixels = u64::from(self.view.extent[0]) * u64::from(self.rows.end - self.rows.start);
+        let [width, height] = self.extent().map(u64::from);
         let samples = self.done as f64 / self.slots() as f64;
-        Progress { samples, paths: (samples * pixels as f64) as u64, time: self.time }
+        Progress { samples, paths: (samples * (width * height) as f64) as u64, time: self.time }
     }
 
     pub fn sums(&self) -> Result<Sums> {
         let empty = self.sums.layout() == vk::ImageLayout::UNDEFINED;
-        let [width, height] = self.view.extent;
+        let [width, height] = self.extent();
         let layer = |layer| -> Result<Vec<[f32; 4]>> {
             if empty {
                 return Ok(vec![[0.0; 4]; width as usize * height as usize]);
@@ -87,7 +98,7 @@ impl Job {
         Ok(Sums::new([width, height], layers, self.done / self.slots(), self.done % self.slots()))
     }
 
-    /// Replaces the sums of the whole picture.
+    /// Replaces the sums.
     pub fn set_sums(&mut self, sums: &Sums) -> Result<()> {
         let regions: Vec<Region<'_>> = sums
             .raw()
@@ -96,7 +107,6 @@ impl Job {
             .map(|(layer, texels)| Region { mip: 0, layer: layer as u32, bytes: bytemuck::cast_slice(texels) })
             .collect();
         self.sums.upload(&regions)?;
-        self.rows = 0..self.view.extent[1];
         self.done = sums.samples() * self.slots() + sums.begun();
         Ok(())
     }

@@ -221,7 +221,7 @@ impl Kernel {
                     turn: round * cut.rays,
                     rays: cut.rays,
                 };
-                graph.compute(shader::Args { push, ..args }, count);
+                graph.compute(shader::Args { push, ..args }, count).rays(u64::from(count) * u64::from(cut.rays));
             }
             at += u64::from(count);
         }
@@ -249,6 +249,7 @@ impl Kernel {
                 scale: environment.map_or(0.0, |e| e.scale),
             },
             extent: job.view.extent,
+            first_row: job.first_row(),
             blocks: job.view.extent[0].div_ceil(BLOCK),
             suns: lights.suns,
             tree: lights.tree.into(),

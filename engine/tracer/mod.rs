@@ -50,7 +50,7 @@ pub mod tables {
     };
 }
 
-use std::{ops::Range, time::Duration};
+use std::time::Duration;
 
 use crate::{
     Error, Result,
@@ -161,17 +161,6 @@ impl<'s> Tracer<'s> {
         let view = view.fit_far(&self.bounds);
         self.kernel.light(self.scene, &self.pose, &self.punctual, settings.sources)?;
         self.job = Some(Job::new(self.kernel.gpu(), view, settings.clone())?);
-        Ok(())
-    }
-
-    /// Begins the picture again with a band of its rows alone: one of [`bands::of`].
-    ///
-    /// # Errors
-    /// `Usage` before [`Self::start`], and for rows that are no band.
-    pub fn restrict(&mut self, rows: Range<u32>) -> Result<()> {
-        let job = self.job_mut()?;
-        bands::check(job.view.extent, &rows)?;
-        job.restrict(rows);
         Ok(())
     }
 

@@ -5,9 +5,9 @@ use std::marker::PhantomData;
 
 use clap::{
     Arg, ArgMatches, Command,
-    builder::{PossibleValuesParser, ValueParser},
+    builder::{PossibleValue, PossibleValuesParser, ValueParser},
 };
-use lucerna::settings::{Described, Key, Kind};
+use lucerna::settings::{Choice, Described, Key, Kind};
 
 use crate::args::finite;
 
@@ -42,15 +42,28 @@ fn name(key: &Key) -> String {
     key.name.replace('_', "-")
 }
 
+/// The first paragraph, in one line.
+fn paragraph(doc: &str) -> String {
+    doc.split("\n\n").next().unwrap_or_default().replace('\n', " ")
+}
+
 fn option(key: &'static Key, heading: &'static str) -> Arg {
     let parser: ValueParser = match &key.kind {
-        Kind::Choice(choices) => PossibleValuesParser::new(choices.iter().map(|choice| choice.name.as_str())).into(),
+        Kind::Choice(choices) => {
+            // Docs that are formulas do not fit into a help text.
+            let short = choices.iter().all(|choice| paragraph(&choice.doc).len() < 150);
+            let value = |choice: &Choice| {
+                let value = PossibleValue::new(choice.name.clone());
+                if short { value.help(paragraph(&choice.doc)) } else { value }
+            };
+            PossibleValuesParser::new(choices.iter().map(value)).into()
+        }
         Kind::Switch => PossibleValuesParser::new(["true", "false"]).into(),
         Kind::Whole => clap::value_parser!(u32).into(),
         Kind::Number => ValueParser::new(finite),
         Kind::Text => ValueParser::string(),
     };
-    let help = key.doc.split("\n\n").next().unwrap_or_default().replace('\n', " ");
+    let help = paragraph(&key.doc);
     let help = match &key.default {
         serde_json::Value::Null => help,
         serde_json::Value::String(default) => format!("{help} [default: {default}]"),
@@ -77,7 +90,12 @@ impl<S: Described + 'static> clap::Args for SettingOptions<S> {
 impl<S: Described + 'static> clap::FromArgMatches for SettingOptions<S> {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
         let given = S::description().keys.iter().filter(|key| key.option.is_some()).filter_map(|key| {
-            let value = matches.get_raw(&key.name)?.next()?.to_string_lossy().into_owned();
+            // Numbers are written as settings have them: options also allow `.5` and `08`.
+            let value = match &key.kind {
+                Kind::Whole => matches.get_one::<u32>(&key.name)?.to_string(),
+                Kind::Number => format!("{:?}", matches.get_one::<f64>(&key.name)?),
+                _ => matches.get_one::<String>(&key.name)?.clone(),
+            };
             Some(format!("{}={value}", key.name))
         });
         Ok(Self { given: given.collect(), settings: PhantomData })
@@ -113,6 +131,7 @@ mod tests {
             given(&["--white", "-4.5", "--operator", "reinhard", "--bad-values=error"]).unwrap(),
             ["tonemap.operator=reinhard", "tonemap.white=-4.5", "tonemap.bad_values=error"]
         );
+        assert_eq!(given(&["--key", ".18", "--detail", "2."]).unwrap(), ["tonemap.key=0.18", "tonemap.detail=2.0"]);
         for wrong in [&["--white", "nan"][..], &["--white", "x"], &["--operator", "gamma"], &["--radius", "3"]] {
             assert!(given(wrong).is_err(), "{wrong:?}");
         }

@@ -21,6 +21,7 @@ const uint ON = 3u; // export
 struct PathSettings {
     EnvironmentMap environment;
     uvec2 extent;              // pixels
+    uint first_row;            // of the sums, which may be those of a band of the picture
     uint blocks;               // of 8 pixels in a row
     uint suns;                 // number of directional lights
     uint tree;                 // 1: the light tree has lights

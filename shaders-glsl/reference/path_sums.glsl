@@ -4,9 +4,13 @@
 //   1 direct,   its square                  4 shading normal, number of samples left out as not finite
 //   2 indirect, samples that hit a surface  5 position, —
 
+ivec3 place_of_sum(uvec2 pixel, uint layer) {
+    return ivec3(pixel.x, pixel.y - settings.first_row, layer);
+}
+
 void add_to_sum(uvec2 pixel, uint layer, vec4 value) {
-    ivec3 at = ivec3(pixel, layer);
-    ivec3 at_error = ivec3(pixel, layer + PATH_SUMS);
+    ivec3 at = place_of_sum(pixel, layer);
+    ivec3 at_error = place_of_sum(pixel, layer + PATH_SUMS);
     vec4 high = imageLoad(sums, at);
     vec4 low = imageLoad(sums, at_error);
     // Two-sum (Knuth), then renormalised: high + low is the sum to 48 bits. `precise` forbids the compiler to simplify the terms.
@@ -21,7 +25,7 @@ void add_to_sum(uvec2 pixel, uint layer, vec4 value) {
 }
 
 void add_plainly(uvec2 pixel, uint layer, vec4 value) {
-    ivec3 at = ivec3(pixel, layer);
+    ivec3 at = place_of_sum(pixel, layer);
     imageStore(sums, at, imageLoad(sums, at) + value);
 }
 

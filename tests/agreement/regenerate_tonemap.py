@@ -3,7 +3,7 @@
 
     pip install numpy scipy tifffile
     apt-get install luminance-hdr pfstools
-    LUCERNA_WRITE_CROPS=CROPS cargo test --test tonemap_agreement
+    LUCERNA_WRITE_CROPS=CROPS cargo test --test tonemap tonemap_agreement
     python3 tests/agreement/regenerate_tonemap.py CROPS
 
 CROPS is a folder; the test writes into it the pixels that it compares, as NAME.pfm. See README.md for versions and findings.

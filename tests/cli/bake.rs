@@ -220,3 +220,56 @@ fn shards_of_a_reference_join_to_the_picture_of_one_run() {
     lab.lucerna(&["rerun", "shards.exr"]).expect(0, &[]);
     lab.lucerna(&words("-", &["--shard", "1/2"])).expect(2, &["--shard", "file"]);
 }
+
+#[test]
+fn leftovers_beside_a_reference_neither_harm_nor_lose_it() {
+    if !device() {
+        return;
+    }
+    let lab = Lab::new();
+    let words = |more: &[&'static str]| {
+        [&["reference", "--builtin", "cornell", "--size", "256x192", "--spp", "2"][..], more].concat()
+    };
+    lab.lucerna(&words(&["-o", "whole.exr"])).expect(0, &[]);
+    let whole = fs::read(lab.at("whole.exr")).unwrap();
+    let same = |name: &str| assert!(fs::read(lab.at(name)).unwrap() == whole, "{name}");
+    // A folder that is no job is no folder of bands.
+    fs::create_dir(lab.at("a.exr.parts")).unwrap();
+    lab.lucerna(&words(&["-o", "a.exr"])).expect(0, &["wrote a.exr"]);
+    assert!(files(&lab.at("a.exr.parts")).is_empty());
+    same("a.exr");
+    // A state of a single run beside the bands stays as it is, and is not in their way.
+    fs::write(lab.at("b.exr.state"), "hours of work").unwrap();
+    lab.lucerna(&words(&["-o", "b.exr"])).expect(1, &["b.exr.state", "--restart"]);
+    lab.lucerna(&words(&["-o", "b.exr", "--shard", "1/2"])).expect(0, &["shard 1/2 is done"]);
+    // The folder is found beside any of the files.
+    let joined = lab.lucerna(&words(&["-o", "b.png", "-o", "b.exr", "--json"]));
+    let json: serde_json::Value = serde_json::from_str(&joined.stdout).unwrap();
+    joined.expect(0, &["goes on after"]);
+    assert!(json["paths_per_second"].as_f64().unwrap() > 0.0 && json["paths"] == 2 * 256 * 192, "{json}");
+    same("b.exr");
+    assert!(lab.at("b.png").exists() && !lab.at("b.exr.parts").exists());
+    assert_eq!(fs::read(lab.at("b.exr.state")).unwrap(), b"hours of work");
+    // --restart drops bands, of this picture and of another.
+    for first in ["3", "2"] {
+        let shard = lab
+            .lucerna(&[&words(&["-o", "c.exr", "--shard", "1/3", "--overwrite"])[..], &["--bounces", first]].concat());
+        shard.expect(0, &[]);
+        lab.lucerna(&words(&["-o", "c.exr", "--restart", "--overwrite"])).expect(0, &["wrote c.exr"]);
+        same("c.exr");
+        assert!(!lab.at("c.exr.parts").exists());
+    }
+    // A shard with --restart leaves the bands of other shards.
+    let units = |folder: &str| count(&lab.at(folder));
+    lab.lucerna(&words(&["-o", "d.exr", "--shard", "1/3"])).expect(0, &[]);
+    let first = units("d.exr.parts");
+    lab.lucerna(&words(&["-o", "d.exr", "--shard", "2/3", "--restart"])).expect(0, &[]);
+    assert!(first > 0 && units("d.exr.parts") > first);
+    // A time limit keeps no picture and says so, also as JSON.
+    let long =
+        ["reference", "--builtin", "cornell", "--size", "256x192", "--spp", "100000", "-o", "e.exr", "--shard", "1/1"];
+    let stopped = lab.lucerna(&[&long[..], &["--time-limit", "1.5s", "--json"]].concat());
+    let json: serde_json::Value = serde_json::from_str(&stopped.stdout).unwrap();
+    stopped.expect(8, &["time limit"]);
+    assert!(json["complete"] == false && json["missing"].as_u64().unwrap() > 0, "{json}");
+}

@@ -15,6 +15,8 @@ mod fiv_cutout;
 mod fiv_many;
 #[path = "../fiv_moving.rs"]
 mod fiv_moving;
+#[path = "../fiv_negligible.rs"]
+mod fiv_negligible;
 #[path = "../fiv_odd.rs"]
 mod fiv_odd;
 #[path = "../fiv_online.rs"]

@@ -171,7 +171,7 @@ pub struct Settings {
     /// How rays are traced. With `imperfect` the shadow rays of virtual lights are always traced in compute.
     pub visibility: Visibility,
     /// Side of the shadow maps of virtual lights.
-    #[schemars(range(min = 16, max = 1024), extend("x-unit" = "texels", "x-needs" = {"visibility": {"const": "raster"}}))]
+    #[schemars(range(min = 16, max = 1024), extend("x-unit" = "texels", "x-needs" = {"indirect": {"const": true}, "visibility": {"const": "raster"}}))]
     pub raster_size: u32,
     /// Computes indirect light.
     pub indirect: bool,

@@ -73,11 +73,11 @@ impl Operator {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
-    /// None: every pixel adapts to itself.
+    /// One curve for the whole picture: every pixel adapts to itself.
     Global,
-    /// All.
+    /// The curve adapts to the neighbourhood of each pixel.
     Local,
-    /// The important ones (Michael 2010, section 4.4); the others adapt to themselves.
+    /// Local only where there is detail (Michael 2010, section 4.4).
     Selective,
 }
 
@@ -85,9 +85,13 @@ pub enum Mode {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Local {
+    /// Exact averages.
+    ///
     /// Ashikhmin, Reinhard: the averages along rows and then along columns, which is the same sum in another order (relative difference of
     /// an average under 10⁻⁵). Bilateral: from blocks of pixels, as [`Settings::spatial`] says.
     Fast,
+    /// Several times faster than fast, with nearly the same result.
+    ///
     /// Ashikhmin, Reinhard: small averages as [`Local::Fast`], large ones from halved pictures. An approximation; the search among the
     /// averages is that of the definition, at every pixel. Bilateral: as [`Local::Fast`].
     ///
@@ -105,7 +109,7 @@ pub enum Local {
     /// On photographs the averages differ from the definition's by up to 4 % at the mean, and pictures by 0.4 to 5 % RMS, 0.1 to 1.2 % at the
     /// mean and a FLIP of 0.003 to 0.016: single pixels beside edges, for which another average is chosen, without halos or blocks.
     Pyramid,
-    /// The definition: every sample of every neighbourhood of every pixel.
+    /// The definition, far slower: every sample of every neighbourhood of every pixel.
     Literal,
 }
 
@@ -161,8 +165,7 @@ pub struct Settings {
     /// Tone mapping operator: how luminances become display luminances.
     #[schemars(extend("x-option" = "Look"))]
     pub operator: Operator,
-    /// global: one curve for the whole picture; local: the curve adapts to the neighbourhood of each pixel; selective: local only where there is
-    /// detail. Left out: local if the operator supports it.
+    /// Which pixels get local adaptation. Left out: local if the operator supports it.
     #[schemars(extend("x-option" = "Look"))]
     pub mode: Option<Mode>,
     /// Stops (EV) before the operator: values are multiplied by 2^exposure.
@@ -225,15 +228,14 @@ pub struct Settings {
     #[schemars(extend("x-option" = "Look"))]
     #[schemars(range(min = 0, max = 16), extend("x-needs" = {"operator": {"const": "bilateral"}, "mode": {"not": {"const": "global"}}}))]
     pub detail: f32,
-    /// Strength of colours: 1 leaves them, as in the papers; 0 is grey.
+    /// Ashikhmin, Reinhard, bilateral and reinhard-global: strength of colours; 1 leaves them, as in the papers; 0 is grey.
     ///
     /// The exponent of the ratios of colour to luminance.
     #[schemars(extend("x-option" = "Look"))]
-    #[schemars(range(min = 0, max = 4))]
+    #[schemars(range(min = 0, max = 4), extend("x-needs" = {"operator": {"enum": ["ashikhmin", "reinhard", "bilateral", "reinhard-global"]}}))]
     pub saturation: f32,
     #[schemars(extend("x-needs" = {"operator": {"enum": ["ashikhmin", "reinhard", "bilateral"]}, "mode": {"not": {"const": "global"}}}))]
-    /// How local adaptation is computed. fast: exact averages; pyramid: several times faster, with nearly the same result; literal: the
-    /// definition, far slower.
+    /// How local adaptation is computed.
     #[schemars(extend("x-option" = "Local and selective operators"))]
     pub local: Local,
     /// Selective: the measure of detail.

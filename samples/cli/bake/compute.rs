@@ -32,7 +32,7 @@ pub enum Ended {
     /// All units of the command's shard exist. This number of units of other shards is missing.
     Shard(Progress, usize),
     /// Units of the command are missing; the message was printed.
-    Early(ExitCode),
+    Early(Progress, ExitCode),
 }
 
 impl Work<'_> {
@@ -60,15 +60,17 @@ impl Work<'_> {
         })?;
         let [done, total] = outcome.progress.cost;
         match &outcome.end {
-            End::Stopped if done == 0 => return Err(Error::new(ErrorKind::Interrupted, "stopped on request")),
+            End::Stopped if done == 0 && interrupt.requested() => {
+                return Err(Error::new(ErrorKind::Interrupted, "stopped on request"));
+            }
             End::Stopped | End::TimeLimit => {
-                let why = if outcome.end == End::Stopped { "stopped" } else { "time limit: stopped" };
+                let why = if interrupt.requested() { "stopped" } else { "time limit: stopped" };
                 console.info(&format!("{why} after {done} of {total} {what}; the same command goes on"));
-                return Ok(Ended::Early(ExitCode::from(STOPPED_EARLY)));
+                return Ok(Ended::Early(outcome.progress, ExitCode::from(STOPPED_EARLY)));
             }
             End::Waits(units) => {
                 console.info(&waits(store.job(), units));
-                return Ok(Ended::Early(ExitCode::from(STOPPED_EARLY)));
+                return Ok(Ended::Early(outcome.progress, ExitCode::from(STOPPED_EARLY)));
             }
             End::Done => {}
         }

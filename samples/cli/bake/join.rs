@@ -24,11 +24,11 @@ use crate::{
 /// Options of `lucerna merge`.
 #[derive(clap::Args, Clone, Debug)]
 pub struct JoinArgs {
-    /// Folders of one job (FILE.fiv.parts), or .fiv files with parts of one whole, in any order. They stay as they are
+    /// Folders of one job (FILE.fiv.parts, PICTURE.exr.parts), or .fiv files with parts of one whole, in any order. They stay as they are
     #[arg(value_name = "PART", required = true)]
     pub parts: Vec<PathBuf>,
 
-    /// File to write (FILE.fiv), or folder to bring all units into
+    /// File to write (FILE.fiv), or folder to bring all units into (PICTURE.exr.parts, from which `lucerna reference` makes the picture)
     #[arg(short, long, value_name = "FILE.fiv|FOLDER", help_heading = "Output")]
     pub output: PathBuf,
 

@@ -39,7 +39,7 @@ pub struct UnitsArgs {
     #[arg(long, value_name = "TIME", help_heading = "Units")]
     pub time_limit: Option<Span>,
 
-    /// Start again, even if a stopped run has left units of this or another job
+    /// Start again, even if a stopped run has left units of this or another job; with --shard only its own units of this job are dropped
     #[arg(long, help_heading = "Units")]
     pub restart: bool,
 }
@@ -56,7 +56,15 @@ impl UnitsArgs {
         if self.restart
             && let Ok(store) = Store::open(folder)
         {
-            said_unknown(folder, &store.remove()?, console);
+            if store.job().key() == job.key() {
+                // Other machines may have finished their units of the same job.
+                for unit in self.shard.unwrap_or_default().units(store.job()) {
+                    // Most units do not exist yet.
+                    let _ = std::fs::remove_file(store.path(unit));
+                }
+            } else {
+                said_unknown(folder, &store.remove()?, console);
+            }
         }
         Store::create(folder, job).map_err(|error| error.help(RESTART))
     }

@@ -165,7 +165,7 @@ fn compute(
     let work =
         Work { store: &store, args: units, begun, progress: args.progress, what, console, interrupt: &interrupt };
     let (progress, missing, bytes) = match work.compute(unit)? {
-        Ended::Early(code) => return Ok(code),
+        Ended::Early(_, code) => return Ok(code),
         Ended::Shard(progress, missing) => (progress, missing, None),
         Ended::Whole(progress) => {
             let saving = interrupt.saving();

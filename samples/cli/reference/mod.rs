@@ -138,16 +138,16 @@ fn picture(
     let names = (stage.scene.name.clone(), stage.placed.name.clone());
     let values = Values { scene: &names.0, camera: &names.1, technique: "reference", frame: 0, layer: "" };
     outputs.probe(&values, &["picture"])?;
-    let first = args.output.first().filter(|name| *name != "-");
-    let path = match first {
-        _ if memory.is_some() => None,
-        Some(name) => Some(PathBuf::from(Pattern::parse(name)?.fill(&values))),
+    let files = match memory {
+        Some(_) => Vec::new(),
         // Names of scenes and cameras never add a folder.
-        None if args.output.is_empty() => Some(PathBuf::from(Pattern::parse(outputs::SINGLE)?.fill(&values))),
-        None => None,
+        None => outputs_of(args).map(|name| Ok(Pattern::parse(name)?.fill(&values).into())).collect::<Result<_>>()?,
     };
+    let folder = Bands::folder(args, &files, console)?;
     let about = about(args, &stage);
-    let mut checkpoint = Checkpoint::new(path.clone(), about.clone());
+    // A picture of bands does not touch the state of a single run.
+    let beside = files.first().filter(|_| folder.is_none() && args.output.first().is_none_or(|name| name != "-"));
+    let mut checkpoint = Checkpoint::new(beside.cloned(), about.clone());
     if !args.resume {
         checkpoint.probe(args.restart)?;
     }
@@ -161,18 +161,23 @@ fn picture(
     let (pose, view) = stage.at(args.stage.time, args.stage.size)?;
     let mut tracer = Tracer::new(&gpu, &stage.scene, &pose)?;
     tracer.start(&view, &settings.reference)?;
-    let bands = Bands::of(args, path.as_deref(), &tracer, &settings, &about, console)?;
+    let open = |folder: &PathBuf| Bands::open(args, folder, &tracer, &settings, &about, console);
+    let bands = folder.as_ref().map(open).transpose()?;
+    let mut traced = None;
     if let Some(bands) = &bands {
-        match bands.compute(&mut tracer, args, begun, console, interrupt)? {
-            Ended::Early(code) => return Ok((code, None)),
-            Ended::Shard(progress, missing) => {
-                if args.json {
-                    console::print_json(&bands.report(&progress, missing))?;
-                }
-                return Ok((ExitCode::SUCCESS, None));
+        let (progress, code) = match bands.compute(&mut tracer, args, begun, console, interrupt)? {
+            Ended::Early(progress, code) => (progress, Some(code)),
+            Ended::Shard(progress, _) => (progress, Some(ExitCode::SUCCESS)),
+            Ended::Whole(progress) => (progress, None),
+        };
+        if let Some(code) = code {
+            if args.json {
+                console::print_json(&bands.report(&progress)?)?;
             }
-            Ended::Whole(_) => bands.join(&mut tracer)?,
+            return Ok((code, None));
         }
+        bands.join(&mut tracer)?;
+        traced = Some(progress);
     }
     if args.resume && checkpoint.resume(&mut tracer)? {
         console.info(&format!("resumes after {:.0} samples per pixel", tracer.progress()?.samples));
@@ -181,6 +186,9 @@ fn picture(
     let goals =
         Goals { samples: settings.samples, error: args.target_error, time: args.time_limit.map(|limit| limit.0) };
     let mut line = ProgressLine::new(args.progress, console.is_quiet(), goals, tracer.progress()?);
+    if let Some(progress) = traced {
+        line.traced(begun, progress.before);
+    }
     // From now on the sums may hold hours of work, which must be saved.
     let _saving = interrupt.saving();
     let end = work(args, &settings, &mut tracer, &mut checkpoint, &mut line, interrupt)?;
@@ -300,12 +308,17 @@ fn work(
     }
 }
 
+/// The names of the files to write.
+fn outputs_of(args: &ReferenceArgs) -> impl Iterator<Item = &str> {
+    let single = args.output.is_empty().then_some(outputs::SINGLE);
+    args.output.iter().map(String::as_str).filter(|name| *name != "-").chain(single)
+}
+
 /// The data on which the bits of a picture depend, besides view and settings.
 fn about(args: &ReferenceArgs, stage: &Stage) -> Value {
     json!({
         "scene": stage.fingerprint,
         "time": args.stage.time,
-        "environment": args.stage.environment,
         "default_light": args.stage.default_light,
         "light": args.stage.light,
         "sun": args.stage.sun,

@@ -42,7 +42,7 @@ pub struct ReferenceArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=u64::from(u32::MAX)), help_heading = "Quality")]
     pub spp: Option<u64>,
 
-    /// Stop after this time with the samples so far: 90, 90s, 10m, 1h30m; exit code 8
+    /// Stop after this time with the samples so far: 90, 90s, 10m, 1h30m; exit code 8. With --shard without a picture: finished bands are kept
     #[arg(long, value_name = "TIME", help_heading = "Quality")]
     pub time_limit: Option<Span>,
 
@@ -54,12 +54,13 @@ pub struct ReferenceArgs {
     #[arg(long, help_heading = "Quality")]
     pub resume: bool,
 
-    /// Start from the beginning, even if a stopped run has left a state next to the image
+    /// Start from the beginning, even if a stopped run has left a state or bands next to the image; with --shard only its own bands are dropped
     #[arg(long, conflicts_with = "resume", help_heading = "Quality")]
     pub restart: bool,
 
     /// Trace only the bands of part I of N of the picture, for several machines; -o names the picture. `auto`: the part of this task in an array
-    /// job of Slurm, Grid Engine or Kubernetes; `auto/N`: of N parts. The same command without --shard joins them
+    /// job of Slurm, Grid Engine or Kubernetes; `auto/N`: of N parts. The bands lie in a folder beside the first file of -o. The same command
+    /// without --shard joins them
     #[arg(long, value_name = "I/N|auto", value_parser = bake::shard, conflicts_with_all = ["target_error", "resume"], help_heading = "Quality")]
     pub shard: Option<Shard>,
 

@@ -56,6 +56,13 @@ impl ProgressLine {
         Self { mode, goals, started: Instant::now(), before, shown: None, error: None }
     }
 
+    /// This run began at `begun`, when `before` paths had been traced.
+    pub fn traced(&mut self, begun: Instant, before: u64) {
+        let share = before as f64 / self.before.paths.max(1) as f64;
+        self.before = Progress { samples: self.before.samples * share, paths: before, ..self.before };
+        self.started = begun;
+    }
+
     /// Whether the line shows the error.
     pub fn wants_error(&self) -> bool {
         self.mode != ProgressMode::None
