@@ -30,6 +30,7 @@
 mod job;
 mod key;
 pub mod merge;
+pub mod pca;
 mod run;
 mod shard;
 mod store;

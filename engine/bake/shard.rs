@@ -105,6 +105,12 @@ impl Shard {
         })
     }
 
+    /// The items of a shard, of `count` equal items in a fixed order: consecutive ones, so that neighbours which share data stay together.
+    pub fn range(self, count: u64) -> std::ops::Range<u64> {
+        let bound = |index: u64| (u128::from(count) * u128::from(index) / u128::from(self.count)) as u64;
+        bound(self.index)..bound(self.index + 1)
+    }
+
     /// The units of a shard: consecutive units of each stage, so that all shards have nearly the same work. The assignment depends only on the
     /// job and the number of shards, and does not change the bytes of a unit.
     pub fn units(self, job: &Job) -> Vec<UnitId> {
@@ -134,6 +140,16 @@ fn number(text: &str) -> Option<u64> {
 mod tests {
     use super::*;
     use crate::bake::{Key, Stage};
+
+    #[test]
+    fn ranges_hold_each_item_once_and_differ_by_one() {
+        for (items, count) in [(0, 3), (2, 5), (10, 3), (7, 7), (u64::MAX, 1_000_000)] {
+            let ranges: Vec<_> = (0..count).map(|index| Shard { index, count }.range(items)).collect();
+            assert!(ranges.windows(2).all(|pair| pair[0].end == pair[1].start));
+            assert_eq!((ranges[0].start, ranges[ranges.len() - 1].end), (0, items));
+            assert!(ranges.iter().all(|r| (items / count..=items / count + 1).contains(&(r.end - r.start))));
+        }
+    }
 
     #[test]
     fn shards_count_from_one() {

@@ -1,8 +1,9 @@
-//! Messages on stderr, and the only functions that write to stdout.
+//! Messages and progress on stderr, and the only functions that write to stdout.
 
 use std::{
     borrow::Cow,
     io::{IsTerminal, Write},
+    sync::{Mutex, PoisonError},
 };
 
 use lucerna::{Error, ErrorKind, Result};
@@ -40,14 +41,6 @@ impl Console {
         }
     }
 
-    /// Like [`Console::info`], for other threads than the one that shows progress: overwrites an incomplete progress line.
-    pub fn aside(&self, text: &str) {
-        if self.level >= 0 {
-            let clear = if std::io::stderr().is_terminal() { "\r\x1b[K" } else { "" };
-            self.plain(&format!("{clear}{text}"));
-        }
-    }
-
     /// Details; printed with `-v`.
     pub fn detail(&self, text: &str) {
         if self.level >= 1 {
@@ -73,9 +66,37 @@ impl Console {
         self.raw(&legible(text));
     }
 
-    /// Ignores errors: the work continues even if stderr is closed.
     fn raw(&self, text: &str) {
-        let _ = writeln!(std::io::stderr().lock(), "{text}");
+        stderr_line(text);
+    }
+}
+
+/// A bar of progress stands on the last line of the terminal.
+static BAR: Mutex<bool> = Mutex::new(false);
+
+/// Begins the last line of a terminal again.
+const AGAIN: &str = "\r\x1b[K";
+
+/// Writes a line to stderr, in the place of a bar. Ignores errors: the work continues even if stderr is closed.
+pub fn stderr_line(text: &str) {
+    let mut bar = BAR.lock().unwrap_or_else(PoisonError::into_inner);
+    let again = if std::mem::take(&mut *bar) { AGAIN } else { "" };
+    let _ = writeln!(std::io::stderr().lock(), "{again}{text}");
+}
+
+/// Draws a bar on the last line of the terminal, over the bar before. `last`: the line stays.
+pub fn stderr_bar(text: &str, last: bool) {
+    let mut bar = BAR.lock().unwrap_or_else(PoisonError::into_inner);
+    *bar = !last;
+    let mut err = std::io::stderr().lock();
+    let _ = write!(err, "{AGAIN}{text}{}", if last { "\n" } else { "" }).and_then(|()| err.flush());
+}
+
+/// Leaves the bar, if there is one, where it is: the next text stands below it.
+pub fn end_bar() {
+    let mut bar = BAR.lock().unwrap_or_else(PoisonError::into_inner);
+    if std::mem::take(&mut *bar) {
+        let _ = writeln!(std::io::stderr().lock());
     }
 }
 

@@ -1,8 +1,20 @@
-//! Progress over frames, on stderr.
+//! The progress of long work, on stderr: one meter for all commands.
 
-use std::io::{IsTerminal, Write};
+use std::{
+    io::IsTerminal,
+    time::{Duration, Instant},
+};
 
-use serde_json::json;
+use serde_json::{Map, Value, json};
+
+use crate::console;
+
+/// Width of a bar, in characters.
+const BAR: usize = 20;
+/// Time between two lines of work that is not counted item by item.
+const PAUSE: Duration = Duration::from_secs(5);
+/// The same for a bar, which overwrites itself.
+const BAR_PAUSE: Duration = Duration::from_millis(200);
 
 /// How progress is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -12,9 +24,9 @@ pub enum ProgressMode {
     Auto,
     /// A bar.
     Bar,
-    /// One line per frame.
+    /// One line per item of work, or every five seconds.
     Plain,
-    /// One JSON object per line.
+    /// The same as JSON, one object per line.
     Json,
     /// Lines that Open Job Description schedulers read (openjd_progress, openjd_status).
     #[value(name = "openjd")]
@@ -23,10 +35,8 @@ pub enum ProgressMode {
 }
 
 impl ProgressMode {
-    /// Resolves `Auto` for this process. A bar consists of escape codes, so it is shown on terminals only. `few`: there is too little work
-    /// for a bar.
-    pub fn here(self, quiet: bool, few: bool) -> Self {
-        let terminal = std::io::stderr().is_terminal();
+    /// Resolves `Auto`. A bar consists of escape codes, so it is shown on terminals only. `few`: there is too little work for a bar.
+    fn resolved(self, terminal: bool, quiet: bool, few: bool) -> Self {
         match self {
             Self::Auto if quiet => Self::None,
             Self::Auto if terminal && !few => Self::Bar,
@@ -35,60 +45,128 @@ impl ProgressMode {
             mode => mode,
         }
     }
+}
 
-    /// Writes a progress line. As a bar it overwrites the line before. `last`: no further line follows.
-    pub fn progress_line(self, text: &str, last: bool) {
-        let mut err = std::io::stderr().lock();
-        // A closed stderr is not an error.
-        let _ = match (self, last) {
-            (Self::None, _) => Ok(()),
-            (Self::Bar, false) => write!(err, "\r\x1b[K{text}").and_then(|()| err.flush()),
-            (Self::Bar, true) => writeln!(err, "\r\x1b[K{text}"),
-            (Self::OpenJd, _) => writeln!(err, "openjd_status: {text}"),
-            _ => writeln!(err, "{text}"),
-        };
+/// A moment of the work.
+#[derive(Clone, Debug)]
+pub struct Moment {
+    /// Finished items, with those of earlier runs.
+    pub done: f64,
+    pub total: f64,
+    /// Plural noun of the items: `samples`.
+    pub unit: &'static str,
+    /// Estimated remaining seconds; `None` if nothing is known.
+    pub seconds_left: Option<f64>,
+    /// The line for people: after the bar, or as the whole line.
+    pub text: String,
+    /// Further facts for programs, by name.
+    pub facts: Map<String, Value>,
+    /// No further line follows.
+    pub last: bool,
+}
+
+/// Shows progress in the way that the user chose.
+#[derive(Debug)]
+pub struct Meter {
+    mode: ProgressMode,
+    started: Instant,
+    shown: Instant,
+}
+
+impl Meter {
+    /// `quiet`: `-q` was given. `few`: there is too little work for a bar.
+    pub fn new(mode: ProgressMode, quiet: bool, few: bool) -> Self {
+        let mode = mode.resolved(std::io::stderr().is_terminal(), quiet, few);
+        Self { mode, started: Instant::now(), shown: Instant::now() }
     }
 
-    /// Says how much of all is done, from 0 to 1, where somebody reads that apart from the line.
-    pub fn share(self, done: f64) {
-        if self == Self::OpenJd {
-            let percent = if done.is_finite() { 100.0 * done.clamp(0.0, 1.0) } else { 0.0 };
-            let _ = writeln!(std::io::stderr().lock(), "openjd_progress: {percent:.1}");
+    /// Whether anything is shown at all.
+    pub fn shows(&self) -> bool {
+        self.mode != ProgressMode::None
+    }
+
+    /// Whether a line of work that is not counted item by item is due.
+    pub fn due(&self) -> bool {
+        let pause = if self.mode == ProgressMode::Bar { BAR_PAUSE } else { PAUSE };
+        self.shows() && self.shown.elapsed() >= pause
+    }
+
+    /// Whether the items that need no work are shown too: lines about them would hide the other lines.
+    pub fn shows_idle_items(&self) -> bool {
+        self.mode != ProgressMode::Plain
+    }
+
+    /// Time is counted from `begun`.
+    pub fn since(&mut self, begun: Instant) {
+        self.started = begun;
+    }
+
+    /// Seconds since the work began.
+    pub fn seconds(&self) -> f64 {
+        self.started.elapsed().as_secs_f64()
+    }
+
+    /// Shows a line.
+    pub fn show(&mut self, moment: &Moment) {
+        self.shown = Instant::now();
+        let text = line(self.mode, moment, self.seconds());
+        match self.mode {
+            ProgressMode::Auto | ProgressMode::None => {}
+            ProgressMode::Bar => console::stderr_bar(&text, moment.last),
+            _ => console::stderr_line(&text),
         }
     }
 }
 
-/// A rough time span: `59 s`, `12 min`, `20 h`.
-pub fn span(seconds: f64) -> String {
-    match seconds {
-        s if s >= 36_000.0 => format!("{:.0} h", s / 3600.0),
-        s if s >= 600.0 => format!("{:.0} min", s / 60.0),
-        s => format!("{s:.0} s"),
+impl Drop for Meter {
+    fn drop(&mut self) {
+        console::end_bar();
     }
 }
 
-/// Counts frames.
-#[derive(Debug)]
-pub struct Progress {
-    mode: ProgressMode,
-    total: u64,
-    done: u64,
-    bar: Option<indicatif::ProgressBar>,
+/// The line of a moment, without its end.
+fn line(mode: ProgressMode, moment: &Moment, seconds: f64) -> String {
+    let Moment { done, total, unit, seconds_left, text, facts, last } = moment;
+    let share = if *last { 1.0 } else { done / total.max(f64::MIN_POSITIVE) };
+    let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 };
+    match mode {
+        ProgressMode::Auto | ProgressMode::None => String::new(),
+        ProgressMode::Plain => text.clone(),
+        ProgressMode::Bar => {
+            let filled = (share * BAR as f64) as usize;
+            format!("{}{} {text}", "█".repeat(filled), "░".repeat(BAR - filled))
+        }
+        ProgressMode::OpenJd => format!("openjd_progress: {:.1}\nopenjd_status: {text}", 100.0 * share),
+        ProgressMode::Json => {
+            let left = if *last { Some(0.0) } else { *seconds_left };
+            let mut object = json!({
+                "done": number(*done), "total": number(*total), "unit": unit, "seconds": seconds, "seconds_left": left, "last": last,
+            });
+            for (name, value) in facts {
+                object[name] = value.clone();
+            }
+            object.to_string()
+        }
+    }
 }
 
-impl Progress {
+/// A count as a whole number where it is one.
+fn number(value: f64) -> Value {
+    if value.fract() == 0.0 && (0.0..9e15).contains(&value) { json!(value as u64) } else { json!(value) }
+}
+
+/// Counts frames or pictures, which take about the same time.
+#[derive(Debug)]
+pub struct Frames {
+    meter: Meter,
+    total: u64,
+    done: u64,
+}
+
+impl Frames {
     /// For `total` frames.
     pub fn new(mode: ProgressMode, quiet: bool, total: u64) -> Self {
-        let mode = mode.here(quiet, total <= 1);
-        let bar = (mode == ProgressMode::Bar).then(|| {
-            let style = indicatif::ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left {msg}");
-            let bar = indicatif::ProgressBar::new(total);
-            if let Ok(style) = style {
-                bar.set_style(style);
-            }
-            bar
-        });
-        Self { mode, total, done: 0, bar }
+        Self { meter: Meter::new(mode, quiet, total <= 1), total, done: 0 }
     }
 
     /// Reports a finished frame: its number, its time in milliseconds, and the files written.
@@ -96,46 +174,45 @@ impl Progress {
         self.step(&format!("frame {frame}"), json!(frame), milliseconds, files);
     }
 
-    fn step(&mut self, what: &str, frame: serde_json::Value, milliseconds: f64, files: &[String]) {
-        self.done += 1;
-        self.mode.share(self.done as f64 / self.total.max(1) as f64);
-        let mut err = std::io::stderr().lock();
-        let _ = match self.mode {
-            ProgressMode::Bar => {
-                if let Some(bar) = &self.bar {
-                    bar.set_position(self.done);
-                    bar.set_message(files.join(" "));
-                }
-                Ok(())
-            }
-            ProgressMode::Plain => writeln!(
-                err,
-                "{what} ({}/{}): {milliseconds:.0} ms{}{}",
-                self.done,
-                self.total,
-                if files.is_empty() { "" } else { ", wrote " },
-                files.join(" ")
-            ),
-            ProgressMode::Json => writeln!(
-                err,
-                "{}",
-                json!({ "frame": frame, "done": self.done, "total": self.total, "ms": milliseconds, "files": files })
-            ),
-            ProgressMode::OpenJd => writeln!(err, "openjd_status: {what} ({}/{})", self.done, self.total),
-            ProgressMode::Auto | ProgressMode::None => Ok(()),
-        };
-    }
-
-    /// Reports a finished picture by its name, like [`Progress::frame`].
+    /// Reports a finished picture by its name, like [`Frames::frame`].
     pub fn named(&mut self, name: &str, milliseconds: f64, files: &[String]) {
         self.step(name, json!(name), milliseconds, files);
     }
 
-    /// Ends the bar.
-    pub fn finish(self) {
-        if let Some(bar) = self.bar {
-            bar.finish_and_clear();
-        }
+    fn step(&mut self, name: &str, frame: Value, milliseconds: f64, files: &[String]) {
+        self.done += 1;
+        let Self { done, total, .. } = *self;
+        let left = self.meter.seconds() / done as f64 * total.saturating_sub(done) as f64;
+        let wrote = if files.is_empty() { String::new() } else { format!(", wrote {}", files.join(" ")) };
+        let rest = if done < total { format!(", {} left", span(left)) } else { String::new() };
+        let facts = json!({ "frame": frame, "ms": milliseconds, "files": files });
+        self.meter.show(&Moment {
+            done: done as f64,
+            total: total as f64,
+            unit: "frames",
+            seconds_left: Some(left),
+            text: format!("{name} ({done}/{total}): {milliseconds:.0} ms{rest}{wrote}"),
+            facts: into_facts(facts),
+            last: done >= total,
+        });
+    }
+}
+
+/// The members of a JSON object.
+pub fn into_facts(value: Value) -> Map<String, Value> {
+    match value {
+        Value::Object(facts) => facts,
+        _ => Map::new(),
+    }
+}
+
+/// A time span: `12 s`, `4 min 10 s`, `3 h 20 min`.
+pub fn span(seconds: f64) -> String {
+    let seconds = if seconds.is_finite() { seconds.max(0.0).round() as u64 } else { return "unknown time".into() };
+    match seconds {
+        0..60 => format!("{seconds} s"),
+        60..3600 => format!("{} min {:02} s", seconds / 60, seconds % 60),
+        _ => format!("{} h {:02} min", seconds / 3600, seconds % 3600 / 60),
     }
 }
 
@@ -143,16 +220,55 @@ impl Progress {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_time_left_is_told_roughly() {
-        assert_eq!((span(59.0).as_str(), span(720.0).as_str(), span(72_000.0).as_str()), ("59 s", "12 min", "20 h"));
+    fn moment(last: bool) -> Moment {
+        Moment {
+            done: 3.0,
+            total: 8.0,
+            unit: "frames",
+            seconds_left: Some(5.0),
+            text: "frame 2".into(),
+            facts: into_facts(json!({ "ms": 4 })),
+            last,
+        }
     }
 
     #[test]
-    fn what_is_asked_for_is_kept_but_for_bars_in_files() {
-        for mode in [ProgressMode::Json, ProgressMode::None, ProgressMode::Plain] {
-            assert_eq!(mode.here(true, true), mode);
+    fn spans_are_told_in_two_units_at_most() {
+        let all =
+            [(59.4, "59 s"), (61.0, "1 min 01 s"), (4200.0, "1 h 10 min"), (-1.0, "0 s"), (f64::NAN, "unknown time")];
+        all.iter().for_each(|(seconds, text)| assert_eq!(span(*seconds), *text));
+    }
+
+    #[test]
+    fn a_chosen_mode_is_kept_and_bars_are_for_terminals() {
+        use ProgressMode::{Auto, Bar, Json, None, OpenJd, Plain};
+        for mode in [Json, None, Plain, OpenJd] {
+            assert_eq!(mode.resolved(true, true, true), mode);
         }
-        assert_eq!(ProgressMode::Auto.here(true, false), ProgressMode::None);
+        assert_eq!([Auto.resolved(true, true, false), Auto.resolved(true, false, true)], [None, Plain]);
+        assert_eq!([Auto.resolved(true, false, false), Auto.resolved(false, false, false)], [Bar, Plain]);
+        assert_eq!([Bar.resolved(true, true, true), Bar.resolved(false, false, false)], [Bar, Plain]);
+    }
+
+    #[test]
+    fn every_mode_says_the_same() {
+        assert_eq!(line(ProgressMode::Plain, &moment(false), 1.0), "frame 2");
+        assert_eq!(line(ProgressMode::Bar, &moment(false), 1.0), "███████░░░░░░░░░░░░░ frame 2");
+        assert_eq!(line(ProgressMode::OpenJd, &moment(false), 1.0), "openjd_progress: 37.5\nopenjd_status: frame 2");
+        assert_eq!(line(ProgressMode::None, &moment(false), 1.0), "");
+        let read = |last| serde_json::from_str::<Value>(&line(ProgressMode::Json, &moment(last), 1.5)).unwrap();
+        let expected = json!({
+            "done": 3, "total": 8, "unit": "frames", "seconds": 1.5, "seconds_left": 5.0, "last": false, "ms": 4
+        });
+        assert_eq!(read(false), expected);
+        assert_eq!([&read(true)["seconds_left"], &read(true)["last"]], [&json!(0.0), &json!(true)]);
+    }
+
+    #[test]
+    fn shares_stay_between_nothing_and_all() {
+        for (done, total, text) in [(9.0, 8.0, "100.0"), (0.0, 0.0, "0.0"), (f64::NAN, 1.0, "0.0")] {
+            let text = format!("openjd_progress: {text}\n");
+            assert!(line(ProgressMode::OpenJd, &Moment { done, total, ..moment(false) }, 1.0).starts_with(&text));
+        }
     }
 }

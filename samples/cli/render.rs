@@ -14,13 +14,13 @@ use lucerna::{
 
 use crate::{
     args::{DeviceArgs, RenderArgs, TalkArgs},
-    bake::Meter,
+    bake::Rate,
     config,
     console::{self, Console},
     last_stage::{LastStage, Staged},
     outputs::Fresh,
     program::{self, STOPPED_EARLY},
-    progress::Progress,
+    progress::Frames,
     record::Record,
     rerun::bounds,
     run::Run,
@@ -181,7 +181,7 @@ fn ready<T: Technique>(
     let (mut meter, mut stopped) = (None, false);
     let quiet = args.talk.console().is_quiet();
     let mut told = |done: u64, total: u64| {
-        let meter = meter.get_or_insert_with(|| Meter::new(args.progress, quiet, T::UNITS, 0, total));
+        let meter = meter.get_or_insert_with(|| Rate::new(args.progress, quiet, T::UNITS, 0, total));
         meter.show(done, 0);
         stopped = interrupt.requested();
         !stopped
@@ -216,7 +216,7 @@ fn frames<T: Technique>(
     let all = run.outputs.wants_layers() || args.view.is_some() || args.dump.is_some() || args.list_passes;
     let frames = run.frames.len() as u32;
     let mut runner = Runner::new(&gpu);
-    let mut progress = Progress::new(args.progress, console.is_quiet(), run.frames.len() as u64);
+    let mut progress = Frames::new(args.progress, console.is_quiet(), run.frames.len() as u64);
     'frames: for frame in run.frames.clone() {
         let late = args.time_limit.is_some_and(|limit| started.elapsed() >= limit.0);
         // The first frame is always rendered; otherwise a run with a short time limit would make no progress.
@@ -277,6 +277,5 @@ fn frames<T: Technique>(
             run.again(begun.elapsed().as_secs_f64() * 1e3, &result.report);
         }
     }
-    progress.finish();
     run.finish(&gpu)
 }

@@ -162,7 +162,7 @@ impl State {
     fn say(self: &Arc<Self>, console: Console) {
         let state = Arc::clone(self);
         let _ = std::thread::Builder::new().spawn(move || {
-            console.aside("stopping; complete output is kept (signal again to stop now)");
+            console.info("stopping; complete output is kept (signal again to stop now)");
             state.said.store(true, Ordering::Release);
         });
     }

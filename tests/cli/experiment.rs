@@ -211,6 +211,39 @@ fn what_is_interrupted_shows_what_is_there() {
 }
 
 /// Files of a folder with this extension, by name.
+#[test]
+fn shards_render_each_picture_once_and_the_same_command_reports_them() {
+    let place = Place::new();
+    place.run("whole", &[]).expect(0, &["wrote"]);
+    place.run("parts", &["--shard", "1/2"]).expect(0, &["2 runs of 5, shard 1/2", "shard 1/2 is done, 2 runs"]);
+    let parts = place.path("parts");
+    assert!(!parts.join("report.html").exists() && !parts.join("manifest.json").exists());
+    let first = with_extension(&parts.join("runs"), "exr");
+    assert_eq!((first.len(), place.planned("parts", &["--shard", "1/2"])), (2, (2, 0)));
+    // The other machine has a disk of its own; the folders are copied together.
+    let json = place.run("other", &["--shard", "2/2", "--json"]).expect(0, &[]).json();
+    assert_eq!((&json["shard"], &json["runs"], &json["missing"]), (&"2/2".into(), &3.into(), &0.into()), "{json}");
+    for entry in fs::read_dir(place.path("other/runs")).unwrap().map(Result::unwrap) {
+        assert!(!parts.join("runs").join(entry.file_name()).exists(), "two shards have rendered {entry:?}");
+        fs::copy(entry.path(), parts.join("runs").join(entry.file_name())).unwrap();
+    }
+    assert_eq!(place.planned("parts", &[]), (5, 0));
+    place.run("parts", &[]).expect(0, &["wrote"]);
+    assert_eq!(contents(&place.path("whole")), contents(&parts));
+    // More shards than pictures: some have nothing to do.
+    place.run("parts", &["--shard", "1/9"]).expect(0, &["0 runs of 5", "shard 1/9 is done"]);
+}
+
+#[test]
+fn a_time_limit_begins_nothing_that_would_end_later() {
+    let place = Place::new();
+    place.run("out", &["--time-limit", "0.001s"]).expect(8, &["time limit: stopped: 0 of 5 runs are done"]);
+    let json = place.run("out", &["--time-limit", "0.001s", "--shard", "2/2", "--json"]);
+    let json = json.expect(8, &["0 of 3 runs of shard 2/2"]).json();
+    assert_eq!((&json["runs"], &json["missing"]), (&0.into(), &3.into()), "{json}");
+    place.run("out", &["--time-limit", "1h"]).expect(0, &["wrote"]);
+}
+
 fn with_extension(folder: &Path, extension: &str) -> Vec<PathBuf> {
     let paths = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let mut paths: Vec<PathBuf> = paths.filter(|path| path.extension().is_some_and(|e| e == extension)).collect();
@@ -360,6 +393,25 @@ fn a_folder_from_elsewhere_names_no_file_outside_of_it() {
     std::os::unix::fs::symlink(&victim, out.join("report.html")).unwrap();
     report().expect(1, &["report.html", "symbolic link"]);
     assert_eq!(fs::read_to_string(&victim).unwrap(), "precious");
+}
+
+#[cfg(unix)]
+#[test]
+fn pictures_and_their_texts_are_not_written_through_links() {
+    let place = Place::new();
+    place.run("out", &["--quick"]).expect(0, &["wrote"]);
+    let victim = place.path("victim.txt");
+    for ending in ["exr", "json"] {
+        let path = with_extension(&place.path("out/runs"), ending).remove(0);
+        let before = fs::read(&path).unwrap();
+        fs::write(&victim, "precious").unwrap();
+        fs::remove_file(&path).unwrap();
+        std::os::unix::fs::symlink(&victim, &path).unwrap();
+        place.run("out", &["--quick"]).expect(1, &["is a link", path.to_str().unwrap()]);
+        assert_eq!(fs::read_to_string(&victim).unwrap(), "precious");
+        fs::remove_file(&path).unwrap();
+        fs::write(&path, before).unwrap();
+    }
 }
 
 #[cfg(unix)]

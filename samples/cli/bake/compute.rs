@@ -7,7 +7,7 @@ use lucerna::{
     bake::{End, Needed, Progress, Store, UnitId, run},
 };
 
-use super::{Meter, UnitsArgs, waits};
+use super::{Rate, UnitsArgs, waits};
 use crate::{console::Console, program::STOPPED_EARLY, progress::ProgressMode, signals::Interrupt};
 
 /// A command's work on the units of a job.
@@ -50,7 +50,7 @@ impl Work<'_> {
             if fresh && done > 0 {
                 console.info(&format!("{folder}: goes on after {done} of {total} {what}"));
             }
-            let meter = meter.get_or_insert_with(|| Meter::new(self.progress, console.is_quiet(), what, done, total));
+            let meter = meter.get_or_insert_with(|| Rate::new(self.progress, console.is_quiet(), what, done, total));
             if done > 0 {
                 interrupt.keep();
             }

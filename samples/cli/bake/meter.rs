@@ -1,76 +1,57 @@
-//! The progress of a computation, on stderr.
+//! The progress of a computation in units.
 
-use std::time::{Duration, Instant};
-
-use serde_json::json;
+use serde_json::{Map, json};
 
 use super::size;
-use crate::progress::{ProgressMode, span};
+use crate::progress::{Meter, Moment, ProgressMode, span};
 
 /// Shows the finished share, the rate, the bytes and the remaining time at intervals.
 #[derive(Debug)]
-pub struct Meter {
-    mode: ProgressMode,
+pub struct Rate {
+    meter: Meter,
     /// Noun for the counted items: `samples`.
-    what: &'static str,
-    started: Instant,
-    shown: Instant,
+    unit: &'static str,
     /// Done before this run.
     before: u64,
     total: u64,
 }
 
-impl Meter {
+impl Rate {
     /// Counts up to `total` items; `before` of them were finished earlier.
-    pub fn new(mode: ProgressMode, quiet: bool, what: &'static str, before: u64, total: u64) -> Self {
-        let mode = mode.here(quiet, false);
-        Self { mode, what, started: Instant::now(), shown: Instant::now(), before, total }
-    }
-
-    /// Seconds of this run.
-    pub fn seconds(&self) -> f64 {
-        self.started.elapsed().as_secs_f64()
+    pub fn new(mode: ProgressMode, quiet: bool, unit: &'static str, before: u64, total: u64) -> Self {
+        Self { meter: Meter::new(mode, quiet, false), unit, before, total }
     }
 
     /// `done`: finished items, with earlier ones. `bytes`: bytes that this run has computed; 0 if they are not counted. The last line is always
     /// shown.
     pub fn show(&mut self, done: u64, bytes: u64) {
-        let last = done >= self.total;
-        let pause = if self.mode == ProgressMode::Bar { 200 } else { 5000 };
-        if self.mode == ProgressMode::None || (!last && self.shown.elapsed() < Duration::from_millis(pause)) {
-            return;
+        if self.meter.shows() && (done >= self.total || self.meter.due()) {
+            let moment = self.moment(done, bytes, self.meter.seconds());
+            self.meter.show(&moment);
         }
-        self.shown = Instant::now();
-        let share = done as f64 / self.total.max(1) as f64;
-        self.mode.share(if last { 1.0 } else { share });
-        self.mode.progress_line(&self.text(done, bytes, self.seconds()), last);
     }
 
-    fn text(&self, done: u64, bytes: u64, seconds: f64) -> String {
-        let Self { what, total, .. } = self;
-        let (rate, left) = rate(self.before, done, *total, seconds);
+    fn moment(&self, done: u64, bytes: u64, seconds: f64) -> Moment {
+        let Self { unit, total, .. } = *self;
+        let (rate, left) = rate(self.before, done, total, seconds);
         let bytes_rate = bytes as f64 / seconds.max(1e-9);
-        if self.mode == ProgressMode::Json {
-            let mut line = json!({ "done": done, "total": total, "seconds_left": left, "bytes": bytes, "bytes_per_second": bytes_rate });
-            line[format!("{what}_per_second")] = json!(rate);
-            return line.to_string();
-        }
         let written = match bytes {
             0 => String::new(),
             _ => format!(", {}, {}/s", size(bytes as f64), size(bytes_rate)),
         };
-        if done >= *total {
-            return format!("{done} {what}, {rate:.0} {what}/s{written}, {seconds:.1} s");
-        }
-        let (percent, left) = (100.0 * done as f64 / (*total).max(1) as f64, span(left));
-        let bar = match self.mode {
-            ProgressMode::Bar => {
-                let filled = (percent / 5.0) as usize;
-                format!("{}{} ", "█".repeat(filled), "░".repeat(20usize.saturating_sub(filled)))
+        let percent = 100.0 * done as f64 / total.max(1) as f64;
+        let text = match done >= total {
+            true => format!("{done} {unit}, {rate:.0} {unit}/s{written}, {seconds:.1} s"),
+            false => {
+                format!("{done}/{total} {unit} ({percent:.0} %), {rate:.0} {unit}/s{written}, {} left", span(left))
             }
-            _ => String::new(),
         };
-        format!("{bar}{done}/{total} {what} ({percent:.0} %), {rate:.0} {what}/s{written}, {left} left")
+        let mut facts = Map::new();
+        facts.insert(format!("{unit}_per_second"), json!(rate));
+        facts.insert("bytes".into(), json!(bytes));
+        facts.insert("bytes_per_second".into(), json!(bytes_rate));
+        let (done, total) = (done as f64, total as f64);
+        Moment { done, total, unit, seconds_left: Some(left), text, facts, last: done >= total }
     }
 }
 
@@ -92,13 +73,12 @@ mod tests {
 
     #[test]
     fn lines_say_how_much_how_fast_and_how_long() {
-        let meter = |mode| Meter { mode, ..Meter::new(ProgressMode::None, true, "samples", 100, 700) };
-        let plain = meter(ProgressMode::Plain);
-        assert_eq!(plain.text(300, 0, 2.0), "300/700 samples (43 %), 100 samples/s, 4 s left");
-        assert_eq!(plain.text(300, 7200, 2.0), "300/700 samples (43 %), 100 samples/s, 7.2 kB, 3.6 kB/s, 4 s left");
-        assert_eq!(plain.text(700, 7200, 2.0), "700 samples, 300 samples/s, 7.2 kB, 3.6 kB/s, 2.0 s");
-        assert!(meter(ProgressMode::Bar).text(300, 0, 2.0).starts_with("████████░░░░░░░░░░░░ 300/700"));
-        let line: serde_json::Value = serde_json::from_str(&meter(ProgressMode::Json).text(300, 7200, 2.0)).unwrap();
-        assert_eq!((&line["samples_per_second"], &line["bytes_per_second"]), (&json!(100.0), &json!(3600.0)));
+        let meter = Rate::new(ProgressMode::None, true, "samples", 100, 700);
+        let text = |done, bytes| meter.moment(done, bytes, 2.0).text;
+        assert_eq!(text(300, 0), "300/700 samples (43 %), 100 samples/s, 4 s left");
+        assert_eq!(text(300, 7200), "300/700 samples (43 %), 100 samples/s, 7.2 kB, 3.6 kB/s, 4 s left");
+        assert_eq!(text(700, 7200), "700 samples, 300 samples/s, 7.2 kB, 3.6 kB/s, 2.0 s");
+        let facts = meter.moment(300, 7200, 2.0).facts;
+        assert_eq!((&facts["samples_per_second"], &facts["bytes_per_second"]), (&json!(100.0), &json!(3600.0)));
     }
 }

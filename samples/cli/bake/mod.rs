@@ -21,7 +21,7 @@ use lucerna::{
 
 pub use compute::{Ended, Work};
 pub use join::{JoinArgs, join, joined};
-pub use meter::Meter;
+pub use meter::Rate;
 pub use plan::PlanArgs;
 pub use status::StatusArgs;
 

@@ -31,11 +31,16 @@ impl<'a> Command<'a> {
         let Some(output) = output(words) else {
             return Err(wrong("names no file to write").help("Give it -o FILE"));
         };
+        // An experiment writes a folder; its report is written last.
+        let written = match words.iter().take(2).any(|word| word == "reproduce") {
+            true => Path::new(output).join("report.html").to_string_lossy().into_owned(),
+            false => output.to_owned(),
+        };
         let own = Path::new(output).file_name().map(|name| name.to_string_lossy().into_owned());
         let name: String = name.map_or_else(|| own.unwrap_or_default(), str::to_owned);
         let good = |c: char| if c.is_ascii_alphanumeric() || "._-".contains(c) { c } else { '_' };
         let name: String = name.chars().map(good).take(60).collect();
-        Ok(Self { words, name, output: output.to_owned(), shards })
+        Ok(Self { words, name, output: written, shards })
     }
 
     fn shell(&self) -> String {
@@ -307,5 +312,8 @@ mod tests {
         let snake = text(Format::Snakemake, &[]).unwrap();
         assert!(snake.contains("range(1, 9)") && snake.contains("output: \"out/scene.fiv\""), "{snake}");
         assert!(snake.contains("--shard {wildcards.shard}/8"));
+        let reproduce = words(&["lucerna", "reproduce", "smoke", "-o", "all/smoke"]);
+        let snake = Command::new(&reproduce, None, 8).unwrap().text(Format::Snakemake).unwrap();
+        assert!(snake.contains("output: \"all/smoke/report.html\"") && snake.contains("\"smoke.shards/"), "{snake}");
     }
 }

@@ -163,7 +163,7 @@ impl Cache {
     /// `Output` if it cannot be written.
     pub fn put(&self, key: &Key, layers: &Layers, times: &Times) -> Result<()> {
         let (bytes, _) = image::encode(image::Format::Exr, layers, &WriteOptions::default())?;
-        image::write_atomic(&self.picture(&key.name), &bytes, true)?;
+        sealed::write_bytes(&self.picture(&key.name), &bytes)?;
         let record = Record { key: key.text.clone(), picture: Digest::of(&bytes).hex(), times: times.clone() };
         sealed::write(&self.text(&key.name), &record)?;
         self.seen.lock().unwrap_or_else(PoisonError::into_inner).insert(key.name.clone(), Some(record));

@@ -3,9 +3,10 @@
 use std::{
     path::{Path, PathBuf},
     process::ExitCode,
+    time::Instant,
 };
 
-use lucerna::{Result, gpu::Gpu};
+use lucerna::{Result, bake::Shard, gpu::Gpu};
 use serde_json::json;
 
 use super::{
@@ -14,13 +15,15 @@ use super::{
     file::{self, BUILTIN},
     place::Folders,
     results::Results,
-    run::{self, Context, Planned},
+    run::{self, Context, Planned, Rendered, Stopped},
 };
 use crate::{
     args::{DeviceArgs, TalkArgs},
+    bake,
     console::{self, Console},
     program::STOPPED_EARLY,
     progress::ProgressMode,
+    reference::Span,
     signals::Interrupt,
 };
 
@@ -50,6 +53,16 @@ pub struct ReproduceArgs {
     /// List the pictures to render, and the existing pictures, then stop
     #[arg(long)]
     pub dry_run: bool,
+
+    /// Render only the pictures of part I of N, for several machines with devices of one kind, and write no report. `auto`: the part of this
+    /// task in an array job of Slurm, Grid Engine or Kubernetes; `auto/N`: of N parts. The same command without --shard renders what is
+    /// missing and writes the report
+    #[arg(long, value_name = "I/N|auto", value_parser = bake::shard)]
+    pub shard: Option<Shard>,
+
+    /// Start no picture that would end after this time: 90, 90s, 10m, 1h30m. Exit code 8 if pictures are missing then
+    #[arg(long, value_name = "TIME")]
+    pub time_limit: Option<Span>,
 
     /// Print one JSON document about the run on stdout
     #[arg(long)]
@@ -90,6 +103,7 @@ pub fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCode> {
         list(args.json)?;
         return Ok(ExitCode::SUCCESS);
     };
+    let begun = Instant::now();
     let experiment = file::open(asked, args.quick)?;
     let interrupt = Interrupt::install();
     let quick = if args.quick { "-quick" } else { "" };
@@ -104,24 +118,29 @@ pub fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCode> {
         progress: args.progress,
         interrupt: &interrupt,
         command: format!("lucerna reproduce {asked}{}", if args.quick { " --quick" } else { "" }),
+        shard: args.shard,
+        until: args.time_limit.map(|limit| begun + limit.0),
         dry: args.dry_run,
     };
-    let (results, planned) = run::run(experiment, &context)?;
+    let Rendered { results, planned, stopped } = run::run(experiment, &context)?;
     if args.dry_run {
         return dry(&planned, args.json).map(|()| ExitCode::SUCCESS);
     }
-    if results.runs.is_empty() {
+    let (done, missing) = (results.runs.len(), results.missing);
+    let asked_to_stop = stopped == Some(Stopped::Request);
+    if asked_to_stop && done == 0 {
         return Ok(ExitCode::from(interrupt.exit_code()));
+    }
+    if let Some(shard) = args.shard {
+        return of_shard(shard, &results, &folder, stopped, args.json, console);
     }
     results.write_manifest(&folder)?;
     interrupt.keep();
-    let all = results.runs.len() + results.missing;
-    if interrupt.requested() && results.missing > 0 {
+    if let Some(stopped) = stopped.filter(|_| missing > 0) {
         // After a stop no report is written, because its measures may take long.
-        let done = results.runs.len();
-        let folder = folder.display();
+        let (all, folder) = (done + missing, folder.display());
         console.info(&format!(
-            "stopped: {done} of {all} runs are done; the same command continues, `lucerna report {folder}` shows the finished runs"
+            "{stopped}: {done} of {all} runs are done; the same command continues, `lucerna report {folder}` shows the finished runs"
         ));
         return Ok(ExitCode::from(STOPPED_EARLY));
     }
@@ -129,6 +148,35 @@ pub fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCode> {
     if results.missing > 0 {
         return Ok(ExitCode::from(STOPPED_EARLY));
     }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The end of a shard: no report, because runs of other shards may be missing.
+fn of_shard(
+    shard: Shard,
+    results: &Results,
+    folder: &Path,
+    stopped: Option<Stopped>,
+    as_json: bool,
+    console: Console,
+) -> Result<ExitCode> {
+    let (done, missing, shown) = (results.runs.len(), results.missing, folder.display());
+    if as_json {
+        let name = &results.experiment.name;
+        console::print_json(&json!({
+            "experiment": name, "shard": shard.to_string(), "folder": folder, "runs": done, "missing": missing,
+        }))?;
+    }
+    if missing > 0 {
+        let (why, all) = (stopped.map_or("stopped".into(), |stopped| stopped.to_string()), done + missing);
+        console.info(&format!(
+            "{shown}: {why}: {done} of {all} runs of shard {shard} are done; the same command continues"
+        ));
+        return Ok(ExitCode::from(STOPPED_EARLY));
+    }
+    console.info(&format!(
+        "{shown}: shard {shard} is done, {done} runs; the same command without --shard renders what is missing and writes the report"
+    ));
     Ok(ExitCode::SUCCESS)
 }
 

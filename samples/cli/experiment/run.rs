@@ -1,9 +1,13 @@
 //! Renders the missing pictures of an experiment.
 
-use std::{collections::BTreeMap, time::Instant};
+use std::{
+    collections::BTreeMap,
+    time::{Duration, Instant},
+};
 
 use lucerna::{
     Error, ErrorKind, Result,
+    bake::Shard,
     gpu::Gpu,
     image::{Layer, Layers, Metadata},
 };
@@ -39,6 +43,10 @@ pub struct Context<'a> {
     pub interrupt: &'a Interrupt,
     /// The command line, for the report.
     pub command: String,
+    /// Renders only the runs of this part.
+    pub shard: Option<Shard>,
+    /// Starts no run that would end later.
+    pub until: Option<Instant>,
     /// Lists the pictures without rendering them.
     pub dry: bool,
 }
@@ -50,17 +58,41 @@ pub struct Planned {
     pub there: bool,
 }
 
-/// Renders all missing pictures, scene after scene. With `dry` it renders none.
+/// Why pictures are missing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stopped {
+    /// A signal.
+    Request,
+    TimeLimit,
+}
+
+impl std::fmt::Display for Stopped {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Request => "stopped",
+            Self::TimeLimit => "time limit: stopped",
+        })
+    }
+}
+
+/// The result of a run.
+#[derive(Debug)]
+pub struct Rendered {
+    pub results: Results,
+    pub planned: Vec<Planned>,
+    pub stopped: Option<Stopped>,
+}
+
+/// Renders all missing pictures of the shard, scene after scene. With `dry` it renders none.
 ///
 /// # Errors
 /// `Input` for scenes that cannot be read; any error of rendering.
-pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Vec<Planned>)> {
+pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<Rendered> {
     let Context { gpu, cache: kept, console, .. } = context;
     let mut skipped = Vec::new();
     let needs = available(&experiment, &mut skipped)?;
     // All scenes are read first, so that missing files are reported at once and the amount of work is known.
     let mut steps: Vec<(&Scene, Vec<Step>)> = Vec::new();
-    let mut counts = BTreeMap::<String, usize>::new();
     let mut first = None;
     for entry in &experiment.scenes {
         let Some(loaded) = place::load(&experiment, entry, &context.folders)? else {
@@ -71,17 +103,27 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
             continue;
         };
         let list = of_scene(&experiment, entry, &loaded, &needs);
-        list.iter().for_each(|step| *counts.entry(experiment.methods[step.method].name.clone()).or_default() += 1);
         steps.push((entry, list));
-        // Keeps the first scene, because it is rendered next.
-        first.get_or_insert(loaded);
+        // Keeps the first scene, because it is probably rendered next.
+        first.get_or_insert((entry.name.clone(), loaded));
     }
-    let total: usize = counts.values().sum();
-    if total == 0 {
+    let all: usize = steps.iter().map(|(_, list)| list.len()).sum();
+    if all == 0 {
         return Err(Error::input("there is no picture to render").help("Scenes or programs were skipped; see above"));
     }
+    if let Some(shard) = context.shard {
+        let (mine, mut index) = (shard.range(all as u64), 0..);
+        steps.iter_mut().for_each(|(_, list)| list.retain(|_| index.next().is_some_and(|at| mine.contains(&at))));
+        steps.retain(|(_, list)| !list.is_empty());
+    }
+    let mut counts = BTreeMap::<String, usize>::new();
+    for step in steps.iter().flat_map(|(_, list)| list) {
+        *counts.entry(experiment.methods[step.method].name.clone()).or_default() += 1;
+    }
+    let total: usize = counts.values().sum();
+    let part = context.shard.map(|shard| format!(" of {all}, shard {shard}")).unwrap_or_default();
     console.info(&format!(
-        "{}: {total} runs, {} scenes, {} on {}",
+        "{}: {total} runs{part}, {} scenes, {} on {}",
         experiment.name,
         steps.len(),
         experiment.size,
@@ -89,10 +131,10 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
     ));
     let device = cache::device(gpu);
     let mut progress = Progress::new(context.progress, console.is_quiet() || context.dry, counts);
-    let (mut planned, mut failed) = (Vec::new(), 0);
+    let (mut planned, mut failed, mut stopped) = (Vec::new(), 0, None);
     'all: for (entry, list) in &steps {
-        let loaded = match first.take() {
-            Some(loaded) => loaded,
+        let loaded = match first.take().filter(|(name, _)| *name == entry.name) {
+            Some((_, loaded)) => loaded,
             None => match place::load(&experiment, entry, &context.folders)? {
                 Some(loaded) => loaded,
                 None => {
@@ -105,6 +147,7 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
         let mut warm = Warm::new(gpu, &loaded, kept.shared());
         for step in list {
             if context.interrupt.requested() {
+                stopped = Some(Stopped::Request);
                 break 'all;
             }
             let method = &experiment.methods[step.method];
@@ -115,13 +158,24 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
             let begun = Instant::now();
             let mut seconds = None;
             if !there && !context.dry {
+                let spent = Duration::from_secs_f64(progress.slowest(&method.name));
+                if context.until.is_some_and(|until| Instant::now() + spent >= until) {
+                    stopped = Some(Stopped::TimeLimit);
+                    break 'all;
+                }
                 match one.render(&mut warm, context, &key) {
                     Ok(true) => {
                         there = true;
                         seconds = Some(begun.elapsed().as_secs_f64());
                     }
-                    Ok(false) => break 'all,
-                    Err(error) if context.interrupt.requested() && program::by_request(&error) => break 'all,
+                    Ok(false) => {
+                        stopped = Some(Stopped::Request);
+                        break 'all;
+                    }
+                    Err(error) if context.interrupt.requested() && program::by_request(&error) => {
+                        stopped = Some(Stopped::Request);
+                        break 'all;
+                    }
                     // A failed picture of an optional program must not end an experiment that takes hours.
                     Err(error) if method.if_missing == IfMissing::Skip && error.kind() != ErrorKind::DeviceLost => {
                         console.warning(&format!("{what} is skipped: {error}"));
@@ -135,11 +189,12 @@ pub fn run(experiment: Experiment, context: &Context<'_>) -> Result<(Results, Ve
             planned.push(Planned { done, there });
         }
     }
-    progress.finish();
+    drop(progress);
     let runs: Vec<Done> = planned.iter().filter(|run| run.there).map(|run| run.done.clone()).collect();
     let missing = total - runs.len() - failed;
     let facts = facts(&experiment, context);
-    Ok((Results { experiment, runs, skipped, missing, facts, cache: (*kept).clone() }, planned))
+    let results = Results { experiment, runs, skipped, missing, facts, cache: (*kept).clone() };
+    Ok(Rendered { results, planned, stopped })
 }
 
 /// Versions of the programs that methods need; `None` if a program is missing and its method may be skipped.

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use lucerna::{Error, Result, image};
+use lucerna::{Error, ErrorKind, Result, image};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Value, json};
 
@@ -17,7 +17,28 @@ use crate::config;
 pub fn write(path: &Path, value: &impl Serialize) -> Result<()> {
     let value = config::to_value(value)?;
     let digest = digest(&value);
-    image::write_atomic(path, format!("{:#}\n", json!({ "digest": digest, "holds": value })).as_bytes(), true)
+    write_bytes(path, format!("{:#}\n", json!({ "digest": digest, "holds": value })).as_bytes())
+}
+
+/// Writes a file of a report's folder; overwrites an existing file.
+///
+/// # Errors
+/// `Output` if the file cannot be written, or if its name is a link: the folder may come from an untrusted source.
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    refuse_link(path)?;
+    image::write_atomic(path, bytes, true)
+}
+
+/// # Errors
+/// `Output` if the name is a link.
+pub fn refuse_link(path: &Path) -> Result<()> {
+    match path.symlink_metadata().is_ok_and(|metadata| metadata.is_symlink()) {
+        true => {
+            let error = Error::new(ErrorKind::Output, "is a link, and its target does not belong to the experiment");
+            Err(error.in_file(path).help("Remove it"))
+        }
+        false => Ok(()),
+    }
 }
 
 /// Reads a file; `None` if it does not exist.

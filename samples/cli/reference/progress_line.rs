@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use lucerna::tracer::Progress;
 
-use crate::progress::{ProgressMode, span};
+use crate::progress::{Meter, Moment, ProgressMode, into_facts, span};
 
 /// The goals of a run. The first one that is reached ends it.
 #[derive(Clone, Copy, Debug)]
@@ -39,12 +39,10 @@ impl Goals {
 /// Shows progress from time to time.
 #[derive(Debug)]
 pub struct ProgressLine {
-    mode: ProgressMode,
+    meter: Meter,
     goals: Goals,
-    started: Instant,
     /// Progress at the start of this run.
     before: Progress,
-    shown: Option<Instant>,
     /// The last estimated error, and the number of samples at that time.
     error: Option<(f64, f64)>,
 }
@@ -52,20 +50,19 @@ pub struct ProgressLine {
 impl ProgressLine {
     /// A progress line for a run with `goals`. `before`: the progress of earlier runs.
     pub fn new(mode: ProgressMode, quiet: bool, goals: Goals, before: Progress) -> Self {
-        let mode = mode.here(quiet, false);
-        Self { mode, goals, started: Instant::now(), before, shown: None, error: None }
+        Self { meter: Meter::new(mode, quiet, false), goals, before, error: None }
     }
 
     /// This run began at `begun`, when `before` paths had been traced.
     pub fn traced(&mut self, begun: Instant, before: u64) {
         let share = before as f64 / self.before.paths.max(1) as f64;
         self.before = Progress { samples: self.before.samples * share, paths: before, ..self.before };
-        self.started = begun;
+        self.meter.since(begun);
     }
 
     /// Whether the line shows the error.
     pub fn wants_error(&self) -> bool {
-        self.mode != ProgressMode::None
+        self.meter.shows()
     }
 
     /// Records an estimated error.
@@ -75,7 +72,7 @@ impl ProgressLine {
 
     /// Seconds of this run.
     pub fn seconds(&self) -> f64 {
-        self.started.elapsed().as_secs_f64()
+        self.meter.seconds()
     }
 
     /// Paths per second in this run.
@@ -83,48 +80,28 @@ impl ProgressLine {
         (now.paths - self.before.paths) as f64 / self.seconds().max(1e-9)
     }
 
-    /// Prints the line, unless it was printed a short time ago.
+    /// Shows the line, if it is due.
     pub fn show(&mut self, now: &Progress) {
-        let pause = match self.mode {
-            ProgressMode::Bar => Duration::from_millis(200),
-            _ => Duration::from_secs(5),
-        };
-        if self.mode == ProgressMode::None || self.shown.is_some_and(|at| at.elapsed() < pause) {
-            return;
+        if self.meter.due() {
+            self.line(now, false);
         }
-        if self.shown.is_none() && self.mode != ProgressMode::Bar {
-            // Short runs print only the last line.
-            self.shown = Some(Instant::now());
-            return;
-        }
-        self.shown = Some(Instant::now());
-        self.line(now, false);
     }
 
-    /// Prints the last line.
+    /// Shows the last line.
     pub fn finish(&mut self, now: &Progress, error: f64) {
         self.error(now, error);
-        if self.mode != ProgressMode::None {
+        if self.meter.shows() {
             self.line(now, true);
         }
     }
 
-    fn line(&self, now: &Progress, last: bool) {
+    fn line(&mut self, now: &Progress, last: bool) {
+        let (seconds, rate) = (self.seconds(), self.rate(now));
         let done = now.samples - self.before.samples;
-        let (left, by) = self.goals.left(now.samples, done, self.seconds(), self.error);
+        let (left, by) = self.goals.left(now.samples, done, seconds, self.error);
         let error = self.error.map(|(error, _)| error).filter(|e| e.is_finite());
-        if self.mode == ProgressMode::Json {
-            let text = serde_json::json!({
-                "samples": now.samples, "target": self.goals.samples, "paths_per_second": self.rate(now),
-                "relative_error": error, "target_error": self.goals.error,
-                "seconds_left": if last { 0.0 } else { left }, "ends_by": by, "done": last,
-            });
-            self.mode.progress_line(&text.to_string(), last);
-            return;
-        }
-        self.mode.share(if last { 1.0 } else { now.samples / self.goals.samples as f64 });
         let samples = if now.samples < 10.0 { format!("{:.1}", now.samples) } else { format!("{:.0}", now.samples) };
-        let mut text = format!("{samples}/{} samples, {} samples/s", self.goals.samples, count(self.rate(now)));
+        let mut text = format!("{samples}/{} samples, {} samples/s", self.goals.samples, count(rate));
         if let Some(error) = error {
             text += &format!(", relative error {error:.2e}");
             if let Some(goal) = self.goals.error {
@@ -132,10 +109,21 @@ impl ProgressLine {
             }
         }
         match last {
-            true => text += &format!(", {:.1} s", self.seconds()),
+            true => text += &format!(", {seconds:.1} s"),
             false => text += &format!(", {} left", span(left)),
         }
-        self.mode.progress_line(&text, last);
+        let facts = serde_json::json!({
+            "paths_per_second": rate, "relative_error": error, "target_error": self.goals.error, "ends_by": by,
+        });
+        self.meter.show(&Moment {
+            done: now.samples,
+            total: self.goals.samples as f64,
+            unit: "samples",
+            seconds_left: Some(left),
+            text,
+            facts: into_facts(facts),
+            last,
+        });
     }
 }
 

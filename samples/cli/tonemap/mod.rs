@@ -35,7 +35,7 @@ use crate::{
     config,
     console::{self, Console},
     program::{self, STOPPED_EARLY},
-    progress::Progress,
+    progress::Frames,
     settings_list,
     signals::Interrupt,
 };
@@ -105,7 +105,7 @@ fn join(writer: Writer<'_>) -> Result<(Vec<String>, Duration)> {
 /// The results of all pictures.
 struct Results {
     console: Console,
-    progress: Progress,
+    progress: Frames,
     done: Vec<Done>,
     failed: Vec<(String, Error)>,
     /// A frame of the current sequence has failed.
@@ -114,7 +114,7 @@ struct Results {
 
 impl Results {
     fn new(args: &TonemapArgs, console: Console, count: usize) -> Self {
-        let progress = Progress::new(args.progress, console.is_quiet(), count as u64);
+        let progress = Frames::new(args.progress, console.is_quiet(), count as u64);
         Self { console, progress, done: Vec::new(), failed: Vec::new(), lost: false }
     }
 
@@ -226,8 +226,7 @@ pub fn run(args: &TonemapArgs, console: Console) -> Result<ExitCode> {
         }
         Ok(about)
     })?;
-    let Results { progress, done, failed, .. } = results;
-    progress.finish();
+    let Results { done, failed, .. } = results;
     if args.json {
         console::print_json(&json_of(&run, &about, &done, &failed, inputs.len())?)?;
     }

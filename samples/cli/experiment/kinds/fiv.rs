@@ -178,6 +178,7 @@ fn vectors(
                 std::fs::create_dir_all(&folder).map_err(|e| {
                     Error::new(lucerna::ErrorKind::Output, "cannot be made").in_file(&folder).caused_by(e)
                 })?;
+                sealed::refuse_link(&file)?;
                 computed.0.write(&file, true)?;
                 let vectors = Digest::of(&whole_file(&file)?).hex();
                 sealed::write(&cost, &Cost { vectors, seconds: computed.1 })?;
