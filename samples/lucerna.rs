@@ -11,6 +11,7 @@ use lucerna_samples::{
     console::{self, Console},
     devices,
     experiment::command::{self as experiment, ReportArgs, ReproduceArgs},
+    export_gltf::{self, ExportGltfArgs},
     export_pov::{self, ExportPovArgs},
     info, inspect, program,
     reference::{self, ReferenceArgs},
@@ -59,6 +60,8 @@ enum Command {
     Rerun(RerunArgs),
     /// Write a scene and a view as a POV-Ray file, and render it where `povray` is installed
     ExportPov(Box<ExportPovArgs>),
+    /// Write a scene as one glTF 2.0 file, for other programs
+    ExportGltf(Box<ExportGltfArgs>),
     /// Measure how far images are from a reference
     Compare(Box<CompareArgs>),
     /// Develop HDR pictures for a screen: EXR, .hdr, PFM to PNG, JPEG, EXR (also as the program `tonemap`)
@@ -127,6 +130,7 @@ impl Command {
             | Self::Settings { talk, .. }
             | Self::List { talk, .. } => talk.console(),
             Self::ExportPov(args) => args.talk.console(),
+            Self::ExportGltf(args) => args.talk.console(),
         }
     }
 }
@@ -165,6 +169,7 @@ fn serve(command: Command, console: Console) -> Result<()> {
             }
         }
         Command::ExportPov(args) => export_pov::run(&args),
+        Command::ExportGltf(args) => export_gltf::run(&args),
         Command::Devices { require_gpu, json, .. } => {
             let list = devices::list(require_gpu)?;
             match json {

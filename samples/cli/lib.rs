@@ -8,6 +8,7 @@ pub mod config;
 pub mod console;
 pub mod devices;
 pub mod experiment;
+pub mod export_gltf;
 pub mod export_pov;
 pub mod exposure;
 pub mod fingerprint;

@@ -11,6 +11,8 @@ mod bake;
 mod compare;
 #[path = "../cli/experiment.rs"]
 mod experiment;
+#[path = "../cli/export_gltf.rs"]
+mod export_gltf;
 #[path = "../cli/export_pov.rs"]
 mod export_pov;
 #[path = "../cli/faults.rs"]
