@@ -328,6 +328,17 @@ fn the_sky_is_sampled_by_its_light() {
         let wanted: Vec<f64> = map.columns.iter().map(|c| f64::from(c.probability) * f64::from(COUNT)).collect();
         let p = chi_square(&counts, &wanted);
         assert!(p > sidak(1), "p = {p:e}");
+        // Within a cell directions are uniform in solid angle, which is in the cosine of the polar angle.
+        let mut shares = [0.0; 16];
+        for d in &drawn {
+            let d = direction(d);
+            let row = (d.x.hypot(d.z).atan2(d.y) / PI * 12.0).floor().min(11.0);
+            let h = |row: f64| (0.5 * PI * row / 12.0).sin().powi(2);
+            let share = (0.5 * (1.0 - d.y) - h(row)) / (h(row + 1.0) - h(row));
+            shares[((share.max(0.0) * 16.0) as usize).min(15)] += 1.0;
+        }
+        let p = chi_square(&shares, &[f64::from(COUNT) / 16.0; 16]);
+        assert!(p > sidak(1), "within cells p = {p:e}: {shares:?}");
         check_mean("solid angle of the sphere", drawn.iter().map(|d| 1.0 / f64::from(d[3])), 4.0 * PI);
         let light = drawn.iter().zip(&values).map(|(d, v)| f64::from(v[0]) / f64::from(d[3]));
         check_mean("light of the sky", light, {
