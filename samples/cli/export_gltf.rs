@@ -123,7 +123,9 @@ pub fn export(scene: &Scene, pose: &Pose, view: &View) -> Result<(Vec<u8>, Vec<S
     for (index, node) in scene.nodes.iter().enumerate() {
         let mut placed = Map::new();
         let mut world = pose.world[index];
-        if let Some((number, mesh)) = node.mesh.and_then(|mesh| Some((mesh, scene.meshes.get(mesh as usize)?))) {
+        let mesh = node.mesh.and_then(|mesh| Some((mesh, scene.meshes.get(mesh as usize)?)));
+        // glTF forbids meshes without primitives.
+        if let Some((number, mesh)) = mesh.filter(|(_, mesh)| mesh.primitives.iter().any(|p| !p.indices.is_empty())) {
             let deforms = |p: &Primitive| !p.morphs.is_empty() || (node.skin.is_some() && !p.joints.is_empty());
             let written = if mesh.primitives.iter().any(deforms) {
                 world = Mat4::IDENTITY;

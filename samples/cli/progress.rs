@@ -129,9 +129,11 @@ fn line(mode: ProgressMode, moment: &Moment, seconds: f64) -> String {
     let Moment { done, total, unit, seconds_left, text, facts, last } = moment;
     let share = if *last { 1.0 } else { done / total.max(f64::MIN_POSITIVE) };
     let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 };
+    // Names in the text may come from untrusted files: they must not begin another line.
+    let text = console::legible(text).replace('\n', " ");
     match mode {
         ProgressMode::Auto | ProgressMode::None => String::new(),
-        ProgressMode::Plain => text.clone(),
+        ProgressMode::Plain => text,
         ProgressMode::Bar => {
             let filled = (share * BAR as f64) as usize;
             format!("{}{} {text}", "█".repeat(filled), "░".repeat(BAR - filled))
@@ -262,6 +264,13 @@ mod tests {
         });
         assert_eq!(read(false), expected);
         assert_eq!([&read(true)["seconds_left"], &read(true)["last"]], [&json!(0.0), &json!(true)]);
+    }
+
+    #[test]
+    fn names_begin_no_line_and_move_no_cursor() {
+        let text = "a\nopenjd_progress: 100\u{1b}[2J".to_owned();
+        let shown = line(ProgressMode::OpenJd, &Moment { text, ..moment(false) }, 1.0);
+        assert_eq!(shown, "openjd_progress: 37.5\nopenjd_status: a openjd_progress: 100\\u{1b}[2J");
     }
 
     #[test]

@@ -2,8 +2,8 @@
 
 mod compute;
 mod join;
-mod meter;
 mod plan;
+mod rate;
 mod scripts;
 mod status;
 
@@ -21,8 +21,8 @@ use lucerna::{
 
 pub use compute::{Ended, Work};
 pub use join::{JoinArgs, join, joined};
-pub use meter::Rate;
 pub use plan::PlanArgs;
+pub use rate::Rate;
 pub use status::StatusArgs;
 
 use crate::{args::TalkArgs, console::Console, reference::Span, signals::Interrupt};
