@@ -221,6 +221,7 @@ fn benchmark(
         trace_uvs: traced.trace_uvs,
         trace_colors: traced.trace_colors,
         trace_scene: traced.trace_scene,
+        scene_at: traced.scene_at,
         trace_accel: traced.trace_accel,
         materials: traced.materials,
         scene_textures: traced.scene_textures,

@@ -129,6 +129,7 @@ fn bands_join_to_the_bits_of_a_picture_that_is_traced_as_a_whole() {
         whole.run(5, |_| true).unwrap();
         assert!(joined.sums().unwrap() == whole.sums().unwrap());
         // A stopped band has no bytes; other pictures are other jobs; a damaged unit is named.
+        first.set_tile(Some(64));
         assert_eq!(first.band(units[0], 3, || false).unwrap_err().exit_code(), 130);
         for other in [first.bands(4, &about).unwrap(), first.bands(3, &json!({ "scene": "b" })).unwrap()] {
             assert!(Store::create(store.folder(), other).is_err());

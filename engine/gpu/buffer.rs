@@ -102,11 +102,13 @@ impl OwnedBuffer {
         let size = desc.size.max(16).next_multiple_of(4);
         // What shaders read, acceleration structures may be built from.
         let storage = desc.place == Place::Device && desc.usage.contains(vk::BufferUsageFlags::STORAGE_BUFFER);
-        let rays = if context.caps.ray_query && storage {
-            vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS
-                | vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR
-        } else {
-            vk::BufferUsageFlags::empty()
+        let rays = match (storage, context.caps.ray_query) {
+            (false, _) => vk::BufferUsageFlags::empty(),
+            (true, false) => vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS,
+            (true, true) => {
+                vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS
+                    | vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR
+            }
         };
         let info = vk::BufferCreateInfo::default()
             .size(size)
@@ -176,14 +178,20 @@ impl OwnedBuffer {
         self.0.raw
     }
 
-    /// Where it lies for the device; `None` unless shaders read it and [`super::Caps::ray_query`].
+    /// Where it lies for the device; `None` unless it is on the device and shaders read it.
     pub fn address(&self) -> Option<vk::DeviceAddress> {
         let Inner { context, desc, raw, .. } = &*self.0;
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
-        let has = context.caps.ray_query && desc.place == Place::Device && desc.usage.intersects(usage);
+        let has = desc.place == Place::Device && desc.usage.intersects(usage);
         let info = vk::BufferDeviceAddressInfo::default().buffer(*raw);
         // SAFETY: a living buffer that was made with a usage that has addresses, on a device with that feature.
         has.then(|| unsafe { context.device.get_buffer_device_address(&info) })
+    }
+
+    /// [`Self::address`] for shaders: the lower word, then the upper one; zero if there is none.
+    pub fn address_words(&self) -> [u32; 2] {
+        let address = self.address().unwrap_or(0);
+        [address as u32, (address >> 32) as u32]
     }
 
     /// Writes `data` at `offset` bytes. The memory is coherent: a submission after this call sees it. The caller sees to it

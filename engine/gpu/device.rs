@@ -305,8 +305,6 @@ impl Context {
             candidate.queue_family.ok_or_else(|| Error::new(ErrorKind::NoDevice, "the chosen device has no queue"))?;
 
         let mut features = candidate.features.wanted();
-        // Device addresses serve only acceleration structures; without them they would only cost.
-        features.v12.buffer_device_address = vk::Bool32::from(caps.ray_query);
         let has = |name: &std::ffi::CStr| facts.extensions.contains(&*name.to_string_lossy());
         let mut extensions: Vec<&std::ffi::CStr> = Vec::new();
         if !options.window_extensions.is_empty() {
@@ -340,7 +338,7 @@ impl Context {
             device: device.clone(),
             physical_device: candidate.physical,
             debug_settings,
-            buffer_device_address: caps.ray_query,
+            buffer_device_address: true,
             allocation_sizes: AllocationSizes::new(32 << 20, 8 << 20)
                 .with_max_device_memblock_size(256 << 20)
                 .with_max_host_memblock_size(64 << 20),

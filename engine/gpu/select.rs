@@ -66,9 +66,9 @@ impl DeviceFacts {
 }
 
 /// Extensions and features that ray queries take.
-const RAY_QUERY: ([&str; 3], [&str; 3]) = (
+const RAY_QUERY: ([&str; 3], [&str; 2]) = (
     ["VK_KHR_acceleration_structure", "VK_KHR_deferred_host_operations", "VK_KHR_ray_query"],
-    ["accelerationStructure", "bufferDeviceAddress", "rayQuery"],
+    ["accelerationStructure", "rayQuery"],
 );
 
 impl DeviceFacts {
@@ -111,6 +111,7 @@ impl Requirements {
                 "synchronization2",
                 "maintenance4",
                 "scalarBlockLayout",
+                "bufferDeviceAddress",
                 "independentBlend",
                 "fragmentStoresAndAtomics",
             ],

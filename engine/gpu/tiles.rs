@@ -28,6 +28,7 @@ pub struct Tiles {
     last: u64,
     granule: u64,
     most: u64,
+    aim: Duration,
 }
 
 /// What a tile should take.
@@ -40,13 +41,20 @@ impl Tiles {
     /// granule.
     pub fn new(total: u64, granule: u32) -> Self {
         let granule = u64::from(granule.max(1));
-        Self { total, begun: 0, size: granule, last: 0, granule, most: u64::MAX / 2 }
+        Self { total, begun: 0, size: granule, last: 0, granule, most: u64::MAX / 2, aim: AIM }
     }
 
     /// No tile has more than `items` (but at least one granule): for limits of dispatch sizes, or of loop turns.
     #[must_use]
     pub fn at_most(mut self, items: u64) -> Self {
         self.most = items.max(self.granule);
+        self
+    }
+
+    /// What a tile should take, instead of 30 ms.
+    #[must_use]
+    pub fn aim(mut self, aim: Duration) -> Self {
+        self.aim = aim;
         self
     }
 
@@ -78,7 +86,7 @@ impl Tiles {
     /// Says how long the last tile took, from submission to completion.
     pub fn took(&mut self, time: Duration) {
         let nanos = time.as_nanos().max(1);
-        let ideal = u128::from(self.last.max(1)) * AIM.as_nanos() / nanos;
+        let ideal = u128::from(self.last.max(1)) * self.aim.as_nanos() / nanos;
         let next = u64::try_from(ideal).unwrap_or(u64::MAX).min(self.last.saturating_mul(GROWTH)).min(self.most);
         self.size = (next / self.granule * self.granule).max(self.granule);
     }

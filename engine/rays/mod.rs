@@ -26,8 +26,8 @@ pub(crate) use traced::traced;
 
 use crate::{
     Error, ErrorKind, Result,
-    gpu::{Gpu, OwnedBuffer},
-    graph::{Accel, Buffer, Graph, Image},
+    gpu::{BufferDesc, Gpu, OwnedBuffer},
+    graph::{Accel, Buffer, Graph, Image, Uniform},
     resident::{Handles, Resident},
     scene::{Aabb, Scene},
     shaders::{
@@ -52,6 +52,8 @@ const MOST: usize = 1 << 24;
 pub struct Rays {
     nodes: OwnedBuffer,
     triangles: OwnedBuffer,
+    /// Copy of the instances of the scene.
+    instances: OwnedBuffer,
     shapes: Vec<Shape>,
     uses: Vec<Use>,
     /// Merged instances, with their transforms at the time when the tree was built.
@@ -70,6 +72,8 @@ pub struct RayHandles {
     pub trace_nodes: Buffer,
     pub trace_triangles: Buffer,
     pub trace_instances: Buffer,
+    /// Addresses of the trees and of the scene.
+    pub scene_at: Uniform<types::SceneAddresses>,
     pub trace_indices: Buffer,
     pub trace_uvs: Buffer,
     pub trace_colors: Buffer,
@@ -98,7 +102,7 @@ impl Rays {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn in_compute(gpu: &Gpu, scene: &Scene, _resident: &Resident) -> Result<Self> {
+    pub fn in_compute(gpu: &Gpu, scene: &Scene, resident: &Resident) -> Result<Self> {
         let mut out = Encoded::default();
         // An upper bound, because the number of uses is not known yet. Every node has eight children, except the last one of each level.
         let pieces: usize =
@@ -126,6 +130,7 @@ impl Rays {
         Ok(Self {
             nodes: upload("rays.nodes", bytemuck::cast_slice(&out.nodes))?,
             triangles: upload("rays.triangles", bytemuck::cast_slice(&out.records))?,
+            instances: OwnedBuffer::new(gpu, "rays.scene", BufferDesc::device(resident.instances_size()))?,
             query: None,
             shapes,
             uses,
@@ -159,6 +164,9 @@ impl Rays {
         encode(&top, 0, 1, &mut words);
         let staging = graph.buffer_from("rays.top", &words);
         graph.copy_buffer(staging, nodes.range(0..staging.size));
+        // Those of the frame have no address.
+        let placed = graph.import_buffer(&self.instances);
+        graph.copy_buffer(scene.instances, placed.range(0..scene.instances.size));
         let triangles = graph.import_buffer(&self.triangles);
         let used = self.uses.iter().filter_map(|u| Some((self.shapes.get(u.shape)?, u.first_instance)));
         let refitted: Vec<_> = used.filter(|(s, _)| s.deformed || (s.merged && self.disturbed)).collect();
@@ -167,6 +175,12 @@ impl Rays {
             trace_nodes: nodes,
             trace_triangles: triangles,
             trace_instances: graph.buffer_from("rays.instances", &instances),
+            scene_at: graph.uniform(&types::SceneAddresses {
+                nodes: self.nodes.address_words(),
+                triangles: self.triangles.address_words(),
+                instances: self.instances.address_words(),
+                ..scene.at
+            }),
             trace_indices: scene.indices,
             trace_uvs: scene.uvs,
             trace_colors: scene.colors,

@@ -11,6 +11,7 @@ macro_rules! traced {
             trace_nodes: rays.trace_nodes,
             trace_triangles: rays.trace_triangles,
             trace_instances: rays.trace_instances,
+            scene_at: rays.scene_at,
             trace_indices: rays.trace_indices,
             trace_uvs: rays.trace_uvs,
             trace_colors: rays.trace_colors,

@@ -151,6 +151,8 @@ pub struct Handles {
     pub environment: Image,
     /// Depth with stencil, as the device has it.
     pub depth_stencil: Format,
+    /// Addresses of these buffers, and zero for those that have none.
+    pub(crate) at: types::SceneAddresses,
     /// The same moment on the host.
     pub moment: Arc<Moment>,
 }
@@ -301,8 +303,23 @@ impl Resident {
             textures,
             environment: graph.import_image(&self.environment).repeat(),
             depth_stencil: self.depth_stencil,
+            at: types::SceneAddresses {
+                indices: self.indices.address_words(),
+                positions: self.positions.address_words(),
+                normals: self.normals.address_words(),
+                tangents: self.tangents.address_words(),
+                uvs: self.uvs.address_words(),
+                colors: self.colors.address_words(),
+                materials: self.materials.address_words(),
+                ..Default::default()
+            },
             moment: Arc::new(moment),
         }
+    }
+
+    /// Size of the instances of a frame, bytes.
+    pub(crate) fn instances_size(&self) -> u64 {
+        (self.items.len().max(1) * size_of::<types::Instance>()) as u64
     }
 
     /// [`Moment::lit_bounds`] in `pose`.

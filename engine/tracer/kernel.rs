@@ -13,20 +13,22 @@ use crate::{
     Result,
     gpu::{BufferDesc, Gpu, OwnedBuffer, OwnedImage},
     graph::{Graph, Image},
-    rays::Rays,
+    rays::{Rays, traced},
     resident::{Handles, Resident},
     scene::{Pose, Scene},
-    shaders::{consts, reference::path as shader, types},
+    shaders::{
+        consts,
+        reference::{path as shader, path_trace},
+        types,
+    },
 };
 
-/// Maximum of slots per dispatch. The buffer of path states has the same size.
+/// Maximum of paths that are traced together. The buffer of path states has the same size.
 const MOST_SLOTS: u64 = 1 << 18;
-/// Maximum of dispatches per submission.
-const MOST_PASSES: u64 = 64;
-/// Rays per path that one invocation traces.
-const RAYS: u32 = 32;
-/// The same on drivers that abort long loops: two rays of at most 30,000 steps stay below the limit.
-const RAYS_LIMITED: u32 = 2;
+/// Maximum of passes per submission.
+const MOST_PASSES: u64 = 512;
+/// Kinds of rays.
+const WAYS: usize = 4;
 
 /// The resources of a scene, except those of [`Resident`].
 #[derive(Debug)]
@@ -38,7 +40,17 @@ pub(super) struct Kernel {
     /// Columns and rows of the environment's importance map.
     cells: [u32; 2],
     lights: Option<Lights>,
-    paths: Option<OwnedBuffer>,
+    paths: Option<Paths>,
+}
+
+/// The states of paths between passes.
+#[derive(Debug)]
+struct Paths {
+    states: OwnedBuffer,
+    hits: OwnedBuffer,
+    lists: OwnedBuffer,
+    /// Counts of paths of even and of odd turns.
+    counts: [OwnedBuffer; 2],
 }
 
 /// The light table of the chosen sources.
@@ -53,23 +65,22 @@ struct Lights {
     nodes: OwnedBuffer,
 }
 
-/// The division of a picture's work into dispatches.
+/// The division of a picture's work into passes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cut {
-    /// Rays per path in one dispatch.
-    rays: u32,
-    /// Dispatches after which all paths have ended.
-    rounds: u32,
-    /// Maximum of slots per dispatch.
+    /// Surfaces after which all paths have ended.
+    surfaces: u32,
+    /// Maximum of paths that are traced together.
     capacity: u64,
     /// The maximum of rays per surface of a path, and the kind of each ray.
-    turns: (u32, [u32; 4]),
+    turns: (u32, [u32; WAYS]),
 }
 
 impl Cut {
     /// Maximum of slots per submission. It also limits small pictures, whose samples are many passes.
     pub fn most(&self) -> u64 {
-        self.capacity * (MOST_PASSES / u64::from(self.rounds)).max(1)
+        let passes = u64::from(self.surfaces) * (1 + u64::from(self.turns.0));
+        self.capacity * (MOST_PASSES / passes).max(1)
     }
 }
 
@@ -127,19 +138,28 @@ impl Kernel {
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`.
     pub fn cut(&mut self, scene: &Scene, job: &Job) -> Result<Cut> {
-        let rays = if self.gpu.loop_limit()?.is_some() { RAYS_LIMITED } else { RAYS };
         let turns = self.turns(scene, &job.settings)?;
-        let rounds = (turns.0 * longest(scene, &job.settings)).div_ceil(rays);
+        let surfaces = longest(scene, &job.settings);
         let capacity = MOST_SLOTS.min(job.slots());
-        let bytes = capacity * size_of::<types::PathState>() as u64;
-        if self.paths.as_ref().is_none_or(|p| p.size() < bytes) {
-            self.paths = Some(OwnedBuffer::new(&self.gpu, "tracer.paths", BufferDesc::device(bytes))?);
+        let states = capacity * size_of::<types::PathState>() as u64;
+        let counts = place_of_count(surfaces + 1, 0);
+        if self.paths.as_ref().is_none_or(|p| p.states.size() < states || p.counts[0].size() < counts) {
+            let buffer = |name, desc| OwnedBuffer::new(&self.gpu, name, desc);
+            self.paths = Some(Paths {
+                states: buffer("tracer.paths", BufferDesc::device(states))?,
+                hits: buffer("tracer.hits", BufferDesc::device(capacity * size_of::<types::Hit>() as u64))?,
+                lists: buffer("tracer.lists", BufferDesc::device(u64::from(consts::PATH_LISTS) * 4 * capacity))?,
+                counts: [
+                    buffer("tracer.even counts", BufferDesc::device(counts))?,
+                    buffer("tracer.odd counts", BufferDesc::device(counts))?,
+                ],
+            });
         }
-        Ok(Cut { rays, rounds, capacity, turns })
+        Ok(Cut { surfaces, capacity, turns })
     }
 
     /// The maximum of rays per surface of a path, and the kind of each ray.
-    fn turns(&self, scene: &Scene, settings: &Settings) -> Result<(u32, [u32; 4])> {
+    fn turns(&self, scene: &Scene, settings: &Settings) -> Result<(u32, [u32; WAYS])> {
         let Some(lights) = &self.lights else { return Err(super::not_started()) };
         let sky = settings.sources.environment() && scene.environment.is_some();
         let there = [
@@ -148,7 +168,7 @@ impl Kernel {
             (lights.suns > 0, consts::TO_SUN),
             (sky, consts::TO_SKY),
         ];
-        let mut ways = [consts::ON; 4];
+        let mut ways = [consts::ON; WAYS];
         let mut count = 0;
         for (_, way) in there.iter().filter(|(there, _)| *there) {
             ways[count] = *way;
@@ -178,8 +198,13 @@ impl Kernel {
         if tile.start == 0 {
             graph.clear(sums, [0.0; 4]);
         }
-        let args = shader::Args {
+        let states = graph.import_buffer(&paths.states);
+        let hits = graph.import_buffer(&paths.hits);
+        let lists = graph.import_buffer(&paths.lists);
+        let counts = [graph.import_buffer(&paths.counts[0]), graph.import_buffer(&paths.counts[1])];
+        let surface = shader::Args {
             view,
+            scene_at: rays.scene_at,
             surface_instances: handles.instances,
             surface_indices: handles.indices,
             surface_positions: handles.positions,
@@ -194,34 +219,56 @@ impl Kernel {
             instance_lights: graph.import_buffer(&lights.instances),
             light_nodes: graph.import_buffer(&lights.nodes),
             settings,
-            paths: graph.import_buffer(paths),
+            paths: states,
+            hits,
+            lists,
+            traced: counts[0],
+            counts: counts[1],
             sums,
             lights: handles.lights,
             materials: handles.materials,
             scene_textures: handles.textures,
-            trace_nodes: rays.trace_nodes,
-            trace_triangles: rays.trace_triangles,
-            trace_instances: rays.trace_instances,
-            trace_indices: rays.trace_indices,
-            trace_uvs: rays.trace_uvs,
-            trace_colors: rays.trace_colors,
-            trace_scene: rays.trace_scene,
-            trace_accel: rays.trace_accel,
             push: shader::Push::default(),
         };
+        let trace = traced!(
+            path_trace::Args {
+                view,
+                settings,
+                paths: states,
+                hits,
+                lists,
+                counts: counts[0],
+                spec: path_trace::Spec::default(),
+                push: path_trace::Push::default(),
+            },
+            rays
+        );
+        let (turns, ways) = cut.turns;
         let mut at = tile.start;
         while at < tile.end {
             let (sample, first) = (at / slots, at % slots);
             let count = (slots - first).min(tile.end - at).min(cut.capacity) as u32;
-            for round in 0..cut.rounds {
-                let push = shader::Push {
-                    first: (offset + first) as u32,
-                    count,
-                    sample_index: sample as u32,
-                    turn: round * cut.rays,
-                    rays: cut.rays,
-                };
-                graph.compute(shader::Args { push, ..args }, count).rays(u64::from(count) * u64::from(cut.rays));
+            let begin = graph.buffer_from("tracer.begin", &first_counts(cut.surfaces, count));
+            for counts in counts {
+                graph.copy_buffer(begin, counts.range(0..begin.size));
+            }
+            let (first, sample_index) = ((offset + first) as u32, sample as u32);
+            let rays = |graph: &mut Graph, turn: u32, way: u32| {
+                let counts = counts[turn as usize % 2];
+                let spec = path_trace::Spec { to_lights: u32::from(way != consts::ON) };
+                let push = path_trace::Push { first, sample_index, turn, way };
+                let args = path_trace::Args { counts, spec, push, ..trace };
+                graph.compute_indirect(args, counts, place_of_count(turn, way)).rays(count.into());
+            };
+            for number in 0..cut.surfaces {
+                rays(graph, number, consts::ON);
+                let [traced, counts] = [number, number + 1].map(|turn| counts[turn as usize % 2]);
+                let push = shader::Push { first, sample_index, surface: number };
+                let args = shader::Args { traced, counts, push, ..surface };
+                graph.compute_indirect(args, traced, place_of_count(number, consts::ON));
+                for way in ways.iter().take(turns as usize).filter(|way| **way != consts::ON) {
+                    rays(graph, number + 1, *way);
+                }
             }
             at += u64::from(count);
         }
@@ -262,6 +309,9 @@ impl Kernel {
             two: 2,
             turns,
             turn_ways,
+            capacity: cut.capacity as u32,
+            paths_at: self.paths.as_ref().map_or([0; 2], |paths| paths.states.address_words()),
+            light_nodes_at: lights.nodes.address_words(),
         }
     }
 }
@@ -270,4 +320,19 @@ impl Kernel {
 fn longest(scene: &Scene, settings: &Settings) -> u32 {
     let sharp = !settings.diffuse_only && may_be_sharp(scene);
     settings.bounces + 3 + if sharp { settings.specular_bounces } else { 0 }
+}
+
+/// Place of a [`types::PathCount`], bytes.
+fn place_of_count(turn: u32, way: u32) -> u64 {
+    size_of::<types::PathCount>() as u64 * (WAYS as u64 * u64::from(turn) + u64::from(way))
+}
+
+/// The counts of paths before the first pass: all are at the camera.
+fn first_counts(surfaces: u32, paths: u32) -> Vec<types::PathCount> {
+    let none = types::PathCount { groups: 0, one: 1, another: 1, paths: 0 };
+    let mut counts = vec![none; WAYS * (surfaces as usize + 1)];
+    if let Some(all) = counts.get_mut(consts::ON as usize) {
+        *all = types::PathCount { groups: paths.div_ceil(consts::PATH_GROUP), paths, ..none };
+    }
+    counts
 }

@@ -3,12 +3,7 @@
 #ifndef LIB_ENVIRONMENT_SAMPLING
 #define LIB_ENVIRONMENT_SAMPLING
 
-struct EnvironmentMap {
-    ivec2 size;      // texels of the radiance
-    uvec2 cells;     // of the importance map, row by row
-    float rotation;  // radians about +Y, counter-clockwise from above
-    float scale;     // on the radiance
-};
+#include "lib/environment_map.glsl"
 
 layout(binding = ENVIRONMENT_BINDING) uniform sampler2D environment_radiance_map; // W/(sr m2), latitude-longitude
 layout(binding = ENVIRONMENT_COLUMNS_BINDING, scalar) readonly buffer EnvironmentColumns { AliasEntry environment_columns[]; };

@@ -2,6 +2,7 @@
 // Before including: lib/scene.glsl, and define SURFACE_BINDING, the first of seven bindings.
 #ifndef LIB_HIT_SURFACE
 #define LIB_HIT_SURFACE
+#include "lib/scene_at.glsl"
 
 layout(binding = SURFACE_BINDING, scalar) readonly buffer SurfaceInstances { Instance surface_instances[]; };
 layout(binding = SURFACE_BINDING + 1, scalar) readonly buffer SurfaceIndices { uint surface_indices[]; };
@@ -21,17 +22,17 @@ struct SurfacePoint {
 
 SurfacePoint surface_point(uint instance, uint triangle, vec2 barycentrics) {
     SurfacePoint p;
-    uint first = surface_instances[instance].first_index + 3u * triangle;
-    p.vertices = uvec3(surface_indices[first], surface_indices[first + 1u], surface_indices[first + 2u]);
+    uint first = INSTANCE_AT(instance).first_index + 3u * triangle;
+    p.vertices = uvec3(INDEX_AT(first), INDEX_AT(first + 1u), INDEX_AT(first + 2u));
     p.weights = vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics);
-    mat4 m = surface_instances[instance].world_from_object;
-    uint at = surface_instances[instance].first_vertex;
-    vec3 a = (m * vec4(surface_positions[at + p.vertices.x], 1.0)).xyz;
-    vec3 b = (m * vec4(surface_positions[at + p.vertices.y], 1.0)).xyz;
-    vec3 c = (m * vec4(surface_positions[at + p.vertices.z], 1.0)).xyz;
+    mat4 m = INSTANCE_AT(instance).world_from_object;
+    uint at = INSTANCE_AT(instance).first_vertex;
+    vec3 a = (m * vec4(POSITION_AT(at + p.vertices.x), 1.0)).xyz;
+    vec3 b = (m * vec4(POSITION_AT(at + p.vertices.y), 1.0)).xyz;
+    vec3 c = (m * vec4(POSITION_AT(at + p.vertices.z), 1.0)).xyz;
     p.position = p.weights.x * a + p.weights.y * b + p.weights.z * c;
     p.area = cross(b - a, c - a);
-    if ((surface_instances[instance].flags & INSTANCE_FLIPPED) != 0u) p.area = -p.area;
+    if ((INSTANCE_AT(instance).flags & INSTANCE_FLIPPED) != 0u) p.area = -p.area;
     vec3 most = max(max(abs(a), abs(b)), abs(c));
     p.reach = max(most.x, max(most.y, most.z));
     return p;
@@ -39,33 +40,33 @@ SurfacePoint surface_point(uint instance, uint triangle, vec2 barycentrics) {
 
 // World shading normal of the front, without normal map; not normalised.
 vec3 surface_normal(uint instance, SurfacePoint p) {
-    uint at = surface_instances[instance].first_vertex;
-    vec3 n = p.weights.x * surface_normals[at + p.vertices.x] + p.weights.y * surface_normals[at + p.vertices.y]
-        + p.weights.z * surface_normals[at + p.vertices.z];
-    return surface_instances[instance].normal_from_object * n;
+    uint at = INSTANCE_AT(instance).first_vertex;
+    vec3 n = p.weights.x * NORMAL_AT(at + p.vertices.x) + p.weights.y * NORMAL_AT(at + p.vertices.y)
+        + p.weights.z * NORMAL_AT(at + p.vertices.z);
+    return INSTANCE_AT(instance).normal_from_object * n;
 }
 
 // World tangent, not normalised, and the side of the bitangent.
 vec4 surface_tangent(uint instance, SurfacePoint p) {
-    uint at = surface_instances[instance].first_vertex;
-    vec4 t = p.weights.x * surface_tangents[at + p.vertices.x] + p.weights.y * surface_tangents[at + p.vertices.y]
-        + p.weights.z * surface_tangents[at + p.vertices.z];
-    float side = (surface_instances[instance].flags & INSTANCE_FLIPPED) != 0u ? -1.0 : 1.0;
-    return vec4(mat3(surface_instances[instance].world_from_object) * t.xyz, t.w * side);
+    uint at = INSTANCE_AT(instance).first_vertex;
+    vec4 t = p.weights.x * TANGENT_AT(at + p.vertices.x) + p.weights.y * TANGENT_AT(at + p.vertices.y)
+        + p.weights.z * TANGENT_AT(at + p.vertices.z);
+    float side = (INSTANCE_AT(instance).flags & INSTANCE_FLIPPED) != 0u ? -1.0 : 1.0;
+    return vec4(mat3(INSTANCE_AT(instance).world_from_object) * t.xyz, t.w * side);
 }
 
 vec2 surface_uv(uint instance, SurfacePoint p, uint set) {
-    uint at = surface_instances[instance].uv_first[min(set, 3u)];
+    uint at = INSTANCE_AT(instance).uv_first[min(set, 3u)];
     if (at == NONE) return vec2(0.0);
-    return p.weights.x * surface_uvs[at + p.vertices.x] + p.weights.y * surface_uvs[at + p.vertices.y]
-        + p.weights.z * surface_uvs[at + p.vertices.z];
+    return p.weights.x * UV_AT(at + p.vertices.x) + p.weights.y * UV_AT(at + p.vertices.y)
+        + p.weights.z * UV_AT(at + p.vertices.z);
 }
 
 vec4 surface_color(uint instance, SurfacePoint p) {
-    uint at = surface_instances[instance].color_first;
+    uint at = INSTANCE_AT(instance).color_first;
     if (at == NONE) return vec4(1.0);
-    return p.weights.x * surface_colors[at + p.vertices.x] + p.weights.y * surface_colors[at + p.vertices.y]
-        + p.weights.z * surface_colors[at + p.vertices.z];
+    return p.weights.x * COLOR_AT(at + p.vertices.x) + p.weights.y * COLOR_AT(at + p.vertices.y)
+        + p.weights.z * COLOR_AT(at + p.vertices.z);
 }
 
 // How far to step off a surface so that rounding cannot put the start on the wrong side.

@@ -42,6 +42,14 @@ layout(binding = LIGHT_TARGETS_BINDING, scalar) readonly buffer LightTargets { L
 // Number of the light that is the first triangle of each instance; NONE where nothing emits.
 layout(binding = INSTANCE_LIGHTS_BINDING, scalar) readonly buffer InstanceLights { uint instance_lights[]; };
 layout(binding = LIGHT_NODES_BINDING, scalar) readonly buffer LightNodes { LightNode light_nodes[]; };
+// By address (lib/scene_at.glsl) where LIGHT_NODES_AT has it.
+#ifdef LIGHT_NODES_AT
+#include "lib/scene_at.glsl"
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightNodesAt { LightNode of[]; };
+#define LIGHT_NODE(i) LightNodesAt(LIGHT_NODES_AT).of[i]
+#else
+#define LIGHT_NODE(i) light_nodes[i]
+#endif
 
 // Number of a sun, and how probable it was.
 uint pick_sun(uint count, uint bits, float keep, out float probability) {
@@ -88,7 +96,7 @@ float light_first_share(uint first, uint second, vec3 point, vec3 normal) {
     // In a loop so that compilers keep one copy of the code.
     float estimates[2] = float[2](0.0, 0.0);
     uint halves[2] = uint[2](first, second);
-    for (uint i = 0u; i < 2u; ++i) estimates[i] = light_estimate(light_nodes[halves[i]], point, normal);
+    for (uint i = 0u; i < 2u; ++i) estimates[i] = light_estimate(LIGHT_NODE(halves[i]), point, normal);
     float sum = estimates[0] + estimates[1];
     if (!(sum > 0.0)) return 0.5;
     if (estimates[0] == 0.0 || estimates[1] == 0.0) return estimates[0] == 0.0 ? 0.0 : 1.0;
@@ -100,7 +108,7 @@ uint pick_light(vec3 point, vec3 normal, uvec2 seed, out float probability) {
     uint node = 0u;
     probability = 1.0;
     for (uint level = 0u; level < LIGHT_LEVELS; ++level) {
-        uint second = light_nodes[node].second;
+        uint second = LIGHT_NODE(node).second;
         if (second == NONE) break;
         float share = light_first_share(node + 1u, second, point, normal);
         // Fresh bits for each level: those of one number would run out.
@@ -109,7 +117,7 @@ uint pick_light(vec3 point, vec3 normal, uvec2 seed, out float probability) {
         probability *= first ? share : 1.0 - share;
         node = first ? node + 1u : second;
     }
-    return light_nodes[node].light;
+    return LIGHT_NODE(node).light;
 }
 
 // How probable pick_light is to give a light for a surface.
@@ -119,7 +127,7 @@ float light_choice(uint number, vec3 point, vec3 normal) {
     float probability = 1.0;
     uint node = 0u;
     for (uint level = 0u; level < LIGHT_LEVELS; ++level) {
-        uint second = light_nodes[node].second;
+        uint second = LIGHT_NODE(node).second;
         if (second == NONE) break;
         float share = light_first_share(node + 1u, second, point, normal);
         bool first = (trail >> level & 1u) == 0u;

@@ -4,20 +4,7 @@
 #include "lib/scene.glsl"
 #include "lib/material.glsl"
 #include "lib/random.glsl"
-
-struct Ray {
-    vec3 origin;    // world space
-    float t_min;    // hits with t_min <= t < t_max count, t in lengths of direction
-    vec3 direction; // any length but zero
-    float t_max;
-};
-
-struct Hit {
-    float t;
-    vec2 barycentrics; // weights of the second and third vertex
-    uint instance;     // into the scene's instances; NONE: nothing was hit
-    uint triangle;     // of that instance: its indices start at first_index + 3 triangle
-};
+#include "lib/ray.glsl"
 
 // Turns that the loops of the last compute traversal took, for tests and benchmarks.
 uint trace_turns = 0u;

@@ -1,6 +1,7 @@
 // Tracing by a compute traversal of the trees of lib/trace_nodes.glsl.
 #ifndef LIB_TRACE_COMPUTE
 #define LIB_TRACE_COMPUTE
+#include "lib/scene_at.glsl"
 #include "lib/trace_nodes.glsl"
 
 // Five vectors a node: CPU drivers load a vector as fast as a number.
@@ -9,6 +10,9 @@ layout(binding = 40, scalar) readonly buffer TraceNodes { uvec4 trace_nodes[]; }
 layout(binding = 41, scalar) readonly buffer TraceTriangles { vec4 trace_triangles[]; };
 // The first is the top tree itself, in world space.
 layout(binding = 42, scalar) readonly buffer TraceInstances { TraceInstance trace_instances[]; };
+
+#define TRACE_NODES(i) TraceNodesAt(scene_at.nodes).of[i]
+#define TRACE_TRIANGLES(i) VectorsOf4At(scene_at.triangles).of[i]
 
 // A ray as the nodes of one tree see it.
 struct TraceSlabs {
@@ -60,8 +64,8 @@ uint trace_boxes(uvec3 near_words, uvec3 far_words, vec3 step_time, vec3 near_ti
 // Slots of a node that the ray meets, as bits; also words 4 and 5 of the node.
 uint trace_node(uint node, TraceSlabs slabs, float t_min, float t_max, out uvec2 children) {
     uint w = 5u * node;
-    uvec4 a = trace_nodes[w], b = trace_nodes[w + 1u], c = trace_nodes[w + 2u], d = trace_nodes[w + 3u];
-    uvec2 e = trace_nodes[w + 4u].xy;
+    uvec4 a = TRACE_NODES(w), b = TRACE_NODES(w + 1u), c = TRACE_NODES(w + 2u), d = TRACE_NODES(w + 3u);
+    uvec2 e = TRACE_NODES(w + 4u).xy;
     children = b.xy;
     uvec3 steps = uvec3(a.w << 23u, a.w << 15u, a.w << 7u) & 0x7f800000u;
     vec3 step_time = uintBitsToFloat(steps) * slabs.inverse;
@@ -96,167 +100,213 @@ uint trace_rank(uint surface) {
     return (surface & TRACE_CUTOUT) != 0u ? 4u + sides : sides;
 }
 
-Hit trace(Ray ray, uint mask, uint salt, bool any) {
-    Hit hit = Hit(ray.t_max, vec2(0.0), NONE, NONE);
-    uint best = NONE; // record of the hit
-    // Entries: a node and the slots that are still to be visited, permuted so that bit 0 is the nearest; 0: the tree's end.
-    uint stack[TRACE_DEPTH];
-    uint height = 0u;
-    TraceSlabs slabs = trace_slabs(ray.origin, ray.direction, trace_instances[0].reach);
-    TraceShear shear = trace_shear(ray.direction);
-    uint first_instance = 0u;
-    bool inside = false;
-    stack[height++] = 0u;
-    uint next = trace_instances[0].root; // node to visit, NONE: the tree is done
-    uint leaves = 0u;                    // first record and the slots that were hit and not yet looked at
-    uint leaf_slots = 0u;
+// A ray on its way through the trees.
+struct Traversal {
+    Ray ray;
+    uint mask;
+    uint salt;
+    Hit hit;           // `instance` without that of the record, no `triangle`
+    uint best;         // record of the hit
+    TraceSlabs slabs;  // of the tree in which the ray is
+    TraceShear shear;
+    uint first_instance;
+    uint next;         // node to visit, NONE: the tree is done
+    uint leaves;       // first record and the slots that are leaves
+    uint leaf_slots;   // those that were hit and not yet looked at
+    uint boxes;        // those whose boxes stand for their triangles (TRACE_BOXES)
+    uint above;        // `leaves` and `leaf_slots` of the top tree while inside
+    uint above_slots;
+    bool inside;       // of an instance
+    bool done;
+    uint height;       // of trace_stack
+    int left;          // turns
+};
+
+// Entries: a node and the slots that are still to be visited, permuted so that bit 0 is the nearest; 0: the tree's end.
+uint trace_stack[TRACE_DEPTH];
+
+Traversal trace_begin(Ray ray, uint mask, uint salt) {
+    Traversal t;
+    t.ray = ray;
+    t.mask = mask;
+    t.salt = salt;
+    t.hit = Hit(ray.t_max, vec2(0.0), NONE, NONE);
+    t.best = NONE;
+    t.slabs = trace_slabs(ray.origin, ray.direction, trace_instances[0].reach);
+    t.shear = trace_shear(ray.direction);
+    t.first_instance = 0u;
+    t.next = trace_instances[0].root;
+    t.leaves = 0u;
+    t.leaf_slots = 0u;
+    t.boxes = 0u;
+    t.above = 0u;
+    t.above_slots = 0u;
+    t.inside = false;
+    t.done = false;
+    trace_stack[0] = 0u;
+    t.height = 1u;
+    t.left = int(TRACE_STEPS);
+    return t;
+}
+
+// Visits a node: its leaves that the ray meets, and the next node.
+void trace_visit(inout Traversal t, bool any) {
+    uvec2 children;
+    uint hits = trace_node(t.next, t.slabs, t.ray.t_min, t.hit.t, children);
+    t.leaves = children.y;
+    t.leaf_slots = hits & t.leaves & 0xffu;
 #ifdef TRACE_BOXES
-    uint boxes = 0u;                     // of these slots, those whose boxes stand for their triangles
+    t.boxes = IMPERFECT != 0u && any && t.inside ? trace_between & t.leaf_slots : 0u;
+    t.leaf_slots &= ~t.boxes;
 #endif
-    uint above = 0u, above_slots = 0u;   // the same of the top tree while inside
-    int left = int(TRACE_STEPS);
-    bool done = false;
-    // CPU drivers run both sides of every branch for all their lanes and skip only loops: what is rare stands outside.
-    while (!done) {
-        // Until something rare comes: a place to enter or to leave, a surface that may be cut out, the end.
-        uint candidate = NONE;
-        vec3 candidate_at = vec3(0.0);
-        bool rare = false;
-        --left;
-        while (!rare) {
-            --left;
-            while (leaf_slots == 0u && next != NONE) {
-                uvec2 children;
-                uint hits = trace_node(next, slabs, ray.t_min, hit.t, children);
-                leaves = children.y;
-                leaf_slots = hits & leaves & 0xffu;
-#ifdef TRACE_BOXES
-                boxes = IMPERFECT != 0u && any ? trace_between & leaf_slots : 0u;
-#endif
-                uint slots = trace_permuted(hits & children.x & 0xffu, slabs.octant);
-                uint entry = next << 8u | slots;
-                if (slots == 0u) {
-                    entry = stack[--height];
-                }
-                if (entry == 0u) {
-                    next = NONE;
-                } else {
-                    uint slot = uint(findLSB(entry)) ^ slabs.octant;
-                    uint nodes = trace_nodes[5u * (entry >> 8u) + 1u].x;
-                    next = (nodes >> 8u) + uint(bitCount(nodes & ((1u << slot) - 1u)));
-                    entry &= entry - 1u;
-                    if ((entry & 0xffu) != 0u) {
-                        stack[height++] = entry;
-                    }
-                }
-                if (--left <= 0) {
-                    next = NONE;
-                    leaf_slots = 0u;
-                }
-            }
-            rare = !inside || leaf_slots == 0u;
-#ifdef TRACE_BOXES
-            // Whatever side is seen and whatever is cut out of it. Nearly always the first one ends the ray.
-            leaf_slots &= inside ? ~boxes : ~0u;
-            while (inside && boxes != 0u) {
-                uint slot = uint(findLSB(boxes));
-                boxes &= boxes - 1u;
-                --left;
-                uint record = (leaves >> 8u) + uint(bitCount(leaves & ((1u << slot) - 1u)));
-                uint surface = floatBitsToUint(trace_triangles[3u * record].w);
-                if (trace_counts(surface & TRACE_UNLIT, 1.0, mask)) {
-                    hit.t = ray.t_min;
-                    hit.instance = first_instance;
-                    boxes = 0u;
-                    done = true;
-                    rare = true;
-                }
-            }
-#endif
-            while (!rare && leaf_slots != 0u) {
-                uint slot = uint(findLSB(leaf_slots));
-                uint record = (leaves >> 8u) + uint(bitCount(leaves & ((1u << slot) - 1u)));
-                leaf_slots &= leaf_slots - 1u;
-                --left;
-                vec4 a = trace_triangles[3u * record];
-                vec3 b = trace_triangles[3u * record + 1u].xyz, c = trace_triangles[3u * record + 2u].xyz;
-                vec3 at;
-                float side = trace_triangle(a.xyz, b, c, slabs.origin, shear, at);
-                uint surface = floatBitsToUint(a.w);
-                if (at.x >= ray.t_min && at.x <= hit.t && trace_counts(surface, side, mask)) {
-                    bool equal = at.x == hit.t;
-                    if ((surface & TRACE_CUTOUT) != 0u || equal) {
-                        candidate = record;
-                        candidate_at = at;
-                        rare = true;
-                    } else {
-                        hit.t = at.x;
-                        hit.barycentrics = at.yz;
-                        best = record;
-                        hit.instance = first_instance;
-                        done = any;
-                        rare = any;
-                    }
-                }
-            }
-        }
-        if (candidate != NONE) {
-            uint instance = first_instance + floatBitsToUint(trace_triangles[3u * candidate + 1u].w);
-            uint triangle = floatBitsToUint(trace_triangles[3u * candidate + 2u].w);
-            uint surface = floatBitsToUint(trace_triangles[3u * candidate].w);
-            // Of equals that which the rasteriser draws first, then the first instance's first triangle, whatever the order of the tree.
-            bool nearer = candidate_at.x < hit.t;
-            if (!nearer && best != NONE) {
-                uint other = hit.instance + floatBitsToUint(trace_triangles[3u * best + 1u].w);
-                uint other_triangle = floatBitsToUint(trace_triangles[3u * best + 2u].w);
-                uint rank = trace_rank(surface), other_rank = trace_rank(floatBitsToUint(trace_triangles[3u * best].w));
-                nearer = rank < other_rank || (rank == other_rank && (instance < other || (instance == other && triangle < other_triangle)));
-            }
-            bool there = (surface & TRACE_CUTOUT) == 0u;
-            if (nearer && (there || trace_covered(instance, triangle, candidate_at.yz, mask, salt))) {
-                hit.t = candidate_at.x;
-                hit.barycentrics = candidate_at.yz;
-                hit.instance = first_instance;
-                best = candidate;
-                done = any;
-            }
-        } else if (leaf_slots != 0u && !done) {
-            // Down into the next instance.
-            uint slot = uint(findLSB(leaf_slots));
-            uint place = (leaves >> 8u) + uint(bitCount(leaves & ((1u << slot) - 1u)));
-            above = leaves;
-            above_slots = leaf_slots & (leaf_slots - 1u);
-            leaf_slots = 0u;
-            stack[height++] = next;
-            stack[height++] = 0u;
-            TraceInstance instance = trace_instances[place];
-            vec4 x = instance.object_from_world[0], y = instance.object_from_world[1], z = instance.object_from_world[2];
-            vec3 origin = vec3(dot(x.xyz, ray.origin) + x.w, dot(y.xyz, ray.origin) + y.w, dot(z.xyz, ray.origin) + z.w);
-            vec3 direction = vec3(dot(x.xyz, ray.direction), dot(y.xyz, ray.direction), dot(z.xyz, ray.direction));
-            slabs = trace_slabs(origin, direction, instance.reach);
-            shear = trace_shear(direction);
-            first_instance = instance.first_instance;
-            next = instance.root;
-            inside = true;
-        } else if (inside && !done) {
-            // Up again.
-            inside = false;
-            slabs = trace_slabs(ray.origin, ray.direction, trace_instances[0].reach);
-            leaves = above;
-            leaf_slots = above_slots;
-            next = stack[--height];
-            done = next == NONE && leaf_slots == 0u;
-        } else {
-            done = true;
-        }
-        done = done || left <= 0;
+    uint slots = trace_permuted(hits & children.x & 0xffu, t.slabs.octant);
+    uint entry = t.next << 8u | slots;
+    uint nodes = children.x;
+    if (slots == 0u) {
+        entry = trace_stack[--t.height];
+        nodes = TRACE_NODES(5u * (entry >> 8u) + 1u).x;
     }
-    trace_turns = TRACE_STEPS - uint(max(left, 0));
-    if (best != NONE) {
-        hit.instance += floatBitsToUint(trace_triangles[3u * best + 1u].w);
-        hit.triangle = floatBitsToUint(trace_triangles[3u * best + 2u].w);
+    if (entry == 0u) {
+        t.next = NONE;
+    } else {
+        uint slot = uint(findLSB(entry)) ^ t.slabs.octant;
+        t.next = (nodes >> 8u) + uint(bitCount(nodes & ((1u << slot) - 1u)));
+        entry &= entry - 1u;
+        if ((entry & 0xffu) != 0u) trace_stack[t.height++] = entry;
+    }
+}
+
+// Tests one triangle. Returns its record if its surface may be cut out, or if it is as near as the hit; NONE else.
+uint trace_leaf(inout Traversal t, bool any, out vec3 at) {
+    uint slot = uint(findLSB(t.leaf_slots));
+    uint record = (t.leaves >> 8u) + uint(bitCount(t.leaves & ((1u << slot) - 1u)));
+    t.leaf_slots &= t.leaf_slots - 1u;
+    vec4 a = TRACE_TRIANGLES(3u * record);
+    vec3 b = TRACE_TRIANGLES(3u * record + 1u).xyz, c = TRACE_TRIANGLES(3u * record + 2u).xyz;
+    float side = trace_triangle(a.xyz, b, c, t.slabs.origin, t.shear, at);
+    uint surface = floatBitsToUint(a.w);
+    if (!(at.x >= t.ray.t_min && at.x <= t.hit.t && trace_counts(surface, side, t.mask))) return NONE;
+    if ((surface & TRACE_CUTOUT) != 0u || at.x == t.hit.t) return record;
+    t.hit.t = at.x;
+    t.hit.barycentrics = at.yz;
+    t.best = record;
+    t.hit.instance = t.first_instance;
+    t.done = any;
+    return NONE;
+}
+
+// Decides about a triangle of trace_leaf().
+void trace_candidate(inout Traversal t, bool any, uint candidate, vec3 at) {
+    uint instance = t.first_instance + floatBitsToUint(TRACE_TRIANGLES(3u * candidate + 1u).w);
+    uint triangle = floatBitsToUint(TRACE_TRIANGLES(3u * candidate + 2u).w);
+    uint surface = floatBitsToUint(TRACE_TRIANGLES(3u * candidate).w);
+    // Of equals that which the rasteriser draws first, then the first instance's first triangle, whatever the order of the tree.
+    bool nearer = at.x < t.hit.t;
+    if (!nearer && t.best != NONE) {
+        uint other = t.hit.instance + floatBitsToUint(TRACE_TRIANGLES(3u * t.best + 1u).w);
+        uint other_triangle = floatBitsToUint(TRACE_TRIANGLES(3u * t.best + 2u).w);
+        uint rank = trace_rank(surface), other_rank = trace_rank(floatBitsToUint(TRACE_TRIANGLES(3u * t.best).w));
+        nearer = rank < other_rank || (rank == other_rank && (instance < other || (instance == other && triangle < other_triangle)));
+    }
+    bool there = (surface & TRACE_CUTOUT) == 0u;
+    if (nearer && (there || trace_covered(instance, triangle, at.yz, t.mask, t.salt))) {
+        t.hit.t = at.x;
+        t.hit.barycentrics = at.yz;
+        t.hit.instance = t.first_instance;
+        t.best = candidate;
+        t.done = any;
+    }
+}
+
+// Down into the next instance.
+void trace_enter(inout Traversal t) {
+    uint slot = uint(findLSB(t.leaf_slots));
+    uint place = (t.leaves >> 8u) + uint(bitCount(t.leaves & ((1u << slot) - 1u)));
+    t.above = t.leaves;
+    t.above_slots = t.leaf_slots & (t.leaf_slots - 1u);
+    t.leaf_slots = 0u;
+    trace_stack[t.height++] = t.next;
+    trace_stack[t.height++] = 0u;
+    TraceInstance instance = trace_instances[place];
+    vec4 x = instance.object_from_world[0], y = instance.object_from_world[1], z = instance.object_from_world[2];
+    Ray ray = t.ray;
+    vec3 origin = vec3(dot(x.xyz, ray.origin) + x.w, dot(y.xyz, ray.origin) + y.w, dot(z.xyz, ray.origin) + z.w);
+    vec3 direction = vec3(dot(x.xyz, ray.direction), dot(y.xyz, ray.direction), dot(z.xyz, ray.direction));
+    t.slabs = trace_slabs(origin, direction, instance.reach);
+    t.shear = trace_shear(direction);
+    t.first_instance = instance.first_instance;
+    t.next = instance.root;
+    t.inside = true;
+}
+
+// Up again.
+void trace_leave(inout Traversal t) {
+    t.inside = false;
+    t.slabs = trace_slabs(t.ray.origin, t.ray.direction, trace_instances[0].reach);
+    t.leaves = t.above;
+    t.leaf_slots = t.above_slots;
+    t.next = trace_stack[--t.height];
+}
+
+#ifdef TRACE_BOXES
+// Boxes that the ray enters and leaves between its ends stand for their triangles, whatever side is seen and whatever is cut out of it.
+// Nearly always the first one ends the ray.
+void trace_boxed(inout Traversal t) {
+    while (t.boxes != 0u) {
+        uint slot = uint(findLSB(t.boxes));
+        t.boxes &= t.boxes - 1u;
+        --t.left;
+        uint record = (t.leaves >> 8u) + uint(bitCount(t.leaves & ((1u << slot) - 1u)));
+        uint surface = floatBitsToUint(TRACE_TRIANGLES(3u * record).w);
+        if (trace_counts(surface & TRACE_UNLIT, 1.0, t.mask)) {
+            t.hit.t = t.ray.t_min;
+            t.hit.instance = t.first_instance;
+            t.boxes = 0u;
+            t.done = true;
+        }
+    }
+}
+#endif
+
+// One turn of a ray: a node, a triangle, and the way into and out of an instance. Invocations that run together may each do something else:
+// CPU drivers skip a part that no invocation of a group needs, and run the other parts for all of them.
+void trace_step(inout Traversal t, bool any) {
+    --t.left;
+    if (t.leaf_slots == 0u && t.next != NONE) {
+        trace_visit(t, any);
+#ifdef TRACE_BOXES
+        if (t.boxes != 0u) trace_boxed(t);
+#endif
+    }
+    if (t.inside) {
+        uint candidate = NONE;
+        vec3 at;
+        if (t.leaf_slots != 0u && !t.done) candidate = trace_leaf(t, any, at);
+        if (candidate != NONE) trace_candidate(t, any, candidate, at);
+        if (t.leaf_slots == 0u && t.next == NONE && !t.done) trace_leave(t);
+    } else {
+        if (t.leaf_slots != 0u) trace_enter(t);
+        else if (t.next == NONE) t.done = true;
+    }
+    t.done = t.done || t.left <= 0;
+}
+
+Hit trace_end(Traversal t) {
+    trace_turns = TRACE_STEPS - uint(max(t.left, 0));
+    Hit hit = t.hit;
+    if (t.best != NONE) {
+        hit.instance += floatBitsToUint(TRACE_TRIANGLES(3u * t.best + 1u).w);
+        hit.triangle = floatBitsToUint(TRACE_TRIANGLES(3u * t.best + 2u).w);
     }
     return hit;
+}
+
+Hit trace(Ray ray, uint mask, uint salt, bool any) {
+    Traversal t = trace_begin(ray, mask, salt);
+    do {
+        trace_step(t, any);
+    } while (!t.done);
+    return trace_end(t);
 }
 
 #endif

@@ -1,7 +1,8 @@
-// The path tracer's settings, the state of a path between dispatches, and its random numbers.
-// Before including: lib/environment_sampling.glsl, lib/random.glsl, lib/sampling.glsl.
+// The path tracer's settings, the state of a path between passes, the lists of paths for each pass, and random numbers.
+// Before including: lib/random.glsl, lib/sampling.glsl.
 #ifndef LIB_PATH
 #define LIB_PATH
+#include "lib/environment_map.glsl"
 
 const uint PATH_DIFFUSE_ONLY = 1u; // export
 const uint PATH_JITTER = 2u; // export
@@ -35,6 +36,9 @@ struct PathSettings {
     uint two;                  // 2
     uint turns;                // rays per surface
     uint turn_ways[4];         // kind of each of these rays; the first is ON
+    uint capacity;             // maximum of paths
+    uvec2 paths_at;            // addresses (lib/scene_at.glsl)
+    uvec2 light_nodes_at;
 };
 
 // A light sample whose shadow ray is not traced yet.
@@ -66,6 +70,27 @@ struct PathState {
     WaitingLight sun;
     WaitingLight sky;
 };
+
+// Number of paths with a ray of one kind between two surfaces. The first three members are the groups of an indirect dispatch.
+struct PathCount {
+    uint groups;       // of PATH_GROUP paths
+    uint one;
+    uint another;
+    uint paths;
+};
+const uint PATH_GROUP = 64u; // export
+// Lists of `capacity` slots: one for each kind of rays to lights; rays to the next surface have two, for even and odd numbers.
+const uint PATH_LISTS = 5u; // export
+
+// Place of a list, in capacities. `turn`: 0 for camera rays, n + 1 for rays from surface n.
+uint path_list(uint way, uint turn) {
+    return way == ON ? ON + (turn & 1u) : way;
+}
+
+// Number of a PathCount.
+uint path_count(uint way, uint turn) {
+    return 4u * turn + way;
+}
 
 // Four independent random words: a pure function of seed, pixel, sample and dimension.
 uvec4 random_words(uvec2 pixel, uint sample_number, uint dimension, uint seed) {

@@ -1,29 +1,4 @@
-// One ray of a path. Included by reference/path.comp, whose bindings it uses.
-
-PathState camera_path(uvec2 pixel) {
-    PathState path;
-    vec2 inside = vec2(0.5);
-    if ((settings.flags & PATH_JITTER) != 0u) {
-        inside = unit_floats(random_words(pixel, sample_index, 0u, settings.seed).xy);
-    }
-    vec2 uv = (vec2(pixel) + inside) / vec2(settings.extent);
-    // From the near plane to the far plane, like the rasteriser.
-    float near = view.near / view.far;
-    path.direction = view_ray(view, uv);
-    path.origin = view_base(view, uv) + near * path.direction;
-    path.limit = 1.0 - near;
-    path.density = 0.0;
-    path.throughput = vec3(1.0);
-    path.alive = 1u;
-    path.vertex = 0u;
-    path.scattered = 0u;
-    path.specular = 0u;
-    path.emission = vec3(0.0);
-    path.direct = vec3(0.0);
-    path.indirect = vec3(0.0);
-    path.waiting = 0u;
-    return path;
-}
+// The surface that the ray of a path has hit. Included by reference/path.comp, whose bindings it uses.
 
 void add_radiance(inout PathState path, uint scatterings, vec3 radiance) {
     if (scatterings == 0u) path.emission += radiance;
@@ -52,27 +27,10 @@ float sample_triangle_light(float chosen, vec3 from, SurfacePoint point, bool do
     return chosen * 2.0 * distance2 * sqrt(distance2) / abs(facing);
 }
 
-// Traces one ray: to the next surface (`way` is ON), or the shadow ray of the waiting light sample. Does nothing if the path has no such ray.
-// This is the only place that traces rays, so that the code exists once. All paths of a dispatch trace the same kind of ray at the same time.
-void path_step(uvec2 pixel, uint way, inout PathState path) {
-    uint dimension = 1u + 4u * path.vertex;
-    bool to_light = way != ON;
-    if (to_light ? (path.waiting >> way & 1u) == 0u : path.alive == 0u) return;
+// Adds the light of the surface, samples lights and the next direction. Rays to lights wait in the state.
+void path_surface(uvec2 pixel, Hit hit, inout PathState path) {
+    uint dimension = path_dimension(path);
     uvec4 salts = random_words(pixel, sample_index, dimension, settings.seed);
-    Ray ray = Ray(path.origin, 0.0, path.direction, path.limit);
-    uint mask = path.vertex == 0u ? TRACE_CAMERA : path.scattered > 0u ? TRACE_SHADOW : 0u;
-    WaitingLight waiting;
-    if (to_light) {
-        path.waiting &= ~(1u << way);
-        waiting = way == TO_LIGHT ? path.lamp : way == TO_SUN ? path.sun : path.sky;
-        ray = Ray(path.light_origin, 0.0, waiting.direction, waiting.limit);
-        mask = TRACE_SHADOW;
-    }
-    Hit hit = trace(ray, mask, to_light ? path.salt + way : salts.x, to_light);
-    if (to_light) {
-        if (hit.instance == NONE) add_radiance(path, path.light_scatterings, waiting.radiance);
-        return;
-    }
     vec3 toward = normalize(path.direction);
     bool missed = hit.instance == NONE;
     bool scatters = !missed && path.scattered <= settings.bounces;
@@ -109,7 +67,7 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
         if (instances[i] == NONE) continue;
         points[i] = surface_point(instances[i], triangles[i], places[i]);
         colors[i] = surface_color(instances[i], points[i]);
-        surfaces[i] = surface_instances[instances[i]].material;
+        surfaces[i] = INSTANCE_AT(instances[i]).material;
         if (i == 0u) {
             vec3 geometric = normalize(points[0].area);
             front = dot(geometric, toward) < 0.0;
@@ -124,8 +82,8 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
         uint k = i / TEXTURE_SLOTS;
         uint slot = k == 0u ? i : i == TEXTURE_SLOTS ? TEXTURE_BASE_COLOR : TEXTURE_EMISSIVE;
         texels[i] = vec4(1.0);
-        if (surfaces[k] == NONE || !has_texture(materials[surfaces[k]].flags, slot)) continue;
-        TextureUse use = materials[surfaces[k]].textures[slot];
+        if (surfaces[k] == NONE || !has_texture(MATERIAL_AT(surfaces[k]).flags, slot)) continue;
+        TextureUse use = MATERIAL_AT(surfaces[k]).textures[slot];
         texels[i] = sample_texture(use, surface_uv(instances[k], points[k], use.uv_set), 0.0);
     }
 
@@ -147,20 +105,20 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
 
     SurfacePoint point = points[0];
     uint material = surfaces[0];
-    uint flags = materials[material].flags;
+    uint flags = MATERIAL_AT(material).flags;
     float twice_area = length(point.area);
     float gap = surface_gap(point);
 
     if (instances[1] != NONE) {
         uint m = surfaces[1];
-        uint kind = materials[m].flags;
+        uint kind = MATERIAL_AT(m).flags;
         vec3 target;
         float density = sample_triangle_light(chosen, above, points[1], (kind & MATERIAL_DOUBLE_SIDED) != 0u, target);
-        float alpha = materials[m].base_color.a * texels[TEXTURE_SLOTS].a * colors[1].a;
-        float covers = (kind & MATERIAL_MASK) != 0u ? float(alpha >= materials[m].alpha_cutoff)
+        float alpha = MATERIAL_AT(m).base_color.a * texels[TEXTURE_SLOTS].a * colors[1].a;
+        float covers = (kind & MATERIAL_MASK) != 0u ? float(alpha >= MATERIAL_AT(m).alpha_cutoff)
             : (kind & MATERIAL_BLEND) != 0u ? clamp(alpha, 0.0, 1.0) : 1.0;
         if (density > 0.0 && samples_extended) {
-            arriving[TO_LIGHT] = materials[m].emissive * texels[TEXTURE_SLOTS + 1u].rgb * (covers / density);
+            arriving[TO_LIGHT] = MATERIAL_AT(m).emissive * texels[TEXTURE_SLOTS + 1u].rgb * (covers / density);
             light_densities[TO_LIGHT] = density;
             ways[TO_LIGHT] = target - above;
         }
@@ -182,23 +140,23 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
         ways[i] = i == TO_SUN ? to_light : one.position - above;
     }
 
-    vec4 base = materials[material].base_color * texels[TEXTURE_BASE_COLOR] * colors[0];
+    vec4 base = MATERIAL_AT(material).base_color * texels[TEXTURE_BASE_COLOR] * colors[0];
     vec3 normal = normalize(surface_normal(hit.instance, point));
     if (has_texture(flags, TEXTURE_NORMAL)) {
         vec4 tangent = surface_tangent(hit.instance, point);
         if (dot(tangent.xyz, tangent.xyz) > 0.0) {
             vec3 t = normalize(tangent.xyz);
             vec3 b = cross(normal, t) * tangent.w;
-            vec3 mapped = (texels[TEXTURE_NORMAL].xyz * 2.0 - 1.0) * vec3(vec2(materials[material].normal_scale), 1.0);
+            vec3 mapped = (texels[TEXTURE_NORMAL].xyz * 2.0 - 1.0) * vec3(vec2(MATERIAL_AT(material).normal_scale), 1.0);
             normal = normalize(mat3(t, b, normal) * mapped);
         }
     }
     if (!front) normal = -normal;
     if (any(isnan(normal))) normal = side;
     bool unlit = (flags & MATERIAL_UNLIT) != 0u;
-    float metallic = clamp(materials[material].metallic * texels[TEXTURE_METALLIC_ROUGHNESS].b, 0.0, 1.0);
-    float roughness = clamp(materials[material].roughness * texels[TEXTURE_METALLIC_ROUGHNESS].g, 0.0, 1.0);
-    float ior = materials[material].ior;
+    float metallic = clamp(MATERIAL_AT(material).metallic * texels[TEXTURE_METALLIC_ROUGHNESS].b, 0.0, 1.0);
+    float roughness = clamp(MATERIAL_AT(material).roughness * texels[TEXTURE_METALLIC_ROUGHNESS].g, 0.0, 1.0);
+    float ior = MATERIAL_AT(material).ior;
     vec3 albedo = unlit ? vec3(0.0) : (1.0 - metallic) * base.rgb;
     if (path.vertex == 0u) {
         float depth = -(view.view_from_world * vec4(point.position, 1.0)).z;
@@ -206,7 +164,7 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
     }
 
     if ((settings.flags & PATH_SEES_EMISSION) != 0u) {
-        vec3 emitted = materials[material].emissive * texels[TEXTURE_EMISSIVE].rgb;
+        vec3 emitted = MATERIAL_AT(material).emissive * texels[TEXTURE_EMISSIVE].rgb;
         if (unlit) {
             add_radiance(path, path.scattered, path.throughput * base.rgb);
         } else if (emitted != vec3(0.0) && (front || (flags & MATERIAL_DOUBLE_SIDED) != 0u)) {
@@ -227,7 +185,7 @@ void path_step(uvec2 pixel, uint way, inout PathState path) {
     bool mirror = !diffuse_only && roughness < 0.05 && metallic > 0.5;
     if (!diffuse_only && metallic > 0.5) normal = mirroring_normal(normal, side, -toward);
     float dielectric = (ior - 1.0) * (ior - 1.0) / ((ior + 1.0) * (ior + 1.0));
-    float transmission = diffuse_only ? 0.0 : clamp(materials[material].transmission * texels[TEXTURE_TRANSMISSION].r, 0.0, 1.0);
+    float transmission = diffuse_only ? 0.0 : clamp(MATERIAL_AT(material).transmission * texels[TEXTURE_TRANSMISSION].r, 0.0, 1.0);
     vec3 v = -toward;
     Bsdf b;
     b.normal = normal;

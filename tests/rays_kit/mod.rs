@@ -94,6 +94,7 @@ impl<'a> Traceable<'a> {
                 rays: list,
                 hits,
                 trace_nodes: traced.trace_nodes,
+                scene_at: traced.scene_at,
                 trace_accel: traced.trace_accel,
                 trace_triangles: traced.trace_triangles,
                 trace_instances: traced.trace_instances,

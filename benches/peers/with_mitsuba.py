@@ -1,0 +1,129 @@
+"""Renders an exported scene with Mitsuba's path integrator on the CPU. Called by peers.py; see there.
+
+usage: with_mitsuba.py SCENE.glb OUT.npz --size WxH --bounces N --spp N --runs N [--environment FILE] [--diffuse]
+
+Writes the pictures of all runs (different seeds) and the processor time of each, without loading and compiling.
+"""
+import argparse
+import pathlib
+import time
+
+import mitsuba as mi
+import numpy as np
+from PIL import Image
+
+from gltf import Scene
+
+mi.set_variant("llvm_ad_rgb")
+T = mi.ScalarTransform4f
+
+
+def texture(scene, use, factor):
+    data, transform = scene.picture(use)
+    codes = np.array(Image.open(data).convert("RGB"), np.float32) / 255.0
+    linear = np.where(codes <= 0.04045, codes / 12.92, ((codes + 0.055) / 1.055) ** 2.4) * np.array(factor, np.float32)
+    size = transform.get("scale", [1.0, 1.0])
+    # Mitsuba counts v upwards, so its pictures begin with the last row.
+    offset = transform.get("offset", [0.0, 0.0])
+    to_uv = T().translate([offset[0], offset[1], 0]).rotate([0, 0, 1], -np.degrees(transform.get("rotation", 0.0))).scale([size[0], size[1], 1])
+    return {"type": "bitmap", "bitmap": mi.Bitmap(linear.astype(np.float32)), "raw": True, "to_uv": to_uv}
+
+
+def bsdf(scene, material, diffuse):
+    pbr = material["pbrMetallicRoughness"]
+    factor, metallic = pbr["baseColorFactor"], pbr.get("metallicFactor", 1.0)
+    # In the diffuse form metals are black, as `reference.diffuse_only` has them.
+    factor = [min(c, 1.0) * (1.0 - metallic if diffuse else 1.0) for c in factor[:3]]
+    colour = {"type": "rgb", "value": factor}
+    if "baseColorTexture" in pbr:
+        colour = texture(scene, pbr["baseColorTexture"], factor)
+    if diffuse:
+        inner = {"type": "diffuse", "reflectance": colour}
+    else:
+        roughness = max(pbr.get("roughnessFactor", 1.0), 0.05)
+        inner = {"type": "principled", "base_color": colour, "metallic": metallic, "roughness": roughness}
+    return {"type": "twosided", "inner": inner}
+
+
+def sides(scene):
+    """The meshes. A double-sided lamp becomes two, a little apart, because Mitsuba's area lights shine to one side."""
+    gap = 1e-4 * max(np.ptp(positions) for positions, *_ in scene.meshes)
+    for positions, normals, uvs, triangles, material in scene.meshes:
+        if scene.emission(material).max() > 0 and scene.materials[material].get("doubleSided"):
+            step = (gap * normals).astype(np.float32)
+            yield positions + step, normals, uvs, triangles, material
+            yield positions - step, -normals, uvs, triangles[:, ::-1], material
+        else:
+            yield positions, normals, uvs, triangles, material
+
+
+def load(path, options):
+    scene = Scene(path)
+    width, height = map(int, options.size.split("x"))
+    world, camera = scene.view
+    # Mitsuba's cameras look along +Z.
+    to_world = T(world @ np.diag([-1.0, 1.0, -1.0, 1.0]))
+    fov = np.degrees(camera["perspective"]["yfov"])
+    film = {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"}, "pixel_format": "rgb"}
+    out = {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": options.bounces + 2, "rr_depth": 3},
+        "sensor": {"type": "perspective", "fov": float(fov), "fov_axis": "y", "to_world": to_world, "film": film,
+                   "near_clip": camera["perspective"]["znear"], "sampler": {"type": "independent", "sample_count": options.spp}},
+    }
+    for index, (positions, normals, uvs, triangles, material) in enumerate(sides(scene)):
+        emitted = scene.emission(material)
+        props = mi.Properties()
+        props["bsdf"] = mi.load_dict(bsdf(scene, scene.materials[material], options.diffuse))
+        if emitted.max() > 0:
+            props["emitter"] = mi.load_dict({"type": "area", "radiance": {"type": "rgb", "value": emitted.tolist()}})
+        mesh = mi.Mesh(f"mesh{index}", len(positions), len(triangles), props=props, has_vertex_normals=True, has_vertex_texcoords=uvs is not None)
+        values = mi.traverse(mesh)
+        values["vertex_positions"] = positions.ravel()
+        values["vertex_normals"] = normals.astype(np.float32).ravel()
+        values["faces"] = triangles.astype(np.uint32).ravel()
+        if uvs is not None:
+            # Its bitmaps begin with the lowest v.
+            values["vertex_texcoords"] = (uvs * [1.0, -1.0] + [0.0, 1.0]).astype(np.float32).ravel()
+        values.update()
+        out[f"mesh{index}"] = mesh
+    for index, (world, lamp) in enumerate(scene.lamps):
+        value = {"type": "rgb", "value": [c * lamp["intensity"] for c in lamp.get("color", [1.0] * 3)]}
+        turned = T(world @ np.diag([-1.0, 1.0, -1.0, 1.0]))
+        if lamp["type"] == "point":
+            out[f"lamp{index}"] = {"type": "point", "position": world[:3, 3].tolist(), "intensity": value}
+        elif lamp["type"] == "spot":
+            cone = lamp["spot"]
+            out[f"lamp{index}"] = {"type": "spot", "to_world": turned, "intensity": value, "cutoff_angle": float(np.degrees(cone["outerConeAngle"])),
+                                   "beam_width": float(np.degrees(cone["innerConeAngle"]))}
+        else:
+            out[f"lamp{index}"] = {"type": "directional", "to_world": turned, "irradiance": value}
+    if options.environment:
+        # Its latitude-longitude maps have their centre at another azimuth than ours.
+        out["sky"] = {"type": "envmap", "filename": str(options.environment), "to_world": T().rotate([0, 1, 0], 180)}
+    return mi.load_dict(out)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scene", type=pathlib.Path)
+    parser.add_argument("out", type=pathlib.Path)
+    parser.add_argument("--size", required=True)
+    parser.add_argument("--bounces", type=int, required=True)
+    parser.add_argument("--spp", type=int, required=True)
+    parser.add_argument("--runs", type=int, required=True)
+    parser.add_argument("--environment", type=pathlib.Path)
+    parser.add_argument("--diffuse", action="store_true")
+    options = parser.parse_args()
+    scene = load(options.scene, options)
+    np.array(mi.render(scene, seed=1000, spp=options.spp))
+    pictures, seconds = [], []
+    for run in range(options.runs):
+        begun = time.process_time()
+        pictures.append(np.array(mi.render(scene, seed=run, spp=options.spp)))
+        seconds.append(time.process_time() - begun)
+    np.savez_compressed(options.out, pictures=np.array(pictures, np.float32), seconds=seconds, version=mi.__version__)
+
+
+if __name__ == "__main__":
+    main()
