@@ -319,7 +319,7 @@ mod tests {
     #[test]
     fn ray_query_needs_every_extension_and_feature() {
         let mut all = device("Tracer", DeviceKind::Discrete);
-        assert_eq!(all.lacks_of_ray_query().len(), 6);
+        assert_eq!(all.lacks_of_ray_query().len(), 5);
         let needs = Requirements::baseline().and_ray_query();
         all.extensions = needs.extensions.iter().map(|e| (*e).to_owned()).collect();
         all.features = needs.features.iter().copied().collect();
@@ -339,7 +339,7 @@ mod tests {
             assert_eq!((choose(&needs), choose(&Requirements::baseline())), (Ok(2), Ok(0)));
             let rejections = select(&devices[..2], &needs, &DeviceChoice::Auto, false).unwrap_err();
             assert_eq!(rejections[0].missing, [format!("lacks feature {feature}")]);
-            assert_eq!(rejections[1].missing.len(), 6);
+            assert_eq!(rejections[1].missing.len(), 5);
         }
     }
 
