@@ -8,7 +8,7 @@ use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     image::Layers,
     scene::{AlphaMode, Environment, LightKind, Material, Pose, Scene, View},
-    tracer::{Filter, Settings, Sources, State, Strategy, Tracer},
+    tracer::{Filter, Points, Settings, Sources, State, Strategy, Tracer},
 };
 
 /// Something of everything: a glossy floor, a coloured box, a ball of glass, a mirror; a lamp, a point light, a sky.
@@ -100,7 +100,8 @@ fn every_way_to_find_light_finds_the_same() {
         let (mut scene, view) = mixed();
         // A ball that shines, so that all ways meet something, and no needle of light that one of them misses.
         scene.materials[1].emissive = vec3(0.5, 0.4, 0.2);
-        let base = Settings { bounces: 1, ..settings() };
+        // The variances are those of independent samples.
+        let base = Settings { bounces: 1, points: Points::Random, ..settings() };
         let with =
             |strategy, seed, samples| render(gpu, &scene, &view, &Settings { strategy, seed, ..base.clone() }, samples);
         let mis = with(Strategy::Mis, 1, 96);
@@ -217,6 +218,8 @@ fn a_state_goes_on_with_its_own_settings_only() {
             ("settings.sources", Settings { sources: Sources::Punctual, ..base.clone() }),
             ("settings.filter", Settings { filter: Filter::Centre, ..base.clone() }),
             ("settings.strategy", Settings { strategy: Strategy::Bsdf, ..base.clone() }),
+            ("settings.points", Settings { points: Points::Random, ..base.clone() }),
+            ("settings.planned was 0, now is 16", Settings { planned: 16, ..base.clone() }),
         ];
         let mut tracer = Tracer::new(gpu, &scene, &Pose::rest(&scene)).unwrap();
         let mut refused = |view: &View, settings: &Settings, about: serde_json::Value, part: &str| {
@@ -391,7 +394,7 @@ fn thousands_of_samples_are_as_exact_as_one() {
 }
 
 #[test]
-fn the_error_falls_as_one_over_the_samples() {
+fn the_error_falls_as_one_over_the_samples_and_faster_with_sobol_points() {
     with_gpu(|gpu| {
         let mut stage = Stage::new();
         let (floor, lamp) =
@@ -399,23 +402,33 @@ fn the_error_falls_as_one_over_the_samples() {
         stage.quad(floor, vec3(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0);
         stage.quad(lamp, vec3(-0.5, 1.0, -0.5), Vec3::X, Vec3::Z);
         let seen = view(vec3(0.0, 0.9, 1.8), Vec3::ZERO, 60.0, [32, 32]);
-        let settings = |seed| Settings { seed, filter: Filter::Centre, ..matt(0) };
-        let reference = render(gpu, &stage.scene, &seen, &settings(99), 4096);
+        let settings = |seed, points| Settings { seed, points, filter: Filter::Centre, ..matt(0) };
+        let reference = render(gpu, &stage.scene, &seen, &settings(99, Points::Sobol), 4096);
         let counts = [4u32, 16, 64, 256];
-        let errors: Vec<f64> = counts
-            .iter()
-            .map(|&n| {
-                let picture = render(gpu, &stage.scene, &seen, &settings(n), n);
-                let pairs = data(&picture, "").iter().zip(data(&reference, ""));
-                pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>() / data(&picture, "").len() as f64
-            })
-            .collect();
-        let x: Vec<f64> = counts.iter().map(|&n| f64::from(n).ln()).collect();
-        let y: Vec<f64> = errors.iter().map(|e| e.ln()).collect();
-        let (mx, my) = (x.iter().sum::<f64>() / 4.0, y.iter().sum::<f64>() / 4.0);
-        let slope = x.iter().zip(&y).map(|(x, y)| (x - mx) * (y - my)).sum::<f64>()
-            / x.iter().map(|x| (x - mx).powi(2)).sum::<f64>();
+        let errors_and_slope = |points| {
+            let errors: Vec<f64> = counts
+                .iter()
+                .map(|&n| {
+                    let picture = render(gpu, &stage.scene, &seen, &settings(n, points), n);
+                    let pairs = data(&picture, "").iter().zip(data(&reference, ""));
+                    pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>() / data(&picture, "").len() as f64
+                })
+                .collect();
+            let x: Vec<f64> = counts.iter().map(|&n| f64::from(n).ln()).collect();
+            let y: Vec<f64> = errors.iter().map(|e| e.ln()).collect();
+            let (mx, my) = (x.iter().sum::<f64>() / 4.0, y.iter().sum::<f64>() / 4.0);
+            let slope = x.iter().zip(&y).map(|(x, y)| (x - mx) * (y - my)).sum::<f64>()
+                / x.iter().map(|x| (x - mx).powi(2)).sum::<f64>();
+            (errors, slope)
+        };
+        let (errors, slope) = errors_and_slope(Points::Random);
         assert!((slope + 1.0).abs() < 0.12, "slope {slope}, errors {errors:?}");
+        // The light of a lamp that nothing hides is smooth in two dimensions.
+        let (fewer, steeper) = errors_and_slope(Points::Sobol);
+        assert!(
+            steeper < -1.7 && fewer[3] < errors[3] / 30.0,
+            "slope {steeper}, errors {fewer:?} instead of {errors:?}"
+        );
     });
 }
 

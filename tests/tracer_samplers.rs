@@ -45,7 +45,7 @@ fn draw(gpu: &Gpu, ask: Ask, environment: &Environment, lights: &tables::LightTa
         suns: lights.suns,
         tree: lights.tree.into(),
         // Here: how many lights there are.
-        slots: lights.targets.len() as u32,
+        textures: lights.targets.len() as u32,
         seed: ask.seed,
         ..Default::default()
     };
@@ -53,7 +53,7 @@ fn draw(gpu: &Gpu, ask: Ask, environment: &Environment, lights: &tables::LightTa
     let (drawn, values) = (graph.buffer("drawn", bytes), graph.buffer("values", bytes));
     let args = shader::Args {
         environment_radiance_map: graph.import_image(&map),
-        environment_columns: graph.buffer_from("cells", &importance.columns),
+        environment_edges: graph.buffer_from("cells", &importance.edges),
         light_columns: graph.buffer_from("columns", &lights.columns),
         light_targets: graph.buffer_from("targets", &lights.targets),
         instance_lights: graph.buffer_from("instances", &lights.instances),
@@ -318,14 +318,14 @@ fn the_sky_is_sampled_by_its_light() {
         let [drawn, values] = draw(gpu, ask(consts::SAMPLER_ENVIRONMENT), &sky, &table(Sources::All));
         // Cells as bins: their exact probabilities are known.
         let local = |d: DVec3| glam::DQuat::from_rotation_y(-1.0) * d;
-        let mut counts = vec![0.0; map.columns.len()];
+        let mut counts = vec![0.0; 24 * 12];
         for d in &drawn {
             let d = local(direction(d));
             let x = ((d.x.atan2(-d.z) / (2.0 * PI) + 0.5) * 24.0) as usize % 24;
             let y = ((d.x.hypot(d.z).atan2(d.y) / PI) * 12.0) as usize;
             counts[y.min(11) * 24 + x] += 1.0;
         }
-        let wanted: Vec<f64> = map.columns.iter().map(|c| f64::from(c.probability) * f64::from(COUNT)).collect();
+        let wanted: Vec<f64> = (0..24 * 12).map(|i| map.probability(i % 24, i / 24) * f64::from(COUNT)).collect();
         let p = chi_square(&counts, &wanted);
         assert!(p > sidak(1), "p = {p:e}");
         // Within a cell directions are uniform in solid angle, which is in the cosine of the polar angle.

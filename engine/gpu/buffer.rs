@@ -1,6 +1,6 @@
 //! Buffers that own their memory.
 
-use std::{fmt, sync::Arc};
+use std::{fmt, ops::Range, sync::Arc};
 
 use ash::vk;
 use gpu_allocator::{MemoryLocation, vulkan::Allocation};
@@ -146,18 +146,42 @@ impl OwnedBuffer {
     pub fn with_contents(gpu: &Gpu, name: &str, contents: &[u8]) -> Result<Self> {
         let buffer = Self::new(gpu, name, BufferDesc::device(contents.len() as u64))?;
         if !contents.is_empty() {
-            let staging = Self::new(gpu, &format!("{name} (staging)"), BufferDesc::upload(contents.len() as u64))?;
-            staging.write(0, contents)?;
-            let mut commands = gpu.commands(&format!("upload `{name}`"))?;
-            let region = vk::BufferCopy::default().size(contents.len() as u64);
-            // SAFETY: both buffers are large enough, and kept until the copy is done.
-            unsafe { gpu.0.device.cmd_copy_buffer(commands.raw(), staging.raw(), buffer.raw(), &[region]) };
-            commands.everything_barrier();
-            commands.keep(staging);
-            commands.keep(buffer.clone());
-            commands.submit()?.wait()?;
+            buffer.upload(0, contents)?;
         }
         Ok(buffer)
+    }
+
+    /// Replaces the bytes from `offset` on through a staging buffer, and waits.
+    ///
+    /// # Errors
+    /// `Runtime` if the range is empty or outside; `OutOfMemory`, `DeviceLost`.
+    pub fn upload(&self, offset: u64, contents: &[u8]) -> Result<()> {
+        let name = self.name();
+        let size = contents.len() as u64;
+        self.inside(offset, size)?;
+        let gpu = Gpu(Arc::clone(&self.0.context));
+        let staging = Self::new(&gpu, &format!("{name} (staging)"), BufferDesc::upload(size))?;
+        staging.write(0, contents)?;
+        let mut commands = gpu.commands(&format!("upload `{name}`"))?;
+        commands.everything_barrier();
+        let region = vk::BufferCopy::default().dst_offset(offset).size(size);
+        // SAFETY: both buffers are large enough, and kept until the copy is done.
+        unsafe { gpu.0.device.cmd_copy_buffer(commands.raw(), staging.raw(), self.raw(), &[region]) };
+        commands.everything_barrier();
+        commands.keep(staging);
+        commands.keep(self.clone());
+        commands.submit()?.wait()
+    }
+
+    /// The range is not empty and lies inside of the buffer.
+    fn inside(&self, offset: u64, size: u64) -> Result<()> {
+        if size == 0 || offset.checked_add(size).is_none_or(|end| end > self.size()) {
+            let Inner { name, desc, .. } = &*self.0;
+            let what =
+                format!("{size} bytes at {offset} are empty or outside of buffer `{name}` of {} bytes", desc.size);
+            return Err(Error::new(ErrorKind::Runtime, what));
+        }
+        Ok(())
     }
 
     /// Bytes, as asked for.
@@ -242,18 +266,28 @@ impl OwnedBuffer {
         if self.0.desc.place == Place::Readback || size == 0 {
             return if size == 0 { Ok(Vec::new()) } else { self.mapped_bytes(0, size) };
         }
+        self.read_range(0..self.size())
+    }
+
+    /// These bytes of a buffer on the device; copies through a staging buffer, and waits.
+    ///
+    /// # Errors
+    /// `Runtime` if the range is empty or outside; `OutOfMemory`, `DeviceLost`.
+    pub fn read_range(&self, range: Range<u64>) -> Result<Vec<u8>> {
+        let size = range.end.saturating_sub(range.start);
+        self.inside(range.start, size)?;
         let gpu = Gpu(Arc::clone(&self.0.context));
-        let staging = Self::new(&gpu, &format!("{} (readback)", self.0.name), BufferDesc::readback(self.size()))?;
+        let staging = Self::new(&gpu, &format!("{} (readback)", self.0.name), BufferDesc::readback(size))?;
         let mut commands = gpu.commands(&format!("read `{}`", self.0.name))?;
         commands.everything_barrier();
-        let region = vk::BufferCopy::default().size(self.size());
+        let region = vk::BufferCopy::default().src_offset(range.start).size(size);
         // SAFETY: both buffers are large enough, and kept until the copy is done.
         unsafe { gpu.0.device.cmd_copy_buffer(commands.raw(), self.raw(), staging.raw(), &[region]) };
         commands.everything_barrier();
         commands.keep(self.clone());
         commands.keep(staging.clone());
         commands.submit()?.wait()?;
-        staging.mapped_bytes(0, size)
+        staging.mapped_bytes(0, size as usize)
     }
 
     fn mapped(&self, place: Place, offset: u64, size: usize) -> Result<*mut u8> {

@@ -168,6 +168,13 @@ fn candidate(instance: &ash::Instance, physical: vk::PhysicalDevice) -> Candidat
         });
 
     let name = |raw: &[std::ffi::c_char]| text(raw);
+    let mut names = features.names();
+    // A property, not a feature, but it is there or it is not.
+    if subgroup.supported_operations.contains(vk::SubgroupFeatureFlags::BALLOT)
+        && subgroup.supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
+    {
+        names.insert("subgroupBallot");
+    }
     let facts = DeviceFacts {
         name: name(&properties.device_name),
         kind: match properties.device_type {
@@ -181,7 +188,7 @@ fn candidate(instance: &ash::Instance, physical: vk::PhysicalDevice) -> Candidat
         api_version: version_of(properties.api_version),
         driver_name: name(&driver.driver_name),
         driver_info: name(&driver.driver_info),
-        features: features.names(),
+        features: names,
         extensions,
         limits: limits(&properties.limits),
         formats: formats(instance, physical),

@@ -114,6 +114,7 @@ impl Requirements {
                 "bufferDeviceAddress",
                 "independentBlend",
                 "fragmentStoresAndAtomics",
+                "subgroupBallot",
             ],
             extensions: Vec::new(),
             limits: vec![

@@ -51,6 +51,19 @@ impl PassRef<'_> {
         self
     }
 
+    /// Says that its compute shader reads and writes a buffer by its address ([`crate::gpu::OwnedBuffer::address_words`]), not through a binding. Such a
+    /// buffer may be larger than bindings may be.
+    pub fn writing(self, buffer: Buffer) -> Self {
+        self.graph.passes[self.index].addressed.push((buffer, true));
+        self
+    }
+
+    /// Says that its compute shader reads a buffer by its address, not through a binding.
+    pub fn reading(self, buffer: Buffer) -> Self {
+        self.graph.passes[self.index].addressed.push((buffer, false));
+        self
+    }
+
     /// Notes its loop.
     fn over(self, items: Items, range: [usize; 2]) -> Self {
         let pass = &mut self.graph.passes[self.index];
@@ -409,7 +422,14 @@ impl Graph {
 
     pub(super) fn pass(&mut self, name: impl Into<String>, work: Work) -> PassRef<'_> {
         let name = self.pass_names.take(name.into());
-        self.passes.push(Pass { name, scope: self.scope.clone(), counted: false, rays: 0, work });
+        self.passes.push(Pass {
+            name,
+            scope: self.scope.clone(),
+            counted: false,
+            rays: 0,
+            addressed: Vec::new(),
+            work,
+        });
         let index = self.passes.len() - 1;
         PassRef { graph: self, index }
     }

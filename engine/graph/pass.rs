@@ -157,6 +157,8 @@ pub(crate) struct Pass {
     pub counted: bool,
     /// Rays that it traces, about; 0: little is known of it.
     pub rays: u64,
+    /// Buffers that its compute shader uses by their addresses; true: it also writes them.
+    pub addressed: Vec<(Buffer, bool)>,
     pub work: Work,
 }
 

@@ -445,6 +445,7 @@ fn upload_pass(graph: &Graph) -> Option<Pass> {
         scope: Vec::new(),
         counted: false,
         rays: 0,
+        addressed: Vec::new(),
         work: Work::Upload { buffers },
     })
 }

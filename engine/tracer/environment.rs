@@ -1,10 +1,10 @@
-//! Importance sampling of the environment: a table of probabilities over cells whose solid angle is known exactly.
+//! Importance sampling of the environment: probabilities of cells whose solid angle is known exactly, as edges of intervals.
 
 use crate::{
     Error, ErrorKind, Result,
     gpu::{Gpu, ImageDesc, OwnedImage, Region},
     scene::{Environment, environment::solid_angle},
-    shaders::types::AliasEntry,
+    shaders::consts::ENVIRONMENT_EDGE_END,
 };
 use ash::vk;
 use glam::Vec3;
@@ -14,18 +14,43 @@ const MOST_CELLS: u64 = 1 << 20;
 /// Share of the samples that is uniform over all directions, so that every direction has a positive density.
 const UNIFORM: f64 = 0.01;
 
-/// Probabilities of cells of a latitude-longitude map, row by row.
+/// Probabilities of cells of a latitude-longitude map.
 #[derive(Debug)]
 pub struct Importance {
     /// Columns and rows.
     pub cells: [u32; 2],
-    pub columns: Vec<AliasEntry>,
+    /// Edges of intervals whose lengths are the probabilities, in units of 1 / [`ENVIRONMENT_EDGE_END`]: the rows, then the cells of each row.
+    /// The device draws by the same integers, so the probabilities are exact.
+    pub edges: Vec<u32>,
+}
+
+impl Importance {
+    /// Probability of a cell.
+    pub fn probability(&self, column: usize, row: usize) -> f64 {
+        let [columns, rows] = self.cells.map(|count| count as usize);
+        let share = |at: usize| f64::from(self.edges[at + 1] - self.edges[at]) / f64::from(ENVIRONMENT_EDGE_END);
+        share(row) * share(rows + 1 + row * (columns + 1) + column)
+    }
+}
+
+/// Adds the edges of intervals whose lengths are in proportion to the weights, which are positive. No interval is empty.
+fn add_edges(edges: &mut Vec<u32>, weights: &[f64]) {
+    let total: f64 = weights.iter().sum();
+    let (mut sum, mut last) = (0.0, 0);
+    edges.push(0);
+    for (i, weight) in weights.iter().enumerate() {
+        sum += weight;
+        let edge = (sum / total * f64::from(ENVIRONMENT_EDGE_END)).round() as u32;
+        let rest = (weights.len() - 1 - i) as u32;
+        last = if rest == 0 { ENVIRONMENT_EDGE_END } else { edge.clamp(last + 1, ENVIRONMENT_EDGE_END - rest) };
+        edges.push(last);
+    }
 }
 
 /// The importance map of an environment; a single cell without one.
 pub fn importance(environment: Option<&Environment>) -> Importance {
     let Some(env) = environment.filter(|e| !e.pixels.is_empty()) else {
-        return Importance { cells: [1, 1], columns: super::alias::table(&[1.0]) };
+        return Importance { cells: [1, 1], edges: vec![0, ENVIRONMENT_EDGE_END, 0, ENVIRONMENT_EDGE_END] };
     };
     let (w, h) = (env.width as usize, env.height as usize);
     let light = spread(&env.pixels.iter().map(|&p| strength(p)).collect::<Vec<_>>(), w, h);
@@ -51,7 +76,12 @@ pub fn importance(environment: Option<&Environment>) -> Importance {
             *weight = (1.0 - UNIFORM) * share + UNIFORM * even;
         }
     }
-    Importance { cells, columns: super::alias::table(&weights) }
+    let mut edges = Vec::with_capacity(rows + 1 + rows * (columns + 1));
+    add_edges(&mut edges, &weights.chunks_exact(columns).map(|row| row.iter().sum()).collect::<Vec<f64>>());
+    for row in weights.chunks_exact(columns) {
+        add_edges(&mut edges, row);
+    }
+    Importance { cells, edges }
 }
 
 /// The environment's radiance in full precision; black without one.
@@ -117,16 +147,16 @@ mod tests {
         env.pixels = vec![Vec3::ZERO; 128];
         let uniform = importance(Some(&env));
         let angle = |y: u32| solid_angle(16, 8, y) / (4.0 * std::f64::consts::PI);
-        assert!((f64::from(uniform.columns[3 * 16].probability) - angle(3)).abs() < 1e-7);
+        assert!((uniform.probability(0, 3) - angle(3)).abs() < 1e-7);
         env.pixels[2 * 16 + 5] = Vec3::new(0.0, 4.0, 0.0);
         let sun = importance(Some(&env));
-        let p = |x: usize, y: usize| f64::from(sun.columns[y * 16 + x].probability) - UNIFORM * angle(y as u32);
+        let p = |x: usize, y: usize| sun.probability(x, y) - UNIFORM * angle(y as u32);
         // 36 : 6 of the texel and its neighbour, weighted by solid angle.
         assert!((p(5, 2) / p(6, 2) - 6.0).abs() < 1e-3);
         assert!((p(5, 3) / p(5, 2) * angle(2) / angle(3) - 1.0 / 6.0).abs() < 1e-4);
         assert!(p(8, 2).abs() < 1e-9);
-        let total: f64 = sun.columns.iter().map(|c| f64::from(c.probability)).sum();
-        assert!((total - 1.0).abs() < 1e-5);
+        let total: f64 = (0..128).map(|i| sun.probability(i % 16, i / 16)).sum();
+        assert!((total - 1.0).abs() < 1e-12);
     }
 
     #[test]
@@ -144,6 +174,6 @@ mod tests {
         let env = Environment { width, height, pixels: vec![Vec3::ONE; 4_500_000], ..Environment::constant(Vec3::ONE) };
         let map = importance(Some(&env));
         assert_eq!(map.cells, [750, 375]);
-        assert_eq!(map.columns.len(), 750 * 375);
+        assert_eq!(map.edges.len(), 376 + 751 * 375);
     }
 }

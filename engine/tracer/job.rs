@@ -2,12 +2,10 @@
 
 use std::{ops::Range, time::Duration};
 
-use ash::vk;
-
 use super::{Progress, Settings, Sums};
 use crate::{
     Error, ErrorKind, Result,
-    gpu::{Gpu, ImageDesc, OwnedImage, Region},
+    gpu::{BufferDesc, Gpu, OwnedBuffer},
     scene::View,
     shaders::consts,
 };
@@ -16,15 +14,19 @@ use crate::{
 pub(super) const BLOCK: u32 = 8;
 /// Slots of a block: one workgroup.
 pub(super) const GRANULE: u32 = BLOCK * BLOCK;
-/// Images of the sums: six sums, and the rounding errors of the first three.
+/// Layers of the sums: six sums, and the rounding errors of the first three.
 pub(super) const LAYERS: u32 = consts::PATH_SUMS + consts::PATH_EXACT_SUMS;
+
+/// Bytes of a pixel in one layer.
+const LAYER_TEXEL: u64 = 16;
 
 /// The work on a picture.
 #[derive(Debug)]
 pub(super) struct Job {
     pub view: View,
     pub settings: Settings,
-    pub sums: OwnedImage,
+    /// The layers one after the other, each row by row. Shaders use them by their address.
+    pub sums: OwnedBuffer,
     /// The rows of pixels that are traced, for which there are sums: whole blocks, except at the lower end of the picture.
     rows: Range<u32>,
     /// Finished slots, summed over all samples.
@@ -46,16 +48,20 @@ impl Job {
             let what = format!("a picture of {width}×{height}; the device allows sides of {most}");
             return Err(Error::new(ErrorKind::Runtime, what));
         }
-        let mut desc = ImageDesc::new(vk::Format::R32G32B32A32_SFLOAT, width, height).layers(LAYERS);
-        desc.usage =
-            vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
-        let sums = OwnedImage::new(gpu, "tracer.sums", desc)?;
+        let bytes = u64::from(LAYERS) * LAYER_TEXEL * u64::from(width) * u64::from(height);
+        let sums = OwnedBuffer::new(gpu, "tracer.sums", BufferDesc::device(bytes))?;
         Ok(Self { view, settings, sums, rows, done: 0, time: Duration::ZERO })
     }
 
     /// Columns and rows of the pixels that are traced.
     pub fn extent(&self) -> [u32; 2] {
         [self.view.extent[0], self.rows.end - self.rows.start]
+    }
+
+    /// Number of the pixels that are traced.
+    pub fn pixels(&self) -> u64 {
+        let [width, height] = self.extent();
+        u64::from(width) * u64::from(height)
     }
 
     /// The first row that is traced.
@@ -86,13 +92,15 @@ impl Job {
     }
 
     pub fn sums(&self) -> Result<Sums> {
-        let empty = self.sums.layout() == vk::ImageLayout::UNDEFINED;
         let [width, height] = self.extent();
         let layer = |layer| -> Result<Vec<[f32; 4]>> {
-            if empty {
+            // The first tile clears the sums.
+            if self.done == 0 {
                 return Ok(vec![[0.0; 4]; width as usize * height as usize]);
             }
-            Ok(self.sums.read(0, layer)?.chunks_exact(16).map(bytemuck::pod_read_unaligned).collect())
+            let bytes = LAYER_TEXEL * self.pixels();
+            let range = bytes * u64::from(layer)..bytes * (u64::from(layer) + 1);
+            Ok(self.sums.read_range(range)?.chunks_exact(16).map(bytemuck::pod_read_unaligned).collect())
         };
         let layers = (0..LAYERS).map(layer).collect::<Result<_>>()?;
         Ok(Sums::new([width, height], layers, self.done / self.slots(), self.done % self.slots()))
@@ -100,13 +108,12 @@ impl Job {
 
     /// Replaces the sums.
     pub fn set_sums(&mut self, sums: &Sums) -> Result<()> {
-        let regions: Vec<Region<'_>> = sums
-            .raw()
-            .iter()
-            .enumerate()
-            .map(|(layer, texels)| Region { mip: 0, layer: layer as u32, bytes: bytemuck::cast_slice(texels) })
-            .collect();
-        self.sums.upload(&regions)?;
+        let mut offset = 0;
+        for layer in sums.raw() {
+            let bytes: &[u8] = bytemuck::cast_slice(layer);
+            self.sums.upload(offset, bytes)?;
+            offset += bytes.len() as u64;
+        }
         self.done = sums.samples() * self.slots() + sums.begun();
         Ok(())
     }

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use glam::Vec3;
+
 use super::{
     Filter, Settings, Sources, Strategy,
     environment::{importance, radiance_map},
@@ -12,10 +14,10 @@ use super::{
 use crate::{
     Result,
     gpu::{BufferDesc, Gpu, OwnedBuffer, OwnedImage},
-    graph::{Graph, Image},
+    graph::{Buffer, Graph},
     rays::{Rays, traced},
     resident::{Handles, Resident},
-    scene::{Pose, Scene},
+    scene::{Material, Pose, Scene},
     shaders::{
         consts,
         reference::{path as shader, path_trace},
@@ -36,7 +38,7 @@ pub(super) struct Kernel {
     gpu: Gpu,
     rays: Rays,
     environment: OwnedImage,
-    environment_columns: OwnedBuffer,
+    environment_edges: OwnedBuffer,
     /// Columns and rows of the environment's importance map.
     cells: [u32; 2],
     lights: Option<Lights>,
@@ -89,13 +91,13 @@ impl Kernel {
     /// `OutOfMemory`, `DeviceLost`.
     pub fn new(gpu: &Gpu, scene: &Scene, resident: &Resident) -> Result<Self> {
         let importance = importance(scene.environment.as_ref());
-        let environment_columns =
-            OwnedBuffer::with_contents(gpu, "tracer.environment", bytemuck::cast_slice(&importance.columns))?;
+        let environment_edges =
+            OwnedBuffer::with_contents(gpu, "tracer.environment", bytemuck::cast_slice(&importance.edges))?;
         Ok(Self {
             gpu: gpu.clone(),
             rays: Rays::new(gpu, scene, resident)?,
             environment: radiance_map(gpu, scene.environment.as_ref())?,
-            environment_columns,
+            environment_edges,
             cells: importance.cells,
             lights: None,
             paths: None,
@@ -177,7 +179,7 @@ impl Kernel {
         Ok((count as u32, ways))
     }
 
-    /// Declares the passes of a range of slots, which may span several samples. Returns the image of the sums.
+    /// Declares the passes of a range of slots, which may span several samples. Returns the sums.
     ///
     /// # Errors
     /// `Usage` before [`Self::cut`].
@@ -188,15 +190,15 @@ impl Kernel {
         job: &Job,
         tile: Range<u64>,
         cut: Cut,
-    ) -> Result<Image> {
+    ) -> Result<Buffer> {
         let rays = self.rays.frame(graph, handles);
         let (Some(lights), Some(paths)) = (&self.lights, &self.paths) else { return Err(super::not_started()) };
         let (slots, offset) = (job.slots(), job.first_slot());
-        let settings = graph.uniform(&self.path_settings(scene, job, lights, cut));
+        let settings = graph.uniform(&self.path_settings(scene, job, (lights, paths), cut));
         let view = graph.uniform(&job.view.uniform());
-        let sums = graph.import_image(&job.sums);
+        let sums = graph.import_buffer(&job.sums);
         if tile.start == 0 {
-            graph.clear(sums, [0.0; 4]);
+            graph.fill(sums, 0);
         }
         let states = graph.import_buffer(&paths.states);
         let hits = graph.import_buffer(&paths.hits);
@@ -213,7 +215,7 @@ impl Kernel {
             surface_uvs: handles.uvs,
             surface_colors: handles.colors,
             environment_radiance_map: graph.import_image(&self.environment),
-            environment_columns: graph.import_buffer(&self.environment_columns),
+            environment_edges: graph.import_buffer(&self.environment_edges),
             light_columns: graph.import_buffer(&lights.columns),
             light_targets: graph.import_buffer(&lights.targets),
             instance_lights: graph.import_buffer(&lights.instances),
@@ -224,7 +226,6 @@ impl Kernel {
             lists,
             traced: counts[0],
             counts: counts[1],
-            sums,
             lights: handles.lights,
             materials: handles.materials,
             scene_textures: handles.textures,
@@ -265,7 +266,7 @@ impl Kernel {
                 let [traced, counts] = [number, number + 1].map(|turn| counts[turn as usize % 2]);
                 let push = shader::Push { first, sample_index, surface: number };
                 let args = shader::Args { traced, counts, push, ..surface };
-                graph.compute_indirect(args, traced, place_of_count(number, consts::ON));
+                graph.compute_indirect(args, traced, place_of_count(number, consts::ON)).writing(sums);
                 for way in ways.iter().take(turns as usize).filter(|way| **way != consts::ON) {
                     rays(graph, number + 1, *way);
                 }
@@ -275,7 +276,13 @@ impl Kernel {
         Ok(sums)
     }
 
-    fn path_settings(&self, scene: &Scene, job: &Job, lights: &Lights, cut: Cut) -> types::PathSettings {
+    fn path_settings(
+        &self,
+        scene: &Scene,
+        job: &Job,
+        (lights, paths): (&Lights, &Paths),
+        cut: Cut,
+    ) -> types::PathSettings {
         let settings = &job.settings;
         let environment = scene.environment.as_ref();
         let (turns, turn_ways) = cut.turns;
@@ -287,6 +294,7 @@ impl Kernel {
         set(settings.sources.environment() && environment.is_some(), consts::PATH_SEES_ENVIRONMENT);
         set(settings.strategy == Strategy::Bsdf, consts::PATH_NO_LIGHT_SAMPLES);
         set(settings.strategy == Strategy::Lights, consts::PATH_NO_BSDF_SAMPLES);
+        let textures = textures(scene, settings);
         let size = environment.map_or([1, 1], |e| [e.width as i32, e.height as i32]);
         types::PathSettings {
             environment: types::EnvironmentMap {
@@ -305,15 +313,40 @@ impl Kernel {
             roulette: settings.roulette,
             flags,
             seed: settings.seed,
-            slots: consts::TEXTURE_SLOTS + 2,
-            two: 2,
+            textures: textures.len() as u32,
+            texture_slots: std::array::from_fn(|i| textures.get(i).copied().unwrap_or(0)),
             turns,
             turn_ways,
             capacity: cut.capacity as u32,
-            paths_at: self.paths.as_ref().map_or([0; 2], |paths| paths.states.address_words()),
+            sum_pixels: job.pixels() as u32,
+            sums_at: job.sums.address_words(),
+            paths_at: paths.states.address_words(),
+            hits_at: paths.hits.address_words(),
+            lists_at: paths.lists.address_words(),
             light_nodes_at: lights.nodes.address_words(),
+            light_targets_at: lights.targets.address_words(),
+            environment_at: self.environment_edges.address_words(),
+            plan: settings.plan(),
         }
     }
+}
+
+/// `texture_slots` of the settings: the kinds of textures that some material has and that the path tracer looks at.
+fn textures(scene: &Scene, settings: &Settings) -> Vec<u32> {
+    let any = |has: fn(&Material) -> bool| scene.materials.iter().any(has);
+    let lamps = |has: fn(&Material) -> bool| {
+        settings.sources.emissive() && scene.materials.iter().any(|m| m.emissive != Vec3::ZERO && has(m))
+    };
+    let kinds = [
+        (consts::TEXTURE_BASE_COLOR, any(|m| m.base_color_texture.is_some())),
+        (consts::TEXTURE_METALLIC_ROUGHNESS, any(|m| m.metallic_roughness_texture.is_some())),
+        (consts::TEXTURE_NORMAL, any(|m| m.normal_texture.is_some())),
+        (consts::TEXTURE_EMISSIVE, any(|m| m.emissive_texture.is_some())),
+        (consts::TEXTURE_TRANSMISSION, !settings.diffuse_only && any(|m| m.transmission_texture.is_some())),
+        (consts::TEXTURE_OF_LAMP + consts::TEXTURE_BASE_COLOR, lamps(|m| m.base_color_texture.is_some())),
+        (consts::TEXTURE_OF_LAMP + consts::TEXTURE_EMISSIVE, lamps(|m| m.emissive_texture.is_some())),
+    ];
+    kinds.into_iter().filter(|(_, has)| *has).map(|(kind, _)| kind).collect()
 }
 
 /// Maximum of surfaces along a path.

@@ -4,7 +4,8 @@
 //! surface the path samples a light of the light tree, a directional light and the environment, and combines these samples with
 //! the light that its scattered ray hits (multiple importance sampling; Veach and Guibas, 1995).
 //!
-//! Random numbers are a pure function of (seed, pixel, sample, dimension). The samples of a pixel are summed in order, together
+//! Random numbers are a pure function of (seed, pixel, sample, dimension): scrambled Sobol points (`lib/points.glsl`; Burley, Practical
+//! Hash-based Owen Scrambling, 2020), or independent ones ([`Points`]). The samples of a pixel are summed in order, together
 //! with their rounding errors. The result therefore is bit-identical for any division of the work, and after an interruption.
 //!
 //! ```no_run
@@ -35,7 +36,7 @@ mod state;
 mod sums;
 mod technique;
 
-pub use settings::{Filter, PictureSettings, Settings, Sources, Strategy};
+pub use settings::{Filter, PictureSettings, Points, Settings, Sources, Strategy};
 pub use state::{Head, State};
 pub use sums::Sums;
 pub use technique::{Mode, Reference};

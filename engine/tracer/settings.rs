@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     Error, Result,
     settings::{Described, described},
+    shaders::consts,
 };
 
 /// Which light sources are used. The others neither light surfaces nor are visible.
@@ -61,6 +62,17 @@ pub enum Strategy {
     Bsdf,
 }
 
+/// The random numbers that choose the directions of paths.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Points {
+    /// Scrambled Sobol points: the same error with fewer samples. The error that is estimated from them is too large.
+    #[default]
+    Sobol,
+    /// Independent random numbers.
+    Random,
+}
+
 /// Settings of a picture. The same settings give bit-identical results on the same device.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -73,7 +85,7 @@ pub struct Settings {
     /// Maximum of mirrors and glass surfaces along a path, in addition to `bounces`.
     #[schemars(range(min = 0, max = 1000))]
     pub specular_bounces: u32,
-    /// Number of scatterings before Russian roulette begins.
+    /// Number of scatterings before Russian roulette begins. It ends paths that carry less than a quarter of the light with which they began.
     #[schemars(range(min = 0, max = 1000))]
     pub roulette: u32,
     /// Every surface is Lambertian: without gloss, mirrors and glass.
@@ -84,6 +96,12 @@ pub struct Settings {
     pub filter: Filter,
     /// Sampling of lights that have an extent.
     pub strategy: Strategy,
+    /// The random numbers that choose the directions of paths.
+    pub points: Points,
+    /// The number of samples per pixel that are planned. The errors of neighbouring pixels then have opposite signs
+    /// (blue noise), if the plan is a power of two and is kept. 0: no plan, pixels are independent, and any number of samples is as good.
+    #[schemars(range(min = 0, max = 65536), extend("x-needs" = {"points": {"const": "sobol"}}))]
+    pub planned: u32,
     /// Seed of all random numbers.
     #[schemars(extend("x-option" = "Picture"))]
     #[schemars(range(min = 0, max = 4_294_967_295_u32))]
@@ -95,11 +113,13 @@ impl Default for Settings {
         Self {
             bounces: 8,
             specular_bounces: 8,
-            roulette: 4,
+            roulette: 0,
             diffuse_only: false,
             sources: Sources::All,
             filter: Filter::Box,
             strategy: Strategy::Mis,
+            points: Points::Sobol,
+            planned: 0,
             seed: 0,
         }
     }
@@ -110,6 +130,15 @@ impl Settings {
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
         Self::description().check(self)
+    }
+
+    /// `plan` of `lib/points.glsl`.
+    pub(super) fn plan(&self) -> u32 {
+        match (self.points, self.planned) {
+            (Points::Random, _) => consts::POINTS_RANDOM,
+            (Points::Sobol, 0) => consts::POINTS_APART,
+            (Points::Sobol, planned) => planned.next_power_of_two().ilog2(),
+        }
     }
 }
 

@@ -134,14 +134,15 @@ impl Technique for Reference {
             return Err(Error::usage(format!("{samples} samples a pixel; at most {} are numbered", u32::MAX)));
         }
         let cut = self.kernel.cut(moment.scene, job)?;
+        let sums_at = job.sums.address_words();
         let tile = job.done..samples * job.slots();
         let sums = self.kernel.declare(graph, (moment.scene, moment.handles), job, tile.clone(), cut)?;
         job.done = tile.end;
         let extent = moment.view.extent;
         let mut layer = |shows: u32| -> Image {
             let shown = graph.image("reference", Format::RGBA32F, extent);
-            let push = resolve::Push { shows, samples: samples as f32, epsilon: EPSILON as f32 };
-            graph.compute(resolve::Args { sums, shown, push }, extent);
+            let push = resolve::Push { shows, samples: samples as f32, epsilon: EPSILON as f32, sums_at };
+            graph.compute(resolve::Args { shown, push }, extent).reading(sums);
             shown
         };
         let picture = Picture::new(layer(moment.shot.mode.shows())).noting(notes(moment.notes));

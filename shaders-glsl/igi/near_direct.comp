@@ -9,7 +9,7 @@
 #include "lib/sampling.glsl"
 #include "lib/brdf.glsl"
 #define ENVIRONMENT_BINDING 8
-#define ENVIRONMENT_COLUMNS_BINDING 9
+#define ENVIRONMENT_EDGES_BINDING 9
 #include "lib/environment_sampling.glsl"
 #define LIGHT_COLUMNS_BINDING 10
 #define LIGHT_TARGETS_BINDING 11

@@ -9,7 +9,7 @@
 #include "lib/sampling.glsl"
 #include "lib/bsdf.glsl"
 #define ENVIRONMENT_BINDING 8
-#define ENVIRONMENT_COLUMNS_BINDING 9
+#define ENVIRONMENT_EDGES_BINDING 9
 #include "lib/environment_sampling.glsl"
 #define SURFACE_BINDING 60
 #include "lib/hit_surface.glsl"

@@ -9,7 +9,7 @@
 #include "lib/sampling.glsl"
 #include "lib/bsdf.glsl"
 #define ENVIRONMENT_BINDING 8
-#define ENVIRONMENT_COLUMNS_BINDING 9
+#define ENVIRONMENT_EDGES_BINDING 9
 #include "lib/environment_sampling.glsl"
 #define SURFACE_BINDING 1
 #include "lib/hit_surface.glsl"
@@ -83,9 +83,9 @@ VplPath begun(uint at) {
     } else if (start.kind == START_ENVIRONMENT) {
         uvec4 words = pcg4d(uvec4(at, settings.seed, 0x5e1fu, 0u));
         float density;
-        // The Halton numbers choose the column of the environment's table. The remaining choices use hashed random numbers.
-        uint bits = uint(second.x * 16777216.0) << 8u | words.w >> 24u;
-        vec3 sky = environment_sample(settings.environment, bits, unit_float(words.x), vec2(unit_float(words.y), second.y), density);
+        // The Halton numbers have 24 bits. The other bits are hashed random numbers.
+        uvec2 bits = uvec2(second * 16777216.0) << 8u | words.xy >> 24u;
+        vec3 sky = environment_sample(settings.environment, bits, density);
         vec3 areas = entered_areas(sky);
         path.direction = -sky;
         path.origin = entry(-sky, first);

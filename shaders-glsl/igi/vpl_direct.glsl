@@ -3,6 +3,7 @@
 // and `settings`.
 #ifndef LIB_VPL_DIRECT
 #define LIB_VPL_DIRECT
+#include "lib/points.glsl"
 
 // A receiver of direct light.
 struct LitPoint {
@@ -35,15 +36,12 @@ vec3 direct_ray(uint i, LitPoint p, uvec2 place, out Ray ray) {
         ray.t_max = one.kind == LIGHT_DIRECTIONAL ? 1e30 : 0.99999;
     } else {
         uint j = i - light_count;
-        uvec4 turn = pcg4d(uvec4(place, settings.seed, 0xd12ecu));
-        uvec4 words = pcg4d(uvec4(place, settings.seed, i));
-        uint number = j % settings.samples;
-        // The R2 sequence (Roberts), with a rotation for each pixel, spreads the samples of a pixel evenly.
-        vec2 u = fract(unit_floats(turn.xy) + float(number) * vec2(0.75487767, 0.56984029));
-        float strata = fract((float(number) + unit_float(words.w)) / float(settings.samples));
+        uint plan = uint(findMSB(settings.samples - 1u) + 1);
+        PointPlace points_at = point_place(place, j % settings.samples, plan, settings.seed ^ 0xd12ecu);
         if (settings.tree != 0u && j < settings.samples) {
             float chosen;
-            LightTarget to = light_targets[pick_light(p.above, p.normal, words.xy, chosen)];
+            vec2 u = unit_floats(point_words(points_at, 0u, settings.seed));
+            LightTarget to = LIGHT_TARGET(pick_light(p.above, p.normal, u.x, pcg4d(uvec4(place, settings.seed, i)).xy, chosen));
             SurfacePoint point = surface_point(to.instance, to.index, sample_triangle(u));
             bool both = (materials[surface_instances[to.instance].material].flags & MATERIAL_DOUBLE_SIDED) != 0u;
             vec3 away = p.position - point.position;
@@ -59,8 +57,7 @@ vec3 direct_ray(uint i, LitPoint p, uvec2 place, out Ray ray) {
             }
         } else {
             float density;
-            uint bits = uint(strata * 16777216.0) << 8u;
-            to_light = environment_sample(settings.environment, bits, unit_float(words.z), u, density);
+            to_light = environment_sample(settings.environment, point_words(points_at, 1u, settings.seed), density);
             if (density > 0.0) arrives = environment_radiance(settings.environment, to_light) / (density * float(settings.samples));
             ray.direction = to_light;
             ray.t_max = 1e30;

@@ -1,12 +1,22 @@
 // Radiance from infinity in full precision, and directions drawn in proportion to it.
-// Before including: lib/sampling.glsl, and define ENVIRONMENT_BINDING and ENVIRONMENT_COLUMNS_BINDING.
+// Before including: lib/sampling.glsl, and define ENVIRONMENT_BINDING and ENVIRONMENT_EDGES_BINDING.
 #ifndef LIB_ENVIRONMENT_SAMPLING
 #define LIB_ENVIRONMENT_SAMPLING
 
 #include "lib/environment_map.glsl"
 
 layout(binding = ENVIRONMENT_BINDING) uniform sampler2D environment_radiance_map; // W/(sr m2), latitude-longitude
-layout(binding = ENVIRONMENT_COLUMNS_BINDING, scalar) readonly buffer EnvironmentColumns { AliasEntry environment_columns[]; };
+// Lower edges of intervals in [0, ENVIRONMENT_EDGE_END]: first of the rows of cells, then for each row of its cells. After the last interval
+// lies ENVIRONMENT_EDGE_END. The length of an interval is its probability exactly.
+layout(binding = ENVIRONMENT_EDGES_BINDING, scalar) readonly buffer EnvironmentEdges { uint environment_edges[]; };
+const uint ENVIRONMENT_EDGE_END = 0x80000000u; // export
+// By address (lib/scene_at.glsl) where ENVIRONMENT_EDGES_AT has it.
+#ifdef ENVIRONMENT_EDGES_AT
+#include "lib/scene_at.glsl"
+#define ENVIRONMENT_EDGE(i) WordsAt(ENVIRONMENT_EDGES_AT).of[i]
+#else
+#define ENVIRONMENT_EDGE(i) environment_edges[i]
+#endif
 
 // Azimuth and polar angle as fractions of their ranges, in the map's own frame. As passes/environment.glsl has it, but
 // precise at the poles.
@@ -46,19 +56,49 @@ float environment_cell_angle(EnvironmentMap map, uint row) {
     return 4.0 * SAMPLING_PI / float(map.cells.x) * sin(mid) * sin(0.5 * SAMPLING_PI / rows);
 }
 
-// Density per steradian with which environment_sample gives this direction.
-float environment_density(EnvironmentMap map, vec3 direction) {
-    uvec2 cell = min(uvec2(environment_place(map, direction) * vec2(map.cells)), map.cells - 1u);
-    return environment_columns[cell.y * map.cells.x + cell.x].probability / environment_cell_angle(map, cell.y);
+// First edge of the cells of a row.
+uint environment_row(EnvironmentMap map, uint row) {
+    return map.cells.y + 1u + row * (map.cells.x + 1u);
 }
 
-// A direction: a cell by its probability (whole bits and a fraction), then uniform in its solid angle.
-vec3 environment_sample(EnvironmentMap map, uint bits, float keep, vec2 u, out float density) {
-    uint index = pick_below(bits, map.cells.x * map.cells.y);
-    AliasEntry column = environment_columns[index];
-    if (keep >= column.keep) index = column.other;
-    uvec2 cell = uvec2(index % map.cells.x, index / map.cells.x);
-    density = environment_columns[index].probability / environment_cell_angle(map, cell.y);
+// Probability of an interval that begins at edge number `at`.
+float environment_share(uint at) {
+    return float(ENVIRONMENT_EDGE(at + 1u) - ENVIRONMENT_EDGE(at)) * (1.0 / 2147483648.0);
+}
+
+// Density per steradian with which environment_sample gives a direction of this cell.
+float environment_cell_density(EnvironmentMap map, uvec2 cell) {
+    float share = environment_share(cell.y) * environment_share(environment_row(map, cell.y) + cell.x);
+    return share / environment_cell_angle(map, cell.y);
+}
+
+// Density per steradian with which environment_sample gives this direction.
+float environment_density(EnvironmentMap map, vec3 direction) {
+    return environment_cell_density(map, min(uvec2(environment_place(map, direction) * vec2(map.cells)), map.cells - 1u));
+}
+
+// The interval of `count` intervals that a word lies in, and its place in the interval, in (0, 1).
+uint environment_interval(uint first, uint count, uint word, out float place) {
+    word >>= 1u;
+    uint low = 0u, high = count;
+    while (high - low > 1u) {
+        uint middle = (low + high) / 2u;
+        if (ENVIRONMENT_EDGE(first + middle) <= word) low = middle;
+        else high = middle;
+    }
+    uint edge = ENVIRONMENT_EDGE(first + low);
+    place = (float(word - edge) + 0.5) / float(ENVIRONMENT_EDGE(first + low + 1u) - edge);
+    return low;
+}
+
+// A direction: a row of cells and a cell of the row by their probabilities, then uniform in the cell's solid angle. Two words that are well
+// distributed in a square give directions that are well distributed by the light.
+vec3 environment_sample(EnvironmentMap map, uvec2 words, out float density) {
+    vec2 u;
+    uvec2 cell;
+    cell.y = environment_interval(0u, map.cells.y, words.y, u.y);
+    cell.x = environment_interval(environment_row(map, cell.y), map.cells.x, words.x, u.x);
+    density = environment_cell_density(map, cell);
     // Uniform in cos θ; sin²(θ/2) = (1 - cos θ)/2 keeps its precision at the upper pole.
     vec2 edges = sin(0.5 * SAMPLING_PI * (float(cell.y) + vec2(0.0, 1.0)) / float(map.cells.y));
     float h = mix(edges.x * edges.x, edges.y * edges.y, u.y);

@@ -42,13 +42,16 @@ layout(binding = LIGHT_TARGETS_BINDING, scalar) readonly buffer LightTargets { L
 // Number of the light that is the first triangle of each instance; NONE where nothing emits.
 layout(binding = INSTANCE_LIGHTS_BINDING, scalar) readonly buffer InstanceLights { uint instance_lights[]; };
 layout(binding = LIGHT_NODES_BINDING, scalar) readonly buffer LightNodes { LightNode light_nodes[]; };
-// By address (lib/scene_at.glsl) where LIGHT_NODES_AT has it.
+// By address (lib/scene_at.glsl) where LIGHT_NODES_AT and LIGHT_TARGETS_AT have it.
 #ifdef LIGHT_NODES_AT
 #include "lib/scene_at.glsl"
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightNodesAt { LightNode of[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightTargetsAt { LightTarget of[]; };
 #define LIGHT_NODE(i) LightNodesAt(LIGHT_NODES_AT).of[i]
+#define LIGHT_TARGET(i) LightTargetsAt(LIGHT_TARGETS_AT).of[i]
 #else
 #define LIGHT_NODE(i) light_nodes[i]
+#define LIGHT_TARGET(i) light_targets[i]
 #endif
 
 // Number of a sun, and how probable it was.
@@ -103,18 +106,29 @@ float light_first_share(uint first, uint second, vec3 point, vec3 normal) {
     return clamp(estimates[0] / sum, LIGHT_LEAST_SHARE, 1.0 - LIGHT_LEAST_SHARE);
 }
 
-// Number of a light of the tree for a surface, and how probable it was. `seed`: two words that are not used otherwise.
-uint pick_light(vec3 point, vec3 normal, uvec2 seed, out float probability) {
+// A choice takes its share out of a number in [0, 1), so long as the number has enough bits for it. This many choices of one half are left in it.
+const float LIGHT_SPENT = 1.0 / 256.0;
+
+// Number of a light of the tree for a surface, and how probable it was. `u`: a number in [0, 1) that chooses; a number in [0, 1) that is
+// independent of the choice comes back. `seed`: two words that are not used otherwise.
+uint pick_light(vec3 point, vec3 normal, inout float u, uvec2 seed, out float probability) {
     uint node = 0u;
     probability = 1.0;
+    float left = 1.0;
     for (uint level = 0u; level < LIGHT_LEVELS; ++level) {
         uint second = LIGHT_NODE(node).second;
         if (second == NONE) break;
         float share = light_first_share(node + 1u, second, point, normal);
-        // Fresh bits for each level: those of one number would run out.
-        float u = unit_float(pcg4d(uvec4(seed, level, 0x51ab17u)).x);
         bool first = u < share;
-        probability *= first ? share : 1.0 - share;
+        float taken = first ? share : 1.0 - share;
+        probability *= taken;
+        left *= taken;
+        u = min((first ? u : u - share) / taken, 0.99999994);
+        // A well-distributed number chooses a well-distributed number of times. Its last bits would not.
+        if (left < LIGHT_SPENT) {
+            u = unit_float(pcg4d(uvec4(seed, level, 0x51ab17u)).x);
+            left = 1.0;
+        }
         node = first ? node + 1u : second;
     }
     return LIGHT_NODE(node).light;
@@ -122,7 +136,7 @@ uint pick_light(vec3 point, vec3 normal, uvec2 seed, out float probability) {
 
 // How probable pick_light is to give a light for a surface.
 float light_choice(uint number, vec3 point, vec3 normal) {
-    uint trail = light_targets[number].trail;
+    uint trail = LIGHT_TARGET(number).trail;
     if (trail == TRAIL_NONE) return 0.0;
     float probability = 1.0;
     uint node = 0u;

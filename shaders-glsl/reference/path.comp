@@ -4,6 +4,7 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_ballot : require
 #include "lib/view.glsl"
 #include "lib/scene.glsl"
 #include "lib/random.glsl"
@@ -16,13 +17,15 @@
 layout(binding = 13, scalar) uniform SettingsBlock { PathSettings settings; };
 
 #define ENVIRONMENT_BINDING 8
-#define ENVIRONMENT_COLUMNS_BINDING 9
+#define ENVIRONMENT_EDGES_BINDING 9
+#define ENVIRONMENT_EDGES_AT settings.environment_at
 #include "lib/environment_sampling.glsl"
 #define LIGHT_COLUMNS_BINDING 10
 #define LIGHT_TARGETS_BINDING 11
 #define INSTANCE_LIGHTS_BINDING 12
 #define LIGHT_NODES_BINDING 16
 #define LIGHT_NODES_AT settings.light_nodes_at
+#define LIGHT_TARGETS_AT settings.light_targets_at
 #include "lib/light_sampling.glsl"
 #define SURFACE_BINDING 1
 #include "lib/hit_surface.glsl"
@@ -31,9 +34,8 @@ layout(binding = 13, scalar) uniform SettingsBlock { PathSettings settings; };
 layout(local_size_x = 64) in;
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
+// Paths, hits and lists are read and written by address (reference/path_at.glsl).
 layout(binding = 14, scalar) buffer Paths { PathState paths[]; };
-// Layers 0 to PATH_SUMS - 1: sums over samples; then PATH_EXACT_SUMS layers: the rounding errors of the first sums.
-layout(binding = 15, rgba32f) uniform image2DArray sums;
 
 layout(binding = 17, scalar) readonly buffer Hits { Hit hits[]; };
 layout(binding = 18, scalar) buffer Lists { uint lists[]; };
@@ -52,35 +54,55 @@ layout(push_constant, scalar) uniform Push {
 #include "reference/path_camera.glsl"
 #include "reference/path_step.glsl"
 
-// Appends a path to the list of its rays of one kind from this surface.
-void append(uint way, uint slot) {
-    uint at = path_count(way, surface + 1u);
-    uint number = atomicAdd(counts[at].paths, 1u);
-    if (number % PATH_GROUP == 0u) atomicAdd(counts[at].groups, 1u);
-    lists[path_list(way, surface + 1u) * settings.capacity + number] = slot;
+// Appends paths to the list of their rays of one kind from this surface. One invocation of a subgroup counts for all.
+void append(bool wanted, uint way, uint slot) {
+    uvec4 those = subgroupBallot(wanted);
+    uint more = subgroupBallotBitCount(those);
+    uint first = 0u;
+    if (more > 0u && subgroupElect()) {
+        uint at = path_count(way, surface + 1u);
+        first = atomicAdd(counts[at].paths, more);
+        uint groups = (first + more + PATH_GROUP - 1u) / PATH_GROUP - (first + PATH_GROUP - 1u) / PATH_GROUP;
+        if (groups > 0u) atomicAdd(counts[at].groups, groups);
+    }
+    first = subgroupBroadcastFirst(first);
+    uint number = first + subgroupBallotExclusiveBitCount(those);
+    if (wanted) LIST_AT(path_list(way, surface + 1u) * settings.capacity + number) = slot;
 }
 
 void main() {
     uint number = gl_GlobalInvocationID.x;
-    if (number >= traced[path_count(ON, surface)].paths) return;
+    bool there = number < traced[path_count(ON, surface)].paths;
     uint slot = number;
-    if (surface > 0u) slot = lists[path_list(ON, surface) * settings.capacity + number];
+    if (there && surface > 0u) slot = LIST_AT(path_list(ON, surface) * settings.capacity + number);
     uvec2 pixel = pixel_of(first + slot);
-    if (any(greaterThanEqual(pixel, settings.extent))) return;
-    PathState path;
-    if (surface == 0u) path = camera_path(pixel);
-    else path = PATH_AT(slot);
-    // The light that waited has arrived.
-    path.waiting = 0u;
-    if (path.alive != 0u) path_surface(pixel, hits[slot], path);
-    if ((path.alive | path.waiting) == 0u) {
-        add_light(pixel, path);
-        return;
+    there = there && all(lessThan(pixel, settings.extent));
+    bool alive = false;
+    uint waiting = 0u;
+    if (there) {
+        Path path;
+        path.steps = unpacked_steps(PATH_AT(slot).steps);
+        // If not, the light that waited has arrived.
+        if (path.steps.alive) {
+            path.origin = PATH_AT(slot).origin;
+            path.density = PATH_AT(slot).density;
+            path.direction = PATH_AT(slot).direction;
+            path.throughput = PATH_AT(slot).throughput;
+            waiting = path_surface(pixel, slot, HIT_AT(slot), path);
+            alive = path.steps.alive;
+            PATH_AT(slot).steps = packed_steps(path.steps);
+            if (alive) {
+                PATH_AT(slot).origin = path.origin;
+                PATH_AT(slot).density = path.density;
+                PATH_AT(slot).direction = path.direction;
+                PATH_AT(slot).throughput = path.throughput;
+            }
+        }
+        if (!alive && waiting == 0u) add_light(pixel, PATH_AT(slot).emission, PATH_AT(slot).direct, PATH_AT(slot).indirect);
     }
-    PATH_AT(slot) = path;
-    append(ON, slot);
+    append(alive || waiting != 0u, ON, slot);
     for (uint turn = 1u; turn < settings.turns; ++turn) {
         uint way = settings.turn_ways[turn];
-        if ((path.waiting >> way & 1u) != 0u) append(way, slot);
+        append((waiting >> way & 1u) != 0u, way, slot);
     }
 }

@@ -8,32 +8,20 @@ uvec2 pixel_of(uint slot) {
     return corner + uvec2(inside % 8u, inside / 8u);
 }
 
-// The dimension of the random numbers that decide about blended surfaces along the ray to a surface.
-uint path_dimension(PathState path) {
-    return 1u + 4u * path.vertex;
+// The dimension of the random numbers that decide about blended surfaces along the ray to a surface. `vertex`: number of surfaces before it.
+uint path_dimension(uint vertex) {
+    return 1u + 5u * vertex;
 }
 
-PathState camera_path(uvec2 pixel) {
-    PathState path;
+// A ray, of which `limit` is in lengths of the direction.
+Ray camera_ray(uvec2 pixel) {
     vec2 inside = vec2(0.5);
     if ((settings.flags & PATH_JITTER) != 0u) {
-        inside = unit_floats(random_words(pixel, sample_index, 0u, settings.seed).xy);
+        inside = unit_floats(point_words(point_place(pixel, sample_index, settings.plan, settings.seed), 0u, settings.seed));
     }
     vec2 uv = (vec2(pixel) + inside) / vec2(settings.extent);
     // From the near plane to the far plane, like the rasteriser.
     float near = view.near / view.far;
-    path.direction = view_ray(view, uv);
-    path.origin = view_base(view, uv) + near * path.direction;
-    path.limit = 1.0 - near;
-    path.density = 0.0;
-    path.throughput = vec3(1.0);
-    path.alive = 1u;
-    path.vertex = 0u;
-    path.scattered = 0u;
-    path.specular = 0u;
-    path.emission = vec3(0.0);
-    path.direct = vec3(0.0);
-    path.indirect = vec3(0.0);
-    path.waiting = 0u;
-    return path;
+    vec3 direction = view_ray(view, uv);
+    return Ray(view_base(view, uv) + near * direction, 0.0, direction, 1.0 - near);
 }

@@ -1,4 +1,6 @@
 // Layers of the sums over samples (see reference/path_sums.glsl), and the layers of the picture that is computed from them.
+#ifndef LIB_PATH_LAYERS
+#define LIB_PATH_LAYERS
 
 const uint PATH_SUMS = 6u; // export
 // The first PATH_EXACT_SUMS layers also have layers for their rounding errors.
@@ -14,3 +16,5 @@ const uint SHOWS_POSITION = 6u; // export
 const uint SHOWS_DEPTH = 7u; // export
 const uint SHOWS_SAMPLES = 8u; // export
 const uint SHOWS_VARIANCE = 9u; // export
+
+#endif

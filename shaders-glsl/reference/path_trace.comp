@@ -32,34 +32,51 @@ layout(push_constant, scalar) uniform Push {
 #include "reference/path_at.glsl"
 #include "reference/path_camera.glsl"
 
-// The ray to the light that waits in a path.
-Ray ray_to_light(uint slot) {
-    if (way == TO_LIGHT) return Ray(PATH_AT(slot).light_origin, 0.0, PATH_AT(slot).lamp.direction, PATH_AT(slot).lamp.limit);
-    if (way == TO_SUN) return Ray(PATH_AT(slot).light_origin, 0.0, PATH_AT(slot).sun.direction, PATH_AT(slot).sun.limit);
-    return Ray(PATH_AT(slot).light_origin, 0.0, PATH_AT(slot).sky.direction, PATH_AT(slot).sky.limit);
+// The light that waits in a path.
+WaitingLight waiting_light(uint slot) {
+    if (way == TO_LIGHT) return PATH_AT(slot).lamp;
+    if (way == TO_SUN) return PATH_AT(slot).sun;
+    return PATH_AT(slot).sky;
+}
+
+void begin_path(uint slot, Ray ray) {
+    PATH_AT(slot).origin = ray.origin;
+    PATH_AT(slot).density = 0.0;
+    PATH_AT(slot).direction = ray.direction;
+    PATH_AT(slot).steps = packed_steps(Steps(true, 0u, 0u, 0u));
+    PATH_AT(slot).throughput = vec3(1.0);
+    PATH_AT(slot).emission = vec3(0.0);
+    PATH_AT(slot).direct = vec3(0.0);
+    PATH_AT(slot).indirect = vec3(0.0);
 }
 
 void main() {
     uint number = gl_GlobalInvocationID.x;
     if (number >= counts[path_count(way, turn)].paths) return;
     uint slot = number;
-    if (turn > 0u) slot = lists[path_list(way, turn) * settings.capacity + number];
+    if (turn > 0u) slot = LIST_AT(path_list(way, turn) * settings.capacity + number);
     if (TO_LIGHTS != 0u) {
-        Hit hit = trace(ray_to_light(slot), TRACE_SHADOW, PATH_AT(slot).salt + way, true);
-        if (hit.instance != NONE) return;
-        vec3 radiance = way == TO_LIGHT ? PATH_AT(slot).lamp.radiance : way == TO_SUN ? PATH_AT(slot).sun.radiance : PATH_AT(slot).sky.radiance;
-        // The light of the first surface is direct.
-        if (PATH_AT(slot).light_scatterings == 1u) PATH_AT(slot).direct += radiance;
-        else PATH_AT(slot).indirect += radiance;
+        WaitingLight light = waiting_light(slot);
+        // The ray ends a little before a lamp, so that the lamp does not occlude itself.
+        Ray ray = Ray(PATH_AT(slot).light_origin, 0.0, light.direction, way == TO_LIGHT ? 0.99999 : 1e30);
+        if (trace(ray, TRACE_SHADOW, PATH_AT(slot).salt + way, true).instance != NONE) return;
+        if (PATH_AT(slot).to_direct != 0u) PATH_AT(slot).direct += light.radiance;
+        else PATH_AT(slot).indirect += light.radiance;
         return;
     }
     uvec2 pixel = pixel_of(first + slot);
-    PathState path;
-    if (turn == 0u) path = camera_path(pixel);
-    else path = PATH_AT(slot);
-    // It only waits for light.
-    if (path.alive == 0u) return;
-    uint mask = path.vertex == 0u ? TRACE_CAMERA : path.scattered > 0u ? TRACE_SHADOW : 0u;
-    uint salt = random_words(pixel, sample_index, path_dimension(path), settings.seed).x;
-    hits[slot] = trace(Ray(path.origin, 0.0, path.direction, path.limit), mask, salt, false);
+    Steps steps = Steps(true, 0u, 0u, 0u);
+    Ray ray;
+    if (turn == 0u) {
+        ray = camera_ray(pixel);
+        begin_path(slot, ray);
+    } else {
+        steps = unpacked_steps(PATH_AT(slot).steps);
+        // It only waits for light.
+        if (!steps.alive) return;
+        ray = Ray(PATH_AT(slot).origin, 0.0, PATH_AT(slot).direction, 1e30);
+    }
+    uint mask = steps.vertex == 0u ? TRACE_CAMERA : steps.scattered > 0u ? TRACE_SHADOW : 0u;
+    uint salt = random_words(pixel, sample_index, path_dimension(steps.vertex), settings.seed).x;
+    HIT_AT(slot) = trace(ray, mask, salt, false);
 }

@@ -2,25 +2,28 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
-#include "reference/path_layers.glsl"
+#include "reference/path_sums_at.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-layout(binding = 0, rgba32f) uniform readonly image2DArray sums;
-layout(binding = 1, rgba32f) uniform writeonly image2D shown;
+layout(binding = 0, rgba32f) uniform writeonly image2D shown;
 
 layout(push_constant, scalar) uniform Push {
     uint shows;    // SHOWS_
     float samples; // of every pixel, at least 1
     float epsilon; // added to the square of the luminance in relative errors
+    uvec2 sums_at; // address
 };
 
 // Depth of the background, metres.
 const float BACKGROUND = 1e10;
 
 vec4 sum_of(ivec2 pixel, uint layer) {
-    vec4 high = imageLoad(sums, ivec3(pixel, layer));
-    return layer < PATH_EXACT_SUMS ? high + imageLoad(sums, ivec3(pixel, layer + PATH_SUMS)) : high;
+    ivec2 size = imageSize(shown);
+    uint at = uint(pixel.y * size.x + pixel.x);
+    uint each = uint(size.x * size.y);
+    vec4 high = SUM_AT(sums_at, layer * each + at);
+    return layer < PATH_EXACT_SUMS ? high + SUM_AT(sums_at, (layer + PATH_SUMS) * each + at) : high;
 }
 
 vec3 mean_of(ivec2 pixel, uint layer) {

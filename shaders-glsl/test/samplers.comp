@@ -7,7 +7,7 @@
 #include "lib/sampling.glsl"
 #include "lib/bsdf.glsl"
 #define ENVIRONMENT_BINDING 0
-#define ENVIRONMENT_COLUMNS_BINDING 1
+#define ENVIRONMENT_EDGES_BINDING 1
 #include "lib/environment_sampling.glsl"
 #define LIGHT_COLUMNS_BINDING 2
 #define LIGHT_TARGETS_BINDING 3
@@ -66,17 +66,19 @@ void main() {
         value.w = bsdf_rough(b, found.xyz, view, back).g;
     }
     if (which == SAMPLER_ENVIRONMENT) {
-        found.xyz = environment_sample(settings.environment, words.z, unit_float(words.w), u, found.w);
+        found.xyz = environment_sample(settings.environment, words.zw, found.w);
         value = vec4(environment_radiance(settings.environment, found.xyz), environment_density(settings.environment, found.xyz));
     }
     if (which == SAMPLER_SUN) found.x = float(pick_sun(settings.suns, words.x, unit_float(words.y), found.w));
     if (which == SAMPLER_LIGHT) {
         // At `albedo`, for a surface that looks along `view`.
-        uint number = pick_light(albedo, view, words.xy, found.w);
+        uint number = pick_light(albedo, view, u.x, words.zw, found.w);
         found.x = float(number);
+        // Independent of the choice.
+        found.y = u.x;
         value.x = light_choice(number, albedo, view);
         // Of every light in turn, whichever is drawn.
-        uint other = i % max(settings.slots, 1u);
+        uint other = i % max(settings.textures, 1u);
         value.y = float(other);
         value.z = light_choice(other, albedo, view);
     }

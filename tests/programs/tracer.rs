@@ -23,6 +23,8 @@ mod tracer_frames;
 mod tracer_invariants;
 #[path = "../tracer_moves.rs"]
 mod tracer_moves;
+#[path = "../tracer_points.rs"]
+mod tracer_points;
 #[path = "../tracer_samplers.rs"]
 mod tracer_samplers;
 #[path = "../tracer_surfaces.rs"]

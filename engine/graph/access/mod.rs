@@ -68,6 +68,10 @@ impl<'a> Collector<'a> {
                 c.buffer(*to, Stages::TRANSFER, Access::TRANSFER_WRITE, Usage::COPY_TO, "to");
             }
         }
+        for (buffer, written) in &pass.addressed {
+            let access = if *written { Access::STORAGE_READ | Access::STORAGE_WRITE } else { Access::STORAGE_READ };
+            c.buffer(*buffer, Stages::COMPUTE, access, Usage::STORAGE, "by address");
+        }
         c.resolve();
         c
     }

@@ -79,7 +79,7 @@ pub struct Igi {
     /// The device has ray queries.
     queries: bool,
     environment: OwnedImage,
-    environment_columns: OwnedBuffer,
+    environment_edges: OwnedBuffer,
     /// Columns and rows of the environment's importance table. Directions within one cell have equal probability density.
     cells: [u32; 2],
     /// [`starts::sky_moments`] of the environment, W/m²; `None` without an environment.
@@ -109,7 +109,7 @@ struct Shared {
     /// Acceleration structures for the shadow rays of virtual lights.
     hidden_by: RayHandles,
     environment: Image,
-    environment_columns: Buffer,
+    environment_edges: Buffer,
     light_columns: Buffer,
     light_targets: Buffer,
     instance_lights: Buffer,
@@ -194,7 +194,7 @@ impl Igi {
         let queries = gpu.caps().ray_query;
         let in_compute = settings.visibility.in_compute(queries)?;
         let importance = tables::importance(scene.environment.as_ref());
-        let columns = bytemuck::cast_slice(&importance.columns);
+        let edges = bytemuck::cast_slice(&importance.edges);
         let double_sided = |primitive: &crate::scene::Primitive| {
             scene.materials.get(primitive.material as usize).is_some_and(|material| material.double_sided)
         };
@@ -207,7 +207,7 @@ impl Igi {
             in_compute,
             queries,
             environment: tables::radiance_map(gpu, scene.environment.as_ref())?,
-            environment_columns: OwnedBuffer::with_contents(gpu, "igi.environment", columns)?,
+            environment_edges: OwnedBuffer::with_contents(gpu, "igi.environment", edges)?,
             cells: importance.cells,
             moments: scene.environment.as_ref().filter(|e| !e.pixels.is_empty()).map(starts::sky_moments),
             double_sided: meshes.flat_map(|mesh| mesh.primitives.iter().map(double_sided)).collect(),
@@ -278,7 +278,7 @@ impl Igi {
             rays,
             hidden_by,
             environment: graph.import_image(&self.environment),
-            environment_columns: graph.import_buffer(&self.environment_columns),
+            environment_edges: graph.import_buffer(&self.environment_edges),
             light_columns: graph.buffer_from("igi.light-columns", &table.columns),
             light_targets: graph.buffer_from("igi.light-targets", &table.targets),
             instance_lights: graph.buffer_from("igi.instance-lights", &table.instances),

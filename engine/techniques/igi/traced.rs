@@ -7,7 +7,7 @@ macro_rules! traced_lit {
         $crate::rays::traced!(
             $($name)::+ {
                 environment_radiance_map: $shared.environment,
-                environment_columns: $shared.environment_columns,
+                environment_edges: $shared.environment_edges,
                 settings: $shared.settings,
                 $($fields)*
             },
