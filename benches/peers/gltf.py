@@ -16,13 +16,14 @@ class Scene:
         self.document = json.loads(raw[20 : 20 + length])
         self.binary = raw[28 + length :]
         self.materials = self.document.get("materials", [])
-        self.meshes, self.lamps, self.view = [], [], None
+        self.meshes, self.colors, self.lamps, self.view = [], [], [], None
         lights = self.document.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", [])
         for node in self.document["nodes"]:
             world = np.array(node.get("matrix", np.eye(4).T.ravel()), np.float64).reshape(4, 4).T
             if "mesh" in node:
                 primitives = self.document["meshes"][node["mesh"]]["primitives"]
                 self.meshes += [self.primitive(primitive, world) for primitive in primitives]
+                self.colors += [self.colors_of(primitive) for primitive in primitives]
             if "camera" in node and self.view is None:
                 self.view = (world, self.document["cameras"][node["camera"]])
             if "extensions" in node:
@@ -47,6 +48,14 @@ class Scene:
         uvs = self.accessor(attributes["TEXCOORD_0"]) if "TEXCOORD_0" in attributes else None
         return positions.astype(np.float32), normals.astype(np.float32), uvs, triangles, primitive["material"]
 
+    def colors_of(self, primitive):
+        """Linear colours of the vertices that tell something, or None."""
+        colors = self.accessor(primitive["attributes"]["COLOR_0"])[:, :3] if "COLOR_0" in primitive["attributes"] else None
+        return None if colors is None or np.all(colors == 1.0) else colors
+
+    def transmits(self, material):
+        return self.materials[material].get("extensions", {}).get("KHR_materials_transmission", {}).get("transmissionFactor", 0.0) > 0.5
+
     def picture(self, use):
         """The bytes of a texture's PNG file, and its transform (offset, rotation, scale)."""
         image = self.document["images"][self.document["textures"][use["index"]]["source"]]
@@ -60,3 +69,26 @@ class Scene:
         material = self.materials[material]
         strength = material.get("extensions", {}).get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
         return np.array(material.get("emissiveFactor", [0.0] * 3)) * strength
+
+
+def without_unlit(source, target):
+    """Writes an exported scene without its unlit surfaces, which let light through in lucerna and stop it in other programs."""
+    raw = source.read_bytes()
+    length = struct.unpack("<I", raw[12:16])[0]
+    document = json.loads(raw[20 : 20 + length])
+    unlit = {i for i, m in enumerate(document["materials"]) if "KHR_materials_unlit" in m.get("extensions", {})}
+    kept = {}
+    for index, mesh in enumerate(document["meshes"]):
+        mesh["primitives"] = [primitive for primitive in mesh["primitives"] if primitive["material"] not in unlit]
+        if mesh["primitives"]:
+            kept[index] = len(kept)
+    document["meshes"] = [mesh for index, mesh in enumerate(document["meshes"]) if index in kept]
+    for node in document["nodes"]:
+        if "mesh" in node:
+            number = kept.get(node.pop("mesh"))
+            if number is not None:
+                node["mesh"] = number
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    rest = raw[20 + length :]
+    target.write_bytes(raw[:8] + struct.pack("<III", 20 + len(text) + len(rest), len(text), 0x4E4F534A) + text + rest)

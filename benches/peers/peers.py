@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Time to equal error of path tracers on the same cores: `lucerna reference` and Mitsuba 3.
+"""Time to equal error of path tracers on the same cores: `lucerna reference`, Mitsuba 3 and Blender's Cycles.
 
 usage: peers.py LUCERNA [--assets DIR] [--folder DIR] [--scenes NAME,…] [--size WxH] [--runs N]
 
@@ -8,7 +8,7 @@ program renders it several times with different seeds; the variance over the run
 without start, loading and compiling. Of two programs that one is better whose error of one sample times its time of one sample is
 smaller. All runs are on this machine's processor: `lucerna` with the CPU driver (VK_DRIVER_FILES names it), Mitsuba with `llvm_ad_rgb`.
 
-Makes a virtual environment with Mitsuba in FOLDER. DRJIT_LIBLLVM_PATH may name a newer LLVM, for example that of Debian's package libllvm19.
+Makes virtual environments with Mitsuba and with Blender in FOLDER. DRJIT_LIBLLVM_PATH may name a newer LLVM, for example that of Debian's package libllvm19.
 """
 import argparse
 import os
@@ -24,11 +24,14 @@ SPONZA = "position = [-8.0, 2.0, 0.5]\ntarget = [5.0, 4.0, -0.5]\nyfov_degrees =
 # Name, arguments of the scene, file of the camera, environment, diffuse only, samples of a run of ours and of Mitsuba's.
 SCENES = {
     "cornell": (["--builtin", "cornell-area"], None, None, True, 64, 256),
-    "sponza": (["scenes/sponza-dabrovic/sponza.obj", "--sun", "60,40,4"], SPONZA, "environments/blender_city.exr", True, 16, 64),
-    "room": (["gltf/sampleroom/sampleroom.gltf"], ROOM, "environments/blender_sunset.exr", True, 16, 64),
-    "garage": (["--builtin", "garage"], None, None, True, 16, 64),
+    "sponza": (["scenes/sponza-dabrovic/sponza.obj", "--sun", "60,40,4"], SPONZA, "environments/blender_city.exr", True, 64, 256),
+    "room": (["gltf/sampleroom/sampleroom.gltf"], ROOM, "environments/blender_sunset.exr", True, 64, 256),
+    "garage": (["--builtin", "garage"], None, None, True, 64, 256),
+    "conference": (["--builtin", "conference"], None, None, False, 64, 256),
 }
 BOUNCES = 8
+# Blender as a Python module, and the only Python that it is made for.
+BLENDER, BLENDER_PYTHON = "bpy==5.0.1", (3, 11)
 
 
 def processor_seconds():
@@ -72,10 +75,19 @@ def main():
     if not python.exists():
         venv.create(folder / "mitsuba", with_pip=True)
         run([python, "-m", "pip", "install", "--quiet", "mitsuba", "numpy", "pillow"])
+    blender = folder / "blender/bin/python"
+    if sys.version_info[:2] == BLENDER_PYTHON and not blender.exists():
+        venv.create(folder / "blender", with_pip=True)
+        run([blender, "-m", "pip", "install", "--quiet", BLENDER, "numpy"])
+    if not blender.exists():
+        print(f"Cycles is left out: {BLENDER} needs Python {BLENDER_PYTHON[0]}.{BLENDER_PYTHON[1]}", file=sys.stderr)
+        blender = None
     if "PEERS_INSIDE" not in os.environ:
         # numpy is there.
         os.execve(python, [str(python), __file__, *sys.argv[1:]], dict(os.environ, PEERS_INSIDE="1"))
     import numpy as np
+
+    import gltf
 
     width, height = map(int, options.size.split("x"))
     print(f"| scene | program | samples per processor second | error of a sample | time to equal error, Mitsuba's = 1 | mean |\n|---|---|---|---|---|---|")
@@ -89,6 +101,10 @@ def main():
             source += ["--environment", options.assets / sky]
         exported = folder / f"{name}.glb"
         run([options.lucerna, "export-gltf", *source, "--size", options.size, "-o", exported, "--overwrite", "-q"])
+        if name == "conference":
+            whole, exported = exported, folder / f"{name}-lit.glb"
+            gltf.without_unlit(whole, exported)
+            source = [exported]
 
         def ours(seed, spp):
             picture = folder / f"{name}.pfm"
@@ -102,17 +118,23 @@ def main():
         rendered = [ours(seed, ours_spp) for seed in range(options.runs)]
         pictures = np.array([picture for picture, _ in rendered])
         seconds = (np.mean([seconds for _, seconds in rendered]) - start) / (ours_spp - 1)
-        result = folder / f"{name}.npz"
-        command = [python, HERE / "with_mitsuba.py", exported, result, "--size", options.size, "--bounces", BOUNCES, "--spp", their_spp]
-        command += ["--runs", options.runs] + (["--diffuse"] if diffuse else [])
         environment = exported.with_name(f"{name}-environment.exr")
-        command += ["--environment", environment] if environment.exists() else []
-        run(command)
-        theirs = np.load(result)
+
+        def theirs(program, python, script, spp, *more):
+            result = folder / f"{name}-{script}.npz"
+            command = [python, HERE / f"{script}.py", exported, result, "--size", options.size, "--bounces", BOUNCES, "--spp", spp]
+            command += ["--runs", options.runs, *more]
+            run(command + (["--environment", environment] if environment.exists() else []))
+            found = np.load(result)
+            return f"{program} {found['version']}", error_of_a_sample(found["pictures"], spp, np), found["seconds"].mean() / spp, found["pictures"].mean()
+
+        more = ["--diffuse"] if diffuse else []
         rows = [
             ("lucerna", error_of_a_sample(pictures, ours_spp, np), seconds, pictures.mean()),
-            (f"Mitsuba {theirs['version']}", error_of_a_sample(theirs["pictures"], their_spp, np), theirs["seconds"].mean() / their_spp, theirs["pictures"].mean()),
+            theirs("Mitsuba", python, "with_mitsuba", their_spp, *more),
         ]
+        if blender:
+            rows.append(theirs("Cycles", blender, "with_blender", ours_spp, *more))
         for program, error, each, mean in rows:
             ratio = error * each / (rows[1][1] * rows[1][2])
             print(f"| {name} | {program} | {width * height / each:,.0f} | {error:.3g} | {ratio:.2f} | {mean:.4f} |", flush=True)

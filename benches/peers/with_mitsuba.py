@@ -16,45 +16,59 @@ from gltf import Scene
 
 mi.set_variant("llvm_ad_rgb")
 T = mi.ScalarTransform4f
+# Mitsuba's principled material adds its glossy light to the whole diffuse light. A white surface of roughness 0.6 then reflects 0.843 where its
+# colour is 0.8 and the other programs reflect about 0.8. This factor on the colour makes up for it.
+PRINCIPLED = 0.95
 
 
 def texture(scene, use, factor):
     data, transform = scene.picture(use)
-    codes = np.array(Image.open(data).convert("RGB"), np.float32) / 255.0
-    linear = np.where(codes <= 0.04045, codes / 12.92, ((codes + 0.055) / 1.055) ** 2.4) * np.array(factor, np.float32)
+    values = np.array(Image.open(data).convert("RGB"), np.float32) / 255.0
+    if factor is not None:
+        # Colours, not normals.
+        values = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4) * np.array(factor, np.float32)
     size = transform.get("scale", [1.0, 1.0])
     # Mitsuba counts v upwards, so its pictures begin with the last row.
     offset = transform.get("offset", [0.0, 0.0])
     to_uv = T().translate([offset[0], offset[1], 0]).rotate([0, 0, 1], -np.degrees(transform.get("rotation", 0.0))).scale([size[0], size[1], 1])
-    return {"type": "bitmap", "bitmap": mi.Bitmap(linear.astype(np.float32)), "raw": True, "to_uv": to_uv}
+    return {"type": "bitmap", "bitmap": mi.Bitmap(values.astype(np.float32)), "raw": True, "to_uv": to_uv}
 
 
-def bsdf(scene, material, diffuse):
+def bsdf(scene, index, diffuse, coloured):
+    material = scene.materials[index]
     pbr = material["pbrMetallicRoughness"]
     factor, metallic = pbr["baseColorFactor"], pbr.get("metallicFactor", 1.0)
     # In the diffuse form metals are black, as `reference.diffuse_only` has them.
-    factor = [min(c, 1.0) * (1.0 - metallic if diffuse else 1.0) for c in factor[:3]]
+    factor = [min(c, 1.0) * (1.0 - metallic if diffuse else PRINCIPLED if metallic < 0.5 else 1.0) for c in factor[:3]]
     colour = {"type": "rgb", "value": factor}
     if "baseColorTexture" in pbr:
         colour = texture(scene, pbr["baseColorTexture"], factor)
+    elif coloured:
+        colour = {"type": "mesh_attribute", "name": "vertex_color"}
+    roughness = pbr.get("roughnessFactor", 1.0)
     if diffuse:
         inner = {"type": "diffuse", "reflectance": colour}
+    elif scene.transmits(index):
+        return {"type": "dielectric", "int_ior": 1.5, "ext_ior": 1.0, "specular_transmittance": colour}
+    elif metallic > 0.5 and roughness < 0.05:
+        inner = {"type": "conductor", "material": "none", "specular_reflectance": colour}
     else:
-        roughness = max(pbr.get("roughnessFactor", 1.0), 0.05)
         inner = {"type": "principled", "base_color": colour, "metallic": metallic, "roughness": roughness}
+    if not diffuse and "normalTexture" in material:
+        inner = {"type": "normalmap", "normalmap": texture(scene, material["normalTexture"], None), "bsdf": inner}
     return {"type": "twosided", "inner": inner}
 
 
 def sides(scene):
     """The meshes. A double-sided lamp becomes two, a little apart, because Mitsuba's area lights shine to one side."""
     gap = 1e-4 * max(np.ptp(positions) for positions, *_ in scene.meshes)
-    for positions, normals, uvs, triangles, material in scene.meshes:
+    for (positions, normals, uvs, triangles, material), colors in zip(scene.meshes, scene.colors):
         if scene.emission(material).max() > 0 and scene.materials[material].get("doubleSided"):
             step = (gap * normals).astype(np.float32)
-            yield positions + step, normals, uvs, triangles, material
-            yield positions - step, -normals, uvs, triangles[:, ::-1], material
+            yield positions + step, normals, uvs, triangles, material, colors
+            yield positions - step, -normals, uvs, triangles[:, ::-1], material, colors
         else:
-            yield positions, normals, uvs, triangles, material
+            yield positions, normals, uvs, triangles, material, colors
 
 
 def load(path, options):
@@ -71,13 +85,16 @@ def load(path, options):
         "sensor": {"type": "perspective", "fov": float(fov), "fov_axis": "y", "to_world": to_world, "film": film,
                    "near_clip": camera["perspective"]["znear"], "sampler": {"type": "independent", "sample_count": options.spp}},
     }
-    for index, (positions, normals, uvs, triangles, material) in enumerate(sides(scene)):
+    for index, (positions, normals, uvs, triangles, material, colors) in enumerate(sides(scene)):
         emitted = scene.emission(material)
         props = mi.Properties()
-        props["bsdf"] = mi.load_dict(bsdf(scene, scene.materials[material], options.diffuse))
+        props["bsdf"] = mi.load_dict(bsdf(scene, material, options.diffuse, colors is not None))
         if emitted.max() > 0:
             props["emitter"] = mi.load_dict({"type": "area", "radiance": {"type": "rgb", "value": emitted.tolist()}})
         mesh = mi.Mesh(f"mesh{index}", len(positions), len(triangles), props=props, has_vertex_normals=True, has_vertex_texcoords=uvs is not None)
+        if colors is not None:
+            factor = scene.materials[material]["pbrMetallicRoughness"]["baseColorFactor"][:3]
+            mesh.add_attribute("vertex_color", 3, (colors * factor * (1.0 if options.diffuse else PRINCIPLED)).astype(np.float32).ravel())
         values = mi.traverse(mesh)
         values["vertex_positions"] = positions.ravel()
         values["vertex_normals"] = normals.astype(np.float32).ravel()

@@ -11,12 +11,12 @@ mod sets;
 
 use lucerna::{
     Result,
-    gpu::{Gpu, GpuOptions},
+    gpu::{BufferDesc, DeviceKind, Gpu, GpuOptions, OwnedBuffer},
     graph::{Graph, Runner},
     rays::Rays,
     resident::Resident,
     scene::{self, LoadOptions, Pose, Scene},
-    shaders::{test::trace as shader, types},
+    shaders::{consts, test::trace_at as shader, types},
 };
 use lucerna_scenes as builtin;
 use std::path::PathBuf;
@@ -101,7 +101,7 @@ fn measure(
     let bvh = scene::bvh::Bvh::build(scene, &Pose::rest(scene));
     println!("\n{name}: {} triangles, built in {:.2} s", bvh.triangles().len(), built.as_secs_f64());
     let query = if gpu.caps().ray_query { Some(Rays::new(gpu, scene, &resident)?) } else { None };
-    let mut device = Device { scene, resident, rays, query, runner: Runner::new(gpu) };
+    let mut device = Device { gpu: gpu.clone(), scene, resident, rays, query, runner: Runner::new(gpu) };
     let sets = sets::sets(&bvh, options.size);
     let theirs = embree.map(|e| e.run(threads, options.rounds, bvh.triangles(), &sets)).transpose()?;
     println!("by the processors' time (by the clock); turns of the loops of one ray: mean, most");
@@ -173,6 +173,7 @@ fn busy() -> f64 {
 }
 
 struct Device<'a> {
+    gpu: Gpu,
     scene: &'a Scene,
     resident: Resident,
     rays: Rays,
@@ -190,10 +191,13 @@ impl Device<'_> {
             _ => self.rays.frame(&mut graph, &handles),
         };
         let count = rays.len() as u32;
-        let hits = graph.buffer("hits", u64::from(count) * size_of::<types::Hit>() as u64);
+        let stacks_in_memory = self.gpu.caps().kind == DeviceKind::Cpu;
+        let buffer = |name, size| OwnedBuffer::new(&self.gpu, name, BufferDesc::device(size));
+        let rays = OwnedBuffer::with_contents(&self.gpu, "rays", bytemuck::cast_slice(rays))?;
+        let hits = buffer("hits", u64::from(count) * size_of::<types::Hit>() as u64)?;
+        let depth = if stacks_in_memory { u64::from(consts::TRACE_DEPTH) } else { 0 };
+        let stacks = buffer("stacks", 4 * (depth * u64::from(count).next_multiple_of(64)).max(1))?;
         let args = shader::Args {
-            rays: graph.buffer_from("rays", rays),
-            hits,
             trace_nodes: traced.trace_nodes,
             trace_triangles: traced.trace_triangles,
             trace_instances: traced.trace_instances,
@@ -205,10 +209,20 @@ impl Device<'_> {
             trace_accel: traced.trace_accel,
             materials: traced.materials,
             scene_textures: traced.scene_textures,
-            push: shader::Push { count: if mode == Mode::Idle { 0 } else { count }, mask: 0, salt: 0 },
-            spec: shader::Spec { any: u32::from(any), count: u32::from(mode == Mode::Count) },
+            push: shader::Push {
+                rays_at: rays.address_words(),
+                hits_at: hits.address_words(),
+                stacks_at: stacks.address_words(),
+                count: if mode == Mode::Idle { 0 } else { count },
+            },
+            spec: shader::Spec {
+                any: u32::from(any),
+                count: u32::from(mode == Mode::Count),
+                stacks_in_memory: u32::from(stacks_in_memory),
+            },
         };
-        graph.compute(args, count);
+        let [rays, hits, stacks] = [rays, hits, stacks].map(|buffer| graph.import_buffer(&buffer));
+        graph.compute(args, count).reading(rays).writing(hits).writing(stacks);
         let token = graph.read_buffer(hits);
         let before = busy();
         let frame = self.runner.run(graph)?;

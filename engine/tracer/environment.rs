@@ -20,7 +20,8 @@ pub struct Importance {
     /// Columns and rows.
     pub cells: [u32; 2],
     /// Edges of intervals whose lengths are the probabilities, in units of 1 / [`ENVIRONMENT_EDGE_END`]: the rows, then the cells of each row.
-    /// The device draws by the same integers, so the probabilities are exact.
+    /// The device draws by the same integers, so the probabilities are exact. Behind the edges of each are as many numbers that say where to
+    /// search (`lib/environment_sampling.glsl`).
     pub edges: Vec<u32>,
 }
 
@@ -29,12 +30,13 @@ impl Importance {
     pub fn probability(&self, column: usize, row: usize) -> f64 {
         let [columns, rows] = self.cells.map(|count| count as usize);
         let share = |at: usize| f64::from(self.edges[at + 1] - self.edges[at]) / f64::from(ENVIRONMENT_EDGE_END);
-        share(row) * share(rows + 1 + row * (columns + 1) + column)
+        share(row) * share(2 * (rows + 1) + 2 * row * (columns + 1) + column)
     }
 }
 
-/// Adds the edges of intervals whose lengths are in proportion to the weights, which are positive. No interval is empty.
+/// Adds the edges of intervals whose lengths are in proportion to the weights, which are positive, and the guides to them. No interval is empty.
 fn add_edges(edges: &mut Vec<u32>, weights: &[f64]) {
+    let first = edges.len();
     let total: f64 = weights.iter().sum();
     let (mut sum, mut last) = (0.0, 0);
     edges.push(0);
@@ -45,12 +47,31 @@ fn add_edges(edges: &mut Vec<u32>, weights: &[f64]) {
         last = if rest == 0 { ENVIRONMENT_EDGE_END } else { edge.clamp(last + 1, ENVIRONMENT_EDGE_END - rest) };
         edges.push(last);
     }
+    add_guides(edges, first);
+}
+
+/// Adds as many numbers as there are edges from number `first` on. Number b is the interval of the least word whose upper 16 bits, times the
+/// number of intervals, are at least b · 2¹⁶ (Chen and Asau, On Generating Random Variates from an Empirical Distribution, 1974).
+fn add_guides(edges: &mut Vec<u32>, first: usize) {
+    let count = edges.len() - first - 1;
+    let mut interval = 0;
+    for part in 0..count {
+        let word = ((part << 16).div_ceil(count) as u32) << 15;
+        while edges[first + interval + 1] <= word {
+            interval += 1;
+        }
+        edges.push(interval as u32);
+    }
+    edges.push(count as u32 - 1);
 }
 
 /// The importance map of an environment; a single cell without one.
 pub fn importance(environment: Option<&Environment>) -> Importance {
     let Some(env) = environment.filter(|e| !e.pixels.is_empty()) else {
-        return Importance { cells: [1, 1], edges: vec![0, ENVIRONMENT_EDGE_END, 0, ENVIRONMENT_EDGE_END] };
+        let mut edges = Vec::new();
+        add_edges(&mut edges, &[1.0]);
+        add_edges(&mut edges, &[1.0]);
+        return Importance { cells: [1, 1], edges };
     };
     let (w, h) = (env.width as usize, env.height as usize);
     let light = spread(&env.pixels.iter().map(|&p| strength(p)).collect::<Vec<_>>(), w, h);
@@ -76,7 +97,7 @@ pub fn importance(environment: Option<&Environment>) -> Importance {
             *weight = (1.0 - UNIFORM) * share + UNIFORM * even;
         }
     }
-    let mut edges = Vec::with_capacity(rows + 1 + rows * (columns + 1));
+    let mut edges = Vec::with_capacity(2 * (rows + 1 + rows * (columns + 1)));
     add_edges(&mut edges, &weights.chunks_exact(columns).map(|row| row.iter().sum()).collect::<Vec<f64>>());
     for row in weights.chunks_exact(columns) {
         add_edges(&mut edges, row);
@@ -174,6 +195,25 @@ mod tests {
         let env = Environment { width, height, pixels: vec![Vec3::ONE; 4_500_000], ..Environment::constant(Vec3::ONE) };
         let map = importance(Some(&env));
         assert_eq!(map.cells, [750, 375]);
-        assert_eq!(map.edges.len(), 376 + 751 * 375);
+        assert_eq!(map.edges.len(), 2 * (376 + 751 * 375));
+    }
+
+    #[test]
+    fn guides_lead_to_the_interval_of_each_word() {
+        let even = vec![1.0; 1000];
+        let steep: Vec<f64> = (0..300).map(|i| 0.9f64.powi(i)).collect();
+        let peak: Vec<f64> = (0..777).map(|i| if i == 500 { 1e9 } else { 1.0 }).collect();
+        for weights in [&even[..], &even[..1], &even[..3], &steep, &peak] {
+            let mut edges = vec![7; 5];
+            add_edges(&mut edges, weights);
+            let (edges, guides) = edges[5..].split_at(weights.len() + 1);
+            let near = edges.iter().flat_map(|&edge| [edge.saturating_sub(1), edge, edge + 1]);
+            let spread = (0..5000u32).map(|i| i.wrapping_mul(0x9e37_79b9) >> 1);
+            for word in near.chain(spread).filter(|&word| word < ENVIRONMENT_EDGE_END) {
+                let interval = edges.partition_point(|&edge| edge <= word) as u32 - 1;
+                let part = ((word >> 15) as usize * weights.len()) >> 16;
+                assert!(guides[part] <= interval && interval <= guides[part + 1], "{word}: {interval} {part}");
+            }
+        }
     }
 }

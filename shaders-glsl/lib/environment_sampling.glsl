@@ -7,7 +7,8 @@
 
 layout(binding = ENVIRONMENT_BINDING) uniform sampler2D environment_radiance_map; // W/(sr m2), latitude-longitude
 // Lower edges of intervals in [0, ENVIRONMENT_EDGE_END]: first of the rows of cells, then for each row of its cells. After the last interval
-// lies ENVIRONMENT_EDGE_END. The length of an interval is its probability exactly.
+// lies ENVIRONMENT_EDGE_END. The length of an interval is its probability exactly. Behind these edges are as many guides: the part of all words
+// that a word lies in says between which two guides its interval is.
 layout(binding = ENVIRONMENT_EDGES_BINDING, scalar) readonly buffer EnvironmentEdges { uint environment_edges[]; };
 const uint ENVIRONMENT_EDGE_END = 0x80000000u; // export
 // By address (lib/scene_at.glsl) where ENVIRONMENT_EDGES_AT has it.
@@ -58,7 +59,7 @@ float environment_cell_angle(EnvironmentMap map, uint row) {
 
 // First edge of the cells of a row.
 uint environment_row(EnvironmentMap map, uint row) {
-    return map.cells.y + 1u + row * (map.cells.x + 1u);
+    return 2u * (map.cells.y + 1u + row * (map.cells.x + 1u));
 }
 
 // Probability of an interval that begins at edge number `at`.
@@ -80,7 +81,8 @@ float environment_density(EnvironmentMap map, vec3 direction) {
 // The interval of `count` intervals that a word lies in, and its place in the interval, in (0, 1).
 uint environment_interval(uint first, uint count, uint word, out float place) {
     word >>= 1u;
-    uint low = 0u, high = count;
+    uint guide = first + count + 1u + ((word >> 15u) * count >> 16u);
+    uint low = ENVIRONMENT_EDGE(guide), high = ENVIRONMENT_EDGE(guide + 1u) + 1u;
     while (high - low > 1u) {
         uint middle = (low + high) / 2u;
         if (ENVIRONMENT_EDGE(first + middle) <= word) low = middle;

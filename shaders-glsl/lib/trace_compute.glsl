@@ -46,12 +46,22 @@ vec4 trace_bytes(uint word) {
 uint trace_between = 0u;
 #endif
 
+// The larger and the smaller of two numbers. CPU drivers have one instruction for each of them. max() and min() take three instructions,
+// because they return the other number where one is NaN.
+vec4 trace_larger(vec4 a, vec4 b) {
+    return vec4(a.x > b.x ? a.x : b.x, a.y > b.y ? a.y : b.y, a.z > b.z ? a.z : b.z, a.w > b.w ? a.w : b.w);
+}
+
+vec4 trace_smaller(vec4 a, vec4 b) {
+    return vec4(a.x < b.x ? a.x : b.x, a.y < b.y ? a.y : b.y, a.z < b.z ? a.z : b.z, a.w < b.w ? a.w : b.w);
+}
+
 // Which of four boxes the ray meets between t_min and t_max: bounds in steps, near ones first.
 uint trace_boxes(uvec3 near_words, uvec3 far_words, vec3 step_time, vec3 near_time, vec3 far_time, float t_min, float t_max) {
-    vec4 near = max(trace_bytes(near_words.x) * step_time.x + near_time.x, trace_bytes(near_words.y) * step_time.y + near_time.y);
-    near = max(max(near, trace_bytes(near_words.z) * step_time.z + near_time.z), t_min);
-    vec4 far = min(trace_bytes(far_words.x) * step_time.x + far_time.x, trace_bytes(far_words.y) * step_time.y + far_time.y);
-    far = min(min(far, trace_bytes(far_words.z) * step_time.z + far_time.z), t_max);
+    vec4 near = trace_larger(trace_bytes(near_words.x) * step_time.x + near_time.x, trace_bytes(near_words.y) * step_time.y + near_time.y);
+    near = trace_larger(trace_larger(near, trace_bytes(near_words.z) * step_time.z + near_time.z), vec4(t_min));
+    vec4 far = trace_smaller(trace_bytes(far_words.x) * step_time.x + far_time.x, trace_bytes(far_words.y) * step_time.y + far_time.y);
+    far = trace_smaller(trace_smaller(far, trace_bytes(far_words.z) * step_time.z + far_time.z), vec4(t_max));
     bvec4 hit = lessThanEqual(near, far);
 #ifdef TRACE_BOXES
     bvec4 past = greaterThan(near, vec4(t_min)), before = lessThan(far, vec4(t_max));
@@ -124,6 +134,30 @@ struct Traversal {
 
 // Entries: a node and the slots that are still to be visited, permuted so that bit 0 is the nearest; 0: the tree's end.
 uint trace_stack[TRACE_DEPTH];
+// With TRACE_STACKS_AT and a specialisation constant STACKS_IN_MEMORY of 1 the stacks are in memory at that address, TRACE_DEPTH words for each
+// invocation. CPU drivers write to an array for one lane after the other, and to addresses for all lanes at once.
+#ifdef TRACE_STACKS_AT
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer TraceStacksAt { uint of[]; };
+// The stacks of 64 invocations lie side by side.
+#define TRACE_STACK_WORD(at) TraceStacksAt(TRACE_STACKS_AT).of[gl_GlobalInvocationID.x / 64u * 64u * TRACE_DEPTH + 64u * (at) + gl_GlobalInvocationID.x % 64u]
+#endif
+
+uint trace_stacked(uint at) {
+#ifdef TRACE_STACKS_AT
+    if (STACKS_IN_MEMORY != 0u) return TRACE_STACK_WORD(at);
+#endif
+    return trace_stack[at];
+}
+
+void trace_stack_set(uint at, uint entry) {
+#ifdef TRACE_STACKS_AT
+    if (STACKS_IN_MEMORY != 0u) {
+        TRACE_STACK_WORD(at) = entry;
+        return;
+    }
+#endif
+    trace_stack[at] = entry;
+}
 
 Traversal trace_begin(Ray ray, uint mask, uint salt) {
     Traversal t;
@@ -143,7 +177,7 @@ Traversal trace_begin(Ray ray, uint mask, uint salt) {
     t.above_slots = 0u;
     t.inside = false;
     t.done = false;
-    trace_stack[0] = 0u;
+    trace_stack_set(0u, 0u);
     t.height = 1u;
     t.left = int(TRACE_STEPS);
     return t;
@@ -163,7 +197,7 @@ void trace_visit(inout Traversal t, bool any) {
     uint entry = t.next << 8u | slots;
     uint nodes = children.x;
     if (slots == 0u) {
-        entry = trace_stack[--t.height];
+        entry = trace_stacked(--t.height);
         nodes = TRACE_NODES(5u * (entry >> 8u) + 1u).x;
     }
     if (entry == 0u) {
@@ -172,7 +206,7 @@ void trace_visit(inout Traversal t, bool any) {
         uint slot = uint(findLSB(entry)) ^ t.slabs.octant;
         t.next = (nodes >> 8u) + uint(bitCount(nodes & ((1u << slot) - 1u)));
         entry &= entry - 1u;
-        if ((entry & 0xffu) != 0u) trace_stack[t.height++] = entry;
+        if ((entry & 0xffu) != 0u) trace_stack_set(t.height++, entry);
     }
 }
 
@@ -218,6 +252,14 @@ void trace_candidate(inout Traversal t, bool any, uint candidate, vec3 at) {
     }
 }
 
+// Looks at one triangle, if there is one.
+void trace_one(inout Traversal t, bool any) {
+    if (t.leaf_slots == 0u || t.done) return;
+    vec3 at;
+    uint candidate = trace_leaf(t, any, at);
+    if (candidate != NONE) trace_candidate(t, any, candidate, at);
+}
+
 // Down into the next instance.
 void trace_enter(inout Traversal t) {
     uint slot = uint(findLSB(t.leaf_slots));
@@ -225,8 +267,8 @@ void trace_enter(inout Traversal t) {
     t.above = t.leaves;
     t.above_slots = t.leaf_slots & (t.leaf_slots - 1u);
     t.leaf_slots = 0u;
-    trace_stack[t.height++] = t.next;
-    trace_stack[t.height++] = 0u;
+    trace_stack_set(t.height++, t.next);
+    trace_stack_set(t.height++, 0u);
     TraceInstance instance = trace_instances[place];
     vec4 x = instance.object_from_world[0], y = instance.object_from_world[1], z = instance.object_from_world[2];
     Ray ray = t.ray;
@@ -245,7 +287,7 @@ void trace_leave(inout Traversal t) {
     t.slabs = trace_slabs(t.ray.origin, t.ray.direction, trace_instances[0].reach);
     t.leaves = t.above;
     t.leaf_slots = t.above_slots;
-    t.next = trace_stack[--t.height];
+    t.next = trace_stacked(--t.height);
 }
 
 #ifdef TRACE_BOXES
@@ -268,8 +310,8 @@ void trace_boxed(inout Traversal t) {
 }
 #endif
 
-// One turn of a ray: a node, a triangle, and the way into and out of an instance. Invocations that run together may each do something else:
-// CPU drivers skip a part that no invocation of a group needs, and run the other parts for all of them.
+// One turn of a ray: a node, up to two triangles, and the way into and out of an instance. Invocations that run together may each do something
+// else: CPU drivers skip a part that no invocation of a group needs, and run the other parts for all of them.
 void trace_step(inout Traversal t, bool any) {
     --t.left;
     if (t.leaf_slots == 0u && t.next != NONE) {
@@ -279,10 +321,8 @@ void trace_step(inout Traversal t, bool any) {
 #endif
     }
     if (t.inside) {
-        uint candidate = NONE;
-        vec3 at;
-        if (t.leaf_slots != 0u && !t.done) candidate = trace_leaf(t, any, at);
-        if (candidate != NONE) trace_candidate(t, any, candidate, at);
+        trace_one(t, any);
+        trace_one(t, any);
         if (t.leaf_slots == 0u && t.next == NONE && !t.done) trace_leave(t);
     } else {
         if (t.leaf_slots != 0u) trace_enter(t);

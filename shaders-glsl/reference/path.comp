@@ -54,25 +54,32 @@ layout(push_constant, scalar) uniform Push {
 #include "reference/path_camera.glsl"
 #include "reference/path_step.glsl"
 
-// Appends paths to the list of their rays of one kind from this surface. One invocation of a subgroup counts for all.
-void append(bool wanted, uint way, uint slot) {
+// Appends paths to the list of their rays of one kind from this surface, or of those that wait for light. One invocation of a subgroup counts
+// for all.
+void append(bool wanted, uint way, bool waits, uint slot) {
     uvec4 those = subgroupBallot(wanted);
     uint more = subgroupBallotBitCount(those);
     uint first = 0u;
     if (more > 0u && subgroupElect()) {
         uint at = path_count(way, surface + 1u);
-        first = atomicAdd(counts[at].paths, more);
+        if (waits) first = atomicAdd(counts[at].waiting, more);
+        else first = atomicAdd(counts[at].paths, more);
         uint groups = (first + more + PATH_GROUP - 1u) / PATH_GROUP - (first + PATH_GROUP - 1u) / PATH_GROUP;
         if (groups > 0u) atomicAdd(counts[at].groups, groups);
     }
     first = subgroupBroadcastFirst(first);
     uint number = first + subgroupBallotExclusiveBitCount(those);
+    if (waits) number = settings.capacity - 1u - number;
     if (wanted) LIST_AT(path_list(way, surface + 1u) * settings.capacity + number) = slot;
 }
 
 void main() {
-    uint number = gl_GlobalInvocationID.x;
-    bool there = number < traced[path_count(ON, surface)].paths;
+    uint count = path_count(ON, surface);
+    uint traced_groups = (traced[count].paths + PATH_GROUP - 1u) / PATH_GROUP;
+    bool waited = gl_WorkGroupID.x >= traced_groups;
+    uint number = gl_GlobalInvocationID.x - (waited ? traced_groups * PATH_GROUP : 0u);
+    bool there = number < (waited ? traced[count].waiting : traced[count].paths);
+    if (waited) number = settings.capacity - 1u - number;
     uint slot = number;
     if (there && surface > 0u) slot = LIST_AT(path_list(ON, surface) * settings.capacity + number);
     uvec2 pixel = pixel_of(first + slot);
@@ -100,9 +107,10 @@ void main() {
         }
         if (!alive && waiting == 0u) add_light(pixel, PATH_AT(slot).emission, PATH_AT(slot).direct, PATH_AT(slot).indirect);
     }
-    append(alive || waiting != 0u, ON, slot);
+    append(alive, ON, false, slot);
+    append(!alive && waiting != 0u, ON, true, slot);
     for (uint turn = 1u; turn < settings.turns; ++turn) {
         uint way = settings.turn_ways[turn];
-        append((waiting >> way & 1u) != 0u, way, slot);
+        append((waiting >> way & 1u) != 0u, way, false, slot);
     }
 }

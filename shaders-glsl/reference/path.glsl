@@ -47,6 +47,7 @@ struct PathSettings {
     uvec2 light_nodes_at;
     uvec2 light_targets_at;
     uvec2 environment_at;
+    uvec2 stacks_at;           // of the traversal (lib/trace_compute.glsl)
     uint plan;                 // of the random numbers (lib/points.glsl)
 };
 
@@ -94,10 +95,11 @@ Steps unpacked_steps(uint steps) {
 
 // Number of paths with a ray of one kind between two surfaces. The first three members are the groups of an indirect dispatch.
 struct PathCount {
-    uint groups;       // of PATH_GROUP paths
+    uint groups;       // of PATH_GROUP paths: first those of `paths`, then those of `waiting`
     uint one;
     uint another;
-    uint paths;
+    uint paths;        // their slots are at the beginning of the list
+    uint waiting;      // paths without a ray that wait for light; their slots are at the end of the list, the last one first
 };
 const uint PATH_GROUP = 64u; // export
 // Lists of `capacity` slots: one for each kind of rays to lights; rays to the next surface have two, for even and odd numbers.

@@ -8,15 +8,19 @@
 #include "lib/random.glsl"
 #include "lib/material.glsl"
 #include "lib/sampling.glsl"
-#include "lib/trace.glsl"
 #include "reference/path.glsl"
 
 layout(local_size_x = 64) in;
 // 1: rays to lights, which end at any hit.
 layout(constant_id = 0) const uint TO_LIGHTS = 0u;
+// 1: the stacks of the traversal are in memory (lib/trace_compute.glsl).
+layout(constant_id = 1) const uint STACKS_IN_MEMORY = 0u;
+
+layout(binding = 13, scalar) uniform SettingsBlock { PathSettings settings; };
+#define TRACE_STACKS_AT settings.stacks_at
+#include "lib/trace.glsl"
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
-layout(binding = 13, scalar) uniform SettingsBlock { PathSettings settings; };
 layout(binding = 14, scalar) buffer Paths { PathState paths[]; };
 layout(binding = 17, scalar) writeonly buffer Hits { Hit hits[]; };
 layout(binding = 18, scalar) readonly buffer Lists { uint lists[]; };
@@ -72,8 +76,6 @@ void main() {
         begin_path(slot, ray);
     } else {
         steps = unpacked_steps(PATH_AT(slot).steps);
-        // It only waits for light.
-        if (!steps.alive) return;
         ray = Ray(PATH_AT(slot).origin, 0.0, PATH_AT(slot).direction, 1e30);
     }
     uint mask = steps.vertex == 0u ? TRACE_CAMERA : steps.scattered > 0u ? TRACE_SHADOW : 0u;
