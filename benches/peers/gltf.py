@@ -72,11 +72,13 @@ class Scene:
 
 
 def without_unlit(source, target):
-    """Writes an exported scene without its unlit surfaces, which let light through in lucerna and stop it in other programs."""
+    """Writes an exported scene without its unlit surfaces, which let light through in lucerna and stop it in other programs. False: there are none."""
     raw = source.read_bytes()
     length = struct.unpack("<I", raw[12:16])[0]
     document = json.loads(raw[20 : 20 + length])
     unlit = {i for i, m in enumerate(document["materials"]) if "KHR_materials_unlit" in m.get("extensions", {})}
+    if not unlit:
+        return False
     kept = {}
     for index, mesh in enumerate(document["meshes"]):
         mesh["primitives"] = [primitive for primitive in mesh["primitives"] if primitive["material"] not in unlit]
@@ -92,3 +94,4 @@ def without_unlit(source, target):
     text += b" " * (-len(text) % 4)
     rest = raw[20 + length :]
     target.write_bytes(raw[:8] + struct.pack("<III", 20 + len(text) + len(rest), len(text), 0x4E4F534A) + text + rest)
+    return True

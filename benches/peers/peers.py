@@ -3,12 +3,13 @@
 
 usage: peers.py LUCERNA [--assets DIR] [--folder DIR] [--scenes NAME,…] [--size WxH] [--runs N]
 
-Each scene is exported once by `lucerna export-gltf`, so that both programs have the same triangles, materials, lamps and camera. Each
+Each scene is exported once by `lucerna export-gltf`, so that all programs have the same triangles, materials, lamps and camera. Each
 program renders it several times with different seeds; the variance over the runs gives the error of one sample. Processor time is counted
-without start, loading and compiling. Of two programs that one is better whose error of one sample times its time of one sample is
-smaller. All runs are on this machine's processor: `lucerna` with the CPU driver (VK_DRIVER_FILES names it), Mitsuba with `llvm_ad_rgb`.
+without start, loading and compiling. The better program has the smaller product of both. All runs are on this machine's processor:
+`lucerna` with the CPU driver (VK_DRIVER_FILES names it), Mitsuba with `llvm_ad_rgb`.
 
-Makes virtual environments with Mitsuba and with Blender in FOLDER. DRJIT_LIBLLVM_PATH may name a newer LLVM, for example that of Debian's package libllvm19.
+Makes virtual environments with Mitsuba and with Blender in FOLDER. DRJIT_LIBLLVM_PATH may name a newer LLVM, for example that of Debian's
+package libllvm19.
 """
 import argparse
 import os
@@ -101,10 +102,10 @@ def main():
             source += ["--environment", options.assets / sky]
         exported = folder / f"{name}.glb"
         run([options.lucerna, "export-gltf", *source, "--size", options.size, "-o", exported, "--overwrite", "-q"])
-        if name == "conference":
-            whole, exported = exported, folder / f"{name}-lit.glb"
-            gltf.without_unlit(whole, exported)
-            source = [exported]
+        environment = exported.with_name(f"{name}-environment.exr")
+        lit = folder / f"{name}-lit.glb"
+        if gltf.without_unlit(exported, lit):
+            exported, source = lit, [lit, *(["--environment", environment] if environment.exists() else [])]
 
         def ours(seed, spp):
             picture = folder / f"{name}.pfm"
@@ -118,7 +119,6 @@ def main():
         rendered = [ours(seed, ours_spp) for seed in range(options.runs)]
         pictures = np.array([picture for picture, _ in rendered])
         seconds = (np.mean([seconds for _, seconds in rendered]) - start) / (ours_spp - 1)
-        environment = exported.with_name(f"{name}-environment.exr")
 
         def theirs(program, python, script, spp, *more):
             result = folder / f"{name}-{script}.npz"

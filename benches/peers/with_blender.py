@@ -5,7 +5,6 @@ usage: with_blender.py SCENE.glb OUT.npz --size WxH --bounces N --spp N --runs N
 Writes the pictures of all runs (different seeds) and the processor time of each, without that of the first sample,
 which holds loading and the trees of boxes.
 """
-import argparse
 import pathlib
 import tempfile
 import time
@@ -14,6 +13,7 @@ import bpy
 import mathutils
 import numpy as np
 
+import arguments
 from gltf import Scene
 
 # From Y up to Blender's Z up.
@@ -174,18 +174,8 @@ def load(path, options, folder):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scene", type=pathlib.Path)
-    parser.add_argument("out", type=pathlib.Path)
-    parser.add_argument("--size", required=True)
-    parser.add_argument("--bounces", type=int, required=True)
-    parser.add_argument("--spp", type=int, required=True)
-    parser.add_argument("--runs", type=int, required=True)
-    parser.add_argument("--threads", type=int, default=0)
-    parser.add_argument("--environment", type=pathlib.Path)
-    parser.add_argument("--diffuse", action="store_true")
-    options = parser.parse_args()
-    width, height = map(int, options.size.split("x"))
+    options = arguments.parsed(__doc__)
+    width, height = options.width, options.height
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
         scene = load(options.scene, options, folder)
@@ -193,8 +183,6 @@ def main():
         render.engine = "CYCLES"
         render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
         render.image_settings.file_format, render.image_settings.color_depth = "OPEN_EXR", "32"
-        if options.threads:
-            render.threads_mode, render.threads = "FIXED", options.threads
         render.use_persistent_data = True
         render.filter_size = 1.0
         cycles.device, cycles.use_adaptive_sampling, cycles.use_denoising = "CPU", False, False

@@ -4,14 +4,13 @@ usage: with_mitsuba.py SCENE.glb OUT.npz --size WxH --bounces N --spp N --runs N
 
 Writes the pictures of all runs (different seeds) and the processor time of each, without loading and compiling.
 """
-import argparse
-import pathlib
 import time
 
 import mitsuba as mi
 import numpy as np
 from PIL import Image
 
+import arguments
 from gltf import Scene
 
 mi.set_variant("llvm_ad_rgb")
@@ -73,12 +72,11 @@ def sides(scene):
 
 def load(path, options):
     scene = Scene(path)
-    width, height = map(int, options.size.split("x"))
     world, camera = scene.view
     # Mitsuba's cameras look along +Z.
     to_world = T(world @ np.diag([-1.0, 1.0, -1.0, 1.0]))
     fov = np.degrees(camera["perspective"]["yfov"])
-    film = {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"}, "pixel_format": "rgb"}
+    film = {"type": "hdrfilm", "width": options.width, "height": options.height, "rfilter": {"type": "box"}, "pixel_format": "rgb"}
     out = {
         "type": "scene",
         "integrator": {"type": "path", "max_depth": options.bounces + 2, "rr_depth": 3},
@@ -122,16 +120,7 @@ def load(path, options):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scene", type=pathlib.Path)
-    parser.add_argument("out", type=pathlib.Path)
-    parser.add_argument("--size", required=True)
-    parser.add_argument("--bounces", type=int, required=True)
-    parser.add_argument("--spp", type=int, required=True)
-    parser.add_argument("--runs", type=int, required=True)
-    parser.add_argument("--environment", type=pathlib.Path)
-    parser.add_argument("--diffuse", action="store_true")
-    options = parser.parse_args()
+    options = arguments.parsed(__doc__)
     scene = load(options.scene, options)
     np.array(mi.render(scene, seed=1000, spp=options.spp))
     pictures, seconds = [], []

@@ -66,7 +66,7 @@ pub enum Strategy {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Points {
-    /// Scrambled Sobol points: the same error with fewer samples. The error that is estimated from them is too large.
+    /// Scrambled Sobol points, which need fewer samples for the same error. The estimated error is then too large.
     #[default]
     Sobol,
     /// Independent random numbers.
@@ -85,7 +85,7 @@ pub struct Settings {
     /// Maximum of mirrors and glass surfaces along a path, in addition to `bounces`.
     #[schemars(range(min = 0, max = 1000))]
     pub specular_bounces: u32,
-    /// Number of scatterings before Russian roulette begins. It ends paths that carry less than a quarter of the light with which they began.
+    /// Number of scatterings before Russian roulette begins. Roulette may end a path that carries less than a quarter of its first light.
     #[schemars(range(min = 0, max = 1000))]
     pub roulette: u32,
     /// Every surface is Lambertian: without gloss, mirrors and glass.
@@ -98,8 +98,9 @@ pub struct Settings {
     pub strategy: Strategy,
     /// The random numbers that choose the directions of paths.
     pub points: Points,
-    /// The number of samples per pixel that are planned. The errors of neighbouring pixels then have opposite signs
-    /// (blue noise), if the plan is a power of two and is kept. 0: no plan, pixels are independent, and any number of samples is as good.
+    /// The planned number of samples per pixel, rounded up to a power of two. If a picture has as many samples, the errors of
+    /// neighbouring pixels have opposite signs (blue noise). 0: no plan; the pixels are independent, and any number of samples is as
+    /// good.
     #[schemars(range(min = 0, max = 65536), extend("x-needs" = {"points": {"const": "sobol"}}))]
     pub planned: u32,
     /// Seed of all random numbers.
