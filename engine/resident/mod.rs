@@ -440,7 +440,7 @@ fn at_least_one(list: &[types::Instance]) -> Vec<types::Instance> {
 }
 
 /// Block `Lights` of `lib/lights.glsl`.
-fn lights_bytes(lights: &[types::Light]) -> Vec<u32> {
+pub(crate) fn lights_bytes(lights: &[types::Light]) -> Vec<u32> {
     let mut out = vec![lights.len() as u32];
     out.extend_from_slice(bytemuck::cast_slice(lights));
     if lights.is_empty() {
@@ -462,7 +462,7 @@ fn one_texel(gpu: &Gpu, name: &str, format: vk::Format, bytes: &[u8]) -> Result<
 const BRIGHTEST: f32 = 65504.0;
 
 /// The environment in half floats; radiance over [`BRIGHTEST`] is cut there.
-fn environment(gpu: &Gpu, environment: Option<&Environment>, max_side: u32) -> Result<OwnedImage> {
+pub(crate) fn environment(gpu: &Gpu, environment: Option<&Environment>, max_side: u32) -> Result<OwnedImage> {
     let name = "scene.environment";
     let format = vk::Format::R16G16B16A16_SFLOAT;
     let Some(env) = environment.filter(|e| !e.pixels.is_empty()) else {

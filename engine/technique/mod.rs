@@ -128,6 +128,8 @@ pub trait Technique: Sized {
     const ABOUT: &'static str;
     /// The units of long work in [`Self::ready`], for progress.
     const UNITS: &'static str = "units";
+    /// The technique brings its own light, so an exposure that suits the scene's lights does not suit its pictures.
+    const OWN_LIGHT: bool = false;
 
     type Settings: Settings;
     type Mode: Mode;

@@ -1,6 +1,7 @@
 //! The papers' methods, one module each.
 
 pub(crate) mod allowed;
+pub mod daylight;
 pub mod fiv;
 pub mod igi;
 pub mod isr;

@@ -6,6 +6,7 @@ pub mod camera;
 pub mod compare;
 pub mod config;
 pub mod console;
+pub mod daylight;
 pub mod devices;
 pub mod experiment;
 pub mod export_gltf;

@@ -37,12 +37,14 @@ pub struct Label {
     pub mode: Option<&'static str>,
     /// The picture is radiance, which the exposure scales. Otherwise its values are shown unscaled.
     pub radiance: bool,
+    /// The exposure that suits a built-in scene does not suit the technique.
+    pub own_light: bool,
 }
 
 impl Label {
     fn of<T: Technique>(mode: T::Mode) -> Self {
         let named = T::Mode::ALL.len() > 1;
-        Self { name: T::NAME, mode: named.then(|| mode.name()), radiance: mode.is_radiance() }
+        Self { name: T::NAME, mode: named.then(|| mode.name()), radiance: mode.is_radiance(), own_light: T::OWN_LIGHT }
     }
 }
 

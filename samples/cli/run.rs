@@ -87,8 +87,8 @@ impl<'a> Run<'a> {
         outputs(options.clone())?;
         let stage = Stage::open(&args.stage)?;
         let suits = match &stage.source {
-            Source::Builtin(name) => builtin::exposure(name).map(f64::from),
-            Source::File(_) => None,
+            Source::Builtin(name) if !technique.own_light => builtin::exposure(name).map(f64::from),
+            Source::Builtin(_) | Source::File(_) => None,
         };
         if settings.tonemap.is_some() && !technique.radiance {
             let what = format!(

@@ -16,6 +16,7 @@ mod environments;
 mod figure;
 pub mod furnace;
 mod garage;
+mod hall;
 mod kit;
 mod moving;
 mod office;
@@ -92,6 +93,12 @@ const ENTRIES: &[Entry] = &[
         description: "Garage with cars, racks and a workbench, its door open to daylight",
         exposure: 1.0,
         build: garage::build,
+    },
+    Entry {
+        name: "hall",
+        description: "Church-like hall: sun through eleven open windows, lamps, coloured cloth, about 190 000 triangles",
+        exposure: 1.6,
+        build: hall::build,
     },
     Entry {
         name: "street",

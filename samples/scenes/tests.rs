@@ -1,5 +1,8 @@
 //! What holds for every built-in scene.
 
+#[path = "hall/tests.rs"]
+mod hall;
+
 use super::{NAMES, cornell, furnace, load};
 use glam::{Mat4, Vec3};
 use lucerna::{
@@ -30,6 +33,7 @@ const TRIANGLES: &[(&str, std::ops::RangeInclusive<usize>)] = &[
     // 190 000 to within a twentieth.
     ("conference", 180_500..=199_500),
     ("garage", 50_000..=150_000),
+    ("hall", 180_000..=200_000),
     ("street", 150_000..=300_000),
     ("figure", 20_000..=60_000),
     ("shadows", 20_000..=60_000),

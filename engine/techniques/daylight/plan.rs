@@ -1,0 +1,236 @@
+//! All that decides the bytes of a bake: scene, receivers, times, settings.
+
+use glam::Mat4;
+use serde::{Deserialize, Serialize};
+
+use super::{Baking, Weather};
+use crate::{
+    Error, Result,
+    bake::{Digest, Part},
+    scene::{LightKind, Scene, View},
+    shaders::consts::{DAY_VERTICES, SKY_PATCHES},
+};
+
+/// Times of a bake at most.
+pub const MOST_TIMES: usize = 4096;
+/// Texels of a bake at most.
+pub const MOST_TEXELS: u64 = 1 << 28;
+
+/// The surfaces that a bake holds light for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", tag = "kind")]
+pub enum Kind {
+    /// The surfaces that one camera sees at the centres of its pixels.
+    View {
+        /// Name of the camera, for messages.
+        camera: String,
+        /// Column after column.
+        view_from_world: [f32; 16],
+        /// Column after column.
+        clip_from_view: [f32; 16],
+    },
+    /// All surfaces: a lightmap for a free camera.
+    Lightmap {
+        charts: u32,
+        /// Texels on surfaces.
+        covered: u64,
+        /// Digest of the corners of all triangles.
+        corners: Digest,
+    },
+}
+
+/// The days and the place of a bake.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Calendar {
+    /// Year, month and day: `2026-06-21`.
+    pub date: String,
+    /// Name of the time zone, or its offset: `Europe/Copenhagen`, `+01:00`.
+    pub zone: String,
+    /// Degrees, positive in the north.
+    pub latitude: f64,
+    /// Degrees, positive in the east.
+    pub longitude: f64,
+    /// Degrees from -Z to the north, clockwise as seen from above.
+    pub north: f32,
+}
+
+/// A time of the day at which the sun shines.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Lit {
+    /// Seconds after the begin of the day.
+    pub seconds: f64,
+    /// Unit vector towards the sun.
+    pub sun: [f32; 3],
+}
+
+/// The plan of a bake.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// Name of the scene, for messages.
+    pub scene: String,
+    /// Digests of the parts of the scene that decide the light.
+    pub parts: Vec<Part>,
+    pub receivers: Kind,
+    /// Columns and rows of texels.
+    pub extent: [u32; 2],
+    pub calendar: Calendar,
+    /// Steps of the day, seconds: as asked for, with the dark ones.
+    pub steps: u32,
+    /// The lit steps, in order.
+    pub times: Vec<Lit>,
+    /// The weather whose skies are within the tolerance.
+    pub weather: Weather,
+    pub settings: Baking,
+}
+
+impl Plan {
+    /// Columns and rows of tiles.
+    pub fn tiles(&self) -> [u32; 2] {
+        self.extent.map(|texels| texels.div_ceil(self.settings.tile.max(1)))
+    }
+
+    /// The texels of a tile: column, row, columns, rows.
+    pub fn tile(&self, index: u32) -> [u32; 4] {
+        let side = self.settings.tile.max(1);
+        let columns = self.tiles()[0].max(1);
+        let corner = [index % columns * side, index / columns * side];
+        let size = [0, 1].map(|axis| side.min(self.extent[axis].saturating_sub(corner[axis])));
+        [corner[0], corner[1], size[0], size[1]]
+    }
+
+    /// Number of the first receiver of a tile in the whole bake.
+    pub fn first_receiver(&self, index: u32) -> u32 {
+        index.wrapping_mul(self.settings.tile * self.settings.tile)
+    }
+
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// `Input`, saying which number is impossible.
+    pub fn validate(&self) -> Result<()> {
+        let wrong = |what: String| Err(Error::input(what));
+        let texels = u64::from(self.extent[0]) * u64::from(self.extent[1]);
+        if texels == 0 || texels > MOST_TEXELS {
+            return wrong(format!("{}×{} texels; 1 to {MOST_TEXELS} are allowed", self.extent[0], self.extent[1]));
+        }
+        if self.times.len() > MOST_TIMES {
+            return wrong(format!("{} times; at most {MOST_TIMES} are allowed", self.times.len()));
+        }
+        let unit = |v: &[f32; 3]| (v.iter().map(|x| x * x).sum::<f32>() - 1.0).abs() < 1e-3;
+        if self.times.iter().any(|time| !time.seconds.is_finite() || !unit(&time.sun)) {
+            return wrong("a time whose sun has no direction".into());
+        }
+        if self.times.windows(2).any(|pair| pair[0].seconds >= pair[1].seconds) {
+            return wrong("times that are not in order".into());
+        }
+        let Weather { .. } =
+            Weather::new(self.weather.turbidity(), self.weather.ground_albedo(), self.weather.overcast())
+                .map_err(Error::input)?;
+        self.settings.validate()
+    }
+
+    /// Number of dimensions of the layers: times and patches of the sky.
+    pub fn dimensions(&self) -> [usize; 2] {
+        [self.times.len(), SKY_PATCHES as usize]
+    }
+
+    /// Says in which part `scene` differs from the scene of the bake; `None`: in none.
+    pub fn difference(&self, scene: &Scene) -> Option<String> {
+        let theirs = parts(scene);
+        let differs =
+            |ours: &&Part| theirs.iter().find(|t| t.name == ours.name).is_none_or(|t| t.digest != ours.digest);
+        let names: Vec<&str> = self.parts.iter().filter(differs).map(|part| part.name.as_str()).collect();
+        (!names.is_empty()).then(|| names.join(", "))
+    }
+
+    /// Checks that these are the corners of the lightmap; none for other bakes.
+    ///
+    /// # Errors
+    /// `Input` if they are others.
+    pub fn check_corners(&self, corners: &[[u16; 6]]) -> Result<()> {
+        let wanted = match &self.receivers {
+            Kind::View { .. } => Digest::of(&[]),
+            Kind::Lightmap { corners, .. } => *corners,
+        };
+        match digest(corners) == wanted {
+            true => Ok(()),
+            false => Err(Error::input("the corners of its lightmap are not those of its plan")),
+        }
+    }
+
+    /// Checks that a view is the one of a bake for one view.
+    ///
+    /// # Errors
+    /// `Usage` if it is another one.
+    pub fn check_view(&self, view: &View) -> Result<()> {
+        let Kind::View { camera, view_from_world, clip_from_view } = &self.receivers else { return Ok(()) };
+        let near = |a: Mat4, b: &[f32; 16]| {
+            let size = b.iter().fold(1.0f32, |most, x| most.max(x.abs()));
+            a.to_cols_array().iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-4 * size)
+        };
+        // The depth range of the projection follows the scene's bounds.
+        let mut projection = view.clip_from_view.to_cols_array();
+        for at in [10, 14] {
+            projection[at] = clip_from_view[at];
+        }
+        let projection = Mat4::from_cols_array(&projection);
+        if view.extent != self.extent {
+            let [width, height] = self.extent;
+            let found = view.extent;
+            let what = format!("the picture has {}×{} pixels, the bake {width}×{height}", found[0], found[1]);
+            return Err(Error::usage(what).help(format!("Render with --size {width}x{height}, or bake another view")));
+        }
+        if !near(view.view_from_world, view_from_world) || !near(projection, clip_from_view) {
+            let what = format!("the bake is for the camera `{camera}` alone, and this is another view");
+            return Err(Error::usage(what).help("Render with that camera, or bake this view"));
+        }
+        Ok(())
+    }
+}
+
+/// Digest of the corners of a lightmap.
+pub fn digest(corners: &[[u16; 6]]) -> Digest {
+    Digest::of(bytemuck::cast_slice(&corners.iter().flatten().map(|number| number.to_le_bytes()).collect::<Vec<_>>()))
+}
+
+impl Baking {
+    /// Maximum of scatterings, which the arrays of vertices limit.
+    pub(super) fn vertices(&self) -> u32 {
+        self.bounces.min(DAY_VERTICES)
+    }
+}
+
+/// Digests of the parts of a scene on which baked light depends. Suns and environment are none of them: the bake brings its own.
+pub fn parts(scene: &Scene) -> Vec<Part> {
+    let part =
+        |name: &str, bytes: Vec<u8>, text: String| Part { name: name.to_owned(), digest: Digest::of(&bytes), text };
+    let mut geometry = Vec::new();
+    for primitive in scene.meshes.iter().flat_map(|mesh| &mesh.primitives) {
+        let mut floats = |values: &[f32]| geometry.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+        primitive.positions.iter().for_each(|v| floats(&v.to_array()));
+        primitive.normals.iter().for_each(|v| floats(&v.to_array()));
+        primitive.tangents.iter().for_each(|v| floats(&v.to_array()));
+        primitive.uvs.iter().flatten().for_each(|v| floats(&v.to_array()));
+        primitive.colors.iter().for_each(|v| floats(&v.to_array()));
+        geometry.extend(primitive.indices.iter().flat_map(|index| index.to_le_bytes()));
+        geometry.extend(primitive.material.to_le_bytes());
+    }
+    let placed =
+        |node: &crate::scene::Node| format!("{:?} {:?} {:?} {:?}", node.parent, node.local, node.mesh, node.weights);
+    let nodes: String = scene.nodes.iter().map(|node| placed(node) + "\n").collect();
+    let lamps: Vec<_> = scene.lights.iter().filter(|l| !matches!(l.kind, LightKind::Directional)).collect();
+    let texels = scene.textures.iter().flat_map(|t| t.rgba.iter().flatten().copied()).collect();
+    vec![
+        part("geometry", geometry, format!("{} meshes", scene.meshes.len())),
+        part("nodes", nodes.into_bytes(), format!("{} nodes", scene.nodes.len())),
+        part(
+            "materials",
+            format!("{:?}", scene.materials).into_bytes(),
+            format!("{} materials", scene.materials.len()),
+        ),
+        part("textures", texels, format!("{} textures", scene.textures.len())),
+        part("lamps", format!("{lamps:?}").into_bytes(), format!("{} lamps", lamps.len())),
+    ]
+}

@@ -1,0 +1,174 @@
+//! Settings of bakes and of pictures.
+
+use serde::{Deserialize, Serialize};
+
+use super::Weather;
+use crate::{
+    Error, Result,
+    passes::{gbuffer, shadow},
+    settings::{Described, JsonSchema, described},
+    technique,
+};
+
+/// Settings that decide the bytes of a bake.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Baking {
+    /// Paths of each texel.
+    #[schemars(range(min = 2, max = 1_048_576))]
+    pub samples: u32,
+    /// Maximum of scatterings between the sun and a texel.
+    #[schemars(range(min = 1, max = 16))]
+    pub bounces: u32,
+    /// Number of scatterings before Russian roulette begins. Roulette may end a path that carries less than a quarter of its first light.
+    #[schemars(range(min = 0, max = 16))]
+    pub roulette: u32,
+    /// Maximum of mirrors and glass surfaces along a path.
+    #[schemars(range(min = 0, max = 64))]
+    pub specular_bounces: u32,
+    /// Every surface is Lambertian: without gloss, mirrors and glass. If off, gloss is taken as diffuse, so that its energy is kept.
+    pub diffuse_only: bool,
+    /// Time between two steps of the day.
+    #[schemars(range(min = 0.1, max = 720), extend("x-unit" = "min"))]
+    pub interval: f64,
+    /// Time of the first step after midnight.
+    #[schemars(range(min = 0, max = 720), extend("x-unit" = "min"))]
+    pub offset: f64,
+    /// The sun is a disc of its true size. If off, the sun is a point, as in the paper.
+    pub disc: bool,
+    /// Maximum of the error of a step of the day in a tile (root mean square), relative to its mean. It decides the number of images.
+    #[schemars(range(min = 0.0001, max = 1))]
+    pub tolerance: f64,
+    /// Maximum of images of a tile; 0: as many as the tolerance needs.
+    #[schemars(range(min = 0, max = 4096))]
+    pub images: u32,
+    /// Side of a tile, texels. Each tile has its own images.
+    #[schemars(range(min = 4, max = 128), extend("x-unit" = "texels"))]
+    pub tile: u32,
+    /// Texels along a metre of a surface, for lightmaps.
+    #[schemars(range(min = 0.01, max = 1000), extend("x-unit" = "1/m"))]
+    pub density: f32,
+    /// Maximum side of a lightmap.
+    #[schemars(range(min = 64, max = 4092), extend("x-unit" = "texels"))]
+    pub lightmap: u32,
+    /// Seed of all random numbers.
+    pub seed: u32,
+}
+
+described!(Baking);
+
+impl Default for Baking {
+    fn default() -> Self {
+        Self {
+            samples: 64,
+            bounces: 6,
+            roulette: 1,
+            specular_bounces: 8,
+            diffuse_only: false,
+            interval: 5.0,
+            offset: 0.0,
+            disc: true,
+            tolerance: 0.05,
+            images: 0,
+            tile: 32,
+            density: 8.0,
+            lightmap: 4092,
+            seed: 0,
+        }
+    }
+}
+
+impl Baking {
+    /// # Errors
+    /// `Usage`, naming the key, the value found and the values allowed.
+    pub fn validate(&self) -> Result<()> {
+        Self::description().check(self).map_err(|error: Error| error.at("bake"))
+    }
+}
+
+/// How the light between two steps of the day is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Interpolation {
+    /// The line between the two steps, as in the paper.
+    #[default]
+    Linear,
+    /// A curve through four steps (Catmull and Rom 1974).
+    CatmullRom,
+    /// The nearest step.
+    Nearest,
+}
+
+/// Settings of pictures.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Local time of the first frame: hours and minutes.
+    #[schemars(regex(pattern = r"^[0-2][0-9]:[0-5][0-9](:[0-5][0-9])?$"))]
+    pub time: String,
+    /// Time between two frames.
+    #[schemars(range(min = -1440, max = 1440), extend("x-unit" = "min"))]
+    pub minutes: f64,
+    /// How the light between two steps of the day is found.
+    pub interpolation: Interpolation,
+    /// Haze of the air: 1 is clear mountain air, 10 is thick haze.
+    #[schemars(range(min = 1, max = 10))]
+    pub turbidity: f64,
+    /// Mean albedo of the land around the scene, for the light of the sky.
+    #[schemars(range(min = 0, max = 1))]
+    pub ground_albedo: f64,
+    /// Share of the sky that clouds cover: 0 is clear, 1 is overcast without a sun.
+    #[schemars(range(min = 0, max = 1))]
+    pub overcast: f64,
+    /// Factor on the light of sun and sky.
+    #[schemars(range(min = 0, max = 1000))]
+    pub strength: f32,
+}
+
+described!(Settings);
+
+impl Default for Settings {
+    fn default() -> Self {
+        let weather = Weather::default();
+        Self {
+            time: "12:00".into(),
+            minutes: 5.0,
+            interpolation: Interpolation::default(),
+            turbidity: weather.turbidity(),
+            ground_albedo: weather.ground_albedo(),
+            overcast: weather.overcast(),
+            strength: 1.0,
+        }
+    }
+}
+
+impl Settings {
+    /// The weather.
+    ///
+    /// # Errors
+    /// `Usage`, naming the value found and the values allowed.
+    pub fn weather(&self) -> Result<Weather> {
+        Weather::new(self.turbidity, self.ground_albedo, self.overcast)
+            .map_err(|what| Error::usage(what).at("daylight"))
+    }
+}
+
+/// Settings of all stages of a picture.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PictureSettings {
+    pub daylight: Settings,
+    pub gbuffer: gbuffer::Settings,
+    pub shadow: shadow::Settings,
+}
+
+impl technique::Settings for PictureSettings {
+    fn paper() -> Option<Self> {
+        None
+    }
+
+    fn validate(&self) -> Result<()> {
+        Settings::description().check(&self.daylight).map_err(|error: Error| error.at("daylight"))?;
+        self.shadow.validate()
+    }
+}

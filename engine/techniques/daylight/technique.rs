@@ -1,0 +1,417 @@
+//! Baked daylight behind the interface of all techniques.
+
+use std::{path::PathBuf, sync::Arc};
+
+use glam::{Vec2, Vec3};
+
+use super::{Day, Interpolation, PictureSettings, Settings, Sky, Stored, layer::Layer, lightmap};
+use crate::{
+    Error, ErrorKind, Result,
+    gpu::{Gpu, OwnedBuffer, OwnedImage},
+    graph::{Cull, Depth, Draw, DrawCall, Format, Graph, Image, Load, Raster, Targets},
+    passes::{
+        direct::{self, Direct, Lights},
+        gbuffer::{self, GBuffer},
+        shadow, skybox,
+    },
+    resident::{self, Handles, Resident},
+    scene::{Environment, Note, NoteKind, Scene, View, environment::direction_from_uv},
+    settings::{Described, Description, idle_notes},
+    shaders::{
+        consts,
+        daylight::{decode, place},
+        types,
+    },
+    technique::{self, Making, Moment, Picture, Technique},
+};
+
+/// Columns and rows of the picture of the sky behind the scene.
+const SKY: [u32; 2] = [256, 128];
+
+/// The light that the picture shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mode {
+    #[default]
+    Total,
+    Direct,
+    Indirect,
+    Irradiance,
+}
+
+impl technique::Mode for Mode {
+    const ALL: &'static [Self] = &[Self::Total, Self::Direct, Self::Indirect, Self::Irradiance];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Total => "total",
+            Self::Direct => "direct",
+            Self::Indirect => "indirect",
+            Self::Irradiance => "irradiance",
+        }
+    }
+
+    fn doc(self) -> &'static str {
+        match self {
+            Self::Total => "All light",
+            Self::Direct => "Direct light of the sun only",
+            Self::Indirect => "Baked light only: the sun's after scattering, and that of the sky",
+            Self::Irradiance => "Irradiance of the baked light, without the surfaces' colours",
+        }
+    }
+}
+
+/// A bake, and the file from which it was read.
+#[derive(Clone, Debug)]
+pub struct Baked {
+    pub stored: Arc<Stored>,
+    /// Errors name this file.
+    pub file: Option<PathBuf>,
+}
+
+impl Baked {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// As [`Stored::read`].
+    pub fn read(file: impl Into<PathBuf>) -> Result<Self> {
+        let file = file.into();
+        Ok(Self { stored: Arc::new(Stored::read(&file)?), file: Some(file) })
+    }
+
+    fn blamed(&self, error: Error) -> Error {
+        match &self.file {
+            Some(file) => error.in_file(file),
+            None => error,
+        }
+    }
+}
+
+/// Baked daylight, prepared for a scene.
+#[derive(Debug)]
+pub struct Daylight {
+    gpu: Gpu,
+    baked: Baked,
+    day: Day,
+    tiles: OwnedBuffer,
+    words: OwnedBuffer,
+    places: Option<Places>,
+    /// The last sky, and the state that it shows.
+    sky: Option<(OwnedImage, [f32; 7])>,
+}
+
+/// The lightmap on the device.
+#[derive(Debug)]
+struct Places {
+    corners: OwnedBuffer,
+    firsts: OwnedBuffer,
+    draws: Vec<DrawCall>,
+}
+
+impl Places {
+    fn new(gpu: &Gpu, scene: &Scene, baked: &Baked) -> Result<Option<Self>> {
+        let corners = &baked.stored.corners;
+        if corners.is_empty() {
+            return Ok(None);
+        }
+        let triangles = lightmap::triangles(scene);
+        let all: u64 = triangles.iter().map(|count| u64::from(*count)).sum();
+        if all != corners.len() as u64 {
+            let what = format!("has places for {} triangles, the scene has {all}", corners.len());
+            return Err(baked.blamed(Error::input(what)));
+        }
+        let (mut firsts, mut draws, mut first) = (Vec::new(), Vec::new(), 0);
+        for (number, count) in triangles.into_iter().enumerate() {
+            firsts.push(first);
+            draws.push(DrawCall {
+                first_vertex: first,
+                vertices: 3 * count,
+                first_instance: number as u32,
+                instances: 1,
+            });
+            first += 3 * count;
+        }
+        draws.retain(|draw| draw.vertices > 0);
+        Ok(Some(Self {
+            corners: OwnedBuffer::with_contents(gpu, "daylight.corners", bytemuck::cast_slice(corners))?,
+            firsts: OwnedBuffer::with_contents(gpu, "daylight.firsts", bytemuck::cast_slice(&firsts))?,
+            draws,
+        }))
+    }
+
+    /// Draws the place in the lightmap of each pixel.
+    fn draw(&self, graph: &mut Graph, handles: &Handles, view: &View, gbuffer: &GBuffer) -> Image {
+        let places = graph.image("daylight.places", Format::RG32F, view.extent);
+        let depth = graph.image("daylight.places.depth", Format::D32F, view.extent);
+        let args = place::Args {
+            view: gbuffer.view,
+            instances: handles.instances,
+            indices: handles.indices,
+            positions: handles.positions,
+            corners: graph.import_buffer(&self.corners),
+            firsts: graph.import_buffer(&self.firsts),
+            depth: gbuffer.depth,
+        };
+        let targets = Targets::new().color(places, Load::Clear([-1.0; 4])).depth(depth, Depth::Clear(0.0));
+        // Sides that the G-buffer does not show are at another depth.
+        graph.raster(targets, Raster::new().cull(Cull::None), args, Draw::calls(self.draws.clone()));
+        places
+    }
+}
+
+impl Daylight {
+    /// The bake.
+    pub fn stored(&self) -> &Stored {
+        &self.baked.stored
+    }
+
+    /// Seconds of the day at a frame.
+    fn seconds(&self, settings: &Settings, frame: u32) -> Result<f64> {
+        let time = self.day.parse_time(&settings.time).map_err(|what| Error::usage(what).at("daylight.time"))?;
+        Ok((time + f64::from(frame) * 60.0 * settings.minutes).rem_euclid(self.day.length()))
+    }
+
+    /// The weights of the baked times around a moment (equations 1 to 3; x there has the offset on the wrong side).
+    fn weights(&self, seconds: f64, how: Interpolation) -> Vec<(usize, f32)> {
+        let times = &self.baked.stored.plan.times;
+        let Some(last) = times.len().checked_sub(1) else { return Vec::new() };
+        let next = times.partition_point(|time| time.seconds <= seconds);
+        let [Some(before), Some(after)] = [next.checked_sub(1), (next <= last).then_some(next)] else {
+            // Before the first and after the last baked time the sun is at the horizon.
+            return vec![(next.min(last), 1.0)];
+        };
+        let step = times[after].seconds - times[before].seconds;
+        let alpha = ((seconds - times[before].seconds) / step) as f32;
+        match how {
+            Interpolation::Nearest => vec![(if alpha < 0.5 { before } else { after }, 1.0)],
+            Interpolation::CatmullRom if before > 0 && after < last => {
+                let (a, a2, a3) = (alpha, alpha * alpha, alpha * alpha * alpha);
+                vec![
+                    (before - 1, 0.5 * (-a + 2.0 * a2 - a3)),
+                    (before, 0.5 * (2.0 - 5.0 * a2 + 3.0 * a3)),
+                    (after, 0.5 * (a + 4.0 * a2 - 3.0 * a3)),
+                    (after + 1, 0.5 * (a3 - a2)),
+                ]
+            }
+            Interpolation::Linear | Interpolation::CatmullRom => vec![(before, 1.0 - alpha), (after, alpha)],
+        }
+    }
+
+    /// Handles of the scene under this sun and sky instead of its own.
+    fn relit(
+        &mut self,
+        graph: &mut Graph,
+        moment: &Moment<'_, Mode>,
+        sun: Vec3,
+        light: [f32; 3],
+        sky: &Sky,
+        strength: f32,
+    ) -> Result<Handles> {
+        let mut here = (*moment.handles.moment).clone();
+        here.lights.clear();
+        if light.iter().any(|light| *light > 0.0) {
+            here.lights.push(types::Light {
+                kind: consts::LIGHT_DIRECTIONAL,
+                direction: (-sun).to_array(),
+                intensity: light,
+                spot_offset: 1.0,
+                ..types::Light::default()
+            });
+        }
+        here.environment_scale = strength;
+        here.environment_rotation = 0.0;
+        let state = [sun.x, sun.y, sun.z, light[0], light[1], light[2], sky.radiance([0.0, 1.0, 0.0])[2]];
+        if self.sky.as_ref().is_none_or(|(_, shown)| *shown != state) {
+            let image = resident::environment(&self.gpu, Some(&picture_of(sky)), SKY[0])?;
+            self.sky = Some((image, state));
+        }
+        let Some((image, _)) = &self.sky else { return Ok(moment.handles.clone()) };
+        Ok(Handles {
+            lights: graph.buffer_from("daylight.lights", &resident::lights_bytes(&here.lights)),
+            environment: graph.import_image(image).repeat(),
+            moment: Arc::new(here),
+            ..moment.handles.clone()
+        })
+    }
+
+    /// Coefficients of the images of all tiles.
+    fn coefficients(&self, weights: &[(usize, f32)], sun: [f32; 3], patches: &[[f32; 3]]) -> Vec<[f32; 3]> {
+        let of_sun = |(time, weight): &(usize, f32)| (*time, sun.map(|channel| channel * weight));
+        let mut out = Vec::new();
+        for tile in &self.baked.stored.tiles {
+            out.extend(tile.sun.mix(weights.iter().map(of_sun)));
+            out.extend(tile.sky.mix(patches.iter().copied().enumerate()));
+        }
+        out.push([0.0; 3]);
+        out
+    }
+}
+
+/// The sky as a picture.
+fn picture_of(sky: &Sky) -> Environment {
+    let [width, height] = SKY;
+    let texel = |x: u32, y: u32| {
+        let uv = Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
+        Vec3::from(sky.radiance(direction_from_uv(uv).to_array()))
+    };
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| texel(x, y))).collect();
+    Environment { name: "sky".into(), width, height, pixels, rotation: 0.0, scale: 1.0 }
+}
+
+/// The tiles and their words on the device.
+fn packed(stored: &Stored) -> (Vec<types::DayTile>, Vec<u32>) {
+    let (mut tiles, mut words, mut first) = (Vec::new(), Vec::new(), 0);
+    for tile in &stored.tiles {
+        let mut entry = types::DayTile {
+            mask: words.len() as u32,
+            mask_words: tile.mask.len() as u32,
+            columns: stored.plan.tile(tiles.len() as u32)[2],
+            ..types::DayTile::default()
+        };
+        words.extend_from_slice(&tile.mask);
+        let mut before = 0;
+        for word in &tile.mask {
+            words.push(before);
+            before += word.count_ones();
+        }
+        for (which, layer) in [&tile.sun, &tile.sky].into_iter().enumerate() {
+            let Layer { wide, narrow, .. } = *layer;
+            entry.first_word[which] = words.len() as u32;
+            (entry.wide[which], entry.narrow[which], entry.first[which]) = (wide, narrow, first);
+            words.extend_from_slice(&layer.words);
+            first += layer.images();
+        }
+        tiles.push(entry);
+    }
+    words.push(0);
+    (tiles, words)
+}
+
+/// Light that a scene has and that is not in a bake.
+fn left_out(scene: &Scene) -> Vec<Note> {
+    let note = |place: &str, text: &str| Note { kind: NoteKind::Ignored, place: place.into(), text: text.into() };
+    let mut notes = Vec::new();
+    if !scene.lights.is_empty() {
+        notes.push(note("lights", "the scene's own lights are off: the light is that of sun and sky"));
+    }
+    if scene.environment.is_some() {
+        notes.push(note("environment", "the scene's own environment is replaced by the sky of the time"));
+    }
+    if scene.materials.iter().any(|material| material.emissive != Vec3::ZERO) {
+        notes.push(note("materials", "emissive surfaces are shown, but they light nothing"));
+    }
+    notes
+}
+
+impl Technique for Daylight {
+    const NAME: &'static str = "daylight";
+    const ABOUT: &'static str =
+        "indirect light of every time of day from a bake; layers direct, indirect, irradiance, albedo, normal, depth";
+    const UNITS: &'static str = "tiles";
+    const OWN_LIGHT: bool = true;
+
+    type Settings = PictureSettings;
+    type Mode = Mode;
+    type Baked = Baked;
+
+    fn description() -> &'static Description {
+        Settings::description()
+    }
+
+    fn prepared_by(_: &PictureSettings) -> PictureSettings {
+        PictureSettings::default()
+    }
+
+    fn upload(gpu: &Gpu, scene: &Scene) -> Result<Resident> {
+        // The sky of the time replaces it.
+        Resident::new(gpu, &Scene { environment: None, ..scene.clone() })
+    }
+
+    fn ready(making: Making<'_, Baked>, _: &PictureSettings) -> Result<Self> {
+        let Making { gpu, scene, baked, .. } = making;
+        let Some(baked) = baked else {
+            let error = Error::usage("there is no baked light").at("daylight");
+            return Err(error.help("Bake it with `daylight bake SCENE -o FILE.day`, and name the file with --bake"));
+        };
+        let stored = &baked.stored;
+        if let Some(parts) = stored.plan.difference(scene) {
+            let what = format!("is the light of `{}`, and this scene has other {parts}", stored.plan.scene);
+            return Err(baked.blamed(Error::input(what).help("Name the scene that was baked, or bake this one")));
+        }
+        let calendar = &stored.plan.calendar;
+        let day = Day::new(&calendar.date, &calendar.zone, calendar.latitude, calendar.longitude)
+            .map_err(|what| baked.blamed(Error::input(what)))?;
+        let (tiles, words) = packed(stored);
+        let most = gpu.caps().limits.storage_range;
+        if 4 * words.len() as u64 > most {
+            let what = format!("its images have {} bytes, the device allows {most} in one buffer", 4 * words.len());
+            return Err(baked
+                .blamed(Error::new(ErrorKind::Runtime, what))
+                .help("Bake fewer texels, or use another device"));
+        }
+        Ok(Self {
+            gpu: gpu.clone(),
+            baked: baked.clone(),
+            day,
+            tiles: OwnedBuffer::with_contents(gpu, "daylight.tiles", bytemuck::cast_slice(&tiles))?,
+            words: OwnedBuffer::with_contents(gpu, "daylight.words", bytemuck::cast_slice(&words))?,
+            places: Places::new(gpu, scene, baked)?,
+            sky: None,
+        })
+    }
+
+    fn frame(&mut self, graph: &mut Graph, moment: &Moment<'_, Mode>, settings: &PictureSettings) -> Result<Picture> {
+        technique::Settings::validate(settings)?;
+        let plan = &self.baked.stored.plan;
+        plan.check_view(&moment.view).map_err(|error| self.baked.blamed(error))?;
+        let [columns, _] = plan.tiles();
+        let (side, texels, north) = (plan.settings.tile, plan.extent, plan.calendar.north);
+        let of_day = &settings.daylight;
+        let seconds = self.seconds(of_day, graph.frame)?;
+        let sun = Vec3::from(self.day.sun(seconds).direction(north));
+        let sky = Sky::new(of_day.weather()?, sun.as_dvec3().to_array()).map_err(Error::usage)?;
+        let light = sky.sun_irradiance().map(|channel| channel * of_day.strength);
+        let patches: Vec<[f32; 3]> =
+            sky.patches().iter().map(|patch| patch.map(|channel| channel * of_day.strength)).collect();
+        let weights = self.weights(seconds, of_day.interpolation);
+        let coefficients = self.coefficients(&weights, light, &patches);
+        let handles = self.relit(graph, moment, sun, light, &sky, of_day.strength)?;
+        let view = &moment.view;
+        let gbuffer = gbuffer::draw(graph, &handles, view, &settings.gbuffer);
+        let shadows = shadow::draw(graph, &handles, view, &settings.shadow);
+        let choices = Direct { paper_law: false, specular: true, light_radius: 0.0, light_power: 1.0 };
+        let lit = direct::light(graph, &gbuffer, Lights::from(&shadows), &choices);
+        let image = |graph: &mut Graph, name: &str| graph.image(name, Format::RGBA16F, view.extent);
+        let [total, indirect, irradiance] =
+            ["daylight", "daylight.indirect", "daylight.irradiance"].map(|name| image(graph, name));
+        let places = self.places.as_ref().map(|places| places.draw(graph, &handles, view, &gbuffer));
+        let args = decode::Args {
+            places: places.unwrap_or(gbuffer.depth),
+            spec: decode::Spec { lightmap: places.is_some().into() },
+            albedo: gbuffer.albedo,
+            depth: gbuffer.depth,
+            direct: lit.direct,
+            specular: gbuffer.specular,
+            total,
+            indirect,
+            irradiance,
+            tiles: graph.import_buffer(&self.tiles),
+            words: graph.import_buffer(&self.words),
+            coefficients: graph.buffer_from("daylight.coefficients", &coefficients),
+            push: decode::Push { side, columns, texels },
+        };
+        graph.compute(args, view.extent);
+        skybox::draw(graph, &handles, &gbuffer, Vec3::ZERO, total);
+        skybox::draw(graph, &handles, &gbuffer, Vec3::ZERO, lit.direct);
+        let shown = match moment.shot.mode {
+            Mode::Total => total,
+            Mode::Direct => lit.direct,
+            Mode::Indirect => indirect,
+            Mode::Irradiance => irradiance,
+        };
+        let of_shadows = idle_notes("shadow", &settings.shadow);
+        let notes = [moment.notes, &shadows.notes, &left_out(moment.scene), &of_shadows].concat();
+        let picture =
+            Picture::new(shown).color("direct", lit.direct).color("indirect", indirect).color("irradiance", irradiance);
+        Ok(picture.showing(gbuffer).noting(notes))
+    }
+}

@@ -1,0 +1,259 @@
+//! The light of a tile for all times of the day, by paths that all times share (`shaders-glsl/daylight`).
+//!
+//! A path starts at a texel and ends in the sky or after some scatterings. Its vertices do not depend on the time, so each vertex sends one
+//! shadow ray to each position of the sun: a day costs one set of paths and many coherent shadow rays, instead of a set of paths for each time.
+//! Light is linear in the sun, so the sun is white and has an irradiance of 1 W/m² at normal incidence.
+
+use super::{Kind, Plan, beam::SUN_ANGULAR_RADIUS};
+use crate::{
+    Result,
+    gpu::{BufferDesc, Gpu, OwnedBuffer},
+    graph::{Graph, Items, Runner},
+    rays::{Rays, traced},
+    resident::Resident,
+    scene::{Pose, Scene, View},
+    shaders::{
+        consts,
+        daylight::{see, sky, suns, walk},
+        types,
+    },
+};
+
+/// Paths of a texel in one batch at most.
+const BATCH: u32 = 16;
+/// Vertices of a batch at most: 200 MB.
+const MOST_VERTICES: u64 = 1 << 22;
+
+/// The scene of a bake on a device.
+#[derive(Debug)]
+pub struct Transport {
+    gpu: Gpu,
+    runner: Runner,
+    scene: Scene,
+    pose: Pose,
+    resident: Resident,
+    rays: Rays,
+    suns: OwnedBuffer,
+    sources: Sources,
+}
+
+/// The texels of a bake.
+#[derive(Clone, Debug)]
+pub enum Sources {
+    /// The pixels of a camera.
+    View(Box<View>),
+    /// The texels of each tile of a lightmap ([`super::lightmap::Unwrapped::by_tile`]).
+    Lightmap(Vec<Vec<(u32, types::Hit)>>),
+}
+
+/// Light of a tile's texels that are on a surface, W/m².
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Light {
+    /// Irradiance by the sun after at least one scattering, for 1 W/m² of the sun: for each texel three rows (red, green, blue) of all times.
+    pub sun: Vec<f32>,
+    /// The same by the odd samples alone less that by the even samples alone, halved: one standard deviation of its noise, on average.
+    pub noise: Vec<f32>,
+    /// Irradiance for a radiance of 1 W/(sr m²) of each patch of the sky: for each texel three rows of all patches.
+    pub sky: Vec<f32>,
+    /// A bit for each texel of the tile, row after row: whether it is on a surface.
+    pub mask: Vec<u32>,
+}
+
+impl Transport {
+    /// Uploads the scene without its own suns and sky.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
+    pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, sources: Sources) -> Result<Self> {
+        let scene = Scene { environment: None, ..scene.clone() };
+        let pose = Pose::rest(&scene);
+        let resident = Resident::for_rays(gpu, &scene)?;
+        let rays = Rays::new(gpu, &scene, &resident)?;
+        let suns: Vec<[f32; 3]> = plan.times.iter().map(|time| time.sun).chain([[0.0, 1.0, 0.0]]).collect();
+        let suns = OwnedBuffer::with_contents(gpu, "daylight.suns", bytemuck::cast_slice(&suns))?;
+        Ok(Self { gpu: gpu.clone(), runner: Runner::new(gpu), scene, pose, resident, rays, suns, sources })
+    }
+
+    /// The light of a tile. Its bits do not depend on the other tiles.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`, `Interrupted`.
+    pub fn tile(&mut self, plan: &Plan, tile: u32) -> Result<Light> {
+        let [column, row, columns, rows] = plan.tile(tile);
+        let words = (columns * rows).div_ceil(32) as usize;
+        let mut mask = vec![0u32; words];
+        let hits: Vec<types::Hit> = match &self.sources {
+            Sources::View(view) => {
+                let view = **view;
+                let pixels: Vec<[u32; 2]> =
+                    (row..row + rows).flat_map(|y| (column..column + columns).map(move |x| [x, y])).collect();
+                let seen = self.seen(plan, &view, &pixels)?;
+                // Hits of nothing have the number NONE (lib/scene.glsl) for their instance.
+                let there = seen.iter().enumerate().filter(|(_, hit)| hit.instance != u32::MAX);
+                there
+                    .map(|(texel, hit)| {
+                        mask[texel / 32] |= 1 << (texel % 32);
+                        *hit
+                    })
+                    .collect()
+            }
+            Sources::Lightmap(tiles) => {
+                let of_tile = tiles.get(tile as usize).map_or(&[][..], Vec::as_slice);
+                of_tile
+                    .iter()
+                    .map(|(texel, hit)| {
+                        mask[*texel as usize / 32] |= 1 << (texel % 32);
+                        *hit
+                    })
+                    .collect()
+            }
+        };
+        let light = self.gather(plan, plan.first_receiver(tile), &hits)?;
+        Ok(Light { mask, ..light })
+    }
+
+    /// The surfaces at the centres of pixels.
+    fn seen(&mut self, plan: &Plan, view: &View, pixels: &[[u32; 2]]) -> Result<Vec<types::Hit>> {
+        let count = pixels.len() as u32;
+        let mut graph = Graph::new("daylight.see");
+        let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
+        let rays = self.rays.frame(&mut graph, &handles);
+        let receivers = graph.buffer("daylight.receivers", u64::from(count) * size_of::<types::Hit>() as u64);
+        let args = traced!(
+            see::Args {
+                view: graph.uniform(&view.fit_far(&handles.bounds()).uniform()),
+                pixels: graph.buffer_from("daylight.pixels", pixels),
+                receivers,
+                push: see::Push { count, extent: plan.extent },
+            },
+            rays,
+            handles
+        );
+        graph.compute(args, count).rays(count.into());
+        let read = graph.read_buffer(receivers);
+        Ok(self.runner.run(&graph)?.buffer(read))
+    }
+
+    /// The light of some surface points; `first`: number of the first in the whole bake.
+    fn gather(&mut self, plan: &Plan, first: u32, hits: &[types::Hit]) -> Result<Light> {
+        let count = hits.len() as u32;
+        if count == 0 {
+            return Ok(Light::default());
+        }
+        let times = plan.times.len() as u32;
+        let vertices = u64::from(count) * u64::from(consts::DAY_VERTICES);
+        let batch = (MOST_VERTICES / vertices).clamp(1, BATCH.into()) as u32;
+        let buffer = |name, bytes: u64| OwnedBuffer::new(&self.gpu, name, BufferDesc::device(bytes.max(16)));
+        let paths = u64::from(count * batch);
+        let receivers = OwnedBuffer::with_contents(&self.gpu, "daylight.receivers", bytemuck::cast_slice(hits))?;
+        let of_vertices = buffer(
+            "daylight.vertices",
+            paths * u64::from(consts::DAY_VERTICES) * size_of::<types::DayVertex>() as u64,
+        )?;
+        let escapes = buffer("daylight.escapes", paths * size_of::<types::DayEscape>() as u64)?;
+        let counts = buffer("daylight.counts", paths * 4)?;
+        let sun_sums = buffer("daylight.sun", u64::from(count) * u64::from(times) * 24)?;
+        let sky_sums = buffer("daylight.sky", u64::from(count) * u64::from(consts::SKY_PATCHES) * 12)?;
+        let samples = plan.settings.samples;
+        let mut first_sample = 0;
+        loop {
+            let now = batch.min(samples - first_sample);
+            let mut graph = Graph::new("daylight.bake");
+            let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
+            let rays = self.rays.frame(&mut graph, &handles);
+            let most_turns = self.rays.most_turns();
+            let receivers = graph.import_buffer(&receivers);
+            let vertices = graph.import_buffer(&of_vertices);
+            let escapes = graph.import_buffer(&escapes);
+            let counts = graph.import_buffer(&counts);
+            let sun_sums = graph.import_buffer(&sun_sums);
+            let sky_sums = graph.import_buffer(&sky_sums);
+            if first_sample == 0 {
+                graph.fill(sun_sums, 0);
+                graph.fill(sky_sums, 0);
+            }
+            let settings = graph.uniform(&settings(plan, first, [count, now, first_sample]));
+            let args = traced!(walk::Args { settings, receivers, vertices, escapes, counts }, rays, handles);
+            let bounces = u64::from(plan.settings.vertices());
+            let paths = count * now;
+            graph.compute(args, paths).rays(u64::from(paths) * bounces);
+            if times > 0 {
+                let args = traced!(
+                    suns::Args {
+                        settings,
+                        suns: graph.import_buffer(&self.suns),
+                        vertices,
+                        counts,
+                        sums: sun_sums,
+                        push: suns::Push { first: 0, count: now },
+                    },
+                    rays
+                );
+                // About half of all vertices are there, and half of them face the sun.
+                let shadow_rays = u64::from(count) * u64::from(times) * bounces.div_ceil(4);
+                let items = Items::new(now).rays(shadow_rays).turns(bounces * most_turns);
+                graph.compute_over(args, [times, count], items);
+            }
+            let args = sky::Args { settings, escapes, sums: sky_sums, push: sky::Push { first: 0, count: now } };
+            graph.compute(args, count);
+            first_sample += now;
+            if first_sample < samples {
+                self.runner.run(&graph)?;
+                continue;
+            }
+            let [sun, sky] = [sun_sums, sky_sums].map(|buffer| graph.read_buffer(buffer));
+            let frame = self.runner.run(&graph)?;
+            return Ok(summed(&frame.buffer(sun), &frame.buffer(sky), count, times, samples));
+        }
+    }
+}
+
+fn settings(plan: &Plan, first_receiver: u32, [receivers, samples, first_sample]: [u32; 3]) -> types::DaySettings {
+    let baking = &plan.settings;
+    let mut flags = 0;
+    if let Kind::View { .. } = plan.receivers {
+        flags |= consts::DAY_NORMAL_MAPS;
+    }
+    if baking.diffuse_only {
+        flags |= consts::DAY_DIFFUSE_ONLY;
+    }
+    types::DaySettings {
+        receivers,
+        first_receiver,
+        samples,
+        first_sample,
+        bounces: baking.vertices(),
+        roulette: baking.roulette,
+        sharp: baking.specular_bounces,
+        flags,
+        seed: baking.seed,
+        times: plan.times.len() as u32,
+        sun_radius: if baking.disc { SUN_ANGULAR_RADIUS.tan() as f32 } else { 0.0 },
+    }
+}
+
+/// Rows of means from sums in the order of the device.
+fn summed(sun: &[[f32; 3]], sky: &[[f32; 3]], count: u32, times: u32, samples: u32) -> Light {
+    let (count, times, patches) = (count as usize, times as usize, consts::SKY_PATCHES as usize);
+    let all = 1.0 / f64::from(samples);
+    let (even_count, odd_count) = (samples.div_ceil(2), samples / 2);
+    let mut light = Light {
+        sun: Vec::with_capacity(3 * count * times),
+        noise: Vec::with_capacity(3 * count * times),
+        sky: Vec::with_capacity(3 * count * patches),
+        mask: Vec::new(),
+    };
+    for texel in 0..count {
+        for channel in 0..3 {
+            for time in 0..times {
+                let at = 2 * (texel * times + time);
+                let [even, odd] = [sun[at][channel], sun[at + 1][channel]].map(f64::from);
+                light.sun.push(((even + odd) * all) as f32);
+                let difference = odd / f64::from(odd_count.max(1)) - even / f64::from(even_count.max(1));
+                light.noise.push((0.5 * difference) as f32);
+            }
+            light.sky.extend((0..patches).map(|patch| (f64::from(sky[texel * patches + patch][channel]) * all) as f32));
+        }
+    }
+    light
+}

@@ -1,0 +1,240 @@
+//! Bakes as jobs of [`crate::bake`]. A unit is a tile with all times of the day; its bytes are its compressed layers.
+
+use super::{
+    Plan, Sky, Weather,
+    layer::{Aim, Columns, Layer},
+    transport::Light,
+};
+use crate::{
+    Error, ErrorKind, Result,
+    bake::{Job, Key, Stage},
+    shaders::consts::SKY_PATCHES,
+};
+
+/// The name of such jobs.
+pub const KIND: &str = "daylight";
+/// Increased whenever the computation changes.
+const VERSION: u32 = 1;
+/// Largest number that a list in a unit may have.
+const MOST_WORDS: u64 = 1 << 32;
+
+/// The compressed light of a tile.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tile {
+    /// Light of the sun: a dimension is a lit time of the day.
+    pub sun: Layer,
+    /// Light of the sky: a dimension is a patch of the sky.
+    pub sky: Layer,
+    /// A bit for each texel, row after row: whether it is on a surface. Images have no other texels.
+    pub mask: Vec<u32>,
+    /// Sums of irradiance of all texels and colours for each time, by the baked light and of its squared error after compression.
+    pub light: Vec<[f64; 2]>,
+}
+
+/// The job that computes a plan on a device. Its key contains the whole plan. `texels`: number of texels on surfaces of each tile, for
+/// predictions of time; `None`: all.
+///
+/// # Errors
+/// `Runtime` if the plan cannot be text.
+pub fn job(plan: &Plan, device: &str, texels: Option<&[u64]>) -> Result<Job> {
+    let text = |error| Error::new(ErrorKind::Runtime, "the plan of the bake cannot be text").caused_by(error);
+    let about = serde_json::to_value(plan).map_err(text)?;
+    let mut key = Key::new(KIND, VERSION).text("device", device);
+    for part in &plan.parts {
+        key = key.text(&format!("scene.{}", part.name), &part.digest.to_string());
+    }
+    for (name, value) in about.as_object().into_iter().flatten().filter(|(name, _)| *name != "parts") {
+        key = match value {
+            serde_json::Value::Object(members) => members
+                .iter()
+                .fold(key, |key, (member, value)| key.text(&format!("{name}.{member}"), &value.to_string())),
+            value => key.text(name, &value.to_string()),
+        };
+    }
+    let [columns, rows] = plan.tiles();
+    let cost = |tile: u32| {
+        let [_, _, columns, rows] = plan.tile(tile).map(u64::from);
+        let texels = texels.map_or(columns * rows, |texels| texels.get(tile as usize).copied().unwrap_or(0));
+        (texels * u64::from(plan.settings.samples)).max(1)
+    };
+    let costs = (0..columns * rows).map(cost).collect();
+    Ok(Job::new(key, vec![Stage::new("tiles", costs)])?.about(about))
+}
+
+/// The skies that a bake guarantees: clear and overcast, at up to 24 of its times, and an even sky. One row of all patches for each.
+///
+/// # Errors
+/// `Input` if the plan has impossible weather.
+pub fn skies(plan: &Plan) -> Result<Vec<f32>> {
+    let patches = SKY_PATCHES as usize;
+    let mut rows = vec![1.0; patches];
+    let step = plan.times.len().div_ceil(24).max(1);
+    for overcast in [0.0, 1.0] {
+        let weather = plan.weather;
+        let weather = Weather::new(weather.turbidity(), weather.ground_albedo(), overcast).map_err(Error::input)?;
+        for time in plan.times.iter().step_by(step) {
+            let radiances = Sky::new(weather, time.sun.map(f64::from)).map_err(Error::input)?.patches();
+            rows.extend(radiances.iter().map(|[r, g, b]| 0.2126 * r + 0.7152 * g + 0.0722 * b));
+        }
+    }
+    Ok(rows)
+}
+
+/// Compresses the light of a tile.
+///
+/// # Errors
+/// As [`Layer::compress`].
+pub fn compress(plan: &Plan, light: &Light, skies: &[f32]) -> Result<Tile> {
+    let [times, patches] = plan.dimensions();
+    let most = match plan.settings.images {
+        0 => usize::MAX,
+        images => images as usize,
+    };
+    let aim = Aim { tolerance: plan.settings.tolerance, most };
+    let limited = |dimensions: usize| Aim { most: most.min(dimensions), ..aim };
+    let mut sun = Layer::compress(&light.sun, times, Columns::Dimensions, limited(times))?;
+    sun.noise = noise(&light.sun, &light.noise, times);
+    let sky = Layer::compress(&light.sky, patches, Columns::Mixtures(skies), limited(patches))?;
+    let lit = errors(&sun, &light.sun, times);
+    Ok(Tile { sun, sky, mask: light.mask.clone(), light: lit })
+}
+
+/// The root mean square of the noise of the column with the most noise, relative to its mean.
+fn noise(rows: &[f32], noise: &[f32], dimensions: usize) -> f32 {
+    let column = |t: usize| {
+        let mean: f64 = rows.iter().skip(t).step_by(dimensions).map(|v| f64::from(*v)).sum();
+        let square: f64 = noise.iter().skip(t).step_by(dimensions).map(|v| f64::from(*v).powi(2)).sum();
+        let lines = (rows.len() / dimensions) as f64;
+        if mean > 0.0 { (square / lines).sqrt() / (mean / lines) } else { 0.0 }
+    };
+    (0..dimensions).map(column).fold(0.0, f64::max) as f32
+}
+
+/// For each column the sum of its light and the sum of its squared errors as decoded.
+fn errors(layer: &Layer, rows: &[f32], dimensions: usize) -> Vec<[f64; 2]> {
+    let texels = rows.len() / (3 * dimensions).max(1);
+    (0..dimensions)
+        .map(|t| {
+            let coefficients = layer.mix([(t, [1.0; 3])].into_iter());
+            let mut sums = [0.0, 0.0];
+            for texel in 0..texels {
+                for (channel, decoded) in layer.decode(texel, &coefficients).into_iter().enumerate() {
+                    let truth = f64::from(rows[(3 * texel + channel) * dimensions + t]);
+                    sums[0] += truth;
+                    sums[1] += (f64::from(decoded) - truth).powi(2);
+                }
+            }
+            sums
+        })
+        .collect()
+}
+
+impl Tile {
+    /// Number of texels that are on a surface.
+    pub fn there(&self) -> u32 {
+        self.mask.iter().map(|word| word.count_ones()).sum()
+    }
+
+    /// The bytes of a unit: numbers with their low byte first.
+    pub fn encode(&self) -> Vec<u8> {
+        let mut out = Vec::new();
+        out.extend_from_slice(&(self.mask.len() as u32).to_le_bytes());
+        self.mask.iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
+        out.extend_from_slice(&(self.light.len() as u32).to_le_bytes());
+        self.light.iter().flatten().for_each(|value| out.extend_from_slice(&value.to_le_bytes()));
+        for layer in [&self.sun, &self.sky] {
+            for number in [layer.dimensions, layer.wide, layer.narrow, layer.worst_dimension] {
+                out.extend_from_slice(&number.to_le_bytes());
+            }
+            for number in [layer.worst, layer.noise] {
+                out.extend_from_slice(&number.to_le_bytes());
+            }
+            for length in [layer.table.len(), layer.words.len()] {
+                out.extend_from_slice(&(length as u64).to_le_bytes());
+            }
+            layer.table.iter().for_each(|value| out.extend_from_slice(&value.to_le_bytes()));
+            layer.words.iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
+        }
+        out
+    }
+
+    /// Reads the bytes of a unit for a tile of `texels` texels.
+    ///
+    /// # Errors
+    /// `Input` if they are not those of a tile of the plan.
+    pub fn decode(bytes: &[u8], plan: &Plan, texels: usize) -> Result<Self> {
+        let mut rest = Rest(bytes);
+        let words = rest.word()? as usize;
+        if words != texels.div_ceil(32) {
+            return Err(Error::input(format!("a mask of {words} words for {texels} texels")));
+        }
+        let mask = (0..words).map(|_| rest.word()).collect::<Result<Vec<_>>>()?;
+        let there: u32 = mask.iter().map(|word| word.count_ones()).sum();
+        let times = rest.word()? as usize;
+        let [dimensions, patches] = plan.dimensions();
+        if times != dimensions {
+            return Err(Error::input(format!("a tile with {times} times, {dimensions} are needed")));
+        }
+        let light = (0..times).map(|_| Ok([rest.double()?, rest.double()?])).collect::<Result<Vec<_>>>()?;
+        let sun = rest.layer()?;
+        let sky = rest.layer()?;
+        sun.validate(there as usize, dimensions).map_err(|error| error.at("light of the sun"))?;
+        sky.validate(there as usize, patches).map_err(|error| error.at("light of the sky"))?;
+        match rest.0.is_empty() {
+            true => Ok(Self { sun, sky, mask, light }),
+            false => Err(Error::input("a tile with something after its end")),
+        }
+    }
+}
+
+/// Bytes that are read from the front.
+struct Rest<'a>(&'a [u8]);
+
+impl<'a> Rest<'a> {
+    fn take(&mut self, count: usize) -> Result<&'a [u8]> {
+        if self.0.len() < count {
+            return Err(Error::input("a tile that is cut off"));
+        }
+        let (head, tail) = self.0.split_at(count);
+        self.0 = tail;
+        Ok(head)
+    }
+
+    fn array<const N: usize>(&mut self) -> Result<[u8; N]> {
+        let mut out = [0; N];
+        out.copy_from_slice(self.take(N)?);
+        Ok(out)
+    }
+
+    fn word(&mut self) -> Result<u32> {
+        Ok(u32::from_le_bytes(self.array()?))
+    }
+
+    fn float(&mut self) -> Result<f32> {
+        Ok(f32::from_le_bytes(self.array()?))
+    }
+
+    fn double(&mut self) -> Result<f64> {
+        Ok(f64::from_le_bytes(self.array()?))
+    }
+
+    fn length(&mut self) -> Result<usize> {
+        let length = u64::from_le_bytes(self.array()?);
+        match length.checked_mul(4).is_some_and(|bytes| bytes <= self.0.len() as u64) && length < MOST_WORDS {
+            true => Ok(length as usize),
+            false => Err(Error::input("a tile that is cut off")),
+        }
+    }
+
+    fn layer(&mut self) -> Result<Layer> {
+        let [dimensions, wide, narrow, worst_dimension] = [self.word()?, self.word()?, self.word()?, self.word()?];
+        let [worst, noise] = [self.float()?, self.float()?];
+        let [table, words] = [self.length()?, self.length()?];
+        if wide > dimensions || narrow > dimensions {
+            return Err(Error::input(format!("{wide} and {narrow} images of {dimensions} dimensions")));
+        }
+        let table = (0..table).map(|_| self.float()).collect::<Result<_>>()?;
+        let words = (0..words).map(|_| self.word()).collect::<Result<_>>()?;
+        Ok(Layer { dimensions, wide, narrow, table, words, worst, worst_dimension, noise })
+    }
+}

@@ -1,0 +1,9 @@
+//! The commands of `daylight`: `bake` writes the input file of `render`, and `info` describes it.
+
+mod bake;
+mod info;
+mod render;
+
+pub use bake::{DayBakeArgs, bake};
+pub use info::{DayInfoArgs, info};
+pub use render::{DayArgs, render};

@@ -1,0 +1,50 @@
+//! `daylight`: indirect light for every time of day, baked once and lit live.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use lucerna_samples::{
+    bake::{self, JoinArgs},
+    daylight::{self, DayArgs, DayBakeArgs, DayInfoArgs},
+    program,
+};
+
+/// Indirect light for every time of day, baked once and lit live.
+#[derive(Parser, Debug)]
+#[command(name = "daylight", version, max_term_width = 120)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Compute the light of a scene for all times of a day and write it to a file
+    #[command(args_override_self = true)]
+    Bake(Box<DayBakeArgs>),
+    /// Print the contents, the size and the errors of a bake
+    Info(DayInfoArgs),
+    /// Join the parts of a bake (as `lucerna merge`)
+    Merge(JoinArgs),
+    /// Render a scene at times of the day into images
+    #[command(args_override_self = true, mut_arg("time", |arg| arg.long("scene-time")), mut_arg("paper", |arg| arg.hide(true)))]
+    Render(Box<DayArgs>),
+}
+
+fn main() -> ExitCode {
+    match Arguments::parse().command {
+        Command::Bake(args) => {
+            let console = args.talk.console();
+            program::run(console, || daylight::bake(&args, console))
+        }
+        Command::Info(args) => {
+            let console = args.talk.console();
+            program::run(console, || daylight::info(&args, console))
+        }
+        Command::Merge(args) => {
+            let console = args.talk.console();
+            program::run(console, || bake::join(&args, console))
+        }
+        Command::Render(args) => program::run(args.common.talk.console(), || daylight::render(&args)),
+    }
+}

@@ -1,0 +1,60 @@
+// Paths of baked daylight: their vertices and the light that left the scene, shared by all times of the day.
+// Before including: lib/sampling.glsl.
+#ifndef LIB_DAYLIGHT
+#define LIB_DAYLIGHT
+
+// Vertices of a path at most, and so the scatterings before the light reaches a receiver.
+const uint DAY_VERTICES = 16u; // export
+// The 145 patches of the sky (Tregenza 1987), and one for all directions below the horizon.
+const uint SKY_PATCHES = 146u; // export
+
+const uint DAY_DIFFUSE_ONLY = 1u; // export
+// Receivers have the detail of normal maps. Texels of lightmaps are larger than that detail.
+const uint DAY_NORMAL_MAPS = 2u; // export
+
+struct DaySettings {
+    uint receivers;
+    uint first_receiver;  // number of the first receiver in the whole bake: its random numbers do not depend on tiles
+    uint samples;         // paths of each receiver in this batch
+    uint first_sample;
+    uint bounces;         // vertices at most
+    uint roulette;        // vertices before Russian roulette begins
+    uint sharp;           // mirrors and glass surfaces along a path at most
+    uint flags;           // DAY_
+    uint seed;
+    uint times;           // positions of the sun
+    float sun_radius;     // tangent of the angular radius of the sun's disc
+};
+
+// A surface point of a path that reflects direct light.
+struct DayVertex {
+    vec3 position;   // moved off the surface
+    vec3 normal;     // shading normal, unit
+    vec3 geometric;  // of the triangle, unit, on the side of the normal
+    vec3 weight;     // irradiance at the receiver for each W/m² of irradiance at the vertex
+};
+
+// The end of a path that left the scene.
+struct DayEscape {
+    vec3 direction;  // unit
+    vec3 weight;     // irradiance at the receiver for each W/(sr m²) from this direction; 0: the path did not leave
+};
+
+// Number of the sky's patch in a unit direction. Rows of 30, 30, 24, 24, 18, 12 and 6 patches, 12 degrees high, and one around the zenith. The
+// first patch of a row is around -z; azimuth grows towards +x. Twin: techniques::daylight::patch::patch_of.
+uint sky_patch(vec3 direction) {
+    float y = direction.y;
+    if (!(y >= 0.0)) return SKY_PATCHES - 1u;
+    if (y >= 0.99452190) return 144u;
+    uint first = 0u, count = 30u;
+    if (y >= 0.20791169) { first = 30u; count = 30u; }
+    if (y >= 0.40673664) { first = 60u; count = 24u; }
+    if (y >= 0.58778525) { first = 84u; count = 24u; }
+    if (y >= 0.74314483) { first = 108u; count = 18u; }
+    if (y >= 0.86602540) { first = 126u; count = 12u; }
+    if (y >= 0.95105650) { first = 138u; count = 6u; }
+    int column = int(floor(atan(direction.x, -direction.z) * (float(count) / 6.2831853) + 0.5));
+    return first + uint((column + int(count)) % int(count));
+}
+
+#endif

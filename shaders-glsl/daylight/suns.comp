@@ -1,0 +1,55 @@
+// Light of the sun at all times of the day: a shadow ray from each vertex to each position of the sun. Invocations side by side have the same
+// vertex and neighbouring times, so that their rays stay together.
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "lib/scene.glsl"
+#include "lib/random.glsl"
+#include "lib/material.glsl"
+#include "lib/sampling.glsl"
+#include "lib/trace.glsl"
+#include "daylight/daylight.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(binding = 0, scalar) uniform SettingsBlock { DaySettings settings; };
+layout(binding = 1, scalar) readonly buffer Suns { vec3 suns[]; };      // unit, towards the sun
+layout(binding = 9, scalar) readonly buffer Vertices { DayVertex vertices[]; };
+layout(binding = 11, scalar) readonly buffer Counts { uint counts[]; };
+// Sums of irradiance for a sun of 1 W/m² at normal incidence: time after time for each receiver. Odd and even samples apart: their difference
+// shows the noise.
+layout(binding = 12, scalar) buffer Sums { vec3 sums[]; };
+
+layout(push_constant, scalar) uniform Push {
+    uint first;    // sample of this batch
+    uint count;
+};
+
+void main() {
+    uint time = gl_GlobalInvocationID.x;
+    uint receiver = gl_WorkGroupID.y;
+    if (time >= settings.times) return;
+    vec3 sun = suns[time];
+    mat3 around = frame_around(sun);
+    vec3 odd = vec3(0.0), even = vec3(0.0);
+    for (uint i = first; i < first + count; ++i) {
+        uint path = receiver * settings.samples + i;
+        uint number = settings.first_sample + i;
+        vec3 of_path = vec3(0.0);
+        for (uint k = 0u; k < counts[path]; ++k) {
+            DayVertex vertex = vertices[path * DAY_VERTICES + k];
+            uvec4 hash = pcg4d(uvec4(settings.first_receiver + receiver, number, k, settings.seed ^ 0x5bd1e995u));
+            // The same place on the disc at all times.
+            vec2 disc = settings.sun_radius * sample_disc(unit_floats(hash.xy));
+            vec3 direction = normalize(sun + around[0] * disc.x + around[1] * disc.y);
+            float cosine = dot(vertex.normal, direction);
+            if (cosine <= 0.0 || dot(vertex.geometric, direction) <= 0.0) continue;
+            if (!trace_any(Ray(vertex.position, 0.0, direction, 1e30), TRACE_SHADOW, hash.z)) of_path += vertex.weight * cosine;
+        }
+        if ((number & 1u) != 0u) odd += of_path;
+        else even += of_path;
+    }
+    uint at = 2u * (receiver * settings.times + time);
+    sums[at] += even;
+    sums[at + 1u] += odd;
+}

@@ -1,0 +1,62 @@
+// The tiles of a bake in device memory, and the light of one texel (techniques::daylight::layer).
+#ifndef LIB_DAY_TILES
+#define LIB_DAY_TILES
+
+struct DayTile {
+    uint mask;           // first word of a bit for each texel, and of the number of texels before each of these words
+    uint mask_words;
+    uint columns;        // texels
+    uint first_word[2];  // of the light of the sun, and of the sky
+    uint wide[2];        // images of 16-bit floats
+    uint narrow[2];      // images of signed bytes
+    uint first[2];       // coefficient
+};
+
+layout(binding = 20, scalar) readonly buffer Tiles { DayTile tiles[]; };
+layout(binding = 21, scalar) readonly buffer Words { uint words[]; };
+// For each image of each tile the colour of one unit of its values, W/m².
+layout(binding = 22, scalar) readonly buffer Coefficients { vec3 coefficients[]; };
+
+// Number of a texel among those of its tile that are on a surface; NONE: it is on none. `inside`: from the corner of the tile.
+uint day_texel(uint tile, uvec2 inside) {
+    uint texel = inside.y * tiles[tile].columns + inside.x;
+    uint word = texel / 32u;
+    uint bits = words[tiles[tile].mask + word];
+    uint bit = 1u << (texel % 32u);
+    if ((bits & bit) == 0u) return NONE;
+    return words[tiles[tile].mask + tiles[tile].mask_words + word] + bitCount(bits & (bit - 1u));
+}
+
+// Irradiance at a texel, W/m². Values of images may be negative, so rounding may leave a small negative sum.
+vec3 day_irradiance(uint tile, uint texel) {
+    vec3 sum = vec3(0.0);
+    for (uint layer = 0u; layer < 2u; ++layer) {
+        uint wide = tiles[tile].wide[layer];
+        uint narrow = tiles[tile].narrow[layer];
+        uint first = tiles[tile].first[layer];
+        uint at = tiles[tile].first_word[layer] + texel * ((6u * wide + 3u * narrow + 3u) / 4u);
+        uint half_at = 0u;
+        for (uint i = 0u; i < wide; ++i) {
+            vec3 value;
+            for (uint c = 0u; c < 3u; ++c) {
+                vec2 pair = unpackHalf2x16(words[at + half_at / 2u]);
+                value[c] = (half_at & 1u) == 0u ? pair.x : pair.y;
+                ++half_at;
+            }
+            sum += coefficients[first + i] * value;
+        }
+        uint byte_at = 2u * half_at;
+        for (uint i = 0u; i < narrow; ++i) {
+            vec3 value;
+            for (uint c = 0u; c < 3u; ++c) {
+                int word = int(words[at + byte_at / 4u]);
+                value[c] = float(bitfieldExtract(word, int(8u * (byte_at & 3u)), 8));
+                ++byte_at;
+            }
+            sum += coefficients[first + wide + i] * value;
+        }
+    }
+    return sum;
+}
+
+#endif

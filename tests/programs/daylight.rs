@@ -1,0 +1,11 @@
+//! One program for several files of tests: linking the engine once saves minutes.
+
+#[path = "../tracer_lab/mod.rs"]
+mod tracer_lab;
+
+#[path = "../daylight_day.rs"]
+mod daylight_day;
+#[path = "../daylight_light.rs"]
+mod daylight_light;
+#[path = "../daylight_sky.rs"]
+mod daylight_sky;
