@@ -3,19 +3,18 @@
 use std::{path::PathBuf, process::ExitCode, time::Instant};
 
 use lucerna::{
-    Error, Result,
+    Result,
     gpu::Gpu,
     image,
-    scene::Scene,
-    techniques::daylight::{
-        Baking, Calendar, Day, Kind, Lit, MOST_TIMES, Plan, Sources, Stored, Transport, Weather, digest, lightmap,
-        parts, units,
-    },
+    techniques::daylight::{Baking, Kind, Sources, Stored, Transport, units},
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::info;
+use super::{
+    info,
+    plan::{DayOptions, KindArg, Planned, plan},
+};
 use crate::{
     args::{DeviceArgs, TalkArgs},
     bake::{self as units_of, Ended, UnitsArgs, Work},
@@ -28,34 +27,14 @@ use crate::{
     stage::{Stage, StageArgs},
 };
 
-/// Elevation at which the sun has set: its radius below the horizon, degrees.
-const SET: f64 = -0.2665;
-
 /// Options of `daylight bake`.
 #[derive(clap::Args, Clone, Debug)]
 pub struct DayBakeArgs {
     #[command(flatten)]
     pub stage: StageArgs,
 
-    /// Date of the day
-    #[arg(long, value_name = "YYYY-MM-DD", default_value = "2026-06-21", help_heading = "Day")]
-    pub date: String,
-
-    /// Degrees, positive in the north
-    #[arg(long, value_name = "DEGREES", default_value_t = 55.5, allow_negative_numbers = true, help_heading = "Day")]
-    pub latitude: f64,
-
-    /// Degrees, positive in the east
-    #[arg(long, value_name = "DEGREES", default_value_t = 10.0, allow_negative_numbers = true, help_heading = "Day")]
-    pub longitude: f64,
-
-    /// Time zone: a name, or an offset such as +01:00
-    #[arg(long, value_name = "ZONE", default_value = "Europe/Copenhagen", help_heading = "Day")]
-    pub timezone: String,
-
-    /// Turn of the north from -Z, degrees, clockwise as seen from above
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, help_heading = "Day")]
-    pub north: f32,
+    #[command(flatten)]
+    pub day: DayOptions,
 
     /// The surfaces to bake
     #[arg(long, value_enum, default_value = "lightmap", value_name = "KIND", help_heading = "Bake")]
@@ -90,15 +69,6 @@ pub struct DayBakeArgs {
     pub progress: ProgressMode,
 }
 
-/// The surfaces that a bake holds light for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum KindArg {
-    /// All surfaces, for a free camera
-    Lightmap,
-    /// The pixels of the camera, for this camera and size alone
-    View,
-}
-
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Keys {
@@ -122,7 +92,7 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
     let interrupt = Interrupt::install();
     let stage = Stage::open(&args.stage)?;
     stage.notes().iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
-    let Planned { plan, sources, corners, notes } = plan(args, &keys.bake, &stage)?;
+    let Planned { plan, sources, corners, notes } = plan(&args.day, args.kind, &keys.bake, &stage, &args.stage)?;
     notes.iter().for_each(|note| console.info(&format!("note: lightmap: {note}")));
     plan.validate()?;
     let gpu = Gpu::new(args.device.options()?)?;
@@ -204,67 +174,4 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
         }))?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// The plan of a command line, and the texels.
-struct Planned {
-    plan: Plan,
-    sources: Sources,
-    corners: Vec<[u16; 6]>,
-    notes: Vec<String>,
-}
-
-fn plan(args: &DayBakeArgs, baking: &Baking, stage: &Stage) -> Result<Planned> {
-    let day = Day::new(&args.date, &args.timezone, args.latitude, args.longitude).map_err(Error::usage)?;
-    let steps = day.steps(baking.interval, baking.offset).map_err(Error::usage)?;
-    if steps.len() > MOST_TIMES {
-        let what = format!("the day has {} steps, at most {MOST_TIMES} are allowed", steps.len());
-        return Err(Error::usage(what).at("bake.interval").help("Choose a longer interval"));
-    }
-    let lit = steps.iter().filter(|seconds| day.sun(**seconds).elevation > SET);
-    let times = lit.map(|&seconds| Lit { seconds, sun: day.sun(seconds).direction(args.north) }).collect();
-    let scene: &Scene = &stage.scene;
-    if scene.meshes.is_empty() {
-        return Err(Error::input("the scene has no surfaces, so there is nothing to bake"));
-    }
-    let (receivers, extent, sources, corners, notes) = match args.kind {
-        KindArg::View => {
-            let (_, view) = stage.at(args.stage.time, args.stage.size)?;
-            let receivers = Kind::View {
-                camera: stage.placed.name.clone(),
-                view_from_world: view.view_from_world.to_cols_array(),
-                clip_from_view: view.clip_from_view.to_cols_array(),
-            };
-            (receivers, view.extent, Sources::View(Box::new(view)), Vec::new(), Vec::new())
-        }
-        KindArg::Lightmap => {
-            let unwrapped = lightmap::unwrap(scene, baking)?;
-            let corners = unwrapped.lightmap.corners.clone();
-            let receivers = Kind::Lightmap {
-                charts: unwrapped.charts,
-                covered: unwrapped.receivers.len() as u64,
-                corners: digest(&corners),
-            };
-            let sources = Sources::Lightmap(unwrapped.by_tile(baking.tile));
-            (receivers, unwrapped.lightmap.extent, sources, corners, unwrapped.notes)
-        }
-    };
-    let plan = Plan {
-        scene: scene.name.clone(),
-        parts: parts(scene),
-        receivers,
-        extent,
-        calendar: Calendar {
-            date: args.date.clone(),
-            zone: args.timezone.clone(),
-            latitude: args.latitude,
-            longitude: args.longitude,
-            north: args.north,
-        },
-        steps: steps.len() as u32,
-        times,
-        weather: Weather::default(),
-        settings: baking.clone(),
-    };
-    Ok(Planned { plan, sources, corners, notes })
 }

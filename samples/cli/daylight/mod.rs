@@ -2,6 +2,7 @@
 
 mod bake;
 mod info;
+mod plan;
 mod render;
 
 pub use bake::{DayBakeArgs, bake};
