@@ -44,6 +44,8 @@ pub struct Resident {
     colors: OwnedBuffer,
     indices: OwnedBuffer,
     materials: OwnedBuffer,
+    /// The same on the host.
+    material_table: Arc<[types::Material]>,
     skin_vertices: OwnedBuffer,
     morph_deltas: OwnedBuffer,
     stream_deltas: OwnedBuffer,
@@ -143,6 +145,8 @@ pub struct Handles {
     pub instances: Buffer,
     /// `types::Material`
     pub materials: Buffer,
+    /// The contents of `materials`, for techniques that change them for a frame.
+    pub material_table: Arc<[types::Material]>,
     /// `lib/lights.glsl`: count and lights.
     pub lights: Buffer,
     /// `scene_textures` of `lib/material.glsl`.
@@ -219,6 +223,7 @@ impl Resident {
             colors: buffer("scene.colors", &raw(&streams.colors))?,
             indices: buffer("scene.indices", &raw(&streams.indices))?,
             materials: buffer("scene.materials", &raw(&materials))?,
+            material_table: materials.into(),
             skin_vertices: buffer("scene.skin_vertices", &raw(&deform.skin_vertices))?,
             morph_deltas: buffer("scene.morph_deltas", &raw(&deform.morph_deltas))?,
             stream_deltas: buffer("scene.stream_deltas", &raw(&deform.stream_deltas))?,
@@ -299,6 +304,7 @@ impl Resident {
             colors,
             instances: graph.buffer_from("scene.instances", &at_least_one(&instances)),
             materials: graph.import_buffer(&self.materials),
+            material_table: self.material_table.clone(),
             lights: graph.buffer_from("scene.lights", &lights),
             textures,
             environment: graph.import_image(&self.environment).repeat(),

@@ -23,6 +23,8 @@ struct DaySettings {
     uint flags;           // DAY_
     uint seed;
     uint times;           // positions of the sun
+    uint lights;          // of the scene
+    uint groups;          // of lamps
     float sun_radius;     // tangent of the angular radius of the sun's disc
 };
 
@@ -38,6 +40,14 @@ struct DayVertex {
 struct DayEscape {
     vec3 direction;  // unit
     vec3 weight;     // irradiance at the receiver for each W/(sr m²) from this direction; 0: the path did not leave
+};
+
+// The surface of a receiver: its side that receives light.
+struct DaySpot {
+    vec3 position;
+    vec3 normal;   // of the triangle, unit
+    vec3 above;    // the position, moved off the surface
+    vec3 shading;  // shading normal, unit
 };
 
 // Number of the sky's patch in a unit direction. Rows of 30, 30, 24, 24, 18, 12 and 6 patches, 12 degrees high, and one around the zenith. The

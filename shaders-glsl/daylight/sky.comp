@@ -9,7 +9,7 @@ layout(local_size_x = 64) in;
 
 layout(binding = 0, scalar) uniform SettingsBlock { DaySettings settings; };
 layout(binding = 10, scalar) readonly buffer Escapes { DayEscape escapes[]; };
-// Sums of irradiance for a radiance of 1 W/(sr m²) of each patch: patch after patch for each receiver.
+// Sums of irradiance for a radiance of 1 W/(sr m²) of each patch: patch after patch for each receiver. Even and odd samples apart.
 layout(binding = 12, scalar) buffer Sums { vec3 sums[]; };
 
 layout(push_constant, scalar) uniform Push {
@@ -23,6 +23,7 @@ void main() {
     for (uint i = first; i < first + count; ++i) {
         DayEscape escape = escapes[receiver * settings.samples + i];
         if (escape.weight == vec3(0.0)) continue;
-        sums[receiver * SKY_PATCHES + sky_patch(escape.direction)] += escape.weight;
+        uint odd = (settings.first_sample + i) & 1u;
+        sums[2u * (receiver * SKY_PATCHES + sky_patch(escape.direction)) + odd] += escape.weight;
     }
 }

@@ -6,10 +6,10 @@ struct DayTile {
     uint mask;           // first word of a bit for each texel, and of the number of texels before each of these words
     uint mask_words;
     uint columns;        // texels
-    uint first_word[2];  // of the light of the sun, and of the sky
-    uint wide[2];        // images of 16-bit floats
-    uint narrow[2];      // images of signed bytes
-    uint first[2];       // coefficient
+    uint first_word[3];  // of the light of the sun, of the sky, of lamps
+    uint wide[3];        // images of 16-bit floats
+    uint narrow[3];      // images of signed bytes
+    uint first[3];       // coefficient
 };
 
 layout(binding = 20, scalar) readonly buffer Tiles { DayTile tiles[]; };
@@ -30,7 +30,7 @@ uint day_texel(uint tile, uvec2 inside) {
 // Irradiance at a texel, W/m². Values of images may be negative, so rounding may leave a small negative sum.
 vec3 day_irradiance(uint tile, uint texel) {
     vec3 sum = vec3(0.0);
-    for (uint layer = 0u; layer < 2u; ++layer) {
+    for (uint layer = 0u; layer < 3u; ++layer) {
         uint wide = tiles[tile].wide[layer];
         uint narrow = tiles[tile].narrow[layer];
         uint first = tiles[tile].first[layer];

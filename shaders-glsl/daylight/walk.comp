@@ -24,6 +24,7 @@ layout(binding = 8, scalar) readonly buffer Receivers { Hit receivers[]; };
 layout(binding = 9, scalar) writeonly buffer Vertices { DayVertex vertices[]; };
 layout(binding = 10, scalar) writeonly buffer Escapes { DayEscape escapes[]; };
 layout(binding = 11, scalar) writeonly buffer Counts { uint counts[]; };
+layout(binding = 14, scalar) writeonly buffer Spots { DaySpot spots[]; };
 
 void main() {
     uint path = gl_GlobalInvocationID.x;
@@ -42,6 +43,7 @@ void main() {
         vec3 toward = at.t < 0.0 ? normalize(point.area) : -normalize(point.area);
         DaySurface s = day_surface(at.instance, at.triangle, at.barycentrics, toward, diffuse_only, smooth_only);
         vec3 origin = s.position + (s.side - toward) * s.gap;
+        if (path % settings.samples == 0u) spots[receiver] = DaySpot(s.position, s.side, origin, s.normal);
         vec3 weight = vec3(SAMPLING_PI);
         vec3 direction = frame_around(s.normal) * sample_cosine(unit_floats(point_words(place, 0u, settings.seed)));
         bool alive = dot(direction, s.side) > 0.0;

@@ -3,7 +3,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 8 | `lucday\r\n` |
-//! | 4 | version, 1 |
+//! | 4 | version, 2 |
 //! | 4 | bytes of the header |
 //! | … | header: JSON, the [`Plan`] and the bytes of each tile |
 //! | … | the tiles, one after the other ([`Tile::encode`]) |
@@ -16,7 +16,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Plan, units, units::Tile};
+use super::{Plan, finish, units, units::Tile};
 use crate::{
     Error, ErrorKind, Result,
     bake::{Digest, Store},
@@ -24,7 +24,7 @@ use crate::{
 };
 
 const MAGIC: &[u8; 8] = b"lucday\r\n";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Bytes of the digest at the end.
 const DIGEST: usize = 32;
 /// Largest size of a file that is read, bytes.
@@ -63,25 +63,29 @@ pub struct Summary {
     pub images: f64,
     /// The most images of a tile for the light of the sun.
     pub most_images: u32,
-    /// The largest error of a step of the day in a tile (root mean square), relative to its mean.
+    /// The largest error of a step of the day in a tile (root mean square), relative to its mean, beside the noise.
     pub worst_tile: f64,
-    /// The largest error of a step of the day over all texels, relative to its mean, and its number.
+    /// Share of the steps of all tiles whose noise hides errors as large as the tolerance.
+    pub hidden: f64,
+    /// The largest difference from the baked light with its noise of a step of the day over all texels, relative to its mean, and its number.
     pub worst_frame: f64,
     pub worst_frame_number: usize,
-    /// The largest error of all but a thousandth of steps and tiles.
+    /// The largest difference of all but a thousandth of steps and tiles.
     pub p999: f64,
     /// The largest error of a sky that the bake guarantees.
     pub worst_sky: f64,
-    /// Median over tiles of the noise of the step with the most noise, relative to its mean.
+    /// Median over tiles of the noise of the whole day, relative to its light.
     pub noise: f64,
 }
 
 impl Stored {
-    /// Joins the units of a job that are all there. `corners`: of the job's lightmap.
+    /// Joins the units of a job that are all there: filter and compression. `corners`: of the job's lightmap; `told` hears the number of
+    /// finished tiles, and an error of it ends the work.
     ///
     /// # Errors
-    /// `Input`, naming the file, if the folder is of another kind of job, or if a unit is missing or damaged; `OutOfMemory`.
-    pub fn join(store: &Store, corners: Vec<[u16; 6]>) -> Result<Self> {
+    /// `Input`, naming the file, if the folder is of another kind of job, or if a unit is missing or damaged; `OutOfMemory`; the errors of
+    /// `told`.
+    pub fn join(store: &Store, corners: Vec<[u16; 6]>, told: impl FnMut(usize) -> Result<()>) -> Result<Self> {
         let job = store.job();
         let wrong = |what: String| Error::input(what).in_file(store.folder());
         if job.key().kind() != units::KIND {
@@ -99,15 +103,8 @@ impl Stored {
         if job.units().count() as u64 != u64::from(columns) * u64::from(rows) {
             return Err(wrong("has another number of units than its plan has tiles".into()));
         }
-        let mut tiles = Vec::new();
-        for unit in job.units() {
-            let payload = store.open_unit(unit)?;
-            payload.verify()?;
-            let texels = texels(&plan, unit.index);
-            let tile = Tile::decode(&payload.bytes()?, &plan, texels);
-            let again = |error: Error| error.in_file(store.path(unit)).help("Remove the file, and it is made anew");
-            tiles.push(tile.map_err(again)?);
-        }
+        let gathered = units::read(store, &plan)?;
+        let tiles = finish::tiles(&plan, &gathered, told)?;
         Ok(Self { plan, tiles, corners })
     }
 
@@ -229,13 +226,15 @@ impl Stored {
             self.tiles.iter().filter(|t| t.there() > 0).map(|tile| f64::from(tile.sun.noise)).collect();
         noises.sort_by(f64::total_cmp);
         let lit = self.tiles.iter().filter(|tile| tile.there() > 0);
+        let hidden: u64 = lit.clone().map(|tile| u64::from(tile.sun.hidden)).sum();
         let images: u64 = lit.clone().map(|tile| u64::from(tile.sun.images())).sum();
         Summary {
             raw_bytes: 6 * texels * times as u64,
-            bytes: self.tiles.iter().map(|tile| tile.sun.bytes() + tile.sky.bytes()).sum(),
+            bytes: self.tiles.iter().map(|tile| tile.layers().iter().map(|layer| layer.bytes()).sum::<u64>()).sum(),
             images: images as f64 / lit.clone().count().max(1) as f64,
             most_images: self.tiles.iter().map(|tile| tile.sun.images()).max().unwrap_or(0),
             worst_tile: self.tiles.iter().map(|tile| f64::from(tile.sun.worst)).fold(0.0, f64::max),
+            hidden: hidden as f64 / (lit.clone().count() * times).max(1) as f64,
             worst_frame,
             worst_frame_number,
             p999: all.get((all.len() * 999 / 1000).min(all.len().saturating_sub(1))).copied().unwrap_or(0.0),

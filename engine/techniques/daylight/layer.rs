@@ -2,14 +2,13 @@
 //!
 //! A tile's light is a matrix with a row for each texel and colour and a column for each dimension. Its principal components around zero give
 //! the vectors, so that no light stays exactly no light. The number of images rises until every column, decoded from the stored bits, is
-//! within the tolerance: a guarantee for the worst moment of the day instead of a share of variance.
+//! within the tolerance: a guarantee for the worst moment of the day instead of a share of variance. Images that would hold only noise are
+//! not made ([`super::columns`]).
 
 use half::f16;
 
-use crate::{
-    Error, Result,
-    bake::pca::{Centre, Keep, Moments},
-};
+use super::columns::{Columns, Measured, Rest, Weighted, project};
+use crate::{Error, Result};
 
 /// Largest part of the tolerance that the rounding of one image to bytes may take.
 const ROUNDING: f64 = 1.0 / 16.0;
@@ -23,15 +22,18 @@ pub struct Layer {
     pub wide: u32,
     /// Images of signed bytes.
     pub narrow: u32,
-    /// Coefficients: for each image one number for each dimension. The scale of the image's values is part of them.
+    /// Coefficients: for each image one number for each dimension. The scale of the image's values is part of them. They are a factor of the image
+    /// ([`factor`]) times numbers that 16-bit floats hold exactly.
     pub table: Vec<f32>,
     /// For each texel the values of all images, three each; rows are filled up to whole words.
     pub words: Vec<u32>,
-    /// Root mean square of the error of the worst column, relative to the column's mean.
+    /// Root mean square of the error of the worst column whose noise does not hide it, relative to the column's mean.
     pub worst: f32,
     /// The worst column.
     pub worst_dimension: u32,
-    /// Root mean square of the noise of the column with the most noise, relative to the column's mean; 0 if it is unknown.
+    /// Number of columns whose noise hides errors as large as the tolerance: the images describe of them what is certain.
+    pub hidden: u32,
+    /// Root mean square of the noise that the images hold in all columns, relative to their light; 0 if it is unknown.
     pub noise: f32,
 }
 
@@ -42,15 +44,6 @@ pub struct Aim {
     pub tolerance: f64,
     /// Images at most.
     pub most: usize,
-}
-
-/// The columns that have to be within the tolerance.
-#[derive(Clone, Copy, Debug)]
-pub enum Columns<'a> {
-    /// Each dimension by itself.
-    Dimensions,
-    /// Mixtures of the dimensions: weights, one row of all dimensions for each mixture.
-    Mixtures(&'a [f32]),
 }
 
 impl Layer {
@@ -64,35 +57,19 @@ impl Layer {
         (6 * wide + 3 * narrow).div_ceil(4)
     }
 
-    /// Bytes in memory and in files.
+    /// Bytes in files.
     pub fn bytes(&self) -> u64 {
-        4 * (self.table.len() + self.words.len()) as u64
+        2 * self.table.len() as u64 + 4 * (self.images() as u64 + self.words.len() as u64)
     }
 
-    /// Compresses the rows of a tile: `rows` has three rows of `dimensions` values (red, green, blue) for each texel.
+    /// Compresses the light of a tile: three rows (red, green, blue) for each texel. If the noise is known, the tolerance is for the light
+    /// without it, and noise is no reason for an image.
     ///
     /// # Errors
     /// `Runtime` if the decomposition does not converge, or if a value is not finite.
-    pub fn compress(rows: &[f32], dimensions: usize, columns: Columns<'_>, aim: Aim) -> Result<Self> {
-        let lines = rows.len() / dimensions.max(1);
-        let texels = lines / 3;
-        let mean = |column: &dyn Fn(&[f32]) -> f64| {
-            rows.chunks_exact(dimensions).map(column).sum::<f64>() / lines.max(1) as f64
-        };
-        // A dimension counts by what it can add: dusk as much as noon.
-        let weights: Vec<f64> = match columns {
-            Columns::Dimensions => (0..dimensions).map(|t| inverse(mean(&|row| f64::from(row[t])))).collect(),
-            Columns::Mixtures(mixtures) => {
-                let mut most = vec![0.0; dimensions];
-                for mixture in mixtures.chunks_exact(dimensions) {
-                    let scale = inverse(mean(&|row: &[f32]| mixed(row, mixture)));
-                    most.iter_mut()
-                        .zip(mixture)
-                        .for_each(|(most, part)| *most = f64::max(*most, f64::from(*part) * scale));
-                }
-                most
-            }
-        };
+    pub fn compress(light: Measured<'_>, columns: Columns<'_>, aim: Aim) -> Result<Self> {
+        let Measured { dimensions, rows, .. } = light;
+        let texels = rows.len() / dimensions.max(1) / 3;
         let none = Self {
             dimensions: dimensions as u32,
             wide: 0,
@@ -101,39 +78,31 @@ impl Layer {
             words: Vec::new(),
             worst: 0.0,
             worst_dimension: 0,
+            hidden: 0,
             noise: 0.0,
         };
+        let weights = columns.weights(light);
         if texels == 0 || weights.iter().all(|w| *w == 0.0) {
             return Ok(none);
         }
-        let mut scaled = vec![0.0f32; rows.len()];
-        for (row, out) in rows.chunks_exact(dimensions).zip(scaled.chunks_exact_mut(dimensions)) {
-            for ((out, value), weight) in out.iter_mut().zip(row).zip(&weights) {
-                *out = (f64::from(*value) * weight) as f32;
-            }
-        }
-        let mut moments = Moments::new(dimensions);
-        moments.add(&scaled, &vec![1.0; lines])?;
-        let basis = moments.basis(Centre::Origin, Keep::Count(aim.most))?;
-        let mut rest = Rest::new(rows, dimensions, columns);
+        let Weighted { scaled, basis, .. } = Weighted::new(light, &weights, aim.most)?;
+        let mut rest = Rest::new(light, columns);
         let mut images: Vec<Image> = Vec::new();
-        let (mut worst, mut worst_dimension) = rest.worst();
+        let mut state = rest.state(aim.tolerance);
         for index in 0..basis.len() {
-            if worst <= aim.tolerance {
+            if state.within {
                 break;
             }
             let vector = basis.vector(index);
             // In units of light: what a dimension has at a coefficient of 1. Dimensions without light stay without.
             let along: Vec<f64> =
                 vector.iter().zip(&weights).map(|(v, w)| if *w > 0.0 { v / w } else { 0.0 }).collect();
-            let values: Vec<f32> = scaled
-                .chunks_exact(dimensions)
-                .map(|row| row.iter().zip(vector).map(|(r, v)| f64::from(*r) * v).sum::<f64>() as f32)
-                .collect();
+            let values: Vec<f32> = project(&scaled, vector).map(|value| value as f32).collect();
             let image = Image::new(&values, along, vector, aim, images.last().is_none_or(|i| i.wide));
-            rest.remove(&image);
+            rest.remove(&image.table, &image.decoded);
+            rest.remove_noise(vector, &weights);
             images.push(image);
-            (worst, worst_dimension) = rest.worst();
+            state = rest.state(aim.tolerance);
         }
         let wide = images.iter().filter(|i| i.wide).count() as u32;
         let narrow = images.len() as u32 - wide;
@@ -157,7 +126,17 @@ impl Layer {
             }
         }
         let table = images.iter().flat_map(|i| i.table.iter().copied()).collect();
-        Ok(Self { wide, narrow, table, words, worst: worst as f32, worst_dimension: worst_dimension as u32, ..none })
+        Ok(Self {
+            wide,
+            narrow,
+            table,
+            words,
+            worst: state.worst as f32,
+            worst_dimension: state.column as u32,
+            hidden: state.hidden as u32,
+            noise: state.noise as f32,
+            ..none
+        })
     }
 
     /// The light of a texel for given coefficients of the images: three values for each image ([`Self::mix`]).
@@ -221,12 +200,10 @@ impl Layer {
     }
 }
 
-fn inverse(mean: f64) -> f64 {
-    if mean > 0.0 && mean.is_finite() { 1.0 / mean } else { 0.0 }
-}
-
-fn mixed(row: &[f32], mixture: &[f32]) -> f64 {
-    row.iter().zip(mixture).map(|(value, weight)| f64::from(*value) * f64::from(*weight)).sum()
+/// The power of two that brings the largest of an image's coefficients to 1 to 2: half-floats are most precise there, and the product is exact.
+pub fn factor(row: impl Iterator<Item = f64>) -> f32 {
+    let largest = row.fold(0.0f64, |most, value| most.max(value.abs()));
+    if largest > 0.0 { largest.log2().floor().clamp(-120.0, 120.0).exp2() as f32 } else { 1.0 }
 }
 
 /// An image as it is stored.
@@ -250,7 +227,13 @@ impl Image {
         let wide = may_be_wide && rounding > ROUNDING * aim.tolerance;
         // Values of 16 bits stay near 1, where they are most precise and never too large.
         let scale = if wide { f64::from(largest).max(1e-30) } else { step.max(1e-30) };
-        let table: Vec<f32> = along.iter().map(|a| (a * scale) as f32).collect();
+        let mut table: Vec<f64> = along.iter().map(|a| a * scale).collect();
+        // Twice, because rounding may bring the largest coefficient to the next power of two.
+        for _ in 0..2 {
+            let factor = f64::from(factor(table.iter().copied()));
+            table.iter_mut().for_each(|value| *value = f16::from_f64(*value / factor).to_f64() * factor);
+        }
+        let table: Vec<f32> = table.into_iter().map(|value| value as f32).collect();
         let (codes, decoded) = values
             .iter()
             .map(|value| {
@@ -268,73 +251,16 @@ impl Image {
     }
 }
 
-/// What the images so far do not describe, column after column.
-struct Rest {
-    lines: usize,
-    /// Means of the columns as they were.
-    means: Vec<f64>,
-    /// Column after column.
-    values: Vec<f32>,
-    /// Weights of the mixtures; `None`: columns are dimensions.
-    mixtures: Option<Vec<f32>>,
-    dimensions: usize,
-}
-
-impl Rest {
-    fn new(rows: &[f32], dimensions: usize, columns: Columns<'_>) -> Self {
-        let lines = rows.len() / dimensions;
-        let mixtures = match columns {
-            Columns::Dimensions => None,
-            Columns::Mixtures(mixtures) => Some(mixtures.to_vec()),
-        };
-        let mut values = Vec::new();
-        match &mixtures {
-            None => {
-                for t in 0..dimensions {
-                    values.extend(rows.iter().skip(t).step_by(dimensions));
-                }
-            }
-            Some(mixtures) => {
-                for mixture in mixtures.chunks_exact(dimensions) {
-                    values.extend(rows.chunks_exact(dimensions).map(|row| mixed(row, mixture) as f32));
-                }
-            }
-        }
-        let means = values
-            .chunks_exact(lines.max(1))
-            .map(|column| column.iter().map(|v| f64::from(*v)).sum::<f64>() / lines.max(1) as f64)
-            .collect();
-        Self { lines, means, values, mixtures, dimensions }
-    }
-
-    fn remove(&mut self, image: &Image) {
-        let of_columns: Vec<f32> = match &self.mixtures {
-            None => image.table.clone(),
-            Some(mixtures) => {
-                mixtures.chunks_exact(self.dimensions).map(|mixture| mixed(&image.table, mixture) as f32).collect()
-            }
-        };
-        for (column, along) in self.values.chunks_exact_mut(self.lines.max(1)).zip(of_columns) {
-            column.iter_mut().zip(&image.decoded).for_each(|(value, decoded)| *value -= along * decoded);
-        }
-    }
-
-    /// The largest relative error of a column, and its number.
-    fn worst(&self) -> (f64, usize) {
-        let columns = self.values.chunks_exact(self.lines.max(1)).zip(&self.means).enumerate();
-        columns.fold((0.0, 0), |(most, at), (number, (column, mean))| {
-            let square = column.iter().map(|v| f64::from(*v) * f64::from(*v)).sum::<f64>() / self.lines.max(1) as f64;
-            let error = square.sqrt() * inverse(*mean);
-            if error > most { (error, number) } else { (most, at) }
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     const AIM: Aim = Aim { tolerance: 0.05, most: 64 };
+
+    /// Light whose noise is unknown.
+    fn of(rows: &[f32], dimensions: usize) -> Measured<'_> {
+        Measured { dimensions, rows, noise: &[] }
+    }
 
     /// Rows of a known rank: smooth products of place and time, positive, and nearly dark at both ends of the day.
     fn rows(texels: usize, dimensions: usize, rank: usize) -> Vec<f32> {
@@ -378,7 +304,7 @@ mod tests {
     fn every_column_that_is_decoded_from_the_bits_is_within_the_tolerance() {
         for (rank, tolerance) in [(1, 0.05), (3, 0.05), (7, 0.05), (7, 0.005), (7, 0.3)] {
             let rows = rows(200, 60, rank);
-            let layer = Layer::compress(&rows, 60, Columns::Dimensions, Aim { tolerance, ..AIM }).unwrap();
+            let layer = Layer::compress(of(&rows, 60), Columns::Dimensions, Aim { tolerance, ..AIM }).unwrap();
             layer.validate(200, 60).unwrap();
             let worst = errors(&layer, &rows, 60);
             assert!(worst <= tolerance && (worst - f64::from(layer.worst)).abs() < 1e-3, "{worst} {}", layer.worst);
@@ -386,28 +312,30 @@ mod tests {
             // The images before the last one were not enough.
             if layer.images() > 1 {
                 let fewer = Aim { tolerance, most: layer.images() as usize - 1 };
-                assert!(f64::from(Layer::compress(&rows, 60, Columns::Dimensions, fewer).unwrap().worst) > tolerance);
+                assert!(
+                    f64::from(Layer::compress(of(&rows, 60), Columns::Dimensions, fewer).unwrap().worst) > tolerance
+                );
             }
         }
     }
 
     #[test]
     fn no_light_is_no_image_and_dark_columns_stay_dark() {
-        let none = Layer::compress(&vec![0.0; 3 * 5 * 7], 7, Columns::Dimensions, AIM).unwrap();
+        let none = Layer::compress(of(&[0.0; 3 * 5 * 7], 7), Columns::Dimensions, AIM).unwrap();
         assert_eq!((none.images(), none.bytes()), (0, 0));
         assert_eq!(none.decode(3, &none.mix([(2, [1.0; 3])].into_iter())), [0.0; 3]);
         let mut rows = rows(30, 10, 3);
         rows.iter_mut().skip(4).step_by(10).for_each(|v| *v = 0.0);
-        let layer = Layer::compress(&rows, 10, Columns::Dimensions, AIM).unwrap();
+        let layer = Layer::compress(of(&rows, 10), Columns::Dimensions, AIM).unwrap();
         let coefficients = layer.mix([(4, [1.0; 3])].into_iter());
         assert!((0..30).all(|texel| layer.decode(texel, &coefficients) == [0.0; 3]));
-        assert_eq!(Layer::compress(&[], 7, Columns::Dimensions, AIM).unwrap().images(), 0);
+        assert_eq!(Layer::compress(of(&[], 7), Columns::Dimensions, AIM).unwrap().images(), 0);
     }
 
     #[test]
     fn light_adds_and_scales() {
         let rows = rows(40, 20, 5);
-        let layer = Layer::compress(&rows, 20, Columns::Dimensions, AIM).unwrap();
+        let layer = Layer::compress(of(&rows, 20), Columns::Dimensions, AIM).unwrap();
         let one = |t: usize, scale: f32| layer.decode(11, &layer.mix([(t, [scale; 3])].into_iter()));
         let both = layer.decode(11, &layer.mix([(3, [2.0; 3]), (9, [0.5; 3])].into_iter()));
         for (channel, both) in both.into_iter().enumerate() {
@@ -421,7 +349,7 @@ mod tests {
         let rows = rows(100, 30, 6);
         let mixtures: Vec<f32> = (0..4 * 30).map(|i| 0.1 + ((i * i) % 17) as f32).collect();
         let layer =
-            Layer::compress(&rows, 30, Columns::Mixtures(&mixtures), Aim { tolerance: 0.01, most: 30 }).unwrap();
+            Layer::compress(of(&rows, 30), Columns::Mixtures(&mixtures), Aim { tolerance: 0.01, most: 30 }).unwrap();
         for mixture in mixtures.chunks(30) {
             let coefficients = layer.mix(mixture.iter().map(|w| [*w; 3]).enumerate());
             let (mut square, mut mean) = (0.0, 0.0);
@@ -438,7 +366,7 @@ mod tests {
     #[test]
     fn the_same_rows_give_the_same_bits() {
         let rows = rows(50, 25, 9);
-        let once = || Layer::compress(&rows, 25, Columns::Dimensions, AIM).unwrap();
+        let once = || Layer::compress(of(&rows, 25), Columns::Dimensions, AIM).unwrap();
         assert_eq!(once(), once());
     }
 }

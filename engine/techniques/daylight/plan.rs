@@ -64,6 +64,17 @@ pub struct Lit {
     pub sun: [f32; 3],
 }
 
+/// Lamps that are switched together: point and spot lights, and emissive surfaces.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Group {
+    pub name: String,
+    /// Numbers of lights of the scene.
+    pub lights: Vec<u32>,
+    /// Numbers of emissive materials.
+    pub materials: Vec<u32>,
+}
+
 /// The plan of a bake.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -82,6 +93,8 @@ pub struct Plan {
     pub times: Vec<Lit>,
     /// The weather whose skies are within the tolerance.
     pub weather: Weather,
+    /// Groups of lamps, which can be switched.
+    pub lamps: Vec<Group>,
     pub settings: Baking,
 }
 
@@ -131,9 +144,9 @@ impl Plan {
         self.settings.validate()
     }
 
-    /// Number of dimensions of the layers: times and patches of the sky.
-    pub fn dimensions(&self) -> [usize; 2] {
-        [self.times.len(), SKY_PATCHES as usize]
+    /// Number of dimensions of the layers: times, patches of the sky, groups of lamps.
+    pub fn dimensions(&self) -> [usize; 3] {
+        [self.times.len(), SKY_PATCHES as usize, self.lamps.len()]
     }
 
     /// Says in which part `scene` differs from the scene of the bake; `None`: in none.

@@ -39,6 +39,12 @@ pub struct Baking {
     /// Maximum of the error of a step of the day in a tile (root mean square), relative to its mean. It decides the number of images.
     #[schemars(range(min = 0.0001, max = 1))]
     pub tolerance: f64,
+    /// The tolerance is for the light without its noise, which the two halves of the samples show. If off, it is for the light with its noise, and
+    /// noise needs images, too.
+    pub noise_floor: bool,
+    /// Radius of the filter that takes means over texels of one surface whose light differs by no more than its noise; 0: no filter.
+    #[schemars(range(min = 0, max = 16), extend("x-unit" = "texels"))]
+    pub filter: u32,
     /// Maximum of images of a tile; 0: as many as the tolerance needs.
     #[schemars(range(min = 0, max = 4096))]
     pub images: u32,
@@ -69,6 +75,8 @@ impl Default for Baking {
             offset: 0.0,
             disc: true,
             tolerance: 0.05,
+            noise_floor: true,
+            filter: 5,
             images: 0,
             tile: 32,
             density: 8.0,
@@ -120,6 +128,11 @@ pub struct Settings {
     /// Share of the sky that clouds cover: 0 is clear, 1 is overcast without a sun.
     #[schemars(range(min = 0, max = 1))]
     pub overcast: f64,
+    /// When lamps burn: `dusk` (while the sun is low), `on`, `off`, or hours (`18:30-06:00`); for single groups `NAME=…`, separated by commas.
+    pub lamps: String,
+    /// Elevation of the sun below which lamps with the schedule `dusk` burn; they fade over one degree.
+    #[schemars(range(min = -18, max = 90), extend("x-unit" = "°"))]
+    pub dusk: f64,
     /// Factor on the light of sun and sky.
     #[schemars(range(min = 0, max = 1000))]
     pub strength: f32,
@@ -137,6 +150,8 @@ impl Default for Settings {
             turbidity: weather.turbidity(),
             ground_albedo: weather.ground_albedo(),
             overcast: weather.overcast(),
+            lamps: "dusk".into(),
+            dusk: 3.0,
             strength: 1.0,
         }
     }

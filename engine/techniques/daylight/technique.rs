@@ -4,7 +4,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use glam::{Vec2, Vec3};
 
-use super::{Day, Interpolation, PictureSettings, Settings, Sky, Stored, layer::Layer, lightmap};
+use super::{Day, Group, Interpolation, PictureSettings, Settings, Sky, Stored, lamps, layer::Layer, lightmap};
 use crate::{
     Error, ErrorKind, Result,
     gpu::{Gpu, OwnedBuffer, OwnedImage},
@@ -234,12 +234,19 @@ impl Daylight {
     }
 
     /// Coefficients of the images of all tiles.
-    fn coefficients(&self, weights: &[(usize, f32)], sun: [f32; 3], patches: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    fn coefficients(
+        &self,
+        weights: &[(usize, f32)],
+        sun: [f32; 3],
+        patches: &[[f32; 3]],
+        lamps: &[[f32; 3]],
+    ) -> Vec<[f32; 3]> {
         let of_sun = |(time, weight): &(usize, f32)| (*time, sun.map(|channel| channel * weight));
         let mut out = Vec::new();
         for tile in &self.baked.stored.tiles {
             out.extend(tile.sun.mix(weights.iter().map(of_sun)));
             out.extend(tile.sky.mix(patches.iter().copied().enumerate()));
+            out.extend(tile.lamps.mix(lamps.iter().copied().enumerate()));
         }
         out.push([0.0; 3]);
         out
@@ -273,7 +280,7 @@ fn packed(stored: &Stored) -> (Vec<types::DayTile>, Vec<u32>) {
             words.push(before);
             before += word.count_ones();
         }
-        for (which, layer) in [&tile.sun, &tile.sky].into_iter().enumerate() {
+        for (which, layer) in tile.layers().into_iter().enumerate() {
             let Layer { wide, narrow, .. } = *layer;
             entry.first_word[which] = words.len() as u32;
             (entry.wide[which], entry.narrow[which], entry.first[which]) = (wide, narrow, first);
@@ -286,18 +293,44 @@ fn packed(stored: &Stored) -> (Vec<types::DayTile>, Vec<u32>) {
     (tiles, words)
 }
 
+/// Materials whose lamps burn as bright as their groups do. Emissive materials in no group stay as they are.
+fn switched(materials: &[types::Material], groups: &[Group], burning: &[f32]) -> Vec<types::Material> {
+    let mut out = materials.to_vec();
+    for (group, share) in groups.iter().zip(burning) {
+        for number in &group.materials {
+            if let Some(material) = out.get_mut(*number as usize) {
+                material.emissive = material.emissive.map(|channel| channel * share);
+            }
+        }
+    }
+    out
+}
+
 /// Light that a scene has and that is not in a bake.
-fn left_out(scene: &Scene) -> Vec<Note> {
+fn left_out(scene: &Scene, groups: &[Group]) -> Vec<Note> {
     let note = |place: &str, text: &str| Note { kind: NoteKind::Ignored, place: place.into(), text: text.into() };
     let mut notes = Vec::new();
-    if !scene.lights.is_empty() {
-        notes.push(note("lights", "the scene's own lights are off: the light is that of sun and sky"));
+    let off = |(number, light): (usize, &crate::scene::Light)| {
+        light.intensity > 0.0 && !groups.iter().any(|group| group.lights.contains(&(number as u32)))
+    };
+    let off = scene.lights.iter().enumerate().filter(|light| off(*light)).count();
+    if off > 0 {
+        notes.push(note(
+            "lights",
+            &format!("{off} of the scene's own lights are off: suns, and lamps that were not baked"),
+        ));
     }
     if scene.environment.is_some() {
         notes.push(note("environment", "the scene's own environment is replaced by the sky of the time"));
     }
-    if scene.materials.iter().any(|material| material.emissive != Vec3::ZERO) {
-        notes.push(note("materials", "emissive surfaces are shown, but they light nothing"));
+    let idle = |(number, material): (usize, &crate::scene::Material)| {
+        material.emissive != Vec3::ZERO && !groups.iter().any(|group| group.materials.contains(&(number as u32)))
+    };
+    if scene.materials.iter().enumerate().any(idle) {
+        notes.push(note(
+            "materials",
+            "some emissive surfaces are shown, but they were not baked as lamps and light nothing",
+        ));
     }
     notes
 }
@@ -373,8 +406,14 @@ impl Technique for Daylight {
         let patches: Vec<[f32; 3]> =
             sky.patches().iter().map(|patch| patch.map(|channel| channel * of_day.strength)).collect();
         let weights = self.weights(seconds, of_day.interpolation);
-        let coefficients = self.coefficients(&weights, light, &patches);
-        let handles = self.relit(graph, moment, sun, light, &sky, of_day.strength)?;
+        let elevation = self.day.sun(seconds).elevation;
+        let burning = lamps::burning(of_day, &plan.lamps, &self.day, seconds, elevation)?;
+        let materials = switched(&moment.handles.material_table, &plan.lamps, &burning);
+        let burning: Vec<[f32; 3]> = burning.into_iter().map(|share| [share; 3]).collect();
+        let coefficients = self.coefficients(&weights, light, &patches, &burning);
+        let left = left_out(moment.scene, &plan.lamps);
+        let mut handles = self.relit(graph, moment, sun, light, &sky, of_day.strength)?;
+        handles.materials = graph.buffer_from("daylight.materials", &materials);
         let view = &moment.view;
         let gbuffer = gbuffer::draw(graph, &handles, view, &settings.gbuffer);
         let shadows = shadow::draw(graph, &handles, view, &settings.shadow);
@@ -409,7 +448,7 @@ impl Technique for Daylight {
             Mode::Irradiance => irradiance,
         };
         let of_shadows = idle_notes("shadow", &settings.shadow);
-        let notes = [moment.notes, &shadows.notes, &left_out(moment.scene), &of_shadows].concat();
+        let notes = [moment.notes, &shadows.notes, &left, &of_shadows].concat();
         let picture =
             Picture::new(shown).color("direct", lit.direct).color("indirect", indirect).color("irradiance", irradiance);
         Ok(picture.showing(gbuffer).noting(notes))

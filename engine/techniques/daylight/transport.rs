@@ -4,7 +4,9 @@
 //! shadow ray to each position of the sun: a day costs one set of paths and many coherent shadow rays, instead of a set of paths for each time.
 //! Light is linear in the sun, so the sun is white and has an irradiance of 1 W/m² at normal incidence.
 
-use super::{Kind, Plan, beam::SUN_ANGULAR_RADIUS};
+use super::{Group, Kind, Plan, beam::SUN_ANGULAR_RADIUS, columns::Measured, gathered::Spot};
+use glam::Vec3;
+
 use crate::{
     Result,
     gpu::{BufferDesc, Gpu, OwnedBuffer},
@@ -14,13 +16,19 @@ use crate::{
     scene::{Pose, Scene, View},
     shaders::{
         consts,
-        daylight::{see, sky, suns, walk},
+        daylight::{lamps, see, sky, suns, walk},
         types,
+    },
+    tracer::{
+        Sources as Lit,
+        tables::{self, LightTable},
     },
 };
 
 /// Paths of a texel in one batch at most.
 const BATCH: u32 = 16;
+/// Maximum of loop iterations that choosing one lamp takes: a descent of the light tree.
+const LAMP_TURNS: u64 = 64;
 /// Vertices of a batch at most: 200 MB.
 const MOST_VERTICES: u64 = 1 << 22;
 
@@ -34,6 +42,10 @@ pub struct Transport {
     resident: Resident,
     rays: Rays,
     suns: OwnedBuffer,
+    /// The lamps that are sampled, made for the first tile.
+    lamps: Option<LightTable>,
+    /// The group of each light, and of each material.
+    groups: OwnedBuffer,
     sources: Sources,
 }
 
@@ -55,8 +67,25 @@ pub struct Light {
     pub noise: Vec<f32>,
     /// Irradiance for a radiance of 1 W/(sr m²) of each patch of the sky: for each texel three rows of all patches.
     pub sky: Vec<f32>,
+    /// Noise of `sky`.
+    pub sky_noise: Vec<f32>,
+    /// Irradiance by the lamps of each group, direct and scattered: for each texel three rows of all groups.
+    pub lamps: Vec<f32>,
+    /// Noise of `lamps`.
+    pub lamps_noise: Vec<f32>,
+    /// The surface of each texel.
+    pub spots: Vec<Spot>,
     /// A bit for each texel of the tile, row after row: whether it is on a surface.
     pub mask: Vec<u32>,
+}
+
+impl Light {
+    /// The light of the sun, of the sky and of lamps, with its noise. `dimensions`: [`Plan::dimensions`].
+    pub fn measured(&self, dimensions: [usize; 3]) -> [Measured<'_>; 3] {
+        let rows = [(&self.sun, &self.noise), (&self.sky, &self.sky_noise), (&self.lamps, &self.lamps_noise)];
+        let mut dimensions = dimensions.into_iter();
+        rows.map(|(rows, noise)| Measured { dimensions: dimensions.next().unwrap_or(0), rows, noise })
+    }
 }
 
 impl Transport {
@@ -65,13 +94,25 @@ impl Transport {
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, sources: Sources) -> Result<Self> {
-        let scene = Scene { environment: None, ..scene.clone() };
+        let (scene, groups) = with_lamps(scene, &plan.lamps);
         let pose = Pose::rest(&scene);
         let resident = Resident::for_rays(gpu, &scene)?;
+        let groups = OwnedBuffer::with_contents(gpu, "daylight.groups", bytemuck::cast_slice(&groups))?;
         let rays = Rays::new(gpu, &scene, &resident)?;
         let suns: Vec<[f32; 3]> = plan.times.iter().map(|time| time.sun).chain([[0.0, 1.0, 0.0]]).collect();
         let suns = OwnedBuffer::with_contents(gpu, "daylight.suns", bytemuck::cast_slice(&suns))?;
-        Ok(Self { gpu: gpu.clone(), runner: Runner::new(gpu), scene, pose, resident, rays, suns, sources })
+        Ok(Self {
+            gpu: gpu.clone(),
+            runner: Runner::new(gpu),
+            scene,
+            pose,
+            resident,
+            rays,
+            suns,
+            lamps: None,
+            groups,
+            sources,
+        })
     }
 
     /// The light of a tile. Its bits do not depend on the other tiles.
@@ -153,7 +194,9 @@ impl Transport {
         let escapes = buffer("daylight.escapes", paths * size_of::<types::DayEscape>() as u64)?;
         let counts = buffer("daylight.counts", paths * 4)?;
         let sun_sums = buffer("daylight.sun", u64::from(count) * u64::from(times) * 24)?;
-        let sky_sums = buffer("daylight.sky", u64::from(count) * u64::from(consts::SKY_PATCHES) * 12)?;
+        let groups = plan.lamps.len() as u32;
+        let lamp_sums = buffer("daylight.lamps", u64::from(count) * u64::from(groups) * 24)?;
+        let sky_sums = buffer("daylight.sky", u64::from(count) * u64::from(consts::SKY_PATCHES) * 24)?;
         let samples = plan.settings.samples;
         let mut first_sample = 0;
         loop {
@@ -168,12 +211,16 @@ impl Transport {
             let counts = graph.import_buffer(&counts);
             let sun_sums = graph.import_buffer(&sun_sums);
             let sky_sums = graph.import_buffer(&sky_sums);
+            let lamp_sums = graph.import_buffer(&lamp_sums);
             if first_sample == 0 {
                 graph.fill(sun_sums, 0);
                 graph.fill(sky_sums, 0);
+                graph.fill(lamp_sums, 0);
             }
-            let settings = graph.uniform(&settings(plan, first, [count, now, first_sample]));
-            let args = traced!(walk::Args { settings, receivers, vertices, escapes, counts }, rays, handles);
+            let spots = graph.buffer("daylight.spots", u64::from(count) * size_of::<types::DaySpot>() as u64);
+            let settings =
+                graph.uniform(&settings(plan, first, [count, now, first_sample], handles.moment.lights.len() as u32));
+            let args = traced!(walk::Args { settings, receivers, vertices, escapes, counts, spots }, rays, handles);
             let bounces = u64::from(plan.settings.vertices());
             let paths = count * now;
             graph.compute(args, paths).rays(u64::from(paths) * bounces);
@@ -194,6 +241,33 @@ impl Transport {
                 let items = Items::new(now).rays(shadow_rays).turns(bounces * most_turns);
                 graph.compute_over(args, [times, count], items);
             }
+            if groups > 0 {
+                let lights = &handles.moment.lights;
+                let table = self.lamps.get_or_insert_with(|| tables::lights(&self.scene, &self.pose, lights, Lit::All));
+                if table.tree {
+                    let args = traced!(
+                        lamps::Args {
+                            settings,
+                            vertices,
+                            counts,
+                            spots,
+                            sums: lamp_sums,
+                            groups: graph.import_buffer(&self.groups),
+                            lights: handles.lights,
+                            light_columns: graph.buffer_from("daylight.light-columns", &table.columns),
+                            light_targets: graph.buffer_from("daylight.light-targets", &table.targets),
+                            instance_lights: graph.buffer_from("daylight.instance-lights", &table.instances),
+                            light_nodes: graph.buffer_from("daylight.light-nodes", &table.nodes),
+                            push: lamps::Push { first: 0, count: now },
+                        },
+                        rays,
+                        handles
+                    );
+                    let turns = (bounces + 1) * (most_turns + LAMP_TURNS);
+                    let items = Items::new(now).rays(u64::from(count) * (bounces + 1)).turns(turns);
+                    graph.compute_over(args, count, items);
+                }
+            }
             let args = sky::Args { settings, escapes, sums: sky_sums, push: sky::Push { first: 0, count: now } };
             graph.compute(args, count);
             first_sample += now;
@@ -201,14 +275,49 @@ impl Transport {
                 self.runner.run(&graph)?;
                 continue;
             }
-            let [sun, sky] = [sun_sums, sky_sums].map(|buffer| graph.read_buffer(buffer));
+            let [sun, sky, lamps, spots] =
+                [sun_sums, sky_sums, lamp_sums, spots].map(|buffer| graph.read_buffer(buffer));
             let frame = self.runner.run(&graph)?;
-            return Ok(summed(&frame.buffer(sun), &frame.buffer(sky), count, times, samples));
+            let spot = |spot: types::DaySpot| Spot { position: spot.position, normal: spot.normal };
+            let spots = frame.buffer(spots).into_iter().map(spot).collect();
+            let mut light = Light { spots, ..Light::default() };
+            [light.sun, light.noise] = summed(&frame.buffer(sun), [count, times, samples]);
+            [light.sky, light.sky_noise] = summed(&frame.buffer(sky), [count, consts::SKY_PATCHES, samples]);
+            [light.lamps, light.lamps_noise] = summed(&frame.buffer(lamps), [count, groups, samples]);
+            return Ok(light);
         }
     }
 }
 
-fn settings(plan: &Plan, first_receiver: u32, [receivers, samples, first_sample]: [u32; 3]) -> types::DaySettings {
+/// A scene in which only the lamps of these groups shine, and the group of each of its placed lights and then of each material (`u32::MAX`: none).
+fn with_lamps(scene: &Scene, groups: &[Group]) -> (Scene, Vec<u32>) {
+    let mut scene = Scene { environment: None, ..scene.clone() };
+    let number = |of: &dyn Fn(&Group) -> bool| groups.iter().position(of).map_or(u32::MAX, |group| group as u32);
+    // Lights of the device are those of the nodes, in order.
+    let placed =
+        scene.nodes.iter().filter_map(|node| node.light).filter(|light| (*light as usize) < scene.lights.len());
+    let mut out: Vec<u32> = placed.map(|light| number(&|group| group.lights.contains(&light))).collect();
+    for (index, light) in scene.lights.iter_mut().enumerate() {
+        if number(&|group| group.lights.contains(&(index as u32))) == u32::MAX {
+            light.intensity = 0.0;
+        }
+    }
+    for (index, material) in scene.materials.iter_mut().enumerate() {
+        let group = number(&|group| group.materials.contains(&(index as u32)));
+        if group == u32::MAX {
+            material.emissive = Vec3::ZERO;
+        }
+        out.push(group);
+    }
+    (scene, out)
+}
+
+fn settings(
+    plan: &Plan,
+    first_receiver: u32,
+    [receivers, samples, first_sample]: [u32; 3],
+    lights: u32,
+) -> types::DaySettings {
     let baking = &plan.settings;
     let mut flags = 0;
     if let Kind::View { .. } = plan.receivers {
@@ -228,32 +337,28 @@ fn settings(plan: &Plan, first_receiver: u32, [receivers, samples, first_sample]
         flags,
         seed: baking.seed,
         times: plan.times.len() as u32,
+        lights,
+        groups: plan.lamps.len() as u32,
         sun_radius: if baking.disc { SUN_ANGULAR_RADIUS.tan() as f32 } else { 0.0 },
     }
 }
 
-/// Rows of means from sums in the order of the device.
-fn summed(sun: &[[f32; 3]], sky: &[[f32; 3]], count: u32, times: u32, samples: u32) -> Light {
-    let (count, times, patches) = (count as usize, times as usize, consts::SKY_PATCHES as usize);
+/// Rows of means and of noise from sums in the order of the device: for each receiver and dimension the sums of even and of odd samples.
+fn summed(sums: &[[f32; 3]], [count, dimensions, samples]: [u32; 3]) -> [Vec<f32>; 2] {
+    let (count, dimensions) = (count as usize, dimensions as usize);
     let all = 1.0 / f64::from(samples);
     let (even_count, odd_count) = (samples.div_ceil(2), samples / 2);
-    let mut light = Light {
-        sun: Vec::with_capacity(3 * count * times),
-        noise: Vec::with_capacity(3 * count * times),
-        sky: Vec::with_capacity(3 * count * patches),
-        mask: Vec::new(),
-    };
+    let mut out = [(); 2].map(|()| Vec::with_capacity(3 * count * dimensions));
     for texel in 0..count {
         for channel in 0..3 {
-            for time in 0..times {
-                let at = 2 * (texel * times + time);
-                let [even, odd] = [sun[at][channel], sun[at + 1][channel]].map(f64::from);
-                light.sun.push(((even + odd) * all) as f32);
+            for dimension in 0..dimensions {
+                let at = 2 * (texel * dimensions + dimension);
+                let [even, odd] = [sums[at][channel], sums[at + 1][channel]].map(f64::from);
                 let difference = odd / f64::from(odd_count.max(1)) - even / f64::from(even_count.max(1));
-                light.noise.push((0.5 * difference) as f32);
+                out[0].push(((even + odd) * all) as f32);
+                out[1].push((0.5 * difference) as f32);
             }
-            light.sky.extend((0..patches).map(|patch| (f64::from(sky[texel * patches + patch][channel]) * all) as f32));
         }
     }
-    light
+    out
 }

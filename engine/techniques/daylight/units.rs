@@ -1,20 +1,25 @@
-//! Bakes as jobs of [`crate::bake`]. A unit is a tile with all times of the day; its bytes are its compressed layers.
+//! Bakes as jobs of [`crate::bake`]. A unit is a tile with all times of the day; its bytes are its gathered light ([`Gathered`]). When all units
+//! are there, they become the compressed [`Tile`]s of a file ([`super::finish`]).
+
+use half::f16;
 
 use super::{
     Plan, Sky, Weather,
-    layer::{Aim, Columns, Layer},
+    columns::{Columns, Measured},
+    gathered::Gathered,
+    layer::{Aim, Layer, factor},
     transport::Light,
 };
 use crate::{
     Error, ErrorKind, Result,
-    bake::{Job, Key, Stage},
+    bake::{Job, Key, Stage, Store, UnitId},
     shaders::consts::SKY_PATCHES,
 };
 
 /// The name of such jobs.
 pub const KIND: &str = "daylight";
 /// Increased whenever the computation changes.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Largest number that a list in a unit may have.
 const MOST_WORDS: u64 = 1 << 32;
 
@@ -25,6 +30,8 @@ pub struct Tile {
     pub sun: Layer,
     /// Light of the sky: a dimension is a patch of the sky.
     pub sky: Layer,
+    /// Light of lamps: a dimension is a group of lamps.
+    pub lamps: Layer,
     /// A bit for each texel, row after row: whether it is on a surface. Images have no other texels.
     pub mask: Vec<u32>,
     /// Sums of irradiance of all texels and colours for each time, by the baked light and of its squared error after compression.
@@ -80,38 +87,46 @@ pub fn skies(plan: &Plan) -> Result<Vec<f32>> {
     Ok(rows)
 }
 
-/// Compresses the light of a tile.
+/// The bytes of a unit: the light of a tile with its noise.
+///
+/// # Errors
+/// As [`Gathered::new`].
+pub fn gathered(plan: &Plan, light: &Light, skies: &[f32]) -> Result<Gathered> {
+    let columns = [Columns::Dimensions, Columns::Mixtures(skies), Columns::Dimensions];
+    Gathered::new(light, plan.dimensions(), columns, plan.settings.tolerance)
+}
+
+/// Reads all units of a job, in order.
+///
+/// # Errors
+/// `Input`, naming the file, if one is missing or damaged.
+pub fn read(store: &Store, plan: &Plan) -> Result<Vec<Gathered>> {
+    let read = |unit: UnitId| {
+        let payload = store.open_unit(unit)?;
+        payload.verify()?;
+        let [_, _, columns, rows] = plan.tile(unit.index);
+        let texels = columns as usize * rows as usize;
+        let again = |error: Error| error.in_file(store.path(unit)).help("Remove the file, and it is made anew");
+        Gathered::decode(&payload.bytes()?, texels, plan.dimensions()).map_err(again)
+    };
+    store.job().units().map(read).collect()
+}
+
+/// One kind of light of a tile, compressed within the tolerance of a plan.
 ///
 /// # Errors
 /// As [`Layer::compress`].
-pub fn compress(plan: &Plan, light: &Light, skies: &[f32]) -> Result<Tile> {
-    let [times, patches] = plan.dimensions();
+pub fn layer(plan: &Plan, light: Measured<'_>, columns: Columns<'_>) -> Result<Layer> {
     let most = match plan.settings.images {
-        0 => usize::MAX,
-        images => images as usize,
+        0 => light.dimensions,
+        images => light.dimensions.min(images as usize),
     };
-    let aim = Aim { tolerance: plan.settings.tolerance, most };
-    let limited = |dimensions: usize| Aim { most: most.min(dimensions), ..aim };
-    let mut sun = Layer::compress(&light.sun, times, Columns::Dimensions, limited(times))?;
-    sun.noise = noise(&light.sun, &light.noise, times);
-    let sky = Layer::compress(&light.sky, patches, Columns::Mixtures(skies), limited(patches))?;
-    let lit = errors(&sun, &light.sun, times);
-    Ok(Tile { sun, sky, mask: light.mask.clone(), light: lit })
-}
-
-/// The root mean square of the noise of the column with the most noise, relative to its mean.
-fn noise(rows: &[f32], noise: &[f32], dimensions: usize) -> f32 {
-    let column = |t: usize| {
-        let mean: f64 = rows.iter().skip(t).step_by(dimensions).map(|v| f64::from(*v)).sum();
-        let square: f64 = noise.iter().skip(t).step_by(dimensions).map(|v| f64::from(*v).powi(2)).sum();
-        let lines = (rows.len() / dimensions) as f64;
-        if mean > 0.0 { (square / lines).sqrt() / (mean / lines) } else { 0.0 }
-    };
-    (0..dimensions).map(column).fold(0.0, f64::max) as f32
+    Layer::compress(light, columns, Aim { tolerance: plan.settings.tolerance, most })
 }
 
 /// For each column the sum of its light and the sum of its squared errors as decoded.
-fn errors(layer: &Layer, rows: &[f32], dimensions: usize) -> Vec<[f64; 2]> {
+pub fn errors(layer: &Layer, light: Measured<'_>) -> Vec<[f64; 2]> {
+    let Measured { dimensions, rows, .. } = light;
     let texels = rows.len() / (3 * dimensions).max(1);
     (0..dimensions)
         .map(|t| {
@@ -130,6 +145,11 @@ fn errors(layer: &Layer, rows: &[f32], dimensions: usize) -> Vec<[f64; 2]> {
 }
 
 impl Tile {
+    /// Light of the sun, of the sky, of lamps.
+    pub fn layers(&self) -> [&Layer; 3] {
+        [&self.sun, &self.sky, &self.lamps]
+    }
+
     /// Number of texels that are on a surface.
     pub fn there(&self) -> u32 {
         self.mask.iter().map(|word| word.count_ones()).sum()
@@ -142,17 +162,19 @@ impl Tile {
         self.mask.iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
         out.extend_from_slice(&(self.light.len() as u32).to_le_bytes());
         self.light.iter().flatten().for_each(|value| out.extend_from_slice(&value.to_le_bytes()));
-        for layer in [&self.sun, &self.sky] {
-            for number in [layer.dimensions, layer.wide, layer.narrow, layer.worst_dimension] {
+        for layer in self.layers() {
+            for number in [layer.dimensions, layer.wide, layer.narrow, layer.worst_dimension, layer.hidden] {
                 out.extend_from_slice(&number.to_le_bytes());
             }
             for number in [layer.worst, layer.noise] {
                 out.extend_from_slice(&number.to_le_bytes());
             }
-            for length in [layer.table.len(), layer.words.len()] {
-                out.extend_from_slice(&(length as u64).to_le_bytes());
+            out.extend_from_slice(&(layer.words.len() as u64).to_le_bytes());
+            for row in layer.table.chunks_exact((layer.dimensions as usize).max(1)) {
+                let factor = factor(row.iter().map(|value| f64::from(*value)));
+                out.extend_from_slice(&factor.to_le_bytes());
+                row.iter().for_each(|value| out.extend_from_slice(&f16::from_f32(value / factor).to_le_bytes()));
             }
-            layer.table.iter().for_each(|value| out.extend_from_slice(&value.to_le_bytes()));
             layer.words.iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
         }
         out
@@ -171,27 +193,30 @@ impl Tile {
         let mask = (0..words).map(|_| rest.word()).collect::<Result<Vec<_>>>()?;
         let there: u32 = mask.iter().map(|word| word.count_ones()).sum();
         let times = rest.word()? as usize;
-        let [dimensions, patches] = plan.dimensions();
+        let [dimensions, patches, lamps] = plan.dimensions();
         if times != dimensions {
             return Err(Error::input(format!("a tile with {times} times, {dimensions} are needed")));
         }
         let light = (0..times).map(|_| Ok([rest.double()?, rest.double()?])).collect::<Result<Vec<_>>>()?;
         let sun = rest.layer()?;
         let sky = rest.layer()?;
+        let groups = lamps;
+        let lamps = rest.layer()?;
         sun.validate(there as usize, dimensions).map_err(|error| error.at("light of the sun"))?;
         sky.validate(there as usize, patches).map_err(|error| error.at("light of the sky"))?;
+        lamps.validate(there as usize, groups).map_err(|error| error.at("light of lamps"))?;
         match rest.0.is_empty() {
-            true => Ok(Self { sun, sky, mask, light }),
+            true => Ok(Self { sun, sky, lamps, mask, light }),
             false => Err(Error::input("a tile with something after its end")),
         }
     }
 }
 
 /// Bytes that are read from the front.
-struct Rest<'a>(&'a [u8]);
+pub(super) struct Rest<'a>(pub &'a [u8]);
 
 impl<'a> Rest<'a> {
-    fn take(&mut self, count: usize) -> Result<&'a [u8]> {
+    pub fn take(&mut self, count: usize) -> Result<&'a [u8]> {
         if self.0.len() < count {
             return Err(Error::input("a tile that is cut off"));
         }
@@ -206,11 +231,11 @@ impl<'a> Rest<'a> {
         Ok(out)
     }
 
-    fn word(&mut self) -> Result<u32> {
+    pub fn word(&mut self) -> Result<u32> {
         Ok(u32::from_le_bytes(self.array()?))
     }
 
-    fn float(&mut self) -> Result<f32> {
+    pub fn float(&mut self) -> Result<f32> {
         Ok(f32::from_le_bytes(self.array()?))
     }
 
@@ -227,14 +252,21 @@ impl<'a> Rest<'a> {
     }
 
     fn layer(&mut self) -> Result<Layer> {
-        let [dimensions, wide, narrow, worst_dimension] = [self.word()?, self.word()?, self.word()?, self.word()?];
+        let mut number = || self.word();
+        let [dimensions, wide, narrow, worst_dimension, hidden] =
+            [number()?, number()?, number()?, number()?, number()?];
         let [worst, noise] = [self.float()?, self.float()?];
-        let [table, words] = [self.length()?, self.length()?];
+        let words = self.length()?;
         if wide > dimensions || narrow > dimensions {
             return Err(Error::input(format!("{wide} and {narrow} images of {dimensions} dimensions")));
         }
-        let table = (0..table).map(|_| self.float()).collect::<Result<_>>()?;
+        let mut table = Vec::new();
+        for _ in 0..wide + narrow {
+            let factor = self.float()?;
+            let row = self.take(2 * dimensions as usize)?.chunks_exact(2);
+            table.extend(row.map(|bytes| f16::from_le_bytes([bytes[0], bytes[1]]).to_f32() * factor));
+        }
         let words = (0..words).map(|_| self.word()).collect::<Result<_>>()?;
-        Ok(Layer { dimensions, wide, narrow, table, words, worst, worst_dimension, noise })
+        Ok(Layer { dimensions, wide, narrow, table, words, worst, worst_dimension, hidden, noise })
     }
 }

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     args::{DeviceArgs, TalkArgs},
-    bake::{self as units_of, Ended, UnitsArgs, Work},
+    bake::{self as units_of, Ended, Rate, UnitsArgs, Work},
     config::{self, SettingsArgs},
     console::{self, Console},
     program,
@@ -126,7 +126,7 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
     let skies = units::skies(&plan)?;
     let unit = |unit: lucerna::bake::UnitId, _: lucerna::bake::Needed<'_>| {
         let light = transport.tile(&plan, unit.index)?;
-        Ok(units::compress(&plan, &light, &skies)?.encode())
+        Ok(units::gathered(&plan, &light, &skies)?.encode())
     };
     let (units_args, what) = (&args.units, "paths");
     let work =
@@ -135,15 +135,21 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
         Ended::Early(_, code) => return Ok(code),
         Ended::Shard(progress, missing) => (progress, missing, None),
         Ended::Whole(progress) => {
+            let total = u64::from(plan.tiles()[0]) * u64::from(plan.tiles()[1]);
+            let mut meter = Rate::new(args.progress, console.is_quiet(), "tiles", 0, total);
+            let stored = Stored::join(&store, corners, |done| {
+                meter.show(done as u64, 0);
+                Interrupt::stop().check()
+            })?;
             let saving = interrupt.saving();
-            let stored = Stored::join(&store, corners)?;
             let bytes = stored.encode()?;
             image::write_atomic(&args.output, &bytes, args.overwrite)?;
             drop(saving);
             units_of::remove(store, console)?;
             let summary = stored.summary();
             info::lines(&summary).iter().for_each(|line| console.info(line));
-            if summary.worst_tile > plan.settings.tolerance {
+            // The tolerance is checked before the error is rounded to 32 bits.
+            if summary.worst_tile > 1.0001 * plan.settings.tolerance && plan.settings.images > 0 {
                 console.warning(&format!(
                     "the error of a tile is {:.1} %, {:.1} % were allowed: bake.images allows only {} images",
                     100.0 * summary.worst_tile,
@@ -151,10 +157,8 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
                     plan.settings.images
                 ));
             }
-            if summary.noise > plan.settings.tolerance {
-                console.info(
-                    "note: the noise is larger than the tolerance; with more bake.samples fewer images are needed",
-                );
+            if summary.hidden > 0.25 {
+                console.info("note: the noise hides errors as large as the tolerance; more bake.samples show them");
             }
             console.info(&format!("wrote {}: {} bytes", args.output.display(), bytes.len()));
             (progress, 0, Some((bytes.len(), summary)))

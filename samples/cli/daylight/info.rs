@@ -73,6 +73,7 @@ pub fn lines(summary: &Summary) -> Vec<String> {
         images,
         most_images,
         worst_tile,
+        hidden,
         worst_frame,
         worst_frame_number,
         p999,
@@ -84,12 +85,16 @@ pub fn lines(summary: &Summary) -> Vec<String> {
         format!("size       {bytes} bytes; all frames as 16-bit floats: {raw_bytes} ({share:.1} % saved)"),
         format!("images     {images:.1} per tile, at most {most_images}"),
         format!(
-            "error      worst step of a tile {:.1} %, all but a thousandth {:.1} %; worst whole step {:.1} % (number {worst_frame_number})",
+            "error      worst step of a tile {:.1} % beside the noise; the noise hides such errors in {:.1} % of the steps of tiles",
             100.0 * worst_tile,
+            100.0 * hidden
+        ),
+        format!(
+            "difference from the light with its noise: all steps of tiles but a thousandth {:.1} %; worst whole step {:.1} % (number {worst_frame_number})",
             100.0 * p999,
             100.0 * worst_frame
         ),
         format!("sky        worst sky {:.1} %", 100.0 * worst_sky),
-        format!("noise      {:.1} % in the worst step of the median tile", 100.0 * noise),
+        format!("noise      {:.1} % of the light of the day, in the median tile", 100.0 * noise),
     ]
 }

@@ -4,7 +4,7 @@ use lucerna::{
     Error, Result,
     scene::Scene,
     techniques::daylight::{
-        Baking, Calendar, Day, Kind, Lit, MOST_TIMES, Plan, Sources, Weather, digest, lightmap, parts,
+        Baking, Calendar, Day, Kind, Lit, MOST_TIMES, Plan, Sources, Weather, digest, lamps, lightmap, parts,
     },
 };
 
@@ -35,6 +35,15 @@ pub struct DayOptions {
     /// Turn of the north from -Z, degrees, clockwise as seen from above
     #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, help_heading = "Day")]
     pub north: f32,
+
+    /// Bake the lamps of this name as a group that can be switched: a light, its node, or an emissive material; `*` at an end stands for any
+    /// text; may be given more than once. Without it all lamps are one group
+    #[arg(long, value_name = "NAME", help_heading = "Bake")]
+    pub lamp: Vec<String>,
+
+    /// Bake no lamps
+    #[arg(long, conflicts_with = "lamp", help_heading = "Bake")]
+    pub no_lamps: bool,
 }
 
 /// The surfaces that a bake holds light for.
@@ -108,6 +117,7 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
         steps: steps.len() as u32,
         times,
         weather: Weather::default(),
+        lamps: if options.no_lamps { Vec::new() } else { lamps::groups(scene, &options.lamp)? },
         settings: baking.clone(),
     };
     Ok(Planned { plan, sources, corners, notes })

@@ -1,0 +1,117 @@
+//! From the gathered light of all tiles to the tiles of a file: filter and compression.
+
+use std::{collections::HashMap, thread};
+
+use super::{
+    Plan,
+    columns::{Columns, Measured},
+    filter::Filter,
+    gathered::Gathered,
+    units::{self, Tile},
+};
+use crate::{Error, ErrorKind, Result};
+
+/// Finishes all tiles. `told` hears the number of finished tiles, and an error of it ends the work. Tiles do not depend on the number of threads.
+///
+/// # Errors
+/// As [`units::layer`]; the errors of `told`.
+pub fn tiles(plan: &Plan, gathered: &[Gathered], mut told: impl FnMut(usize) -> Result<()>) -> Result<Vec<Tile>> {
+    let skies = units::skies(plan)?;
+    let radius = plan.settings.filter;
+    let filter =
+        (radius > 0 && gathered.iter().any(|tile| !tile.spots.is_empty())).then(|| Filter::new(plan, gathered, radius));
+    let filter = filter.as_ref();
+    let mut out = Vec::with_capacity(gathered.len());
+    let threads = thread::available_parallelism().map_or(1, usize::from).min(16);
+    for first in (0..gathered.len()).step_by(threads) {
+        let last = (first + threads).min(gathered.len());
+        let done: Vec<Result<Tile>> = thread::scope(|scope| {
+            let skies = &skies;
+            let handles: Vec<_> =
+                (first..last).map(|index| scope.spawn(move || tile(plan, gathered, filter, index, skies))).collect();
+            let lost = || Err(Error::new(ErrorKind::Runtime, "a thread that compresses a tile ended early"));
+            handles.into_iter().map(|handle| handle.join().unwrap_or_else(|_| lost())).collect()
+        });
+        for tile in done {
+            out.push(tile?);
+        }
+        told(out.len())?;
+    }
+    Ok(out)
+}
+
+/// One tile.
+fn tile(plan: &Plan, gathered: &[Gathered], filter: Option<&Filter>, index: usize, skies: &[f32]) -> Result<Tile> {
+    let dimensions = plan.dimensions();
+    let columns = [Columns::Dimensions, Columns::Mixtures(skies), Columns::Dimensions];
+    let lit = &gathered[index];
+    let mut layers = Vec::new();
+    let near: Option<Vec<_>> =
+        filter.map(|filter| (0..lit.spots.len()).map(|texel| filter.weights(index, texel)).collect());
+    let mut errors = Vec::new();
+    for (which, columns) in columns.into_iter().enumerate() {
+        let row = 3 * dimensions[which];
+        let [mut mean, mut noise] = [(); 2].map(|()| vec![0.0f32; row * lit.spots.len()]);
+        match &near {
+            None => {
+                for (texel, (mean, noise)) in
+                    mean.chunks_exact_mut(row.max(1)).zip(noise.chunks_exact_mut(row.max(1))).enumerate()
+                {
+                    lit.layers[which].restore(texel, mean, noise);
+                }
+            }
+            Some(near) => filtered(gathered, near, which, row, [&mut mean, &mut noise]),
+        }
+        let exact = !plan.settings.noise_floor;
+        let measured = Measured { dimensions: dimensions[which], rows: &mean, noise: if exact { &[] } else { &noise } };
+        let layer = units::layer(plan, measured, columns)?;
+        if which == 0 {
+            errors = units::errors(&layer, measured);
+        }
+        layers.push(layer);
+    }
+    let mut layers = layers.into_iter();
+    let (Some(sun), Some(sky), Some(lamps)) = (layers.next(), layers.next(), layers.next()) else {
+        return Err(Error::new(ErrorKind::Runtime, "a tile without its three kinds of light"));
+    };
+    Ok(Tile { sun, sky, lamps, mask: lit.mask.clone(), light: errors })
+}
+
+/// A neighbour of a texel: its tile, its number there, and its weights in the two halves of the samples.
+type Neighbour = (usize, usize, [f32; 2]);
+
+/// Weighted means of the two halves of the samples, as mean and noise.
+fn filtered(gathered: &[Gathered], near: &[Vec<Neighbour>], which: usize, row: usize, out: [&mut Vec<f32>; 2]) {
+    // The halves of the texels that are neighbours, each restored once.
+    let mut known: HashMap<(usize, usize), usize> = HashMap::new();
+    let mut halves: Vec<f32> = Vec::new();
+    let mut noise = vec![0.0; row];
+    for &(tile, number, _) in near.iter().flatten() {
+        known.entry((tile, number)).or_insert_with(|| {
+            let at = halves.len();
+            halves.resize(at + 2 * row, 0.0);
+            let (first, second) = halves[at..].split_at_mut(row);
+            gathered[tile].layers[which].restore(number, first, &mut noise);
+            for ((first, second), noise) in first.iter_mut().zip(second).zip(&noise) {
+                (*first, *second) = (*first + noise, *first - noise);
+            }
+            at
+        });
+    }
+    let [means, noises] = out;
+    let (mut first, mut second) = (vec![0.0f32; row], vec![0.0f32; row]);
+    for ((near, mean), noise) in
+        near.iter().zip(means.chunks_exact_mut(row.max(1))).zip(noises.chunks_exact_mut(row.max(1)))
+    {
+        first.fill(0.0);
+        second.fill(0.0);
+        for (tile, number, [a, b]) in near {
+            let Some(&at) = known.get(&(*tile, *number)) else { continue };
+            first.iter_mut().zip(&halves[at..at + row]).for_each(|(sum, value)| *sum += a * value);
+            second.iter_mut().zip(&halves[at + row..at + 2 * row]).for_each(|(sum, value)| *sum += b * value);
+        }
+        for (((mean, noise), a), b) in mean.iter_mut().zip(noise).zip(&first).zip(&second) {
+            (*mean, *noise) = (0.5 * (a + b), 0.5 * (a - b));
+        }
+    }
+}
