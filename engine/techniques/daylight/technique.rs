@@ -4,7 +4,11 @@ use std::{path::PathBuf, sync::Arc};
 
 use glam::{Vec2, Vec3};
 
-use super::{Day, Interpolation, PictureSettings, Settings, Sky, Stored, layer::Layer, lightmap};
+use super::{
+    Added, Day, Interpolation, PictureSettings, Settings, Sky, Stored, added, lightmap,
+    pictures::{coefficients, packed},
+    probes::{self, Field},
+};
 use crate::{
     Error, ErrorKind, Result,
     gpu::{Gpu, OwnedBuffer, OwnedImage},
@@ -95,6 +99,9 @@ pub struct Daylight {
     tiles: OwnedBuffer,
     words: OwnedBuffer,
     places: Option<Places>,
+    /// The first node of the objects that the bake does not know.
+    added: Option<u32>,
+    probes: Option<Field>,
     /// The last sky, and the state that it shows.
     sky: Option<(OwnedImage, [f32; 7])>,
 }
@@ -232,18 +239,6 @@ impl Daylight {
             ..moment.handles.clone()
         })
     }
-
-    /// Coefficients of the images of all tiles.
-    fn coefficients(&self, weights: &[(usize, f32)], sun: [f32; 3], patches: &[[f32; 3]]) -> Vec<[f32; 3]> {
-        let of_sun = |(time, weight): &(usize, f32)| (*time, sun.map(|channel| channel * weight));
-        let mut out = Vec::new();
-        for tile in &self.baked.stored.tiles {
-            out.extend(tile.sun.mix(weights.iter().map(of_sun)));
-            out.extend(tile.sky.mix(patches.iter().copied().enumerate()));
-        }
-        out.push([0.0; 3]);
-        out
-    }
 }
 
 /// The sky as a picture.
@@ -255,35 +250,6 @@ fn picture_of(sky: &Sky) -> Environment {
     };
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| texel(x, y))).collect();
     Environment { name: "sky".into(), width, height, pixels, rotation: 0.0, scale: 1.0 }
-}
-
-/// The tiles and their words on the device.
-fn packed(stored: &Stored) -> (Vec<types::DayTile>, Vec<u32>) {
-    let (mut tiles, mut words, mut first) = (Vec::new(), Vec::new(), 0);
-    for tile in &stored.tiles {
-        let mut entry = types::DayTile {
-            mask: words.len() as u32,
-            mask_words: tile.mask.len() as u32,
-            columns: stored.plan.tile(tiles.len() as u32)[2],
-            ..types::DayTile::default()
-        };
-        words.extend_from_slice(&tile.mask);
-        let mut before = 0;
-        for word in &tile.mask {
-            words.push(before);
-            before += word.count_ones();
-        }
-        for (which, layer) in [&tile.sun, &tile.sky].into_iter().enumerate() {
-            let Layer { wide, narrow, .. } = *layer;
-            entry.first_word[which] = words.len() as u32;
-            (entry.wide[which], entry.narrow[which], entry.first[which]) = (wide, narrow, first);
-            words.extend_from_slice(&layer.words);
-            first += layer.images();
-        }
-        tiles.push(entry);
-    }
-    words.push(0);
-    (tiles, words)
 }
 
 /// Light that a scene has and that is not in a bake.
@@ -333,14 +299,21 @@ impl Technique for Daylight {
             return Err(error.help("Bake it with `daylight bake SCENE -o FILE.day`, and name the file with --bake"));
         };
         let stored = &baked.stored;
-        if let Some(parts) = stored.plan.difference(scene) {
-            let what = format!("is the light of `{}`, and this scene has other {parts}", stored.plan.scene);
-            return Err(baked.blamed(Error::input(what).help("Name the scene that was baked, or bake this one")));
+        let base = scene.before_added();
+        let mut added = scene.added.map(|counts| counts.nodes as u32);
+        if let Some(parts) = stored.plan.difference(&base) {
+            // The bake may have been made with the added objects.
+            if added.take().is_none() || stored.plan.difference(scene).is_some() {
+                let what = format!("is the light of `{}`, and this scene has other {parts}", stored.plan.scene);
+                return Err(baked.blamed(Error::input(what).help("Name the scene that was baked, or bake this one")));
+            }
         }
+        let base = if added.is_some() { &*base } else { scene };
         let calendar = &stored.plan.calendar;
         let day = Day::new(&calendar.date, &calendar.zone, calendar.latitude, calendar.longitude)
             .map_err(|what| baked.blamed(Error::input(what)))?;
-        let (tiles, words) = packed(stored);
+        let columns = |index: usize| stored.plan.tile(index as u32)[2];
+        let (tiles, words) = packed(stored.tiles.iter().enumerate().map(|(index, tile)| (tile, columns(index))));
         let most = gpu.caps().limits.storage_range;
         if 4 * words.len() as u64 > most {
             let what = format!("its images have {} bytes, the device allows {most} in one buffer", 4 * words.len());
@@ -354,7 +327,9 @@ impl Technique for Daylight {
             day,
             tiles: OwnedBuffer::with_contents(gpu, "daylight.tiles", bytemuck::cast_slice(&tiles))?,
             words: OwnedBuffer::with_contents(gpu, "daylight.words", bytemuck::cast_slice(&words))?,
-            places: Places::new(gpu, scene, baked)?,
+            places: Places::new(gpu, base, baked)?,
+            added,
+            probes: if added.is_some() { Field::new(gpu, stored)? } else { None },
             sky: None,
         })
     }
@@ -373,7 +348,7 @@ impl Technique for Daylight {
         let patches: Vec<[f32; 3]> =
             sky.patches().iter().map(|patch| patch.map(|channel| channel * of_day.strength)).collect();
         let weights = self.weights(seconds, of_day.interpolation);
-        let coefficients = self.coefficients(&weights, light, &patches);
+        let coefficients = coefficients(self.baked.stored.tiles.iter(), &weights, light, &patches);
         let handles = self.relit(graph, moment, sun, light, &sky, of_day.strength)?;
         let view = &moment.view;
         let gbuffer = gbuffer::draw(graph, &handles, view, &settings.gbuffer);
@@ -383,7 +358,21 @@ impl Technique for Daylight {
         let image = |graph: &mut Graph, name: &str| graph.image(name, Format::RGBA16F, view.extent);
         let [total, indirect, irradiance] =
             ["daylight", "daylight.indirect", "daylight.irradiance"].map(|name| image(graph, name));
-        let places = self.places.as_ref().map(|places| places.draw(graph, &handles, view, &gbuffer));
+        let of_probes = self.added.filter(|_| of_day.added == Added::Probes);
+        if of_probes.is_some() && self.probes.is_none() {
+            let error = Error::input("has no probes, which light the added objects");
+            return Err(self.baked.blamed(
+                error.help("Bake with -D bake.probes=2, or take the light behind the objects with -D daylight.added=screen"),
+            ));
+        }
+        // The surfaces behind the added objects.
+        let behind = self.added.filter(|_| of_day.added == Added::Screen && self.places.is_some()).map(|first| {
+            graph.scope("behind", |graph| {
+                gbuffer::draw(graph, &added::without(&handles, first), view, &settings.gbuffer)
+            })
+        });
+        let under = behind.as_ref().unwrap_or(&gbuffer);
+        let places = self.places.as_ref().map(|places| places.draw(graph, &handles, view, under));
         let args = decode::Args {
             places: places.unwrap_or(gbuffer.depth),
             spec: decode::Spec { lightmap: places.is_some().into() },
@@ -400,6 +389,14 @@ impl Technique for Daylight {
             push: decode::Push { side, columns, texels },
         };
         graph.compute(args, view.extent);
+        if let (Some(first), Some(field)) = (of_probes, &self.probes) {
+            let mask = added::mask(graph, &handles, view, &gbuffer, first);
+            let moment = probes::Moment { weights: &weights, sun: light, patches: &patches };
+            let tiles = self.baked.stored.probes.iter().map(|brick| &brick.light);
+            let light = field.decode(graph, tiles, moment);
+            let pixels = probes::Pixels { mask, direct: lit.direct, total, indirect, irradiance };
+            field.shine(graph, &gbuffer, view, light, &pixels);
+        }
         skybox::draw(graph, &handles, &gbuffer, Vec3::ZERO, total);
         skybox::draw(graph, &handles, &gbuffer, Vec3::ZERO, lit.direct);
         let shown = match moment.shot.mode {

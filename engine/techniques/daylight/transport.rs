@@ -27,13 +27,13 @@ const MOST_VERTICES: u64 = 1 << 22;
 /// The scene of a bake on a device.
 #[derive(Debug)]
 pub struct Transport {
-    gpu: Gpu,
-    runner: Runner,
-    scene: Scene,
-    pose: Pose,
-    resident: Resident,
-    rays: Rays,
-    suns: OwnedBuffer,
+    pub(super) gpu: Gpu,
+    pub(super) runner: Runner,
+    pub(super) scene: Scene,
+    pub(super) pose: Pose,
+    pub(super) resident: Resident,
+    pub(super) rays: Rays,
+    pub(super) suns: OwnedBuffer,
     sources: Sources,
 }
 
@@ -208,7 +208,7 @@ impl Transport {
     }
 }
 
-fn settings(plan: &Plan, first_receiver: u32, [receivers, samples, first_sample]: [u32; 3]) -> types::DaySettings {
+pub(super) fn settings(plan: &Plan, first_receiver: u32, [receivers, samples, first_sample]: [u32; 3]) -> types::DaySettings {
     let baking = &plan.settings;
     let mut flags = 0;
     if let Kind::View { .. } = plan.receivers {

@@ -1,8 +1,9 @@
 //! Bakes as jobs of [`crate::bake`]. A unit is a tile with all times of the day; its bytes are its compressed layers.
 
 use super::{
-    Plan, Sky, Weather,
+    Plan, Sky, Transport, Weather,
     layer::{Aim, Columns, Layer},
+    probes::Brick,
     transport::Light,
 };
 use crate::{
@@ -57,7 +58,9 @@ pub fn job(plan: &Plan, device: &str, texels: Option<&[u64]>) -> Result<Job> {
         let texels = texels.map_or(columns * rows, |texels| texels.get(tile as usize).copied().unwrap_or(0));
         (texels * u64::from(plan.settings.samples)).max(1)
     };
-    let costs = (0..columns * rows).map(cost).collect();
+    let probes = |brick: u32| plan.probes.as_ref().map_or(0, |grid| grid.brick(brick).len() as u64);
+    let of_brick = |brick: u32| (probes(brick) * u64::from(plan.settings.probe_samples)).max(1);
+    let costs = (0..columns * rows).map(cost).chain((0..plan.brick_count()).map(of_brick)).collect();
     Ok(Job::new(key, vec![Stage::new("tiles", costs)])?.about(about))
 }
 
@@ -78,6 +81,17 @@ pub fn skies(plan: &Plan) -> Result<Vec<f32>> {
         }
     }
     Ok(rows)
+}
+
+/// The bytes of a unit: a tile, or a brick of probes.
+///
+/// # Errors
+/// As [`Transport::tile`] and [`compress`].
+pub fn unit(plan: &Plan, transport: &mut Transport, index: u32, skies: &[f32]) -> Result<Vec<u8>> {
+    match index.checked_sub(plan.tile_count()) {
+        Some(brick) => Ok(Brick::compress(plan, transport.brick(plan, brick)?, skies)?.encode()),
+        None => Ok(compress(plan, &transport.tile(plan, index)?, skies)?.encode()),
+    }
 }
 
 /// Compresses the light of a tile.
