@@ -34,7 +34,8 @@ impl FromStr for Added {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || {
-            "expected FILE@X,Y,Z[,SCALE[,TURN]] or builtin:NAME@X,Y,Z[,SCALE[,TURN]], like pot.glb@1,0,-2,0.5,90".to_owned()
+            "expected FILE@X,Y,Z[,SCALE[,TURN]] or builtin:NAME@X,Y,Z[,SCALE[,TURN]], like pot.glb@1,0,-2,0.5,90"
+                .to_owned()
         };
         // Names of files may contain the sign as well.
         let (what, numbers) = text.rsplit_once('@').ok_or_else(wrong)?;

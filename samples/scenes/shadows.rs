@@ -4,8 +4,9 @@
 mod tree;
 
 use super::{
-    environments, teapot,
+    environments,
     kit::{Geometry, Model, Stage, blend, lathe, round_cone, srgb, surface_net},
+    teapot,
 };
 use glam::{Vec2, Vec3, vec2, vec3};
 use lucerna::scene::{Material, Scene};

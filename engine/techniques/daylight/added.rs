@@ -20,9 +20,10 @@ pub(super) fn mask(graph: &mut Graph, handles: &Handles, view: &View, gbuffer: &
         depth: gbuffer.depth,
     };
     let calls = handles.moment.instances.iter().enumerate();
-    let calls = calls.filter(|(_, instance)| instance.node >= first && instance.indices > 0).map(|(number, instance)| {
-        DrawCall { first_vertex: 0, vertices: instance.indices, first_instance: number as u32, instances: 1 }
-    });
+    let calls =
+        calls.filter(|(_, instance)| instance.node >= first && instance.indices > 0).map(|(number, instance)| {
+            DrawCall { first_vertex: 0, vertices: instance.indices, first_instance: number as u32, instances: 1 }
+        });
     let targets = Targets::new().color(mask, Load::Clear([0.0; 4])).depth(depth, Depth::Clear(0.0));
     // Sides that the G-buffer does not show are at another depth.
     graph.raster(targets, Raster::new().cull(Cull::None), args, Draw::calls(calls.collect()));

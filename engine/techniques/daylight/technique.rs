@@ -361,9 +361,9 @@ impl Technique for Daylight {
         let of_probes = self.added.filter(|_| of_day.added == Added::Probes);
         if of_probes.is_some() && self.probes.is_none() {
             let error = Error::input("has no probes, which light the added objects");
-            return Err(self.baked.blamed(
-                error.help("Bake with -D bake.probes=2, or take the light behind the objects with -D daylight.added=screen"),
-            ));
+            return Err(self.baked.blamed(error.help(
+                "Bake with -D bake.probes=2, or take the light behind the objects with -D daylight.added=screen",
+            )));
         }
         // The surfaces behind the added objects.
         let behind = self.added.filter(|_| of_day.added == Added::Screen && self.places.is_some()).map(|first| {

@@ -208,7 +208,11 @@ impl Transport {
     }
 }
 
-pub(super) fn settings(plan: &Plan, first_receiver: u32, [receivers, samples, first_sample]: [u32; 3]) -> types::DaySettings {
+pub(super) fn settings(
+    plan: &Plan,
+    first_receiver: u32,
+    [receivers, samples, first_sample]: [u32; 3],
+) -> types::DaySettings {
     let baking = &plan.settings;
     let mut flags = 0;
     if let Kind::View { .. } = plan.receivers {

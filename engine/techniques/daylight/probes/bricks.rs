@@ -68,9 +68,8 @@ impl Brick {
         let (mut positions, mut distances) = (Vec::new(), Vec::new());
         for probe in head.chunks_exact(BYTES) {
             let (position, map) = probe.split_at(12);
-            let float = |at: usize| {
-                f32::from_le_bytes([position[at], position[at + 1], position[at + 2], position[at + 3]])
-            };
+            let float =
+                |at: usize| f32::from_le_bytes([position[at], position[at + 1], position[at + 2], position[at + 3]]);
             let half = |at: usize| f16::from_le_bytes([map[at], map[at + 1]]);
             positions.push(Vec3::new(float(0), float(4), float(8)));
             distances.push(std::array::from_fn(|texel| [half(4 * texel), half(4 * texel + 2)]));

@@ -71,7 +71,8 @@ impl Field {
             }
         }
         probes.iter_mut().zip(nearest(grid, &valid)).for_each(|(probe, near)| probe.near = near);
-        let words_of = |map: &Map| map.map(|[mean, square]| u32::from(mean.to_bits()) | u32::from(square.to_bits()) << 16);
+        let words_of =
+            |map: &Map| map.map(|[mean, square]| u32::from(mean.to_bits()) | u32::from(square.to_bits()) << 16);
         let distances: Vec<u32> = distances.iter().flat_map(words_of).collect();
         let (tiles, words) = packed(stored.probes.iter().map(|brick| (&brick.light, 1)));
         let upload = |name, bytes: &[u8]| OwnedBuffer::with_contents(gpu, name, bytes);

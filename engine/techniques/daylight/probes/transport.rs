@@ -217,7 +217,8 @@ fn summed(sun: &[[f32; 3]], sky: &[[f32; 3]], valid: &[bool], times: usize, samp
             for patch in 0..patches {
                 let values = of(sky, probe * patches + patch, channel);
                 for (direction, value) in values.into_iter().enumerate() {
-                    light.sky[begin[1] + (3 * direction + channel) * patches + patch] = (value / f64::from(samples)) as f32;
+                    light.sky[begin[1] + (3 * direction + channel) * patches + patch] =
+                        (value / f64::from(samples)) as f32;
                 }
             }
         }
