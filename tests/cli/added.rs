@@ -81,7 +81,8 @@ fn baked_daylight_lights_objects_that_it_does_not_know() {
     assert!(daylight(&["info", &none, "--json"]).expect(0, &[]).json()["probes"].is_null());
     assert!(daylight(&["info", &day]).expect(0, &[]).stdout.contains("probes "));
     let picture = |bake: &str, out: &str, more: &[&str]| {
-        let common = ["render", "--builtin", "cornell", "--bake", bake, "--size", "32x24", "--exposure", "-8", "-o", out];
+        let common =
+            ["render", "--builtin", "cornell", "--bake", bake, "--size", "32x24", "--exposure", "-8", "-o", out];
         daylight(&[&common[..], more].concat())
     };
     let hare = ["--add", "builtin:hare@0,0,0,0.3"];

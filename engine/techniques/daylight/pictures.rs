@@ -1,7 +1,7 @@
 //! The tiles of a bake as shaders read them (`tiles.glsl`).
 
 use super::{layer::Layer, units::Tile};
-use crate::shaders::types;
+use crate::{Error, ErrorKind, Result, gpu::Gpu, shaders::types};
 
 /// Tiles with their number of columns, and their words, as the device reads them.
 pub(super) fn packed<'a>(list: impl Iterator<Item = (&'a Tile, u32)>) -> (Vec<types::DayTile>, Vec<u32>) {
@@ -47,4 +47,20 @@ pub(super) fn coefficients<'a>(
     }
     out.push([0.0; 3]);
     out
+}
+
+/// Checks that the images of a bake fit into one buffer.
+///
+/// # Errors
+/// `Runtime` with both sizes.
+pub(super) fn fits(gpu: &Gpu, words: &[u32]) -> Result<()> {
+    let most = gpu.caps().limits.storage_range;
+    let bytes = 4 * words.len() as u64;
+    if bytes <= most {
+        return Ok(());
+    }
+    Err(Error::new(
+        ErrorKind::Runtime,
+        format!("its images have {bytes} bytes, the device allows {most} in one buffer"),
+    ))
 }

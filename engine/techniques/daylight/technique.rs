@@ -6,11 +6,11 @@ use glam::{Vec2, Vec3};
 
 use super::{
     Added, Day, Interpolation, PictureSettings, Settings, Sky, Stored, added, lightmap,
-    pictures::{coefficients, packed},
+    pictures::{coefficients, fits, packed},
     probes::{self, Field},
 };
 use crate::{
-    Error, ErrorKind, Result,
+    Error, Result,
     gpu::{Gpu, OwnedBuffer, OwnedImage},
     graph::{Cull, Depth, Draw, DrawCall, Format, Graph, Image, Load, Raster, Targets},
     passes::{
@@ -252,10 +252,13 @@ fn picture_of(sky: &Sky) -> Environment {
     Environment { name: "sky".into(), width, height, pixels, rotation: 0.0, scale: 1.0 }
 }
 
-/// Light that a scene has and that is not in a bake.
-fn left_out(scene: &Scene) -> Vec<Note> {
+/// Light that a scene has and that is not in a bake. `added`: there are objects that the bake does not know.
+fn left_out(scene: &Scene, added: bool) -> Vec<Note> {
     let note = |place: &str, text: &str| Note { kind: NoteKind::Ignored, place: place.into(), text: text.into() };
     let mut notes = Vec::new();
+    if added {
+        notes.push(note("--add", "the added objects block no indirect light and reflect none to the scene"));
+    }
     if !scene.lights.is_empty() {
         notes.push(note("lights", "the scene's own lights are off: the light is that of sun and sky"));
     }
@@ -314,13 +317,7 @@ impl Technique for Daylight {
             .map_err(|what| baked.blamed(Error::input(what)))?;
         let columns = |index: usize| stored.plan.tile(index as u32)[2];
         let (tiles, words) = packed(stored.tiles.iter().enumerate().map(|(index, tile)| (tile, columns(index))));
-        let most = gpu.caps().limits.storage_range;
-        if 4 * words.len() as u64 > most {
-            let what = format!("its images have {} bytes, the device allows {most} in one buffer", 4 * words.len());
-            return Err(baked
-                .blamed(Error::new(ErrorKind::Runtime, what))
-                .help("Bake fewer texels, or use another device"));
-        }
+        fits(gpu, &words).map_err(|error| baked.blamed(error.help("Bake fewer texels, or use another device")))?;
         Ok(Self {
             gpu: gpu.clone(),
             baked: baked.clone(),
@@ -329,7 +326,7 @@ impl Technique for Daylight {
             words: OwnedBuffer::with_contents(gpu, "daylight.words", bytemuck::cast_slice(&words))?,
             places: Places::new(gpu, base, baked)?,
             added,
-            probes: if added.is_some() { Field::new(gpu, stored)? } else { None },
+            probes: if added.is_some() { Field::new(gpu, stored).map_err(|error| baked.blamed(error))? } else { None },
             sky: None,
         })
     }
@@ -406,7 +403,7 @@ impl Technique for Daylight {
             Mode::Irradiance => irradiance,
         };
         let of_shadows = idle_notes("shadow", &settings.shadow);
-        let notes = [moment.notes, &shadows.notes, &left_out(moment.scene), &of_shadows].concat();
+        let notes = [moment.notes, &shadows.notes, &left_out(moment.scene, self.added.is_some()), &of_shadows].concat();
         let picture =
             Picture::new(shown).color("direct", lit.direct).color("indirect", indirect).color("irradiance", irradiance);
         Ok(picture.showing(gbuffer).noting(notes))

@@ -16,7 +16,7 @@ use crate::{
     },
     techniques::daylight::{
         Stored,
-        pictures::{coefficients, packed},
+        pictures::{coefficients, fits, packed},
         units::Tile,
     },
 };
@@ -55,7 +55,7 @@ impl Field {
     /// Uploads the probes of a bake; `None` if it has none.
     ///
     /// # Errors
-    /// `OutOfMemory`, `DeviceLost`.
+    /// `OutOfMemory`, `DeviceLost`; `Runtime` if the images are larger than the device's limits.
     pub fn new(gpu: &Gpu, stored: &Stored) -> Result<Option<Self>> {
         let Some(grid) = &stored.plan.probes else { return Ok(None) };
         let count = grid.probes() as usize;
@@ -75,6 +75,7 @@ impl Field {
             |map: &Map| map.map(|[mean, square]| u32::from(mean.to_bits()) | u32::from(square.to_bits()) << 16);
         let distances: Vec<u32> = distances.iter().flat_map(words_of).collect();
         let (tiles, words) = packed(stored.probes.iter().map(|brick| (&brick.light, 1)));
+        fits(gpu, &words).map_err(|error| error.at("probes").help("Bake fewer probes, or use another device"))?;
         let upload = |name, bytes: &[u8]| OwnedBuffer::with_contents(gpu, name, bytes);
         Ok(Some(Self {
             grid: grid.clone(),
