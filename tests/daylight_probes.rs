@@ -17,7 +17,7 @@ use lucerna::{
     techniques::daylight::{
         Added, Baked, Baking, Calendar, Day, Daylight, Kind, Lit, PictureSettings, Plan, Sky, Sources, Stored,
         Transport, Weather, parts,
-        probes::{Brick, DIRECTIONS, Grid, harmonics, irradiance},
+        probes::{Brick, DIRECTIONS, Field, Grid, Moment, harmonics, irradiance},
         units,
     },
     tracer::{Filter, Settings},
@@ -102,13 +102,14 @@ fn axes() -> [DVec3; 6] {
     [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z]
 }
 
-/// The irradiance of the first probe of a grid under a sky of radiance 1, for any normal.
+/// The mean irradiance of the eight probes of a grid under a sky of radiance 1, for any normal.
 fn under_an_even_sky(gpu: &Gpu, scene: &Scene, grid: Grid) -> impl Fn(DVec3) -> f64 {
     let plan = plan(scene, grid, baking());
     let gathered = transport(gpu, scene, &plan).brick(&plan, 0).unwrap();
     let sky = gathered.light.sky;
-    let terms = terms(0, 0, |row| sky[row * PATCHES..(row + 1) * PATCHES].iter().map(|v| f64::from(*v)).sum());
-    move |normal| irradiance(&terms, normal)
+    let light = |row: usize| sky[row * PATCHES..(row + 1) * PATCHES].iter().map(|v| f64::from(*v)).sum::<f64>();
+    let all: Vec<[f64; 9]> = (0..8).map(|probe| terms(probe, 0, light)).collect();
+    move |normal| all.iter().map(|terms| irradiance(terms, normal)).sum::<f64>() / 8.0
 }
 
 #[test]
@@ -192,7 +193,7 @@ fn truth(gpu: &Gpu, scene: &Scene, at: Vec3, normal: Vec3) -> [f64; 3] {
     let a = normal.any_orthonormal_vector();
     let b = normal.cross(a);
     stage.quad(white, at - 1e-3 * (a + b), a * 2e-3, b * 2e-3);
-    let eye = view(at + 0.01 * normal, at, 5.0, [8, 8]);
+    let eye = view(at + 0.01 * normal, at, 5.0, [4, 4]);
     let settings =
         Settings { bounces: 16, roulette: 16, diffuse_only: true, filter: Filter::Centre, ..Settings::default() };
     let layers = render(gpu, &stage.scene, &eye, &settings, 512);
@@ -304,6 +305,62 @@ fn probes_have_the_same_bits_whatever_else_is_baked_and_come_back_from_a_file() 
     });
 }
 
+#[test]
+fn the_device_decodes_probes_as_the_processor_does_and_without_negative_light() {
+    with_gpu(|gpu| {
+        let scene = room();
+        let grid = Grid { origin: [-1.5, 0.3, -1.5], spacing: [0.7, 0.7, 0.7], counts: [5, 2, 2] };
+        let stored = stored(gpu, &scene, Some(grid.clone()), Baking { samples: 2, probe_samples: 32, ..baking() });
+        let weights = [(0, 0.25), (1, 0.75)];
+        // Light from a part of the sky alone comes from few directions, so harmonics swing below zero.
+        let patches: Vec<[f32; 3]> = (0..PATCHES).map(|i| if i < 20 { [3.0, 2.0, 1.0] } else { [0.0; 3] }).collect();
+        for sun in [[1.0, 0.9, 0.5], [0.0; 3]] {
+            let field = Field::new(gpu, &stored).unwrap().unwrap();
+            let mut graph = Graph::new("probes");
+            let tiles = stored.probes.iter().map(|brick| &brick.light);
+            let light = field.decode(&mut graph, tiles, Moment { weights: &weights, sun, patches: &patches });
+            let read = graph.read_buffer(light);
+            let light: Vec<[f32; 3]> = Runner::new(gpu).run(&graph).unwrap().buffer(read);
+            let mut weakened = 0;
+            for (index, brick) in stored.probes.iter().enumerate() {
+                let of_sun = brick.light.sun.mix(weights.iter().map(|(time, w)| (*time, sun.map(|c| c * w))));
+                let of_sky = brick.light.sky.mix(patches.iter().copied().enumerate());
+                for (inside, at) in grid.brick(index as u32).into_iter().enumerate() {
+                    assert!(brick.valid(inside), "{at:?}");
+                    let found = &light[9 * grid.number(at) as usize..][..9];
+                    for channel in 0..3 {
+                        let wanted = terms(0, channel, |row| {
+                            let texel = inside * DIRECTIONS + row / 3;
+                            let [a, b] =
+                                [brick.light.sun.decode(texel, &of_sun), brick.light.sky.decode(texel, &of_sky)];
+                            f64::from(a[channel]) + f64::from(b[channel])
+                        });
+                        let found: [f64; 9] = std::array::from_fn(|k| f64::from(found[k][channel]));
+                        let close = |a: f64, b: f64| (a - b).abs() < 1e-4 * wanted[0].abs().max(1e-6);
+                        assert!(close(found[0], wanted[0]), "{at:?}: {found:?}, not {wanted:?}");
+                        // One factor for all harmonics above the first.
+                        let (up, down) = found[1..]
+                            .iter()
+                            .zip(&wanted[1..])
+                            .fold((0.0, 0.0), |(up, down), (a, b)| (up + a * b, down + b * b));
+                        let factor: f64 = if down > 0.0 { up / down } else { 1.0 };
+                        assert!((-1e-4..1.0001).contains(&factor), "{at:?}: {factor}");
+                        assert!(
+                            (1..9).all(|k| close(found[k], factor * wanted[k])),
+                            "{at:?}: {found:?}, not {wanted:?}"
+                        );
+                        weakened += u32::from(factor < 0.999);
+                        for normal in axes().into_iter().chain((0..DIRECTIONS).map(normal)) {
+                            assert!(irradiance(&found, normal) > -0.03 * wanted[0], "{at:?} {normal}");
+                        }
+                    }
+                }
+            }
+            eprintln!("{weakened} of {} weakened", 3 * grid.probes());
+        }
+    });
+}
+
 /// A picture of baked daylight at nine o'clock.
 fn picture(gpu: &Gpu, scene: &Scene, stored: &Arc<Stored>, added: Added) -> lucerna::Result<Layers> {
     let mut settings = PictureSettings::default();
@@ -352,7 +409,7 @@ fn an_added_object_has_the_indirect_light_of_the_path_tracer_by_probes() {
         let depth = |layers: &Layers| layers.layer("depth").unwrap().data.clone();
         let (before, after) = (depth(&alone), depth(&probes));
         let seen: Vec<usize> = (0..after.len()).filter(|i| (before[*i] - after[*i]).abs() > 1e-3 * after[*i]).collect();
-        assert!(seen.len() > 60, "{} pixels", seen.len());
+        assert!(seen.len() > 25, "{} pixels", seen.len());
         let settings =
             Settings { bounces: 9, roulette: 16, diffuse_only: true, filter: Filter::Centre, ..Settings::default() };
         let truth = render(gpu, &relit(&with), &eye(), &settings, 256);
