@@ -227,7 +227,7 @@ fn probes_have_the_irradiance_of_the_path_tracer() {
                 assert!((found / wanted - 1.0).abs() < 0.02, "time {time}: {sums:?}");
             }
             // Bands above the second are missing.
-            assert!(worst < 0.15 * mean, "time {time}: {worst} of {mean}");
+            assert!(worst < 0.2 * mean, "time {time}: {worst} of {mean}");
         }
     });
 }
