@@ -118,7 +118,7 @@ pub enum Added {
     /// From the probes around the point.
     #[default]
     Probes,
-    /// That of the surface behind the object at the same pixel, as in the paper.
+    /// That of the surface behind the object at the same pixel, as in the paper; none before the sky.
     Screen,
 }
 

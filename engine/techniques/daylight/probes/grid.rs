@@ -32,7 +32,8 @@ impl Grid {
         let counts = |spacing: f32| size.to_array().map(|size| (size / spacing).ceil().clamp(2.0, 1e6) as u32);
         let product = |counts: [u32; 3]| counts.map(u64::from).iter().product::<u64>();
         let most = u64::from(most.max(8));
-        let mut spacing = spacing;
+        // Tiny numbers would not grow by a hundredth.
+        let mut spacing = spacing.max(1e-6);
         while product(counts(spacing)) > most {
             spacing *= 1.01;
         }
@@ -134,6 +135,9 @@ mod tests {
         assert_eq!((grid.counts, grid.spacing), ([10, 3, 2], [1.0; 3]));
         assert_eq!(grid.position([0, 0, 0]), vec3(-0.5, 0.5, 2.5));
         assert_eq!(grid.position([9, 2, 1]), vec3(8.5, 2.5, 3.5));
+        for spacing in [f32::from_bits(1), 1e-20, 1e20] {
+            assert!((8..=100).contains(&Grid::new(&around, spacing, 100).probes()), "{spacing}");
+        }
         for most in [8, 20, 59, 60] {
             let fewer = Grid::new(&around, 1.0, most);
             assert!(fewer.probes() <= most && fewer.counts.iter().all(|count| *count >= 2), "{most}: {fewer:?}");
