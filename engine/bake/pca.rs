@@ -273,6 +273,9 @@ fn leading(matrix: DMatrix<f64>, keep: Keep, total: f64) -> Result<(Vec<f64>, Ve
     if count == 0 || wanted == 0 || total == 0.0 {
         return Ok((Vec::new(), Vec::new()));
     }
+    // Dimensions without values have no part in any vector. With their zeros the decomposition of nalgebra 0.34 often gives NaN.
+    let there: Vec<usize> = (0..count).filter(|&at| matrix[(at, at)] != 0.0).collect();
+    let matrix = if there.len() < count { matrix.select_rows(&there).select_columns(&there) } else { matrix };
     let steps = 1000 + 100 * count;
     let finite = |found: &SymmetricEigen<f64, Dyn>| {
         found.eigenvalues.iter().chain(found.eigenvectors.iter()).all(|value| value.is_finite())
@@ -284,7 +287,7 @@ fn leading(matrix: DMatrix<f64>, keep: Keep, total: f64) -> Result<(Vec<f64>, Ve
             Error::new(ErrorKind::Runtime, "the decomposition does not converge").at("principal components")
         })?,
     };
-    let mut order: Vec<usize> = (0..count).collect();
+    let mut order: Vec<usize> = (0..there.len()).collect();
     // A stable sort: equal values keep their order.
     order.sort_by(|&a, &b| found.eigenvalues[b].total_cmp(&found.eigenvalues[a]));
     let noise = found.eigenvalues[order[0]] * f64::EPSILON * count as f64;
@@ -296,7 +299,9 @@ fn leading(matrix: DMatrix<f64>, keep: Keep, total: f64) -> Result<(Vec<f64>, Ve
         }
         described += value;
         squares.push(value);
-        vectors.push(found.eigenvectors.column(at).iter().copied().collect());
+        let mut vector = vec![0.0; count];
+        there.iter().zip(found.eigenvectors.column(at).iter()).for_each(|(&at, &value)| vector[at] = value);
+        vectors.push(vector);
     }
     Ok((squares, vectors))
 }
@@ -527,5 +532,31 @@ mod tests {
         wrong(&[1.0, f32::NAN], 2, &[1.0], "NaN is not finite");
         wrong(&[1.0, 2.0], 2, &[-1.0], "-1 is no weight");
         assert!(Moments::new(2).merge(&Moments::new(3)).is_err());
+    }
+
+    #[test]
+    fn dimensions_without_values_do_not_harm() {
+        let hash = |a: usize, b: usize| (a * 7919 + b * 104_729 + a * b * 31) % 1009;
+        for used in [1, 2, 5, 20] {
+            for seed in 0..20 {
+                let value = |row: usize, at: usize| match at % (146 / used) == seed % (146 / used)
+                    && hash(row + seed, at) < 300
+                {
+                    true => hash(at, row) as f64 / 1009.0,
+                    false => 0.0,
+                };
+                let rows = rows(57, 146, value);
+                let basis = basis(&rows, 146, &[1.0; 57], Centre::Origin, Keep::Count(146)).unwrap();
+                let mut moments = Moments::new(146);
+                moments.add(&rows, &[1.0; 57]).unwrap();
+                for basis in [basis, moments.basis(Centre::Origin, Keep::Count(146)).unwrap()] {
+                    for row in rows.chunks(146) {
+                        let back = basis.restore(&basis.project(row));
+                        let near = |(a, b): (&f32, &f64)| (f64::from(*a) - b).abs() < 1e-6;
+                        assert!(row.iter().zip(&back).all(near), "{used} dimensions, seed {seed}");
+                    }
+                }
+            }
+        }
     }
 }

@@ -117,7 +117,8 @@ pub fn on_ground(things: &[Scene], ground: &Ground) -> Result<Scene> {
         let which = k % things.len();
         let (thing, fit) = (&things[which], &fits[which]);
         let foot = -fit.foot * fit.scale + Vec3::new(place.x, OVER * height - ground.sunk * fit.height, place.y);
-        stand(&mut out, thing, &bases[which], (k, k < things.len()), foot, fit.scale);
+        let local = Transform::Trs { translation: foot, rotation: Quat::IDENTITY, scale: Vec3::splat(fit.scale) };
+        stand(&mut out, thing, &bases[which], (k, k < things.len()), local);
     }
     cameras(&mut out, spread, height, size);
     out.environment = things.iter().find_map(|thing| thing.environment.clone());
@@ -129,7 +130,7 @@ pub fn on_ground(things: &[Scene], ground: &Ground) -> Result<Scene> {
 }
 
 /// The box around everything at rest.
-fn bounds(scene: &Scene) -> Aabb {
+pub(super) fn bounds(scene: &Scene) -> Aabb {
     let pose = Pose::rest(scene);
     let mut around = Aabb::EMPTY;
     for (index, node) in scene.nodes.iter().enumerate() {
@@ -164,13 +165,13 @@ fn places(count: u32, apart: f32) -> Vec<Vec2> {
 }
 
 /// Where the lists of a thing begin in the new scene.
-struct Base {
+pub(super) struct Base {
     mesh: u32,
     light: u32,
 }
 
 /// Adds meshes, materials, textures and lights of a thing.
-fn take(out: &mut Scene, thing: &Scene) -> Base {
+pub(super) fn take(out: &mut Scene, thing: &Scene) -> Base {
     let (texture, material) = (out.textures.len() as u32, out.materials.len() as u32);
     let base = Base { mesh: out.meshes.len() as u32, light: out.lights.len() as u32 };
     out.textures.extend_from_slice(&thing.textures);
@@ -196,9 +197,8 @@ fn take(out: &mut Scene, thing: &Scene) -> Base {
     base
 }
 
-/// Adds nodes, skins and animations of a copy of a thing.
-fn stand(out: &mut Scene, thing: &Scene, base: &Base, (number, first): (usize, bool), foot: Vec3, scale: f32) {
-    let local = Transform::Trs { translation: foot, rotation: Quat::IDENTITY, scale: Vec3::splat(scale) };
+/// Adds nodes, skins and animations of a copy of a thing. `local`: its place.
+pub(super) fn stand(out: &mut Scene, thing: &Scene, base: &Base, (number, first): (usize, bool), local: Transform) {
     let root = out.nodes.len() as u32;
     out.nodes.push(Node { name: format!("{} {}", thing.name, number + 1), local, ..Node::default() });
     let (node, skin) = (root + 1, out.skins.len() as u32);

@@ -2,6 +2,7 @@
 //!
 //! Right-handed, Y up, metres, linear Rec. 709. Cameras and lights look down −Z of their node. Nothing here knows Vulkan.
 
+pub mod added;
 pub mod animate;
 mod budget;
 pub mod bvh;
@@ -48,6 +49,8 @@ pub struct Scene {
     pub animations: Vec<Animation>,
     /// Light from infinity around the scene.
     pub environment: Option<Environment>,
+    /// Where the objects begin that were added at run time ([`added::add`]); `None`: there are none.
+    pub added: Option<added::Counts>,
     /// What the front end met and could not serve, or served by an approximation. Shown by `inspect` and at load.
     pub notes: Vec<Note>,
 }

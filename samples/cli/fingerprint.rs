@@ -21,6 +21,7 @@ pub fn scene(scene: &Scene) -> String {
         skins,
         animations,
         environment,
+        added: _,
         notes: _,
     } = scene;
     let mut mixer = Mixer(0x9E37_79B9_7F4A_7C15);

@@ -34,7 +34,7 @@ pub struct GroundOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub copies: Option<u32>,
 
-    /// Another scene, which alternates with the first one: a file, or a built-in scene or object (hare, queen, tree); may be given more
+    /// Another scene, which alternates with the first one: a file, or a built-in scene or object (hare, queen, tree, pot); may be given more
     /// than once
     #[arg(long, value_name = "SCENE", requires = "ground", help_heading = "Ground")]
     #[serde(skip_serializing_if = "Vec::is_empty")]

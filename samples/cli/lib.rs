@@ -1,5 +1,6 @@
 //! The code that the executables share: command line, settings, the loop over frames, output names, messages, exit codes.
 
+pub mod added;
 pub mod args;
 pub mod bake;
 pub mod camera;

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::{
+    added::Added,
     args::{Frames, MAX_FRAMES, MAX_SIDE, RenderArgs, Size},
     camera::CameraFile,
     config::SettingsArgs,
@@ -31,6 +32,9 @@ pub struct Record {
     /// The options of `--ground`, if it was given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ground: Option<GroundOptions>,
+    /// The added objects.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub add: Vec<Added>,
     /// Hash of the scene ([`crate::fingerprint::scene`]).
     pub fingerprint: String,
     pub width: u32,
@@ -90,6 +94,7 @@ impl Record {
             scene: stage.source.clone(),
             unit: args.scene.unit,
             ground: args.scene.ground.ground.then(|| args.scene.ground.options.clone()),
+            add: args.scene.add.clone(),
             fingerprint: stage.fingerprint.clone(),
             width: args.size.width,
             height: args.size.height,
@@ -155,7 +160,7 @@ impl Record {
         };
         let ground = GroundArgs { ground: self.ground.is_some(), options: self.ground.clone().unwrap_or_default() };
         Ok(StageArgs {
-            scene: SceneArgs { scene, builtin, unit: self.unit, ground },
+            scene: SceneArgs { scene, builtin, unit: self.unit, add: self.add.clone(), ground },
             size: Size { width: self.width, height: self.height },
             camera: None,
             time: self.time,
@@ -213,6 +218,12 @@ impl Record {
                 .flat_map(GroundOptions::files)
                 .map(|path| format!("{path:?}, and the files in its folder that it refers to")),
         );
+        list.extend(
+            self.add
+                .iter()
+                .filter_map(Added::file)
+                .map(|path| format!("{path:?}, and the files in its folder that it refers to")),
+        );
         let environment = self.environment.as_deref().map(Path::new);
         list.extend(environment.filter(|path| !source::is_built_in_environment(path)).map(|path| format!("{path:?}")));
         list
@@ -245,6 +256,7 @@ mod tests {
             scene: Source::File("-odd.obj".into()),
             unit: Some(0.01),
             ground: Some(GroundOptions { copies: Some(3), sunk: Some(-0.2), ..GroundOptions::default() }),
+            add: vec!["pot.glb@0,1,2".parse().unwrap()],
             fingerprint: "0".into(),
             width: 64,
             height: 48,
@@ -285,7 +297,9 @@ mod tests {
         // No option may write a file, or read a file that the record does not name.
         assert!(args.output.is_empty() && args.dump.is_none() && args.timings.is_none() && args.stage.camera.is_none());
         assert!(args.settings.file.is_none() && !args.overwrite && !args.json);
-        assert_eq!(again.files(), ["\"-odd.obj\", and the files in its folder that it refers to"]);
+        let with_folder = |name: &str| format!("{name:?}, and the files in its folder that it refers to");
+        assert_eq!(again.files(), [with_folder("-odd.obj"), with_folder("pot.glb")]);
+        assert_eq!(args.stage.scene.add, again.add);
         for (odd, place) in [
             (Record { width: 0, ..record.clone() }, "width"),
             (Record { height: MAX_SIDE + 1, ..record.clone() }, "height"),

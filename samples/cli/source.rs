@@ -8,9 +8,14 @@ use lucerna::{
 };
 use lucerna_scenes as builtin;
 
-use crate::{args::positive, ground::GroundArgs, record::Source};
+use crate::{
+    added::{self, Added},
+    args::positive,
+    ground::GroundArgs,
+    record::Source,
+};
 
-/// The options `SCENE`, `--builtin NAME` and `--unit`.
+/// The options `SCENE`, `--builtin NAME`, `--unit`, `--add`, and those of `--ground`.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct SceneArgs {
     /// Scene file: .gltf, .glb or .obj
@@ -25,18 +30,41 @@ pub struct SceneArgs {
     #[arg(long, value_name = "METRES", value_parser = positive, conflicts_with = "builtin")]
     pub unit: Option<f64>,
 
+    /// Add an object to the scene: X,Y,Z is the middle of its underside in metres, SCALE a factor on its size, TURN an angle about +Y in
+    /// degrees. FILE may be builtin:NAME. Its lights and cameras are left out. May be given more than once
+    #[arg(long, value_name = "FILE@X,Y,Z[,SCALE[,TURN]]")]
+    pub add: Vec<Added>,
+
     #[command(flatten)]
     pub ground: GroundArgs,
 }
 
 impl SceneArgs {
-    /// Reads the scene.
+    /// Reads the scene with the added objects.
+    ///
+    /// # Errors
+    /// As [`Self::open_alone`] and [`Self::add`].
+    pub fn open(&self) -> Result<(Scene, Source)> {
+        let (mut scene, source) = self.open_alone()?;
+        self.add(&mut scene)?;
+        Ok((scene, source))
+    }
+
+    /// Reads the scene without the added objects.
     ///
     /// # Errors
     /// As [`open`] and [`GroundArgs::place`].
-    pub fn open(&self) -> Result<(Scene, Source)> {
+    pub fn open_alone(&self) -> Result<(Scene, Source)> {
         let (scene, source) = open(self.scene.as_deref(), self.builtin.as_deref(), &in_unit(self.unit))?;
         Ok((self.ground.place(scene, self.unit)?, source))
+    }
+
+    /// Adds the objects.
+    ///
+    /// # Errors
+    /// As [`added::all`].
+    pub fn add(&self, scene: &mut Scene) -> Result<()> {
+        added::all(scene, &self.add, &in_unit(self.unit))
     }
 }
 

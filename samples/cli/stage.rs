@@ -86,7 +86,7 @@ impl Stage {
     /// # Errors
     /// `Input` for files that cannot be read, `Usage` for names that do not exist.
     pub fn open(args: &StageArgs) -> Result<Self> {
-        let (mut scene, source) = args.scene.open()?;
+        let (mut scene, source) = args.scene.open_alone()?;
         if scene.name.is_empty() {
             scene.name = "scene".into();
         }
@@ -95,9 +95,8 @@ impl Stage {
             scene.environment = Some(environment);
             scene.notes.extend(notes);
         }
-        let fingerprint = fingerprint::scene(&scene);
+        let mut fingerprint = fingerprint::scene(&scene);
         lights::light(&mut scene, &args.light, args.sun.as_ref(), args.default_light);
-        let extents = Extents::of(&scene);
         let named_file = || {
             args.camera.as_deref().is_some_and(|asked| {
                 Path::new(asked).is_file() || camera::in_list(asked).is_some_and(|(file, _)| Path::new(file).is_file())
@@ -110,6 +109,12 @@ impl Stage {
         if !from_file {
             framing::add_missing_camera(&mut scene, args.size.aspect());
         }
+        // After lights and cameras, so that both are the same with and without the added objects.
+        if !args.scene.add.is_empty() {
+            args.scene.add(&mut scene)?;
+            fingerprint = fingerprint::scene(&scene);
+        }
+        let extents = Extents::of(&scene);
         let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
         let choice = match (&args.eye, &args.camera) {
             (Some(Eye { view: record::View::File(file), .. }), _) => Choice::File(file.clone()),

@@ -6,6 +6,7 @@ mod tree;
 use super::{
     environments,
     kit::{Geometry, Model, Stage, blend, lathe, round_cone, srgb, surface_net},
+    teapot,
 };
 use glam::{Vec2, Vec3, vec2, vec3};
 use lucerna::scene::{Material, Scene};
@@ -17,7 +18,7 @@ pub(super) struct Thing {
     add: fn(&mut Stage) -> u32,
 }
 
-pub(super) const THINGS: [Thing; 3] = [
+pub(super) const THINGS: [Thing; 4] = [
     Thing { name: "hare", description: "A sitting hare, 0.8 m high", add: add_hare },
     Thing { name: "queen", description: "A chess queen, 1 m high: a surface of revolution", add: add_queen },
     Thing {
@@ -25,6 +26,7 @@ pub(super) const THINGS: [Thing; 3] = [
         description: "A tree of about 20 000 vertices, 1.7 m high: leaves are triangles",
         add: add_tree,
     },
+    Thing { name: "pot", description: "The Utah teapot alone, 19 cm high", add: teapot::pot },
 ];
 
 /// One of [`THINGS`] as a scene.

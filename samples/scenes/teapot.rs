@@ -21,9 +21,7 @@ pub(super) fn build() -> Scene {
     room(&mut stage);
     table(&mut stage);
 
-    let glaze =
-        stage.material(Material { double_sided: true, roughness: 0.16, ..Material::diffuse("glaze", srgb(0xe9e4d8)) });
-    let pot = stage.mesh("teapot", Model::of(glaze, patches::tessellate(STEPS, SCALE)));
+    let pot = pot(&mut stage);
     stage.place("teapot", pot, placed(vec3(-0.04, TABLE + 0.006, -0.08), 22.0));
     still_life(&mut stage);
 
@@ -43,6 +41,13 @@ pub(super) fn build() -> Scene {
     stage.camera("above", [-0.15, 1.5, 0.55], [-0.01, 0.76, 0.0], 36.0);
     stage.camera("lid", [0.1, 1.09, 0.26], [-0.03, 0.87, -0.08], 44.0);
     stage.finish()
+}
+
+/// The teapot alone.
+pub(super) fn pot(stage: &mut Stage) -> u32 {
+    let glaze =
+        stage.material(Material { double_sided: true, roughness: 0.16, ..Material::diffuse("glaze", srgb(0xe9e4d8)) });
+    stage.mesh("teapot", Model::of(glaze, patches::tessellate(STEPS, SCALE)))
 }
 
 fn room(stage: &mut Stage) {

@@ -50,6 +50,15 @@ struct DaySpot {
     vec3 shading;  // shading normal, unit
 };
 
+// The distance of a path of a probe that leaves the scene at once, metres.
+const float DAY_FAR = 1e30; // export
+
+// The first part of a path of a probe.
+struct DayStart {
+    vec3 direction;  // unit
+    float distance;  // to the first surface, metres; negative: the path hits the inside of a solid
+};
+
 // Number of the sky's patch in a unit direction. Rows of 30, 30, 24, 24, 18, 12 and 6 patches, 12 degrees high, and one around the zenith. The
 // first patch of a row is around -z; azimuth grows towards +x. Twin: techniques::daylight::patch::patch_of.
 uint sky_patch(vec3 direction) {

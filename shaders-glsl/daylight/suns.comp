@@ -20,6 +20,8 @@ layout(binding = 11, scalar) readonly buffer Counts { uint counts[]; };
 // shows the noise.
 layout(binding = 12, scalar) buffer Sums { vec3 sums[]; };
 
+#include "daylight/sun.glsl"
+
 layout(push_constant, scalar) uniform Push {
     uint first;    // sample of this batch
     uint count;
@@ -35,17 +37,7 @@ void main() {
     for (uint i = first; i < first + count; ++i) {
         uint path = receiver * settings.samples + i;
         uint number = settings.first_sample + i;
-        vec3 of_path = vec3(0.0);
-        for (uint k = 0u; k < counts[path]; ++k) {
-            DayVertex vertex = vertices[path * DAY_VERTICES + k];
-            uvec4 hash = pcg4d(uvec4(settings.first_receiver + receiver, number, k, settings.seed ^ 0x5bd1e995u));
-            // The same place on the disc at all times.
-            vec2 disc = settings.sun_radius * sample_disc(unit_floats(hash.xy));
-            vec3 direction = normalize(sun + around[0] * disc.x + around[1] * disc.y);
-            float cosine = dot(vertex.normal, direction);
-            if (cosine <= 0.0 || dot(vertex.geometric, direction) <= 0.0) continue;
-            if (!trace_any(Ray(vertex.position, 0.0, direction, 1e30), TRACE_SHADOW, hash.z)) of_path += vertex.weight * cosine;
-        }
+        vec3 of_path = day_sun(path, settings.first_receiver + receiver, number, sun, around);
         if ((number & 1u) != 0u) odd += of_path;
         else even += of_path;
     }

@@ -13,6 +13,7 @@ struct DaySurface {
     float gap;
     bool thin;
     bool unlit;
+    bool inside;     // the ray hits the back of a surface that has only one side
 };
 
 // The surface at a hit, seen along `toward` (unit). `smooth_only`: without the normal map.
@@ -27,6 +28,7 @@ DaySurface day_surface(uint instance, uint triangle, vec2 barycentrics, vec3 tow
     s.side = front ? geometric : -geometric;
     s.gap = surface_gap(point);
     s.thin = (flags & MATERIAL_DOUBLE_SIDED) != 0u;
+    s.inside = !front && !s.thin;
     s.unlit = (flags & MATERIAL_UNLIT) != 0u;
     vec4 base = MATERIAL_AT(material).base_color * surface_color(instance, point);
     float metallic = MATERIAL_AT(material).metallic;

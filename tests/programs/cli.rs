@@ -5,6 +5,8 @@ mod fault;
 #[path = "../cli/support.rs"]
 mod support;
 
+#[path = "../cli/added.rs"]
+mod added;
 #[path = "../cli/bake.rs"]
 mod bake;
 #[path = "../cli/compare.rs"]

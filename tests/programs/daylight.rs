@@ -7,5 +7,7 @@ mod tracer_lab;
 mod daylight_day;
 #[path = "../daylight_light.rs"]
 mod daylight_light;
+#[path = "../daylight_probes.rs"]
+mod daylight_probes;
 #[path = "../daylight_sky.rs"]
 mod daylight_sky;

@@ -85,6 +85,7 @@ pub(crate) fn read(path: &Path, bytes: &[u8], limits: &Limits) -> Result<Scene> 
         skins,
         animations,
         environment: None,
+        added: None,
         notes: notes.finish(),
     })
 }

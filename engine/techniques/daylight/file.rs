@@ -7,6 +7,7 @@
 //! | 4 | bytes of the header |
 //! | … | header: JSON, the [`Plan`] and the bytes of each tile |
 //! | … | the tiles, one after the other ([`Tile::encode`]) |
+//! | … | the bricks of probes, one after the other ([`Brick::encode`]) |
 //! | … | for lightmaps: the corners of all triangles, six numbers of 16 bits each, in sixteenths of a texel |
 //! | 32 | BLAKE3 digest of all bytes before |
 //!
@@ -16,7 +17,12 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Plan, finish, units, units::Tile};
+use super::{
+    Plan, finish,
+    probes::{self, Brick},
+    units,
+    units::Tile,
+};
 use crate::{
     Error, ErrorKind, Result,
     bake::{Digest, Store},
@@ -38,6 +44,8 @@ pub struct Stored {
     pub plan: Plan,
     /// Row after row.
     pub tiles: Vec<Tile>,
+    /// The bricks of probes; empty if the plan has no probes.
+    pub probes: Vec<Brick>,
     /// The lightmap's place of each triangle ([`Lightmap::corners`](super::lightmap::Lightmap::corners)); empty for other bakes.
     pub corners: Vec<[u16; 6]>,
 }
@@ -48,6 +56,9 @@ struct Header {
     plan: Plan,
     /// Bytes of each tile.
     tiles: Vec<u64>,
+    /// Bytes of each brick of probes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    probes: Vec<u64>,
     /// Number of triangles with corners.
     triangles: u64,
 }
@@ -99,13 +110,13 @@ impl Stored {
             .map_err(|error| wrong("has a plan that cannot be read".into()).caused_by(error))?;
         plan.validate().map_err(|error| wrong(format!("has an impossible plan: {error}")))?;
         plan.check_corners(&corners).map_err(|error| error.in_file(store.folder()))?;
-        let [columns, rows] = plan.tiles();
-        if job.units().count() as u64 != u64::from(columns) * u64::from(rows) {
-            return Err(wrong("has another number of units than its plan has tiles".into()));
+        if job.units().count() as u64 != u64::from(plan.tile_count()) + u64::from(plan.brick_count()) {
+            return Err(wrong("has another number of units than its plan has tiles and bricks of probes".into()));
         }
         let gathered = units::read(store, &plan)?;
         let tiles = finish::tiles(&plan, &gathered, told)?;
-        Ok(Self { plan, tiles, corners })
+        let probes = units::read_bricks(store, &plan)?;
+        Ok(Self { plan, tiles, probes, corners })
     }
 
     /// The bytes of a file. Equal bakes give equal bytes.
@@ -114,9 +125,12 @@ impl Stored {
     /// `Runtime` if the header cannot be written.
     pub fn encode(&self) -> Result<Vec<u8>> {
         let tiles: Vec<Vec<u8>> = self.tiles.iter().map(Tile::encode).collect();
+        let probes: Vec<Vec<u8>> = self.probes.iter().map(Brick::encode).collect();
+        let lengths = |list: &[Vec<u8>]| list.iter().map(|bytes| bytes.len() as u64).collect();
         let header = Header {
             plan: self.plan.clone(),
-            tiles: tiles.iter().map(|tile| tile.len() as u64).collect(),
+            tiles: lengths(&tiles),
+            probes: lengths(&probes),
             triangles: self.corners.len() as u64,
         };
         let header = serde_json::to_vec(&header).map_err(|error| {
@@ -127,7 +141,7 @@ impl Stored {
         out.extend_from_slice(&VERSION.to_le_bytes());
         out.extend_from_slice(&(header.len() as u32).to_le_bytes());
         out.extend_from_slice(&header);
-        tiles.iter().for_each(|tile| out.extend_from_slice(tile));
+        tiles.iter().chain(&probes).for_each(|bytes| out.extend_from_slice(bytes));
         self.corners.iter().flatten().for_each(|number| out.extend_from_slice(&number.to_le_bytes()));
         let digest = Digest::of(&out);
         out.extend_from_slice(&digest.0);
@@ -163,7 +177,7 @@ impl Stored {
             let found = bytes.len();
             return Err(damaged(format!("is cut off: it has {found} bytes, and its header alone has {length}")));
         };
-        let Header { plan, tiles: lengths, triangles } = serde_json::from_slice(header)
+        let Header { plan, tiles: lengths, probes: brick_lengths, triangles } = serde_json::from_slice(header)
             .map_err(|error| damaged("has a header that cannot be read".into()).caused_by(error))?;
         plan.validate().map_err(|error| damaged(format!("has an impossible plan: {error}")))?;
         let [columns, rows] = plan.tiles().map(u64::from);
@@ -171,8 +185,12 @@ impl Stored {
             let what = format!("has {} tiles; its plan has {columns}×{rows}", lengths.len());
             return Err(damaged(what));
         }
+        if brick_lengths.len() as u64 != u64::from(plan.brick_count()) {
+            let what = format!("has {} bricks of probes; its plan has {}", brick_lengths.len(), plan.brick_count());
+            return Err(damaged(what));
+        }
         let body = 16 + length;
-        let sum = lengths.iter().try_fold(body as u64, |sum, length| sum.checked_add(*length));
+        let sum = lengths.iter().chain(&brick_lengths).try_fold(body as u64, |sum, length| sum.checked_add(*length));
         let of_corners = triangles.checked_mul(12);
         let sum = sum.and_then(|sum| sum.checked_add(of_corners?));
         let whole = sum.and_then(|sum| sum.checked_add(DIGEST as u64));
@@ -195,12 +213,24 @@ impl Stored {
             tiles.push(decoded.map_err(|error| error.at(format!("tiles[{index}]")))?);
             rest = after;
         }
+        let mut probes = Vec::new();
+        for (index, length) in brick_lengths.iter().enumerate() {
+            let (brick, after) = rest.split_at(*length as usize);
+            let decoded = Brick::decode(brick, &plan, of_brick(&plan, index as u32));
+            probes.push(decoded.map_err(|error| error.at(format!("probes[{index}]")))?);
+            rest = after;
+        }
         let corners: Vec<[u16; 6]> = rest
             .chunks_exact(12)
             .map(|bytes| std::array::from_fn(|i| u16::from_le_bytes([bytes[2 * i], bytes[2 * i + 1]])))
             .collect();
         plan.check_corners(&corners).map_err(|error| damaged(error.to_string()))?;
-        Ok(Self { plan, tiles, corners })
+        Ok(Self { plan, tiles, probes, corners })
+    }
+
+    /// What the probes are within; `None` if there are none.
+    pub fn probe_summary(&self) -> Option<probes::Summary> {
+        self.plan.probes.as_ref().map(|grid| probes::summary(grid, &self.probes))
     }
 
     /// What the bake holds and what it is within.
@@ -246,6 +276,11 @@ impl Stored {
 
 fn relative(light: f64, square: f64, lines: f64) -> f64 {
     if light > 0.0 { (square / lines).sqrt() / (light / lines) } else { 0.0 }
+}
+
+/// Number of probes of a brick.
+fn of_brick(plan: &Plan, index: u32) -> usize {
+    plan.probes.as_ref().map_or(0, |grid| grid.brick(index).len())
 }
 
 /// Number of texels of a tile.

@@ -4,7 +4,7 @@ use std::{collections::HashMap, thread};
 
 use super::{
     Plan,
-    columns::{Columns, Measured},
+    columns::Measured,
     filter::Filter,
     gathered::Gathered,
     units::{self, Tile},
@@ -43,7 +43,7 @@ pub fn tiles(plan: &Plan, gathered: &[Gathered], mut told: impl FnMut(usize) -> 
 /// One tile.
 fn tile(plan: &Plan, gathered: &[Gathered], filter: Option<&Filter>, index: usize, skies: &[f32]) -> Result<Tile> {
     let dimensions = plan.dimensions();
-    let columns = [Columns::Dimensions, Columns::Mixtures(skies), Columns::Dimensions];
+    let columns = units::kinds(skies);
     let lit = &gathered[index];
     let mut layers = Vec::new();
     let near: Option<Vec<_>> =

@@ -5,6 +5,7 @@
 //! principal components, as many as the [tolerance](Baking::tolerance) needs. [`units`] makes the tiles units of a job, and [`Stored`] is the
 //! file. At run time [`Daylight`] draws direct light with shadow maps and adds the baked light of the time.
 
+mod added;
 pub mod atlas;
 pub mod beam;
 mod civil;
@@ -18,7 +19,9 @@ pub mod lamps;
 pub mod layer;
 pub mod lightmap;
 pub mod patch;
+mod pictures;
 mod plan;
+pub mod probes;
 mod settings;
 pub mod sky;
 mod technique;
@@ -29,7 +32,7 @@ pub use beam::Weather;
 pub use day::{Day, Place, Sun};
 pub use file::{Stored, Summary};
 pub use plan::{Calendar, Group, Kind, Lit, MOST_TIMES, Plan, digest, parts};
-pub use settings::{Baking, Interpolation, PictureSettings, Settings};
+pub use settings::{Added, Baking, Interpolation, PictureSettings, Settings};
 pub use sky::Sky;
 pub use technique::{Baked, Daylight, Mode};
 pub use transport::{Light, Sources, Transport};

@@ -3,7 +3,7 @@
 use glam::Mat4;
 use serde::{Deserialize, Serialize};
 
-use super::{Baking, Weather};
+use super::{Baking, Weather, probes::Grid};
 use crate::{
     Error, Result,
     bake::{Digest, Part},
@@ -86,6 +86,9 @@ pub struct Plan {
     pub receivers: Kind,
     /// Columns and rows of texels.
     pub extent: [u32; 2],
+    /// `None`: no probes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub probes: Option<Grid>,
     pub calendar: Calendar,
     /// Steps of the day, seconds: as asked for, with the dark ones.
     pub steps: u32,
@@ -113,6 +116,16 @@ impl Plan {
         [corner[0], corner[1], size[0], size[1]]
     }
 
+    /// Number of tiles; the units of a bake are the tiles and then the bricks of probes.
+    pub fn tile_count(&self) -> u32 {
+        self.tiles().iter().product()
+    }
+
+    /// Number of bricks of probes.
+    pub fn brick_count(&self) -> u32 {
+        self.probes.as_ref().map_or(0, Grid::bricks)
+    }
+
     /// Number of the first receiver of a tile in the whole bake.
     pub fn first_receiver(&self, index: u32) -> u32 {
         index.wrapping_mul(self.settings.tile * self.settings.tile)
@@ -128,6 +141,7 @@ impl Plan {
         if texels == 0 || texels > MOST_TEXELS {
             return wrong(format!("{}×{} texels; 1 to {MOST_TEXELS} are allowed", self.extent[0], self.extent[1]));
         }
+        self.probes.iter().try_for_each(|grid| grid.validate().map_err(|error| error.at("probes")))?;
         if self.times.len() > MOST_TIMES {
             return wrong(format!("{} times; at most {MOST_TIMES} are allowed", self.times.len()));
         }

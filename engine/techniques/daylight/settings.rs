@@ -57,6 +57,15 @@ pub struct Baking {
     /// Maximum side of a lightmap.
     #[schemars(range(min = 64, max = 4092), extend("x-unit" = "texels"))]
     pub lightmap: u32,
+    /// Distance between probes, which light objects that are added at run time; 0: no probes. It is larger where there would be too many.
+    #[schemars(range(min = 0, max = 1000), extend("x-unit" = "m"))]
+    pub probes: f32,
+    /// Maximum number of probes.
+    #[schemars(range(min = 8, max = 1_048_576))]
+    pub most_probes: u32,
+    /// Paths of each probe.
+    #[schemars(range(min = 2, max = 1_048_576))]
+    pub probe_samples: u32,
     /// Seed of all random numbers.
     pub seed: u32,
 }
@@ -81,6 +90,9 @@ impl Default for Baking {
             tile: 32,
             density: 8.0,
             lightmap: 4092,
+            probes: 2.0,
+            most_probes: 4096,
+            probe_samples: 256,
             seed: 0,
         }
     }
@@ -107,6 +119,17 @@ pub enum Interpolation {
     Nearest,
 }
 
+/// The indirect light of objects that are added at run time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Added {
+    /// From the probes around the point.
+    #[default]
+    Probes,
+    /// That of the surface behind the object at the same pixel, as in the paper; none before the sky.
+    Screen,
+}
+
 /// Settings of pictures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -119,6 +142,8 @@ pub struct Settings {
     pub minutes: f64,
     /// How the light between two steps of the day is found.
     pub interpolation: Interpolation,
+    /// The indirect light of objects that are added at run time.
+    pub added: Added,
     /// Haze of the air: 1 is clear mountain air, 10 is thick haze.
     #[schemars(range(min = 1, max = 10))]
     pub turbidity: f64,
@@ -147,6 +172,7 @@ impl Default for Settings {
             time: "12:00".into(),
             minutes: 5.0,
             interpolation: Interpolation::default(),
+            added: Added::default(),
             turbidity: weather.turbidity(),
             ground_albedo: weather.ground_albedo(),
             overcast: weather.overcast(),

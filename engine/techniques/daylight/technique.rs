@@ -4,9 +4,13 @@ use std::{path::PathBuf, sync::Arc};
 
 use glam::{Vec2, Vec3};
 
-use super::{Day, Group, Interpolation, PictureSettings, Settings, Sky, Stored, lamps, layer::Layer, lightmap};
+use super::{
+    Added, Day, Group, Interpolation, PictureSettings, Settings, Sky, Stored, added, lamps, lightmap,
+    pictures::{coefficients, fits, packed},
+    probes::{self, Field},
+};
 use crate::{
-    Error, ErrorKind, Result,
+    Error, Result,
     gpu::{Gpu, OwnedBuffer, OwnedImage},
     graph::{Cull, Depth, Draw, DrawCall, Format, Graph, Image, Load, Raster, Targets},
     passes::{
@@ -95,6 +99,9 @@ pub struct Daylight {
     tiles: OwnedBuffer,
     words: OwnedBuffer,
     places: Option<Places>,
+    /// The first node of the objects that the bake does not know.
+    added: Option<u32>,
+    probes: Option<Field>,
     /// The last sky, and the state that it shows.
     sky: Option<(OwnedImage, [f32; 7])>,
 }
@@ -232,25 +239,6 @@ impl Daylight {
             ..moment.handles.clone()
         })
     }
-
-    /// Coefficients of the images of all tiles.
-    fn coefficients(
-        &self,
-        weights: &[(usize, f32)],
-        sun: [f32; 3],
-        patches: &[[f32; 3]],
-        lamps: &[[f32; 3]],
-    ) -> Vec<[f32; 3]> {
-        let of_sun = |(time, weight): &(usize, f32)| (*time, sun.map(|channel| channel * weight));
-        let mut out = Vec::new();
-        for tile in &self.baked.stored.tiles {
-            out.extend(tile.sun.mix(weights.iter().map(of_sun)));
-            out.extend(tile.sky.mix(patches.iter().copied().enumerate()));
-            out.extend(tile.lamps.mix(lamps.iter().copied().enumerate()));
-        }
-        out.push([0.0; 3]);
-        out
-    }
 }
 
 /// The sky as a picture.
@@ -262,35 +250,6 @@ fn picture_of(sky: &Sky) -> Environment {
     };
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| texel(x, y))).collect();
     Environment { name: "sky".into(), width, height, pixels, rotation: 0.0, scale: 1.0 }
-}
-
-/// The tiles and their words on the device.
-fn packed(stored: &Stored) -> (Vec<types::DayTile>, Vec<u32>) {
-    let (mut tiles, mut words, mut first) = (Vec::new(), Vec::new(), 0);
-    for tile in &stored.tiles {
-        let mut entry = types::DayTile {
-            mask: words.len() as u32,
-            mask_words: tile.mask.len() as u32,
-            columns: stored.plan.tile(tiles.len() as u32)[2],
-            ..types::DayTile::default()
-        };
-        words.extend_from_slice(&tile.mask);
-        let mut before = 0;
-        for word in &tile.mask {
-            words.push(before);
-            before += word.count_ones();
-        }
-        for (which, layer) in tile.layers().into_iter().enumerate() {
-            let Layer { wide, narrow, .. } = *layer;
-            entry.first_word[which] = words.len() as u32;
-            (entry.wide[which], entry.narrow[which], entry.first[which]) = (wide, narrow, first);
-            words.extend_from_slice(&layer.words);
-            first += layer.images();
-        }
-        tiles.push(entry);
-    }
-    words.push(0);
-    (tiles, words)
 }
 
 /// Materials whose lamps burn as bright as their groups do. Emissive materials in no group stay as they are.
@@ -306,10 +265,13 @@ fn switched(materials: &[types::Material], groups: &[Group], burning: &[f32]) ->
     out
 }
 
-/// Light that a scene has and that is not in a bake.
-fn left_out(scene: &Scene, groups: &[Group]) -> Vec<Note> {
+/// Light that a scene has and that is not in a bake. `added`: there are objects that the bake does not know.
+fn left_out(scene: &Scene, groups: &[Group], added: bool) -> Vec<Note> {
     let note = |place: &str, text: &str| Note { kind: NoteKind::Ignored, place: place.into(), text: text.into() };
     let mut notes = Vec::new();
+    if added {
+        notes.push(note("--add", "the added objects block no indirect light and reflect none to the scene"));
+    }
     let off = |(number, light): (usize, &crate::scene::Light)| {
         light.intensity > 0.0 && !groups.iter().any(|group| group.lights.contains(&(number as u32)))
     };
@@ -366,28 +328,31 @@ impl Technique for Daylight {
             return Err(error.help("Bake it with `daylight bake SCENE -o FILE.day`, and name the file with --bake"));
         };
         let stored = &baked.stored;
-        if let Some(parts) = stored.plan.difference(scene) {
-            let what = format!("is the light of `{}`, and this scene has other {parts}", stored.plan.scene);
-            return Err(baked.blamed(Error::input(what).help("Name the scene that was baked, or bake this one")));
+        let base = scene.before_added();
+        let mut added = scene.added.map(|counts| counts.nodes as u32);
+        if let Some(parts) = stored.plan.difference(&base) {
+            // The bake may have been made with the added objects.
+            if added.take().is_none() || stored.plan.difference(scene).is_some() {
+                let what = format!("is the light of `{}`, and this scene has other {parts}", stored.plan.scene);
+                return Err(baked.blamed(Error::input(what).help("Name the scene that was baked, or bake this one")));
+            }
         }
+        let base = if added.is_some() { &*base } else { scene };
         let calendar = &stored.plan.calendar;
         let day = Day::new(&calendar.date, &calendar.zone, calendar.latitude, calendar.longitude)
             .map_err(|what| baked.blamed(Error::input(what)))?;
-        let (tiles, words) = packed(stored);
-        let most = gpu.caps().limits.storage_range;
-        if 4 * words.len() as u64 > most {
-            let what = format!("its images have {} bytes, the device allows {most} in one buffer", 4 * words.len());
-            return Err(baked
-                .blamed(Error::new(ErrorKind::Runtime, what))
-                .help("Bake fewer texels, or use another device"));
-        }
+        let columns = |index: usize| stored.plan.tile(index as u32)[2];
+        let (tiles, words) = packed(stored.tiles.iter().enumerate().map(|(index, tile)| (tile, columns(index))));
+        fits(gpu, &words).map_err(|error| baked.blamed(error.help("Bake fewer texels, or use another device")))?;
         Ok(Self {
             gpu: gpu.clone(),
             baked: baked.clone(),
             day,
             tiles: OwnedBuffer::with_contents(gpu, "daylight.tiles", bytemuck::cast_slice(&tiles))?,
             words: OwnedBuffer::with_contents(gpu, "daylight.words", bytemuck::cast_slice(&words))?,
-            places: Places::new(gpu, scene, baked)?,
+            places: Places::new(gpu, base, baked)?,
+            added,
+            probes: if added.is_some() { Field::new(gpu, stored).map_err(|error| baked.blamed(error))? } else { None },
             sky: None,
         })
     }
@@ -410,8 +375,8 @@ impl Technique for Daylight {
         let burning = lamps::burning(of_day, &plan.lamps, &self.day, seconds, elevation)?;
         let materials = switched(&moment.handles.material_table, &plan.lamps, &burning);
         let burning: Vec<[f32; 3]> = burning.into_iter().map(|share| [share; 3]).collect();
-        let coefficients = self.coefficients(&weights, light, &patches, &burning);
-        let left = left_out(moment.scene, &plan.lamps);
+        let coefficients = coefficients(self.baked.stored.tiles.iter(), &weights, light, &patches, &burning);
+        let left = left_out(moment.scene, &plan.lamps, self.added.is_some());
         let mut handles = self.relit(graph, moment, sun, light, &sky, of_day.strength)?;
         handles.materials = graph.buffer_from("daylight.materials", &materials);
         let view = &moment.view;
@@ -422,7 +387,21 @@ impl Technique for Daylight {
         let image = |graph: &mut Graph, name: &str| graph.image(name, Format::RGBA16F, view.extent);
         let [total, indirect, irradiance] =
             ["daylight", "daylight.indirect", "daylight.irradiance"].map(|name| image(graph, name));
-        let places = self.places.as_ref().map(|places| places.draw(graph, &handles, view, &gbuffer));
+        let of_probes = self.added.filter(|_| of_day.added == Added::Probes);
+        if of_probes.is_some() && self.probes.is_none() {
+            let error = Error::input("has no probes, which light the added objects");
+            return Err(self.baked.blamed(error.help(
+                "Bake with -D bake.probes=2, or take the light behind the objects with -D daylight.added=screen",
+            )));
+        }
+        // The surfaces behind the added objects.
+        let behind = self.added.filter(|_| of_day.added == Added::Screen && self.places.is_some()).map(|first| {
+            graph.scope("behind", |graph| {
+                gbuffer::draw(graph, &added::without(&handles, first), view, &settings.gbuffer)
+            })
+        });
+        let under = behind.as_ref().unwrap_or(&gbuffer);
+        let places = self.places.as_ref().map(|places| places.draw(graph, &handles, view, under));
         let args = decode::Args {
             places: places.unwrap_or(gbuffer.depth),
             spec: decode::Spec { lightmap: places.is_some().into() },
@@ -439,6 +418,14 @@ impl Technique for Daylight {
             push: decode::Push { side, columns, texels },
         };
         graph.compute(args, view.extent);
+        if let (Some(first), Some(field)) = (of_probes, &self.probes) {
+            let mask = added::mask(graph, &handles, view, &gbuffer, first);
+            let moment = probes::Moment { weights: &weights, sun: light, patches: &patches };
+            let tiles = self.baked.stored.probes.iter().map(|brick| &brick.light);
+            let light = field.decode(graph, tiles, moment);
+            let pixels = probes::Pixels { mask, direct: lit.direct, total, indirect, irradiance };
+            field.shine(graph, &gbuffer, view, light, &pixels);
+        }
         skybox::draw(graph, &handles, &gbuffer, Vec3::ZERO, total);
         skybox::draw(graph, &handles, &gbuffer, Vec3::ZERO, lit.direct);
         let shown = match moment.shot.mode {

@@ -35,13 +35,13 @@ const MOST_VERTICES: u64 = 1 << 22;
 /// The scene of a bake on a device.
 #[derive(Debug)]
 pub struct Transport {
-    gpu: Gpu,
-    runner: Runner,
-    scene: Scene,
-    pose: Pose,
-    resident: Resident,
-    rays: Rays,
-    suns: OwnedBuffer,
+    pub(super) gpu: Gpu,
+    pub(super) runner: Runner,
+    pub(super) scene: Scene,
+    pub(super) pose: Pose,
+    pub(super) resident: Resident,
+    pub(super) rays: Rays,
+    pub(super) suns: OwnedBuffer,
     /// The lamps that are sampled, made for the first tile.
     lamps: Option<LightTable>,
     /// The group of each light, and of each material.
@@ -312,7 +312,7 @@ fn with_lamps(scene: &Scene, groups: &[Group]) -> (Scene, Vec<u32>) {
     (scene, out)
 }
 
-fn settings(
+pub(super) fn settings(
     plan: &Plan,
     first_receiver: u32,
     [receivers, samples, first_sample]: [u32; 3],

@@ -4,10 +4,11 @@
 use half::f16;
 
 use super::{
-    Plan, Sky, Weather,
+    Plan, Sky, Transport, Weather,
     columns::{Columns, Measured},
     gathered::Gathered,
     layer::{Aim, Layer, factor},
+    probes::Brick,
     transport::Light,
 };
 use crate::{
@@ -64,7 +65,9 @@ pub fn job(plan: &Plan, device: &str, texels: Option<&[u64]>) -> Result<Job> {
         let texels = texels.map_or(columns * rows, |texels| texels.get(tile as usize).copied().unwrap_or(0));
         (texels * u64::from(plan.settings.samples)).max(1)
     };
-    let costs = (0..columns * rows).map(cost).collect();
+    let probes = |brick: u32| plan.probes.as_ref().map_or(0, |grid| grid.brick(brick).len() as u64);
+    let of_brick = |brick: u32| (probes(brick) * u64::from(plan.settings.probe_samples)).max(1);
+    let costs = (0..columns * rows).map(cost).chain((0..plan.brick_count()).map(of_brick)).collect();
     Ok(Job::new(key, vec![Stage::new("tiles", costs)])?.about(about))
 }
 
@@ -87,29 +90,76 @@ pub fn skies(plan: &Plan) -> Result<Vec<f32>> {
     Ok(rows)
 }
 
-/// The bytes of a unit: the light of a tile with its noise.
+/// The bytes of a unit: the light of a tile with its noise, or a brick of probes.
+///
+/// # Errors
+/// As [`Transport::tile`] and [`Gathered::new`].
+pub fn unit(plan: &Plan, transport: &mut Transport, index: u32, skies: &[f32]) -> Result<Vec<u8>> {
+    match index.checked_sub(plan.tile_count()) {
+        Some(brick) => Ok(Brick::compress(plan, transport.brick(plan, brick)?, skies)?.encode()),
+        None => Ok(gathered(plan, &transport.tile(plan, index)?, skies)?.encode()),
+    }
+}
+
+/// The light of a tile with its noise.
 ///
 /// # Errors
 /// As [`Gathered::new`].
 pub fn gathered(plan: &Plan, light: &Light, skies: &[f32]) -> Result<Gathered> {
-    let columns = [Columns::Dimensions, Columns::Mixtures(skies), Columns::Dimensions];
-    Gathered::new(light, plan.dimensions(), columns, plan.settings.tolerance)
+    Gathered::new(light, plan.dimensions(), kinds(skies), plan.settings.tolerance)
 }
 
-/// Reads all units of a job, in order.
+/// The columns of the three kinds of light that are within the tolerance.
+pub(super) fn kinds(skies: &[f32]) -> [Columns<'_>; 3] {
+    [Columns::Dimensions, Columns::Mixtures(skies), Columns::Dimensions]
+}
+
+/// Reads all tiles of a job, in order.
 ///
 /// # Errors
 /// `Input`, naming the file, if one is missing or damaged.
 pub fn read(store: &Store, plan: &Plan) -> Result<Vec<Gathered>> {
-    let read = |unit: UnitId| {
-        let payload = store.open_unit(unit)?;
-        payload.verify()?;
-        let [_, _, columns, rows] = plan.tile(unit.index);
+    let tile = |index: u32| {
+        let [_, _, columns, rows] = plan.tile(index);
         let texels = columns as usize * rows as usize;
-        let again = |error: Error| error.in_file(store.path(unit)).help("Remove the file, and it is made anew");
-        Gathered::decode(&payload.bytes()?, texels, plan.dimensions()).map_err(again)
+        opened(store, index, |bytes| Gathered::decode(bytes, texels, plan.dimensions()))
     };
-    store.job().units().map(read).collect()
+    (0..plan.tile_count()).map(tile).collect()
+}
+
+/// Reads all bricks of probes of a job, in order.
+///
+/// # Errors
+/// `Input`, naming the file, if one is missing or damaged.
+pub fn read_bricks(store: &Store, plan: &Plan) -> Result<Vec<Brick>> {
+    let probes = |brick: u32| plan.probes.as_ref().map_or(0, |grid| grid.brick(brick).len());
+    let brick =
+        |brick: u32| opened(store, plan.tile_count() + brick, |bytes| Brick::decode(bytes, plan, probes(brick)));
+    (0..plan.brick_count()).map(brick).collect()
+}
+
+fn opened<T>(store: &Store, index: u32, decode: impl Fn(&[u8]) -> Result<T>) -> Result<T> {
+    let unit = UnitId { stage: 0, index };
+    let payload = store.open_unit(unit)?;
+    payload.verify()?;
+    let again = |error: Error| error.in_file(store.path(unit)).help("Remove the file, and it is made anew");
+    decode(&payload.bytes()?).map_err(again)
+}
+
+/// Compresses light as it was gathered, without a filter.
+///
+/// # Errors
+/// As [`Layer::compress`].
+pub fn compress(plan: &Plan, light: &Light, skies: &[f32]) -> Result<Tile> {
+    let measured = light.measured(plan.dimensions()).map(|light| match plan.settings.noise_floor {
+        true => light,
+        false => Measured { noise: &[], ..light },
+    });
+    let columns = kinds(skies);
+    let sun = layer(plan, measured[0], columns[0])?;
+    let (sky, lamps) = (layer(plan, measured[1], columns[1])?, layer(plan, measured[2], columns[2])?);
+    let errors = errors(&sun, measured[0]);
+    Ok(Tile { sun, sky, lamps, mask: light.mask.clone(), light: errors })
 }
 
 /// One kind of light of a tile, compressed within the tolerance of a plan.

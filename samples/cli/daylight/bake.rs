@@ -112,6 +112,20 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
     if plan.times.is_empty() {
         console.info("note: the sun does not rise on this day; the bake holds the light of the sky alone");
     }
+    if let Some(grid) = &plan.probes {
+        let ([x, y, z], [across, up, along]) = (grid.counts, grid.spacing);
+        console.info(&format!(
+            "{x}×{y}×{z} probes, {across:.2} m, {up:.2} m and {along:.2} m apart, {} paths per probe",
+            plan.settings.probe_samples
+        ));
+        let most = across.max(up).max(along);
+        if most > 1.01 * plan.settings.probes {
+            console.info(&format!(
+                "note: bake.most_probes = {} allows no smaller distance; --probe-box limits them to a part of the scene",
+                plan.settings.most_probes
+            ));
+        }
+    }
     let raw = 6 * texels * plan.times.len() as u64;
     console.info(&format!("all frames as 16-bit floats would have {raw} bytes"));
     let about = gpu.describe();
@@ -125,8 +139,7 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
     let mut transport = Transport::new(&gpu, &stage.scene, &plan, sources)?;
     let skies = units::skies(&plan)?;
     let unit = |unit: lucerna::bake::UnitId, _: lucerna::bake::Needed<'_>| {
-        let light = transport.tile(&plan, unit.index)?;
-        Ok(units::gathered(&plan, &light, &skies)?.encode())
+        units::unit(&plan, &mut transport, unit.index, &skies)
     };
     let (units_args, what) = (&args.units, "paths");
     let work =
@@ -147,7 +160,9 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
             drop(saving);
             units_of::remove(store, console)?;
             let summary = stored.summary();
-            info::lines(&summary).iter().for_each(|line| console.info(line));
+            let of_probes = stored.probe_summary();
+            let lines = info::lines(&summary).into_iter().chain(of_probes.as_ref().map(info::probe_line));
+            lines.for_each(|line| console.info(&line));
             // The tolerance is checked before the error is rounded to 32 bits.
             if summary.worst_tile > 1.0001 * plan.settings.tolerance && plan.settings.images > 0 {
                 console.warning(&format!(

@@ -4,7 +4,7 @@ use std::{path::PathBuf, process::ExitCode};
 
 use lucerna::{
     Result,
-    techniques::daylight::{Kind, Stored, Summary},
+    techniques::daylight::{Kind, Stored, Summary, probes},
 };
 use serde_json::json;
 
@@ -40,6 +40,7 @@ pub fn info(args: &DayInfoArgs, _: Console) -> Result<ExitCode> {
             "file": args.file,
             "plan": console::to_json(&stored.plan)?,
             "summary": console::to_json(&summary)?,
+            "probes": stored.probe_summary().as_ref().map(console::to_json).transpose()?,
         }))?;
         return Ok(ExitCode::SUCCESS);
     }
@@ -62,7 +63,19 @@ pub fn info(args: &DayInfoArgs, _: Console) -> Result<ExitCode> {
     ))?;
     console::print(&format!("paths      {} per texel, {} scatterings", plan.settings.samples, plan.settings.bounces))?;
     lines(&summary).iter().try_for_each(|line| console::print(line))?;
+    stored.probe_summary().iter().try_for_each(|summary| console::print(&probe_line(summary)))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The sizes and the errors of the probes, for people.
+pub fn probe_line(summary: &probes::Summary) -> String {
+    let probes::Summary { probes, valid, spacing: [x, y, z], bytes, images, worst, noise } = summary;
+    format!(
+        "probes     {probes} every {x:.2}×{y:.2}×{z:.2} m, {} of them inside solids; {bytes} bytes, {images:.1} images per brick, worst step {:.1} %, noise {:.1} %",
+        probes - valid,
+        100.0 * worst,
+        100.0 * noise
+    )
 }
 
 /// The sizes and the errors of a bake, for people.

@@ -1,10 +1,14 @@
 //! The plan of a bake: the day, the surfaces, and their texels.
 
+use std::str::FromStr;
+
+use glam::Vec3;
 use lucerna::{
     Error, Result,
-    scene::Scene,
+    scene::{Aabb, Scene},
     techniques::daylight::{
         Baking, Calendar, Day, Kind, Lit, MOST_TIMES, Plan, Sources, Weather, digest, lamps, lightmap, parts,
+        probes::Grid,
     },
 };
 
@@ -44,6 +48,28 @@ pub struct DayOptions {
     /// Bake no lamps
     #[arg(long, conflicts_with = "lamp", help_heading = "Bake")]
     pub no_lamps: bool,
+
+    /// The box in which probes stand, two opposite corners in metres [default: the box around the scene]
+    #[arg(long, value_name = "X,Y,Z,X,Y,Z", allow_hyphen_values = true, help_heading = "Bake")]
+    pub probe_box: Option<Corners>,
+}
+
+/// A box: two opposite corners, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Corners(Aabb);
+
+impl FromStr for Corners {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let wrong = || "expected X,Y,Z,X,Y,Z: two opposite corners of a box that is not flat, metres".to_owned();
+        let one = |word: &str| word.trim().parse().ok().filter(|number: &f32| number.is_finite());
+        let numbers: Vec<f32> = text.split(',').map(|word| one(word).ok_or_else(wrong)).collect::<Result<_, _>>()?;
+        let [a, b, c, d, e, f] = numbers[..] else { return Err(wrong()) };
+        let (from, to) = (Vec3::new(a, b, c), Vec3::new(d, e, f));
+        let around = Aabb { min: from.min(to), max: from.max(to) };
+        if (around.max - around.min).min_element() > 0.0 { Ok(Self(around)) } else { Err(wrong()) }
+    }
 }
 
 /// The surfaces that a bake holds light for.
@@ -102,11 +128,23 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
             (receivers, unwrapped.lightmap.extent, sources, corners, unwrapped.notes)
         }
     };
+    let probes = match (baking.probes > 0.0, options.probe_box) {
+        (true, given) => {
+            let around = given.map(|corners| corners.0).or_else(|| Grid::around(scene, baking.probes));
+            around.map(|around| Grid::new(&around, baking.probes, baking.most_probes))
+        }
+        (false, Some(_)) => {
+            let error = Error::usage("a box for probes, and bake.probes is 0").at("--probe-box");
+            return Err(error.help("Give a distance with -D bake.probes=1, or leave the box out"));
+        }
+        (false, None) => None,
+    };
     let plan = Plan {
         scene: scene.name.clone(),
         parts: parts(scene),
         receivers,
         extent,
+        probes,
         calendar: Calendar {
             date: options.date.clone(),
             zone: options.timezone.clone(),

@@ -12,7 +12,7 @@ const PATHS: u64 = 10_000_000_000;
 const RAYS: u64 = 100_000_000_000;
 /// Maximum of rendered pixels, if the file's size does not tell their number.
 const PIXELS: u64 = 1 << 24;
-/// Maximum of added lights, and of further objects on a ground.
+/// Maximum of added lights, of added objects, and of further objects on a ground.
 const THINGS: u64 = 256;
 
 /// Returns an error if the picture needs more than `allowed` of something.
@@ -51,6 +51,7 @@ pub fn check(record: &Record, extent: [u32; 2], long: bool) -> Result<()> {
     let samples = record.settings["samples"].as_u64().unwrap_or(1);
     over("settings.samples", samples.saturating_mul(pixels), PATHS, "paths")?;
     over("light", record.light.len() as u64, THINGS, "lights")?;
+    over("add", record.add.len() as u64, THINGS, "objects")?;
     let beside = record.ground.as_ref().map_or(0, |ground| ground.beside.len());
     over("ground.beside", beside as u64, THINGS, "objects")
 }
