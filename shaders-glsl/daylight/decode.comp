@@ -5,7 +5,9 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/gbuffer.glsl"
 #include "lib/scene.glsl"
+#include "lib/view.glsl"
 #include "daylight/tiles.glsl"
+#include "daylight/cube.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -17,9 +19,11 @@ layout(binding = 5, rgba16f) uniform writeonly image2D total;
 layout(binding = 6, rgba16f) uniform writeonly image2D indirect;
 layout(binding = 7, rgba16f) uniform writeonly image2D irradiance;
 layout(binding = 8) uniform sampler2D places;         // in the lightmap, texels
+layout(binding = 9, scalar) uniform ViewBlock { View view; };
+layout(binding = 10) uniform sampler2D normal;
+layout(binding = 11, scalar) readonly buffer Around { CubeTexel around[]; };  // row after row, of the faces beside each other
 
-// 0: texels are pixels. 1: texels are those of a lightmap.
-layout(constant_id = 0) const uint LIGHTMAP = 0u;
+layout(constant_id = 0) const uint TEXELS_OF = DAY_VIEW;
 
 layout(push_constant, scalar) uniform Push {
     uint side;     // of a tile, texels
@@ -50,6 +54,34 @@ vec3 lightmap_light(vec2 place) {
     return sum.a > 0.0 ? sum.rgb / sum.a : vec3(0.0);
 }
 
+// Bilinear between the texels of the faces in the direction of the pixel, where they show its surface: those of other surfaces count only if there
+// are no better ones.
+vec3 cube_light(ivec2 pixel) {
+    vec2 uv = (vec2(pixel) + 0.5) / view.extent;
+    vec3 seen = world_from_depth(view, uv, texelFetch(depth, pixel, 0).r) - view.position;
+    vec3 n = decode_normal(texelFetch(normal, pixel, 0));
+    uint n_texels = texels.y;
+    vec2 place;
+    uint face = day_cube_face(seen, place);
+    vec2 at = place * float(n_texels) - 0.5;
+    vec2 f = at - floor(at);
+    float texel_size = 2.0 * length(seen) / float(n_texels);
+    vec4 sum = vec4(0.0);
+    for (uint i = 0u; i < 4u; ++i) {
+        uvec2 step = uvec2(i & 1u, i >> 1u);
+        uvec3 texel;
+        if (!day_cube_texel(face, ivec2(floor(at)) + ivec2(step), n_texels, texel)) continue;
+        CubeTexel there = around[texel.y * texels.x + texel.z * n_texels + texel.x];
+        if (there.depth <= 0.0) continue;
+        vec2 centre = (vec2(texel.xy) + 0.5) / float(n_texels);
+        float off = dot(n, there.depth * day_cube_direction(texel.z, centre) - seen) / texel_size;
+        float alike = exp(-2.0 * off * off) * pow(max(dot(n, octahedral_decode(unpackSnorm2x16(there.normal))), 0.0), 4.0);
+        float weight = (step.x == 1u ? f.x : 1.0 - f.x) * (step.y == 1u ? f.y : 1.0 - f.y);
+        if (weight > 0.0) sum += weight * max(alike, 1e-4) * texel_light(uvec2(texel.z * n_texels + texel.x, texel.y));
+    }
+    return sum.a > 0.0 ? sum.rgb / sum.a : vec3(0.0);
+}
+
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(total)))) return;
@@ -61,8 +93,10 @@ void main() {
         return;
     }
     vec3 e = vec3(0.0);
-    if (LIGHTMAP == 0u) {
+    if (TEXELS_OF == DAY_VIEW) {
         e = texel_light(uvec2(pixel)).rgb;
+    } else if (TEXELS_OF == DAY_CUBE) {
+        e = cube_light(pixel);
     } else {
         vec2 place = texelFetch(places, pixel, 0).xy;
         if (place.x >= 0.0) e = lightmap_light(place);

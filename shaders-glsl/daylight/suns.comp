@@ -13,7 +13,8 @@
 layout(local_size_x = 64) in;
 
 layout(binding = 0, scalar) uniform SettingsBlock { DaySettings settings; };
-layout(binding = 1, scalar) readonly buffer Suns { vec3 suns[]; };      // unit, towards the sun
+// Unit vector towards the sun and 0, or the place of a sun that is a point, and its squared distance from the centre of its path.
+layout(binding = 1, scalar) readonly buffer Suns { vec4 suns[]; };
 layout(binding = 9, scalar) readonly buffer Vertices { DayVertex vertices[]; };
 layout(binding = 11, scalar) readonly buffer Counts { uint counts[]; };
 // Sums of irradiance for a sun of 1 W/m² at normal incidence: time after time for each receiver. Odd and even samples apart: their difference
@@ -29,8 +30,8 @@ void main() {
     uint time = gl_GlobalInvocationID.x;
     uint receiver = gl_WorkGroupID.y;
     if (time >= settings.times) return;
-    vec3 sun = suns[time];
-    mat3 around = frame_around(sun);
+    vec4 sun = suns[time];
+    mat3 around = frame_around(sun.w > 0.0 ? vec3(0.0, 1.0, 0.0) : sun.xyz);
     vec3 odd = vec3(0.0), even = vec3(0.0);
     for (uint i = first; i < first + count; ++i) {
         uint path = receiver * settings.samples + i;
@@ -41,10 +42,19 @@ void main() {
             uvec4 hash = pcg4d(uvec4(settings.first_receiver + receiver, number, k, settings.seed ^ 0x5bd1e995u));
             // The same place on the disc at all times.
             vec2 disc = settings.sun_radius * sample_disc(unit_floats(hash.xy));
-            vec3 direction = normalize(sun + around[0] * disc.x + around[1] * disc.y);
+            vec3 direction = normalize(sun.xyz + around[0] * disc.x + around[1] * disc.y);
+            float strength = 1.0;
+            float far = 1e30;
+            if (sun.w > 0.0) {
+                vec3 way = sun.xyz - vertex.position;
+                far = length(way);
+                direction = way / far;
+                strength = sun.w / (far * far);
+            }
             float cosine = dot(vertex.normal, direction);
             if (cosine <= 0.0 || dot(vertex.geometric, direction) <= 0.0) continue;
-            if (!trace_any(Ray(vertex.position, 0.0, direction, 1e30), TRACE_SHADOW, hash.z)) of_path += vertex.weight * cosine;
+            bool hidden = trace_any(Ray(vertex.position, 0.0, direction, far), TRACE_SHADOW, hash.z);
+            if (!hidden) of_path += vertex.weight * (strength * cosine);
         }
         if ((number & 1u) != 0u) odd += of_path;
         else even += of_path;

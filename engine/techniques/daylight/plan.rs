@@ -1,14 +1,17 @@
 //! All that decides the bytes of a bake: scene, receivers, times, settings.
 
-use glam::Mat4;
+use glam::{Mat4, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::{Baking, Weather};
+use super::{Adaptive, Baking, Comparison, Course, SunPath, Weather, cube};
 use crate::{
     Error, Result,
     bake::{Digest, Part},
-    scene::{LightKind, Scene, View},
-    shaders::consts::{DAY_VERTICES, SKY_PATCHES},
+    scene::{LightKind, Scene, View, cull::Aabb},
+    shaders::{
+        consts::{self, DAY_VERTICES, SKY_PATCHES},
+        types,
+    },
 };
 
 /// Times of a bake at most.
@@ -37,10 +40,19 @@ pub enum Kind {
         /// Digest of the corners of all triangles.
         corners: Digest,
     },
+    /// The surfaces around one point: six faces beside each other, for a camera that turns in place ([`super::cube`]).
+    Cube {
+        /// Name of the camera, for messages.
+        camera: String,
+        /// Metres.
+        position: [f32; 3],
+        /// Nearest distance along the axis of a face that is seen, metres.
+        near: f32,
+    },
 }
 
 /// The days and the place of a bake.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calendar {
     /// Year, month and day: `2026-06-21`.
@@ -53,6 +65,62 @@ pub struct Calendar {
     pub longitude: f64,
     /// Degrees from -Z to the north, clockwise as seen from above.
     pub north: f32,
+    /// A path from a file. Date, zone and place are then empty.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub path: Option<SunPath>,
+    /// The sun is a point near the scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub point: Option<SunPoint>,
+    /// First and last moment for which the bake has light, seconds after the begin of the day; `None`: the whole day.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub span: Option<[f64; 2]>,
+}
+
+/// A sun at a distance, as in the paper (section 3.1): a point light on a sphere around the scene. The paper does not say how its light falls
+/// off. Here it falls off with the square of the distance, and it has the irradiance of the sun at the centre of the sphere.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SunPoint {
+    /// Metres.
+    pub centre: [f32; 3],
+    /// From the centre, metres.
+    pub distance: f32,
+}
+
+impl SunPoint {
+    /// The place of the sun in a unit direction from the centre, metres.
+    pub fn position(&self, sun: [f32; 3]) -> [f32; 3] {
+        std::array::from_fn(|i| self.centre[i] + self.distance * sun[i])
+    }
+}
+
+impl Calendar {
+    /// The sun as a light: `sun` is the unit vector towards it, `light` its irradiance at normal incidence (at a distance: at the centre of its
+    /// path), W/m². `bounds`: of everything that it lights.
+    pub(super) fn light(&self, sun: Vec3, light: [f32; 3], bounds: &Aabb) -> types::Light {
+        let directional = types::Light {
+            kind: consts::LIGHT_DIRECTIONAL,
+            direction: (-sun).to_array(),
+            intensity: light,
+            spot_offset: 1.0,
+            ..types::Light::default()
+        };
+        let Some(point) = self.point else { return directional };
+        let position = Vec3::from(point.position(sun.to_array()));
+        // A spot light that lights everything evenly: its one shadow map has more texels on the scene than those of a light to all sides.
+        let cosine = |corner: Vec3| (corner - position).normalize_or(-sun).dot(-sun);
+        let least = bounds.corners().into_iter().map(cosine).fold(1.0, f32::min);
+        let (inner, outer) = (least - 1e-4, (1.05 * least.clamp(-1.0, 1.0).acos() + 0.02).min(3.0).cos());
+        let scale = 1.0 / (inner - outer).max(1e-4);
+        types::Light {
+            kind: consts::LIGHT_SPOT,
+            position: position.to_array(),
+            intensity: light.map(|channel| channel * point.distance * point.distance),
+            spot_scale: scale,
+            spot_offset: -outer * scale,
+            ..directional
+        }
+    }
 }
 
 /// A time of the day at which the sun shines.
@@ -125,10 +193,34 @@ impl Plan {
         if self.times.windows(2).any(|pair| pair[0].seconds >= pair[1].seconds) {
             return wrong("times that are not in order".into());
         }
+        let course = Course::of(&self.calendar).map_err(Error::input)?;
+        if let Some(point) = self.calendar.point
+            && !(point.centre.iter().all(|part| part.is_finite()) && (1e-3..=1e9).contains(&point.distance))
+        {
+            return wrong(format!("a sun at a distance of {} m; 0.001 to 1000000000 m are allowed", point.distance));
+        }
+        if let Some([from, until]) = self.calendar.span
+            && !(0.0 <= from && from <= until && until <= course.length())
+        {
+            return wrong(format!("light from {from} to {until} seconds of a day of {} seconds", course.length()));
+        }
+        if let Kind::Cube { position, near, .. } = &self.receivers {
+            cube::check_extent(self.extent)?;
+            if !position.iter().chain([near]).all(|number| number.is_finite()) {
+                return wrong("a camera whose place is not finite".into());
+            }
+        }
         let Weather { .. } =
             Weather::new(self.weather.turbidity(), self.weather.ground_albedo(), self.weather.overcast())
                 .map_err(Error::input)?;
-        self.settings.validate()
+        self.settings.validate()?;
+        match (&self.receivers, self.settings.adaptive, self.settings.measure) {
+            (_, Adaptive::Off, _) | (_, _, Comparison::Rms) | (Kind::View { .. } | Kind::Cube { .. }, _, _) => Ok(()),
+            (Kind::Lightmap { .. }, _, Comparison::Pdiff) => {
+                let what = "`pdiff` compares pictures, and the texels of a lightmap are none";
+                Err(Error::usage(what).at("bake.measure").help("Choose `rms`"))
+            }
+        }
     }
 
     /// Number of dimensions of the layers: times and patches of the sky.
@@ -151,7 +243,7 @@ impl Plan {
     /// `Input` if they are others.
     pub fn check_corners(&self, corners: &[[u16; 6]]) -> Result<()> {
         let wanted = match &self.receivers {
-            Kind::View { .. } => Digest::of(&[]),
+            Kind::View { .. } | Kind::Cube { .. } => Digest::of(&[]),
             Kind::Lightmap { corners, .. } => *corners,
         };
         match digest(corners) == wanted {
@@ -160,11 +252,14 @@ impl Plan {
         }
     }
 
-    /// Checks that a view is the one of a bake for one view.
+    /// Checks that a view is the one of a bake for one view, or that it is at the place of a cube.
     ///
     /// # Errors
     /// `Usage` if it is another one.
     pub fn check_view(&self, view: &View) -> Result<()> {
+        if let Kind::Cube { camera, position, .. } = &self.receivers {
+            return cube::check_view(view, camera, (*position).into());
+        }
         let Kind::View { camera, view_from_world, clip_from_view } = &self.receivers else { return Ok(()) };
         let near = |a: Mat4, b: &[f32; 16]| {
             let size = b.iter().fold(1.0f32, |most, x| most.max(x.abs()));

@@ -4,7 +4,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use glam::{Vec2, Vec3};
 
-use super::{Day, Interpolation, PictureSettings, Settings, Sky, Stored, layer::Layer, lightmap};
+use super::{Course, Interpolation, PictureSettings, Settings, Sky, Stored, cube::Around, layer::Layer, lightmap};
 use crate::{
     Error, ErrorKind, Result,
     gpu::{Gpu, OwnedBuffer, OwnedImage},
@@ -91,10 +91,11 @@ impl Baked {
 pub struct Daylight {
     gpu: Gpu,
     baked: Baked,
-    day: Day,
+    course: Course,
     tiles: OwnedBuffer,
     words: OwnedBuffer,
     places: Option<Places>,
+    around: Option<Around>,
     /// The last sky, and the state that it shows.
     sky: Option<(OwnedImage, [f32; 7])>,
 }
@@ -166,8 +167,16 @@ impl Daylight {
 
     /// Seconds of the day at a frame.
     fn seconds(&self, settings: &Settings, frame: u32) -> Result<f64> {
-        let time = self.day.parse_time(&settings.time).map_err(|what| Error::usage(what).at("daylight.time"))?;
-        Ok((time + f64::from(frame) * 60.0 * settings.minutes).rem_euclid(self.day.length()))
+        let time = self.course.parse_time(&settings.time).map_err(|what| Error::usage(what).at("daylight.time"))?;
+        let seconds = (time + f64::from(frame) * 60.0 * settings.minutes).rem_euclid(self.course.length());
+        if let Some([from, until]) = self.baked.stored.plan.calendar.span
+            && !(from..=until).contains(&seconds)
+        {
+            let [at, from, until] = [seconds, from, until].map(|seconds| self.course.label(seconds));
+            let what = format!("frame {frame} is at {at}, the bake has light from {from} until {until}");
+            return Err(self.baked.blamed(Error::usage(what)).help("Choose other times, or bake the whole day"));
+        }
+        Ok(seconds)
     }
 
     /// The weights of the baked times around a moment (equations 1 to 3; x there has the offset on the wrong side).
@@ -209,13 +218,7 @@ impl Daylight {
         let mut here = (*moment.handles.moment).clone();
         here.lights.clear();
         if light.iter().any(|light| *light > 0.0) {
-            here.lights.push(types::Light {
-                kind: consts::LIGHT_DIRECTIONAL,
-                direction: (-sun).to_array(),
-                intensity: light,
-                spot_offset: 1.0,
-                ..types::Light::default()
-            });
+            here.lights.push(self.baked.stored.plan.calendar.light(sun, light, &moment.handles.bounds()));
         }
         here.environment_scale = strength;
         here.environment_rotation = 0.0;
@@ -337,9 +340,7 @@ impl Technique for Daylight {
             let what = format!("is the light of `{}`, and this scene has other {parts}", stored.plan.scene);
             return Err(baked.blamed(Error::input(what).help("Name the scene that was baked, or bake this one")));
         }
-        let calendar = &stored.plan.calendar;
-        let day = Day::new(&calendar.date, &calendar.zone, calendar.latitude, calendar.longitude)
-            .map_err(|what| baked.blamed(Error::input(what)))?;
+        let course = Course::of(&stored.plan.calendar).map_err(|what| baked.blamed(Error::input(what)))?;
         let (tiles, words) = packed(stored);
         let most = gpu.caps().limits.storage_range;
         if 4 * words.len() as u64 > most {
@@ -351,10 +352,11 @@ impl Technique for Daylight {
         Ok(Self {
             gpu: gpu.clone(),
             baked: baked.clone(),
-            day,
+            course,
             tiles: OwnedBuffer::with_contents(gpu, "daylight.tiles", bytemuck::cast_slice(&tiles))?,
             words: OwnedBuffer::with_contents(gpu, "daylight.words", bytemuck::cast_slice(&words))?,
             places: Places::new(gpu, scene, baked)?,
+            around: Around::new(gpu, scene, &stored.plan)?,
             sky: None,
         })
     }
@@ -364,12 +366,15 @@ impl Technique for Daylight {
         let plan = &self.baked.stored.plan;
         plan.check_view(&moment.view).map_err(|error| self.baked.blamed(error))?;
         let [columns, _] = plan.tiles();
-        let (side, texels, north) = (plan.settings.tile, plan.extent, plan.calendar.north);
+        let (side, texels) = (plan.settings.tile, plan.extent);
         let of_day = &settings.daylight;
         let seconds = self.seconds(of_day, graph.frame)?;
-        let sun = Vec3::from(self.day.sun(seconds).direction(north));
+        let shine = self.course.sun(seconds);
+        let sun = Vec3::from(shine.direction);
         let sky = Sky::new(of_day.weather()?, sun.as_dvec3().to_array()).map_err(Error::usage)?;
-        let light = sky.sun_irradiance().map(|channel| channel * of_day.strength);
+        let clear = 1.0 - of_day.overcast as f32;
+        let light = shine.irradiance.map_or(sky.sun_irradiance(), |sun| sun.map(|channel| channel * clear));
+        let light = light.map(|channel| channel * of_day.strength);
         let patches: Vec<[f32; 3]> =
             sky.patches().iter().map(|patch| patch.map(|channel| channel * of_day.strength)).collect();
         let weights = self.weights(seconds, of_day.interpolation);
@@ -386,7 +391,10 @@ impl Technique for Daylight {
         let places = self.places.as_ref().map(|places| places.draw(graph, &handles, view, &gbuffer));
         let args = decode::Args {
             places: places.unwrap_or(gbuffer.depth),
-            spec: decode::Spec { lightmap: places.is_some().into() },
+            spec: decode::Spec { texels_of: self.around.as_ref().map_or(places.is_some().into(), |_| consts::DAY_CUBE) },
+            view: gbuffer.view,
+            normal: gbuffer.normal,
+            around: graph.import_buffer(self.around.as_ref().map_or(&self.tiles, Around::guide)),
             albedo: gbuffer.albedo,
             depth: gbuffer.depth,
             direct: lit.direct,
