@@ -18,6 +18,9 @@ use crate::{
     settings::JsonSchema,
 };
 
+/// Paths of each texel at most, to choose the steps.
+pub const SPARSE_PATHS: u32 = 32;
+
 /// How the steps of a bake are chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

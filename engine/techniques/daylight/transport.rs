@@ -4,7 +4,7 @@
 //! shadow ray to each position of the sun: a day costs one set of paths and many coherent shadow rays, instead of a set of paths for each time.
 //! Light is linear in the sun, so the sun is white and has an irradiance of 1 W/m² at normal incidence.
 
-use super::{Baking, Kind, Plan, adaptive::Sparse, beam::SUN_ANGULAR_RADIUS};
+use super::{Baking, Kind, Plan, adaptive::{SPARSE_PATHS, Sparse}, beam::SUN_ANGULAR_RADIUS};
 use crate::{
     Result,
     gpu::{BufferDesc, Gpu, OwnedBuffer},
@@ -23,8 +23,6 @@ use crate::{
 const BATCH: u32 = 16;
 /// Texels of [`Transport::sparse`], about.
 const SPARSE: usize = 2048;
-/// Paths of each of them at most.
-const SPARSE_PATHS: u32 = 32;
 /// Vertices of a batch at most: 200 MB.
 const MOST_VERTICES: u64 = 1 << 22;
 

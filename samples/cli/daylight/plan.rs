@@ -1,17 +1,23 @@
 //! The plan of a bake: the day, the surfaces, and their texels.
 
+use std::path::PathBuf;
+
 use lucerna::{
     Error, Result,
     scene::Scene,
     techniques::daylight::{
-        Baking, Calendar, Day, Kind, Lit, MOST_TIMES, Plan, Sources, Weather, digest, lightmap, parts,
+        Adaptive, Baking, Calendar, Course, Kind, Lit, MOST_TIMES, Plan, Sources, SunPath, SunPoint, Transport, Weather,
+        adaptive, cube, digest, lightmap, parts,
     },
 };
 
-use crate::stage::{Stage, StageArgs};
+use crate::{
+    scene_bounds,
+    stage::{Stage, StageArgs},
+};
 
-/// Elevation at which the sun has set: its radius below the horizon, degrees.
-const SET: f64 = -0.2665;
+/// Least distance of a sun that is a point, in radii of the scene.
+const NEAREST: f32 = 1.25;
 
 /// The day and the place of a bake.
 #[derive(clap::Args, Clone, Debug)]
@@ -35,6 +41,98 @@ pub struct DayOptions {
     /// Turn of the north from -Z, degrees, clockwise as seen from above
     #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, help_heading = "Day")]
     pub north: f32,
+
+    /// Path of the sun in place of date and place: columns `time,azimuth,elevation` or `time,x,y,z`, then perhaps `red,green,blue` (W/m²); or
+    /// tables [[sun]] with `time`, `azimuth` and `elevation` or `direction`, and perhaps `irradiance`
+    #[arg(
+        long,
+        value_name = "FILE.csv|.toml",
+        conflicts_with_all = ["date", "latitude", "longitude", "timezone"],
+        help_heading = "Day"
+    )]
+    pub sun_path: Option<PathBuf>,
+
+    /// The sun is a point that is so far from the middle of the scene, as in the paper: its direction is another one at each surface
+    #[arg(long, value_name = "METRES", help_heading = "Day")]
+    pub sun_distance: Option<f32>,
+
+    /// First local time that needs light
+    #[arg(long, value_name = "HH:MM", help_heading = "Day")]
+    pub from: Option<String>,
+
+    /// Last local time that needs light
+    #[arg(long, value_name = "HH:MM", help_heading = "Day")]
+    pub until: Option<String>,
+}
+
+impl DayOptions {
+    /// # Errors
+    /// `Usage` for an impossible day, `Input` for a file that cannot be read.
+    fn calendar(&self, scene: &Scene) -> Result<(Calendar, Course)> {
+        let mut calendar = match &self.sun_path {
+            Some(file) => {
+                let path = SunPath::read(file)?;
+                if self.north != 0.0 && !path.has_angles() {
+                    let what = "--north turns azimuths, and the path of the sun has directions";
+                    return Err(Error::usage(what).help("Leave --north out"));
+                }
+                Calendar { path: Some(path), north: self.north, ..Calendar::default() }
+            }
+            None => Calendar {
+                date: self.date.clone(),
+                zone: self.timezone.clone(),
+                latitude: self.latitude,
+                longitude: self.longitude,
+                north: self.north,
+                ..Calendar::default()
+            },
+        };
+        let course = Course::of(&calendar).map_err(Error::usage)?;
+        calendar.point = self.sun_distance.map(|distance| point(scene, distance)).transpose()?;
+        calendar.span = self.span(&course)?;
+        Ok((calendar, course))
+    }
+
+    /// First and last time that needs light.
+    fn span(&self, course: &Course) -> Result<Option<[f64; 2]>> {
+        if self.from.is_none() && self.until.is_none() {
+            return Ok(None);
+        }
+        let time = |name: &str, text: &Option<String>, other: f64| match text {
+            Some(text) => course.parse_time(text).map_err(|what| Error::usage(what).at(name)),
+            None => Ok(other),
+        };
+        let from = time("--from", &self.from, 0.0)?;
+        let until = time("--until", &self.until, course.length())?;
+        if from > until {
+            let what = format!("--until {} is before --from {}", course.label(until), course.label(from));
+            return Err(Error::usage(what).help("A bake is of one day; exchange them, or bake twice"));
+        }
+        Ok(Some([from, until]))
+    }
+}
+
+/// A sun at a distance from the middle of the scene.
+fn point(scene: &Scene, distance: f32) -> Result<SunPoint> {
+    let bounds = scene_bounds::over_animations(scene)
+        .ok_or_else(|| Error::input("the scene has no surfaces, so there is nothing to bake"))?;
+    let least = NEAREST * bounds.half().length();
+    if !(distance >= least && distance <= 1e9) {
+        let what = format!("--sun-distance is {distance}, {least:.3} to 1000000000 m are allowed for this scene");
+        return Err(Error::usage(what).help("The sun must be outside the scene"));
+    }
+    Ok(SunPoint { centre: bounds.centre().to_array(), distance })
+}
+
+/// The steps that have light, of those within the span of the calendar and next to it.
+fn lit(steps: &[f64], calendar: &Calendar, course: &Course, baking: &Baking) -> Vec<Lit> {
+    // A step more on each side, so that the light at the ends of the span is between two steps.
+    let beside = 60.0 * baking.interval;
+    let within = |seconds: f64| {
+        calendar.span.is_none_or(|[from, until]| from - beside < seconds && seconds < until + beside)
+    };
+    let shining = steps.iter().filter(|seconds| within(**seconds)).map(|&seconds| (seconds, course.sun(seconds)));
+    shining.filter(|(_, sun)| sun.is_lit()).map(|(seconds, sun)| Lit { seconds, sun: sun.direction }).collect()
 }
 
 /// The surfaces that a bake holds light for.
@@ -44,6 +142,8 @@ pub enum KindArg {
     Lightmap,
     /// The pixels of the camera, for this camera and size alone
     View,
+    /// The surfaces around the camera, which turns in place: six faces of `bake.face` texels
+    Cube,
 }
 
 /// The plan of a command line, and the texels.
@@ -59,18 +159,17 @@ pub struct Planned {
 /// # Errors
 /// `Usage` for an impossible day or lightmap; `Input` if the scene has no surfaces.
 pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage, args: &StageArgs) -> Result<Planned> {
-    let day = Day::new(&options.date, &options.timezone, options.latitude, options.longitude).map_err(Error::usage)?;
-    let steps = day.steps(baking.interval, baking.offset).map_err(Error::usage)?;
+    let scene: &Scene = &stage.scene;
+    if lightmap::triangles(scene).iter().all(|count| *count == 0) {
+        return Err(Error::input("the scene has no surfaces, so there is nothing to bake"));
+    }
+    let (calendar, course) = options.calendar(scene)?;
+    let steps = course.steps(baking.interval, baking.offset).map_err(Error::usage)?;
     if steps.len() > MOST_TIMES {
         let what = format!("the day has {} steps, at most {MOST_TIMES} are allowed", steps.len());
         return Err(Error::usage(what).at("bake.interval").help("Choose a longer interval"));
     }
-    let lit = steps.iter().filter(|seconds| day.sun(**seconds).elevation > SET);
-    let times = lit.map(|&seconds| Lit { seconds, sun: day.sun(seconds).direction(options.north) }).collect();
-    let scene: &Scene = &stage.scene;
-    if scene.meshes.is_empty() {
-        return Err(Error::input("the scene has no surfaces, so there is nothing to bake"));
-    }
+    let times = lit(&steps, &calendar, &course, baking);
     let (receivers, extent, sources, corners, notes) = match kind {
         KindArg::View => {
             let (_, view) = stage.at(args.time, args.size)?;
@@ -80,6 +179,17 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
                 clip_from_view: view.clip_from_view.to_cols_array(),
             };
             (receivers, view.extent, Sources::View(Box::new(view)), Vec::new(), Vec::new())
+        }
+        KindArg::Cube => {
+            let (_, view) = stage.at(args.time, args.size)?;
+            if view.is_orthographic() {
+                let what = format!("the camera {} has parallel rays, and one that turns in place needs", stage.placed.name);
+                return Err(Error::usage(format!("{what} perspective")).help("Choose another one with --camera"));
+            }
+            let (position, near) = (view.position, view.near);
+            let receivers = Kind::Cube { camera: stage.placed.name.clone(), position: position.to_array(), near };
+            let faces = cube::views(position, near, baking.face);
+            (receivers, [cube::FACES * baking.face, baking.face], Sources::Cube(Box::new(faces)), Vec::new(), Vec::new())
         }
         KindArg::Lightmap => {
             let unwrapped = lightmap::unwrap(scene, baking)?;
@@ -98,17 +208,41 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
         parts: parts(scene),
         receivers,
         extent,
-        calendar: Calendar {
-            date: options.date.clone(),
-            zone: options.timezone.clone(),
-            latitude: options.latitude,
-            longitude: options.longitude,
-            north: options.north,
-        },
+        calendar,
         steps: steps.len() as u32,
         times,
         weather: Weather::default(),
         settings: baking.clone(),
     };
     Ok(Planned { plan, sources, corners, notes })
+}
+
+/// Leaves out the steps that interpolation replaces ([`adaptive`]), and says so in a line for the user; `None` if all steps are wanted.
+///
+/// # Errors
+/// As [`Transport::sparse`].
+pub fn thin_out(plan: &mut Plan, transport: &mut Transport) -> Result<Option<(String, serde_json::Value)>> {
+    if plan.settings.adaptive == Adaptive::Off || plan.times.is_empty() {
+        return Ok(None);
+    }
+    let seconds: Vec<f64> = plan.times.iter().map(|time| time.seconds).collect();
+    let chosen = adaptive::choose(&transport.sparse(plan)?, &seconds, &plan.settings)?;
+    let course = Course::of(&plan.calendar).map_err(Error::input)?;
+    plan.times = chosen.kept.iter().map(|step| plan.times[*step]).collect();
+    transport.follow(plan)?;
+    let worst = course.label(seconds[chosen.worst_step]);
+    let said = format!(
+        "{} of {} lit steps are needed; the worst of the others is off by {:.2} %, at {worst} (interpolated, by {} paths of few texels)",
+        chosen.kept.len(),
+        seconds.len(),
+        100.0 * chosen.worst,
+        plan.settings.samples.min(adaptive::SPARSE_PATHS),
+    );
+    let json = serde_json::json!({
+        "lit": seconds.len(),
+        "kept": chosen.kept.len(),
+        "worst": chosen.worst,
+        "worst_at": worst,
+    });
+    Ok(Some((said, json)))
 }
