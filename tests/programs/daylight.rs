@@ -3,9 +3,13 @@
 #[path = "../tracer_lab/mod.rs"]
 mod tracer_lab;
 
+#[path = "../daylight_cube.rs"]
+mod daylight_cube;
 #[path = "../daylight_day.rs"]
 mod daylight_day;
 #[path = "../daylight_light.rs"]
 mod daylight_light;
 #[path = "../daylight_sky.rs"]
 mod daylight_sky;
+#[path = "../daylight_sun.rs"]
+mod daylight_sun;

@@ -71,6 +71,25 @@ pub fn direction(face: usize, place: Vec2) -> Vec3 {
     forward + (2.0 * place.x - 1.0) * right + (2.0 * place.y - 1.0) * down
 }
 
+/// Column, row and face of a texel that may be one step beyond the border of a face of `side` texels, where the next face begins; `None`: three
+/// faces meet there, so that there is no such texel. Twin: `day_cube_texel`.
+pub fn texel(of: usize, [x, y]: [i32; 2], side: u32) -> Option<[u32; 3]> {
+    let inside = |at: i32| (0..side as i32).contains(&at);
+    match (inside(x), inside(y)) {
+        (true, true) => Some([x as u32, y as u32, of as u32]),
+        (false, false) => None,
+        _ => {
+            // A quarter of a texel beyond the border: the row along the border stays the same.
+            let beyond = 0.25 / side as f32;
+            let place = (Vec2::new(x as f32, y as f32) + 0.5) / side as f32;
+            let place = place.clamp(Vec2::splat(-beyond), Vec2::splat(1.0 + beyond));
+            let (next, there) = face(direction(of, place));
+            let at = |part: f32| ((part * side as f32) as u32).min(side - 1);
+            Some([at(there.x), at(there.y), next as u32])
+        }
+    }
+}
+
 /// Checks the extent of the picture of all faces.
 ///
 /// # Errors
@@ -166,6 +185,32 @@ mod tests {
             let (number, place) = face(along);
             assert!(place.min_element() >= 0.0 && place.max_element() <= 1.0);
             assert!(direction(number, place).normalize().distance(along.normalize()) < 1e-5);
+        }
+    }
+
+    /// Texels on both sides of a border are each other's neighbours, and they touch.
+    #[test]
+    fn texels_beside_a_border_are_neighbours_of_each_other() {
+        let side = 16;
+        let centre = |[x, y, number]: [u32; 3]| {
+            direction(number as usize, (Vec2::new(x as f32, y as f32) + 0.5) / side as f32).normalize()
+        };
+        for number in 0..6 {
+            for along in 0..side as i32 {
+                let last = side as i32 - 1;
+                for (mine, step) in [([0, along], [-1, 0]), ([last, along], [1, 0]), ([along, 0], [0, -1]), ([along, last], [0, 1])] {
+                    let other = texel(number, [mine[0] + step[0], mine[1] + step[1]], side).unwrap();
+                    let mine = [mine[0] as u32, mine[1] as u32, number as u32];
+                    assert_ne!(other[2], mine[2]);
+                    assert!(centre(other).distance(centre(mine)) < 2.1 / side as f32, "{mine:?} {other:?}");
+                    let back = [[-1, 0], [1, 0], [0, -1], [0, 1]].into_iter().filter_map(|step| {
+                        texel(other[2] as usize, [other[0] as i32 + step[0], other[1] as i32 + step[1]], side)
+                    });
+                    assert!(back.into_iter().any(|found| found == mine), "{mine:?} {other:?}");
+                }
+            }
+            assert_eq!(texel(number, [-1, 16], side), None);
+            assert_eq!(texel(number, [3, 5], side), Some([3, 5, number as u32]));
         }
     }
 
