@@ -42,7 +42,13 @@ pub fn plan(scene: &Scene, view: &View, settings: Baking) -> Plan {
             clip_from_view: view.clip_from_view.to_cols_array(),
         },
         extent: view.extent,
-        calendar: Calendar { date: "2026-06-21".into(), zone: "UTC".into(), latitude: 0.0, longitude: 0.0, ..Calendar::default() },
+        calendar: Calendar {
+            date: "2026-06-21".into(),
+            zone: "UTC".into(),
+            latitude: 0.0,
+            longitude: 0.0,
+            ..Calendar::default()
+        },
         steps: 3,
         times: times.collect(),
         weather: Weather::default(),

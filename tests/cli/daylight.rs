@@ -79,7 +79,8 @@ fn impossible_days_are_exit_code_2_and_say_what_is_possible() {
     ] {
         lab.view("out.day", words).expect(2, parts);
     }
-    let words = ["bake", "--builtin", "primitives", "-D", "bake.adaptive=middle", "-D", "bake.measure=pdiff", "-o", "out.day"];
+    let words =
+        ["bake", "--builtin", "primitives", "-D", "bake.adaptive=middle", "-D", "bake.measure=pdiff", "-o", "out.day"];
     lab.run(&[&words[..], &SMALL].concat()).expect(2, &["bake.measure", "lightmap", "rms"]);
     assert_eq!(files(lab.0.path()), [""; 0]);
 }
@@ -88,7 +89,11 @@ fn impossible_days_are_exit_code_2_and_say_what_is_possible() {
 fn paths_of_the_sun_that_cannot_be_read_name_file_and_line() {
     let lab = Lab::new();
     for (name, text, parts) in [
-        ("a.csv", "time,azimuth,elevation\n06:00,90,0\n07:00,95,east\n", &["a.csv", "line 3", "`elevation`", "`east`"][..]),
+        (
+            "a.csv",
+            "time,azimuth,elevation\n06:00,90,0\n07:00,95,east\n",
+            &["a.csv", "line 3", "`elevation`", "`east`"][..],
+        ),
         ("b.csv", "time,azimuth\n06:00,90\n", &["b.csv", "line 1", "time,azimuth"]),
         ("c.csv", "", &["c.csv", "empty"]),
         ("d.csv", "time,x,y,z\n06:00,1,0,0\n05:00,1,0,0\n", &["d.csv", "line 3", "order"]),
@@ -110,7 +115,10 @@ fn a_path_from_a_file_lights_bakes_and_pictures() {
     }
     let lab = Lab::new();
     // A lamp that goes on and off again: light from one side at 08:00, from above at 12:00, none after 16:00.
-    lab.write("lamp.csv", "time,x,y,z,red,green,blue\n08:00,1,1,0,100,50,0\n12:00,0,1,0,100,50,0\n16:00,0,1,0.5,0,0,0\n");
+    lab.write(
+        "lamp.csv",
+        "time,x,y,z,red,green,blue\n08:00,1,1,0,100,50,0\n12:00,0,1,0,100,50,0\n16:00,0,1,0.5,0,0,0\n",
+    );
     let path = ["--sun-path", "lamp.csv", "-D", "bake.interval=30"];
     let told = lab.view("lamp.day", &[&path[..], &["--json"]].concat()).expect(0, &[]).json();
     // From 08:00 to 15:30; at 16:00 the light is out.
@@ -123,7 +131,8 @@ fn a_path_from_a_file_lights_bakes_and_pictures() {
         lab.run(&[&["render"][..], &scene, &["--time", time, "--mode", mode, "-o", &out, "--overwrite"]].concat())
             .expect(0, &[]);
         let layers = image::read(lab.at(&out), &Limits::default()).unwrap();
-        let [r, g, b] = [0, 1, 2].map(|c| mean(&layers.main().unwrap().data.iter().skip(c).step_by(3).copied().collect::<Vec<_>>()));
+        let [r, g, b] = [0, 1, 2]
+            .map(|c| mean(&layers.main().unwrap().data.iter().skip(c).step_by(3).copied().collect::<Vec<_>>()));
         [r, g, b]
     };
     let noon = at("12:00", "direct");
@@ -132,8 +141,20 @@ fn a_path_from_a_file_lights_bakes_and_pictures() {
     let later = at("14:00", "direct")[0] / noon[0];
     assert!((0.35..0.65).contains(&later), "{later}");
     assert_eq!(at("17:00", "indirect"), [0.0; 3]);
-    lab.run(&["render", "--builtin", "primitives", "--size", "16x12", "--bake", "lamp.day", "--time", "25:00", "-o", "x.exr"])
-        .expect(2, &["25:00"]);
+    lab.run(&[
+        "render",
+        "--builtin",
+        "primitives",
+        "--size",
+        "16x12",
+        "--bake",
+        "lamp.day",
+        "--time",
+        "25:00",
+        "-o",
+        "x.exr",
+    ])
+    .expect(2, &["25:00"]);
 }
 
 #[test]
@@ -172,8 +193,10 @@ fn days_with_few_steps_without_sun_and_with_a_change_of_clock_are_whole() {
         let told = day(out, &["--date", date, "-D", "bake.interval=60"]);
         assert_eq!(told["steps"], steps, "{date}");
     }
-    for (bake, time) in [("one.day", "12:00"), ("night.day", "12:00"), ("spring.day", "03:00"), ("autumn.day", "23:59")] {
-        let words = ["render", "--builtin", "primitives", "--size", "16x12", "--bake", bake, "--time", time, "--overwrite"];
+    for (bake, time) in [("one.day", "12:00"), ("night.day", "12:00"), ("spring.day", "03:00"), ("autumn.day", "23:59")]
+    {
+        let words =
+            ["render", "--builtin", "primitives", "--size", "16x12", "--bake", bake, "--time", time, "--overwrite"];
         lab.run(&[&words[..], &["-o", "x.exr"]].concat()).expect(0, &[]);
     }
     let spring = ["render", "--builtin", "primitives", "--size", "16x12", "--bake", "spring.day", "--time", "02:30"];
@@ -187,21 +210,35 @@ fn a_camera_that_turns_in_place_sees_the_light_of_a_view() {
     }
     let lab = Lab::new();
     let scene = ["--builtin", "primitives"];
-    let many = ["-D", "bake.samples=256", "-D", "bake.interval=180", "-D", "bake.tolerance=0.01", "--from", "11:00", "--until", "13:00"];
+    let many = [
+        "-D",
+        "bake.samples=256",
+        "-D",
+        "bake.interval=180",
+        "-D",
+        "bake.tolerance=0.01",
+        "--from",
+        "11:00",
+        "--until",
+        "13:00",
+    ];
     let size = ["--size", "40x30"];
     lab.run(&[&["bake"][..], &scene, &size, &many, &["--kind", "view", "-o", "view.day"]].concat()).expect(0, &[]);
     let cube = ["--kind", "cube", "-D", "bake.face=48", "-o", "cube.day"];
     lab.run(&[&["bake"][..], &scene, &many, &cube].concat()).expect(0, &["288×48"]);
     let info = lab.run(&["info", "cube.day"]).expect(0, &[]).stdout;
     assert!(info.contains("cube around camera"), "{info}");
-    let shot = |bake: &str, out: &str| lab.irradiance(out, &[&scene[..], &size, &["--bake", bake, "--time", "12:00"]].concat());
+    let shot = |bake: &str, out: &str| {
+        lab.irradiance(out, &[&scene[..], &size, &["--bake", bake, "--time", "12:00"]].concat())
+    };
     let (view, cube) = (shot("view.day", "view.exr"), shot("cube.day", "cube.exr"));
     let ratio = mean(&cube) / mean(&view);
     assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
     let error = apart(&cube, &view);
     assert!(error < 0.15, "{error}");
     // Any size and angle of view, but only from this place.
-    let other = ["render", "--builtin", "primitives", "--bake", "cube.day", "--time", "12:00", "--camera", "1", "-o", "o.exr"];
+    let other =
+        ["render", "--builtin", "primitives", "--bake", "cube.day", "--time", "12:00", "--camera", "1", "-o", "o.exr"];
     lab.run(&other).expect(2, &["cube.day", "turns in place at", "lightmap"]);
 }
 
@@ -261,7 +298,10 @@ fn square(folder: &Path, name: &str, second: Option<[[f32; 2]; 4]>) {
 #[test]
 fn scenes_without_surfaces_are_refused_and_coordinates_may_be_missing_or_useless() {
     let lab = Lab::new();
-    lab.write("empty.gltf", r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"name":"nothing"}]}"#);
+    lab.write(
+        "empty.gltf",
+        r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"name":"nothing"}]}"#,
+    );
     lab.write("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
     for scene in ["empty.gltf", "points.obj"] {
         for kind in ["lightmap", "view", "cube"] {
@@ -303,8 +343,25 @@ fn a_disk_that_fills_up_keeps_no_half_bake() {
     lab.view("full.day", &["-D", "bake.interval=180"]).expect(1, &["full.day", "No space left"]);
     // No file may grow over 16 blocks; the signal for that is ignored, so that the write fails as on a full disk.
     let mut limited = command("sh");
-    limited.current_dir(lab.0.path()).args(["-c", "trap '' XFSZ; ulimit -f 16; \"$@\"", "sh", env!("CARGO_BIN_EXE_daylight"), "bake"]);
-    limited.args(["--builtin", "primitives", "--kind", "view", "--size", "64x48", "-D", "bake.tile=64", "-D", "bake.samples=4"]);
+    limited.current_dir(lab.0.path()).args([
+        "-c",
+        "trap '' XFSZ; ulimit -f 16; \"$@\"",
+        "sh",
+        env!("CARGO_BIN_EXE_daylight"),
+        "bake",
+    ]);
+    limited.args([
+        "--builtin",
+        "primitives",
+        "--kind",
+        "view",
+        "--size",
+        "64x48",
+        "-D",
+        "bake.tile=64",
+        "-D",
+        "bake.samples=4",
+    ]);
     ran(limited.args(["-D", "bake.interval=120", "-o", "big.day"])).expect(1, &["big.day"]);
     assert!(!lab.at("big.day").exists());
 }

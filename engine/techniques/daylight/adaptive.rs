@@ -11,7 +11,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Baking, Light};
+use super::{Baking, Light, plan::NEXT_DAY};
 use crate::{
     Result,
     measure::{Display, Exposure, Measure, Options, Pair, Picture},
@@ -73,9 +73,19 @@ pub fn choose(sparse: &Sparse, seconds: &[f64], settings: &Baking) -> Result<Cho
     let Some(last) = seconds.len().checked_sub(1) else {
         return Ok(Chosen { kept: Vec::new(), worst: 0.0, worst_step: 0 });
     };
-    let mut kept = vec![0, last / 2, last];
-    // "First we have two equally big intervals."
-    let mut intervals = vec![[0, last / 2], [last / 2, last]];
+    let mut kept = Vec::new();
+    let mut intervals = Vec::new();
+    // Days do not follow each other: no light is interpolated between them.
+    let days = seconds.chunk_by(|a, b| (a / NEXT_DAY).floor() == (b / NEXT_DAY).floor());
+    let mut first = 0;
+    for day in days {
+        let last = first + day.len() - 1;
+        let middle = usize::midpoint(first, last);
+        kept.extend([first, middle, last]);
+        // "First we have two equally big intervals."
+        intervals.extend([[first, middle], [middle, last]]);
+        first = last + 1;
+    }
     while let Some([from, to]) = intervals.pop() {
         let middle = usize::midpoint(from, to);
         if middle == from || settings.adaptive == Adaptive::Off {

@@ -37,12 +37,8 @@ pub const AXES: [[Vec3; 3]; 6] = [
 /// The views of the six faces of `side`×`side` texels from a point. `near`: nearest distance along the axis of a face that is seen, metres.
 pub fn views(position: Vec3, near: f32, side: u32) -> [View; 6] {
     AXES.map(|[forward, right, down]| {
-        let world_from_camera = Mat4::from_cols(
-            right.extend(0.0),
-            (-down).extend(0.0),
-            (-forward).extend(0.0),
-            position.extend(1.0),
-        );
+        let world_from_camera =
+            Mat4::from_cols(right.extend(0.0), (-down).extend(0.0), (-forward).extend(0.0), position.extend(1.0));
         let projection =
             Projection::Perspective { yfov: std::f32::consts::FRAC_PI_2, aspect: None, znear: near, zfar: None };
         View::new(&Camera { name: String::new(), projection }, world_from_camera, [side; 2])
@@ -198,7 +194,9 @@ mod tests {
         for number in 0..6 {
             for along in 0..side as i32 {
                 let last = side as i32 - 1;
-                for (mine, step) in [([0, along], [-1, 0]), ([last, along], [1, 0]), ([along, 0], [0, -1]), ([along, last], [0, 1])] {
+                for (mine, step) in
+                    [([0, along], [-1, 0]), ([last, along], [1, 0]), ([along, 0], [0, -1]), ([along, last], [0, 1])]
+                {
                     let other = texel(number, [mine[0] + step[0], mine[1] + step[1]], side).unwrap();
                     let mine = [mine[0] as u32, mine[1] as u32, number as u32];
                     assert_ne!(other[2], mine[2]);

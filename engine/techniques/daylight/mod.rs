@@ -28,7 +28,7 @@ pub use beam::Weather;
 pub use course::{Course, Shine, SunPath};
 pub use day::{Day, Place, Sun};
 pub use file::{Stored, Summary};
-pub use plan::{Calendar, Kind, Lit, MOST_TIMES, Plan, SunPoint, digest, parts};
+pub use plan::{Calendar, Kind, Lit, MOST_TIMES, NEXT_DAY, Plan, SunPoint, digest, parts};
 pub use settings::{Baking, Interpolation, PictureSettings, Settings};
 pub use sky::Sky;
 pub use technique::{Baked, Daylight, Mode};

@@ -16,6 +16,10 @@ use crate::{
 
 /// Times of a bake at most.
 pub const MOST_TIMES: usize = 4096;
+/// Days of a bake at most.
+pub const MOST_DAYS: usize = 366;
+/// From the begin of a day of a bake to that of the next one in its list of times, seconds. No day is as long.
+pub const NEXT_DAY: f64 = 172_800.0;
 /// Texels of a bake at most.
 pub const MOST_TEXELS: u64 = 1 << 28;
 
@@ -57,6 +61,9 @@ pub enum Kind {
 pub struct Calendar {
     /// Year, month and day: `2026-06-21`.
     pub date: String,
+    /// Further days of the same place.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub dates: Vec<String>,
     /// Name of the time zone, or its offset: `Europe/Copenhagen`, `+01:00`.
     pub zone: String,
     /// Degrees, positive in the north.
@@ -95,6 +102,35 @@ impl SunPoint {
 }
 
 impl Calendar {
+    /// The dates of all days.
+    pub fn dates(&self) -> impl Iterator<Item = &str> {
+        std::iter::once(&self.date).chain(&self.dates).map(String::as_str)
+    }
+
+    /// The courses of the sun of all days, in order.
+    ///
+    /// # Errors
+    /// A sentence that says what is impossible.
+    pub fn courses(&self) -> Result<Vec<Course>, String> {
+        if self.dates.len() >= MOST_DAYS {
+            return Err(format!("{} days, at most {MOST_DAYS} are allowed", self.dates.len() + 1));
+        }
+        if let Some(path) = &self.path {
+            return match self.dates.is_empty() {
+                true => Ok(vec![Course::path(path, self.north)?]),
+                false => Err("a path of the sun and further days".into()),
+            };
+        }
+        let mut courses = Vec::new();
+        for (number, date) in self.dates().enumerate() {
+            if self.dates().take(number).any(|other| other == date) {
+                return Err(format!("the date {date} is there twice"));
+            }
+            courses.push(Course::almanac(date, self)?);
+        }
+        Ok(courses)
+    }
+
     /// The sun as a light: `sun` is the unit vector towards it, `light` its irradiance at normal incidence (at a distance: at the centre of its
     /// path), W/m². `bounds`: of everything that it lights.
     pub(super) fn light(&self, sun: Vec3, light: [f32; 3], bounds: &Aabb) -> types::Light {
@@ -126,10 +162,17 @@ impl Calendar {
 /// A time of the day at which the sun shines.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lit {
-    /// Seconds after the begin of the day.
+    /// Seconds after the begin of the day, and [`NEXT_DAY`] for each day of the bake before it.
     pub seconds: f64,
     /// Unit vector towards the sun.
     pub sun: [f32; 3],
+}
+
+impl Lit {
+    /// Number of its day.
+    pub fn day(&self) -> usize {
+        (self.seconds / NEXT_DAY).max(0.0) as usize
+    }
 }
 
 /// The plan of a bake.
@@ -193,16 +236,19 @@ impl Plan {
         if self.times.windows(2).any(|pair| pair[0].seconds >= pair[1].seconds) {
             return wrong("times that are not in order".into());
         }
-        let course = Course::of(&self.calendar).map_err(Error::input)?;
+        let courses = self.calendar.courses().map_err(Error::input)?;
+        if let Some(time) = self.times.iter().find(|time| time.seconds < 0.0 || time.day() >= courses.len()) {
+            return wrong(format!("a time at {} seconds, which is in no day of the bake", time.seconds));
+        }
         if let Some(point) = self.calendar.point
             && !(point.centre.iter().all(|part| part.is_finite()) && (1e-3..=1e9).contains(&point.distance))
         {
             return wrong(format!("a sun at a distance of {} m; 0.001 to 1000000000 m are allowed", point.distance));
         }
         if let Some([from, until]) = self.calendar.span
-            && !(0.0 <= from && from <= until && until <= course.length())
+            && !(0.0 <= from && from <= until && until <= NEXT_DAY)
         {
-            return wrong(format!("light from {from} to {until} seconds of a day of {} seconds", course.length()));
+            return wrong(format!("light from {from} to {until} seconds of a day"));
         }
         if let Kind::Cube { position, near, .. } = &self.receivers {
             cube::check_extent(self.extent)?;
@@ -221,6 +267,11 @@ impl Plan {
                 Err(Error::usage(what).at("bake.measure").help("Choose `rms`"))
             }
         }
+    }
+
+    /// The times of a day.
+    pub fn of_day(&self, day: usize) -> std::ops::Range<usize> {
+        self.times.partition_point(|time| time.day() < day)..self.times.partition_point(|time| time.day() <= day)
     }
 
     /// Number of dimensions of the layers: times and patches of the sky.

@@ -121,6 +121,9 @@ pub enum Interpolation {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
+    /// Date of the pictures, for bakes of several days: one of the bake's dates; empty: its first.
+    #[schemars(regex(pattern = r"^([0-9]{4}-[0-9]{2}-[0-9]{2})?$"))]
+    pub date: String,
     /// Local time of the first frame: hours and minutes.
     #[schemars(regex(pattern = r"^[0-2][0-9]:[0-5][0-9](:[0-5][0-9])?$"))]
     pub time: String,
@@ -149,6 +152,7 @@ impl Default for Settings {
     fn default() -> Self {
         let weather = Weather::default();
         Self {
+            date: String::new(),
             time: "12:00".into(),
             minutes: 5.0,
             interpolation: Interpolation::default(),

@@ -4,7 +4,9 @@ use std::{path::PathBuf, sync::Arc};
 
 use glam::{Vec2, Vec3};
 
-use super::{Course, Interpolation, PictureSettings, Settings, Sky, Stored, cube::Around, layer::Layer, lightmap};
+use super::{
+    Course, Interpolation, Lit, NEXT_DAY, PictureSettings, Settings, Sky, Stored, cube::Around, layer::Layer, lightmap,
+};
 use crate::{
     Error, ErrorKind, Result,
     gpu::{Gpu, OwnedBuffer, OwnedImage},
@@ -91,7 +93,8 @@ impl Baked {
 pub struct Daylight {
     gpu: Gpu,
     baked: Baked,
-    course: Course,
+    /// One for each day of the bake.
+    courses: Vec<Course>,
     tiles: OwnedBuffer,
     words: OwnedBuffer,
     places: Option<Places>,
@@ -165,44 +168,44 @@ impl Daylight {
         &self.baked.stored
     }
 
+    /// Number of the day of the pictures.
+    fn day(&self, settings: &Settings) -> Result<usize> {
+        let calendar = &self.baked.stored.plan.calendar;
+        if settings.date.is_empty() {
+            return Ok(0);
+        }
+        let found = calendar.dates().position(|date| date == settings.date);
+        found.filter(|_| calendar.path.is_none()).ok_or_else(|| {
+            let there = match calendar.path {
+                Some(_) => "a path of the sun without a date".to_owned(),
+                None => calendar.dates().collect::<Vec<_>>().join(", "),
+            };
+            let what = format!("the date is {}, the bake has {there}", settings.date);
+            self.baked.blamed(Error::usage(what)).at("daylight.date")
+        })
+    }
+
     /// Seconds of the day at a frame.
-    fn seconds(&self, settings: &Settings, frame: u32) -> Result<f64> {
-        let time = self.course.parse_time(&settings.time).map_err(|what| Error::usage(what).at("daylight.time"))?;
-        let seconds = (time + f64::from(frame) * 60.0 * settings.minutes).rem_euclid(self.course.length());
+    fn seconds(&self, course: &Course, settings: &Settings, frame: u32) -> Result<f64> {
+        let time = course.parse_time(&settings.time).map_err(|what| Error::usage(what).at("daylight.time"))?;
+        let seconds = (time + f64::from(frame) * 60.0 * settings.minutes).rem_euclid(course.length());
         if let Some([from, until]) = self.baked.stored.plan.calendar.span
             && !(from..=until).contains(&seconds)
         {
-            let [at, from, until] = [seconds, from, until].map(|seconds| self.course.label(seconds));
+            let [at, from, until] = [seconds, from, until].map(|seconds| course.label(seconds));
             let what = format!("frame {frame} is at {at}, the bake has light from {from} until {until}");
             return Err(self.baked.blamed(Error::usage(what)).help("Choose other times, or bake the whole day"));
         }
         Ok(seconds)
     }
 
-    /// The weights of the baked times around a moment (equations 1 to 3; x there has the offset on the wrong side).
-    fn weights(&self, seconds: f64, how: Interpolation) -> Vec<(usize, f32)> {
-        let times = &self.baked.stored.plan.times;
-        let Some(last) = times.len().checked_sub(1) else { return Vec::new() };
-        let next = times.partition_point(|time| time.seconds <= seconds);
-        let [Some(before), Some(after)] = [next.checked_sub(1), (next <= last).then_some(next)] else {
-            // Before the first and after the last baked time the sun is at the horizon.
-            return vec![(next.min(last), 1.0)];
-        };
-        let step = times[after].seconds - times[before].seconds;
-        let alpha = ((seconds - times[before].seconds) / step) as f32;
-        match how {
-            Interpolation::Nearest => vec![(if alpha < 0.5 { before } else { after }, 1.0)],
-            Interpolation::CatmullRom if before > 0 && after < last => {
-                let (a, a2, a3) = (alpha, alpha * alpha, alpha * alpha * alpha);
-                vec![
-                    (before - 1, 0.5 * (-a + 2.0 * a2 - a3)),
-                    (before, 0.5 * (2.0 - 5.0 * a2 + 3.0 * a3)),
-                    (after, 0.5 * (a + 4.0 * a2 - 3.0 * a3)),
-                    (after + 1, 0.5 * (a3 - a2)),
-                ]
-            }
-            Interpolation::Linear | Interpolation::CatmullRom => vec![(before, 1.0 - alpha), (after, alpha)],
-        }
+    /// The weights of the baked times around a moment of a day (equations 1 to 3; x there has the offset on the wrong side).
+    fn weights(&self, day: usize, seconds: f64, how: Interpolation) -> Vec<(usize, f32)> {
+        let plan = &self.baked.stored.plan;
+        let of_day = plan.of_day(day);
+        let first = of_day.start;
+        let weights = weights(&plan.times[of_day], seconds + NEXT_DAY * day as f64, how);
+        weights.into_iter().map(|(time, weight)| (first + time, weight)).collect()
     }
 
     /// Handles of the scene under this sun and sky instead of its own.
@@ -246,6 +249,31 @@ impl Daylight {
         }
         out.push([0.0; 3]);
         out
+    }
+}
+
+/// Weights of some of `times`, in order, around a moment.
+fn weights(times: &[Lit], seconds: f64, how: Interpolation) -> Vec<(usize, f32)> {
+    let Some(last) = times.len().checked_sub(1) else { return Vec::new() };
+    let next = times.partition_point(|time| time.seconds <= seconds);
+    let [Some(before), Some(after)] = [next.checked_sub(1), (next <= last).then_some(next)] else {
+        // Before the first and after the last baked time the sun is at the horizon.
+        return vec![(next.min(last), 1.0)];
+    };
+    let step = times[after].seconds - times[before].seconds;
+    let alpha = ((seconds - times[before].seconds) / step) as f32;
+    match how {
+        Interpolation::Nearest => vec![(if alpha < 0.5 { before } else { after }, 1.0)],
+        Interpolation::CatmullRom if before > 0 && after < last => {
+            let (a, a2, a3) = (alpha, alpha * alpha, alpha * alpha * alpha);
+            vec![
+                (before - 1, 0.5 * (-a + 2.0 * a2 - a3)),
+                (before, 0.5 * (2.0 - 5.0 * a2 + 3.0 * a3)),
+                (after, 0.5 * (a + 4.0 * a2 - 3.0 * a3)),
+                (after + 1, 0.5 * (a3 - a2)),
+            ]
+        }
+        Interpolation::Linear | Interpolation::CatmullRom => vec![(before, 1.0 - alpha), (after, alpha)],
     }
 }
 
@@ -340,7 +368,7 @@ impl Technique for Daylight {
             let what = format!("is the light of `{}`, and this scene has other {parts}", stored.plan.scene);
             return Err(baked.blamed(Error::input(what).help("Name the scene that was baked, or bake this one")));
         }
-        let course = Course::of(&stored.plan.calendar).map_err(|what| baked.blamed(Error::input(what)))?;
+        let courses = stored.plan.calendar.courses().map_err(|what| baked.blamed(Error::input(what)))?;
         let (tiles, words) = packed(stored);
         let most = gpu.caps().limits.storage_range;
         if 4 * words.len() as u64 > most {
@@ -352,7 +380,7 @@ impl Technique for Daylight {
         Ok(Self {
             gpu: gpu.clone(),
             baked: baked.clone(),
-            course,
+            courses,
             tiles: OwnedBuffer::with_contents(gpu, "daylight.tiles", bytemuck::cast_slice(&tiles))?,
             words: OwnedBuffer::with_contents(gpu, "daylight.words", bytemuck::cast_slice(&words))?,
             places: Places::new(gpu, scene, baked)?,
@@ -368,8 +396,10 @@ impl Technique for Daylight {
         let [columns, _] = plan.tiles();
         let (side, texels) = (plan.settings.tile, plan.extent);
         let of_day = &settings.daylight;
-        let seconds = self.seconds(of_day, graph.frame)?;
-        let shine = self.course.sun(seconds);
+        let day = self.day(of_day)?;
+        let course = &self.courses[day];
+        let seconds = self.seconds(course, of_day, graph.frame)?;
+        let shine = course.sun(seconds);
         let sun = Vec3::from(shine.direction);
         let sky = Sky::new(of_day.weather()?, sun.as_dvec3().to_array()).map_err(Error::usage)?;
         let clear = 1.0 - of_day.overcast as f32;
@@ -377,7 +407,7 @@ impl Technique for Daylight {
         let light = light.map(|channel| channel * of_day.strength);
         let patches: Vec<[f32; 3]> =
             sky.patches().iter().map(|patch| patch.map(|channel| channel * of_day.strength)).collect();
-        let weights = self.weights(seconds, of_day.interpolation);
+        let weights = self.weights(day, seconds, of_day.interpolation);
         let coefficients = self.coefficients(&weights, light, &patches);
         let handles = self.relit(graph, moment, sun, light, &sky, of_day.strength)?;
         let view = &moment.view;
@@ -391,7 +421,9 @@ impl Technique for Daylight {
         let places = self.places.as_ref().map(|places| places.draw(graph, &handles, view, &gbuffer));
         let args = decode::Args {
             places: places.unwrap_or(gbuffer.depth),
-            spec: decode::Spec { texels_of: self.around.as_ref().map_or(places.is_some().into(), |_| consts::DAY_CUBE) },
+            spec: decode::Spec {
+                texels_of: self.around.as_ref().map_or(places.is_some().into(), |_| consts::DAY_CUBE),
+            },
             view: gbuffer.view,
             normal: gbuffer.normal,
             around: graph.import_buffer(self.around.as_ref().map_or(&self.tiles, Around::guide)),

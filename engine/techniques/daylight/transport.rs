@@ -4,7 +4,11 @@
 //! shadow ray to each position of the sun: a day costs one set of paths and many coherent shadow rays, instead of a set of paths for each time.
 //! Light is linear in the sun, so the sun is white and has an irradiance of 1 W/m² at normal incidence.
 
-use super::{Baking, Kind, Plan, adaptive::{SPARSE_PATHS, Sparse}, beam::SUN_ANGULAR_RADIUS};
+use super::{
+    Baking, Kind, Plan,
+    adaptive::{SPARSE_PATHS, Sparse},
+    beam::SUN_ANGULAR_RADIUS,
+};
 use crate::{
     Result,
     gpu::{BufferDesc, Gpu, OwnedBuffer},

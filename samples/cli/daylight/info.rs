@@ -4,7 +4,7 @@ use std::{path::PathBuf, process::ExitCode};
 
 use lucerna::{
     Error, Result,
-    techniques::daylight::{Calendar, Course, Kind, Stored, Summary, SunPoint},
+    techniques::daylight::{Calendar, Kind, Stored, Summary, SunPoint},
 };
 use serde_json::json;
 
@@ -52,9 +52,13 @@ pub fn info(args: &DayInfoArgs, _: Console) -> Result<ExitCode> {
     let calendar = &plan.calendar;
     console::print(&format!("scene      {}, {kind}", plan.scene))?;
     console::print(&format!("texels     {}×{}, tiles of {}", plan.extent[0], plan.extent[1], plan.settings.tile))?;
-    let Calendar { date, zone, latitude, longitude, .. } = calendar;
+    let Calendar { date, dates, zone, latitude, longitude, .. } = calendar;
     let day = match &calendar.path {
         Some(path) => format!("path of the sun with {} times", path.stops.len()),
+        None if !dates.is_empty() => format!(
+            "{} at {latitude:.4}° N, {longitude:.4}° E, {zone}",
+            calendar.dates().collect::<Vec<_>>().join(", ")
+        ),
         None => format!("{date} at {latitude:.4}° N, {longitude:.4}° E, {zone}"),
     };
     console::print(&format!("day        {day}; {} steps, light for {}", plan.steps, plan.times.len()))?;
@@ -62,8 +66,8 @@ pub fn info(args: &DayInfoArgs, _: Console) -> Result<ExitCode> {
         console::print(&format!("sun        a point {distance} m from {x}, {y}, {z}"))?;
     }
     if let Some(span) = calendar.span {
-        let course = Course::of(calendar).map_err(Error::input)?;
-        let [from, until] = span.map(|seconds| course.label(seconds));
+        let courses = calendar.courses().map_err(Error::input)?;
+        let [from, until] = span.map(|seconds| courses[0].label(seconds));
         console::print(&format!("span       {from} until {until}"))?;
     }
     console::print(&format!("paths      {} per texel, {} scatterings", plan.settings.samples, plan.settings.bounces))?;

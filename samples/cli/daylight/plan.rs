@@ -6,8 +6,8 @@ use lucerna::{
     Error, Result,
     scene::Scene,
     techniques::daylight::{
-        Adaptive, Baking, Calendar, Course, Kind, Lit, MOST_TIMES, Plan, Sources, SunPath, SunPoint, Transport, Weather,
-        adaptive, cube, digest, lightmap, parts,
+        Adaptive, Baking, Calendar, Course, Kind, Lit, MOST_TIMES, NEXT_DAY, Plan, Sources, SunPath, SunPoint,
+        Transport, Weather, adaptive, cube, digest, lightmap, parts,
     },
 };
 
@@ -25,6 +25,10 @@ pub struct DayOptions {
     /// Date of the day
     #[arg(long, value_name = "YYYY-MM-DD", default_value = "2026-06-21", help_heading = "Day")]
     pub date: String,
+
+    /// Several days in one file, for seasons; `daylight render --date` chooses
+    #[arg(long, value_name = "YYYY-MM-DD,…", value_delimiter = ',', conflicts_with = "date", help_heading = "Day")]
+    pub dates: Vec<String>,
 
     /// Degrees, positive in the north
     #[arg(long, value_name = "DEGREES", default_value_t = 55.5, allow_negative_numbers = true, help_heading = "Day")]
@@ -47,7 +51,7 @@ pub struct DayOptions {
     #[arg(
         long,
         value_name = "FILE.csv|.toml",
-        conflicts_with_all = ["date", "latitude", "longitude", "timezone"],
+        conflicts_with_all = ["date", "dates", "latitude", "longitude", "timezone"],
         help_heading = "Day"
     )]
     pub sun_path: Option<PathBuf>,
@@ -68,7 +72,7 @@ pub struct DayOptions {
 impl DayOptions {
     /// # Errors
     /// `Usage` for an impossible day, `Input` for a file that cannot be read.
-    fn calendar(&self, scene: &Scene) -> Result<(Calendar, Course)> {
+    fn calendar(&self, scene: &Scene) -> Result<(Calendar, Vec<Course>)> {
         let mut calendar = match &self.sun_path {
             Some(file) => {
                 let path = SunPath::read(file)?;
@@ -79,7 +83,8 @@ impl DayOptions {
                 Calendar { path: Some(path), north: self.north, ..Calendar::default() }
             }
             None => Calendar {
-                date: self.date.clone(),
+                date: self.dates.first().unwrap_or(&self.date).clone(),
+                dates: self.dates.iter().skip(1).cloned().collect(),
                 zone: self.timezone.clone(),
                 latitude: self.latitude,
                 longitude: self.longitude,
@@ -87,10 +92,15 @@ impl DayOptions {
                 ..Calendar::default()
             },
         };
-        let course = Course::of(&calendar).map_err(Error::usage)?;
+        let courses = calendar.courses().map_err(Error::usage)?;
         calendar.point = self.sun_distance.map(|distance| point(scene, distance)).transpose()?;
-        calendar.span = self.span(&course)?;
-        Ok((calendar, course))
+        let spans = courses.iter().map(|course| self.span(course)).collect::<Result<Vec<_>>>()?;
+        calendar.span = spans[0];
+        if spans.iter().any(|span| *span != spans[0]) {
+            let what = "--from and --until are different moments on days with and without a change of the clock";
+            return Err(Error::usage(what).help("Bake these days apart, or the whole days"));
+        }
+        Ok((calendar, courses))
     }
 
     /// First and last time that needs light.
@@ -124,15 +134,17 @@ fn point(scene: &Scene, distance: f32) -> Result<SunPoint> {
     Ok(SunPoint { centre: bounds.centre().to_array(), distance })
 }
 
-/// The steps that have light, of those within the span of the calendar and next to it.
-fn lit(steps: &[f64], calendar: &Calendar, course: &Course, baking: &Baking) -> Vec<Lit> {
+/// The steps of a day that have light, of those within the span of the calendar and next to it.
+fn lit(steps: &[f64], calendar: &Calendar, (day, course): (usize, &Course), baking: &Baking) -> Vec<Lit> {
     // A step more on each side, so that the light at the ends of the span is between two steps.
     let beside = 60.0 * baking.interval;
-    let within = |seconds: f64| {
-        calendar.span.is_none_or(|[from, until]| from - beside < seconds && seconds < until + beside)
-    };
+    let within =
+        |seconds: f64| calendar.span.is_none_or(|[from, until]| from - beside < seconds && seconds < until + beside);
     let shining = steps.iter().filter(|seconds| within(**seconds)).map(|&seconds| (seconds, course.sun(seconds)));
-    shining.filter(|(_, sun)| sun.is_lit()).map(|(seconds, sun)| Lit { seconds, sun: sun.direction }).collect()
+    shining
+        .filter(|(_, sun)| sun.is_lit())
+        .map(|(seconds, sun)| Lit { seconds: seconds + NEXT_DAY * day as f64, sun: sun.direction })
+        .collect()
 }
 
 /// The surfaces that a bake holds light for.
@@ -163,13 +175,21 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
     if lightmap::triangles(scene).iter().all(|count| *count == 0) {
         return Err(Error::input("the scene has no surfaces, so there is nothing to bake"));
     }
-    let (calendar, course) = options.calendar(scene)?;
-    let steps = course.steps(baking.interval, baking.offset).map_err(Error::usage)?;
-    if steps.len() > MOST_TIMES {
-        let what = format!("the day has {} steps, at most {MOST_TIMES} are allowed", steps.len());
-        return Err(Error::usage(what).at("bake.interval").help("Choose a longer interval"));
+    let (calendar, courses) = options.calendar(scene)?;
+    let (mut steps, mut times) = (0, Vec::new());
+    for (day, course) in courses.iter().enumerate() {
+        let of_day = course.steps(baking.interval, baking.offset).map_err(Error::usage)?;
+        steps += of_day.len();
+        if steps > MOST_TIMES {
+            let days = match courses.len() {
+                1 => "the day has".to_owned(),
+                days => format!("{} of {days} days have", day + 1),
+            };
+            let what = format!("{days} {steps} steps, at most {MOST_TIMES} are allowed");
+            return Err(Error::usage(what).at("bake.interval").help("Choose a longer interval"));
+        }
+        times.extend(lit(&of_day, &calendar, (day, course), baking));
     }
-    let times = lit(&steps, &calendar, &course, baking);
     let (receivers, extent, sources, corners, notes) = match kind {
         KindArg::View => {
             let (_, view) = stage.at(args.time, args.size)?;
@@ -183,13 +203,20 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
         KindArg::Cube => {
             let (_, view) = stage.at(args.time, args.size)?;
             if view.is_orthographic() {
-                let what = format!("the camera {} has parallel rays, and one that turns in place needs", stage.placed.name);
+                let what =
+                    format!("the camera {} has parallel rays, and one that turns in place needs", stage.placed.name);
                 return Err(Error::usage(format!("{what} perspective")).help("Choose another one with --camera"));
             }
             let (position, near) = (view.position, view.near);
             let receivers = Kind::Cube { camera: stage.placed.name.clone(), position: position.to_array(), near };
             let faces = cube::views(position, near, baking.face);
-            (receivers, [cube::FACES * baking.face, baking.face], Sources::Cube(Box::new(faces)), Vec::new(), Vec::new())
+            (
+                receivers,
+                [cube::FACES * baking.face, baking.face],
+                Sources::Cube(Box::new(faces)),
+                Vec::new(),
+                Vec::new(),
+            )
         }
         KindArg::Lightmap => {
             let unwrapped = lightmap::unwrap(scene, baking)?;
@@ -209,7 +236,7 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
         receivers,
         extent,
         calendar,
-        steps: steps.len() as u32,
+        steps: steps as u32,
         times,
         weather: Weather::default(),
         settings: baking.clone(),
@@ -227,10 +254,11 @@ pub fn thin_out(plan: &mut Plan, transport: &mut Transport) -> Result<Option<(St
     }
     let seconds: Vec<f64> = plan.times.iter().map(|time| time.seconds).collect();
     let chosen = adaptive::choose(&transport.sparse(plan)?, &seconds, &plan.settings)?;
-    let course = Course::of(&plan.calendar).map_err(Error::input)?;
+    let courses = plan.calendar.courses().map_err(Error::input)?;
+    let worst = plan.times[chosen.worst_step];
+    let worst = courses[worst.day()].label(worst.seconds % NEXT_DAY);
     plan.times = chosen.kept.iter().map(|step| plan.times[*step]).collect();
     transport.follow(plan)?;
-    let worst = course.label(seconds[chosen.worst_step]);
     let said = format!(
         "{} of {} lit steps are needed; the worst of the others is off by {:.2} %, at {worst} (interpolated, by {} paths of few texels)",
         chosen.kept.len(),

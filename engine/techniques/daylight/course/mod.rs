@@ -100,7 +100,10 @@ impl SunPath {
     }
 
     fn at(&self, seconds: f64, north: f32) -> Shine {
-        let night = Shine { direction: [0.0, -1.0, 0.0], irradiance: self.stops.first().and_then(|stop| stop.irradiance).map(|_| [0.0; 3]) };
+        let night = Shine {
+            direction: [0.0, -1.0, 0.0],
+            irradiance: self.stops.first().and_then(|stop| stop.irradiance).map(|_| [0.0; 3]),
+        };
         let next = self.stops.partition_point(|stop| stop.seconds <= seconds);
         let Some(before) = next.checked_sub(1).map(|before| &self.stops[before]) else { return night };
         let from = before.sun.unit(north);
@@ -172,7 +175,14 @@ fn between(from: [f64; 3], to: [f64; 3], along: f64) -> [f64; 3] {
     unit(std::array::from_fn(|i| cosine * from[i] + sine * side[i]))
 }
 
-/// The course of the sun through the day of a bake.
+fn finite(north: f32) -> Result<f32, String> {
+    match north.is_finite() {
+        true => Ok(north),
+        false => Err(format!("the north is turned by {north} degrees, a finite number is allowed")),
+    }
+}
+
+/// The course of the sun through a day of a bake.
 #[derive(Clone, Debug)]
 pub enum Course {
     /// That of a date and a place.
@@ -182,25 +192,22 @@ pub enum Course {
 }
 
 impl Course {
-    /// The course that a calendar describes.
+    /// A path from a file; `north`: turn of the north from -Z, degrees.
     ///
     /// # Errors
     /// A sentence that says what is impossible.
-    pub fn of(calendar: &Calendar) -> Result<Self, String> {
-        let north = calendar.north;
-        if !north.is_finite() {
-            return Err(format!("the north is turned by {north} degrees, a finite number is allowed"));
-        }
-        match &calendar.path {
-            Some(path) => {
-                path.validate()?;
-                Ok(Self::Path { path: path.clone(), north })
-            }
-            None => {
-                let day = Day::new(&calendar.date, &calendar.zone, calendar.latitude, calendar.longitude)?;
-                Ok(Self::Almanac { day: Box::new(day), north })
-            }
-        }
+    pub(super) fn path(path: &SunPath, north: f32) -> Result<Self, String> {
+        path.validate()?;
+        Ok(Self::Path { path: path.clone(), north: finite(north)? })
+    }
+
+    /// A date at the place of a calendar.
+    ///
+    /// # Errors
+    /// A sentence that says what is impossible.
+    pub(super) fn almanac(date: &str, calendar: &Calendar) -> Result<Self, String> {
+        let day = Day::new(date, &calendar.zone, calendar.latitude, calendar.longitude)?;
+        Ok(Self::Almanac { day: Box::new(day), north: finite(calendar.north)? })
     }
 
     /// Seconds of the day.
@@ -214,9 +221,7 @@ impl Course {
     /// The sun at `seconds` after the begin of the day.
     pub fn sun(&self, seconds: f64) -> Shine {
         match self {
-            Self::Almanac { day, north } => {
-                Shine { direction: day.sun(seconds).direction(*north), irradiance: None }
-            }
+            Self::Almanac { day, north } => Shine { direction: day.sun(seconds).direction(*north), irradiance: None },
             Self::Path { path, north } => path.at(seconds, *north),
         }
     }

@@ -16,7 +16,8 @@ const MOST_BYTES: u64 = 16 << 20;
 /// Times of a path at most.
 const MOST_STOPS: usize = 100_000;
 /// The columns of a `.csv` file, for messages.
-const COLUMNS: &str = "`time`, then `azimuth,elevation` or `x,y,z`, then `red,green,blue` if the sun has an irradiance of its own";
+const COLUMNS: &str =
+    "`time`, then `azimuth,elevation` or `x,y,z`, then `red,green,blue` if the sun has an irradiance of its own";
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -67,7 +68,8 @@ impl SunPath {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let lines = text.lines().enumerate().map(|(number, line)| (number + 1, line.trim()));
         let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-        let (number, head) = lines.next().ok_or_else(|| Error::input(format!("is empty; its columns are {COLUMNS}")))?;
+        let (number, head) =
+            lines.next().ok_or_else(|| Error::input(format!("is empty; its columns are {COLUMNS}")))?;
         let names: Vec<String> = head.split(',').map(|name| name.trim().to_lowercase()).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let (angles, coloured) = match names[..] {

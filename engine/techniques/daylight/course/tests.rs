@@ -4,8 +4,14 @@ fn calendar(path: Option<SunPath>) -> Calendar {
     Calendar { date: "2026-06-21".into(), zone: "UTC".into(), latitude: 51.5, path, ..Calendar::default() }
 }
 
+fn only(calendar: &Calendar) -> Course {
+    let mut courses = calendar.courses().unwrap();
+    assert_eq!(courses.len(), 1);
+    courses.remove(0)
+}
+
 fn course(text: &str) -> Course {
-    Course::of(&calendar(Some(SunPath::from_csv(text).unwrap()))).unwrap()
+    only(&calendar(Some(SunPath::from_csv(text).unwrap())))
 }
 
 fn apart(a: [f32; 3], b: [f32; 3]) -> f32 {
@@ -14,7 +20,7 @@ fn apart(a: [f32; 3], b: [f32; 3]) -> f32 {
 
 #[test]
 fn a_path_of_an_almanac_gives_the_suns_of_the_almanac() {
-    let day = Course::of(&calendar(None)).unwrap();
+    let day = only(&calendar(None));
     let Course::Almanac { day: almanac, .. } = &day else { panic!("no date") };
     let mut text = String::from("# every ten minutes\ntime,azimuth,elevation\n");
     for seconds in (0..86_400).step_by(600) {
@@ -63,7 +69,7 @@ fn north_turns_azimuths_and_no_directions() {
         ("time,x,y,z\n06:00,0,0,-1\n18:00,0,0,-1\n", [0.0, 0.0, -1.0]),
     ] {
         let path = SunPath::from_csv(text).unwrap();
-        let course = Course::of(&Calendar { north: 90.0, ..calendar(Some(path)) }).unwrap();
+        let course = only(&Calendar { north: 90.0, ..calendar(Some(path)) });
         assert!(apart(course.sun(40_000.0).direction, turned) < 1e-6);
     }
 }
@@ -102,10 +108,25 @@ fn wrong_files_name_the_line_and_what_is_allowed() {
         ("[[sun]]\ntime = 6\n", &["line 2"][..]),
         ("[[sun]]\ntime = \"06:00\"\nazimut = 3\n", &["line 3", "azimut"]),
         ("[[sun]]\ntime = \"06:00\"\nazimuth = 3\n", &["line 1", "elevation"]),
-        ("[[sun]]\ntime = \"06:00\"\ndirection = [0, 1, 0]\n\n[[sun]]\ntime = \"05:00\"\ndirection = [0, 1, 0]\n", &["line 5"]),
+        (
+            "[[sun]]\ntime = \"06:00\"\ndirection = [0, 1, 0]\n\n[[sun]]\ntime = \"05:00\"\ndirection = [0, 1, 0]\n",
+            &["line 5"],
+        ),
         ("[[sun]]\ntime = \"06:00\"\ndirection = [0, 1, 0]\n", &["at least 2"]),
     ] {
         let said = toml(text);
         assert!(parts.iter().all(|part| said.contains(part)), "{said}");
+    }
+}
+
+#[test]
+fn several_days_have_their_own_suns_and_no_day_is_there_twice() {
+    let dates =
+        |dates: &[&str]| Calendar { dates: dates.iter().map(|date| (*date).to_owned()).collect(), ..calendar(None) };
+    let courses = dates(&["2026-12-21", "2026-03-20"]).courses().unwrap();
+    let heights = courses.iter().map(|course| course.sun(12.0 * 3600.0).direction[1]).collect::<Vec<_>>();
+    assert!(heights[0] > heights[2] && heights[2] > heights[1], "{heights:?}");
+    for (days, part) in [(&["2026-06-21"][..], "2026-06-21 is there twice"), (&["2026-02-30"], "2026-02-30")] {
+        assert!(dates(days).courses().unwrap_err().contains(part));
     }
 }
