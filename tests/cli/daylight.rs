@@ -6,7 +6,7 @@ use std::{
 };
 
 use crate::support::{Ran, command, device, files, ran};
-use lucerna::image::{self, Limits};
+use lucerna::{image, scene::Limits};
 
 struct Lab(tempfile::TempDir);
 
@@ -71,6 +71,8 @@ fn impossible_days_are_exit_code_2_and_say_what_is_possible() {
         (&["-D", "bake.interval=0.1"], &["14400 steps", "4096", "longer interval"]),
         (&["-D", "bake.interval=0.01"], &["bake.interval", "0.01"]),
         (&["-D", "bake.offset=5"], &["offset is 5", "interval of 5"]),
+        (&["--dates", "2026-06-21,2026-06-21"], &["2026-06-21", "twice"]),
+        (&["--dates", "2026-06-21", "--date", "2026-06-21"], &["--dates", "--date"]),
         (&["--sun-distance", "1"], &["--sun-distance is 1", "outside the scene"]),
         (&["--sun-distance", "nan"], &["--sun-distance"]),
         (&["-D", "bake.adaptive=sometimes"], &["sometimes", "paper", "middle"]),
@@ -117,7 +119,7 @@ fn a_path_from_a_file_lights_bakes_and_pictures() {
     // A lamp that goes on and off again: light from one side at 08:00, from above at 12:00, none after 16:00.
     lab.write(
         "lamp.csv",
-        "time,x,y,z,red,green,blue\n08:00,1,1,0,100,50,0\n12:00,0,1,0,100,50,0\n16:00,0,1,0.5,0,0,0\n",
+        "time,x,y,z,red,green,blue\n08:00,1,1,0,20000,10000,0\n12:00,0,1,0,20000,10000,0\n16:00,0,1,0.5,0,0,0\n",
     );
     let path = ["--sun-path", "lamp.csv", "-D", "bake.interval=30"];
     let told = lab.view("lamp.day", &[&path[..], &["--json"]].concat()).expect(0, &[]).json();
@@ -212,7 +214,7 @@ fn a_camera_that_turns_in_place_sees_the_light_of_a_view() {
     let scene = ["--builtin", "primitives"];
     let many = [
         "-D",
-        "bake.samples=256",
+        "bake.samples=96",
         "-D",
         "bake.interval=180",
         "-D",
@@ -224,8 +226,8 @@ fn a_camera_that_turns_in_place_sees_the_light_of_a_view() {
     ];
     let size = ["--size", "40x30"];
     lab.run(&[&["bake"][..], &scene, &size, &many, &["--kind", "view", "-o", "view.day"]].concat()).expect(0, &[]);
-    let cube = ["--kind", "cube", "-D", "bake.face=48", "-o", "cube.day"];
-    lab.run(&[&["bake"][..], &scene, &many, &cube].concat()).expect(0, &["288×48"]);
+    let cube = ["--kind", "cube", "-D", "bake.face=32", "-o", "cube.day"];
+    lab.run(&[&["bake"][..], &scene, &many, &cube].concat()).expect(0, &["192×32"]);
     let info = lab.run(&["info", "cube.day"]).expect(0, &[]).stdout;
     assert!(info.contains("cube around camera"), "{info}");
     let shot = |bake: &str, out: &str| {
@@ -233,9 +235,9 @@ fn a_camera_that_turns_in_place_sees_the_light_of_a_view() {
     };
     let (view, cube) = (shot("view.day", "view.exr"), shot("cube.day", "cube.exr"));
     let ratio = mean(&cube) / mean(&view);
-    assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
+    assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
     let error = apart(&cube, &view);
-    assert!(error < 0.15, "{error}");
+    assert!(error < 0.2, "{error}");
     // Any size and angle of view, but only from this place.
     let other =
         ["render", "--builtin", "primitives", "--bake", "cube.day", "--time", "12:00", "--camera", "1", "-o", "o.exr"];
@@ -272,6 +274,35 @@ fn steps_that_are_left_out_are_the_same_for_all_shards_and_change_little() {
     assert!(error < 0.15, "{error}");
     let pdiff = ["-D", "bake.adaptive=middle", "-D", "bake.measure=pdiff"];
     lab.view("pdiff.day", &[&day[..], &pdiff].concat()).expect(0, &["lit steps are needed"]);
+}
+
+#[test]
+fn several_days_in_one_file_are_as_the_days_alone() {
+    if !device() {
+        return;
+    }
+    let lab = Lab::new();
+    let day = ["-D", "bake.interval=60", "-D", "bake.tolerance=0.01", "--json"];
+    let summer = lab.view("summer.day", &[&day[..], &["--date", "2026-06-21"]].concat()).expect(0, &[]).json();
+    let winter = lab.view("winter.day", &[&day[..], &["--date", "2026-12-21"]].concat()).expect(0, &[]).json();
+    let both = [&day[..], &["--dates", "2026-06-21,2026-12-21", "-D", "bake.adaptive=off"]].concat();
+    let both = lab.view("both.day", &both).expect(0, &[]).json();
+    let lit = |told: &serde_json::Value| told["lit"].as_u64().unwrap();
+    assert_eq!(lit(&both), lit(&summer) + lit(&winter));
+    assert!(lit(&winter) < lit(&summer));
+    let shot = |bake: &str, out: &str, more: &[&str]| {
+        let words = ["--builtin", "primitives", "--size", "16x12", "--bake", bake, "--time", "11:30"];
+        lab.irradiance(out, &[&words[..], more].concat())
+    };
+    for (alone, date) in [("summer.day", "2026-06-21"), ("winter.day", "2026-12-21")] {
+        let [a, b] =
+            [shot(alone, &format!("{alone}.exr"), &[]), shot("both.day", &format!("{date}.exr"), &["--date", date])];
+        assert!(apart(&b, &a) < 0.02, "{date}: {}", apart(&b, &a));
+    }
+    let other = ["render", "--builtin", "primitives", "--size", "16x12", "--bake", "both.day", "--date", "2026-03-20"];
+    lab.run(&[&other[..], &["-o", "x.exr"]].concat()).expect(2, &["2026-03-20", "2026-06-21, 2026-12-21"]);
+    let info = lab.run(&["info", "both.day"]).expect(0, &[]).stdout;
+    assert!(info.contains("2026-06-21, 2026-12-21"), "{info}");
 }
 
 /// A glTF file of one square, with a second set of coordinates or without.
