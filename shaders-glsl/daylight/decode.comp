@@ -54,30 +54,43 @@ vec3 lightmap_light(vec2 place) {
     return sum.a > 0.0 ? sum.rgb / sum.a : vec3(0.0);
 }
 
-// Bilinear between the texels of the faces in the direction of the pixel, where they show its surface: those of other surfaces count only if there
-// are no better ones.
+// The light of a texel of the faces with its weight: `share` as far as it shows the surface that the pixel sees at `seen` from the camera with normal
+// `n`. Texels of other surfaces count only if there are no better ones.
+vec4 cube_texel(uint face, ivec2 at, vec3 seen, vec3 n, float share) {
+    uint side_texels = texels.y;
+    uvec3 texel;
+    if (share <= 0.0 || !day_cube_texel(face, at, side_texels, texel)) return vec4(0.0);
+    CubeTexel there = around[texel.y * texels.x + texel.z * side_texels + texel.x];
+    if (there.depth <= 0.0) return vec4(0.0);
+    vec2 centre = (vec2(texel.xy) + 0.5) / float(side_texels);
+    float texel_size = 2.0 * length(seen) / float(side_texels);
+    float off = dot(n, there.depth * day_cube_direction(texel.z, centre) - seen) / texel_size;
+    float alike = exp(-2.0 * off * off) * pow(max(dot(n, octahedral_decode(unpackSnorm2x16(there.normal))), 0.0), 4.0);
+    return share * max(alike, 1e-4) * texel_light(uvec2(texel.z * side_texels + texel.x, texel.y));
+}
+
+// Bilinear between the texels of the faces in the direction of the pixel.
 vec3 cube_light(ivec2 pixel) {
     vec2 uv = (vec2(pixel) + 0.5) / view.extent;
     vec3 seen = world_from_depth(view, uv, texelFetch(depth, pixel, 0).r) - view.position;
     vec3 n = decode_normal(texelFetch(normal, pixel, 0));
-    uint n_texels = texels.y;
     vec2 place;
     uint face = day_cube_face(seen, place);
-    vec2 at = place * float(n_texels) - 0.5;
+    vec2 at = place * float(texels.y) - 0.5;
+    ivec2 corner = ivec2(floor(at));
     vec2 f = at - floor(at);
-    float texel_size = 2.0 * length(seen) / float(n_texels);
     vec4 sum = vec4(0.0);
-    for (uint i = 0u; i < 4u; ++i) {
-        uvec2 step = uvec2(i & 1u, i >> 1u);
-        uvec3 texel;
-        if (!day_cube_texel(face, ivec2(floor(at)) + ivec2(step), n_texels, texel)) continue;
-        CubeTexel there = around[texel.y * texels.x + texel.z * n_texels + texel.x];
-        if (there.depth <= 0.0) continue;
-        vec2 centre = (vec2(texel.xy) + 0.5) / float(n_texels);
-        float off = dot(n, there.depth * day_cube_direction(texel.z, centre) - seen) / texel_size;
-        float alike = exp(-2.0 * off * off) * pow(max(dot(n, octahedral_decode(unpackSnorm2x16(there.normal))), 0.0), 4.0);
-        float weight = (step.x == 1u ? f.x : 1.0 - f.x) * (step.y == 1u ? f.y : 1.0 - f.y);
-        if (weight > 0.0) sum += weight * max(alike, 1e-4) * texel_light(uvec2(texel.z * n_texels + texel.x, texel.y));
+    for (int i = 0; i < 4; ++i) {
+        ivec2 step = ivec2(i & 1, i >> 1);
+        float share = (step.x == 1 ? f.x : 1.0 - f.x) * (step.y == 1 ? f.y : 1.0 - f.y);
+        sum += cube_texel(face, corner + step, seen, n, share);
+    }
+    if (sum.a < 0.01) {
+        // None of them shows the surface, as on things thinner than a texel: farther texels may.
+        for (int i = 0; i < 36; ++i) {
+            vec2 step = vec2(i % 6 - 2, i / 6 - 2);
+            sum += cube_texel(face, corner + ivec2(step), seen, n, 0.1 / (1.0 + dot(step - f, step - f)));
+        }
     }
     return sum.a > 0.0 ? sum.rgb / sum.a : vec3(0.0);
 }

@@ -2,8 +2,8 @@
 //!
 //! The lit steps are halved until an interval passes a test. The paper compares the interpolated frame with the two ends of the interval
 //! ([`Adaptive::Paper`]). That test is blind where both ends are alike, as before sunrise and after sunset, and it asks for steps where the light
-//! changes evenly. [`Adaptive::Middle`] compares the interpolated frame with the true one. Both split every interval that is longer than
-//! [`Baking::longest`](super::Baking::longest).
+//! changes evenly. [`Adaptive::Middle`] compares the interpolated frame with the true one, [`Adaptive::Every`] all frames of the interval with the
+//! true ones. All split every interval that is longer than [`Baking::longest`](super::Baking::longest).
 //!
 //! Paths serve all times, so the light of all steps is known for a few texels ([`Sparse`]) before the bake begins. The steps that are left out save
 //! bytes and shadow rays, but no paths. The light is that of a white sun of 1 W/m², as it is stored: a change of the sun's strength alone needs no
@@ -32,6 +32,8 @@ pub enum Adaptive {
     Paper,
     /// The frame in the middle of an interval, interpolated, against the true one.
     Middle,
+    /// All frames of an interval, interpolated, against the true ones: no step that is left out differs noticeably.
+    Every,
 }
 
 /// How frames are compared.
@@ -92,7 +94,12 @@ pub fn choose(sparse: &Sparse, seconds: &[f64], settings: &Baking) -> Result<Cho
             continue;
         }
         let long = seconds[to] - seconds[from] > 60.0 * settings.longest;
-        if long || frames.differ([from, middle, to], settings)? {
+        let mut split = long;
+        let checked = if settings.adaptive == Adaptive::Every { from + 1..to } else { middle..middle + 1 };
+        for step in checked {
+            split = split || frames.differ([from, step, to], settings)?;
+        }
+        if split {
             kept.push(middle);
             intervals.extend([[from, middle], [middle, to]]);
         }
@@ -249,6 +256,9 @@ mod tests {
         let near = chosen.kept.iter().filter(|step| step.abs_diff(54) < 18).count();
         assert!(2 * near > chosen.kept.len(), "{near} of {}", chosen.kept.len());
         assert!(chosen.worst < 0.05, "{} at {}", chosen.worst, chosen.worst_step);
+        // Where every step counts, none is off by more.
+        let every = choose(&all, &seconds, &baking(Adaptive::Every)).unwrap();
+        assert!(every.worst <= 0.02 && every.kept.len() >= chosen.kept.len() && every.kept.len() < 90, "{every:?}");
         assert!(chosen.kept.windows(2).all(|pair| pair[0] < pair[1]));
     }
 
