@@ -28,7 +28,7 @@ fn a_sun_at_a_distance_has_the_light_of_a_point_light_there() {
         for (time, lit) in plan.times.iter().enumerate() {
             let mut stage = Stage { scene: scene.clone() };
             let place = Mat4::from_translation(Vec3::from(point.position(lit.sun)));
-            stage.light(LightKind::Point, Vec3::ONE, point.distance * point.distance, place);
+            stage.light(LightKind::Point { range: None }, Vec3::ONE, point.distance * point.distance, place);
             let layers = render(gpu, &stage.scene, &view, &settings, 512);
             let of = |name: &str| layers.layer(name).unwrap().data.clone();
             let (indirect, albedo) = (of("indirect"), of("albedo"));
