@@ -10,7 +10,7 @@ use lucerna::{
 };
 
 /// A white floor between a red and a blue wall, with a hanging board that shades a part.
-fn stage() -> Scene {
+pub fn stage() -> Scene {
     let mut stage = Stage::new();
     let white = stage.material(Material::diffuse("white", vec3(0.8, 0.8, 0.8)));
     let red = stage.material(Material::diffuse("red", vec3(0.8, 0.2, 0.1)));
@@ -23,7 +23,7 @@ fn stage() -> Scene {
     stage.scene
 }
 
-fn eye() -> View {
+pub fn eye() -> View {
     view(vec3(0.0, 2.2, 4.5), vec3(0.0, 0.7, 0.0), 45.0, [40, 30])
 }
 
@@ -31,7 +31,7 @@ fn suns() -> Vec<Vec3> {
     vec![vec3(0.9, 0.5, 0.3), vec3(0.1, 1.0, 0.2), vec3(-0.8, 0.2, 0.5)].into_iter().map(Vec3::normalize).collect()
 }
 
-fn plan(scene: &Scene, view: &View, settings: Baking) -> Plan {
+pub fn plan(scene: &Scene, view: &View, settings: Baking) -> Plan {
     let times = suns().into_iter().enumerate().map(|(i, sun)| Lit { seconds: 3600.0 * i as f64, sun: sun.to_array() });
     Plan {
         scene: "stage".into(),
@@ -43,7 +43,14 @@ fn plan(scene: &Scene, view: &View, settings: Baking) -> Plan {
         },
         extent: view.extent,
         probes: None,
-        calendar: Calendar { date: "2026-06-21".into(), zone: "UTC".into(), latitude: 0.0, longitude: 0.0, north: 0.0 },
+        lamps: Vec::new(),
+        calendar: Calendar {
+            date: "2026-06-21".into(),
+            zone: "UTC".into(),
+            latitude: 0.0,
+            longitude: 0.0,
+            ..Calendar::default()
+        },
         steps: 3,
         times: times.collect(),
         weather: Weather::default(),
@@ -51,7 +58,7 @@ fn plan(scene: &Scene, view: &View, settings: Baking) -> Plan {
     }
 }
 
-fn baking() -> Baking {
+pub fn baking() -> Baking {
     Baking { samples: 256, bounces: 16, roulette: 16, disc: false, diffuse_only: true, ..Baking::default() }
 }
 

@@ -13,7 +13,7 @@
 layout(local_size_x = 64) in;
 
 layout(binding = 0, scalar) uniform SettingsBlock { DaySettings settings; };
-layout(binding = 1, scalar) readonly buffer Suns { vec3 suns[]; };      // unit, towards the sun
+layout(binding = 1, scalar) readonly buffer Suns { vec4 suns[]; };      // as in daylight/sun.glsl
 layout(binding = 8, scalar) readonly buffer Starts { DayStart starts[]; };
 layout(binding = 9, scalar) readonly buffer Vertices { DayVertex vertices[]; };
 layout(binding = 11, scalar) readonly buffer Counts { uint counts[]; };
@@ -32,8 +32,8 @@ void main() {
     uint time = gl_GlobalInvocationID.x;
     uint receiver = gl_WorkGroupID.y;
     if (time >= settings.times) return;
-    vec3 sun = suns[time];
-    mat3 around = frame_around(sun);
+    vec4 sun = suns[time];
+    mat3 around = sun_frame(sun);
     for (uint i = first; i < first + count; ++i) {
         uint path = receiver * settings.samples + i;
         uint number = settings.first_sample + i;

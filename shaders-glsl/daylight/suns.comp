@@ -13,7 +13,8 @@
 layout(local_size_x = 64) in;
 
 layout(binding = 0, scalar) uniform SettingsBlock { DaySettings settings; };
-layout(binding = 1, scalar) readonly buffer Suns { vec3 suns[]; };      // unit, towards the sun
+// Unit vector towards the sun and 0, or the place of a sun that is a point, and its squared distance from the centre of its path.
+layout(binding = 1, scalar) readonly buffer Suns { vec4 suns[]; };
 layout(binding = 9, scalar) readonly buffer Vertices { DayVertex vertices[]; };
 layout(binding = 11, scalar) readonly buffer Counts { uint counts[]; };
 // Sums of irradiance for a sun of 1 W/m² at normal incidence: time after time for each receiver. Odd and even samples apart: their difference
@@ -31,8 +32,8 @@ void main() {
     uint time = gl_GlobalInvocationID.x;
     uint receiver = gl_WorkGroupID.y;
     if (time >= settings.times) return;
-    vec3 sun = suns[time];
-    mat3 around = frame_around(sun);
+    vec4 sun = suns[time];
+    mat3 around = sun_frame(sun);
     vec3 odd = vec3(0.0), even = vec3(0.0);
     for (uint i = first; i < first + count; ++i) {
         uint path = receiver * settings.samples + i;

@@ -11,6 +11,8 @@ mod added;
 mod bake;
 #[path = "../cli/compare.rs"]
 mod compare;
+#[path = "../cli/daylight.rs"]
+mod daylight;
 #[path = "../cli/experiment.rs"]
 mod experiment;
 #[path = "../cli/export_gltf.rs"]

@@ -3,6 +3,8 @@
 #[path = "../tracer_lab/mod.rs"]
 mod tracer_lab;
 
+#[path = "../daylight_cube.rs"]
+mod daylight_cube;
 #[path = "../daylight_day.rs"]
 mod daylight_day;
 #[path = "../daylight_light.rs"]
@@ -11,3 +13,5 @@ mod daylight_light;
 mod daylight_probes;
 #[path = "../daylight_sky.rs"]
 mod daylight_sky;
+#[path = "../daylight_sun.rs"]
+mod daylight_sun;

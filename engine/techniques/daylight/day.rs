@@ -152,21 +152,7 @@ impl Day {
     /// # Errors
     /// A value outside its range is an error.
     pub fn steps(&self, interval_minutes: f64, offset_minutes: f64) -> Result<Vec<f64>, String> {
-        // The small tolerance accepts 1/60 in any rounding.
-        if !(interval_minutes.is_finite() && interval_minutes >= 0.999 / 60.0) {
-            return Err(format!(
-                "The interval is {interval_minutes} minutes, but it must be at least one second (1/60 of a minute). \
-                 Choose a longer interval, for example 15."
-            ));
-        }
-        if !(offset_minutes >= 0.0 && offset_minutes < interval_minutes) {
-            return Err(format!(
-                "The offset is {offset_minutes} minutes, but it must be at least 0 and less than the interval of \
-                 {interval_minutes} minutes. Subtract or add whole intervals until it fits."
-            ));
-        }
-        let (interval, offset, length) = (interval_minutes * 60.0, offset_minutes * 60.0, self.length());
-        Ok((0_u32..).map(|i| offset + f64::from(i) * interval).take_while(|&x| x < length).collect())
+        steps(self.length(), interval_minutes, offset_minutes)
     }
 
     /// Reads a local civil time ("07:40" or "07:40:30") and returns the seconds since the start of the day.
@@ -176,12 +162,7 @@ impl Day {
     /// # Errors
     /// A text that isn't a time and a time that doesn't exist on this day are errors.
     pub fn parse_time(&self, text: &str) -> Result<f64, String> {
-        let time = civil_time(text).ok_or_else(|| {
-            format!(
-                "The time is \"{text}\", but it must be from 00:00 to 23:59:59. Write two digits each for the hour, \
-                 the minute and, if needed, the second, for example \"07:40\" or \"07:40:30\"."
-            )
-        })?;
+        let time = civil_time(text).ok_or_else(|| time_error(text))?;
         let ambiguous = self.zone.to_ambiguous_timestamp(self.date.to_datetime(time));
         if let AmbiguousOffset::Gap { .. } = ambiguous.offset() {
             return Err(format!(
@@ -225,6 +206,33 @@ impl Day {
         let (elevation, azimuth) = geometric_position(time, self.place, 0.0);
         Sun { elevation: elevation + refraction(elevation, STANDARD_PRESSURE, STANDARD_TEMPERATURE), azimuth }
     }
+}
+
+/// [`Day::steps`] of a day of `length` seconds.
+pub(super) fn steps(length: f64, interval_minutes: f64, offset_minutes: f64) -> Result<Vec<f64>, String> {
+    // The small tolerance accepts 1/60 in any rounding.
+    if !(interval_minutes.is_finite() && interval_minutes >= 0.999 / 60.0) {
+        return Err(format!(
+            "The interval is {interval_minutes} minutes, but it must be at least one second (1/60 of a minute). \
+             Choose a longer interval, for example 15."
+        ));
+    }
+    if !(offset_minutes >= 0.0 && offset_minutes < interval_minutes) {
+        return Err(format!(
+            "The offset is {offset_minutes} minutes, but it must be at least 0 and less than the interval of \
+             {interval_minutes} minutes. Subtract or add whole intervals until it fits."
+        ));
+    }
+    let (interval, offset) = (interval_minutes * 60.0, offset_minutes * 60.0);
+    Ok((0_u32..).map(|i| offset + f64::from(i) * interval).take_while(|&x| x < length).collect())
+}
+
+/// Says that a text is no time of a day.
+pub(super) fn time_error(text: &str) -> String {
+    format!(
+        "The time is \"{text}\", but it must be from 00:00 to 23:59:59. Write two digits each for the hour, the minute \
+         and, if needed, the second, for example \"07:40\" or \"07:40:30\"."
+    )
 }
 
 /// The apparent position of the sun's centre.

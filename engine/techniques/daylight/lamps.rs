@@ -1,6 +1,6 @@
 //! Lamps: their groups in a bake, and when they burn.
 
-use super::{Day, Group, Settings};
+use super::{Course, Group, Settings};
 use crate::{Error, Result, scene::Scene};
 
 /// When the lamps of a group burn.
@@ -90,7 +90,13 @@ fn fits(pattern: &str, name: &str) -> bool {
 ///
 /// # Errors
 /// `Usage` if the schedule cannot be read or names a group that the bake does not have.
-pub fn burning(settings: &Settings, groups: &[Group], day: &Day, seconds: f64, elevation: f64) -> Result<Vec<f32>> {
+pub fn burning(
+    settings: &Settings,
+    groups: &[Group],
+    course: &Course,
+    seconds: f64,
+    elevation: f64,
+) -> Result<Vec<f32>> {
     let wrong = |what: String| {
         let help =
             "Allowed are dusk, on, off and hours (18:30-06:00), also for single groups: NAME=on,OTHER=18:30-06:00";
@@ -103,7 +109,8 @@ pub fn burning(settings: &Settings, groups: &[Group], day: &Day, seconds: f64, e
         hours => {
             let cannot = || wrong(format!("`{hours}` is no schedule"));
             let (from, to) = hours.split_once('-').ok_or_else(cannot)?;
-            let second = |text: &str| day.parse_time(text.trim()).map_err(|what| wrong(format!("`{hours}`: {what}")));
+            let second =
+                |text: &str| course.parse_time(text.trim()).map_err(|what| wrong(format!("`{hours}`: {what}")));
             Ok(Schedule::Hours([second(from)?, second(to)?]))
         }
     };
@@ -140,7 +147,8 @@ mod tests {
 
     #[test]
     fn lamps_burn_by_the_sun_by_hours_and_by_name() {
-        let day = Day::new("2026-06-21", "UTC", 50.0, 0.0).unwrap();
+        let day = Box::new(crate::techniques::daylight::Day::new("2026-06-21", "UTC", 50.0, 0.0).unwrap());
+        let day = Course::Almanac { day, north: 0.0 };
         let groups = [group("posts"), group("office")];
         let at = |lamps: &str, hour: f64, elevation: f64| {
             let settings = Settings { lamps: lamps.into(), ..Settings::default() };

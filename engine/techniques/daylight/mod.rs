@@ -5,11 +5,14 @@
 //! principal components, as many as the [tolerance](Baking::tolerance) needs. [`units`] makes the tiles units of a job, and [`Stored`] is the
 //! file. At run time [`Daylight`] draws direct light with shadow maps and adds the baked light of the time.
 
+pub mod adaptive;
 mod added;
 pub mod atlas;
 pub mod beam;
 mod civil;
 pub mod columns;
+pub mod course;
+pub mod cube;
 pub mod day;
 mod file;
 pub mod filter;
@@ -28,10 +31,12 @@ mod technique;
 mod transport;
 pub mod units;
 
+pub use adaptive::{Adaptive, Comparison};
 pub use beam::Weather;
+pub use course::{Course, Shine, SunPath};
 pub use day::{Day, Place, Sun};
 pub use file::{Stored, Summary};
-pub use plan::{Calendar, Group, Kind, Lit, MOST_TIMES, Plan, digest, parts};
+pub use plan::{Calendar, Group, Kind, Lit, MOST_TIMES, NEXT_DAY, Plan, SunPoint, digest, parts};
 pub use settings::{Added, Baking, Interpolation, PictureSettings, Settings};
 pub use sky::Sky;
 pub use technique::{Baked, Daylight, Mode};

@@ -1,18 +1,25 @@
 //! All that decides the bytes of a bake: scene, receivers, times, settings.
 
-use glam::Mat4;
+use glam::{Mat4, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::{Baking, Weather, probes::Grid};
+use super::{Adaptive, Baking, Comparison, Course, SunPath, Weather, cube, probes::Grid};
 use crate::{
     Error, Result,
     bake::{Digest, Part},
-    scene::{LightKind, Scene, View},
-    shaders::consts::{DAY_VERTICES, SKY_PATCHES},
+    scene::{LightKind, Scene, View, cull::Aabb},
+    shaders::{
+        consts::{self, DAY_VERTICES, SKY_PATCHES},
+        types,
+    },
 };
 
 /// Times of a bake at most.
 pub const MOST_TIMES: usize = 4096;
+/// Days of a bake at most.
+pub const MOST_DAYS: usize = 366;
+/// From the begin of a day of a bake to that of the next one in its list of times, seconds. No day is as long.
+pub const NEXT_DAY: f64 = 172_800.0;
 /// Texels of a bake at most.
 pub const MOST_TEXELS: u64 = 1 << 28;
 
@@ -37,14 +44,26 @@ pub enum Kind {
         /// Digest of the corners of all triangles.
         corners: Digest,
     },
+    /// The surfaces around one point: six faces beside each other, for a camera that turns in place ([`super::cube`]).
+    Cube {
+        /// Name of the camera, for messages.
+        camera: String,
+        /// Metres.
+        position: [f32; 3],
+        /// Nearest distance along the axis of a face that is seen, metres.
+        near: f32,
+    },
 }
 
 /// The days and the place of a bake.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calendar {
     /// Year, month and day: `2026-06-21`.
     pub date: String,
+    /// Further days of the same place.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub dates: Vec<String>,
     /// Name of the time zone, or its offset: `Europe/Copenhagen`, `+01:00`.
     pub zone: String,
     /// Degrees, positive in the north.
@@ -53,12 +72,97 @@ pub struct Calendar {
     pub longitude: f64,
     /// Degrees from -Z to the north, clockwise as seen from above.
     pub north: f32,
+    /// A path from a file. Date, zone and place are then empty.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub path: Option<SunPath>,
+    /// The sun is a point near the scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub point: Option<SunPoint>,
+    /// First and last moment for which the bake has light, seconds after the begin of the day; `None`: the whole day.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub span: Option<[f64; 2]>,
+}
+
+/// A sun at a distance, as in the paper (section 3.1): a point light on a sphere around the scene. The paper does not say how its light falls
+/// off. Here it falls off with the square of the distance, and it has the irradiance of the sun at the centre of the sphere.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SunPoint {
+    /// Metres.
+    pub centre: [f32; 3],
+    /// From the centre, metres.
+    pub distance: f32,
+}
+
+impl SunPoint {
+    /// The place of the sun in a unit direction from the centre, metres.
+    pub fn position(&self, sun: [f32; 3]) -> [f32; 3] {
+        std::array::from_fn(|i| self.centre[i] + self.distance * sun[i])
+    }
+}
+
+impl Calendar {
+    /// The dates of all days.
+    pub fn dates(&self) -> impl Iterator<Item = &str> {
+        std::iter::once(&self.date).chain(&self.dates).map(String::as_str)
+    }
+
+    /// The courses of the sun of all days, in order.
+    ///
+    /// # Errors
+    /// A sentence that says what is impossible.
+    pub fn courses(&self) -> Result<Vec<Course>, String> {
+        if self.dates.len() >= MOST_DAYS {
+            return Err(format!("{} days, at most {MOST_DAYS} are allowed", self.dates.len() + 1));
+        }
+        if let Some(path) = &self.path {
+            return match self.dates.is_empty() {
+                true => Ok(vec![Course::path(path, self.north)?]),
+                false => Err("a path of the sun and further days".into()),
+            };
+        }
+        let mut courses = Vec::new();
+        for (number, date) in self.dates().enumerate() {
+            if self.dates().take(number).any(|other| other == date) {
+                return Err(format!("the date {date} is there twice"));
+            }
+            courses.push(Course::almanac(date, self)?);
+        }
+        Ok(courses)
+    }
+
+    /// The sun as a light: `sun` is the unit vector towards it, `light` its irradiance at normal incidence (at a distance: at the centre of its
+    /// path), W/m². `bounds`: of everything that it lights.
+    pub(super) fn light(&self, sun: Vec3, light: [f32; 3], bounds: &Aabb) -> types::Light {
+        let directional = types::Light {
+            kind: consts::LIGHT_DIRECTIONAL,
+            direction: (-sun).to_array(),
+            intensity: light,
+            spot_offset: 1.0,
+            ..types::Light::default()
+        };
+        let Some(point) = self.point else { return directional };
+        let position = Vec3::from(point.position(sun.to_array()));
+        // A spot light that lights everything evenly: its one shadow map has more texels on the scene than those of a light to all sides.
+        let cosine = |corner: Vec3| (corner - position).normalize_or(-sun).dot(-sun);
+        let least = bounds.corners().into_iter().map(cosine).fold(1.0, f32::min);
+        let (inner, outer) = (least - 1e-4, (1.05 * least.clamp(-1.0, 1.0).acos() + 0.02).min(3.0).cos());
+        let scale = 1.0 / (inner - outer).max(1e-4);
+        types::Light {
+            kind: consts::LIGHT_SPOT,
+            position: position.to_array(),
+            intensity: light.map(|channel| channel * point.distance * point.distance),
+            spot_scale: scale,
+            spot_offset: -outer * scale,
+            ..directional
+        }
+    }
 }
 
 /// A time of the day at which the sun shines.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lit {
-    /// Seconds after the begin of the day.
+    /// Seconds after the begin of the day, and [`NEXT_DAY`] for each day of the bake before it.
     pub seconds: f64,
     /// Unit vector towards the sun.
     pub sun: [f32; 3],
@@ -73,6 +177,13 @@ pub struct Group {
     pub lights: Vec<u32>,
     /// Numbers of emissive materials.
     pub materials: Vec<u32>,
+}
+
+impl Lit {
+    /// Number of its day.
+    pub fn day(&self) -> usize {
+        (self.seconds / NEXT_DAY).max(0.0) as usize
+    }
 }
 
 /// The plan of a bake.
@@ -152,10 +263,42 @@ impl Plan {
         if self.times.windows(2).any(|pair| pair[0].seconds >= pair[1].seconds) {
             return wrong("times that are not in order".into());
         }
+        let courses = self.calendar.courses().map_err(Error::input)?;
+        if let Some(time) = self.times.iter().find(|time| time.seconds < 0.0 || time.day() >= courses.len()) {
+            return wrong(format!("a time at {} seconds, which is in no day of the bake", time.seconds));
+        }
+        if let Some(point) = self.calendar.point
+            && !(point.centre.iter().all(|part| part.is_finite()) && (1e-3..=1e9).contains(&point.distance))
+        {
+            return wrong(format!("a sun at a distance of {} m; 0.001 to 1000000000 m are allowed", point.distance));
+        }
+        if let Some([from, until]) = self.calendar.span
+            && !(0.0 <= from && from <= until && until <= NEXT_DAY)
+        {
+            return wrong(format!("light from {from} to {until} seconds of a day"));
+        }
+        if let Kind::Cube { position, near, .. } = &self.receivers {
+            cube::check_extent(self.extent)?;
+            if !position.iter().chain([near]).all(|number| number.is_finite()) {
+                return wrong("a camera whose place is not finite".into());
+            }
+        }
         let Weather { .. } =
             Weather::new(self.weather.turbidity(), self.weather.ground_albedo(), self.weather.overcast())
                 .map_err(Error::input)?;
-        self.settings.validate()
+        self.settings.validate()?;
+        match (&self.receivers, self.settings.adaptive, self.settings.measure) {
+            (_, Adaptive::Off, _) | (_, _, Comparison::Rms) | (Kind::View { .. } | Kind::Cube { .. }, _, _) => Ok(()),
+            (Kind::Lightmap { .. }, _, Comparison::Pdiff) => {
+                let what = "`pdiff` compares pictures, and the texels of a lightmap are none";
+                Err(Error::usage(what).at("bake.measure").help("Choose `rms`"))
+            }
+        }
+    }
+
+    /// The times of a day.
+    pub fn of_day(&self, day: usize) -> std::ops::Range<usize> {
+        self.times.partition_point(|time| time.day() < day)..self.times.partition_point(|time| time.day() <= day)
     }
 
     /// Number of dimensions of the layers: times, patches of the sky, groups of lamps.
@@ -178,7 +321,7 @@ impl Plan {
     /// `Input` if they are others.
     pub fn check_corners(&self, corners: &[[u16; 6]]) -> Result<()> {
         let wanted = match &self.receivers {
-            Kind::View { .. } => Digest::of(&[]),
+            Kind::View { .. } | Kind::Cube { .. } => Digest::of(&[]),
             Kind::Lightmap { corners, .. } => *corners,
         };
         match digest(corners) == wanted {
@@ -187,11 +330,14 @@ impl Plan {
         }
     }
 
-    /// Checks that a view is the one of a bake for one view.
+    /// Checks that a view is the one of a bake for one view, or that it is at the place of a cube.
     ///
     /// # Errors
     /// `Usage` if it is another one.
     pub fn check_view(&self, view: &View) -> Result<()> {
+        if let Kind::Cube { camera, position, .. } = &self.receivers {
+            return cube::check_view(view, camera, (*position).into());
+        }
         let Kind::View { camera, view_from_world, clip_from_view } = &self.receivers else { return Ok(()) };
         let near = |a: Mat4, b: &[f32; 16]| {
             let size = b.iter().fold(1.0f32, |most, x| most.max(x.abs()));

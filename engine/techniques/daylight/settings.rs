@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Weather;
+use super::{Adaptive, Comparison, Weather};
 use crate::{
     Error, Result,
     passes::{gbuffer, shadow},
@@ -34,6 +34,16 @@ pub struct Baking {
     /// Time of the first step after midnight.
     #[schemars(range(min = 0, max = 720), extend("x-unit" = "min"))]
     pub offset: f64,
+    /// How the steps are chosen. Light between the chosen steps is interpolated.
+    pub adaptive: Adaptive,
+    /// How frames are compared to choose steps.
+    pub measure: Comparison,
+    /// Difference of two frames that is noticeable: a share of the mean for `rms`, of the pixels for `pdiff`.
+    #[schemars(range(min = 0, max = 1))]
+    pub noticeable: f64,
+    /// Longest time between two chosen steps.
+    #[schemars(range(min = 0.1, max = 1440), extend("x-unit" = "min"))]
+    pub longest: f64,
     /// The sun is a disc of its true size. If off, the sun is a point, as in the paper.
     pub disc: bool,
     /// Maximum of the error of a step of the day in a tile (root mean square), relative to its mean. It decides the number of images.
@@ -54,6 +64,9 @@ pub struct Baking {
     /// Texels along a metre of a surface, for lightmaps.
     #[schemars(range(min = 0.01, max = 1000), extend("x-unit" = "1/m"))]
     pub density: f32,
+    /// Side of a face, for a camera that turns in place.
+    #[schemars(range(min = 8, max = 4096), extend("x-unit" = "texels"))]
+    pub face: u32,
     /// Maximum side of a lightmap.
     #[schemars(range(min = 64, max = 4092), extend("x-unit" = "texels"))]
     pub lightmap: u32,
@@ -82,6 +95,10 @@ impl Default for Baking {
             diffuse_only: false,
             interval: 5.0,
             offset: 0.0,
+            adaptive: Adaptive::default(),
+            measure: Comparison::default(),
+            noticeable: 0.02,
+            longest: 60.0,
             disc: true,
             tolerance: 0.05,
             noise_floor: true,
@@ -89,6 +106,7 @@ impl Default for Baking {
             images: 0,
             tile: 32,
             density: 8.0,
+            face: 256,
             lightmap: 4092,
             probes: 2.0,
             most_probes: 4096,
@@ -134,6 +152,9 @@ pub enum Added {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
+    /// Date of the pictures, for bakes of several days: one of the bake's dates; empty: its first.
+    #[schemars(regex(pattern = r"^([0-9]{4}-[0-9]{2}-[0-9]{2})?$"))]
+    pub date: String,
     /// Local time of the first frame: hours and minutes.
     #[schemars(regex(pattern = r"^[0-2][0-9]:[0-5][0-9](:[0-5][0-9])?$"))]
     pub time: String,
@@ -169,6 +190,7 @@ impl Default for Settings {
     fn default() -> Self {
         let weather = Weather::default();
         Self {
+            date: String::new(),
             time: "12:00".into(),
             minutes: 5.0,
             interpolation: Interpolation::default(),

@@ -5,7 +5,9 @@ use std::{path::PathBuf, sync::Arc};
 use glam::{Vec2, Vec3};
 
 use super::{
-    Added, Day, Group, Interpolation, PictureSettings, Settings, Sky, Stored, added, lamps, lightmap,
+    Added, Course, Group, Interpolation, Lit, NEXT_DAY, PictureSettings, Settings, Sky, Stored, added,
+    cube::Around,
+    lamps, lightmap,
     pictures::{coefficients, fits, packed},
     probes::{self, Field},
 };
@@ -95,13 +97,15 @@ impl Baked {
 pub struct Daylight {
     gpu: Gpu,
     baked: Baked,
-    day: Day,
+    /// One for each day of the bake.
+    courses: Vec<Course>,
     tiles: OwnedBuffer,
     words: OwnedBuffer,
     places: Option<Places>,
     /// The first node of the objects that the bake does not know.
     added: Option<u32>,
     probes: Option<Field>,
+    around: Option<Around>,
     /// The last sky, and the state that it shows.
     sky: Option<(OwnedImage, [f32; 7])>,
 }
@@ -171,36 +175,44 @@ impl Daylight {
         &self.baked.stored
     }
 
-    /// Seconds of the day at a frame.
-    fn seconds(&self, settings: &Settings, frame: u32) -> Result<f64> {
-        let time = self.day.parse_time(&settings.time).map_err(|what| Error::usage(what).at("daylight.time"))?;
-        Ok((time + f64::from(frame) * 60.0 * settings.minutes).rem_euclid(self.day.length()))
+    /// Number of the day of the pictures.
+    fn day(&self, settings: &Settings) -> Result<usize> {
+        let calendar = &self.baked.stored.plan.calendar;
+        if settings.date.is_empty() {
+            return Ok(0);
+        }
+        let found = calendar.dates().position(|date| date == settings.date);
+        found.filter(|_| calendar.path.is_none()).ok_or_else(|| {
+            let there = match calendar.path {
+                Some(_) => "a path of the sun without a date".to_owned(),
+                None => calendar.dates().collect::<Vec<_>>().join(", "),
+            };
+            let what = format!("the date is {}, the bake has {there}", settings.date);
+            self.baked.blamed(Error::usage(what)).at("daylight.date")
+        })
     }
 
-    /// The weights of the baked times around a moment (equations 1 to 3; x there has the offset on the wrong side).
-    fn weights(&self, seconds: f64, how: Interpolation) -> Vec<(usize, f32)> {
-        let times = &self.baked.stored.plan.times;
-        let Some(last) = times.len().checked_sub(1) else { return Vec::new() };
-        let next = times.partition_point(|time| time.seconds <= seconds);
-        let [Some(before), Some(after)] = [next.checked_sub(1), (next <= last).then_some(next)] else {
-            // Before the first and after the last baked time the sun is at the horizon.
-            return vec![(next.min(last), 1.0)];
-        };
-        let step = times[after].seconds - times[before].seconds;
-        let alpha = ((seconds - times[before].seconds) / step) as f32;
-        match how {
-            Interpolation::Nearest => vec![(if alpha < 0.5 { before } else { after }, 1.0)],
-            Interpolation::CatmullRom if before > 0 && after < last => {
-                let (a, a2, a3) = (alpha, alpha * alpha, alpha * alpha * alpha);
-                vec![
-                    (before - 1, 0.5 * (-a + 2.0 * a2 - a3)),
-                    (before, 0.5 * (2.0 - 5.0 * a2 + 3.0 * a3)),
-                    (after, 0.5 * (a + 4.0 * a2 - 3.0 * a3)),
-                    (after + 1, 0.5 * (a3 - a2)),
-                ]
-            }
-            Interpolation::Linear | Interpolation::CatmullRom => vec![(before, 1.0 - alpha), (after, alpha)],
+    /// Seconds of the day at a frame.
+    fn seconds(&self, course: &Course, settings: &Settings, frame: u32) -> Result<f64> {
+        let time = course.parse_time(&settings.time).map_err(|what| Error::usage(what).at("daylight.time"))?;
+        let seconds = (time + f64::from(frame) * 60.0 * settings.minutes).rem_euclid(course.length());
+        if let Some([from, until]) = self.baked.stored.plan.calendar.span
+            && !(from..=until).contains(&seconds)
+        {
+            let [at, from, until] = [seconds, from, until].map(|seconds| course.label(seconds));
+            let what = format!("frame {frame} is at {at}, the bake has light from {from} until {until}");
+            return Err(self.baked.blamed(Error::usage(what)).help("Choose other times, or bake the whole day"));
         }
+        Ok(seconds)
+    }
+
+    /// The weights of the baked times around a moment of a day (equations 1 to 3; x there has the offset on the wrong side).
+    fn weights(&self, day: usize, seconds: f64, how: Interpolation) -> Vec<(usize, f32)> {
+        let plan = &self.baked.stored.plan;
+        let of_day = plan.of_day(day);
+        let first = of_day.start;
+        let weights = weights(&plan.times[of_day], seconds + NEXT_DAY * day as f64, how);
+        weights.into_iter().map(|(time, weight)| (first + time, weight)).collect()
     }
 
     /// Handles of the scene under this sun and sky instead of its own.
@@ -216,13 +228,7 @@ impl Daylight {
         let mut here = (*moment.handles.moment).clone();
         here.lights.clear();
         if light.iter().any(|light| *light > 0.0) {
-            here.lights.push(types::Light {
-                kind: consts::LIGHT_DIRECTIONAL,
-                direction: (-sun).to_array(),
-                intensity: light,
-                spot_offset: 1.0,
-                ..types::Light::default()
-            });
+            here.lights.push(self.baked.stored.plan.calendar.light(sun, light, &moment.handles.bounds()));
         }
         here.environment_scale = strength;
         here.environment_rotation = 0.0;
@@ -238,6 +244,31 @@ impl Daylight {
             moment: Arc::new(here),
             ..moment.handles.clone()
         })
+    }
+}
+
+/// Weights of some of `times`, in order, around a moment.
+fn weights(times: &[Lit], seconds: f64, how: Interpolation) -> Vec<(usize, f32)> {
+    let Some(last) = times.len().checked_sub(1) else { return Vec::new() };
+    let next = times.partition_point(|time| time.seconds <= seconds);
+    let [Some(before), Some(after)] = [next.checked_sub(1), (next <= last).then_some(next)] else {
+        // Before the first and after the last baked time the sun is at the horizon.
+        return vec![(next.min(last), 1.0)];
+    };
+    let step = times[after].seconds - times[before].seconds;
+    let alpha = ((seconds - times[before].seconds) / step) as f32;
+    match how {
+        Interpolation::Nearest => vec![(if alpha < 0.5 { before } else { after }, 1.0)],
+        Interpolation::CatmullRom if before > 0 && after < last => {
+            let (a, a2, a3) = (alpha, alpha * alpha, alpha * alpha * alpha);
+            vec![
+                (before - 1, 0.5 * (-a + 2.0 * a2 - a3)),
+                (before, 0.5 * (2.0 - 5.0 * a2 + 3.0 * a3)),
+                (after, 0.5 * (a + 4.0 * a2 - 3.0 * a3)),
+                (after + 1, 0.5 * (a3 - a2)),
+            ]
+        }
+        Interpolation::Linear | Interpolation::CatmullRom => vec![(before, 1.0 - alpha), (after, alpha)],
     }
 }
 
@@ -338,21 +369,20 @@ impl Technique for Daylight {
             }
         }
         let base = if added.is_some() { &*base } else { scene };
-        let calendar = &stored.plan.calendar;
-        let day = Day::new(&calendar.date, &calendar.zone, calendar.latitude, calendar.longitude)
-            .map_err(|what| baked.blamed(Error::input(what)))?;
+        let courses = stored.plan.calendar.courses().map_err(|what| baked.blamed(Error::input(what)))?;
         let columns = |index: usize| stored.plan.tile(index as u32)[2];
         let (tiles, words) = packed(stored.tiles.iter().enumerate().map(|(index, tile)| (tile, columns(index))));
         fits(gpu, &words).map_err(|error| baked.blamed(error.help("Bake fewer texels, or use another device")))?;
         Ok(Self {
             gpu: gpu.clone(),
             baked: baked.clone(),
-            day,
+            courses,
             tiles: OwnedBuffer::with_contents(gpu, "daylight.tiles", bytemuck::cast_slice(&tiles))?,
             words: OwnedBuffer::with_contents(gpu, "daylight.words", bytemuck::cast_slice(&words))?,
             places: Places::new(gpu, base, baked)?,
             added,
             probes: if added.is_some() { Field::new(gpu, stored).map_err(|error| baked.blamed(error))? } else { None },
+            around: Around::new(gpu, base, &stored.plan)?,
             sky: None,
         })
     }
@@ -362,17 +392,22 @@ impl Technique for Daylight {
         let plan = &self.baked.stored.plan;
         plan.check_view(&moment.view).map_err(|error| self.baked.blamed(error))?;
         let [columns, _] = plan.tiles();
-        let (side, texels, north) = (plan.settings.tile, plan.extent, plan.calendar.north);
+        let (side, texels) = (plan.settings.tile, plan.extent);
         let of_day = &settings.daylight;
-        let seconds = self.seconds(of_day, graph.frame)?;
-        let sun = Vec3::from(self.day.sun(seconds).direction(north));
+        let day = self.day(of_day)?;
+        let course = &self.courses[day];
+        let seconds = self.seconds(course, of_day, graph.frame)?;
+        let shine = course.sun(seconds);
+        let sun = Vec3::from(shine.direction);
         let sky = Sky::new(of_day.weather()?, sun.as_dvec3().to_array()).map_err(Error::usage)?;
-        let light = sky.sun_irradiance().map(|channel| channel * of_day.strength);
+        let clear = 1.0 - of_day.overcast as f32;
+        let light = shine.irradiance.map_or(sky.sun_irradiance(), |sun| sun.map(|channel| channel * clear));
+        let light = light.map(|channel| channel * of_day.strength);
         let patches: Vec<[f32; 3]> =
             sky.patches().iter().map(|patch| patch.map(|channel| channel * of_day.strength)).collect();
-        let weights = self.weights(seconds, of_day.interpolation);
-        let elevation = self.day.sun(seconds).elevation;
-        let burning = lamps::burning(of_day, &plan.lamps, &self.day, seconds, elevation)?;
+        let weights = self.weights(day, seconds, of_day.interpolation);
+        let elevation = f64::from(sun.y).clamp(-1.0, 1.0).asin().to_degrees();
+        let burning = lamps::burning(of_day, &plan.lamps, course, seconds, elevation)?;
         let materials = switched(&moment.handles.material_table, &plan.lamps, &burning);
         let burning: Vec<[f32; 3]> = burning.into_iter().map(|share| [share; 3]).collect();
         let coefficients = coefficients(self.baked.stored.tiles.iter(), &weights, light, &patches, &burning);
@@ -404,7 +439,12 @@ impl Technique for Daylight {
         let places = self.places.as_ref().map(|places| places.draw(graph, &handles, view, under));
         let args = decode::Args {
             places: places.unwrap_or(gbuffer.depth),
-            spec: decode::Spec { lightmap: places.is_some().into() },
+            spec: decode::Spec {
+                texels_of: self.around.as_ref().map_or(places.is_some().into(), |_| consts::DAY_CUBE),
+            },
+            view: gbuffer.view,
+            normal: gbuffer.normal,
+            around: graph.import_buffer(self.around.as_ref().map_or(&self.tiles, Around::guide)),
             albedo: gbuffer.albedo,
             depth: gbuffer.depth,
             direct: lit.direct,

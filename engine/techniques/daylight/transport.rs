@@ -4,7 +4,13 @@
 //! shadow ray to each position of the sun: a day costs one set of paths and many coherent shadow rays, instead of a set of paths for each time.
 //! Light is linear in the sun, so the sun is white and has an irradiance of 1 W/m² at normal incidence.
 
-use super::{Group, Kind, Plan, beam::SUN_ANGULAR_RADIUS, columns::Measured, gathered::Spot};
+use super::{
+    Baking, Group, Kind, Plan,
+    adaptive::{SPARSE_PATHS, Sparse},
+    beam::SUN_ANGULAR_RADIUS,
+    columns::Measured,
+    gathered::Spot,
+};
 use glam::Vec3;
 
 use crate::{
@@ -29,6 +35,8 @@ use crate::{
 const BATCH: u32 = 16;
 /// Maximum of loop iterations that choosing one lamp takes: a descent of the light tree.
 const LAMP_TURNS: u64 = 64;
+/// Texels of [`Transport::sparse`], about.
+const SPARSE: usize = 2048;
 /// Vertices of a batch at most: 200 MB.
 const MOST_VERTICES: u64 = 1 << 22;
 
@@ -54,6 +62,8 @@ pub struct Transport {
 pub enum Sources {
     /// The pixels of a camera.
     View(Box<View>),
+    /// The faces of a camera that turns in place ([`super::cube::views`]).
+    Cube(Box<[View; 6]>),
     /// The texels of each tile of a lightmap ([`super::lightmap::Unwrapped::by_tile`]).
     Lightmap(Vec<Vec<(u32, types::Hit)>>),
 }
@@ -99,8 +109,7 @@ impl Transport {
         let resident = Resident::for_rays(gpu, &scene)?;
         let groups = OwnedBuffer::with_contents(gpu, "daylight.groups", bytemuck::cast_slice(&groups))?;
         let rays = Rays::new(gpu, &scene, &resident)?;
-        let suns: Vec<[f32; 3]> = plan.times.iter().map(|time| time.sun).chain([[0.0, 1.0, 0.0]]).collect();
-        let suns = OwnedBuffer::with_contents(gpu, "daylight.suns", bytemuck::cast_slice(&suns))?;
+        let suns = suns_of(gpu, plan)?;
         Ok(Self {
             gpu: gpu.clone(),
             runner: Runner::new(gpu),
@@ -124,11 +133,10 @@ impl Transport {
         let words = (columns * rows).div_ceil(32) as usize;
         let mut mask = vec![0u32; words];
         let hits: Vec<types::Hit> = match &self.sources {
-            Sources::View(view) => {
-                let view = **view;
+            Sources::View(_) | Sources::Cube(_) => {
                 let pixels: Vec<[u32; 2]> =
                     (row..row + rows).flat_map(|y| (column..column + columns).map(move |x| [x, y])).collect();
-                let seen = self.seen(plan, &view, &pixels)?;
+                let seen = self.seen(&pixels)?;
                 // Hits of nothing have the number NONE (lib/scene.glsl) for their instance.
                 let there = seen.iter().enumerate().filter(|(_, hit)| hit.instance != u32::MAX);
                 there
@@ -153,8 +161,75 @@ impl Transport {
         Ok(Light { mask, ..light })
     }
 
+    /// The light of some texels that lie evenly over the bake, by few paths: what the choice of the steps needs. It is the same for all shards.
+    ///
+    /// # Errors
+    /// As [`Self::tile`].
+    pub fn sparse(&mut self, plan: &Plan) -> Result<Sparse> {
+        let [width, height] = plan.extent;
+        let (hits, mask, extent) = match &self.sources {
+            Sources::Lightmap(tiles) => {
+                let every = tiles.iter().map(Vec::len).sum::<usize>().div_ceil(SPARSE).max(1);
+                let hits: Vec<_> = tiles.iter().flatten().step_by(every).map(|(_, hit)| *hit).collect();
+                (hits, Vec::new(), None)
+            }
+            Sources::View(_) | Sources::Cube(_) => {
+                let step = (f64::from(width) * f64::from(height) / SPARSE as f64).sqrt().ceil().max(1.0) as u32;
+                let extent = [width.div_ceil(step), height.div_ceil(step)];
+                let middle = |at: u32, most: u32| (at * step + step / 2).min(most - 1);
+                let texels: Vec<[u32; 2]> = (0..extent[1])
+                    .flat_map(|y| (0..extent[0]).map(move |x| [middle(x, width), middle(y, height)]))
+                    .collect();
+                let mut mask = vec![0u32; texels.len().div_ceil(32)];
+                let mut hits = Vec::new();
+                for (texel, hit) in self.seen(&texels)?.into_iter().enumerate() {
+                    if hit.instance != u32::MAX {
+                        mask[texel / 32] |= 1 << (texel % 32);
+                        hits.push(hit);
+                    }
+                }
+                (hits, mask, Some(extent))
+            }
+        };
+        let settings = Baking { samples: plan.settings.samples.min(SPARSE_PATHS), ..plan.settings.clone() };
+        let light = self.gather(&Plan { settings, ..plan.clone() }, 0, &hits)?;
+        Ok(Sparse { light: Light { mask, ..light }, extent })
+    }
+
+    /// Goes on with the times of another plan of the same texels.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`.
+    pub fn follow(&mut self, plan: &Plan) -> Result<()> {
+        self.suns = suns_of(&self.gpu, plan)?;
+        Ok(())
+    }
+
+    /// The surfaces at the centres of texels of a view or of the faces of a cube.
+    fn seen(&mut self, texels: &[[u32; 2]]) -> Result<Vec<types::Hit>> {
+        let views = match &self.sources {
+            Sources::View(view) => {
+                let view = **view;
+                return self.seen_by(&view, texels);
+            }
+            Sources::Cube(views) => views.clone(),
+            Sources::Lightmap(_) => return Ok(Vec::new()),
+        };
+        let side = views[0].extent[0];
+        let mut seen = vec![types::Hit { instance: u32::MAX, ..types::Hit::default() }; texels.len()];
+        for (face, view) in views.iter().enumerate() {
+            let of_face: Vec<usize> = (0..texels.len()).filter(|i| (texels[*i][0] / side) as usize == face).collect();
+            if !of_face.is_empty() {
+                let pixels: Vec<[u32; 2]> = of_face.iter().map(|i| [texels[*i][0] % side, texels[*i][1]]).collect();
+                let hits = self.seen_by(view, &pixels)?;
+                of_face.into_iter().zip(hits).for_each(|(i, hit)| seen[i] = hit);
+            }
+        }
+        Ok(seen)
+    }
+
     /// The surfaces at the centres of pixels.
-    fn seen(&mut self, plan: &Plan, view: &View, pixels: &[[u32; 2]]) -> Result<Vec<types::Hit>> {
+    fn seen_by(&mut self, view: &View, pixels: &[[u32; 2]]) -> Result<Vec<types::Hit>> {
         let count = pixels.len() as u32;
         let mut graph = Graph::new("daylight.see");
         let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
@@ -165,7 +240,7 @@ impl Transport {
                 view: graph.uniform(&view.fit_far(&handles.bounds()).uniform()),
                 pixels: graph.buffer_from("daylight.pixels", pixels),
                 receivers,
-                push: see::Push { count, extent: plan.extent },
+                push: see::Push { count, extent: view.extent },
             },
             rays,
             handles
@@ -289,6 +364,20 @@ impl Transport {
     }
 }
 
+/// The suns of all times; one more, so that the buffer is never empty.
+fn suns_of(gpu: &Gpu, plan: &Plan) -> Result<OwnedBuffer> {
+    // Place and squared distance of a sun that is a point, else direction and 0.
+    let entry = |sun: [f32; 3]| match plan.calendar.point {
+        Some(point) => {
+            let [x, y, z] = point.position(sun);
+            [x, y, z, point.distance * point.distance]
+        }
+        None => [sun[0], sun[1], sun[2], 0.0],
+    };
+    let suns: Vec<[f32; 4]> = plan.times.iter().map(|time| time.sun).chain([[0.0, 1.0, 0.0]]).map(entry).collect();
+    OwnedBuffer::with_contents(gpu, "daylight.suns", bytemuck::cast_slice(&suns))
+}
+
 /// A scene in which only the lamps of these groups shine, and the group of each of its placed lights and then of each material (`u32::MAX`: none).
 fn with_lamps(scene: &Scene, groups: &[Group]) -> (Scene, Vec<u32>) {
     let mut scene = Scene { environment: None, ..scene.clone() };
@@ -320,7 +409,7 @@ pub(super) fn settings(
 ) -> types::DaySettings {
     let baking = &plan.settings;
     let mut flags = 0;
-    if let Kind::View { .. } = plan.receivers {
+    if let Kind::View { .. } | Kind::Cube { .. } = plan.receivers {
         flags |= consts::DAY_NORMAL_MAPS;
     }
     if baking.diffuse_only {

@@ -13,7 +13,7 @@ use serde_json::json;
 
 use super::{
     info,
-    plan::{DayOptions, KindArg, Planned, plan},
+    plan::{DayOptions, KindArg, Planned, plan, thin_out},
 };
 use crate::{
     args::{DeviceArgs, TalkArgs},
@@ -92,13 +92,13 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
     let interrupt = Interrupt::install();
     let stage = Stage::open(&args.stage)?;
     stage.notes().iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
-    let Planned { plan, sources, corners, notes } = plan(&args.day, args.kind, &keys.bake, &stage, &args.stage)?;
+    let Planned { mut plan, sources, corners, notes } = plan(&args.day, args.kind, &keys.bake, &stage, &args.stage)?;
     notes.iter().for_each(|note| console.info(&format!("note: lightmap: {note}")));
     plan.validate()?;
     let gpu = Gpu::new(args.device.options()?)?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
     let texels = match &plan.receivers {
-        Kind::View { .. } => u64::from(plan.extent[0]) * u64::from(plan.extent[1]),
+        Kind::View { .. } | Kind::Cube { .. } => u64::from(plan.extent[0]) * u64::from(plan.extent[1]),
         Kind::Lightmap { covered, .. } => *covered,
     };
     console.info(&format!(
@@ -110,7 +110,7 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
         plan.settings.samples
     ));
     if plan.times.is_empty() {
-        console.info("note: the sun does not rise on this day; the bake holds the light of the sky alone");
+        console.info("note: the sun does not shine at any step; the bake holds the light of the sky alone");
     }
     if let Some(grid) = &plan.probes {
         let ([x, y, z], [across, up, along]) = (grid.counts, grid.spacing);
@@ -132,11 +132,13 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
     let device = format!("{}, {} {}", about.device, about.driver, about.driver_info);
     let folder = units_of::parts(&args.output)?;
     let of_tiles: Option<Vec<u64>> = match &sources {
-        Sources::View(_) => None,
+        Sources::View(_) | Sources::Cube(_) => None,
         Sources::Lightmap(tiles) => Some(tiles.iter().map(|tile| tile.len() as u64).collect()),
     };
-    let store = args.units.store(&folder, units::job(&plan, &device, of_tiles.as_deref())?, console)?;
     let mut transport = Transport::new(&gpu, &stage.scene, &plan, sources)?;
+    let adaptive = thin_out(&mut plan, &mut transport)?;
+    adaptive.iter().for_each(|(said, _)| console.info(said));
+    let store = args.units.store(&folder, units::job(&plan, &device, of_tiles.as_deref())?, console)?;
     let skies = units::skies(&plan)?;
     let unit = |unit: lucerna::bake::UnitId, _: lucerna::bake::Needed<'_>| {
         units::unit(&plan, &mut transport, unit.index, &skies)
@@ -188,6 +190,7 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
             "missing": missing,
             "lit": plan.times.len(),
             "steps": plan.steps,
+            "adaptive": adaptive.map(|(_, json)| json),
             "seconds": progress.seconds,
             "settings": config::to_value(&keys)?,
         }))?;

@@ -3,8 +3,8 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use lucerna::{
-    Result,
-    techniques::daylight::{Kind, Stored, Summary, probes},
+    Error, Result,
+    techniques::daylight::{Calendar, Kind, Stored, Summary, SunPoint, probes},
 };
 use serde_json::json;
 
@@ -47,20 +47,30 @@ pub fn info(args: &DayInfoArgs, _: Console) -> Result<ExitCode> {
     let plan = &stored.plan;
     let kind = match &plan.receivers {
         Kind::View { camera, .. } => format!("pixels of camera {camera}"),
+        Kind::Cube { camera, position: [x, y, z], .. } => format!("cube around camera {camera} at {x}, {y}, {z}"),
         Kind::Lightmap { charts, covered, .. } => format!("lightmap, {charts} charts, {covered} texels on surfaces"),
     };
     let calendar = &plan.calendar;
     console::print(&format!("scene      {}, {kind}", plan.scene))?;
     console::print(&format!("texels     {}×{}, tiles of {}", plan.extent[0], plan.extent[1], plan.settings.tile))?;
-    console::print(&format!(
-        "day        {} at {:.4}° N, {:.4}° E, {}; {} steps, {} lit",
-        calendar.date,
-        calendar.latitude,
-        calendar.longitude,
-        calendar.zone,
-        plan.steps,
-        plan.times.len()
-    ))?;
+    let Calendar { date, dates, zone, latitude, longitude, .. } = calendar;
+    let day = match &calendar.path {
+        Some(path) => format!("path of the sun with {} times", path.stops.len()),
+        None if !dates.is_empty() => format!(
+            "{} at {latitude:.4}° N, {longitude:.4}° E, {zone}",
+            calendar.dates().collect::<Vec<_>>().join(", ")
+        ),
+        None => format!("{date} at {latitude:.4}° N, {longitude:.4}° E, {zone}"),
+    };
+    console::print(&format!("day        {day}; {} steps, light for {}", plan.steps, plan.times.len()))?;
+    if let Some(SunPoint { centre: [x, y, z], distance }) = calendar.point {
+        console::print(&format!("sun        a point {distance} m from {x}, {y}, {z}"))?;
+    }
+    if let Some(span) = calendar.span {
+        let courses = calendar.courses().map_err(Error::input)?;
+        let [from, until] = span.map(|seconds| courses[0].label(seconds));
+        console::print(&format!("span       {from} until {until}"))?;
+    }
     console::print(&format!("paths      {} per texel, {} scatterings", plan.settings.samples, plan.settings.bounces))?;
     lines(&summary).iter().try_for_each(|line| console::print(line))?;
     stored.probe_summary().iter().try_for_each(|summary| console::print(&probe_line(summary)))?;

@@ -1,21 +1,24 @@
 //! The plan of a bake: the day, the surfaces, and their texels.
 
-use std::str::FromStr;
+use std::{path::PathBuf, str::FromStr};
 
 use glam::Vec3;
 use lucerna::{
     Error, Result,
     scene::{Aabb, Scene},
     techniques::daylight::{
-        Baking, Calendar, Day, Kind, Lit, MOST_TIMES, Plan, Sources, Weather, digest, lamps, lightmap, parts,
-        probes::Grid,
+        Adaptive, Baking, Calendar, Course, Kind, Lit, MOST_TIMES, NEXT_DAY, Plan, Sources, SunPath, SunPoint,
+        Transport, Weather, adaptive, cube, digest, lamps, lightmap, parts, probes::Grid,
     },
 };
 
-use crate::stage::{Stage, StageArgs};
+use crate::{
+    scene_bounds,
+    stage::{Stage, StageArgs},
+};
 
-/// Elevation at which the sun has set: its radius below the horizon, degrees.
-const SET: f64 = -0.2665;
+/// Least distance of a sun that is a point, in radii of the scene.
+const NEAREST: f32 = 1.25;
 
 /// The day and the place of a bake.
 #[derive(clap::Args, Clone, Debug)]
@@ -23,6 +26,10 @@ pub struct DayOptions {
     /// Date of the day
     #[arg(long, value_name = "YYYY-MM-DD", default_value = "2026-06-21", help_heading = "Day")]
     pub date: String,
+
+    /// Several days in one file, for seasons; `daylight render --date` chooses
+    #[arg(long, value_name = "YYYY-MM-DD,…", value_delimiter = ',', conflicts_with = "date", help_heading = "Day")]
+    pub dates: Vec<String>,
 
     /// Degrees, positive in the north
     #[arg(long, value_name = "DEGREES", default_value_t = 55.5, allow_negative_numbers = true, help_heading = "Day")]
@@ -40,6 +47,28 @@ pub struct DayOptions {
     #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, help_heading = "Day")]
     pub north: f32,
 
+    /// Path of the sun in place of date and place: columns `time,azimuth,elevation` or `time,x,y,z`, then perhaps `red,green,blue` (W/m²); or
+    /// tables [[sun]] with `time`, `azimuth` and `elevation` or `direction`, and perhaps `irradiance`
+    #[arg(
+        long,
+        value_name = "FILE.csv|.toml",
+        conflicts_with_all = ["date", "dates", "latitude", "longitude", "timezone"],
+        help_heading = "Day"
+    )]
+    pub sun_path: Option<PathBuf>,
+
+    /// The sun is a point that is so far from the middle of the scene, as in the paper: its direction is another one at each surface
+    #[arg(long, value_name = "METRES", help_heading = "Day")]
+    pub sun_distance: Option<f32>,
+
+    /// First local time that needs light
+    #[arg(long, value_name = "HH:MM", help_heading = "Day")]
+    pub from: Option<String>,
+
+    /// Last local time that needs light
+    #[arg(long, value_name = "HH:MM", help_heading = "Day")]
+    pub until: Option<String>,
+
     /// Bake the lamps of this name as a group that can be switched: a light, its node, or an emissive material; `*` at an end stands for any
     /// text; may be given more than once. Without it all lamps are one group
     #[arg(long, value_name = "NAME", help_heading = "Bake")]
@@ -52,6 +81,84 @@ pub struct DayOptions {
     /// The box in which probes stand, two opposite corners in metres [default: the box around the scene]
     #[arg(long, value_name = "X,Y,Z,X,Y,Z", allow_hyphen_values = true, help_heading = "Bake")]
     pub probe_box: Option<Corners>,
+}
+
+impl DayOptions {
+    /// # Errors
+    /// `Usage` for an impossible day, `Input` for a file that cannot be read.
+    fn calendar(&self, scene: &Scene) -> Result<(Calendar, Vec<Course>)> {
+        let mut calendar = match &self.sun_path {
+            Some(file) => {
+                let path = SunPath::read(file)?;
+                if self.north != 0.0 && !path.has_angles() {
+                    let what = "--north turns azimuths, and the path of the sun has directions";
+                    return Err(Error::usage(what).help("Leave --north out"));
+                }
+                Calendar { path: Some(path), north: self.north, ..Calendar::default() }
+            }
+            None => Calendar {
+                date: self.dates.first().unwrap_or(&self.date).clone(),
+                dates: self.dates.iter().skip(1).cloned().collect(),
+                zone: self.timezone.clone(),
+                latitude: self.latitude,
+                longitude: self.longitude,
+                north: self.north,
+                ..Calendar::default()
+            },
+        };
+        let courses = calendar.courses().map_err(Error::usage)?;
+        calendar.point = self.sun_distance.map(|distance| point(scene, distance)).transpose()?;
+        let spans = courses.iter().map(|course| self.span(course)).collect::<Result<Vec<_>>>()?;
+        calendar.span = spans[0];
+        if spans.iter().any(|span| *span != spans[0]) {
+            let what = "--from and --until are different moments on days with and without a change of the clock";
+            return Err(Error::usage(what).help("Bake these days apart, or the whole days"));
+        }
+        Ok((calendar, courses))
+    }
+
+    /// First and last time that needs light.
+    fn span(&self, course: &Course) -> Result<Option<[f64; 2]>> {
+        if self.from.is_none() && self.until.is_none() {
+            return Ok(None);
+        }
+        let time = |name: &str, text: &Option<String>, other: f64| match text {
+            Some(text) => course.parse_time(text).map_err(|what| Error::usage(what).at(name)),
+            None => Ok(other),
+        };
+        let from = time("--from", &self.from, 0.0)?;
+        let until = time("--until", &self.until, course.length())?;
+        if from > until {
+            let what = format!("--until {} is before --from {}", course.label(until), course.label(from));
+            return Err(Error::usage(what).help("A bake is of one day; exchange them, or bake twice"));
+        }
+        Ok(Some([from, until]))
+    }
+}
+
+/// A sun at a distance from the middle of the scene.
+fn point(scene: &Scene, distance: f32) -> Result<SunPoint> {
+    let bounds = scene_bounds::over_animations(scene)
+        .ok_or_else(|| Error::input("the scene has no surfaces, so there is nothing to bake"))?;
+    let least = NEAREST * bounds.half().length();
+    if !(distance >= least && distance <= 1e9) {
+        let what = format!("--sun-distance is {distance}, {least:.3} to 1000000000 m are allowed for this scene");
+        return Err(Error::usage(what).help("The sun must be outside the scene"));
+    }
+    Ok(SunPoint { centre: bounds.centre().to_array(), distance })
+}
+
+/// The steps of a day that have light, of those within the span of the calendar and next to it.
+fn lit(steps: &[f64], calendar: &Calendar, (day, course): (usize, &Course), baking: &Baking) -> Vec<Lit> {
+    // A step more on each side, so that the light at the ends of the span is between two steps.
+    let beside = 60.0 * baking.interval;
+    let within =
+        |seconds: f64| calendar.span.is_none_or(|[from, until]| from - beside < seconds && seconds < until + beside);
+    let shining = steps.iter().filter(|seconds| within(**seconds)).map(|&seconds| (seconds, course.sun(seconds)));
+    shining
+        .filter(|(_, sun)| sun.is_lit())
+        .map(|(seconds, sun)| Lit { seconds: seconds + NEXT_DAY * day as f64, sun: sun.direction })
+        .collect()
 }
 
 /// A box: two opposite corners, metres.
@@ -79,6 +186,8 @@ pub enum KindArg {
     Lightmap,
     /// The pixels of the camera, for this camera and size alone
     View,
+    /// The surfaces around the camera, which turns in place: six faces of `bake.face` texels
+    Cube,
 }
 
 /// The plan of a command line, and the texels.
@@ -94,17 +203,24 @@ pub struct Planned {
 /// # Errors
 /// `Usage` for an impossible day or lightmap; `Input` if the scene has no surfaces.
 pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage, args: &StageArgs) -> Result<Planned> {
-    let day = Day::new(&options.date, &options.timezone, options.latitude, options.longitude).map_err(Error::usage)?;
-    let steps = day.steps(baking.interval, baking.offset).map_err(Error::usage)?;
-    if steps.len() > MOST_TIMES {
-        let what = format!("the day has {} steps, at most {MOST_TIMES} are allowed", steps.len());
-        return Err(Error::usage(what).at("bake.interval").help("Choose a longer interval"));
-    }
-    let lit = steps.iter().filter(|seconds| day.sun(**seconds).elevation > SET);
-    let times = lit.map(|&seconds| Lit { seconds, sun: day.sun(seconds).direction(options.north) }).collect();
     let scene: &Scene = &stage.scene;
-    if scene.meshes.is_empty() {
+    if lightmap::triangles(scene).iter().all(|count| *count == 0) {
         return Err(Error::input("the scene has no surfaces, so there is nothing to bake"));
+    }
+    let (calendar, courses) = options.calendar(scene)?;
+    let (mut steps, mut times) = (0, Vec::new());
+    for (day, course) in courses.iter().enumerate() {
+        let of_day = course.steps(baking.interval, baking.offset).map_err(Error::usage)?;
+        steps += of_day.len();
+        if steps > MOST_TIMES {
+            let days = match courses.len() {
+                1 => "the day has".to_owned(),
+                days => format!("{} of {days} days have", day + 1),
+            };
+            let what = format!("{days} {steps} steps, at most {MOST_TIMES} are allowed");
+            return Err(Error::usage(what).at("bake.interval").help("Choose a longer interval"));
+        }
+        times.extend(lit(&of_day, &calendar, (day, course), baking));
     }
     let (receivers, extent, sources, corners, notes) = match kind {
         KindArg::View => {
@@ -115,6 +231,24 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
                 clip_from_view: view.clip_from_view.to_cols_array(),
             };
             (receivers, view.extent, Sources::View(Box::new(view)), Vec::new(), Vec::new())
+        }
+        KindArg::Cube => {
+            let (_, view) = stage.at(args.time, args.size)?;
+            if view.is_orthographic() {
+                let what =
+                    format!("the camera {} has parallel rays, and one that turns in place needs", stage.placed.name);
+                return Err(Error::usage(format!("{what} perspective")).help("Choose another one with --camera"));
+            }
+            let (position, near) = (view.position, view.near);
+            let receivers = Kind::Cube { camera: stage.placed.name.clone(), position: position.to_array(), near };
+            let faces = cube::views(position, near, baking.face);
+            (
+                receivers,
+                [cube::FACES * baking.face, baking.face],
+                Sources::Cube(Box::new(faces)),
+                Vec::new(),
+                Vec::new(),
+            )
         }
         KindArg::Lightmap => {
             let unwrapped = lightmap::unwrap(scene, baking)?;
@@ -145,18 +279,43 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
         receivers,
         extent,
         probes,
-        calendar: Calendar {
-            date: options.date.clone(),
-            zone: options.timezone.clone(),
-            latitude: options.latitude,
-            longitude: options.longitude,
-            north: options.north,
-        },
-        steps: steps.len() as u32,
+        calendar,
+        steps: steps as u32,
         times,
         weather: Weather::default(),
         lamps: if options.no_lamps { Vec::new() } else { lamps::groups(scene, &options.lamp)? },
         settings: baking.clone(),
     };
     Ok(Planned { plan, sources, corners, notes })
+}
+
+/// Leaves out the steps that interpolation replaces ([`adaptive`]), and says so in a line for the user; `None` if all steps are wanted.
+///
+/// # Errors
+/// As [`Transport::sparse`].
+pub fn thin_out(plan: &mut Plan, transport: &mut Transport) -> Result<Option<(String, serde_json::Value)>> {
+    if plan.settings.adaptive == Adaptive::Off || plan.times.is_empty() {
+        return Ok(None);
+    }
+    let seconds: Vec<f64> = plan.times.iter().map(|time| time.seconds).collect();
+    let chosen = adaptive::choose(&transport.sparse(plan)?, &seconds, &plan.settings)?;
+    let courses = plan.calendar.courses().map_err(Error::input)?;
+    let worst = plan.times[chosen.worst_step];
+    let worst = courses[worst.day()].label(worst.seconds % NEXT_DAY);
+    plan.times = chosen.kept.iter().map(|step| plan.times[*step]).collect();
+    transport.follow(plan)?;
+    let said = format!(
+        "{} of {} lit steps are needed; the worst of the others is off by {:.2} %, at {worst} (interpolated, by {} paths of few texels)",
+        chosen.kept.len(),
+        seconds.len(),
+        100.0 * chosen.worst,
+        plan.settings.samples.min(adaptive::SPARSE_PATHS),
+    );
+    let json = serde_json::json!({
+        "lit": seconds.len(),
+        "kept": chosen.kept.len(),
+        "worst": chosen.worst,
+        "worst_at": worst,
+    });
+    Ok(Some((said, json)))
 }

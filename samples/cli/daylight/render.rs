@@ -26,6 +26,10 @@ pub struct DayArgs {
     #[arg(id = "clock", long = "time", value_name = "HH:MM", help_heading = "Technique")]
     pub time: Option<String>,
 
+    /// Date, for a bake of several days [default: the first of the bake]
+    #[arg(long, value_name = "YYYY-MM-DD", help_heading = "Technique")]
+    pub date: Option<String>,
+
     /// Minutes from one frame of a sequence to the next [default: 5]
     #[arg(long, value_name = "MINUTES", allow_negative_numbers = true, help_heading = "Technique")]
     pub minutes: Option<f64>,
@@ -44,6 +48,9 @@ pub fn render(args: &DayArgs) -> Result<ExitCode> {
     let mut given = Given::<Daylight>::by(&args.common, args.mode)?;
     if let Some(time) = &args.time {
         given.base.daylight.time = time.clone();
+    }
+    if let Some(date) = &args.date {
+        given.base.daylight.date = date.clone();
     }
     if let Some(minutes) = args.minutes {
         given.base.daylight.minutes = minutes;
