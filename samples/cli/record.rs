@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use lucerna::{Error, Result};
+use lucerna::{Error, Result, bake::Digest, technique::Bake};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -61,8 +61,45 @@ pub struct Record {
     pub mode: Option<String>,
     #[serde(default)]
     pub f32: bool,
+    /// The file of a bake, without which the picture cannot be made.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bake: Option<BakeFile>,
     /// All settings of the technique, as `--print-config` prints them.
     pub settings: Value,
+}
+
+/// The file of a bake.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BakeFile {
+    pub file: String,
+    /// Of its contents.
+    pub digest: Digest,
+}
+
+impl BakeFile {
+    /// What the pictures of a bake say about it. `None`: they can be made without it.
+    pub fn of(baked: &impl Bake) -> Option<Self> {
+        let (file, digest) = baked.source()?;
+        Some(Self { file: file.to_string_lossy().into_owned(), digest })
+    }
+
+    /// Reads the file.
+    ///
+    /// # Errors
+    /// `Input`, naming the file, if it cannot be read or is another bake.
+    pub fn read<B: Bake>(&self) -> Result<B> {
+        let baked = B::read(Path::new(&self.file))?;
+        match baked.source() {
+            Some((_, digest)) if digest != self.digest => {
+                let what =
+                    format!("has the digest {digest}; the picture was made with a bake of digest {}", self.digest);
+                let error = Error::input(what).in_file(&self.file);
+                Err(error.help("Put the bake of the picture there, or bake it again with the same options"))
+            }
+            _ => Ok(baked),
+        }
+    }
 }
 
 /// The source of the scene.
@@ -107,6 +144,7 @@ impl Record {
             view: None,
             mode: None,
             f32: false,
+            bake: None,
             settings: Value::Null,
         }
     }
@@ -214,6 +252,7 @@ impl Record {
                 .map(|path| format!("{path:?}, and the files in its folder that it refers to")),
         );
         let environment = self.environment.as_deref().map(Path::new);
+        list.extend(self.bake.iter().map(|bake| format!("{:?}", bake.file)));
         list.extend(environment.filter(|path| !source::is_built_in_environment(path)).map(|path| format!("{path:?}")));
         list
     }
@@ -262,6 +301,7 @@ mod tests {
             view: None,
             mode: Some("direct".into()),
             f32: true,
+            bake: Some(BakeFile { file: "-odd.day".into(), digest: Digest::of(b"odd") }),
             settings: serde_json::json!({"samples": 24, "strength": 0.1, "limit": null}),
         };
         let again = Record::from_config(&serde_json::to_value(&record).unwrap()).unwrap();
@@ -285,7 +325,8 @@ mod tests {
         // No option may write a file, or read a file that the record does not name.
         assert!(args.output.is_empty() && args.dump.is_none() && args.timings.is_none() && args.stage.camera.is_none());
         assert!(args.settings.file.is_none() && !args.overwrite && !args.json);
-        assert_eq!(again.files(), ["\"-odd.obj\", and the files in its folder that it refers to"]);
+        let files = ["\"-odd.obj\", and the files in its folder that it refers to", "\"-odd.day\""];
+        assert_eq!(again.files(), files);
         for (odd, place) in [
             (Record { width: 0, ..record.clone() }, "width"),
             (Record { height: MAX_SIDE + 1, ..record.clone() }, "height"),

@@ -1,5 +1,5 @@
 // Baked indirect light at the pixels of a picture, and the sum of all light. A pixel fetches the images of its tile; no frame of the day is ever
-// rebuilt in memory. In the notation of the paper (Bahnsen et al. 2012, equations 1 to 3), the coefficients are already those between two steps.
+// rebuilt in memory. With frames, it fetches the frames around the time. In the notation of the paper (Bahnsen et al. 2012, equations 1 to 3), the coefficients are already those between two steps.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -18,61 +18,131 @@ layout(binding = 6, rgba16f) uniform writeonly image2D indirect;
 layout(binding = 7, rgba16f) uniform writeonly image2D irradiance;
 layout(binding = 8) uniform sampler2D places;         // in the lightmap, texels
 
+layout(binding = 9, scalar) readonly buffer Frame0 { uint frame_0[]; };  // 16-bit floats, three for each texel on a surface
+layout(binding = 10, scalar) readonly buffer Frame1 { uint frame_1[]; };
+layout(binding = 11, scalar) readonly buffer Frame2 { uint frame_2[]; };
+layout(binding = 12, scalar) readonly buffer Frame3 { uint frame_3[]; };
+layout(binding = 13, scalar) buffer Fetches { uint fetches[256]; };      // read from images and frames, in parts
+
 // 0: texels are pixels. 1: texels are those of a lightmap.
 layout(constant_id = 0) const uint LIGHTMAP = 0u;
+// The light of the sun is in images: 0. It is in frames: one more than the number of frames that are mixed.
+layout(constant_id = 1) const uint FRAMES = 0u;
+// The light between two times is the line between its logarithms.
+layout(constant_id = 2) const uint LOGARITHMS = 0u;
 
 layout(push_constant, scalar) uniform Push {
     uint side;     // of a tile, texels
     uint columns;  // of tiles
     uvec2 texels;  // of the bake
+    uint second;   // first coefficient for the second time, with logarithms
+    float alpha;   // share of the second time, with logarithms
+    vec3 sun;      // irradiance, W/m²
+    vec4 weights;  // of the frames
 };
 
-// The light of a texel, with 1 in a; 0 where no surface is.
-vec4 texel_light(uvec2 texel) {
+// Added to light for 1 W/m² of the sun before the logarithm.
+const float DARKEST = 1e-4;
+
+// The light of a texel.
+struct TexelLight {
+    vec3 first;   // of the sun at the first time, or of both times, W/m²
+    vec3 second;  // of the sun at the second time, with logarithms
+    vec3 rest;    // of the sky
+    float there;  // 1; 0 where no surface is
+};
+
+uint fetched = 0u;
+
+// Three values of a frame from two words.
+vec3 frame_value(uint low, uint high, uint texel) {
+    vec2 a = unpackHalf2x16(low);
+    vec2 b = unpackHalf2x16(high);
+    return (texel & 1u) == 0u ? vec3(a, b.x) : vec3(a.y, b);
+}
+
+TexelLight texel_light(uvec2 texel) {
     uvec2 tile = texel / side;
     uint number = tile.y * columns + tile.x;
     uint at = day_texel(number, texel - tile * side);
-    return at == NONE ? vec4(0.0) : vec4(day_irradiance(number, at), 1.0);
+    if (at == NONE) return TexelLight(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
+    DaySums of_sun = DaySums(vec3(0.0), vec3(0.0), 0u);
+    if (FRAMES == 0u) {
+        day_layer(of_sun, number, 0u, at, LOGARITHMS != 0u ? second : 0u);
+    } else {
+        uint i = tiles[number].first_texel + at;
+        uint word = 3u * i / 2u;
+        if (FRAMES > 1u) of_sun.first = weights.x * frame_value(frame_0[word], frame_0[word + 1u], i);
+        if (FRAMES > 2u) {
+            vec3 next = weights.y * frame_value(frame_1[word], frame_1[word + 1u], i);
+            if (LOGARITHMS != 0u) of_sun.second = next; else of_sun.first += next;
+        }
+        if (FRAMES > 3u) of_sun.first += weights.z * frame_value(frame_2[word], frame_2[word + 1u], i);
+        if (FRAMES > 4u) of_sun.first += weights.w * frame_value(frame_3[word], frame_3[word + 1u], i);
+        of_sun.first *= sun;
+        of_sun.second *= sun;
+        of_sun.fetches = FRAMES - 1u;
+    }
+    DaySums of_sky = DaySums(vec3(0.0), vec3(0.0), 0u);
+    day_layer(of_sky, number, 1u, at, 0u);
+    fetched += of_sun.fetches + of_sky.fetches;
+    return TexelLight(of_sun.first, of_sun.second, of_sky.first, 1.0);
 }
 
 // Bilinear between the texels that are on a surface. Texels of other charts are farther away than one texel.
-vec3 lightmap_light(vec2 place) {
+TexelLight lightmap_light(vec2 place) {
     vec2 corner = floor(place - 0.5);
     vec2 f = place - 0.5 - corner;
-    vec4 sum = vec4(0.0);
+    TexelLight sum = TexelLight(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
     for (uint i = 0u; i < 4u; ++i) {
         uvec2 step = uvec2(i & 1u, i >> 1u);
         ivec2 texel = ivec2(corner) + ivec2(step);
         if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(uvec2(texel), texels))) continue;
         float weight = (step.x == 1u ? f.x : 1.0 - f.x) * (step.y == 1u ? f.y : 1.0 - f.y);
-        if (weight > 0.0) sum += weight * texel_light(uvec2(texel));
+        if (weight <= 0.0) continue;
+        TexelLight light = texel_light(uvec2(texel));
+        sum.first += weight * light.first;
+        sum.second += weight * light.second;
+        sum.rest += weight * light.rest;
+        sum.there += weight * light.there;
     }
-    return sum.a > 0.0 ? sum.rgb / sum.a : vec3(0.0);
+    float scale = sum.there > 0.0 ? 1.0 / sum.there : 0.0;
+    return TexelLight(sum.first * scale, sum.second * scale, sum.rest * scale, sum.there);
+}
+
+// The irradiance of a pixel, W/m².
+vec3 irradiance_of(TexelLight light) {
+    if (LOGARITHMS == 0u) return max(light.first + light.rest, vec3(0.0));
+    vec3 least = max(DARKEST * sun, vec3(1e-30));
+    vec3 first = max(light.first, vec3(0.0)) + least;
+    vec3 second = max(light.second, vec3(0.0)) + least;
+    return max(exp(mix(log(first), log(second), alpha)) - least + light.rest, vec3(0.0));
 }
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(total)))) return;
-    vec4 light = texelFetch(direct, pixel, 0);
+    vec4 shown = texelFetch(direct, pixel, 0);
     if (texelFetch(depth, pixel, 0).r >= 1.0) {
-        imageStore(total, pixel, vec4(light.rgb, 0.0));
+        imageStore(total, pixel, vec4(shown.rgb, 0.0));
         imageStore(indirect, pixel, vec4(0.0));
         imageStore(irradiance, pixel, vec4(0.0));
         return;
     }
-    vec3 e = vec3(0.0);
+    TexelLight light = TexelLight(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
     if (LIGHTMAP == 0u) {
-        e = texel_light(uvec2(pixel)).rgb;
+        light = texel_light(uvec2(pixel));
     } else {
         vec2 place = texelFetch(places, pixel, 0).xy;
-        if (place.x >= 0.0) e = lightmap_light(place);
+        if (place.x >= 0.0) light = lightmap_light(place);
     }
-    e = max(e, vec3(0.0));
+    vec3 e = light.there > 0.0 ? irradiance_of(light) : vec3(0.0);
+    if (fetched > 0u) atomicAdd(fetches[(gl_WorkGroupID.x + 7u * gl_WorkGroupID.y) & 255u], fetched);
     vec4 color = texelFetch(albedo, pixel, 0);
     // Gloss reflects the indirect light as a diffuse surface of the same reflectance does; a dielectric's 4 % are left out, as in direct light.
     vec3 reflectance = color.rgb + max(texelFetch(specular, pixel, 0).rgb - 0.04, 0.0);
     vec3 bounced = color.a * reflectance * e / 3.14159265358979;
-    imageStore(total, pixel, vec4(light.rgb + bounced, 1.0));
+    imageStore(total, pixel, vec4(shown.rgb + bounced, 1.0));
     imageStore(indirect, pixel, vec4(bounced, 1.0));
     imageStore(irradiance, pixel, vec4(e, 1.0));
 }

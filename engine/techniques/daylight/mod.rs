@@ -6,25 +6,33 @@
 //! file. At run time [`Daylight`] draws direct light with shadow maps and adds the baked light of the time.
 
 pub mod atlas;
+mod baked;
 pub mod beam;
 mod civil;
 pub mod day;
 mod file;
+pub mod frames;
 pub mod layer;
 pub mod lightmap;
+mod on_device;
 pub mod patch;
+mod places;
 mod plan;
 mod settings;
 pub mod sky;
+pub mod steps;
+mod stream;
 mod technique;
 mod transport;
 pub mod units;
 
+pub use baked::Baked;
 pub use beam::Weather;
 pub use day::{Day, Place, Sun};
 pub use file::{Stored, Summary};
+pub use frames::Frames;
 pub use plan::{Calendar, Kind, Lit, MOST_TIMES, Plan, digest, parts};
-pub use settings::{Baking, Interpolation, PictureSettings, Settings};
+pub use settings::{Baking, Interpolation, PictureSettings, Settings, SkyLight};
 pub use sky::Sky;
-pub use technique::{Baked, Daylight, Mode};
+pub use technique::{Daylight, Mode};
 pub use transport::{Light, Sources, Transport};

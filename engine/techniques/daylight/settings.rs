@@ -95,8 +95,24 @@ pub enum Interpolation {
     Linear,
     /// A curve through four steps (Catmull and Rom 1974).
     CatmullRom,
+    /// The line between the logarithms of the light. A picture decodes both steps and joins them at each pixel, which costs as many
+    /// fetches of images and twice the sums. Black has no logarithm, so a ten-thousandth of the sun's irradiance is added before and taken
+    /// away after.
+    LogLinear,
     /// The nearest step.
     Nearest,
+}
+
+/// How the light of the sky is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SkyLight {
+    /// By the radiance of each patch of the sky at the time.
+    #[default]
+    Patches,
+    /// The light of the sky under the day's highest sun, scaled by the height of the sun, as the paper scales one image. The paper names no
+    /// function of the height; this one is the sine of the elevation.
+    Scaled,
 }
 
 /// Settings of pictures.
@@ -111,6 +127,10 @@ pub struct Settings {
     pub minutes: f64,
     /// How the light between two steps of the day is found.
     pub interpolation: Interpolation,
+    /// How the light of the sky is found.
+    pub sky: SkyLight,
+    /// Direct light of the sun has highlights. If off, Lambert's law alone.
+    pub gloss: bool,
     /// Haze of the air: 1 is clear mountain air, 10 is thick haze.
     #[schemars(range(min = 1, max = 10))]
     pub turbidity: f64,
@@ -134,6 +154,8 @@ impl Default for Settings {
             time: "12:00".into(),
             minutes: 5.0,
             interpolation: Interpolation::default(),
+            sky: SkyLight::default(),
+            gloss: true,
             turbidity: weather.turbidity(),
             ground_albedo: weather.ground_albedo(),
             overcast: weather.overcast(),
@@ -163,8 +185,19 @@ pub struct PictureSettings {
 }
 
 impl technique::Settings for PictureSettings {
+    /// Linear interpolation, one image of the sky, and a plain shadow map. The paper's Phong shading has no numbers for highlights, so only
+    /// its diffuse part is left.
     fn paper() -> Option<Self> {
-        None
+        Some(Self {
+            daylight: Settings {
+                interpolation: Interpolation::Linear,
+                sky: SkyLight::Scaled,
+                gloss: false,
+                ..Settings::default()
+            },
+            shadow: shadow::Settings { kind: shadow::Kind::Plain, cascades: 1, ..shadow::Settings::default() },
+            ..Self::default()
+        })
     }
 
     fn validate(&self) -> Result<()> {

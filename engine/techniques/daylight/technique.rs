@@ -1,32 +1,37 @@
 //! Baked daylight behind the interface of all techniques.
 
-use std::{path::PathBuf, sync::Arc};
+use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
-use super::{Day, Interpolation, PictureSettings, Settings, Sky, Stored, layer::Layer, lightmap};
+use super::{
+    Baked, Day, PictureSettings, Settings, Sky, SkyLight, Stored,
+    on_device::OnDevice,
+    places::Places,
+    steps::{Mixture, Steps},
+};
 use crate::{
-    Error, ErrorKind, Result,
-    gpu::{Gpu, OwnedBuffer, OwnedImage},
-    graph::{Cull, Depth, Draw, DrawCall, Format, Graph, Image, Load, Raster, Targets},
+    Error, Result,
+    gpu::{Gpu, OwnedImage},
+    graph::{Format, Graph},
     passes::{
         direct::{self, Direct, Lights},
-        gbuffer::{self, GBuffer},
-        shadow, skybox,
+        gbuffer, shadow, skybox,
     },
     resident::{self, Handles, Resident},
-    scene::{Environment, Note, NoteKind, Scene, View, environment::direction_from_uv},
+    scene::{Environment, Note, NoteKind, Scene, environment::direction_from_uv},
     settings::{Described, Description, idle_notes},
-    shaders::{
-        consts,
-        daylight::{decode, place},
-        types,
-    },
+    shaders::{consts, daylight::decode, types},
     technique::{self, Making, Moment, Picture, Technique},
 };
 
 /// Columns and rows of the picture of the sky behind the scene.
 const SKY: [u32; 2] = [256, 128];
+
+/// Numbers of pixels' fetches, summed up separately so that they do not overflow.
+const FETCH_SUMS: u64 = 256;
+/// Pictures whose steps are read ahead of time.
+const LOOK_AHEAD: u32 = 256;
 
 /// The light that the picture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -60,102 +65,17 @@ impl technique::Mode for Mode {
     }
 }
 
-/// A bake, and the file from which it was read.
-#[derive(Clone, Debug)]
-pub struct Baked {
-    pub stored: Arc<Stored>,
-    /// Errors name this file.
-    pub file: Option<PathBuf>,
-}
-
-impl Baked {
-    /// Reads a file.
-    ///
-    /// # Errors
-    /// As [`Stored::read`].
-    pub fn read(file: impl Into<PathBuf>) -> Result<Self> {
-        let file = file.into();
-        Ok(Self { stored: Arc::new(Stored::read(&file)?), file: Some(file) })
-    }
-
-    fn blamed(&self, error: Error) -> Error {
-        match &self.file {
-            Some(file) => error.in_file(file),
-            None => error,
-        }
-    }
-}
-
 /// Baked daylight, prepared for a scene.
 #[derive(Debug)]
 pub struct Daylight {
     gpu: Gpu,
     baked: Baked,
     day: Day,
-    tiles: OwnedBuffer,
-    words: OwnedBuffer,
+    steps: Steps,
+    light: OnDevice,
     places: Option<Places>,
     /// The last sky, and the state that it shows.
     sky: Option<(OwnedImage, [f32; 7])>,
-}
-
-/// The lightmap on the device.
-#[derive(Debug)]
-struct Places {
-    corners: OwnedBuffer,
-    firsts: OwnedBuffer,
-    draws: Vec<DrawCall>,
-}
-
-impl Places {
-    fn new(gpu: &Gpu, scene: &Scene, baked: &Baked) -> Result<Option<Self>> {
-        let corners = &baked.stored.corners;
-        if corners.is_empty() {
-            return Ok(None);
-        }
-        let triangles = lightmap::triangles(scene);
-        let all: u64 = triangles.iter().map(|count| u64::from(*count)).sum();
-        if all != corners.len() as u64 {
-            let what = format!("has places for {} triangles, the scene has {all}", corners.len());
-            return Err(baked.blamed(Error::input(what)));
-        }
-        let (mut firsts, mut draws, mut first) = (Vec::new(), Vec::new(), 0);
-        for (number, count) in triangles.into_iter().enumerate() {
-            firsts.push(first);
-            draws.push(DrawCall {
-                first_vertex: first,
-                vertices: 3 * count,
-                first_instance: number as u32,
-                instances: 1,
-            });
-            first += 3 * count;
-        }
-        draws.retain(|draw| draw.vertices > 0);
-        Ok(Some(Self {
-            corners: OwnedBuffer::with_contents(gpu, "daylight.corners", bytemuck::cast_slice(corners))?,
-            firsts: OwnedBuffer::with_contents(gpu, "daylight.firsts", bytemuck::cast_slice(&firsts))?,
-            draws,
-        }))
-    }
-
-    /// Draws the place in the lightmap of each pixel.
-    fn draw(&self, graph: &mut Graph, handles: &Handles, view: &View, gbuffer: &GBuffer) -> Image {
-        let places = graph.image("daylight.places", Format::RG32F, view.extent);
-        let depth = graph.image("daylight.places.depth", Format::D32F, view.extent);
-        let args = place::Args {
-            view: gbuffer.view,
-            instances: handles.instances,
-            indices: handles.indices,
-            positions: handles.positions,
-            corners: graph.import_buffer(&self.corners),
-            firsts: graph.import_buffer(&self.firsts),
-            depth: gbuffer.depth,
-        };
-        let targets = Targets::new().color(places, Load::Clear([-1.0; 4])).depth(depth, Depth::Clear(0.0));
-        // Sides that the G-buffer does not show are at another depth.
-        graph.raster(targets, Raster::new().cull(Cull::None), args, Draw::calls(self.draws.clone()));
-        places
-    }
 }
 
 impl Daylight {
@@ -170,29 +90,26 @@ impl Daylight {
         Ok((time + f64::from(frame) * 60.0 * settings.minutes).rem_euclid(self.day.length()))
     }
 
-    /// The weights of the baked times around a moment (equations 1 to 3; x there has the offset on the wrong side).
-    fn weights(&self, seconds: f64, how: Interpolation) -> Vec<(usize, f32)> {
-        let times = &self.baked.stored.plan.times;
-        let Some(last) = times.len().checked_sub(1) else { return Vec::new() };
-        let next = times.partition_point(|time| time.seconds <= seconds);
-        let [Some(before), Some(after)] = [next.checked_sub(1), (next <= last).then_some(next)] else {
-            // Before the first and after the last baked time the sun is at the horizon.
-            return vec![(next.min(last), 1.0)];
-        };
-        let step = times[after].seconds - times[before].seconds;
-        let alpha = ((seconds - times[before].seconds) / step) as f32;
-        match how {
-            Interpolation::Nearest => vec![(if alpha < 0.5 { before } else { after }, 1.0)],
-            Interpolation::CatmullRom if before > 0 && after < last => {
-                let (a, a2, a3) = (alpha, alpha * alpha, alpha * alpha * alpha);
-                vec![
-                    (before - 1, 0.5 * (-a + 2.0 * a2 - a3)),
-                    (before, 0.5 * (2.0 - 5.0 * a2 + 3.0 * a3)),
-                    (after, 0.5 * (a + 4.0 * a2 - 3.0 * a3)),
-                    (after + 1, 0.5 * (a3 - a2)),
-                ]
+    /// Steps that the next pictures need, the nearest first.
+    fn upcoming(&self, settings: &Settings, frame: u32) -> impl Iterator<Item = usize> {
+        let moments = (1..=LOOK_AHEAD).filter_map(move |ahead| self.seconds(settings, frame.checked_add(ahead)?).ok());
+        let times = moments.map(|seconds| self.steps.mixture(seconds, settings.interpolation));
+        times.flat_map(|mixture| mixture.times().collect::<Vec<_>>())
+    }
+
+    /// The radiance of the patches of the sky.
+    fn patches(&self, settings: &Settings, sky: &Sky, sun: Vec3) -> Result<Vec<[f32; 3]>> {
+        let scaled = |sky: &Sky, factor: f32| sky.patches().iter().map(|patch| patch.map(|c| c * factor)).collect();
+        match settings.sky {
+            SkyLight::Patches => Ok(scaled(sky, settings.strength)),
+            SkyLight::Scaled => {
+                let suns = self.baked.stored.plan.times.iter().map(|time| time.sun);
+                let Some(highest) = suns.max_by(|a, b| a[1].total_cmp(&b[1])) else {
+                    return Ok(scaled(sky, 0.0));
+                };
+                let noon = Sky::new(settings.weather()?, highest.map(f64::from)).map_err(Error::usage)?;
+                Ok(scaled(&noon, settings.strength * sun.y.max(0.0) / highest[1].max(1e-6)))
             }
-            Interpolation::Linear | Interpolation::CatmullRom => vec![(before, 1.0 - alpha), (after, alpha)],
         }
     }
 
@@ -233,13 +150,15 @@ impl Daylight {
         })
     }
 
-    /// Coefficients of the images of all tiles.
-    fn coefficients(&self, weights: &[(usize, f32)], sun: [f32; 3], patches: &[[f32; 3]]) -> Vec<[f32; 3]> {
-        let of_sun = |(time, weight): &(usize, f32)| (*time, sun.map(|channel| channel * weight));
+    /// Coefficients of the images of all tiles for two mixtures of times; both have the same sky.
+    fn coefficients(&self, mixtures: &[Vec<(usize, f32)>], sun: [f32; 3], patches: &[[f32; 3]]) -> Vec<[f32; 3]> {
         let mut out = Vec::new();
-        for tile in &self.baked.stored.tiles {
-            out.extend(tile.sun.mix(weights.iter().map(of_sun)));
-            out.extend(tile.sky.mix(patches.iter().copied().enumerate()));
+        for mixture in mixtures {
+            let of_sun = |(time, weight): &(usize, f32)| (*time, sun.map(|channel| channel * weight));
+            for tile in &self.baked.stored.tiles {
+                out.extend(tile.sun.mix(mixture.iter().map(of_sun)));
+                out.extend(tile.sky.mix(patches.iter().copied().enumerate()));
+            }
         }
         out.push([0.0; 3]);
         out
@@ -255,35 +174,6 @@ fn picture_of(sky: &Sky) -> Environment {
     };
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| texel(x, y))).collect();
     Environment { name: "sky".into(), width, height, pixels, rotation: 0.0, scale: 1.0 }
-}
-
-/// The tiles and their words on the device.
-fn packed(stored: &Stored) -> (Vec<types::DayTile>, Vec<u32>) {
-    let (mut tiles, mut words, mut first) = (Vec::new(), Vec::new(), 0);
-    for tile in &stored.tiles {
-        let mut entry = types::DayTile {
-            mask: words.len() as u32,
-            mask_words: tile.mask.len() as u32,
-            columns: stored.plan.tile(tiles.len() as u32)[2],
-            ..types::DayTile::default()
-        };
-        words.extend_from_slice(&tile.mask);
-        let mut before = 0;
-        for word in &tile.mask {
-            words.push(before);
-            before += word.count_ones();
-        }
-        for (which, layer) in [&tile.sun, &tile.sky].into_iter().enumerate() {
-            let Layer { wide, narrow, .. } = *layer;
-            entry.first_word[which] = words.len() as u32;
-            (entry.wide[which], entry.narrow[which], entry.first[which]) = (wide, narrow, first);
-            words.extend_from_slice(&layer.words);
-            first += layer.images();
-        }
-        tiles.push(entry);
-    }
-    words.push(0);
-    (tiles, words)
 }
 
 /// Light that a scene has and that is not in a bake.
@@ -340,20 +230,12 @@ impl Technique for Daylight {
         let calendar = &stored.plan.calendar;
         let day = Day::new(&calendar.date, &calendar.zone, calendar.latitude, calendar.longitude)
             .map_err(|what| baked.blamed(Error::input(what)))?;
-        let (tiles, words) = packed(stored);
-        let most = gpu.caps().limits.storage_range;
-        if 4 * words.len() as u64 > most {
-            let what = format!("its images have {} bytes, the device allows {most} in one buffer", 4 * words.len());
-            return Err(baked
-                .blamed(Error::new(ErrorKind::Runtime, what))
-                .help("Bake fewer texels, or use another device"));
-        }
         Ok(Self {
             gpu: gpu.clone(),
             baked: baked.clone(),
+            steps: Steps::new(&stored.plan, &day),
             day,
-            tiles: OwnedBuffer::with_contents(gpu, "daylight.tiles", bytemuck::cast_slice(&tiles))?,
-            words: OwnedBuffer::with_contents(gpu, "daylight.words", bytemuck::cast_slice(&words))?,
+            light: OnDevice::new(gpu, baked)?,
             places: Places::new(gpu, scene, baked)?,
             sky: None,
         })
@@ -370,23 +252,43 @@ impl Technique for Daylight {
         let sun = Vec3::from(self.day.sun(seconds).direction(north));
         let sky = Sky::new(of_day.weather()?, sun.as_dvec3().to_array()).map_err(Error::usage)?;
         let light = sky.sun_irradiance().map(|channel| channel * of_day.strength);
-        let patches: Vec<[f32; 3]> =
-            sky.patches().iter().map(|patch| patch.map(|channel| channel * of_day.strength)).collect();
-        let weights = self.weights(seconds, of_day.interpolation);
-        let coefficients = self.coefficients(&weights, light, &patches);
+        let patches = self.patches(of_day, &sky, sun)?;
+        let mixture = self.steps.mixture(seconds, of_day.interpolation);
+        let upcoming: Vec<usize> = match self.light.has_frames() {
+            true => self.upcoming(of_day, graph.frame).collect(),
+            false => Vec::new(),
+        };
+        let frames = self.light.frames(graph, &mixture, upcoming.into_iter())?;
+        let (mixtures, weights, alpha) = match &mixture {
+            Mixture::Sum(sum) => {
+                let mut weights = [0.0; 4];
+                weights.iter_mut().zip(sum).for_each(|(weight, of)| *weight = of.weight);
+                (vec![sum.iter().map(|of| (of.time, of.weight)).collect()], weights, 0.0)
+            }
+            Mixture::Logarithms { times, alpha } => (times.map(|time| vec![(time, 1.0)]).to_vec(), [1.0; 4], *alpha),
+        };
+        let logarithms = mixtures.len() > 1;
+        let coefficients = self.coefficients(&mixtures, light, &patches);
         let handles = self.relit(graph, moment, sun, light, &sky, of_day.strength)?;
         let view = &moment.view;
         let gbuffer = gbuffer::draw(graph, &handles, view, &settings.gbuffer);
         let shadows = shadow::draw(graph, &handles, view, &settings.shadow);
-        let choices = Direct { paper_law: false, specular: true, light_radius: 0.0, light_power: 1.0 };
+        let choices = Direct { paper_law: false, specular: of_day.gloss, light_radius: 0.0, light_power: 1.0 };
         let lit = direct::light(graph, &gbuffer, Lights::from(&shadows), &choices);
         let image = |graph: &mut Graph, name: &str| graph.image(name, Format::RGBA16F, view.extent);
         let [total, indirect, irradiance] =
             ["daylight", "daylight.indirect", "daylight.irradiance"].map(|name| image(graph, name));
         let places = self.places.as_ref().map(|places| places.draw(graph, &handles, view, &gbuffer));
+        let second = (coefficients.len() / mixtures.len()) as u32;
+        let fetches = graph.buffer("daylight.fetches", 4 * FETCH_SUMS);
+        graph.fill(fetches, 0);
         let args = decode::Args {
             places: places.unwrap_or(gbuffer.depth),
-            spec: decode::Spec { lightmap: places.is_some().into() },
+            spec: decode::Spec {
+                lightmap: places.is_some().into(),
+                frames: if self.light.has_frames() { mixture.times().count() as u32 + 1 } else { 0 },
+                logarithms: logarithms.into(),
+            },
             albedo: gbuffer.albedo,
             depth: gbuffer.depth,
             direct: lit.direct,
@@ -394,10 +296,15 @@ impl Technique for Daylight {
             total,
             indirect,
             irradiance,
-            tiles: graph.import_buffer(&self.tiles),
-            words: graph.import_buffer(&self.words),
+            tiles: self.light.tiles(graph),
+            words: self.light.words(graph),
             coefficients: graph.buffer_from("daylight.coefficients", &coefficients),
-            push: decode::Push { side, columns, texels },
+            frame0: frames.buffers[0],
+            frame1: frames.buffers[1],
+            frame2: frames.buffers[2],
+            frame3: frames.buffers[3],
+            fetches,
+            push: decode::Push { side, columns, texels, second, alpha, sun: light, weights },
         };
         graph.compute(args, view.extent);
         skybox::draw(graph, &handles, &gbuffer, Vec3::ZERO, total);
@@ -412,6 +319,13 @@ impl Technique for Daylight {
         let notes = [moment.notes, &shadows.notes, &left_out(moment.scene), &of_shadows].concat();
         let picture =
             Picture::new(shown).color("direct", lit.direct).color("indirect", indirect).color("irradiance", irradiance);
+        let picture = picture.counting("fetches", fetches);
+        let picture = match self.light.has_frames() {
+            true => picture
+                .number("steps_uploaded", frames.uploaded as f64)
+                .number("stream_wait_ms", 1e3 * frames.waited.as_secs_f64()),
+            false => picture,
+        };
         Ok(picture.showing(gbuffer).noting(notes))
     }
 }
