@@ -19,7 +19,8 @@ pub struct Baked {
     pub stream: Option<usize>,
     /// Errors name this file.
     pub file: Option<PathBuf>,
-    digest: Option<Digest>,
+    /// Of the file.
+    pub digest: Option<Digest>,
 }
 
 impl Baked {

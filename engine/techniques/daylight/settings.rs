@@ -42,8 +42,8 @@ pub struct Baking {
     /// Maximum of images of a tile; 0: as many as the tolerance needs.
     #[schemars(range(min = 0, max = 4096))]
     pub images: u32,
-    /// Side of a tile, texels. Each tile has its own images.
-    #[schemars(range(min = 4, max = 128), extend("x-unit" = "texels"))]
+    /// Side of a tile, texels. Each tile has its own images. 0: one tile for the whole picture, as in the paper.
+    #[schemars(range(min = 4, max = 128), extend("x-zero" = true, "x-unit" = "texels"))]
     pub tile: u32,
     /// Texels along a metre of a surface, for lightmaps.
     #[schemars(range(min = 0.01, max = 1000), extend("x-unit" = "1/m"))]
@@ -79,6 +79,12 @@ impl Default for Baking {
 }
 
 impl Baking {
+    /// The paper's choices: a sun without a size, and 20 images for the whole picture, whatever their error. The paper takes the mean image
+    /// away before; here components are around zero, so that no light stays exactly no light, and the mean is one of the images.
+    pub fn paper() -> Self {
+        Self { disc: false, tile: 0, images: 20, tolerance: 1e-4, ..Self::default() }
+    }
+
     /// # Errors
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {

@@ -246,7 +246,7 @@ impl Technique for Daylight {
         let plan = &self.baked.stored.plan;
         plan.check_view(&moment.view).map_err(|error| self.baked.blamed(error))?;
         let [columns, _] = plan.tiles();
-        let (side, texels, north) = (plan.settings.tile, plan.extent, plan.calendar.north);
+        let (side, texels, north) = (plan.side(), plan.extent, plan.calendar.north);
         let of_day = &settings.daylight;
         let seconds = self.seconds(of_day, graph.frame)?;
         let sun = Vec3::from(self.day.sun(seconds).direction(north));

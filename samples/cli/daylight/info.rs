@@ -50,7 +50,7 @@ pub fn info(args: &DayInfoArgs, _: Console) -> Result<ExitCode> {
     };
     let calendar = &plan.calendar;
     console::print(&format!("scene      {}, {kind}", plan.scene))?;
-    console::print(&format!("texels     {}×{}, tiles of {}", plan.extent[0], plan.extent[1], plan.settings.tile))?;
+    console::print(&format!("texels     {}×{}, tiles of {}", plan.extent[0], plan.extent[1], plan.side()))?;
     console::print(&format!(
         "day        {} at {:.4}° N, {:.4}° E, {}; {} steps, {} lit",
         calendar.date,
