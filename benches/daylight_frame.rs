@@ -3,7 +3,8 @@
 //!
 //! `cargo bench --bench daylight_frame [-- WIDTHxHEIGHT [ROUNDS]]`; 320x240 and 9 by default. `LUCERNA_DEVICE` chooses the device. Times are
 //! medians of ROUNDS rounds, ms. In each round all rows run once. *decode*: the pass that finds the light of all pixels. *host*: the time
-//! until the passes of the picture are declared; the coefficients are a part of it.
+//! until the passes of the picture are declared; the coefficients are a part of it. A second table has sequences from resident and streamed frames;
+//! the file has just been written, so that the system has it in its cache.
 
 mod common;
 #[path = "../tests/daylight_lab/mod.rs"]
@@ -54,8 +55,16 @@ impl Row {
     }
 
     fn once(&mut self, scene: &Scene, view: &View) -> Result<()> {
+        let numbers = self.picture(scene, view, 0)?;
+        self.fetches = numbers.first().map_or(0.0, |(_, number)| *number);
+        Ok(())
+    }
+
+    /// Renders a picture and gives the numbers about its cost.
+    fn picture(&mut self, scene: &Scene, view: &View, frame: u32) -> Result<Vec<(&'static str, f64)>> {
         let begun = Instant::now();
         let mut graph = Graph::new("daylight");
+        graph.frame = frame;
         let pose = Pose::rest(scene);
         let picture = self.ready.frame(&mut graph, (scene, &pose), view, Shot::default(), &self.settings)?;
         self.host.push(begun.elapsed().as_secs_f64() * 1e3);
@@ -63,8 +72,7 @@ impl Row {
         let frame = self.runner.run(&graph)?;
         let decode = frame.report.passes.iter().filter(|pass| pass.name.contains("decode"));
         self.decode.push(decode.map(|pass| pass.gpu_ms.unwrap_or(pass.cpu_ms)).sum());
-        self.fetches = reading.numbers(&frame).first().map_or(0.0, |(_, number)| *number);
-        Ok(())
+        Ok(reading.numbers(&frame))
     }
 }
 
@@ -86,8 +94,7 @@ fn run() -> Result<()> {
     }
     let base = stored(&scene, &view, polar_day(), 5.0, 0.0, 10);
     let folder = std::env::temp_dir().join(format!("lucerna-daylight-{}.frames", std::process::id()));
-    // Fewer steps, so that the frames fit in memory; their cost does not depend on it.
-    frames::write(&folder, &stored(&scene, &view, polar_day(), 40.0, 0.0, 10), Digest::of(b"lab"), true, |_| true)?;
+    frames::write(&folder, &base, Digest::of(b"lab"), true, |_| true)?;
     let framed = Baked { stream: None, ..Baked::read(&folder)? };
     for (how, name) in [(Interpolation::CatmullRom, "Catmull-Rom"), (Interpolation::LogLinear, "log-linear")] {
         rows.push(Row::new(&gpu, &scene, format!("10 images, 288 steps, {name}"), &Baked::new(base.clone()), how)?);
@@ -97,9 +104,8 @@ fn run() -> Result<()> {
         (Interpolation::CatmullRom, "Catmull-Rom"),
         (Interpolation::LogLinear, "log-linear"),
     ] {
-        rows.push(Row::new(&gpu, &scene, format!("frames, 36 steps, {name}"), &framed, how)?);
+        rows.push(Row::new(&gpu, &scene, format!("frames, 288 steps, {name}"), &framed, how)?);
     }
-    let _ = std::fs::remove_file(&folder);
     for round in 0..=rounds {
         for row in &mut rows {
             row.once(&scene, &view)?;
@@ -121,6 +127,40 @@ fn run() -> Result<()> {
             row.fetches / pixels,
             row.bytes
         );
+    }
+    let streamed = sequences(&gpu, &scene, &view, &framed);
+    let _ = std::fs::remove_file(&folder);
+    streamed
+}
+
+/// Sequences of pictures from resident and from streamed frames.
+fn sequences(gpu: &Gpu, scene: &Scene, view: &View, framed: &Baked) -> Result<()> {
+    println!();
+    println!(
+        "Sequences of 100 pictures from frames of {} bytes:",
+        framed.frames.as_ref().map_or(0, |f| f.step_bytes())
+    );
+    println!();
+    println!("| minutes a picture | | picture, median | longest | wait of the first | longest wait of the others |");
+    println!("|---|---|---|---|---|---|");
+    for minutes in [1.0, 5.0, -30.0] {
+        for (name, stream) in [("resident", None), ("streamed", Some(frames::DEFAULT_RING))] {
+            let baked = Baked { stream, ..framed.clone() };
+            let mut row = Row::new(gpu, scene, String::new(), &baked, Interpolation::Linear)?;
+            row.settings.daylight.minutes = minutes;
+            let (mut times, mut waits) = (Vec::new(), Vec::new());
+            for frame in 0..100 {
+                let begun = Instant::now();
+                let numbers = row.picture(scene, view, frame)?;
+                times.push(begun.elapsed().as_secs_f64() * 1e3);
+                waits.push(numbers.iter().find(|(name, _)| *name == "stream_wait_ms").map_or(0.0, |(_, ms)| *ms));
+            }
+            let most = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+            // The first picture makes pipelines.
+            let (longest, later) = (most(&times[1..]), most(&waits[1..]));
+            let middle = median(times.split_off(1));
+            println!("| {minutes} | {name} | {middle:.1} | {longest:.1} | {:.1} | {later:.1} |", waits[0]);
+        }
     }
     Ok(())
 }
