@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use lucerna_samples::{
     bake::{self, JoinArgs},
-    daylight::{self, DayArgs, DayBakeArgs, DayInfoArgs},
+    daylight::{self, DayArgs, DayBakeArgs, DayFramesArgs, DayInfoArgs},
     program,
 };
 
@@ -24,10 +24,12 @@ enum Command {
     Bake(Box<DayBakeArgs>),
     /// Print the contents, the size and the errors of a bake
     Info(DayInfoArgs),
+    /// Decode every step of a bake into a file of uncompressed frames, which `render --stream` reads step by step
+    Frames(DayFramesArgs),
     /// Join the parts of a bake (as `lucerna merge`)
     Merge(JoinArgs),
     /// Render a scene at times of the day into images
-    #[command(args_override_self = true, mut_arg("time", |arg| arg.long("scene-time")), mut_arg("paper", |arg| arg.hide(true)))]
+    #[command(args_override_self = true, mut_arg("time", |arg| arg.long("scene-time")))]
     Render(Box<DayArgs>),
 }
 
@@ -40,6 +42,10 @@ fn main() -> ExitCode {
         Command::Info(args) => {
             let console = args.talk.console();
             program::run(console, || daylight::info(&args, console))
+        }
+        Command::Frames(args) => {
+            let console = args.talk.console();
+            program::run(console, || daylight::frames(&args, console))
         }
         Command::Merge(args) => {
             let console = args.talk.console();

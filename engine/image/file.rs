@@ -103,14 +103,54 @@ pub fn write_all_atomic(files: &[(&Path, &[u8])], overwrite: bool) -> Result<()>
         written.push((*path, bytes.len(), target, temporary));
     }
     publish(&written, overwrite)?;
+    sync_folders(&written);
+    Ok(())
+}
+
+/// As [`write_atomic`], for a file that is made piece by piece and need not fit in memory. `bytes`: its whole size, for messages.
+///
+/// # Errors
+/// As [`write_atomic`], and the first error of a piece.
+pub fn write_pieces_atomic(
+    path: &Path,
+    bytes: u64,
+    pieces: impl Iterator<Item = Result<Vec<u8>>>,
+    overwrite: bool,
+) -> Result<()> {
+    let bytes = usize::try_from(bytes).unwrap_or(usize::MAX);
+    let fail = |error: io::Error| cannot_write(path, bytes, error);
+    let target = inspect(path, overwrite)?;
+    if target.device {
+        let mut file = OpenOptions::new().write(true).open(&target.path).map_err(fail)?;
+        for piece in pieces {
+            file.write_all(&piece?).map_err(fail)?;
+        }
+        return file.flush().map_err(fail);
+    }
+    sweep(&target.folder);
+    let mut temporary = Temporary::create(&target.folder).map_err(fail)?;
+    for piece in pieces {
+        temporary.file.write_all(&piece?).map_err(fail)?;
+    }
+    if let Some(permissions) = &target.permissions {
+        // A replaced file keeps who may read it; failing to is no reason to lose the data.
+        let _ = temporary.file.set_permissions(permissions.clone());
+    }
+    temporary.file.sync_all().map_err(fail)?;
+    let written = [(path, bytes, target, temporary)];
+    publish(&written, overwrite)?;
+    sync_folders(&written);
+    Ok(())
+}
+
+/// The rename itself reaches the disk with its folder; not every file system can do that.
+fn sync_folders(written: &[(&Path, usize, Target, Temporary)]) {
     let folders: HashSet<&Path> = written.iter().map(|(_, _, target, _)| target.folder.as_path()).collect();
     for folder in folders {
-        // The rename itself reaches the disk with its folder; not every file system can do that.
         if let Ok(folder) = File::open(folder) {
             let _ = folder.sync_all();
         }
     }
-    Ok(())
 }
 
 /// Gives all files their names, or takes those away again that were not there before.

@@ -34,7 +34,7 @@ use std::path::Path;
 pub use color::{Chromaticities, REC_709};
 pub use file::{
     is_temporary, leave_nothing_unfinished, probe_output, read_file_checked, read_head_checked, write_all_atomic,
-    write_atomic,
+    write_atomic, write_pieces_atomic,
 };
 pub use metadata::Metadata;
 pub use picture::{Layer, Layers, Precision};

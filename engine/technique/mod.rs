@@ -11,12 +11,13 @@ mod readback;
 pub use picture::{Decode, Picture};
 pub use readback::{Readback, raw};
 
-use std::fmt::Debug;
+use std::{convert::Infallible, fmt::Debug, path::Path};
 
 use serde::{Serialize, de::DeserializeOwned};
 
 use crate::{
-    Result,
+    Error, Result,
+    bake::Digest,
     gpu::Gpu,
     graph::Graph,
     resident::{Handles, Resident},
@@ -66,6 +67,33 @@ impl Mode for AllLight {
 
     fn doc(self) -> &'static str {
         "All light"
+    }
+}
+
+/// Data from the file of a bake.
+pub trait Bake: Sized {
+    /// A picture cannot be made without the file.
+    const NEEDED: bool;
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// `Input`, naming the file and saying what is wrong.
+    fn read(file: &Path) -> Result<Self>;
+
+    /// The file and the digest of its contents, if a picture depends on them. `None`: the settings of a picture are enough to make it again.
+    fn source(&self) -> Option<(&Path, Digest)>;
+}
+
+impl Bake for Infallible {
+    const NEEDED: bool = false;
+
+    fn read(file: &Path) -> Result<Self> {
+        Err(Error::input("is named as the file of a bake, but this technique needs none").in_file(file))
+    }
+
+    fn source(&self) -> Option<(&Path, Digest)> {
+        None
     }
 }
 
@@ -133,8 +161,8 @@ pub trait Technique: Sized {
 
     type Settings: Settings;
     type Mode: Mode;
-    /// Data from the file of a bake. [`std::convert::Infallible`] for techniques without bakes.
-    type Baked;
+    /// Data from the file of a bake. [`Infallible`] for techniques without bakes.
+    type Baked: Bake;
 
     /// The technique's own settings, without those of the passes before it.
     fn description() -> &'static Description;

@@ -25,6 +25,13 @@ pub enum Decode {
 /// Makes a note from a number that the frame has computed.
 pub(super) type Remark = Box<dyn Fn(u32) -> Option<Note>>;
 
+/// A number about the cost of a frame.
+pub(super) enum Number {
+    Known(f64),
+    /// The sum of all words of a buffer.
+    Counted(Buffer),
+}
+
 /// The result of a technique for a frame: the total, layers for file formats that hold them, sums, and notes.
 pub struct Picture {
     pub(super) total: Image,
@@ -33,6 +40,7 @@ pub struct Picture {
     pub(super) layers: Vec<Layer>,
     pub(super) sums: Vec<Sum>,
     pub(super) remarks: Vec<(Buffer, Remark)>,
+    pub(super) numbers: Vec<(&'static str, Number)>,
     /// The surfaces that the picture shows. [`super::Ready::frame`] takes it and adds its layers.
     pub gbuffer: Option<GBuffer>,
     /// The view of the picture. [`super::Ready::frame`] sets it.
@@ -67,8 +75,8 @@ impl Debug for Picture {
 impl Picture {
     /// A picture without layers: the red, green and blue channels of an image are radiance.
     pub fn new(total: Image) -> Self {
-        let (layers, sums, remarks, notes) = Default::default();
-        Self { total, grey: false, layers, sums, remarks, gbuffer: None, view: None, notes }
+        let (layers, sums, remarks, numbers, notes) = Default::default();
+        Self { total, grey: false, layers, sums, remarks, numbers, gbuffer: None, view: None, notes }
     }
 
     /// A picture without layers: the first channel of an image, as grey.
@@ -105,6 +113,20 @@ impl Picture {
     #[must_use]
     pub fn sum(mut self, name: &'static str, image: Image, channel: usize) -> Self {
         self.sums.push(Sum { name, image, channel });
+        self
+    }
+
+    /// Adds a number about the cost of the frame that a pass counts: the sum of all words of a buffer.
+    #[must_use]
+    pub fn counting(mut self, name: &'static str, words: Buffer) -> Self {
+        self.numbers.push((name, Number::Counted(words)));
+        self
+    }
+
+    /// Adds a number about the cost of the frame.
+    #[must_use]
+    pub fn number(mut self, name: &'static str, number: f64) -> Self {
+        self.numbers.push((name, Number::Known(number)));
         self
     }
 

@@ -9,7 +9,7 @@ use crate::{
     scene::Note,
 };
 
-use super::picture::{self, Picture, Remark};
+use super::picture::{self, Number, Picture, Remark};
 
 /// The declared readback of a picture.
 pub struct Readback {
@@ -20,6 +20,13 @@ pub struct Readback {
     layers: Vec<(ImageRead, picture::Layer)>,
     sums: Vec<(ImageRead, picture::Sum)>,
     remarks: Vec<(BufferRead, Remark)>,
+    numbers: Vec<(&'static str, Counted)>,
+}
+
+/// A number about the cost of a frame.
+enum Counted {
+    Known(f64),
+    Words(BufferRead),
 }
 
 impl Debug for Readback {
@@ -40,6 +47,14 @@ pub(super) fn of(picture: Picture, graph: &mut Graph, layers: bool, sums: bool) 
         layers: layers.into_iter().map(|layer| (graph.read_image(layer.image), layer)).collect(),
         sums: sums.into_iter().map(|sum| (graph.read_image(sum.image), sum)).collect(),
         remarks: picture.remarks.into_iter().map(|(number, of)| (graph.read_buffer(number), of)).collect(),
+        numbers: picture
+            .numbers
+            .into_iter()
+            .map(|(name, number)| match number {
+                Number::Known(number) => (name, Counted::Known(number)),
+                Number::Counted(words) => (name, Counted::Words(graph.read_buffer(words))),
+            })
+            .collect(),
     }
 }
 
@@ -50,7 +65,8 @@ impl Readback {
     /// `Usage` if no pass writes it; the message lists the names.
     pub fn view(graph: &mut Graph, name: &str) -> Result<Self> {
         let total = graph.view(name)?;
-        Ok(Self { total, grey: false, view: true, layers: Vec::new(), sums: Vec::new(), remarks: Vec::new() })
+        let (layers, sums, remarks, numbers) = Default::default();
+        Ok(Self { total, grey: false, view: true, layers, sums, remarks, numbers })
     }
 
     /// The sums, after the graph has run.
@@ -60,6 +76,18 @@ impl Readback {
             (sum.name.to_owned(), pixels.into_iter().map(|pixel| f64::from(pixel[sum.channel])).sum())
         };
         self.sums.iter().map(of).collect()
+    }
+
+    /// Numbers about the cost of the frame, after the graph has run.
+    pub fn numbers(&self, frame: &Frame) -> Vec<(&'static str, f64)> {
+        let of = |(name, number): &(&'static str, Counted)| {
+            let number = match number {
+                Counted::Known(number) => *number,
+                Counted::Words(words) => frame.buffer::<u32>(*words).into_iter().map(f64::from).sum(),
+            };
+            (*name, number)
+        };
+        self.numbers.iter().map(of).collect()
     }
 
     /// The notes that depend on numbers of the frame, after the graph has run.

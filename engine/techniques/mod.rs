@@ -35,11 +35,12 @@ macro_rules! techniques {
             None
         }
 
-        /// The techniques by their names in `-D igi.vpls=500`, with the description of their settings; then the passes before them and the
-        /// tone mapping after them.
+        /// The techniques by their names in `-D igi.vpls=500`, with the description of their settings; then the bakes of `daylight`, the passes
+        /// before techniques and the tone mapping after them.
         pub fn descriptions() -> Vec<(&'static str, &'static Description)> {
             vec![
                 $((<$technique as Technique>::NAME, <$technique as Technique>::description()),)*
+                ("bake", daylight::Baking::description()),
                 ("gbuffer", passes::gbuffer::Settings::description()),
                 ("shadow", passes::shadow::Settings::description()),
                 ("tonemap", tonemap::Settings::description()),
@@ -52,5 +53,6 @@ techniques! {
     isr::Isr,
     igi::Igi,
     fiv::Fiv,
+    daylight::Daylight,
     Reference,
 }

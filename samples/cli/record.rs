@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use lucerna::{Error, Result};
+use lucerna::{Error, Result, bake::Digest, technique::Bake};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -65,8 +65,45 @@ pub struct Record {
     pub mode: Option<String>,
     #[serde(default)]
     pub f32: bool,
+    /// The file of a bake, without which the picture cannot be made.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bake: Option<BakeFile>,
     /// All settings of the technique, as `--print-config` prints them.
     pub settings: Value,
+}
+
+/// The file of a bake.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BakeFile {
+    pub file: String,
+    /// Of its contents.
+    pub digest: Digest,
+}
+
+impl BakeFile {
+    /// What the pictures of a bake say about it. `None`: they can be made without it.
+    pub fn of(baked: &impl Bake) -> Option<Self> {
+        let (file, digest) = baked.source()?;
+        Some(Self { file: file.to_string_lossy().into_owned(), digest })
+    }
+
+    /// Reads the file.
+    ///
+    /// # Errors
+    /// `Input`, naming the file, if it cannot be read or is another bake.
+    pub fn read<B: Bake>(&self) -> Result<B> {
+        let baked = B::read(Path::new(&self.file))?;
+        match baked.source() {
+            Some((_, digest)) if digest != self.digest => {
+                let what =
+                    format!("has the digest {digest}; the picture was made with a bake of digest {}", self.digest);
+                let error = Error::input(what).in_file(&self.file);
+                Err(error.help("Put the bake of the picture there, or bake it again with the same options"))
+            }
+            _ => Ok(baked),
+        }
+    }
 }
 
 /// The source of the scene.
@@ -112,6 +149,7 @@ impl Record {
             view: None,
             mode: None,
             f32: false,
+            bake: None,
             settings: Value::Null,
         }
     }
@@ -225,6 +263,7 @@ impl Record {
                 .map(|path| format!("{path:?}, and the files in its folder that it refers to")),
         );
         let environment = self.environment.as_deref().map(Path::new);
+        list.extend(self.bake.iter().map(|bake| format!("{:?}", bake.file)));
         list.extend(environment.filter(|path| !source::is_built_in_environment(path)).map(|path| format!("{path:?}")));
         list
     }
@@ -274,6 +313,7 @@ mod tests {
             view: None,
             mode: Some("direct".into()),
             f32: true,
+            bake: Some(BakeFile { file: "-odd.day".into(), digest: Digest::of(b"odd") }),
             settings: serde_json::json!({"samples": 24, "strength": 0.1, "limit": null}),
         };
         let again = Record::from_config(&serde_json::to_value(&record).unwrap()).unwrap();
@@ -298,7 +338,7 @@ mod tests {
         assert!(args.output.is_empty() && args.dump.is_none() && args.timings.is_none() && args.stage.camera.is_none());
         assert!(args.settings.file.is_none() && !args.overwrite && !args.json);
         let with_folder = |name: &str| format!("{name:?}, and the files in its folder that it refers to");
-        assert_eq!(again.files(), [with_folder("-odd.obj"), with_folder("pot.glb")]);
+        assert_eq!(again.files(), [with_folder("-odd.obj"), with_folder("pot.glb"), "\"-odd.day\"".to_owned()]);
         assert_eq!(args.stage.scene.add, again.add);
         for (odd, place) in [
             (Record { width: 0, ..record.clone() }, "width"),

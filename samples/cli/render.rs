@@ -9,7 +9,7 @@ use lucerna::{
     graph::{Graph, Runner},
     image::Format,
     scene::Scene,
-    technique::{self, Mode, Readback, Ready, Settings, Shot, Technique},
+    technique::{self, Bake, Mode, Readback, Ready, Settings, Shot, Technique},
 };
 
 use crate::{
@@ -21,7 +21,7 @@ use crate::{
     outputs::Fresh,
     program::{self, STOPPED_EARLY},
     progress::Frames,
-    record::Record,
+    record::{BakeFile, Record},
     rerun::bounds,
     run::Run,
     settings_list,
@@ -112,6 +112,7 @@ pub fn render<T: Technique>(args: &RenderArgs, given: &Given<T>) -> Result<ExitC
     }
     let interrupt = Interrupt::install();
     let mut run = Run::new(Label::of::<T>(given.mode), args, args.talk.console(), &staged, None)?;
+    run.name_bake(given.baked.as_ref().and_then(BakeFile::of));
     frames(given, args, staged, &mut run, &interrupt, started)?;
     Ok(match run.progress() {
         _ if args.list_passes => ExitCode::SUCCESS,
@@ -163,11 +164,16 @@ impl Again<'_> {
 /// # Errors
 /// Any error of rendering; `Input` for wrong values in the record.
 pub fn again<T: Technique>(asked: &Again<'_>) -> Result<Option<Fresh>> {
-    let given = Given::<T> { base: T::Settings::default(), mode: asked.mode()?, baked: None };
+    let mut given = Given::<T> { base: T::Settings::default(), mode: asked.mode()?, baked: None };
     let staged = Staged::recorded(&asked.record.settings, &given.base, T::Settings::validate)?;
     bounds::rays(T::NAME, T::rays(&staged.technique), asked.long)?;
     let args = asked.record.render_args(asked)?;
+    given.baked = asked.record.bake.as_ref().map(BakeFile::read).transpose()?;
+    if given.baked.is_none() && T::Baked::NEEDED {
+        return Err(Error::input("is missing: the metadata do not name the bake of the picture").at("bake"));
+    }
     let mut run = Run::new(Label::of::<T>(given.mode), &args, asked.console(), &staged, Some(asked.format))?;
+    run.name_bake(asked.record.bake.clone());
     frames(&given, &args, staged, &mut run, asked.interrupt, Instant::now())?;
     Ok(run.fresh())
 }
@@ -250,6 +256,7 @@ fn frames<T: Technique>(
         // An interrupted frame is not written, unless it is complete.
         let Some(result) = unless_stopped(result, interrupt)? else { break };
         run.note(&reading.notes(&result));
+        run.numbers(&reading.numbers(&result));
         let mut layers = reading.layers(&result);
         run.expose(&layers);
         layers.metadata = run.metadata(&gpu, &seen, frame)?;

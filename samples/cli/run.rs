@@ -22,7 +22,7 @@ use crate::{
     outputs::{ALPHA_LEFT_OUT, Fresh, Outputs},
     pattern::Values,
     program,
-    record::{Record, Source},
+    record::{BakeFile, Record, Source},
     render::Label,
     stage::Stage,
     timings::Timings,
@@ -45,6 +45,8 @@ pub struct Run<'a> {
     timings: Timings,
     done: Vec<Done>,
     warnings: Vec<String>,
+    /// Of the next frame.
+    numbers: serde_json::Map<String, Value>,
     /// Wall-clock time of the steps before the first frame.
     pub phases: Vec<(&'static str, Duration)>,
 }
@@ -56,6 +58,9 @@ struct Done {
     /// Wall-clock time of the first run, including the readback.
     milliseconds: f64,
     files: Vec<String>,
+    /// Numbers of the technique about the cost of the frame.
+    #[serde(skip_serializing_if = "serde_json::Map::is_empty")]
+    numbers: serde_json::Map<String, Value>,
     /// Times of each run. The first run also creates pipelines and reads the picture back.
     runs: Vec<RunTime>,
 }
@@ -136,6 +141,7 @@ impl<'a> Run<'a> {
             timings: Timings::default(),
             done: Vec::new(),
             warnings: Vec::new(),
+            numbers: serde_json::Map::new(),
             phases: Vec::new(),
         };
         if !args.list_passes {
@@ -195,6 +201,11 @@ impl<'a> Run<'a> {
     fn values(&self, frame: u32) -> Values<'_> {
         let (scene, camera) = (&self.stage.scene.name, &self.stage.placed.name);
         Values { scene, camera, technique: &self.label, frame, layer: "" }
+    }
+
+    /// Names the file of a bake in the metadata of pictures.
+    pub fn name_bake(&mut self, bake: Option<BakeFile>) {
+        self.record.bake = bake;
     }
 
     /// The metadata of a picture.
@@ -273,10 +284,16 @@ impl<'a> Run<'a> {
         self.warnings.push(text);
     }
 
+    /// Records numbers about the cost of the frame that is finished next.
+    pub fn numbers(&mut self, numbers: &[(&str, f64)]) {
+        self.numbers = numbers.iter().map(|(name, number)| ((*name).to_owned(), json!(number))).collect();
+    }
+
     /// Records a finished frame.
     pub fn done(&mut self, frame: u32, seconds: f64, milliseconds: f64, files: Vec<String>, report: &Report) {
         self.timings.add(frame, report);
-        self.done.push(Done { frame, seconds, milliseconds, files, runs: Vec::new() });
+        let numbers = std::mem::take(&mut self.numbers);
+        self.done.push(Done { frame, seconds, milliseconds, files, numbers, runs: Vec::new() });
         self.record_time(milliseconds, report);
     }
 

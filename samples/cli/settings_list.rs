@@ -119,6 +119,7 @@ mod tests {
             ("isr", include_str!("../isr/README.md")),
             ("igi", include_str!("../igi/README.md")),
             ("fiv", include_str!("../fiv/README.md")),
+            ("daylight", include_str!("../daylight/README.md")),
             ("tonemap", include_str!("../tonemap/README.md")),
             ("reference", include_str!("../../docs/reference.md")),
         ];

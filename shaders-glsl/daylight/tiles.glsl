@@ -10,6 +10,7 @@ struct DayTile {
     uint wide[3];        // images of 16-bit floats
     uint narrow[3];      // images of signed bytes
     uint first[3];       // coefficient
+    uint first_texel;    // number of texels in the tiles before
 };
 
 layout(binding = 20, scalar) readonly buffer Tiles { DayTile tiles[]; };
@@ -27,36 +28,49 @@ uint day_texel(uint tile, uvec2 inside) {
     return words[tiles[tile].mask + tiles[tile].mask_words + word] + bitCount(bits & (bit - 1u));
 }
 
-// Irradiance at a texel, W/m². Values of images may be negative, so rounding may leave a small negative sum.
-vec3 day_irradiance(uint tile, uint texel) {
-    vec3 sum = vec3(0.0);
-    for (uint layer = 0u; layer < 3u; ++layer) {
-        uint wide = tiles[tile].wide[layer];
-        uint narrow = tiles[tile].narrow[layer];
-        uint first = tiles[tile].first[layer];
-        uint at = tiles[tile].first_word[layer] + texel * ((6u * wide + 3u * narrow + 3u) / 4u);
-        uint half_at = 0u;
-        for (uint i = 0u; i < wide; ++i) {
-            vec3 value;
-            for (uint c = 0u; c < 3u; ++c) {
-                vec2 pair = unpackHalf2x16(words[at + half_at / 2u]);
-                value[c] = (half_at & 1u) == 0u ? pair.x : pair.y;
-                ++half_at;
-            }
-            sum += coefficients[first + i] * value;
+// Light of a texel.
+struct DaySums {
+    vec3 first;   // W/m²
+    vec3 second;  // with the coefficients from `second` on; 0 if that is 0
+    uint fetches; // values that were read, three colours each
+};
+
+// Adds the images of a layer at a texel, with their coefficients. Values of images may be negative, so rounding may leave a small negative sum.
+void day_layer(inout DaySums sums, uint tile, uint layer, uint texel, uint second) {
+    uint wide = tiles[tile].wide[layer];
+    uint narrow = tiles[tile].narrow[layer];
+    uint first = tiles[tile].first[layer];
+    uint at = tiles[tile].first_word[layer] + texel * ((6u * wide + 3u * narrow + 3u) / 4u);
+    uint half_at = 0u;
+    for (uint i = 0u; i < wide; ++i) {
+        vec3 value;
+        for (uint c = 0u; c < 3u; ++c) {
+            vec2 pair = unpackHalf2x16(words[at + half_at / 2u]);
+            value[c] = (half_at & 1u) == 0u ? pair.x : pair.y;
+            ++half_at;
         }
-        uint byte_at = 2u * half_at;
-        for (uint i = 0u; i < narrow; ++i) {
-            vec3 value;
-            for (uint c = 0u; c < 3u; ++c) {
-                int word = int(words[at + byte_at / 4u]);
-                value[c] = float(bitfieldExtract(word, int(8u * (byte_at & 3u)), 8));
-                ++byte_at;
-            }
-            sum += coefficients[first + wide + i] * value;
-        }
+        sums.first += coefficients[first + i] * value;
+        if (second != 0u) sums.second += coefficients[second + first + i] * value;
     }
-    return sum;
+    uint byte_at = 2u * half_at;
+    for (uint i = 0u; i < narrow; ++i) {
+        vec3 value;
+        for (uint c = 0u; c < 3u; ++c) {
+            int word = int(words[at + byte_at / 4u]);
+            value[c] = float(bitfieldExtract(word, int(8u * (byte_at & 3u)), 8));
+            ++byte_at;
+        }
+        sums.first += coefficients[first + wide + i] * value;
+        if (second != 0u) sums.second += coefficients[second + first + wide + i] * value;
+    }
+    sums.fetches += wide + narrow;
+}
+
+// Irradiance at a texel by all layers, W/m².
+vec3 day_irradiance(uint tile, uint texel) {
+    DaySums sums = DaySums(vec3(0.0), vec3(0.0), 0u);
+    for (uint layer = 0u; layer < 3u; ++layer) day_layer(sums, tile, layer, texel, 0u);
+    return sums.first;
 }
 
 #endif

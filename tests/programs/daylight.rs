@@ -1,5 +1,7 @@
 //! One program for several files of tests: linking the engine once saves minutes.
 
+#[path = "../daylight_lab/mod.rs"]
+mod daylight_lab;
 #[path = "../tracer_lab/mod.rs"]
 mod tracer_lab;
 
@@ -7,6 +9,8 @@ mod tracer_lab;
 mod daylight_cube;
 #[path = "../daylight_day.rs"]
 mod daylight_day;
+#[path = "../daylight_frames.rs"]
+mod daylight_frames;
 #[path = "../daylight_light.rs"]
 mod daylight_light;
 #[path = "../daylight_probes.rs"]

@@ -153,8 +153,19 @@ impl Stored {
     /// # Errors
     /// `Input`, naming the file and saying what is wrong.
     pub fn read(path: &Path) -> Result<Self> {
+        Ok(Self::read_with_digest(path)?.0)
+    }
+
+    /// Reads a file, and gives the digest at its end.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_with_digest(path: &Path) -> Result<(Self, Digest)> {
         let bytes = image::read_file_checked(path, MOST_BYTES)?;
-        Self::decode(&bytes).map_err(|error| error.in_file(path))
+        let stored = Self::decode(&bytes).map_err(|error| error.in_file(path))?;
+        let mut digest = [0; DIGEST];
+        digest.copy_from_slice(&bytes[bytes.len() - DIGEST..]);
+        Ok((stored, Digest(digest)))
     }
 
     /// # Errors

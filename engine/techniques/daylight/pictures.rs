@@ -5,12 +5,13 @@ use crate::{Error, ErrorKind, Result, gpu::Gpu, shaders::types};
 
 /// Tiles with their number of columns, and their words, as the device reads them.
 pub(super) fn packed<'a>(list: impl Iterator<Item = (&'a Tile, u32)>) -> (Vec<types::DayTile>, Vec<u32>) {
-    let (mut tiles, mut words, mut first) = (Vec::new(), Vec::new(), 0);
+    let (mut tiles, mut words, mut first, mut texels) = (Vec::new(), Vec::new(), 0, 0);
     for (tile, columns) in list {
         let mut entry = types::DayTile {
             mask: words.len() as u32,
             mask_words: tile.mask.len() as u32,
             columns,
+            first_texel: texels,
             ..types::DayTile::default()
         };
         words.extend_from_slice(&tile.mask);
@@ -19,6 +20,7 @@ pub(super) fn packed<'a>(list: impl Iterator<Item = (&'a Tile, u32)>) -> (Vec<ty
             words.push(before);
             before += word.count_ones();
         }
+        texels += before;
         for (which, layer) in tile.layers().into_iter().enumerate() {
             let Layer { wide, narrow, .. } = *layer;
             entry.first_word[which] = words.len() as u32;
@@ -32,21 +34,30 @@ pub(super) fn packed<'a>(list: impl Iterator<Item = (&'a Tile, u32)>) -> (Vec<ty
     (tiles, words)
 }
 
-/// Coefficients of the images of all tiles, in their order. `weights`: of the baked times; `sun`: its colour; `patches`: radiance of the sky;
-/// `lamps`: how bright each group of lamps is.
+/// The light of a moment.
+pub(super) struct Sources<'a> {
+    /// Irradiance of the sun, W/m².
+    pub sun: [f32; 3],
+    /// Radiance of the patches of the sky, W/(sr m²).
+    pub patches: &'a [[f32; 3]],
+    /// How bright each group of lamps is.
+    pub lamps: &'a [[f32; 3]],
+}
+
+/// Coefficients of the images of all tiles, in their order, for one mixture of the baked times after the other.
 pub(super) fn coefficients<'a>(
-    tiles: impl Iterator<Item = &'a Tile>,
-    weights: &[(usize, f32)],
-    sun: [f32; 3],
-    patches: &[[f32; 3]],
-    lamps: &[[f32; 3]],
+    tiles: impl IntoIterator<Item = &'a Tile> + Clone,
+    mixtures: &[Vec<(usize, f32)>],
+    light: &Sources<'_>,
 ) -> Vec<[f32; 3]> {
-    let of_sun = |(time, weight): &(usize, f32)| (*time, sun.map(|channel| channel * weight));
+    let of_sun = |(time, weight): &(usize, f32)| (*time, light.sun.map(|channel| channel * weight));
     let mut out = Vec::new();
-    for tile in tiles {
-        out.extend(tile.sun.mix(weights.iter().map(of_sun)));
-        out.extend(tile.sky.mix(patches.iter().copied().enumerate()));
-        out.extend(tile.lamps.mix(lamps.iter().copied().enumerate()));
+    for mixture in mixtures {
+        for tile in tiles.clone() {
+            out.extend(tile.sun.mix(mixture.iter().map(of_sun)));
+            out.extend(tile.sky.mix(light.patches.iter().copied().enumerate()));
+            out.extend(tile.lamps.mix(light.lamps.iter().copied().enumerate()));
+        }
     }
     out.push([0.0; 3]);
     out
@@ -56,9 +67,8 @@ pub(super) fn coefficients<'a>(
 ///
 /// # Errors
 /// `Runtime` with both sizes.
-pub(super) fn fits(gpu: &Gpu, words: &[u32]) -> Result<()> {
+pub(super) fn fits(gpu: &Gpu, bytes: u64) -> Result<()> {
     let most = gpu.caps().limits.storage_range;
-    let bytes = 4 * words.len() as u64;
     if bytes <= most {
         return Ok(());
     }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Adaptive, Baking, Comparison, Course, SunPath, Weather, cube, probes::Grid};
 use crate::{
-    Error, Result,
+    Error, ErrorKind, Result,
     bake::{Digest, Part},
     scene::{LightKind, Scene, View, cull::Aabb},
     shaders::{
@@ -22,6 +22,9 @@ pub const MOST_DAYS: usize = 366;
 pub const NEXT_DAY: f64 = 172_800.0;
 /// Texels of a bake at most.
 pub const MOST_TEXELS: u64 = 1 << 28;
+
+/// Texels times times of a bake with one tile at most: a device has to hold 24 bytes for each, and every device allows buffers of 128 MiB.
+pub const MOST_WHOLE: u64 = (128 << 20) / 24;
 
 /// The surfaces that a bake holds light for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -215,12 +218,20 @@ pub struct Plan {
 impl Plan {
     /// Columns and rows of tiles.
     pub fn tiles(&self) -> [u32; 2] {
-        self.extent.map(|texels| texels.div_ceil(self.settings.tile.max(1)))
+        self.extent.map(|texels| texels.div_ceil(self.side()))
+    }
+
+    /// Side of a tile, texels.
+    pub fn side(&self) -> u32 {
+        match self.settings.tile {
+            0 => self.extent[0].max(self.extent[1]).max(1),
+            side => side,
+        }
     }
 
     /// The texels of a tile: column, row, columns, rows.
     pub fn tile(&self, index: u32) -> [u32; 4] {
-        let side = self.settings.tile.max(1);
+        let side = self.side();
         let columns = self.tiles()[0].max(1);
         let corner = [index % columns * side, index / columns * side];
         let size = [0, 1].map(|axis| side.min(self.extent[axis].saturating_sub(corner[axis])));
@@ -239,7 +250,7 @@ impl Plan {
 
     /// Number of the first receiver of a tile in the whole bake.
     pub fn first_receiver(&self, index: u32) -> u32 {
-        index.wrapping_mul(self.settings.tile * self.settings.tile)
+        index.wrapping_mul(self.side().wrapping_mul(self.side()))
     }
 
     /// Checks the numbers.
@@ -283,6 +294,7 @@ impl Plan {
                 return wrong("a camera whose place is not finite".into());
             }
         }
+        self.check_whole().map_err(|error| error.of_kind(ErrorKind::Input))?;
         let Weather { .. } =
             Weather::new(self.weather.turbidity(), self.weather.ground_albedo(), self.weather.overcast())
                 .map_err(Error::input)?;
@@ -294,6 +306,21 @@ impl Plan {
                 Err(Error::usage(what).at("bake.measure").help("Choose `rms`"))
             }
         }
+    }
+
+    /// Checks that a tile for the whole picture is not too large for devices.
+    ///
+    /// # Errors
+    /// `Usage`, saying how many texels are allowed.
+    pub fn check_whole(&self) -> Result<()> {
+        let texels = u64::from(self.extent[0]) * u64::from(self.extent[1]);
+        let most = MOST_WHOLE / self.dimensions().into_iter().max().unwrap_or(1).max(1) as u64;
+        if self.settings.tile != 0 || texels <= most {
+            return Ok(());
+        }
+        let what = format!("0: one tile of {texels} texels; with so many times at most {most} are allowed");
+        let error = Error::usage(what).at("bake.tile");
+        Err(error.help("Choose a smaller picture, a longer interval, or tiles: bake.tile=128"))
     }
 
     /// The times of a day.

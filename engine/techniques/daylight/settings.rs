@@ -58,8 +58,8 @@ pub struct Baking {
     /// Maximum of images of a tile; 0: as many as the tolerance needs.
     #[schemars(range(min = 0, max = 4096))]
     pub images: u32,
-    /// Side of a tile, texels. Each tile has its own images.
-    #[schemars(range(min = 4, max = 128), extend("x-unit" = "texels"))]
+    /// Side of a tile, texels. Each tile has its own images. 0: one tile for the whole picture, as in the paper.
+    #[schemars(range(min = 4, max = 128), extend("x-zero" = true, "x-unit" = "texels"))]
     pub tile: u32,
     /// Texels along a metre of a surface, for lightmaps.
     #[schemars(range(min = 0.01, max = 1000), extend("x-unit" = "1/m"))]
@@ -117,6 +117,12 @@ impl Default for Baking {
 }
 
 impl Baking {
+    /// The paper's choices: a sun without a size, and 20 images for the whole picture, whatever their error. The paper takes the mean image
+    /// away before; here components are around zero, so that no light stays exactly no light, and the mean is one of the images.
+    pub fn paper() -> Self {
+        Self { disc: false, tile: 0, images: 20, tolerance: 1e-4, noise_floor: false, filter: 0, ..Self::default() }
+    }
+
     /// # Errors
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
@@ -133,6 +139,10 @@ pub enum Interpolation {
     Linear,
     /// A curve through four steps (Catmull and Rom 1974).
     CatmullRom,
+    /// The line between the logarithms of the light. A picture decodes both steps and joins them at each pixel, which costs as many
+    /// fetches of images and twice the sums. Black has no logarithm, so a ten-thousandth of the sun's irradiance is added before and taken
+    /// away after.
+    LogLinear,
     /// The nearest step.
     Nearest,
 }
@@ -146,6 +156,18 @@ pub enum Added {
     Probes,
     /// That of the surface behind the object at the same pixel, as in the paper; none before the sky.
     Screen,
+}
+
+/// How the light of the sky is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SkyLight {
+    /// By the radiance of each patch of the sky at the time.
+    #[default]
+    Patches,
+    /// The light of the sky under the day's highest sun, scaled by the height of the sun, as the paper scales one image. The paper names no
+    /// function of the height; this one is the sine of the elevation.
+    Scaled,
 }
 
 /// Settings of pictures.
@@ -165,6 +187,10 @@ pub struct Settings {
     pub interpolation: Interpolation,
     /// The indirect light of objects that are added at run time.
     pub added: Added,
+    /// How the light of the sky is found.
+    pub sky: SkyLight,
+    /// Direct light of the sun has highlights. If off, Lambert's law alone.
+    pub gloss: bool,
     /// Haze of the air: 1 is clear mountain air, 10 is thick haze.
     #[schemars(range(min = 1, max = 10))]
     pub turbidity: f64,
@@ -195,6 +221,8 @@ impl Default for Settings {
             minutes: 5.0,
             interpolation: Interpolation::default(),
             added: Added::default(),
+            sky: SkyLight::default(),
+            gloss: true,
             turbidity: weather.turbidity(),
             ground_albedo: weather.ground_albedo(),
             overcast: weather.overcast(),
@@ -226,8 +254,19 @@ pub struct PictureSettings {
 }
 
 impl technique::Settings for PictureSettings {
+    /// Linear interpolation, one image of the sky, and a plain shadow map. The paper's Phong shading has no numbers for highlights, so only
+    /// its diffuse part is left.
     fn paper() -> Option<Self> {
-        None
+        Some(Self {
+            daylight: Settings {
+                interpolation: Interpolation::Linear,
+                sky: SkyLight::Scaled,
+                gloss: false,
+                ..Settings::default()
+            },
+            shadow: shadow::Settings { kind: shadow::Kind::Plain, cascades: 1, ..shadow::Settings::default() },
+            ..Self::default()
+        })
     }
 
     fn validate(&self) -> Result<()> {

@@ -1,38 +1,41 @@
 //! Baked daylight behind the interface of all techniques.
 
-use std::{path::PathBuf, sync::Arc};
+use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
 use super::{
-    Added, Course, Group, Interpolation, Lit, NEXT_DAY, PictureSettings, Settings, Sky, Stored, added,
+    Added, Baked, Course, Group, PictureSettings, Settings, Sky, SkyLight, Stored, added,
     cube::Around,
-    lamps, lightmap,
-    pictures::{coefficients, fits, packed},
+    lamps,
+    on_device::OnDevice,
+    pictures::{Sources, coefficients},
+    places::Places,
     probes::{self, Field},
+    steps::{Mixture, Steps},
 };
 use crate::{
     Error, Result,
-    gpu::{Gpu, OwnedBuffer, OwnedImage},
-    graph::{Cull, Depth, Draw, DrawCall, Format, Graph, Image, Load, Raster, Targets},
+    gpu::{Gpu, OwnedImage},
+    graph::{Format, Graph},
     passes::{
         direct::{self, Direct, Lights},
-        gbuffer::{self, GBuffer},
-        shadow, skybox,
+        gbuffer, shadow, skybox,
     },
     resident::{self, Handles, Resident},
-    scene::{Environment, Note, NoteKind, Scene, View, environment::direction_from_uv},
+    scene::{Environment, Note, NoteKind, Scene, environment::direction_from_uv},
     settings::{Described, Description, idle_notes},
-    shaders::{
-        consts,
-        daylight::{decode, place},
-        types,
-    },
+    shaders::{consts, daylight::decode, types},
     technique::{self, Making, Moment, Picture, Technique},
 };
 
 /// Columns and rows of the picture of the sky behind the scene.
 const SKY: [u32; 2] = [256, 128];
+
+/// Numbers of pixels' fetches, summed up separately so that they do not overflow.
+const FETCH_SUMS: u64 = 256;
+/// Pictures whose steps are read ahead of time.
+const LOOK_AHEAD: u32 = 256;
 
 /// The light that the picture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,32 +69,6 @@ impl technique::Mode for Mode {
     }
 }
 
-/// A bake, and the file from which it was read.
-#[derive(Clone, Debug)]
-pub struct Baked {
-    pub stored: Arc<Stored>,
-    /// Errors name this file.
-    pub file: Option<PathBuf>,
-}
-
-impl Baked {
-    /// Reads a file.
-    ///
-    /// # Errors
-    /// As [`Stored::read`].
-    pub fn read(file: impl Into<PathBuf>) -> Result<Self> {
-        let file = file.into();
-        Ok(Self { stored: Arc::new(Stored::read(&file)?), file: Some(file) })
-    }
-
-    fn blamed(&self, error: Error) -> Error {
-        match &self.file {
-            Some(file) => error.in_file(file),
-            None => error,
-        }
-    }
-}
-
 /// Baked daylight, prepared for a scene.
 #[derive(Debug)]
 pub struct Daylight {
@@ -99,8 +76,9 @@ pub struct Daylight {
     baked: Baked,
     /// One for each day of the bake.
     courses: Vec<Course>,
-    tiles: OwnedBuffer,
-    words: OwnedBuffer,
+    /// The same.
+    steps: Vec<Steps>,
+    light: OnDevice,
     places: Option<Places>,
     /// The first node of the objects that the bake does not know.
     added: Option<u32>,
@@ -108,65 +86,6 @@ pub struct Daylight {
     around: Option<Around>,
     /// The last sky, and the state that it shows.
     sky: Option<(OwnedImage, [f32; 7])>,
-}
-
-/// The lightmap on the device.
-#[derive(Debug)]
-struct Places {
-    corners: OwnedBuffer,
-    firsts: OwnedBuffer,
-    draws: Vec<DrawCall>,
-}
-
-impl Places {
-    fn new(gpu: &Gpu, scene: &Scene, baked: &Baked) -> Result<Option<Self>> {
-        let corners = &baked.stored.corners;
-        if corners.is_empty() {
-            return Ok(None);
-        }
-        let triangles = lightmap::triangles(scene);
-        let all: u64 = triangles.iter().map(|count| u64::from(*count)).sum();
-        if all != corners.len() as u64 {
-            let what = format!("has places for {} triangles, the scene has {all}", corners.len());
-            return Err(baked.blamed(Error::input(what)));
-        }
-        let (mut firsts, mut draws, mut first) = (Vec::new(), Vec::new(), 0);
-        for (number, count) in triangles.into_iter().enumerate() {
-            firsts.push(first);
-            draws.push(DrawCall {
-                first_vertex: first,
-                vertices: 3 * count,
-                first_instance: number as u32,
-                instances: 1,
-            });
-            first += 3 * count;
-        }
-        draws.retain(|draw| draw.vertices > 0);
-        Ok(Some(Self {
-            corners: OwnedBuffer::with_contents(gpu, "daylight.corners", bytemuck::cast_slice(corners))?,
-            firsts: OwnedBuffer::with_contents(gpu, "daylight.firsts", bytemuck::cast_slice(&firsts))?,
-            draws,
-        }))
-    }
-
-    /// Draws the place in the lightmap of each pixel.
-    fn draw(&self, graph: &mut Graph, handles: &Handles, view: &View, gbuffer: &GBuffer) -> Image {
-        let places = graph.image("daylight.places", Format::RG32F, view.extent);
-        let depth = graph.image("daylight.places.depth", Format::D32F, view.extent);
-        let args = place::Args {
-            view: gbuffer.view,
-            instances: handles.instances,
-            indices: handles.indices,
-            positions: handles.positions,
-            corners: graph.import_buffer(&self.corners),
-            firsts: graph.import_buffer(&self.firsts),
-            depth: gbuffer.depth,
-        };
-        let targets = Targets::new().color(places, Load::Clear([-1.0; 4])).depth(depth, Depth::Clear(0.0));
-        // Sides that the G-buffer does not show are at another depth.
-        graph.raster(targets, Raster::new().cull(Cull::None), args, Draw::calls(self.draws.clone()));
-        places
-    }
 }
 
 impl Daylight {
@@ -206,13 +125,28 @@ impl Daylight {
         Ok(seconds)
     }
 
-    /// The weights of the baked times around a moment of a day (equations 1 to 3; x there has the offset on the wrong side).
-    fn weights(&self, day: usize, seconds: f64, how: Interpolation) -> Vec<(usize, f32)> {
-        let plan = &self.baked.stored.plan;
-        let of_day = plan.of_day(day);
-        let first = of_day.start;
-        let weights = weights(&plan.times[of_day], seconds + NEXT_DAY * day as f64, how);
-        weights.into_iter().map(|(time, weight)| (first + time, weight)).collect()
+    /// Steps that the next pictures need, the nearest first.
+    fn upcoming(&self, day: usize, settings: &Settings, frame: u32) -> impl Iterator<Item = usize> {
+        let at = move |ahead| self.seconds(&self.courses[day], settings, frame.checked_add(ahead)?).ok();
+        let moments = (1..=LOOK_AHEAD).filter_map(at);
+        let times = moments.map(move |seconds| self.steps[day].mixture(seconds, settings.interpolation));
+        times.flat_map(|mixture| mixture.times().collect::<Vec<_>>())
+    }
+
+    /// The radiance of the patches of the sky.
+    fn patches(&self, settings: &Settings, sky: &Sky, sun: Vec3) -> Result<Vec<[f32; 3]>> {
+        let scaled = |sky: &Sky, factor: f32| sky.patches().iter().map(|patch| patch.map(|c| c * factor)).collect();
+        match settings.sky {
+            SkyLight::Patches => Ok(scaled(sky, settings.strength)),
+            SkyLight::Scaled => {
+                let suns = self.baked.stored.plan.times.iter().map(|time| time.sun);
+                let Some(highest) = suns.max_by(|a, b| a[1].total_cmp(&b[1])) else {
+                    return Ok(scaled(sky, 0.0));
+                };
+                let noon = Sky::new(settings.weather()?, highest.map(f64::from)).map_err(Error::usage)?;
+                Ok(scaled(&noon, settings.strength * sun.y.max(0.0) / highest[1].max(1e-6)))
+            }
+        }
     }
 
     /// Handles of the scene under this sun and sky instead of its own.
@@ -244,31 +178,6 @@ impl Daylight {
             moment: Arc::new(here),
             ..moment.handles.clone()
         })
-    }
-}
-
-/// Weights of some of `times`, in order, around a moment.
-fn weights(times: &[Lit], seconds: f64, how: Interpolation) -> Vec<(usize, f32)> {
-    let Some(last) = times.len().checked_sub(1) else { return Vec::new() };
-    let next = times.partition_point(|time| time.seconds <= seconds);
-    let [Some(before), Some(after)] = [next.checked_sub(1), (next <= last).then_some(next)] else {
-        // Before the first and after the last baked time the sun is at the horizon.
-        return vec![(next.min(last), 1.0)];
-    };
-    let step = times[after].seconds - times[before].seconds;
-    let alpha = ((seconds - times[before].seconds) / step) as f32;
-    match how {
-        Interpolation::Nearest => vec![(if alpha < 0.5 { before } else { after }, 1.0)],
-        Interpolation::CatmullRom if before > 0 && after < last => {
-            let (a, a2, a3) = (alpha, alpha * alpha, alpha * alpha * alpha);
-            vec![
-                (before - 1, 0.5 * (-a + 2.0 * a2 - a3)),
-                (before, 0.5 * (2.0 - 5.0 * a2 + 3.0 * a3)),
-                (after, 0.5 * (a + 4.0 * a2 - 3.0 * a3)),
-                (after + 1, 0.5 * (a3 - a2)),
-            ]
-        }
-        Interpolation::Linear | Interpolation::CatmullRom => vec![(before, 1.0 - alpha), (after, alpha)],
     }
 }
 
@@ -370,15 +279,13 @@ impl Technique for Daylight {
         }
         let base = if added.is_some() { &*base } else { scene };
         let courses = stored.plan.calendar.courses().map_err(|what| baked.blamed(Error::input(what)))?;
-        let columns = |index: usize| stored.plan.tile(index as u32)[2];
-        let (tiles, words) = packed(stored.tiles.iter().enumerate().map(|(index, tile)| (tile, columns(index))));
-        fits(gpu, &words).map_err(|error| baked.blamed(error.help("Bake fewer texels, or use another device")))?;
+        let steps = courses.iter().enumerate().map(|(day, course)| Steps::new(&stored.plan, day, course)).collect();
         Ok(Self {
             gpu: gpu.clone(),
             baked: baked.clone(),
             courses,
-            tiles: OwnedBuffer::with_contents(gpu, "daylight.tiles", bytemuck::cast_slice(&tiles))?,
-            words: OwnedBuffer::with_contents(gpu, "daylight.words", bytemuck::cast_slice(&words))?,
+            steps,
+            light: OnDevice::new(gpu, baked)?,
             places: Places::new(gpu, base, baked)?,
             added,
             probes: if added.is_some() { Field::new(gpu, stored).map_err(|error| baked.blamed(error))? } else { None },
@@ -392,7 +299,7 @@ impl Technique for Daylight {
         let plan = &self.baked.stored.plan;
         plan.check_view(&moment.view).map_err(|error| self.baked.blamed(error))?;
         let [columns, _] = plan.tiles();
-        let (side, texels) = (plan.settings.tile, plan.extent);
+        let (side, texels) = (plan.side(), plan.extent);
         let of_day = &settings.daylight;
         let day = self.day(of_day)?;
         let course = &self.courses[day];
@@ -403,21 +310,36 @@ impl Technique for Daylight {
         let clear = 1.0 - of_day.overcast as f32;
         let light = shine.irradiance.map_or(sky.sun_irradiance(), |sun| sun.map(|channel| channel * clear));
         let light = light.map(|channel| channel * of_day.strength);
-        let patches: Vec<[f32; 3]> =
-            sky.patches().iter().map(|patch| patch.map(|channel| channel * of_day.strength)).collect();
-        let weights = self.weights(day, seconds, of_day.interpolation);
+        let patches = self.patches(of_day, &sky, sun)?;
         let elevation = f64::from(sun.y).clamp(-1.0, 1.0).asin().to_degrees();
         let burning = lamps::burning(of_day, &plan.lamps, course, seconds, elevation)?;
         let materials = switched(&moment.handles.material_table, &plan.lamps, &burning);
         let burning: Vec<[f32; 3]> = burning.into_iter().map(|share| [share; 3]).collect();
-        let coefficients = coefficients(self.baked.stored.tiles.iter(), &weights, light, &patches, &burning);
         let left = left_out(moment.scene, &plan.lamps, self.added.is_some());
+        let mixture = self.steps[day].mixture(seconds, of_day.interpolation);
+        let upcoming: Vec<usize> = match self.light.has_frames() {
+            true => self.upcoming(day, of_day, graph.frame).collect(),
+            false => Vec::new(),
+        };
+        let frames = self.light.frames(graph, &mixture, upcoming.into_iter())?;
+        let (mixtures, weights, alpha) = match &mixture {
+            Mixture::Sum(sum) => {
+                let mut weights = [0.0; 4];
+                weights.iter_mut().zip(sum).for_each(|(weight, of)| *weight = of.weight);
+                (vec![sum.iter().map(|of| (of.time, of.weight)).collect()], weights, 0.0)
+            }
+            Mixture::Logarithms { times, alpha } => (times.map(|time| vec![(time, 1.0)]).to_vec(), [1.0; 4], *alpha),
+        };
+        let logarithms = mixtures.len() > 1;
+        let tiles = &self.baked.stored.tiles;
+        let lights = Sources { sun: light, patches: &patches, lamps: &burning };
+        let coefficients = coefficients(tiles, &mixtures, &lights);
         let mut handles = self.relit(graph, moment, sun, light, &sky, of_day.strength)?;
         handles.materials = graph.buffer_from("daylight.materials", &materials);
         let view = &moment.view;
         let gbuffer = gbuffer::draw(graph, &handles, view, &settings.gbuffer);
         let shadows = shadow::draw(graph, &handles, view, &settings.shadow);
-        let choices = Direct { paper_law: false, specular: true, light_radius: 0.0, light_power: 1.0 };
+        let choices = Direct { paper_law: false, specular: of_day.gloss, light_radius: 0.0, light_power: 1.0 };
         let lit = direct::light(graph, &gbuffer, Lights::from(&shadows), &choices);
         let image = |graph: &mut Graph, name: &str| graph.image(name, Format::RGBA16F, view.extent);
         let [total, indirect, irradiance] =
@@ -437,14 +359,19 @@ impl Technique for Daylight {
         });
         let under = behind.as_ref().unwrap_or(&gbuffer);
         let places = self.places.as_ref().map(|places| places.draw(graph, &handles, view, under));
+        let second = (coefficients.len() / mixtures.len()) as u32;
+        let fetches = graph.buffer("daylight.fetches", 4 * FETCH_SUMS);
+        graph.fill(fetches, 0);
         let args = decode::Args {
             places: places.unwrap_or(gbuffer.depth),
             spec: decode::Spec {
                 texels_of: self.around.as_ref().map_or(places.is_some().into(), |_| consts::DAY_CUBE),
+                frames: if self.light.has_frames() { mixture.times().count() as u32 + 1 } else { 0 },
+                logarithms: logarithms.into(),
             },
             view: gbuffer.view,
             normal: gbuffer.normal,
-            around: graph.import_buffer(self.around.as_ref().map_or(&self.tiles, Around::guide)),
+            around: self.around.as_ref().map_or(self.light.tiles(graph), |around| graph.import_buffer(around.guide())),
             albedo: gbuffer.albedo,
             depth: gbuffer.depth,
             direct: lit.direct,
@@ -452,15 +379,21 @@ impl Technique for Daylight {
             total,
             indirect,
             irradiance,
-            tiles: graph.import_buffer(&self.tiles),
-            words: graph.import_buffer(&self.words),
+            tiles: self.light.tiles(graph),
+            words: self.light.words(graph),
             coefficients: graph.buffer_from("daylight.coefficients", &coefficients),
-            push: decode::Push { side, columns, texels },
+            frame0: frames.buffers[0],
+            frame1: frames.buffers[1],
+            frame2: frames.buffers[2],
+            frame3: frames.buffers[3],
+            fetches,
+            push: decode::Push { side, columns, texels, second, alpha, sun: light, weights },
         };
         graph.compute(args, view.extent);
         if let (Some(first), Some(field)) = (of_probes, &self.probes) {
+            let linear = mixture.linear();
             let mask = added::mask(graph, &handles, view, &gbuffer, first);
-            let moment = probes::Moment { weights: &weights, sun: light, patches: &patches };
+            let moment = probes::Moment { weights: &linear, sun: light, patches: &patches };
             let tiles = self.baked.stored.probes.iter().map(|brick| &brick.light);
             let light = field.decode(graph, tiles, moment);
             let pixels = probes::Pixels { mask, direct: lit.direct, total, indirect, irradiance };
@@ -478,6 +411,13 @@ impl Technique for Daylight {
         let notes = [moment.notes, &shadows.notes, &left, &of_shadows].concat();
         let picture =
             Picture::new(shown).color("direct", lit.direct).color("indirect", indirect).color("irradiance", irradiance);
+        let picture = picture.counting("fetches", fetches);
+        let picture = match self.light.has_frames() {
+            true => picture
+                .number("steps_uploaded", frames.uploaded as f64)
+                .number("stream_wait_ms", 1e3 * frames.waited.as_secs_f64()),
+            false => picture,
+        };
         Ok(picture.showing(gbuffer).noting(notes))
     }
 }

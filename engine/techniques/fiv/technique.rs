@@ -1,10 +1,11 @@
 //! Fullsphere irradiance vectors behind the interface of all techniques.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::{Fiv, Method, PictureSettings, Settings, Stored};
 use crate::{
     Error, ErrorKind, Result,
+    bake::Digest,
     graph::Graph,
     scene::Note,
     settings::{Described, Description, Difference},
@@ -19,16 +20,20 @@ pub struct Baked {
     pub file: Option<PathBuf>,
 }
 
-impl Baked {
-    /// Reads a file of vectors.
-    ///
-    /// # Errors
-    /// As [`Stored::read`].
-    pub fn read(file: impl Into<PathBuf>) -> Result<Self> {
-        let file = file.into();
-        Ok(Self { stored: Stored::read(&file)?, file: Some(file) })
+impl technique::Bake for Baked {
+    const NEEDED: bool = false;
+
+    fn read(file: &Path) -> Result<Self> {
+        Ok(Self { stored: Stored::read(file)?, file: Some(file.to_owned()) })
     }
 
+    /// The settings in the metadata of a picture are enough to compute the vectors again.
+    fn source(&self) -> Option<(&Path, Digest)> {
+        None
+    }
+}
+
+impl Baked {
     /// Checks that settings agree with the settings that the vectors were computed with.
     ///
     /// # Errors

@@ -58,6 +58,10 @@ pub struct DayBakeArgs {
     #[command(flatten)]
     pub settings: SettingsArgs,
 
+    /// Start from the paper's settings: a sun without a size, 20 images for the whole picture
+    #[arg(long, help_heading = "Settings")]
+    pub paper: bool,
+
     #[command(flatten)]
     pub device: DeviceArgs,
 
@@ -81,9 +85,9 @@ struct Keys {
 /// Whatever fails, with the kind that decides the exit code.
 pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
     let begun = Instant::now();
-    let keys = args.settings.effective(&Keys::default())?;
-    args.settings
-        .blamed(keys.bake.validate(), || args.settings.file_alone().effective(&Keys::default())?.bake.validate())?;
+    let base = Keys { bake: if args.paper { Baking::paper() } else { Baking::default() } };
+    let keys = args.settings.effective(&base)?;
+    args.settings.blamed(keys.bake.validate(), || args.settings.file_alone().effective(&base)?.bake.validate())?;
     if args.settings.print_config {
         console::print(settings_list::with_docs(&config::to_toml(&keys)?).trim_end())?;
         return Ok(ExitCode::SUCCESS);

@@ -52,7 +52,7 @@ pub fn info(args: &DayInfoArgs, _: Console) -> Result<ExitCode> {
     };
     let calendar = &plan.calendar;
     console::print(&format!("scene      {}, {kind}", plan.scene))?;
-    console::print(&format!("texels     {}×{}, tiles of {}", plan.extent[0], plan.extent[1], plan.settings.tile))?;
+    console::print(&format!("texels     {}×{}, tiles of {}", plan.extent[0], plan.extent[1], plan.side()))?;
     let Calendar { date, dates, zone, latitude, longitude, .. } = calendar;
     let day = match &calendar.path {
         Some(path) => format!("path of the sun with {} times", path.stops.len()),

@@ -258,8 +258,10 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
                 covered: unwrapped.receivers.len() as u64,
                 corners: digest(&corners),
             };
-            let sources = Sources::Lightmap(unwrapped.by_tile(baking.tile));
-            (receivers, unwrapped.lightmap.extent, sources, corners, unwrapped.notes)
+            let extent = unwrapped.lightmap.extent;
+            let side = if baking.tile == 0 { extent[0].max(extent[1]) } else { baking.tile };
+            let sources = Sources::Lightmap(unwrapped.by_tile(side.max(1)));
+            (receivers, extent, sources, corners, unwrapped.notes)
         }
     };
     let probes = match (baking.probes > 0.0, options.probe_box) {
@@ -286,6 +288,7 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
         lamps: if options.no_lamps { Vec::new() } else { lamps::groups(scene, &options.lamp)? },
         settings: baking.clone(),
     };
+    plan.check_whole()?;
     Ok(Planned { plan, sources, corners, notes })
 }
 

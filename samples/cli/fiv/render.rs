@@ -4,7 +4,7 @@ use std::{path::PathBuf, process::ExitCode};
 
 use lucerna::{
     Result,
-    technique::AllLight,
+    technique::{AllLight, Bake},
     techniques::fiv::{Baked, Fiv},
 };
 
@@ -29,7 +29,7 @@ pub struct FivArgs {
 /// # Errors
 /// Any error of the run. Its kind decides the exit code.
 pub fn render(args: &FivArgs) -> Result<ExitCode> {
-    let baked = args.vectors.as_ref().map(Baked::read).transpose()?;
+    let baked = args.vectors.as_deref().map(Baked::read).transpose()?;
     let mut given = Given::<Fiv>::by(&args.common, AllLight)?;
     if let Some(baked) = &baked {
         // The settings in the picture's metadata are then sufficient to render the picture again.

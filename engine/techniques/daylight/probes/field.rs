@@ -16,7 +16,7 @@ use crate::{
     },
     techniques::daylight::{
         Stored,
-        pictures::{coefficients, fits, packed},
+        pictures::{Sources, coefficients, fits, packed},
         units::Tile,
     },
 };
@@ -75,7 +75,8 @@ impl Field {
             |map: &Map| map.map(|[mean, square]| u32::from(mean.to_bits()) | u32::from(square.to_bits()) << 16);
         let distances: Vec<u32> = distances.iter().flat_map(words_of).collect();
         let (tiles, words) = packed(stored.probes.iter().map(|brick| (&brick.light, 1)));
-        fits(gpu, &words).map_err(|error| error.at("probes").help("Bake fewer probes, or use another device"))?;
+        fits(gpu, 4 * words.len() as u64)
+            .map_err(|error| error.at("probes").help("Bake fewer probes, or use another device"))?;
         let upload = |name, bytes: &[u8]| OwnedBuffer::with_contents(gpu, name, bytes);
         Ok(Some(Self {
             grid: grid.clone(),
@@ -87,7 +88,12 @@ impl Field {
     }
 
     /// The irradiance of all probes as harmonics: [`consts::PROBE_TERMS`] colours for each probe in the order of [`Grid::number`], W/m².
-    pub fn decode<'a>(&self, graph: &mut Graph, tiles: impl Iterator<Item = &'a Tile>, moment: Moment<'_>) -> Buffer {
+    pub fn decode<'a>(
+        &self,
+        graph: &mut Graph,
+        tiles: impl Iterator<Item = &'a Tile> + Clone,
+        moment: Moment<'_>,
+    ) -> Buffer {
         let Moment { weights, sun, patches } = moment;
         let bytes = 12 * u64::from(consts::PROBE_TERMS) * u64::from(self.grid.probes());
         let light = graph.buffer("daylight.probe_light", bytes);
@@ -96,8 +102,10 @@ impl Field {
             light,
             tiles: graph.import_buffer(&self.tiles),
             words: graph.import_buffer(&self.words),
-            coefficients: graph
-                .buffer_from("daylight.probe_coefficients", &coefficients(tiles, weights, sun, patches, &[])),
+            coefficients: graph.buffer_from(
+                "daylight.probe_coefficients",
+                &coefficients(tiles, &[weights.to_vec()], &Sources { sun, patches, lamps: &[] }),
+            ),
         };
         graph.compute(args, self.grid.probes());
         light

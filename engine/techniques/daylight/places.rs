@@ -1,0 +1,75 @@
+//! The lightmap on the device: where the surfaces of a picture have their texels.
+
+use super::{Baked, lightmap};
+use crate::{
+    Error, Result,
+    gpu::{Gpu, OwnedBuffer},
+    graph::{Cull, Depth, Draw, DrawCall, Format, Graph, Image, Load, Raster, Targets},
+    passes::gbuffer::GBuffer,
+    resident::Handles,
+    scene::{Scene, View},
+    shaders::daylight::place,
+};
+
+/// The corners of all triangles in the lightmap.
+#[derive(Debug)]
+pub(super) struct Places {
+    corners: OwnedBuffer,
+    firsts: OwnedBuffer,
+    draws: Vec<DrawCall>,
+}
+
+impl Places {
+    /// `None`: the bake has no lightmap.
+    ///
+    /// # Errors
+    /// `Input` if the scene has another number of triangles; `OutOfMemory`.
+    pub fn new(gpu: &Gpu, scene: &Scene, baked: &Baked) -> Result<Option<Self>> {
+        let corners = &baked.stored.corners;
+        if corners.is_empty() {
+            return Ok(None);
+        }
+        let triangles = lightmap::triangles(scene);
+        let all: u64 = triangles.iter().map(|count| u64::from(*count)).sum();
+        if all != corners.len() as u64 {
+            let what = format!("has places for {} triangles, the scene has {all}", corners.len());
+            return Err(baked.blamed(Error::input(what)));
+        }
+        let (mut firsts, mut draws, mut first) = (Vec::new(), Vec::new(), 0);
+        for (number, count) in triangles.into_iter().enumerate() {
+            firsts.push(first);
+            draws.push(DrawCall {
+                first_vertex: first,
+                vertices: 3 * count,
+                first_instance: number as u32,
+                instances: 1,
+            });
+            first += 3 * count;
+        }
+        draws.retain(|draw| draw.vertices > 0);
+        Ok(Some(Self {
+            corners: OwnedBuffer::with_contents(gpu, "daylight.corners", bytemuck::cast_slice(corners))?,
+            firsts: OwnedBuffer::with_contents(gpu, "daylight.firsts", bytemuck::cast_slice(&firsts))?,
+            draws,
+        }))
+    }
+
+    /// Draws the place in the lightmap of each pixel.
+    pub fn draw(&self, graph: &mut Graph, handles: &Handles, view: &View, gbuffer: &GBuffer) -> Image {
+        let places = graph.image("daylight.places", Format::RG32F, view.extent);
+        let depth = graph.image("daylight.places.depth", Format::D32F, view.extent);
+        let args = place::Args {
+            view: gbuffer.view,
+            instances: handles.instances,
+            indices: handles.indices,
+            positions: handles.positions,
+            corners: graph.import_buffer(&self.corners),
+            firsts: graph.import_buffer(&self.firsts),
+            depth: gbuffer.depth,
+        };
+        let targets = Targets::new().color(places, Load::Clear([-1.0; 4])).depth(depth, Depth::Clear(0.0));
+        // Sides that the G-buffer does not show are at another depth.
+        graph.raster(targets, Raster::new().cull(Cull::None), args, Draw::calls(self.draws.clone()));
+        places
+    }
+}
