@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use lucerna_samples::{
     bake::{self, JoinArgs},
-    daylight::{self, DayArgs, DayBakeArgs, DayInfoArgs},
+    daylight::{self, DayArgs, DayBakeArgs, DayExportArgs, DayInfoArgs},
     program,
 };
 
@@ -24,6 +24,9 @@ enum Command {
     Bake(Box<DayBakeArgs>),
     /// Print the contents, the size and the errors of a bake
     Info(DayInfoArgs),
+    /// Write a lightmap bake in forms that other programs read: glTF, EXR, KTX2, JSON
+    #[command(args_override_self = true, mut_arg("time", |arg| arg.long("scene-time")))]
+    Export(Box<DayExportArgs>),
     /// Join the parts of a bake (as `lucerna merge`)
     Merge(JoinArgs),
     /// Render a scene at times of the day into images
@@ -40,6 +43,10 @@ fn main() -> ExitCode {
         Command::Info(args) => {
             let console = args.talk.console();
             program::run(console, || daylight::info(&args, console))
+        }
+        Command::Export(args) => {
+            let console = args.talk.console();
+            program::run(console, || daylight::export(&args, console))
         }
         Command::Merge(args) => {
             let console = args.talk.console();

@@ -19,6 +19,7 @@ mod exr_read;
 mod exr_write;
 mod file;
 pub(crate) mod jpeg;
+mod ktx2_file;
 mod metadata;
 mod orientation;
 mod pfm;
@@ -36,6 +37,7 @@ pub use file::{
     is_temporary, leave_nothing_unfinished, probe_output, read_file_checked, read_head_checked, write_all_atomic,
     write_atomic,
 };
+pub use ktx2_file::{Ktx2Format, encode_ktx2, level_extent};
 pub use metadata::Metadata;
 pub use picture::{Layer, Layers, Precision};
 pub use probe::from_angular_map;

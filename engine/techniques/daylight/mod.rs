@@ -9,6 +9,7 @@ pub mod atlas;
 pub mod beam;
 mod civil;
 pub mod day;
+pub mod export;
 mod file;
 pub mod layer;
 pub mod lightmap;
