@@ -25,7 +25,7 @@ pub struct Pages {
     pub spots: Vec<Vec<Spot>>,
 }
 
-/// An image that holds one image of each of many tiles.
+/// An image that holds images of many tiles.
 #[derive(Clone, Debug)]
 pub struct Page {
     pub extent: [u32; 2],
@@ -43,8 +43,8 @@ pub struct Spot {
     pub corner: [u32; 2],
 }
 
-/// Largest side of a page; the images of a bake of any size fit into several.
-const MOST_SIDE: u32 = 4096;
+/// Largest side of a page, texels, if a tile is not larger.
+const MOST_SIDE: u32 = 2048;
 
 /// All kinds of light of a bake.
 pub fn layers(stored: &Stored) -> Vec<Pages> {
@@ -73,28 +73,29 @@ impl Pages {
                 out.table.extend(row.iter().map(|coefficient| coefficient * scale));
             }
         }
-        // Spots are given out kind by kind and image by image, so that the most important images of all tiles share pages.
+        // Spots are given out kind by kind and image by image: the most important images of all tiles come first.
         for wide in [true, false] {
             let count = |layer: &Layer| if wide { layer.wide } else { layer.narrow };
             let most = stored.tiles.iter().map(|tile| count(of(tile))).max().unwrap_or(0);
+            let mut all: Vec<(u32, usize)> = Vec::new();
             for image in 0..most {
-                let with: Vec<usize> =
-                    (0..stored.tiles.len()).filter(|number| count(of(&stored.tiles[*number])) > image).collect();
-                let per_row = (MOST_SIDE / side).min((with.len() as f64).sqrt().ceil() as u32).max(1);
-                for group in with.chunks((per_row * (MOST_SIDE / side)) as usize) {
-                    let rows = (group.len() as u32).div_ceil(per_row);
-                    let extent = [per_row * side, rows * side];
-                    let texels = extent[0] as usize * extent[1] as usize;
-                    let mut page = Page { extent, wide, values: vec![[0.0; 4]; texels] };
-                    for (slot, number) in group.iter().enumerate() {
-                        let corner = [slot as u32 % per_row * side, slot as u32 / per_row * side];
-                        let layer = of(&stored.tiles[*number]);
-                        let index = if wide { image } else { layer.wide + image };
-                        page.put(stored, *number, layer, index, corner);
-                        out.spots[*number].push(Spot { page: out.pages.len() as u32, corner });
-                    }
-                    out.pages.push(page);
+                let tiles = stored.tiles.iter().enumerate().filter(|(_, tile)| count(of(tile)) > image);
+                all.extend(tiles.map(|(number, _)| (image, number)));
+            }
+            let along = (MOST_SIDE / side).max(1);
+            for group in all.chunks((along * along) as usize) {
+                let per_row = along.min((group.len() as f64).sqrt().ceil() as u32);
+                let extent = [per_row * side, (group.len() as u32).div_ceil(per_row) * side];
+                let texels = extent[0] as usize * extent[1] as usize;
+                let mut page = Page { extent, wide, values: vec![[0.0; 4]; texels] };
+                for (slot, (image, number)) in group.iter().enumerate() {
+                    let corner = [slot as u32 % per_row * side, slot as u32 / per_row * side];
+                    let layer = of(&stored.tiles[*number]);
+                    let index = if wide { *image } else { layer.wide + image };
+                    page.put(stored, *number, layer, index, corner);
+                    out.spots[*number].push(Spot { page: out.pages.len() as u32, corner });
                 }
+                out.pages.push(page);
             }
         }
         out
