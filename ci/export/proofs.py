@@ -4,6 +4,8 @@
 usage: proofs.py PROGRAMS NODE_MODULES FOLDER [--keep PICTURES]
 """
 import argparse
+import base64
+import json
 import pathlib
 import subprocess
 import sys
@@ -24,6 +26,8 @@ SCENES = {
     "primitives": ["--builtin", "primitives"],
     "cornell": ["--builtin", "cornell"],
 }
+# Albedo of a floor alone under an overcast sky: its irradiance has a closed form.
+ALBEDO = 0.5
 
 
 def seconds(text):
@@ -72,6 +76,59 @@ def png(path, picture, mean):
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", data) + chunk(b"IEND", b""))
 
 
+def write_floor(path):
+    """A floor of 2×2 m of albedo ALBEDO, and a camera above that sees nothing else."""
+    corners = np.array([[-1, 0, -1], [-1, 0, 1], [1, 0, 1], [1, 0, -1]], "<f4")
+    normals = np.array([[0, 1, 0]] * 4, "<f4")
+    triangles = np.array([0, 1, 2, 0, 2, 3], "<u4")
+    parts = [corners.tobytes(), normals.tobytes(), triangles.tobytes()]
+    starts = np.cumsum([0] + [len(part) for part in parts])
+    document = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0, 1]}],
+        "nodes": [{"mesh": 0}, {"name": "above", "camera": 0, "translation": [0, 1, 0], "rotation": [-(0.5**0.5), 0, 0, 0.5**0.5]}],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 0.8, "znear": 0.1}}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorFactor": [ALBEDO] * 3 + [1], "metallicFactor": 0}}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "NORMAL": 1}, "indices": 2, "material": 0}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [-1, 0, -1], "max": [1, 0, 1]},
+            {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC3"},
+            {"bufferView": 2, "componentType": 5125, "count": 6, "type": "SCALAR"},
+        ],
+        "bufferViews": [{"buffer": 0, "byteOffset": int(at), "byteLength": len(part)} for at, part in zip(starts, parts)],
+        "buffers": [{"byteLength": int(starts[-1]), "uri": "data:application/octet-stream;base64," + base64.b64encode(b"".join(parts)).decode()}],
+    }
+    path.write_text(json.dumps(document))
+
+
+def floor(proofs, options, run, daylight):
+    """The floor has E = 7π/9 · L of the zenith under the overcast sky of the CIE, and reflects ρ/π · E in all programs."""
+    scene, bake, folder = (options.folder / name for name in ("floor.gltf", "floor.day", "floor"))
+    write_floor(scene)
+    size = f"{WIDTH}x{HEIGHT}"
+    run(daylight, "bake", scene, "-q", "-D", "bake.samples=256", "-D", "bake.density=8", "-D", "bake.interval=60", "-o", bake)
+    run(daylight, "export", scene, "--size", size, "--bake", bake, "-q", "--overcast", "1", "-o", folder)
+    export = rebuild.Export(folder)
+    noon = seconds("12:00")
+    expected = 7 * np.pi / 9 * export.moment(noon)[144, :3].mean()
+    radiance = ALBEDO / np.pi * expected
+    light = export.light(noon)[export.sources < export.sources.size].mean()
+    proofs.check(abs(light / expected - 1) < 0.03, f"floor, numpy: E = {light:.2f} W/m², in closed form {expected:.2f}")
+    address = serve({"/": READERS, "/node_modules/": options.modules, "/export/": folder, "/babylon.html": HERE / "babylon.html"})
+    browser = Browser(WIDTH + 500, HEIGHT + 400)
+    for name, page, call in [
+        ("three.js", "viewer.html", f"indirect({noon})"),
+        ("three.js, MOZ_lightmap", "viewer.html", f"indirect({noon}, 'scene')"),
+        ("Babylon.js", "babylon.html", "indirect('lightmap-1200.ktx2')"),
+    ]:
+        browser.open(f"{address}/{page}?export=export&size={size}")
+        middle = browser.floats(call).reshape(HEIGHT, WIDTH, 4)[HEIGHT // 4 : -HEIGHT // 4, WIDTH // 4 : -WIDTH // 4, :3].mean()
+        text = f"floor, {name}: {middle:.2f} W/(sr m²), in closed form {radiance:.2f}; against E of the file times ρ/π {middle / (light * ALBEDO / np.pi):.4f}"
+        proofs.check(abs(middle / (light * ALBEDO / np.pi) - 1) < 0.01 and abs(middle / radiance - 1) < 0.03, text)
+    browser.close()
+
+
 def main():
     parser = argparse.ArgumentParser()
     for name in ("programs", "modules", "folder"):
@@ -83,6 +140,7 @@ def main():
     daylight = options.programs / "daylight"
     if options.keep:
         options.keep.mkdir(parents=True, exist_ok=True)
+    floor(proofs, options, run, daylight)
     for name, scene in SCENES.items():
         folder, bake = options.folder / name, options.folder / f"{name}.day"
         size = ["--size", f"{WIDTH}x{HEIGHT}"]

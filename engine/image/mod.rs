@@ -11,6 +11,7 @@
 //!
 //! Everything is encoded in memory and then written by [`write_atomic`]: a file is complete or not there.
 
+mod bc6h;
 mod color;
 mod encoding;
 mod exr_chroma;
@@ -32,6 +33,7 @@ pub mod srgb;
 
 use std::path::Path;
 
+pub use bc6h::{Bc6h, encode_bc6h};
 pub use color::{Chromaticities, REC_709};
 pub use file::{
     is_temporary, leave_nothing_unfinished, probe_output, read_file_checked, read_head_checked, write_all_atomic,

@@ -7,7 +7,10 @@ use super::super::{
     atlas::{self, Texel, padding_sources},
     units::Tile,
 };
-use crate::{Error, Result, image::level_extent};
+use crate::{
+    Error, Result,
+    image::{Bc6h, encode_bc6h, level_extent},
+};
 
 /// The source of a texel that no surface is near.
 pub const NOWHERE: u32 = u32::MAX;
@@ -151,6 +154,17 @@ impl Levels {
         let half = |value: f32| f16::from_f32(value.min(f16::MAX.to_f32())).to_le_bytes();
         let texel = |[r, g, b]: &[f32; 3]| [*r, *g, *b, 1.0].map(half).concat();
         self.levels.iter().map(|level| level.iter().flat_map(texel).collect()).collect()
+    }
+
+    /// The levels as blocks of BC6H, and the root mean square of the error of the largest one relative to its mean.
+    pub fn blocks(&self) -> (Vec<Vec<u8>>, f64) {
+        let encoded = self.levels.iter().enumerate();
+        let blocks: Vec<Bc6h> =
+            encoded.map(|(number, level)| encode_bc6h(level, level_extent(self.extent, number), false)).collect();
+        let largest = self.levels[0].as_flattened();
+        let mean = largest.iter().map(|value| f64::from(*value)).sum::<f64>() / largest.len() as f64;
+        let error = (blocks[0].square / largest.len() as f64).sqrt();
+        (blocks.into_iter().map(|level| level.bytes).collect(), if mean > 0.0 { error / mean } else { 0.0 })
     }
 }
 

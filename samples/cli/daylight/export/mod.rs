@@ -14,7 +14,7 @@ use lucerna::{
     image::{self, Format, Ktx2Format, Layers, Metadata, WriteOptions, encode_ktx2},
     techniques::daylight::{
         Day, Kind, Plan, Stored, Weather,
-        export::{self, Moment},
+        export::{self, Levels, Moment},
     },
 };
 use serde_json::json;
@@ -63,6 +63,10 @@ pub struct DayExportArgs {
     #[arg(long, value_name = "SHARE", default_value_t = Weather::default().overcast(), help_heading = "Export")]
     pub overcast: f64,
 
+    /// What the texels of the lightmaps' KTX2 files are
+    #[arg(long, value_enum, default_value_t, value_name = "FORMAT", help_heading = "Export")]
+    pub format: TexelArg,
+
     /// Folder to write; it is made if it is missing
     #[arg(short, long, value_name = "FOLDER", help_heading = "Output")]
     pub output: PathBuf,
@@ -77,6 +81,16 @@ pub struct DayExportArgs {
 
     #[command(flatten)]
     pub talk: TalkArgs,
+}
+
+/// The texels of a lightmap in a KTX2 file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum TexelArg {
+    /// Four 16-bit floats
+    #[default]
+    Half,
+    /// Blocks of 4×4 texels in 16 bytes (BC6H), an eighth of the size
+    Bc6h,
 }
 
 /// A time of the day and its name in file names: `0740`.
@@ -158,13 +172,13 @@ pub fn export(args: &DayExportArgs, console: Console) -> Result<ExitCode> {
         clocks.extend(others);
     }
     Clock::named_apart(&mut clocks);
-    prepare(&args.output, args.overwrite)?;
     let stage = Stage::open(&args.stage)?;
     stage.notes().iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
     if let Some(parts) = plan.difference(&stage.scene) {
         let what = format!("is the light of `{}`, and this scene has other {parts}", plan.scene);
         return Err(blamed(Error::input(what).help("Name the scene that was baked, or bake this one")));
     }
+    prepare(&args.output, args.overwrite)?;
     let mut folder = Folder { path: &args.output, overwrite: args.overwrite, written: Vec::new() };
     let first = format!("lightmap-{}.hdr", clocks[0].name);
     let (bytes, uv_set) = scene::glb_of(&stage, &stored, &first, args, console).map_err(blamed)?;
@@ -187,10 +201,9 @@ pub fn export(args: &DayExportArgs, console: Console) -> Result<ExitCode> {
             entry["hdr"] = json!(first);
         }
         if number < shown {
-            let levels = export::levels(&light, &sources, plan.extent).halves();
-            let about = [("lucerna.time", clock.label.as_str()), ("lucerna.unit", table::UNIT)];
             let ktx2 = format!("lightmap-{}.ktx2", clock.name);
-            folder.write(ktx2.clone(), &encode_ktx2(Ktx2Format::R16g16b16a16Sfloat, plan.extent, &levels, &about)?)?;
+            let bytes = ktx2_of(&export::levels(&light, &sources, plan.extent), clock, args.format, console)?;
+            folder.write(ktx2.clone(), &bytes)?;
             entry["ktx2"] = json!(ktx2);
         }
         listed.push(entry);
@@ -236,6 +249,24 @@ fn pixels(plan: &Plan, light: &[[f32; 3]], clock: &Clock) -> Layers {
         ..Metadata::default()
     };
     layers
+}
+
+/// The lightmap of a time with its levels.
+fn ktx2_of(levels: &Levels, clock: &Clock, format: TexelArg, console: Console) -> Result<Vec<u8>> {
+    let about = [("lucerna.time", clock.label.as_str()), ("lucerna.unit", table::UNIT)];
+    let (format, bytes) = match format {
+        TexelArg::Half => (Ktx2Format::R16g16b16a16Sfloat, levels.halves()),
+        TexelArg::Bc6h => {
+            let (blocks, error) = levels.blocks();
+            console.info(&format!(
+                "{}: BC6H, error {:.2} % of the mean (root mean square)",
+                clock.label,
+                100.0 * error
+            ));
+            (Ktx2Format::Bc6hUfloatBlock, blocks)
+        }
+    };
+    encode_ktx2(format, levels.extent, &bytes, &about)
 }
 
 /// Lists of numbers on one line each.
