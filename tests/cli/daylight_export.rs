@@ -25,8 +25,36 @@ struct Lab(tempfile::TempDir);
 impl Lab {
     fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let text = "v -1 0 -1\nv -1 0 1\nv 1 0 1\nv 1 0 -1\nf 1 2 3 4\n";
-        fs::write(folder.path().join("floor.obj"), text).unwrap();
+        let corners: [[f32; 3]; 4] = [[-1.0, 0.0, -1.0], [-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]];
+        let normals = [[0.0f32, 1.0, 0.0]; 4];
+        let mut bytes: Vec<u8> = corners.iter().chain(&normals).flatten().flat_map(|v| v.to_le_bytes()).collect();
+        bytes.extend([0u32, 1, 2, 0, 2, 3].iter().flat_map(|index| index.to_le_bytes()));
+        fs::write(folder.path().join("floor.bin"), &bytes).unwrap();
+        let accessor = |view: u32, count: u32, of: &str, component: u32| {
+            json!({ "bufferView": view, "componentType": component, "count": count, "type": of,
+                "min": if view == 0 { json!([-1, 0, -1]) } else { json!(null) },
+                "max": if view == 0 { json!([1, 0, 1]) } else { json!(null) } })
+        };
+        let mut document = json!({
+            "asset": { "version": "2.0" },
+            "scene": 0,
+            "scenes": [{ "nodes": [0, 1] }],
+            "nodes": [{ "mesh": 0 }, { "name": "eye", "camera": 0, "translation": [0, 1, 3] }],
+            "cameras": [{ "type": "perspective", "perspective": { "yfov": 0.8, "znear": 0.1 } }],
+            "materials": [{ "pbrMetallicRoughness": { "baseColorFactor": [0.5, 0.5, 0.5, 1], "metallicFactor": 0 } }],
+            "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "NORMAL": 1 }, "indices": 2, "material": 0 }] }],
+            "accessors": [accessor(0, 4, "VEC3", 5126), accessor(1, 4, "VEC3", 5126), accessor(2, 6, "SCALAR", 5125)],
+            "bufferViews": [
+                { "buffer": 0, "byteOffset": 0, "byteLength": 48 },
+                { "buffer": 0, "byteOffset": 48, "byteLength": 48 },
+                { "buffer": 0, "byteOffset": 96, "byteLength": 24 },
+            ],
+            "buffers": [{ "byteLength": 120, "uri": "floor.bin" }],
+        });
+        for accessor in document["accessors"].as_array_mut().unwrap() {
+            accessor.as_object_mut().unwrap().retain(|_, value| !value.is_null());
+        }
+        fs::write(folder.path().join("floor.gltf"), document.to_string()).unwrap();
         Self(folder)
     }
 
@@ -35,7 +63,7 @@ impl Lab {
     }
 
     fn scene(&self) -> Scene {
-        let mut scene = load(self.at("floor.obj"), &LoadOptions::default()).unwrap();
+        let mut scene = load(self.at("floor.gltf"), &LoadOptions::default()).unwrap();
         scene.name = "floor".into();
         scene
     }
@@ -108,8 +136,10 @@ impl Lab {
     }
 
     fn export(&self, bake: &str, out: &str, more: &[&str]) -> Ran {
-        let (scene, bake, out) = (self.at("floor.obj"), self.at(bake), self.at(out));
-        daylight(&[&["export", &scene, "--bake", &bake, "-o", &out][..], more].concat())
+        let (scene, bake, out) = (self.at("floor.gltf"), self.at(bake), self.at(out));
+        // A light that is added is a node, and nodes belong to a bake.
+        let words = ["export", &scene, "--default-light", "never", "--bake", &bake, "-o", &out];
+        daylight(&[&words[..], more].concat())
     }
 }
 
@@ -236,7 +266,7 @@ fn the_pages_and_the_table_rebuild_the_lightmaps() {
     }
     let lab = Lab::new();
     let (bake, out) = (lab.at("primitives.day"), lab.at("out"));
-    let small = ["-D", "bake.samples=4", "-D", "bake.density=2", "-D", "bake.interval=60", "-D", "bake.tile=16"];
+    let small = ["-D", "bake.samples=16", "-D", "bake.density=6", "-D", "bake.interval=60", "-D", "bake.tile=32"];
     daylight(&[&["bake", "--builtin", "primitives", "-q", "-o", &bake][..], &small].concat()).expect(0, &[]);
     let words = ["export", "--builtin", "primitives", "--bake", &bake, "-o", &out];
     daylight(&[&words[..], &["--time", "09:30,04:20", "--all"]].concat()).expect(0, &["lightmap-*.exr"]);
@@ -386,7 +416,7 @@ fn what_cannot_be_exported_is_refused_and_named() {
     lab.export("cut.day", "out", &[]).expect(3, &["cut.day", "cut off"]);
     // Folders.
     lab.export("even.day", "none/out", &[]).expect(1, &["none"]);
-    lab.export("even.day", "floor.obj", &[]).expect(1, &["floor.obj"]);
+    lab.export("even.day", "floor.gltf", &[]).expect(1, &["floor.gltf"]);
     fs::create_dir(lab.at("full")).unwrap();
     fs::write(lab.at("full/notes.txt"), "mine").unwrap();
     lab.export("even.day", "full", &[]).expect(1, &["full", "--overwrite"]);
