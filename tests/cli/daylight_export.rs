@@ -271,6 +271,11 @@ fn the_pages_and_the_table_rebuild_the_lightmaps() {
     let words = ["export", "--builtin", "primitives", "--bake", &bake, "-o", &out];
     daylight(&[&words[..], &["--time", "09:30,04:20", "--all"]].concat()).expect(0, &["lightmap-*.exr"]);
     let folder = Path::new(&out);
+    // Each node has a mesh of its own, and all of it lies in the lightmap.
+    let scene = load(folder.join("scene.glb"), &LoadOptions::default()).unwrap();
+    assert_eq!(scene.meshes.len(), scene.nodes.iter().filter(|node| node.mesh.is_some()).count());
+    let mut uvs = scene.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|primitive| &primitive.uvs[1]);
+    assert!(uvs.all(|uv| uv.min_element() > 0.0 && uv.max_element() < 1.0));
     let table = json_of(folder.join("daylight.json"));
     let whole = |value: &Value| value.as_u64().unwrap() as usize;
     let [width, height] = [&table["width"], &table["height"]].map(whole);

@@ -32,8 +32,7 @@ pub fn unwrapped(scene: &Scene, stored: &Stored) -> Result<Unwrapping> {
     if corners.is_empty() || all != corners.len() as u64 {
         return Err(Error::input(format!("has places for {} triangles, the scene has {all}", corners.len())));
     }
-    let used: Vec<u32> = scene.materials.iter().flat_map(uv_sets).collect();
-    let Some(uv_set) = (1..MAX_UV_SETS as u32).find(|set| !used.contains(set)) else {
+    let Some(uv_set) = free_set(&scene.materials) else {
         return Err(Error::input(format!("textures use all {MAX_UV_SETS} sets of texture coordinates"))
             .help("Make one of the sets 1 to 3 free for the lightmap"));
     };
@@ -60,6 +59,12 @@ pub fn unwrapped(scene: &Scene, stored: &Stored) -> Result<Unwrapping> {
         out.meshes.push(mesh);
     }
     Ok(Unwrapping { scene: out, uv_set, vertices })
+}
+
+/// The first set of coordinates after set 0 that no texture uses.
+fn free_set(materials: &[Material]) -> Option<u32> {
+    let used: Vec<u32> = materials.iter().flat_map(uv_sets).collect();
+    (1..MAX_UV_SETS as u32).find(|set| !used.contains(set))
 }
 
 /// The sets of coordinates that the textures of a material use.
@@ -127,4 +132,46 @@ fn morphed(morph: &MorphTarget, from: &[usize]) -> MorphTarget {
 /// The values of some vertices; none if there are none.
 fn taken<T: Copy>(values: &[T], from: &[usize]) -> Vec<T> {
     if values.is_empty() { Vec::new() } else { from.iter().map(|vertex| values[*vertex]).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Vec3, vec2};
+
+    use super::*;
+    use crate::scene::TextureRef;
+
+    #[test]
+    fn the_lightmap_gets_the_first_free_set() {
+        let on = |set: u32| Material {
+            emissive_texture: Some(TextureRef { uv_set: set, ..TextureRef::new(0) }),
+            ..Material::default()
+        };
+        assert_eq!(free_set(&[]), Some(1));
+        assert_eq!(free_set(&[on(0), on(1)]), Some(2));
+        assert_eq!(free_set(&[on(1), on(2), on(3)]), None);
+    }
+
+    #[test]
+    fn vertices_are_split_only_where_charts_end() {
+        let primitive = Primitive {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::ONE, Vec3::Y],
+            normals: vec![Vec3::Z; 4],
+            indices: vec![0, 1, 2, 0, 2, 3],
+            ..Primitive::default()
+        };
+        let one = [[16, 16, 32, 16, 32, 32], [16, 16, 32, 32, 16, 32]];
+        let two = [[16, 16, 32, 16, 32, 32], [80, 16, 96, 32, 80, 32]];
+        for (places, vertices) in [(one, 4), (two, 6)] {
+            let split = split(&primitive, &places, 2, vec2(0.1, 0.2));
+            assert_eq!((split.positions.len(), split.normals.len(), split.uvs.len()), (vertices, vertices, 3));
+            assert!(split.uvs[..2].iter().all(|set| *set == vec![Vec2::ZERO; vertices]));
+            assert!(split.tangents.is_empty() && split.colors.is_empty());
+            for (corner, (old, new)) in primitive.indices.iter().zip(&split.indices).enumerate() {
+                let at = |i: usize| f32::from(places[corner / 3][2 * (corner % 3) + i]) / 16.0;
+                assert_eq!(primitive.positions[*old as usize], split.positions[*new as usize]);
+                assert!(split.uvs[2][*new as usize].distance(vec2(0.1 * at(0), 0.2 * at(1))) < 1e-6);
+            }
+        }
+    }
 }
