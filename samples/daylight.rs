@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use lucerna_samples::{
     bake::{self, JoinArgs},
-    daylight::{self, DayArgs, DayBakeArgs, DayFramesArgs, DayInfoArgs},
+    daylight::{self, DayArgs, DayBakeArgs, DayExportArgs, DayFramesArgs, DayInfoArgs},
     program,
 };
 
@@ -26,6 +26,9 @@ enum Command {
     Info(DayInfoArgs),
     /// Decode every step of a bake into a file of uncompressed frames, which `render --stream` reads step by step
     Frames(DayFramesArgs),
+    /// Write a lightmap bake in forms that other programs read: glTF, EXR, KTX2, JSON
+    #[command(args_override_self = true, mut_arg("time", |arg| arg.long("scene-time")))]
+    Export(Box<DayExportArgs>),
     /// Join the parts of a bake (as `lucerna merge`)
     Merge(JoinArgs),
     /// Render a scene at times of the day into images
@@ -46,6 +49,10 @@ fn main() -> ExitCode {
         Command::Frames(args) => {
             let console = args.talk.console();
             program::run(console, || daylight::frames(&args, console))
+        }
+        Command::Export(args) => {
+            let console = args.talk.console();
+            program::run(console, || daylight::export(&args, console))
         }
         Command::Merge(args) => {
             let console = args.talk.console();

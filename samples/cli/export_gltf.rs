@@ -21,6 +21,7 @@ use serde_json::{Map, Value, json};
 
 use crate::{
     args::TalkArgs,
+    glb::glb,
     program,
     stage::{Stage, StageArgs},
 };
@@ -111,6 +112,19 @@ fn towards(uv: Vec2) -> Vec3 {
 /// # Errors
 /// `Runtime` if the file would be larger than glTF allows (4 GiB), or a texture cannot be encoded.
 pub fn export(scene: &Scene, pose: &Pose, view: &View) -> Result<(Vec<u8>, Vec<String>)> {
+    let Parts { document, binary, notes } = parts(scene, pose, view)?;
+    Ok((glb(&document, binary)?, notes))
+}
+
+/// A glTF document, its one buffer, and notes about parts of the scene that are left out.
+pub(crate) struct Parts {
+    pub document: Value,
+    pub binary: Vec<u8>,
+    pub notes: Vec<String>,
+}
+
+/// The parts of [`export`].
+pub(crate) fn parts(scene: &Scene, pose: &Pose, view: &View) -> Result<Parts> {
     let mut out = Writer::default();
     let images = scene.textures.iter().map(|texture| out.image(texture)).collect::<Result<Vec<_>>>()?;
     let materials: Vec<Value> = scene.materials.iter().map(|material| out.material(material)).collect();
@@ -197,31 +211,7 @@ pub fn export(scene: &Scene, pose: &Pose, view: &View) -> Result<(Vec<u8>, Vec<S
         document["extensionsUsed"] = json!(out.used);
     }
     out.notes.dedup();
-    Ok((glb(&document, out.bytes)?, out.notes))
-}
-
-/// The two chunks of a .glb file (glTF 2.0, section 4.4).
-fn glb(document: &Value, mut binary: Vec<u8>) -> Result<Vec<u8>> {
-    let mut text = document.to_string().into_bytes();
-    text.resize(text.len().next_multiple_of(4), b' ');
-    binary.resize(binary.len().next_multiple_of(4), 0);
-    let chunks = [(text, b"JSON"), (binary, b"BIN\0")];
-    let chunks = chunks.iter().filter(|(bytes, _)| !bytes.is_empty());
-    let length = 12 + chunks.clone().map(|(bytes, _)| 8 + bytes.len()).sum::<usize>();
-    let word = |value: usize| -> Result<[u8; 4]> {
-        let what = "the scene is larger than 4 GiB, which glTF does not allow";
-        Ok(u32::try_from(value).map_err(|_| Error::new(ErrorKind::Runtime, what))?.to_le_bytes())
-    };
-    let mut out = Vec::with_capacity(length);
-    out.extend(b"glTF");
-    out.extend(2u32.to_le_bytes());
-    out.extend(word(length)?);
-    for (bytes, kind) in chunks {
-        out.extend(word(bytes.len())?);
-        out.extend(*kind);
-        out.extend(bytes);
-    }
-    Ok(out)
+    Ok(Parts { document, binary: out.bytes, notes: out.notes })
 }
 
 /// The parts of a document that materials and meshes share.

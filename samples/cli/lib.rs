@@ -16,6 +16,7 @@ pub mod exposure;
 pub mod fingerprint;
 pub mod fiv;
 pub mod framing;
+mod glb;
 pub mod ground;
 pub mod info;
 pub mod inspect;

@@ -15,6 +15,7 @@ pub mod columns;
 pub mod course;
 pub mod cube;
 pub mod day;
+pub mod export;
 mod file;
 pub mod filter;
 pub mod finish;

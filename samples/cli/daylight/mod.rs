@@ -1,12 +1,14 @@
-//! The commands of `daylight`: `bake` writes the input file of `render`, `info` describes it, and `frames` makes uncompressed frames of it.
+//! The commands of `daylight`: `bake` writes the input file of `render`, `export` and `frames`, and `info` describes it.
 
 mod bake;
+mod export;
 mod frames;
 mod info;
 mod plan;
 mod render;
 
 pub use bake::{DayBakeArgs, bake};
+pub use export::{DayExportArgs, export};
 pub use frames::{DayFramesArgs, frames};
 pub use info::{DayInfoArgs, info};
 pub use render::{DayArgs, render};

@@ -1,0 +1,208 @@
+//! The irradiance of a lightmap at a time, by the processor.
+
+use half::f16;
+
+use super::super::{
+    Course, Lit, Plan, Sky, Stored, Weather,
+    atlas::{self, Texel, padding_sources},
+    units::Tile,
+};
+use crate::{
+    Error, Result,
+    image::{Bc6h, encode_bc6h, level_extent},
+};
+
+/// The source of a texel that no surface is near.
+pub const NOWHERE: u32 = u32::MAX;
+
+/// The light from outside at a time.
+#[derive(Clone, Debug)]
+pub struct Moment {
+    /// Unit vector towards the sun.
+    pub direction: [f32; 3],
+    /// Irradiance of the sun at normal incidence, W/m².
+    pub sun: [f32; 3],
+    /// Radiance of each patch of the sky, W/(sr m²).
+    pub patches: Vec<[f32; 3]>,
+    /// The lit times of the bake around the time, and their weights.
+    pub weights: Vec<(usize, f32)>,
+}
+
+impl Moment {
+    /// `seconds`: after the begin of the day.
+    ///
+    /// # Errors
+    /// `Usage` if the weather is impossible.
+    pub fn new(plan: &Plan, course: &Course, seconds: f64, weather: Weather) -> Result<Self> {
+        let shine = course.sun(seconds);
+        let sky = Sky::new(weather, shine.direction.map(f64::from)).map_err(Error::usage)?;
+        let clear = 1.0 - weather.overcast() as f32;
+        let sun = shine.irradiance.map_or(sky.sun_irradiance(), |sun| sun.map(|channel| channel * clear));
+        let weights = weights(&plan.times[plan.of_day(0)], seconds);
+        Ok(Self { direction: shine.direction, sun, patches: sky.patches(), weights })
+    }
+}
+
+/// Linear interpolation between the baked times (Bahnsen et al. 2012, equation 2). Before the first and after the last one the sun is at the
+/// horizon, and the nearest one counts.
+fn weights(times: &[Lit], seconds: f64) -> Vec<(usize, f32)> {
+    let next = times.partition_point(|time| time.seconds <= seconds);
+    match (next.checked_sub(1), times.get(next)) {
+        (Some(before), Some(after)) => {
+            let begun = times[before].seconds;
+            let alpha = ((seconds - begun) / (after.seconds - begun)) as f32;
+            vec![(before, 1.0 - alpha), (next, alpha)]
+        }
+        (Some(before), None) => vec![(before, 1.0)],
+        (None, Some(_)) => vec![(0, 1.0)],
+        (None, None) => Vec::new(),
+    }
+}
+
+/// The texels of a tile that are on a surface, in the order of the layers' texels: their columns and rows in the whole bake.
+pub(super) fn covered(plan: &Plan, number: usize, tile: &Tile) -> Vec<[u32; 2]> {
+    let [column, row, columns, rows] = plan.tile(number as u32);
+    let there = |texel: &u32| tile.mask.get(*texel as usize / 32).is_some_and(|word| word >> (texel % 32) & 1 == 1);
+    (0..columns * rows).filter(there).map(|texel| [column + texel % columns, row + texel / columns]).collect()
+}
+
+/// The irradiance of each texel of a bake, W/m², row after row; 0 where no surface is.
+pub fn irradiance(stored: &Stored, moment: &Moment) -> Vec<[f32; 3]> {
+    let [width, height] = stored.plan.extent;
+    let mut out = vec![[0.0; 3]; width as usize * height as usize];
+    let of_sun = |(time, weight): &(usize, f32)| (*time, moment.sun.map(|channel| channel * weight));
+    for (number, tile) in stored.tiles.iter().enumerate() {
+        let sun = tile.sun.mix(moment.weights.iter().map(of_sun));
+        let sky = tile.sky.mix(moment.patches.iter().copied().enumerate());
+        for (texel, [x, y]) in covered(&stored.plan, number, tile).into_iter().enumerate() {
+            let parts = [tile.sun.decode(texel, &sun), tile.sky.decode(texel, &sky)];
+            let sum: [f32; 3] = std::array::from_fn(|channel| parts.iter().map(|part| part[channel]).sum());
+            out[(y * width + x) as usize] = sum.map(|value: f32| value.max(0.0));
+        }
+    }
+    out
+}
+
+/// For each texel the texel whose light it shows: itself on a surface; the nearest one on a surface in the padding around charts, so that
+/// bilinear filtering finds no dark texels; [`NOWHERE`] elsewhere. Numbers are row · width + column.
+pub fn sources(stored: &Stored) -> Vec<u32> {
+    let [width, height] = stored.plan.extent;
+    let mut texels = Vec::new();
+    for (number, tile) in stored.tiles.iter().enumerate() {
+        let there = covered(&stored.plan, number, tile);
+        texels.extend(there.into_iter().map(|[x, y]| Texel { x, y, triangle: 0, barycentric: [0.0; 2] }));
+    }
+    let mut out = vec![NOWHERE; width as usize * height as usize];
+    let padding = atlas::Settings::default().padding;
+    for (texel, source) in padding_sources(width, height, padding, &texels) {
+        out[texel as usize] = source;
+    }
+    for Texel { x, y, .. } in texels {
+        let own = y * width + x;
+        out[own as usize] = own;
+    }
+    out
+}
+
+/// The light with its padding filled.
+pub fn filled(light: &[[f32; 3]], sources: &[u32]) -> Vec<[f32; 3]> {
+    sources.iter().map(|source| light.get(*source as usize).copied().unwrap_or_default()).collect()
+}
+
+/// The levels of an image, the largest first.
+#[derive(Clone, Debug)]
+pub struct Levels {
+    pub extent: [u32; 2],
+    pub levels: Vec<Vec<[f32; 3]>>,
+}
+
+/// All levels of a lightmap. A texel of a level is the mean of the four under it that have light, so charts do not darken at their rims.
+/// Charts lie on blocks of 4×4 texels with as much between them: levels 1 and 2 mix no charts, smaller levels do.
+pub fn levels(light: &[[f32; 3]], sources: &[u32], extent: [u32; 2]) -> Levels {
+    // Texels that have no light count only where no other is.
+    let mut level: Vec<[f32; 4]> = filled(light, sources)
+        .iter()
+        .zip(sources)
+        .map(|([r, g, b], source)| [*r, *g, *b, if *source == NOWHERE { 0.0 } else { 1.0 }])
+        .collect();
+    let mut out = Levels { extent, levels: Vec::new() };
+    let mut size = extent;
+    loop {
+        out.levels.push(level.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect());
+        if size == [1, 1] {
+            return out;
+        }
+        let smaller = level_extent(size, 1);
+        let mut next = Vec::with_capacity(smaller[0] as usize * smaller[1] as usize);
+        for y in 0..smaller[1] {
+            for x in 0..smaller[0] {
+                let mut sum = [0.0f32; 4];
+                for [dx, dy] in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+                    let at = [(2 * x + dx).min(size[0] - 1), (2 * y + dy).min(size[1] - 1)];
+                    let [r, g, b, there] = level[(at[1] * size[0] + at[0]) as usize];
+                    sum = [sum[0] + r * there, sum[1] + g * there, sum[2] + b * there, sum[3] + there];
+                }
+                let scale = if sum[3] > 0.0 { 1.0 / sum[3] } else { 0.0 };
+                next.push([sum[0] * scale, sum[1] * scale, sum[2] * scale, f32::from(u8::from(sum[3] > 0.0))]);
+            }
+        }
+        (level, size) = (next, smaller);
+    }
+}
+
+impl Levels {
+    /// The levels as bytes of 16-bit floats, four for each texel; the fourth is 1. Values too large for them become the largest one.
+    pub fn halves(&self) -> Vec<Vec<u8>> {
+        let half = |value: f32| f16::from_f32(value.min(f16::MAX.to_f32())).to_le_bytes();
+        let texel = |[r, g, b]: &[f32; 3]| [*r, *g, *b, 1.0].map(half).concat();
+        self.levels.iter().map(|level| level.iter().flat_map(texel).collect()).collect()
+    }
+
+    /// The levels as blocks of BC6H, and the root mean square of the error of the largest one relative to its mean.
+    pub fn blocks(&self) -> (Vec<Vec<u8>>, f64) {
+        let encoded = self.levels.iter().enumerate();
+        let blocks: Vec<Bc6h> =
+            encoded.map(|(number, level)| encode_bc6h(level, level_extent(self.extent, number), false)).collect();
+        let largest = self.levels[0].as_flattened();
+        let mean = largest.iter().map(|value| f64::from(*value)).sum::<f64>() / largest.len() as f64;
+        let error = (blocks[0].square / largest.len() as f64).sqrt();
+        (blocks.into_iter().map(|level| level.bytes).collect(), if mean > 0.0 { error / mean } else { 0.0 })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_are_means_of_the_texels_with_light() {
+        // Two texels of one surface in a corner, the rest nowhere.
+        let (extent, own) = ([8, 4], [0u32, 1]);
+        let mut light = vec![[0.0; 3]; 32];
+        let mut sources = vec![NOWHERE; 32];
+        for texel in own {
+            light[texel as usize] = [2.0 + 2.0 * texel as f32, 1.0, 0.5];
+            sources[texel as usize] = texel;
+        }
+        sources[8] = 1;
+        let all = levels(&light, &sources, extent);
+        assert_eq!(all.levels.iter().map(Vec::len).collect::<Vec<_>>(), [32, 8, 2, 1]);
+        assert_eq!(all.levels[0][8], [4.0, 1.0, 0.5]);
+        for level in &all.levels[1..] {
+            assert!((level[0][0] - 10.0 / 3.0).abs() < 1e-6 && level[0][1] == 1.0, "{:?}", level[0]);
+        }
+        let bytes = all.halves();
+        assert_eq!(bytes[3].len(), 8);
+        assert_eq!(f16::from_le_bytes([bytes[3][6], bytes[3][7]]), f16::ONE);
+    }
+
+    #[test]
+    fn weights_are_those_of_the_line_between_two_times() {
+        let times: Vec<Lit> = [100.0, 200.0, 400.0].map(|seconds| Lit { seconds, sun: [0.0, 1.0, 0.0] }).into();
+        assert_eq!(weights(&times, 0.0), [(0, 1.0)]);
+        assert_eq!(weights(&times, 100.0), [(0, 1.0), (1, 0.0)]);
+        assert_eq!(weights(&times, 250.0), [(1, 0.75), (2, 0.25)]);
+        assert_eq!(weights(&times, 1000.0), [(2, 1.0)]);
+        assert!(weights(&[], 10.0).is_empty());
+    }
+}
