@@ -7,4 +7,5 @@ mod render;
 
 pub use bake::{DayBakeArgs, bake};
 pub use info::{DayInfoArgs, info};
+pub use plan::{DayOptions, Planned, of_view};
 pub use render::{DayArgs, render};

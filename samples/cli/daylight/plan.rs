@@ -2,11 +2,12 @@
 
 use lucerna::{
     Error, Result,
-    scene::Scene,
+    scene::{Scene, View},
     techniques::daylight::{
         Baking, Calendar, Day, Kind, Lit, MOST_TIMES, Plan, Sources, Weather, digest, lightmap, parts,
     },
 };
+use serde::{Deserialize, Serialize};
 
 use crate::stage::{Stage, StageArgs};
 
@@ -14,7 +15,8 @@ use crate::stage::{Stage, StageArgs};
 const SET: f64 = -0.2665;
 
 /// The day and the place of a bake.
-#[derive(clap::Args, Clone, Debug)]
+#[derive(clap::Args, Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct DayOptions {
     /// Date of the day
     #[arg(long, value_name = "YYYY-MM-DD", default_value = "2026-06-21", help_heading = "Day")]
@@ -37,6 +39,29 @@ pub struct DayOptions {
     pub north: f32,
 }
 
+impl Default for DayOptions {
+    /// The defaults of the options.
+    fn default() -> Self {
+        Self {
+            date: "2026-06-21".into(),
+            latitude: 55.5,
+            longitude: 10.0,
+            timezone: "Europe/Copenhagen".into(),
+            north: 0.0,
+        }
+    }
+}
+
+impl DayOptions {
+    /// The civil day.
+    ///
+    /// # Errors
+    /// `Usage` for an impossible date, zone or place.
+    pub fn day(&self) -> Result<Day> {
+        Day::new(&self.date, &self.timezone, self.latitude, self.longitude).map_err(Error::usage)
+    }
+}
+
 /// The surfaces that a bake holds light for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum KindArg {
@@ -54,12 +79,68 @@ pub struct Planned {
     pub notes: Vec<String>,
 }
 
+/// The surfaces of a bake, and their texels.
+struct Receivers {
+    kind: Kind,
+    extent: [u32; 2],
+    sources: Sources,
+    corners: Vec<[u16; 6]>,
+    notes: Vec<String>,
+}
+
+impl Receivers {
+    fn of_view(camera: &str, view: &View) -> Self {
+        let kind = Kind::View {
+            camera: camera.to_owned(),
+            view_from_world: view.view_from_world.to_cols_array(),
+            clip_from_view: view.clip_from_view.to_cols_array(),
+        };
+        let sources = Sources::View(Box::new(*view));
+        Self { kind, extent: view.extent, sources, corners: Vec::new(), notes: Vec::new() }
+    }
+
+    fn of_lightmap(scene: &Scene, baking: &Baking) -> Result<Self> {
+        let unwrapped = lightmap::unwrap(scene, baking)?;
+        let corners = unwrapped.lightmap.corners.clone();
+        let kind = Kind::Lightmap {
+            charts: unwrapped.charts,
+            covered: unwrapped.receivers.len() as u64,
+            corners: digest(&corners),
+        };
+        let sources = Sources::Lightmap(unwrapped.by_tile(baking.tile));
+        Ok(Self { kind, extent: unwrapped.lightmap.extent, sources, corners, notes: unwrapped.notes })
+    }
+}
+
 /// Plans the bake of a scene.
 ///
 /// # Errors
 /// `Usage` for an impossible day or lightmap; `Input` if the scene has no surfaces.
 pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage, args: &StageArgs) -> Result<Planned> {
-    let day = Day::new(&options.date, &options.timezone, options.latitude, options.longitude).map_err(Error::usage)?;
+    planned(options, baking, &stage.scene, || match kind {
+        KindArg::View => {
+            let (_, view) = stage.at(args.time, args.size)?;
+            Ok(Receivers::of_view(&stage.placed.name, &view))
+        }
+        KindArg::Lightmap => Receivers::of_lightmap(&stage.scene, baking),
+    })
+}
+
+/// Plans the bake of the pixels of a view.
+///
+/// # Errors
+/// As [`plan`].
+pub fn of_view(options: &DayOptions, baking: &Baking, scene: &Scene, camera: &str, view: &View) -> Result<Planned> {
+    planned(options, baking, scene, || Ok(Receivers::of_view(camera, view)))
+}
+
+fn planned(
+    options: &DayOptions,
+    baking: &Baking,
+    scene: &Scene,
+    receivers: impl FnOnce() -> Result<Receivers>,
+) -> Result<Planned> {
+    let day = options.day()?;
     let steps = day.steps(baking.interval, baking.offset).map_err(Error::usage)?;
     if steps.len() > MOST_TIMES {
         let what = format!("the day has {} steps, at most {MOST_TIMES} are allowed", steps.len());
@@ -67,36 +148,14 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
     }
     let lit = steps.iter().filter(|seconds| day.sun(**seconds).elevation > SET);
     let times = lit.map(|&seconds| Lit { seconds, sun: day.sun(seconds).direction(options.north) }).collect();
-    let scene: &Scene = &stage.scene;
     if scene.meshes.is_empty() {
         return Err(Error::input("the scene has no surfaces, so there is nothing to bake"));
     }
-    let (receivers, extent, sources, corners, notes) = match kind {
-        KindArg::View => {
-            let (_, view) = stage.at(args.time, args.size)?;
-            let receivers = Kind::View {
-                camera: stage.placed.name.clone(),
-                view_from_world: view.view_from_world.to_cols_array(),
-                clip_from_view: view.clip_from_view.to_cols_array(),
-            };
-            (receivers, view.extent, Sources::View(Box::new(view)), Vec::new(), Vec::new())
-        }
-        KindArg::Lightmap => {
-            let unwrapped = lightmap::unwrap(scene, baking)?;
-            let corners = unwrapped.lightmap.corners.clone();
-            let receivers = Kind::Lightmap {
-                charts: unwrapped.charts,
-                covered: unwrapped.receivers.len() as u64,
-                corners: digest(&corners),
-            };
-            let sources = Sources::Lightmap(unwrapped.by_tile(baking.tile));
-            (receivers, unwrapped.lightmap.extent, sources, corners, unwrapped.notes)
-        }
-    };
+    let Receivers { kind, extent, sources, corners, notes } = receivers()?;
     let plan = Plan {
         scene: scene.name.clone(),
         parts: parts(scene),
-        receivers,
+        receivers: kind,
         extent,
         calendar: Calendar {
             date: options.date.clone(),
