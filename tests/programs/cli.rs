@@ -9,6 +9,8 @@ mod support;
 mod bake;
 #[path = "../cli/compare.rs"]
 mod compare;
+#[path = "../cli/daylight_experiment.rs"]
+mod daylight_experiment;
 #[path = "../cli/experiment.rs"]
 mod experiment;
 #[path = "../cli/export_gltf.rs"]

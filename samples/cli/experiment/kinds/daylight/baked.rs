@@ -8,9 +8,7 @@ use lucerna::{
     graph::Runner,
     scene::{Pose, Scene},
     technique::{Ready, Shot},
-    techniques::daylight::{
-        Baked, Baking, Daylight, Light, PictureSettings, Plan, Sky, Stored, Transport, units,
-    },
+    techniques::daylight::{Baked, Baking, Daylight, Light, PictureSettings, Plan, Sky, Stored, Transport, units},
 };
 use serde_json::Value;
 
@@ -104,12 +102,7 @@ fn make(
 
 impl Kept {
     /// A picture from the compressed light.
-    pub(super) fn render(
-        &mut self,
-        gpu: &Gpu,
-        job: &Job<'_>,
-        settings: &PictureSettings,
-    ) -> Result<Option<Rendered>> {
+    pub(super) fn render(&mut self, gpu: &Gpu, job: &Job<'_>, settings: &PictureSettings) -> Result<Option<Rendered>> {
         let Self { scene, pose, stored, ready, .. } = self;
         let (ready, runner) = match ready {
             Some(ready) => ready,

@@ -148,8 +148,7 @@ fn lit(mut scene: Scene, sun: Vec3, sky: &Sky, strength: f32) -> (Scene, Pose) {
         Vec3::from(sky.radiance(direction_from_uv(uv).to_array()))
     };
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| texel(x, y))).collect();
-    scene.environment =
-        Some(Environment { name: "sky".into(), width, height, pixels, rotation: 0.0, scale: strength });
+    scene.environment = Some(Environment { name: "sky".into(), width, height, pixels, rotation: 0.0, scale: strength });
     let pose = Pose::rest(&scene);
     (scene, pose)
 }
