@@ -129,7 +129,7 @@ fn interpolated(day: &Day, how: How, kept: &[usize], t: usize) -> Picture {
     day.picture(pixels)
 }
 
-/// Errors of all frames that are not kept: root mean squares over the means, %, and shares of pixels that differ visibly, %.
+/// Errors of all frames that are not kept: root mean squares over the means (of bright frames), %, and shares of pixels that differ visibly, %.
 struct Errors {
     rms: Vec<f64>,
     pdiff: Vec<f64>,
@@ -141,7 +141,9 @@ fn errors(day: &Day, how: How, kept: &[usize]) -> Result<Errors> {
     for t in (kept[0]..=kept[kept.len() - 1]).filter(|t| kept.binary_search(t).is_err()) {
         let (truth, test) = (day.frame(t), interpolated(day, how, kept, t));
         let seen = day.pdiff(&truth, &test)?;
-        errors.rms.push(relative_rms(&truth, &test));
+        if day.is_bright(t) {
+            errors.rms.push(relative_rms(&truth, &test));
+        }
         errors.different += usize::from(seen.detail("different") == Some(1.0));
         errors.pdiff.push(seen.value);
     }
@@ -189,17 +191,9 @@ pub(super) fn adaptive(days: &[Day]) -> Result<Section> {
     for day in days {
         for test in Test::ALL {
             let kept = needed(day, test)?;
-            let intervals: Vec<(f64, f64)> = kept
-                .windows(2)
-                .map(|pair| {
-                    let [from, to] = [pair[0], pair[1]].map(|t| day.seconds[t]);
-                    (0.5 * (from + to) / HOUR, (to - from) / MINUTE)
-                })
-                .collect();
-            let of = |least: bool| {
-                let lengths = intervals.iter().map(|(_, length)| *length);
-                if least { lengths.fold(f64::INFINITY, f64::min) } else { lengths.fold(0.0, f64::max) }
-            };
+            let intervals: Vec<[f64; 2]> =
+                kept.windows(2).map(|pair| [day.seconds[pair[0]], day.seconds[pair[1]]]).collect();
+            let lengths = || intervals.iter().map(|[from, to]| (to - from) / MINUTE);
             let left = errors(day, How::Linear, &kept)?;
             table.push([
                 day.name.as_str().into(),
@@ -207,14 +201,15 @@ pub(super) fn adaptive(days: &[Day]) -> Result<Section> {
                 kept.len().into(),
                 day.len().into(),
                 (100.0 * (1.0 - kept.len() as f64 / day.len() as f64)).into(),
-                of(true).into(),
-                of(false).into(),
+                lengths().fold(f64::INFINITY, f64::min).into(),
+                lengths().fold(0.0, f64::max).into(),
                 left.different.into(),
                 left.pdiff.last().copied().into(),
                 middle(&left.rms).into(),
                 left.rms.last().copied().into(),
             ]);
-            plot = plot.line(format!("{}, {}", day.name, test.name()), intervals);
+            let steps = intervals.iter().flat_map(|[from, to]| [from, to].map(|at| (at / HOUR, (to - from) / MINUTE)));
+            plot = plot.line(format!("{}, {}", day.name, test.name()), steps);
         }
     }
     section.add(table);
@@ -256,7 +251,7 @@ pub(super) fn interpolation(days: &[Day]) -> Result<Section> {
                     day.name.as_str().into(),
                     minutes.into(),
                     how.name().into(),
-                    found.rms.len().into(),
+                    found.pdiff.len().into(),
                     middle(&found.rms).into(),
                     found.rms.last().copied().into(),
                     middle(&found.pdiff).into(),

@@ -19,6 +19,8 @@ const SEEN: f64 = 100.0 / (800.0 * 600.0);
 /// Number of the paper's frame, of [`PAPER_LIT`] lit frames; the first is 1.
 const PAPER_FRAME: f64 = 121.0;
 const PAPER_LIT: f64 = 180.0;
+/// Frames that are darker than this share of the brightest one have no relative error.
+const DARK: f64 = 1e-3;
 
 /// The indirect light of the sun at all lit times of a day.
 pub(super) struct Day {
@@ -40,6 +42,8 @@ pub(super) struct Day {
     civil: Civil,
     /// Measures with one exposure for the whole day.
     pub options: Options,
+    /// Whether a frame counts where errors are relative to its mean.
+    bright: Vec<bool>,
 }
 
 impl Day {
@@ -79,9 +83,13 @@ impl Day {
             white,
             civil: options.day()?,
             options: Options::default(),
+            bright: Vec::new(),
         };
+        let means: Vec<f64> = (0..lit).map(|t| mean(&day.frame(t).pixels)).collect();
+        let brightest = (0..lit).max_by(|a, b| means[*a].total_cmp(&means[*b])).unwrap_or(0);
+        day.bright = means.iter().map(|mean| *mean > DARK * means[brightest]).collect();
         // Screens do not adapt from frame to frame: the brightest frame decides.
-        let stops = Display::default().stops(&day.frame(day.brightest()));
+        let stops = Display::default().stops(&day.frame(brightest));
         day.options.display.exposure = Exposure::Stops(stops);
         day.options.pdiff_threshold = day.seen();
         Ok(day)
@@ -110,10 +118,9 @@ impl Day {
         (((PAPER_FRAME - 0.5) / PAPER_LIT * self.len() as f64) as usize).min(self.len() - 1)
     }
 
-    fn brightest(&self) -> usize {
-        let mean = |t: usize| mean(&self.frame(t).pixels);
-        let means: Vec<f64> = (0..self.len()).map(mean).collect();
-        (0..self.len()).max_by(|a, b| means[*a].total_cmp(&means[*b])).unwrap_or(0)
+    /// Whether a frame counts where errors are relative to its mean: it has at least a thousandth of the mean of the brightest frame.
+    pub fn is_bright(&self, t: usize) -> bool {
+        self.bright[t]
     }
 
     /// Local time, `07:40`.
@@ -143,11 +150,12 @@ impl Day {
         Measure::Pdiff.of(&Pair::new(truth, test)?, &self.options)
     }
 
-    /// The largest root mean square error of a frame over its mean, %, from sums over all pixels and channels: of squared errors, and of light.
+    /// The largest root mean square error of a bright frame over its mean, %, from sums over all pixels and channels: of squared errors, and of
+    /// light.
     pub fn worst(&self, squares: &[f64], light: &[f64]) -> f64 {
         let count = (3 * self.width * self.height) as f64;
-        let lit = squares.iter().zip(light).filter(|(_, light)| **light > 0.0);
-        lit.map(|(square, light)| 100.0 * (square * count).sqrt() / light).fold(0.0, f64::max)
+        let of = |t: usize| 100.0 * (squares[t] * count).sqrt() / light[t];
+        (0..self.len()).filter(|t| self.bright[*t]).map(of).fold(0.0, f64::max)
     }
 
     /// Rows of all times, one for each pixel and channel: of radiance, or of white irradiance. Pixels that never have light are left out.

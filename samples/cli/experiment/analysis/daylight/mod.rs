@@ -26,6 +26,7 @@ pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
     let runs: Vec<&Done> = results.of(FRAMES).collect();
     let days = runs.iter().map(|run| Day::read(results, run)).collect::<Result<Vec<Day>>>()?;
     if !days.is_empty() {
+        page.add(noise(results, &days, &runs)?);
         let [variance, restored] = variance::sections(&days)?;
         page.add(variance);
         page.add(sizes::before_and_after(results, &days, &runs)?);
@@ -39,6 +40,44 @@ pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
     }
     page.add(times(results, &days, &runs)?);
     Ok(())
+}
+
+/// What the frames are, and their noise.
+fn noise(results: &Results, days: &[Day], runs: &[&Done]) -> Result<Section> {
+    let mut section = Section::new("The frames");
+    section.text(
+        "A frame is the indirect light of the sun at a lit step of the day: all light of the sun but what surfaces have from it directly. One set of paths \
+         serves all times. The paper has photon maps with final gathering, which are smooth; paths have noise, and noise is no signal that a few vectors \
+         describe. So a filter averages neighbouring pixels on the same surface, with the same weights at all times. It blurs small shadows of indirect \
+         light. *Noise left* is the root mean square of the noise over the mean of the frame, from two halves of the paths, after the filter. Errors below \
+         that are of the size of the noise or smaller are errors of noise. Where errors are relative to the mean of a frame, frames darker than a \
+         thousandth of the brightest one do not count.",
+    );
+    let columns = [
+        "scene",
+        "pixels",
+        "steps",
+        "lit",
+        "radius of the filter (pixels)",
+        "noise left, median frame (%)",
+        "worst frame (%)",
+    ];
+    let mut table = Table::new("frames", "Frames and their noise", columns);
+    for (day, run) in days.iter().zip(runs) {
+        let times = results.times(run)?;
+        let percent = |name: &str| times.fact(name).map(|value| 100.0 * value);
+        table.push([
+            day.name.as_str().into(),
+            format!("{}×{}", day.width, day.height).into(),
+            day.steps.into(),
+            day.len().into(),
+            times.fact("filter").into(),
+            percent("median noise").into(),
+            percent("worst noise").into(),
+        ]);
+    }
+    section.add(table);
+    Ok(section)
 }
 
 /// Times of the bakes and of the references.

@@ -119,6 +119,15 @@ impl Kept {
 
     /// Irradiance before compression, W/m² for 1 W/m² of the sun: one picture for each lit time, 0 without a surface.
     pub(super) fn frames(&self) -> Vec<f32> {
+        self.pictures(|light| &light.sun)
+    }
+
+    /// The noise of [`Self::frames`]: one standard deviation, on average.
+    pub(super) fn noise(&self) -> Vec<f32> {
+        self.pictures(|light| &light.noise)
+    }
+
+    fn pictures(&self, of: impl Fn(&Light) -> &Vec<f32>) -> Vec<f32> {
         let [width, height] = self.plan.extent.map(|side| side as usize);
         let times = self.plan.times.len();
         let mut out = vec![0.0; 3 * width * height * times];
@@ -128,7 +137,7 @@ impl Kept {
             for (number, texel) in (0..32 * light.mask.len()).filter(there).enumerate() {
                 let pixel = (row + texel / columns) * width + column + texel % columns;
                 for channel in 0..3 {
-                    let of_texel = &light.sun[(3 * number + channel) * times..][..times];
+                    let of_texel = &of(light)[(3 * number + channel) * times..][..times];
                     for (time, value) in of_texel.iter().enumerate() {
                         out[3 * (time * width * height + pixel) + channel] = *value;
                     }
@@ -155,4 +164,18 @@ impl Kept {
         }
         Ok(facts)
     }
+}
+
+/// Median over the frames, and the largest, of the root mean square of the noise over the mean of the frame. Frames without light have none.
+pub(super) fn noise_of_frames(frames: &[f32], noise: &[f32], times: usize) -> [(String, f64); 2] {
+    let one = (frames.len() / times.max(1)).max(1);
+    let relative = |(frame, noise): (&[f32], &[f32])| {
+        let mean = frame.iter().map(|value| f64::from(*value)).sum::<f64>() / one as f64;
+        let square = noise.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>() / one as f64;
+        (mean > 0.0).then(|| square.sqrt() / mean)
+    };
+    let mut all: Vec<f64> = frames.chunks_exact(one).zip(noise.chunks_exact(one)).filter_map(relative).collect();
+    all.sort_by(f64::total_cmp);
+    let middle = all.get(all.len() / 2).copied().unwrap_or(0.0);
+    [("median noise".into(), middle), ("worst noise".into(), all.last().copied().unwrap_or(0.0))]
 }

@@ -3,6 +3,7 @@
 //! All three leave out the scene's own lights, its environment and the light of emissive surfaces: a bake has the light of sun and sky alone.
 
 mod baked;
+mod filter;
 mod truth;
 
 use glam::{Quat, Vec2, Vec3};
@@ -38,7 +39,12 @@ struct OfPicture {
 struct OfFrames {
     day: DayOptions,
     bake: Baking,
+    /// Radius of the filter against noise, pixels; 0: none.
+    filter: u32,
 }
+
+/// Largest radius of the filter.
+const MOST_FILTER: u32 = 32;
 
 /// Settings of the path tracer at a time of the day.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -72,6 +78,9 @@ pub(super) fn frame_settings(paper: bool, changes: &Changes) -> Result<Value> {
     let settings: OfFrames = config::with(&OfFrames::default(), changes)?;
     settings.bake.validate()?;
     settings.day.day()?;
+    if settings.filter > MOST_FILTER {
+        return Err(Error::usage(format!("filter is {}, allowed are 0 to {MOST_FILTER}", settings.filter)));
+    }
     config::to_value(&settings)
 }
 
@@ -100,17 +109,26 @@ pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rende
 }
 
 /// All frames of a day, one below the other: first the albedo, then for each lit time the irradiance of the sun's indirect light for 1 W/m² of
-/// the sun (white). Facts name the time of each frame and the sun's irradiance then.
+/// the sun (white). Facts name the time of each frame, the sun's irradiance then, and the noise.
 pub(super) fn frames(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
-    let OfFrames { day, bake } = read(job.settings)?;
+    let OfFrames { day, bake, filter } = read(job.settings)?;
     let gpu = warm.gpu.clone();
     let Some(bake) = baked::of(warm, job, &day, &bake)? else { return Ok(None) };
     let Some(shown) = bake.render(&gpu, job, &PictureSettings::default())? else { return Ok(None) };
+    let of = |name: &str| shown.layers.layer(name).map(|layer| layer.data.as_slice()).unwrap_or_default();
+    let (mut frames, mut noise) = (bake.frames(), bake.noise());
+    if filter > 0 {
+        let surfaces = filter::Surfaces::new(job.view, of("normal"), of("depth"));
+        frames = surfaces.filter(&frames, filter);
+        noise = surfaces.filter(&noise, filter);
+    }
+    let mut facts = bake.facts_of_frames()?;
+    facts.push(("filter".into(), filter.into()));
+    facts.extend(baked::noise_of_frames(&frames, &noise, bake.plan.times.len()));
     let [width, height] = job.view.extent;
-    let albedo = shown.layers.layer("albedo").map(|layer| layer.data.clone()).unwrap_or_default();
-    let data = [albedo, bake.frames()].concat();
+    let data = [of("albedo"), &frames].concat();
     let stack = Layer { precision: Precision::Full, ..Layer::new("", &["R", "G", "B"], data) };
-    let times = Times { wall: vec![bake.seconds * 1e3], facts: bake.facts_of_frames()?, ..Times::default() };
+    let times = Times { wall: vec![bake.seconds * 1e3], facts, ..Times::default() };
     let layers = Layers::new(width, height * (bake.plan.times.len() as u32 + 1)).with(stack);
     Ok(Some(Rendered { layers, times }))
 }
