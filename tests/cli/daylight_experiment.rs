@@ -122,7 +122,7 @@ fn the_shipped_experiment_gives_all_its_tables() {
 
     // The technique beside the path tracer: sixteen paths a texel have the energy within some per cent.
     let beside = rows(&report, "beside");
-    assert_eq!(beside.len(), 3 * TIMES.len());
+    assert_eq!(beside.len(), 4 * TIMES.len());
     for row in &beside {
         for column in ["energy", "energy, baked"] {
             assert!((0.85..1.15).contains(&number(row, column)), "{row:?}");

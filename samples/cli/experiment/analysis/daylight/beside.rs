@@ -13,8 +13,9 @@ use crate::{
 };
 
 /// Techniques of pictures and their names in tables. The reference of `day` is named `day, truth`.
-const DAYS: [(&str, &str); 4] = [
+const DAYS: [(&str, &str); 5] = [
     ("day", "the day of the experiment"),
+    ("diffuse", "the same day, diffuse surfaces on both sides"),
     ("overcast", "the same day, overcast"),
     ("winter", "a winter day"),
     ("added", "an object added after the bake"),
@@ -57,8 +58,9 @@ fn hours(time: &str) -> f64 {
 pub(super) fn section(results: &Results) -> Result<Section> {
     let mut section = Section::new("Section 4.1: the technique against the path tracer");
     section.text(
-        "The light of sun and sky alone; the scene's own lights are off. The path tracer has all surfaces as they are, the technique takes gloss under \
-         the baked light as diffuse. *Energy* is the mean of the picture over that of the reference, *baked* the same for all light but the sun's direct \
+        "The light of sun and sky alone; the scene's own lights are off. The path tracer has all surfaces as they are, the technique shows no gloss under \
+         the baked light. On dark surfaces that is much of the light. So one row has diffuse surfaces alone on both sides: what differs there is neither \
+         gloss nor a mirror. *Energy* is the mean of the picture over that of the reference, *baked* the same for all light but the sun's direct \
          light. All errors are of linear radiance; *FLIP* and *PDiff* are of the picture as a screen shows it at the exposure that suits the reference. The paper shows such pictures with 3ds Max as its reference, and gives no numbers. Reference pictures have noise of their own, and \
          the bake has its noise too (see the table of sizes).",
     );
