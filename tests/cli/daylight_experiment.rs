@@ -95,7 +95,7 @@ fn the_shipped_experiment_gives_all_its_tables() {
     }
 
     // The numbers that follow from the paper's sizes alone.
-    let size = rows(&report, "size-things-0");
+    let size = rows(&report, "size-things-front");
     let ours = |what: &str| size.iter().find(|row| row["quantity"] == what).map(|row| number(row, "ours")).unwrap();
     assert_eq!(ours("steps of the day"), 36.0);
     let lit = ours("lit frames");
@@ -125,7 +125,10 @@ fn the_shipped_experiment_gives_all_its_tables() {
     assert_eq!(beside.len(), 4 * TIMES.len());
     for row in &beside {
         for column in ["energy", "energy, baked"] {
-            assert!((0.85..1.15).contains(&number(row, column)), "{row:?}");
+            // Without gloss nothing but noise is left.
+            let diffuse = row["day"].as_str().unwrap().contains("diffuse");
+            let near = if diffuse { 0.97..1.03 } else { 0.85..1.15 };
+            assert!(near.contains(&number(row, column)), "{row:?}");
         }
     }
 
@@ -139,7 +142,8 @@ fn the_shipped_experiment_gives_all_its_tables() {
         let (floats, signed) = (of(side, "16-bit floats"), of(side, "signed bytes"));
         assert!(floats.len() == 8 && signed.len() == 8);
         assert!(floats.windows(2).all(|pair| pair[0].0 <= pair[1].0 && pair[0].1 >= 0.999 * pair[1].1), "{floats:?}");
-        assert!(signed.iter().zip(&floats).all(|(a, b)| a.0 <= b.0 && a.1 >= 0.999 * b.1), "{signed:?} {floats:?}");
+        // The rounding of a byte may by chance make an error a little smaller.
+        assert!(signed.iter().zip(&floats).all(|(a, b)| a.0 <= b.0 && a.1 >= 0.95 * b.1), "{signed:?} {floats:?}");
     }
 
     // Nothing is rendered again, and the report has the same bytes.

@@ -10,8 +10,10 @@
 //! root mean square of their difference over √2, relative to the mean of the frame. The path tracer is measured at
 //! [`MEASURED`] times of the day, with 1, 2, 4… paths a pixel until it has reached the noise of the shared way at that
 //! time; cost at equal noise is interpolated between the two numbers around it (in logarithms). The cost of the whole
-//! day is extrapolated from these times to all lit frames. Uploads of the scene are left out on both sides.
+//! day is extrapolated from these times to all lit frames; rows with the same number of paths in each frame compare the
+//! mean and the worst noise of these times. Uploads of the scene are left out on both sides.
 
+#[path = "../../benches/common/mod.rs"]
 mod common;
 
 use std::time::Instant;
@@ -174,6 +176,45 @@ impl Curve {
         let slope = ((s2 / s1).ln() / (n2 / n1).ln()).clamp(-2.0, -0.5);
         s2 * (wanted / n2).powf(slope)
     }
+
+    /// Noise and seconds with 2^`doublings` paths a pixel, interpolated or extrapolated in logarithms.
+    fn at(&self, doublings: f64) -> (f64, f64) {
+        let Self(points) = self;
+        let last = points.len() - 1;
+        let first = (doublings.max(0.0) as usize).min(last.saturating_sub(1));
+        let more = doublings - first as f64;
+        let [(n1, s1), (n2, s2)] = [points[first], points[(first + 1).min(last)]];
+        // The noise of independent paths falls by √2 with each doubling.
+        let (noise, seconds) = if first < last { ((n2 / n1).log2(), (s2 / s1).log2()) } else { (-0.5, 1.0) };
+        (n1 * (more * noise).exp2(), s1 * (more * seconds).exp2())
+    }
+}
+
+/// Seconds of the mean frame if all frames have the same number of paths, so many that `of` their noise is `wanted`.
+fn alike(curves: &[(usize, Curve)], wanted: f64, of: fn(&[f64]) -> f64) -> (f64, f64) {
+    let noise = |doublings: f64| of(&curves.iter().map(|(_, curve)| curve.at(doublings).0).collect::<Vec<_>>());
+    let (mut low, mut high) = (0.0, f64::from(MOST.ilog2()));
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if noise(middle) > wanted { low = middle } else { high = middle }
+    }
+    spread(curves.iter().map(|(_, curve)| curve.at(high).1).collect())
+}
+
+/// Mean, and its standard error.
+fn spread(all: Vec<f64>) -> (f64, f64) {
+    let count = all.len() as f64;
+    let mean = mean(&all);
+    let variance = all.iter().map(|seconds| (seconds - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+    (mean, (variance / count).sqrt())
+}
+
+fn mean(all: &[f64]) -> f64 {
+    all.iter().sum::<f64>() / all.len() as f64
+}
+
+fn worst(all: &[f64]) -> f64 {
+    all.iter().copied().fold(0.0, f64::max)
 }
 
 fn no_layer() -> Error {
@@ -182,8 +223,8 @@ fn no_layer() -> Error {
 
 /// The lit frames that the paper's adaptive halving needs: PerceptualDiff of the interpolated middle frame with both ends.
 fn needed(frames: &[Picture]) -> Result<Vec<usize>> {
-    let mean = |picture: &Picture| picture.pixels.as_flattened().iter().sum::<f32>();
-    let brightest = (0..frames.len()).max_by(|a, b| mean(&frames[*a]).total_cmp(&mean(&frames[*b]))).unwrap_or(0);
+    let light = |picture: &Picture| picture.pixels.as_flattened().iter().sum::<f32>();
+    let brightest = (0..frames.len()).max_by(|a, b| light(&frames[*a]).total_cmp(&light(&frames[*b]))).unwrap_or(0);
     let stops = Display::default().stops(&frames[brightest]);
     let display = Display { exposure: Exposure::Stops(stops), ..Display::default() };
     let pixels = frames[0].pixels.len() as f64;
@@ -248,7 +289,6 @@ fn run() -> Result<()> {
     let lit = first.times.len();
     let of_shared: Vec<f64> = a.iter().zip(&b).map(|(a, b)| noise(a, b)).map(|(noise, mean)| noise / mean).collect();
     let [paths, compression] = spent;
-    let (mean, worst) = (of_shared.iter().sum::<f64>() / lit as f64, of_shared.iter().copied().fold(0.0, f64::max));
     println!("{lit} lit frames of {}; shared: {samples} paths a pixel", first.steps);
     println!(
         "shared paths {:.1} s of wall clock, {:.1} s of processor; compression {:.1} s and {:.1} s",
@@ -257,7 +297,11 @@ fn run() -> Result<()> {
         compression.wall,
         compression.seconds()
     );
-    println!("noise of the shared way: mean over times {:.1} %, worst {:.1} %", 100.0 * mean, 100.0 * worst);
+    println!(
+        "noise of the shared way: mean over times {:.1} %, worst {:.1} %",
+        100.0 * mean(&of_shared),
+        100.0 * worst(&of_shared)
+    );
     println!("\n{:>9} {:>13} {:>13} {:>13} {:>14}", "time", "shared, %", "tracer, %", "paths a pixel", "seconds equal");
     let civil = day.day()?;
     let mut curves = Vec::new();
@@ -265,7 +309,6 @@ fn run() -> Result<()> {
         let at = (2 * index + 1) * lit / (2 * MEASURED.min(lit));
         let time = first.times[at];
         let scene = sunlit(&scene, Vec3::from(time.sun));
-        // The other ways to count need the curve down to the mean and to the worst noise too.
         let curve = Curve::measure(&gpu, &scene, &view, &settings, of_shared[at])?;
         let last = curve.0.len() - 1;
         println!(
@@ -278,13 +321,8 @@ fn run() -> Result<()> {
         );
         curves.push((at, curve));
     }
-    let count = curves.len() as f64;
-    let per_frame = |wanted: &dyn Fn(usize) -> f64| {
-        let all: Vec<f64> = curves.iter().map(|(at, curve)| curve.seconds(wanted(*at))).collect();
-        let mean = all.iter().sum::<f64>() / count;
-        let variance = all.iter().map(|seconds| (seconds - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-        (mean, (variance / count).sqrt())
-    };
+    let there: Vec<f64> = curves.iter().map(|(at, _)| of_shared[*at]).collect();
+    let at_each = spread(curves.iter().map(|(at, curve)| curve.seconds(of_shared[*at])).collect());
     let sky_of = |t: usize| Sky::new(first.weather, first.times[t].sun.map(f64::from)).map_err(Error::input);
     let coloured = |t: usize| {
         let sun = sky_of(t)?.sun_irradiance();
@@ -303,10 +341,10 @@ fn run() -> Result<()> {
         );
         seconds
     };
-    let each = row("one by one, the noise of the shared way at each time", lit, per_frame(&|at| of_shared[at]));
-    row("one by one, each frame at its mean noise", lit, per_frame(&|_| mean));
-    row("one by one, each frame at its worst noise", lit, per_frame(&|_| worst));
-    row("adaptive (paper's test), noise at each time", kept.len(), per_frame(&|at| of_shared[at]));
+    let each = row("one by one, the noise of the shared way at each time", lit, at_each);
+    row("one by one, as many paths in each, equal mean noise", lit, alike(&curves, mean(&there), mean));
+    row("one by one, as many paths in each, equal worst noise", lit, alike(&curves, worst(&there), worst));
+    row("adaptive (paper's test), noise at each time", kept.len(), at_each);
     println!("{:<58} {lit:>9} {:>11.1}", "shared paths, exact shadow rays", paths.seconds());
     println!("{:<58} {lit:>9} {all:>11.1}", "the same with compression");
     let verdict = if paths.seconds() <= GOAL * each { "reached" } else { "missed" };
