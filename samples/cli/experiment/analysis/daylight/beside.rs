@@ -1,6 +1,9 @@
 //! Section 4.1: the technique against the path tracer, at several times, in other weather and another season.
 
-use lucerna::{Result, measure::Measure};
+use lucerna::{
+    Result,
+    measure::{Display, Measure},
+};
 
 use super::{SIDE, day::mean};
 use crate::{
@@ -61,7 +64,8 @@ pub(super) fn section(results: &Results) -> Result<Section> {
         "The light of sun and sky alone; the scene's own lights are off. The path tracer has all surfaces as they are, the technique shows no gloss under \
          the baked light. On dark surfaces that is much of the light. So one row has diffuse surfaces alone on both sides: what differs there is neither \
          gloss nor a mirror. *Energy* is the mean of the picture over that of the reference, *baked* the same for all light but the sun's direct \
-         light. All errors are of linear radiance; *FLIP* and *PDiff* are of the picture as a screen shows it at the exposure that suits the reference. The paper shows such pictures with 3ds Max as its reference, and gives no numbers. Reference pictures have noise of their own, and \
+         light. All errors are of linear radiance; *FLIP* and *PDiff* are of the picture as a screen shows it at the exposure that suits the reference. Where the sun shines, few \
+         pixels at the edges of its light may make most of the relative MSE of the picture. The paper shows such pictures with 3ds Max as its reference, and gives no numbers. Reference pictures have noise of their own, and \
          the bake has its noise too (see the table of sizes).",
     );
     let columns =
@@ -106,10 +110,12 @@ pub(super) fn section(results: &Results) -> Result<Section> {
         for Two { run, truth, time } in spread(&all, Some(results.experiment.images)) {
             let reference = results.picture(Layer(truth, ""))?;
             let (scene, camera) = view;
+            // A scene's own exposure is for its own lights.
+            let stops = Display::default().stops(&reference);
             let id = format!("{scene}-{camera}-{method}-{}", time.replace(':', ""));
             let title = format!("{scene}, {camera}, {what}, {time}");
             let set = Comparison::new(id, title, reference.width, reference.height)
-                .exposure(results.exposure(truth)?)
+                .exposure(stops)
                 .with("baked daylight", results.picture(Layer(run, ""))?.pixels)
                 .with("path tracer", reference.pixels)
                 .with("baked light", results.picture(Layer(run, "indirect"))?.pixels)

@@ -60,7 +60,7 @@ fn noise(results: &Results, days: &[Day], runs: &[&Done]) -> Result<Section> {
         "lit",
         "radius of the filter (pixels)",
         "noise left, median frame (%)",
-        "worst frame (%)",
+        "worst frame, dark ones included (%)",
     ];
     let mut table = Table::new("frames", "Frames and their noise", columns);
     for (day, run) in days.iter().zip(runs) {
