@@ -20,20 +20,25 @@ struct Arguments {
 #[derive(Subcommand, Debug)]
 enum Command {
     /// Compute the light of a scene for all times of a day and write it to a file
-    #[command(args_override_self = true)]
+    #[command(args_override_self = true, mut_arg("default_light", never))]
     Bake(Box<DayBakeArgs>),
     /// Print the contents, the size and the errors of a bake
     Info(DayInfoArgs),
     /// Decode every step of a bake into a file of uncompressed frames, which `render --stream` reads step by step
     Frames(DayFramesArgs),
     /// Write a lightmap bake in forms that other programs read: glTF, EXR, KTX2, JSON
-    #[command(args_override_self = true, mut_arg("time", |arg| arg.long("scene-time")))]
+    #[command(args_override_self = true, mut_arg("time", |arg| arg.long("scene-time")), mut_arg("default_light", never))]
     Export(Box<DayExportArgs>),
     /// Join the parts of a bake (as `lucerna merge`)
     Merge(JoinArgs),
     /// Render a scene at times of the day into images
-    #[command(args_override_self = true, mut_arg("time", |arg| arg.long("scene-time")))]
+    #[command(args_override_self = true, mut_arg("time", |arg| arg.long("scene-time")), mut_arg("default_light", never))]
     Render(Box<DayArgs>),
+}
+
+/// A bake has the light of its day and the lamps of the scene; no lights are added for scenes without any.
+fn never(argument: clap::Arg) -> clap::Arg {
+    argument.default_value("never").hide(true)
 }
 
 fn main() -> ExitCode {

@@ -75,7 +75,7 @@ fn by_cpu(stored: &Stored, settings: &Settings, seconds: f64) -> Vec<[f32; 3]> {
     let sun = day.sun(seconds).direction(plan.calendar.north);
     let sky = Sky::new(Weather::default(), sun.map(f64::from)).unwrap();
     let (light, patches) = (sky.sun_irradiance(), sky.patches());
-    let mixture = Steps::new(plan, &day).mixture(seconds, settings.interpolation);
+    let mixture = Steps::new(plan, 0, &plan.calendar.courses().unwrap()[0]).mixture(seconds, settings.interpolation);
     let mut out = vec![[0.0; 3]; (plan.extent[0] * plan.extent[1]) as usize];
     for (index, tile) in stored.tiles.iter().enumerate() {
         let [column, row, columns, _] = plan.tile(index as u32);

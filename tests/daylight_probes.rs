@@ -62,7 +62,14 @@ fn plan(scene: &Scene, grid: Grid, settings: Baking) -> Plan {
         },
         extent: eye.extent,
         probes: Some(grid),
-        calendar: Calendar { date: "2026-06-21".into(), zone: "UTC".into(), latitude: 0.0, longitude: 0.0, north: 0.0 },
+        lamps: Vec::new(),
+        calendar: Calendar {
+            date: "2026-06-21".into(),
+            zone: "UTC".into(),
+            latitude: 0.0,
+            longitude: 0.0,
+            ..Calendar::default()
+        },
         steps: 2,
         times: vec![lit(9.0), lit(15.0)],
         weather: Weather::default(),
@@ -368,7 +375,7 @@ fn picture(gpu: &Gpu, scene: &Scene, stored: &Arc<Stored>, added: Added) -> luce
     let mut settings = PictureSettings::default();
     settings.daylight.time = "09:00".into();
     settings.daylight.added = added;
-    let baked = Baked { stored: stored.clone(), file: None };
+    let baked = Baked { stored: stored.clone(), frames: None, stream: None, file: None, digest: None };
     let mut ready = Ready::<Daylight>::new(gpu, scene, &settings, Some(&baked), &mut |_, _| true)?;
     let mut graph = Graph::new(Daylight::NAME);
     let picture = ready.frame(&mut graph, (scene, &Pose::rest(scene)), &eye(), Shot::default(), &settings)?;

@@ -161,6 +161,7 @@ mod tests {
             animations: vec![Animation { name: String::new(), channels: vec![channel] }],
             environment: Some(Environment { width: 2, height: 1, ..Environment::constant(Vec3::ONE) }),
             notes: Vec::new(),
+            added: None,
         }
     }
 

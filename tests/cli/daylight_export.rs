@@ -88,8 +88,10 @@ impl Lab {
                 zone: "UTC".into(),
                 latitude: 50.0,
                 longitude: 0.0,
-                north: 0.0,
+                ..Calendar::default()
             },
+            probes: None,
+            lamps: Vec::new(),
             steps: 2,
             times: [0.45, 0.55].map(|part| Lit { seconds: 86_400.0 * part, sun: sun.to_array() }).into(),
             weather: Weather::default(),
@@ -101,7 +103,7 @@ impl Lab {
         let zenith = Sky::new(overcast, noon.map(f64::from)).unwrap().patches()[144];
         // The cap of the sky alone gives all of it; an overcast sky is grey.
         let along = irradiance / zenith[0];
-        let [times, patches] = plan.dimensions();
+        let [times, patches, _] = plan.dimensions();
         let of_tile = |texels: &Vec<(u32, lucerna::shaders::types::Hit)>, number: usize| {
             let [_, _, columns, rows] = plan.tile(number as u32);
             let mut mask = vec![0u32; (columns * rows).div_ceil(32) as usize];
@@ -118,6 +120,7 @@ impl Lab {
                 words: Vec::new(),
                 worst: 0.0,
                 worst_dimension: 0,
+                hidden: 0,
                 noise: 0.0,
             };
             let sky = Layer {
@@ -127,18 +130,18 @@ impl Lab {
                 words: [one | one << 16, one].repeat(texels.len()),
                 ..none.clone()
             };
-            Tile { sun: none, sky, mask, light: vec![[0.0; 2]; times] }
+            let lamps = Layer { dimensions: 0, ..none.clone() };
+            Tile { sun: none, sky, lamps, mask, light: vec![[0.0; 2]; times] }
         };
         let tiles = unwrapped.by_tile(settings.tile).iter().enumerate().map(|(n, texels)| of_tile(texels, n)).collect();
-        let stored = Stored { plan, tiles, corners: unwrapped.lightmap.corners };
+        let stored = Stored { plan, tiles, probes: Vec::new(), corners: unwrapped.lightmap.corners };
         fs::write(self.at(name), stored.encode().unwrap()).unwrap();
         stored
     }
 
     fn export(&self, bake: &str, out: &str, more: &[&str]) -> Ran {
         let (scene, bake, out) = (self.at("floor.gltf"), self.at(bake), self.at(out));
-        // A light that is added is a node, and nodes belong to a bake.
-        let words = ["export", &scene, "--default-light", "never", "--bake", &bake, "-o", &out];
+        let words = ["export", &scene, "--bake", &bake, "-o", &out];
         daylight(&[&words[..], more].concat())
     }
 }

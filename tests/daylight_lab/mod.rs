@@ -44,12 +44,18 @@ fn layer(texels: u32, dimensions: u32, images: u32, seed: u32) -> Layer {
         }
     };
     let table = (0..images).flat_map(|image| (0..dimensions).map(move |t| along(image, t))).collect();
-    Layer { dimensions, wide, narrow, table, words, worst: 0.0, worst_dimension: 0, noise: 0.0 }
+    Layer { dimensions, wide, narrow, table, words, worst: 0.0, worst_dimension: 0, hidden: 0, noise: 0.0 }
 }
 
 /// The day of [`stored`]: polar day, so that the sun shines over midnight, too.
 pub fn polar_day() -> Calendar {
-    Calendar { date: "2026-06-21".into(), zone: "Europe/Oslo".into(), latitude: 78.2, longitude: 15.6, north: 0.0 }
+    Calendar {
+        date: "2026-06-21".into(),
+        zone: "Europe/Oslo".into(),
+        latitude: 78.2,
+        longitude: 15.6,
+        ..Calendar::default()
+    }
 }
 
 pub fn day(calendar: &Calendar) -> Day {
@@ -72,6 +78,8 @@ pub fn stored(scene: &Scene, view: &View, calendar: Calendar, interval: f64, off
             clip_from_view: view.clip_from_view.to_cols_array(),
         },
         extent: view.extent,
+        probes: None,
+        lamps: Vec::new(),
         calendar,
         steps: steps.len() as u32,
         times,
@@ -79,7 +87,7 @@ pub fn stored(scene: &Scene, view: &View, calendar: Calendar, interval: f64, off
         settings: Baking { interval, offset, tile: 16, ..Baking::default() },
     };
     let [columns, rows] = plan.tiles();
-    let [dimensions, patches] = plan.dimensions().map(|count| count as u32);
+    let [dimensions, patches, _] = plan.dimensions().map(|count| count as u32);
     let tiles = (0..columns * rows).map(|index| {
         let [_, _, columns, rows] = plan.tile(index);
         let texels = columns * rows;
@@ -87,10 +95,11 @@ pub fn stored(scene: &Scene, view: &View, calendar: Calendar, interval: f64, off
         Tile {
             sun: layer(texels, dimensions, images, 2 * index + 1),
             sky: layer(texels, patches, SKY_IMAGES, 2 * index),
+            lamps: layer(texels, 0, 0, 0),
             mask: (0..texels.div_ceil(32)).map(bits).collect(),
             light: vec![[1.0, 0.0]; dimensions as usize],
         }
     });
     let tiles = tiles.collect();
-    Stored { plan, tiles, corners: Vec::new() }
+    Stored { plan, tiles, probes: Vec::new(), corners: Vec::new() }
 }

@@ -13,6 +13,8 @@ mod bake;
 mod compare;
 #[path = "../cli/daylight.rs"]
 mod daylight;
+#[path = "../cli/daylight_experiment.rs"]
+mod daylight_experiment;
 #[path = "../cli/daylight_export.rs"]
 mod daylight_export;
 #[path = "../cli/daylight_pictures.rs"]

@@ -11,4 +11,5 @@ pub use bake::{DayBakeArgs, bake};
 pub use export::{DayExportArgs, export};
 pub use frames::{DayFramesArgs, frames};
 pub use info::{DayInfoArgs, info};
+pub use plan::{DayOptions, Planned, of_view};
 pub use render::{DayArgs, render};

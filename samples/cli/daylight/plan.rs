@@ -5,12 +5,13 @@ use std::{path::PathBuf, str::FromStr};
 use glam::Vec3;
 use lucerna::{
     Error, Result,
-    scene::{Aabb, Scene},
+    scene::{Aabb, Scene, View},
     techniques::daylight::{
-        Adaptive, Baking, Calendar, Course, Kind, Lit, MOST_TIMES, NEXT_DAY, Plan, Sources, SunPath, SunPoint,
+        Adaptive, Baking, Calendar, Course, Day, Kind, Lit, MOST_TIMES, NEXT_DAY, Plan, Sources, SunPath, SunPoint,
         Transport, Weather, adaptive, cube, digest, lamps, lightmap, parts, probes::Grid,
     },
 };
+use serde::{Deserialize, Serialize};
 
 use crate::{
     scene_bounds,
@@ -21,7 +22,8 @@ use crate::{
 const NEAREST: f32 = 1.25;
 
 /// The day and the place of a bake.
-#[derive(clap::Args, Clone, Debug)]
+#[derive(clap::Args, Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct DayOptions {
     /// Date of the day
     #[arg(long, value_name = "YYYY-MM-DD", default_value = "2026-06-21", help_heading = "Day")]
@@ -29,6 +31,7 @@ pub struct DayOptions {
 
     /// Several days in one file, for seasons; `daylight render --date` chooses
     #[arg(long, value_name = "YYYY-MM-DD,…", value_delimiter = ',', conflicts_with = "date", help_heading = "Day")]
+    #[serde(skip)]
     pub dates: Vec<String>,
 
     /// Degrees, positive in the north
@@ -55,31 +58,38 @@ pub struct DayOptions {
         conflicts_with_all = ["date", "dates", "latitude", "longitude", "timezone"],
         help_heading = "Day"
     )]
+    #[serde(skip)]
     pub sun_path: Option<PathBuf>,
 
     /// The sun is a point that is so far from the middle of the scene, as in the paper: its direction is another one at each surface
     #[arg(long, value_name = "METRES", help_heading = "Day")]
+    #[serde(skip)]
     pub sun_distance: Option<f32>,
 
     /// First local time that needs light
     #[arg(long, value_name = "HH:MM", help_heading = "Day")]
+    #[serde(skip)]
     pub from: Option<String>,
 
     /// Last local time that needs light
     #[arg(long, value_name = "HH:MM", help_heading = "Day")]
+    #[serde(skip)]
     pub until: Option<String>,
 
     /// Bake the lamps of this name as a group that can be switched: a light, its node, or an emissive material; `*` at an end stands for any
     /// text; may be given more than once. Without it all lamps are one group
     #[arg(long, value_name = "NAME", help_heading = "Bake")]
+    #[serde(skip)]
     pub lamp: Vec<String>,
 
     /// Bake no lamps
     #[arg(long, conflicts_with = "lamp", help_heading = "Bake")]
+    #[serde(skip)]
     pub no_lamps: bool,
 
     /// The box in which probes stand, two opposite corners in metres [default: the box around the scene]
     #[arg(long, value_name = "X,Y,Z,X,Y,Z", allow_hyphen_values = true, help_heading = "Bake")]
+    #[serde(skip)]
     pub probe_box: Option<Corners>,
 }
 
@@ -179,6 +189,37 @@ impl FromStr for Corners {
     }
 }
 
+impl Default for DayOptions {
+    /// The defaults of the options, without lamps.
+    fn default() -> Self {
+        Self {
+            date: "2026-06-21".into(),
+            latitude: 55.5,
+            longitude: 10.0,
+            timezone: "Europe/Copenhagen".into(),
+            dates: Vec::new(),
+            north: 0.0,
+            sun_path: None,
+            sun_distance: None,
+            from: None,
+            until: None,
+            lamp: Vec::new(),
+            no_lamps: true,
+            probe_box: None,
+        }
+    }
+}
+
+impl DayOptions {
+    /// The civil day.
+    ///
+    /// # Errors
+    /// `Usage` for an impossible date, zone or place.
+    pub fn day(&self) -> Result<Day> {
+        Day::new(&self.date, &self.timezone, self.latitude, self.longitude).map_err(Error::usage)
+    }
+}
+
 /// The surfaces that a bake holds light for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum KindArg {
@@ -198,12 +239,85 @@ pub struct Planned {
     pub notes: Vec<String>,
 }
 
+/// The surfaces of a bake, and their texels.
+struct Receivers {
+    kind: Kind,
+    extent: [u32; 2],
+    sources: Sources,
+    corners: Vec<[u16; 6]>,
+    notes: Vec<String>,
+}
+
+impl Receivers {
+    fn of_view(camera: &str, view: &View) -> Self {
+        let kind = Kind::View {
+            camera: camera.to_owned(),
+            view_from_world: view.view_from_world.to_cols_array(),
+            clip_from_view: view.clip_from_view.to_cols_array(),
+        };
+        let sources = Sources::View(Box::new(*view));
+        Self { kind, extent: view.extent, sources, corners: Vec::new(), notes: Vec::new() }
+    }
+
+    fn around(camera: &str, view: &View, baking: &Baking) -> Self {
+        let (position, near) = (view.position, view.near);
+        let kind = Kind::Cube { camera: camera.to_owned(), position: position.to_array(), near };
+        let sources = Sources::Cube(Box::new(cube::views(position, near, baking.face)));
+        Self { kind, extent: [cube::FACES * baking.face, baking.face], sources, corners: Vec::new(), notes: Vec::new() }
+    }
+
+    fn of_lightmap(scene: &Scene, baking: &Baking) -> Result<Self> {
+        let unwrapped = lightmap::unwrap(scene, baking)?;
+        let corners = unwrapped.lightmap.corners.clone();
+        let kind = Kind::Lightmap {
+            charts: unwrapped.charts,
+            covered: unwrapped.receivers.len() as u64,
+            corners: digest(&corners),
+        };
+        let extent = unwrapped.lightmap.extent;
+        let side = if baking.tile == 0 { extent[0].max(extent[1]) } else { baking.tile };
+        let sources = Sources::Lightmap(unwrapped.by_tile(side.max(1)));
+        Ok(Self { kind, extent, sources, corners, notes: unwrapped.notes })
+    }
+}
+
 /// Plans the bake of a scene.
 ///
 /// # Errors
 /// `Usage` for an impossible day or lightmap; `Input` if the scene has no surfaces.
 pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage, args: &StageArgs) -> Result<Planned> {
-    let scene: &Scene = &stage.scene;
+    planned(options, baking, &stage.scene, || match kind {
+        KindArg::View => {
+            let (_, view) = stage.at(args.time, args.size)?;
+            Ok(Receivers::of_view(&stage.placed.name, &view))
+        }
+        KindArg::Cube => {
+            let (_, view) = stage.at(args.time, args.size)?;
+            if view.is_orthographic() {
+                let what =
+                    format!("the camera {} has parallel rays, and one that turns in place needs", stage.placed.name);
+                return Err(Error::usage(format!("{what} perspective")).help("Choose another one with --camera"));
+            }
+            Ok(Receivers::around(&stage.placed.name, &view, baking))
+        }
+        KindArg::Lightmap => Receivers::of_lightmap(&stage.scene, baking),
+    })
+}
+
+/// Plans the bake of the pixels of a view.
+///
+/// # Errors
+/// As [`plan`].
+pub fn of_view(options: &DayOptions, baking: &Baking, scene: &Scene, camera: &str, view: &View) -> Result<Planned> {
+    planned(options, baking, scene, || Ok(Receivers::of_view(camera, view)))
+}
+
+fn planned(
+    options: &DayOptions,
+    baking: &Baking,
+    scene: &Scene,
+    receivers: impl FnOnce() -> Result<Receivers>,
+) -> Result<Planned> {
     if lightmap::triangles(scene).iter().all(|count| *count == 0) {
         return Err(Error::input("the scene has no surfaces, so there is nothing to bake"));
     }
@@ -222,48 +336,7 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
         }
         times.extend(lit(&of_day, &calendar, (day, course), baking));
     }
-    let (receivers, extent, sources, corners, notes) = match kind {
-        KindArg::View => {
-            let (_, view) = stage.at(args.time, args.size)?;
-            let receivers = Kind::View {
-                camera: stage.placed.name.clone(),
-                view_from_world: view.view_from_world.to_cols_array(),
-                clip_from_view: view.clip_from_view.to_cols_array(),
-            };
-            (receivers, view.extent, Sources::View(Box::new(view)), Vec::new(), Vec::new())
-        }
-        KindArg::Cube => {
-            let (_, view) = stage.at(args.time, args.size)?;
-            if view.is_orthographic() {
-                let what =
-                    format!("the camera {} has parallel rays, and one that turns in place needs", stage.placed.name);
-                return Err(Error::usage(format!("{what} perspective")).help("Choose another one with --camera"));
-            }
-            let (position, near) = (view.position, view.near);
-            let receivers = Kind::Cube { camera: stage.placed.name.clone(), position: position.to_array(), near };
-            let faces = cube::views(position, near, baking.face);
-            (
-                receivers,
-                [cube::FACES * baking.face, baking.face],
-                Sources::Cube(Box::new(faces)),
-                Vec::new(),
-                Vec::new(),
-            )
-        }
-        KindArg::Lightmap => {
-            let unwrapped = lightmap::unwrap(scene, baking)?;
-            let corners = unwrapped.lightmap.corners.clone();
-            let receivers = Kind::Lightmap {
-                charts: unwrapped.charts,
-                covered: unwrapped.receivers.len() as u64,
-                corners: digest(&corners),
-            };
-            let extent = unwrapped.lightmap.extent;
-            let side = if baking.tile == 0 { extent[0].max(extent[1]) } else { baking.tile };
-            let sources = Sources::Lightmap(unwrapped.by_tile(side.max(1)));
-            (receivers, extent, sources, corners, unwrapped.notes)
-        }
-    };
+    let Receivers { kind, extent, sources, corners, notes } = receivers()?;
     let probes = match (baking.probes > 0.0, options.probe_box) {
         (true, given) => {
             let around = given.map(|corners| corners.0).or_else(|| Grid::around(scene, baking.probes));
@@ -278,7 +351,7 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
     let plan = Plan {
         scene: scene.name.clone(),
         parts: parts(scene),
-        receivers,
+        receivers: kind,
         extent,
         probes,
         calendar,

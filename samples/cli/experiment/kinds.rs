@@ -1,5 +1,6 @@
 //! The kinds of techniques and references that experiments can name.
 
+mod daylight;
 mod fiv;
 mod technique;
 mod tonemap;
@@ -159,6 +160,33 @@ pub const KINDS: &[Kind] = &[
     technique::of::<Isr>(),
     technique::of::<Igi>(),
     Kind { render: fiv::picture, ..technique::of::<Fiv>() },
+    Kind {
+        name: "daylight",
+        description: "baked daylight at a time of the day (picture.daylight.time); layers direct, indirect, irradiance",
+        on_device: true,
+        of_images: false,
+        settings: daylight::picture_settings,
+        render: daylight::picture,
+        available: || Ok(String::new()),
+    },
+    Kind {
+        name: "daylight-frames",
+        description: "the indirect light of the sun at all times of the day, one picture below the other",
+        on_device: true,
+        of_images: false,
+        settings: daylight::frame_settings,
+        render: daylight::frames,
+        available: || Ok(String::new()),
+    },
+    Kind {
+        name: "daylight-truth",
+        description: "path tracer on the device under sun and sky of a time of the day; layers direct, indirect",
+        on_device: true,
+        of_images: false,
+        settings: daylight::truth_settings,
+        render: daylight::truth,
+        available: || Ok(String::new()),
+    },
     Kind {
         name: "tracer",
         description: "path tracer on the device; layers emission, direct, indirect, albedo, normal, depth, samples, variance",

@@ -1,6 +1,7 @@
 //! Analyses: functions that turn the results of an experiment into tables, plots and images.
 
 mod compare;
+mod daylight;
 mod fiv;
 mod igi;
 mod isr;
@@ -17,6 +18,7 @@ pub type Analysis = fn(&Results, &mut Page) -> Result<()>;
 /// All analyses, by the name that a file gives.
 const ANALYSES: &[(&str, Analysis)] = &[
     ("compare", compare::analyse),
+    ("daylight", daylight::analyse),
     ("fiv", fiv::analyse),
     ("igi", igi::analyse),
     ("isr", isr::analyse),

@@ -1,0 +1,184 @@
+//! Bakes that stay in memory.
+
+use std::{sync::Arc, time::Instant};
+
+use lucerna::{
+    Error, Result,
+    gpu::Gpu,
+    graph::Runner,
+    scene::{Pose, Scene},
+    technique::{Ready, Shot},
+    techniques::daylight::{
+        Baked, Baking, Daylight, Light, PictureSettings, Plan, Sky, Stored, Transport, finish, units,
+    },
+};
+use serde_json::Value;
+
+use super::{Job, Rendered, Warm, dark, on_device};
+use crate::{
+    config,
+    daylight::{DayOptions, Planned, of_view},
+    experiment::place,
+};
+
+/// Bakes of a scene that stay in memory. Techniques and frames of the same day share one.
+const KEPT: usize = 2;
+
+/// A bake of the pixels of a view.
+pub(super) struct Kept {
+    key: Value,
+    scene: Scene,
+    pose: Pose,
+    pub(super) plan: Plan,
+    lights: Vec<Light>,
+    stored: Arc<Stored>,
+    ready: Option<(Ready<Daylight>, Runner)>,
+    /// Wall-clock time of the paths and the compression.
+    pub(super) seconds: f64,
+    /// Sizes and errors.
+    pub(super) facts: Vec<(String, f64)>,
+}
+
+/// The bake for these settings; `None` if it was interrupted.
+pub(super) fn of<'w>(
+    warm: &'w mut Warm<'_>,
+    job: &Job<'_>,
+    day: &DayOptions,
+    baking: &Baking,
+) -> Result<Option<&'w mut Kept>> {
+    let key = config::to_value(&(day, baking, place::view_key(job.view)?))?;
+    let (gpu, scene) = (warm.gpu, warm.scene);
+    let list: &mut Vec<Kept> = warm.keep("daylight bakes", |_, _, _| Ok(Vec::new()))?;
+    let index = match list.iter().position(|kept| kept.key == key) {
+        Some(index) => index,
+        None => {
+            list.truncate(KEPT - 1);
+            let Some(made) = make(gpu, scene, job, day, baking, key)? else { return Ok(None) };
+            list.insert(0, made);
+            0
+        }
+    };
+    Ok(list.get_mut(index))
+}
+
+fn make(
+    gpu: &Gpu,
+    scene: &Scene,
+    job: &Job<'_>,
+    day: &DayOptions,
+    baking: &Baking,
+    key: Value,
+) -> Result<Option<Kept>> {
+    let scene = dark(scene);
+    let begun = Instant::now();
+    let Planned { plan, sources, .. } = of_view(day, baking, &scene, "view", job.view)?;
+    plan.validate()?;
+    let skies = units::skies(&plan)?;
+    let mut transport = Transport::new(gpu, &scene, &plan, sources)?;
+    let [columns, rows] = plan.tiles();
+    let (mut lights, mut gathered) = (Vec::new(), Vec::new());
+    for tile in 0..columns * rows {
+        if job.interrupt.requested() {
+            return Ok(None);
+        }
+        let light = transport.tile(&plan, tile)?;
+        gathered.push(units::gathered(&plan, &light, &skies)?);
+        lights.push(light);
+    }
+    let tiles = finish::tiles(&plan, &gathered, |_| Ok(()))?;
+    let seconds = begun.elapsed().as_secs_f64();
+    let stored = Stored { plan: plan.clone(), tiles, probes: Vec::new(), corners: Vec::new() };
+    let summary = stored.summary();
+    let facts = [
+        ("raw bytes", summary.raw_bytes as f64),
+        ("bytes", summary.bytes as f64),
+        ("images", summary.images),
+        ("most images", f64::from(summary.most_images)),
+        ("worst tile", summary.worst_tile),
+        ("worst frame", summary.worst_frame),
+        ("noise", summary.noise),
+    ];
+    let facts = facts.map(|(name, value)| (name.to_owned(), value)).to_vec();
+    let pose = Pose::rest(&scene);
+    Ok(Some(Kept { key, scene, pose, plan, lights, stored: Arc::new(stored), ready: None, seconds, facts }))
+}
+
+impl Kept {
+    /// A picture from the compressed light.
+    pub(super) fn render(&mut self, gpu: &Gpu, job: &Job<'_>, settings: &PictureSettings) -> Result<Option<Rendered>> {
+        let Self { scene, pose, stored, ready, .. } = self;
+        let (ready, runner) = match ready {
+            Some(ready) => ready,
+            None => {
+                let baked = Baked { stored: stored.clone(), frames: None, stream: None, file: None, digest: None };
+                let made = Ready::new(gpu, scene, settings, Some(&baked), &mut |_, _| true)?;
+                ready.insert((made, Runner::new(gpu)))
+            }
+        };
+        on_device(runner, job, "daylight", |graph| {
+            ready.frame(graph, (scene, pose), job.view, Shot::default(), settings)
+        })
+    }
+
+    /// Irradiance before compression, W/m² for 1 W/m² of the sun: one picture for each lit time, 0 without a surface.
+    pub(super) fn frames(&self) -> Vec<f32> {
+        self.pictures(|light| &light.sun)
+    }
+
+    /// The noise of [`Self::frames`]: one standard deviation, on average.
+    pub(super) fn noise(&self) -> Vec<f32> {
+        self.pictures(|light| &light.noise)
+    }
+
+    fn pictures(&self, of: impl Fn(&Light) -> &Vec<f32>) -> Vec<f32> {
+        let [width, height] = self.plan.extent.map(|side| side as usize);
+        let times = self.plan.times.len();
+        let mut out = vec![0.0; 3 * width * height * times];
+        for (index, light) in self.lights.iter().enumerate() {
+            let [column, row, columns, _] = self.plan.tile(index as u32).map(|number| number as usize);
+            let there = |texel: &usize| light.mask[texel / 32] >> (texel % 32) & 1 != 0;
+            for (number, texel) in (0..32 * light.mask.len()).filter(there).enumerate() {
+                let pixel = (row + texel / columns) * width + column + texel % columns;
+                for channel in 0..3 {
+                    let of_texel = &of(light)[(3 * number + channel) * times..][..times];
+                    for (time, value) in of_texel.iter().enumerate() {
+                        out[3 * (time * width * height + pixel) + channel] = *value;
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// Sizes, errors, and for each lit time its second of the day and the irradiance of the sun in the weather of the plan.
+    ///
+    /// # Errors
+    /// `Input` for impossible weather.
+    pub(super) fn facts_of_frames(&self) -> Result<Vec<(String, f64)>> {
+        let mut facts = self.facts.clone();
+        facts.push(("steps".into(), f64::from(self.plan.steps)));
+        facts.push(("lit".into(), self.plan.times.len() as f64));
+        for (number, time) in self.plan.times.iter().enumerate() {
+            let sky = Sky::new(self.plan.weather, time.sun.map(f64::from)).map_err(Error::input)?;
+            facts.push((format!("second {number}"), time.seconds));
+            for (name, value) in ["red", "green", "blue"].iter().zip(sky.sun_irradiance()) {
+                facts.push((format!("{name} {number}"), f64::from(value)));
+            }
+        }
+        Ok(facts)
+    }
+}
+
+/// Median over the frames, and the largest, of the root mean square of the noise over the mean of the frame. Frames without light have none.
+pub(super) fn noise_of_frames(frames: &[f32], noise: &[f32], times: usize) -> [(String, f64); 2] {
+    let one = (frames.len() / times.max(1)).max(1);
+    let relative = |(frame, noise): (&[f32], &[f32])| {
+        let mean = frame.iter().map(|value| f64::from(*value)).sum::<f64>() / one as f64;
+        let square = noise.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>() / one as f64;
+        (mean > 0.0).then(|| square.sqrt() / mean)
+    };
+    let mut all: Vec<f64> = frames.chunks_exact(one).zip(noise.chunks_exact(one)).filter_map(relative).collect();
+    all.sort_by(f64::total_cmp);
+    let middle = all.get(all.len() / 2).copied().unwrap_or(0.0);
+    [("median noise".into(), middle), ("worst noise".into(), all.last().copied().unwrap_or(0.0))]
+}
