@@ -345,6 +345,11 @@ fn the_device_decodes_probes_as_the_processor_does_and_without_negative_light() 
                             f64::from(a[channel]) + f64::from(b[channel])
                         });
                         let found: [f64; 9] = std::array::from_fn(|k| f64::from(found[k][channel]));
+                        // A sky that the bake does not guarantee may come back with less than no light.
+                        if wanted[0] <= 0.0 {
+                            assert_eq!(found, [0.0; 9], "{at:?}");
+                            continue;
+                        }
                         let close = |a: f64, b: f64| (a - b).abs() < 1e-4 * wanted[0].abs().max(1e-6);
                         assert!(close(found[0], wanted[0]), "{at:?}: {found:?}, not {wanted:?}");
                         // One factor for all harmonics above the first.

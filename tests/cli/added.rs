@@ -37,14 +37,14 @@ fn wrong_objects_are_refused_and_named() {
 
 #[test]
 fn objects_are_in_the_scene_of_every_command() {
-    let nodes = |more: &[&str]| {
+    let materials = |more: &[&str]| {
         let ran = lucerna([&["inspect", "--builtin", "cornell", "--json"], more].concat());
-        ran.expect(0, &[]).json()["nodes"].clone()
+        ran.expect(0, &[]).json()["materials"].as_array().unwrap().len()
     };
-    let before = nodes(&[]);
-    assert_ne!(before, nodes(&["--add", "builtin:pot@0,0.1,0,2,45", "--add", "builtin:hare@0.1,0,0,0.1"]));
+    let before = materials(&[]);
+    assert_ne!(before, materials(&["--add", "builtin:pot@0,0.1,0,2,45", "--add", "builtin:hare@0.1,0,0,0.1"]));
     if let Some(file) = asset("gltf/CesiumMan/CesiumMan.glb") {
-        assert_ne!(before, nodes(&["--add", &format!("{}@0,0.1,0,0.001", file.display())]));
+        assert_ne!(before, materials(&["--add", &format!("{}@0,0.1,0,0.001", file.display())]));
     }
     if !device() {
         return;
@@ -53,7 +53,7 @@ fn objects_are_in_the_scene_of_every_command() {
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let common = ["render", "--builtin", "cornell", "--size", "32x24", "--exposure", "0"];
     isr(&[&common[..], &["-o", &at("a.png")]].concat()).expect(0, &[]);
-    isr(&[&common[..], &["--add", "builtin:hare@0,0,0,0.3", "-o", &at("b.png")]].concat()).expect(0, &[]);
+    isr(&[&common[..], &["--add", "builtin:hare@0.2,0,0.2,0.3", "-o", &at("b.png")]].concat()).expect(0, &[]);
     assert_ne!(std::fs::read(at("a.png")).unwrap(), std::fs::read(at("b.png")).unwrap());
     // The record of the picture has the object.
     lucerna(["rerun", &at("b.png")]).expect(0, &[]);
@@ -85,7 +85,7 @@ fn baked_daylight_lights_objects_that_it_does_not_know() {
             ["render", "--builtin", "cornell", "--bake", bake, "--size", "32x24", "--exposure", "-8", "-o", out];
         daylight(&[&common[..], more].concat())
     };
-    let hare = ["--add", "builtin:hare@0,0,0,0.3"];
+    let hare = ["--add", "builtin:hare@0.2,0,0.2,0.3"];
     picture(&day, &at("alone.png"), &[]).expect(0, &[]);
     picture(&day, &at("probes.png"), &hare).expect(0, &[]);
     picture(&day, &at("screen.png"), &[&hare[..], &["-D", "daylight.added=screen"]].concat()).expect(0, &[]);
