@@ -190,7 +190,7 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
         }
         times.extend(lit(&of_day, &calendar, (day, course), baking));
     }
-    let (receivers, extent, sources, corners, notes) = match kind {
+    let (receivers, extent, sources, corners, mut notes): (_, _, _, _, Vec<String>) = match kind {
         KindArg::View => {
             let (_, view) = stage.at(args.time, args.size)?;
             let receivers = Kind::View {
@@ -227,9 +227,13 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
                 corners: digest(&corners),
             };
             let sources = Sources::Lightmap(unwrapped.by_tile(baking.tile));
-            (receivers, unwrapped.lightmap.extent, sources, corners, unwrapped.notes)
+            let notes = unwrapped.notes.iter().map(|note| format!("lightmap: {note}")).collect();
+            (receivers, unwrapped.lightmap.extent, sources, corners, notes)
         }
     };
+    if calendar.point.is_some() && baking.disc {
+        notes.push("a sun at a distance is a point: bake.disc has no effect".into());
+    }
     let plan = Plan {
         scene: scene.name.clone(),
         parts: parts(scene),
