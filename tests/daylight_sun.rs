@@ -8,7 +8,7 @@ use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::LightKind,
-    techniques::daylight::{Sources, SunPoint, Transport},
+    techniques::daylight::{Baking, Sources, SunPoint, Transport},
     tracer::{Filter, Settings},
 };
 
@@ -17,8 +17,9 @@ fn a_sun_at_a_distance_has_the_light_of_a_point_light_there() {
     with_gpu(|gpu| {
         let (scene, view) = (stage(), eye());
         let point = SunPoint { centre: [0.0, 1.0, 0.0], distance: 5.0 };
-        let mut plan = plan(&scene, &view, baking());
+        let mut plan = plan(&scene, &view, Baking { samples: 192, ..baking() });
         plan.calendar.point = Some(point);
+        plan.times.remove(1);
         plan.validate().unwrap();
         let mut transport = Transport::new(gpu, &scene, &plan, Sources::View(Box::new(view))).unwrap();
         let [columns, rows] = plan.tiles();
@@ -29,7 +30,7 @@ fn a_sun_at_a_distance_has_the_light_of_a_point_light_there() {
             let mut stage = Stage { scene: scene.clone() };
             let place = Mat4::from_translation(Vec3::from(point.position(lit.sun)));
             stage.light(LightKind::Point { range: None }, Vec3::ONE, point.distance * point.distance, place);
-            let layers = render(gpu, &stage.scene, &view, &settings, 512);
+            let layers = render(gpu, &stage.scene, &view, &settings, 256);
             let of = |name: &str| layers.layer(name).unwrap().data.clone();
             let (indirect, albedo) = (of("indirect"), of("albedo"));
             let (mut wanted, mut found) = (Vec3::ZERO, Vec3::ZERO);
@@ -48,7 +49,7 @@ fn a_sun_at_a_distance_has_the_light_of_a_point_light_there() {
                 }
             }
             let ratio = found / wanted;
-            assert!((ratio - 1.0).abs().max_element() < 0.015, "time {time}: {ratio}");
+            assert!((ratio - 1.0).abs().max_element() < 0.02, "time {time}: {ratio}");
         }
     });
 }

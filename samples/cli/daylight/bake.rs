@@ -97,7 +97,7 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
     let stage = Stage::open(&args.stage)?;
     stage.notes().iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
     let Planned { mut plan, sources, corners, notes } = plan(&args.day, args.kind, &keys.bake, &stage, &args.stage)?;
-    notes.iter().for_each(|note| console.info(&format!("note: lightmap: {note}")));
+    notes.iter().for_each(|note| console.info(&format!("note: {note}")));
     plan.validate()?;
     let gpu = Gpu::new(args.device.options()?)?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));

@@ -277,7 +277,8 @@ impl Receivers {
         let extent = unwrapped.lightmap.extent;
         let side = if baking.tile == 0 { extent[0].max(extent[1]) } else { baking.tile };
         let sources = Sources::Lightmap(unwrapped.by_tile(side.max(1)));
-        Ok(Self { kind, extent, sources, corners, notes: unwrapped.notes })
+        let notes = unwrapped.notes.iter().map(|note| format!("lightmap: {note}")).collect();
+        Ok(Self { kind, extent, sources, corners, notes })
     }
 }
 
@@ -336,7 +337,7 @@ fn planned(
         }
         times.extend(lit(&of_day, &calendar, (day, course), baking));
     }
-    let Receivers { kind, extent, sources, corners, notes } = receivers()?;
+    let Receivers { kind, extent, sources, corners, mut notes } = receivers()?;
     let probes = match (baking.probes > 0.0, options.probe_box) {
         (true, given) => {
             let around = given.map(|corners| corners.0).or_else(|| Grid::around(scene, baking.probes));
@@ -348,6 +349,9 @@ fn planned(
         }
         (false, None) => None,
     };
+    if calendar.point.is_some() && baking.disc {
+        notes.push("a sun at a distance is a point: bake.disc has no effect".into());
+    }
     let plan = Plan {
         scene: scene.name.clone(),
         parts: parts(scene),
