@@ -93,5 +93,5 @@ fn the_papers_preset_bakes_one_tile_and_renders() {
     daylight(&[&PICTURE[..], &["--paper", "--bake", &day, "-o", &picture]].concat()).expect(0, &[]);
     lucerna(["rerun", &picture]).expect(0, &["paper.day"]);
     let huge = ["bake", "--builtin", "cornell", "--paper", "--kind", "view", "--size", "1600x1200", "-o", "x.day"];
-    daylight(&huge).expect(2, &["bake.tile", "128"]);
+    daylight(&huge).expect(2, &["bake.tile", "64"]);
 }

@@ -320,7 +320,7 @@ impl Plan {
         }
         let what = format!("0: one tile of {texels} texels; with so many times at most {most} are allowed");
         let error = Error::usage(what).at("bake.tile");
-        Err(error.help("Choose a smaller picture, a longer interval, or tiles: bake.tile=128"))
+        Err(error.help("Choose a smaller picture, a longer interval, or tiles: bake.tile=64"))
     }
 
     /// The times of a day.
