@@ -239,7 +239,8 @@ mod tests {
         }
         let mean = colours.iter().flatten().map(|v| f64::from(*v)).sum::<f64>() / 702.0;
         let relative = (blocks.square / 702.0).sqrt() / mean;
-        assert!(relative < 0.01, "{relative}");
+        // Endpoints of 10 bits have steps of 1/32.
+        assert!(relative < 0.015, "{relative}");
     }
 
     #[test]
