@@ -253,7 +253,7 @@ impl Image {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::columns::mixed, *};
 
     const AIM: Aim = Aim { tolerance: 0.05, most: 64 };
 

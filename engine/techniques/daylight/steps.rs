@@ -166,6 +166,10 @@ impl Steps {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::techniques::daylight::Day;
+
+    /// Elevation at which the sun has set, degrees.
+    const SET: f64 = -0.2665;
 
     /// Sums of the weights by time.
     fn dense(steps: &Steps, seconds: f64, how: Interpolation) -> Vec<f64> {
