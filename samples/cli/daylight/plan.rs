@@ -171,3 +171,21 @@ fn planned(
     };
     Ok(Planned { plan, sources, corners, notes })
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Options {
+        #[command(flatten)]
+        day: DayOptions,
+    }
+
+    #[test]
+    fn the_defaults_are_those_of_the_options() {
+        assert_eq!(Options::parse_from(["daylight"]).day, DayOptions::default());
+    }
+}
