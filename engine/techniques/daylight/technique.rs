@@ -85,7 +85,7 @@ pub struct Daylight {
     probes: Option<Field>,
     around: Option<Around>,
     /// The last sky, and the state that it shows.
-    sky: Option<(OwnedImage, [f32; 7])>,
+    sky: Option<(OwnedImage, [[f32; 3]; 4])>,
 }
 
 impl Daylight {
@@ -166,7 +166,8 @@ impl Daylight {
         }
         here.environment_scale = strength;
         here.environment_rotation = 0.0;
-        let state = [sun.x, sun.y, sun.z, light[0], light[1], light[2], sky.radiance([0.0, 1.0, 0.0])[2]];
+        let [up, down] = [1.0, -1.0].map(|y| sky.radiance([0.0, y, 0.0]));
+        let state = [sun.to_array(), light, up, down];
         if self.sky.as_ref().is_none_or(|(_, shown)| *shown != state) {
             let image = resident::environment(&self.gpu, Some(&picture_of(sky)), SKY[0])?;
             self.sky = Some((image, state));

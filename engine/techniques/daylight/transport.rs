@@ -37,8 +37,8 @@ const BATCH: u32 = 16;
 const LAMP_TURNS: u64 = 64;
 /// Texels of [`Transport::sparse`], about.
 const SPARSE: usize = 2048;
-/// Vertices of a batch at most: 200 MB.
-const MOST_VERTICES: u64 = 1 << 22;
+/// Vertices of a batch at most: 100 MB, because every device allows buffers of 128 MiB.
+const MOST_VERTICES: u64 = 1 << 21;
 
 /// The scene of a bake on a device.
 #[derive(Debug)]

@@ -399,3 +399,21 @@ pub fn thin_out(plan: &mut Plan, transport: &mut Transport) -> Result<Option<(St
     });
     Ok(Some((said, json)))
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Options {
+        #[command(flatten)]
+        day: DayOptions,
+    }
+
+    #[test]
+    fn the_defaults_are_those_of_the_options() {
+        assert_eq!(Options::parse_from(["daylight", "--no-lamps"]).day, DayOptions::default());
+    }
+}

@@ -19,6 +19,8 @@ const SEEN: f64 = 100.0 / (800.0 * 600.0);
 /// Number of the paper's frame, of [`PAPER_LIT`] lit frames; the first is 1.
 const PAPER_FRAME: f64 = 121.0;
 const PAPER_LIT: f64 = 180.0;
+/// Lit frames at least: both ends of the day and one between.
+const LEAST: usize = 3;
 /// Frames that are darker than this share of the brightest one have no relative error.
 const DARK: f64 = 1e-3;
 
@@ -56,7 +58,11 @@ impl Day {
         let (steps, lit) = (fact("steps")? as usize, fact("lit")? as usize);
         let stack = results.picture(Layer(run, ""))?;
         let (width, rows) = (stack.width as usize, stack.height as usize);
-        if lit == 0 || rows % (lit + 1) != 0 {
+        if lit < LEAST {
+            let what = format!("has {lit} lit frames, at least {LEAST} are needed");
+            return Err(wrong(&what).help("Choose another date or latitude, or a shorter bake.interval"));
+        }
+        if rows % (lit + 1) != 0 {
             return Err(wrong(&format!("has {rows} rows for {lit} frames and the albedo")));
         }
         let height = rows / (lit + 1);
