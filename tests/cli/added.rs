@@ -52,8 +52,8 @@ fn objects_are_in_the_scene_of_every_command() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let common = ["render", "--builtin", "cornell", "--size", "32x24", "--exposure", "0"];
-    isr(&[&common[..], &["-o", &at("a.png")]].concat()).expect(0, &[]);
-    isr(&[&common[..], &["--add", "builtin:hare@0.2,0,0.2,0.3", "-o", &at("b.png")]].concat()).expect(0, &[]);
+    isr([&common[..], &["-o", &at("a.png")]].concat()).expect(0, &[]);
+    isr([&common[..], &["--add", "builtin:hare@0.2,0,0.2,0.3", "-o", &at("b.png")]].concat()).expect(0, &[]);
     assert_ne!(std::fs::read(at("a.png")).unwrap(), std::fs::read(at("b.png")).unwrap());
     // The record of the picture has the object.
     lucerna(["rerun", &at("b.png")]).expect(0, &[]);

@@ -62,15 +62,15 @@ impl Transport {
         };
         let places: Vec<Vec3> = grid.brick(brick).into_iter().map(|at| grid.position(at)).collect();
         // Random numbers of probes differ from those of texels.
-        let first = 0x8000_0000 | brick * consts::PROBE_BRICK.pow(3);
+        let first = 0x8000_0000 | (brick * consts::PROBE_BRICK.pow(3));
         let buffers = self.buffers(places.len() as u32, plan.times.len() as u32)?;
         let spacing = Vec3::from(grid.spacing);
         let (margin, most) = (0.1 * spacing.min_element(), 0.45 * spacing);
         let mut offsets = vec![Vec3::ZERO; places.len()];
         let at = |offsets: &[Vec3]| -> Vec<Vec3> { places.iter().zip(offsets).map(|(p, o)| *p + *o).collect() };
+        let mut scouts = plan.clone();
+        scouts.settings.bounces = 1;
         for _ in 0..STEPS {
-            let scouts = plan.clone();
-            let scouts = Plan { settings: super::super::Baking { bounces: 1, ..scouts.settings }, ..scouts };
             let mut found = vec![Vec::new(); places.len()];
             for first_sample in (0..SCOUTS).step_by(BATCH as usize) {
                 let starts = self.batch(&scouts, first, &at(&offsets), &buffers, [first_sample, BATCH], false)?;
@@ -94,7 +94,7 @@ impl Transport {
             distances.iter_mut().zip(starts.chunks_exact(now as usize)).for_each(|(d, starts)| d.add(starts));
         }
         let valid: Vec<bool> = distances.iter().map(|distances| !distances.is_inside()).collect();
-        let (sun, sky) = self.sums(&buffers)?;
+        let [sun, sky] = self.sums(&buffers)?;
         let light = summed(&sun, &sky, &valid, plan.times.len(), samples);
         Ok(Gathered { positions, distances: distances.iter().map(Distances::map).collect(), light })
     }
@@ -172,12 +172,12 @@ impl Transport {
         Ok(starts)
     }
 
-    fn sums(&mut self, buffers: &Buffers) -> Result<(Vec<[f32; 3]>, Vec<[f32; 3]>)> {
+    fn sums(&mut self, buffers: &Buffers) -> Result<[Vec<[f32; 3]>; 2]> {
         let mut graph = Graph::new("daylight.probes");
         let sums = [&buffers.sun, &buffers.sky].map(|buffer| graph.import_buffer(buffer));
         let [sun, sky] = sums.map(|buffer| graph.read_buffer(buffer));
         let frame = self.runner.run(&graph)?;
-        Ok((frame.buffer(sun), frame.buffer(sky)))
+        Ok([frame.buffer(sun), frame.buffer(sky)])
     }
 }
 
