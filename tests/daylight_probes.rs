@@ -16,7 +16,9 @@ use lucerna::{
     technique::{Ready, Shot, Technique},
     techniques::daylight::{
         Added, Baked, Baking, Calendar, Day, Daylight, Kind, Lit, PictureSettings, Plan, Sky, Sources, Stored,
-        Transport, Weather, parts,
+        Transport, Weather, finish,
+        gathered::Gathered,
+        parts,
         probes::{Brick, DIRECTIONS, Field, Grid, Moment, harmonics, irradiance},
         units,
     },
@@ -212,7 +214,7 @@ fn probes_have_the_irradiance_of_the_path_tracer() {
     with_gpu(|gpu| {
         let scene = room();
         let middle = vec3(0.4, 0.5, 0.3);
-        let plan = plan(&scene, around(middle, 1e-3), Baking { probe_samples: 256, ..baking() });
+        let plan = plan(&scene, around(middle, 1e-3), Baking { probe_samples: 256, noise_floor: false, ..baking() });
         let gathered = transport(gpu, &scene, &plan).brick(&plan, 0).unwrap();
         for (time, lit) in plan.times.iter().enumerate() {
             let lit = sunny(scene.clone(), Vec3::from(lit.sun), Vec3::ONE);
@@ -270,11 +272,14 @@ fn stored(gpu: &Gpu, scene: &Scene, grid: Option<Grid>, settings: Baking) -> Sto
     let skies = units::skies(&plan).unwrap();
     let mut transport = transport(gpu, scene, &plan);
     let unit = |transport: &mut Transport, index: u32| units::unit(&plan, transport, index, &skies).unwrap();
-    let tiles = (0..plan.tile_count()).map(|index| {
-        let [_, _, columns, rows] = plan.tile(index);
-        units::Tile::decode(&unit(&mut transport, index), &plan, (columns * rows) as usize).unwrap()
-    });
-    let tiles = tiles.collect();
+    let gathered: Vec<Gathered> = (0..plan.tile_count())
+        .map(|index| {
+            let [_, _, columns, rows] = plan.tile(index);
+            let bytes = unit(&mut transport, index);
+            Gathered::decode(&bytes, (columns * rows) as usize, plan.dimensions()).unwrap()
+        })
+        .collect();
+    let tiles = finish::tiles(&plan, &gathered, |_| Ok(())).unwrap();
     let probes = (0..plan.brick_count()).map(|brick| {
         let count = plan.probes.as_ref().unwrap().brick(brick).len();
         Brick::decode(&unit(&mut transport, plan.tile_count() + brick), &plan, count).unwrap()

@@ -311,10 +311,10 @@ fn leading(matrix: DMatrix<f64>, keep: Keep, total: f64) -> Result<(Vec<f64>, Ve
 fn rotated(mut matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
     let count = matrix.nrows();
     let mut vectors = DMatrix::<f64>::identity(count, count);
-    let size = matrix.iter().fold(0.0f64, |most, value| most.max(value.abs()));
-    if !size.is_finite() {
+    if matrix.iter().any(|value| !value.is_finite()) {
         return None;
     }
+    let size = matrix.iter().fold(0.0f64, |most, value| most.max(value.abs()));
     // Each sweep squares what is left; a dozen is more than any matrix needs.
     for _ in 0..64 {
         let mut rest = 0.0f64;

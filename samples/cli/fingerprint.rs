@@ -160,7 +160,6 @@ mod tests {
             skins: vec![Skin { name: String::new(), joints: vec![0], inverse_bind: vec![Mat4::IDENTITY] }],
             animations: vec![Animation { name: String::new(), channels: vec![channel] }],
             environment: Some(Environment { width: 2, height: 1, ..Environment::constant(Vec3::ONE) }),
-            added: None,
             notes: Vec::new(),
             added: None,
         }

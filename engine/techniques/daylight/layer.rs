@@ -22,8 +22,8 @@ pub struct Layer {
     pub wide: u32,
     /// Images of signed bytes.
     pub narrow: u32,
-    /// Coefficients: for each image one number for each dimension. The scale of the image's values is part of them. They are a factor of the image
-    /// ([`factor`]) times numbers that 16-bit floats hold exactly.
+    /// Coefficients: for each image one number for each dimension. The scale of the image's values is part of them. Files have 24 bits of them
+    /// ([`rounded`]).
     pub table: Vec<f32>,
     /// For each texel the values of all images, three each; rows are filled up to whole words.
     pub words: Vec<u32>,
@@ -59,7 +59,7 @@ impl Layer {
 
     /// Bytes in files.
     pub fn bytes(&self) -> u64 {
-        2 * self.table.len() as u64 + 4 * (self.images() as u64 + self.words.len() as u64)
+        3 * self.table.len() as u64 + 4 * self.words.len() as u64
     }
 
     /// Compresses the light of a tile: three rows (red, green, blue) for each texel. If the noise is known, the tolerance is for the light
@@ -200,10 +200,11 @@ impl Layer {
     }
 }
 
-/// The power of two that brings the largest of an image's coefficients to 1 to 2: half-floats are most precise there, and the product is exact.
-pub fn factor(row: impl Iterator<Item = f64>) -> f32 {
-    let largest = row.fold(0.0f64, |most, value| most.max(value.abs()));
-    if largest > 0.0 { largest.log2().floor().clamp(-120.0, 120.0).exp2() as f32 } else { 1.0 }
+/// A number of 24 bits: that of 32 bits without its last byte. Coefficients at dusk are a millionth of those at noon, which is too little for
+/// numbers of 16 bits.
+pub fn rounded(value: f32) -> f32 {
+    let near = f32::from_bits(value.to_bits().saturating_add(0x80) & !0xff);
+    if near.is_finite() { near } else { value }
 }
 
 /// An image as it is stored.
@@ -227,13 +228,7 @@ impl Image {
         let wide = may_be_wide && rounding > ROUNDING * aim.tolerance;
         // Values of 16 bits stay near 1, where they are most precise and never too large.
         let scale = if wide { f64::from(largest).max(1e-30) } else { step.max(1e-30) };
-        let mut table: Vec<f64> = along.iter().map(|a| a * scale).collect();
-        // Twice, because rounding may bring the largest coefficient to the next power of two.
-        for _ in 0..2 {
-            let factor = f64::from(factor(table.iter().copied()));
-            table.iter_mut().for_each(|value| *value = f16::from_f64(*value / factor).to_f64() * factor);
-        }
-        let table: Vec<f32> = table.into_iter().map(|value| value as f32).collect();
+        let table: Vec<f32> = along.iter().map(|a| rounded((a * scale) as f32)).collect();
         let (codes, decoded) = values
             .iter()
             .map(|value| {

@@ -80,6 +80,7 @@ pub struct Baking {
     #[schemars(range(min = 2, max = 1_048_576))]
     pub probe_samples: u32,
     /// Seed of all random numbers.
+    #[schemars(range(min = 0, max = 4_294_967_295_u32))]
     pub seed: u32,
 }
 

@@ -1,13 +1,11 @@
 //! Bakes as jobs of [`crate::bake`]. A unit is a tile with all times of the day; its bytes are its gathered light ([`Gathered`]). When all units
 //! are there, they become the compressed [`Tile`]s of a file ([`super::finish`]).
 
-use half::f16;
-
 use super::{
     Plan, Sky, Transport, Weather,
     columns::{Columns, Measured},
     gathered::Gathered,
-    layer::{Aim, Layer, factor},
+    layer::{Aim, Layer, rounded},
     probes::Brick,
     transport::Light,
 };
@@ -220,11 +218,7 @@ impl Tile {
                 out.extend_from_slice(&number.to_le_bytes());
             }
             out.extend_from_slice(&(layer.words.len() as u64).to_le_bytes());
-            for row in layer.table.chunks_exact((layer.dimensions as usize).max(1)) {
-                let factor = factor(row.iter().map(|value| f64::from(*value)));
-                out.extend_from_slice(&factor.to_le_bytes());
-                row.iter().for_each(|value| out.extend_from_slice(&f16::from_f32(value / factor).to_le_bytes()));
-            }
+            layer.table.iter().for_each(|value| out.extend_from_slice(&rounded(*value).to_le_bytes()[1..]));
             layer.words.iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
         }
         out
@@ -310,12 +304,9 @@ impl<'a> Rest<'a> {
         if wide > dimensions || narrow > dimensions {
             return Err(Error::input(format!("{wide} and {narrow} images of {dimensions} dimensions")));
         }
-        let mut table = Vec::new();
-        for _ in 0..wide + narrow {
-            let factor = self.float()?;
-            let row = self.take(2 * dimensions as usize)?.chunks_exact(2);
-            table.extend(row.map(|bytes| f16::from_le_bytes([bytes[0], bytes[1]]).to_f32() * factor));
-        }
+        let table =
+            self.take((wide as usize + narrow as usize).saturating_mul(3 * dimensions as usize))?.chunks_exact(3);
+        let table = table.map(|bytes| f32::from_le_bytes([0, bytes[0], bytes[1], bytes[2]])).collect();
         let words = (0..words).map(|_| self.word()).collect::<Result<_>>()?;
         Ok(Layer { dimensions, wide, narrow, table, words, worst, worst_dimension, hidden, noise })
     }
