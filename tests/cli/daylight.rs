@@ -122,7 +122,7 @@ fn a_path_from_a_file_lights_bakes_and_pictures() {
         "lamp.csv",
         "time,x,y,z,red,green,blue\n08:00,1,1,0,20000,10000,0\n12:00,0,1,0,20000,10000,0\n16:00,0,1,0,0,0,0\n",
     );
-    let path = ["--sun-path", "lamp.csv", "-D", "bake.interval=30"];
+    let path = ["--sun-path", "lamp.csv", "-D", "bake.interval=30", "--no-lamps"];
     let told = lab.view("lamp.day", &[&path[..], &["--json"]].concat()).expect(0, &[]).json();
     // From 08:00 to 15:30; at 16:00 the light is out.
     assert_eq!((&told["steps"], &told["lit"]), (&48.into(), &16.into()));
@@ -283,7 +283,8 @@ fn several_days_in_one_file_are_as_the_days_alone() {
         return;
     }
     let lab = Lab::new();
-    let day = ["-D", "bake.interval=60", "-D", "bake.tolerance=0.01", "--json"];
+    let exact = ["-D", "bake.tolerance=0.01", "-D", "bake.noise_floor=false", "-D", "bake.filter=0"];
+    let day = [&["-D", "bake.interval=60", "--json"][..], &exact].concat();
     let summer = lab.view("summer.day", &[&day[..], &["--date", "2026-06-21"]].concat()).expect(0, &[]).json();
     let winter = lab.view("winter.day", &[&day[..], &["--date", "2026-12-21"]].concat()).expect(0, &[]).json();
     let both = [&day[..], &["--dates", "2026-06-21,2026-12-21", "-D", "bake.adaptive=off"]].concat();

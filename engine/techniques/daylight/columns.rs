@@ -233,6 +233,54 @@ impl Rest {
     }
 }
 
+/// The mean light that some images leave out, as one more image: the same value at each texel, and a coefficient for each dimension. Where noise
+/// hides the light, images that describe it are not found, but its mean over the tile is known, and no energy may be lost. `None`: all
+/// columns have their mean within the tolerance.
+pub(super) fn level(
+    light: Measured<'_>,
+    columns: Columns<'_>,
+    images: &[(&[f32], &[f32])],
+    tolerance: f64,
+) -> Option<([f32; 3], Vec<f64>)> {
+    let dimensions = light.dimensions.max(1);
+    let texels = (light.lines() / 3).max(1) as f64;
+    let mut left = vec![[0.0f64; 3]; dimensions];
+    for (line, row) in light.rows.chunks_exact(dimensions).enumerate() {
+        left.iter_mut().zip(row).for_each(|(left, value)| left[line % 3] += f64::from(*value) / texels);
+    }
+    let means: Vec<f64> = left.iter().map(|channels| channels.iter().sum::<f64>() / 3.0).collect();
+    for (along, values) in images {
+        let mut sums = [0.0f64; 3];
+        values.iter().enumerate().for_each(|(line, value)| sums[line % 3] += f64::from(*value) / texels);
+        for (left, along) in left.iter_mut().zip(*along) {
+            left.iter_mut().zip(sums).for_each(|(left, sum)| *left -= f64::from(*along) * sum);
+        }
+    }
+    let grey: Vec<f64> = left.iter().map(|channels| channels.iter().sum::<f64>() / 3.0).collect();
+    let off = |missing: f64, mean: f64| missing.abs() > 0.5 * tolerance * mean;
+    let wrong = match columns {
+        Columns::Dimensions => grey.iter().zip(&means).any(|(missing, mean)| off(*missing, *mean)),
+        Columns::Mixtures(mixtures) => mixtures.chunks_exact(dimensions).any(|mixture| {
+            let of = |values: &[f64]| values.iter().zip(mixture).map(|(v, m)| v * f64::from(*m)).sum::<f64>();
+            off(of(&grey), of(&means))
+        }),
+    };
+    // The colour of what is missing, by its size.
+    let mut colour = [0.0f64; 3];
+    for (left, (missing, mean)) in left.iter().zip(grey.iter().zip(&means)) {
+        let weight = missing.signum() * inverse(*mean);
+        colour.iter_mut().zip(left).for_each(|(colour, left)| *colour += weight * left);
+    }
+    let largest = colour.iter().fold(0.0f64, |most, value| most.max(value.abs()));
+    if !wrong || largest == 0.0 {
+        return None;
+    }
+    let colour = colour.map(|value| value.max(0.0) / largest);
+    let square: f64 = colour.iter().map(|value| value * value).sum();
+    let along = left.iter().map(|left| left.iter().zip(&colour).map(|(l, c)| l * c).sum::<f64>() / square.max(1e-30));
+    Some((colour.map(|value| value as f32), along.collect()))
+}
+
 fn take(values: &mut [f32], of_columns: &[f32], image: &[f32]) {
     for (column, along) in values.chunks_exact_mut(image.len().max(1)).zip(of_columns) {
         column.iter_mut().zip(image).for_each(|(value, decoded)| *value -= along * decoded);
@@ -337,6 +385,14 @@ mod tests {
         let layer = Layer::compress(light, Columns::Dimensions, aim).unwrap();
         assert!(layer.hidden as usize > TIMES / 2, "{} hidden", layer.hidden);
         assert!(layer.images() < 10, "{}", layer.images());
+        // Each column keeps its mean.
+        for t in 0..TIMES {
+            let coefficients = layer.mix([(t, [1.0; 3])].into_iter());
+            let sums = |texel: usize| layer.decode(texel, &coefficients).into_iter().sum::<f32>();
+            let found: f64 = (0..TEXELS).map(|texel| f64::from(sums(texel))).sum();
+            let wanted: f64 = rows.iter().skip(t).step_by(TIMES).map(|value| f64::from(*value)).sum();
+            assert!((found / wanted - 1.0).abs() < 0.02, "{t}: {found} {wanted}");
+        }
     }
 
     #[test]

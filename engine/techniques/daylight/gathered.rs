@@ -7,7 +7,7 @@ use half::f16;
 
 use super::{
     Light,
-    columns::{Columns, Measured, Rest, Weighted, project},
+    columns::{Columns, Measured, Rest, Weighted, level, project},
 };
 use crate::{Error, Result};
 
@@ -61,7 +61,7 @@ impl Coded {
         }
         let Weighted { scaled, noise, basis } = Weighted::new(light, &weights, MOST)?;
         let mut rest = Rest::new(light, columns);
-        let (mut vectors, mut coefficients) = (Vec::new(), Vec::new());
+        let (mut vectors, mut coefficients): (Vec<f32>, Vec<[Vec<f16>; 2]>) = (Vec::new(), Vec::new());
         for index in 0..basis.len() {
             if rest.state(SHARE * tolerance).within {
                 break;
@@ -79,6 +79,15 @@ impl Coded {
             rest.remove_noise(vector, &weights);
             vectors.extend(along);
             coefficients.push([of_light, of_noise]);
+        }
+        let decoded: Vec<Vec<f32>> =
+            coefficients.iter().map(|[of_light, _]| of_light.iter().map(|value| value.to_f32()).collect()).collect();
+        let known: Vec<(&[f32], &[f32])> =
+            vectors.chunks_exact(dimensions).zip(&decoded).map(|(along, values)| (along, values.as_slice())).collect();
+        if let Some((colour, along)) = level(light, columns, &known, SHARE * tolerance) {
+            vectors.extend(along.into_iter().map(|value| value as f32));
+            let values = colour.iter().map(|value| f16::from_f32(*value)).cycle().take(lines).collect();
+            coefficients.push([values, vec![f16::ZERO; lines]]);
         }
         let mut bits = Vec::with_capacity(2 * lines * coefficients.len());
         for line in 0..lines {
@@ -207,7 +216,7 @@ impl Gathered {
         for (layer, wanted) in layers.iter_mut().zip(dimensions) {
             layer.dimensions = rest.word()?;
             let count = rest.word()? as usize;
-            if count > MOST || layer.dimensions as usize != wanted {
+            if count > MOST + 1 || layer.dimensions as usize != wanted {
                 return Err(Error::input(format!("{count} vectors of {} dimensions", layer.dimensions)));
             }
             layer.vectors = (0..count * wanted).map(|_| rest.float()).collect::<Result<_>>()?;

@@ -7,7 +7,7 @@
 
 use half::f16;
 
-use super::columns::{Columns, Measured, Rest, Weighted, project};
+use super::columns::{Columns, Measured, Rest, Weighted, level, project};
 use crate::{Error, Result};
 
 /// Largest part of the tolerance that the rounding of one image to bytes may take.
@@ -101,6 +101,17 @@ impl Layer {
             let image = Image::new(&values, along, vector, aim, images.last().is_none_or(|i| i.wide));
             rest.remove(&image.table, &image.decoded);
             rest.remove_noise(vector, &weights);
+            images.push(image);
+            state = rest.state(aim.tolerance);
+        }
+        let known: Vec<(&[f32], &[f32])> = images.iter().map(|i| (i.table.as_slice(), i.decoded.as_slice())).collect();
+        if let Some((colour, along)) = level(light, columns, &known, aim.tolerance)
+            && images.len() < aim.most
+        {
+            let values: Vec<f32> = colour.iter().copied().cycle().take(3 * texels).collect();
+            // Bytes hold a colour well enough.
+            let image = Image::new(&values, along, &[], aim, false);
+            rest.remove(&image.table, &image.decoded);
             images.push(image);
             state = rest.state(aim.tolerance);
         }

@@ -121,7 +121,16 @@ impl Baking {
     /// The paper's choices: a sun without a size, and 20 images for the whole picture, whatever their error. The paper takes the mean image
     /// away before; here components are around zero, so that no light stays exactly no light, and the mean is one of the images.
     pub fn paper() -> Self {
-        Self { disc: false, tile: 0, images: 20, tolerance: 1e-4, noise_floor: false, filter: 0, ..Self::default() }
+        Self {
+            disc: false,
+            tile: 0,
+            images: 20,
+            tolerance: 1e-4,
+            noise_floor: false,
+            filter: 0,
+            probes: 0.0,
+            ..Self::default()
+        }
     }
 
     /// # Errors
