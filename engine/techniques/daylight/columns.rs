@@ -80,17 +80,12 @@ impl Columns<'_> {
 #[derive(Debug)]
 pub(super) struct Weighted {
     pub scaled: Vec<f32>,
-    /// Empty if the noise is unknown.
-    pub noise: Vec<f32>,
     pub basis: Basis,
 }
 
 impl Weighted {
     pub fn new(light: Measured<'_>, weights: &[f64], most: usize) -> Result<Self> {
-        let times = |rows: &[f32]| -> Vec<f32> {
-            rows.iter().zip(weights.iter().cycle()).map(|(value, weight)| (f64::from(*value) * weight) as f32).collect()
-        };
-        let (scaled, noise) = (times(light.rows), times(light.noise));
+        let (scaled, noise) = (times(light.rows, weights), times(light.noise, weights));
         let ones = vec![1.0; light.lines()];
         let mut moments = Moments::new(light.dimensions);
         moments.add(&scaled, &ones)?;
@@ -100,8 +95,13 @@ impl Weighted {
             moments.without_noise(&of_noise)?;
         }
         let basis = moments.basis(Centre::Origin, Keep::Count(most))?;
-        Ok(Self { scaled, noise, basis })
+        Ok(Self { scaled, basis })
     }
+}
+
+/// Rows times the weights of their dimensions.
+pub(super) fn times(rows: &[f32], weights: &[f64]) -> Vec<f32> {
+    rows.iter().zip(weights.iter().cycle()).map(|(value, weight)| (f64::from(*value) * weight) as f32).collect()
 }
 
 /// The coefficient of each row along a vector.
@@ -276,8 +276,9 @@ pub(super) fn level(
         return None;
     }
     let colour = colour.map(|value| value.max(0.0) / largest);
-    let square: f64 = colour.iter().map(|value| value * value).sum();
-    let along = left.iter().map(|left| left.iter().zip(&colour).map(|(l, c)| l * c).sum::<f64>() / square.max(1e-30));
+    // The sum of the colours is kept exactly.
+    let sum = colour.iter().sum::<f64>().max(1e-30);
+    let along = left.iter().map(|left| left.iter().sum::<f64>() / sum);
     Some((colour.map(|value| value as f32), along.collect()))
 }
 

@@ -7,7 +7,7 @@ use half::f16;
 
 use super::{
     Light,
-    columns::{Columns, Measured, Rest, Weighted, level, project},
+    columns::{Columns, Measured, Rest, Weighted, level, project, times},
 };
 use crate::{Error, Result};
 
@@ -47,11 +47,13 @@ pub struct Gathered {
 }
 
 impl Coded {
-    /// Codes the light of some lines. `tolerance`: error that the final compression allows.
+    /// Codes the light of some lines. `tolerance`: error that the final compression allows; `exact`: for the light with its noise.
     ///
     /// # Errors
     /// `Runtime` if the decomposition does not converge, or if a value is not finite.
-    pub fn new(light: Measured<'_>, columns: Columns<'_>, tolerance: f64) -> Result<Self> {
+    pub fn new(light: Measured<'_>, columns: Columns<'_>, tolerance: f64, exact: bool) -> Result<Self> {
+        let all_noise = light.noise;
+        let light = if exact { Measured { noise: &[], ..light } } else { light };
         let dimensions = light.dimensions;
         let none = Self { dimensions: dimensions as u32, ..Self::default() };
         let lines = light.rows.len() / dimensions.max(1);
@@ -59,7 +61,9 @@ impl Coded {
         if lines == 0 || weights.iter().all(|weight| *weight == 0.0) {
             return Ok(none);
         }
-        let Weighted { scaled, noise, basis } = Weighted::new(light, &weights, MOST)?;
+        let most = if exact { light.dimensions } else { MOST };
+        let Weighted { scaled, basis } = Weighted::new(light, &weights, most)?;
+        let noise = times(all_noise, &weights);
         let mut rest = Rest::new(light, columns);
         let (mut vectors, mut coefficients): (Vec<f32>, Vec<[Vec<f16>; 2]>) = (Vec::new(), Vec::new());
         for index in 0..basis.len() {
@@ -167,9 +171,15 @@ impl Gathered {
     ///
     /// # Errors
     /// As [`Coded::new`].
-    pub fn new(light: &Light, dimensions: [usize; 3], columns: [Columns<'_>; 3], tolerance: f64) -> Result<Self> {
+    pub fn new(
+        light: &Light,
+        dimensions: [usize; 3],
+        columns: [Columns<'_>; 3],
+        tolerance: f64,
+        exact: bool,
+    ) -> Result<Self> {
         let measured = light.measured(dimensions);
-        let coded = |layer: usize| Coded::new(measured[layer], columns[layer], tolerance);
+        let coded = |layer: usize| Coded::new(measured[layer], columns[layer], tolerance, exact);
         let layers = [coded(0)?, coded(1)?, coded(2)?];
         Ok(Self { mask: light.mask.clone(), spots: light.spots.clone(), layers })
     }
@@ -216,7 +226,7 @@ impl Gathered {
         for (layer, wanted) in layers.iter_mut().zip(dimensions) {
             layer.dimensions = rest.word()?;
             let count = rest.word()? as usize;
-            if count > MOST + 1 || layer.dimensions as usize != wanted {
+            if count > MOST.max(wanted) + 1 || layer.dimensions as usize != wanted {
                 return Err(Error::input(format!("{count} vectors of {} dimensions", layer.dimensions)));
             }
             layer.vectors = (0..count * wanted).map(|_| rest.float()).collect::<Result<_>>()?;

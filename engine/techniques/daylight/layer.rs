@@ -85,7 +85,7 @@ impl Layer {
         if texels == 0 || weights.iter().all(|w| *w == 0.0) {
             return Ok(none);
         }
-        let Weighted { scaled, basis, .. } = Weighted::new(light, &weights, aim.most)?;
+        let Weighted { scaled, basis } = Weighted::new(light, &weights, aim.most)?;
         let mut rest = Rest::new(light, columns);
         let mut images: Vec<Image> = Vec::new();
         let mut state = rest.state(aim.tolerance);

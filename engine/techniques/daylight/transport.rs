@@ -439,10 +439,10 @@ fn summed(sums: &[[f32; 3]], [count, dimensions, samples]: [u32; 3]) -> [Vec<f32
     let (even_count, odd_count) = (samples.div_ceil(2), samples / 2);
     let mut out = [(); 2].map(|()| Vec::with_capacity(3 * count * dimensions));
     for texel in 0..count {
+        let first = 2 * texel * dimensions;
         for channel in 0..3 {
-            for dimension in 0..dimensions {
-                let at = 2 * (texel * dimensions + dimension);
-                let [even, odd] = [sums[at][channel], sums[at + 1][channel]].map(f64::from);
+            for pair in sums[first..first + 2 * dimensions].chunks_exact(2) {
+                let [even, odd] = [pair[0][channel], pair[1][channel]].map(f64::from);
                 let difference = odd / f64::from(odd_count.max(1)) - even / f64::from(even_count.max(1));
                 out[0].push(((even + odd) * all) as f32);
                 out[1].push((0.5 * difference) as f32);

@@ -2,7 +2,7 @@
 //! are there, they become the compressed [`Tile`]s of a file ([`super::finish`]).
 
 use super::{
-    Plan, Sky, Transport, Weather,
+    Baking, Plan, Sky, Transport, Weather,
     columns::{Columns, Measured},
     gathered::Gathered,
     layer::{Aim, Layer, rounded},
@@ -104,7 +104,8 @@ pub fn unit(plan: &Plan, transport: &mut Transport, index: u32, skies: &[f32]) -
 /// # Errors
 /// As [`Gathered::new`].
 pub fn gathered(plan: &Plan, light: &Light, skies: &[f32]) -> Result<Gathered> {
-    Gathered::new(light, plan.dimensions(), kinds(skies), plan.settings.tolerance)
+    let Baking { tolerance, noise_floor, .. } = plan.settings;
+    Gathered::new(light, plan.dimensions(), kinds(skies), tolerance, !noise_floor)
 }
 
 /// The columns of the three kinds of light that are within the tolerance.
