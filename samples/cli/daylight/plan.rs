@@ -51,7 +51,7 @@ pub struct DayOptions {
     pub north: f32,
 
     /// Path of the sun in place of date and place: columns `time,azimuth,elevation` or `time,x,y,z`, then perhaps `red,green,blue` (W/m²); or
-    /// tables [[sun]] with `time`, `azimuth` and `elevation` or `direction`, and perhaps `irradiance`
+    /// tables `[[sun]]` with `time`, `azimuth` and `elevation` or `direction`, and perhaps `irradiance`
     #[arg(
         long,
         value_name = "FILE.csv|.toml",
@@ -308,7 +308,7 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
 /// Plans the bake of the pixels of a view.
 ///
 /// # Errors
-/// As [`plan`].
+/// As `plan`.
 pub fn of_view(options: &DayOptions, baking: &Baking, scene: &Scene, camera: &str, view: &View) -> Result<Planned> {
     planned(options, baking, scene, || Ok(Receivers::of_view(camera, view)))
 }
