@@ -27,6 +27,7 @@
 //! # Ok(())
 //! # }
 //! ```
+mod eigen;
 mod job;
 mod key;
 pub mod merge;

@@ -11,6 +11,8 @@ mod daylight_cube;
 mod daylight_day;
 #[path = "../daylight_frames.rs"]
 mod daylight_frames;
+#[path = "../daylight_lamps.rs"]
+mod daylight_lamps;
 #[path = "../daylight_light.rs"]
 mod daylight_light;
 #[path = "../daylight_probes.rs"]
