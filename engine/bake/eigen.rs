@@ -5,15 +5,15 @@ use nalgebra::{DMatrix, Dyn, SymmetricEigen};
 use super::pca::Keep;
 use crate::{Error, ErrorKind, Result};
 
-/// The largest eigenvalues of a symmetric matrix in descending order, and their eigenvectors.
-pub(super) fn leading(matrix: DMatrix<f64>, keep: Keep, total: f64) -> Result<(Vec<f64>, Vec<Vec<f64>>)> {
+/// The largest eigenvalues of a symmetric matrix in descending order, their eigenvectors, and the smallest eigenvalue or 0.
+pub(super) fn leading(matrix: DMatrix<f64>, keep: Keep, total: f64) -> Result<(Vec<f64>, Vec<Vec<f64>>, f64)> {
     let count = matrix.nrows();
     let wanted = match keep {
         Keep::Count(count) => count,
         Keep::Share(_) => count,
     };
     if count == 0 || wanted == 0 || total == 0.0 {
-        return Ok((Vec::new(), Vec::new()));
+        return Ok((Vec::new(), Vec::new(), 0.0));
     }
     // Dimensions without values have no part in any vector. With their zeros the decomposition of nalgebra 0.34 often gives NaN.
     let there: Vec<usize> = (0..count).filter(|&at| matrix[(at, at)] != 0.0).collect();
@@ -45,7 +45,8 @@ pub(super) fn leading(matrix: DMatrix<f64>, keep: Keep, total: f64) -> Result<(V
         there.iter().zip(found.eigenvectors.column(at).iter()).for_each(|(&at, &value)| vector[at] = value);
         vectors.push(vector);
     }
-    Ok((squares, vectors))
+    let least = found.eigenvalues.iter().copied().fold(0.0, f64::min);
+    Ok((squares, vectors, least))
 }
 
 /// Eigenvalues by cyclic Jacobi rotations (Golub and Van Loan, Matrix Computations, 8.5): slow, and right for every finite symmetric matrix.
@@ -114,7 +115,7 @@ mod tests {
         assert!(quick.iter().zip(&found).all(|(a, b)| (a - b).abs() < 1e-10), "{quick:?} {found:?}");
         // Numbers that are tiny beside the largest: the quick way may divide by zero.
         let tiny = DMatrix::from_fn(40, 40, |a, b| if a == b && a < 3 { 1.0 } else { 1e-160 * ((a + b) % 5) as f64 });
-        let (squares, vectors) = leading(tiny, Keep::Count(40), 3.0).unwrap();
+        let (squares, vectors, _) = leading(tiny, Keep::Count(40), 3.0).unwrap();
         assert!(squares.len() == 3 && vectors.iter().flatten().all(|value| value.is_finite()), "{squares:?}");
         assert!(rotated(DMatrix::from_element(2, 2, f64::NAN)).is_none());
     }

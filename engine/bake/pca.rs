@@ -45,6 +45,9 @@ pub struct Basis {
     pub squares: Vec<f64>,
     /// Weighted mean square of the rows' distances from the centre.
     pub total: f64,
+    /// The smallest eigenvalue if it is negative, else 0. Only [`Moments::without_noise`] makes negative ones; positive ones of the same size are
+    /// as likely noise.
+    pub least: f64,
 }
 
 impl Basis {
@@ -194,9 +197,9 @@ impl Moments {
             }
         }
         let total = matrix.trace().max(0.0);
-        let (squares, vectors) = leading(matrix, keep, total)?;
+        let (squares, vectors, least) = leading(matrix, keep, total)?;
         let vectors: Vec<f64> = vectors.concat();
-        Ok(signed(Basis { mean, vectors, squares, total }))
+        Ok(signed(Basis { mean, vectors, squares, total, least }))
     }
 }
 
@@ -241,7 +244,7 @@ pub fn basis(rows: &[f32], dimensions: usize, weights: &[f64], centre: Centre, k
         }
     }
     let total = matrix.trace().max(0.0);
-    let (mut squares, shares) = leading(matrix, keep, total)?;
+    let (mut squares, shares, _) = leading(matrix, keep, total)?;
     let mut vectors: Vec<Vec<f64>> = Vec::new();
     for shares in &shares {
         let mut vector = vec![0.0; dimensions];
@@ -261,7 +264,7 @@ pub fn basis(rows: &[f32], dimensions: usize, weights: &[f64], centre: Centre, k
         vectors.push(vector);
     }
     squares.truncate(vectors.len());
-    Ok(signed(Basis { mean, vectors: vectors.concat(), squares, total }))
+    Ok(signed(Basis { mean, vectors: vectors.concat(), squares, total, least: 0.0 }))
 }
 
 /// Makes the value of the largest magnitude of each vector positive.

@@ -13,6 +13,9 @@ use crate::{
 /// Weights below this part of the largest are no light: their inverse would not be a number of 32 bits.
 const LEAST: f64 = 1e-12;
 
+/// Columns below this part of the brightest one have no light: a few stray paths, a millionth as bright as noon, tell nothing.
+pub(super) const DARK: f64 = 1e-6;
+
 /// The light of a tile and its noise: three rows (red, green, blue) for each texel.
 #[derive(Clone, Copy, Debug)]
 pub struct Measured<'a> {
@@ -51,7 +54,7 @@ impl Columns<'_> {
             Columns::Dimensions => {
                 let means: Vec<f64> =
                     (0..dimensions).map(|t| light.mean(light.rows, |row| f64::from(row[t]))).collect();
-                let least = 1e-9 * means.iter().copied().fold(0.0, f64::max);
+                let least = DARK * means.iter().copied().fold(0.0, f64::max);
                 let noise = |t: usize| light.mean(light.noise, |row| f64::from(row[t]).powi(2));
                 let weight = |(t, mean): (usize, &f64)| match *mean > least {
                     true => inverse((mean * mean + noise(t)).sqrt()),
@@ -207,9 +210,13 @@ impl Rest {
         let lines = self.lines.max(1);
         let (mut noise, mut light) = (0.0, 0.0);
         let mut of_noise = self.noise.chunks_exact(lines);
+        let dark = DARK * self.means.iter().copied().fold(0.0, f64::max);
         for (number, column) in self.values.chunks_exact(lines).enumerate() {
-            let scale = inverse(self.means[number]).powi(2);
             let left = of_noise.next().map_or(0.0, square);
+            if self.means[number] <= dark {
+                continue;
+            }
+            let scale = inverse(self.means[number]).powi(2);
             let error = square(column) - left;
             // The variance of a product of the halves' rests is the square of twice their noise; a texel's colours have the same noise.
             let doubt = 2.0 * left / texels.sqrt();
@@ -233,6 +240,25 @@ impl Rest {
     }
 }
 
+/// The mean of the light that some images leave out, in red, green and blue of each dimension. An image: what each dimension has of it, and a value
+/// for each line.
+pub(super) fn left_out(light: Measured<'_>, images: &[(&[f32], &[f32])]) -> Vec<[f64; 3]> {
+    let dimensions = light.dimensions.max(1);
+    let texels = (light.lines() / 3).max(1) as f64;
+    let mut left = vec![[0.0f64; 3]; dimensions];
+    for (line, row) in light.rows.chunks_exact(dimensions).enumerate() {
+        left.iter_mut().zip(row).for_each(|(left, value)| left[line % 3] += f64::from(*value) / texels);
+    }
+    for (along, values) in images {
+        let mut sums = [0.0f64; 3];
+        values.iter().enumerate().for_each(|(line, value)| sums[line % 3] += f64::from(*value) / texels);
+        for (left, along) in left.iter_mut().zip(*along) {
+            left.iter_mut().zip(sums).for_each(|(left, sum)| *left -= f64::from(*along) * sum);
+        }
+    }
+    left
+}
+
 /// The mean light that some images leave out, as one more image: the same value at each texel, and a coefficient for each dimension. Where noise
 /// hides the light, images that describe it are not found, but its mean over the tile is known, and no energy may be lost. `None`: all
 /// columns have their mean within the tolerance.
@@ -243,19 +269,8 @@ pub(super) fn level(
     tolerance: f64,
 ) -> Option<([f32; 3], Vec<f64>)> {
     let dimensions = light.dimensions.max(1);
-    let texels = (light.lines() / 3).max(1) as f64;
-    let mut left = vec![[0.0f64; 3]; dimensions];
-    for (line, row) in light.rows.chunks_exact(dimensions).enumerate() {
-        left.iter_mut().zip(row).for_each(|(left, value)| left[line % 3] += f64::from(*value) / texels);
-    }
-    let means: Vec<f64> = left.iter().map(|channels| channels.iter().sum::<f64>() / 3.0).collect();
-    for (along, values) in images {
-        let mut sums = [0.0f64; 3];
-        values.iter().enumerate().for_each(|(line, value)| sums[line % 3] += f64::from(*value) / texels);
-        for (left, along) in left.iter_mut().zip(*along) {
-            left.iter_mut().zip(sums).for_each(|(left, sum)| *left -= f64::from(*along) * sum);
-        }
-    }
+    let left = left_out(light, images);
+    let means: Vec<f64> = left_out(light, &[]).iter().map(|channels| channels.iter().sum::<f64>() / 3.0).collect();
     let grey: Vec<f64> = left.iter().map(|channels| channels.iter().sum::<f64>() / 3.0).collect();
     let off = |missing: f64, mean: f64| missing.abs() > 0.5 * tolerance * mean;
     let wrong = match columns {

@@ -18,7 +18,9 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Plan, finish,
+    Plan,
+    columns::DARK,
+    finish,
     probes::{self, Brick},
     units,
     units::Tile,
@@ -70,6 +72,8 @@ pub struct Summary {
     pub raw_bytes: u64,
     /// Bytes of the images and coefficients.
     pub bytes: u64,
+    /// Bytes of the places of triangles in the lightmap.
+    pub places_bytes: u64,
     /// Mean number of images of a tile for the light of the sun.
     pub images: f64,
     /// The most images of a tile for the light of the sun.
@@ -252,14 +256,17 @@ impl Stored {
         let mut all = Vec::new();
         for tile in &self.tiles {
             let lines = 3.0 * f64::from(tile.there());
+            let dark = dark(&tile.light);
             for (sums, [light, square]) in frames.iter_mut().zip(&tile.light) {
                 sums[0] += light;
                 sums[1] += square;
-                all.push(relative(*light, *square, lines));
+                all.push(if *light > dark { relative(*light, *square, lines) } else { 0.0 });
             }
         }
         let lines = 3.0 * texels as f64;
-        let of_frames = frames.iter().map(|[light, square]| relative(*light, *square, lines)).enumerate();
+        let dark = dark(&frames);
+        let of_frames = frames.iter().enumerate().filter(|(_, [light, _])| *light > dark);
+        let of_frames = of_frames.map(|(number, [light, square])| (number, relative(*light, *square, lines)));
         let (worst_frame_number, worst_frame) =
             of_frames.fold((0, 0.0), |most, next| if next.1 > most.1 { next } else { most });
         all.sort_by(f64::total_cmp);
@@ -272,6 +279,7 @@ impl Stored {
         Summary {
             raw_bytes: 6 * texels * times as u64,
             bytes: self.tiles.iter().map(|tile| tile.layers().iter().map(|layer| layer.bytes()).sum::<u64>()).sum(),
+            places_bytes: 12 * self.corners.len() as u64,
             images: images as f64 / lit.clone().count().max(1) as f64,
             most_images: self.tiles.iter().map(|tile| tile.sun.images()).max().unwrap_or(0),
             worst_tile: self.tiles.iter().map(|tile| f64::from(tile.sun.worst)).fold(0.0, f64::max),
@@ -283,6 +291,11 @@ impl Stored {
             noise: noises.get(noises.len() / 2).copied().unwrap_or(0.0),
         }
     }
+}
+
+/// Light of steps that have none ([`DARK`]).
+fn dark(steps: &[[f64; 2]]) -> f64 {
+    DARK * steps.iter().fold(0.0, |most, [light, _]| f64::max(most, *light))
 }
 
 fn relative(light: f64, square: f64, lines: f64) -> f64 {

@@ -7,12 +7,11 @@
 
 use std::collections::BTreeMap;
 
-use super::{Kind, Plan, gathered::Gathered};
+use super::{
+    Kind, Plan,
+    gathered::{FEATURES, Features, Gathered},
+};
 
-/// Parts of the day whose light is compared.
-const PARTS: usize = 6;
-/// Features: parts of the day, the sky, the lamps.
-const FEATURES: usize = PARTS + 2;
 /// Square of a difference in standard deviations of the noise that counts as noise.
 const BY_NOISE: f32 = 2.0;
 /// How fast weights fall beyond it.
@@ -35,9 +34,6 @@ struct Texel {
     /// Distance to the next texels, metres.
     size: f32,
 }
-
-/// Features of the two halves of the samples.
-type Features = [[f32; FEATURES]; 2];
 
 /// The texels of a bake with what decides the weights between them.
 #[derive(Debug)]
@@ -75,7 +71,7 @@ impl Filter {
             Kind::View { .. } => Near::Picture { columns, rows, at },
             _ => in_space(&texels, radius),
         };
-        let features = features(tiles);
+        let features: Vec<Features> = tiles.iter().flat_map(|tile| tile.features.iter().copied()).collect();
         let variances = vec![[0.0; FEATURES]; features.len()];
         let mut filter = Self { texels, firsts, near, radius, features, variances };
         filter.smooth();
@@ -91,11 +87,17 @@ impl Filter {
             let cosine = dot(q.normal, texel.normal);
             let off = dot(way, texel.normal).abs();
             // On a curved surface the way between two texels leaves the tangent plane by less than half its length.
-            if cosine < LEAST_COSINE || off > 0.2 * dot(way, way).sqrt() + 0.05 * texel.size {
+            // A degenerate triangle has no normal.
+            let turned = cosine.is_nan() || cosine < LEAST_COSINE;
+            if other != of && turned || off > 0.2 * dot(way, way).sqrt() + 0.05 * texel.size {
                 return;
             }
             let x = distance / falloff;
-            found(other, (-0.5 * x * x).exp() * ((cosine - LEAST_COSINE) / (1.0 - LEAST_COSINE)).min(1.0));
+            found(
+                other,
+                (-0.5 * x * x).exp()
+                    * if other == of { 1.0 } else { ((cosine - LEAST_COSINE) / (1.0 - LEAST_COSINE)).min(1.0) },
+            );
         };
         match &self.near {
             Near::Picture { columns, rows, at } => {
@@ -255,7 +257,9 @@ fn sizes(texels: &mut [Texel], at: &[u32], [columns, rows]: [u32; 2]) {
     known.sort_by(f32::total_cmp);
     let median = known.get(known.len() / 2).copied().unwrap_or(1.0);
     // A neighbour in the bake may be far away on another surface, or very near in a narrow chart.
-    texels.iter_mut().zip(found).for_each(|(texel, size)| texel.size = size.clamp(0.25 * median, 4.0 * median));
+    for (texel, size) in texels.iter_mut().zip(found) {
+        texel.size = if size.is_finite() { size.clamp(0.25 * median, 4.0 * median) } else { median };
+    }
 }
 
 fn in_space(texels: &[Texel], radius: f32) -> Near {
@@ -267,55 +271,4 @@ fn in_space(texels: &[Texel], radius: f32) -> Near {
         cells.entry(texel.position.map(|p| cell_of(p, cell))).or_default().push(number as u32);
     }
     Near::Space { cell, cells }
-}
-
-/// The features of all texels: the luminance of parts of the light for both halves of the samples.
-fn features(tiles: &[Gathered]) -> Vec<Features> {
-    // What a dimension adds to a feature: dusk as much as noon.
-    let times = tiles.first().map_or(0, |tile| tile.layers[0].dimensions as usize);
-    let mut means = vec![0.0f64; times];
-    for tile in tiles {
-        let sun = &tile.layers[0];
-        for (index, sum) in sun.sums().into_iter().enumerate() {
-            let vector = &sun.vectors[index * times..][..times];
-            means.iter_mut().zip(vector).for_each(|(mean, v)| *mean += sum * f64::from(*v));
-        }
-    }
-    let brightest = means.iter().copied().fold(0.0, f64::max);
-    // The first and last minutes of a day have more noise than light.
-    let scale = |mean: f64| if mean > 0.0 { (1.0 / (mean + 0.02 * brightest)) as f32 } else { 0.0 };
-    let mut out = Vec::new();
-    for tile in tiles {
-        let mut along: [Vec<[f32; FEATURES]>; 3] = Default::default();
-        for (layer, along) in tile.layers.iter().zip(&mut along).enumerate().map(|(i, (l, a))| ((i, l), a)) {
-            let (which, layer) = layer;
-            let dimensions = layer.dimensions as usize;
-            for index in 0..layer.len() {
-                let mut of = [0.0; FEATURES];
-                for (d, value) in layer.vectors[index * dimensions..][..dimensions].iter().enumerate() {
-                    match which {
-                        0 => of[d * PARTS / times.max(1)] += value * scale(means[d]) * brightest as f32,
-                        1 => of[PARTS] += value,
-                        _ => of[PARTS + 1] += value,
-                    }
-                }
-                along.push(of);
-            }
-        }
-        for texel in 0..tile.spots.len() {
-            let mut of = [[0.0; FEATURES]; 2];
-            for (layer, along) in tile.layers.iter().zip(&along) {
-                let count = along.len();
-                for (at, [mean, noise]) in layer.coefficients_of(texel).enumerate() {
-                    let luma = [0.2126, 0.7152, 0.0722][at / count];
-                    for (j, along) in along[at % count].iter().enumerate() {
-                        of[0][j] += luma * (mean + noise) * along;
-                        of[1][j] += luma * (mean - noise) * along;
-                    }
-                }
-            }
-            out.push(of);
-        }
-    }
-    out
 }

@@ -6,7 +6,7 @@
 use half::f16;
 
 use super::{
-    Light,
+    Baking, Light, Plan,
     columns::{Columns, Measured, Rest, Weighted, level, project, times},
 };
 use crate::{Error, Result};
@@ -14,7 +14,7 @@ use crate::{Error, Result};
 /// Part of the tolerance that the coefficients may miss.
 const SHARE: f64 = 0.25;
 /// Vectors of a kind of light at most.
-const MOST: usize = 96;
+const MOST: usize = 128;
 
 /// One kind of light of a tile: vectors over the dimensions, and coefficients of each line (a texel's red, green or blue).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -42,8 +42,53 @@ pub struct Gathered {
     pub mask: Vec<u32>,
     /// The surface of each such texel.
     pub spots: Vec<Spot>,
+    /// What the filter compares, of each such texel.
+    pub features: Vec<Features>,
     /// Light of the sun, of the sky, of lamps.
     pub layers: [Coded; 3],
+}
+
+/// Parts of the day whose light is compared.
+const PARTS: usize = 6;
+/// Parts of the day, the sky, the lamps.
+pub const FEATURES: usize = PARTS + 2;
+
+/// Luminance of parts of a texel's light in the two halves of the samples, W/m².
+pub type Features = [[f32; FEATURES]; 2];
+
+/// The features of all texels of a tile. `parts`: the part of the day of each time.
+fn features(measured: &[Measured<'_>; 3], texels: usize, parts: &[usize]) -> Vec<Features> {
+    let mut out = vec![[[0.0; FEATURES]; 2]; texels];
+    for (which, light) in measured.iter().enumerate() {
+        let dimensions = light.dimensions;
+        if dimensions == 0 || light.rows.is_empty() || light.noise.len() != light.rows.len() {
+            continue;
+        }
+        let lines = light.rows.chunks_exact(dimensions).zip(light.noise.chunks_exact(dimensions));
+        for (line, (rows, noise)) in lines.enumerate() {
+            let luma = [0.2126, 0.7152, 0.0722][line % 3];
+            let [a, b] = &mut out[line / 3];
+            for (dimension, (mean, noise)) in rows.iter().zip(noise).enumerate() {
+                let feature = match which {
+                    0 => parts[dimension],
+                    1 => PARTS,
+                    _ => PARTS + 1,
+                };
+                a[feature] += luma * (mean + noise);
+                b[feature] += luma * (mean - noise);
+            }
+        }
+    }
+    out
+}
+
+/// The part of the day of each time of a plan, by its place among the lit times of its day.
+fn parts(plan: &Plan) -> Vec<usize> {
+    let part = |time: usize| {
+        let of_day = plan.of_day(plan.times[time].day());
+        (time - of_day.start) * PARTS / of_day.len().max(1)
+    };
+    (0..plan.times.len()).map(part).collect()
 }
 
 impl Coded {
@@ -67,7 +112,10 @@ impl Coded {
         let mut rest = Rest::new(light, columns);
         let (mut vectors, mut coefficients): (Vec<f32>, Vec<[Vec<f16>; 2]>) = (Vec::new(), Vec::new());
         for index in 0..basis.len() {
-            if rest.state(SHARE * tolerance).within {
+            // Vectors that are no larger than those of noise alone are left out. The filter finds light that is below the noise of one tile, so
+            // all larger ones are kept.
+            let noise_alone = exact || basis.squares[index] <= -basis.least;
+            if noise_alone && rest.state(SHARE * tolerance).within {
                 break;
             }
             let vector = basis.vector(index);
@@ -114,7 +162,7 @@ impl Coded {
     }
 
     /// Coefficients of a texel's mean and noise: all vectors of its red, then of its green and its blue.
-    pub fn coefficients_of(&self, texel: usize) -> impl Iterator<Item = [f32; 2]> + '_ {
+    fn coefficients_of(&self, texel: usize) -> impl Iterator<Item = [f32; 2]> + '_ {
         let count = self.len();
         let first = 6 * count * texel;
         let at = move |line: usize, half: usize, index: usize| {
@@ -122,16 +170,6 @@ impl Coded {
             f16::from_bits(bits).to_f32()
         };
         (0..3).flat_map(move |line| (0..count).map(move |index| [at(line, 0, index), at(line, 1, index)]))
-    }
-
-    /// For each vector the sum of its coefficients over all lines.
-    pub fn sums(&self) -> Vec<f64> {
-        let count = self.len();
-        let mut sums = vec![0.0; count];
-        for line in self.coefficients.chunks_exact((2 * count).max(1)) {
-            sums.iter_mut().zip(line).for_each(|(sum, bits)| *sum += f64::from(f16::from_bits(*bits).to_f32()));
-        }
-        sums
     }
 
     /// Mean and noise of a texel's light: three rows each.
@@ -167,21 +205,17 @@ impl Coded {
 }
 
 impl Gathered {
-    /// Codes the light of a tile.
+    /// Codes the light of a tile. `columns`: those of the three kinds of light that are within the tolerance.
     ///
     /// # Errors
     /// As [`Coded::new`].
-    pub fn new(
-        light: &Light,
-        dimensions: [usize; 3],
-        columns: [Columns<'_>; 3],
-        tolerance: f64,
-        exact: bool,
-    ) -> Result<Self> {
-        let measured = light.measured(dimensions);
-        let coded = |layer: usize| Coded::new(measured[layer], columns[layer], tolerance, exact);
+    pub fn new(plan: &Plan, light: &Light, columns: [Columns<'_>; 3]) -> Result<Self> {
+        let measured = light.measured(plan.dimensions());
+        let Baking { tolerance, noise_floor, .. } = plan.settings;
+        let coded = |layer: usize| Coded::new(measured[layer], columns[layer], tolerance, !noise_floor);
         let layers = [coded(0)?, coded(1)?, coded(2)?];
-        Ok(Self { mask: light.mask.clone(), spots: light.spots.clone(), layers })
+        let features = features(&measured, light.spots.len(), &parts(plan));
+        Ok(Self { mask: light.mask.clone(), spots: light.spots.clone(), features, layers })
     }
 
     /// The bytes of a unit: numbers with their low byte first.
@@ -194,6 +228,8 @@ impl Gathered {
             let numbers = spot.position.iter().chain(&spot.normal);
             numbers.for_each(|value| out.extend_from_slice(&value.to_le_bytes()));
         }
+        let features = self.features.iter().flatten().flatten();
+        features.for_each(|value| out.extend_from_slice(&value.to_le_bytes()));
         for layer in &self.layers {
             word(&mut out, layer.dimensions as usize);
             word(&mut out, layer.len());
@@ -214,13 +250,24 @@ impl Gathered {
             return Err(Error::input(format!("a mask of {words} words for {texels} texels")));
         }
         let mask = (0..words).map(|_| rest.word()).collect::<Result<Vec<_>>>()?;
+        super::units::check_mask(&mask, texels)?;
         let there: u32 = mask.iter().map(|word| word.count_ones()).sum();
         let mut spots = Vec::with_capacity(there as usize);
         for _ in 0..there {
             let mut number = || rest.float();
             let position = [number()?, number()?, number()?];
             let normal = [number()?, number()?, number()?];
+            if !position.iter().chain(&normal).all(|value| value.is_finite()) {
+                return Err(Error::input("a surface that is not finite"));
+            }
             spots.push(Spot { position, normal });
+        }
+        let mut features = vec![[[0.0; FEATURES]; 2]; there as usize];
+        for value in features.iter_mut().flatten().flatten() {
+            *value = rest.float()?;
+            if !value.is_finite() {
+                return Err(Error::input("a luminance that is not finite"));
+            }
         }
         let mut layers = [Coded::default(), Coded::default(), Coded::default()];
         for (layer, wanted) in layers.iter_mut().zip(dimensions) {
@@ -236,7 +283,7 @@ impl Gathered {
             layer.validate(there as usize, wanted)?;
         }
         match rest.0.is_empty() {
-            true => Ok(Self { mask, spots, layers }),
+            true => Ok(Self { mask, spots, features, layers }),
             false => Err(Error::input("a tile with something after its end")),
         }
     }

@@ -7,7 +7,7 @@
 
 use half::f16;
 
-use super::columns::{Columns, Measured, Rest, Weighted, level, project};
+use super::columns::{Columns, Measured, Rest, Weighted, left_out, level, project};
 use crate::{Error, Result};
 
 /// Largest part of the tolerance that the rounding of one image to bytes may take.
@@ -91,7 +91,11 @@ impl Layer {
         let mut state = rest.state(aim.tolerance);
         for index in 0..basis.len() {
             if state.within {
-                break;
+                keep_means(&mut images, &mut rest, light);
+                state = rest.state(aim.tolerance);
+                if state.within {
+                    break;
+                }
             }
             let vector = basis.vector(index);
             // In units of light: what a dimension has at a coefficient of 1. Dimensions without light stay without.
@@ -104,8 +108,7 @@ impl Layer {
             images.push(image);
             state = rest.state(aim.tolerance);
         }
-        let known: Vec<(&[f32], &[f32])> = images.iter().map(|i| (i.table.as_slice(), i.decoded.as_slice())).collect();
-        if let Some((colour, along)) = level(light, columns, &known, aim.tolerance)
+        if let Some((colour, along)) = level(light, columns, &known(&images), aim.tolerance)
             && images.len() < aim.most
         {
             let values: Vec<f32> = colour.iter().copied().cycle().take(3 * texels).collect();
@@ -211,6 +214,34 @@ impl Layer {
     }
 }
 
+/// What each dimension has of images, and their values.
+fn known(images: &[Image]) -> Vec<(&[f32], &[f32])> {
+    images.iter().map(|image| (image.table.as_slice(), image.decoded.as_slice())).collect()
+}
+
+/// Gives the first image what the mean of each dimension misses, so that neighbouring tiles fit together where a wall is even: the error that the
+/// tolerance allows would otherwise be a step at their border.
+fn keep_means(images: &mut [Image], rest: &mut Rest, light: Measured<'_>) {
+    let missing = left_out(light, &known(images));
+    let Some(first) = images.first_mut() else { return };
+    let count = first.decoded.len().max(1) as f64;
+    let mean = first.decoded.iter().map(|value| f64::from(*value)).sum::<f64>() / count;
+    let square = first.decoded.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>() / count;
+    // An image that is dark here and bright there cannot carry a mean.
+    if mean * mean < 0.1 * square || square == 0.0 {
+        return;
+    }
+    let changed: Vec<f32> = first
+        .table
+        .iter()
+        .zip(missing.iter().map(|channels| channels.iter().sum::<f64>() / 3.0))
+        .map(|(along, missing)| if *along == 0.0 { 0.0 } else { rounded((f64::from(*along) + missing / mean) as f32) })
+        .collect();
+    let added: Vec<f32> = changed.iter().zip(&first.table).map(|(new, old)| new - old).collect();
+    rest.remove(&added, &first.decoded);
+    first.table = changed;
+}
+
 /// A number of 24 bits: that of 32 bits without its last byte. Coefficients at dusk are a millionth of those at noon, which is too little for
 /// numbers of 16 bits.
 pub fn rounded(value: f32) -> f32 {
@@ -259,7 +290,10 @@ impl Image {
 
 #[cfg(test)]
 mod tests {
-    use super::{super::columns::mixed, *};
+    use super::{
+        super::columns::{DARK, mixed},
+        *,
+    };
 
     const AIM: Aim = Aim { tolerance: 0.05, most: 64 };
 
@@ -286,9 +320,13 @@ mod tests {
         rows
     }
 
+    /// The largest relative error of the columns that are not dark.
     fn errors(layer: &Layer, rows: &[f32], dimensions: usize) -> f64 {
         let texels = rows.len() / dimensions / 3;
+        let means: Vec<f32> = (0..dimensions).map(|t| rows.iter().skip(t).step_by(dimensions).sum()).collect();
+        let brightest = means.iter().copied().fold(0.0, f32::max);
         (0..dimensions)
+            .filter(|t| f64::from(means[*t]) > DARK * f64::from(brightest))
             .map(|t| {
                 let coefficients = layer.mix([(t, [1.0; 3])].into_iter());
                 let (mut square, mut mean) = (0.0, 0.0);
@@ -315,9 +353,9 @@ mod tests {
             let worst = errors(&layer, &rows, 60);
             assert!(worst <= tolerance && (worst - f64::from(layer.worst)).abs() < 1e-3, "{worst} {}", layer.worst);
             assert!(layer.images() as usize <= rank + 1, "{} images for rank {rank}", layer.images());
-            // The images before the last one were not enough.
-            if layer.images() > 1 {
-                let fewer = Aim { tolerance, most: layer.images() as usize - 1 };
+            // Fewer images are not enough. The last one may be there for the means alone.
+            if layer.images() > 2 {
+                let fewer = Aim { tolerance, most: layer.images() as usize - 2 };
                 assert!(
                     f64::from(Layer::compress(of(&rows, 60), Columns::Dimensions, fewer).unwrap().worst) > tolerance
                 );

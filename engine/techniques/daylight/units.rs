@@ -2,7 +2,7 @@
 //! are there, they become the compressed [`Tile`]s of a file ([`super::finish`]).
 
 use super::{
-    Baking, Plan, Sky, Transport, Weather,
+    Plan, Sky, Transport, Weather,
     columns::{Columns, Measured},
     gathered::Gathered,
     layer::{Aim, Layer, rounded},
@@ -104,8 +104,7 @@ pub fn unit(plan: &Plan, transport: &mut Transport, index: u32, skies: &[f32]) -
 /// # Errors
 /// As [`Gathered::new`].
 pub fn gathered(plan: &Plan, light: &Light, skies: &[f32]) -> Result<Gathered> {
-    let Baking { tolerance, noise_floor, .. } = plan.settings;
-    Gathered::new(light, plan.dimensions(), kinds(skies), tolerance, !noise_floor)
+    Gathered::new(plan, light, kinds(skies))
 }
 
 /// The columns of the three kinds of light that are within the tolerance.
@@ -236,6 +235,7 @@ impl Tile {
             return Err(Error::input(format!("a mask of {words} words for {texels} texels")));
         }
         let mask = (0..words).map(|_| rest.word()).collect::<Result<Vec<_>>>()?;
+        check_mask(&mask, texels)?;
         let there: u32 = mask.iter().map(|word| word.count_ones()).sum();
         let times = rest.word()? as usize;
         let [dimensions, patches, lamps] = plan.dimensions();
@@ -254,6 +254,17 @@ impl Tile {
             true => Ok(Self { sun, sky, lamps, mask, light }),
             false => Err(Error::input("a tile with something after its end")),
         }
+    }
+}
+
+/// Checks that a mask has no bits beyond its texels.
+///
+/// # Errors
+/// `Input` if it has.
+pub(super) fn check_mask(mask: &[u32], texels: usize) -> Result<()> {
+    match mask.last().is_some_and(|word| !texels.is_multiple_of(32) && word >> (texels % 32) != 0) {
+        true => Err(Error::input("a mask with bits beyond its texels")),
+        false => Ok(()),
     }
 }
 

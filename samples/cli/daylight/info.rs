@@ -93,6 +93,7 @@ pub fn lines(summary: &Summary) -> Vec<String> {
     let Summary {
         raw_bytes,
         bytes,
+        places_bytes,
         images,
         most_images,
         worst_tile,
@@ -106,6 +107,7 @@ pub fn lines(summary: &Summary) -> Vec<String> {
     let share = 100.0 * (1.0 - *bytes as f64 / (*raw_bytes).max(1) as f64);
     vec![
         format!("size       {bytes} bytes; all frames as 16-bit floats: {raw_bytes} ({share:.1} % saved)"),
+        format!("places     {places_bytes} bytes: where each triangle is in the lightmap"),
         format!("images     {images:.1} per tile, at most {most_images}"),
         format!(
             "error      worst step of a tile {:.1} % beside the noise; the noise hides such errors in {:.1} % of the steps of tiles",
