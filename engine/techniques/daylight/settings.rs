@@ -101,7 +101,7 @@ impl Default for Baking {
             noticeable: 0.02,
             longest: 60.0,
             disc: true,
-            tolerance: 0.05,
+            tolerance: 0.02,
             noise_floor: true,
             filter: 5,
             images: 0,
