@@ -11,6 +11,9 @@ use super::{
 };
 use crate::{Error, ErrorKind, Result};
 
+/// Memory of all threads together at most, about.
+const MOST_BYTES: u64 = 4 << 30;
+
 /// Finishes all tiles. `told` hears the number of finished tiles, and an error of it ends the work. Tiles do not depend on the number of threads.
 ///
 /// # Errors
@@ -23,6 +26,10 @@ pub fn tiles(plan: &Plan, gathered: &[Gathered], mut told: impl FnMut(usize) -> 
     let filter = filter.as_ref();
     let mut out = Vec::with_capacity(gathered.len());
     let threads = thread::available_parallelism().map_or(1, usize::from).min(16);
+    // Both halves of the texels around a tile, and their means: numbers of 32 bits.
+    let side = u64::from(plan.side() + 2 * radius);
+    let dimensions = plan.dimensions().into_iter().max().unwrap_or(1) as u64;
+    let threads = threads.min((MOST_BYTES / (side * side * dimensions * 3 * 4 * 4).max(1)).max(1) as usize);
     for first in (0..gathered.len()).step_by(threads) {
         let last = (first + threads).min(gathered.len());
         let done: Vec<Result<Tile>> = thread::scope(|scope| {

@@ -111,6 +111,10 @@ pub fn write(
         );
     }
     let texels: u64 = stored.tiles.iter().map(|tile| u64::from(tile.there())).sum();
+    if texels == 0 {
+        let error = Error::usage("the bake has no texels on surfaces, so there are no frames");
+        return Err(error.help("Bake a view that sees surfaces"));
+    }
     let bake = still(stored).encode()?;
     let mut head = Vec::new();
     head.extend_from_slice(MAGIC);
@@ -124,14 +128,14 @@ pub fn write(
     head.extend_from_slice(&identity.0);
     let bytes = head.len() as u64 + steps as u64 * record_bytes(texels);
     let records = (0..steps).map(|step| {
-        if !told(step as u64) {
-            return Err(Error::new(ErrorKind::Interrupted, "writing frames was stopped"));
-        }
         let mut record = (step as u32).to_le_bytes().to_vec();
         record.extend_from_slice(&frame(stored, step));
         let digest = of_step(&identity, &record);
         record.extend_from_slice(&digest.0);
-        Ok(record)
+        match told(step as u64 + 1) {
+            true => Ok(record),
+            false => Err(Error::new(ErrorKind::Interrupted, "writing frames was stopped")),
+        }
     });
     image::write_pieces_atomic(path, bytes, std::iter::once(Ok(head)).chain(records), overwrite)?;
     Ok(bytes)

@@ -117,6 +117,8 @@ impl OnDevice {
                     // The graph of an earlier picture may still hold a buffer, but it has run.
                     match there.iter_mut().find(|(s, _)| !needed.contains(s)) {
                         Some((s, buffer)) => {
+                            // Of no step until the upload has succeeded.
+                            *s = usize::MAX;
                             buffer.upload(0, light)?;
                             *s = *step;
                         }

@@ -32,9 +32,7 @@ impl Mixture {
         };
         of_sum.iter().map(|weight| weight.time).chain(of_both.iter().copied())
     }
-}
 
-impl Mixture {
     /// Times with weights; the line in place of the logarithms.
     pub fn linear(&self) -> Vec<(usize, f32)> {
         match self {
@@ -62,7 +60,14 @@ impl Steps {
     pub fn new(plan: &Plan, day: usize, course: &Course) -> Self {
         let times = plan.of_day(day);
         let seconds = plan.times[times.clone()].iter().map(|time| time.seconds - NEXT_DAY * day as f64).collect();
-        Self { first: times.start, ..Self::of(seconds, course.length(), |seconds| course.sun(seconds).is_lit()) }
+        let mut steps = Self::of(seconds, course.length(), |seconds| course.sun(seconds).is_lit());
+        // A part of a day has no light between its end and its begin on the next day.
+        if plan.calendar.span.is_some()
+            && let Some(last) = steps.night.last_mut()
+        {
+            *last = true;
+        }
+        Self { first: times.start, ..steps }
     }
 
     /// `lit`: whether the sun shines at a time.

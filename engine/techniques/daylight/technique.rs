@@ -63,7 +63,7 @@ impl technique::Mode for Mode {
         match self {
             Self::Total => "All light",
             Self::Direct => "Direct light of the sun only",
-            Self::Indirect => "Baked light only: the sun's after scattering, and that of the sky",
+            Self::Indirect => "Baked light only: the sun's after scattering, and all light of the sky and of lamps",
             Self::Irradiance => "Irradiance of the baked light, without the surfaces' colours",
         }
     }
@@ -134,12 +134,13 @@ impl Daylight {
     }
 
     /// The radiance of the patches of the sky.
-    fn patches(&self, settings: &Settings, sky: &Sky, sun: Vec3) -> Result<Vec<[f32; 3]>> {
+    fn patches(&self, day: usize, settings: &Settings, sky: &Sky, sun: Vec3) -> Result<Vec<[f32; 3]>> {
         let scaled = |sky: &Sky, factor: f32| sky.patches().iter().map(|patch| patch.map(|c| c * factor)).collect();
         match settings.sky {
             SkyLight::Patches => Ok(scaled(sky, settings.strength)),
             SkyLight::Scaled => {
-                let suns = self.baked.stored.plan.times.iter().map(|time| time.sun);
+                let plan = &self.baked.stored.plan;
+                let suns = plan.times[plan.of_day(day)].iter().map(|time| time.sun);
                 let Some(highest) = suns.max_by(|a, b| a[1].total_cmp(&b[1])) else {
                     return Ok(scaled(sky, 0.0));
                 };
@@ -212,6 +213,9 @@ fn left_out(scene: &Scene, groups: &[Group], added: bool) -> Vec<Note> {
     let mut notes = Vec::new();
     if added {
         notes.push(note("--add", "the added objects block no indirect light and reflect none to the scene"));
+        if !groups.is_empty() {
+            notes.push(note("--add", "baked lamps do not light the added objects"));
+        }
     }
     let off = |(number, light): (usize, &crate::scene::Light)| {
         light.intensity > 0.0 && !groups.iter().any(|group| group.lights.contains(&(number as u32)))
@@ -311,7 +315,7 @@ impl Technique for Daylight {
         let clear = 1.0 - of_day.overcast as f32;
         let light = shine.irradiance.map_or(sky.sun_irradiance(), |sun| sun.map(|channel| channel * clear));
         let light = light.map(|channel| channel * of_day.strength);
-        let patches = self.patches(of_day, &sky, sun)?;
+        let patches = self.patches(day, of_day, &sky, sun)?;
         let elevation = f64::from(sun.y).clamp(-1.0, 1.0).asin().to_degrees();
         let burning = lamps::burning(of_day, &plan.lamps, course, seconds, elevation)?;
         let materials = switched(&moment.handles.material_table, &plan.lamps, &burning);

@@ -192,7 +192,7 @@ impl Transport {
             }
         };
         let settings = Baking { samples: plan.settings.samples.min(SPARSE_PATHS), ..plan.settings.clone() };
-        let light = self.gather(&Plan { settings, ..plan.clone() }, 0, &hits)?;
+        let light = self.gather(&Plan { settings, lamps: Vec::new(), ..plan.clone() }, 0, &hits)?;
         Ok(Sparse { light: Light { mask, ..light }, extent })
     }
 

@@ -114,7 +114,8 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
         plan.settings.samples
     ));
     if plan.times.is_empty() {
-        console.info("note: the sun does not shine at any step; the bake holds the light of the sky alone");
+        let rest = if plan.lamps.is_empty() { "of the sky alone" } else { "of the sky and of lamps" };
+        console.info(&format!("note: the sun does not shine at any step; the bake holds the light {rest}"));
     }
     if let Some(grid) = &plan.probes {
         let ([x, y, z], [across, up, along]) = (grid.counts, grid.spacing);

@@ -147,7 +147,7 @@ pub fn export(args: &DayExportArgs, console: Console) -> Result<ExitCode> {
     let plan = &stored.plan;
     let blamed = |error: Error| error.in_file(&args.bake);
     let Kind::Lightmap { .. } = plan.receivers else {
-        let what = "holds the light of what one camera sees, which has no places on the surfaces of a scene";
+        let what = "has the light that one camera sees, and it has no places on the surfaces of a scene";
         return Err(blamed(Error::input(what).help("Bake with --kind lightmap, and export that file")));
     };
     let courses = plan.calendar.courses().map_err(|what| blamed(Error::input(what)))?;
@@ -155,6 +155,10 @@ pub fn export(args: &DayExportArgs, console: Console) -> Result<ExitCode> {
     if courses.len() > 1 {
         let what = format!("has {} days, and an export has one", courses.len());
         return Err(blamed(Error::input(what).help("Bake one day, and export that file")));
+    }
+    if plan.calendar.span.is_some() {
+        let what = "has light for a part of the day, and an export has the whole day";
+        return Err(blamed(Error::input(what).help("Bake without --from and --until, and export that file")));
     }
     if !plan.lamps.is_empty() {
         let names: Vec<&str> = plan.lamps.iter().map(|group| group.name.as_str()).collect();
