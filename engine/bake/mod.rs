@@ -30,6 +30,7 @@
 mod eigen;
 mod job;
 mod key;
+pub mod lowrank;
 pub mod merge;
 pub mod pca;
 mod run;

@@ -5,6 +5,7 @@ pub mod daylight;
 pub mod fiv;
 pub mod igi;
 pub mod isr;
+pub mod prt;
 pub mod tonemap;
 
 use crate::{
@@ -35,12 +36,13 @@ macro_rules! techniques {
             None
         }
 
-        /// The techniques by their names in `-D igi.vpls=500`, with the description of their settings; then the bakes of `daylight`, the passes
+        /// The techniques by their names in `-D igi.vpls=500`, with the description of their settings; then the bakes of `daylight` and `prt`, the passes
         /// before techniques and the tone mapping after them.
         pub fn descriptions() -> Vec<(&'static str, &'static Description)> {
             vec![
                 $((<$technique as Technique>::NAME, <$technique as Technique>::description()),)*
                 ("bake", daylight::Baking::description()),
+                ("room", prt::Baking::description()),
                 ("gbuffer", passes::gbuffer::Settings::description()),
                 ("shadow", passes::shadow::Settings::description()),
                 ("tonemap", tonemap::Settings::description()),
@@ -54,5 +56,6 @@ techniques! {
     igi::Igi,
     fiv::Fiv,
     daylight::Daylight,
+    prt::Prt,
     Reference,
 }

@@ -10,6 +10,7 @@ use crate::{
     added::Added,
     args::{Frames, MAX_FRAMES, MAX_SIDE, RenderArgs, Size},
     camera::CameraFile,
+    changed::Change,
     config::SettingsArgs,
     framing::DefaultLight,
     ground::{GroundArgs, GroundOptions},
@@ -35,6 +36,9 @@ pub struct Record {
     /// The added objects.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub add: Vec<Added>,
+    /// The changed materials.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub set: Vec<Change>,
     /// Hash of the scene ([`crate::fingerprint::scene`]).
     pub fingerprint: String,
     pub width: u32,
@@ -132,6 +136,7 @@ impl Record {
             unit: args.scene.unit,
             ground: args.scene.ground.ground.then(|| args.scene.ground.options.clone()),
             add: args.scene.add.clone(),
+            set: args.scene.set.clone(),
             fingerprint: stage.fingerprint.clone(),
             width: args.size.width,
             height: args.size.height,
@@ -198,7 +203,7 @@ impl Record {
         };
         let ground = GroundArgs { ground: self.ground.is_some(), options: self.ground.clone().unwrap_or_default() };
         Ok(StageArgs {
-            scene: SceneArgs { scene, builtin, unit: self.unit, add: self.add.clone(), ground },
+            scene: SceneArgs { scene, builtin, unit: self.unit, add: self.add.clone(), set: self.set.clone(), ground },
             size: Size { width: self.width, height: self.height },
             camera: None,
             time: self.time,
@@ -296,6 +301,7 @@ mod tests {
             unit: Some(0.01),
             ground: Some(GroundOptions { copies: Some(3), sunk: Some(-0.2), ..GroundOptions::default() }),
             add: vec!["pot.glb@0,1,2".parse().unwrap()],
+            set: vec!["wall.albedo=0.5,0.25,1".parse().unwrap()],
             fingerprint: "0".into(),
             width: 64,
             height: 48,
@@ -339,7 +345,7 @@ mod tests {
         assert!(args.settings.file.is_none() && !args.overwrite && !args.json);
         let with_folder = |name: &str| format!("{name:?}, and the files in its folder that it refers to");
         assert_eq!(again.files(), [with_folder("-odd.obj"), with_folder("pot.glb"), "\"-odd.day\"".to_owned()]);
-        assert_eq!(args.stage.scene.add, again.add);
+        assert_eq!((args.stage.scene.add, args.stage.scene.set), (again.add.clone(), again.set.clone()));
         for (odd, place) in [
             (Record { width: 0, ..record.clone() }, "width"),
             (Record { height: MAX_SIDE + 1, ..record.clone() }, "height"),

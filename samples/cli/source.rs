@@ -11,11 +11,12 @@ use lucerna_scenes as builtin;
 use crate::{
     added::{self, Added},
     args::positive,
+    changed::{self, Change},
     ground::GroundArgs,
     record::Source,
 };
 
-/// The options `SCENE`, `--builtin NAME`, `--unit`, `--add`, and those of `--ground`.
+/// The options `SCENE`, `--builtin NAME`, `--unit`, `--add`, `--set`, and those of `--ground`.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct SceneArgs {
     /// Scene file: .gltf, .glb or .obj
@@ -34,6 +35,11 @@ pub struct SceneArgs {
     /// degrees. FILE may be builtin:NAME. Its lights and cameras are left out. May be given more than once
     #[arg(long, value_name = "FILE@X,Y,Z[,SCALE[,TURN]]")]
     pub add: Vec<Added>,
+
+    /// Change the albedo of a material of the scene: linear red, green and blue from 0 to 1, or one number for a grey. May be given more than
+    /// once
+    #[arg(long, value_name = "MATERIAL.albedo=R,G,B")]
+    pub set: Vec<Change>,
 
     #[command(flatten)]
     pub ground: GroundArgs,
@@ -55,7 +61,8 @@ impl SceneArgs {
     /// # Errors
     /// As [`open`] and [`GroundArgs::place`].
     pub fn open_alone(&self) -> Result<(Scene, Source)> {
-        let (scene, source) = open(self.scene.as_deref(), self.builtin.as_deref(), &in_unit(self.unit))?;
+        let (mut scene, source) = open(self.scene.as_deref(), self.builtin.as_deref(), &in_unit(self.unit))?;
+        changed::all(&mut scene, &self.set)?;
         Ok((self.ground.place(scene, self.unit)?, source))
     }
 

@@ -35,6 +35,8 @@ mod igi;
 mod igi_experiment;
 #[path = "../cli/lucerna.rs"]
 mod lucerna;
+#[path = "../cli/prt.rs"]
+mod prt;
 #[path = "../cli/reference.rs"]
 mod reference;
 #[path = "../cli/render.rs"]

@@ -52,6 +52,7 @@ pub fn check(record: &Record, extent: [u32; 2], long: bool) -> Result<()> {
     over("settings.samples", samples.saturating_mul(pixels), PATHS, "paths")?;
     over("light", record.light.len() as u64, THINGS, "lights")?;
     over("add", record.add.len() as u64, THINGS, "objects")?;
+    over("set", record.set.len() as u64, THINGS, "materials")?;
     let beside = record.ground.as_ref().map_or(0, |ground| ground.beside.len());
     over("ground.beside", beside as u64, THINGS, "objects")
 }

@@ -1,0 +1,364 @@
+//! What a bake computes on the device: particles, distances, gathered samples and the light of examples (`shaders-glsl/prt`).
+
+use glam::Vec3;
+
+use super::{
+    Baking, Plan,
+    cap::Cap,
+    plan,
+    samples::{self, Grid, Thinning},
+};
+use crate::{
+    Error, ErrorKind, Result, Stop,
+    bake::Digest,
+    gpu::{Gpu, OwnedBuffer},
+    graph::{Graph, Items, Runner},
+    rays::{Rays, traced},
+    resident::Resident,
+    scene::{Pose, Scene},
+    shaders::{
+        consts::{PRT_FIRST_HIT, PRT_HITS},
+        prt::{depths, examples, gather, particles},
+        types::{self, PrtPoint},
+    },
+};
+
+/// Particles that are followed at once.
+const PARTICLES: u32 = 1 << 16;
+/// Rounds of particles at most.
+const MOST_ROUNDS: u32 = 96;
+/// Samples from which the area that light reaches is estimated.
+const PILOT: f32 = 3000.0;
+
+/// The scene of a bake on a device.
+#[derive(Debug)]
+pub struct Bakery {
+    runner: Runner,
+    gpu: Gpu,
+    scene: Scene,
+    pose: Pose,
+    resident: Resident,
+    rays: Rays,
+    on_device: Option<Uploaded>,
+}
+
+/// Samples on the device.
+#[derive(Debug)]
+struct Uploaded {
+    samples: OwnedBuffer,
+    grid: Grid,
+    starts: OwnedBuffer,
+    order: OwnedBuffer,
+}
+
+/// The samples of a scene.
+#[derive(Clone, Debug)]
+pub struct Sampled {
+    pub plan: Plan,
+    /// Cluster after cluster.
+    pub samples: Vec<PrtPoint>,
+    /// Places in the free space, evenly distributed: one for each example light, metres.
+    pub examples: Vec<[f32; 3]>,
+}
+
+/// The hits of a round of particles.
+struct Round {
+    /// With the path of each particle apart.
+    hits: Vec<Vec<PrtPoint>>,
+    /// Scattered particles that left the scene, and all of them.
+    escaped: [u64; 2],
+}
+
+impl Bakery {
+    /// Uploads the scene.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
+    pub fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
+        let scene = Scene { environment: None, ..scene.clone() };
+        let resident = Resident::for_rays(gpu, &scene)?;
+        let rays = Rays::new(gpu, &scene, &resident)?;
+        let pose = Pose::rest(&scene);
+        Ok(Self { runner: Runner::new(gpu), gpu: gpu.clone(), scene, pose, resident, rays, on_device: None })
+    }
+
+    /// Puts samples on the surfaces that particles from `starts` reach, and clusters them. The same on every shard.
+    ///
+    /// # Errors
+    /// `Input` if there is no surface or if nearly all particles leave the scene; `OutOfMemory`, `DeviceLost`, `Interrupted`.
+    pub fn sample(&mut self, baking: &Baking, starts: &[Vec3], stop: &Stop) -> Result<Sampled> {
+        baking.validate()?;
+        let triangles = samples::triangles(&self.scene);
+        let whole = samples::area(&triangles) as f32;
+        if !(whole > 0.0 && whole.is_finite()) {
+            return Err(Error::input("the scene has no surface that light reaches"));
+        }
+        let pilot = (samples::DENSITY * whole / PILOT).sqrt();
+        let (mut found, _, escaped) = self.thinned(baking, starts, pilot, 4, stop)?;
+        if found.len() < 16 {
+            let what = format!("particles from {} places inside the scene hit next to nothing", starts.len());
+            return Err(Error::input(what).help("Name a point inside the room with --inside X,Y,Z"));
+        }
+        if escaped > 0.7 {
+            let what = format!("the scene is open: {:.0} % of all scattered particles leave it", 100.0 * escaped);
+            return Err(Error::input(what).help("Name a point inside a room with --inside X,Y,Z"));
+        }
+        samples::weigh(&mut found, &triangles, pilot);
+        let reached: f32 = found.iter().map(|sample| sample.area).sum();
+        let radius = (samples::DENSITY * reached / baking.samples as f32).sqrt();
+        let (mut found, places, escaped) = self.thinned(baking, starts, radius, MOST_ROUNDS, stop)?;
+        if found.len() > plan::MOST_SAMPLES {
+            let what = format!("{} samples, at most {} are possible", found.len(), plan::MOST_SAMPLES);
+            return Err(Error::usage(what).at("room.samples"));
+        }
+        samples::weigh(&mut found, &triangles, radius);
+        // A sample that stands for no surface is of no use.
+        found.retain(|sample| sample.area > 0.0);
+        let (sorted, clusters) = samples::cluster(found, baking);
+        let bounds = {
+            let (mut low, mut high) = (Vec3::splat(f32::MAX), Vec3::splat(f32::MIN));
+            triangles.iter().flatten().for_each(|p| (low, high) = (low.min(*p), high.max(*p)));
+            high - low
+        };
+        let plan = Plan {
+            scene: self.scene.name.clone(),
+            parts: plan::parts(&self.scene),
+            settings: baking.clone(),
+            starts: starts.iter().map(|start| start.to_array()).collect(),
+            radius,
+            far: bounds.length(),
+            clusters,
+            samples: Digest::of(bytemuck::cast_slice(&sorted)),
+            escaped,
+        };
+        if plan.all_vectors() > plan::MOST_VECTORS {
+            let what = format!("{} vectors of light, at most {} are possible", plan.all_vectors(), plan::MOST_VECTORS);
+            let error = Error::usage(what).at("room.cluster");
+            return Err(error.help("Choose larger clusters, fewer samples or fewer vectors (room.light)"));
+        }
+        Ok(Sampled { plan, samples: sorted, examples: places })
+    }
+
+    /// Thinned hits of particles, places in the free space, and the share of scattered particles that left the scene.
+    fn thinned(
+        &mut self,
+        baking: &Baking,
+        starts: &[Vec3],
+        radius: f32,
+        rounds: u32,
+        stop: &Stop,
+    ) -> Result<(Vec<PrtPoint>, Vec<[f32; 3]>, f64)> {
+        let mut thinning = Thinning::new(radius);
+        let mut places = Vec::new();
+        let mut escaped = [0u64; 2];
+        for round in 0..rounds {
+            stop.check()?;
+            let found = self.particles(baking, starts, round * PARTICLES)?;
+            escaped.iter_mut().zip(found.escaped).for_each(|(sum, more)| *sum += more);
+            if round == 0 {
+                places = free_places(&found.hits, baking);
+            }
+            let mut kept = 0;
+            // Hits of one particle depend on each other, so those of all particles come in turns.
+            for turn in 0..PRT_HITS as usize {
+                let hits = found.hits.iter().filter_map(|hits| hits.get(turn));
+                kept += hits.filter(|hit| thinning.offer(hit)).count();
+            }
+            if thinning.samples.len() > plan::MOST_SAMPLES || kept * 400 < thinning.samples.len() {
+                break;
+            }
+        }
+        Ok((thinning.samples, places, escaped[0] as f64 / escaped[1].max(1) as f64))
+    }
+
+    /// The hits of a round of particles.
+    fn particles(&mut self, baking: &Baking, starts: &[Vec3], first: u32) -> Result<Round> {
+        let mut graph = Graph::new("prt.particles");
+        let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
+        let rays = self.rays.frame(&mut graph, &handles);
+        let size = u64::from(PARTICLES) * u64::from(PRT_HITS) * size_of::<PrtPoint>() as u64;
+        let points = graph.buffer("prt.points", size);
+        let counts = graph.buffer("prt.counts", 4 * u64::from(PARTICLES));
+        let places: Vec<[f32; 3]> = starts.iter().map(|start| start.to_array()).collect();
+        let args = traced!(
+            particles::Args {
+                starts: graph.buffer_from("prt.starts", &places),
+                points,
+                counts,
+                push: particles::Push {
+                    particles: PARTICLES,
+                    first,
+                    starts_of: places.len() as u32,
+                    seed: baking.seed,
+                },
+            },
+            rays,
+            handles
+        );
+        let hits = PRT_FIRST_HIT + PRT_HITS;
+        graph.compute(args, PARTICLES).rays(u64::from(PARTICLES) * u64::from(hits));
+        let (points, counts) = (graph.read_buffer(points), graph.read_buffer(counts));
+        let frame = self.runner.run(&graph)?;
+        let (points, counts): (Vec<PrtPoint>, Vec<u32>) = (frame.buffer(points), frame.buffer(counts));
+        let of = |(points, count): (&[PrtPoint], &u32)| points[..(*count).min(PRT_HITS) as usize].to_vec();
+        let hits: Vec<_> = points.chunks_exact(PRT_HITS as usize).zip(&counts).map(of).collect();
+        let after = counts.iter().filter(|count| **count > 0);
+        let left = after.clone().filter(|count| **count < PRT_HITS).count() as u64;
+        let scattered = after.map(|count| u64::from(*count.min(&(PRT_HITS - 1)))).sum();
+        Ok(Round { hits, escaped: [left, scattered] })
+    }
+
+    /// Moves samples to the device, for the stages that follow.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`.
+    pub fn upload(&mut self, sampled: &Sampled) -> Result<()> {
+        let grid = Grid::new(&sampled.samples, sampled.plan.radius);
+        let buffer = |name, bytes: &[u8]| OwnedBuffer::with_contents(&self.gpu, name, bytes);
+        self.on_device = Some(Uploaded {
+            samples: buffer("prt.samples", bytemuck::cast_slice(&sampled.samples))?,
+            starts: buffer("prt.cells", bytemuck::cast_slice(&grid.starts))?,
+            order: buffer("prt.order", bytemuck::cast_slice(&grid.order))?,
+            grid,
+        });
+        Ok(())
+    }
+
+    /// Distances from the samples of a cluster in the directions of its cap, metres: a row for each sample. Negative: below the horizon.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`, `Interrupted`.
+    pub fn depths(&mut self, plan: &Plan, cluster: usize, cap: &Cap) -> Result<Vec<f32>> {
+        let uploaded = self.on_device.as_ref().ok_or_else(not_uploaded)?;
+        let count = plan.clusters[cluster];
+        let directions = cap.directions() as u32;
+        let mut graph = Graph::new("prt.depths");
+        let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
+        let rays = self.rays.frame(&mut graph, &handles);
+        let depths = graph.buffer("prt.depths", 4 * u64::from(count) * u64::from(directions));
+        let first = plan.range(cluster).start as u32;
+        let args = traced!(
+            depths::Args {
+                cap: graph.uniform(&device_cap(cap, [first, count])),
+                samples: graph.import_buffer(&uploaded.samples),
+                depths,
+                push: depths::Push { first: 0, count: directions, far: plan.far, seed: plan.settings.seed },
+            },
+            rays
+        );
+        let items = Items::new(directions).rays(count.into()).turns(self.rays.most_turns());
+        graph.compute_over(args, count, items);
+        let read = graph.read_buffer(depths);
+        Ok(self.runner.run(&graph)?.buffer(read))
+    }
+
+    /// The samples that the samples of a cluster see along their rays: a row for each sample, `u32::MAX` where there is none.
+    ///
+    /// # Errors
+    /// As [`Self::depths`].
+    pub fn gather(&mut self, plan: &Plan, cluster: usize) -> Result<Vec<u32>> {
+        let uploaded = self.on_device.as_ref().ok_or_else(not_uploaded)?;
+        let count = plan.clusters[cluster];
+        let of_sample = plan.settings.rays;
+        let mut graph = Graph::new("prt.gather");
+        let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
+        let rays = self.rays.frame(&mut graph, &handles);
+        let seen = graph.buffer("prt.seen", 4 * u64::from(count) * u64::from(of_sample));
+        let args = traced!(
+            gather::Args {
+                samples: graph.import_buffer(&uploaded.samples),
+                grid: graph.uniform(&uploaded.grid.grid),
+                starts: graph.import_buffer(&uploaded.starts),
+                order: graph.import_buffer(&uploaded.order),
+                seen,
+                push: gather::Push {
+                    first: 0,
+                    count: of_sample,
+                    first_sample: plan.range(cluster).start as u32,
+                    receivers: count,
+                    rays: of_sample,
+                    seed: plan.settings.seed,
+                },
+            },
+            rays,
+            handles
+        );
+        // Finding a sample takes up to some hundred steps.
+        let items = Items::new(of_sample).rays(2 * u64::from(count)).turns(self.rays.most_turns() + 512);
+        graph.compute_over(args, count, items);
+        let read = graph.read_buffer(seen);
+        Ok(self.runner.run(&graph)?.buffer(read))
+    }
+
+    /// Irradiance at the samples of a cluster by each example light of 1 W/sr, W/m²: a row of all lights for each sample.
+    ///
+    /// # Errors
+    /// As [`Self::depths`].
+    pub fn lit(&mut self, plan: &Plan, cluster: usize, places: &[[f32; 3]]) -> Result<Vec<f32>> {
+        let uploaded = self.on_device.as_ref().ok_or_else(not_uploaded)?;
+        let count = plan.clusters[cluster];
+        let lights = places.len() as u32;
+        let mut graph = Graph::new("prt.examples");
+        let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
+        let rays = self.rays.frame(&mut graph, &handles);
+        let irradiances = graph.buffer("prt.irradiances", 4 * u64::from(count) * u64::from(lights));
+        let args = traced!(
+            examples::Args {
+                samples: graph.import_buffer(&uploaded.samples),
+                places: graph.buffer_from("prt.places", places),
+                irradiances,
+                push: examples::Push {
+                    first: 0,
+                    count: lights,
+                    first_sample: plan.range(cluster).start as u32,
+                    receivers: count,
+                    lights,
+                    nearest: 2.0 * plan.radius,
+                    seed: plan.settings.seed,
+                },
+            },
+            rays
+        );
+        let items = Items::new(lights).rays(count.into()).turns(self.rays.most_turns());
+        graph.compute_over(args, count, items);
+        let read = graph.read_buffer(irradiances);
+        Ok(self.runner.run(&graph)?.buffer(read))
+    }
+}
+
+fn not_uploaded() -> Error {
+    Error::new(ErrorKind::Runtime, "the samples are not on the device")
+}
+
+/// The cap of a cluster for shaders, without rows.
+pub(super) fn device_cap(cap: &Cap, [first_sample, samples]: [u32; 2]) -> types::PrtCap {
+    types::PrtCap {
+        axis: cap.axis.to_array(),
+        cos_most: cap.cos_most,
+        side: cap.side,
+        first_sample,
+        samples,
+        ..types::PrtCap::default()
+    }
+}
+
+/// Places for the example lights. Particles that scatter diffusely fill a closed space evenly, so a random point along their paths is an even
+/// point of the space.
+fn free_places(hits: &[Vec<PrtPoint>], baking: &Baking) -> Vec<[f32; 3]> {
+    let segments =
+        || hits.iter().flat_map(|hits| hits.windows(2)).map(|pair| [0, 1].map(|i| samples::position(&pair[i])));
+    let whole: f64 = segments().map(|[a, b]| f64::from(a.distance(b))).sum();
+    let each = whole / f64::from(baking.examples);
+    let mut out = Vec::new();
+    let mut sum = 0.0;
+    for [a, b] in segments() {
+        let length = f64::from(a.distance(b));
+        while each > 0.0 && (out.len() as f64 + 0.5) * each < sum + length {
+            let along = ((out.len() as f64 + 0.5) * each - sum) / length.max(1e-9);
+            out.push(a.lerp(b, along as f32).to_array());
+        }
+        sum += length;
+    }
+    out.truncate(baking.examples as usize);
+    out
+}

@@ -1,0 +1,29 @@
+//! Precomputed radiance transfer for lights that move inside a room ("Precomputed Illumination for Virtual Reality Scenarios", Leonhardt and Bohn).
+//!
+//! [`Bakery`] puts samples on all surfaces and traces rays between them. [`units`] are the stages of a bake: visibility, transport, light of
+//! examples, bases, transfer. [`Stored`] is the file. At run time [`Prt`] finds the direct light at the samples, transfers it, and spreads
+//! it over the picture.
+
+mod baked;
+mod bakery;
+mod cap;
+mod coded;
+mod file;
+mod on_device;
+mod plan;
+mod samples;
+mod settings;
+pub mod solve;
+mod technique;
+mod transfer;
+pub mod units;
+mod visibility;
+
+pub use baked::Baked;
+pub use bakery::{Bakery, Sampled};
+pub use cap::Cap;
+pub use file::{Stored, Summary};
+pub use plan::{MOST_SAMPLES, Plan, parts, starts};
+pub use samples::Grid;
+pub use settings::{Baking, Direct, PictureSettings, Settings};
+pub use technique::{Mode, Prt};

@@ -1,0 +1,310 @@
+//! A bake on a device, and the passes from the lights of a frame to the irradiance of the samples.
+
+use glam::Vec3;
+use half::f16;
+
+use super::{
+    Settings, Stored, bakery,
+    samples::Grid,
+    solve::{self, Solved},
+};
+use crate::{
+    Result,
+    gpu::{Gpu, OwnedBuffer},
+    graph::{Buffer, Graph, Runner},
+    resident::Resident,
+    scene::{Pose, Scene},
+    shaders::{
+        prt::{albedo, lit, mix, project, receive, scatter},
+        types::{PrtCap, PrtReceiver, PrtVector},
+    },
+};
+
+/// A bake on a device.
+#[derive(Debug)]
+pub struct OnDevice {
+    pub samples: OwnedBuffer,
+    /// The cluster of each sample.
+    pub clusters: OwnedBuffer,
+    pub grid: Grid,
+    pub starts: OwnedBuffer,
+    pub order: OwnedBuffer,
+    pub count: u32,
+    caps: OwnedBuffer,
+    rows: OwnedBuffer,
+    albedos: OwnedBuffer,
+    /// What the matrices depend on.
+    albedo_list: Vec<[f32; 3]>,
+    vectors: Vec<PrtVector>,
+    weights: OwnedBuffer,
+    matrices: Option<(OwnedBuffer, Solved, [bool; 2])>,
+    receivers: OwnedBuffer,
+    words: OwnedBuffer,
+    /// Rows of the receivers' vectors; `None`: samples have their parts of the vectors of light.
+    mixed: Option<(OwnedBuffer, u32)>,
+    /// Numbers that a frame multiplies: for each sample and light point; for each sample; between bases.
+    pub products: [u64; 3],
+}
+
+/// Light at the samples.
+#[derive(Clone, Copy, Debug)]
+pub struct Lit {
+    pub irradiances: Buffer,
+    /// Share of each light that a sample sees.
+    pub visible: Buffer,
+}
+
+/// Two halves in a word; an odd number of them is filled up with 0.
+fn packed(halves: impl IntoIterator<Item = f16>) -> Vec<u32> {
+    let halves: Vec<u32> = halves.into_iter().map(|half| u32::from(half.to_bits())).collect();
+    halves.chunks(2).map(|pair| pair[0] | pair.get(1).copied().unwrap_or(0) << 16).collect()
+}
+
+impl OnDevice {
+    /// Uploads a bake, and finds the albedos of the samples by the materials of a scene. `gloss`: all reflected energy counts, not that of the
+    /// diffuse base alone.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
+    pub fn new(gpu: &Gpu, scene: &Scene, stored: &Stored, gloss: bool) -> Result<Self> {
+        let plan = &stored.plan;
+        let all = plan.all_vectors();
+        let (mut clusters, mut caps, mut rows) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut vectors, mut weights) = (Vec::new(), Vec::new());
+        let (mut receivers, mut words, mut mixed) = (Vec::new(), Vec::new(), Vec::<f32>::new());
+        let mut of_mixed = 0u32;
+        let mut products = [0u64; 3];
+        for cluster in 0..plan.clusters.len() {
+            let (range, count) = (plan.range(cluster), plan.clusters[cluster]);
+            clusters.extend(std::iter::repeat_n(cluster as u32, count as usize));
+            // Rows of directions: the mean and the vectors. Rows of samples: 1 and the coefficients.
+            let (visibility, cap) = (&stored.visibility[cluster], stored.cap(cluster));
+            let of_row = visibility.vectors as usize;
+            let first_row = rows.len() as u32;
+            for (direction, mean) in visibility.mean.iter().enumerate() {
+                let vectors = &visibility.basis[direction * of_row..][..of_row];
+                rows.extend(packed(std::iter::once(*mean).chain(vectors.iter().copied())));
+            }
+            let first_sample_row = rows.len() as u32;
+            for sample in 0..count as usize {
+                let coefficients = &visibility.coefficients[sample * of_row..][..of_row];
+                rows.extend(packed(std::iter::once(f16::ONE).chain(coefficients.iter().copied())));
+            }
+            caps.push(PrtCap {
+                first_row,
+                first_sample_row,
+                words: (of_row as u32 + 2) / 2,
+                ..bakery::device_cap(&cap, [range.start as u32, count])
+            });
+            let (basis, transfer) = (&stored.bases[cluster], &stored.transfers[cluster]);
+            let first_weight = weights.len() as u32;
+            let samples = &stored.samples[range.clone()];
+            samples.iter().enumerate().for_each(|(number, s)| weights.extend(basis.weights(number, s.area)));
+            for number in 0..basis.vectors {
+                vectors.push(PrtVector {
+                    first_sample: range.start as u32,
+                    samples: count,
+                    first_weight,
+                    stride: basis.vectors,
+                    number,
+                    is_mean: u32::from(basis.centred && number + 1 == basis.vectors),
+                    ..PrtVector::default()
+                });
+            }
+            let stride = transfer.stride(all);
+            let first_mixed = if plan.settings.receivers > 0 { of_mixed } else { 0 };
+            for values in transfer.values.chunks_exact(stride.max(1)) {
+                receivers.push(PrtReceiver { first_word: words.len() as u32, first_mixed, count: stride as u32 });
+                words.extend(packed(values.iter().copied()));
+            }
+            if stride == 0 {
+                receivers.extend(std::iter::repeat_n(PrtReceiver::default(), count as usize));
+            }
+            mixed.extend(&transfer.rows);
+            of_mixed += transfer.rank;
+            products[0] += 4 * u64::from(visibility.vectors + 1) * u64::from(count);
+            products[1] += u64::from(count) * (stride as u64 + u64::from(basis.vectors));
+        }
+        products[2] = 3 * (all * all) as u64 + mixed.len() as u64;
+        let grid = Grid::new(&stored.samples, plan.radius);
+        let buffer = |name, bytes: &[u8]| {
+            let filled = if bytes.is_empty() { &[0; 16][..] } else { bytes };
+            OwnedBuffer::with_contents(gpu, name, filled)
+        };
+        let samples = buffer("prt.samples", bytemuck::cast_slice(&stored.samples))?;
+        let albedo_list = albedos(gpu, scene, &samples, stored.samples.len() as u32, gloss)?;
+        Ok(Self {
+            samples,
+            clusters: buffer("prt.clusters", bytemuck::cast_slice(&clusters))?,
+            starts: buffer("prt.cells", bytemuck::cast_slice(&grid.starts))?,
+            order: buffer("prt.order", bytemuck::cast_slice(&grid.order))?,
+            grid,
+            count: stored.samples.len() as u32,
+            caps: buffer("prt.caps", bytemuck::cast_slice(&caps))?,
+            rows: buffer("prt.rows", bytemuck::cast_slice(&rows))?,
+            albedos: buffer("prt.albedos", bytemuck::cast_slice(&albedo_list))?,
+            albedo_list,
+            vectors,
+            weights: buffer("prt.weights", bytemuck::cast_slice(&weights))?,
+            matrices: None,
+            receivers: buffer("prt.receivers", bytemuck::cast_slice(&receivers))?,
+            words: buffer("prt.words", bytemuck::cast_slice(&words))?,
+            mixed: match plan.settings.receivers {
+                0 => None,
+                _ => Some((buffer("prt.mixed-rows", bytemuck::cast_slice(&mixed))?, of_mixed)),
+            },
+            products,
+        })
+    }
+
+    /// The light of a frame's lights at the samples. `lights`: the lights of the frame, and their number.
+    ///
+    /// # Errors
+    /// As [`solve::solve`]; `OutOfMemory`, `DeviceLost`.
+    pub fn light(
+        &mut self,
+        graph: &mut Graph,
+        gpu: &Gpu,
+        stored: &Stored,
+        (lights, light_count): (Buffer, u32),
+        settings: &Settings,
+    ) -> Result<Lit> {
+        let count = self.count;
+        let choice = [settings.bounces, settings.mean];
+        if self.matrices.as_ref().is_none_or(|(_, _, of)| *of != choice) {
+            let solved = solve::solve(stored, &self.albedo_list, settings.bounces, settings.mean)?;
+            let all = solved.inverse.concat();
+            let buffer = OwnedBuffer::with_contents(gpu, "prt.matrices", bytemuck::cast_slice(&all))?;
+            self.matrices = Some((buffer, solved, choice));
+        }
+        let samples = graph.import_buffer(&self.samples);
+        let direct = graph.buffer("prt.direct", 12 * u64::from(count));
+        let visible = graph.buffer("prt.visible", 4 * u64::from(count) * u64::from(light_count.max(1)));
+        let offsets = offsets(settings);
+        let args = lit::Args {
+            samples,
+            clusters: graph.import_buffer(&self.clusters),
+            caps: graph.import_buffer(&self.caps),
+            rows: graph.import_buffer(&self.rows),
+            offsets: graph.buffer_from("prt.offsets", &offsets),
+            lights,
+            direct,
+            visible,
+            push: lit::Push {
+                count,
+                points: offsets.len() as u32,
+                bias: settings.bias,
+                bias_distance: settings.bias_distance * stored.plan.radius,
+                strength: settings.strength,
+            },
+        };
+        graph.compute(args, count).rays(u64::from(count) * offsets.len() as u64 * u64::from(light_count));
+        let Some((matrices, solved, _)) = &self.matrices else {
+            return Ok(Lit { irradiances: direct, visible });
+        };
+        let all = self.vectors.len() as u32;
+        let vectors: Vec<PrtVector> = self
+            .vectors
+            .iter()
+            .zip(&solved.shift)
+            .zip(&solved.fixed)
+            .map(|((vector, shift), fixed)| PrtVector { shift: *shift, fixed_value: *fixed, ..*vector })
+            .collect();
+        let [projected, scattered] =
+            ["prt.projected", "prt.scattered"].map(|name| graph.buffer(name, 12 * u64::from(all)));
+        let args = project::Args {
+            vectors: graph.buffer_from("prt.vectors", &vectors),
+            weights: graph.import_buffer(&self.weights),
+            direct,
+            albedos: graph.import_buffer(&self.albedos),
+            coefficients: projected,
+            push: project::Push { count: all },
+        };
+        graph.compute(args, all);
+        let args = scatter::Args {
+            matrices: graph.import_buffer(matrices),
+            before: projected,
+            after: scattered,
+            push: scatter::Push { count: all },
+        };
+        graph.compute(args, all);
+        Ok(Lit { irradiances: self.receive(graph, scattered), visible })
+    }
+
+    /// Irradiance of the samples by these coefficients of all vectors of light.
+    pub fn receive(&self, graph: &mut Graph, coefficients: Buffer) -> Buffer {
+        let mixed = match &self.mixed {
+            None => coefficients,
+            Some((rows, count)) => {
+                let mixed = graph.buffer("prt.mixed", 12 * u64::from(*count).max(1));
+                let vectors = self.vectors.len() as u32;
+                let args = mix::Args {
+                    rows: graph.import_buffer(rows),
+                    coefficients,
+                    mixed,
+                    push: mix::Push { count: *count, vectors },
+                };
+                graph.compute(args, *count);
+                mixed
+            }
+        };
+        let irradiances = graph.buffer("prt.irradiances", 12 * u64::from(self.count));
+        let args = receive::Args {
+            receivers: graph.import_buffer(&self.receivers),
+            words: graph.import_buffer(&self.words),
+            mixed,
+            irradiances,
+            push: receive::Push { count: self.count },
+        };
+        graph.compute(args, self.count);
+        irradiances
+    }
+
+    /// Number of vectors of light.
+    pub fn vectors(&self) -> u32 {
+        self.vectors.len() as u32
+    }
+}
+
+/// The points of a light around its place: evenly on a sphere (a spiral of the golden angle).
+fn offsets(settings: &Settings) -> Vec<[f32; 3]> {
+    let count = if settings.radius > 0.0 { settings.points } else { 1 };
+    (0..count)
+        .map(|i| {
+            if count == 1 {
+                return [0.0; 3];
+            }
+            let y = 1.0 - 2.0 * (i as f32 + 0.5) / count as f32;
+            let around = i as f32 * std::f32::consts::PI * (3.0 - 5f32.sqrt());
+            let across = (1.0 - y * y).sqrt();
+            (settings.radius * Vec3::new(across * around.cos(), y, across * around.sin())).to_array()
+        })
+        .collect()
+}
+
+/// The albedos of samples by the materials of a scene.
+fn albedos(gpu: &Gpu, scene: &Scene, samples: &OwnedBuffer, count: u32, gloss: bool) -> Result<Vec<[f32; 3]>> {
+    let scene = Scene { environment: None, ..scene.clone() };
+    let mut resident = Resident::for_rays(gpu, &scene)?;
+    let mut graph = Graph::new("prt.albedo");
+    let handles = resident.frame_in(&mut graph, &scene, &Pose::rest(&scene));
+    let albedos = graph.buffer("prt.albedos", 12 * u64::from(count));
+    let args = albedo::Args {
+        materials: handles.materials,
+        scene_textures: handles.textures,
+        surface_instances: handles.instances,
+        surface_indices: handles.indices,
+        surface_positions: handles.positions,
+        surface_normals: handles.normals,
+        surface_tangents: handles.tangents,
+        surface_uvs: handles.uvs,
+        surface_colors: handles.colors,
+        samples: graph.import_buffer(samples),
+        albedos,
+        push: albedo::Push { count },
+        spec: albedo::Spec { gloss: gloss.into() },
+    };
+    graph.compute(args, count);
+    let read = graph.read_buffer(albedos);
+    Ok(Runner::new(gpu).run(&graph)?.buffer(read))
+}

@@ -1,0 +1,305 @@
+//! Samples on surfaces without a mesh: thinning, areas, clusters, and the grid in which samples are found (Leonhardt and Bohn, section 4.1).
+
+use glam::{Vec2, Vec3};
+
+use super::Baking;
+use crate::{
+    scene::{Pose, Scene},
+    shaders::types::{PrtGrid, PrtPoint},
+};
+
+/// Samples on a plane whose least distance is 1, of one square metre, when no further sample fits in (random sequential adsorption: discs of
+/// half that radius cover 0.547 of the plane).
+pub(super) const DENSITY: f32 = 0.697;
+/// Points on surfaces for each sample, from which its area follows.
+const POINTS: usize = 50;
+/// Cells of a grid at most.
+const MOST_CELLS: f64 = 8e6;
+
+pub(super) fn position(point: &PrtPoint) -> Vec3 {
+    Vec3::from(point.position)
+}
+
+pub(super) fn side(point: &PrtPoint) -> Vec3 {
+    Vec3::from(point.side)
+}
+
+/// Samples in a grid, to which more are added while they are thinned.
+#[derive(Debug)]
+pub(super) struct Thinning {
+    radius: f32,
+    cells: std::collections::HashMap<[i32; 3], Vec<u32>>,
+    pub samples: Vec<PrtPoint>,
+}
+
+impl Thinning {
+    /// `radius`: least distance of two samples on a plane, metres.
+    pub fn new(radius: f32) -> Self {
+        Self { radius, cells: Default::default(), samples: Vec::new() }
+    }
+
+    /// Keeps a candidate if no sample is too close. The least distance shrinks with the angle between the normals, so that curved
+    /// surfaces have more samples, and two sides of a sheet do not count for each other.
+    pub fn offer(&mut self, candidate: &PrtPoint) -> bool {
+        let at = position(candidate);
+        let cell = |v: Vec3| (v / self.radius).floor().as_ivec3();
+        let [low, high] = [-self.radius, self.radius].map(|by| cell(at + by));
+        for z in low.z..=high.z {
+            for y in low.y..=high.y {
+                for x in low.x..=high.x {
+                    for other in self.cells.get(&[x, y, z]).into_iter().flatten() {
+                        let other = &self.samples[*other as usize];
+                        let least = self.radius * (0.5 + 0.5 * side(other).dot(side(candidate)));
+                        if position(other).distance_squared(at) < least * least {
+                            return false;
+                        }
+                    }
+                }
+            }
+        }
+        self.cells.entry(cell(at).to_array()).or_default().push(self.samples.len() as u32);
+        self.samples.push(*candidate);
+        true
+    }
+}
+
+/// The grid of samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    pub grid: PrtGrid,
+    /// First entry of `order` of each cell, and its end.
+    pub starts: Vec<u32>,
+    /// Numbers of samples, cell after cell.
+    pub order: Vec<u32>,
+}
+
+impl Grid {
+    /// `radius`: least distance of two samples on a plane, metres.
+    pub fn new(samples: &[PrtPoint], radius: f32) -> Self {
+        let (mut low, mut high) = (Vec3::splat(f32::MAX), Vec3::splat(f32::MIN));
+        for sample in samples {
+            (low, high) = (low.min(position(sample)), high.max(position(sample)));
+        }
+        if samples.is_empty() {
+            (low, high) = (Vec3::ZERO, Vec3::ZERO);
+        }
+        let size = (high - low).as_dvec3();
+        let mut cell = f64::from(2.0 * radius).max(1e-6);
+        while (size / cell + 1.0).element_product() > MOST_CELLS {
+            cell *= 1.25;
+        }
+        let counts = (size / cell).floor().as_uvec3() + 1;
+        let grid = PrtGrid { origin: low.to_array(), cell: cell as f32, counts: counts.to_array(), radius };
+        let cells: Vec<usize> = samples.iter().map(|sample| cell_of(&grid, position(sample))).collect();
+        let mut starts = vec![0u32; counts.element_product() as usize + 1];
+        cells.iter().for_each(|cell| starts[cell + 1] += 1);
+        for cell in 1..starts.len() {
+            starts[cell] += starts[cell - 1];
+        }
+        let mut next = starts.clone();
+        let mut order = vec![0u32; samples.len()];
+        for (number, cell) in cells.iter().enumerate() {
+            order[next[*cell] as usize] = number as u32;
+            next[*cell] += 1;
+        }
+        Self { grid, starts, order }
+    }
+
+    /// The sample that stands for a point of a surface. Twin of `nearest_sample` of `prt/find.glsl`, without its second search.
+    fn nearest(&self, samples: &[PrtPoint], at: Vec3, normal: Vec3) -> Option<usize> {
+        let counts = glam::UVec3::from(self.grid.counts).as_ivec3();
+        let place = (at - Vec3::from(self.grid.origin)) / self.grid.cell;
+        let low = (place - 0.5).floor().as_ivec3();
+        let (low, high) = (low.max(glam::IVec3::ZERO), (low + 1).min(counts - 1));
+        let mut found = None;
+        let mut least = f32::MAX;
+        for z in low.z..=high.z {
+            for y in low.y..=high.y {
+                for x in low.x..=high.x {
+                    let cell = ((z * counts.y + y) * counts.x + x) as usize;
+                    for number in &self.order[self.starts[cell] as usize..self.starts[cell + 1] as usize] {
+                        let sample = &samples[*number as usize];
+                        let facing = side(sample).dot(normal);
+                        let way = position(sample) - at;
+                        let score = way.length_squared() * if facing > 0.9 { 1.0 } else { 3.0 - 2.0 * facing };
+                        // A sample on a parallel surface beside this one does not stand for this one.
+                        let apart = way.dot(normal).abs() > 0.5 * self.grid.radius;
+                        if facing > 0.3 && !apart && score < least {
+                            (least, found) = (score, Some(*number as usize));
+                        }
+                    }
+                }
+            }
+        }
+        found.filter(|_| least < 4.0 * self.grid.radius * self.grid.radius)
+    }
+}
+
+fn cell_of(grid: &PrtGrid, at: Vec3) -> usize {
+    let counts = glam::UVec3::from(grid.counts);
+    let cell = ((at - Vec3::from(grid.origin)) / grid.cell).floor().max(Vec3::ZERO).as_uvec3().min(counts - 1);
+    ((cell.z * counts.y + cell.y) * counts.x + cell.x) as usize
+}
+
+/// The triangles of a scene at rest.
+pub(super) fn triangles(scene: &Scene) -> Vec<[Vec3; 3]> {
+    let pose = Pose::rest(scene);
+    let mut out = Vec::new();
+    for (node, mesh) in scene.nodes.iter().enumerate().filter_map(|(node, of)| Some((node, of.mesh?))) {
+        let Some((mesh, world)) = scene.meshes.get(mesh as usize).zip(pose.world.get(node)) else { continue };
+        for primitive in &mesh.primitives {
+            let unlit = scene.materials.get(primitive.material as usize).is_none_or(|material| material.unlit);
+            if unlit {
+                continue;
+            }
+            let corner = |index: &u32| {
+                primitive.positions.get(*index as usize).map_or(Vec3::ZERO, |p| world.transform_point3(*p))
+            };
+            out.extend(primitive.indices.chunks_exact(3).map(|t| [corner(&t[0]), corner(&t[1]), corner(&t[2])]));
+        }
+    }
+    out
+}
+
+fn doubled_area([a, b, c]: &[Vec3; 3]) -> Vec3 {
+    (*b - *a).cross(*c - *a)
+}
+
+/// Area of triangles, m².
+pub(super) fn area(triangles: &[[Vec3; 3]]) -> f64 {
+    triangles.iter().map(|t| 0.5 * f64::from(doubled_area(t).length())).filter(|area| area.is_finite()).sum()
+}
+
+/// Gives each sample the area of the surface that is nearest to it. Sides that no particle reached have no samples and count for none.
+pub(super) fn weigh(samples: &mut [PrtPoint], triangles: &[[Vec3; 3]], radius: f32) {
+    let grid = Grid::new(samples, radius);
+    let whole = area(triangles);
+    let each = whole / (POINTS * samples.len().max(1)) as f64;
+    let mut counts = vec![0u32; samples.len()];
+    // Points of a low-discrepancy sequence (Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018).
+    let (mut sum, mut number) = (0.0f64, 0u64);
+    for triangle in triangles {
+        let normal = doubled_area(triangle);
+        let part = 0.5 * f64::from(normal.length());
+        if !part.is_finite() || part <= 0.0 || each <= 0.0 {
+            continue;
+        }
+        sum += part / each;
+        let normal = normal.normalize();
+        while (number as f64) + 0.5 < sum {
+            number += 1;
+            let fraction = |by: f64| (0.5 + by * number as f64).fract() as f32;
+            let uv = Vec2::new(fraction(0.754_877_666_246_693), fraction(0.569_840_290_998_053));
+            let uv = if uv.x + uv.y > 1.0 { 1.0 - uv } else { uv };
+            let [a, b, c] = triangle;
+            let at = *a + (*b - *a) * uv.x + (*c - *a) * uv.y;
+            for normal in [normal, -normal] {
+                if let Some(found) = grid.nearest(samples, at, normal) {
+                    counts[found] += 1;
+                }
+            }
+        }
+    }
+    for (sample, count) in samples.iter_mut().zip(counts) {
+        // Each side of a triangle has its whole area.
+        sample.area = (f64::from(count) * each) as f32;
+    }
+}
+
+/// Sorts samples by clusters, and returns the number of samples of each. Roots are found as samples are, with a larger radius; each
+/// sample goes to the nearest root, and rather to one with a similar normal and the same material.
+pub(super) fn cluster(samples: Vec<PrtPoint>, baking: &Baking) -> (Vec<PrtPoint>, Vec<u32>) {
+    let whole: f32 = samples.iter().map(|sample| sample.area).sum();
+    let wanted = (samples.len() as f32 / baking.cluster as f32).round().max(1.0);
+    let mut radius = (DENSITY * whole / wanted).sqrt();
+    // Furniture is smaller than the radius and has roots of its own, so the radius grows until their number fits.
+    let roots = loop {
+        let mut thinning = Thinning::new(radius.max(1e-6));
+        for sample in &samples {
+            thinning.offer(sample);
+        }
+        if thinning.samples.len() as f32 <= 1.1 * wanted || thinning.samples.len() <= 1 {
+            break thinning.samples;
+        }
+        radius *= 1.05;
+    };
+    let mut of: Vec<(usize, PrtPoint)> = samples
+        .into_iter()
+        .map(|sample| {
+            let score = |root: &PrtPoint| {
+                let facing = side(root).dot(side(&sample));
+                let strange = if root.material == sample.material { 1.0 } else { 1.5 };
+                position(root).distance(position(&sample)) * (2.0 - facing) * strange
+            };
+            let best = (0..roots.len()).min_by(|a, b| score(&roots[*a]).total_cmp(&score(&roots[*b])));
+            (best.unwrap_or(0), sample)
+        })
+        .collect();
+    of.sort_by_key(|(cluster, _)| *cluster);
+    let mut counts = vec![0u32; roots.len()];
+    of.iter().for_each(|(cluster, _)| counts[*cluster] += 1);
+    counts.retain(|count| *count > 0);
+    (of.into_iter().map(|(_, sample)| sample).collect(), counts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(at: Vec3, side: Vec3) -> PrtPoint {
+        PrtPoint { position: at.to_array(), side: side.to_array(), normal: side.to_array(), ..PrtPoint::default() }
+    }
+
+    /// Samples on a square of one metre, and its triangles.
+    fn square(radius: f32) -> (Vec<PrtPoint>, Vec<[Vec3; 3]>) {
+        let mut thinning = Thinning::new(radius);
+        for i in 0..60_000u32 {
+            let fraction = |by: f64| (0.5 + by * f64::from(i)).fract() as f32;
+            let at = Vec3::new(fraction(0.754_877_666_246_693), 0.0, fraction(0.569_840_290_998_053));
+            thinning.offer(&point(at, Vec3::Y));
+        }
+        let [a, b, c, d] = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(x, z)| Vec3::new(x, 0.0, z));
+        (thinning.samples, vec![[a, b, c], [a, c, d]])
+    }
+
+    #[test]
+    fn samples_are_apart_and_fill_a_plane() {
+        let (samples, _) = square(0.05);
+        for (index, a) in samples.iter().enumerate() {
+            assert!(samples[..index].iter().all(|b| position(a).distance(position(b)) >= 0.05));
+        }
+        let wanted = DENSITY / 0.05f32.powi(2);
+        // Quasi-random candidates and the border of the square add some.
+        assert!((samples.len() as f32 / wanted - 1.0).abs() < 0.15, "{} {wanted}", samples.len());
+    }
+
+    #[test]
+    fn areas_sum_to_the_surface_and_only_to_its_lit_side() {
+        let (mut samples, triangles) = square(0.05);
+        weigh(&mut samples, &triangles, 0.05);
+        let whole: f32 = samples.iter().map(|sample| sample.area).sum();
+        assert!((whole - 1.0).abs() < 1e-3, "{whole}");
+        let mean = 1.0 / samples.len() as f32;
+        assert!(samples.iter().all(|sample| sample.area > 0.3 * mean && sample.area < 3.0 * mean));
+    }
+
+    #[test]
+    fn two_sides_of_a_sheet_have_samples_of_their_own() {
+        let mut thinning = Thinning::new(0.1);
+        assert!(thinning.offer(&point(Vec3::ZERO, Vec3::Y)));
+        assert!(thinning.offer(&point(Vec3::ZERO, -Vec3::Y)));
+        assert!(!thinning.offer(&point(Vec3::X * 0.09, Vec3::Y)));
+        assert!(thinning.offer(&point(Vec3::X * 0.09, Vec3::Z)));
+    }
+
+    #[test]
+    fn clusters_hold_all_samples_once() {
+        let (mut samples, triangles) = square(0.05);
+        weigh(&mut samples, &triangles, 0.05);
+        let all = samples.len();
+        let baking = Baking { cluster: 40, ..Baking::default() };
+        let (sorted, counts) = cluster(samples, &baking);
+        assert_eq!((sorted.len(), counts.iter().sum::<u32>() as usize), (all, all));
+        assert!(counts.len() > 3 && counts.iter().all(|count| *count < 120), "{counts:?}");
+    }
+}

@@ -1,0 +1,169 @@
+//! Settings of bakes and of pictures.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    Error, Result,
+    passes::{gbuffer, shadow},
+    settings::{Described, JsonSchema, described},
+    technique,
+};
+
+/// Settings that decide the bytes of a bake.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Baking {
+    /// Samples on all surfaces that light reaches, about.
+    #[schemars(range(min = 16, max = 1_000_000))]
+    pub samples: u32,
+    /// Samples of a cluster, about.
+    #[schemars(range(min = 8, max = 4096))]
+    pub cluster: u32,
+    /// Directions above a sample in which the distance to the nearest surface is stored.
+    #[schemars(range(min = 16, max = 16384))]
+    pub directions: u32,
+    /// Vectors that describe the distances of a cluster: d₁ of the paper.
+    #[schemars(range(min = 1, max = 256))]
+    pub visibility: u32,
+    /// Vectors that describe the direct light of a cluster: d₂ of the paper.
+    #[schemars(range(min = 1, max = 64))]
+    pub light: u32,
+    /// Point lights at random places in the free space, whose light the vectors are made for.
+    #[schemars(range(min = 16, max = 4096))]
+    pub examples: u32,
+    /// Rays that gather the light of one scattering at a sample.
+    #[schemars(range(min = 16, max = 65536))]
+    pub rays: u32,
+    /// Vectors that describe the light that a cluster receives; 0: every coefficient of every sample, as in the paper.
+    #[schemars(range(min = 0, max = 256))]
+    pub receivers: u32,
+    /// Share of the coefficients that are kept, the largest of each cluster; the others become 0.
+    #[schemars(range(min = 0.01, max = 1), extend("x-needs" = "receivers = 0"))]
+    pub keep: f64,
+    /// Direct light is described around the mean of the examples, as in the paper. A room then glows with the light off. If off, around zero, by
+    /// examples of equal weight, and the mean over a cluster is exact.
+    pub centred: bool,
+    /// Seed of all random numbers.
+    #[schemars(range(min = 0, max = 4_294_967_295_u32))]
+    pub seed: u32,
+}
+
+described!(Baking);
+
+impl Default for Baking {
+    fn default() -> Self {
+        Self {
+            samples: 45_000,
+            cluster: 1000,
+            directions: 2016,
+            visibility: 50,
+            light: 10,
+            examples: 1000,
+            rays: 1024,
+            receivers: 24,
+            keep: 1.0,
+            centred: false,
+            seed: 0,
+        }
+    }
+}
+
+impl Baking {
+    /// The paper's choices: a basis around the mean of the examples, and a fifth of all coefficients between clusters and samples.
+    pub fn paper() -> Self {
+        Self { receivers: 0, keep: 0.2, centred: true, ..Self::default() }
+    }
+
+    /// # Errors
+    /// `Usage`, naming the key, the value found and the values allowed.
+    pub fn validate(&self) -> Result<()> {
+        Self::description().check(self).map_err(|error: Error| error.at("room"))
+    }
+}
+
+/// How the direct light of a picture is shadowed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Direct {
+    /// By the visibility of the samples, as in the paper: soft shadows at the distance of the samples.
+    #[default]
+    Samples,
+    /// By shadow maps.
+    Maps,
+}
+
+/// Settings of pictures.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// How the direct light is shadowed.
+    pub direct: Direct,
+    /// Points that stand for a light.
+    #[schemars(range(min = 1, max = 256))]
+    pub points: u32,
+    /// Radius of lights: their points are on a sphere.
+    #[schemars(range(min = 0, max = 100), extend("x-unit" = "m"))]
+    pub radius: f32,
+    /// A light that is farther away than the stored distance by less than this share of it is visible.
+    #[schemars(range(min = 0, max = 1))]
+    pub bias: f32,
+    /// Distance of that kind, in addition to the share, in distances of samples.
+    #[schemars(range(min = 0, max = 100))]
+    pub bias_distance: f32,
+    /// Distance at which a sample has lost most of its part in a pixel, in distances of samples.
+    #[schemars(range(min = 0.3, max = 1))]
+    pub splat: f32,
+    /// Direct light has highlights. If off, Lambert's law alone.
+    pub gloss: bool,
+    /// Scatterings of the light: all of them, or one.
+    pub bounces: bool,
+    /// With a bake around the mean of the examples: the light that the mean itself transfers is there. The paper's equation 10 leaves it out.
+    pub mean: bool,
+    /// Factor on the light of all lights.
+    #[schemars(range(min = 0, max = 1000))]
+    pub strength: f32,
+    /// Basis vector whose transfer the mode `transfer` shows: its number among all vectors of all clusters.
+    #[schemars(range(min = 0, max = 1_000_000))]
+    pub vector: u32,
+}
+
+described!(Settings);
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            direct: Direct::default(),
+            points: 1,
+            radius: 0.0,
+            bias: 0.06,
+            bias_distance: 1.0,
+            splat: 0.6,
+            gloss: true,
+            bounces: true,
+            mean: true,
+            strength: 1.0,
+            vector: 0,
+        }
+    }
+}
+
+/// Settings of all stages of a picture.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PictureSettings {
+    pub prt: Settings,
+    pub gbuffer: gbuffer::Settings,
+    pub shadow: shadow::Settings,
+}
+
+impl technique::Settings for PictureSettings {
+    /// Diffuse surfaces, without the transfer of the mean (equation 10).
+    fn paper() -> Option<Self> {
+        Some(Self { prt: Settings { gloss: false, mean: false, ..Settings::default() }, ..Self::default() })
+    }
+
+    fn validate(&self) -> Result<()> {
+        Settings::description().check(&self.prt).map_err(|error: Error| error.at("prt"))?;
+        self.shadow.validate()
+    }
+}

@@ -1,0 +1,265 @@
+//! Precomputed transfer behind the interface of all techniques.
+
+use glam::Vec3;
+
+use super::{Baked, Direct as Shadows, PictureSettings, Settings, Stored, on_device::OnDevice};
+use crate::{
+    Error, Result,
+    gpu::Gpu,
+    graph::{Format, Graph},
+    passes::{
+        direct::{self, Direct, Lights},
+        gbuffer, shadow, skybox,
+    },
+    scene::{LightKind, Note, NoteKind, Scene},
+    settings::{Described, Description, idle_notes},
+    shaders::{consts, prt::pixels},
+    technique::{self, Making, Moment, Picture, Technique},
+};
+
+/// What the picture shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mode {
+    #[default]
+    Total,
+    Direct,
+    Indirect,
+    Irradiance,
+    Shadow,
+    Samples,
+    Clusters,
+    Transfer,
+}
+
+impl technique::Mode for Mode {
+    const ALL: &'static [Self] = &[
+        Self::Total,
+        Self::Direct,
+        Self::Indirect,
+        Self::Irradiance,
+        Self::Shadow,
+        Self::Samples,
+        Self::Clusters,
+        Self::Transfer,
+    ];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Total => "total",
+            Self::Direct => "direct",
+            Self::Indirect => "indirect",
+            Self::Irradiance => "irradiance",
+            Self::Shadow => "shadow",
+            Self::Samples => "samples",
+            Self::Clusters => "clusters",
+            Self::Transfer => "transfer",
+        }
+    }
+
+    fn doc(self) -> &'static str {
+        match self {
+            Self::Total => "All light",
+            Self::Direct => "Direct light only",
+            Self::Indirect => "Transferred light only: all light after at least one scattering",
+            Self::Irradiance => "Irradiance of the transferred light, without the surfaces' colours",
+            Self::Shadow => "Share of the first light that the samples see",
+            Self::Samples => "The nearest sample of each point in a colour of its own, samples as black dots",
+            Self::Clusters => "Clusters in colours of their own (figure 1), samples as darker dots",
+            Self::Transfer => "Light that the vector prt.vector sends: red above 0, blue below (figure 3)",
+        }
+    }
+
+    fn is_radiance(self) -> bool {
+        !matches!(self, Self::Shadow | Self::Samples | Self::Clusters)
+    }
+}
+
+/// Precomputed transfer, prepared for a scene.
+#[derive(Debug)]
+pub struct Prt {
+    gpu: Gpu,
+    baked: Baked,
+    light: OnDevice,
+}
+
+impl Prt {
+    /// The bake.
+    pub fn stored(&self) -> &Stored {
+        &self.baked.stored
+    }
+}
+
+/// Light and surfaces of a scene that the bake leaves out.
+fn left_out(scene: &Scene) -> Vec<Note> {
+    let note = |place: &str, text: String| Note { kind: NoteKind::Ignored, place: place.into(), text };
+    let mut notes = Vec::new();
+    let suns =
+        scene.lights.iter().filter(|light| light.kind == LightKind::Directional && light.intensity > 0.0).count();
+    if suns > 0 {
+        notes.push(note("lights", format!("{suns} suns are off: only point and spot lights are transferred")));
+    }
+    if scene.environment.is_some() {
+        notes.push(note("environment", "the environment is shown, but it lights nothing".into()));
+    }
+    let named = |what: &str, is: &dyn Fn(&crate::scene::Material) -> bool| {
+        let names: Vec<&str> = scene.materials.iter().filter(|m| is(m)).map(|m| m.name.as_str()).take(5).collect();
+        (!names.is_empty()).then(|| note("materials", format!("{what}: {}", names.join(", "))))
+    };
+    notes.extend(named("some surfaces glow, but they light nothing", &|m| m.emissive != Vec3::ZERO));
+    notes.extend(named("glass stops light, and reflects it as a diffuse surface", &|m| m.transmission > 0.0));
+    notes.extend(named("mirrors reflect light as diffuse surfaces", &|m| m.is_mirror()));
+    if !scene.animations.is_empty()
+        && scene.animations.iter().any(|of| of.channels.iter().any(|c| moves(scene, c.node)))
+    {
+        notes.push(note("animations", "surfaces that move are baked where they rest".into()));
+    }
+    notes
+}
+
+/// Whether a node or one of its children has a mesh.
+fn moves(scene: &Scene, node: u32) -> bool {
+    scene.nodes.iter().enumerate().filter(|(_, of)| of.mesh.is_some()).any(|(number, _)| {
+        let mut at = Some(number as u32);
+        while let Some(here) = at {
+            if here == node {
+                return true;
+            }
+            at = scene.nodes.get(here as usize).and_then(|node| node.parent);
+        }
+        false
+    })
+}
+
+impl Technique for Prt {
+    const NAME: &'static str = "prt";
+    const ABOUT: &'static str = "indirect light of lights that move, from a bake of the room; layers direct, indirect, irradiance, shadow, albedo, normal, depth";
+    const UNITS: &'static str = "clusters";
+
+    type Settings = PictureSettings;
+    type Mode = Mode;
+    type Baked = Baked;
+
+    fn description() -> &'static Description {
+        Settings::description()
+    }
+
+    fn prepared_by(settings: &PictureSettings) -> PictureSettings {
+        // Albedos of samples depend on the kind of reflection.
+        let prt = Settings { gloss: settings.prt.gloss, ..Settings::default() };
+        PictureSettings { prt, ..PictureSettings::default() }
+    }
+
+    fn ready(making: Making<'_, Baked>, settings: &PictureSettings) -> Result<Self> {
+        let Making { gpu, scene, baked, .. } = making;
+        let Some(baked) = baked else {
+            let error = Error::usage("there is no baked room").at("prt");
+            return Err(error.help("Bake it with `prt bake SCENE -o FILE.prt`, and name the file with --bake"));
+        };
+        if let Some(parts) = baked.stored.plan.difference(scene) {
+            let what = format!("is the room `{}`, and this scene has other {parts}", baked.stored.plan.scene);
+            return Err(baked.blamed(Error::input(what).help("Name the scene that was baked, or bake this one")));
+        }
+        let light = OnDevice::new(gpu, scene, &baked.stored, settings.prt.gloss)?;
+        Ok(Self { gpu: gpu.clone(), baked: baked.clone(), light })
+    }
+
+    fn frame(&mut self, graph: &mut Graph, moment: &Moment<'_, Mode>, settings: &PictureSettings) -> Result<Picture> {
+        technique::Settings::validate(settings)?;
+        let of_prt = &settings.prt;
+        let (handles, view) = (moment.handles, &moment.view);
+        let mode = moment.shot.mode;
+        let lights = &handles.moment.lights;
+        let count = lights.len() as u32;
+        let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
+        let stored = self.baked.stored.clone();
+        let mut lit = self
+            .light
+            .light(graph, &self.gpu, &stored, (handles.lights, count), of_prt)
+            .map_err(|error| self.baked.blamed(error))?;
+        let show = match mode {
+            Mode::Samples => consts::PRT_SHOW_SAMPLES,
+            Mode::Clusters => consts::PRT_SHOW_CLUSTERS,
+            Mode::Transfer => consts::PRT_SHOW_TRANSFER,
+            _ => consts::PRT_SHOW_LIGHT,
+        };
+        if mode == Mode::Transfer {
+            let all = self.light.vectors();
+            if of_prt.vector >= all {
+                let what = format!("{}, the bake has the vectors 0 to {}", of_prt.vector, all - 1);
+                return Err(Error::usage(what).at("prt.vector"));
+            }
+            let mut one = vec![[0.0f32; 3]; all as usize];
+            one[of_prt.vector as usize] = [of_prt.strength; 3];
+            let one = graph.buffer_from("prt.vector", &one);
+            lit.irradiances = self.light.receive(graph, one);
+        }
+        let mut notes = [moment.notes, &left_out(moment.scene), &idle_notes("shadow", &settings.shadow)].concat();
+        let mapped = (of_prt.direct == Shadows::Maps && show == consts::PRT_SHOW_LIGHT).then(|| {
+            let shadows = shadow::draw(graph, handles, view, &settings.shadow);
+            notes.extend(shadows.notes.iter().cloned());
+            let choices = Direct { paper_law: false, specular: of_prt.gloss, light_radius: 0.0, light_power: 1.0 };
+            direct::light(graph, &gbuffer, Lights::from(&shadows), &choices).direct
+        });
+        let image = |graph: &mut Graph, name: &str| graph.image(name, Format::RGBA16F, view.extent);
+        let [total, of_direct, indirect, irradiance, shadow] =
+            ["prt", "prt.direct-light", "prt.indirect", "prt.irradiance", "prt.shadow"].map(|name| image(graph, name));
+        // Passes after the first one add to it.
+        graph.clear(of_direct, [0.0; 4]);
+        let passes = if mapped.is_some() { 1 } else { count.div_ceil(consts::PRT_LIGHTS).max(1) };
+        for pass in 0..passes {
+            let args = pixels::Args {
+                view: gbuffer.view,
+                albedo: gbuffer.albedo,
+                normal: gbuffer.normal,
+                depth: gbuffer.depth,
+                specular: gbuffer.specular,
+                emission: gbuffer.emission,
+                mapped: mapped.unwrap_or(gbuffer.emission),
+                samples: graph.import_buffer(&self.light.samples),
+                grid: graph.uniform(&self.light.grid.grid),
+                starts: graph.import_buffer(&self.light.starts),
+                order: graph.import_buffer(&self.light.order),
+                irradiances: lit.irradiances,
+                visible: lit.visible,
+                clusters: graph.import_buffer(&self.light.clusters),
+                lights: handles.lights,
+                total,
+                direct: of_direct,
+                indirect,
+                irradiance,
+                shadow,
+                push: pixels::Push {
+                    count: self.light.count,
+                    splat: of_prt.splat,
+                    strength: of_prt.strength,
+                    first_light: pass * consts::PRT_LIGHTS,
+                    last: u32::from(pass + 1 == passes),
+                },
+                spec: pixels::Spec { show, gloss: of_prt.gloss.into(), mapped: mapped.is_some().into() },
+            };
+            graph.compute(args, view.extent);
+        }
+        if show == consts::PRT_SHOW_LIGHT {
+            skybox::draw(graph, handles, &gbuffer, Vec3::ZERO, total);
+            skybox::draw(graph, handles, &gbuffer, Vec3::ZERO, of_direct);
+        }
+        let shown = match mode {
+            Mode::Total | Mode::Samples | Mode::Clusters | Mode::Transfer => total,
+            Mode::Direct => of_direct,
+            Mode::Indirect => indirect,
+            Mode::Irradiance => irradiance,
+            Mode::Shadow => shadow,
+        };
+        let points = if of_prt.radius > 0.0 { of_prt.points } else { 1 };
+        let [of_points, of_samples, of_bases] = self.light.products;
+        let picture = Picture::new(shown)
+            .color("direct", of_direct)
+            .color("indirect", indirect)
+            .color("irradiance", irradiance)
+            .color("shadow", shadow)
+            .number("visibility_products", (of_points * u64::from(points * count)) as f64)
+            .number("transfer_products", of_samples as f64)
+            .number("basis_products", of_bases as f64);
+        Ok(picture.showing(gbuffer).noting(notes))
+    }
+}

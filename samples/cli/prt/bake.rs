@@ -1,0 +1,215 @@
+//! `prt bake`: computes how light spreads in a room and writes it to a file.
+
+use std::{path::PathBuf, process::ExitCode, str::FromStr, time::Instant};
+
+use glam::Vec3;
+use lucerna::{
+    Error, Result,
+    gpu::Gpu,
+    image,
+    techniques::prt::{Bakery, Baking, MOST_SAMPLES, Stored, starts, units},
+};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use super::info;
+use crate::{
+    args::{DeviceArgs, TalkArgs},
+    bake::{self as units_of, Ended, UnitsArgs, Work},
+    config::{self, SettingsArgs},
+    console::{self, Console},
+    program,
+    progress::ProgressMode,
+    settings_list,
+    signals::Interrupt,
+    stage::{Stage, StageArgs},
+};
+
+/// A point in the scene: `X,Y,Z`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inside(Vec3);
+
+impl FromStr for Inside {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let one = |word: &str| word.trim().parse().ok().filter(|number: &f32| number.is_finite());
+        let numbers: Option<Vec<f32>> = text.split(',').map(one).collect();
+        match numbers.as_deref() {
+            Some([x, y, z]) => Ok(Self(Vec3::new(*x, *y, *z))),
+            _ => Err("expected X,Y,Z, metres".into()),
+        }
+    }
+}
+
+/// Options of `prt bake`.
+#[derive(clap::Args, Clone, Debug)]
+pub struct PrtBakeArgs {
+    #[command(flatten)]
+    pub stage: StageArgs,
+
+    /// Point inside the room from which particles look for surfaces; may be given more than once [default: the lights and cameras of the
+    /// scene, or its middle]
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "Bake")]
+    pub inside: Vec<Inside>,
+
+    /// File to write
+    #[arg(short, long, value_name = "FILE.prt", help_heading = "Output")]
+    pub output: PathBuf,
+
+    /// Replace the file if it exists
+    #[arg(long, help_heading = "Output")]
+    pub overwrite: bool,
+
+    /// Print one JSON document about the run on stdout
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+
+    #[command(flatten)]
+    pub units: UnitsArgs,
+
+    #[command(flatten)]
+    pub settings: SettingsArgs,
+
+    /// Start from the paper's settings: vectors of light around their mean, and a fifth of all coefficients
+    #[arg(long, help_heading = "Settings")]
+    pub paper: bool,
+
+    #[command(flatten)]
+    pub device: DeviceArgs,
+
+    #[command(flatten)]
+    pub talk: TalkArgs,
+
+    /// How progress is shown on stderr
+    #[arg(long, value_enum, default_value_t, value_name = "HOW", help_heading = "Messages")]
+    pub progress: ProgressMode,
+}
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Keys {
+    room: Baking,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Whatever fails, with the kind that decides the exit code.
+pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
+    let begun = Instant::now();
+    let base = Keys { room: if args.paper { Baking::paper() } else { Baking::default() } };
+    let keys = args.settings.effective(&base)?;
+    args.settings.blamed(keys.room.validate(), || args.settings.file_alone().effective(&base)?.room.validate())?;
+    if args.settings.print_config {
+        console::print(settings_list::with_docs(&config::to_toml(&keys)?).trim_end())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    image::probe_output(&args.output, args.overwrite)?;
+    let interrupt = Interrupt::install();
+    let stage = Stage::open(&args.stage)?;
+    stage.notes().iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
+    let gpu = Gpu::new(args.device.options()?)?;
+    console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
+    let need = memory(&keys.room);
+    console.info(&format!("about {:.1} GB of memory for {} samples", need as f64 / 1e9, keys.room.samples));
+    if let Some(free) = available().filter(|free| *free < need) {
+        let what = format!("{} samples need about {need} bytes of memory, {free} are free", keys.room.samples);
+        return Err(Error::usage(what).at("room.samples").help("Choose fewer samples, rays or directions"));
+    }
+    let starts = match args.inside.is_empty() {
+        true => starts(&stage.scene),
+        false => args.inside.iter().map(|inside| inside.0).collect(),
+    };
+    if starts.is_empty() {
+        return Err(Error::input("the scene has no surface that light reaches"));
+    }
+    let mut bakery = Bakery::new(&gpu, &stage.scene)?;
+    let sampled = bakery.sample(&keys.room, &starts, &Interrupt::stop())?;
+    let (plan, samples) = (sampled.plan.clone(), sampled.samples.clone());
+    let of_samples = begun.elapsed().as_secs_f64();
+    console.info(&format!(
+        "{} samples {:.3} m apart in {} clusters, after {of_samples:.1} s",
+        samples.len(),
+        plan.radius,
+        plan.clusters.len()
+    ));
+    if plan.escaped > 0.02 {
+        console.info(&format!(
+            "note: {:.0} % of the particles left the scene: light that leaves it does not come back",
+            100.0 * plan.escaped
+        ));
+    }
+    let about = gpu.describe();
+    let device = format!("{}, {} {}", about.device, about.driver, about.driver_info);
+    let folder = units_of::parts(&args.output)?;
+    let store = args.units.store(&folder, units::job(&plan, &samples, &device)?, console)?;
+    let mut work = units::Work::new(bakery, sampled)?;
+    let mut times = Vec::new();
+    let unit = |unit: lucerna::bake::UnitId, needed: lucerna::bake::Needed<'_>| {
+        let begun = Instant::now();
+        let bytes = work.unit(unit, &needed);
+        times.resize(times.len().max(unit.stage as usize + 1), 0.0);
+        times[unit.stage as usize] += begun.elapsed().as_secs_f64();
+        bytes
+    };
+    let (units_args, what) = (&args.units, "rays");
+    let of_units =
+        Work { store: &store, args: units_args, begun, progress: args.progress, what, console, interrupt: &interrupt };
+    let (progress, missing, summary) = match of_units.compute(unit)? {
+        Ended::Early(_, code) => return Ok(code),
+        Ended::Shard(progress, missing) => (progress, missing, None),
+        Ended::Whole(progress) => {
+            let stored = Stored::join(&store, samples)?;
+            let saving = interrupt.saving();
+            let bytes = stored.encode()?;
+            image::write_atomic(&args.output, &bytes, args.overwrite)?;
+            drop(saving);
+            units_of::remove(store, console)?;
+            let summary = stored.summary();
+            info::lines(&summary).iter().for_each(|line| console.info(line));
+            console.info(&format!("wrote {}: {} bytes", args.output.display(), bytes.len()));
+            (progress, 0, Some((bytes.len(), summary)))
+        }
+    };
+    let names = ["visibility", "gather", "direct", "basis", "transfer"];
+    let stages: Vec<String> = names.iter().zip(&times).map(|(name, time)| format!("{name} {time:.1} s")).collect();
+    console.info(&format!("samples {of_samples:.1} s, {}", stages.join(", ")));
+    if args.json {
+        console::print_json(&json!({
+            "file": summary.as_ref().map(|_| &args.output),
+            "bytes": summary.as_ref().map(|(bytes, _)| bytes),
+            "summary": summary.as_ref().map(|(_, summary)| console::to_json(summary)).transpose()?,
+            "units": progress.units[1],
+            "missing": missing,
+            "clusters": plan.clusters,
+            "seconds": progress.seconds,
+            "seconds_of_samples": of_samples,
+            "seconds_of_stages": names.iter().zip(&times).collect::<std::collections::BTreeMap<_, _>>(),
+            "settings": config::to_value(&keys)?,
+        }))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Bytes that a bake needs at most, about: samples and their light, and the largest stage of a cluster.
+fn memory(room: &Baking) -> u64 {
+    let samples = u64::from(room.samples);
+    let clusters = samples.div_ceil(room.cluster.into());
+    let vectors = clusters * u64::from(room.light);
+    let cluster = 2 * u64::from(room.cluster);
+    let of_cluster =
+        cluster * (24 * u64::from(room.directions) + 12 * cluster + 8 * vectors + 4 * u64::from(room.rays));
+    let stored = samples * (64 + 2 * u64::from(room.visibility + room.light) + 4 * 300);
+    let transfer = samples * if room.receivers > 0 { 2 * u64::from(room.receivers) } else { 4 * vectors };
+    // All scatterings are solved between all vectors.
+    let solved = 32 * vectors * vectors;
+    (100 << 20) + solved + 2 * of_cluster + 2 * stored + 2 * transfer + (MOST_SAMPLES as u64).min(samples) * 64
+}
+
+/// Free memory of the machine, bytes; `None`: unknown.
+fn available() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?;
+    Some(1024 * line.split_whitespace().nth(1)?.parse::<u64>().ok()?)
+}

@@ -1,0 +1,50 @@
+//! `prt`: precomputed radiance transfer for lights that move inside a room.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use lucerna_samples::{
+    bake::{self, JoinArgs},
+    program,
+    prt::{self, PrtArgs, PrtBakeArgs, PrtInfoArgs},
+};
+
+/// Precomputed radiance transfer for lights that move inside a room.
+#[derive(Parser, Debug)]
+#[command(name = "prt", version, max_term_width = 120)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Compute how light spreads in a room and write it to a file
+    #[command(args_override_self = true)]
+    Bake(Box<PrtBakeArgs>),
+    /// Print the contents, the size and the errors of a bake
+    Info(PrtInfoArgs),
+    /// Join the parts of a bake (as `lucerna merge`)
+    Merge(JoinArgs),
+    /// Render a room under lights that move into images
+    #[command(args_override_self = true)]
+    Render(Box<PrtArgs>),
+}
+
+fn main() -> ExitCode {
+    match Arguments::parse().command {
+        Command::Bake(args) => {
+            let console = args.talk.console();
+            program::run(console, || prt::bake(&args, console))
+        }
+        Command::Info(args) => {
+            let console = args.talk.console();
+            program::run(console, || prt::info(&args, console))
+        }
+        Command::Merge(args) => {
+            let console = args.talk.console();
+            program::run(console, || bake::join(&args, console))
+        }
+        Command::Render(args) => program::run(args.common.talk.console(), || prt::render(&args)),
+    }
+}

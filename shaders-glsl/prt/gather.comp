@@ -1,0 +1,60 @@
+// The samples that a sample sees along rays with the density of the cosine: a row of the transport operator of one bounce. Each ray has the same
+// weight, so a closed white box keeps all light.
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "lib/scene.glsl"
+#include "lib/random.glsl"
+#include "lib/material.glsl"
+#include "lib/sampling.glsl"
+#include "lib/points.glsl"
+#define SURFACE_BINDING 1
+#include "lib/hit_surface.glsl"
+#include "lib/trace.glsl"
+#include "prt/prt.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(binding = 8, scalar) readonly buffer Samples { PrtPoint samples[]; };
+layout(binding = 9, scalar) uniform GridBlock { PrtGrid grid; };
+layout(binding = 10, scalar) readonly buffer Starts { uint starts[]; };
+layout(binding = 11, scalar) readonly buffer Order { uint order[]; };
+// NONE: nothing; PRT_LOST: a surface without samples.
+layout(binding = 12, scalar) writeonly buffer Seen { uint seen[]; };
+
+#include "prt/find.glsl"
+
+layout(push_constant, scalar) uniform Push {
+    uint first;        // ray
+    uint count;
+    uint first_sample;
+    uint receivers;
+    uint rays;         // of each sample
+    uint seed;
+};
+
+void main() {
+    uint receiver = gl_GlobalInvocationID.x;
+    if (receiver >= receivers) return;
+    uint number = first_sample + receiver;
+    PrtPoint s = samples[number];
+    mat3 frame = frame_around(s.normal);
+    PointPlace place;
+    for (uint i = first; i < first + count; ++i) {
+        place = point_place(uvec2(number & 0xffffu, number >> 16u), i, POINTS_APART, seed);
+        vec3 direction = frame * sample_cosine(unit_floats(point_words(place, 0u, seed)));
+        uint found = NONE;
+        if (dot(direction, s.side) > 0.0) {
+            Ray ray = Ray(s.position + (s.side + direction) * s.gap, 0.0, direction, 1e30);
+            Hit hit = trace(ray, TRACE_SHADOW, pcg4d(uvec4(number, i, 13u, seed)).x, false);
+            if (hit.instance != NONE) {
+                SurfacePoint p = surface_point(hit.instance, hit.triangle, hit.barycentrics);
+                vec3 side = normalize(p.area);
+                if (dot(side, direction) > 0.0) side = -side;
+                found = nearest_sample(p.position, side, INSTANCE_AT(hit.instance).material);
+                if (found == NONE) found = PRT_LOST;
+            }
+        }
+        seen[receiver * rays + i] = found;
+    }
+}

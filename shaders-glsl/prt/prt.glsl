@@ -1,0 +1,55 @@
+// Precomputed radiance transfer: samples on surfaces, and the grid in which they are found.
+#ifndef LIB_PRT
+#define LIB_PRT
+
+// Hits of a particle that are not kept, and those after them that are.
+const uint PRT_FIRST_HIT = 5u; // export
+const uint PRT_HITS = 8u; // export
+// A ray met a surface without samples.
+const uint PRT_LOST = 0xfffffffeu; // export
+// Lights whose visibility is gathered at once.
+const uint PRT_LIGHTS = 8u; // export
+// What a picture shows.
+const uint PRT_SHOW_LIGHT = 0u; // export
+const uint PRT_SHOW_SAMPLES = 1u; // export
+const uint PRT_SHOW_CLUSTERS = 2u; // export
+const uint PRT_SHOW_TRANSFER = 3u; // export
+
+// A place where a particle hit a surface, or a sample.
+struct PrtPoint {
+    vec3 position;      // metres
+    uint instance;      // NONE: the particle left the scene before
+    vec3 side;          // normal of the triangle on the lit side, unit
+    uint triangle;
+    vec3 normal;        // shading normal on the same side, unit
+    uint material;
+    vec2 barycentrics;
+    float gap;          // distance by which rays start off the surface, metres
+    float area;         // of the surface that the sample stands for, m²
+};
+
+// Cells of equal size that cover all samples. `starts` has the first sample of each cell, `order` the samples cell after cell.
+struct PrtGrid {
+    vec3 origin;
+    float cell;         // side, metres
+    uvec3 counts;
+    float radius;       // least distance of two samples on a plane, metres
+};
+
+// Directions of a cluster: equal cells of a spherical cap, by the concentric map of a square to a disc.
+struct PrtCap {
+    vec3 axis;          // unit
+    float cos_most;     // cosine of the largest angle to the axis
+    uint side;          // cells along a side of the square
+    uint first_sample;
+    uint samples;
+    uint first_row;     // of the rows of its directions, in words
+    uint first_sample_row; // of the rows of its samples, in words
+    uint words;         // of a row: 1 and the coefficients of a sample, or the mean and the vectors of a direction; halves
+};
+
+uint prt_cell(PrtGrid grid, ivec3 at) {
+    return (uint(at.z) * grid.counts.y + uint(at.y)) * grid.counts.x + uint(at.x);
+}
+
+#endif

@@ -1,0 +1,112 @@
+//! `prt bake`, `prt render` and `prt info` from the outside.
+
+use std::{fs, path::PathBuf};
+
+use crate::support::{Ran, command, device, ran};
+use lucerna::{image, scene::Limits};
+
+struct Lab(tempfile::TempDir);
+
+/// Settings that make a bake small.
+const SMALL: [&str; 12] = [
+    "-D",
+    "room.samples=800",
+    "-D",
+    "room.cluster=200",
+    "-D",
+    "room.directions=100",
+    "-D",
+    "room.rays=64",
+    "-D",
+    "room.examples=60",
+    "-D",
+    "room.visibility=12",
+];
+const SCENE: [&str; 2] = ["--builtin", "cornell"];
+
+impl Lab {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn at(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn run(&self, words: &[&str]) -> Ran {
+        ran(command(env!("CARGO_BIN_EXE_prt")).current_dir(self.0.path()).args(words))
+    }
+
+    fn bake(&self, out: &str, more: &[&str]) -> Ran {
+        self.run(&[&["bake"][..], &SCENE, &SMALL, &["-o", out], more].concat())
+    }
+
+    fn picture(&self, out: &str, more: &[&str]) -> Vec<f32> {
+        let words = ["render", "--bake", "room.prt", "--size", "32x24", "-o", out];
+        self.run(&[&words[..], &SCENE, more].concat()).expect(0, &[]);
+        image::read(self.at(out), &Limits::default()).unwrap().main().unwrap().data.clone()
+    }
+}
+
+#[test]
+fn shards_and_one_run_give_the_same_bytes_and_a_finished_bake_renders() {
+    if !device() {
+        return;
+    }
+    let lab = Lab::new();
+    let told = lab.bake("room.prt", &["--json"]).expect(0, &["samples", "wrote room.prt"]).json();
+    assert!(told["summary"]["samples"].as_u64().unwrap() > 400 && told["missing"] == 0, "{told}");
+    // Stages depend on other clusters, so shards take turns until all units are there.
+    for _ in 0..5 {
+        for shard in ["1/2", "2/2"] {
+            let ran = lab.bake("other.prt", &["--shard", shard]);
+            assert!(ran.code == 0 || ran.code == 8, "{} {}", ran.code, ran.stderr);
+        }
+    }
+    lab.bake("other.prt", &[]).expect(0, &["wrote other.prt"]);
+    assert!(fs::read(lab.at("room.prt")).unwrap() == fs::read(lab.at("other.prt")).unwrap());
+    let info = lab.run(&["info", "room.prt"]).expect(0, &[]).stdout;
+    assert!(info.contains("visibility") && info.contains("transfer"), "{info}");
+    // Two lights are the sum of both; without light it is dark.
+    let of = |out: &str, more: &[&str]| {
+        lab.picture(out, &[more, &["--default-light", "never", "--mode", "irradiance"]].concat())
+    };
+    let one = of("one.exr", &[]);
+    let more = of("more.exr", &["-D", "prt.strength=2"]);
+    assert!(one.iter().sum::<f32>() > 0.0);
+    for (one, more) in one.iter().zip(&more) {
+        assert!((more - 2.0 * one).abs() <= 0.01 * more.abs() + 1e-6);
+    }
+    assert!(of("none.exr", &["-D", "prt.strength=0"]).iter().all(|value| *value == 0.0));
+    // An other colour of the left wall.
+    let words = [&["render", "--bake", "room.prt", "--size", "32x24", "-o", "no.png"][..], &SCENE].concat();
+    lab.run(&[&words[..], &["--set", "nothing.albedo=1"]].concat()).expect(2, &["--set", "there is no material"]);
+    lab.run(&[&words[..], &["-D", "prt.vector=100000", "--mode", "transfer"]].concat()).expect(2, &["prt.vector"]);
+    for mode in ["samples", "clusters", "transfer", "shadow", "direct", "indirect"] {
+        let picture = lab.picture(&format!("{mode}.exr"), &["--mode", mode]);
+        assert!(picture.iter().any(|value| *value > 0.0), "{mode}");
+    }
+}
+
+#[test]
+fn bakes_of_other_scenes_and_odd_files_are_refused() {
+    if !device() {
+        return;
+    }
+    let lab = Lab::new();
+    lab.bake("room.prt", &[]).expect(0, &[]);
+    let render = |scene: &str, file: &str| lab.run(&["render", "--builtin", scene, "--bake", file, "-o", "x.png"]);
+    render("furnace", "room.prt").expect(3, &["room.prt", "other geometry"]);
+    let bytes = fs::read(lab.at("room.prt")).unwrap();
+    fs::write(lab.at("cut.prt"), &bytes[..bytes.len() / 2]).unwrap();
+    render("cornell", "cut.prt").expect(3, &["cut.prt", "cut off"]);
+    fs::write(lab.at("odd.prt"), "odd").unwrap();
+    render("cornell", "odd.prt").expect(3, &["odd.prt", "is not a file of precomputed transfer"]);
+    render("cornell", "none.prt").expect(3, &["none.prt"]);
+    assert!(!lab.at("x.png").exists());
+    lab.bake("room.prt", &[]).expect(4, &["room.prt"]);
+    lab.bake("new.prt", &["-D", "room.samples=5"]).expect(2, &["room.samples", "16 to 1000000"]);
+    lab.bake("new.prt", &["--inside", "0,0"]).expect(2, &["--inside"]);
+    lab.bake("new.prt", &["--inside", "500,500,500"]).expect(3, &["--inside"]);
+    assert!(!lab.at("new.prt").exists());
+}
