@@ -72,7 +72,7 @@ pub(super) fn build() -> Scene {
     room::windows(&mut stage, &palette);
     room::door(&mut stage, &palette);
     let shared = Shared {
-        cup: stage.mesh("cup", cup(palette.porcelain, 10)),
+        cup: stage.mesh("cup", cup(palette.porcelain, 12)),
         candlestick: stage.mesh("candlestick", things::candlestick(&palette)),
     };
     seating(&mut stage, &palette, &shared);
@@ -97,7 +97,7 @@ fn palette(stage: &mut Stage) -> Palette {
         green: dyed(stage, "green wall", 0x7fa25f, (12, 1.0), 8),
         trim: stage.paint("trim", 0xece8dd, 0.7),
         beam: stage.textured("beam", &veneer(256, srgb(0x7a5233), srgb(0x553620), 9), 1.2, 0.85),
-        wood: stage.textured("wood", &veneer(256, srgb(0x8f5c36), srgb(0x5e391f), 31), 1.1, 0.7),
+        wood: stage.textured("wood", &veneer(256, srgb(0x8f5c36), srgb(0x5e391f), 31), 1.3, 0.7),
         oak: stage.textured("oak", &veneer(256, srgb(0xcf9f66), srgb(0xa6763f), 32), 0.9, 0.7),
         top: stage.textured("table top", &veneer(256, srgb(0xa3683a), srgb(0x6e4223), 33), 1.1, 0.18),
         sofa: dyed(stage, "sofa", 0xd8c8a6, (40, 0.35), 11),

@@ -87,7 +87,7 @@ fn shelf_row(model: &mut Model, palette: &Palette, (from, to): (f32, f32), (y, r
         }
         1 => {
             let pile = things::pile(palette, 4, random);
-            model.append(&pile, Mat4::from_translation(vec3(to - 0.13, y, 0.02)) * Mat4::from_rotation_y(1.5));
+            model.append(&pile, Mat4::from_translation(vec3(to - 0.135, y, 0.02)));
         }
         _ => {}
     }

@@ -19,9 +19,9 @@ fn oval(half: Vec2, top: f32, thick: f32) -> Geometry {
     outline.push(Vec2::ZERO);
     let stretched = Mat4::from_scale(vec3(1.0, 1.0, half.y / half.x));
     let mut out = lathe(&outline, 40, 40.0).transformed(stretched).at(0.0, top, 0.0);
-    // Grain runs along the table, not around its middle.
+    // Grain runs along the table, not around its middle, and the picture of it does not begin again on the top.
     for (uv, p) in out.uvs.iter_mut().zip(&out.positions) {
-        *uv = vec2(p.z, p.x + p.y);
+        *uv = vec2(p.z + 0.65, p.x + p.y + 0.4);
     }
     out
 }
