@@ -4,11 +4,14 @@ use super::super::kit::{Geometry, Model, Picture, Stage, fbm, picture_frame, pla
 use super::{HALF, Palette, room::BREAST};
 use glam::{Mat4, Vec2, Vec3, vec2, vec3};
 
+/// The colour at (u, v), v downwards.
+type Paint = fn(Vec2) -> Vec3;
+
 /// The paintings and the mirror, each at its place.
 pub(super) fn hang(stage: &mut Stage, palette: &Palette) {
     let (x, z) = HALF;
     let left = |y: f32, along: f32| placed(vec3(-x, y, along), 90.0);
-    let paintings: [(&str, fn(Vec2) -> Vec3, Vec2, Mat4); 6] = [
+    let paintings: [(&str, Paint, Vec2, Mat4); 6] = [
         ("valley", valley, vec2(0.95, 0.66), left(1.62, 0.25)),
         ("boats", boats, vec2(0.42, 0.54), left(1.62, -0.72)),
         ("still life", still_life, vec2(0.42, 0.54), left(1.62, 1.22)),
