@@ -2,14 +2,13 @@
 //! 190 000 triangles as drawn, most of them in the chairs, which are instances of one. Nothing leads out of it.
 
 use super::kit::{
-    Geometry, Model, Picture, Random, Stage, at, bevel_box, carpet, lettering, mottled, placed, slab, srgb, terrain,
-    value_noise, veneer,
+    Geometry, Model, Picture, Random, Stage, at, bevel_box, carpet, cup, fern, fruit_bowl, lettering, mottled, placed,
+    slab, srgb, terrain, tree, value_noise, veneer,
 };
 use glam::{Mat4, Vec2, Vec3, vec2, vec3};
 use lucerna::scene::{Material, Scene};
 
 mod furniture;
-mod plants;
 mod things;
 
 use furniture::TABLE;
@@ -210,7 +209,7 @@ fn on_the_table(stage: &mut Stage, palette: &Palette) {
             stage.place(&format!("glass {glasses}"), tumbler, here * placed(place, turn));
         }
     }
-    stage.mesh_at("bowl", things::bowl(palette), at(0.0, top, 0.02));
+    stage.mesh_at("bowl", fruit_bowl(palette.porcelain, palette.fruit, 24), at(0.0, top, 0.02));
     stage.mesh_at("telephone", things::telephone(palette), placed(vec3(-1.42, top, 0.0), 30.0));
     stage.mesh_at("telephone 2", things::telephone(palette), placed(vec3(1.42, top, 0.0), -15.0));
     let pad = stage.mesh("pad", things::pad(palette));
@@ -247,9 +246,9 @@ fn along_the_walls(stage: &mut Stage, palette: &Palette) {
     let on = |along: f32, deep: f32| at(0.6 + along, top, -z + 0.27 + deep);
     stage.mesh_at("chrome ball", things::ball(palette.chrome, palette.dark, 0.17, (56, 28)), on(-1.12, 0.04));
     stage.mesh_at("glass ball", things::ball(palette.glass, palette.dark, 0.11, (48, 24)), on(-0.72, 0.08));
-    let fern = plants::fern(palette, 24, &mut random);
+    let fern = fern((palette.clay, palette.leaf), 24, &mut random);
     stage.mesh_at("fern", fern, on(1.25, 0.0) * Mat4::from_scale(Vec3::splat(0.62)));
-    let cup = stage.mesh("cup", things::cup(palette));
+    let cup = stage.mesh("cup", cup(palette.porcelain, 24));
     for i in 0..6 {
         let place = vec3(0.05 + 0.13 * (i % 3) as f32, 0.0, 0.02 + 0.13 * (i / 3) as f32 - 0.06);
         stage.place(&format!("cup {}", i + 1), cup, on(0.0, 0.0) * placed(place, 35.0 * i as f32));
@@ -258,7 +257,7 @@ fn along_the_walls(stage: &mut Stage, palette: &Palette) {
     for (i, (px, pz, scale)) in
         [(x - 0.5, -z + 0.55, 1.0), (x - 0.5, z - 0.65, 0.9), (-x + 0.45, -z + 0.5, 0.95)].into_iter().enumerate()
     {
-        let tree = plants::tree(palette, 70, &mut random);
+        let tree = tree((palette.clay, palette.leaf), 70, &mut random);
         let map = placed(vec3(px, 0.0, pz), 77.0 * i as f32) * Mat4::from_scale(Vec3::splat(scale));
         stage.mesh_at(&format!("plant {}", i + 1), tree, map);
     }

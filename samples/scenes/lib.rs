@@ -20,6 +20,7 @@ mod hall;
 mod kit;
 mod moving;
 mod office;
+mod parlour;
 mod primitives;
 mod shadows;
 mod street;
@@ -87,6 +88,12 @@ const ENTRIES: &[Entry] = &[
         description: "Conference room for eighteen: four lamps, a mirror, chrome, glass, about 190 000 triangles",
         exposure: 0.3,
         build: conference::build,
+    },
+    Entry {
+        name: "parlour",
+        description: "Closed living room by one lamp, for light computed in advance: diffuse, a red and a green wall",
+        exposure: 1.4,
+        build: parlour::build,
     },
     Entry {
         name: "garage",

@@ -43,11 +43,16 @@ pub(super) fn build() -> Scene {
     stage.finish()
 }
 
+/// The teapot as it stands on y = 0, in `steps` × `steps` cells a patch. Seen from both sides.
+pub(super) fn shape(steps: usize) -> Geometry {
+    patches::tessellate(steps, SCALE)
+}
+
 /// The teapot alone.
 pub(super) fn pot(stage: &mut Stage) -> u32 {
     let glaze =
         stage.material(Material { double_sided: true, roughness: 0.16, ..Material::diffuse("glaze", srgb(0xe9e4d8)) });
-    stage.mesh("teapot", Model::of(glaze, patches::tessellate(STEPS, SCALE)))
+    stage.mesh("teapot", Model::of(glaze, shape(STEPS)))
 }
 
 fn room(stage: &mut Stage) {

@@ -2,6 +2,8 @@
 
 #[path = "hall/tests.rs"]
 mod hall;
+#[path = "parlour/tests.rs"]
+mod parlour;
 
 use super::{NAMES, cornell, furnace, load};
 use glam::{Mat4, Vec3};
@@ -32,6 +34,7 @@ const TRIANGLES: &[(&str, std::ops::RangeInclusive<usize>)] = &[
     ("office", 20_000..=22_000),
     // 190 000 to within a twentieth.
     ("conference", 180_500..=199_500),
+    ("parlour", 20_000..=80_000),
     ("garage", 50_000..=150_000),
     ("hall", 180_000..=200_000),
     ("street", 150_000..=300_000),

@@ -1,21 +1,11 @@
 //! What stands on the table and the sideboard, and the lamps above.
 
 use super::super::kit::{
-    Geometry, Model, Picture, Stage, bevel_box, circle, cuboid, cylinder, lathe, slab, sphere, srgb, sweep, torus,
-    value_noise,
+    Geometry, Model, Picture, Stage, bevel_box, circle, cuboid, curve, cylinder, lathe, profile, slab, sphere, srgb,
+    sweep, torus, value_noise, vessel,
 };
-use super::{
-    Palette,
-    furniture::{curve, profile},
-};
+use super::Palette;
 use glam::{Vec2, Vec3, vec2, vec3};
-
-/// A vessel: up its outside and down its inside.
-fn vessel(outside: &[(f32, f32)], inside: &[(f32, f32)], steps: usize, segments: usize) -> Geometry {
-    let mut way = profile(outside, steps);
-    way.extend(profile(inside, steps));
-    lathe(&way, segments, 50.0)
-}
 
 /// A carafe of clear glass, 0.27 m high, standing on y = 0.
 pub(super) fn carafe() -> Geometry {
@@ -54,26 +44,6 @@ pub(super) fn tray(palette: &Palette) -> Model {
     let points =
         [(0.0, 0.0), (0.165, 0.0), (0.175, 0.004), (0.185, 0.022), (0.182, 0.024), (0.17, 0.0105), (0.0, 0.0105)];
     Model::of(palette.chrome, lathe(&points.map(|(r, y)| vec2(r, y)), 56, 30.0))
-}
-
-/// A bowl of fruit.
-pub(super) fn bowl(palette: &Palette) -> Model {
-    let outside = [(0.0, 0.0), (0.07, 0.0), (0.075, 0.012), (0.13, 0.05), (0.175, 0.095)];
-    let inside = [(0.172, 0.097), (0.126, 0.056), (0.07, 0.022), (0.0, 0.018)];
-    let mut model = Model::of(palette.porcelain, vessel(&outside, &inside, 3, 44));
-    let kinds = [0xc4342b, 0xe0912a, 0x9fb83a, 0xd9b23a];
-    for i in 0..9 {
-        let (ring, turn) = if i < 6 { (0.092, 60.0 * i as f32) } else { (0.045, 120.0 * (i - 6) as f32 + 30.0) };
-        let radius = 0.038 + 0.002 * (i % 3) as f32;
-        let height = if i < 6 { 0.092 } else { 0.145 };
-        // A dent at the stalk.
-        let dented =
-            |p: Vec3| p - Vec3::Y * (0.35 * radius * (-(p.x * p.x + p.z * p.z) / (0.09 * radius * radius)).exp());
-        let one = sphere(radius, 24, 12).displaced(|p| if p.y > 0.0 { dented(p) } else { p });
-        let tilted = one.turned_x(17.0 * i as f32).at(ring, height, 0.0).turned_y(turn);
-        model.add(palette.fruit, tilted.colored(srgb(kinds[i % kinds.len()])));
-    }
-    model
 }
 
 /// A telephone with three feet for the middle of a table.
@@ -160,24 +130,6 @@ pub(super) fn ball(material: u32, foot: u32, radius: f32, (segments, rings): (us
     let mut model = Model::of(material, sphere(radius, segments, rings).at(0.0, radius + 0.006, 0.0));
     model.add(foot, torus(0.42 * radius, 0.012, 40, 8).at(0.0, 0.012, 0.0));
     model
-}
-
-/// A cup on its saucer, the handle towards +X.
-pub(super) fn cup(palette: &Palette) -> Model {
-    let saucer =
-        [(0.0, 0.0), (0.03, 0.0), (0.034, 0.004), (0.058, 0.011), (0.0575, 0.0125), (0.03, 0.0075), (0.0, 0.0075)];
-    let mut out = lathe(&saucer.map(|(r, y)| vec2(r, y)), 24, 40.0);
-    let outside = [(0.0, 0.0), (0.02, 0.0), (0.024, 0.005), (0.036, 0.03), (0.039, 0.055)];
-    let inside = [(0.0372, 0.0552), (0.034, 0.03), (0.022, 0.008), (0.0, 0.0055)];
-    out.append(&vessel(&outside, &inside, 2, 24).at(0.0, 0.0078, 0.0));
-    let grip: Vec<Vec3> = (0..=8)
-        .map(|i| {
-            let angle = (-70.0 + 140.0 * i as f32 / 8.0f32).to_radians();
-            vec3(0.031 + 0.021 * angle.cos(), 0.04 + 0.017 * angle.sin(), 0.0)
-        })
-        .collect();
-    out.append(&sweep(&grip, &circle(0.0033, 6), true, |_| 1.0));
-    Model::of(palette.porcelain, out)
 }
 
 /// A coffee pot of polished steel with a black handle.

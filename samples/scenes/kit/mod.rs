@@ -3,25 +3,35 @@
 //! Everything here is metres, Y up, counter-clockwise seen from outside. Texture coordinates are metres of surface (so
 //! that a material says how large its texture is), v grows downwards as in glTF.
 
+mod curves;
 mod geometry;
+mod mouldings;
 mod nets;
 mod pictures;
+mod plants;
 mod random;
 mod sky;
+mod soft;
 mod solids;
 mod stage;
 mod surfaces;
+mod tableware;
 
+pub(crate) use curves::{curve, profile};
 #[cfg(test)]
 pub(crate) use geometry::place;
 pub(crate) use geometry::{Geometry, Model};
+pub(crate) use mouldings::{moulding, picture_frame};
 pub(crate) use nets::{blend, blend_max, polygon_distance, round_cone, shrink_wrap, surface_net};
 pub(crate) use pictures::{Picture, bricks, carpet, checker, lettering, mottled, planks, veneer};
+pub(crate) use plants::{fern, tree};
 pub(crate) use random::{Random, fbm, hash, value_noise};
 pub(crate) use sky::{GradientSky, uniform_environment};
+pub(crate) use soft::{pillow, puffed, rounded_box};
 pub(crate) use solids::{Opening, bevel_box, cuboid, slab, sphere, torus, wall};
 pub(crate) use stage::{Stage, looking, trs};
 pub(crate) use surfaces::{circle, cylinder, extrude, frustum, lathe, loop_sweep, sheet, sweep, terrain, tube};
+pub(crate) use tableware::{cup, fruit_bowl, vessel};
 
 use glam::{Mat4, Quat, Vec3};
 

@@ -1,11 +1,10 @@
 //! A fern and a small tree, each in its pot.
 
-use super::super::kit::{Geometry, Model, Random, circle, lathe, srgb, sweep};
-use super::{Palette, furniture::curve};
+use super::{Geometry, Model, Random, circle, curve, lathe, srgb, sweep};
 use glam::{Mat4, Quat, Vec2, Vec3, vec2, vec3};
 
 /// A round pot of `radius` and `height` filled with soil, standing on y = 0.
-fn pot(palette: &Palette, radius: f32, height: f32) -> Model {
+fn pot(clay: u32, radius: f32, height: f32) -> Model {
     let points = [
         (0.0, 0.0),
         (0.62, 0.0),
@@ -18,7 +17,7 @@ fn pot(palette: &Palette, radius: f32, height: f32) -> Model {
         (0.0, 0.86),
     ];
     let outline: Vec<Vec2> = points.iter().map(|&(r, y)| vec2(r * radius, y * height)).collect();
-    Model::of(palette.clay, lathe(&outline, 36, 40.0))
+    Model::of(clay, lathe(&outline, 36, 40.0))
 }
 
 /// A leaf along +X from the origin, `length` long, bent down at its tip, in two halves along its rib.
@@ -46,8 +45,8 @@ fn leaf(length: f32, width: f32, droop: f32) -> Geometry {
 }
 
 /// Arching fronds with leaflets, from a pot 0.3 m high.
-pub(super) fn fern(palette: &Palette, fronds: usize, random: &mut Random) -> Model {
-    let mut model = pot(palette, 0.2, 0.3);
+pub(crate) fn fern((clay, green_paint): (u32, u32), fronds: usize, random: &mut Random) -> Model {
+    let mut model = pot(clay, 0.2, 0.3);
     let mut green = Geometry::default();
     for i in 0..fronds {
         let (turn, lean, length) = (i as f32 * 137.5, random.range(0.25, 1.0), random.range(0.45, 0.75));
@@ -69,13 +68,13 @@ pub(super) fn fern(palette: &Palette, fronds: usize, random: &mut Random) -> Mod
         }
         green.append(&frond.turned_y(turn).colored(srgb(0x4f7f38) * random.range(0.6, 1.15)));
     }
-    model.add(palette.leaf, green);
+    model.add(green_paint, green);
     model
 }
 
 /// A slender tree 1.8 m high with `leaves` large leaves.
-pub(super) fn tree(palette: &Palette, leaves: usize, random: &mut Random) -> Model {
-    let mut model = pot(palette, 0.23, 0.42);
+pub(crate) fn tree((clay, green_paint): (u32, u32), leaves: usize, random: &mut Random) -> Model {
+    let mut model = pot(clay, 0.23, 0.42);
     let mut bark = Geometry::default();
     let mut green = Geometry::default();
     for stem in 0..3 {
@@ -105,7 +104,7 @@ pub(super) fn tree(palette: &Palette, leaves: usize, random: &mut Random) -> Mod
             green.append(&one.turned_y(turn).colored(srgb(0x3f7a3a) * random.range(0.65, 1.2)));
         }
     }
-    model.add(palette.leaf, bark);
-    model.add(palette.leaf, green);
+    model.add(green_paint, bark);
+    model.add(green_paint, green);
     model
 }
