@@ -82,7 +82,7 @@ PrtNear near_samples(vec3 position, vec3 n) {
                     if (facing <= (turn == 0u ? 0.5 : 0.0)) continue;
                     // Away from the tangent plane counts more, so that light does not leak over steps and between sheets.
                     float off = dot(way, n);
-                    square += 8.0 * off * off;
+                    square += 64.0 * off * off;
                     float weight = exp(-square * inverse) * facing * facing;
                     if (turn == 1u) weight += 1e-12 / (1e-9 + square);
                     if (square < found.away) {

@@ -6,7 +6,7 @@ use super::{
     Baking, Plan,
     cap::Cap,
     plan,
-    samples::{self, Grid, Thinning},
+    samples::{self, Grid, Thinning, Triangles},
 };
 use crate::{
     Error, ErrorKind, Result, Stop,
@@ -88,13 +88,13 @@ impl Bakery {
     /// `Input` if there is no surface or if nearly all particles leave the scene; `OutOfMemory`, `DeviceLost`, `Interrupted`.
     pub fn sample(&mut self, baking: &Baking, starts: &[Vec3], stop: &Stop) -> Result<Sampled> {
         baking.validate()?;
-        let triangles = samples::triangles(&self.scene);
-        let whole = samples::area(&triangles) as f32;
+        let mut triangles = Triangles::new(&self.scene);
+        let whole = samples::area(&triangles.list) as f32;
         if !(whole > 0.0 && whole.is_finite()) {
             return Err(Error::input("the scene has no surface that light reaches"));
         }
         let pilot = (samples::DENSITY * whole / PILOT).sqrt();
-        let (mut found, _, escaped) = self.thinned(baking, starts, pilot, 4, stop)?;
+        let (mut found, _, escaped) = self.thinned(baking, starts, (pilot, 4), &mut triangles, stop)?;
         if found.len() < 16 {
             let what = format!("particles from {} places inside the scene hit next to nothing", starts.len());
             return Err(Error::input(what).help("Name a point inside the room with --inside X,Y,Z"));
@@ -106,7 +106,7 @@ impl Bakery {
         samples::weigh(&mut found, &triangles, pilot);
         let reached: f32 = found.iter().map(|sample| sample.area).sum();
         let radius = (samples::DENSITY * reached / baking.samples as f32).sqrt();
-        let (mut found, places, escaped) = self.thinned(baking, starts, radius, MOST_ROUNDS, stop)?;
+        let (mut found, places, escaped) = self.thinned(baking, starts, (radius, MOST_ROUNDS), &mut triangles, stop)?;
         if found.len() > plan::MOST_SAMPLES {
             let what = format!("{} samples, at most {} are possible", found.len(), plan::MOST_SAMPLES);
             return Err(Error::usage(what).at("room.samples"));
@@ -117,7 +117,7 @@ impl Bakery {
         let (sorted, clusters) = samples::cluster(found, baking);
         let bounds = {
             let (mut low, mut high) = (Vec3::splat(f32::MAX), Vec3::splat(f32::MIN));
-            triangles.iter().flatten().for_each(|p| (low, high) = (low.min(*p), high.max(*p)));
+            triangles.list.iter().flat_map(|(t, _)| t).for_each(|p| (low, high) = (low.min(*p), high.max(*p)));
             high - low
         };
         let plan = Plan {
@@ -144,8 +144,8 @@ impl Bakery {
         &mut self,
         baking: &Baking,
         starts: &[Vec3],
-        radius: f32,
-        rounds: u32,
+        (radius, rounds): (f32, u32),
+        triangles: &mut Triangles,
         stop: &Stop,
     ) -> Result<(Vec<PrtPoint>, Vec<[f32; 3]>, f64)> {
         let mut thinning = Thinning::new(radius);
@@ -158,6 +158,7 @@ impl Bakery {
             if round == 0 {
                 places = free_places(&found.hits, baking);
             }
+            found.hits.iter().flatten().for_each(|hit| triangles.count(hit));
             let mut kept = 0;
             // Hits of one particle depend on each other, so those of all particles come in turns.
             for turn in 0..PRT_HITS as usize {

@@ -49,7 +49,9 @@ impl Thinning {
                 for x in low.x..=high.x {
                     for other in self.cells.get(&[x, y, z]).into_iter().flatten() {
                         let other = &self.samples[*other as usize];
-                        let least = self.radius * (0.5 + 0.5 * side(other).dot(side(candidate)));
+                        // A picture on a wall has samples of its own.
+                        let strange = if other.material == candidate.material { 1.0 } else { 0.6 };
+                        let least = strange * self.radius * (0.5 + 0.5 * side(other).dot(side(candidate)));
                         if position(other).distance_squared(at) < least * least {
                             return false;
                         }
@@ -106,7 +108,7 @@ impl Grid {
     }
 
     /// The sample that stands for a point of a surface. Twin of `nearest_sample` of `prt/find.glsl`, without its second search.
-    fn nearest(&self, samples: &[PrtPoint], at: Vec3, normal: Vec3) -> Option<usize> {
+    fn nearest(&self, samples: &[PrtPoint], at: Vec3, normal: Vec3, material: u32) -> Option<usize> {
         let counts = glam::UVec3::from(self.grid.counts).as_ivec3();
         let place = (at - Vec3::from(self.grid.origin)) / self.grid.cell;
         let low = (place - 0.5).floor().as_ivec3();
@@ -121,9 +123,12 @@ impl Grid {
                         let sample = &samples[*number as usize];
                         let facing = side(sample).dot(normal);
                         let way = position(sample) - at;
-                        let score = way.length_squared() * if facing > 0.9 { 1.0 } else { 3.0 - 2.0 * facing };
-                        // A sample on a parallel surface beside this one does not stand for this one.
-                        let apart = way.dot(normal).abs() > 0.5 * self.grid.radius;
+                        let off = way.dot(normal);
+                        let turned = if facing > 0.9 { 1.0 } else { 3.0 - 2.0 * facing };
+                        let strange = if sample.material == material { 1.0 } else { 4.0 };
+                        let score = (way.length_squared() + 64.0 * off * off) * turned * strange;
+                        // A sample far away or on a parallel surface does not stand for this one.
+                        let apart = off.abs().max(0.25 * way.length()) > 0.5 * self.grid.radius;
                         if facing > 0.3 && !apart && score < least {
                             (least, found) = (score, Some(*number as usize));
                         }
@@ -131,7 +136,7 @@ impl Grid {
                 }
             }
         }
-        found.filter(|_| least < 4.0 * self.grid.radius * self.grid.radius)
+        found
     }
 }
 
@@ -141,24 +146,68 @@ fn cell_of(grid: &PrtGrid, at: Vec3) -> usize {
     ((cell.z * counts.y + cell.y) * counts.x + cell.x) as usize
 }
 
+/// A triangle of a scene and its material.
+pub(super) type Triangle = ([Vec3; 3], u32);
+
 /// The triangles of a scene at rest.
-pub(super) fn triangles(scene: &Scene) -> Vec<[Vec3; 3]> {
-    let pose = Pose::rest(scene);
-    let mut out = Vec::new();
-    for (node, mesh) in scene.nodes.iter().enumerate().filter_map(|(node, of)| Some((node, of.mesh?))) {
-        let Some((mesh, world)) = scene.meshes.get(mesh as usize).zip(pose.world.get(node)) else { continue };
-        for primitive in &mesh.primitives {
-            let unlit = scene.materials.get(primitive.material as usize).is_none_or(|material| material.unlit);
-            if unlit {
-                continue;
+#[derive(Debug, Default)]
+pub(super) struct Triangles {
+    pub list: Vec<Triangle>,
+    /// The first triangle of each instance, in the order of [`crate::resident::Moment::instances`].
+    firsts: Vec<u32>,
+    /// Hits of particles on the front and on the back of each triangle.
+    hits: Vec<[u32; 2]>,
+}
+
+impl Triangles {
+    /// Surfaces that light does not stop at have no area.
+    pub fn new(scene: &Scene) -> Self {
+        let pose = Pose::rest(scene);
+        let mut out = Self::default();
+        for (node, mesh) in scene.nodes.iter().enumerate().filter_map(|(node, of)| Some((node, of.mesh?))) {
+            let Some((mesh, world)) = scene.meshes.get(mesh as usize).zip(pose.world.get(node)) else { continue };
+            for primitive in &mesh.primitives {
+                let Some(material) = scene.materials.get(primitive.material as usize) else { continue };
+                out.firsts.push(out.list.len() as u32);
+                let corner = |index: &u32| match primitive.positions.get(*index as usize) {
+                    Some(position) if !material.unlit => world.transform_point3(*position),
+                    _ => Vec3::ZERO,
+                };
+                let triangle = |t: &[u32]| ([corner(&t[0]), corner(&t[1]), corner(&t[2])], primitive.material);
+                out.list.extend(primitive.indices.chunks_exact(3).map(triangle));
             }
-            let corner = |index: &u32| {
-                primitive.positions.get(*index as usize).map_or(Vec3::ZERO, |p| world.transform_point3(*p))
-            };
-            out.extend(primitive.indices.chunks_exact(3).map(|t| [corner(&t[0]), corner(&t[1]), corner(&t[2])]));
+        }
+        out.hits = vec![[0; 2]; out.list.len()];
+        out
+    }
+
+    /// Counts the hit of a particle.
+    pub fn count(&mut self, hit: &PrtPoint) {
+        let first = self.firsts.get(hit.instance as usize).copied().unwrap_or(0);
+        let at = (first + hit.triangle) as usize;
+        if let (Some((triangle, _)), Some(hits)) = (self.list.get(at), self.hits.get_mut(at)) {
+            hits[usize::from(doubled_area(triangle).dot(side(hit)) < 0.0)] += 1;
         }
     }
-    out
+
+    /// Whether particles reach each side of each triangle; `None`: the side is so small that they may have missed it by chance.
+    fn reached(&self) -> Vec<[Option<bool>; 2]> {
+        let parts: Vec<f64> = self.list.iter().map(|(t, _)| 0.5 * f64::from(doubled_area(t).length())).collect();
+        let (mut all, mut of_hit) = (0.0, 0.0);
+        for (hits, part) in self.hits.iter().zip(&parts) {
+            for count in hits.iter().filter(|count| **count > 0) {
+                all += f64::from(*count);
+                of_hit += part;
+            }
+        }
+        let density = if of_hit > 0.0 { all / of_hit } else { 0.0 };
+        let reached = |count: u32, part: f64| match count {
+            // Corners have fewer hits than open walls, and some have none by chance.
+            0 if part * density < 20.0 => None,
+            count => Some(count > 0),
+        };
+        self.hits.iter().zip(&parts).map(|(hits, part)| hits.map(|count| reached(count, *part))).collect()
+    }
 }
 
 fn doubled_area([a, b, c]: &[Vec3; 3]) -> Vec3 {
@@ -166,19 +215,20 @@ fn doubled_area([a, b, c]: &[Vec3; 3]) -> Vec3 {
 }
 
 /// Area of triangles, m².
-pub(super) fn area(triangles: &[[Vec3; 3]]) -> f64 {
-    triangles.iter().map(|t| 0.5 * f64::from(doubled_area(t).length())).filter(|area| area.is_finite()).sum()
+pub(super) fn area(triangles: &[Triangle]) -> f64 {
+    triangles.iter().map(|(t, _)| 0.5 * f64::from(doubled_area(t).length())).filter(|area| area.is_finite()).sum()
 }
 
 /// Gives each sample the area of the surface that is nearest to it. Sides that no particle reached have no samples and count for none.
-pub(super) fn weigh(samples: &mut [PrtPoint], triangles: &[[Vec3; 3]], radius: f32) {
+pub(super) fn weigh(samples: &mut [PrtPoint], triangles: &Triangles, radius: f32) {
     let grid = Grid::new(samples, radius);
-    let whole = area(triangles);
+    let whole = area(&triangles.list);
+    let reached = triangles.reached();
     let each = whole / (POINTS * samples.len().max(1)) as f64;
     let mut counts = vec![0u32; samples.len()];
     // Points of a low-discrepancy sequence (Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018).
     let (mut sum, mut number) = (0.0f64, 0u64);
-    for triangle in triangles {
+    for ((triangle, material), reached) in triangles.list.iter().zip(&reached) {
         let normal = doubled_area(triangle);
         let part = 0.5 * f64::from(normal.length());
         if !part.is_finite() || part <= 0.0 || each <= 0.0 {
@@ -193,8 +243,13 @@ pub(super) fn weigh(samples: &mut [PrtPoint], triangles: &[[Vec3; 3]], radius: f
             let uv = if uv.x + uv.y > 1.0 { 1.0 - uv } else { uv };
             let [a, b, c] = triangle;
             let at = *a + (*b - *a) * uv.x + (*c - *a) * uv.y;
-            for normal in [normal, -normal] {
-                if let Some(found) = grid.nearest(samples, at, normal) {
+            for (normal, reached) in [normal, -normal].into_iter().zip(reached) {
+                let found = if *reached == Some(false) { None } else { grid.nearest(samples, at, normal, *material) };
+                let Some(found) = found else { continue };
+                // A side that is too small for hits belongs to a sample of the same plane.
+                let sample = &samples[found];
+                let off = (position(sample) - at).dot(normal).abs();
+                if reached.is_some() || off < 0.1 * radius && side(sample).dot(normal) > 0.7 {
                     counts[found] += 1;
                 }
             }
@@ -251,7 +306,7 @@ mod tests {
     }
 
     /// Samples on a square of one metre, and its triangles.
-    fn square(radius: f32) -> (Vec<PrtPoint>, Vec<[Vec3; 3]>) {
+    fn square(radius: f32) -> (Vec<PrtPoint>, Triangles) {
         let mut thinning = Thinning::new(radius);
         for i in 0..60_000u32 {
             let fraction = |by: f64| (0.5 + by * f64::from(i)).fract() as f32;
@@ -259,7 +314,9 @@ mod tests {
             thinning.offer(&point(at, Vec3::Y));
         }
         let [a, b, c, d] = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(x, z)| Vec3::new(x, 0.0, z));
-        (thinning.samples, vec![[a, b, c], [a, c, d]])
+        // Seen from its upper side, which is the back of these triangles.
+        let list = vec![([a, b, c], 0), ([a, c, d], 0)];
+        (thinning.samples, Triangles { list, firsts: vec![0], hits: vec![[0, 1000]; 2] })
     }
 
     #[test]
