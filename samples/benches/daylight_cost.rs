@@ -122,10 +122,8 @@ fn shared(gpu: &Gpu, scene: &Scene, view: &View, plan: &Plan, albedo: &[f32]) ->
         let (_, compression) = Spent::of(|| units::compress(plan, &light, &skies))?;
         add(&mut spent[0], paths);
         add(&mut spent[1], compression);
-        let [column, row, wide, _] = plan.tile(tile).map(|number| number as usize);
-        let there = |texel: &usize| light.mask[texel / 32] >> (texel % 32) & 1 != 0;
-        for (number, texel) in (0..32 * light.mask.len()).filter(there).enumerate() {
-            let at = 3 * ((row + texel / wide) * width + column + texel % wide);
+        for (number, [x, y]) in plan.covered(tile, &light.mask).enumerate() {
+            let at = 3 * (y as usize * width + x as usize);
             for channel in 0..3 {
                 let scale = albedo[at + channel] / std::f32::consts::PI;
                 let of_texel = &light.sun[(3 * number + channel) * plan.times.len()..];
