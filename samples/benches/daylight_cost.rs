@@ -28,7 +28,7 @@ use lucerna::{
     techniques::daylight::{Baking, Plan, Sky, Transport, units},
     tracer::{self, Filter, Tracer},
 };
-use lucerna_samples::daylight::{DayOptions, of_view};
+use lucerna_samples::daylight::{DayOptions, KindArg, for_view};
 use lucerna_scenes as builtin;
 
 /// Times of the day at which the path tracer is measured.
@@ -265,7 +265,8 @@ fn run() -> Result<()> {
     let view = View::of_camera(&scene, &Pose::rest(&scene), 0, extent)?;
     let day = DayOptions { date: "2026-08-16".into(), ..DayOptions::default() };
     let baking = |seed| Baking { samples, disc: false, seed, ..Baking::default() };
-    let plans = [1, 2].map(|seed| of_view(&day, &baking(seed), &scene, "0", &view).map(|planned| planned.plan));
+    let plans =
+        [1, 2].map(|seed| for_view(&day, KindArg::View, &baking(seed), &scene, "0", &view).map(|planned| planned.plan));
     let [first, second] = plans;
     let (first, second) = (first?, second?);
     println!("{}, {name} at {}x{}, {}", gpu.describe(), extent[0], extent[1], day.date);
