@@ -171,7 +171,7 @@ fn a_cube_and_a_lightmap_have_the_light_of_the_view() {
     for what in ["the same day, from a cube", "the same day, from a lightmap"] {
         let found = of(what);
         assert!(
-            found.len() == 2 && found.iter().zip(&view).all(|(a, b)| (a / b - 1.0).abs() < 0.05),
+            found.len() == 2 && found.iter().zip(&view).all(|(a, b)| (a / b - 1.0).abs() < 0.03),
             "{what}: {found:?}, {view:?}"
         );
     }
