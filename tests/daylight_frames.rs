@@ -3,20 +3,17 @@
 use std::path::Path;
 
 use crate::{
-    daylight_lab::{SKY_IMAGES, day, polar_day, stored},
+    daylight_lab::{SKY_IMAGES, Studio, day, polar_day, stored},
     tracer_lab::{Stage, view},
 };
 use glam::{Vec3, vec3};
 use lucerna::{
-    Result,
     bake::Digest,
     gpu::{Gpu, testing::with_gpu},
-    graph::{Graph, Runner},
-    image::Layers,
-    scene::{Material, Pose, Scene, View},
-    technique::{Bake, Ready, Settings as _, Shot},
+    scene::{Material, Scene, View},
+    technique::{Bake, Settings as _},
     techniques::daylight::{
-        Baked, Daylight, Frames, Interpolation, PictureSettings, Settings, Sky, SkyLight, Stored, Weather, frames,
+        Baked, Frames, Interpolation, PictureSettings, Settings, Sky, SkyLight, Stored, Weather, frames,
         steps::{Mixture, Steps},
     },
 };
@@ -38,34 +35,8 @@ fn settings(time: &str, interpolation: Interpolation) -> PictureSettings {
     PictureSettings { daylight, ..PictureSettings::default() }
 }
 
-/// A program that renders frames.
-struct Studio {
-    scene: Scene,
-    view: View,
-    ready: Ready<Daylight>,
-    runner: Runner,
-}
-
-impl Studio {
-    fn new(gpu: &Gpu, baked: &Baked) -> Self {
-        let (scene, view) = (scene(), eye());
-        let ready = Ready::new(gpu, &scene, &PictureSettings::default(), Some(baked), &mut |_, _| true).unwrap();
-        Self { scene, view, ready, runner: Runner::new(gpu) }
-    }
-
-    fn frame(&mut self, frame: u32, settings: &PictureSettings) -> Result<(Layers, Vec<(&'static str, f64)>)> {
-        let mut graph = Graph::new("daylight");
-        graph.frame = frame;
-        let pose = Pose::rest(&self.scene);
-        let picture = self.ready.frame(&mut graph, (&self.scene, &pose), &self.view, Shot::default(), settings)?;
-        let reading = picture.read(&mut graph, true, false);
-        let result = self.runner.run(&graph)?;
-        Ok((reading.layers(&result), reading.numbers(&result)))
-    }
-
-    fn irradiance(&mut self, settings: &PictureSettings) -> Vec<[f32; 3]> {
-        self.frame(0, settings).unwrap().0.layer("irradiance").unwrap().rgb_pixels().unwrap()
-    }
+fn studio(gpu: &Gpu, baked: &Baked) -> Studio {
+    Studio::new(gpu, scene(), eye(), baked)
 }
 
 /// Twin of `decode.comp`.
@@ -132,7 +103,7 @@ fn pictures_have_the_light_of_the_cpu_by_every_interpolation_from_images_and_fro
         let folder = tempfile::tempdir().unwrap();
         let stored = stored(&scene(), &eye(), polar_day(), 90.0, 17.0, 7);
         let (images, framed) = (Baked::new(stored.clone()), in_frames(&stored, folder.path()));
-        let mut studios = [("images", Studio::new(gpu, &images)), ("frames", Studio::new(gpu, &framed))];
+        let mut studios = [("images", studio(gpu, &images)), ("frames", studio(gpu, &framed))];
         // At a baked time, between two, and between the last of a day and the first of the next.
         for time in ["10:47", "09:00", "00:00:30"] {
             let seconds = day(&stored.plan.calendar).parse_time(time).unwrap();
@@ -152,7 +123,7 @@ fn pictures_have_the_light_of_the_cpu_by_every_interpolation_from_images_and_fro
 fn at_its_own_time_a_picture_is_the_baked_frame_by_every_interpolation() {
     with_gpu(|gpu| {
         let stored = stored(&scene(), &eye(), polar_day(), 90.0, 17.0, 7);
-        let mut studio = Studio::new(gpu, &Baked::new(stored.clone()));
+        let mut studio = studio(gpu, &Baked::new(stored.clone()));
         let day = day(&stored.plan.calendar);
         for time in [0, 6, 15] {
             let label = day.label(stored.plan.times[time].seconds);
@@ -175,8 +146,7 @@ fn streamed_pictures_are_the_resident_ones_bit_for_bit_in_both_directions_of_tim
         assert!(streamed.stream.is_some());
         let resident = Baked { stream: None, ..streamed.clone() };
         let small = Baked { stream: Some(4), ..streamed.clone() };
-        let (mut right, mut ours) =
-            (Studio::new(gpu, &resident), [Studio::new(gpu, &streamed), Studio::new(gpu, &small)]);
+        let (mut right, mut ours) = (studio(gpu, &resident), [studio(gpu, &streamed), studio(gpu, &small)]);
         for (minutes, how) in
             [(11.0, Interpolation::Linear), (-47.0, Interpolation::CatmullRom), (0.5, Interpolation::LogLinear)]
         {
@@ -206,7 +176,7 @@ fn files_that_change_while_they_are_streamed_are_errors_that_name_the_file_and_t
             // Not overwritten by renaming, because the open file would then stay as it is.
             let _ = std::fs::remove_file(&path);
             whole(&path);
-            let mut studio = Studio::new(gpu, &Baked::read(&path).unwrap());
+            let mut studio = studio(gpu, &Baked::read(&path).unwrap());
             let mut early = settings("01:10", Interpolation::Linear);
             early.daylight.minutes = 0.0;
             studio.frame(0, &early).unwrap();
@@ -283,7 +253,7 @@ fn fetches_grow_with_the_images_and_not_with_the_steps_of_the_day() {
         for images in [5, 10, 20] {
             for interval in [90.0, 5.0] {
                 let stored = stored(&scene(), &eye(), polar_day(), interval, 0.0, images);
-                let mut studio = Studio::new(gpu, &Baked::new(stored));
+                let mut studio = studio(gpu, &Baked::new(stored));
                 for how in [Interpolation::Linear, Interpolation::CatmullRom, Interpolation::LogLinear] {
                     let (_, numbers) = studio.frame(0, &settings("09:01", how)).unwrap();
                     let wanted = f64::from(pixels * (images + SKY_IMAGES));
@@ -301,7 +271,7 @@ fn the_papers_sky_is_one_image_that_the_height_of_the_sun_scales() {
         let highest = stored.plan.times.iter().max_by(|a, b| a.sun[1].total_cmp(&b.sun[1])).unwrap();
         let day = day(&stored.plan.calendar);
         let label = day.label(highest.seconds);
-        let mut studio = Studio::new(gpu, &Baked::new(stored.clone()));
+        let mut studio = studio(gpu, &Baked::new(stored.clone()));
         let mut at = |time: &str, sky: SkyLight| {
             let mut settings = settings(time, Interpolation::Linear);
             (settings.daylight.sky, settings.daylight.overcast) = (sky, 1.0);

@@ -1,6 +1,7 @@
 //! Lamps in baked daylight: closed forms, groups, and the path tracer.
 
 use crate::{
+    daylight_lab::{baked, lights},
     daylight_light::{eye, plan, stage},
     tracer_lab::{Stage, matt, render, view},
 };
@@ -8,7 +9,7 @@ use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     scene::{LightKind, Material, Scene, View},
-    techniques::daylight::{Baking, Group, Light, Plan, Sources, Transport, finish, units},
+    techniques::daylight::{Baking, Group, Light, Plan, Sources},
 };
 
 fn baking(samples: u32) -> Baking {
@@ -24,8 +25,7 @@ fn with_lamps(scene: &Scene, view: &View, samples: u32, lamps: Vec<Group>) -> Pl
 }
 
 fn tiles(gpu: &Gpu, scene: &Scene, view: &View, plan: &Plan) -> Vec<Light> {
-    let mut transport = Transport::new(gpu, scene, plan, Sources::View(Box::new(*view))).unwrap();
-    (0..plan.tile_count()).map(|tile| transport.tile(plan, tile).unwrap()).collect()
+    lights(gpu, scene, plan, Sources::View(Box::new(*view)))
 }
 
 #[test]
@@ -70,12 +70,7 @@ fn a_closed_box_that_glows_has_its_emission_over_one_less_its_albedo_after_compr
         stage.cuboid(glowing, Vec3::splat(-1.0), Vec3::ONE, true);
         let eye = view(vec3(0.1, -0.2, 0.8), vec3(0.0, 0.1, -1.0), 60.0, [32, 32]);
         let plan = with_lamps(&stage.scene, &eye, 128, vec![group("walls", &[], &[glowing])]);
-        let skies = units::skies(&plan).unwrap();
-        let gathered: Vec<_> = tiles(gpu, &stage.scene, &eye, &plan)
-            .iter()
-            .map(|light| units::gathered(&plan, light, &skies).unwrap())
-            .collect();
-        for tile in finish::tiles(&plan, &gathered, |_| Ok(())).unwrap() {
+        for tile in baked(gpu, &stage.scene, plan, Sources::View(Box::new(eye))).tiles {
             let coefficients = tile.lamps.mix([(0, [1.0; 3])].into_iter());
             let texels = tile.there() as usize;
             let mut sum = Vec3::ZERO;
@@ -108,10 +103,8 @@ fn lamps_have_the_light_of_the_path_tracer() {
         let (direct, indirect, albedo) = (of("direct"), of("indirect"), of("albedo"));
         let (mut found, mut wanted) = ([0.0f64; 3], [0.0f64; 3]);
         for (index, light) in tiles(gpu, &stage.scene, &eye, &plan).iter().enumerate() {
-            let [column, row, wide, high] = plan.tile(index as u32);
-            let there = |texel: &u32| light.mask[*texel as usize / 32] >> (texel % 32) & 1 != 0;
-            for (number, texel) in (0..wide * high).filter(there).enumerate() {
-                let pixel = ((row + texel / wide) * plan.extent[0] + column + texel % wide) as usize;
+            for (number, [x, y]) in plan.covered(index as u32, &light.mask).enumerate() {
+                let pixel = (y * plan.extent[0] + x) as usize;
                 for channel in 0..3 {
                     let at = 3 * pixel + channel;
                     let irradiance = light.lamps[3 * number + channel];

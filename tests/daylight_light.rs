@@ -1,6 +1,9 @@
 //! Baked daylight against the path tracer: the light of the sun at several times and of the sky, by the same shared paths.
 
-use crate::tracer_lab::{Stage, render, view};
+use crate::{
+    daylight_lab::lights,
+    tracer_lab::{Stage, render, view},
+};
 use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
@@ -94,19 +97,14 @@ fn shared_paths_have_the_light_of_the_path_tracer_at_each_time_and_of_the_sky() 
     with_gpu(|gpu| {
         let (scene, view) = (stage(), eye());
         let plan = plan(&scene, &view, baking());
-        let mut transport = Transport::new(gpu, &scene, &plan, Sources::View(Box::new(view))).unwrap();
-        let [columns, rows] = plan.tiles();
-        let tiles: Vec<_> = (0..columns * rows).map(|tile| transport.tile(&plan, tile).unwrap()).collect();
+        let tiles = lights(gpu, &scene, &plan, Sources::View(Box::new(view)));
         let pixels = (plan.extent[0] * plan.extent[1]) as usize;
         for time in 0..=plan.times.len() {
             let (wanted, _, albedo) = truth(gpu, scene.clone(), &view, suns().get(time).copied());
             let mut found = [0.0; 3];
             for (index, light) in tiles.iter().enumerate() {
-                let [column, row, wide, _] = plan.tile(index as u32);
-                let there = |texel: &u32| light.mask[*texel as usize / 32] >> (texel % 32) & 1 != 0;
-                let texels = light.mask.len() as u32 * 32;
-                for (number, texel) in (0..texels).filter(there).enumerate() {
-                    let pixel = (row + texel / wide) * plan.extent[0] + column + texel % wide;
+                for (number, [x, y]) in plan.covered(index as u32, &light.mask).enumerate() {
+                    let pixel = y * plan.extent[0] + x;
                     for (channel, found) in found.iter_mut().enumerate() {
                         let line = 3 * number + channel;
                         let irradiance: f32 = match time < plan.times.len() {

@@ -1,6 +1,7 @@
 //! Suns that are points: baked light against the path tracer with a point light at the same place.
 
 use crate::{
+    daylight_lab::lights,
     daylight_light::{baking, eye, plan, stage},
     tracer_lab::{Stage, render},
 };
@@ -8,7 +9,7 @@ use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::LightKind,
-    techniques::daylight::{Baking, Sources, SunPoint, Transport},
+    techniques::daylight::{Baking, Sources, SunPoint},
     tracer::{Filter, Settings},
 };
 
@@ -21,9 +22,7 @@ fn a_sun_at_a_distance_has_the_light_of_a_point_light_there() {
         plan.calendar.point = Some(point);
         plan.times.remove(1);
         plan.validate().unwrap();
-        let mut transport = Transport::new(gpu, &scene, &plan, Sources::View(Box::new(view))).unwrap();
-        let [columns, rows] = plan.tiles();
-        let tiles: Vec<_> = (0..columns * rows).map(|tile| transport.tile(&plan, tile).unwrap()).collect();
+        let tiles = lights(gpu, &scene, &plan, Sources::View(Box::new(view)));
         let settings =
             Settings { bounces: 16, roulette: 16, diffuse_only: true, filter: Filter::Centre, ..Settings::default() };
         for (time, lit) in plan.times.iter().enumerate() {
@@ -38,10 +37,8 @@ fn a_sun_at_a_distance_has_the_light_of_a_point_light_there() {
                 wanted += vec3(pixel[0], pixel[1], pixel[2]);
             }
             for (index, light) in tiles.iter().enumerate() {
-                let [column, row, wide, _] = plan.tile(index as u32);
-                let there = |texel: &u32| light.mask[*texel as usize / 32] >> (texel % 32) & 1 != 0;
-                for (number, texel) in (0..light.mask.len() as u32 * 32).filter(there).enumerate() {
-                    let pixel = 3 * ((row + texel / wide) * plan.extent[0] + column + texel % wide) as usize;
+                for (number, [x, y]) in plan.covered(index as u32, &light.mask).enumerate() {
+                    let pixel = 3 * (y * plan.extent[0] + x) as usize;
                     for channel in 0..3 {
                         let irradiance = light.sun[(3 * number + channel) * plan.times.len() + time];
                         found[channel] += irradiance * albedo[pixel + channel] / std::f32::consts::PI;

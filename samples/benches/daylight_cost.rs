@@ -28,7 +28,7 @@ use lucerna::{
     techniques::daylight::{Baking, Plan, Sky, Transport, units},
     tracer::{self, Filter, Tracer},
 };
-use lucerna_samples::daylight::{DayOptions, of_view};
+use lucerna_samples::daylight::{DayOptions, KindArg, for_view};
 use lucerna_scenes as builtin;
 
 /// Times of the day at which the path tracer is measured.
@@ -122,10 +122,8 @@ fn shared(gpu: &Gpu, scene: &Scene, view: &View, plan: &Plan, albedo: &[f32]) ->
         let (_, compression) = Spent::of(|| units::compress(plan, &light, &skies))?;
         add(&mut spent[0], paths);
         add(&mut spent[1], compression);
-        let [column, row, wide, _] = plan.tile(tile).map(|number| number as usize);
-        let there = |texel: &usize| light.mask[texel / 32] >> (texel % 32) & 1 != 0;
-        for (number, texel) in (0..32 * light.mask.len()).filter(there).enumerate() {
-            let at = 3 * ((row + texel / wide) * width + column + texel % wide);
+        for (number, [x, y]) in plan.covered(tile, &light.mask).enumerate() {
+            let at = 3 * (y as usize * width + x as usize);
             for channel in 0..3 {
                 let scale = albedo[at + channel] / std::f32::consts::PI;
                 let of_texel = &light.sun[(3 * number + channel) * plan.times.len()..];
@@ -267,7 +265,8 @@ fn run() -> Result<()> {
     let view = View::of_camera(&scene, &Pose::rest(&scene), 0, extent)?;
     let day = DayOptions { date: "2026-08-16".into(), ..DayOptions::default() };
     let baking = |seed| Baking { samples, disc: false, seed, ..Baking::default() };
-    let plans = [1, 2].map(|seed| of_view(&day, &baking(seed), &scene, "0", &view).map(|planned| planned.plan));
+    let plans =
+        [1, 2].map(|seed| for_view(&day, KindArg::View, &baking(seed), &scene, "0", &view).map(|planned| planned.plan));
     let [first, second] = plans;
     let (first, second) = (first?, second?);
     println!("{}, {name} at {}x{}, {}", gpu.describe(), extent[0], extent[1], day.date);

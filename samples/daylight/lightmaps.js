@@ -62,14 +62,17 @@ export class Lightmaps {
         return { sun: light(sun_column), direction: at(direction_column), patches: Array.from({ length: patches }, (_, patch) => light(patch)) };
     }
 
-    // Two baked times and their weights.
+    // Two baked times and their weights: a line between them, and over a night the nearer one.
     weights(seconds) {
-        const { times } = this.table, last = times.length - 1;
-        if (last < 0) return [];
-        const next = times.findIndex((time) => time > seconds);
-        if (next <= 0) return [[next < 0 ? last : 0, 1]];
-        const part = (seconds - times[next - 1]) / (times[next] - times[next - 1]);
-        return [[next - 1, 1 - part], [next, part]];
+        const { times, nights, day } = this.table, count = times.length;
+        if (!count) return [];
+        // After the last time comes the first one of the next day.
+        const found = times.findIndex((time) => time > seconds), next = found < 0 ? count : found;
+        const before = (next + count - 1) % count, after = next % count;
+        const begin = times[before] - (next === 0 ? day.seconds : 0), end = times[after] + (next === count ? day.seconds : 0);
+        const part = (seconds - begin) / (end - begin);
+        if (nights.includes(before)) return [[part < 0.5 ? before : after, 1]];
+        return [[before, 1 - part], [after, part]];
     }
 
     // Irradiance of all texels at a time: four numbers for each, row after row from the top.

@@ -93,9 +93,21 @@ class Export:
         return (1 - (x - row)) * self.moments[row] + (x - row) * self.moments[following]
 
     def weights(self, seconds):
-        """For each baked time its weight: the line between the two times around the moment."""
-        times = np.array(self.table["times"])
-        return np.array([np.interp(seconds, times, row) for row in np.eye(len(times))])
+        """For each baked time its weight: the line between the two times around the moment, and over a night the nearer one."""
+        times, length = self.table["times"], self.table["day"]["seconds"]
+        out = np.zeros(len(times))
+        if times:
+            # After the last time comes the first one of the next day.
+            following = int(np.searchsorted(times, seconds, side="right"))
+            before, after = (following - 1) % len(times), following % len(times)
+            begin = times[before] - (length if following == 0 else 0)
+            end = times[after] + (length if following == len(times) else 0)
+            part = (seconds - begin) / (end - begin)
+            if before in self.table["nights"]:
+                part = 0 if part < 0.5 else 1
+            out[before] += 1 - part
+            out[after] += part
+        return out
 
     def light(self, seconds):
         """Irradiance, rows × columns × 3, W/m²."""

@@ -154,6 +154,30 @@ fn the_shipped_experiment_gives_all_its_tables() {
 }
 
 #[test]
+fn a_cube_and_a_lightmap_have_the_light_of_the_view() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out");
+    lucerna(["reproduce", "daylight-kinds", "--quick", "-o", output.to_str().unwrap()]).expect(0, &["wrote"]);
+    let report: Value = serde_json::from_slice(&fs::read(output.join("report.json")).unwrap()).unwrap();
+    let beside = rows(&report, "beside");
+    let of = |what: &str| -> Vec<f64> {
+        beside.iter().filter(|row| row["day"] == what).map(|row| number(row, "energy, baked")).collect()
+    };
+    let view = of("the day of the experiment");
+    assert!(view.len() == 2 && view.iter().all(|energy| (0.9..1.05).contains(energy)), "{view:?}");
+    for what in ["the same day, from a cube", "the same day, from a lightmap"] {
+        let found = of(what);
+        assert!(
+            found.len() == 2 && found.iter().zip(&view).all(|(a, b)| (a / b - 1.0).abs() < 0.03),
+            "{what}: {found:?}, {view:?}"
+        );
+    }
+}
+
+#[test]
 fn wrong_days_times_and_settings_are_named() {
     let folder = tempfile::tempdir().unwrap();
     for (list, key, value, parts) in [

@@ -296,6 +296,8 @@ fn the_pages_and_the_table_rebuild_the_lightmaps() {
         let row = (seconds - about["first_seconds"].as_f64().unwrap()) / 60.0;
         assert_eq!(row.fract(), 0.0);
         let outside = |column: usize, channel: usize| moments[4 * (row as usize * moment_columns + column) + channel];
+        // A summer day: after the last step it is night until the first one.
+        assert_eq!(table["nights"], serde_json::json!([times.len() - 1]));
         let next = times.iter().position(|time| *time > seconds);
         let weights = match next {
             Some(0) => vec![(0, 1.0)],

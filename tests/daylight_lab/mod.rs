@@ -1,10 +1,22 @@
-//! Bakes without a baking: made-up images, so that tests and benchmarks of the run time need no paths.
+//! Bakes without a baking: made-up images, so that tests and benchmarks of the run time need no paths. And what tests of bakes share: a whole
+//! bake in memory, and a program that renders frames.
 #![allow(dead_code)]
 
 use half::f16;
 use lucerna::{
-    scene::{Scene, View},
-    techniques::daylight::{Baking, Calendar, Day, Kind, Lit, Plan, Stored, Weather, layer::Layer, parts, units::Tile},
+    Result,
+    gpu::Gpu,
+    graph::{Graph, Runner},
+    image::Layers,
+    scene::{Pose, Scene, View},
+    technique::{Ready, Shot},
+    techniques::daylight::{
+        Baked, Baking, Calendar, Day, Daylight, Kind, Light, Lit, PictureSettings, Plan, Sources, Stored, Transport,
+        Weather, finish,
+        layer::Layer,
+        parts,
+        units::{self, Tile},
+    },
 };
 
 /// Images for the light of the sky.
@@ -102,4 +114,49 @@ pub fn stored(scene: &Scene, view: &View, calendar: Calendar, interval: f64, off
     });
     let tiles = tiles.collect();
     Stored { plan, tiles, probes: Vec::new(), corners: Vec::new() }
+}
+
+/// The light of all tiles before filter and compression.
+pub fn lights(gpu: &Gpu, scene: &Scene, plan: &Plan, sources: Sources) -> Vec<Light> {
+    let mut transport = Transport::new(gpu, scene, plan, sources).unwrap();
+    (0..plan.tile_count()).map(|tile| transport.tile(plan, tile).unwrap()).collect()
+}
+
+/// A bake without probes, filtered and compressed as a file has it.
+pub fn baked(gpu: &Gpu, scene: &Scene, plan: Plan, sources: Sources) -> Stored {
+    let skies = units::skies(&plan).unwrap();
+    let tiles = lights(gpu, scene, &plan, sources);
+    let gathered: Vec<_> = tiles.iter().map(|light| units::gathered(&plan, light, &skies).unwrap()).collect();
+    let tiles = finish::tiles(&plan, &gathered, |_| Ok(())).unwrap();
+    Stored { plan, tiles, probes: Vec::new(), corners: Vec::new() }
+}
+
+/// A program that renders frames.
+pub struct Studio {
+    scene: Scene,
+    view: View,
+    ready: Ready<Daylight>,
+    runner: Runner,
+}
+
+impl Studio {
+    pub fn new(gpu: &Gpu, scene: Scene, view: View, baked: &Baked) -> Self {
+        let ready = Ready::new(gpu, &scene, &PictureSettings::default(), Some(baked), &mut |_, _| true).unwrap();
+        Self { scene, view, ready, runner: Runner::new(gpu) }
+    }
+
+    /// The layers and the numbers of a frame.
+    pub fn frame(&mut self, frame: u32, settings: &PictureSettings) -> Result<(Layers, Vec<(&'static str, f64)>)> {
+        let mut graph = Graph::new("daylight");
+        graph.frame = frame;
+        let pose = Pose::rest(&self.scene);
+        let picture = self.ready.frame(&mut graph, (&self.scene, &pose), &self.view, Shot::default(), settings)?;
+        let reading = picture.read(&mut graph, true, false);
+        let result = self.runner.run(&graph)?;
+        Ok((reading.layers(&result), reading.numbers(&result)))
+    }
+
+    pub fn irradiance(&mut self, settings: &PictureSettings) -> Vec<[f32; 3]> {
+        self.frame(0, settings).unwrap().0.layer("irradiance").unwrap().rgb_pixels().unwrap()
+    }
 }

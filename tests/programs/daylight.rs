@@ -17,6 +17,8 @@ mod daylight_lamps;
 mod daylight_light;
 #[path = "../daylight_probes.rs"]
 mod daylight_probes;
+#[path = "../daylight_sequence.rs"]
+mod daylight_sequence;
 #[path = "../daylight_sky.rs"]
 mod daylight_sky;
 #[path = "../daylight_sun.rs"]

@@ -2,8 +2,9 @@
 //!
 //! Weights follow the idea of Rousselle, Knaus and Zwicker (Adaptive Rendering with Non-Local Means Filtering, 2012): differences are compared with
 //! their noise, and the halves of the samples weight each other. The neighbours of a texel lie on its surface in space, so that the borders of
-//! charts do not matter. Instead of patches, means of near texels are compared, for parts of the day, the sky and the lamps. Weights of a half come from the other half, so that weights and
-//! noise are independent, and all times have the same weights: the light stays linear in its sources, and does not flicker.
+//! charts do not matter. Instead of patches, means of near texels are compared, for parts of the day, the sky and the lamps. Weights of a half
+//! come from the other half, so that weights and noise are independent, and all times have the same weights: the light stays linear in its
+//! sources, and does not flicker.
 
 use std::collections::BTreeMap;
 
@@ -215,11 +216,8 @@ fn listed(plan: &Plan, tiles: &[Gathered]) -> (Vec<Texel>, Vec<u32>, Vec<u32>) {
     let mut at = vec![NONE; plan.extent[0] as usize * plan.extent[1] as usize];
     for (tile, gathered) in tiles.iter().enumerate() {
         firsts.push(texels.len() as u32);
-        let [column, row, columns, rows] = plan.tile(tile as u32);
-        let there =
-            |inside: &u32| gathered.mask.get(*inside as usize / 32).is_some_and(|w| w >> (inside % 32) & 1 != 0);
-        for (number, (inside, spot)) in (0..columns * rows).filter(there).zip(&gathered.spots).enumerate() {
-            let (x, y) = (column + inside % columns, row + inside / columns);
+        let covered = plan.covered(tile as u32, &gathered.mask);
+        for (number, ([x, y], spot)) in covered.zip(&gathered.spots).enumerate() {
             at[y as usize * plan.extent[0] as usize + x as usize] = texels.len() as u32;
             texels.push(Texel {
                 tile: tile as u32,

@@ -238,6 +238,13 @@ impl Plan {
         [corner[0], corner[1], size[0], size[1]]
     }
 
+    /// Columns and rows, in the whole bake, of the texels of a tile whose bits in its mask are set, in the order of their light.
+    pub fn covered(&self, index: u32, mask: &[u32]) -> impl Iterator<Item = [u32; 2]> {
+        let [column, row, columns, rows] = self.tile(index);
+        let there = |texel: &u32| mask.get(*texel as usize / 32).is_some_and(|word| word >> (texel % 32) & 1 != 0);
+        (0..columns * rows).filter(there).map(move |texel| [column + texel % columns, row + texel / columns])
+    }
+
     /// Number of tiles; the units of a bake are the tiles and then the bricks of probes.
     pub fn tile_count(&self) -> u32 {
         self.tiles().iter().product()

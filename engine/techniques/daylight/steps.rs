@@ -80,6 +80,11 @@ impl Steps {
         Self { first: 0, night: night.collect(), seconds, length }
     }
 
+    /// The times after which it is night until the next one, as numbers among the times of the day.
+    pub fn nights(&self) -> impl Iterator<Item = usize> + '_ {
+        self.night.iter().enumerate().filter(|(_, night)| **night).map(|(number, _)| number)
+    }
+
     /// The time of a number that may lie on a neighbouring day.
     fn at(&self, number: isize) -> f64 {
         let count = self.seconds.len() as isize;
@@ -302,6 +307,7 @@ mod tests {
             only(23.0 * 3600.0, 24);
             only(1.0 * 3600.0, 0);
         }
+        assert_eq!(steps.nights().collect::<Vec<_>>(), [24]);
         let Mixture::Sum(weights) = steps.mixture(22_000.0, Interpolation::CatmullRom) else { panic!() };
         assert!(
             weights.iter().all(|weight| weight.time <= 2),

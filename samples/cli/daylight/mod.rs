@@ -11,5 +11,5 @@ pub use bake::{DayBakeArgs, bake};
 pub use export::{DayExportArgs, export};
 pub use frames::{DayFramesArgs, frames};
 pub use info::{DayInfoArgs, info};
-pub use plan::{DayOptions, Planned, of_view};
+pub use plan::{DayOptions, KindArg, Planned, for_view};
 pub use render::{DayArgs, render};

@@ -221,7 +221,8 @@ impl DayOptions {
 }
 
 /// The surfaces that a bake holds light for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum KindArg {
     /// All surfaces, for a free camera
     Lightmap,
@@ -259,11 +260,16 @@ impl Receivers {
         Self { kind, extent: view.extent, sources, corners: Vec::new(), notes: Vec::new() }
     }
 
-    fn around(camera: &str, view: &View, baking: &Baking) -> Self {
+    fn around(camera: &str, view: &View, baking: &Baking) -> Result<Self> {
+        if view.is_orthographic() {
+            let what = format!("the camera {camera} has parallel rays, and one that turns in place needs perspective");
+            return Err(Error::usage(what).help("Choose another one with --camera"));
+        }
         let (position, near) = (view.position, view.near);
         let kind = Kind::Cube { camera: camera.to_owned(), position: position.to_array(), near };
         let sources = Sources::Cube(Box::new(cube::views(position, near, baking.face)));
-        Self { kind, extent: [cube::FACES * baking.face, baking.face], sources, corners: Vec::new(), notes: Vec::new() }
+        let extent = [cube::FACES * baking.face, baking.face];
+        Ok(Self { kind, extent, sources, corners: Vec::new(), notes: Vec::new() })
     }
 
     fn of_lightmap(scene: &Scene, baking: &Baking) -> Result<Self> {
@@ -294,23 +300,29 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
         }
         KindArg::Cube => {
             let (_, view) = stage.at(args.time, args.size)?;
-            if view.is_orthographic() {
-                let what =
-                    format!("the camera {} has parallel rays, and one that turns in place needs", stage.placed.name);
-                return Err(Error::usage(format!("{what} perspective")).help("Choose another one with --camera"));
-            }
-            Ok(Receivers::around(&stage.placed.name, &view, baking))
+            Receivers::around(&stage.placed.name, &view, baking)
         }
         KindArg::Lightmap => Receivers::of_lightmap(&stage.scene, baking),
     })
 }
 
-/// Plans the bake of the pixels of a view.
+/// Plans the bake for a view: of its pixels, or so that the view is one of many.
 ///
 /// # Errors
 /// As `plan`.
-pub fn of_view(options: &DayOptions, baking: &Baking, scene: &Scene, camera: &str, view: &View) -> Result<Planned> {
-    planned(options, baking, scene, || Ok(Receivers::of_view(camera, view)))
+pub fn for_view(
+    options: &DayOptions,
+    kind: KindArg,
+    baking: &Baking,
+    scene: &Scene,
+    camera: &str,
+    view: &View,
+) -> Result<Planned> {
+    planned(options, baking, scene, || match kind {
+        KindArg::View => Ok(Receivers::of_view(camera, view)),
+        KindArg::Cube => Receivers::around(camera, view, baking),
+        KindArg::Lightmap => Receivers::of_lightmap(scene, baking),
+    })
 }
 
 fn planned(

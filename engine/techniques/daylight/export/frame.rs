@@ -3,9 +3,9 @@
 use half::f16;
 
 use super::super::{
-    Course, Lit, Plan, Sky, Stored, Weather,
+    Course, Interpolation, Sky, Stored, Weather,
     atlas::{self, Texel, padding_sources},
-    units::Tile,
+    steps::Steps,
 };
 use crate::{
     Error, Result,
@@ -29,41 +29,18 @@ pub struct Moment {
 }
 
 impl Moment {
-    /// `seconds`: after the begin of the day.
+    /// The light of the line between two of the day's `steps`. `seconds`: after the begin of the day.
     ///
     /// # Errors
     /// `Usage` if the weather is impossible.
-    pub fn new(plan: &Plan, course: &Course, seconds: f64, weather: Weather) -> Result<Self> {
+    pub fn new(course: &Course, steps: &Steps, seconds: f64, weather: Weather) -> Result<Self> {
         let shine = course.sun(seconds);
         let sky = Sky::new(weather, shine.direction.map(f64::from)).map_err(Error::usage)?;
         let clear = 1.0 - weather.overcast() as f32;
         let sun = shine.irradiance.map_or(sky.sun_irradiance(), |sun| sun.map(|channel| channel * clear));
-        let weights = weights(&plan.times[plan.of_day(0)], seconds);
+        let weights = steps.mixture(seconds, Interpolation::Linear).linear();
         Ok(Self { direction: shine.direction, sun, patches: sky.patches(), weights })
     }
-}
-
-/// Linear interpolation between the baked times (Bahnsen et al. 2012, equation 2). Before the first and after the last one the sun is at the
-/// horizon, and the nearest one counts.
-fn weights(times: &[Lit], seconds: f64) -> Vec<(usize, f32)> {
-    let next = times.partition_point(|time| time.seconds <= seconds);
-    match (next.checked_sub(1), times.get(next)) {
-        (Some(before), Some(after)) => {
-            let begun = times[before].seconds;
-            let alpha = ((seconds - begun) / (after.seconds - begun)) as f32;
-            vec![(before, 1.0 - alpha), (next, alpha)]
-        }
-        (Some(before), None) => vec![(before, 1.0)],
-        (None, Some(_)) => vec![(0, 1.0)],
-        (None, None) => Vec::new(),
-    }
-}
-
-/// The texels of a tile that are on a surface, in the order of the layers' texels: their columns and rows in the whole bake.
-pub(super) fn covered(plan: &Plan, number: usize, tile: &Tile) -> Vec<[u32; 2]> {
-    let [column, row, columns, rows] = plan.tile(number as u32);
-    let there = |texel: &u32| tile.mask.get(*texel as usize / 32).is_some_and(|word| word >> (texel % 32) & 1 == 1);
-    (0..columns * rows).filter(there).map(|texel| [column + texel % columns, row + texel / columns]).collect()
 }
 
 /// The irradiance of each texel of a bake, W/m², row after row; 0 where no surface is.
@@ -74,7 +51,7 @@ pub fn irradiance(stored: &Stored, moment: &Moment) -> Vec<[f32; 3]> {
     for (number, tile) in stored.tiles.iter().enumerate() {
         let sun = tile.sun.mix(moment.weights.iter().map(of_sun));
         let sky = tile.sky.mix(moment.patches.iter().copied().enumerate());
-        for (texel, [x, y]) in covered(&stored.plan, number, tile).into_iter().enumerate() {
+        for (texel, [x, y]) in stored.plan.covered(number as u32, &tile.mask).enumerate() {
             let parts = [tile.sun.decode(texel, &sun), tile.sky.decode(texel, &sky)];
             let sum: [f32; 3] = std::array::from_fn(|channel| parts.iter().map(|part| part[channel]).sum());
             out[(y * width + x) as usize] = sum.map(|value: f32| value.max(0.0));
@@ -89,7 +66,7 @@ pub fn sources(stored: &Stored) -> Vec<u32> {
     let [width, height] = stored.plan.extent;
     let mut texels = Vec::new();
     for (number, tile) in stored.tiles.iter().enumerate() {
-        let there = covered(&stored.plan, number, tile);
+        let there: Vec<[u32; 2]> = stored.plan.covered(number as u32, &tile.mask).collect();
         texels.extend(there.into_iter().map(|[x, y]| Texel { x, y, triangle: 0, barycentric: [0.0; 2] }));
     }
     let mut out = vec![NOWHERE; width as usize * height as usize];
@@ -194,15 +171,5 @@ mod tests {
         let bytes = all.halves();
         assert_eq!(bytes[3].len(), 8);
         assert_eq!(f16::from_le_bytes([bytes[3][6], bytes[3][7]]), f16::ONE);
-    }
-
-    #[test]
-    fn weights_are_those_of_the_line_between_two_times() {
-        let times: Vec<Lit> = [100.0, 200.0, 400.0].map(|seconds| Lit { seconds, sun: [0.0, 1.0, 0.0] }).into();
-        assert_eq!(weights(&times, 0.0), [(0, 1.0)]);
-        assert_eq!(weights(&times, 100.0), [(0, 1.0), (1, 0.0)]);
-        assert_eq!(weights(&times, 250.0), [(1, 0.75), (2, 0.25)]);
-        assert_eq!(weights(&times, 1000.0), [(2, 1.0)]);
-        assert!(weights(&[], 10.0).is_empty());
     }
 }

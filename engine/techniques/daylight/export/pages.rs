@@ -2,10 +2,7 @@
 
 use half::f16;
 
-use super::{
-    super::{Stored, layer::Layer, units::Tile},
-    frame::covered,
-};
+use super::super::{Stored, layer::Layer, units::Tile};
 
 /// One kind of light of all tiles.
 #[derive(Clone, Debug)]
@@ -114,7 +111,7 @@ impl Page {
         // Coefficients of this image alone give its values.
         let mut alone = vec![[0.0; 3]; layer.images() as usize];
         alone[image as usize] = if self.wide { [1.0; 3] } else { [1.0 / 127.0; 3] };
-        for (texel, [x, y]) in covered(&stored.plan, number, &stored.tiles[number]).into_iter().enumerate() {
+        for (texel, [x, y]) in stored.plan.covered(number as u32, &stored.tiles[number].mask).enumerate() {
             let [r, g, b] = layer.decode(texel, &alone);
             let at = (corner[1] + y - row) * self.extent[0] + corner[0] + x - column;
             self.values[at as usize] = [r, g, b, 1.0];

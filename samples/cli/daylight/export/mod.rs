@@ -15,6 +15,7 @@ use lucerna::{
     techniques::daylight::{
         Course, Kind, Plan, Stored, Weather,
         export::{self, Levels, Moment},
+        steps::Steps,
     },
 };
 use serde_json::json;
@@ -200,10 +201,11 @@ pub fn export(args: &DayExportArgs, console: Console) -> Result<ExitCode> {
     let sources = export::sources(&stored);
     let raw = sources.iter().flat_map(|source| source.to_le_bytes()).collect();
     folder.write("sources.ktx2".into(), &encode_ktx2(Ktx2Format::R32Uint, plan.extent, &[raw], &[])?)?;
-    let table = table::write(&mut folder, &stored, day, weather, uv_set)?;
+    let steps = Steps::new(plan, 0, day);
+    let table = table::write(&mut folder, &stored, (day, &steps), weather, uv_set)?;
     let mut listed = Vec::new();
     for (number, clock) in clocks.iter().enumerate() {
-        let moment = Moment::new(plan, day, clock.seconds, weather)?;
+        let moment = Moment::new(day, &steps, clock.seconds, weather)?;
         let light = export::irradiance(&stored, &moment);
         let exr = format!("lightmap-{}.exr", clock.name);
         let layers = pixels(plan, &export::filled(&light, &sources), clock);

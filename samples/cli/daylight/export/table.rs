@@ -5,8 +5,9 @@ use lucerna::{
     Result,
     image::{Ktx2Format, encode_ktx2},
     techniques::daylight::{
-        Course, Plan, Stored, Weather,
+        Course, Stored, Weather,
         export::{self, Moment, Page, Pages},
+        steps::Steps,
     },
 };
 use serde_json::{Value, json};
@@ -21,7 +22,13 @@ pub const UNIT: &str = "irradiance in W/m2, linear Rec. 709; reflected radiance 
 const STEP: u32 = 60;
 
 /// Writes the images and gives the document that describes them.
-pub fn write(folder: &mut Folder<'_>, stored: &Stored, day: &Course, weather: Weather, uv_set: u32) -> Result<Value> {
+pub fn write(
+    folder: &mut Folder<'_>,
+    stored: &Stored,
+    (day, steps): (&Course, &Steps),
+    weather: Weather,
+    uv_set: u32,
+) -> Result<Value> {
     let plan = &stored.plan;
     let calendar = &plan.calendar;
     let layers = export::layers(stored);
@@ -66,7 +73,8 @@ pub fn write(folder: &mut Folder<'_>, stored: &Stored, day: &Course, weather: We
             "overcast": weather.overcast(),
         },
         "times": plan.times[plan.of_day(0)].iter().map(|time| time.seconds).collect::<Vec<_>>(),
-        "moments": moments(folder, plan, day, weather)?,
+        "nights": steps.nights().collect::<Vec<_>>(),
+        "moments": moments(folder, (day, steps), weather)?,
         "tolerance": plan.settings.tolerance,
         "layers": described,
         "tiles": tiles,
@@ -101,9 +109,9 @@ fn page_bytes(page: &Page) -> Result<Vec<u8>> {
 
 /// Writes the light from outside for each minute: a row of the radiances of all patches of the sky, then the irradiance of the sun, then the
 /// direction towards it. Rows begin and end with the last minutes that have light.
-fn moments(folder: &mut Folder<'_>, plan: &Plan, day: &Course, weather: Weather) -> Result<Value> {
+fn moments(folder: &mut Folder<'_>, (day, steps): (&Course, &Steps), weather: Weather) -> Result<Value> {
     let count = (day.length() / f64::from(STEP)).ceil() as u32 + 1;
-    let rows = rows(plan, day, weather, count)?;
+    let rows = rows(day, steps, weather, count)?;
     let dark = |row: &Vec<[f32; 3]>| row[..row.len() - 1].iter().flatten().all(|value| *value == 0.0);
     let first = rows.iter().position(|row| !dark(row)).unwrap_or(0);
     let last = rows.iter().rposition(|row| !dark(row)).unwrap_or(0);
@@ -126,9 +134,9 @@ fn moments(folder: &mut Folder<'_>, plan: &Plan, day: &Course, weather: Weather)
 }
 
 /// The rows of all minutes of a day.
-fn rows(plan: &Plan, day: &Course, weather: Weather, count: u32) -> Result<Vec<Vec<[f32; 3]>>> {
+fn rows(day: &Course, steps: &Steps, weather: Weather, count: u32) -> Result<Vec<Vec<[f32; 3]>>> {
     let row = |minute: u32| {
-        let moment = Moment::new(plan, day, f64::from(minute * STEP), weather)?;
+        let moment = Moment::new(day, steps, f64::from(minute * STEP), weather)?;
         Ok([moment.patches, vec![moment.sun, moment.direction]].concat())
     };
     let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get() as u32);

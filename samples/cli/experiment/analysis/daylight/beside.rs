@@ -15,9 +15,11 @@ use crate::{
     report::{Axis, Cell, Comparison, Plot, Section, Table},
 };
 
-/// Techniques of pictures and their names in tables. The reference of `day` is named `day, truth`.
-const DAYS: [(&str, &str); 5] = [
+/// Techniques of pictures and their names in tables.
+const DAYS: [(&str, &str); 7] = [
     ("day", "the day of the experiment"),
+    ("cube", "the same day, from a cube"),
+    ("lightmap", "the same day, from a lightmap"),
     ("diffuse", "the same day, diffuse surfaces on both sides"),
     ("overcast", "the same day, overcast"),
     ("winter", "a winter day"),
@@ -42,7 +44,7 @@ fn pairs<'a>(results: &'a Results, view: (&'a str, &'a str), name: &str) -> Vec<
     let mut pairs = Vec::new();
     for run in results.at(view).filter(|run| run.method == name) {
         let Some(time) = time(run) else { continue };
-        let reference = format!("{name}, truth");
+        let reference = reference_of(name);
         let truth = results.with_role(Role::Reference).find(|other| {
             (other.scene.as_str(), other.view.as_str()) == view
                 && other.method == reference
@@ -51,6 +53,12 @@ fn pairs<'a>(results: &'a Results, view: (&'a str, &'a str), name: &str) -> Vec<
         pairs.extend(truth.map(|truth| Two { run, truth, time }));
     }
     pairs
+}
+
+/// Name of the reference of a technique.
+fn reference_of(name: &str) -> String {
+    let day = if matches!(name, "cube" | "lightmap") { "day" } else { name };
+    format!("{day}, truth")
 }
 
 /// Hours after midnight of `07:40`.

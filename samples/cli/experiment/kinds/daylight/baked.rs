@@ -17,19 +17,20 @@ use serde_json::Value;
 use super::{Job, Rendered, Warm, dark, on_device};
 use crate::{
     config,
-    daylight::{DayOptions, Planned, of_view},
+    daylight::{DayOptions, KindArg, Planned, for_view},
     experiment::place,
 };
 
 /// Bakes of a scene that stay in memory. Techniques and frames of the same day share one.
 const KEPT: usize = 2;
 
-/// A bake of the pixels of a view.
+/// A bake for a view.
 pub(super) struct Kept {
     key: Value,
     scene: Scene,
     pose: Pose,
     pub(super) plan: Plan,
+    /// The light of all tiles before compression, if they are the pixels of the view.
     lights: Vec<Light>,
     stored: Arc<Stored>,
     ready: Option<(Ready<Daylight>, Runner)>,
@@ -43,17 +44,16 @@ pub(super) struct Kept {
 pub(super) fn of<'w>(
     warm: &'w mut Warm<'_>,
     job: &Job<'_>,
-    day: &DayOptions,
-    baking: &Baking,
+    (day, kind, baking): (&DayOptions, KindArg, &Baking),
 ) -> Result<Option<&'w mut Kept>> {
-    let key = config::to_value(&(day, baking, place::view_key(job.view)?))?;
+    let key = config::to_value(&(day, kind, baking, place::view_key(job.view)?))?;
     let (gpu, scene) = (warm.gpu, warm.scene);
     let list: &mut Vec<Kept> = warm.keep("daylight bakes", |_, _, _| Ok(Vec::new()))?;
     let index = match list.iter().position(|kept| kept.key == key) {
         Some(index) => index,
         None => {
             list.truncate(KEPT - 1);
-            let Some(made) = make(gpu, scene, job, day, baking, key)? else { return Ok(None) };
+            let Some(made) = make(gpu, scene, job, (day, kind, baking), key)? else { return Ok(None) };
             list.insert(0, made);
             0
         }
@@ -65,13 +65,12 @@ fn make(
     gpu: &Gpu,
     scene: &Scene,
     job: &Job<'_>,
-    day: &DayOptions,
-    baking: &Baking,
+    (day, kind, baking): (&DayOptions, KindArg, &Baking),
     key: Value,
 ) -> Result<Option<Kept>> {
     let scene = dark(scene);
     let begun = Instant::now();
-    let Planned { plan, sources, .. } = of_view(day, baking, &scene, "view", job.view)?;
+    let Planned { plan, sources, corners, .. } = for_view(day, kind, baking, &scene, "view", job.view)?;
     plan.validate()?;
     let skies = units::skies(&plan)?;
     let mut transport = Transport::new(gpu, &scene, &plan, sources)?;
@@ -83,11 +82,13 @@ fn make(
         }
         let light = transport.tile(&plan, tile)?;
         gathered.push(units::gathered(&plan, &light, &skies)?);
-        lights.push(light);
+        if kind == KindArg::View {
+            lights.push(light);
+        }
     }
     let tiles = finish::tiles(&plan, &gathered, |_| Ok(()))?;
     let seconds = begun.elapsed().as_secs_f64();
-    let stored = Stored { plan: plan.clone(), tiles, probes: Vec::new(), corners: Vec::new() };
+    let stored = Stored { plan: plan.clone(), tiles, probes: Vec::new(), corners };
     let summary = stored.summary();
     let facts = [
         ("raw bytes", summary.raw_bytes as f64),
@@ -135,10 +136,8 @@ impl Kept {
         let times = self.plan.times.len();
         let mut out = vec![0.0; 3 * width * height * times];
         for (index, light) in self.lights.iter().enumerate() {
-            let [column, row, columns, _] = self.plan.tile(index as u32).map(|number| number as usize);
-            let there = |texel: &usize| light.mask[texel / 32] >> (texel % 32) & 1 != 0;
-            for (number, texel) in (0..32 * light.mask.len()).filter(there).enumerate() {
-                let pixel = (row + texel / columns) * width + column + texel % columns;
+            for (number, [x, y]) in self.plan.covered(index as u32, &light.mask).enumerate() {
+                let pixel = y as usize * width + x as usize;
                 for channel in 0..3 {
                     let of_texel = &of(light)[(3 * number + channel) * times..][..times];
                     for (time, value) in of_texel.iter().enumerate() {

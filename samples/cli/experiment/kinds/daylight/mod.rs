@@ -19,18 +19,35 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::{Job, MOST_SAMPLES, Rendered, Times, Warm, on_device, read};
-use crate::{config, daylight::DayOptions, experiment::file::Changes};
+use crate::{
+    config,
+    daylight::{DayOptions, KindArg},
+    experiment::file::Changes,
+};
 
 /// Columns and rows of the path tracer's sky.
 const SKY: [u32; 2] = [512, 256];
 
 /// Settings of a picture by baked daylight.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct OfPicture {
     day: DayOptions,
+    /// What the texels of the bake are.
+    kind: KindArg,
     bake: Baking,
     picture: PictureSettings,
+}
+
+impl Default for OfPicture {
+    fn default() -> Self {
+        Self {
+            day: DayOptions::default(),
+            kind: KindArg::View,
+            bake: Baking::default(),
+            picture: PictureSettings::default(),
+        }
+    }
 }
 
 /// Settings of the frames of a day.
@@ -98,9 +115,9 @@ pub(super) fn truth_settings(paper: bool, changes: &Changes) -> Result<Value> {
 
 /// A picture by baked daylight. The bake stays in memory for the other times of its day.
 pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
-    let OfPicture { day, bake, picture } = read(job.settings)?;
+    let OfPicture { day, kind, bake, picture } = read(job.settings)?;
     let gpu = warm.gpu.clone();
-    let Some(bake) = baked::of(warm, job, &day, &bake)? else { return Ok(None) };
+    let Some(bake) = baked::of(warm, job, (&day, kind, &bake))? else { return Ok(None) };
     let rendered = bake.render(&gpu, job, &picture)?;
     Ok(rendered.map(|mut rendered| {
         rendered.times.facts.extend(bake.facts.iter().cloned());
@@ -113,7 +130,7 @@ pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rende
 pub(super) fn frames(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
     let OfFrames { day, bake, filter } = read(job.settings)?;
     let gpu = warm.gpu.clone();
-    let Some(bake) = baked::of(warm, job, &day, &bake)? else { return Ok(None) };
+    let Some(bake) = baked::of(warm, job, (&day, KindArg::View, &bake))? else { return Ok(None) };
     let Some(shown) = bake.render(&gpu, job, &PictureSettings::default())? else { return Ok(None) };
     let of = |name: &str| shown.layers.layer(name).map(|layer| layer.data.as_slice()).unwrap_or_default();
     let (mut frames, mut noise) = (bake.frames(), bake.noise());
