@@ -120,6 +120,7 @@ mod tests {
             ("igi", include_str!("../igi/README.md")),
             ("fiv", include_str!("../fiv/README.md")),
             ("daylight", include_str!("../daylight/README.md")),
+            ("prt", include_str!("../prt/README.md")),
             ("tonemap", include_str!("../tonemap/README.md")),
             ("reference", include_str!("../../docs/reference.md")),
         ];

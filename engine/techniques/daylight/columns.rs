@@ -272,7 +272,8 @@ pub(super) fn level(
     let left = left_out(light, images);
     let means: Vec<f64> = left_out(light, &[]).iter().map(|channels| channels.iter().sum::<f64>() / 3.0).collect();
     let grey: Vec<f64> = left.iter().map(|channels| channels.iter().sum::<f64>() / 3.0).collect();
-    let off = |missing: f64, mean: f64| missing.abs() > 0.5 * tolerance * mean;
+    let dark = DARK * means.iter().copied().fold(0.0, f64::max);
+    let off = |missing: f64, mean: f64| mean > dark && missing.abs() > 0.5 * tolerance * mean;
     let wrong = match columns {
         Columns::Dimensions => grey.iter().zip(&means).any(|(missing, mean)| off(*missing, *mean)),
         Columns::Mixtures(mixtures) => mixtures.chunks_exact(dimensions).any(|mixture| {

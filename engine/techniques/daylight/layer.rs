@@ -108,6 +108,9 @@ impl Layer {
             images.push(image);
             state = rest.state(aim.tolerance);
         }
+        // Where noise ended the images before the tolerance was reached, the mean is known all the same.
+        keep_means(&mut images, &mut rest, light);
+        state = rest.state(aim.tolerance);
         if let Some((colour, along)) = level(light, columns, &known(&images), aim.tolerance)
             && images.len() < aim.most
         {

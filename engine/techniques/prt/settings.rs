@@ -38,7 +38,7 @@ pub struct Baking {
     #[schemars(range(min = 0, max = 256))]
     pub receivers: u32,
     /// Share of the coefficients that are kept, the largest of each cluster; the others become 0.
-    #[schemars(range(min = 0.01, max = 1), extend("x-needs" = "receivers = 0"))]
+    #[schemars(range(min = 0.01, max = 1), extend("x-needs" = {"receivers": {"const": 0}}))]
     pub keep: f64,
     /// Direct light is described around the mean of the examples, as in the paper. A room then glows with the light off. If off, around zero, by
     /// examples of equal weight, and the mean over a cluster is exact.

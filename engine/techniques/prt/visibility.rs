@@ -93,7 +93,7 @@ mod tests {
         let directions = cap.directions();
         let depth = |sample: usize, direction: usize| {
             let (a, b) = (sample as f32 * 0.1, direction as f32 * 0.07);
-            if direction % 9 == 0 { -1.0 } else { 3.0 + a.sin() * b.cos() + 0.2 * a * (0.3 * b).sin() }
+            if direction.is_multiple_of(9) { -1.0 } else { 3.0 + a.sin() * b.cos() + 0.2 * a * (0.3 * b).sin() }
         };
         let depths: Vec<f32> = (0..40 * directions).map(|at| depth(at / directions, at % directions)).collect();
         let stored = Visibility::compress(&depths, &cap, 2).unwrap();

@@ -2,7 +2,7 @@
 //!
 //! A picture is untrusted data. Its metadata are parsed into the same settings as the command line, and rendered in this process. No
 //! program is started, no file is written, and the picture cannot set command line options. The picture may name these files: the scene,
-//! further files in the scene's folder, the environment, for `daylight` the bake, and for `tonemap` its input. Each file is printed before it is read. Work that
+//! further files in the scene's folder, the environment, for `daylight` and `prt` the bake, and for `tonemap` its input. Each file is printed before it is read. Work that
 //! would take hours is refused without `--long`.
 
 pub mod bounds;
@@ -36,7 +36,7 @@ use crate::{
 /// Options of `lucerna rerun`.
 #[derive(clap::Args, Clone, Debug)]
 pub struct RerunArgs {
-    /// An image that `isr`, `igi`, `fiv` or `daylight render`, `lucerna reference` or `tonemap` wrote
+    /// An image that `isr`, `igi`, `fiv`, `daylight` or `prt render`, `lucerna reference` or `tonemap` wrote
     pub image: PathBuf,
 
     /// Largest accepted difference between two samples [default: the bits must be the same]
@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn only_whole_commands_of_the_list_are_made_again() {
-        assert_eq!(makers().len(), 6);
+        assert_eq!(makers().len(), 7);
         for (words, maker) in makers() {
             assert_eq!(Maker::of(&json!({ "command": words })).unwrap(), maker);
         }
