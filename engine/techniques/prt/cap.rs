@@ -82,7 +82,7 @@ mod tests {
         cosines.sort_by(f32::total_cmp);
         let count = cosines.len() as f32;
         for (at, cosine) in cosines.iter().enumerate() {
-            assert!((cosine - at as f32 / count).abs() < 0.03, "{at}: {cosine}");
+            assert!((cosine - at as f32 / count).abs() < 0.05, "{at}: {cosine}");
         }
     }
 

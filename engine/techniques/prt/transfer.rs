@@ -346,6 +346,6 @@ mod tests {
         let dense: Vec<f32> = (0..100).map(|i| i as f32 - 50.0).collect();
         let thin = thinned(dense, &[1.0; 10], 0.2);
         assert!((thin.kept() - 0.2).abs() < 0.02, "{}", thin.kept());
-        assert!(thin.values[0].to_f32() == -50.0 && thin.values[50] == f16::ZERO && thin.left < 0.7);
+        assert!(thin.values[0].to_f32() == -50.0 && thin.values[50] == f16::ZERO && thin.left < 0.75);
     }
 }
