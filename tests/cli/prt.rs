@@ -105,7 +105,7 @@ fn bakes_of_other_scenes_and_odd_files_are_refused() {
     render("cornell", "none.prt").expect(3, &["none.prt"]);
     assert!(!lab.at("x.png").exists());
     lab.bake("room.prt", &[]).expect(1, &["room.prt", "exists already"]);
-    lab.bake("new.prt", &["-D", "room.samples=5"]).expect(2, &["room.samples", "16 to 1000000"]);
+    lab.bake("new.prt", &["-D", "room.samples=5"]).expect(2, &["room.samples", "16 to 1e6"]);
     lab.bake("new.prt", &["--inside", "0,0"]).expect(2, &["--inside"]);
     lab.bake("new.prt", &["--inside", "500,500,500"]).expect(3, &["--inside"]);
     assert!(!lab.at("new.prt").exists());
