@@ -62,6 +62,20 @@ pub struct Part {
     pub text: String,
 }
 
+impl Part {
+    /// A part that is known by its bytes.
+    pub fn of(name: &str, bytes: &[u8], text: String) -> Self {
+        Self { name: name.to_owned(), digest: Digest::of(bytes), text }
+    }
+
+    /// Names the parts of `ours` that are others in `theirs`, or that are not there; `None`: there are none.
+    pub fn difference(ours: &[Self], theirs: &[Self]) -> Option<String> {
+        let same = |part: &Self| theirs.iter().any(|other| other.name == part.name && other.digest == part.digest);
+        let names: Vec<&str> = ours.iter().filter(|part| !same(part)).map(|part| part.name.as_str()).collect();
+        (!names.is_empty()).then(|| names.join(", "))
+    }
+}
+
 /// All that decides the bytes of a job. Two jobs with equal keys have equal bytes.
 ///
 /// ```
@@ -84,7 +98,7 @@ impl Key {
     /// Adds a part that is known by its bytes; messages show `text`.
     #[must_use]
     pub fn part(mut self, name: &str, bytes: &[u8], text: &str) -> Self {
-        self.parts.push(Part { name: name.to_owned(), digest: Digest::of(bytes), text: text.to_owned() });
+        self.parts.push(Part::of(name, bytes, text.to_owned()));
         self
     }
 
@@ -92,6 +106,24 @@ impl Key {
     #[must_use]
     pub fn text(self, name: &str, text: &str) -> Self {
         self.part(name, text.as_bytes(), text)
+    }
+
+    /// Adds the scene's parts, and each member of a plan as a part with its JSON text; members that are objects have a part for each of their own
+    /// members.
+    #[must_use]
+    pub fn plan(mut self, scene: &[Part], plan: &serde_json::Value) -> Self {
+        for part in scene {
+            self = self.text(&format!("scene.{}", part.name), &part.digest.to_string());
+        }
+        for (name, value) in plan.as_object().into_iter().flatten().filter(|(name, _)| *name != "parts") {
+            self = match value {
+                serde_json::Value::Object(members) => members
+                    .iter()
+                    .fold(self, |key, (member, value)| key.text(&format!("{name}.{member}"), &value.to_string())),
+                value => self.text(name, &value.to_string()),
+            };
+        }
+        self
     }
 
     /// In the order in which they were added.

@@ -7,15 +7,16 @@ use std::thread;
 
 use nalgebra::DMatrix;
 
-use super::{eigen::leading, pca::Keep};
+use super::{
+    eigen::leading,
+    pca::{Keep, dot},
+};
 use crate::{Error, ErrorKind, Result};
 
 /// Vectors of the iteration beyond those that are wanted.
 const MORE: usize = 12;
 /// Steps of the subspace iteration. The error of a vector falls in each by the ratio of its eigenvalue to the first one that is left out.
 const STEPS: usize = 12;
-/// Values that are summed side by side.
-const LANES: usize = 8;
 /// Values of a row that stay in the first cache while products are summed.
 const STRIP: usize = 512;
 
@@ -222,20 +223,6 @@ fn orthonormal(vectors: &mut [f64], size: usize) {
         let scale = if length > 1e-13 * first && length > 0.0 { 1.0 / length } else { 0.0 };
         vector.iter_mut().for_each(|value| *value *= scale);
     }
-}
-
-/// The sum of products, always in the same order.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut lanes = [0.0; LANES];
-    let (a, b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in a.zip(b) {
-        for lane in 0..LANES {
-            lanes[lane] += a[lane] * b[lane];
-        }
-    }
-    let [s0, s1, s2, s3, s4, s5, s6, s7] = lanes;
-    ((s0 + s4) + (s2 + s6)) + ((s1 + s5) + (s3 + s7)) + rest
 }
 
 #[cfg(test)]

@@ -27,6 +27,7 @@
 //! # Ok(())
 //! # }
 //! ```
+pub mod container;
 mod eigen;
 mod job;
 mod key;

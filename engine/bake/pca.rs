@@ -294,7 +294,7 @@ fn check(rows: &[f32], dimensions: usize, weights: &[f64]) -> Result<()> {
 }
 
 /// The sum of products, always in the same order.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut lanes = [0.0; LANES];
     let (a, b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
     let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();

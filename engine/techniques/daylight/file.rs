@@ -26,19 +26,15 @@ use super::{
     units::Tile,
 };
 use crate::{
-    Error, ErrorKind, Result,
-    bake::{Digest, Store},
+    Error, Result,
+    bake::{Digest, Store, container::Container},
     image,
 };
 
-const MAGIC: &[u8; 8] = b"lucday\r\n";
-const VERSION: u32 = 2;
-/// Bytes of the digest at the end.
-const DIGEST: usize = 32;
+const FILE: Container =
+    Container { magic: *b"lucday\r\n", version: 2, name: "a file of baked daylight", command: "daylight bake" };
 /// Largest size of a file that is read, bytes.
 const MOST_BYTES: u64 = 8 << 30;
-/// Largest header that is read, bytes.
-const MOST_HEADER: usize = 64 << 20;
 
 /// A whole bake.
 #[derive(Clone, Debug, PartialEq)]
@@ -137,19 +133,9 @@ impl Stored {
             probes: lengths(&probes),
             triangles: self.corners.len() as u64,
         };
-        let header = serde_json::to_vec(&header).map_err(|error| {
-            Error::new(ErrorKind::Runtime, "the header of the bake cannot be written").caused_by(error)
-        })?;
-        let mut out = Vec::new();
-        out.extend_from_slice(MAGIC);
-        out.extend_from_slice(&VERSION.to_le_bytes());
-        out.extend_from_slice(&(header.len() as u32).to_le_bytes());
-        out.extend_from_slice(&header);
-        tiles.iter().chain(&probes).for_each(|bytes| out.extend_from_slice(bytes));
-        self.corners.iter().flatten().for_each(|number| out.extend_from_slice(&number.to_le_bytes()));
-        let digest = Digest::of(&out);
-        out.extend_from_slice(&digest.0);
-        Ok(out)
+        let mut body: Vec<u8> = [tiles, probes].concat().concat();
+        self.corners.iter().flatten().for_each(|number| body.extend_from_slice(&number.to_le_bytes()));
+        FILE.encode(&header, &body)
     }
 
     /// Reads a file.
@@ -167,60 +153,31 @@ impl Stored {
     pub fn read_with_digest(path: &Path) -> Result<(Self, Digest)> {
         let bytes = image::read_file_checked(path, MOST_BYTES)?;
         let stored = Self::decode(&bytes).map_err(|error| error.in_file(path))?;
-        let mut digest = [0; DIGEST];
-        digest.copy_from_slice(&bytes[bytes.len() - DIGEST..]);
-        Ok((stored, Digest(digest)))
+        Ok((stored, Container::digest(&bytes)))
     }
 
     /// # Errors
     /// `Input`, saying what is wrong.
     pub fn decode(bytes: &[u8]) -> Result<Self> {
-        let damaged = |what: String| Error::input(what).help("Bake it again with `daylight bake`");
-        if !bytes.starts_with(MAGIC) {
-            return Err(Error::input("is not a file of baked daylight").help("`daylight bake` writes such files"));
-        }
-        let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-        let (Some(version), Some(length)) = (word(8), word(12)) else {
-            return Err(damaged(format!("is cut off after {} bytes", bytes.len())));
-        };
-        if version != VERSION {
-            return Err(damaged(format!("has version {version}; version {VERSION} can be read")));
-        }
-        let length = length as usize;
-        let header = bytes.get(16..16 + length.min(MOST_HEADER)).filter(|h| h.len() == length);
-        let Some(header) = header else {
-            let found = bytes.len();
-            return Err(damaged(format!("is cut off: it has {found} bytes, and its header alone has {length}")));
-        };
-        let Header { plan, tiles: lengths, probes: brick_lengths, triangles } = serde_json::from_slice(header)
-            .map_err(|error| damaged("has a header that cannot be read".into()).caused_by(error))?;
-        plan.validate().map_err(|error| damaged(format!("has an impossible plan: {error}")))?;
-        let [columns, rows] = plan.tiles().map(u64::from);
-        if lengths.len() as u64 != columns * rows {
-            let what = format!("has {} tiles; its plan has {columns}×{rows}", lengths.len());
-            return Err(damaged(what));
-        }
-        if brick_lengths.len() as u64 != u64::from(plan.brick_count()) {
-            let what = format!("has {} bricks of probes; its plan has {}", brick_lengths.len(), plan.brick_count());
-            return Err(damaged(what));
-        }
-        let body = 16 + length;
-        let sum = lengths.iter().chain(&brick_lengths).try_fold(body as u64, |sum, length| sum.checked_add(*length));
-        let of_corners = triangles.checked_mul(12);
-        let sum = sum.and_then(|sum| sum.checked_add(of_corners?));
-        let whole = sum.and_then(|sum| sum.checked_add(DIGEST as u64));
-        if whole != Some(bytes.len() as u64) {
-            let what = whole.map_or("too many bytes".into(), |whole| format!("{whole} bytes"));
-            return Err(damaged(format!(
-                "is cut off or has something after its end: {} bytes, by its header {what}",
-                bytes.len()
-            )));
-        }
-        let (covered, digest) = bytes.split_at(bytes.len() - DIGEST);
-        if Digest::of(covered).0 != digest {
-            return Err(damaged("is damaged: its digest does not fit".into()));
-        }
-        let mut rest = &covered[body..];
+        let damaged = |what: String| FILE.damaged(what);
+        let (header, mut rest) = FILE.decode(bytes, |header: &Header| {
+            let plan = &header.plan;
+            plan.validate().map_err(|error| damaged(format!("has an impossible plan: {error}")))?;
+            let [columns, rows] = plan.tiles().map(u64::from);
+            if header.tiles.len() as u64 != columns * rows {
+                let what = format!("has {} tiles; its plan has {columns}×{rows}", header.tiles.len());
+                return Err(damaged(what));
+            }
+            let bricks = plan.brick_count();
+            if header.probes.len() as u64 != u64::from(bricks) {
+                let what = format!("has {} bricks of probes; its plan has {bricks}", header.probes.len());
+                return Err(damaged(what));
+            }
+            let of_corners = header.triangles.checked_mul(12);
+            let mut lengths = header.tiles.iter().chain(&header.probes);
+            Ok(of_corners.and_then(|sum| lengths.try_fold(sum, |sum, length| sum.checked_add(*length))))
+        })?;
+        let Header { plan, tiles: lengths, probes: brick_lengths, .. } = header;
         let mut tiles = Vec::new();
         for (index, length) in lengths.iter().enumerate() {
             let (tile, after) = rest.split_at(*length as usize);

@@ -342,11 +342,7 @@ impl Plan {
 
     /// Says in which part `scene` differs from the scene of the bake; `None`: in none.
     pub fn difference(&self, scene: &Scene) -> Option<String> {
-        let theirs = parts(scene);
-        let differs =
-            |ours: &&Part| theirs.iter().find(|t| t.name == ours.name).is_none_or(|t| t.digest != ours.digest);
-        let names: Vec<&str> = self.parts.iter().filter(differs).map(|part| part.name.as_str()).collect();
-        (!names.is_empty()).then(|| names.join(", "))
+        Part::difference(&self.parts, &parts(scene))
     }
 
     /// Checks that these are the corners of the lightmap; none for other bakes.
@@ -411,8 +407,6 @@ impl Baking {
 
 /// Digests of the parts of a scene on which baked light depends. Suns and environment are none of them: the bake brings its own.
 pub fn parts(scene: &Scene) -> Vec<Part> {
-    let part =
-        |name: &str, bytes: Vec<u8>, text: String| Part { name: name.to_owned(), digest: Digest::of(&bytes), text };
     let mut geometry = Vec::new();
     for primitive in scene.meshes.iter().flat_map(|mesh| &mesh.primitives) {
         let mut floats = |values: &[f32]| geometry.extend(values.iter().flat_map(|value| value.to_le_bytes()));
@@ -428,16 +422,16 @@ pub fn parts(scene: &Scene) -> Vec<Part> {
         |node: &crate::scene::Node| format!("{:?} {:?} {:?} {:?}", node.parent, node.local, node.mesh, node.weights);
     let nodes: String = scene.nodes.iter().map(|node| placed(node) + "\n").collect();
     let lamps: Vec<_> = scene.lights.iter().filter(|l| !matches!(l.kind, LightKind::Directional)).collect();
-    let texels = scene.textures.iter().flat_map(|t| t.rgba.iter().flatten().copied()).collect();
+    let texels: Vec<u8> = scene.textures.iter().flat_map(|t| t.rgba.iter().flatten().copied()).collect();
     vec![
-        part("geometry", geometry, format!("{} meshes", scene.meshes.len())),
-        part("nodes", nodes.into_bytes(), format!("{} nodes", scene.nodes.len())),
-        part(
+        Part::of("geometry", &geometry, format!("{} meshes", scene.meshes.len())),
+        Part::of("nodes", nodes.as_bytes(), format!("{} nodes", scene.nodes.len())),
+        Part::of(
             "materials",
-            format!("{:?}", scene.materials).into_bytes(),
+            format!("{:?}", scene.materials).as_bytes(),
             format!("{} materials", scene.materials.len()),
         ),
-        part("textures", texels, format!("{} textures", scene.textures.len())),
-        part("lamps", format!("{lamps:?}").into_bytes(), format!("{} lamps", lamps.len())),
+        Part::of("textures", &texels, format!("{} textures", scene.textures.len())),
+        Part::of("lamps", format!("{lamps:?}").as_bytes(), format!("{} lamps", lamps.len())),
     ]
 }

@@ -45,18 +45,7 @@ pub struct Tile {
 pub fn job(plan: &Plan, device: &str, texels: Option<&[u64]>) -> Result<Job> {
     let text = |error| Error::new(ErrorKind::Runtime, "the plan of the bake cannot be text").caused_by(error);
     let about = serde_json::to_value(plan).map_err(text)?;
-    let mut key = Key::new(KIND, VERSION).text("device", device);
-    for part in &plan.parts {
-        key = key.text(&format!("scene.{}", part.name), &part.digest.to_string());
-    }
-    for (name, value) in about.as_object().into_iter().flatten().filter(|(name, _)| *name != "parts") {
-        key = match value {
-            serde_json::Value::Object(members) => members
-                .iter()
-                .fold(key, |key, (member, value)| key.text(&format!("{name}.{member}"), &value.to_string())),
-            value => key.text(name, &value.to_string()),
-        };
-    }
+    let key = Key::new(KIND, VERSION).text("device", device).plan(&plan.parts, &about);
     let [columns, rows] = plan.tiles();
     let cost = |tile: u32| {
         let [_, _, columns, rows] = plan.tile(tile).map(u64::from);

@@ -25,20 +25,16 @@ use super::{
     visibility::Visibility,
 };
 use crate::{
-    Error, ErrorKind, Result,
-    bake::{Digest, Store, UnitId},
+    Error, Result,
+    bake::{Digest, Store, UnitId, container::Container},
     image,
     shaders::types::PrtPoint,
 };
 
-const MAGIC: &[u8; 8] = b"lucprt\r\n";
-const VERSION: u32 = 1;
-/// Bytes of the digest at the end.
-const DIGEST: usize = 32;
+const FILE: Container =
+    Container { magic: *b"lucprt\r\n", version: 1, name: "a file of precomputed transfer", command: "prt bake" };
 /// Largest size of a file that is read, bytes.
 const MOST_BYTES: u64 = 8 << 30;
-/// Largest header that is read, bytes.
-const MOST_HEADER: usize = 64 << 20;
 
 /// A whole bake.
 #[derive(Clone, Debug, PartialEq)]
@@ -154,19 +150,8 @@ impl Stored {
             })
             .collect();
         let lengths = parts.iter().map(|parts| [0, 1, 2].map(|i| parts[i].len() as u64)).collect();
-        let header = serde_json::to_vec(&Header { plan: self.plan.clone(), parts: lengths }).map_err(|error| {
-            Error::new(ErrorKind::Runtime, "the header of the bake cannot be written").caused_by(error)
-        })?;
-        let mut out = Vec::new();
-        out.extend_from_slice(MAGIC);
-        out.extend_from_slice(&VERSION.to_le_bytes());
-        out.extend_from_slice(&(header.len() as u32).to_le_bytes());
-        out.extend_from_slice(&header);
-        out.extend_from_slice(bytemuck::cast_slice(&self.samples));
-        parts.iter().flatten().for_each(|bytes| out.extend_from_slice(bytes));
-        let digest = Digest::of(&out);
-        out.extend_from_slice(&digest.0);
-        Ok(out)
+        let body = [bytemuck::cast_slice(&self.samples), &parts.concat().concat()].concat();
+        FILE.encode(&Header { plan: self.plan.clone(), parts: lengths }, &body)
     }
 
     /// Reads a file, and gives the digest at its end.
@@ -176,54 +161,25 @@ impl Stored {
     pub fn read(path: &Path) -> Result<(Self, Digest)> {
         let bytes = image::read_file_checked(path, MOST_BYTES)?;
         let stored = Self::decode(&bytes).map_err(|error| error.in_file(path))?;
-        let mut digest = [0; DIGEST];
-        digest.copy_from_slice(&bytes[bytes.len() - DIGEST..]);
-        Ok((stored, Digest(digest)))
+        Ok((stored, Container::digest(&bytes)))
     }
 
     /// # Errors
     /// `Input`, saying what is wrong.
     pub fn decode(bytes: &[u8]) -> Result<Self> {
-        let damaged = |what: String| Error::input(what).help("Bake it again with `prt bake`");
-        if !bytes.starts_with(MAGIC) {
-            return Err(Error::input("is not a file of precomputed transfer").help("`prt bake` writes such files"));
-        }
-        let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-        let (Some(version), Some(length)) = (word(8), word(12)) else {
-            return Err(damaged(format!("is cut off after {} bytes", bytes.len())));
-        };
-        if version != VERSION {
-            return Err(damaged(format!("has version {version}; version {VERSION} can be read")));
-        }
-        let length = length as usize;
-        let header = bytes.get(16..16 + length.min(MOST_HEADER)).filter(|h| h.len() == length);
-        let Some(header) = header else {
-            let found = bytes.len();
-            return Err(damaged(format!("is cut off: it has {found} bytes, and its header alone has {length}")));
-        };
-        let Header { plan, parts } = serde_json::from_slice(header)
-            .map_err(|error| damaged("has a header that cannot be read".into()).caused_by(error))?;
-        plan.validate().map_err(|error| damaged(format!("has an impossible plan: {error}")))?;
-        if parts.len() != plan.clusters.len() {
-            let what = format!("has parts of {} clusters; its plan has {}", parts.len(), plan.clusters.len());
-            return Err(damaged(what));
-        }
-        let of_samples = (plan.count() * size_of::<PrtPoint>()) as u64;
-        let body = (16 + length) as u64;
-        let sum = parts.iter().flatten().try_fold(body + of_samples, |sum, length| sum.checked_add(*length));
-        let whole = sum.and_then(|sum| sum.checked_add(DIGEST as u64));
-        if whole != Some(bytes.len() as u64) {
-            let what = whole.map_or("too many bytes".into(), |whole| format!("{whole} bytes"));
-            return Err(damaged(format!(
-                "is cut off or has something after its end: {} bytes, by its header {what}",
-                bytes.len()
-            )));
-        }
-        let (covered, digest) = bytes.split_at(bytes.len() - DIGEST);
-        if Digest::of(covered).0 != digest {
-            return Err(damaged("is damaged: its digest does not fit".into()));
-        }
-        let (samples, mut rest) = covered[body as usize..].split_at(of_samples as usize);
+        let damaged = |what: String| FILE.damaged(what);
+        let of_samples = |plan: &Plan| (plan.count() * size_of::<PrtPoint>()) as u64;
+        let (header, body) = FILE.decode(bytes, |Header { plan, parts }: &Header| {
+            plan.validate().map_err(|error| damaged(format!("has an impossible plan: {error}")))?;
+            if parts.len() != plan.clusters.len() {
+                let what = format!("has parts of {} clusters; its plan has {}", parts.len(), plan.clusters.len());
+                return Err(damaged(what));
+            }
+            let mut lengths = parts.iter().flatten();
+            Ok(lengths.try_fold(of_samples(plan), |sum, length| sum.checked_add(*length)))
+        })?;
+        let Header { plan, parts } = header;
+        let (samples, mut rest) = body.split_at(of_samples(&plan) as usize);
         let samples: Vec<PrtPoint> = bytemuck::pod_collect_to_vec(samples);
         check(&plan, &samples).map_err(|error| damaged(error.to_string()))?;
         let mut out = Self { plan, samples, visibility: Vec::new(), bases: Vec::new(), transfers: Vec::new() };

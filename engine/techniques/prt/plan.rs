@@ -99,11 +99,7 @@ impl Plan {
 
     /// Says in which part `scene` differs from the scene of the bake; `None`: in none.
     pub fn difference(&self, scene: &Scene) -> Option<String> {
-        let theirs = parts(scene);
-        let differs =
-            |ours: &&Part| theirs.iter().find(|t| t.name == ours.name).is_none_or(|t| t.digest != ours.digest);
-        let names: Vec<&str> = self.parts.iter().filter(differs).map(|part| part.name.as_str()).collect();
-        (!names.is_empty()).then(|| names.join(", "))
+        Part::difference(&self.parts, &parts(scene))
     }
 }
 
@@ -133,12 +129,10 @@ pub fn parts(scene: &Scene) -> Vec<Part> {
         }
         coverage.push('\n');
     }
-    let part =
-        |name: &str, bytes: Vec<u8>, text: String| Part { name: name.to_owned(), digest: Digest::of(&bytes), text };
     vec![
-        part("geometry", geometry, format!("{} meshes", scene.meshes.len())),
-        part("nodes", placed.collect::<String>().into_bytes(), format!("{} nodes", scene.nodes.len())),
-        part("coverage", [coverage.into_bytes(), texels].concat(), format!("{} materials", scene.materials.len())),
+        Part::of("geometry", &geometry, format!("{} meshes", scene.meshes.len())),
+        Part::of("nodes", placed.collect::<String>().as_bytes(), format!("{} nodes", scene.nodes.len())),
+        Part::of("coverage", &[coverage.into_bytes(), texels].concat(), format!("{} materials", scene.materials.len())),
     ]
 }
 
