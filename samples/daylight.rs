@@ -20,7 +20,7 @@ struct Arguments {
 #[derive(Subcommand, Debug)]
 enum Command {
     /// Compute the light of a scene for all times of a day and write it to a file
-    #[command(args_override_self = true, mut_arg("default_light", never))]
+    #[command(args_override_self = true, mut_arg("default_light", never), mut_arg("output", |arg| arg.value_name("FILE.day")))]
     Bake(Box<DayBakeArgs>),
     /// Print the contents, the size and the errors of a bake
     Info(DayInfoArgs),
@@ -44,7 +44,7 @@ fn never(argument: clap::Arg) -> clap::Arg {
 fn main() -> ExitCode {
     match Arguments::parse().command {
         Command::Bake(args) => {
-            let console = args.talk.console();
+            let console = args.run.talk.console();
             program::run(console, || daylight::bake(&args, console))
         }
         Command::Info(args) => {

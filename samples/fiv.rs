@@ -20,7 +20,7 @@ struct Arguments {
 #[derive(Subcommand, Debug)]
 enum Command {
     /// Compute the vectors of occluders under an environment and write them to a file
-    #[command(args_override_self = true)]
+    #[command(args_override_self = true, mut_arg("output", |arg| arg.value_name("FILE.fiv")))]
     Precompute(Box<PrecomputeArgs>),
     /// Join the parts of a file (as `lucerna merge`)
     Merge(JoinArgs),
@@ -38,7 +38,7 @@ enum Command {
 fn main() -> ExitCode {
     match Arguments::parse().command {
         Command::Precompute(args) => {
-            let console = args.talk.console();
+            let console = args.run.talk.console();
             program::run(console, || fiv::precompute(&args, console))
         }
         Command::Merge(args) => {

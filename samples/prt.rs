@@ -20,7 +20,7 @@ struct Arguments {
 #[derive(Subcommand, Debug)]
 enum Command {
     /// Compute how light spreads in a room and write it to a file
-    #[command(args_override_self = true)]
+    #[command(args_override_self = true, mut_arg("output", |arg| arg.value_name("FILE.prt")))]
     Bake(Box<PrtBakeArgs>),
     /// Print the contents, the size and the errors of a bake
     Info(PrtInfoArgs),
@@ -34,7 +34,7 @@ enum Command {
 fn main() -> ExitCode {
     match Arguments::parse().command {
         Command::Bake(args) => {
-            let console = args.talk.console();
+            let console = args.run.talk.console();
             program::run(console, || prt::bake(&args, console))
         }
         Command::Info(args) => {

@@ -1,5 +1,6 @@
 //! Command line of [`lucerna::bake`]: the options and the progress of commands that compute units, `lucerna bake` and `lucerna merge`.
 
+mod args;
 mod compute;
 mod join;
 mod plan;
@@ -19,6 +20,7 @@ use lucerna::{
     bake::{self, Job, Options, Shard, Store},
 };
 
+pub use args::BakeArgs;
 pub use compute::{Ended, Work};
 pub use join::{JoinArgs, join, joined};
 pub use plan::PlanArgs;

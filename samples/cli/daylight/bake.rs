@@ -1,6 +1,6 @@
 //! `daylight bake`: computes the light of a scene for all times of a day and writes it to a file.
 
-use std::{path::PathBuf, process::ExitCode, time::Instant};
+use std::{process::ExitCode, time::Instant};
 
 use lucerna::{
     Result,
@@ -16,13 +16,10 @@ use super::{
     plan::{DayOptions, KindArg, Planned, plan, thin_out},
 };
 use crate::{
-    args::{DeviceArgs, TalkArgs},
-    bake::{self as units_of, Ended, Rate, UnitsArgs, Work},
-    config::{self, SettingsArgs},
+    bake::{self as units_of, BakeArgs, Ended, Rate, Work},
+    config,
     console::{self, Console},
     program,
-    progress::ProgressMode,
-    settings_list,
     signals::Interrupt,
     stage::{Stage, StageArgs},
 };
@@ -40,37 +37,12 @@ pub struct DayBakeArgs {
     #[arg(long, value_enum, default_value = "lightmap", value_name = "KIND", help_heading = "Bake")]
     pub kind: KindArg,
 
-    /// File to write
-    #[arg(short, long, value_name = "FILE.day", help_heading = "Output")]
-    pub output: PathBuf,
-
-    /// Replace the file if it exists
-    #[arg(long, help_heading = "Output")]
-    pub overwrite: bool,
-
-    /// Print one JSON document about the run on stdout
-    #[arg(long, help_heading = "Output")]
-    pub json: bool,
-
-    #[command(flatten)]
-    pub units: UnitsArgs,
-
-    #[command(flatten)]
-    pub settings: SettingsArgs,
-
     /// Start from the paper's settings: a sun without a size, 20 images for the whole picture
     #[arg(long, help_heading = "Settings")]
     pub paper: bool,
 
     #[command(flatten)]
-    pub device: DeviceArgs,
-
-    #[command(flatten)]
-    pub talk: TalkArgs,
-
-    /// How progress is shown on stderr
-    #[arg(long, value_enum, default_value_t, value_name = "HOW", help_heading = "Messages")]
-    pub progress: ProgressMode,
+    pub run: BakeArgs,
 }
 
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -86,20 +58,17 @@ struct Keys {
 pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
     let begun = Instant::now();
     let base = Keys { bake: if args.paper { Baking::paper() } else { Baking::default() } };
-    let keys = args.settings.effective(&base)?;
-    args.settings.blamed(keys.bake.validate(), || args.settings.file_alone().effective(&base)?.bake.validate())?;
-    if args.settings.print_config {
-        console::print(settings_list::with_docs(&config::to_toml(&keys)?).trim_end())?;
+    let Some(keys) = args.run.keys(&base, |keys: &Keys| keys.bake.validate())? else {
         return Ok(ExitCode::SUCCESS);
-    }
-    image::probe_output(&args.output, args.overwrite)?;
+    };
+    image::probe_output(&args.run.output, args.run.overwrite)?;
     let interrupt = Interrupt::install();
     let stage = Stage::open(&args.stage)?;
     stage.notes().iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
     let Planned { mut plan, sources, corners, notes } = plan(&args.day, args.kind, &keys.bake, &stage, &args.stage)?;
     notes.iter().for_each(|note| console.info(&format!("note: {note}")));
     plan.validate()?;
-    let gpu = Gpu::new(args.device.options()?)?;
+    let gpu = Gpu::new(args.run.device.options()?)?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
     let texels = match &plan.receivers {
         Kind::View { .. } | Kind::Cube { .. } => u64::from(plan.extent[0]) * u64::from(plan.extent[1]),
@@ -135,7 +104,7 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
     console.info(&format!("all frames as 16-bit floats would have {raw} bytes"));
     let about = gpu.describe();
     let device = format!("{}, {} {}", about.device, about.driver, about.driver_info);
-    let folder = units_of::parts(&args.output)?;
+    let folder = units_of::parts(&args.run.output)?;
     let of_tiles: Option<Vec<u64>> = match &sources {
         Sources::View(_) | Sources::Cube(_) => None,
         Sources::Lightmap(tiles) => Some(tiles.iter().map(|tile| tile.len() as u64).collect()),
@@ -143,27 +112,34 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
     let mut transport = Transport::new(&gpu, &stage.scene, &plan, sources)?;
     let adaptive = thin_out(&mut plan, &mut transport)?;
     adaptive.iter().for_each(|(said, _)| console.info(said));
-    let store = args.units.store(&folder, units::job(&plan, &device, of_tiles.as_deref())?, console)?;
+    let store = args.run.units.store(&folder, units::job(&plan, &device, of_tiles.as_deref())?, console)?;
     let skies = units::skies(&plan)?;
     let unit = |unit: lucerna::bake::UnitId, _: lucerna::bake::Needed<'_>| {
         units::unit(&plan, &mut transport, unit.index, &skies)
     };
-    let (units_args, what) = (&args.units, "paths");
-    let work =
-        Work { store: &store, args: units_args, begun, progress: args.progress, what, console, interrupt: &interrupt };
+    let (units_args, what) = (&args.run.units, "paths");
+    let work = Work {
+        store: &store,
+        args: units_args,
+        begun,
+        progress: args.run.progress,
+        what,
+        console,
+        interrupt: &interrupt,
+    };
     let (progress, missing, summary) = match work.compute(unit)? {
         Ended::Early(_, code) => return Ok(code),
         Ended::Shard(progress, missing) => (progress, missing, None),
         Ended::Whole(progress) => {
             let total = u64::from(plan.tiles()[0]) * u64::from(plan.tiles()[1]);
-            let mut meter = Rate::new(args.progress, console.is_quiet(), "tiles", 0, total);
+            let mut meter = Rate::new(args.run.progress, console.is_quiet(), "tiles", 0, total);
             let stored = Stored::join(&store, corners, |done| {
                 meter.show(done as u64, 0);
                 Interrupt::stop().check()
             })?;
             let saving = interrupt.saving();
             let bytes = stored.encode()?;
-            image::write_atomic(&args.output, &bytes, args.overwrite)?;
+            image::write_atomic(&args.run.output, &bytes, args.run.overwrite)?;
             drop(saving);
             units_of::remove(store, console)?;
             let summary = stored.summary();
@@ -182,13 +158,13 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
             if summary.hidden > 0.25 {
                 console.info("note: the noise hides errors as large as the tolerance; more bake.samples show them");
             }
-            console.info(&format!("wrote {}: {} bytes", args.output.display(), bytes.len()));
+            console.info(&format!("wrote {}: {} bytes", args.run.output.display(), bytes.len()));
             (progress, 0, Some((bytes.len(), summary)))
         }
     };
-    if args.json {
+    if args.run.json {
         console::print_json(&json!({
-            "file": summary.as_ref().map(|_| &args.output),
+            "file": summary.as_ref().map(|_| &args.run.output),
             "bytes": summary.as_ref().map(|(bytes, _)| bytes),
             "summary": summary.as_ref().map(|(_, summary)| console::to_json(summary)).transpose()?,
             "units": progress.units[1],

@@ -19,14 +19,12 @@ use serde_json::json;
 
 use super::{partial, vector_settings};
 use crate::{
-    args::{DeviceArgs, TalkArgs, positive},
-    bake::{self, Ended, UnitsArgs, Work},
-    config::{self, SettingsArgs},
+    args::positive,
+    bake::{self, BakeArgs, Ended, Work},
+    config,
     console::{self, Console},
     ground::GroundArgs,
     program,
-    progress::ProgressMode,
-    settings_list,
     signals::Interrupt,
     source,
 };
@@ -54,33 +52,8 @@ pub struct PrecomputeArgs {
     #[arg(long, alias = "env", value_name = "FILE")]
     pub environment: Option<PathBuf>,
 
-    /// File to write
-    #[arg(short, long, value_name = "FILE.fiv", help_heading = "Output")]
-    pub output: PathBuf,
-
-    /// Replace the file if it exists
-    #[arg(long, help_heading = "Output")]
-    pub overwrite: bool,
-
-    /// Print one JSON document about the run on stdout
-    #[arg(long, help_heading = "Output")]
-    pub json: bool,
-
     #[command(flatten)]
-    pub units: UnitsArgs,
-
-    #[command(flatten)]
-    pub settings: SettingsArgs,
-
-    #[command(flatten)]
-    pub device: DeviceArgs,
-
-    #[command(flatten)]
-    pub talk: TalkArgs,
-
-    /// How progress is shown on stderr
-    #[arg(long, value_enum, default_value_t, value_name = "HOW", help_heading = "Messages")]
-    pub progress: ProgressMode,
+    pub run: BakeArgs,
 }
 
 /// The settings, with the same keys as `fiv render`.
@@ -96,20 +69,15 @@ struct Keys {
 /// Whatever fails, with the kind that decides the exit code.
 pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
     let begun = Instant::now();
-    let mut keys = args.settings.effective(&Keys::default())?;
     let checked = |keys: &Keys| vector_settings::of_vectors(&keys.fiv).validate().map_err(|error| error.at("fiv"));
-    args.settings.blamed(checked(&keys), || checked(&args.settings.file_alone().effective(&Keys::default())?))?;
-    if args.settings.print_config {
-        console::print(settings_list::with_docs(&config::to_toml(&keys)?).trim_end())?;
-        return Ok(ExitCode::SUCCESS);
-    }
+    let Some(mut keys) = args.run.keys(&Keys::default(), checked)? else { return Ok(ExitCode::SUCCESS) };
     let idle = vector_settings::idle(&keys.fiv)?;
     if !idle.is_empty() {
         console.info(&format!("note: vectors do not depend on {}", idle.join(", ")));
     }
     // Texels are separated only for this method.
     keys.fiv.method = Method::Vectors;
-    image::probe_output(&args.output, args.overwrite)?;
+    image::probe_output(&args.run.output, args.run.overwrite)?;
     // From here on the program ends by itself when it is asked to.
     let _ = Interrupt::install();
     let (occluders, environment) = load(args, &keys.fiv, console)?;
@@ -118,7 +86,7 @@ pub fn precompute(args: &PrecomputeArgs, console: Console) -> Result<ExitCode> {
         console.info(&format!("note: {} pixels of the environment are not valid radiance", sky.repaired));
     }
     let mut plan = Plan::new(&environment.name, sky.hash(), &occluders, &keys.fiv);
-    let gpu = Gpu::new(args.device.options()?)?;
+    let gpu = Gpu::new(args.run.device.options()?)?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
     let names: Vec<&str> = plan.occluders.iter().map(|o| o.name.as_str()).collect();
     console.info(&format!("{} samples of {} occluders: {}", plan.grid, names.len(), names.join(", ")));
@@ -142,10 +110,10 @@ fn compute(
     let interrupt = Interrupt::install();
     let about = gpu.describe();
     let device = format!("{}, {} {}", about.device, about.driver, about.driver_info);
-    let folder = bake::parts(&args.output)?;
-    let store = args.units.store(&folder, units::job(plan, &device)?, console)?;
-    let part = partial(&args.output)?;
-    take(&part, &store, plan, args.units.restart, console)?;
+    let folder = bake::parts(&args.run.output)?;
+    let store = args.run.units.store(&folder, units::job(plan, &device)?, console)?;
+    let part = partial(&args.run.output)?;
+    take(&part, &store, plan, args.run.units.restart, console)?;
     let mut on_device = OnDevice::new(gpu);
     let unit = |unit, _: Needed<'_>| {
         let range = units::range(store.job(), unit);
@@ -161,26 +129,26 @@ fn compute(
             false => Err(Error::new(ErrorKind::Interrupted, "stopped on request")),
         }
     };
-    let (units, what) = (&args.units, "samples");
+    let (units, what) = (&args.run.units, "samples");
     let work =
-        Work { store: &store, args: units, begun, progress: args.progress, what, console, interrupt: &interrupt };
+        Work { store: &store, args: units, begun, progress: args.run.progress, what, console, interrupt: &interrupt };
     let (progress, missing, bytes) = match work.compute(unit)? {
         Ended::Early(_, code) => return Ok(code),
         Ended::Shard(progress, missing) => (progress, missing, None),
         Ended::Whole(progress) => {
             let saving = interrupt.saving();
-            let bytes = bake::joined(&store, &args.output, args.overwrite)?;
+            let bytes = bake::joined(&store, &args.run.output, args.run.overwrite)?;
             drop(saving);
             bake::remove(store, console)?;
             let _ = std::fs::remove_file(&part);
-            console.info(&format!("wrote {}: {bytes} bytes", args.output.display()));
+            console.info(&format!("wrote {}: {bytes} bytes", args.run.output.display()));
             (progress, 0, Some(bytes))
         }
     };
-    let (shard, total) = (args.units.shard, progress.cost[1]);
-    if args.json {
+    let (shard, total) = (args.run.units.shard, progress.cost[1]);
+    if args.run.json {
         console::print_json(&json!({
-            "file": bytes.map(|_| &args.output),
+            "file": bytes.map(|_| &args.run.output),
             "bytes": bytes,
             "folder": shard.map(|_| &folder),
             "shard": shard.map(|shard| shard.to_string()),

@@ -1,26 +1,23 @@
 //! `prt bake`: computes how light spreads in a room and writes it to a file.
 
-use std::{path::PathBuf, process::ExitCode, str::FromStr, time::Instant};
+use std::{process::ExitCode, str::FromStr, time::Instant};
 
 use glam::Vec3;
 use lucerna::{
     Error, Result,
     gpu::Gpu,
     image,
-    techniques::prt::{Bakery, Baking, MOST_SAMPLES, Stored, starts, units},
+    techniques::prt::{Bakery, Baking, Stored, starts, units},
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::info;
 use crate::{
-    args::{DeviceArgs, TalkArgs},
-    bake::{self as units_of, Ended, UnitsArgs, Work},
-    config::{self, SettingsArgs},
+    bake::{self as units_of, BakeArgs, Ended, Work},
+    config,
     console::{self, Console},
     program,
-    progress::ProgressMode,
-    settings_list,
     signals::Interrupt,
     stage::{Stage, StageArgs},
 };
@@ -53,37 +50,12 @@ pub struct PrtBakeArgs {
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "Bake")]
     pub inside: Vec<Inside>,
 
-    /// File to write
-    #[arg(short, long, value_name = "FILE.prt", help_heading = "Output")]
-    pub output: PathBuf,
-
-    /// Replace the file if it exists
-    #[arg(long, help_heading = "Output")]
-    pub overwrite: bool,
-
-    /// Print one JSON document about the run on stdout
-    #[arg(long, help_heading = "Output")]
-    pub json: bool,
-
-    #[command(flatten)]
-    pub units: UnitsArgs,
-
-    #[command(flatten)]
-    pub settings: SettingsArgs,
-
     /// Start from the paper's settings: vectors of light around their mean, and a fifth of all coefficients
     #[arg(long, help_heading = "Settings")]
     pub paper: bool,
 
     #[command(flatten)]
-    pub device: DeviceArgs,
-
-    #[command(flatten)]
-    pub talk: TalkArgs,
-
-    /// How progress is shown on stderr
-    #[arg(long, value_enum, default_value_t, value_name = "HOW", help_heading = "Messages")]
-    pub progress: ProgressMode,
+    pub run: BakeArgs,
 }
 
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -99,17 +71,14 @@ struct Keys {
 pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
     let begun = Instant::now();
     let base = Keys { room: if args.paper { Baking::paper() } else { Baking::default() } };
-    let keys = args.settings.effective(&base)?;
-    args.settings.blamed(keys.room.validate(), || args.settings.file_alone().effective(&base)?.room.validate())?;
-    if args.settings.print_config {
-        console::print(settings_list::with_docs(&config::to_toml(&keys)?).trim_end())?;
+    let Some(keys) = args.run.keys(&base, |keys: &Keys| keys.room.validate())? else {
         return Ok(ExitCode::SUCCESS);
-    }
-    image::probe_output(&args.output, args.overwrite)?;
+    };
+    image::probe_output(&args.run.output, args.run.overwrite)?;
     let interrupt = Interrupt::install();
     let stage = Stage::open(&args.stage)?;
     stage.notes().iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
-    let gpu = Gpu::new(args.device.options()?)?;
+    let gpu = Gpu::new(args.run.device.options()?)?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
     let need = memory(&keys.room);
     console.info(&format!("about {:.1} GB of memory for {} samples", need as f64 / 1e9, keys.room.samples));
@@ -142,8 +111,8 @@ pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
     }
     let about = gpu.describe();
     let device = format!("{}, {} {}", about.device, about.driver, about.driver_info);
-    let folder = units_of::parts(&args.output)?;
-    let store = args.units.store(&folder, units::job(&plan, &samples, &device)?, console)?;
+    let folder = units_of::parts(&args.run.output)?;
+    let store = args.run.units.store(&folder, units::job(&plan, &samples, &device)?, console)?;
     let mut work = units::Work::new(bakery, sampled)?;
     let mut times = Vec::new();
     let unit = |unit: lucerna::bake::UnitId, needed: lucerna::bake::Needed<'_>| {
@@ -153,9 +122,16 @@ pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
         times[unit.stage as usize] += begun.elapsed().as_secs_f64();
         bytes
     };
-    let (units_args, what) = (&args.units, "rays");
-    let of_units =
-        Work { store: &store, args: units_args, begun, progress: args.progress, what, console, interrupt: &interrupt };
+    let (units_args, what) = (&args.run.units, "rays");
+    let of_units = Work {
+        store: &store,
+        args: units_args,
+        begun,
+        progress: args.run.progress,
+        what,
+        console,
+        interrupt: &interrupt,
+    };
     let (progress, missing, summary) = match of_units.compute(unit)? {
         Ended::Early(_, code) => return Ok(code),
         Ended::Shard(progress, missing) => (progress, missing, None),
@@ -163,21 +139,21 @@ pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
             let stored = Stored::join(&store, samples)?;
             let saving = interrupt.saving();
             let bytes = stored.encode()?;
-            image::write_atomic(&args.output, &bytes, args.overwrite)?;
+            image::write_atomic(&args.run.output, &bytes, args.run.overwrite)?;
             drop(saving);
             units_of::remove(store, console)?;
             let summary = stored.summary();
             info::lines(&summary).iter().for_each(|line| console.info(line));
-            console.info(&format!("wrote {}: {} bytes", args.output.display(), bytes.len()));
+            console.info(&format!("wrote {}: {} bytes", args.run.output.display(), bytes.len()));
             (progress, 0, Some((bytes.len(), summary)))
         }
     };
     let names = ["visibility", "gather", "direct", "basis", "transfer"];
     let stages: Vec<String> = names.iter().zip(&times).map(|(name, time)| format!("{name} {time:.1} s")).collect();
     console.info(&format!("samples {of_samples:.1} s, {}", stages.join(", ")));
-    if args.json {
+    if args.run.json {
         console::print_json(&json!({
-            "file": summary.as_ref().map(|_| &args.output),
+            "file": summary.as_ref().map(|_| &args.run.output),
             "bytes": summary.as_ref().map(|(bytes, _)| bytes),
             "summary": summary.as_ref().map(|(_, summary)| console::to_json(summary)).transpose()?,
             "units": progress.units[1],
@@ -204,7 +180,7 @@ fn memory(room: &Baking) -> u64 {
     let transfer = samples * if room.receivers > 0 { 2 * u64::from(room.receivers) } else { 4 * vectors };
     // All scatterings are solved between all vectors.
     let solved = 32 * vectors * vectors;
-    (100 << 20) + solved + 2 * of_cluster + 2 * stored + 2 * transfer + (MOST_SAMPLES as u64).min(samples) * 64
+    (100 << 20) + solved + 2 * of_cluster + 2 * stored + 2 * transfer
 }
 
 /// Free memory of the machine, bytes; `None`: unknown.
