@@ -25,6 +25,7 @@ layout(push_constant, scalar) uniform Push {
     float bias;           // share of the distance
     float bias_distance;  // metres
     float strength;
+    float far_of_room;    // unit of the stored distances, metres
 };
 
 float row_product(uint a, uint b, uint words) {
@@ -48,7 +49,7 @@ float seen_share(PrtPoint s, PrtCap cap, uint row, vec3 direction, float far) {
         vec3 middle = cap_direction(cap, (cell + 0.5) / float(cap.side));
         if (weight <= 0.0 || dot(middle, s.side) <= 0.0) continue;
         uint at = cap.first_row + (uint(cell.y) * cap.side + uint(cell.x)) * cap.words;
-        float nearest = row_product(at, row, cap.words);
+        float nearest = far_of_room * row_product(at, row, cap.words);
         // The comparison is soft over the width of the bias, so that shadows do not jump from frame to frame.
         float margin = bias * nearest + bias_distance;
         sum += weight * clamp((nearest + margin - far) / max(margin, 1e-6) + 0.5, 0.0, 1.0);

@@ -196,6 +196,7 @@ impl OnDevice {
                 bias: settings.bias,
                 bias_distance: settings.bias_distance * stored.plan.radius,
                 strength: settings.strength,
+                far_of_room: stored.plan.far,
             },
         };
         graph.compute(args, count).rays(u64::from(count) * offsets.len() as u64 * u64::from(light_count));

@@ -57,10 +57,10 @@ impl Default for Baking {
             cluster: 1000,
             directions: 2016,
             visibility: 50,
-            light: 10,
+            light: 24,
             examples: 1000,
             rays: 1024,
-            receivers: 24,
+            receivers: 48,
             keep: 1.0,
             centred: false,
             seed: 0,
@@ -69,9 +69,9 @@ impl Default for Baking {
 }
 
 impl Baking {
-    /// The paper's choices: a basis around the mean of the examples, and a fifth of all coefficients between clusters and samples.
+    /// The paper's choices: ten vectors of light around the mean of the examples, and a fifth of all coefficients between clusters and samples.
     pub fn paper() -> Self {
-        Self { receivers: 0, keep: 0.2, centred: true, ..Self::default() }
+        Self { light: 10, receivers: 0, keep: 0.2, centred: true, ..Self::default() }
     }
 
     /// # Errors

@@ -35,18 +35,7 @@ pub const TRANSFER: u32 = 4;
 pub fn job(plan: &Plan, samples: &[crate::shaders::types::PrtPoint], device: &str) -> Result<Job> {
     let text = |error| Error::new(ErrorKind::Runtime, "the plan of the bake cannot be text").caused_by(error);
     let about = serde_json::to_value(plan).map_err(text)?;
-    let mut key = Key::new(KIND, VERSION).text("device", device);
-    for part in &plan.parts {
-        key = key.text(&format!("scene.{}", part.name), &part.digest.to_string());
-    }
-    for (name, value) in about.as_object().into_iter().flatten().filter(|(name, _)| *name != "parts") {
-        key = match value {
-            serde_json::Value::Object(members) => members
-                .iter()
-                .fold(key, |key, (member, value)| key.text(&format!("{name}.{member}"), &value.to_string())),
-            value => key.text(name, &value.to_string()),
-        };
-    }
+    let key = Key::new(KIND, VERSION).text("device", device).plan(&plan.parts, &about);
     let settings = &plan.settings;
     let costs = |each: &dyn Fn(usize) -> u64| -> Vec<u64> {
         (0..plan.clusters.len()).map(|c| (u64::from(plan.clusters[c]) * each(c)).max(1)).collect()
@@ -101,14 +90,17 @@ impl Work {
                 let cap = plan.cap(samples, cluster);
                 let depths = self.bakery.depths(plan, cluster, &cap)?;
                 let mut out = Writer::default();
-                Visibility::compress(&depths, &cap, plan.settings.visibility)?.write(&mut out);
+                Visibility::compress(&depths, &cap, plan.settings.visibility, plan.far)?.write(&mut out);
                 Ok(out.0)
             }
             GATHER => Ok(bytemuck::cast_slice(&self.bakery.gather(plan, cluster)?).to_vec()),
             DIRECT => {
                 let lit = self.bakery.lit(plan, cluster, &self.sampled.examples)?;
-                // The bits of f32 would need twice the space; examples need no more than 11 bits.
-                let lit: Vec<f16> = lit.into_iter().map(f16::from_f32).collect();
+                // The bits of f32 would need twice the space; examples need no more than 11 bits. In units in which a light at the other end of the
+                // room gives 1, so that rooms of all sizes have numbers that 16 bits hold.
+                let scale = scale(&self.sampled.plan);
+                let lit: Vec<f16> =
+                    lit.into_iter().map(|e| f16::from_f32((e * scale).min(f16::MAX.to_f32()))).collect();
                 Ok(lit.iter().flat_map(|value| value.to_le_bytes()).collect())
             }
             BASIS => {
@@ -122,7 +114,8 @@ impl Work {
                 let direct = halves(&needed.open(UnitId { stage: DIRECT, index: unit.index })?.bytes()?);
                 let areas = areas(plan, &self.sampled.samples, cluster);
                 let vectors = plan.vectors(cluster) - usize::from(plan.settings.centred);
-                let basis = Basis::new(&areas, &direct, &indirect, vectors, plan.settings.centred)?;
+                let light = (direct.as_slice(), indirect.as_slice(), scale(plan));
+                let basis = Basis::new(&areas, light, vectors, plan.settings.centred)?;
                 let mut out = Writer::default();
                 basis.write(&mut out);
                 Ok(out.0)
@@ -174,6 +167,11 @@ impl Work {
     pub fn sampled(&self) -> &Sampled {
         &self.sampled
     }
+}
+
+/// Factor on the light of examples.
+fn scale(plan: &Plan) -> f32 {
+    plan.far * plan.far
 }
 
 fn words(bytes: &[u8]) -> Vec<u32> {

@@ -10,7 +10,7 @@ use crate::{Result, bake::lowrank::low_rank};
 pub struct Visibility {
     /// Number of vectors, d₁ of the paper.
     pub vectors: u32,
-    /// Mean distance of each direction, metres.
+    /// Mean distance of each direction. Distances are relative to that in which nothing is, so that 16 bits hold those of all rooms.
     pub mean: Vec<f16>,
     /// All vectors of a direction, direction after direction.
     pub basis: Vec<f16>,
@@ -21,12 +21,14 @@ pub struct Visibility {
 }
 
 impl Visibility {
-    /// `depths`: a row of the cap's directions for each sample, metres; negative values are below the horizon and unknown.
+    /// `depths`: a row of the cap's directions for each sample, metres; negative values are below the horizon and unknown. `far`: the distance in
+    /// which nothing is, metres.
     ///
     /// # Errors
     /// `Runtime` if a distance is not finite.
-    pub fn compress(depths: &[f32], cap: &Cap, vectors: u32) -> Result<Self> {
+    pub fn compress(depths: &[f32], cap: &Cap, vectors: u32, far: f32) -> Result<Self> {
         let directions = cap.directions();
+        let depths: Vec<f32> = depths.iter().map(|depth| depth / far).collect();
         let (mut sums, mut counts) = (vec![0.0f64; directions], vec![0u32; directions]);
         for row in depths.chunks_exact(directions) {
             for ((sum, count), depth) in sums.iter_mut().zip(&mut counts).zip(row).filter(|(_, depth)| **depth >= 0.0) {
@@ -53,11 +55,11 @@ impl Visibility {
             coefficients.extend(found.project(row).into_iter().map(f16::from_f64));
         }
         let mut out = Self { vectors: count as u32, mean, basis, coefficients, error: 0.0 };
-        out.error = out.error_of(depths);
+        out.error = far * out.error_of(&depths);
         Ok(out)
     }
 
-    /// The distance of a sample in a direction, metres (equation 9).
+    /// The distance of a sample in a direction, relative to that in which nothing is (equation 9).
     pub fn distance(&self, sample: usize, direction: usize) -> f32 {
         let count = self.vectors as usize;
         let products =
@@ -96,14 +98,14 @@ mod tests {
             if direction.is_multiple_of(9) { -1.0 } else { 3.0 + a.sin() * b.cos() + 0.2 * a * (0.3 * b).sin() }
         };
         let depths: Vec<f32> = (0..40 * directions).map(|at| depth(at / directions, at % directions)).collect();
-        let stored = Visibility::compress(&depths, &cap, 2).unwrap();
+        let stored = Visibility::compress(&depths, &cap, 2, 5.0).unwrap();
         assert_eq!(stored.vectors, 2);
         assert!(stored.error < 0.004, "{}", stored.error);
         for (at, depth) in depths.iter().enumerate().filter(|(_, depth)| **depth >= 0.0) {
-            let found = stored.distance(at / directions, at % directions);
+            let found = 5.0 * stored.distance(at / directions, at % directions);
             assert!((found - depth).abs() < 0.02, "{found} {depth}");
         }
-        let one = Visibility::compress(&depths, &cap, 1).unwrap();
+        let one = Visibility::compress(&depths, &cap, 1, 5.0).unwrap();
         assert!(one.error > 10.0 * stored.error);
     }
 }
