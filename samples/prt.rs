@@ -19,7 +19,7 @@ struct Arguments {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Compute how light spreads in a room and write it to a file
+    /// Compute the transport of light in a room and write a file
     #[command(args_override_self = true, mut_arg("output", |arg| arg.value_name("FILE.prt")))]
     Bake(Box<PrtBakeArgs>),
     /// Print the contents, the size and the errors of a bake

@@ -58,7 +58,7 @@ impl Container {
     /// 64 bits hold.
     ///
     /// # Errors
-    /// `Input`, saying what is wrong; the errors of `length`.
+    /// `Input`, naming the fault; the errors of `length`.
     pub fn decode<'a, H: DeserializeOwned>(
         &self,
         bytes: &'a [u8],

@@ -1,5 +1,5 @@
-// Light of the samples at the pixels: a mean over the samples around a point, with Gaussian weights, of the same surface. What elliptical
-// splats add up is gathered here by each pixel, so that the sum of the weights is one and no order of drawing matters.
+// Light of the samples at the pixels: a mean over the samples around a point, with Gaussian weights, of the same surface. Each
+// pixel gathers the sum that elliptical splats would add up, so that the sum of the weights is one and no order of drawing matters.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -47,7 +47,7 @@ layout(push_constant, scalar) uniform Push {
     uint last;         // 1: the last pass, which adds the indirect light
 };
 
-// What the samples around a point say about it.
+// The light of the samples around a point.
 struct PrtNear {
     vec3 irradiance;
     float visible[PRT_LIGHTS];

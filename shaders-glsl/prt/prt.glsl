@@ -9,7 +9,7 @@ const uint PRT_HITS = 8u; // export
 const uint PRT_LOST = 0xfffffffeu; // export
 // Lights whose visibility is gathered at once.
 const uint PRT_LIGHTS = 8u; // export
-// What a picture shows.
+// Kinds of pictures.
 const uint PRT_SHOW_LIGHT = 0u; // export
 const uint PRT_SHOW_SAMPLES = 1u; // export
 const uint PRT_SHOW_CLUSTERS = 2u; // export

@@ -1,4 +1,4 @@
-//! What a bake computes on the device: particles, distances, gathered samples and the light of examples (`shaders-glsl/prt`).
+//! The computations of a bake on the device: particles, distances, gathered samples and the light of examples (`shaders-glsl/prt`).
 
 use glam::Vec3;
 

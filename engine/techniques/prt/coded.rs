@@ -42,7 +42,7 @@ impl Writer {
     }
 }
 
-/// Reads what [`Writer`] wrote.
+/// Reads the lists of a [`Writer`].
 #[derive(Debug)]
 pub(super) struct Reader<'a>(pub &'a [u8]);
 

@@ -56,7 +56,7 @@ struct Header {
     parts: Vec<[u64; 3]>,
 }
 
-/// What a bake holds.
+/// The sizes and the errors of a bake.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
     pub samples: usize,
@@ -157,7 +157,7 @@ impl Stored {
     /// Reads a file, and gives the digest at its end.
     ///
     /// # Errors
-    /// `Input`, naming the file and saying what is wrong.
+    /// `Input`, naming the file and the fault.
     pub fn read(path: &Path) -> Result<(Self, Digest)> {
         let bytes = image::read_file_checked(path, MOST_BYTES)?;
         let stored = Self::decode(&bytes).map_err(|error| error.in_file(path))?;
@@ -165,7 +165,7 @@ impl Stored {
     }
 
     /// # Errors
-    /// `Input`, saying what is wrong.
+    /// `Input`, naming the fault.
     pub fn decode(bytes: &[u8]) -> Result<Self> {
         let damaged = |what: String| FILE.damaged(what);
         let of_samples = |plan: &Plan| (plan.count() * size_of::<PrtPoint>()) as u64;
@@ -195,7 +195,7 @@ impl Stored {
         Ok(out)
     }
 
-    /// What the bake holds.
+    /// The sizes and the errors of the bake.
     pub fn summary(&self) -> Summary {
         let mean = |value: &dyn Fn(usize) -> f64| {
             let all = (0..self.plan.clusters.len()).map(|c| value(c) * f64::from(self.plan.clusters[c]));

@@ -1,8 +1,8 @@
 //! Precomputed radiance transfer for lights that move inside a room ("Precomputed Illumination for Virtual Reality Scenarios", Leonhardt and Bohn).
 //!
 //! [`Bakery`] puts samples on all surfaces and traces rays between them. [`units`] are the stages of a bake: visibility, transport, light of
-//! examples, bases, transfer. [`Stored`] is the file. At run time [`Prt`] finds the direct light at the samples, transfers it, and spreads
-//! it over the picture.
+//! examples, bases, transfer. [`Stored`] is the file. At run time [`Prt`] finds the direct light at the samples, transfers this light, and
+//! spreads the sum over the picture.
 
 mod baked;
 mod bakery;

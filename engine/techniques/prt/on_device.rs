@@ -33,7 +33,7 @@ pub struct OnDevice {
     caps: OwnedBuffer,
     rows: OwnedBuffer,
     albedos: OwnedBuffer,
-    /// What the matrices depend on.
+    /// Albedo of each sample, on which the matrices depend; red, green, blue.
     albedo_list: Vec<[f32; 3]>,
     vectors: Vec<PrtVector>,
     weights: OwnedBuffer,

@@ -1,4 +1,4 @@
-//! What a bake is of: its scene, its samples and its clusters.
+//! The plan of a bake: scene, samples and clusters.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -78,7 +78,7 @@ impl Plan {
     }
 
     /// # Errors
-    /// `Input`, saying what is impossible.
+    /// `Input`, naming the impossible value.
     pub fn validate(&self) -> Result<()> {
         self.settings.validate().map_err(|error| error.of_kind(crate::ErrorKind::Input))?;
         let wrong = |what: &str| Err(Error::input(what));

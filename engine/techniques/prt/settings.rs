@@ -37,7 +37,7 @@ pub struct Baking {
     /// Vectors that describe the light that a cluster receives; 0: every coefficient of every sample, as in the paper.
     #[schemars(range(min = 0, max = 256))]
     pub receivers: u32,
-    /// Share of the coefficients that are kept, the largest of each cluster; the others become 0.
+    /// Share of the coefficients that are kept, the largest of each cluster; all smaller ones become 0.
     #[schemars(range(min = 0.01, max = 1), extend("x-needs" = {"receivers": {"const": 0}}))]
     pub keep: f64,
     /// Direct light is described around the mean of the examples, as in the paper. A room then glows with the light off. If off, around zero, by
@@ -117,7 +117,7 @@ pub struct Settings {
     pub gloss: bool,
     /// Scatterings of the light: all of them, or one.
     pub bounces: bool,
-    /// With a bake around the mean of the examples: the light that the mean itself transfers is there. The paper's equation 10 leaves it out.
+    /// With a bake around the mean of the examples: the light that the mean itself transfers is there. The paper's equation 10 leaves this light out.
     pub mean: bool,
     /// Factor on the light of all lights.
     #[schemars(range(min = 0, max = 1000))]

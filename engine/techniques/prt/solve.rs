@@ -1,7 +1,7 @@
 //! All scatterings at once, between the bases of the clusters.
 //!
 //! Let a be the coefficients of the radiosity of all samples, X the transfer and P the projection. Radiosity is the albedo ρ times irradiance, so
-//! a = P ρ (E + X a) with the direct irradiance E, and a = (1 − P ρ X)⁻¹ P ρ E. The matrix has a row for each vector, so it is small, and the
+//! a = P ρ (E + X a) with the direct irradiance E, and a = (1 − P ρ X)⁻¹ P ρ E. The matrix has a row for each vector, so the matrix is small, and the
 //! sum of all scatterings is exact in the space of the bases (the paper follows photons for each vector instead, for one albedo).
 
 use nalgebra::DMatrix;
@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use super::{Stored, transfer};
 use crate::{Error, Result};
 
-/// What turns the projected direct light into the coefficients of all light, for red, green and blue.
+/// The matrices that turn the projected direct light into the coefficients of all light, for red, green and blue.
 #[derive(Clone, Debug)]
 pub struct Solved {
     /// (1 − P ρ X)⁻¹, column after column.

@@ -17,7 +17,7 @@ use crate::{
     technique::{self, Making, Moment, Picture, Technique},
 };
 
-/// What the picture shows.
+/// The light, or the part of the bake, that the picture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
     #[default]
@@ -89,7 +89,7 @@ impl Prt {
     }
 }
 
-/// Light and surfaces of a scene that the bake leaves out.
+/// Notes on light and surfaces of a scene that the bake leaves out or simplifies.
 fn left_out(scene: &Scene) -> Vec<Note> {
     let note = |place: &str, text: String| Note { kind: NoteKind::Ignored, place: place.into(), text };
     let mut notes = Vec::new();
@@ -99,7 +99,7 @@ fn left_out(scene: &Scene) -> Vec<Note> {
         notes.push(note("lights", format!("{suns} suns are off: only point and spot lights are transferred")));
     }
     if scene.environment.is_some() {
-        notes.push(note("environment", "the environment is shown, but it lights nothing".into()));
+        notes.push(note("environment", "the environment is shown, but lights nothing".into()));
     }
     let named = |what: &str, is: &dyn Fn(&crate::scene::Material) -> bool| {
         let names: Vec<&str> = scene.materials.iter().filter(|m| is(m)).map(|m| m.name.as_str()).take(5).collect();
@@ -203,7 +203,7 @@ impl Technique for Prt {
         let image = |graph: &mut Graph, name: &str| graph.image(name, Format::RGBA16F, view.extent);
         let [total, of_direct, indirect, irradiance, shadow] =
             ["prt", "prt.direct-light", "prt.indirect", "prt.irradiance", "prt.shadow"].map(|name| image(graph, name));
-        // Passes after the first one add to it.
+        // Each pass after the first one adds the light of its lamps.
         graph.clear(of_direct, [0.0; 4]);
         let passes = if mapped.is_some() { 1 } else { count.div_ceil(consts::PRT_LIGHTS).max(1) };
         for pass in 0..passes {

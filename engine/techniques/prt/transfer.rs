@@ -1,7 +1,7 @@
 //! Bases for direct light, and the light that each of their vectors sends to each sample (Leonhardt and Bohn, section 4.3).
 //!
 //! A vector of a basis is a function on the samples of a cluster. The functions are orthonormal if samples count with their areas. Transfer is of
-//! radiosity without any albedo: the albedo is applied when light arrives, so that it may change at run time.
+//! radiosity without any albedo: the albedo is applied when light arrives, so that albedos may change at run time.
 
 use half::f16;
 
@@ -12,7 +12,7 @@ use crate::{
     shaders::types::PrtPoint,
 };
 
-/// Examples whose light after one scattering is an example, too: indirect light is smoother than direct light, and it is projected as well.
+/// Examples whose light after one scattering is an example, too: indirect light is smoother than direct light, and both are projected.
 pub const INDIRECT: usize = 300;
 
 /// The basis of the direct light of a cluster.
@@ -120,7 +120,7 @@ impl Basis {
         })
     }
 
-    /// What a sample adds to the coefficients of all vectors for 1 W/m² there. The mean's coefficient does not depend on the light.
+    /// The coefficients of all vectors for 1 W/m² at one sample. The mean's coefficient does not depend on the light.
     pub fn weights<'a>(&'a self, sample: usize, area: f32) -> impl Iterator<Item = f32> + 'a {
         let stride = self.vectors as usize;
         let root = area.sqrt();
@@ -194,7 +194,7 @@ impl Senders {
         out
     }
 
-    /// The transfer to the samples of a cluster. `seen`: what they see along their rays.
+    /// The transfer to the samples of a cluster. `seen`: the samples that their rays meet.
     ///
     /// # Errors
     /// `Runtime` if a value is not finite.
@@ -240,7 +240,7 @@ impl Senders {
     }
 }
 
-/// Every coefficient, or the share of them that counts most; the others become 0 (section 4.4).
+/// Every coefficient, or the share of them that counts most; all smaller ones become 0 (section 4.4).
 fn thinned(dense: Vec<f32>, sizes: &[f32], keep: f64) -> Transfer {
     let sized: Vec<f32> = dense.iter().zip(sizes.iter().cycle()).map(|(value, size)| (value * size).abs()).collect();
     let mut order = sized.clone();

@@ -163,7 +163,7 @@ impl Work {
         Ok(senders)
     }
 
-    /// The samples, and what is on the device.
+    /// The samples of the bake.
     pub fn sampled(&self) -> &Sampled {
         &self.sampled
     }

@@ -16,7 +16,7 @@ pub struct Visibility {
     pub basis: Vec<f16>,
     /// All coefficients of a sample, sample after sample.
     pub coefficients: Vec<f16>,
-    /// Root mean square of the error of a distance, as it is decoded from the stored numbers, metres.
+    /// Root mean square of the error of a distance, after decoding, metres.
     pub error: f32,
 }
 

@@ -1,4 +1,4 @@
-//! `prt bake`: computes how light spreads in a room and writes it to a file.
+//! `prt bake`: computes the transport of light in a room and writes a file.
 
 use std::{process::ExitCode, str::FromStr, time::Instant};
 

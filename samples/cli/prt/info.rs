@@ -28,7 +28,7 @@ pub struct PrtInfoArgs {
     pub talk: TalkArgs,
 }
 
-/// Prints what a bake holds.
+/// Prints the contents of a bake.
 ///
 /// # Errors
 /// `Input` if the file cannot be read.

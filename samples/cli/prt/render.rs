@@ -23,7 +23,7 @@ pub struct PrtArgs {
     #[arg(long, value_name = "FILE.prt", help_heading = "Technique")]
     pub bake: PathBuf,
 
-    /// What to show
+    /// Light, or part of the bake, to show
     #[arg(long, value_parser = render::mode::<Mode>(), default_value = "total", help_heading = "Technique")]
     pub mode: Mode,
 }
