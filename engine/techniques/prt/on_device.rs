@@ -4,7 +4,7 @@ use glam::Vec3;
 use half::f16;
 
 use super::{
-    Settings, Stored, bakery,
+    Plan, Settings, Stored, bakery,
     samples::Grid,
     solve::{self, Solved},
 };
@@ -33,11 +33,10 @@ pub struct OnDevice {
     caps: OwnedBuffer,
     rows: OwnedBuffer,
     albedos: OwnedBuffer,
-    /// Albedo of each sample, on which the matrices depend; red, green, blue.
-    albedo_list: Vec<[f32; 3]>,
     vectors: Vec<PrtVector>,
     weights: OwnedBuffer,
-    matrices: Option<(OwnedBuffer, Solved, [bool; 2])>,
+    /// All scatterings, for red, green and blue.
+    matrices: OwnedBuffer,
     receivers: OwnedBuffer,
     words: OwnedBuffer,
     /// Rows of the receivers' vectors; `None`: samples have their parts of the vectors of light.
@@ -61,12 +60,12 @@ fn packed(halves: impl IntoIterator<Item = f16>) -> Vec<u32> {
 }
 
 impl OnDevice {
-    /// Uploads a bake, and finds the albedos of the samples by the materials of a scene. `gloss`: all reflected energy counts, not that of the
-    /// diffuse base alone.
+    /// Uploads a bake, finds the albedos of the samples by the materials of a scene, and solves for all scatterings. With `gloss`, all reflected
+    /// energy counts, not that of the diffuse base alone. `gloss`, `bounces` and `mean` of the settings count.
     ///
     /// # Errors
-    /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
-    pub fn new(gpu: &Gpu, scene: &Scene, stored: &Stored, gloss: bool) -> Result<Self> {
+    /// As [`solve::solve`]; `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
+    pub fn new(gpu: &Gpu, scene: &Scene, stored: &Stored, settings: &Settings) -> Result<Self> {
         let plan = &stored.plan;
         let all = plan.all_vectors();
         let (mut clusters, mut caps, mut rows) = (Vec::new(), Vec::new(), Vec::new());
@@ -132,7 +131,11 @@ impl OnDevice {
             OwnedBuffer::with_contents(gpu, name, filled)
         };
         let samples = buffer("prt.samples", bytemuck::cast_slice(&stored.samples))?;
-        let albedo_list = albedos(gpu, scene, &samples, stored.samples.len() as u32, gloss)?;
+        let albedos = albedos(gpu, scene, &samples, stored.samples.len() as u32, settings.gloss)?;
+        let Solved { inverse, shift, fixed } = solve::solve(stored, &albedos, settings.bounces, settings.mean)?;
+        for ((vector, shift), fixed) in vectors.iter_mut().zip(shift).zip(fixed) {
+            (vector.shift, vector.fixed_value) = (shift, fixed);
+        }
         Ok(Self {
             samples,
             clusters: buffer("prt.clusters", bytemuck::cast_slice(&clusters))?,
@@ -142,11 +145,10 @@ impl OnDevice {
             count: stored.samples.len() as u32,
             caps: buffer("prt.caps", bytemuck::cast_slice(&caps))?,
             rows: buffer("prt.rows", bytemuck::cast_slice(&rows))?,
-            albedos: buffer("prt.albedos", bytemuck::cast_slice(&albedo_list))?,
-            albedo_list,
+            albedos: buffer("prt.albedos", bytemuck::cast_slice(&albedos))?,
             vectors,
             weights: buffer("prt.weights", bytemuck::cast_slice(&weights))?,
-            matrices: None,
+            matrices: buffer("prt.matrices", bytemuck::cast_slice(&inverse.concat()))?,
             receivers: buffer("prt.receivers", bytemuck::cast_slice(&receivers))?,
             words: buffer("prt.words", bytemuck::cast_slice(&words))?,
             mixed: match plan.settings.receivers {
@@ -158,25 +160,14 @@ impl OnDevice {
     }
 
     /// The light of a frame's lights at the samples. `lights`: the lights of the frame, and their number.
-    ///
-    /// # Errors
-    /// As [`solve::solve`]; `OutOfMemory`, `DeviceLost`.
     pub fn light(
-        &mut self,
+        &self,
         graph: &mut Graph,
-        gpu: &Gpu,
-        stored: &Stored,
+        plan: &Plan,
         (lights, light_count): (Buffer, u32),
         settings: &Settings,
-    ) -> Result<Lit> {
+    ) -> Lit {
         let count = self.count;
-        let choice = [settings.bounces, settings.mean];
-        if self.matrices.as_ref().is_none_or(|(_, _, of)| *of != choice) {
-            let solved = solve::solve(stored, &self.albedo_list, settings.bounces, settings.mean)?;
-            let all = solved.inverse.concat();
-            let buffer = OwnedBuffer::with_contents(gpu, "prt.matrices", bytemuck::cast_slice(&all))?;
-            self.matrices = Some((buffer, solved, choice));
-        }
         let samples = graph.import_buffer(&self.samples);
         let direct = graph.buffer("prt.direct", 12 * u64::from(count));
         let visible = graph.buffer("prt.visible", 4 * u64::from(count) * u64::from(light_count.max(1)));
@@ -194,27 +185,17 @@ impl OnDevice {
                 count,
                 points: offsets.len() as u32,
                 bias: settings.bias,
-                bias_distance: settings.bias_distance * stored.plan.radius,
+                bias_distance: settings.bias_distance * plan.radius,
                 strength: settings.strength,
-                far_of_room: stored.plan.far,
+                far_of_room: plan.far,
             },
         };
         graph.compute(args, count).rays(u64::from(count) * offsets.len() as u64 * u64::from(light_count));
-        let Some((matrices, solved, _)) = &self.matrices else {
-            return Ok(Lit { irradiances: direct, visible });
-        };
-        let all = self.vectors.len() as u32;
-        let vectors: Vec<PrtVector> = self
-            .vectors
-            .iter()
-            .zip(&solved.shift)
-            .zip(&solved.fixed)
-            .map(|((vector, shift), fixed)| PrtVector { shift: *shift, fixed_value: *fixed, ..*vector })
-            .collect();
+        let all = self.vectors();
         let [projected, scattered] =
             ["prt.projected", "prt.scattered"].map(|name| graph.buffer(name, 12 * u64::from(all)));
         let args = project::Args {
-            vectors: graph.buffer_from("prt.vectors", &vectors),
+            vectors: graph.buffer_from("prt.vectors", &self.vectors),
             weights: graph.import_buffer(&self.weights),
             direct,
             albedos: graph.import_buffer(&self.albedos),
@@ -223,13 +204,13 @@ impl OnDevice {
         };
         graph.compute(args, all);
         let args = scatter::Args {
-            matrices: graph.import_buffer(matrices),
+            matrices: graph.import_buffer(&self.matrices),
             before: projected,
             after: scattered,
             push: scatter::Push { count: all },
         };
         graph.compute(args, all);
-        Ok(Lit { irradiances: self.receive(graph, scattered), visible })
+        Lit { irradiances: self.receive(graph, scattered), visible }
     }
 
     /// Irradiance of the samples by these coefficients of all vectors of light.

@@ -5,7 +5,6 @@ use glam::Vec3;
 use super::{Baked, Direct as Shadows, PictureSettings, Settings, Stored, on_device::OnDevice};
 use crate::{
     Error, Result,
-    gpu::Gpu,
     graph::{Format, Graph},
     passes::{
         direct::{self, Direct, Lights},
@@ -77,7 +76,6 @@ impl technique::Mode for Mode {
 /// Precomputed transfer, prepared for a scene.
 #[derive(Debug)]
 pub struct Prt {
-    gpu: Gpu,
     baked: Baked,
     light: OnDevice,
 }
@@ -144,8 +142,8 @@ impl Technique for Prt {
     }
 
     fn prepared_by(settings: &PictureSettings) -> PictureSettings {
-        // Albedos of samples depend on the kind of reflection.
-        let prt = Settings { gloss: settings.prt.gloss, ..Settings::default() };
+        let Settings { gloss, bounces, mean, .. } = settings.prt;
+        let prt = Settings { gloss, bounces, mean, ..Settings::default() };
         PictureSettings { prt, ..PictureSettings::default() }
     }
 
@@ -159,8 +157,8 @@ impl Technique for Prt {
             let what = format!("is the room `{}`, and this scene has other {parts}", baked.stored.plan.scene);
             return Err(baked.blamed(Error::input(what).help("Name the scene that was baked, or bake this one")));
         }
-        let light = OnDevice::new(gpu, scene, &baked.stored, settings.prt.gloss)?;
-        Ok(Self { gpu: gpu.clone(), baked: baked.clone(), light })
+        let light = OnDevice::new(gpu, scene, &baked.stored, &settings.prt).map_err(|error| baked.blamed(error))?;
+        Ok(Self { baked: baked.clone(), light })
     }
 
     fn frame(&mut self, graph: &mut Graph, moment: &Moment<'_, Mode>, settings: &PictureSettings) -> Result<Picture> {
@@ -171,11 +169,7 @@ impl Technique for Prt {
         let lights = &handles.moment.lights;
         let count = lights.len() as u32;
         let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
-        let stored = self.baked.stored.clone();
-        let mut lit = self
-            .light
-            .light(graph, &self.gpu, &stored, (handles.lights, count), of_prt)
-            .map_err(|error| self.baked.blamed(error))?;
+        let mut lit = self.light.light(graph, &self.baked.stored.plan, (handles.lights, count), of_prt);
         let show = match mode {
             Mode::Samples => consts::PRT_SHOW_SAMPLES,
             Mode::Clusters => consts::PRT_SHOW_CLUSTERS,
