@@ -6,7 +6,7 @@ use clap::{Parser, Subcommand};
 use lucerna_samples::{
     bake::{self, JoinArgs},
     program,
-    prt::{self, PrtArgs, PrtBakeArgs, PrtInfoArgs},
+    prt::{self, PrtArgs, PrtBakeArgs, PrtCheckArgs, PrtInfoArgs},
 };
 
 /// Precomputed radiance transfer for lights that move inside a room.
@@ -22,6 +22,9 @@ enum Command {
     /// Compute the transport of light in a room and write a file
     #[command(args_override_self = true, mut_arg("output", |arg| arg.value_name("FILE.prt")))]
     Bake(Box<PrtBakeArgs>),
+    /// Measure the error of a bake beside light by following paths
+    #[command(args_override_self = true)]
+    Check(Box<PrtCheckArgs>),
     /// Print the contents, the size and the errors of a bake
     Info(PrtInfoArgs),
     /// Join the parts of a bake (as `lucerna merge`)
@@ -36,6 +39,10 @@ fn main() -> ExitCode {
         Command::Bake(args) => {
             let console = args.run.talk.console();
             program::run(console, || prt::bake(&args, console))
+        }
+        Command::Check(args) => {
+            let console = args.talk.console();
+            program::run(console, || prt::check(&args, console))
         }
         Command::Info(args) => {
             let console = args.talk.console();

@@ -10,7 +10,11 @@ use lucerna::{
     image::Layers,
     scene::{Material, Pose, Scene, View},
     technique::{Ready, Shot, Technique},
-    techniques::prt::{Baked, Bakery, Baking, Mode, PictureSettings, Prt, Sampled, Stored, solve, starts, units},
+    techniques::prt::{
+        Baked, Bakery, Baking, Mode, PictureSettings, Prt, Sampled, Settings, Stored,
+        check::{Extent, OfLight, check},
+        solve, starts, units,
+    },
 };
 
 fn small() -> Baking {
@@ -222,6 +226,32 @@ fn pictures_have_the_light_of_the_path_tracer() {
         for (found, wanted) in mean(&mapped, "direct").into_iter().zip(mean(&truth, "direct")) {
             assert!((found / wanted - 1.0).abs() < 0.02, "{found} {wanted}");
         }
+    });
+}
+
+#[test]
+fn a_check_finds_little_error_in_a_bake_and_much_where_scatterings_are_missing() {
+    with_gpu(|gpu| {
+        let scene = room();
+        let stored = baked(gpu, &scene, &small());
+        let extent = Extent { lights: 6, samples: 100, paths: 128, seed: 3 };
+        let of = |bounces| {
+            let settings = Settings { gloss: false, bounces, ..Settings::default() };
+            check(gpu, &scene, &stored, &settings, extent, &Stop::default()).unwrap()
+        };
+        let found = of(true);
+        assert_eq!(found.len(), 6);
+        assert_eq!(found, of(true), "the same bits");
+        let mean = |list: &[OfLight], of: fn(&OfLight) -> f64| list.iter().map(of).sum::<f64>() / list.len() as f64;
+        // The energy is that of `pictures_have_the_light_of_the_path_tracer`.
+        let (direct, indirect) = (mean(&found, |l| l.direct.ratio), mean(&found, |l| l.indirect.ratio));
+        let transferred = mean(&found, |l| l.transferred.ratio);
+        assert!((direct - 1.0).abs() < 0.06 && (indirect - 1.0).abs() < 0.06, "{direct} {indirect}");
+        assert!((transferred - 1.0).abs() < 0.05, "{transferred}");
+        assert!(found.iter().all(|light| light.away > 0.0 && light.away < 1.3), "half of the room's height");
+        // One scattering instead of all of them: surfaces that reflect about 0.6 lose about as much.
+        let once = mean(&of(false), |l| l.transferred.ratio);
+        assert!((0.3..0.7).contains(&once), "{once}");
     });
 }
 

@@ -9,6 +9,8 @@ const uint PRT_HITS = 8u; // export
 const uint PRT_LOST = 0xfffffffeu; // export
 // Lights whose visibility is gathered at once.
 const uint PRT_LIGHTS = 8u; // export
+// Scatterings of the paths that a bake is compared with.
+const uint PRT_CHECK_BOUNCES = 256u;
 // Kinds of pictures.
 const uint PRT_SHOW_LIGHT = 0u; // export
 const uint PRT_SHOW_SAMPLES = 1u; // export

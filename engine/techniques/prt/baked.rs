@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::Stored;
-use crate::{Error, Result, bake::Digest, technique};
+use crate::{Error, Result, bake::Digest, scene::Scene, technique};
 
 /// A bake, and the file from which it was read.
 #[derive(Clone, Debug)]
@@ -22,6 +22,16 @@ impl Baked {
     /// A bake that no file holds.
     pub fn new(stored: Stored) -> Self {
         Self { stored: Arc::new(stored), file: None, digest: None }
+    }
+
+    /// Refuses scenes that are not the one of the bake.
+    ///
+    /// # Errors
+    /// `Input`, naming the file and the part of the scene that differs.
+    pub fn of(&self, scene: &Scene) -> Result<()> {
+        let Some(parts) = self.stored.plan.difference(scene) else { return Ok(()) };
+        let what = format!("is the room `{}`, and this scene has other {parts}", self.stored.plan.scene);
+        Err(self.blamed(Error::input(what).help("Name the scene that was baked, or bake this one")))
     }
 
     /// The error with the name of the file.

@@ -33,12 +33,12 @@ const PILOT: f32 = 3000.0;
 /// The scene of a bake on a device.
 #[derive(Debug)]
 pub struct Bakery {
-    runner: Runner,
+    pub(super) runner: Runner,
     gpu: Gpu,
-    scene: Scene,
-    pose: Pose,
-    resident: Resident,
-    rays: Rays,
+    pub(super) scene: Scene,
+    pub(super) pose: Pose,
+    pub(super) resident: Resident,
+    pub(super) rays: Rays,
     on_device: Option<Uploaded>,
 }
 
@@ -156,7 +156,7 @@ impl Bakery {
             let found = self.particles(baking, starts, round * PARTICLES)?;
             escaped.iter_mut().zip(found.escaped).for_each(|(sum, more)| *sum += more);
             if round == 0 {
-                places = free_places(&found.hits, baking);
+                places = free_places(&found.hits, baking.examples);
             }
             found.hits.iter().flatten().for_each(|hit| triangles.count(hit));
             let mut kept = 0;
@@ -170,6 +170,17 @@ impl Bakery {
             }
         }
         Ok((thinning.samples, places, escaped[0] as f64 / escaped[1].max(1) as f64))
+    }
+
+    /// Places in the free space that are not those of the examples of a bake, evenly distributed, metres.
+    ///
+    /// # Errors
+    /// `OutOfMemory`, `DeviceLost`.
+    pub fn places(&mut self, plan: &Plan, count: u32) -> Result<Vec<[f32; 3]>> {
+        let starts: Vec<Vec3> = plan.starts.iter().map(|start| Vec3::from(*start)).collect();
+        // Particles after all those of a bake.
+        let found = self.particles(&plan.settings, &starts, MOST_ROUNDS * PARTICLES)?;
+        Ok(free_places(&found.hits, count))
     }
 
     /// The hits of a round of particles.
@@ -213,11 +224,11 @@ impl Bakery {
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`.
-    pub fn upload(&mut self, sampled: &Sampled) -> Result<()> {
-        let grid = Grid::new(&sampled.samples, sampled.plan.radius);
+    pub fn upload(&mut self, plan: &Plan, samples: &[PrtPoint]) -> Result<()> {
+        let grid = Grid::new(samples, plan.radius);
         let buffer = |name, bytes: &[u8]| OwnedBuffer::with_contents(&self.gpu, name, bytes);
         self.on_device = Some(Uploaded {
-            samples: buffer("prt.samples", bytemuck::cast_slice(&sampled.samples))?,
+            samples: buffer("prt.samples", bytemuck::cast_slice(samples))?,
             starts: buffer("prt.cells", bytemuck::cast_slice(&grid.starts))?,
             order: buffer("prt.order", bytemuck::cast_slice(&grid.order))?,
             grid,
@@ -291,11 +302,12 @@ impl Bakery {
         Ok(self.runner.run(&graph)?.buffer(read))
     }
 
-    /// Irradiance at the samples of a cluster by each example light of 1 W/sr, W/m²: a row of all lights for each sample.
+    /// Irradiance at the samples of a cluster by each light of 1 W/sr, W/m²: a row of all lights for each sample. Distances below `nearest` count as
+    /// `nearest`, metres.
     ///
     /// # Errors
     /// As [`Self::depths`].
-    pub fn lit(&mut self, plan: &Plan, cluster: usize, places: &[[f32; 3]]) -> Result<Vec<f32>> {
+    pub fn lit(&mut self, plan: &Plan, cluster: usize, places: &[[f32; 3]], nearest: f32) -> Result<Vec<f32>> {
         let uploaded = self.on_device.as_ref().ok_or_else(not_uploaded)?;
         let count = plan.clusters[cluster];
         let lights = places.len() as u32;
@@ -314,7 +326,7 @@ impl Bakery {
                     first_sample: plan.range(cluster).start as u32,
                     receivers: count,
                     lights,
-                    nearest: 2.0 * plan.radius,
+                    nearest,
                     seed: plan.settings.seed,
                 },
             },
@@ -324,6 +336,13 @@ impl Bakery {
         graph.compute_over(args, count, items);
         let read = graph.read_buffer(irradiances);
         Ok(self.runner.run(&graph)?.buffer(read))
+    }
+}
+
+impl Bakery {
+    /// The samples on the device.
+    pub(super) fn uploaded(&self) -> Result<&OwnedBuffer> {
+        self.on_device.as_ref().map(|uploaded| &uploaded.samples).ok_or_else(not_uploaded)
     }
 }
 
@@ -345,11 +364,11 @@ pub(super) fn device_cap(cap: &Cap, [first_sample, samples]: [u32; 2]) -> types:
 
 /// Places for the example lights. Particles that scatter diffusely fill a closed space evenly, so a random point along their paths is an even
 /// point of the space.
-fn free_places(hits: &[Vec<PrtPoint>], baking: &Baking) -> Vec<[f32; 3]> {
+fn free_places(hits: &[Vec<PrtPoint>], count: u32) -> Vec<[f32; 3]> {
     let segments =
         || hits.iter().flat_map(|hits| hits.windows(2)).map(|pair| [0, 1].map(|i| samples::position(&pair[i])));
     let whole: f64 = segments().map(|[a, b]| f64::from(a.distance(b))).sum();
-    let each = whole / f64::from(baking.examples);
+    let each = whole / f64::from(count);
     let mut out = Vec::new();
     let mut sum = 0.0;
     for [a, b] in segments() {
@@ -360,6 +379,6 @@ fn free_places(hits: &[Vec<PrtPoint>], baking: &Baking) -> Vec<[f32; 3]> {
         }
         sum += length;
     }
-    out.truncate(baking.examples as usize);
+    out.truncate(count as usize);
     out
 }

@@ -7,6 +7,7 @@
 mod baked;
 mod bakery;
 mod cap;
+pub mod check;
 mod coded;
 mod file;
 mod on_device;

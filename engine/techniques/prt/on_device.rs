@@ -48,6 +48,9 @@ pub struct OnDevice {
 /// Light at the samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Lit {
+    /// Irradiance before any scattering, W/m².
+    pub direct: Buffer,
+    /// Irradiance after at least one scattering, W/m².
     pub irradiances: Buffer,
     /// Share of each light that a sample sees.
     pub visible: Buffer,
@@ -210,7 +213,7 @@ impl OnDevice {
             push: scatter::Push { count: all },
         };
         graph.compute(args, all);
-        Lit { irradiances: self.receive(graph, scattered), visible }
+        Lit { direct, irradiances: self.receive(graph, scattered), visible }
     }
 
     /// Irradiance of the samples by these coefficients of all vectors of light.
@@ -265,7 +268,13 @@ fn offsets(settings: &Settings) -> Vec<[f32; 3]> {
 }
 
 /// The albedos of samples by the materials of a scene.
-fn albedos(gpu: &Gpu, scene: &Scene, samples: &OwnedBuffer, count: u32, gloss: bool) -> Result<Vec<[f32; 3]>> {
+pub(super) fn albedos(
+    gpu: &Gpu,
+    scene: &Scene,
+    samples: &OwnedBuffer,
+    count: u32,
+    gloss: bool,
+) -> Result<Vec<[f32; 3]>> {
     let scene = Scene { environment: None, ..scene.clone() };
     let mut resident = Resident::for_rays(gpu, &scene)?;
     let mut graph = Graph::new("prt.albedo");

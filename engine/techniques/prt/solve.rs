@@ -88,7 +88,53 @@ pub fn solve(stored: &Stored, albedos: &[[f32; 3]], bounces: bool, mean: bool) -
     Ok(Solved { inverse, shift, fixed })
 }
 
-/// Indirect irradiance at the samples, W/m², by this direct irradiance: the slow twin of the passes of a frame.
+impl Solved {
+    /// Indirect irradiance at the samples, W/m², by this direct irradiance: the slow twin of the passes of a frame.
+    pub fn indirect(&self, stored: &Stored, albedos: &[[f32; 3]], direct: &[[f32; 3]]) -> Vec<[f32; 3]> {
+        let plan = &stored.plan;
+        let all = plan.all_vectors();
+        let mut out = vec![[0.0f32; 3]; stored.samples.len()];
+        for channel in 0..3 {
+            let mut before = vec![0.0f64; all];
+            for (cluster, basis) in stored.bases.iter().enumerate() {
+                let (first, range) = (plan.first_vector(cluster), plan.range(cluster));
+                for (number, sample) in range.clone().enumerate() {
+                    let radiosity = f64::from(albedos[sample][channel] * direct[sample][channel]);
+                    let weights = basis.weights(number, stored.samples[sample].area);
+                    before[first..]
+                        .iter_mut()
+                        .zip(weights)
+                        .for_each(|(sum, weight)| *sum += f64::from(weight) * radiosity);
+                }
+            }
+            let fixed = self.fixed.iter().zip(&self.shift).map(|(fixed, shift)| f64::from(fixed - shift));
+            before.iter_mut().zip(fixed).for_each(|(sum, fixed)| *sum += fixed);
+            let mut after = vec![0.0f64; all];
+            for (column, before) in self.inverse[channel].chunks_exact(all.max(1)).zip(&before) {
+                after.iter_mut().zip(column).for_each(|(sum, value)| *sum += f64::from(*value) * before);
+            }
+            for (cluster, transfer) in stored.transfers.iter().enumerate() {
+                let stride = transfer.stride(all);
+                let mixed: Vec<f64> = match transfer.rank {
+                    0 => after.clone(),
+                    _ => transfer
+                        .rows
+                        .chunks_exact(all.max(1))
+                        .map(|row| row.iter().zip(&after).map(|(a, b)| f64::from(*a) * b).sum())
+                        .collect(),
+                };
+                for (number, sample) in plan.range(cluster).enumerate() {
+                    let values = &transfer.values[number * stride..][..stride];
+                    let sum: f64 = values.iter().zip(&mixed).map(|(a, b)| f64::from(a.to_f32()) * b).sum();
+                    out[sample][channel] = sum as f32;
+                }
+            }
+        }
+        out
+    }
+}
+
+/// As [`Solved::indirect`], solved for these albedos.
 ///
 /// # Errors
 /// As [`solve`].
@@ -99,44 +145,7 @@ pub fn indirect(
     bounces: bool,
     mean: bool,
 ) -> Result<Vec<[f32; 3]>> {
-    let plan = &stored.plan;
-    let all = plan.all_vectors();
-    let solved = solve(stored, albedos, bounces, mean)?;
-    let mut out = vec![[0.0f32; 3]; stored.samples.len()];
-    for channel in 0..3 {
-        let mut before = vec![0.0f64; all];
-        for (cluster, basis) in stored.bases.iter().enumerate() {
-            let (first, range) = (plan.first_vector(cluster), plan.range(cluster));
-            for (number, sample) in range.clone().enumerate() {
-                let radiosity = f64::from(albedos[sample][channel] * direct[sample][channel]);
-                let weights = basis.weights(number, stored.samples[sample].area);
-                before[first..].iter_mut().zip(weights).for_each(|(sum, weight)| *sum += f64::from(weight) * radiosity);
-            }
-        }
-        let fixed = solved.fixed.iter().zip(&solved.shift).map(|(fixed, shift)| f64::from(fixed - shift));
-        before.iter_mut().zip(fixed).for_each(|(sum, fixed)| *sum += fixed);
-        let mut after = vec![0.0f64; all];
-        for (column, before) in solved.inverse[channel].chunks_exact(all.max(1)).zip(&before) {
-            after.iter_mut().zip(column).for_each(|(sum, value)| *sum += f64::from(*value) * before);
-        }
-        for (cluster, transfer) in stored.transfers.iter().enumerate() {
-            let stride = transfer.stride(all);
-            let mixed: Vec<f64> = match transfer.rank {
-                0 => after.clone(),
-                _ => transfer
-                    .rows
-                    .chunks_exact(all.max(1))
-                    .map(|row| row.iter().zip(&after).map(|(a, b)| f64::from(*a) * b).sum())
-                    .collect(),
-            };
-            for (number, sample) in plan.range(cluster).enumerate() {
-                let values = &transfer.values[number * stride..][..stride];
-                let sum: f64 = values.iter().zip(&mixed).map(|(a, b)| f64::from(a.to_f32()) * b).sum();
-                out[sample][channel] = sum as f32;
-            }
-        }
-    }
-    Ok(out)
+    Ok(solve(stored, albedos, bounces, mean)?.indirect(stored, albedos, direct))
 }
 
 /// The factor by which repeated scattering grows, about: the largest eigenvalue.

@@ -153,10 +153,7 @@ impl Technique for Prt {
             let error = Error::usage("there is no baked room").at("prt");
             return Err(error.help("Bake it with `prt bake SCENE -o FILE.prt`, and name the file with --bake"));
         };
-        if let Some(parts) = baked.stored.plan.difference(scene) {
-            let what = format!("is the room `{}`, and this scene has other {parts}", baked.stored.plan.scene);
-            return Err(baked.blamed(Error::input(what).help("Name the scene that was baked, or bake this one")));
-        }
+        baked.of(scene)?;
         let light = OnDevice::new(gpu, scene, &baked.stored, &settings.prt).map_err(|error| baked.blamed(error))?;
         Ok(Self { baked: baked.clone(), light })
     }

@@ -73,7 +73,7 @@ impl Work {
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`.
     pub fn new(mut bakery: Bakery, sampled: Sampled) -> Result<Self> {
-        bakery.upload(&sampled)?;
+        bakery.upload(&sampled.plan, &sampled.samples)?;
         Ok(Self { bakery, sampled, first: None, senders: None })
     }
 
@@ -95,7 +95,7 @@ impl Work {
             }
             GATHER => Ok(bytemuck::cast_slice(&self.bakery.gather(plan, cluster)?).to_vec()),
             DIRECT => {
-                let lit = self.bakery.lit(plan, cluster, &self.sampled.examples)?;
+                let lit = self.bakery.lit(plan, cluster, &self.sampled.examples, 2.0 * plan.radius)?;
                 // The bits of f32 would need twice the space; examples need no more than 11 bits. In units in which a light at the other end of the
                 // room gives 1, so that rooms of all sizes have numbers that 16 bits hold.
                 let scale = scale(&self.sampled.plan);

@@ -1,0 +1,137 @@
+//! `prt check`: the error of a bake beside light by following paths.
+
+use std::{path::PathBuf, process::ExitCode};
+
+use lucerna::{
+    Result,
+    gpu::Gpu,
+    technique::Bake,
+    techniques::prt::{
+        Baked, Settings,
+        check::{self, Difference, Extent, OfLight},
+    },
+};
+use serde_json::json;
+
+use crate::{
+    args::{DeviceArgs, TalkArgs},
+    console::{self, Console},
+    program,
+    signals::Interrupt,
+    stage::{Stage, StageArgs},
+};
+
+/// Options of `prt check`.
+#[derive(clap::Args, Clone, Debug)]
+pub struct PrtCheckArgs {
+    #[command(flatten)]
+    pub stage: StageArgs,
+
+    /// File of `prt bake`
+    #[arg(long, value_name = "FILE.prt", help_heading = "Check")]
+    pub bake: PathBuf,
+
+    /// Lights at places in the free space that the bake has not seen
+    #[arg(long, value_name = "N", default_value_t = Extent::default().lights, value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = "Check")]
+    pub lights: u32,
+
+    /// Samples at which light is compared
+    #[arg(long, value_name = "N", default_value_t = Extent::default().samples, value_parser = clap::value_parser!(u32).range(1..=100_000), help_heading = "Check")]
+    pub points: u32,
+
+    /// Paths that are followed from each of these samples
+    #[arg(long, value_name = "N", default_value_t = Extent::default().paths, value_parser = clap::value_parser!(u32).range(2..=1_000_000), help_heading = "Check")]
+    pub paths: u32,
+
+    /// Seed of the paths
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Check")]
+    pub seed: u32,
+
+    /// Print one JSON document on stdout
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+
+    #[command(flatten)]
+    pub device: DeviceArgs,
+
+    #[command(flatten)]
+    pub talk: TalkArgs,
+}
+
+/// Distances to the nearest surface that separate the lines of the table, metres.
+const APART: [f32; 4] = [0.1, 0.3, 0.5, 1.0];
+
+/// Prints the errors of a bake by the distance of the lights to surfaces.
+///
+/// # Errors
+/// `Input` if the file cannot be read or is of another scene; errors of the device.
+pub fn check(args: &PrtCheckArgs, console: Console) -> Result<ExitCode> {
+    let baked = Baked::read(&args.bake)?;
+    Interrupt::install();
+    let stage = Stage::open(&args.stage)?;
+    stage.notes().iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
+    baked.of(&stage.scene)?;
+    let gpu = Gpu::new(args.device.options()?)?;
+    console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
+    let PrtCheckArgs { lights, points, paths, seed, .. } = *args;
+    let extent = Extent { lights, samples: points, paths, seed };
+    // Paths scatter as on diffuse surfaces.
+    let settings = Settings { gloss: false, ..Settings::default() };
+    let found = check::check(&gpu, &stage.scene, &baked.stored, &settings, extent, &Interrupt::stop())?;
+    let lines: Vec<(f32, Vec<OfLight>)> = (0..=APART.len())
+        .map(|line| {
+            let from = line.checked_sub(1).map_or(0.0, |before| APART[before]);
+            let to = APART.get(line).copied().unwrap_or(f32::INFINITY);
+            (from, found.iter().filter(|light| light.away >= from && light.away < to).copied().collect())
+        })
+        .collect();
+    if args.json {
+        console::print_json(&json!({
+            "file": args.bake,
+            "device": gpu.describe().to_string(),
+            "lights": console::to_json(&found)?,
+            "by_distance": lines.iter().filter(|(_, of)| !of.is_empty()).map(|(from, of)| json!({
+                "from": from,
+                "lights": of.len(),
+                "direct": joined(of, |light| light.direct),
+                "indirect": joined(of, |light| light.indirect),
+                "transferred": joined(of, |light| light.transferred),
+            })).collect::<Vec<_>>(),
+        }))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    console::print(
+        "lights by their distance to surfaces; error: root mean square over that of the truth; energy: light over that of the truth",
+    )?;
+    console::print("distance   lights  direct error  energy  indirect error  energy  with exact direct light  energy")?;
+    for (from, of) in lines.iter().filter(|(_, of)| !of.is_empty()) {
+        let [direct, indirect, transferred] = [
+            joined(of, |light| light.direct),
+            joined(of, |light| light.indirect),
+            joined(of, |light| light.transferred),
+        ];
+        console::print(&format!(
+            "{:<9}  {:>6}  {}  {}  {}",
+            format!("{from} m"),
+            of.len(),
+            cells(direct, 10),
+            cells(indirect, 12),
+            cells(transferred, 21)
+        ))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Root mean square of the errors of lights, and the mean of their ratios: each light counts alike.
+fn joined(lights: &[OfLight], of: fn(&OfLight) -> Difference) -> Difference {
+    let count = lights.len().max(1) as f64;
+    let all = || lights.iter().map(of);
+    Difference {
+        error: (all().map(|one| one.error.powi(2)).sum::<f64>() / count).sqrt(),
+        ratio: all().map(|one| one.ratio).sum::<f64>() / count,
+    }
+}
+
+fn cells(Difference { error, ratio }: Difference, width: usize) -> String {
+    format!("{:>width$.1} %  {ratio:>6.3}", 100.0 * error)
+}
