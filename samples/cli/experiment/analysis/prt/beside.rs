@@ -21,15 +21,15 @@ pub(super) fn section(results: &Results, measured: &[Measured<'_>]) -> Result<Op
     let mut section = Section::new("The technique against the path tracer");
     section.text(
         "Diffuse surfaces on both sides, and all scatterings. An area light is 25 points on a sphere on both sides. *Error* is the root mean square of the \
-         difference of linear radiance over the mean of the reference, in per cent, over all pixels: it has the noise of the reference, and the \
-         edges. *Shadow* is the share of the light that a point sees, against rays to the light, where the surface faces the light. *Energy* is the sum \
+         difference of linear radiance over the mean of the reference, in per cent. Of *pixels* it has the noise of the reference and the edges, which the technique does not \
+         smooth; of *blocks*, the means over 8×8 pixels, it has little of either. *Shadow* is the share of the light that a point sees, against rays to the light, where the surface faces the light. *Energy* is the sum \
          over that of the reference.",
     );
     section.add(means(&all));
     let mut errors = Table::new(
         "errors",
         "Errors of each picture (%)",
-        ["scene", "technique", "light"].into_iter().chain(PARTS.map(|part| part.0)),
+        ["scene", "technique", "light"].map(str::to_owned).into_iter().chain(both_columns(&PARTS)),
     );
     let columns = ["scene", "technique", "light"].map(str::to_owned).into_iter();
     let columns =
@@ -37,8 +37,8 @@ pub(super) fn section(results: &Results, measured: &[Measured<'_>]) -> Result<Op
     let mut energies = Table::new("energy", "Energy of each picture", columns);
     for one in &all {
         let names = [place(one.case.run), one.case.run.method.clone(), one.case.light()].map(Cell::from);
-        errors
-            .push(names.clone().into_iter().chain(one.parts.iter().map(|part| Cell::from(part.map(|part| part.rms)))));
+        let both = one.parts.iter().flat_map(|part| [part.map(|of| of.rms), part.map(|of| of.blocks)].map(Cell::from));
+        errors.push(names.clone().into_iter().chain(both));
         let energy = |part: &Option<Errors>| {
             part.map_or([Cell::Empty, Cell::Empty, Cell::Empty], |of| of.energy.map(Cell::from))
         };
@@ -52,21 +52,28 @@ pub(super) fn section(results: &Results, measured: &[Measured<'_>]) -> Result<Op
         section.text(
             "The noise of the reference, from two pictures with different seeds: no technique can have a smaller error by this reference.",
         );
-        let mut table = Table::new("noise", "Noise of the reference (%)", ["scene", "direct", "indirect", "total"]);
+        let columns = std::iter::once("scene".to_owned()).chain(both_columns(&PARTS[1..]));
+        let mut table = Table::new("noise", "Noise of the reference (%)", columns);
         for (run, parts) in noise {
-            table.push(std::iter::once(Cell::from(place(run))).chain(parts.map(Cell::from)));
+            let both = parts.iter().flat_map(|part| [0, 1].map(|at| Cell::from(part.map(|of| of[at]))));
+            table.push(std::iter::once(Cell::from(place(run))).chain(both));
         }
         section.add(table);
     }
     Ok(Some(section))
 }
 
+/// For each part, the names of the columns of its two errors.
+fn both_columns(parts: &[(&str, &str)]) -> Vec<String> {
+    parts.iter().flat_map(|(part, _)| ["pixels", "blocks"].map(|of| format!("{part}, {of}"))).collect()
+}
+
 /// Means over the lights.
 fn means(all: &[&Measured<'_>]) -> Table {
     let columns = ["scene", "technique", "lights"].map(str::to_owned).into_iter();
-    let columns = columns.chain(PARTS.map(|(part, _)| format!("{part}, error (%)")));
+    let columns = columns.chain(both_columns(&PARTS).into_iter().map(|name| format!("{name} (%)")));
     let columns = columns.chain(PARTS[1..].iter().map(|(part, _)| format!("{part}, energy")));
-    let columns = columns.chain(["indirect, worst error (%)".to_owned()]);
+    let columns = columns.chain(["indirect, blocks, worst light (%)".to_owned()]);
     let mut table = Table::new("means", "Means over all lights", columns);
     let mut groups: Vec<(String, &str)> =
         all.iter().map(|one| (place(one.case.run), one.case.run.method.as_str())).collect();
@@ -81,9 +88,10 @@ fn means(all: &[&Measured<'_>]) -> Table {
         let of = || all.iter().filter(|one| one.case.run.method == method && place(one.case.run) == scene);
         let part =
             |at: usize, value: &dyn Fn(&Errors) -> f64| mean(of().filter_map(|one| Some(value(&one.parts[at]?))));
-        let worst = of().filter_map(|one| Some(one.parts[2]?.rms)).max_by(f64::total_cmp);
+        let worst = of().filter_map(|one| Some(one.parts[2]?.blocks)).max_by(f64::total_cmp);
         let cells = [scene.as_str().into(), method.into(), of().count().into()];
-        let errors = (0..PARTS.len()).map(|at| Cell::from(part(at, &|of| of.rms)));
+        let errors =
+            (0..PARTS.len()).flat_map(|at| [part(at, &|of| of.rms), part(at, &|of| of.blocks)].map(Cell::from));
         let energies = (1..PARTS.len()).map(|at| Cell::from(part(at, &Errors::energy)));
         table.push(cells.into_iter().chain(errors).chain(energies).chain([worst.into()]));
     }
@@ -102,13 +110,14 @@ fn by_light(all: &[&Measured<'_>]) -> Plot {
         }
     }
     let x = Axis::new("light: x, y, z (m), intensity (W/sr)").names(lights.clone());
-    let mut plot = Plot::new("by-light", format!("Error of the indirect light, {scene}"), x, Axis::new("error (%)"));
+    let mut plot =
+        Plot::new("by-light", format!("Error of the indirect light in blocks, {scene}"), x, Axis::new("error (%)"));
     let mut methods: Vec<&str> = here.iter().map(|one| one.case.run.method.as_str()).collect();
     methods.dedup();
     for method in methods {
         let of = |light: &String| {
             let one = here.iter().find(|one| one.case.run.method == method && one.case.light() == *light);
-            one.and_then(|one| Some(one.parts[2]?.rms)).unwrap_or(f64::NAN)
+            one.and_then(|one| Some(one.parts[2]?.blocks)).unwrap_or(f64::NAN)
         };
         let heights: Vec<f64> = lights.iter().map(of).collect();
         if heights.iter().filter(|height| height.is_finite()).count() > 1 {
@@ -158,7 +167,7 @@ pub(super) fn mean_and_darkness(results: &Results, cases: &[Case<'_>]) -> Result
     section.text(
         "The paper describes direct light around the mean of the examples. The mean has a transfer of its own, which equation 10 leaves out; the tables above \
          have both. With the transfer of the mean, what the vectors do not describe of the mean stays when the light goes off: the room glows. Without it, the light \
-         of the mean is missing in all pictures. Vectors around zero have neither fault: no light is exactly no light.",
+         of the mean is missing in all pictures, and in darkness the light is below zero, which is shown as none. Vectors around zero have neither fault: no light is exactly no light.",
     );
     section.add(table);
     Ok(Some(section))

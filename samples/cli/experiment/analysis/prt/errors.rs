@@ -9,32 +9,49 @@ use crate::experiment::{
     results::{Done, Layer, Results},
 };
 
+/// Side of a block, pixels.
+const BLOCK: usize = 8;
+
 /// Error of a part of the light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in super::super) struct Errors {
     /// Root mean square of the difference over the mean of the truth, %.
     pub rms: f64,
+    /// The same of the means over blocks of 8×8 pixels: without most of the noise of the reference, and with less of what is at edges.
+    pub blocks: f64,
     /// Sum over that of the truth: red, green, blue.
     pub energy: [f64; 3],
 }
 
 impl Errors {
-    /// The errors of these pixels; `None` if the truth is dark. `counts`: the pixels that count.
-    pub fn of(truth: &[[f32; 3]], test: &[[f32; 3]], counts: impl Fn(usize) -> bool) -> Option<Self> {
+    /// The errors of these pixels, rows of `width`; `None` if the truth is dark. `counts`: the pixels that count.
+    pub fn of(width: usize, truth: &[[f32; 3]], test: &[[f32; 3]], counts: impl Fn(usize) -> bool) -> Option<Self> {
+        let columns = width.div_ceil(BLOCK).max(1);
+        let rows = truth.len().div_ceil(width.max(1)).div_ceil(BLOCK);
+        let mut blocks = vec![([0.0f64; 3], 0u32); columns * rows];
         let (mut square, mut number) = (0.0, 0u32);
         let (mut found, mut whole) = ([0.0f64; 3], [0.0f64; 3]);
-        for (_, (truth, test)) in truth.iter().zip(test).enumerate().filter(|(at, _)| counts(*at)) {
-            number += 3;
+        for (at, (truth, test)) in truth.iter().zip(test).enumerate().filter(|(at, _)| counts(*at)) {
+            number += 1;
+            let (off, inside) = &mut blocks[at / width / BLOCK * columns + at % width / BLOCK];
+            *inside += 1;
             for channel in 0..3 {
                 let [a, b] = [truth, test].map(|pixel| f64::from(pixel[channel]));
                 square += (a - b) * (a - b);
+                off[channel] += b - a;
                 found[channel] += b;
                 whole[channel] += a;
             }
         }
-        let mean = whole.iter().sum::<f64>() / f64::from(number.max(1));
+        let values = 3.0 * f64::from(number.max(1));
+        let mean = whole.iter().sum::<f64>() / values;
+        // Each block counts as often as it has pixels.
+        let of_block =
+            |(off, inside): &([f64; 3], u32)| off.iter().map(|off| off * off).sum::<f64>() / f64::from(*inside);
+        let of_blocks: f64 = blocks.iter().filter(|(_, inside)| *inside > 0).map(of_block).sum();
         (mean > 0.0).then(|| Self {
-            rms: 100.0 * (square / f64::from(number)).sqrt() / mean,
+            rms: 100.0 * (square / values).sqrt() / mean,
+            blocks: 100.0 * (of_blocks / values).sqrt() / mean,
             energy: std::array::from_fn(|channel| found[channel] / whole[channel]),
         })
     }
@@ -136,15 +153,16 @@ pub(super) fn measure<'a>(results: &Results, cases: &'a [Case<'a>]) -> Result<Ve
             let [a, b] = [results.picture(Layer(truth, layer))?, results.picture(Layer(case.run, layer))?];
             // Away from the light nothing is lit, whether anything is in between or not.
             let counts = |at: usize| layer != "shadow" || facing.get(at).is_some_and(|pixel| pixel[0] > 0.0);
-            *part = Errors::of(&a.pixels, &b.pixels, counts);
+            *part = Errors::of(a.width as usize, &a.pixels, &b.pixels, counts);
         }
         list.push(Measured { case, parts });
     }
     Ok(list)
 }
 
-/// Noise of a reference, %: from two pictures of it with different seeds, the root mean square of one of them, relative to the mean.
-pub(super) fn noise(results: &Results) -> Result<Vec<(&Done, [Option<f64>; 3])>> {
+/// Noise of a reference, %: from two pictures of it with different seeds, the root mean square of one of them, relative to the mean; of pixels and of
+/// blocks.
+pub(super) fn noise(results: &Results) -> Result<Vec<(&Done, [Option<[f64; 2]>; 3])>> {
     let references: Vec<&Done> = results.with_role(Role::Reference).collect();
     let settings = |run: &Done| -> Result<(Value, Value)> {
         let method = method(results, run)?;
@@ -165,7 +183,8 @@ pub(super) fn noise(results: &Results) -> Result<Vec<(&Done, [Option<f64>; 3])>>
             for (part, (_, layer)) in parts.iter_mut().zip(&PARTS[1..]) {
                 let [a, b] = [results.picture(Layer(run, layer))?, results.picture(Layer(other, layer))?];
                 // The difference of two pictures has the noise of both.
-                *part = Errors::of(&a.pixels, &b.pixels, |_| true).map(|of| of.rms / 2f64.sqrt());
+                let both = Errors::of(a.width as usize, &a.pixels, &b.pixels, |_| true);
+                *part = both.map(|of| [of.rms, of.blocks].map(|error| error / 2f64.sqrt()));
             }
             list.push((*other, parts));
         }

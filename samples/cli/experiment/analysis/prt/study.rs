@@ -26,7 +26,7 @@ const VARIED: [(&str, &str); 5] = [
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Choice {
     pub settings: [f64; 5],
-    /// Relative root mean square errors, %: of the shadow, and of direct, indirect and all light.
+    /// Errors of blocks, %: of the shadow, and of direct, indirect and all light.
     pub errors: [Option<f64>; 4],
     pub megabytes: f64,
     /// Millions of products in a frame.
@@ -91,7 +91,7 @@ fn choices(results: &Results, measured: &[Measured<'_>]) -> Result<Vec<Choice>> 
         let sum = |names: &[&str]| names.iter().filter_map(|name| fact(name)).sum::<f64>() / 1e6;
         list.push(Choice {
             settings,
-            errors: std::array::from_fn(|part| mean(of.iter().filter_map(|one| Some(one.parts[part]?.rms)))),
+            errors: std::array::from_fn(|part| mean(of.iter().filter_map(|one| Some(one.parts[part]?.blocks)))),
             megabytes: sum(&["bytes visibility", "bytes visibility vectors", "bytes basis", "bytes transfer"]),
             products: sum(&["visibility_products", "transfer_products", "basis_products"]),
             frame: mean(times.iter().filter_map(Times::frame)),
@@ -112,7 +112,7 @@ pub(super) fn section(results: &Results, measured: &[Measured<'_>]) -> Result<Op
 fn shown(choices: &[Choice], within: f64) -> Section {
     let mut section = Section::new("The study that the paper leaves open");
     section.text(format!(
-        "Settings of the bake against error, memory and the work of a frame. Errors are means over the lights of the study. Vectors are ordered by the share \
+        "Settings of the bake against error, memory and the work of a frame. Errors are those of blocks of 8×8 pixels, means over the lights of the study. Vectors are ordered by the share \
          that they describe: a row with fewer vectors uses the first ones of a bake with more, so only the numbers of samples a cluster and of directions need \
          bakes of their own. *Memory*: means, coefficients and vectors of the visibility, bases, and transfer. *Products*: for a light of one point, those of \
          the visibility, of the projection and transfer, and of all scatterings; the last of these grow with the square of the number of all vectors. \

@@ -5,14 +5,29 @@ use crate::experiment::{file, kinds};
 fn errors_of_known_pixels() {
     let truth = [[1.0, 2.0, 0.0], [3.0, 2.0, 4.0]];
     let test = [[1.0, 2.0, 0.0], [0.0, 2.0, 2.0]];
-    let errors = Errors::of(&truth, &test, |_| true).unwrap();
+    let errors = Errors::of(2, &truth, &test, |_| true).unwrap();
     // Mean 2, squares 9 and 4 of six values.
     assert!((errors.rms - 100.0 * (13.0f64 / 6.0).sqrt() / 2.0).abs() < 1e-9);
+    // The one block is off by −1.5, 0 and −1.
+    assert!((errors.blocks - 100.0 * (3.25f64 / 3.0).sqrt() / 2.0).abs() < 1e-9);
     assert_eq!(errors.energy, [0.25, 1.0, 0.5]);
     assert!((errors.energy() - 1.75 / 3.0).abs() < 1e-12);
-    let first = Errors::of(&truth, &test, |at| at == 0).unwrap();
-    assert_eq!(first.rms, 0.0);
-    assert_eq!(Errors::of(&[[0.0; 3]], &[[1.0; 3]], |_| true), None);
+    let first = Errors::of(2, &truth, &test, |at| at == 0).unwrap();
+    assert_eq!([first.rms, first.blocks], [0.0, 0.0]);
+    assert_eq!(Errors::of(1, &[[0.0; 3]], &[[1.0; 3]], |_| true), None);
+}
+
+#[test]
+fn noise_leaves_the_blocks() {
+    // A checkerboard of errors around a grey picture, and one block of four that is off.
+    let truth = vec![[1.0; 3]; 256];
+    let sign = |at: usize| if (at / 16 + at % 16).is_multiple_of(2) { 0.1 } else { -0.1 };
+    let noisy: Vec<[f32; 3]> = (0..256).map(|at| [1.0 + sign(at); 3]).collect();
+    let errors = Errors::of(16, &truth, &noisy, |_| true).unwrap();
+    assert!((errors.rms - 10.0).abs() < 1e-4 && errors.blocks < 1e-4, "{errors:?}");
+    let off: Vec<[f32; 3]> = (0..256).map(|at| if at / 16 < 8 && at % 16 < 8 { [1.5; 3] } else { [1.0; 3] }).collect();
+    let errors = Errors::of(16, &truth, &off, |_| true).unwrap();
+    assert!((errors.blocks - 25.0).abs() < 1e-4 && (errors.rms - 25.0).abs() < 1e-4, "{errors:?}");
 }
 
 #[test]

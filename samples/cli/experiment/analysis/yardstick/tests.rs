@@ -5,7 +5,7 @@ use crate::{
 };
 
 fn row(method: &str, rms: f64, frame: f64) -> Row {
-    let error = Some(Errors { rms, energy: [1.0, 0.9, 0.8] });
+    let error = Some(Errors { rms, blocks: rms, energy: [1.0, 0.9, 0.8] });
     Row {
         view: "room, camera".into(),
         method: method.into(),
