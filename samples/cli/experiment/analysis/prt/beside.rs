@@ -25,7 +25,7 @@ pub(super) fn section(results: &Results, measured: &[Measured<'_>]) -> Result<Op
          smooth; of *blocks*, the means over 8×8 pixels, it has little of either. *Shadow* is the share of the light that a point sees, against rays to the light, where the surface faces the light. *Energy* is the sum \
          over that of the reference.",
     );
-    section.add(means(&all));
+    means(&all).into_iter().for_each(|table| section.add(table));
     let mut errors = Table::new(
         "errors",
         "Errors of each picture (%)",
@@ -69,12 +69,14 @@ fn both_columns(parts: &[(&str, &str)]) -> Vec<String> {
 }
 
 /// Means over the lights.
-fn means(all: &[&Measured<'_>]) -> Table {
-    let columns = ["scene", "technique", "lights"].map(str::to_owned).into_iter();
+fn means(all: &[&Measured<'_>]) -> [Table; 2] {
+    let heads = || ["scene", "technique", "lights"].map(str::to_owned).into_iter();
+    let columns = heads();
     let columns = columns.chain(both_columns(&PARTS).into_iter().map(|name| format!("{name} (%)")));
-    let columns = columns.chain(PARTS[1..].iter().map(|(part, _)| format!("{part}, energy")));
     let columns = columns.chain(["indirect, blocks, worst light (%)".to_owned()]);
-    let mut table = Table::new("means", "Means over all lights", columns);
+    let mut table = Table::new("means", "Errors, means over all lights", columns);
+    let columns = heads().chain(PARTS[1..].iter().map(|(part, _)| (*part).to_owned()));
+    let mut energy = Table::new("means-energy", "Energy, means over all lights and channels", columns);
     let mut groups: Vec<(String, &str)> =
         all.iter().map(|one| (place(one.case.run), one.case.run.method.as_str())).collect();
     let mut seen = Vec::new();
@@ -89,13 +91,14 @@ fn means(all: &[&Measured<'_>]) -> Table {
         let part =
             |at: usize, value: &dyn Fn(&Errors) -> f64| mean(of().filter_map(|one| Some(value(&one.parts[at]?))));
         let worst = of().filter_map(|one| Some(one.parts[2]?.blocks)).max_by(f64::total_cmp);
-        let cells = [scene.as_str().into(), method.into(), of().count().into()];
+        let cells = || [scene.as_str().into(), method.into(), of().count().into()].into_iter();
         let errors =
             (0..PARTS.len()).flat_map(|at| [part(at, &|of| of.rms), part(at, &|of| of.blocks)].map(Cell::from));
         let energies = (1..PARTS.len()).map(|at| Cell::from(part(at, &Errors::energy)));
-        table.push(cells.into_iter().chain(errors).chain(energies).chain([worst.into()]));
+        table.push(cells().chain(errors).chain([worst.into()]));
+        energy.push(cells().chain(energies));
     }
-    table
+    [table, energy]
 }
 
 /// Errors of the indirect light by light, for the view with the most lights.

@@ -160,9 +160,12 @@ pub(super) fn measure<'a>(results: &Results, cases: &'a [Case<'a>]) -> Result<Ve
     Ok(list)
 }
 
-/// Noise of a reference, %: from two pictures of it with different seeds, the root mean square of one of them, relative to the mean; of pixels and of
-/// blocks.
-pub(super) fn noise(results: &Results) -> Result<Vec<(&Done, [Option<[f64; 2]>; 3])>> {
+/// Noise of direct, indirect and all light, %: of pixels and of blocks.
+pub(super) type Noise = [Option<[f64; 2]>; 3];
+
+/// Noise of each reference that has pictures with two seeds: the root mean square of the noise of one picture, relative to
+/// the mean.
+pub(super) fn noise(results: &Results) -> Result<Vec<(&Done, Noise)>> {
     let references: Vec<&Done> = results.with_role(Role::Reference).collect();
     let settings = |run: &Done| -> Result<(Value, Value)> {
         let method = method(results, run)?;

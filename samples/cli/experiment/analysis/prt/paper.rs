@@ -4,10 +4,7 @@ use lucerna::Result;
 
 use super::errors::{Case, mean};
 use crate::{
-    experiment::{
-        kinds::Times,
-        results::{Done, Results},
-    },
+    experiment::{kinds::Times, results::Results},
     report::{Cell, Section, Table},
 };
 
@@ -18,10 +15,9 @@ const FRAMES: [f64; 2] = [30.0, 25.0];
 /// The paper's time of the precomputation, hours, about.
 const HOURS: f64 = 4.0;
 
-/// Times and facts of a technique's first picture of the first scene.
-fn first(results: &Results, name: &str) -> Result<Option<(Done, Times)>> {
-    let run = results.of(name).next();
-    run.map(|run| Ok((run.clone(), results.times(run)?))).transpose()
+/// Times and facts of a technique's first picture.
+fn first(results: &Results, name: &str) -> Result<Option<Times>> {
+    results.of(name).next().map(|run| results.times(run)).transpose()
 }
 
 /// Frames of the size of the paper, if the experiment has them.
@@ -49,14 +45,19 @@ pub(super) fn section(results: &Results, cases: &[Case<'_>]) -> Result<Option<Se
          visibility are those of the means and coefficients; the vectors, which a picture needs too, are counted apart here. The paper's transfer of 21 MB \
          holds what it keeps of the coefficients for red, green and blue; the transfer here has no colour, because albedos are applied when a picture is made.",
     );
+    if results.experiment.quick {
+        section.text(
+            "In quick mode all bakes have fewer samples, in smaller clusters, and fewer rays: times and bytes are not those of the experiment proper.",
+        );
+    }
     let asked = |side: &str, path: &str| -> Cell {
         cases.iter().find(|case| case.run.method == side).map(|case| case.number(path)).into()
     };
     let columns = ["quantity", "unit", "paper", SIDES[0].1, SIDES[1].1];
     let mut sizes = Table::new("sizes", "Settings and sizes of the bakes", columns);
-    let both = |of: &dyn Fn(&str, &Option<(Done, Times)>) -> Cell| [0, 1].map(|at| of(SIDES[at].0, &sides[at]));
+    let both = |of: &dyn Fn(&str, Option<&Times>) -> Cell| [0, 1].map(|at| of(SIDES[at].0, sides[at].as_ref()));
     let fact = |name: &'static str, scale: f64| {
-        both(&move |_, side| side.as_ref().and_then(|(_, times)| times.fact(name)).map(|value| value * scale).into())
+        both(&move |_, side| side.and_then(|times| times.fact(name)).map(|value| value * scale).into())
     };
     let setting = |path: &'static str| both(&move |side, _| asked(side, path));
     let rows: [(&str, &str, Option<f64>, [Cell; 2]); 15] = [

@@ -13,6 +13,8 @@ const STUDY: &str = "study";
 /// Presets have an error of at most so many times the smallest one of the study, without a parameter `within` of the experiment.
 const WITHIN: f64 = 1.25;
 
+const PRESETS: [&str; 3] = ["exact", "small", "fast"];
+
 /// Settings of a bake that are varied: heading, and path.
 const VARIED: [(&str, &str); 5] = [
     ("samples a cluster", "/bake/cluster"),
@@ -122,15 +124,14 @@ fn shown(choices: &[Choice], within: f64) -> Section {
     let named = presets(choices, within).unwrap_or([usize::MAX; 3]);
     let front = front(&choices.iter().map(Choice::costs).collect::<Vec<_>>());
     let heads = VARIED.iter().map(|(head, _)| (*head).to_owned());
-    let columns = heads.clone().chain(PARTS.map(|(part, _)| format!("{part}, error (%)")));
+    let columns = heads.clone().chain(PARTS.map(|(part, _)| format!("{part} (%)")));
     let columns = columns.chain(["memory (MB)", "products (10⁶)", "front", "preset"].map(str::to_owned));
     let mut table = Table::new("study", "Settings against errors, memory and work", columns);
     let columns = heads.chain(["frame (ms)", "bake (s)"].map(str::to_owned));
     let mut times = Table::new("study-times", "Measured times", columns).timed();
     for (at, choice) in choices.iter().enumerate() {
         let settings = || choice.settings.iter().map(|value| Cell::from(*value));
-        let preset: Vec<&str> =
-            named.iter().zip(["exact", "small", "fast"]).filter(|(of, _)| **of == at).map(|(_, name)| name).collect();
+        let preset: Vec<&str> = named.iter().zip(PRESETS).filter(|(of, _)| **of == at).map(|(_, name)| name).collect();
         let errors = choice.errors.iter().map(|error| Cell::from(*error));
         let rest: [Cell; 4] = [
             choice.megabytes.into(),
@@ -142,6 +143,15 @@ fn shown(choices: &[Choice], within: f64) -> Section {
         times.push(settings().chain([choice.frame.into(), choice.bake.into()]));
     }
     section.add(table);
+    let columns = ["preset".to_owned()].into_iter().chain(VARIED.iter().map(|(head, _)| (*head).to_owned()));
+    let columns = columns.chain(["error (%)", "memory (MB)", "products (10⁶)"].map(str::to_owned));
+    let mut three = Table::new("presets", "Three presets", columns);
+    for (name, at) in PRESETS.into_iter().zip(named) {
+        let Some(choice) = choices.get(at) else { continue };
+        let settings = choice.settings.iter().map(|value| Cell::from(*value));
+        three.push([name.into()].into_iter().chain(settings).chain(choice.costs().map(Cell::from)));
+    }
+    section.add(three);
     for (id, caption, axis, of) in [
         ("study-memory", "Error against memory", "memory (MB)", (|choice| choice.megabytes) as fn(&Choice) -> f64),
         ("study-work", "Error against the work of a frame", "products (10⁶)", |choice| choice.products),
@@ -153,7 +163,7 @@ fn shown(choices: &[Choice], within: f64) -> Section {
         let (x, y) = (Axis::new(axis).log(), Axis::new("error of all light (%)"));
         let dots = choices.iter().map(|choice| (of(choice), choice.total(), choice.name()));
         let mut plot = Plot::new(id, caption, x, y).named_points("choices", dots).line("front", line);
-        for (name, at) in ["exact", "small", "fast"].into_iter().zip(named) {
+        for (name, at) in PRESETS.into_iter().zip(named) {
             let one = choices.get(at).map(|choice| (of(choice), choice.total(), choice.name()));
             plot = plot.named_points(name, one);
         }

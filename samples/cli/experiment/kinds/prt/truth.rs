@@ -117,16 +117,25 @@ mod tests {
         let projection = Projection::Perspective { yfov: 1.0, aspect: None, znear: 0.1, zfar: Some(100.0) };
         let camera = Camera { name: String::new(), projection };
         let view = View::new(&camera, Mat4::from_translation(Vec3::new(2.0, 0.0, -2.0)), [8, 4]);
-        // Behind the plate as the wall sees it: the wall to the left of x = −2 is dark, the rest is lit.
-        let found = shadows(&bvh, &view, &[Vec3::new(4.0 / 6.0, 0.0, 0.0)]);
-        assert!(found.iter().all(|pixel| pixel[1] == 1.0));
-        let lit: Vec<bool> = found[..8].iter().map(|pixel| pixel[0] == 1.0).collect();
-        assert!(lit.contains(&true), "{found:?}");
-        let first = lit.iter().position(|lit| *lit).unwrap_or(8);
-        assert!(lit[first..].iter().all(|lit| *lit), "{lit:?}");
-        // Half of two lights is hidden by the plate where only one of them is behind it.
-        let both = shadows(&bvh, &view, &[Vec3::new(2.0, 0.0, 0.0), Vec3::new(2.0, 0.0, -6.0)]);
-        assert!(both.iter().all(|pixel| *pixel == [1.0, 1.0]), "a light behind the wall does not count");
+        // From (−0.5, 0, 0) the edge of the plate throws its shadow to x = 1.5 on the wall: on three of eight columns.
+        let hidden = Vec3::new(-0.5, 0.0, 0.0);
+        let dark = |at: usize| at % 8 < 3;
+        for (at, pixel) in shadows(&bvh, &view, &[hidden]).iter().enumerate() {
+            assert_eq!(*pixel, [f32::from(!dark(at)), 1.0], "{at}");
+        }
+        // Another light, which nothing hides, counts with its irradiance.
+        let open = Vec3::new(2.0, 0.0, 0.0);
+        for (at, pixel) in shadows(&bvh, &view, &[hidden, open]).iter().enumerate() {
+            let [x, y] = [(at % 8) as f32 - 3.5, 1.5 - (at / 8) as f32].map(|steps| steps * 0.5f32.tan());
+            let point = Vec3::new(2.0 + x, y, -4.0);
+            let [a, b] = [hidden, open].map(|light| 4.0 / (light - point).length().powi(3));
+            let share = if dark(at) { b / (a + b) } else { 1.0 };
+            assert!((pixel[0] - share).abs() < 1e-3, "{at}: {pixel:?} {share}");
+        }
+        // Behind the wall and without a light nothing faces the light.
+        for lights in [&[Vec3::new(0.0, 0.0, -5.0)][..], &[]] {
+            assert!(shadows(&bvh, &view, lights).iter().all(|pixel| *pixel == [0.0; 2]));
+        }
     }
 
     #[test]
