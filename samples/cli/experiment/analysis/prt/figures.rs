@@ -26,8 +26,9 @@ pub(super) fn bake(results: &Results, cases: &[Case<'_>]) -> Result<Option<Secti
     let showing = |what: &'static str| cases.iter().filter(move |case| case.setting("/show") == what);
     let mut section = Section::new("Figures 1 and 3: the bake");
     section.text(
-        "Figure 1: samples, each in the colour of its own with its neighbourhood, and clusters. Figure 3: the light that one vector of a cluster sends to all samples, \
-         red above zero and blue below. The first vector around zero is even light over its cluster and sends no negative light; all others send both.",
+        "Figure 1: samples, each as a dot in a neighbourhood of its own colour, and clusters. Figure 3: the light that one vector of a cluster sends to all samples, \
+         red above zero and blue below. The first vector around zero is even light over its cluster: below zero is only \
+         what the vectors of the receivers miss. All others send both.",
     );
     let mut colours: Option<Comparison> = None;
     for (what, name) in [("samples", "samples"), ("clusters", "clusters")] {
@@ -90,7 +91,7 @@ pub(super) fn light(results: &Results, cases: &[Case<'_>]) -> Result<Option<Sect
             let id = format!("light-{at}-{}", if layer.is_empty() { "total" } else { layer });
             let mut images = set(id, title, &reference, stops);
             if layer == "shadow" {
-                images = images.values("share of the light");
+                images = images.values("shares of the light");
             }
             images = images.with("path tracer", reference.pixels);
             // The defaults stand first beside the reference.
