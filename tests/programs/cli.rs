@@ -37,6 +37,8 @@ mod igi_experiment;
 mod lucerna;
 #[path = "../cli/prt.rs"]
 mod prt;
+#[path = "../cli/prt_experiment.rs"]
+mod prt_experiment;
 #[path = "../cli/reference.rs"]
 mod reference;
 #[path = "../cli/render.rs"]

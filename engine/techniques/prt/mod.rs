@@ -24,6 +24,7 @@ pub use baked::Baked;
 pub use bakery::{Bakery, Sampled};
 pub use cap::Cap;
 pub use file::{Stored, Summary};
+pub use on_device::points_of_lights;
 pub use plan::{MOST_SAMPLES, Plan, parts, starts};
 pub use samples::Grid;
 pub use settings::{Baking, Direct, PictureSettings, Settings};

@@ -174,7 +174,7 @@ impl OnDevice {
         let samples = graph.import_buffer(&self.samples);
         let direct = graph.buffer("prt.direct", 12 * u64::from(count));
         let visible = graph.buffer("prt.visible", 4 * u64::from(count) * u64::from(light_count.max(1)));
-        let offsets = offsets(settings);
+        let offsets = points_of_lights(settings);
         let args = lit::Args {
             samples,
             clusters: graph.import_buffer(&self.clusters),
@@ -251,8 +251,8 @@ impl OnDevice {
     }
 }
 
-/// The points of a light around its place: evenly on a sphere (a spiral of the golden angle).
-fn offsets(settings: &Settings) -> Vec<[f32; 3]> {
+/// The points of a light around its place, metres: evenly on a sphere (a spiral of the golden angle).
+pub fn points_of_lights(settings: &Settings) -> Vec<[f32; 3]> {
     let count = if settings.radius > 0.0 { settings.points } else { 1 };
     (0..count)
         .map(|i| {

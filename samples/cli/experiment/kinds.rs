@@ -2,6 +2,7 @@
 
 mod daylight;
 mod fiv;
+mod prt;
 mod technique;
 mod tonemap;
 
@@ -188,6 +189,24 @@ pub const KINDS: &[Kind] = &[
         available: || Ok(String::new()),
     },
     Kind {
+        name: "prt",
+        description: "precomputed transfer with its bake, by one lamp (`lamp`) or the scene's; layers direct, indirect, irradiance, shadow",
+        on_device: true,
+        of_images: false,
+        settings: prt::picture_settings,
+        render: prt::picture,
+        available: || Ok(String::new()),
+    },
+    Kind {
+        name: "prt-truth",
+        description: "path tracer on the device by the same lamp, diffuse; layers direct, indirect, shadow, facing",
+        on_device: true,
+        of_images: false,
+        settings: prt::truth_settings,
+        render: prt::truth,
+        available: || Ok(String::new()),
+    },
+    Kind {
         name: "tracer",
         description: "path tracer on the device; layers emission, direct, indirect, albedo, normal, depth, samples, variance",
         on_device: true,
@@ -307,6 +326,7 @@ pub fn on_device(
         if let Some(reading) = reading {
             layers = Some(reading.layers(&frame));
             times.facts = reading.sums(&frame);
+            times.facts.extend(reading.numbers(&frame).into_iter().map(|(name, number)| (name.to_owned(), number)));
         }
         times.wall.push(begun.elapsed().as_secs_f64() * 1e3);
         reports.push(frame.report);

@@ -5,7 +5,9 @@ mod daylight;
 mod fiv;
 mod igi;
 mod isr;
+mod prt;
 mod tonemap;
+mod yardstick;
 
 use lucerna::{Error, Result};
 
@@ -22,7 +24,9 @@ const ANALYSES: &[(&str, Analysis)] = &[
     ("fiv", fiv::analyse),
     ("igi", igi::analyse),
     ("isr", isr::analyse),
+    ("prt", prt::analyse),
     ("tonemap", tonemap::analyse),
+    ("yardstick", yardstick::analyse),
 ];
 
 /// Finds an analysis.

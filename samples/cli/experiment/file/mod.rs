@@ -57,8 +57,10 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ("fiv", include_str!("../../../experiments/fiv.toml")),
     ("igi", include_str!("../../../experiments/igi.toml")),
     ("isr", include_str!("../../../experiments/isr.toml")),
+    ("prt", include_str!("../../../experiments/prt.toml")),
     ("smoke", include_str!("../../../experiments/smoke.toml")),
     ("tonemap", include_str!("../../../experiments/tonemap.toml")),
+    ("yardstick", include_str!("../../../experiments/yardstick.toml")),
 ];
 
 /// Changed settings, by their keys.

@@ -121,6 +121,7 @@ pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rende
     let rendered = bake.render(&gpu, job, &picture)?;
     Ok(rendered.map(|mut rendered| {
         rendered.times.facts.extend(bake.facts.iter().cloned());
+        rendered.times.facts.push(("seconds whole".into(), bake.seconds));
         rendered
     }))
 }
