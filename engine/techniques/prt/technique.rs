@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Baked, Direct as Shadows, PictureSettings, Settings, Stored, on_device::OnDevice};
+use super::{Baked, Direct as Shadows, PictureSettings, Settings, Stored, on_device::OnDevice, spread::Spreader};
 use crate::{
     Error, Result,
     graph::{Format, Graph},
@@ -78,6 +78,7 @@ impl technique::Mode for Mode {
 pub struct Prt {
     baked: Baked,
     light: OnDevice,
+    spreader: Spreader,
 }
 
 impl Prt {
@@ -142,8 +143,8 @@ impl Technique for Prt {
     }
 
     fn prepared_by(settings: &PictureSettings) -> PictureSettings {
-        let Settings { gloss, bounces, mean, .. } = settings.prt;
-        let prt = Settings { gloss, bounces, mean, ..Settings::default() };
+        let Settings { gloss, bounces, mean, spread, .. } = settings.prt;
+        let prt = Settings { gloss, bounces, mean, spread, ..Settings::default() };
         PictureSettings { prt, ..PictureSettings::default() }
     }
 
@@ -158,7 +159,8 @@ impl Technique for Prt {
             return Err(baked.blamed(Error::input(what).help("Name the scene that was baked, or bake this one")));
         }
         let light = OnDevice::new(gpu, scene, &baked.stored, &settings.prt).map_err(|error| baked.blamed(error))?;
-        Ok(Self { baked: baked.clone(), light })
+        let spreader = Spreader::new(gpu, scene, &baked.stored, settings.prt.spread)?;
+        Ok(Self { baked: baked.clone(), light, spreader })
     }
 
     fn frame(&mut self, graph: &mut Graph, moment: &Moment<'_, Mode>, settings: &PictureSettings) -> Result<Picture> {
@@ -199,8 +201,19 @@ impl Technique for Prt {
             ["prt", "prt.direct-light", "prt.indirect", "prt.irradiance", "prt.shadow"].map(|name| image(graph, name));
         // Each pass after the first one adds the light of its lamps.
         graph.clear(of_direct, [0.0; 4]);
-        let passes = if mapped.is_some() { 1 } else { count.div_ceil(consts::PRT_LIGHTS).max(1) };
+        // These pictures show single samples.
+        let single = matches!(mode, Mode::Samples | Mode::Clusters);
+        let spread = if single { None } else { self.spreader.of_view(graph, view, of_prt) };
+        let at_once = if spread.is_some() { self.spreader.lights_at_once() } else { consts::PRT_LIGHTS };
+        let passes = if mapped.is_some() { 1 } else { count.div_ceil(at_once).max(1) };
         for pass in 0..passes {
+            let first_light = pass * at_once;
+            if let Some(spread) = &spread {
+                let lights = [first_light, at_once.min(count - first_light.min(count))];
+                let seen = (view, &gbuffer, &settings.gbuffer);
+                spread.draw(graph, handles, seen, (&self.light, &lit), lights);
+            }
+            let unused = gbuffer.emission;
             let args = pixels::Args {
                 view: gbuffer.view,
                 albedo: gbuffer.albedo,
@@ -208,7 +221,7 @@ impl Technique for Prt {
                 depth: gbuffer.depth,
                 specular: gbuffer.specular,
                 emission: gbuffer.emission,
-                mapped: mapped.unwrap_or(gbuffer.emission),
+                mapped: mapped.unwrap_or(unused),
                 samples: graph.import_buffer(&self.light.samples),
                 grid: graph.uniform(&self.light.grid.grid),
                 starts: graph.import_buffer(&self.light.starts),
@@ -222,14 +235,21 @@ impl Technique for Prt {
                 indirect,
                 irradiance,
                 shadow,
+                spread_light: spread.as_ref().map_or(unused, |spread| spread.sums.light),
+                spread_visible: spread.as_ref().map_or(unused, |spread| spread.sums.visible),
                 push: pixels::Push {
                     count: self.light.count,
                     splat: of_prt.splat,
                     strength: of_prt.strength,
-                    first_light: pass * consts::PRT_LIGHTS,
+                    first_light,
                     last: u32::from(pass + 1 == passes),
                 },
-                spec: pixels::Spec { show, gloss: of_prt.gloss.into(), mapped: mapped.is_some().into() },
+                spec: pixels::Spec {
+                    show,
+                    gloss: of_prt.gloss.into(),
+                    mapped: mapped.is_some().into(),
+                    spread: spread.is_some().into(),
+                },
             };
             graph.compute(args, view.extent);
         }
@@ -246,7 +266,7 @@ impl Technique for Prt {
         };
         let points = if of_prt.radius > 0.0 { of_prt.points } else { 1 };
         let [of_points, of_samples, of_bases] = self.light.products;
-        let picture = Picture::new(shown)
+        let mut picture = Picture::new(shown)
             .color("direct", of_direct)
             .color("indirect", indirect)
             .color("irradiance", irradiance)
@@ -254,6 +274,9 @@ impl Technique for Prt {
             .number("visibility_products", (of_points * u64::from(points * count)) as f64)
             .number("transfer_products", of_samples as f64)
             .number("basis_products", of_bases as f64);
+        if let Some((name, count)) = spread.map(|spread| spread.count()) {
+            picture = picture.number(name, count.into());
+        }
         Ok(picture.showing(gbuffer).noting(notes))
     }
 }
