@@ -25,10 +25,11 @@ void main() {
     if (z >= 1.0) discard;
     vec3 way = screen_position(view, pixel, 1.0, z) - place.xyz;
     // Away from the tangent plane counts more, so that light does not leak over steps and between sheets.
-    float off = dot(way, normal);
+    vec3 n = decode_normal(texelFetch(pixel_normal, pixel, 0));
+    float off = max(abs(dot(way, normal)), abs(dot(way, n)));
     float square = (dot(way, way) + 64.0 * off * off) / (place.w * place.w);
     if (square >= PRT_SPLAT_END * PRT_SPLAT_END) discard;
-    float facing = dot(decode_normal(texelFetch(pixel_normal, pixel, 0)), normal);
+    float facing = dot(n, normal);
     if (facing <= 0.5) discard;
     // Without a step at the rim.
     float weight = (exp(-0.5 * square) - exp(-0.5 * PRT_SPLAT_END * PRT_SPLAT_END)) * facing * facing;

@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-use super::samples::{DENSITY, position};
+use super::samples::position;
 use crate::{
     scene::{View, cull::Aabb, cull::Frustum},
     shaders::{
@@ -17,7 +17,7 @@ const FLAT: f32 = 0.05;
 /// Least cosine of the angle between a node's normal and those of its samples.
 const EVEN: f32 = 0.9;
 /// Largest distance of a node's samples from its middle, in distances of its splats; half the diagonal of a square is 0.7.
-const COMPACT: f32 = 1.2;
+const COMPACT: f32 = 1.4;
 
 /// Trees of all clusters.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -131,10 +131,9 @@ impl Tree {
 
 /// A node of one sample.
 fn leaf(sample: &PrtPoint, first: u32, radius: f32) -> (Node, PrtSplat) {
-    // Curved surfaces and edges have more samples, each with less area; the areas of single samples are uncertain.
-    let spacing = (DENSITY * sample.area).sqrt().clamp(0.6 * radius, 1.5 * radius);
-    let splat = PrtSplat { position: sample.position, spacing, normal: sample.normal, first, count: 1 };
-    (Node { middle: position(sample), bound: 0.0, spacing, merges: true, parts: None }, splat)
+    // Not by the sample's own area: samples that stand for more than others would spread farther than the surface does that they lie on.
+    let splat = PrtSplat { position: sample.position, spacing: radius, normal: sample.normal, first, count: 1 };
+    (Node { middle: position(sample), bound: 0.0, spacing: radius, merges: true, parts: None }, splat)
 }
 
 /// Sorts samples into two parts and returns the number of those in the first one: along the axis in which they differ most, of positions and
@@ -145,10 +144,10 @@ fn split(samples: &[PrtPoint], members: &mut [u32]) -> usize {
         (low, high) = (low.min(position(&samples[*member as usize])), high.max(position(&samples[*member as usize])));
     }
     let size = (high - low).max_element();
-    // Normals that differ by 2 count as positions at both ends.
+    // Planes are parted before places.
     let of = |member: u32, axis: usize| match axis {
         0..3 => samples[member as usize].position[axis],
-        _ => 0.5 * size * samples[member as usize].normal[axis - 3],
+        _ => 2.0 * size * samples[member as usize].normal[axis - 3],
     };
     let extent = |axis: usize| {
         let values = members.iter().map(|member| of(*member, axis));
@@ -195,7 +194,8 @@ mod tests {
         floor
             .chain(wall)
             .map(|([x, y], floor)| {
-                let (at, normal) = if floor { (Vec3::new(x, 0.0, y), Vec3::Y) } else { (Vec3::new(x, y, 0.0), Vec3::Z) };
+                let (at, normal) =
+                    if floor { (Vec3::new(x, 0.0, y), Vec3::Y) } else { (Vec3::new(x, y, 0.0), Vec3::Z) };
                 PrtPoint {
                     position: at.to_array(),
                     side: normal.to_array(),
@@ -209,8 +209,11 @@ mod tests {
 
     fn seen(from: Vec3) -> View {
         let projection = Projection::Perspective { yfov: 0.8, aspect: None, znear: 0.01, zfar: Some(1000.0) };
-        let back = Mat4::look_at_rh(from, Vec3::new(0.5, 0.3, 0.3), Vec3::Y).inverse();
-        View::new(&Camera { name: String::new(), projection }, back, [128, 96])
+        let back = (from - Vec3::new(0.5, 0.3, 0.3)).normalize();
+        let right = Vec3::Y.cross(back).normalize();
+        let axes = [right, back.cross(right), back].map(|axis| axis.extend(0.0));
+        let world = Mat4::from_cols(axes[0], axes[1], axes[2], from.extend(1.0));
+        View::new(&Camera { name: String::new(), projection }, world, [128, 96])
     }
 
     #[test]
@@ -228,7 +231,7 @@ mod tests {
                 let own = &tree.members[splat.first as usize..(splat.first + splat.count) as usize];
                 members.extend(own);
                 // One plane each.
-                assert!(own.iter().all(|m| (samples[*m as usize].normal == samples[own[0] as usize].normal)));
+                assert!(own.iter().all(|m| samples[*m as usize].normal == samples[own[0] as usize].normal));
             }
             members.sort_unstable();
             members.dedup();
@@ -247,7 +250,9 @@ mod tests {
     fn spheres_hold_both_parts() {
         let (a, b) = ((Vec3::ZERO, 1.0), (Vec3::X * 3.0, 0.5));
         let (middle, radius) = around([a, b]);
-        assert!((middle.distance(a.0) + a.1 - radius).abs() < 1e-5 && (middle.distance(b.0) + b.1 - radius).abs() < 1e-5);
+        assert!(
+            (middle.distance(a.0) + a.1 - radius).abs() < 1e-5 && (middle.distance(b.0) + b.1 - radius).abs() < 1e-5
+        );
         assert_eq!(around([a, (Vec3::X * 0.2, 0.3)]), a);
         assert_eq!(around([a, a]), a);
     }

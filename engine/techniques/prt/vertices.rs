@@ -121,8 +121,8 @@ impl Vertices {
             // As in the G-buffer, the first of coplanar surfaces is visible.
             let state = Raster::new().depth_compare(Compare::Greater);
             let state = state.cull(batch.map_or_else(Default::default, |batch| batch.sided.cull()));
-            let draw = batch
-                .map_or_else(|| crate::graph::Draw::indexed(scene.indices, Vec::new()), |batch| batch.draw(scene));
+            let draw =
+                batch.map_or_else(|| crate::graph::Draw::indexed(scene.indices, Vec::new()), |batch| batch.draw(scene));
             graph.raster(targets, state, args, draw);
         }
     }
