@@ -4,21 +4,22 @@ use crate::{
     prt_light::{baked, closed, diffuse, small},
     tracer_lab::{Stage, view},
 };
-use glam::{Vec3, vec3};
+use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::{Graph, Runner},
     image::Layers,
-    scene::{Material, Pose, Scene, View},
+    scene::{Camera, Material, Pose, Projection, Scene, View},
     technique::{Ready, Shot},
-    techniques::prt::{Baked, Baking, PictureSettings, Prt, Spread, Stored},
+    techniques::prt::{Baked, Baking, Direct, PictureSettings, Prt, Spread, Stored},
 };
 
 const WAYS: [Spread; 3] = [Spread::Gather, Spread::Splats, Spread::Vertices];
 
-/// A picture and the numbers of its cost.
+/// A picture, its passes, and the numbers of its cost.
 struct Shown {
     layers: Layers,
+    passes: String,
     numbers: Vec<(&'static str, f64)>,
 }
 
@@ -39,7 +40,8 @@ fn picture(gpu: &Gpu, scene: &Scene, stored: &Stored, view: &View, settings: &Pi
     let picture = ready.frame(&mut graph, (scene, &Pose::rest(scene)), view, Shot::default(), settings).unwrap();
     let reading = picture.read(&mut graph, true, false);
     let frame = Runner::new(gpu).run(&graph).unwrap();
-    Shown { layers: reading.layers(&frame), numbers: reading.numbers(&frame) }
+    let passes = graph.plan().unwrap().list_passes();
+    Shown { layers: reading.layers(&frame), passes, numbers: reading.numbers(&frame) }
 }
 
 fn by(spread: Spread) -> PictureSettings {
@@ -153,5 +155,52 @@ fn far_away_a_splat_stands_for_many_samples() {
         assert!(off.into_iter().all(|off| off < 0.1), "{off:?}");
         // Near samples have splats of their own.
         assert_eq!(sized(1.0, 0.5).number("splats"), sized(1.0, 0.0).number("splats"));
+    });
+}
+
+#[test]
+fn two_eyes_see_what_each_sees_alone_and_share_the_light() {
+    with_gpu(|gpu| {
+        let scene = divided(0.5);
+        let stored = baked(gpu, &scene, &Baking { samples: 1500, rays: 64, examples: 60, ..small() });
+        // The far plane of the camera is its own, so that depths have the same bits in all views.
+        let projection = Projection::Perspective { yfov: 1.2, aspect: None, znear: 0.01, zfar: Some(10.0) };
+        let world = Mat4::from_translation(vec3(-0.2, 1.3, 1.3)) * Mat4::from_rotation_y(-0.3);
+        let [width, height] = [40, 32];
+        let camera = Camera { name: String::new(), projection };
+        let view = View::new(&camera, world, [width, height]);
+        let mut ways = vec![by(Spread::Gather), by(Spread::Splats), by(Spread::Vertices), by(Spread::Gather)];
+        ways[3].prt.direct = Direct::Maps;
+        for mut settings in ways {
+            let singles = [-0.1, 0.1].map(|way| {
+                let there = Mat4::from_translation(way * world.x_axis.truncate()) * world;
+                let expected = View::new(&camera, there, [width, height]);
+                let eye = view.beside(way);
+                let off = eye.position.distance(expected.position);
+                assert!(off < 1e-6 && eye.view_from_world.abs_diff_eq(expected.view_from_world, 1e-6));
+                picture(gpu, &scene, &stored, &eye, &settings)
+            });
+            settings.prt.eyes = 0.2;
+            let both = picture(gpu, &scene, &stored, &view, &settings);
+            assert_eq!([both.layers.width, both.layers.height], [2 * width, height]);
+            assert!(singles[0].layers.layers[0].data != singles[1].layers.layers[0].data);
+            for (index, layer) in both.layers.layers.iter().enumerate() {
+                let of = layer.channels.len();
+                for (i, values) in layer.data.chunks_exact(of).enumerate() {
+                    let (x, y) = (i % (2 * width as usize), i / (2 * width as usize));
+                    let (eye, x) = (x / width as usize, x % width as usize);
+                    let alone = &singles[eye].layers.layers[index];
+                    let at = (y * width as usize + x) * of;
+                    assert_eq!(values, &alone.data[at..at + of], "{} at {x} {y} of eye {eye}", layer.name);
+                }
+            }
+            let count = |passes: &str, of: &str| passes.split_whitespace().filter(|word| *word == of).count();
+            let of = |name: &str| count(&both.passes, name);
+            assert_eq!((of("prt.lit"), of("prt.lit#2"), of("prt.pixels"), of("prt.pixels#2")), (1, 0, 1, 1));
+            assert_eq!(of("prt.at_vertices#2"), 0);
+            if settings.prt.spread == Spread::Splats {
+                assert_eq!(both.number("splats"), singles[0].number("splats") + singles[1].number("splats"));
+            }
+        }
     });
 }

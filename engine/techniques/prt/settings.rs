@@ -131,6 +131,9 @@ pub struct Settings {
     /// Least distance of splats on the picture: farther away, one splat stands for several samples of a plane. 0: each sample has its own.
     #[schemars(range(min = 0, max = 64), extend("x-unit" = "px", "x-needs" = {"spread": {"const": "splats"}}))]
     pub splat_pixels: f32,
+    /// Distance of two eyes: left and right view side by side, each of the picture's size, with the camera between them. Both look straight ahead. 0: one view.
+    #[schemars(range(min = 0, max = 10), extend("x-unit" = "m"))]
+    pub eyes: f32,
     /// Direct light has highlights. If off, Lambert's law alone.
     pub gloss: bool,
     /// Scatterings of the light: all of them, or one.
@@ -158,6 +161,7 @@ impl Default for Settings {
             splat: 0.6,
             spread: Spread::default(),
             splat_pixels: 2.0,
+            eyes: 0.0,
             gloss: true,
             bounces: true,
             mean: true,

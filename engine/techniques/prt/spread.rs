@@ -9,7 +9,7 @@ use super::{
 use crate::{
     Result,
     gpu::Gpu,
-    graph::{Extent, Format, Graph, Image},
+    graph::{Buffer, Extent, Format, Graph, Image},
     passes::gbuffer::{self, GBuffer},
     resident::Handles,
     scene::{Scene, View},
@@ -55,33 +55,71 @@ impl Spreader {
         Ok(Self { way, format })
     }
 
-    /// Lights whose visibility reaches the pixels in one pass.
-    pub fn lights_at_once(&self) -> u32 {
-        match self.way {
-            Way::Gather => consts::PRT_LIGHTS,
-            Way::Splats(_) | Way::Vertices(_) => consts::PRT_SPREAD_LIGHTS,
+    /// The light that all views of a frame spread.
+    pub fn light<'a>(
+        &'a self,
+        graph: &mut Graph,
+        scene: &Handles,
+        lit: (&'a OnDevice, &'a Lit),
+        settings: &Settings,
+    ) -> Spreading<'a> {
+        let count = scene.moment.lights.len() as u32;
+        let mut spreading = Spreading { spreader: self, lit, at_once: consts::PRT_LIGHTS, values: Vec::new() };
+        if !matches!(self.way, Way::Gather) {
+            spreading.at_once = consts::PRT_SPREAD_LIGHTS;
         }
+        if let Way::Vertices(vertices) = &self.way {
+            let passes = spreading.passes(count);
+            let lights = (0..passes).map(|pass| spreading.lights(pass, count));
+            spreading.values = lights.map(|lights| vertices.light(graph, scene, lit, lights, settings.splat)).collect();
+        }
+        spreading
+    }
+}
+
+/// The light of the samples of a frame on its way to the pixels.
+#[derive(Clone, Debug)]
+pub struct Spreading<'a> {
+    spreader: &'a Spreader,
+    lit: (&'a OnDevice, &'a Lit),
+    /// Lights whose visibility reaches the pixels in one pass.
+    at_once: u32,
+    /// Light at the vertices in each pass.
+    values: Vec<Buffer>,
+}
+
+impl Spreading<'_> {
+    /// Passes over the pixels for this number of lights.
+    pub fn passes(&self, lights: u32) -> u32 {
+        lights.div_ceil(self.at_once).max(1)
     }
 
-    /// The way for one view. Pixels of views gather by themselves where this is `None`.
+    /// Number of the first light of a pass, and the number of its lights.
+    pub fn lights(&self, pass: u32, count: u32) -> [u32; 2] {
+        let first = pass * self.at_once;
+        [first, self.at_once.min(count - first.min(count))]
+    }
+
+    /// The way to the pixels of one view. `None`: the pixels gather by themselves.
     pub fn of_view(&self, graph: &mut Graph, view: &View, settings: &Settings) -> Option<OfView<'_>> {
-        let way = match &self.way {
+        let way = match &self.spreader.way {
             Way::Gather => return None,
             Way::Splats(splats) => OfWay::Splats(splats.seen(graph, view, settings.splat_pixels, settings.splat)),
             Way::Vertices(vertices) => OfWay::Vertices(vertices),
         };
-        let image = |graph: &mut Graph, name: &str| graph.image(name, self.format, Extent::from(view.extent)).nearest();
+        let extent = Extent::from(view.extent);
+        let image = |graph: &mut Graph, name: &str| graph.image(name, self.spreader.format, extent).nearest();
         let sums = Sums { light: image(graph, "prt.sum-light"), visible: image(graph, "prt.sum-visible") };
-        Some(OfView { way, sums, splat: settings.splat })
+        Some(OfView { way, sums, spreading: self })
     }
 }
 
-/// A way of spreading light for one view.
+/// The way of the light to the pixels of one view.
 #[derive(Debug)]
 pub struct OfView<'a> {
     way: OfWay<'a>,
     pub sums: Sums,
-    splat: f32,
+    spreading: &'a Spreading<'a>,
 }
 
 #[derive(Debug)]
@@ -91,19 +129,19 @@ enum OfWay<'a> {
 }
 
 impl OfView<'_> {
-    /// Fills the sums. `lights`: number of the first one whose visibility is summed, and their number.
+    /// Fills the sums with the light of a pass.
     pub fn draw(
         &self,
         graph: &mut Graph,
         scene: &Handles,
         (view, gbuffer, settings): (&View, &GBuffer, &gbuffer::Settings),
-        lit: (&OnDevice, &Lit),
-        lights: [u32; 2],
+        pass: u32,
     ) {
+        let lights = self.spreading.lights(pass, scene.moment.lights.len() as u32);
         match &self.way {
-            OfWay::Splats(seen) => seen.draw(graph, gbuffer, lit, lights, self.sums),
+            OfWay::Splats(seen) => seen.draw(graph, gbuffer, self.spreading.lit, lights, self.sums),
             OfWay::Vertices(vertices) => {
-                let values = vertices.light(graph, scene, lit, lights, self.splat);
+                let values = self.spreading.values[pass as usize];
                 vertices.draw(graph, scene, (view, gbuffer, settings), values, self.sums);
             }
         }
