@@ -17,7 +17,7 @@ use lucerna::{
     },
 };
 
-fn small() -> Baking {
+pub fn small() -> Baking {
     Baking {
         samples: 3000,
         cluster: 250,
@@ -35,7 +35,7 @@ fn sampled(gpu: &Gpu, scene: &Scene, baking: &Baking) -> Result<(Bakery, Sampled
     Ok((bakery, sampled))
 }
 
-fn baked(gpu: &Gpu, scene: &Scene, baking: &Baking) -> Stored {
+pub fn baked(gpu: &Gpu, scene: &Scene, baking: &Baking) -> Stored {
     let (bakery, sampled) = sampled(gpu, scene, baking).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let job = units::job(&sampled.plan, &sampled.samples, "device").unwrap();
@@ -47,7 +47,7 @@ fn baked(gpu: &Gpu, scene: &Scene, baking: &Baking) -> Stored {
 }
 
 /// The inside of a box of 2×2×2 m with a lamp in it.
-fn closed(albedo: Vec3) -> Scene {
+pub fn closed(albedo: Vec3) -> Scene {
     let mut stage = Stage::new();
     let wall = stage.material(Material::diffuse("wall", albedo));
     stage.cuboid(wall, Vec3::splat(-1.0), Vec3::ONE, true);
@@ -56,7 +56,7 @@ fn closed(albedo: Vec3) -> Scene {
 }
 
 /// A room with a red wall and a block in it.
-fn room() -> Scene {
+pub fn room() -> Scene {
     let mut stage = Stage::new();
     let white = stage.material(Material::diffuse("white", Vec3::splat(0.7)));
     let red = stage.material(Material::diffuse("red", vec3(0.7, 0.1, 0.1)));
@@ -84,7 +84,7 @@ fn picture(gpu: &Gpu, scene: &Scene, stored: &Stored, view: &View, settings: &Pi
     reading.layers(&frame)
 }
 
-fn diffuse() -> PictureSettings {
+pub fn diffuse() -> PictureSettings {
     let mut settings = PictureSettings::default();
     settings.prt.gloss = false;
     settings

@@ -25,6 +25,8 @@ pub struct Caps {
     /// [`super::GpuOptions::ray_query`] does not forbid it.
     pub ray_query: bool,
     pub float_atomic_add: bool,
+    /// Colour targets of four floats can be blended.
+    pub blend_float32: bool,
     pub sampled_array_dynamic_indexing: bool,
     pub storage_read_without_format: bool,
     pub storage_write_without_format: bool,
@@ -80,6 +82,11 @@ impl Caps {
                 has.optimal_tiling_features
                     .contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT | vk::FormatFeatureFlags::SAMPLED_IMAGE)
             });
+        // SAFETY: query of a physical device of a living instance.
+        let floats = unsafe {
+            instance.get_physical_device_format_properties(candidate.physical, vk::Format::R32G32B32A32_SFLOAT)
+        };
+        let blends = vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND;
         Self {
             kind: candidate.facts.kind,
             subgroup_size: candidate.subgroup_size,
@@ -92,6 +99,7 @@ impl Caps {
             multiview: on(f.v11.multiview),
             image_cube_array: on(f.core.image_cube_array),
             ray_query,
+            blend_float32: floats.optimal_tiling_features.contains(blends),
             float_atomic_add: on(f.float_atomics.shader_buffer_float32_atomic_add),
             sampled_array_dynamic_indexing: on(f.core.shader_sampled_image_array_dynamic_indexing),
             storage_read_without_format: on(f.core.shader_storage_image_read_without_format),

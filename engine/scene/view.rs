@@ -101,6 +101,17 @@ impl View {
         self
     }
 
+    /// The same camera, moved to its right by `metres`.
+    #[must_use]
+    pub fn beside(mut self, metres: f32) -> Self {
+        let [right, up, forward] = self.axes();
+        self.position += metres * right;
+        let axes = [right, up, -forward].map(|axis| axis.extend(0.0));
+        self.view_from_world = rigid_inverse(Mat4::from_cols(axes[0], axes[1], axes[2], self.position.extend(1.0)));
+        self.clip_from_world = self.clip_from_view * self.view_from_world;
+        self
+    }
+
     fn set_range(&mut self, near: f32, far: f32) {
         self.near = if near.is_finite() { near } else { 0.01 };
         if matches!(self.projection, Projection::Perspective { .. }) {

@@ -1,5 +1,4 @@
-// Light of the samples at the pixels: a mean over the samples around a point, with Gaussian weights, of the same surface. Each
-// pixel gathers the sum that elliptical splats would add up, so that the sum of the weights is one and no order of drawing matters.
+// Light at the pixels: the light of the samples is gathered around each pixel, or comes from images (SPREAD), and lights the surface.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -18,6 +17,8 @@ layout(constant_id = 0) const uint SHOW = PRT_SHOW_LIGHT;
 layout(constant_id = 1) const uint GLOSS = 1u;
 // 1: direct light by shadow maps is in `mapped`.
 layout(constant_id = 2) const uint MAPPED = 0u;
+// 1: splats or vertices have left sums of weighted light in `spread_light` and `spread_visible`. Pixels that they missed are gathered.
+layout(constant_id = 3) const uint SPREAD = 0u;
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D albedo;
@@ -38,6 +39,8 @@ layout(binding = 15, rgba16f) uniform image2D direct;
 layout(binding = 16, rgba16f) uniform writeonly image2D indirect;
 layout(binding = 18, rgba16f) uniform writeonly image2D irradiance;
 layout(binding = 19, rgba16f) uniform writeonly image2D shadow;  // share of the first light that is seen
+layout(binding = 20) uniform sampler2D spread_light;    // rgb: irradiance times weight; a: weight
+layout(binding = 21) uniform sampler2D spread_visible;  // shares of PRT_SPREAD_LIGHTS lights times weight
 
 layout(push_constant, scalar) uniform Push {
     uint count;        // samples
@@ -47,61 +50,22 @@ layout(push_constant, scalar) uniform Push {
     uint last;         // 1: the last pass, which adds the indirect light
 };
 
-// The light of the samples around a point.
-struct PrtNear {
-    vec3 irradiance;
-    float visible[PRT_LIGHTS];
-    uint nearest;
-    float away;        // of the nearest one, in distances of samples
-};
+#include "prt/near.glsl"
 
-PrtNear near_samples(vec3 position, vec3 n) {
-    PrtNear found;
-    found.irradiance = vec3(0.0);
-    found.nearest = NONE;
-    found.away = 1e30;
-    float lights[PRT_LIGHTS];
-    uint used = min(light_count - min(first_light, light_count), PRT_LIGHTS);
-    for (uint l = 0u; l < PRT_LIGHTS; ++l) lights[l] = 0.0;
-    float sum = 0.0;
-    float inverse = 0.5 / (splat * splat * grid.radius * grid.radius);
-    ivec3 middle = ivec3(floor((position - grid.origin) / grid.cell));
-    ivec3 low = max(middle - 1, ivec3(0)), high = min(middle + 1, ivec3(grid.counts) - 1);
-    // First with samples that face as the pixel does; a leaf or an edge may have none.
-    for (uint turn = 0u; turn < 2u && sum <= 0.0; ++turn) {
-        for (int z = low.z; z <= high.z; ++z) {
-            for (int y = low.y; y <= high.y; ++y) {
-                if (low.x > high.x) continue;
-                uint row = prt_cell(grid, ivec3(low.x, y, z));
-                uint to = starts[row + uint(high.x - low.x) + 1u];
-                for (uint k = starts[row]; k < to; ++k) {
-                    uint i = order[k];
-                    vec3 way = samples[i].position - position;
-                    float facing = dot(samples[i].normal, n);
-                    float square = dot(way, way);
-                    if (facing <= (turn == 0u ? 0.5 : 0.0)) continue;
-                    // Away from the tangent plane counts more, so that light does not leak over steps and between sheets.
-                    float off = dot(way, n);
-                    square += 64.0 * off * off;
-                    float weight = exp(-square * inverse) * facing * facing;
-                    if (turn == 1u) weight += 1e-12 / (1e-9 + square);
-                    if (square < found.away) {
-                        found.away = square;
-                        found.nearest = i;
-                    }
-                    if (weight < 1e-9 && turn == 0u) continue;
-                    sum += weight;
-                    found.irradiance += weight * irradiances[i];
-                    for (uint l = 0u; l < used; ++l) lights[l] += weight * visible[(first_light + l) * count + i];
-                }
-            }
+PrtNear light_around(ivec2 pixel, vec3 position, vec3 n, uint lights) {
+    if (SPREAD != 0u) {
+        vec4 sum = texelFetch(spread_light, pixel, 0);
+        if (sum.a >= PRT_LEAST_WEIGHT) {
+            vec4 seen = texelFetch(spread_visible, pixel, 0) / sum.a;
+            PrtNear found;
+            found.irradiance = sum.rgb / sum.a;
+            for (uint l = 0u; l < PRT_LIGHTS; ++l) found.visible[l] = l < 4u ? seen[l] : 0.0;
+            found.nearest = NONE;
+            found.away = 0.0;
+            return found;
         }
     }
-    float scale = sum > 0.0 ? 1.0 / sum : 0.0;
-    found.irradiance *= scale;
-    for (uint l = 0u; l < PRT_LIGHTS; ++l) found.visible[l] = lights[l] * scale;
-    found.away = sqrt(found.away) / grid.radius;
-    return found;
+    return near_samples(position, n, PrtKernel(splat, count, first_light, lights));
 }
 
 vec3 color_of(uint number) {
@@ -131,7 +95,9 @@ void main() {
     vec4 color = texelFetch(albedo, pixel, 0);
     vec3 n = decode_normal(texelFetch(normal, pixel, 0));
     vec3 p = screen_position(view, pixel, 1.0, z);
-    PrtNear found = near_samples(p, n);
+    uint at_once = SPREAD != 0u ? PRT_SPREAD_LIGHTS : PRT_LIGHTS;
+    uint lights = min(light_count - min(first_light, light_count), at_once);
+    PrtNear found = light_around(pixel, p, n, lights);
     if (SHOW == PRT_SHOW_SAMPLES || SHOW == PRT_SHOW_CLUSTERS) {
         vec3 shown = vec3(0.0);
         if (found.nearest != NONE) {
@@ -157,7 +123,7 @@ void main() {
         vec3 v = to_camera(view, p);
         Brdf brdf = brdf_of(color.rgb, GLOSS != 0u ? gloss.rgb : vec3(0.0), gloss.a, dot(n, v));
         lit = first_light == 0u ? texelFetch(emission, pixel, 0).rgb : imageLoad(direct, pixel).rgb;
-        for (uint l = 0u; l < PRT_LIGHTS && first_light + l < light_count; ++l) {
+        for (uint l = 0u; l < lights; ++l) {
             Light one = light(first_light + l);
             if (one.kind == LIGHT_DIRECTIONAL) continue;
             vec3 to_light;

@@ -11,6 +11,12 @@ const uint PRT_LOST = 0xfffffffeu; // export
 const uint PRT_LIGHTS = 8u; // export
 // Scatterings of the paths that a bake is compared with.
 const uint PRT_CHECK_BOUNCES = 256u;
+// Lights whose visibility splats and vertices carry to the pixels at once: the channels of an image.
+const uint PRT_SPREAD_LIGHTS = 4u; // export
+// Sums of weights below this one are too small to divide by.
+const float PRT_LEAST_WEIGHT = 1e-3; // export
+// Standard deviations at which a splat ends.
+const float PRT_SPLAT_END = 3.0; // export
 // Kinds of pictures.
 const uint PRT_SHOW_LIGHT = 0u; // export
 const uint PRT_SHOW_SAMPLES = 1u; // export
@@ -48,6 +54,21 @@ struct PrtCap {
     uint first_row;     // of the rows of its directions, in words
     uint first_sample_row; // of the rows of its samples, in words
     uint words;         // of a row: 1 and the coefficients of a sample, or the mean and the vectors of a direction; halves
+};
+
+// A disc on a surface that carries the light of a sample, or of several samples of a plane.
+struct PrtSplat {
+    vec3 position;      // metres
+    float spacing;      // distance of such splats on a plane, metres
+    vec3 normal;        // unit
+    uint first;         // of its samples in the list of members
+    uint count;
+};
+
+// Where the light at the vertices of an instance lies.
+struct PrtMesh {
+    uint first;         // of its values
+    uint sides;         // 1, or 2 for double-sided surfaces: front and back of each vertex
 };
 
 uint prt_cell(PrtGrid grid, ivec3 at) {

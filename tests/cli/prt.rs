@@ -79,13 +79,25 @@ fn shards_and_one_run_give_the_same_bytes_and_a_finished_bake_renders() {
     }
     assert!(of("none.exr", &["-D", "prt.strength=0"]).iter().all(|value| *value == 0.0));
     // An other colour of the left wall.
-    let words = [&["render", "--bake", "room.prt", "--size", "32x24", "-o", "no.png"][..], &SCENE].concat();
-    lab.run(&[&words[..], &["--set", "nothing.albedo=1"]].concat()).expect(2, &["--set", "there is no material"]);
-    lab.run(&[&words[..], &["-D", "prt.vector=100000", "--mode", "transfer"]].concat()).expect(2, &["prt.vector"]);
+    let picture = [&["render", "--bake", "room.prt", "--size", "32x24", "-o", "no.png"][..], &SCENE].concat();
+    lab.run(&[&picture[..], &["--set", "nothing.albedo=1"]].concat()).expect(2, &["--set", "there is no material"]);
+    lab.run(&[&picture[..], &["-D", "prt.vector=100000", "--mode", "transfer"]].concat()).expect(2, &["prt.vector"]);
+    for (words, what) in [
+        (["-D", "prt.spread=dots"], "expected one of `gather`, `splats`, `vertices`"),
+        (["-D", "prt.splat_pixels=-1"], "0 to 64"),
+        (["-D", "prt.eyes=11"], "0 to 10"),
+    ] {
+        lab.run(&[&picture[..], &words].concat()).expect(2, &[what]);
+    }
     for mode in ["samples", "clusters", "transfer", "shadow", "direct", "indirect"] {
         let picture = lab.picture(&format!("{mode}.exr"), &["--mode", mode]);
         assert!(picture.iter().any(|value| *value > 0.0), "{mode}");
     }
+    // Two eyes are side by side, and such a picture can be made again from its metadata.
+    let both = lab.picture("eyes.exr", &["-D", "prt.eyes=0.1", "-D", "prt.spread=splats"]);
+    assert_eq!(both.len(), 2 * 3 * 32 * 24);
+    let mut rerun = command(env!("CARGO_BIN_EXE_lucerna"));
+    ran(rerun.current_dir(lab.0.path()).args(["rerun", "eyes.exr"])).expect(0, &[]);
 }
 
 #[test]

@@ -5,3 +5,6 @@ mod tracer_lab;
 
 #[path = "../prt_light.rs"]
 mod prt_light;
+
+#[path = "../prt_pixels.rs"]
+mod prt_pixels;

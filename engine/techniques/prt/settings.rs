@@ -92,6 +92,19 @@ pub enum Direct {
     Maps,
 }
 
+/// How the light of the samples reaches the pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Spread {
+    /// Each pixel takes the mean over the samples around it.
+    #[default]
+    Gather,
+    /// Samples are drawn as discs on their surfaces, as in the paper.
+    Splats,
+    /// Each vertex takes the mean over the samples around it, and pixels interpolate: for finely divided meshes.
+    Vertices,
+}
+
 /// Settings of pictures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -113,6 +126,14 @@ pub struct Settings {
     /// Distance at which a sample has lost most of its part in a pixel, in distances of samples.
     #[schemars(range(min = 0.3, max = 1))]
     pub splat: f32,
+    /// How the light of the samples reaches the pixels.
+    pub spread: Spread,
+    /// Least distance of splats on the picture: farther away, one splat stands for several samples of a plane. 0: each sample has its own.
+    #[schemars(range(min = 0, max = 64), extend("x-unit" = "px", "x-needs" = {"spread": {"const": "splats"}}))]
+    pub splat_pixels: f32,
+    /// Distance of two eyes: left and right view side by side, each of the picture's size, with the camera between them. Both look straight ahead. 0: one view.
+    #[schemars(range(min = 0, max = 10), extend("x-unit" = "m"))]
+    pub eyes: f32,
     /// Direct light has highlights. If off, Lambert's law alone.
     pub gloss: bool,
     /// Scatterings of the light: all of them, or one.
@@ -138,6 +159,9 @@ impl Default for Settings {
             bias: 0.06,
             bias_distance: 1.0,
             splat: 0.6,
+            spread: Spread::default(),
+            splat_pixels: 2.0,
+            eyes: 0.0,
             gloss: true,
             bounces: true,
             mean: true,

@@ -2,17 +2,17 @@
 
 use glam::Vec3;
 
-use super::{Baked, Direct as Shadows, PictureSettings, Settings, Stored, on_device::OnDevice};
+use super::{
+    Baked, PictureSettings, Settings, Stored, eyes,
+    on_device::OnDevice,
+    pixels::{Drawing, Shown},
+    spread::Spreader,
+};
 use crate::{
     Error, Result,
-    graph::{Format, Graph},
-    passes::{
-        direct::{self, Direct, Lights},
-        gbuffer, shadow, skybox,
-    },
+    graph::Graph,
     scene::{LightKind, Note, NoteKind, Scene},
     settings::{Described, Description, idle_notes},
-    shaders::{consts, prt::pixels},
     technique::{self, Making, Moment, Picture, Technique},
 };
 
@@ -78,6 +78,7 @@ impl technique::Mode for Mode {
 pub struct Prt {
     baked: Baked,
     light: OnDevice,
+    spreader: Spreader,
 }
 
 impl Prt {
@@ -142,8 +143,8 @@ impl Technique for Prt {
     }
 
     fn prepared_by(settings: &PictureSettings) -> PictureSettings {
-        let Settings { gloss, bounces, mean, .. } = settings.prt;
-        let prt = Settings { gloss, bounces, mean, ..Settings::default() };
+        let Settings { gloss, bounces, mean, spread, .. } = settings.prt;
+        let prt = Settings { gloss, bounces, mean, spread, ..Settings::default() };
         PictureSettings { prt, ..PictureSettings::default() }
     }
 
@@ -155,7 +156,8 @@ impl Technique for Prt {
         };
         baked.of(scene)?;
         let light = OnDevice::new(gpu, scene, &baked.stored, &settings.prt).map_err(|error| baked.blamed(error))?;
-        Ok(Self { baked: baked.clone(), light })
+        let spreader = Spreader::new(gpu, scene, &baked.stored, settings.prt.spread)?;
+        Ok(Self { baked: baked.clone(), light, spreader })
     }
 
     fn frame(&mut self, graph: &mut Graph, moment: &Moment<'_, Mode>, settings: &PictureSettings) -> Result<Picture> {
@@ -165,14 +167,7 @@ impl Technique for Prt {
         let mode = moment.shot.mode;
         let lights = &handles.moment.lights;
         let count = lights.len() as u32;
-        let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
         let mut lit = self.light.light(graph, &self.baked.stored.plan, (handles.lights, count), of_prt);
-        let show = match mode {
-            Mode::Samples => consts::PRT_SHOW_SAMPLES,
-            Mode::Clusters => consts::PRT_SHOW_CLUSTERS,
-            Mode::Transfer => consts::PRT_SHOW_TRANSFER,
-            _ => consts::PRT_SHOW_LIGHT,
-        };
         if mode == Mode::Transfer {
             let all = self.light.vectors();
             if of_prt.vector >= all {
@@ -185,72 +180,28 @@ impl Technique for Prt {
             lit.irradiances = self.light.receive(graph, one);
         }
         let mut notes = [moment.notes, &left_out(moment.scene), &idle_notes("shadow", &settings.shadow)].concat();
-        let mapped = (of_prt.direct == Shadows::Maps && show == consts::PRT_SHOW_LIGHT).then(|| {
-            let shadows = shadow::draw(graph, handles, view, &settings.shadow);
-            notes.extend(shadows.notes.iter().cloned());
-            let choices = Direct { paper_law: false, specular: of_prt.gloss, light_radius: 0.0, light_power: 1.0 };
-            direct::light(graph, &gbuffer, Lights::from(&shadows), &choices).direct
-        });
-        let image = |graph: &mut Graph, name: &str| graph.image(name, Format::RGBA16F, view.extent);
-        let [total, of_direct, indirect, irradiance, shadow] =
-            ["prt", "prt.direct-light", "prt.indirect", "prt.irradiance", "prt.shadow"].map(|name| image(graph, name));
-        // Each pass after the first one adds the light of its lamps.
-        graph.clear(of_direct, [0.0; 4]);
-        let passes = if mapped.is_some() { 1 } else { count.div_ceil(consts::PRT_LIGHTS).max(1) };
-        for pass in 0..passes {
-            let args = pixels::Args {
-                view: gbuffer.view,
-                albedo: gbuffer.albedo,
-                normal: gbuffer.normal,
-                depth: gbuffer.depth,
-                specular: gbuffer.specular,
-                emission: gbuffer.emission,
-                mapped: mapped.unwrap_or(gbuffer.emission),
-                samples: graph.import_buffer(&self.light.samples),
-                grid: graph.uniform(&self.light.grid.grid),
-                starts: graph.import_buffer(&self.light.starts),
-                order: graph.import_buffer(&self.light.order),
-                irradiances: lit.irradiances,
-                visible: lit.visible,
-                clusters: graph.import_buffer(&self.light.clusters),
-                lights: handles.lights,
-                total,
-                direct: of_direct,
-                indirect,
-                irradiance,
-                shadow,
-                push: pixels::Push {
-                    count: self.light.count,
-                    splat: of_prt.splat,
-                    strength: of_prt.strength,
-                    first_light: pass * consts::PRT_LIGHTS,
-                    last: u32::from(pass + 1 == passes),
-                },
-                spec: pixels::Spec { show, gloss: of_prt.gloss.into(), mapped: mapped.is_some().into() },
-            };
-            graph.compute(args, view.extent);
-        }
-        if show == consts::PRT_SHOW_LIGHT {
-            skybox::draw(graph, handles, &gbuffer, Vec3::ZERO, total);
-            skybox::draw(graph, handles, &gbuffer, Vec3::ZERO, of_direct);
-        }
-        let shown = match mode {
-            Mode::Total | Mode::Samples | Mode::Clusters | Mode::Transfer => total,
-            Mode::Direct => of_direct,
-            Mode::Indirect => indirect,
-            Mode::Irradiance => irradiance,
-            Mode::Shadow => shadow,
+        let spread = self.spreader.light(graph, handles, (&self.light, &lit), of_prt);
+        let drawing = Drawing { light: &self.light, lit: &lit, spread, handles, settings, mode };
+        let shown = if of_prt.eyes > 0.0 {
+            let eyes = [-0.5, 0.5].map(|side| drawing.draw(graph, &view.beside(side * of_prt.eyes), &mut notes));
+            eyes::side_by_side(graph, eyes, mode, moment.shot.layers)
+        } else {
+            drawing.draw(graph, view, &mut notes)
         };
         let points = if of_prt.radius > 0.0 { of_prt.points } else { 1 };
         let [of_points, of_samples, of_bases] = self.light.products;
-        let picture = Picture::new(shown)
-            .color("direct", of_direct)
-            .color("indirect", indirect)
-            .color("irradiance", irradiance)
-            .color("shadow", shadow)
+        let Shown { gbuffer, images, counted } = shown;
+        let mut picture = Picture::new(images.of(mode))
+            .color("direct", images.direct)
+            .color("indirect", images.indirect)
+            .color("irradiance", images.irradiance)
+            .color("shadow", images.shadow)
             .number("visibility_products", (of_points * u64::from(points * count)) as f64)
             .number("transfer_products", of_samples as f64)
             .number("basis_products", of_bases as f64);
+        if let Some((name, number)) = counted {
+            picture = picture.number(name, f64::from(number));
+        }
         Ok(picture.showing(gbuffer).noting(notes))
     }
 }

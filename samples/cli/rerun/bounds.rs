@@ -31,7 +31,9 @@ fn over(place: &str, asked: u64, allowed: u64, what: &str) -> Result<()> {
 /// # Errors
 /// `Input`, with the number that is too large.
 pub fn check(record: &Record, extent: [u32; 2], long: bool) -> Result<()> {
-    let [width, height] = [record.width, record.height];
+    // Two eyes of `prt` are side by side.
+    let views = 1 + u32::from(record.settings["prt"]["eyes"].as_f64().is_some_and(|apart| apart > 0.0));
+    let [width, height] = [record.width.saturating_mul(views), record.height];
     // An image of the graph may have any size.
     if record.view.is_none() && [width, height] != extent {
         let [w, h] = extent;
@@ -103,6 +105,8 @@ mod tests {
             assert!(error.to_string().contains(number) && error.to_string().contains("--long"), "{error}");
             check(&record, [8, 4], true).unwrap();
         }
+        check(&record(json!({ "settings": { "prt": { "eyes": 0.06 } } })), [16, 4], false).unwrap();
+        check(&record(json!({ "settings": { "prt": { "eyes": 0.0 } } })), [16, 4], false).unwrap_err();
         check(&record(json!({ "frame": 999, "settings": { "samples": 4096 } })), [8, 4], false).unwrap();
     }
 
