@@ -100,7 +100,7 @@ struct Truth {
 /// own lights are off.
 ///
 /// # Errors
-/// As [`OnDevice::new`]; `Usage` if there is nothing to compare; `Interrupted`.
+/// As [`solve::solve`]; `OutOfMemory`, `DeviceLost`; `Usage` if there is nothing to compare; `Interrupted`.
 pub fn check(
     gpu: &Gpu,
     scene: &Scene,
@@ -282,8 +282,14 @@ mod tests {
     #[test]
     fn noise_of_the_truth_is_no_error() {
         let mut sums = Sums::default();
-        let noise = |i: usize| ((i as f64 * 12.9898).sin() * 43_758.545_3).fract();
-        for i in 0..100_000 {
+        // SplitMix64, in [-1, 1).
+        let noise = |i: u64| {
+            let mut z = (i + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        for i in 0..100_000u64 {
             let truth = 2.0 + (i as f64).sin();
             sums.add(1.1 * truth, [truth + noise(2 * i), truth + noise(2 * i + 1)]);
         }
