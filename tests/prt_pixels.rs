@@ -1,7 +1,7 @@
 //! Precomputed transfer: how the light of the samples reaches the pixels.
 
 use crate::{
-    prt_light::{baked, closed, diffuse, small},
+    prt_lab::{baked, closed, diffuse, small},
     tracer_lab::{Stage, view},
 };
 use glam::{Mat4, Vec3, vec3};

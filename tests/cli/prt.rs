@@ -63,6 +63,13 @@ fn shards_and_one_run_give_the_same_bytes_and_a_finished_bake_renders() {
             assert!(ran.code == 0 || ran.code == 8, "{} {}", ran.code, ran.stderr);
         }
     }
+    // The parts hold all that the file needs, so they are joined without the scene.
+    let merge = |parts: &str, out: &str| lab.run(&["merge", parts, "-o", out]);
+    merge("other.prt", "joined.prt").expect(0, &["wrote joined.prt"]);
+    assert!(fs::read(lab.at("room.prt")).unwrap() == fs::read(lab.at("joined.prt")).unwrap());
+    merge("other.prt", "joined.fiv").expect(2, &["joined.fiv", "units of kind `prt`", ".prt"]);
+    merge("room.prt", "joined.fiv").expect(2, &["room.prt", "whole bake", "FILE.prt.parts"]);
+    assert!(!lab.at("joined.fiv").exists());
     lab.bake("other.prt", &[]).expect(0, &["wrote other.prt"]);
     assert!(fs::read(lab.at("room.prt")).unwrap() == fs::read(lab.at("other.prt")).unwrap());
     let info = lab.run(&["info", "room.prt"]).expect(0, &[]).stdout;
@@ -118,6 +125,8 @@ fn bakes_of_other_scenes_and_odd_files_are_refused() {
     assert!(!lab.at("x.png").exists());
     lab.bake("room.prt", &[]).expect(1, &["room.prt", "exists already"]);
     lab.bake("new.prt", &["-D", "room.samples=5"]).expect(2, &["room.samples", "16 to 1e6"]);
+    let many = ["-D", "room.samples=1000000", "-D", "room.cluster=100"];
+    lab.bake("new.prt", &many).expect(2, &["room.cluster", "240000 vectors of light", "at most 8192"]);
     lab.bake("new.prt", &["--inside", "0,0"]).expect(2, &["--inside"]);
     lab.bake("new.prt", &["--inside", "500,500,500"]).expect(3, &["--inside"]);
     assert!(!lab.at("new.prt").exists());

@@ -1,10 +1,17 @@
 //! One program for several files of tests: linking the engine once saves minutes.
 
+#[path = "../prt_lab/mod.rs"]
+mod prt_lab;
 #[path = "../tracer_lab/mod.rs"]
 mod tracer_lab;
 
 #[path = "../prt_light.rs"]
 mod prt_light;
-
+#[path = "../prt_odd.rs"]
+mod prt_odd;
 #[path = "../prt_pixels.rs"]
 mod prt_pixels;
+#[path = "../prt_samples.rs"]
+mod prt_samples;
+#[path = "../prt_transfer.rs"]
+mod prt_transfer;

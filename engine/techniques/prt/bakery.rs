@@ -62,11 +62,11 @@ pub struct Sampled {
 }
 
 /// The hits of a round of particles.
-struct Round {
+pub(super) struct Round {
     /// With the path of each particle apart.
-    hits: Vec<Vec<PrtPoint>>,
+    pub hits: Vec<Vec<PrtPoint>>,
     /// Scattered particles that left the scene, and all of them.
-    escaped: [u64; 2],
+    pub escaped: [u64; 2],
 }
 
 impl Bakery {
@@ -80,6 +80,10 @@ impl Bakery {
         let rays = Rays::new(gpu, &scene, &resident)?;
         let pose = Pose::rest(&scene);
         Ok(Self { runner: Runner::new(gpu), gpu: gpu.clone(), scene, pose, resident, rays, on_device: None })
+    }
+
+    pub(super) fn scene(&self) -> &Scene {
+        &self.scene
     }
 
     /// Puts samples on the surfaces that particles from `starts` reach, and clusters them. The same on every shard.
@@ -115,18 +119,14 @@ impl Bakery {
         // A sample that stands for no surface is of no use.
         found.retain(|sample| sample.area > 0.0);
         let (sorted, clusters) = samples::cluster(found, baking);
-        let bounds = {
-            let (mut low, mut high) = (Vec3::splat(f32::MAX), Vec3::splat(f32::MIN));
-            triangles.list.iter().flat_map(|(t, _)| t).for_each(|p| (low, high) = (low.min(*p), high.max(*p)));
-            high - low
-        };
+        let [low, high] = samples::bounds(&triangles.list);
         let plan = Plan {
             scene: self.scene.name.clone(),
             parts: plan::parts(&self.scene),
             settings: baking.clone(),
             starts: starts.iter().map(|start| start.to_array()).collect(),
             radius,
-            far: bounds.length(),
+            far: low.distance(high),
             clusters,
             samples: Digest::of(bytemuck::cast_slice(&sorted)),
             escaped,
@@ -184,7 +184,7 @@ impl Bakery {
     }
 
     /// The hits of a round of particles.
-    fn particles(&mut self, baking: &Baking, starts: &[Vec3], first: u32) -> Result<Round> {
+    pub(super) fn particles(&mut self, baking: &Baking, starts: &[Vec3], first: u32) -> Result<Round> {
         let mut graph = Graph::new("prt.particles");
         let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
         let rays = self.rays.frame(&mut graph, &handles);

@@ -88,6 +88,21 @@ pub struct Summary {
 }
 
 impl Stored {
+    /// Joins the units of a job that are all there, also on a machine that does not know the scene.
+    ///
+    /// # Errors
+    /// As [`Self::join`].
+    pub fn of_parts(store: &Store) -> Result<Self> {
+        of_kind(store)?;
+        let payload = store.open_unit(UnitId { stage: units::SAMPLES, index: 0 })?;
+        payload.verify()?;
+        let samples = payload.bytes()?;
+        if samples.len() % size_of::<PrtPoint>() != 0 {
+            return Err(Error::input("has a part of a sample at its end").in_file(store.folder()).at("samples"));
+        }
+        Self::join(store, bytemuck::pod_collect_to_vec(&samples))
+    }
+
     /// Joins the units of a job that are all there.
     ///
     /// # Errors
@@ -95,9 +110,7 @@ impl Stored {
     pub fn join(store: &Store, samples: Vec<PrtPoint>) -> Result<Self> {
         let job = store.job();
         let wrong = |what: String| Error::input(what).in_file(store.folder());
-        if job.key().kind() != units::KIND {
-            return Err(wrong(format!("is a job of kind `{}`, not of `{}`", job.key().kind(), units::KIND)));
-        }
+        of_kind(store)?;
         let plan: Plan = serde_json::from_value(job.about.clone())
             .map_err(|error| wrong("has a plan that cannot be read".into()).caused_by(error))?;
         check(&plan, &samples).map_err(|error| error.in_file(store.folder()))?;
@@ -217,6 +230,16 @@ impl Stored {
             left: mean(&|c| f64::from(self.transfers[c].left).powi(2)).sqrt(),
             lost: mean(&|c| f64::from(self.transfers[c].lost)),
             escaped: self.plan.escaped,
+        }
+    }
+}
+
+/// Checks that a folder is that of a bake.
+fn of_kind(store: &Store) -> Result<()> {
+    match store.job().key().kind() {
+        units::KIND => Ok(()),
+        kind => {
+            Err(Error::input(format!("is a job of kind `{kind}`, not of `{}`", units::KIND)).in_file(store.folder()))
         }
     }
 }

@@ -139,9 +139,7 @@ pub fn parts(scene: &Scene) -> Vec<Part> {
 /// Points inside a scene from which particles may start: its lights and cameras, and if there are none, its middle.
 pub fn starts(scene: &Scene) -> Vec<Vec3> {
     let pose = crate::scene::Pose::rest(scene);
-    let triangles = samples::Triangles::new(scene).list;
-    let (mut low, mut high) = (Vec3::splat(f32::MAX), Vec3::splat(f32::MIN));
-    triangles.iter().flat_map(|(t, _)| t).for_each(|p| (low, high) = (low.min(*p), high.max(*p)));
+    let [low, high] = samples::bounds(&samples::Triangles::new(scene).list);
     let inside = |at: &Vec3| at.cmpgt(low).all() && at.cmplt(high).all();
     let of = |here: &dyn Fn(&crate::scene::Node) -> bool| -> Vec<Vec3> {
         let nodes = scene.nodes.iter().zip(&pose.world).filter(|(node, _)| here(node));

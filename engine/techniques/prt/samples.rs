@@ -183,11 +183,40 @@ impl Triangles {
 
     /// Counts the hit of a particle.
     pub fn count(&mut self, hit: &PrtPoint) {
+        if let Some((at, back)) = self.find(hit) {
+            self.hits[at][usize::from(back)] += 1;
+        }
+    }
+
+    /// The triangle of a hit, and whether the hit is on its back.
+    fn find(&self, hit: &PrtPoint) -> Option<(usize, bool)> {
         let first = self.firsts.get(hit.instance as usize).copied().unwrap_or(0);
         let at = (first + hit.triangle) as usize;
-        if let (Some((triangle, _)), Some(hits)) = (self.list.get(at), self.hits.get_mut(at)) {
-            hits[usize::from(doubled_area(triangle).dot(side(hit)) < 0.0)] += 1;
+        let (triangle, _) = self.list.get(at)?;
+        Some((at, doubled_area(triangle).dot(side(hit)) < 0.0))
+    }
+
+    /// Whether a hit is on the front of a triangle that no particle was counted on.
+    pub fn is_new(&self, hit: &PrtPoint) -> bool {
+        self.find(hit).is_some_and(|(at, back)| !back && self.hits[at][0] == 0)
+    }
+
+    /// Up to `count` points, evenly distributed over the fronts of triangles that no particle was counted on, with the normals there.
+    pub fn unseen(&self, count: usize) -> Vec<[Vec3; 2]> {
+        let fronts = || self.list.iter().zip(&self.hits).filter(|(_, hits)| hits[0] == 0).map(|((t, _), _)| t);
+        let part = |triangle: &[Vec3; 3]| 0.5 * f64::from(doubled_area(triangle).length());
+        let each = fronts().map(part).filter(|part| part.is_finite()).sum::<f64>() / count as f64;
+        let mut out: Vec<[Vec3; 2]> = Vec::new();
+        let mut sum = 0.0;
+        for triangle in fronts().filter(|triangle| part(triangle).is_finite() && each > 0.0) {
+            sum += part(triangle) / each;
+            while out.len() as f64 + 0.5 < sum {
+                let [a, b, c] = triangle;
+                let uv = quasi(out.len() as u64 + 1);
+                out.push([*a + (*b - *a) * uv.x + (*c - *a) * uv.y, doubled_area(triangle).normalize()]);
+            }
         }
+        out
     }
 
     /// Whether particles reach each side of each triangle; `None`: the side is so small that they may have missed it by chance.
@@ -214,9 +243,23 @@ fn doubled_area([a, b, c]: &[Vec3; 3]) -> Vec3 {
     (*b - *a).cross(*c - *a)
 }
 
+/// Least and greatest coordinates of triangles, metres.
+pub(super) fn bounds(triangles: &[Triangle]) -> [Vec3; 2] {
+    let corners = || triangles.iter().flat_map(|(triangle, _)| *triangle);
+    [corners().fold(Vec3::splat(f32::MAX), Vec3::min), corners().fold(Vec3::splat(f32::MIN), Vec3::max)]
+}
+
 /// Area of triangles, m².
 pub(super) fn area(triangles: &[Triangle]) -> f64 {
     triangles.iter().map(|(t, _)| 0.5 * f64::from(doubled_area(t).length())).filter(|area| area.is_finite()).sum()
+}
+
+/// Barycentrics of the second and the third corner of a point in a triangle: a low-discrepancy sequence (Roberts, The Unreasonable Effectiveness of
+/// Quasirandom Sequences, 2018).
+fn quasi(number: u64) -> Vec2 {
+    let fraction = |by: f64| (0.5 + by * number as f64).fract() as f32;
+    let uv = Vec2::new(fraction(0.754_877_666_246_693), fraction(0.569_840_290_998_053));
+    if uv.x + uv.y > 1.0 { 1.0 - uv } else { uv }
 }
 
 /// Gives each sample the area of the surface that is nearest to it. Sides that no particle reached have no samples and count for none.
@@ -226,7 +269,6 @@ pub(super) fn weigh(samples: &mut [PrtPoint], triangles: &Triangles, radius: f32
     let reached = triangles.reached();
     let each = whole / (POINTS * samples.len().max(1)) as f64;
     let mut counts = vec![0u32; samples.len()];
-    // Points of a low-discrepancy sequence (Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018).
     let (mut sum, mut number) = (0.0f64, 0u64);
     for ((triangle, material), reached) in triangles.list.iter().zip(&reached) {
         let normal = doubled_area(triangle);
@@ -238,9 +280,7 @@ pub(super) fn weigh(samples: &mut [PrtPoint], triangles: &Triangles, radius: f32
         let normal = normal.normalize();
         while (number as f64) + 0.5 < sum {
             number += 1;
-            let fraction = |by: f64| (0.5 + by * number as f64).fract() as f32;
-            let uv = Vec2::new(fraction(0.754_877_666_246_693), fraction(0.569_840_290_998_053));
-            let uv = if uv.x + uv.y > 1.0 { 1.0 - uv } else { uv };
+            let uv = quasi(number);
             let [a, b, c] = triangle;
             let at = *a + (*b - *a) * uv.x + (*c - *a) * uv.y;
             for (normal, reached) in [normal, -normal].into_iter().zip(reached) {

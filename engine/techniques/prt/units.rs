@@ -21,12 +21,13 @@ pub const KIND: &str = "prt";
 /// Increased whenever the computation changes.
 const VERSION: u32 = 1;
 
-/// Numbers of the stages.
+/// Numbers of the stages. All machines put the same samples on the surfaces; the one unit of the last stage keeps them for the file.
 pub const VISIBILITY: u32 = 0;
 pub const GATHER: u32 = 1;
 pub const DIRECT: u32 = 2;
 pub const BASIS: u32 = 3;
 pub const TRANSFER: u32 = 4;
+pub const SAMPLES: u32 = 5;
 
 /// The job of a plan on a device. Its key contains the whole plan.
 ///
@@ -53,6 +54,7 @@ pub fn job(plan: &Plan, samples: &[crate::shaders::types::PrtPoint], device: &st
         Stage::new("transfer", costs(&|_| u64::from(settings.rays)))
             .needs(GATHER, Which::Same)
             .needs(BASIS, Which::All),
+        Stage::new("samples", vec![plan.count().max(1) as u64]),
     ];
     Ok(Job::new(key, stages)?.about(about))
 }
@@ -103,6 +105,7 @@ impl Work {
                     lit.into_iter().map(|e| f16::from_f32((e * scale).min(f16::MAX.to_f32()))).collect();
                 Ok(lit.iter().flat_map(|value| value.to_le_bytes()).collect())
             }
+            SAMPLES => Ok(bytemuck::cast_slice(samples).to_vec()),
             BASIS => {
                 let seen = words(&needed.open(UnitId { stage: GATHER, index: unit.index })?.bytes()?);
                 let few = self.sampled.examples.len().min(INDIRECT);

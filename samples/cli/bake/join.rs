@@ -9,7 +9,11 @@ use lucerna::{
     Error, Result,
     bake::{self, Store},
     image,
-    techniques::fiv::{Stored, file, units},
+    techniques::{
+        daylight,
+        fiv::{Stored, file, units},
+        prt,
+    },
     tracer::bands,
 };
 use serde_json::json;
@@ -24,12 +28,14 @@ use crate::{
 /// Options of `lucerna merge`.
 #[derive(clap::Args, Clone, Debug)]
 pub struct JoinArgs {
-    /// Folders of one job (FILE.fiv.parts, PICTURE.exr.parts), or .fiv files with parts of one whole, in any order. They stay as they are
+    /// Folders of one job (FILE.fiv.parts, FILE.prt.parts, FILE.day.parts, PICTURE.exr.parts), or .fiv files with parts of one whole, in any
+    /// order. They stay as they are
     #[arg(value_name = "PART", required = true)]
     pub parts: Vec<PathBuf>,
 
-    /// File to write (FILE.fiv), or folder to bring all units into (PICTURE.exr.parts, from which `lucerna reference` makes the picture)
-    #[arg(short, long, value_name = "FILE.fiv|FOLDER", help_heading = "Output")]
+    /// File to write (FILE.fiv, FILE.prt), or folder to bring all units into (PICTURE.exr.parts, from which `lucerna reference` makes the
+    /// picture; FILE.day.parts, from which `daylight bake` makes the file)
+    #[arg(short, long, value_name = "FILE|FOLDER", help_heading = "Output")]
     pub output: PathBuf,
 
     /// Replace the file if it exists
@@ -50,12 +56,17 @@ pub struct JoinArgs {
 /// `Input` if parts are of different jobs, or files are damaged; `Output` if something cannot be written.
 pub fn join(args: &JoinArgs, console: Console) -> Result<ExitCode> {
     let folders: Vec<PathBuf> = args.parts.iter().map(|path| folder_of(path)).collect();
-    let to_file = args.output.extension().is_some_and(|ending| ending == "fiv") && !args.output.is_dir();
+    let ending = args.output.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+    let to_file = ["fiv", "prt"].contains(&ending) && !args.output.is_dir();
     if to_file {
         image::probe_output(&args.output, args.overwrite)?;
     }
     if folders.iter().all(|path| !path.is_dir()) {
-        if !to_file {
+        if let Some(file) = folders.iter().find(|path| path.extension().is_some_and(|e| e == "prt" || e == "day")) {
+            let error = Error::usage("is a whole bake, and only the folders of stopped bakes are joined").in_file(file);
+            return Err(error.help("Name the folders FILE.prt.parts or FILE.day.parts"));
+        }
+        if ending != "fiv" || !to_file {
             let error = Error::usage("parts are files, and files are joined to a file").in_file(&args.output);
             return Err(error.help("Name a file that ends with .fiv, or join folders"));
         }
@@ -65,12 +76,9 @@ pub fn join(args: &JoinArgs, console: Console) -> Result<ExitCode> {
         let error = Error::usage("is no folder, but other parts are folders").in_file(file);
         return Err(error.help("Join folders with folders and files with files"));
     }
-    let pictures = |folder: &PathBuf| Store::open(folder).is_ok_and(|store| store.job().key().kind() == bands::KIND);
-    if args.output.extension().is_none_or(|ending| ending != "parts") && folders.iter().any(pictures) {
-        let error = Error::usage("the parts are of a picture, which `lucerna reference` joins").in_file(&args.output);
-        return Err(
-            error.help("Name the folder PICTURE.parts, and then run the command without --shard and with -o PICTURE")
-        );
+    if let Some(kind) = folders.iter().find_map(|folder| Some(Store::open(folder).ok()?.job().key().kind().to_owned()))
+    {
+        expect_output(&kind, ending, &args.output)?;
     }
     let into = if to_file { parts(&args.output)? } else { args.output.clone() };
     let (store, merged) = bake::merge(&folders, &into)?;
@@ -108,6 +116,28 @@ pub fn join(args: &JoinArgs, console: Console) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Checks that an output with this ending is right for units of this kind.
+fn expect_output(kind: &str, ending: &str, output: &Path) -> Result<()> {
+    let (what, command, file) = match kind {
+        bands::KIND => ("a picture", "lucerna reference", "PICTURE"),
+        daylight::units::KIND => ("daylight", "daylight bake", "FILE.day"),
+        _ => {
+            let wanted = if kind == prt::units::KIND { "prt" } else { "fiv" };
+            if ending == wanted || !["fiv", "prt", "day"].contains(&ending) || output.is_dir() {
+                return Ok(());
+            }
+            let error = Error::usage(format!("the parts are units of kind `{kind}`")).in_file(output);
+            return Err(error.help(format!("Name a file that ends with .{wanted}, or a folder")));
+        }
+    };
+    if ending == "parts" {
+        return Ok(());
+    }
+    let error = Error::usage(format!("the parts are of {what}, which `{command}` joins")).in_file(output);
+    Err(error
+        .help(format!("Name the folder {file}.parts, and then run the command without --shard and with -o {file}")))
+}
+
 fn files(paths: &[PathBuf], args: &JoinArgs, console: Console) -> Result<ExitCode> {
     let parts = paths.iter().map(Stored::read).collect::<Result<Vec<_>>>()?;
     let whole = file::merge(parts)?;
@@ -127,6 +157,7 @@ fn files(paths: &[PathBuf], args: &JoinArgs, console: Console) -> Result<ExitCod
 pub fn joined(store: &Store, output: &Path, overwrite: bool) -> Result<u64> {
     match store.job().key().kind() {
         units::KIND => units::join(store)?.write(output, overwrite)?,
+        prt::units::KIND => image::write_atomic(output, &prt::Stored::of_parts(store)?.encode()?, overwrite)?,
         kind => {
             let error =
                 Error::input(format!("is a job of kind `{kind}`, which is for no file")).in_file(store.folder());

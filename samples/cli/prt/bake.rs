@@ -7,7 +7,7 @@ use lucerna::{
     Error, Result,
     gpu::Gpu,
     image,
-    techniques::prt::{Bakery, Baking, Stored, starts, units},
+    techniques::prt::{Bakery, Baking, MOST_VECTORS, Stored, starts, units},
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -80,13 +80,14 @@ pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
     stage.notes().iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
     let gpu = Gpu::new(args.run.device.options()?)?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
+    vectors(&keys.room)?;
     let need = memory(&keys.room);
     console.info(&format!("about {:.1} GB of memory for {} samples", need as f64 / 1e9, keys.room.samples));
     if let Some(free) = available().filter(|free| *free < need) {
         let what = format!("{} samples need about {need} bytes of memory, {free} are free", keys.room.samples);
         return Err(Error::usage(what).at("room.samples").help("Choose fewer samples, rays or directions"));
     }
-    let starts = match args.inside.is_empty() {
+    let mut starts = match args.inside.is_empty() {
         true => starts(&stage.scene),
         false => args.inside.iter().map(|inside| inside.0).collect(),
     };
@@ -94,6 +95,20 @@ pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
         return Err(Error::input("the scene has no surface that light reaches"));
     }
     let mut bakery = Bakery::new(&gpu, &stage.scene)?;
+    if args.inside.is_empty() {
+        let rooms = bakery.rooms(&keys.room, &mut starts, &Interrupt::stop())?;
+        if rooms > 0 {
+            let places: Vec<String> = starts[starts.len() - rooms..]
+                .iter()
+                .map(|at| format!("{:.3},{:.3},{:.3}", at.x, at.y, at.z))
+                .collect();
+            console.info(&format!(
+                "note: {rooms} more rooms, without a way to the scene's lights and cameras, are baked, too; points in them: {}; --inside \
+                 chooses rooms",
+                places.join(" ")
+            ));
+        }
+    }
     let sampled = bakery.sample(&keys.room, &starts, &Interrupt::stop())?;
     let (plan, samples) = (sampled.plan.clone(), sampled.samples.clone());
     let of_samples = begun.elapsed().as_secs_f64();
@@ -166,6 +181,22 @@ pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
         }))?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Refuses settings that lead to far too many vectors of light, before minutes of work.
+fn vectors(room: &Baking) -> Result<()> {
+    let clusters = (room.samples / room.cluster).max(1);
+    let vectors = clusters as usize * (room.light as usize + usize::from(room.centred));
+    if vectors <= MOST_VECTORS {
+        return Ok(());
+    }
+    let what = format!(
+        "{} samples in clusters of {} have about {vectors} vectors of light, at most {MOST_VECTORS} are possible",
+        room.samples, room.cluster
+    );
+    Err(Error::usage(what)
+        .at("room.cluster")
+        .help("Choose larger clusters, fewer samples or fewer vectors (room.light)"))
 }
 
 /// Bytes that a bake needs at most, about: samples and their light, and the largest stage of a cluster.
