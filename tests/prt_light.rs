@@ -11,7 +11,7 @@ use lucerna::{
     scene::{Material, Scene},
     techniques::prt::{
         Baking, Mode, Sampled, Settings, Stored,
-        check::{Extent, OfLight, check},
+        check::{CheckOptions, LightErrors, RelativeError, check},
         solve,
     },
 };
@@ -174,28 +174,32 @@ fn pictures_have_the_light_of_the_path_tracer() {
 }
 
 #[test]
-fn a_check_finds_little_error_in_a_bake_and_much_where_scatterings_are_missing() {
+fn a_check_finds_the_closed_form_and_what_one_scattering_leaves_out() {
     with_gpu(|gpu| {
-        let scene = room();
+        let (albedo, scene) = (0.5, closed(Vec3::splat(0.5)));
         let stored = baked(gpu, &scene, &small());
-        let extent = Extent { lights: 6, samples: 100, paths: 128, seed: 3 };
-        let of = |bounces| {
-            let settings = Settings { gloss: false, bounces, ..Settings::default() };
-            check(gpu, &scene, &stored, &settings, extent, &Stop::default()).unwrap()
-        };
-        let found = of(true);
+        let options = CheckOptions { lights: 6, samples: 400, paths: 256, seed: 3 };
+        let of = |settings: Settings| check(gpu, &scene, &stored, &settings, options, &Stop::default()).unwrap();
+        let diffuse = Settings { gloss: false, ..Settings::default() };
+        let found = of(diffuse.clone());
         assert_eq!(found.len(), 6);
-        assert_eq!(found, of(true), "the same bits");
-        let mean = |list: &[OfLight], of: fn(&OfLight) -> f64| list.iter().map(of).sum::<f64>() / list.len() as f64;
-        // The energy is that of `pictures_have_the_light_of_the_path_tracer`.
-        let (direct, indirect) = (mean(&found, |l| l.direct.ratio), mean(&found, |l| l.indirect.ratio));
-        let transferred = mean(&found, |l| l.transferred.ratio);
-        assert!((direct - 1.0).abs() < 0.06 && (indirect - 1.0).abs() < 0.06, "{direct} {indirect}");
-        assert!((transferred - 1.0).abs() < 0.05, "{transferred}");
-        assert!(found.iter().all(|light| light.away > 0.0 && light.away < 1.3), "half of the room's height");
-        // One scattering instead of all of them: surfaces that reflect about 0.6 lose about as much.
-        let once = mean(&of(false), |l| l.transferred.ratio);
-        assert!((0.3..0.7).contains(&once), "{once}");
+        // The same bits; strength and radius of lights do not count.
+        assert_eq!(found, of(Settings { strength: 3.0, radius: 0.2, ..diffuse.clone() }));
+        assert!(found.iter().all(|light| light.distance_to_surface > 0.0 && light.distance_to_surface < 1.0));
+        let mean = |list: &[LightErrors], part: fn(&LightErrors) -> Option<RelativeError>| {
+            list.iter().map(|light| part(light).unwrap().energy).sum::<f64>() / list.len() as f64
+        };
+        // All light of a box is ρ/(1 − ρ) of the direct light, that after one scattering is ρ: a share of 1 − ρ.
+        let [all, once] = [true, false].map(|bounces| {
+            let found = of(Settings { bounces, ..diffuse.clone() });
+            [mean(&found, |light| light.indirect), mean(&found, |light| light.transferred)]
+        });
+        assert!(all.iter().all(|energy| (energy - 1.0).abs() < 0.02), "{all:?}");
+        assert!(once.iter().all(|energy| (energy / (1.0 - albedo) - 1.0).abs() < 0.02), "{once:?}");
+        assert!((mean(&found, |light| light.direct) - 1.0).abs() < 0.02, "{found:?}");
+        // Light far from the walls of the box is smooth.
+        let middle = found.iter().max_by(|a, b| a.distance_to_surface.total_cmp(&b.distance_to_surface)).unwrap();
+        assert!(middle.transferred.unwrap().error < 0.05, "{middle:?}");
     });
 }
 

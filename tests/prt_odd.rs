@@ -17,6 +17,8 @@ fn a_second_room_without_a_way_to_the_light_has_samples_and_the_inside_of_furnit
         stage.cuboid(wall, vec3(-1.0, -1.0, -1.0), Vec3::ONE, true);
         stage.cuboid(wall, vec3(4.0, -1.0, -1.0), vec3(6.0, 1.0, 1.0), true);
         stage.cuboid(wall, vec3(-0.5, -0.7, -0.5), vec3(0.0, -0.2, 0.0), false);
+        // A hollow cabinet behind the wall.
+        stage.cuboid(wall, vec3(1.2, -0.2, -0.2), vec3(1.5, 0.1, 0.1), true);
         stage.point(vec3(0.2, 0.3, -0.1), Vec3::ONE);
         let mut places = starts(&stage.scene);
         let mut bakery = Bakery::new(gpu, &stage.scene).unwrap();

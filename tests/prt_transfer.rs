@@ -146,8 +146,7 @@ fn dense(stored: &Stored, cluster: usize, seen: &[u32]) -> [Vec<f64>; 2] {
     let plan = &stored.plan;
     let all = plan.all_vectors();
     let rays = plan.settings.rays as usize;
-    let of: Vec<(usize, usize)> =
-        (0..plan.clusters.len()).flat_map(|c| plan.range(c).map(move |i| (c, i))).map(|(c, i)| (c, i)).collect();
+    let of: Vec<(usize, usize)> = (0..plan.clusters.len()).flat_map(|c| plan.range(c).map(move |i| (c, i))).collect();
     let mut exact = vec![0.0f64; plan.range(cluster).len() * all];
     for (row, seen) in exact.chunks_exact_mut(all).zip(seen.chunks_exact(rays)) {
         for number in seen.iter().map(|n| *n as usize).filter(|n| *n < of.len()) {

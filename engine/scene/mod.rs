@@ -15,6 +15,7 @@ mod folder;
 pub mod gltf;
 pub mod ground;
 mod load;
+pub(crate) mod nearest;
 pub mod normals;
 mod notes;
 mod obj;

@@ -59,7 +59,7 @@ PrtNear light_around(ivec2 pixel, vec3 position, vec3 n, uint lights) {
             vec4 seen = texelFetch(spread_visible, pixel, 0) / sum.a;
             PrtNear found;
             found.irradiance = sum.rgb / sum.a;
-            for (uint l = 0u; l < PRT_LIGHTS; ++l) found.visible[l] = l < 4u ? seen[l] : 0.0;
+            for (uint l = 0u; l < PRT_LIGHTS; ++l) found.visible[l] = l < PRT_SPREAD_LIGHTS ? seen[l] : 0.0;
             found.nearest = NONE;
             found.away = 0.0;
             return found;

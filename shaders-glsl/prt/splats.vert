@@ -19,12 +19,6 @@ layout(location = 1) flat out vec3 normal;
 layout(location = 2) flat out vec3 light;
 layout(location = 3) flat out vec4 seen;
 
-// Depth in clip space after division, of a point at this distance along the axis.
-float hardware_depth(float away) {
-    if (view.orthographic != 0u) return clamp((view.far - away) / (view.far - view.near), 0.0, 1.0);
-    return clamp(view.near * (view.far - away) / ((view.far - view.near) * max(away, view.near)), 0.0, 1.0);
-}
-
 void main() {
     PrtSplat s = splats[drawn[gl_InstanceIndex]];
     place = vec4(s.position, splat * s.spacing);
@@ -46,6 +40,8 @@ void main() {
     vec3 world = s.position + corner.x * across + corner.y * along;
     gl_Position = view.clip_from_world * vec4(world, 1.0);
     // Surfaces that bulge over the disc must not hide it: it is tested nearer to the camera than it is.
-    float away = -(view.view_from_world * vec4(world, 1.0)).z;
-    gl_Position.z = gl_Position.w * hardware_depth(away - 0.25 * s.spacing / cosine);
+    vec3 nearer = (view.view_from_world * vec4(world, 1.0)).xyz;
+    nearer.z = min(nearer.z + 0.25 * s.spacing / cosine, -view.near);
+    vec4 clip = view.clip_from_view * vec4(nearer, 1.0);
+    gl_Position.z = gl_Position.w * clamp(clip.z / clip.w, 0.0, 1.0);
 }

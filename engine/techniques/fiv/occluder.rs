@@ -281,7 +281,7 @@ fn hash(alone: &Scene, own: &[Own]) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{posed_mesh::nearest, *};
+    use super::*;
     use crate::builtin;
     use glam::Quat;
 
@@ -364,28 +364,6 @@ mod tests {
         // A single occluder is not limited by `largest`.
         let alone = stage(&[at(-3.0)]);
         assert_eq!(Occluders::of(&alone, &Pose::rest(&alone), false, 0.5).placed.len(), 1);
-    }
-
-    #[test]
-    fn distances_from_triangles_are_those_of_the_nearest_point() {
-        let exact = |t: [Vec3; 3]| {
-            let at = |i: usize, j: usize| (i as f32 / 400.0, j as f32 / 400.0);
-            let inside = (0..=400).flat_map(|i| (0..=400 - i).map(move |j| at(i, j)));
-            inside.map(|(u, v)| (t[0] + (t[1] - t[0]) * u + (t[2] - t[0]) * v).length()).fold(f32::INFINITY, f32::min)
-        };
-        let v = Vec3::new;
-        for triangle in [
-            [v(1.0, 1.0, 1.0), v(2.0, 1.0, 1.0), v(1.0, 3.0, 1.0)],
-            [v(-1.0, -1.0, 1.0), v(2.0, -1.0, 1.0), v(-1.0, 3.0, 1.0)],
-            [v(-1.0, 0.5, 0.2), v(2.0, 0.6, 0.3), v(0.0, 3.0, 1.0)],
-            [v(-1.0, -2.5, 0.2), v(2.0, 0.6, 0.3), v(0.0, -3.0, 1.0)],
-            [v(3.0, 0.0, 0.2), v(0.5, 0.1, -0.4), v(4.0, -3.0, 1.0)],
-        ] {
-            for turned in [triangle, [triangle[1], triangle[2], triangle[0]], [triangle[2], triangle[0], triangle[1]]] {
-                assert!((nearest(turned) - exact(triangle)).abs() < 0.02, "{turned:?}");
-                assert!(nearest(turned) <= exact(triangle) + 1e-5);
-            }
-        }
     }
 
     #[test]

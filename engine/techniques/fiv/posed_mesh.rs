@@ -3,7 +3,7 @@
 use glam::{Vec3, Vec4};
 
 use super::{samples::Shells, support_function::SupportFunction};
-use crate::scene::{Mesh, Pose, Primitive, Scene, deform};
+use crate::scene::{Mesh, Pose, Primitive, Scene, deform, nearest::distance_of_origin};
 
 /// Least radius of the first sphere of samples, in radii of the bounding sphere.
 const LEAST_FIRST: f32 = 0.1;
@@ -87,7 +87,7 @@ impl Size {
         let (mut radius, mut inner, mut area) = (0f32, f32::INFINITY, 0f64);
         for triangle in triangles {
             radius = triangle.iter().map(|p| p.length()).fold(radius, f32::max);
-            inner = inner.min(nearest(triangle));
+            inner = inner.min(distance_of_origin(triangle));
             let [a, b, c] = triangle;
             area += f64::from(0.5 * (b - a).cross(c - a).length());
         }
@@ -133,35 +133,4 @@ fn bounding_centre(primitives: &[PosedPrimitive]) -> Option<Vec3> {
         }
     }
     Some(centre.as_vec3())
-}
-
-/// Distance of the origin from a triangle.
-pub(super) fn nearest([a, b, c]: [Vec3; 3]) -> f32 {
-    let (ab, ac) = (b - a, c - a);
-    // Regions of corners and edges (Ericson, Real-Time Collision Detection, 5.1.5).
-    let (d1, d2) = (-ab.dot(a), -ac.dot(a));
-    if d1 <= 0.0 && d2 <= 0.0 {
-        return a.length();
-    }
-    let (d3, d4) = (-ab.dot(b), -ac.dot(b));
-    if d3 >= 0.0 && d4 <= d3 {
-        return b.length();
-    }
-    let (d5, d6) = (-ab.dot(c), -ac.dot(c));
-    if d6 >= 0.0 && d5 <= d6 {
-        return c.length();
-    }
-    let (vc, vb, va) = (d1 * d4 - d3 * d2, d5 * d2 - d1 * d6, d3 * d6 - d5 * d4);
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        return (a + ab * (d1 / (d1 - d3))).length();
-    }
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        return (a + ac * (d2 / (d2 - d6))).length();
-    }
-    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
-        return (b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)))).length();
-    }
-    let whole = 1.0 / (va + vb + vc);
-    let inside = a + ab * (vb * whole) + ac * (vc * whole);
-    if inside.is_finite() { inside.length() } else { a.length().min(b.length()).min(c.length()) }
 }

@@ -28,7 +28,7 @@ impl Baked {
     ///
     /// # Errors
     /// `Input`, naming the file and the part of the scene that differs.
-    pub fn of(&self, scene: &Scene) -> Result<()> {
+    pub fn expect_scene(&self, scene: &Scene) -> Result<()> {
         let Some(parts) = self.stored.plan.difference(scene) else { return Ok(()) };
         let what = format!("is the room `{}`, and this scene has other {parts}", self.stored.plan.scene);
         Err(self.blamed(Error::input(what).help("Name the scene that was baked, or bake this one")))

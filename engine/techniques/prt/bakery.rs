@@ -7,6 +7,7 @@ use super::{
     cap::Cap,
     plan,
     samples::{self, Grid, Thinning, Triangles},
+    settings::too_many_vectors,
 };
 use crate::{
     Error, ErrorKind, Result, Stop,
@@ -82,10 +83,6 @@ impl Bakery {
         Ok(Self { runner: Runner::new(gpu), gpu: gpu.clone(), scene, pose, resident, rays, on_device: None })
     }
 
-    pub(super) fn scene(&self) -> &Scene {
-        &self.scene
-    }
-
     /// Puts samples on the surfaces that particles from `starts` reach, and clusters them. The same on every shard.
     ///
     /// # Errors
@@ -133,8 +130,7 @@ impl Bakery {
         };
         if plan.all_vectors() > plan::MOST_VECTORS {
             let what = format!("{} vectors of light, at most {} are possible", plan.all_vectors(), plan::MOST_VECTORS);
-            let error = Error::usage(what).at("room.cluster");
-            return Err(error.help("Choose larger clusters, fewer samples or fewer vectors (room.light)"));
+            return Err(too_many_vectors(what));
         }
         Ok(Sampled { plan, samples: sorted, examples: places })
     }

@@ -9,14 +9,14 @@ use super::{
     solve::{self, Solved},
 };
 use crate::{
-    Result,
+    Error, Result,
     gpu::{Gpu, OwnedBuffer},
     graph::{Buffer, Graph, Runner},
     resident::Resident,
     scene::{Pose, Scene},
     shaders::{
         prt::{albedo, lit, mix, project, receive, scatter},
-        types::{PrtCap, PrtReceiver, PrtVector},
+        types::{PrtCap, PrtPoint, PrtReceiver, PrtVector},
     },
 };
 
@@ -63,12 +63,20 @@ fn packed(halves: impl IntoIterator<Item = f16>) -> Vec<u32> {
 }
 
 impl OnDevice {
-    /// Uploads a bake, finds the albedos of the samples by the materials of a scene, and solves for all scatterings. With `gloss`, all reflected
-    /// energy counts, not that of the diffuse base alone. `gloss`, `bounces` and `mean` of the settings count.
+    /// Uploads a bake, with [`scattering`] by the materials of a scene.
     ///
     /// # Errors
-    /// As [`solve::solve`]; `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
+    /// As [`scattering`] and [`Self::with`].
     pub fn new(gpu: &Gpu, scene: &Scene, stored: &Stored, settings: &Settings) -> Result<Self> {
+        let (albedos, solved) = scattering(gpu, scene, stored, settings)?;
+        Self::with(gpu, stored, &albedos, &solved)
+    }
+
+    /// Uploads a bake with the albedos of its samples and all scatterings.
+    ///
+    /// # Errors
+    /// `Input` if the device's buffers are too small; `OutOfMemory`, `DeviceLost`.
+    pub fn with(gpu: &Gpu, stored: &Stored, albedos: &[[f32; 3]], solved: &Solved) -> Result<Self> {
         let plan = &stored.plan;
         let all = plan.all_vectors();
         let (mut clusters, mut caps, mut rows) = (Vec::new(), Vec::new(), Vec::new());
@@ -127,6 +135,17 @@ impl OnDevice {
             products[0] += 4 * u64::from(visibility.vectors + 1) * u64::from(count);
             products[1] += u64::from(count) * (stride as u64 + u64::from(basis.vectors));
         }
+        let most = gpu.caps().limits.storage_range;
+        let largest =
+            4 * [words.len(), rows.len(), weights.len(), mixed.len(), all * all * 3].into_iter().max().unwrap_or(0)
+                as u64;
+        if largest > most {
+            let what = format!("has {largest} bytes of one kind of vectors, and the device's buffers hold {most}");
+            let error = Error::input(what);
+            return Err(
+                error.help("Bake with fewer vectors (room.light, room.visibility) or with room.receivers above 0")
+            );
+        }
         products[2] = 3 * (all * all) as u64 + mixed.len() as u64;
         let grid = Grid::new(&stored.samples, plan.radius);
         let buffer = |name, bytes: &[u8]| {
@@ -134,10 +153,9 @@ impl OnDevice {
             OwnedBuffer::with_contents(gpu, name, filled)
         };
         let samples = buffer("prt.samples", bytemuck::cast_slice(&stored.samples))?;
-        let albedos = albedos(gpu, scene, &samples, stored.samples.len() as u32, settings.gloss)?;
-        let Solved { inverse, shift, fixed } = solve::solve(stored, &albedos, settings.bounces, settings.mean)?;
+        let Solved { inverse, shift, fixed } = solved;
         for ((vector, shift), fixed) in vectors.iter_mut().zip(shift).zip(fixed) {
-            (vector.shift, vector.fixed_value) = (shift, fixed);
+            (vector.shift, vector.fixed_value) = (*shift, *fixed);
         }
         Ok(Self {
             samples,
@@ -148,7 +166,7 @@ impl OnDevice {
             count: stored.samples.len() as u32,
             caps: buffer("prt.caps", bytemuck::cast_slice(&caps))?,
             rows: buffer("prt.rows", bytemuck::cast_slice(&rows))?,
-            albedos: buffer("prt.albedos", bytemuck::cast_slice(&albedos))?,
+            albedos: buffer("prt.albedos", bytemuck::cast_slice(albedos))?,
             vectors,
             weights: buffer("prt.weights", bytemuck::cast_slice(&weights))?,
             matrices: buffer("prt.matrices", bytemuck::cast_slice(&inverse.concat()))?,
@@ -267,14 +285,20 @@ pub fn points_of_lights(settings: &Settings) -> Vec<[f32; 3]> {
         .collect()
 }
 
+/// The albedos of the samples by the materials of a scene, and all scatterings with them. With `gloss`, all reflected energy counts, not that of the
+/// diffuse base alone. `gloss`, `bounces` and `mean` of the settings count.
+///
+/// # Errors
+/// As [`solve::solve`]; `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
+pub fn scattering(gpu: &Gpu, scene: &Scene, stored: &Stored, settings: &Settings) -> Result<(Vec<[f32; 3]>, Solved)> {
+    let albedos = albedos(gpu, scene, &stored.samples, settings.gloss)?;
+    let solved = solve::solve(stored, &albedos, settings.bounces, settings.mean)?;
+    Ok((albedos, solved))
+}
+
 /// The albedos of samples by the materials of a scene.
-pub(super) fn albedos(
-    gpu: &Gpu,
-    scene: &Scene,
-    samples: &OwnedBuffer,
-    count: u32,
-    gloss: bool,
-) -> Result<Vec<[f32; 3]>> {
+fn albedos(gpu: &Gpu, scene: &Scene, samples: &[PrtPoint], gloss: bool) -> Result<Vec<[f32; 3]>> {
+    let count = samples.len() as u32;
     let scene = Scene { environment: None, ..scene.clone() };
     let mut resident = Resident::for_rays(gpu, &scene)?;
     let mut graph = Graph::new("prt.albedo");
@@ -290,7 +314,7 @@ pub(super) fn albedos(
         surface_tangents: handles.tangents,
         surface_uvs: handles.uvs,
         surface_colors: handles.colors,
-        samples: graph.import_buffer(samples),
+        samples: graph.buffer_from("prt.samples", samples),
         albedos,
         push: albedo::Push { count },
         spec: albedo::Spec { gloss: gloss.into() },

@@ -47,11 +47,11 @@ impl Images {
 pub struct Shown {
     pub gbuffer: GBuffer,
     pub images: Images,
-    /// What the way to the pixels counts, and its number.
+    /// The name of the items that the way to the pixels draws, and their number.
     pub counted: Option<(&'static str, u32)>,
 }
 
-/// What all views of a frame have in common.
+/// The light and the settings that all views of a frame share.
 #[derive(Clone, Debug)]
 pub struct Drawing<'a> {
     pub light: &'a OnDevice,
@@ -84,11 +84,10 @@ impl Drawing<'_> {
             ["prt", "prt.direct-light", "prt.indirect", "prt.irradiance", "prt.shadow"].map(|name| image(graph, name));
         // Each pass after the first one adds the light of its lamps.
         graph.clear(direct, [0.0; 4]);
-        let count = handles.moment.lights.len() as u32;
         // Pictures of single samples find these by themselves.
         let single = matches!(self.mode, Mode::Samples | Mode::Clusters);
         let spread = if single { None } else { self.spread.of_view(graph, view, of_prt) };
-        let passes = if mapped.is_some() || single { 1 } else { self.spread.passes(count) };
+        let passes = self.spread.passes();
         for pass in 0..passes {
             if let Some(spread) = &spread {
                 spread.draw(graph, handles, (view, &gbuffer, &self.settings.gbuffer), pass);
@@ -121,7 +120,7 @@ impl Drawing<'_> {
                     count: self.light.count,
                     splat: of_prt.splat,
                     strength: of_prt.strength,
-                    first_light: self.spread.lights(pass, count)[0],
+                    first_light: self.spread.lights(pass)[0],
                     last: u32::from(pass + 1 == passes),
                 },
                 spec: pixels::Spec {

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::MOST_VECTORS;
 use crate::{
     Error, Result,
     passes::{gbuffer, shadow},
@@ -77,8 +78,25 @@ impl Baking {
     /// # Errors
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
-        Self::description().check(self).map_err(|error: Error| error.at("room"))
+        Self::description().check(self).map_err(|error: Error| error.at("room"))?;
+        // Far too many vectors are refused before minutes of work; the samples decide about all others.
+        let clusters = (self.samples / self.cluster).max(1) as usize;
+        let vectors = clusters * (self.light as usize + usize::from(self.centred));
+        if vectors <= MOST_VECTORS {
+            return Ok(());
+        }
+        let what = format!(
+            "{} samples in clusters of {} have about {vectors} vectors of light, at most {MOST_VECTORS} are possible",
+            self.samples, self.cluster
+        );
+        Err(too_many_vectors(what))
     }
+}
+
+/// The error for more vectors than [`MOST_VECTORS`].
+pub(super) fn too_many_vectors(what: String) -> Error {
+    let error = Error::usage(what).at("room.cluster");
+    error.help("Choose larger clusters, fewer samples or fewer vectors (room.light)")
 }
 
 /// How the direct light of a picture is shadowed.
@@ -123,7 +141,7 @@ pub struct Settings {
     /// Distance of that kind, in addition to the share, in distances of samples.
     #[schemars(range(min = 0, max = 100))]
     pub bias_distance: f32,
-    /// Distance at which a sample has lost most of its part in a pixel, in distances of samples.
+    /// Standard deviation of the Gaussian weights of samples in a pixel, in distances of samples.
     #[schemars(range(min = 0.3, max = 1))]
     pub splat: f32,
     /// How the light of the samples reaches the pixels.

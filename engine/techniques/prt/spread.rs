@@ -25,7 +25,7 @@ pub struct Sums {
     pub visible: Image,
 }
 
-/// What a way of spreading needs besides the samples, for a scene.
+/// A way of spreading, with the data that it needs besides the samples.
 #[derive(Debug)]
 enum Way {
     Gather,
@@ -55,22 +55,19 @@ impl Spreader {
         Ok(Self { way, format })
     }
 
-    /// The light that all views of a frame spread.
+    /// The light that all views of a frame spread. `count`: lights whose visibility is needed.
     pub fn light<'a>(
         &'a self,
         graph: &mut Graph,
         scene: &Handles,
         lit: (&'a OnDevice, &'a Lit),
+        count: u32,
         settings: &Settings,
     ) -> Spreading<'a> {
-        let count = scene.moment.lights.len() as u32;
-        let mut spreading = Spreading { spreader: self, lit, at_once: consts::PRT_LIGHTS, values: Vec::new() };
-        if !matches!(self.way, Way::Gather) {
-            spreading.at_once = consts::PRT_SPREAD_LIGHTS;
-        }
+        let at_once = if matches!(self.way, Way::Gather) { consts::PRT_LIGHTS } else { consts::PRT_SPREAD_LIGHTS };
+        let mut spreading = Spreading { spreader: self, lit, at_once, count, values: Vec::new() };
         if let Way::Vertices(vertices) = &self.way {
-            let passes = spreading.passes(count);
-            let lights = (0..passes).map(|pass| spreading.lights(pass, count));
+            let lights = (0..spreading.passes()).map(|pass| spreading.lights(pass));
             spreading.values = lights.map(|lights| vertices.light(graph, scene, lit, lights, settings.splat)).collect();
         }
         spreading
@@ -84,20 +81,22 @@ pub struct Spreading<'a> {
     lit: (&'a OnDevice, &'a Lit),
     /// Lights whose visibility reaches the pixels in one pass.
     at_once: u32,
+    /// All these lights.
+    count: u32,
     /// Light at the vertices in each pass.
     values: Vec<Buffer>,
 }
 
 impl Spreading<'_> {
-    /// Passes over the pixels for this number of lights.
-    pub fn passes(&self, lights: u32) -> u32 {
-        lights.div_ceil(self.at_once).max(1)
+    /// Passes over the pixels.
+    pub fn passes(&self) -> u32 {
+        self.count.div_ceil(self.at_once).max(1)
     }
 
     /// Number of the first light of a pass, and the number of its lights.
-    pub fn lights(&self, pass: u32, count: u32) -> [u32; 2] {
+    pub fn lights(&self, pass: u32) -> [u32; 2] {
         let first = pass * self.at_once;
-        [first, self.at_once.min(count - first.min(count))]
+        [first, self.at_once.min(self.count - first.min(self.count))]
     }
 
     /// The way to the pixels of one view. `None`: the pixels gather by themselves.
@@ -137,7 +136,7 @@ impl OfView<'_> {
         (view, gbuffer, settings): (&View, &GBuffer, &gbuffer::Settings),
         pass: u32,
     ) {
-        let lights = self.spreading.lights(pass, scene.moment.lights.len() as u32);
+        let lights = self.spreading.lights(pass);
         match &self.way {
             OfWay::Splats(seen) => seen.draw(graph, gbuffer, self.spreading.lit, lights, self.sums),
             OfWay::Vertices(vertices) => {
@@ -147,7 +146,7 @@ impl OfView<'_> {
         }
     }
 
-    /// What is counted, and its number.
+    /// The name of the items that the way draws, and their number.
     pub fn count(&self) -> (&'static str, u32) {
         match &self.way {
             OfWay::Splats(seen) => ("splats", seen.count),

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{
-    Baked, PictureSettings, Settings, Stored, eyes,
+    Baked, Direct as Shadows, PictureSettings, Settings, Stored, eyes,
     on_device::OnDevice,
     pixels::{Drawing, Shown},
     spread::Spreader,
@@ -13,6 +13,7 @@ use crate::{
     graph::Graph,
     scene::{LightKind, Note, NoteKind, Scene},
     settings::{Described, Description, idle_notes},
+    shaders::consts,
     technique::{self, Making, Moment, Picture, Technique},
 };
 
@@ -154,7 +155,7 @@ impl Technique for Prt {
             let error = Error::usage("there is no baked room").at("prt");
             return Err(error.help("Bake it with `prt bake SCENE -o FILE.prt`, and name the file with --bake"));
         };
-        baked.of(scene)?;
+        baked.expect_scene(scene)?;
         let light = OnDevice::new(gpu, scene, &baked.stored, &settings.prt).map_err(|error| baked.blamed(error))?;
         let spreader = Spreader::new(gpu, scene, &baked.stored, settings.prt.spread)?;
         Ok(Self { baked: baked.clone(), light, spreader })
@@ -180,7 +181,10 @@ impl Technique for Prt {
             lit.irradiances = self.light.receive(graph, one);
         }
         let mut notes = [moment.notes, &left_out(moment.scene), &idle_notes("shadow", &settings.shadow)].concat();
-        let spread = self.spreader.light(graph, handles, (&self.light, &lit), of_prt);
+        // Shadow maps take the place of the visibility, and pictures of single samples have no light: the first lights are enough for the layer.
+        let by_samples = of_prt.direct == Shadows::Samples && !matches!(mode, Mode::Samples | Mode::Clusters);
+        let visible = if by_samples { count } else { count.min(consts::PRT_SPREAD_LIGHTS) };
+        let spread = self.spreader.light(graph, handles, (&self.light, &lit), visible, of_prt);
         let drawing = Drawing { light: &self.light, lit: &lit, spread, handles, settings, mode };
         let shown = if of_prt.eyes > 0.0 {
             let eyes = [-0.5, 0.5].map(|side| drawing.draw(graph, &view.beside(side * of_prt.eyes), &mut notes));

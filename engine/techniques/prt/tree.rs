@@ -35,7 +35,7 @@ struct Node {
     /// A sphere around the samples of the node that lies in that of its parent.
     middle: Vec3,
     bound: f32,
-    /// Largest distance of its splats, so far up the tree.
+    /// Size of its splat, metres.
     spacing: f32,
     /// One splat may stand for all its samples.
     merges: bool,
@@ -144,7 +144,7 @@ fn split(samples: &[PrtPoint], members: &mut [u32]) -> usize {
         (low, high) = (low.min(position(&samples[*member as usize])), high.max(position(&samples[*member as usize])));
     }
     let size = (high - low).max_element();
-    // Planes are parted before places.
+    // Normals count more than places, so that the samples of one plane stay together.
     let of = |member: u32, axis: usize| match axis {
         0..3 => samples[member as usize].position[axis],
         _ => 2.0 * size * samples[member as usize].normal[axis - 3],

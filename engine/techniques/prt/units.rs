@@ -1,7 +1,7 @@
 //! Bakes as jobs of [`crate::bake`]. Each cluster is a unit of each stage: the distances around its samples, the samples that they see, the light of
 //! the examples, the basis of that light, and the light that all bases send to the cluster.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Instant};
 
 use half::f16;
 
@@ -28,6 +28,8 @@ pub const DIRECT: u32 = 2;
 pub const BASIS: u32 = 3;
 pub const TRANSFER: u32 = 4;
 pub const SAMPLES: u32 = 5;
+/// Names of the stages.
+const STAGES: [&str; 6] = ["visibility", "gather", "direct", "basis", "transfer", "samples"];
 
 /// The job of a plan on a device. Its key contains the whole plan.
 ///
@@ -41,20 +43,21 @@ pub fn job(plan: &Plan, samples: &[crate::shaders::types::PrtPoint], device: &st
     let costs = |each: &dyn Fn(usize) -> u64| -> Vec<u64> {
         (0..plan.clusters.len()).map(|c| (u64::from(plan.clusters[c]) * each(c)).max(1)).collect()
     };
+    let name = |stage: u32| STAGES[stage as usize];
     let directions = |cluster: usize| plan.cap(samples, cluster).directions() as u64;
     let stages = vec![
         // Principal components take as long as the rays.
-        Stage::new("visibility", costs(&|cluster| 2 * directions(cluster))),
+        Stage::new(name(VISIBILITY), costs(&|cluster| 2 * directions(cluster))),
         // Rays with a search for a sample.
-        Stage::new("gather", costs(&|_| 2 * u64::from(settings.rays))),
-        Stage::new("direct", costs(&|_| u64::from(settings.examples) / 2)),
-        Stage::new("basis", costs(&|_| u64::from(settings.examples)))
+        Stage::new(name(GATHER), costs(&|_| 2 * u64::from(settings.rays))),
+        Stage::new(name(DIRECT), costs(&|_| u64::from(settings.examples) / 2)),
+        Stage::new(name(BASIS), costs(&|_| u64::from(settings.examples)))
             .needs(GATHER, Which::Same)
             .needs(DIRECT, Which::All),
-        Stage::new("transfer", costs(&|_| u64::from(settings.rays)))
+        Stage::new(name(TRANSFER), costs(&|_| u64::from(settings.rays)))
             .needs(GATHER, Which::Same)
             .needs(BASIS, Which::All),
-        Stage::new("samples", vec![plan.count().max(1) as u64]),
+        Stage::new(name(SAMPLES), vec![plan.count().max(1) as u64]),
     ];
     Ok(Job::new(key, stages)?.about(about))
 }
@@ -67,6 +70,8 @@ pub struct Work {
     /// Light of the first examples at all samples.
     first: Option<Arc<Vec<f32>>>,
     senders: Option<Arc<Senders>>,
+    /// Time of each stage, seconds.
+    spent: [f64; STAGES.len()],
 }
 
 impl Work {
@@ -76,7 +81,12 @@ impl Work {
     /// `OutOfMemory`, `DeviceLost`.
     pub fn new(mut bakery: Bakery, sampled: Sampled) -> Result<Self> {
         bakery.upload(&sampled.plan, &sampled.samples)?;
-        Ok(Self { bakery, sampled, first: None, senders: None })
+        Ok(Self { bakery, sampled, first: None, senders: None, spent: [0.0; STAGES.len()] })
+    }
+
+    /// The stages, and the time that their units have taken so far, seconds.
+    pub fn seconds(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        STAGES.into_iter().zip(self.spent)
     }
 
     /// The bytes of a unit.
@@ -84,6 +94,15 @@ impl Work {
     /// # Errors
     /// `Input` if a unit that is needed is damaged; `OutOfMemory`, `DeviceLost`, `Interrupted`.
     pub fn unit(&mut self, unit: UnitId, needed: &Needed<'_>) -> Result<Vec<u8>> {
+        let begun = Instant::now();
+        let bytes = self.bytes(unit, needed);
+        if let Some(spent) = self.spent.get_mut(unit.stage as usize) {
+            *spent += begun.elapsed().as_secs_f64();
+        }
+        bytes
+    }
+
+    fn bytes(&mut self, unit: UnitId, needed: &Needed<'_>) -> Result<Vec<u8>> {
         let cluster = unit.index as usize;
         let plan = &self.sampled.plan;
         let samples = &self.sampled.samples;

@@ -17,7 +17,7 @@ use crate::{
     },
 };
 
-/// Where the light at the vertices of a scene lies.
+/// The places of the light at the vertices of a scene, in a buffer.
 #[derive(Debug)]
 pub struct Vertices {
     meshes: OwnedBuffer,
@@ -41,8 +41,11 @@ impl Vertices {
                 count += primitive.positions.len() as u64 * u64::from(sides);
             }
         }
-        let most = gpu.caps().limits.storage_range / 32;
-        if count > most.min(u64::from(u32::MAX / 2)) {
+        let limits = &gpu.caps().limits;
+        // 32 bytes for each vertex, and groups of 64.
+        let groups = 64 * u64::from(limits.work_group_count[0]);
+        let most = (limits.storage_range / 32).min(groups).min(u64::from(u32::MAX / 2));
+        if count > most {
             let what = format!("vertices, and the scene has {count} of them; the device allows {most}");
             return Err(Error::usage(what).at("prt.spread").help("Use gather or splats"));
         }

@@ -7,7 +7,7 @@ use lucerna::{
     Error, Result,
     gpu::Gpu,
     image,
-    techniques::prt::{Bakery, Baking, MOST_VECTORS, Stored, starts, units},
+    techniques::prt::{Bakery, Baking, Stored, units},
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -80,34 +80,23 @@ pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
     stage.notes().iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
     let gpu = Gpu::new(args.run.device.options()?)?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
-    vectors(&keys.room)?;
     let need = memory(&keys.room);
     console.info(&format!("about {:.1} GB of memory for {} samples", need as f64 / 1e9, keys.room.samples));
     if let Some(free) = available().filter(|free| *free < need) {
         let what = format!("{} samples need about {need} bytes of memory, {free} are free", keys.room.samples);
         return Err(Error::usage(what).at("room.samples").help("Choose fewer samples, rays or directions"));
     }
-    let mut starts = match args.inside.is_empty() {
-        true => starts(&stage.scene),
-        false => args.inside.iter().map(|inside| inside.0).collect(),
-    };
-    if starts.is_empty() {
-        return Err(Error::input("the scene has no surface that light reaches"));
-    }
     let mut bakery = Bakery::new(&gpu, &stage.scene)?;
-    if args.inside.is_empty() {
-        let rooms = bakery.rooms(&keys.room, &mut starts, &Interrupt::stop())?;
-        if rooms > 0 {
-            let places: Vec<String> = starts[starts.len() - rooms..]
-                .iter()
-                .map(|at| format!("{:.3},{:.3},{:.3}", at.x, at.y, at.z))
-                .collect();
-            console.info(&format!(
-                "note: {rooms} more rooms, without a way to the scene's lights and cameras, are baked, too; points in them: {}; --inside \
-                 chooses rooms",
-                places.join(" ")
-            ));
-        }
+    let (starts, rooms) = match args.inside.is_empty() {
+        true => bakery.starts(&keys.room, &Interrupt::stop())?,
+        false => (args.inside.iter().map(|inside| inside.0).collect(), 0),
+    };
+    if rooms > 0 {
+        let places = starts[starts.len() - rooms..].iter().map(|at| format!("{:.3},{:.3},{:.3}", at.x, at.y, at.z));
+        console.info(&format!(
+            "note: lights and cameras do not reach {rooms} rooms, which are baked, too; points in them: {}; --inside chooses rooms",
+            places.collect::<Vec<_>>().join(" ")
+        ));
     }
     let sampled = bakery.sample(&keys.room, &starts, &Interrupt::stop())?;
     let (plan, samples) = (sampled.plan.clone(), sampled.samples.clone());
@@ -129,14 +118,7 @@ pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
     let folder = units_of::parts(&args.run.output)?;
     let store = args.run.units.store(&folder, units::job(&plan, &samples, &device)?, console)?;
     let mut work = units::Work::new(bakery, sampled)?;
-    let mut times = Vec::new();
-    let unit = |unit: lucerna::bake::UnitId, needed: lucerna::bake::Needed<'_>| {
-        let begun = Instant::now();
-        let bytes = work.unit(unit, &needed);
-        times.resize(times.len().max(unit.stage as usize + 1), 0.0);
-        times[unit.stage as usize] += begun.elapsed().as_secs_f64();
-        bytes
-    };
+    let unit = |unit: lucerna::bake::UnitId, needed: lucerna::bake::Needed<'_>| work.unit(unit, &needed);
     let (units_args, what) = (&args.run.units, "rays");
     let of_units = Work {
         store: &store,
@@ -163,9 +145,11 @@ pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
             (progress, 0, Some((bytes.len(), summary)))
         }
     };
-    let names = ["visibility", "gather", "direct", "basis", "transfer"];
-    let stages: Vec<String> = names.iter().zip(&times).map(|(name, time)| format!("{name} {time:.1} s")).collect();
-    console.info(&format!("samples {of_samples:.1} s, {}", stages.join(", ")));
+    // The samples are there before all stages; their unit only keeps them.
+    let mut seconds: Vec<(&str, f64)> = work.seconds().filter(|(name, _)| *name != "samples").collect();
+    seconds.insert(0, ("samples", of_samples));
+    let stages: Vec<String> = seconds.iter().map(|(name, time)| format!("{name} {time:.1} s")).collect();
+    console.info(&stages.join(", "));
     if args.run.json {
         console::print_json(&json!({
             "file": summary.as_ref().map(|_| &args.run.output),
@@ -175,28 +159,11 @@ pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
             "missing": missing,
             "clusters": plan.clusters,
             "seconds": progress.seconds,
-            "seconds_of_samples": of_samples,
-            "seconds_of_stages": names.iter().zip(&times).collect::<std::collections::BTreeMap<_, _>>(),
+            "seconds_of_stages": seconds.into_iter().collect::<std::collections::BTreeMap<_, _>>(),
             "settings": config::to_value(&keys)?,
         }))?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// Refuses settings that lead to far too many vectors of light, before minutes of work.
-fn vectors(room: &Baking) -> Result<()> {
-    let clusters = (room.samples / room.cluster).max(1);
-    let vectors = clusters as usize * (room.light as usize + usize::from(room.centred));
-    if vectors <= MOST_VECTORS {
-        return Ok(());
-    }
-    let what = format!(
-        "{} samples in clusters of {} have about {vectors} vectors of light, at most {MOST_VECTORS} are possible",
-        room.samples, room.cluster
-    );
-    Err(Error::usage(what)
-        .at("room.cluster")
-        .help("Choose larger clusters, fewer samples or fewer vectors (room.light)"))
 }
 
 /// Bytes that a bake needs at most, about: samples and their light, and the largest stage of a cluster.

@@ -8,7 +8,7 @@ use lucerna::{
     technique::Bake,
     techniques::prt::{
         Baked, Settings,
-        check::{self, Difference, Extent, OfLight},
+        check::{self, CheckOptions, LightErrors, RelativeError},
     },
 };
 use serde_json::json;
@@ -32,15 +32,15 @@ pub struct PrtCheckArgs {
     pub bake: PathBuf,
 
     /// Lights at places in the free space that the bake has not seen
-    #[arg(long, value_name = "N", default_value_t = Extent::default().lights, value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = "Check")]
+    #[arg(long, value_name = "N", default_value_t = CheckOptions::default().lights, value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = "Check")]
     pub lights: u32,
 
     /// Samples at which light is compared
-    #[arg(long, value_name = "N", default_value_t = Extent::default().samples, value_parser = clap::value_parser!(u32).range(1..=100_000), help_heading = "Check")]
-    pub points: u32,
+    #[arg(long, value_name = "N", default_value_t = CheckOptions::default().samples, value_parser = clap::value_parser!(u32).range(1..=100_000), help_heading = "Check")]
+    pub samples: u32,
 
     /// Paths that are followed from each of these samples
-    #[arg(long, value_name = "N", default_value_t = Extent::default().paths, value_parser = clap::value_parser!(u32).range(2..=1_000_000), help_heading = "Check")]
+    #[arg(long, value_name = "N", default_value_t = CheckOptions::default().paths, value_parser = clap::value_parser!(u32).range(2..=1_000_000), help_heading = "Check")]
     pub paths: u32,
 
     /// Seed of the paths
@@ -70,19 +70,26 @@ pub fn check(args: &PrtCheckArgs, console: Console) -> Result<ExitCode> {
     Interrupt::install();
     let stage = Stage::open(&args.stage)?;
     stage.notes().iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
-    baked.of(&stage.scene)?;
+    baked.expect_scene(&stage.scene)?;
     let gpu = Gpu::new(args.device.options()?)?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
-    let PrtCheckArgs { lights, points, paths, seed, .. } = *args;
-    let extent = Extent { lights, samples: points, paths, seed };
+    let PrtCheckArgs { lights, samples, paths, seed, .. } = *args;
+    let options = CheckOptions { lights, samples, paths, seed };
     // Paths scatter as on diffuse surfaces.
     let settings = Settings { gloss: false, ..Settings::default() };
-    let found = check::check(&gpu, &stage.scene, &baked.stored, &settings, extent, &Interrupt::stop())?;
-    let lines: Vec<(f32, Vec<OfLight>)> = (0..=APART.len())
+    let found = check::check(&gpu, &stage.scene, &baked.stored, &settings, options, &Interrupt::stop())?;
+    let lines: Vec<(f32, Vec<LightErrors>)> = (0..=APART.len())
         .map(|line| {
             let from = line.checked_sub(1).map_or(0.0, |before| APART[before]);
             let to = APART.get(line).copied().unwrap_or(f32::INFINITY);
-            (from, found.iter().filter(|light| light.away >= from && light.away < to).copied().collect())
+            (
+                from,
+                found
+                    .iter()
+                    .filter(|light| light.distance_to_surface >= from && light.distance_to_surface < to)
+                    .copied()
+                    .collect(),
+            )
         })
         .collect();
     if args.json {
@@ -122,16 +129,19 @@ pub fn check(args: &PrtCheckArgs, console: Console) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Root mean square of the errors of lights, and the mean of their ratios: each light counts alike.
-fn joined(lights: &[OfLight], of: fn(&OfLight) -> Difference) -> Difference {
-    let count = lights.len().max(1) as f64;
-    let all = || lights.iter().map(of);
-    Difference {
-        error: (all().map(|one| one.error.powi(2)).sum::<f64>() / count).sqrt(),
-        ratio: all().map(|one| one.ratio).sum::<f64>() / count,
-    }
+/// Root mean square of the errors of lights, and the mean of their energies: each light counts alike, but for those in darkness. `None`: all are.
+fn joined(lights: &[LightErrors], of: fn(&LightErrors) -> Option<RelativeError>) -> Option<RelativeError> {
+    let all: Vec<RelativeError> = lights.iter().filter_map(of).collect();
+    let count = all.len() as f64;
+    (!all.is_empty()).then(|| RelativeError {
+        error: (all.iter().map(|one| one.error.powi(2)).sum::<f64>() / count).sqrt(),
+        energy: all.iter().map(|one| one.energy).sum::<f64>() / count,
+    })
 }
 
-fn cells(Difference { error, ratio }: Difference, width: usize) -> String {
-    format!("{:>width$.1} %  {ratio:>6.3}", 100.0 * error)
+fn cells(error: Option<RelativeError>, width: usize) -> String {
+    match error {
+        Some(RelativeError { error, energy }) => format!("{:>width$.1} %  {energy:>6.3}", 100.0 * error),
+        None => format!("{:>width$}    {:>6}", "dark", ""),
+    }
 }
