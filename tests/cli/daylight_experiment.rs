@@ -1,11 +1,12 @@
 //! `lucerna reproduce` with the experiment of baked daylight as it is shipped, at a size of a few pixels and with few times; and its mistakes.
 //! Needs a device (it says so when there is none).
 
-use crate::support;
-use std::{collections::BTreeMap, fs, path::Path};
-
-use crate::support::{device, lucerna};
+use crate::{
+    experiment_lab::{number, rows, run},
+    support::{device, lucerna},
+};
 use serde_json::Value;
+use std::fs;
 use toml::{Table, Value as Toml};
 
 const SHIPPED: &str = include_str!("../../samples/experiments/daylight.toml");
@@ -34,28 +35,6 @@ fn small() -> Table {
         }
     }
     file
-}
-
-fn run(folder: &Path, file: &Table, more: &[&str]) -> support::Ran {
-    let path = folder.join("e.toml");
-    fs::write(&path, toml::to_string(file).unwrap()).unwrap();
-    let output = folder.join("out");
-    let first = ["reproduce", path.to_str().unwrap(), "-o", output.to_str().unwrap()];
-    lucerna(first.iter().chain(more))
-}
-
-/// A table of a report: rows by column.
-fn rows(document: &Value, table: &str) -> Vec<BTreeMap<String, Value>> {
-    let table = &document["tables"][table];
-    let columns = table["columns"].as_array().unwrap_or_else(|| panic!("no such table in {document}"));
-    let named = |row: &Value| -> BTreeMap<String, Value> {
-        columns.iter().map(|name| name.as_str().unwrap().to_owned()).zip(row.as_array().unwrap().clone()).collect()
-    };
-    table["rows"].as_array().unwrap().iter().map(named).collect()
-}
-
-fn number(row: &BTreeMap<String, Value>, column: &str) -> f64 {
-    row[column].as_f64().unwrap_or_else(|| panic!("no number {column} in {row:?}"))
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! One program for the tests of the command line: linking the engine once saves minutes.
 
+#[path = "../cli/experiment_lab.rs"]
+mod experiment_lab;
 #[path = "../gpu_common/fault.rs"]
 mod fault;
 #[path = "../cli/support.rs"]
