@@ -129,6 +129,9 @@ fn read(experiment: &Experiment, entry: &Entry, folders: &Folders) -> Result<Loa
         let path = if source::is_built_in_environment(path) { path.to_path_buf() } else { found(name)? };
         scene.environment = Some(source::environment(&path)?.0);
     }
+    if !entry.lights {
+        scene.nodes.iter_mut().for_each(|node| node.light = None);
+    }
     lights::light(&mut scene, &entry.light, entry.sun.as_ref(), entry.default_light);
     if !entry.sky {
         scene.environment = None;

@@ -123,6 +123,9 @@ pub struct Scene {
     /// `false` removes the environment and keeps the lights.
     #[serde(default = "yes")]
     pub sky: bool,
+    /// `false` removes the scene's own lights, before `light` and `sun` add others.
+    #[serde(default = "yes")]
+    pub lights: bool,
     #[serde(default)]
     pub light: Vec<Point>,
     pub sun: Option<Sun>,

@@ -1,6 +1,7 @@
 //! The technique against the path tracer, for all lights; and the transfer of the mean.
 
 use lucerna::Result;
+use serde_json::Value;
 
 use super::errors::{Case, Errors, Measured, PARTS, mean, noise};
 use crate::{
@@ -21,8 +22,8 @@ pub(super) fn section(results: &Results, measured: &[Measured<'_>]) -> Result<Op
     let mut section = Section::new("The technique against the path tracer");
     section.text(
         "Diffuse surfaces on both sides, and all scatterings. An area light is 25 points on a sphere on both sides. *Error* is the root mean square of the \
-         difference of linear radiance over the mean of the reference, in per cent. Of *pixels* it has the noise of the reference and the edges, which the technique does not \
-         smooth; of *blocks*, the means over 8×8 pixels, it has little of either. *Shadow* is the share of the light that a point sees, against rays to the light, where the surface faces the light. *Energy* is the sum \
+         difference of linear radiance over the mean of the reference, in per cent. The error of *pixels* contains the noise of the reference, and the edges; the error \
+         of *blocks*, of the means over 8×8 pixels, contains little of both. *Shadow* is the share of the light that a point sees, against rays to the light, where the surface faces the light. *Energy* is the sum \
          over that of the reference.",
     );
     means(&all).into_iter().for_each(|table| section.add(table));
@@ -101,7 +102,7 @@ fn means(all: &[&Measured<'_>]) -> [Table; 2] {
     [table, energy]
 }
 
-/// Errors of the indirect light by light, for the view with the most lights.
+/// Errors of the indirect light by light, for the first view.
 fn by_light(all: &[&Measured<'_>]) -> Plot {
     let mut lights: Vec<String> = Vec::new();
     let scene = all.first().map(|one| place(one.case.run)).unwrap_or_default();
@@ -143,16 +144,20 @@ pub(super) fn mean_and_darkness(results: &Results, cases: &[Case<'_>]) -> Result
         Ok(picture.pixels.iter().flatten().map(|value| f64::from(*value)).sum())
     };
     for case in cases.iter().filter(off) {
-        let same = |path: &str, other: &Case<'_>| case.setting(path) == other.setting(path);
+        // All settings but the strength.
+        let settings = |case: &Case<'_>| {
+            let mut settings = case.settings.clone();
+            settings.pointer_mut("/picture/prt/strength").map(Value::take);
+            settings
+        };
+        let of_dark = settings(case);
         let lit = cases.iter().find(|other| {
             (&other.run.scene, &other.run.view) == (&case.run.scene, &case.run.view)
-                && ["/bake", "/cut", "/lamp", "/show", "/picture/prt/mean", "/picture/prt/radius"]
-                    .iter()
-                    .all(|path| same(path, other))
+                && settings(other) == of_dark
                 && other.number("/picture/prt/strength") > 0.0
         });
         let Some(lit) = lit else { continue };
-        let whole = light(lit.run)?;
+        let (whole, dark) = (light(lit.run)?, light(case.run)?);
         let yes = |path: &str| if case.setting(path) == true { "yes" } else { "no" };
         table.push([
             place(case.run).into(),
@@ -160,7 +165,7 @@ pub(super) fn mean_and_darkness(results: &Results, cases: &[Case<'_>]) -> Result
             case.number("/bake/light").into(),
             yes("/bake/centred").into(),
             if case.setting("/bake/centred") == true { yes("/picture/prt/mean").into() } else { Cell::Empty },
-            (whole > 0.0).then(|| 100.0 * light(case.run).unwrap_or(f64::NAN) / whole).into(),
+            (whole > 0.0).then_some(100.0 * dark / whole).into(),
         ]);
     }
     if table.rows.is_empty() {

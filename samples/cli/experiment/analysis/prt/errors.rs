@@ -19,7 +19,7 @@ pub(in super::super) struct Errors {
     pub rms: f64,
     /// The same of the means over blocks of 8×8 pixels: without most of the noise of the reference, and with less of what is at edges.
     pub blocks: f64,
-    /// Sum over that of the truth: red, green, blue.
+    /// Sum over that of the truth: red, green, blue; NaN for a colour in which the truth is dark.
     pub energy: [f64; 3],
 }
 
@@ -52,13 +52,13 @@ impl Errors {
         (mean > 0.0).then(|| Self {
             rms: 100.0 * (square / values).sqrt() / mean,
             blocks: 100.0 * (of_blocks / values).sqrt() / mean,
-            energy: std::array::from_fn(|channel| found[channel] / whole[channel]),
+            energy: std::array::from_fn(|c| if whole[c] > 0.0 { found[c] / whole[c] } else { f64::NAN }),
         })
     }
 
-    /// Mean of the three channels' energies.
+    /// Mean of the energies of all colours in which the truth has light.
     pub fn energy(&self) -> f64 {
-        self.energy.iter().sum::<f64>() / 3.0
+        mean(self.energy.into_iter().filter(|energy| energy.is_finite())).unwrap_or(f64::NAN)
     }
 }
 
@@ -93,7 +93,7 @@ impl Case<'_> {
     }
 
     /// Whether the picture shows light that is to be compared with the truth.
-    fn shows_light(&self) -> bool {
+    pub fn shows_light(&self) -> bool {
         self.setting("/show") == "total" && self.number("/picture/prt/strength") == 1.0
     }
 }
@@ -104,7 +104,7 @@ fn method<'a>(results: &'a Results, run: &Done) -> Result<&'a Method> {
 }
 
 /// The lights of a picture, for equality.
-fn lights(settings: &Value, group: &str) -> (Value, Value, Value) {
+pub(super) fn lights(settings: &Value, group: &str) -> (Value, Value, Value) {
     let of = |key: &str| settings.pointer(&format!("{group}/{key}")).cloned().unwrap_or_default();
     let radius = of("radius");
     let points = if radius.as_f64() == Some(0.0) { Value::Null } else { of("points") };

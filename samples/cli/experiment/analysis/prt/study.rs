@@ -1,6 +1,7 @@
 //! The study that the paper leaves open: error, memory and work of a frame against the numbers of samples a cluster, directions and vectors.
 
 use lucerna::Result;
+use serde_json::Value;
 
 use super::errors::{Measured, PARTS, mean};
 use crate::{
@@ -15,13 +16,13 @@ const WITHIN: f64 = 1.25;
 
 const PRESETS: [&str; 3] = ["exact", "small", "fast"];
 
-/// Settings of a bake that are varied: heading, and path.
-const VARIED: [(&str, &str); 5] = [
-    ("samples a cluster", "/bake/cluster"),
-    ("directions", "/bake/directions"),
-    ("d₁", "visibility"),
-    ("d₂", "light"),
-    ("receivers", "receivers"),
+/// Settings of a bake that are varied: heading, path of the bake's own value, and path of the number of vectors that are used.
+const VARIED: [(&str, &str, Option<&str>); 5] = [
+    ("samples a cluster", "/bake/cluster", None),
+    ("directions", "/bake/directions", None),
+    ("d₁", "/bake/visibility", Some("/cut/visibility")),
+    ("d₂", "/bake/light", Some("/cut/light")),
+    ("receivers", "/bake/receivers", Some("/cut/receivers")),
 ];
 
 /// A choice of settings with the means over all lights.
@@ -74,20 +75,21 @@ pub(super) fn presets(choices: &[Choice], within: f64) -> Option<[usize; 3]> {
 
 /// The choices of the study, in the order of the experiment.
 fn choices(results: &Results, measured: &[Measured<'_>]) -> Result<Vec<Choice>> {
-    let mut groups: Vec<([f64; 5], Vec<&Measured<'_>>)> = Vec::new();
+    let mut groups: Vec<([f64; 5], &Value, Vec<&Measured<'_>>)> = Vec::new();
     for one in measured.iter().filter(|one| one.case.run.method.starts_with(STUDY)) {
-        let settings = VARIED.map(|(_, path)| {
-            let cut = one.case.number(&format!("/cut/{path}"));
-            let of_bake = if path.starts_with('/') { path.to_owned() } else { format!("/bake/{path}") };
-            if cut > 0.0 { cut } else { one.case.number(&of_bake) }
+        let settings = VARIED.map(|(_, bake, cut)| {
+            let cut = cut.map(|path| one.case.number(path)).filter(|cut| *cut > 0.0);
+            cut.unwrap_or_else(|| one.case.number(bake))
         });
-        match groups.iter_mut().find(|(known, _)| *known == settings) {
-            Some((_, list)) => list.push(one),
-            None => groups.push((settings, vec![one])),
+        // The first vectors of a larger bake are nearly, but not exactly, those of a bake of its own.
+        let bake = one.case.setting("/bake");
+        match groups.iter_mut().find(|(known, of, _)| *known == settings && *of == bake) {
+            Some((_, _, list)) => list.push(one),
+            None => groups.push((settings, bake, vec![one])),
         }
     }
     let mut list = Vec::new();
-    for (settings, of) in groups {
+    for (settings, _, of) in groups {
         let times = of.iter().map(|one| results.times(one.case.run)).collect::<Result<Vec<_>>>()?;
         let fact = |name: &str| mean(times.iter().filter_map(|times| times.fact(name)));
         let sum = |names: &[&str]| names.iter().filter_map(|name| fact(name)).sum::<f64>() / 1e6;
@@ -116,14 +118,14 @@ fn shown(choices: &[Choice], within: f64) -> Section {
     section.text(format!(
         "Settings of the bake against error, memory and the work of a frame. Errors are those of blocks of 8×8 pixels, means over the lights of the study. Vectors are ordered by the share \
          that they describe: a row with fewer vectors uses the first ones of a bake with more, so only the numbers of samples a cluster and of directions need \
-         bakes of their own. *Memory*: means, coefficients and vectors of the visibility, bases, and transfer. *Products*: for a light of one point, those of \
+         bakes of their own. The time of a bake is that of the larger bake. *Memory*: means, coefficients and vectors of the visibility, bases, and transfer. *Products*: for a light of one point, those of \
          the visibility, of the projection and transfer, and of all scatterings; the last of these grow with the square of the number of all vectors. \
          *Front*: no other row is at least as good in error of all light, memory and products, and better in one. Three presets: *exact* has the \
          smallest error; *small* has the fewest bytes, and *fast* the fewest products, with an error of at most {within} times the smallest one."
     ));
     let named = presets(choices, within).unwrap_or([usize::MAX; 3]);
     let front = front(&choices.iter().map(Choice::costs).collect::<Vec<_>>());
-    let heads = VARIED.iter().map(|(head, _)| (*head).to_owned());
+    let heads = VARIED.iter().map(|(head, ..)| (*head).to_owned());
     let columns = heads.clone().chain(PARTS.map(|(part, _)| format!("{part} (%)")));
     let columns = columns.chain(["memory (MB)", "products (10⁶)", "front", "preset"].map(str::to_owned));
     let mut table = Table::new("study", "Settings against errors, memory and work", columns);
@@ -143,7 +145,7 @@ fn shown(choices: &[Choice], within: f64) -> Section {
         times.push(settings().chain([choice.frame.into(), choice.bake.into()]));
     }
     section.add(table);
-    let columns = ["preset".to_owned()].into_iter().chain(VARIED.iter().map(|(head, _)| (*head).to_owned()));
+    let columns = ["preset".to_owned()].into_iter().chain(VARIED.iter().map(|(head, ..)| (*head).to_owned()));
     let columns = columns.chain(["error (%)", "memory (MB)", "products (10⁶)"].map(str::to_owned));
     let mut three = Table::new("presets", "Three presets", columns);
     for (name, at) in PRESETS.into_iter().zip(named) {

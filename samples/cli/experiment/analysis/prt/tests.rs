@@ -1,4 +1,4 @@
-use super::errors::Errors;
+use super::errors::{Errors, lights as lights_of};
 use crate::experiment::{file, kinds};
 
 #[test]
@@ -15,6 +15,9 @@ fn errors_of_known_pixels() {
     let first = Errors::of(2, &truth, &test, |at| at == 0).unwrap();
     assert_eq!([first.rms, first.blocks], [0.0, 0.0]);
     assert_eq!(Errors::of(1, &[[0.0; 3]], &[[1.0; 3]], |_| true), None);
+    // A colour without light has no energy.
+    let red = Errors::of(1, &[[2.0, 0.0, 0.0]], &[[1.0, 0.0, 0.0]], |_| true).unwrap();
+    assert!(red.energy() == 0.5 && red.energy[1].is_nan());
 }
 
 #[test]
@@ -39,7 +42,7 @@ fn every_light_of_the_experiment_has_its_reference() {
         for method in of("prt-truth") {
             for variant in method.variants() {
                 let settings = kinds::find(&method.kind).unwrap().effective(method, &variant).unwrap();
-                lights.push((method.scenes.clone(), settings["lamp"].clone(), settings["radius"].clone()));
+                lights.push((method.scenes.clone(), lights_of(&settings, "")));
             }
         }
         for method in of("prt") {
@@ -49,8 +52,7 @@ fn every_light_of_the_experiment_has_its_reference() {
                 if settings["show"] != "total" || settings["picture"]["prt"]["strength"] != 1.0 || frames {
                     continue;
                 }
-                let light =
-                    (method.scenes.clone(), settings["lamp"].clone(), settings["picture"]["prt"]["radius"].clone());
+                let light = (method.scenes.clone(), lights_of(&settings, "/picture/prt"));
                 assert!(lights.contains(&light), "{}: {light:?}", method.name);
             }
         }

@@ -1,6 +1,7 @@
 //! All methods by the same light: error against time.
 //!
-//! Pictures of the kind `daylight` are held against the reference of the kind `daylight-truth`, all others against the first other reference of the view.
+//! Pictures of the kinds `daylight` and `daylight-truth` have sun and sky. They are held against the reference of the kind `daylight-truth`, all others
+//! against the first other reference of the view; the two groups have plots of their own.
 
 #[cfg(test)]
 mod tests;
@@ -20,11 +21,15 @@ use crate::{
 const SIDE: u32 = 512;
 /// Parts of the light: name, and layer.
 const PARTS: [(&str, &str); 2] = [("indirect light", "indirect"), ("all light", "")];
+/// Kinds whose light is that of sun and sky.
 const DAYLIGHT: [&str; 2] = ["daylight", "daylight-truth"];
+/// Techniques whose name begins so are the path tracer.
+const TRACED: &str = "path tracer";
 
 /// A picture with its errors and times.
 #[derive(Clone, Debug, PartialEq)]
 struct Row {
+    /// Scene, view and light.
     view: String,
     method: String,
     /// With the values of its matrix.
@@ -42,13 +47,22 @@ fn kind<'a>(results: &'a Results, run: &Done) -> &'a str {
     method.map_or("", |method| method.kind.as_str())
 }
 
+/// Whether a picture has the light of sun and sky.
+fn by_sky(results: &Results, run: &Done) -> bool {
+    DAYLIGHT.contains(&kind(results, run))
+}
+
 /// The reference of a picture.
 fn truth<'a>(results: &'a Results, run: &Done) -> Option<&'a Done> {
-    let [technique, reference] = DAYLIGHT;
-    let of_daylight = kind(results, run) == technique;
-    results.with_role(Role::Reference).find(|other| {
-        (&other.scene, &other.view) == (&run.scene, &run.view) && (kind(results, other) == reference) == of_daylight
-    })
+    let sky = by_sky(results, run);
+    results
+        .with_role(Role::Reference)
+        .find(|other| (&other.scene, &other.view) == (&run.scene, &run.view) && by_sky(results, other) == sky)
+}
+
+/// Scene, view and light of a picture: what pictures must share to be compared.
+fn place(results: &Results, run: &Done) -> String {
+    format!("{}, {}{}", run.scene, run.view, if by_sky(results, run) { ", sun and sky" } else { "" })
 }
 
 fn rows(results: &Results) -> Result<Vec<Row>> {
@@ -62,7 +76,7 @@ fn rows(results: &Results) -> Result<Vec<Row>> {
         }
         let times = results.times(run)?;
         rows.push(Row {
-            view: format!("{}, {}", run.scene, run.view),
+            view: place(results, run),
             method: run.method.clone(),
             label: run.label(),
             errors,
@@ -96,16 +110,16 @@ fn plots(rows: &[Row]) -> Section {
     let mut section = Section::new("Error against time");
     section.text(
         "One view and one light by all methods. *Error* is the root mean square of the difference of linear radiance over the mean of the reference, of \
-         diffuse surfaces on both sides. *Time* is that of one picture on this device: of a bake that a method needs the table below has the time, and a \
-         picture after the first one costs no more of it. The path tracer draws a line: more samples, less error; its error falls with the root of the \
-         time. What stands below that line is faster than the path tracer at the same error.",
+         diffuse surfaces on both sides. *Time* is that of one picture on this device: the table below gives the time of each bake, which all \
+         pictures of a scene share. The path tracer draws a line: more samples, less error; its error falls with the root of the \
+         time. A method below that line is faster than the path tracer at the same error.",
     );
     section.text(
         "The methods do not all have the same light. Image-space radiosity gathers one scattering from what the picture shows. Virtual lights scatter as often \
          as the settings say, and corners lose light near them. Precomputed transfer has all scatterings of point and spot lights, and of no sun. Baked \
-         daylight has sun and sky alone: a closed room has neither, so a hall with windows stands beside the parlour. There daylight is held against the \
-         path tracer by the same sun and sky, and the other methods against the path tracer by a sun of the same direction without a sky, which they \
-         do not gather. Few light paths find a window, so virtual lights have little of the light in the hall; all figures are for one seed.",
+         daylight has sun and sky alone: a closed room has neither, so a hall with windows stands beside the parlour. There daylight and \
+         the path tracer have sun and sky, in a plot of their own; the other methods have a white sun of the same direction alone, because they do not \
+         gather a sky. Few light paths find a window, so virtual lights have little of the light in the hall; all figures are for one seed.",
     );
     for (at, view) in views(rows).into_iter().enumerate() {
         for (part, (name, _)) in PARTS.iter().enumerate() {
@@ -159,29 +173,28 @@ fn tables(rows: &[Row]) -> Section {
 
 /// Time in which the path tracer reaches an error of all light, ms: its error falls with the root of the time.
 fn equal_time(rows: &[Row], view: &str, rms: f64) -> Option<f64> {
-    let traced = rows.iter().filter(|row| row.view == view && row.method == "path tracer");
+    let traced = rows.iter().filter(|row| row.view == view && row.method.starts_with(TRACED));
     mean(traced.filter_map(|row| Some(row.frame? * (row.errors[1]?.rms / rms).powi(2))))
 }
 
 fn images(results: &Results) -> Result<Section> {
     let mut section = Section::new("Pictures");
-    for (at, (scene, view)) in results.views().into_iter().enumerate() {
+    // Pictures by one light share an exposure.
+    for (at, truth) in results.with_role(Role::Reference).enumerate() {
         for (part, layer) in PARTS {
-            let mut set: Option<Comparison> = None;
-            let all: Vec<&Done> = results.at((scene, view)).collect();
-            let references = |run: &&&Done| results.with_role(Role::Reference).any(|other| other.key == run.key);
-            // References first: methods are flipped against them.
-            let order = all.iter().filter(references).chain(all.iter().filter(|run| !references(run)));
-            for run in order {
-                let picture = results.picture(Layer(run, layer))?;
-                let current = set.take().unwrap_or_else(|| {
-                    let id = format!("picture-{at}-{}", part.split(' ').next().unwrap_or_default());
-                    Comparison::new(id, format!("{scene}, {view}: {part}"), picture.width, picture.height)
-                        .exposure(Display::default().stops(&picture))
-                });
-                set = Some(current.with(run.label(), picture.pixels));
+            let picture = results.picture(Layer(truth, layer))?;
+            let id = format!("picture-{at}-{}", part.split(' ').next().unwrap_or_default());
+            let title = format!("{}: {part}", place(results, truth));
+            let mut set = Comparison::new(id, title, picture.width, picture.height)
+                .exposure(Display::default().stops(&picture))
+                .with(truth.label(), picture.pixels);
+            for run in results
+                .with_role(Role::Technique)
+                .filter(|run| self::truth(results, run).map(|of| &of.key) == Some(&truth.key))
+            {
+                set = set.with(run.label(), results.picture(Layer(run, layer))?.pixels);
             }
-            set.into_iter().for_each(|set| section.add(set.at_most(SIDE)));
+            section.add(set.at_most(SIDE));
         }
     }
     Ok(section)

@@ -10,7 +10,7 @@ use lucerna::{
     image,
     scene::{Pose, Scene},
     technique::{Ready, Shot, Technique},
-    techniques::prt::{Baked, Bakery, Baking, Mode, PictureSettings, Prt, Stored, Summary, starts, units},
+    techniques::prt::{Baked, Bakery, Baking, Mode, PictureSettings, Prt, Stored, Summary, units},
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -25,8 +25,6 @@ use crate::{
 
 /// Bakes of a scene that stay in memory; the others are read again.
 const KEPT: usize = 2;
-/// The stages of a bake that are jobs of units, in their order.
-const STAGES: [&str; 5] = ["visibility", "gather", "direct", "basis", "transfer"];
 /// Largest file of a bake, bytes.
 const MOST_BYTES: u64 = 8 << 30;
 
@@ -120,7 +118,8 @@ fn known(file: &Path, about: &Path) -> Result<Option<Found>> {
 fn make(gpu: &Gpu, scene: &Scene, baking: &Baking, folder: &Path, stop: &Stop) -> Result<Option<Found>> {
     let begun = Instant::now();
     let mut bakery = Bakery::new(gpu, scene)?;
-    let sampled = bakery.sample(baking, &starts(scene), stop)?;
+    let (starts, _) = bakery.starts(baking, stop)?;
+    let sampled = bakery.sample(baking, &starts, stop)?;
     let of_samples = begun.elapsed().as_secs_f64();
     let temporary = tempfile::tempdir_in(folder).map_err(|error| {
         Error::new(ErrorKind::Output, "no folder can be made in it").in_file(folder).caused_by(error)
@@ -128,21 +127,17 @@ fn make(gpu: &Gpu, scene: &Scene, baking: &Baking, folder: &Path, stop: &Stop) -
     let samples = sampled.samples.clone();
     let store = Store::create(temporary.path(), units::job(&sampled.plan, &samples, &cache::device(gpu))?)?;
     let mut work = units::Work::new(bakery, sampled)?;
-    let mut spent = [0.0; STAGES.len()];
     let options = Options { stop: stop.clone(), ..Options::default() };
-    let one = |unit: bake::UnitId, needed: bake::Needed<'_>| {
-        let begun = Instant::now();
-        let bytes = work.unit(unit, &needed);
-        spent[unit.stage as usize] += begun.elapsed().as_secs_f64();
-        bytes
-    };
+    let one = |unit: bake::UnitId, needed: bake::Needed<'_>| work.unit(unit, &needed);
     if bake::run(&store, &options, one, |_| {})?.end != End::Done {
         return Ok(None);
     }
     let stored = Stored::join(&store, samples)?;
     let whole = begun.elapsed().as_secs_f64();
     let mut seconds = vec![("seconds samples".to_owned(), of_samples)];
-    seconds.extend(STAGES.iter().zip(spent).map(|(name, spent)| (format!("seconds {name}"), spent)));
+    // The samples are there before all stages; their unit only keeps them.
+    let stages = work.seconds().filter(|(name, _)| *name != "samples");
+    seconds.extend(stages.map(|(name, spent)| (format!("seconds {name}"), spent)));
     seconds.push(("seconds whole".into(), whole));
     Ok(Some((stored, seconds)))
 }

@@ -18,7 +18,8 @@ use super::{Job, OfTruth, Rendered, Times, Warm, lamp_of, lit};
 const OFF: f32 = 1e-4;
 
 /// Layers as those of precomputed transfer. `shadow`: share of the first light that a point sees, as rays to its points find it. `facing`: 1 where the
-/// first light is above the surface's horizon; 0 everywhere in scenes with surfaces that let light through, for which there are no such rays.
+/// first light is above the surface's horizon; 0 everywhere in scenes with cut-out or
+/// transparent surfaces, which these rays do not know. Lamps that are shown without light stop these rays, too.
 pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>, settings: &OfTruth) -> Result<Option<Rendered>> {
     let mut tracer = settings.tracer.clone();
     tracer.seed = tracer.seed.wrapping_add(job.seed);
@@ -35,7 +36,9 @@ pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>, settings: &OfTruth) ->
     let bvh: &mut Bvh = warm.keep("bvh", |_, scene, pose| Ok(Bvh::build(scene, pose)))?;
     let lights: Vec<Vec3> = places(&scene, &pose).into_iter().take(offsets.len()).collect();
     let opaque = scene.materials.iter().all(|material| material.alpha == AlphaMode::Opaque);
-    let found = shadows(bvh, job.view, if opaque { &lights } else { &[] });
+    let lights = if opaque { &lights[..] } else { &[] };
+    let depths = layers.layer("depth").map(|layer| layer.data.clone()).unwrap_or_default();
+    let found = shadows(bvh, job.view, lights, &depths);
     for (name, index) in [("shadow", 0), ("facing", 1)] {
         let pixels: Vec<[f32; 3]> = found.iter().map(|pixel| [pixel[index]; 3]).collect();
         layers = Layers { ..layers }.with(Layer::rgb(name, &pixels));
@@ -70,14 +73,23 @@ fn places(scene: &Scene, pose: &Pose) -> Vec<Vec3> {
     nodes.map(|(_, world)| world.w_axis.truncate()).collect()
 }
 
-/// Share of the light of these points that each pixel's surface sees, and 1 if it faces one of them.
-fn shadows(bvh: &Bvh, view: &View, lights: &[Vec3]) -> Vec<[f32; 2]> {
+/// Share of the light of these points that each pixel's surface sees, and 1 if it faces one of them. `depths`: of the picture, metres; pixels in which the
+/// rays meet another surface than the picture shows have 0.
+fn shadows(bvh: &Bvh, view: &View, lights: &[Vec3], depths: &[f32]) -> Vec<[f32; 2]> {
+    let [_, _, forward] = view.axes();
     let [width, height] = view.extent;
     let pixel = |x: u32, y: u32| {
         let uv = (Vec2::new(x as f32, y as f32) + 0.5) / Vec2::new(width as f32, height as f32);
         let [near, far] = [0.0, 1.0].map(|depth| view.world_from_depth(uv, depth));
         let direction = (far - near).normalize_or_zero();
         let Some(hit) = bvh.closest(&Ray { t_min: view.near, ..Ray::new(near, direction) }) else { return [0.0; 2] };
+        let depth = (near + direction * hit.t - view.position).dot(forward);
+        let shown = depths.get((y * width + x) as usize).copied().unwrap_or(f32::NAN);
+        // Two surfaces in one pixel are within a hundredth of each other if they are the same.
+        let same = (shown - depth).abs() < 0.01 * depth;
+        if !same {
+            return [0.0; 2];
+        }
         let [a, b, c] = bvh.triangles()[hit.triangle as usize];
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
@@ -120,21 +132,23 @@ mod tests {
         // From (−0.5, 0, 0) the edge of the plate throws its shadow to x = 1.5 on the wall: on three of eight columns.
         let hidden = Vec3::new(-0.5, 0.0, 0.0);
         let dark = |at: usize| at % 8 < 3;
-        for (at, pixel) in shadows(&bvh, &view, &[hidden]).iter().enumerate() {
+        for (at, pixel) in shadows(&bvh, &view, &[hidden], &[2.0; 32]).iter().enumerate() {
             assert_eq!(*pixel, [f32::from(!dark(at)), 1.0], "{at}");
         }
         // Another light, which nothing hides, counts with its irradiance.
         let open = Vec3::new(2.0, 0.0, 0.0);
-        for (at, pixel) in shadows(&bvh, &view, &[hidden, open]).iter().enumerate() {
+        for (at, pixel) in shadows(&bvh, &view, &[hidden, open], &[2.0; 32]).iter().enumerate() {
             let [x, y] = [(at % 8) as f32 - 3.5, 1.5 - (at / 8) as f32].map(|steps| steps * 0.5f32.tan());
             let point = Vec3::new(2.0 + x, y, -4.0);
             let [a, b] = [hidden, open].map(|light| 4.0 / (light - point).length().powi(3));
             let share = if dark(at) { b / (a + b) } else { 1.0 };
             assert!((pixel[0] - share).abs() < 1e-3, "{at}: {pixel:?} {share}");
         }
+        // A picture that shows another surface has no shadow to compare.
+        assert!(shadows(&bvh, &view, &[open], &[1.5; 32]).iter().all(|pixel| *pixel == [0.0; 2]));
         // Behind the wall and without a light nothing faces the light.
         for lights in [&[Vec3::new(0.0, 0.0, -5.0)][..], &[]] {
-            assert!(shadows(&bvh, &view, lights).iter().all(|pixel| *pixel == [0.0; 2]));
+            assert!(shadows(&bvh, &view, lights, &[2.0; 32]).iter().all(|pixel| *pixel == [0.0; 2]));
         }
     }
 
