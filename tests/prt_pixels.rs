@@ -2,7 +2,7 @@
 
 use crate::{
     prt_lab::{baked, closed, diffuse, small},
-    tracer_lab::{Stage, view},
+    tracer_lab::{Stage, flat_view, view},
 };
 use glam::{Mat4, Vec3, vec3};
 use lucerna::{
@@ -11,7 +11,7 @@ use lucerna::{
     image::Layers,
     scene::{Camera, Material, Pose, Projection, Scene, View},
     technique::{Ready, Shot},
-    techniques::prt::{Baked, Baking, Direct, PictureSettings, Prt, Spread, Stored},
+    techniques::prt::{Baked, Baking, Direct, PictureSettings, Prt, Spread, Stored, Tree},
 };
 
 const WAYS: [Spread; 3] = [Spread::Gather, Spread::Splats, Spread::Vertices];
@@ -155,6 +155,41 @@ fn far_away_a_splat_stands_for_many_samples() {
         assert!(off.into_iter().all(|off| off < 0.1), "{off:?}");
         // Near samples have splats of their own.
         assert_eq!(sized(1.0, 0.5).number("splats"), sized(1.0, 0.0).number("splats"));
+    });
+}
+
+#[test]
+fn splats_of_a_cut_have_the_area_of_all_samples_at_any_size() {
+    with_gpu(|gpu| {
+        let scene = divided(1.0);
+        let stored = baked(gpu, &scene, &Baking { rays: 16, examples: 16, directions: 16, ..small() });
+        let tree = Tree::new(&stored.samples, &stored.plan.clusters, stored.plan.radius);
+        let count = stored.samples.len();
+        let whole: f64 = stored.samples.iter().map(|sample| f64::from(sample.area)).sum();
+        // 59 m² of walls, floor and ceiling, and five sides of the block.
+        assert!((whole / (59.0 + 2.0 * (0.6 + 0.8) + 0.6 * 0.8) - 1.0).abs() < 0.02, "{whole}");
+        // Sides are along the axes, so each one faces one of two opposite views along a diagonal. Both see all of the room.
+        let middle = vec3(0.0, 1.25, 0.0);
+        let eyes = [20.0, -20.0].map(|away| flat_view(middle + away * Vec3::ONE, middle, 12.0, [64, 48]));
+        let mut before = usize::MAX;
+        for least in [0.0, 0.1, 0.5, 1.0, 2.0, 4.0, 16.0, 64.0] {
+            let cut: Vec<u32> = eyes.iter().flat_map(|eye| tree.cut(eye, least, 1.8)).collect();
+            let splats = || cut.iter().map(|number| &tree.splats[*number as usize]);
+            let members = splats().flat_map(|s| &tree.members[s.first as usize..(s.first + s.count) as usize]);
+            let mut members: Vec<u32> = members.copied().collect();
+            let area: f64 = members.iter().map(|member| f64::from(stored.samples[*member as usize].area)).sum();
+            assert!((area / whole - 1.0).abs() < 1e-9, "{least}: {area} of {whole}");
+            // The area is that of all samples because each one is there, once.
+            members.sort_unstable();
+            assert!(members.into_iter().eq(0..count as u32), "{least}");
+            // Discs are as large as those that they stand for.
+            let discs: f64 = splats().map(|splat| f64::from(splat.spacing).powi(2)).sum();
+            let wanted = count as f64 * f64::from(stored.plan.radius).powi(2);
+            assert!((discs / wanted - 1.0).abs() < 1e-4, "{least}: {discs} {wanted}");
+            assert!(cut.len() <= before && (least > 0.0 || cut.len() == count), "{least}: {}", cut.len());
+            before = cut.len();
+        }
+        assert!(before < count / 5, "{before} of {count}");
     });
 }
 

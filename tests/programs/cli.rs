@@ -39,8 +39,12 @@ mod igi_experiment;
 mod lucerna;
 #[path = "../cli/prt.rs"]
 mod prt;
+#[path = "../cli/prt_bake.rs"]
+mod prt_bake;
 #[path = "../cli/prt_experiment.rs"]
 mod prt_experiment;
+#[path = "../cli/prt_rooms.rs"]
+mod prt_rooms;
 #[path = "../cli/reference.rs"]
 mod reference;
 #[path = "../cli/render.rs"]

@@ -7,6 +7,8 @@ mod tracer_lab;
 
 #[path = "../prt_light.rs"]
 mod prt_light;
+#[path = "../prt_moving.rs"]
+mod prt_moving;
 #[path = "../prt_odd.rs"]
 mod prt_odd;
 #[path = "../prt_pixels.rs"]
@@ -15,3 +17,7 @@ mod prt_pixels;
 mod prt_samples;
 #[path = "../prt_transfer.rs"]
 mod prt_transfer;
+#[path = "../prt_units.rs"]
+mod prt_units;
+#[path = "../prt_visibility.rs"]
+mod prt_visibility;

@@ -34,6 +34,18 @@ pub fn sampled(gpu: &Gpu, scene: &Scene, baking: &Baking) -> Result<(Bakery, Sam
 
 pub fn baked(gpu: &Gpu, scene: &Scene, baking: &Baking) -> Stored {
     let (bakery, sampled) = sampled(gpu, scene, baking).unwrap();
+    stored(bakery, sampled)
+}
+
+/// As [`baked`], with the rooms that lights do not reach.
+pub fn baked_with_rooms(gpu: &Gpu, scene: &Scene, baking: &Baking) -> Stored {
+    let mut bakery = Bakery::new(gpu, scene).unwrap();
+    let (starts, _) = bakery.starts(baking, &Stop::default()).unwrap();
+    let sampled = bakery.sample(baking, &starts, &Stop::default()).unwrap();
+    stored(bakery, sampled)
+}
+
+fn stored(bakery: Bakery, sampled: Sampled) -> Stored {
     let folder = tempfile::tempdir().unwrap();
     let job = units::job(&sampled.plan, &sampled.samples, "device").unwrap();
     let store = Store::create(&folder.path().join("room.parts"), job).unwrap();

@@ -28,6 +28,8 @@ use crate::{
 const PARTICLES: u32 = 1 << 16;
 /// Rounds of particles at most.
 const MOST_ROUNDS: u32 = 96;
+/// Least share of the particles that are still in the scene when their hits begin to count. A cube with one side open keeps about a quarter (0.8⁵ · 5/6).
+const LEAST_INSIDE: f64 = 0.05;
 /// Samples from which the area that light reaches is estimated.
 const PILOT: f32 = 3000.0;
 
@@ -95,7 +97,7 @@ impl Bakery {
             return Err(Error::input("the scene has no surface that light reaches"));
         }
         let pilot = (samples::DENSITY * whole / PILOT).sqrt();
-        let (mut found, _, escaped) = self.thinned(baking, starts, (pilot, 4), &mut triangles, stop)?;
+        let (mut found, _, escaped, stayed) = self.thinned(baking, starts, (pilot, 4), &mut triangles, stop)?;
         if found.len() < 16 {
             let what = format!("particles from {} places inside the scene hit next to nothing", starts.len());
             return Err(Error::input(what).help("Name a point inside the room with --inside X,Y,Z"));
@@ -104,10 +106,15 @@ impl Bakery {
             let what = format!("the scene is open: {:.0} % of all scattered particles leave it", 100.0 * escaped);
             return Err(Error::input(what).help("Name a point inside a room with --inside X,Y,Z"));
         }
+        if stayed < LEAST_INSIDE {
+            let what = format!("the scene is open: {:.0} % of all particles leave it at once", 100.0 * (1.0 - stayed));
+            return Err(Error::input(what).help("Name a point inside a room with --inside X,Y,Z"));
+        }
         samples::weigh(&mut found, &triangles, pilot);
         let reached: f32 = found.iter().map(|sample| sample.area).sum();
         let radius = (samples::DENSITY * reached / baking.samples as f32).sqrt();
-        let (mut found, places, escaped) = self.thinned(baking, starts, (radius, MOST_ROUNDS), &mut triangles, stop)?;
+        let (mut found, places, escaped, _) =
+            self.thinned(baking, starts, (radius, MOST_ROUNDS), &mut triangles, stop)?;
         if found.len() > plan::MOST_SAMPLES {
             let what = format!("{} samples, at most {} are possible", found.len(), plan::MOST_SAMPLES);
             return Err(Error::usage(what).at("room.samples"));
@@ -135,7 +142,8 @@ impl Bakery {
         Ok(Sampled { plan, samples: sorted, examples: places })
     }
 
-    /// Thinned hits of particles, places in the free space, and the share of scattered particles that left the scene.
+    /// Thinned hits of particles, places in the free space, the share of scattered particles that left the scene, and the share of all particles that
+    /// were still in the scene when their hits began to count.
     fn thinned(
         &mut self,
         baking: &Baking,
@@ -143,14 +151,17 @@ impl Bakery {
         (radius, rounds): (f32, u32),
         triangles: &mut Triangles,
         stop: &Stop,
-    ) -> Result<(Vec<PrtPoint>, Vec<[f32; 3]>, f64)> {
+    ) -> Result<(Vec<PrtPoint>, Vec<[f32; 3]>, f64, f64)> {
         let mut thinning = Thinning::new(radius);
         let mut places = Vec::new();
         let mut escaped = [0u64; 2];
+        let mut stayed = [0usize; 2];
         for round in 0..rounds {
             stop.check()?;
             let found = self.particles(baking, starts, round * PARTICLES)?;
             escaped.iter_mut().zip(found.escaped).for_each(|(sum, more)| *sum += more);
+            stayed[0] += found.hits.iter().filter(|hits| !hits.is_empty()).count();
+            stayed[1] += found.hits.len();
             if round == 0 {
                 places = free_places(&found.hits, baking.examples);
             }
@@ -165,7 +176,8 @@ impl Bakery {
                 break;
             }
         }
-        Ok((thinning.samples, places, escaped[0] as f64 / escaped[1].max(1) as f64))
+        let escaped = escaped[0] as f64 / escaped[1].max(1) as f64;
+        Ok((thinning.samples, places, escaped, stayed[0] as f64 / stayed[1].max(1) as f64))
     }
 
     /// Places in the free space that are not those of the examples of a bake, evenly distributed, metres.

@@ -171,6 +171,23 @@ fn chosen(stored: &Stored, count: u32) -> Vec<u32> {
     out
 }
 
+/// Direct and indirect irradiance at all samples by a light of 1 W/sr at each of these places, as pictures have them, W/m². `settings`: of the pictures;
+/// the strength of lights counts, and so do their radius and their points.
+///
+/// # Errors
+/// `Input` if the light of all scatterings is not finite; `OutOfMemory`, `DeviceLost`, `Interrupted`.
+pub fn at_samples(
+    gpu: &Gpu,
+    scene: &Scene,
+    stored: &Stored,
+    settings: &Settings,
+    places: &[[f32; 3]],
+) -> Result<Vec<[Vec<[f32; 3]>; 2]>> {
+    let light = OnDevice::new(gpu, scene, stored, settings)?;
+    let mut runner = Runner::new(gpu);
+    places.iter().map(|place| transferred(&mut runner, &light, &stored.plan, *place, settings)).collect()
+}
+
 /// Direct and indirect irradiance at all samples by a light of 1 W/sr, as a picture has them, W/m².
 fn transferred(
     runner: &mut Runner,

@@ -14,7 +14,7 @@ const MOST_ROOMS: usize = 8;
 const CANDIDATES: usize = 256;
 /// Share of the particles that are still in the scene when their hits begin to count. Light leaves any other place too fast for a room.
 const CLOSED: f64 = 0.25;
-/// Share of the hits that are on fronts of triangles that no other particle has met. The inside of furniture has backs.
+/// Share of the hits that are on fronts of triangles that next to no other particle has met. The inside of furniture has backs.
 const NEW: f64 = 0.75;
 /// Least mean distance between two hits of a particle, as a share of that in the known rooms: cabinets and boxes are hollow, too.
 const LEAST: f64 = 0.25;
@@ -54,8 +54,9 @@ impl Bakery {
             let hits = self.particles(baking, &fresh, 0)?.hits;
             hits.iter().flatten().for_each(|hit| triangles.count(hit));
             let least = *least.get_or_insert(LEAST * free_path(hits.iter()));
+            let usual = triangles.usual();
             let places: Vec<Vec3> =
-                triangles.unseen(CANDIDATES).iter().map(|[at, normal]| *at + off * *normal).collect();
+                triangles.unseen(CANDIDATES, usual).iter().map(|[at, normal]| *at + off * *normal).collect();
             if places.is_empty() {
                 return Ok(room);
             }
@@ -64,7 +65,7 @@ impl Bakery {
             let of = |place: usize| found.iter().skip(place).step_by(places.len());
             // The middle between two hits of one particle is in the free space.
             let pair = |place: usize| of(place).flat_map(|hits| hits.windows(2)).next();
-            let is_room = |place: &usize| is_room(of(*place), &triangles) && free_path(of(*place)) >= least;
+            let is_room = |place: &usize| is_room(of(*place), &triangles, usual) && free_path(of(*place)) >= least;
             let rooms = (0..places.len()).filter(is_room);
             let Some(pair) = rooms.filter_map(pair).next() else { return Ok(room) };
             let start = 0.5 * (samples::position(&pair[0]) + samples::position(&pair[1]));
@@ -86,13 +87,13 @@ fn free_path<'a>(particles: impl Iterator<Item = &'a Vec<PrtPoint>>) -> f64 {
 }
 
 /// Whether the particles of a place, each with its hits, are in a room that is not known.
-fn is_room<'a>(particles: impl Iterator<Item = &'a Vec<PrtPoint>>, triangles: &Triangles) -> bool {
+fn is_room<'a>(particles: impl Iterator<Item = &'a Vec<PrtPoint>>, triangles: &Triangles, usual: f64) -> bool {
     let (mut all, mut inside, mut hits, mut new) = (0u32, 0u32, 0u32, 0u32);
     for of in particles {
         all += 1;
         inside += u32::from(!of.is_empty());
         hits += of.len() as u32;
-        new += of.iter().filter(|hit| triangles.is_new(hit)).count() as u32;
+        new += of.iter().filter(|hit| triangles.is_new(hit, usual)).count() as u32;
     }
     hits > 0 && f64::from(inside) >= CLOSED * f64::from(all) && f64::from(new) >= NEW * f64::from(hits)
 }

@@ -13,6 +13,8 @@ use crate::{
 pub(super) const DENSITY: f32 = 0.697;
 /// Points on surfaces for each sample, from which its area follows.
 const POINTS: usize = 50;
+/// Hits of a triangle below which they are stray ones, as a share of those that its area would have.
+const STRAY: f64 = 0.02;
 /// Cells of a grid at most.
 const MOST_CELLS: f64 = 8e6;
 
@@ -43,23 +45,30 @@ impl Thinning {
     pub fn offer(&mut self, candidate: &PrtPoint) -> bool {
         let at = position(candidate);
         let cell = |v: Vec3| (v / self.radius).floor().as_ivec3();
+        let close = |other: &u32| {
+            let other = &self.samples[*other as usize];
+            // A picture on a wall has samples of its own.
+            let strange = if other.material == candidate.material { 1.0 } else { 0.6 };
+            let least = strange * self.radius * (0.5 + 0.5 * side(other).dot(side(candidate)));
+            position(other).distance_squared(at) < least * least
+        };
+        let any = |cell: [i32; 3]| self.cells.get(&cell).is_some_and(|others| others.iter().any(close));
+        // Most candidates are too close to a sample of their own cell.
+        let own = cell(at).to_array();
+        if any(own) {
+            return false;
+        }
         let [low, high] = [-self.radius, self.radius].map(|by| cell(at + by));
         for z in low.z..=high.z {
             for y in low.y..=high.y {
                 for x in low.x..=high.x {
-                    for other in self.cells.get(&[x, y, z]).into_iter().flatten() {
-                        let other = &self.samples[*other as usize];
-                        // A picture on a wall has samples of its own.
-                        let strange = if other.material == candidate.material { 1.0 } else { 0.6 };
-                        let least = strange * self.radius * (0.5 + 0.5 * side(other).dot(side(candidate)));
-                        if position(other).distance_squared(at) < least * least {
-                            return false;
-                        }
+                    if [x, y, z] != own && any([x, y, z]) {
+                        return false;
                     }
                 }
             }
         }
-        self.cells.entry(cell(at).to_array()).or_default().push(self.samples.len() as u32);
+        self.cells.entry(own).or_default().push(self.samples.len() as u32);
         self.samples.push(*candidate);
         true
     }
@@ -196,14 +205,39 @@ impl Triangles {
         Some((at, doubled_area(triangle).dot(side(hit)) < 0.0))
     }
 
-    /// Whether a hit is on the front of a triangle that no particle was counted on.
-    pub fn is_new(&self, hit: &PrtPoint) -> bool {
-        self.find(hit).is_some_and(|(at, back)| !back && self.hits[at][0] == 0)
+    /// Hits on one square metre of the sides that particles meet: the median over hits, which slivers with a hit by chance do not move.
+    pub fn usual(&self) -> f64 {
+        let sides = self.list.iter().zip(&self.hits).flat_map(|((triangle, _), hits)| {
+            let part = (0.5 * f64::from(doubled_area(triangle).length())).max(1e-30);
+            hits.iter().map(move |count| (f64::from(*count) / part, *count))
+        });
+        let mut all: Vec<(f64, u32)> = sides.filter(|(_, count)| *count > 0).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut half = all.iter().map(|(_, count)| u64::from(*count)).sum::<u64>() / 2;
+        let found = all.iter().find(|(_, count)| {
+            let here = half < u64::from(*count);
+            half = half.saturating_sub((*count).into());
+            here
+        });
+        found.map_or(0.0, |(density, _)| *density)
     }
 
-    /// Up to `count` points, evenly distributed over the fronts of triangles that no particle was counted on, with the normals there.
-    pub fn unseen(&self, count: usize) -> Vec<[Vec3; 2]> {
-        let fronts = || self.list.iter().zip(&self.hits).filter(|(_, hits)| hits[0] == 0).map(|((t, _), _)| t);
+    /// Whether next to no particle met the front of a triangle. A few slip through the edges of rooms, where two surfaces meet.
+    fn is_strange(&self, at: usize, usual: f64) -> bool {
+        let hits = f64::from(self.hits[at][0]);
+        hits == 0.0 || hits < STRAY * usual * 0.5 * f64::from(doubled_area(&self.list[at].0).length())
+    }
+
+    /// Whether a hit is on the front of a triangle that particles do not meet. `usual`: [`Self::usual`].
+    pub fn is_new(&self, hit: &PrtPoint, usual: f64) -> bool {
+        self.find(hit).is_some_and(|(at, back)| !back && self.is_strange(at, usual))
+    }
+
+    /// Up to `count` points, evenly distributed over the fronts of triangles that particles do not meet, with the normals there.
+    pub fn unseen(&self, count: usize, usual: f64) -> Vec<[Vec3; 2]> {
+        let strange = (0..self.list.len()).filter(|at| self.is_strange(*at, usual));
+        let strange: Vec<&[Vec3; 3]> = strange.map(|at| &self.list[at].0).collect();
+        let fronts = || strange.iter().copied();
         let part = |triangle: &[Vec3; 3]| 0.5 * f64::from(doubled_area(triangle).length());
         let each = fronts().map(part).filter(|part| part.is_finite()).sum::<f64>() / count as f64;
         let mut out: Vec<[Vec3; 2]> = Vec::new();
@@ -307,13 +341,18 @@ pub(super) fn cluster(samples: Vec<PrtPoint>, baking: &Baking) -> (Vec<PrtPoint>
     let whole: f32 = samples.iter().map(|sample| sample.area).sum();
     let wanted = (samples.len() as f32 / baking.cluster as f32).round().max(1.0);
     let mut radius = (DENSITY * whole / wanted).sqrt();
+    let corners = samples.iter().map(position);
+    let size = corners.clone().fold(Vec3::MIN, Vec3::max) - corners.fold(Vec3::MAX, Vec3::min);
+    // Samples that look in opposite directions are never too close.
+    let largest = 2.0 * radius.max(size.length());
     // Furniture is smaller than the radius and has roots of its own, so the radius grows until their number fits.
     let roots = loop {
         let mut thinning = Thinning::new(radius.max(1e-6));
         for sample in &samples {
             thinning.offer(sample);
         }
-        if thinning.samples.len() as f32 <= 1.1 * wanted || thinning.samples.len() <= 1 {
+        if thinning.samples.len() as f32 <= 1.1 * wanted || radius > largest {
+            thinning.samples.truncate((1.1 * wanted) as usize);
             break thinning.samples;
         }
         radius *= 1.05;
@@ -371,6 +410,22 @@ mod tests {
     }
 
     #[test]
+    fn a_few_stray_hits_do_not_make_a_room_known() {
+        let (_, mut triangles) = square(0.05);
+        triangles.list.push(([Vec3::Y, Vec3::Y + Vec3::X, Vec3::Y + Vec3::Z], 0));
+        triangles.list.push(([Vec3::Z, Vec3::Z + Vec3::X, Vec3::Z + 1e-9 * Vec3::Y], 0));
+        triangles.hits.extend([[19, 0], [1, 0]]);
+        // The fronts of the square have no hits, their backs have 2000 of one square metre.
+        assert_eq!(triangles.usual(), 2000.0);
+        let strange = |triangles: &Triangles| (0..4).map(|at| triangles.is_strange(at, 2000.0)).collect::<Vec<_>>();
+        assert_eq!(strange(&triangles), [true, true, true, false]);
+        triangles.hits[2] = [21, 0];
+        assert_eq!(strange(&triangles), [true, true, false, false]);
+        assert!(triangles.unseen(100, 2000.0).iter().all(|[at, _]| at.y == 0.0));
+        assert_eq!(Triangles::default().usual(), 0.0);
+    }
+
+    #[test]
     fn areas_sum_to_the_surface_and_only_to_its_lit_side() {
         let (mut samples, triangles) = square(0.05);
         weigh(&mut samples, &triangles, 0.05);
@@ -387,6 +442,16 @@ mod tests {
         assert!(thinning.offer(&point(Vec3::ZERO, -Vec3::Y)));
         assert!(!thinning.offer(&point(Vec3::X * 0.09, Vec3::Y)));
         assert!(thinning.offer(&point(Vec3::X * 0.09, Vec3::Z)));
+    }
+
+    #[test]
+    fn samples_that_look_at_each_other_are_one_cluster_if_one_is_wanted() {
+        let ways = [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y];
+        let samples: Vec<PrtPoint> = ways.iter().map(|way| PrtPoint { area: 1.0, ..point(-*way, *way) }).collect();
+        for (size, clusters) in [(8, 1), (4, 1), (2, 2)] {
+            let (sorted, counts) = cluster(samples.clone(), &Baking { cluster: size, ..Baking::default() });
+            assert_eq!((sorted.len(), counts.len()), (4, clusters), "{size}: {counts:?}");
+        }
     }
 
     #[test]

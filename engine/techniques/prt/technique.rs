@@ -1,9 +1,8 @@
 //! Precomputed transfer behind the interface of all techniques.
 
-use glam::Vec3;
-
 use super::{
     Baked, Direct as Shadows, PictureSettings, Settings, Stored, eyes,
+    left_out::left_out,
     on_device::OnDevice,
     pixels::{Drawing, Shown},
     spread::Spreader,
@@ -11,7 +10,6 @@ use super::{
 use crate::{
     Error, Result,
     graph::Graph,
-    scene::{LightKind, Note, NoteKind, Scene},
     settings::{Described, Description, idle_notes},
     shaders::consts,
     technique::{self, Making, Moment, Picture, Technique},
@@ -87,47 +85,6 @@ impl Prt {
     pub fn stored(&self) -> &Stored {
         &self.baked.stored
     }
-}
-
-/// Notes on light and surfaces of a scene that the bake leaves out or simplifies.
-fn left_out(scene: &Scene) -> Vec<Note> {
-    let note = |place: &str, text: String| Note { kind: NoteKind::Ignored, place: place.into(), text };
-    let mut notes = Vec::new();
-    let suns =
-        scene.lights.iter().filter(|light| light.kind == LightKind::Directional && light.intensity > 0.0).count();
-    if suns > 0 {
-        notes.push(note("lights", format!("{suns} suns are off: only point and spot lights are transferred")));
-    }
-    if scene.environment.is_some() {
-        notes.push(note("environment", "the environment is shown, but lights nothing".into()));
-    }
-    let named = |what: &str, is: &dyn Fn(&crate::scene::Material) -> bool| {
-        let names: Vec<&str> = scene.materials.iter().filter(|m| is(m)).map(|m| m.name.as_str()).take(5).collect();
-        (!names.is_empty()).then(|| note("materials", format!("{what}: {}", names.join(", "))))
-    };
-    notes.extend(named("some surfaces glow, but they light nothing", &|m| m.emissive != Vec3::ZERO));
-    notes.extend(named("glass stops light, and reflects it as a diffuse surface", &|m| m.transmission > 0.0));
-    notes.extend(named("mirrors reflect light as diffuse surfaces", &|m| m.is_mirror()));
-    if !scene.animations.is_empty()
-        && scene.animations.iter().any(|of| of.channels.iter().any(|c| moves(scene, c.node)))
-    {
-        notes.push(note("animations", "surfaces that move are baked where they rest".into()));
-    }
-    notes
-}
-
-/// Whether a node or one of its children has a mesh.
-fn moves(scene: &Scene, node: u32) -> bool {
-    scene.nodes.iter().enumerate().filter(|(_, of)| of.mesh.is_some()).any(|(number, _)| {
-        let mut at = Some(number as u32);
-        while let Some(here) = at {
-            if here == node {
-                return true;
-            }
-            at = scene.nodes.get(here as usize).and_then(|node| node.parent);
-        }
-        false
-    })
 }
 
 impl Technique for Prt {

@@ -56,6 +56,10 @@ pub struct JoinArgs {
 /// `Input` if parts are of different jobs, or files are damaged; `Output` if something cannot be written.
 pub fn join(args: &JoinArgs, console: Console) -> Result<ExitCode> {
     let folders: Vec<PathBuf> = args.parts.iter().map(|path| folder_of(path)).collect();
+    if let Some(missing) = folders.iter().find(|path| !path.exists()) {
+        let error = Error::input("does not exist").in_file(missing);
+        return Err(error.help("Name folders or files that a stopped or finished run has left"));
+    }
     let ending = args.output.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
     let to_file = ["fiv", "prt"].contains(&ending) && !args.output.is_dir();
     if to_file {

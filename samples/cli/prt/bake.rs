@@ -4,20 +4,21 @@ use std::{process::ExitCode, str::FromStr, time::Instant};
 
 use glam::Vec3;
 use lucerna::{
-    Error, Result,
+    Error, ErrorKind, Result,
     gpu::Gpu,
     image,
-    techniques::prt::{Bakery, Baking, Stored, units},
+    techniques::prt::{self, Bakery, Baking, Stored, units},
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::info;
+use super::{info, memory};
 use crate::{
     bake::{self as units_of, BakeArgs, Ended, Work},
     config,
     console::{self, Console},
     program,
+    record::Source,
     signals::Interrupt,
     stage::{Stage, StageArgs},
 };
@@ -77,18 +78,22 @@ pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
     image::probe_output(&args.run.output, args.run.overwrite)?;
     let interrupt = Interrupt::install();
     let stage = Stage::open(&args.stage)?;
-    stage.notes().iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
+    for note in stage.notes().iter().chain(&prt::simplified(&stage.scene)) {
+        console.info(&format!("note: {}: {}", note.place, note.text));
+    }
     let gpu = Gpu::new(args.run.device.options()?)?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
-    let need = memory(&keys.room);
+    let need = memory::need(&keys.room);
     console.info(&format!("about {:.1} GB of memory for {} samples", need as f64 / 1e9, keys.room.samples));
-    if let Some(free) = available().filter(|free| *free < need) {
-        let what = format!("{} samples need about {need} bytes of memory, {free} are free", keys.room.samples);
-        return Err(Error::usage(what).at("room.samples").help("Choose fewer samples, rays or directions"));
-    }
+    memory::expect_free(&keys.room, memory::available())?;
+    // What is wrong with a scene is said with its name.
+    let blamed = |error: Error| match (&stage.source, error.kind()) {
+        (Source::File(file) | Source::Builtin(file), ErrorKind::Input) => error.in_file(file),
+        _ => error,
+    };
     let mut bakery = Bakery::new(&gpu, &stage.scene)?;
     let (starts, rooms) = match args.inside.is_empty() {
-        true => bakery.starts(&keys.room, &Interrupt::stop())?,
+        true => bakery.starts(&keys.room, &Interrupt::stop()).map_err(blamed)?,
         false => (args.inside.iter().map(|inside| inside.0).collect(), 0),
     };
     if rooms > 0 {
@@ -98,7 +103,7 @@ pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
             places.collect::<Vec<_>>().join(" ")
         ));
     }
-    let sampled = bakery.sample(&keys.room, &starts, &Interrupt::stop())?;
+    let sampled = bakery.sample(&keys.room, &starts, &Interrupt::stop()).map_err(blamed)?;
     let (plan, samples) = (sampled.plan.clone(), sampled.samples.clone());
     let of_samples = begun.elapsed().as_secs_f64();
     console.info(&format!(
@@ -164,26 +169,4 @@ pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
         }))?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// Bytes that a bake needs at most, about: samples and their light, and the largest stage of a cluster.
-fn memory(room: &Baking) -> u64 {
-    let samples = u64::from(room.samples);
-    let clusters = samples.div_ceil(room.cluster.into());
-    let vectors = clusters * u64::from(room.light);
-    let cluster = 2 * u64::from(room.cluster);
-    let of_cluster =
-        cluster * (24 * u64::from(room.directions) + 12 * cluster + 8 * vectors + 4 * u64::from(room.rays));
-    let stored = samples * (64 + 2 * u64::from(room.visibility + room.light) + 4 * 300);
-    let transfer = samples * if room.receivers > 0 { 2 * u64::from(room.receivers) } else { 4 * vectors };
-    // All scatterings are solved between all vectors.
-    let solved = 32 * vectors * vectors;
-    (100 << 20) + solved + 2 * of_cluster + 2 * stored + 2 * transfer
-}
-
-/// Free memory of the machine, bytes; `None`: unknown.
-fn available() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?;
-    Some(1024 * line.split_whitespace().nth(1)?.parse::<u64>().ok()?)
 }

@@ -7,7 +7,7 @@ use lucerna::{
     gpu::Gpu,
     technique::Bake,
     techniques::prt::{
-        Baked, Settings,
+        self, Baked, Settings,
         check::{self, CheckOptions, LightErrors, RelativeError},
     },
 };
@@ -69,7 +69,9 @@ pub fn check(args: &PrtCheckArgs, console: Console) -> Result<ExitCode> {
     let baked = Baked::read(&args.bake)?;
     Interrupt::install();
     let stage = Stage::open(&args.stage)?;
-    stage.notes().iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
+    for note in stage.notes().iter().chain(&prt::simplified(&stage.scene)) {
+        console.info(&format!("note: {}: {}", note.place, note.text));
+    }
     baked.expect_scene(&stage.scene)?;
     let gpu = Gpu::new(args.device.options()?)?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));

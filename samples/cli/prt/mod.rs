@@ -3,6 +3,7 @@
 mod bake;
 mod check;
 mod info;
+mod memory;
 mod render;
 
 pub use bake::{PrtBakeArgs, bake};
