@@ -64,6 +64,17 @@ pub struct Sampled {
     pub examples: Vec<[f32; 3]>,
 }
 
+/// Thinned hits of particles.
+struct Thinned {
+    samples: Vec<PrtPoint>,
+    /// In the free space, metres.
+    places: Vec<[f32; 3]>,
+    /// Share of scattered particles that left the scene.
+    escaped: f64,
+    /// Share of all particles that were still in the scene when their hits began to count.
+    stayed: f64,
+}
+
 /// The hits of a round of particles.
 pub(super) struct Round {
     /// With the path of each particle apart.
@@ -97,7 +108,8 @@ impl Bakery {
             return Err(Error::input("the scene has no surface that light reaches"));
         }
         let pilot = (samples::DENSITY * whole / PILOT).sqrt();
-        let (mut found, _, escaped, stayed) = self.thinned(baking, starts, (pilot, 4), &mut triangles, stop)?;
+        let Thinned { samples: mut found, escaped, stayed, .. } =
+            self.thinned(baking, starts, (pilot, 4), &mut triangles, stop)?;
         if found.len() < 16 {
             let what = format!("particles from {} places inside the scene hit next to nothing", starts.len());
             return Err(Error::input(what).help("Name a point inside the room with --inside X,Y,Z"));
@@ -113,7 +125,7 @@ impl Bakery {
         samples::weigh(&mut found, &triangles, pilot);
         let reached: f32 = found.iter().map(|sample| sample.area).sum();
         let radius = (samples::DENSITY * reached / baking.samples as f32).sqrt();
-        let (mut found, places, escaped, _) =
+        let Thinned { samples: mut found, places, escaped, .. } =
             self.thinned(baking, starts, (radius, MOST_ROUNDS), &mut triangles, stop)?;
         if found.len() > plan::MOST_SAMPLES {
             let what = format!("{} samples, at most {} are possible", found.len(), plan::MOST_SAMPLES);
@@ -142,8 +154,7 @@ impl Bakery {
         Ok(Sampled { plan, samples: sorted, examples: places })
     }
 
-    /// Thinned hits of particles, places in the free space, the share of scattered particles that left the scene, and the share of all particles that
-    /// were still in the scene when their hits began to count.
+    /// Thins the hits of particles.
     fn thinned(
         &mut self,
         baking: &Baking,
@@ -151,7 +162,7 @@ impl Bakery {
         (radius, rounds): (f32, u32),
         triangles: &mut Triangles,
         stop: &Stop,
-    ) -> Result<(Vec<PrtPoint>, Vec<[f32; 3]>, f64, f64)> {
+    ) -> Result<Thinned> {
         let mut thinning = Thinning::new(radius);
         let mut places = Vec::new();
         let mut escaped = [0u64; 2];
@@ -177,7 +188,8 @@ impl Bakery {
             }
         }
         let escaped = escaped[0] as f64 / escaped[1].max(1) as f64;
-        Ok((thinning.samples, places, escaped, stayed[0] as f64 / stayed[1].max(1) as f64))
+        let stayed = stayed[0] as f64 / stayed[1].max(1) as f64;
+        Ok(Thinned { samples: thinning.samples, places, escaped, stayed })
     }
 
     /// Places in the free space that are not those of the examples of a bake, evenly distributed, metres.
