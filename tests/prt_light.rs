@@ -63,9 +63,10 @@ fn a_closed_box_has_all_scatterings_and_one_of_albedo_1_is_refused() {
     with_gpu(|gpu| {
         let stored = baked(gpu, &closed(Vec3::splat(0.5)), &small());
         let direct = vec![[1.0, 2.0, 0.0]; stored.samples.len()];
+        let first = Settings { bounces: false, ..Settings::default() };
         for albedo in [0.3f32, 0.5, 0.9] {
             let albedos = vec![[albedo; 3]; stored.samples.len()];
-            let found = solve::indirect(&stored, &albedos, &direct, true, true).unwrap();
+            let found = solve::indirect(&stored, &albedos, &direct, &Settings::default()).unwrap();
             let wanted = albedo / (1.0 - albedo);
             for (channel, light) in [1.0, 2.0, 0.0].into_iter().enumerate() {
                 let mean = found.iter().map(|e| e[channel]).sum::<f32>() / found.len() as f32;
@@ -73,10 +74,11 @@ fn a_closed_box_has_all_scatterings_and_one_of_albedo_1_is_refused() {
                 let off = found.iter().map(|e| (e[channel] - light * wanted).abs()).fold(0.0, f32::max);
                 assert!(off <= 0.05 * light * wanted, "{albedo}: {off}");
             }
-            let once = solve::indirect(&stored, &albedos, &direct, false, true).unwrap();
+            let once = solve::indirect(&stored, &albedos, &direct, &first).unwrap();
             assert!((once.iter().map(|e| e[0]).sum::<f32>() / once.len() as f32 / albedo - 1.0).abs() < 0.01);
         }
-        let error = solve::indirect(&stored, &vec![[1.0; 3]; stored.samples.len()], &direct, true, true).unwrap_err();
+        let error =
+            solve::indirect(&stored, &vec![[1.0; 3]; stored.samples.len()], &direct, &Settings::default()).unwrap_err();
         assert!(error.to_string().contains("no end") && error.exit_code() == 3, "{error}");
     });
 }
@@ -92,7 +94,9 @@ fn light_is_linear_none_is_none_and_only_a_mean_glows_with_the_light_off() {
             let light = |scale: f32, bend: f32| -> Vec<[f32; 3]> {
                 (0..count).map(|i| [scale * (1.0 + (i as f32 * bend).sin()); 3]).collect()
             };
-            let of = |direct: &[[f32; 3]], mean| solve::indirect(&stored, &albedos, direct, true, mean).unwrap();
+            let of = |direct: &[[f32; 3]], mean| {
+                solve::indirect(&stored, &albedos, direct, &Settings { mean, ..Settings::default() }).unwrap()
+            };
             let dark = of(&vec![[0.0; 3]; count], true);
             if centred {
                 // The mean and what is taken away for it do not cancel: the ghost of a centred basis.
@@ -121,7 +125,8 @@ fn light_goes_the_same_way_in_both_directions() {
             (0..count).map(|i| if range.contains(&i) { [1.0; 3] } else { [0.0; 3] }).collect()
         };
         let white = vec![[1.0; 3]; count];
-        let sent = |from: usize| solve::indirect(&stored, &white, &even(from), false, true).unwrap();
+        let once = Settings { bounces: false, ..Settings::default() };
+        let sent = |from: usize| solve::indirect(&stored, &white, &even(from), &once).unwrap();
         let received = |light: &[[f32; 3]], at: usize| -> f32 {
             stored.plan.range(at).map(|i| light[i][0] * stored.samples[i].area).sum()
         };

@@ -34,7 +34,7 @@ fn films(gpu: &Gpu, scene: &Scene, baking: &Baking, path: &[[f32; 3]]) -> ([Film
     let materials =
         scene.materials.iter().map(|material| material.base_color.truncate().to_array()).collect::<Vec<_>>();
     let albedos: Vec<[f32; 3]> = stored.samples.iter().map(|s| materials[s.material as usize]).collect();
-    let solved: Solved = solve::solve(&stored, &albedos, true, true).unwrap();
+    let solved: Solved = solve::solve(&stored, &albedos, &settings).unwrap();
     let truth = (0..path.len()).map(|step| {
         let direct: Vec<[f32; 3]> = exact.iter().skip(step).step_by(path.len()).map(|e| [*e; 3]).collect();
         [grey(&direct), grey(&solved.indirect(&stored, &albedos, &direct))]

@@ -11,7 +11,7 @@ use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     image::Layers,
     scene::{Camera, Material, Projection, Scene, Transform, View},
-    techniques::prt::{Bakery, Baking, Mode, Stored, solve, starts},
+    techniques::prt::{Bakery, Baking, Mode, Settings, Stored, solve, starts},
 };
 
 /// Mean of a layer over pixels and colours.
@@ -144,7 +144,7 @@ fn one_cluster_and_clusters_of_a_few_samples_keep_the_light() {
             assert!(clusters.contains(&stored.plan.clusters.len()), "{samples}: {:?}", stored.plan.clusters);
             let count = stored.samples.len();
             let even = vec![[1.0; 3]; count];
-            let found = solve::indirect(&stored, &vec![[0.5; 3]; count], &even, true, true).unwrap();
+            let found = solve::indirect(&stored, &vec![[0.5; 3]; count], &even, &Settings::default()).unwrap();
             for e in found {
                 assert!((e[0] - 1.0).abs() < 0.02, "{samples} in clusters of {cluster}: {}", e[0]);
             }

@@ -8,7 +8,7 @@ use glam::{Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::{Material, Scene},
-    techniques::prt::{Baking, Stored, solve},
+    techniques::prt::{Baking, Settings, Stored, solve},
 };
 
 /// The inside of a box of a × b × c m from the origin.
@@ -57,11 +57,12 @@ fn one_scattering_between_plates_is_their_form_factor() {
         let baking = Baking { samples: 2000, cluster: 60, light: 64, receivers: 0, ..small() };
         let stored = baked(gpu, &cuboid(size), &baking);
         let count = stored.samples.len();
+        let once = Settings { bounces: false, ..Settings::default() };
         let faces = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
         let on = |sample: usize, face: usize| Vec3::from(stored.samples[sample].side).dot(faces[face]) > 0.9;
         for sender in 0..6 {
             let light: Vec<[f32; 3]> = (0..count).map(|i| [f32::from(on(i, sender)); 3]).collect();
-            let found = solve::indirect(&stored, &vec![[1.0; 3]; count], &light, false, true).unwrap();
+            let found = solve::indirect(&stored, &vec![[1.0; 3]; count], &light, &once).unwrap();
             for receiver in 0..6 {
                 let (mut sum, mut area) = (0.0f64, 0.0f64);
                 for i in (0..count).filter(|i| on(*i, receiver)) {
@@ -141,15 +142,18 @@ fn examples_are_restored_up_to_the_share_that_the_sizes_leave_out() {
     });
 }
 
-/// Light that each vector sends to each sample of a cluster: by the rays, without any compression, and by the bake.
+/// Light that each vector sends to each sample of a cluster, but for that of links: by the rays, without any compression, and by the bake.
 fn dense(stored: &Stored, cluster: usize, seen: &[u32]) -> [Vec<f64>; 2] {
     let plan = &stored.plan;
     let all = plan.all_vectors();
     let rays = plan.settings.rays as usize;
     let of: Vec<(usize, usize)> = (0..plan.clusters.len()).flat_map(|c| plan.range(c).map(move |i| (c, i))).collect();
     let mut exact = vec![0.0f64; plan.range(cluster).len() * all];
-    for (row, seen) in exact.chunks_exact_mut(all).zip(seen.chunks_exact(rays)) {
-        for number in seen.iter().map(|n| *n as usize).filter(|n| *n < of.len()) {
+    let links = &stored.transfers[cluster].links;
+    for (at, (row, seen)) in exact.chunks_exact_mut(all).zip(seen.chunks_exact(rays)).enumerate() {
+        let linked: Vec<usize> = links.of(at, rays as u32).map(|(sender, _)| sender).collect();
+        let rest = seen.iter().map(|n| *n as usize).filter(|n| *n < of.len() && !linked.contains(n));
+        for number in rest {
             let (c, i) = of[number];
             let first = plan.first_vector(c);
             let functions = stored.bases[c].functions(i - plan.range(c).start, stored.samples[i].area);
@@ -176,8 +180,8 @@ fn dense(stored: &Stored, cluster: usize, seen: &[u32]) -> [Vec<f64>; 2] {
 fn low_rank_threshold_and_quantisation_leave_out_no_more_than_the_bake_states() {
     with_gpu(|gpu| {
         let scene = closed(Vec3::splat(0.5));
-        for (receivers, keep) in [(6, 1.0), (0, 0.2), (0, 1.0)] {
-            let baking = Baking { samples: 400, cluster: 100, light: 8, rays: 128, receivers, keep, ..small() };
+        for (receivers, keep, links) in [(6, 1.0, 0.0), (6, 1.0, 0.03), (0, 0.2, 0.0), (0, 0.2, 0.03), (0, 1.0, 0.0)] {
+            let baking = Baking { samples: 400, cluster: 100, light: 8, rays: 128, receivers, keep, links, ..small() };
             let stored = baked(gpu, &scene, &baking);
             let (mut bakery, again) = sampled(gpu, &scene, &baking).unwrap();
             bakery.upload(&again.plan, &again.samples).unwrap();
@@ -213,7 +217,7 @@ fn signed_light_is_transferred_as_the_difference_of_its_parts() {
         let count = stored.samples.len();
         let of = |light: &dyn Fn(usize) -> f32| {
             let light: Vec<[f32; 3]> = (0..count).map(|i| [light(i); 3]).collect();
-            solve::indirect(&stored, &vec![[0.5; 3]; count], &light, true, true).unwrap()
+            solve::indirect(&stored, &vec![[0.5; 3]; count], &light, &Settings::default()).unwrap()
         };
         let (a, b) = (|i: usize| 1.0 + (0.3 * i as f32).sin(), |i: usize| 2.0 * (0.11 * i as f32).cos());
         let (of_a, of_b, both) = (of(&a), of(&b), of(&|i| a(i) - b(i)));

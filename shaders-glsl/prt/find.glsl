@@ -1,7 +1,10 @@
-// The sample that stands for a point of a surface: near, on the same plane, on the same side and of the same material.
-// Before including: prt/prt.glsl, lib/scene.glsl, and declare `grid`, `starts`, `order` and `samples`.
+// The sample that stands for a point of a surface: near, on the same plane, on the same side, of the same material and as free.
+// Before including: prt/prt.glsl, lib/scene.glsl, and declare `grid`, `starts`, `order`, `samples` and `clearances`.
 
-uint nearest_sample(vec3 position, vec3 side, uint material) {
+// `clearance`: free distance above the point, metres; negative: not known.
+
+uint nearest_sample(vec3 position, vec3 side, uint material, float clearance) {
+    float most = PRT_CLEAR * grid.radius;
     vec3 at = (position - grid.origin) / grid.cell;
     uint found = NONE;
     float least = 1e30;
@@ -24,6 +27,12 @@ uint nearest_sample(vec3 position, vec3 side, uint material) {
                     float off = dot(way, side);
                     float score = (dot(way, way) + 64.0 * off * off) * (facing > 0.9 ? 1.0 : 3.0 - 2.0 * facing);
                     if (samples[number].material != material) score *= 4.0;
+                    if (clearance >= 0.0) {
+                        // Light behind a picture is not the light beside it.
+                        float a = min(clearance, most), b = min(clearances[number], most);
+                        float ratio = max(a, b) / max(min(a, b), 0.02 * most);
+                        score *= ratio * ratio;
+                    }
                     if (facing > (ring == 0u ? 0.3 : 0.0) && score < least) {
                         least = score;
                         found = number;

@@ -21,6 +21,7 @@ layout(binding = 10, scalar) readonly buffer Starts { uint starts[]; };
 layout(binding = 11, scalar) readonly buffer Order { uint order[]; };
 // NONE: nothing; PRT_LOST: a surface without samples.
 layout(binding = 12, scalar) writeonly buffer Seen { uint seen[]; };
+layout(binding = 13, scalar) readonly buffer Clearances { float clearances[]; };  // of all samples, metres
 
 #include "prt/find.glsl"
 
@@ -51,7 +52,18 @@ void main() {
                 SurfacePoint p = surface_point(hit.instance, hit.triangle, hit.barycentrics);
                 vec3 side = normalize(p.area);
                 if (dot(side, direction) > 0.0) side = -side;
-                found = nearest_sample(p.position, side, INSTANCE_AT(hit.instance).material);
+                uint material = INSTANCE_AT(hit.instance).material;
+                float most = PRT_CLEAR * grid.radius;
+                found = nearest_sample(p.position, side, material, -1.0);
+                // In a gap, or beside one, the free distance above the surface tells which samples are in the gap, too.
+                if (hit.t < most || found != NONE && clearances[found] < most) {
+                    Ray up = Ray(p.position + 2.0 * surface_gap(p) * side, 0.0, side, most);
+                    Hit above = trace(up, TRACE_SHADOW, pcg4d(uvec4(number, i, 23u, seed)).x, false);
+                    float clearance = above.instance == NONE ? most : above.t;
+                    found = nearest_sample(p.position, side, material, clearance);
+                    // A gap without samples is dark.
+                    if (found != NONE && clearance < grid.radius && clearances[found] > 3.0 * clearance) found = NONE;
+                }
                 if (found == NONE) found = PRT_LOST;
             }
         }

@@ -19,9 +19,8 @@ struct PrtVector {
 
 layout(binding = 0, scalar) readonly buffer Vectors { PrtVector vectors[]; };
 layout(binding = 1, scalar) readonly buffer Weights { float weights[]; };
-layout(binding = 2, scalar) readonly buffer Direct { vec3 direct[]; };
-layout(binding = 3, scalar) readonly buffer Albedos { vec3 albedos[]; };
-layout(binding = 4, scalar) writeonly buffer Coefficients { vec3 coefficients[]; };
+layout(binding = 2, scalar) readonly buffer Radiosities { vec3 radiosities[]; };
+layout(binding = 3, scalar) writeonly buffer Coefficients { vec3 coefficients[]; };
 
 layout(push_constant, scalar) uniform Push { uint count; };
 
@@ -32,8 +31,7 @@ void main() {
     vec3 sum = vec3(of.fixed_value - of.shift);
     if (of.is_mean == 0u) {
         for (uint i = 0u; i < of.samples; ++i) {
-            uint s = of.first_sample + i;
-            sum += weights[of.first_weight + i * of.stride + of.number] * albedos[s] * direct[s];
+            sum += weights[of.first_weight + i * of.stride + of.number] * radiosities[of.first_sample + i];
         }
     }
     coefficients[v] = sum;

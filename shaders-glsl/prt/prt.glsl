@@ -7,6 +7,8 @@ const uint PRT_FIRST_HIT = 5u; // export
 const uint PRT_HITS = 8u; // export
 // A ray met a surface without samples.
 const uint PRT_LOST = 0xfffffffeu; // export
+// Free distance above a surface that counts as wide, in distances of samples.
+const float PRT_CLEAR = 2.0; // export
 // Lights whose visibility is gathered at once.
 const uint PRT_LIGHTS = 8u; // export
 // Scatterings of the paths that a bake is compared with.

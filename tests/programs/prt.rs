@@ -7,6 +7,8 @@ mod tracer_lab;
 
 #[path = "../prt_light.rs"]
 mod prt_light;
+#[path = "../prt_links.rs"]
+mod prt_links;
 #[path = "../prt_moving.rs"]
 mod prt_moving;
 #[path = "../prt_odd.rs"]

@@ -18,8 +18,8 @@ use crate::{
     resident::Resident,
     scene::{Pose, Scene},
     shaders::{
-        consts::{PRT_FIRST_HIT, PRT_HITS},
-        prt::{depths, examples, gather, particles},
+        consts::{PRT_CLEAR, PRT_FIRST_HIT, PRT_HITS},
+        prt::{clearances, depths, examples, gather, particles},
         types::{self, PrtPoint},
     },
 };
@@ -296,12 +296,19 @@ impl Bakery {
         let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
         let rays = self.rays.frame(&mut graph, &handles);
         let seen = graph.buffer("prt.seen", 4 * u64::from(count) * u64::from(of_sample));
+        let all = plan.count() as u32;
+        let clearances = graph.buffer("prt.clearances", 4 * u64::from(all));
+        let push = clearances::Push { count: all, most: PRT_CLEAR * plan.radius, seed: plan.settings.seed };
+        let args =
+            traced!(clearances::Args { samples: graph.import_buffer(&uploaded.samples), clearances, push }, rays);
+        graph.compute(args, all).rays(all.into());
         let args = traced!(
             gather::Args {
                 samples: graph.import_buffer(&uploaded.samples),
                 grid: graph.uniform(&uploaded.grid.grid),
                 starts: graph.import_buffer(&uploaded.starts),
                 order: graph.import_buffer(&uploaded.order),
+                clearances,
                 seen,
                 push: gather::Push {
                     first: 0,
@@ -315,8 +322,9 @@ impl Bakery {
             rays,
             handles
         );
-        // Finding a sample takes up to some hundred steps.
-        let items = Items::new(of_sample).rays(2 * u64::from(count)).turns(self.rays.most_turns() + 512);
+        // Finding a sample takes up to some hundred steps, and there may be a second search with a ray before.
+        let turns = 2 * (self.rays.most_turns() + 512);
+        let items = Items::new(of_sample).rays(3 * u64::from(count)).turns(turns);
         graph.compute_over(args, count, items);
         let read = graph.read_buffer(seen);
         Ok(self.runner.run(&graph)?.buffer(read))

@@ -3,6 +3,7 @@
 use half::f16;
 
 use super::{
+    links::Links,
     transfer::{Basis, Transfer},
     visibility::Visibility,
 };
@@ -27,6 +28,16 @@ impl Writer {
     }
 
     pub fn halves(&mut self, list: &[f16]) {
+        self.word(list.len() as u32);
+        list.iter().for_each(|value| self.0.extend(value.to_le_bytes()));
+    }
+
+    pub fn words(&mut self, list: &[u32]) {
+        self.word(list.len() as u32);
+        list.iter().for_each(|value| self.word(*value));
+    }
+
+    pub fn shorts(&mut self, list: &[u16]) {
         self.word(list.len() as u32);
         list.iter().for_each(|value| self.0.extend(value.to_le_bytes()));
     }
@@ -75,6 +86,18 @@ impl<'a> Reader<'a> {
         let count = self.word()? as usize;
         let bytes = self.take(count.saturating_mul(2))?;
         finite(bytes.chunks_exact(2).map(|b| f16::from_le_bytes([b[0], b[1]])).collect(), f16::is_finite)
+    }
+
+    pub fn words(&mut self) -> Result<Vec<u32>> {
+        let count = self.word()? as usize;
+        let bytes = self.take(count.saturating_mul(4))?;
+        Ok(bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
+    }
+
+    pub fn shorts(&mut self) -> Result<Vec<u16>> {
+        let count = self.word()? as usize;
+        let bytes = self.take(count.saturating_mul(2))?;
+        Ok(bytes.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect())
     }
 
     pub fn sparse(&mut self) -> Result<Vec<f16>> {
@@ -149,14 +172,24 @@ impl Transfer {
         out.float(self.left);
         out.float(self.lost);
         out.floats(&self.rows);
-        if self.rank > 0 || self.values.is_empty() { out.halves(&self.values) } else { out.sparse(&self.values) }
+        if self.rank > 0 || self.values.is_empty() {
+            out.halves(&self.values)
+        } else {
+            out.sparse(&self.values)
+        }
+        self.links.write(out);
     }
 
-    /// Reads the transfer to a cluster.
-    pub(super) fn read(from: &mut Reader<'_>, samples: usize, all: usize, low_rank: bool) -> Result<Self> {
+    /// Reads the transfer to a cluster. `all`: vectors of light; `senders`: samples of the bake.
+    pub(super) fn read(
+        from: &mut Reader<'_>,
+        samples: usize,
+        [all, senders]: [usize; 2],
+        low_rank: bool,
+    ) -> Result<Self> {
         let (rank, left, lost, rows) = (from.word()?, from.float()?, from.float()?, from.floats()?);
         let values = if low_rank && rank == 0 || rank > 0 { from.halves()? } else { from.sparse()? };
-        let out = Self { rank, rows, values, left, lost };
+        let out = Self { rank, rows, values, left, lost, links: Links::read(from, samples, senders)? };
         long("rows of receivers", out.rows.len(), all.saturating_mul(rank as usize))?;
         let stride = if low_rank { rank as usize } else { all };
         long("transferred light", out.values.len(), samples.saturating_mul(stride))?;

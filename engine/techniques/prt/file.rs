@@ -3,14 +3,14 @@
 //! | bytes | content |
 //! |---|---|
 //! | 8 | `lucprt\r\n` |
-//! | 4 | version, 1 |
+//! | 4 | version, 2 |
 //! | 4 | bytes of the header |
 //! | … | header: JSON, the [`Plan`] and the bytes of each part |
 //! | … | the samples, 64 bytes each: position, instance, normal of the side, triangle, shading normal, material, barycentrics, gap, area |
-//! | … | for each cluster: distances, basis, transfer; lists begin with their lengths |
+//! | … | for each cluster: distances, basis, transfer with its links; lists begin with their lengths |
 //! | 32 | BLAKE3 digest of all bytes before |
 //!
-//! Numbers are little-endian. Lists have 16-bit floats, but for the sizes of vectors and the rows of receivers.
+//! Numbers are little-endian. Lists have 16-bit floats, but for the sizes of vectors, the rows of receivers and the numbers of links.
 
 use std::path::Path;
 
@@ -32,7 +32,7 @@ use crate::{
 };
 
 const FILE: Container =
-    Container { magic: *b"lucprt\r\n", version: 1, name: "a file of precomputed transfer", command: "prt bake" };
+    Container { magic: *b"lucprt\r\n", version: 2, name: "a file of precomputed transfer", command: "prt bake" };
 /// Largest size of a file that is read, bytes.
 const MOST_BYTES: u64 = 8 << 30;
 
@@ -75,6 +75,12 @@ pub struct Summary {
     pub basis_bytes: u64,
     /// Bytes of the transfer.
     pub transfer_bytes: u64,
+    /// Bytes of the links.
+    pub link_bytes: u64,
+    /// Links of a sample, mean.
+    pub links: f64,
+    /// Share of the light that links carry, if all samples have the same radiosity.
+    pub linked: f64,
     /// Share of the transfer's coefficients that are not 0.
     pub kept: f64,
     /// Root mean square of the error of a distance, metres.
@@ -225,6 +231,10 @@ impl Stored {
             visibility_vectors_bytes: sum(&|c| self.visibility[c].bytes()[1]),
             basis_bytes: sum(&|c| 2 * self.bases[c].values.len() as u64 + 4 * self.bases[c].sizes.len() as u64),
             transfer_bytes: sum(&|c| self.transfers[c].bytes()),
+            link_bytes: sum(&|c| self.transfers[c].links.bytes()),
+            links: sum(&|c| self.transfers[c].links.senders.len() as u64) as f64 / self.samples.len().max(1) as f64,
+            linked: sum(&|c| self.transfers[c].links.rays.iter().map(|rays| u64::from(*rays)).sum()) as f64
+                / (self.samples.len().max(1) as f64 * f64::from(self.plan.settings.rays)),
             kept: mean(&|c| self.transfers[c].kept()),
             distance_error: mean(&|c| f64::from(self.visibility[c].error).powi(2)).sqrt(),
             left: mean(&|c| f64::from(self.transfers[c].left).powi(2)).sqrt(),

@@ -15,7 +15,7 @@ use crate::{
     resident::Resident,
     scene::{Pose, Scene},
     shaders::{
-        prt::{albedo, lit, mix, project, receive, scatter},
+        prt::{albedo, lit, mix, project, radiosity, receive, restore, scatter},
         types::{PrtCap, PrtPoint, PrtReceiver, PrtVector},
     },
 };
@@ -39,6 +39,12 @@ pub struct OnDevice {
     matrices: OwnedBuffer,
     receivers: OwnedBuffer,
     words: OwnedBuffer,
+    /// Values of the vectors of light at each sample, senders of links and their shares; empty without links.
+    functions: OwnedBuffer,
+    senders: OwnedBuffer,
+    shares: OwnedBuffer,
+    /// Scatterings whose light links carry; `None`: there are no links.
+    linked: Option<u32>,
     /// Rows of the receivers' vectors; `None`: samples have their parts of the vectors of light.
     mixed: Option<(OwnedBuffer, u32)>,
     /// Numbers that a frame multiplies: for each sample and light point; for each sample; between bases.
@@ -83,6 +89,8 @@ impl OnDevice {
         let (mut vectors, mut weights) = (Vec::new(), Vec::new());
         let (mut receivers, mut words, mut mixed) = (Vec::new(), Vec::new(), Vec::<f32>::new());
         let mut of_mixed = 0u32;
+        let (mut functions, mut senders, mut shares) = (Vec::new(), Vec::new(), Vec::new());
+        let links = stored.transfers.iter().any(|of| !of.links.senders.is_empty());
         let mut products = [0u64; 3];
         for cluster in 0..plan.clusters.len() {
             let (range, count) = (plan.range(cluster), plan.clusters[cluster]);
@@ -123,22 +131,43 @@ impl OnDevice {
             }
             let stride = transfer.stride(all);
             let first_mixed = if plan.settings.receivers > 0 { of_mixed } else { 0 };
-            for values in transfer.values.chunks_exact(stride.max(1)) {
-                receivers.push(PrtReceiver { first_word: words.len() as u32, first_mixed, count: stride as u32 });
-                words.extend(packed(values.iter().copied()));
-            }
-            if stride == 0 {
-                receivers.extend(std::iter::repeat_n(PrtReceiver::default(), count as usize));
+            for (number, sample) in samples.iter().enumerate() {
+                let (first_link, first_function) = (senders.len() as u32, functions.len() as u32);
+                for (sender, share) in transfer.links.of(number, plan.settings.rays) {
+                    senders.push(sender as u32);
+                    shares.push(share);
+                }
+                receivers.push(PrtReceiver {
+                    first_word: words.len() as u32,
+                    first_mixed,
+                    count: stride as u32,
+                    first_link,
+                    links: senders.len() as u32 - first_link,
+                    first_function,
+                    first_vector: plan.first_vector(cluster) as u32,
+                    vectors: basis.vectors,
+                });
+                words.extend(packed(transfer.values[number * stride..][..stride].iter().copied()));
+                if links {
+                    functions.extend(basis.functions(number, sample.area));
+                }
             }
             mixed.extend(&transfer.rows);
             of_mixed += transfer.rank;
             products[0] += 4 * u64::from(visibility.vectors + 1) * u64::from(count);
             products[1] += u64::from(count) * (stride as u64 + u64::from(basis.vectors));
         }
+        let rounds = u64::from(solved.linked.max(1));
+        if links {
+            let again = (rounds - 1) * products[1];
+            products[1] += again + rounds * senders.len() as u64 + functions.len() as u64;
+        }
         let most = gpu.caps().limits.storage_range;
         let largest =
-            4 * [words.len(), rows.len(), weights.len(), mixed.len(), all * all * 3].into_iter().max().unwrap_or(0)
-                as u64;
+            4 * [words.len(), rows.len(), weights.len(), mixed.len(), all * all * 3, functions.len(), senders.len()]
+                .into_iter()
+                .max()
+                .unwrap_or(0) as u64;
         if largest > most {
             let what = format!("has {largest} bytes of one kind of vectors, and the device's buffers hold {most}");
             let error = Error::input(what);
@@ -146,14 +175,14 @@ impl OnDevice {
                 error.help("Bake with fewer vectors (room.light, room.visibility) or with room.receivers above 0")
             );
         }
-        products[2] = 3 * (all * all) as u64 + mixed.len() as u64;
+        products[2] = 3 * (all * all) as u64 + rounds * mixed.len() as u64;
         let grid = Grid::new(&stored.samples, plan.radius);
         let buffer = |name, bytes: &[u8]| {
             let filled = if bytes.is_empty() { &[0; 16][..] } else { bytes };
             OwnedBuffer::with_contents(gpu, name, filled)
         };
         let samples = buffer("prt.samples", bytemuck::cast_slice(&stored.samples))?;
-        let Solved { inverse, shift, fixed } = solved;
+        let Solved { inverse, shift, fixed, linked } = solved;
         for ((vector, shift), fixed) in vectors.iter_mut().zip(shift).zip(fixed) {
             (vector.shift, vector.fixed_value) = (*shift, *fixed);
         }
@@ -172,6 +201,10 @@ impl OnDevice {
             matrices: buffer("prt.matrices", bytemuck::cast_slice(&inverse.concat()))?,
             receivers: buffer("prt.receivers", bytemuck::cast_slice(&receivers))?,
             words: buffer("prt.words", bytemuck::cast_slice(&words))?,
+            functions: buffer("prt.functions", bytemuck::cast_slice(&functions))?,
+            senders: buffer("prt.senders", bytemuck::cast_slice(&senders))?,
+            shares: buffer("prt.shares", bytemuck::cast_slice(&shares))?,
+            linked: links.then_some(*linked),
             mixed: match plan.settings.receivers {
                 0 => None,
                 _ => Some((buffer("prt.mixed-rows", bytemuck::cast_slice(&mixed))?, of_mixed)),
@@ -212,18 +245,10 @@ impl OnDevice {
             },
         };
         graph.compute(args, count).rays(u64::from(count) * offsets.len() as u64 * u64::from(light_count));
+        let mut radiosities = self.radiosity(graph, direct, None);
+        let projected = self.project(graph, radiosities);
         let all = self.vectors();
-        let [projected, scattered] =
-            ["prt.projected", "prt.scattered"].map(|name| graph.buffer(name, 12 * u64::from(all)));
-        let args = project::Args {
-            vectors: graph.buffer_from("prt.vectors", &self.vectors),
-            weights: graph.import_buffer(&self.weights),
-            direct,
-            albedos: graph.import_buffer(&self.albedos),
-            coefficients: projected,
-            push: project::Push { count: all },
-        };
-        graph.compute(args, all);
+        let scattered = graph.buffer("prt.scattered", 12 * u64::from(all));
         let args = scatter::Args {
             matrices: graph.import_buffer(&self.matrices),
             before: projected,
@@ -231,11 +256,68 @@ impl OnDevice {
             push: scatter::Push { count: all },
         };
         graph.compute(args, all);
-        Lit { direct, irradiances: self.receive(graph, scattered), visible }
+        // Links carry the first scattering exactly, and the further ones as the vectors have them.
+        if let Some(linked) = self.linked {
+            radiosities = self.restore(graph, scattered, (linked > 0).then_some((radiosities, projected)));
+        }
+        let mut irradiances = self.receive(graph, scattered, radiosities);
+        for _ in 1..self.linked.unwrap_or(0) {
+            radiosities = self.radiosity(graph, direct, Some(irradiances));
+            let projected = self.project(graph, radiosities);
+            irradiances = self.receive(graph, projected, radiosities);
+        }
+        Lit { direct, irradiances, visible }
     }
 
-    /// Irradiance of the samples by these coefficients of all vectors of light.
-    pub fn receive(&self, graph: &mut Graph, coefficients: Buffer) -> Buffer {
+    /// Radiosity of the samples by this direct and indirect irradiance.
+    fn radiosity(&self, graph: &mut Graph, direct: Buffer, indirect: Option<Buffer>) -> Buffer {
+        let radiosities = graph.buffer("prt.radiosities", 12 * u64::from(self.count));
+        let args = radiosity::Args {
+            albedos: graph.import_buffer(&self.albedos),
+            direct,
+            indirect: indirect.unwrap_or(direct),
+            radiosities,
+            push: radiosity::Push { count: self.count, indirectly: indirect.is_some().into() },
+        };
+        graph.compute(args, self.count);
+        radiosities
+    }
+
+    /// The coefficients of this radiosity.
+    fn project(&self, graph: &mut Graph, radiosities: Buffer) -> Buffer {
+        let all = self.vectors();
+        let coefficients = graph.buffer("prt.projected", 12 * u64::from(all));
+        let args = project::Args {
+            vectors: graph.buffer_from("prt.vectors", &self.vectors),
+            weights: graph.import_buffer(&self.weights),
+            radiosities,
+            coefficients,
+            push: project::Push { count: all },
+        };
+        graph.compute(args, all);
+        coefficients
+    }
+
+    /// Radiosity of the samples that has these coefficients. `exact`: radiosity that is known, and its coefficients; only the rest of the coefficients
+    /// is then restored.
+    pub fn restore(&self, graph: &mut Graph, coefficients: Buffer, exact: Option<(Buffer, Buffer)>) -> Buffer {
+        let restored = graph.buffer("prt.restored", 12 * u64::from(self.count));
+        let (radiosities, known) = exact.unwrap_or((coefficients, coefficients));
+        let args = restore::Args {
+            receivers: graph.import_buffer(&self.receivers),
+            functions: graph.import_buffer(&self.functions),
+            coefficients,
+            known,
+            radiosities,
+            restored,
+            push: restore::Push { count: self.count, exactly: exact.is_some().into() },
+        };
+        graph.compute(args, self.count);
+        restored
+    }
+
+    /// Irradiance of the samples by light with these coefficients of all vectors, and by the radiosity of linked samples.
+    pub fn receive(&self, graph: &mut Graph, coefficients: Buffer, radiosities: Buffer) -> Buffer {
         let mixed = match &self.mixed {
             None => coefficients,
             Some((rows, count)) => {
@@ -256,11 +338,19 @@ impl OnDevice {
             receivers: graph.import_buffer(&self.receivers),
             words: graph.import_buffer(&self.words),
             mixed,
+            senders: graph.import_buffer(&self.senders),
+            shares: graph.import_buffer(&self.shares),
+            radiosities,
             irradiances,
             push: receive::Push { count: self.count },
         };
         graph.compute(args, self.count);
         irradiances
+    }
+
+    /// Whether the bake has links.
+    pub fn has_links(&self) -> bool {
+        self.linked.is_some()
     }
 
     /// Number of vectors of light.
@@ -286,13 +376,13 @@ pub fn points_of_lights(settings: &Settings) -> Vec<[f32; 3]> {
 }
 
 /// The albedos of the samples by the materials of a scene, and all scatterings with them. With `gloss`, all reflected energy counts, not that of the
-/// diffuse base alone. `gloss`, `bounces` and `mean` of the settings count.
+/// diffuse base alone. `gloss`, `bounces`, `mean` and `linked` of the settings count.
 ///
 /// # Errors
 /// As [`solve::solve`]; `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
 pub fn scattering(gpu: &Gpu, scene: &Scene, stored: &Stored, settings: &Settings) -> Result<(Vec<[f32; 3]>, Solved)> {
     let albedos = albedos(gpu, scene, &stored.samples, settings.gloss)?;
-    let solved = solve::solve(stored, &albedos, settings.bounces, settings.mean)?;
+    let solved = solve::solve(stored, &albedos, settings)?;
     Ok((albedos, solved))
 }
 

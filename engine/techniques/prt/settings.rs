@@ -38,6 +38,10 @@ pub struct Baking {
     /// Vectors that describe the light that a cluster receives; 0: every coefficient of every sample, as in the paper.
     #[schemars(range(min = 0, max = 256))]
     pub receivers: u32,
+    /// A sample is linked to another one that fills at least this share of its hemisphere, weighted by the cosine, and that at least four of its rays
+    /// meet: the light of that sample arrives as is, without vectors. 0: there are no links, as in the paper.
+    #[schemars(range(min = 0, max = 1))]
+    pub links: f64,
     /// Share of the coefficients that are kept, the largest of each cluster; all smaller ones become 0.
     #[schemars(range(min = 0.01, max = 1), extend("x-needs" = {"receivers": {"const": 0}}))]
     pub keep: f64,
@@ -62,6 +66,7 @@ impl Default for Baking {
             examples: 1000,
             rays: 1024,
             receivers: 48,
+            links: 0.0035,
             keep: 1.0,
             centred: false,
             seed: 0,
@@ -72,7 +77,7 @@ impl Default for Baking {
 impl Baking {
     /// The paper's choices: ten vectors of light around the mean of the examples, and a fifth of all coefficients between clusters and samples.
     pub fn paper() -> Self {
-        Self { light: 10, receivers: 0, keep: 0.2, centred: true, ..Self::default() }
+        Self { light: 10, receivers: 0, links: 0.0, keep: 0.2, centred: true, ..Self::default() }
     }
 
     /// # Errors
@@ -156,6 +161,9 @@ pub struct Settings {
     pub gloss: bool,
     /// Scatterings of the light: all of them, or one.
     pub bounces: bool,
+    /// Scatterings whose light the links of a bake carry exactly; vectors describe all further ones. 0: vectors describe the light of links, too.
+    #[schemars(range(min = 0, max = 16))]
+    pub linked: u32,
     /// With a bake around the mean of the examples: the light that the mean itself transfers is there. The paper's equation 10 leaves this light out.
     pub mean: bool,
     /// Factor on the light of all lights.
@@ -182,6 +190,7 @@ impl Default for Settings {
             eyes: 0.0,
             gloss: true,
             bounces: true,
+            linked: 3,
             mean: true,
             strength: 1.0,
             vector: 0,

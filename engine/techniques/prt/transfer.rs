@@ -5,7 +5,7 @@
 
 use half::f16;
 
-use super::Plan;
+use super::{Plan, links::Links};
 use crate::{
     Result,
     bake::lowrank::{LowRank, low_rank},
@@ -14,6 +14,9 @@ use crate::{
 
 /// Examples whose light after one scattering is an example, too: indirect light is smoother than direct light, and both are projected.
 pub const INDIRECT: usize = 300;
+
+/// Rays of a link at least: fewer tell little of the share of the hemisphere.
+const LEAST_RAYS: usize = 4;
 
 /// The basis of the direct light of a cluster.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -41,6 +44,8 @@ pub struct Transfer {
     pub left: f32,
     /// Share of rays that met a surface without samples.
     pub lost: f32,
+    /// Pairs of samples whose light is not in `values`.
+    pub links: Links,
 }
 
 impl Basis {
@@ -204,21 +209,31 @@ impl Senders {
         let receivers = &samples[plan.range(cluster)];
         let scale = 1.0 / rays as f32;
         let mut dense = vec![0.0f32; receivers.len() * all];
-        let mut lost = 0u64;
+        let mut lost = 0usize;
+        let mut links = Links::default();
+        let least = match plan.settings.links {
+            0.0 => usize::MAX,
+            share => ((share * rays as f64).ceil() as usize).max(LEAST_RAYS),
+        };
+        let mut sorted = Vec::with_capacity(rays);
         for (row, seen) in dense.chunks_exact_mut(all.max(1)).zip(seen.chunks_exact(rays)) {
-            for number in seen.iter().map(|number| *number as usize) {
+            sorted.clear();
+            sorted.extend_from_slice(seen);
+            sorted.sort_unstable();
+            links.add(&sorted, least, |number, met| {
                 let Some(first) = self.firsts.get(number) else {
-                    lost += u64::from(number as u32 == crate::shaders::consts::PRT_LOST);
-                    continue;
+                    lost += if number as u32 == crate::shaders::consts::PRT_LOST { met } else { 0 };
+                    return;
                 };
                 let values = &self.values[self.starts[number] as usize..self.starts[number + 1] as usize];
-                row[*first as usize..].iter_mut().zip(values).for_each(|(sum, value)| *sum += value * scale);
-            }
+                let share = met as f32 * scale;
+                row[*first as usize..].iter_mut().zip(values).for_each(|(sum, value)| *sum += value * share);
+            });
         }
         let lost = lost as f32 / seen.len().max(1) as f32;
         let rank = plan.settings.receivers as usize;
         if rank == 0 {
-            return Ok(Transfer { lost, ..thinned(dense, &self.sizes, plan.settings.keep) });
+            return Ok(Transfer { lost, links, ..thinned(dense, &self.sizes, plan.settings.keep) });
         }
         // Samples count with their areas, and vectors with the size of their coefficients.
         let roots: Vec<f32> = receivers.iter().map(|sample| sample.area.sqrt()).collect();
@@ -236,7 +251,7 @@ impl Senders {
         let divided = |(value, size): (&f64, &f32)| if *size > 0.0 { (value / f64::from(*size)) as f32 } else { 0.0 };
         let rows =
             found.vectors.chunks_exact(all.max(1)).flat_map(|v| v.iter().zip(&self.sizes).map(divided)).collect();
-        Ok(Transfer { rank: found.len() as u32, rows, values, left: left.max(0.0).sqrt() as f32, lost })
+        Ok(Transfer { rank: found.len() as u32, rows, values, left: left.max(0.0).sqrt() as f32, lost, links })
     }
 }
 
@@ -262,7 +277,7 @@ fn thinned(dense: Vec<f32>, sizes: &[f32], keep: f64) -> Transfer {
     });
     let values = values.collect();
     let left = if whole > 0.0 { (left / whole).sqrt() as f32 } else { 0.0 };
-    Transfer { rank: 0, rows: Vec::new(), values, left, lost: 0.0 }
+    Transfer { values, left, ..Transfer::default() }
 }
 
 impl Transfer {

@@ -65,6 +65,9 @@ pub fn lines(summary: &Summary) -> Vec<String> {
         visibility_vectors_bytes,
         basis_bytes,
         transfer_bytes,
+        link_bytes,
+        links,
+        linked,
         kept,
         distance_error,
         left,
@@ -83,6 +86,10 @@ pub fn lines(summary: &Summary) -> Vec<String> {
             "transfer    {transfer_bytes} bytes, {:.1} % of the coefficients are not 0; {:.1} % of the light is left out",
             100.0 * kept,
             100.0 * left
+        ),
+        format!(
+            "links       {link_bytes} bytes, {links:.1} of each sample; they carry {:.1} % of even light",
+            100.0 * linked
         ),
         format!(
             "particles   {:.1} % left the scene; {:.2} % of the rays met a surface without samples",

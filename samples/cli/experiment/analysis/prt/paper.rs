@@ -60,7 +60,7 @@ pub(super) fn section(results: &Results, cases: &[Case<'_>]) -> Result<Option<Se
         both(&move |_, side| side.and_then(|times| times.fact(name)).map(|value| value * scale).into())
     };
     let setting = |path: &'static str| both(&move |side, _| asked(side, path));
-    let rows: [(&str, &str, Option<f64>, [Cell; 2]); 15] = [
+    let rows: [(&str, &str, Option<f64>, [Cell; 2]); 16] = [
         ("samples", "", Some(45_000.0), fact("samples", 1.0)),
         ("clusters", "", Some(48.0), fact("clusters", 1.0)),
         ("samples a cluster, asked for", "", Some(1000.0), setting("/bake/cluster")),
@@ -73,6 +73,7 @@ pub(super) fn section(results: &Results, cases: &[Case<'_>]) -> Result<Option<Se
         ("visibility: vectors", "MB", None, fact("bytes visibility vectors", 1e-6)),
         ("bases", "MB", None, fact("bytes basis", 1e-6)),
         ("transfer", "MB", Some(21.0), fact("bytes transfer", 1e-6)),
+        ("links", "MB", None, fact("bytes links", 1e-6)),
         ("coefficients kept, at most", "%", Some(20.0), fact("kept", 100.0)),
         ("error of a distance, root mean square", "m", None, fact("distance error", 1.0)),
         ("transferred light that is left out, root mean square", "%", None, fact("left", 100.0)),

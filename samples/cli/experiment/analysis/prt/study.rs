@@ -96,7 +96,13 @@ fn choices(results: &Results, measured: &[Measured<'_>]) -> Result<Vec<Choice>> 
         list.push(Choice {
             settings,
             errors: std::array::from_fn(|part| mean(of.iter().filter_map(|one| Some(one.parts[part]?.blocks)))),
-            megabytes: sum(&["bytes visibility", "bytes visibility vectors", "bytes basis", "bytes transfer"]),
+            megabytes: sum(&[
+                "bytes visibility",
+                "bytes visibility vectors",
+                "bytes basis",
+                "bytes transfer",
+                "bytes links",
+            ]),
             products: sum(&["visibility_products", "transfer_products", "basis_products"]),
             frame: mean(times.iter().filter_map(Times::frame)),
             bake: fact("seconds whole"),

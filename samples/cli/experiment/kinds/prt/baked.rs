@@ -186,6 +186,7 @@ fn facts(summary: &Summary, whole: bool) -> Vec<(String, f64)> {
         ("bytes visibility vectors", summary.visibility_vectors_bytes as f64),
         ("bytes basis", summary.basis_bytes as f64),
         ("bytes transfer", summary.transfer_bytes as f64),
+        ("bytes links", summary.link_bytes as f64),
         ("kept", summary.kept),
     ];
     let errors = [("distance error", summary.distance_error), ("left", summary.left)];

@@ -1,0 +1,89 @@
+//! Links: light of samples that see much of each other, beside the vectors.
+
+use crate::{
+    prt_lab::{baked, small},
+    prt_light::room,
+};
+use lucerna::{
+    Stop,
+    gpu::testing::with_gpu,
+    techniques::prt::{
+        Baking, Settings, Stored,
+        check::{CheckOptions, at_samples, check},
+        solve,
+    },
+};
+
+const PLACES: [[f32; 3]; 2] = [[-1.2, 0.5, 0.9], [1.6, 2.1, -1.1]];
+
+fn diffuse(linked: u32) -> Settings {
+    Settings { gloss: false, linked, ..Settings::default() }
+}
+
+/// Root of the mean of squares, over samples with their areas.
+fn norm(stored: &Stored, of: impl Fn(usize) -> f32) -> f64 {
+    let square = |(i, area): (usize, f32)| f64::from(area) * f64::from(of(i)).powi(2);
+    stored.samples.iter().map(|sample| sample.area).enumerate().map(square).sum::<f64>().sqrt()
+}
+
+#[test]
+fn light_through_links_is_that_of_the_slow_twin() {
+    with_gpu(|gpu| {
+        let scene = room();
+        let stored = baked(gpu, &scene, &Baking { samples: 1000, rays: 128, links: 0.02, ..small() });
+        let links: usize = stored.transfers.iter().map(|of| of.links.senders.len()).sum();
+        assert!(links > stored.samples.len(), "{links}");
+        let albedo = |material: u32| scene.materials[material as usize].base_color.truncate().to_array();
+        let albedos: Vec<_> = stored.samples.iter().map(|sample| albedo(sample.material)).collect();
+        let mut before: Vec<Vec<[f32; 3]>> = Vec::new();
+        for (linked, bounces) in [(0, true), (1, true), (3, true), (3, false)] {
+            let settings = Settings { bounces, ..diffuse(linked) };
+            let found = at_samples(gpu, &scene, &stored, &settings, &PLACES).unwrap();
+            let solved = solve::solve(&stored, &albedos, &settings).unwrap();
+            for [direct, indirect] in &found {
+                let twin = solved.indirect(&stored, &albedos, direct);
+                for channel in 0..3 {
+                    let off = norm(&stored, |i| indirect[i][channel] - twin[i][channel]);
+                    assert!(off < 1e-4 * norm(&stored, |i| twin[i][channel]), "{linked} {bounces} {channel}: {off}");
+                }
+            }
+            // Each number of scatterings has light of its own.
+            let first = found[0][1].clone();
+            assert!(!before.contains(&first), "{linked} {bounces}");
+            before.push(first);
+        }
+    });
+}
+
+#[test]
+fn scatterings_through_links_come_to_an_end() {
+    with_gpu(|gpu| {
+        let stored = baked(gpu, &room(), &Baking { samples: 800, rays: 128, light: 2, receivers: 4, ..small() });
+        let count = stored.samples.len();
+        let albedos = vec![[0.5; 3]; count];
+        let direct: Vec<[f32; 3]> = (0..count).map(|i| [f32::from(i % 7 == 0); 3]).collect();
+        let of = |linked| solve::indirect(&stored, &albedos, &direct, &diffuse(linked)).unwrap();
+        let last = of(16);
+        let whole = norm(&stored, |i| last[i][0]);
+        let off = [1, 2, 4, 15].map(|linked| {
+            let found = of(linked);
+            norm(&stored, |i| found[i][0] - last[i][0]) / whole
+        });
+        assert!(off.is_sorted_by(|a, b| a > b) && off[3] < 1e-3, "{off:?}");
+    });
+}
+
+#[test]
+fn links_lower_the_error_of_light_near_surfaces() {
+    with_gpu(|gpu| {
+        let scene = room();
+        let stored = baked(gpu, &scene, &Baking { samples: 2000, cluster: 1000, light: 4, ..small() });
+        let options = CheckOptions { lights: 6, samples: 150, paths: 256, seed: 0 };
+        let [by_vectors, by_links] = [0, 3].map(|linked| {
+            let found = check(gpu, &scene, &stored, &diffuse(linked), options, &Stop::default()).unwrap();
+            let errors: Vec<f64> = found.iter().filter_map(|light| Some(light.transferred?.error)).collect();
+            (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()
+        });
+        assert!(by_links < 0.7 * by_vectors, "{by_links} {by_vectors}");
+    });
+}
