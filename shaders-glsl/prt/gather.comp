@@ -62,7 +62,7 @@ void main() {
                     float clearance = above.instance == NONE ? most : above.t;
                     found = nearest_sample(p.position, side, material, clearance);
                     // A gap without samples is dark.
-                    if (found != NONE && clearance < grid.radius && clearances[found] > 3.0 * clearance) found = NONE;
+                    if (found != NONE && clearance < grid.radius && clearances[found] > PRT_OTHER_GAP * clearance) found = NONE;
                 }
                 if (found == NONE) found = PRT_LOST;
             }

@@ -9,6 +9,8 @@ const uint PRT_HITS = 8u; // export
 const uint PRT_LOST = 0xfffffffeu; // export
 // Free distance above a surface that counts as wide, in distances of samples.
 const float PRT_CLEAR = 2.0; // export
+// A sample whose free distance is more times that of a hit in a gap is not in this gap.
+const float PRT_OTHER_GAP = 3.0;
 // Lights whose visibility is gathered at once.
 const uint PRT_LIGHTS = 8u; // export
 // Scatterings of the paths that a bake is compared with.

@@ -49,6 +49,7 @@ pub struct Bakery {
 #[derive(Debug)]
 struct Uploaded {
     samples: OwnedBuffer,
+    clearances: OwnedBuffer,
     grid: Grid,
     starts: OwnedBuffer,
     order: OwnedBuffer,
@@ -115,12 +116,10 @@ impl Bakery {
             return Err(Error::input(what).help("Name a point inside the room with --inside X,Y,Z"));
         }
         if escaped > 0.7 {
-            let what = format!("the scene is open: {:.0} % of all scattered particles leave it", 100.0 * escaped);
-            return Err(Error::input(what).help("Name a point inside a room with --inside X,Y,Z"));
+            return Err(open(format!("{:.0} % of all scattered particles leave it", 100.0 * escaped)));
         }
         if stayed < LEAST_INSIDE {
-            let what = format!("the scene is open: {:.0} % of all particles leave it at once", 100.0 * (1.0 - stayed));
-            return Err(Error::input(what).help("Name a point inside a room with --inside X,Y,Z"));
+            return Err(open(format!("{:.0} % of all particles leave it at once", 100.0 * (1.0 - stayed))));
         }
         samples::weigh(&mut found, &triangles, pilot);
         let reached: f32 = found.iter().map(|sample| sample.area).sum();
@@ -246,14 +245,36 @@ impl Bakery {
     /// `OutOfMemory`, `DeviceLost`.
     pub fn upload(&mut self, plan: &Plan, samples: &[PrtPoint]) -> Result<()> {
         let grid = Grid::new(samples, plan.radius);
+        let clearances = self.clearances(plan, samples)?;
         let buffer = |name, bytes: &[u8]| OwnedBuffer::with_contents(&self.gpu, name, bytes);
         self.on_device = Some(Uploaded {
             samples: buffer("prt.samples", bytemuck::cast_slice(samples))?,
+            clearances: buffer("prt.clearances", bytemuck::cast_slice(&clearances))?,
             starts: buffer("prt.cells", bytemuck::cast_slice(&grid.starts))?,
             order: buffer("prt.order", bytemuck::cast_slice(&grid.order))?,
             grid,
         });
         Ok(())
+    }
+
+    /// The free distance above each sample, at most `PRT_CLEAR` distances of samples, metres.
+    fn clearances(&mut self, plan: &Plan, samples: &[PrtPoint]) -> Result<Vec<f32>> {
+        let count = samples.len() as u32;
+        let mut graph = Graph::new("prt.clearances");
+        let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
+        let rays = self.rays.frame(&mut graph, &handles);
+        let clearances = graph.buffer("prt.clearances", 4 * u64::from(count));
+        let args = traced!(
+            clearances::Args {
+                samples: graph.buffer_from("prt.samples", samples),
+                clearances,
+                push: clearances::Push { count, most: PRT_CLEAR * plan.radius, seed: plan.settings.seed },
+            },
+            rays
+        );
+        graph.compute(args, count).rays(count.into());
+        let read = graph.read_buffer(clearances);
+        Ok(self.runner.run(&graph)?.buffer(read))
     }
 
     /// Distances from the samples of a cluster in the directions of its cap, metres: a row for each sample. Negative: below the horizon.
@@ -296,19 +317,13 @@ impl Bakery {
         let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
         let rays = self.rays.frame(&mut graph, &handles);
         let seen = graph.buffer("prt.seen", 4 * u64::from(count) * u64::from(of_sample));
-        let all = plan.count() as u32;
-        let clearances = graph.buffer("prt.clearances", 4 * u64::from(all));
-        let push = clearances::Push { count: all, most: PRT_CLEAR * plan.radius, seed: plan.settings.seed };
-        let args =
-            traced!(clearances::Args { samples: graph.import_buffer(&uploaded.samples), clearances, push }, rays);
-        graph.compute(args, all).rays(all.into());
         let args = traced!(
             gather::Args {
                 samples: graph.import_buffer(&uploaded.samples),
                 grid: graph.uniform(&uploaded.grid.grid),
                 starts: graph.import_buffer(&uploaded.starts),
                 order: graph.import_buffer(&uploaded.order),
-                clearances,
+                clearances: graph.import_buffer(&uploaded.clearances),
                 seen,
                 push: gather::Push {
                     first: 0,
@@ -372,6 +387,11 @@ impl Bakery {
     pub(super) fn uploaded(&self) -> Result<&OwnedBuffer> {
         self.on_device.as_ref().map(|uploaded| &uploaded.samples).ok_or_else(not_uploaded)
     }
+}
+
+/// The error for a scene that is no room.
+fn open(what: String) -> Error {
+    Error::input(format!("the scene is open: {what}")).help("Name a point inside a room with --inside X,Y,Z")
 }
 
 fn not_uploaded() -> Error {

@@ -1,7 +1,7 @@
 //! Links: pairs of samples that see much of each other. Their light is transferred as is, not by vectors.
 //!
 //! Vectors describe smooth light well. The light of a bright spot beside a sample is not smooth, and few vectors cannot describe such a spot at every
-//! place. A link carries it exactly, and vectors carry the light of all other pairs (a sparse matrix beside one of low rank). The paper has no links.
+//! place. A link carries it as the rays have met it, and vectors carry the light of all other pairs (a sparse matrix beside one of low rank). The paper has no links.
 
 use super::coded::{Reader, Writer};
 use crate::{Error, Result};
@@ -9,7 +9,7 @@ use crate::{Error, Result};
 /// The links of the samples of a cluster: for each sample the samples that fill much of its hemisphere.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Links {
-    /// The first link of each sample, and the end of all.
+    /// The first link of each sample, and the end of all; empty if no sample of the cluster has links.
     pub starts: Vec<u32>,
     /// Numbers of the samples that send light, ascending for each receiver.
     pub senders: Vec<u32>,
@@ -62,6 +62,9 @@ impl Links {
     pub(super) fn read(from: &mut Reader<'_>, samples: usize, all: usize) -> Result<Self> {
         let out = Self { starts: from.words()?, senders: from.words()?, rays: from.shorts()? };
         let count = out.senders.len();
+        if out == Self::default() {
+            return Ok(out);
+        }
         let whole = [out.starts.first(), out.starts.last()] == [Some(&0), Some(&(count as u32))];
         let rising = out.starts.windows(2).all(|pair| pair[0] <= pair[1]);
         let known = out.senders.iter().all(|sender| (*sender as usize) < all);
@@ -108,6 +111,9 @@ mod tests {
         let read = |bytes: &[u8], samples: usize, all: usize| Links::read(&mut Reader(bytes), samples, all);
         let bytes = written(&links);
         assert_eq!(read(&bytes, 3, 8).unwrap(), links);
+        let none = Links::default();
+        assert_eq!(read(&written(&none), 3, 8).unwrap(), none);
+        assert_eq!(none.of(2, 10).count(), 0);
         assert!(read(&bytes, 3, 2).is_err() && read(&bytes, 4, 8).is_err());
         for wrong in [
             Links { starts: vec![0, 2, 1, 2], ..links.clone() },

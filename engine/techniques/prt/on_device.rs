@@ -169,10 +169,12 @@ impl OnDevice {
                 .max()
                 .unwrap_or(0) as u64;
         if largest > most {
-            let what = format!("has {largest} bytes of one kind of vectors, and the device's buffers hold {most}");
+            let what = format!("has {largest} bytes of one kind of vectors or links, and the device's buffers hold {most}");
             let error = Error::input(what);
             return Err(
-                error.help("Bake with fewer vectors (room.light, room.visibility) or with room.receivers above 0")
+                error.help(
+                    "Bake with fewer vectors (room.light, room.visibility), with room.receivers above 0, or with fewer links (a larger room.links)",
+                )
             );
         }
         products[2] = 3 * (all * all) as u64 + rounds * mixed.len() as u64;
@@ -256,17 +258,29 @@ impl OnDevice {
             push: scatter::Push { count: all },
         };
         graph.compute(args, all);
-        // Links carry the first scattering exactly, and the further ones as the vectors have them.
-        if let Some(linked) = self.linked {
-            radiosities = self.restore(graph, scattered, (linked > 0).then_some((radiosities, projected)));
+        let linked = self.linked.unwrap_or(0);
+        if linked == 0 {
+            return Lit { direct, irradiances: self.sent(graph, scattered), visible };
         }
+        // The first scattering through links has the direct light itself; the light of all further ones is that of the vectors.
+        radiosities = self.restore(graph, scattered, Some((radiosities, projected)));
         let mut irradiances = self.receive(graph, scattered, radiosities);
-        for _ in 1..self.linked.unwrap_or(0) {
+        for _ in 1..linked {
             radiosities = self.radiosity(graph, direct, Some(irradiances));
             let projected = self.project(graph, radiosities);
             irradiances = self.receive(graph, projected, radiosities);
         }
         Lit { direct, irradiances, visible }
+    }
+
+    /// Irradiance of the samples by light that has these coefficients of all vectors, and nothing beside them.
+    pub fn sent(&self, graph: &mut Graph, coefficients: Buffer) -> Buffer {
+        // Without links no radiosity is read.
+        let radiosities = match self.linked {
+            Some(_) => self.restore(graph, coefficients, None),
+            None => coefficients,
+        };
+        self.receive(graph, coefficients, radiosities)
     }
 
     /// Radiosity of the samples by this direct and indirect irradiance.
@@ -300,7 +314,7 @@ impl OnDevice {
 
     /// Radiosity of the samples that has these coefficients. `exact`: radiosity that is known, and its coefficients; only the rest of the coefficients
     /// is then restored.
-    pub fn restore(&self, graph: &mut Graph, coefficients: Buffer, exact: Option<(Buffer, Buffer)>) -> Buffer {
+    fn restore(&self, graph: &mut Graph, coefficients: Buffer, exact: Option<(Buffer, Buffer)>) -> Buffer {
         let restored = graph.buffer("prt.restored", 12 * u64::from(self.count));
         let (radiosities, known) = exact.unwrap_or((coefficients, coefficients));
         let args = restore::Args {
@@ -317,7 +331,7 @@ impl OnDevice {
     }
 
     /// Irradiance of the samples by light with these coefficients of all vectors, and by the radiosity of linked samples.
-    pub fn receive(&self, graph: &mut Graph, coefficients: Buffer, radiosities: Buffer) -> Buffer {
+    fn receive(&self, graph: &mut Graph, coefficients: Buffer, radiosities: Buffer) -> Buffer {
         let mixed = match &self.mixed {
             None => coefficients,
             Some((rows, count)) => {
@@ -346,11 +360,6 @@ impl OnDevice {
         };
         graph.compute(args, self.count);
         irradiances
-    }
-
-    /// Whether the bake has links.
-    pub fn has_links(&self) -> bool {
-        self.linked.is_some()
     }
 
     /// Number of vectors of light.

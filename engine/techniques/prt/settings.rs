@@ -161,7 +161,8 @@ pub struct Settings {
     pub gloss: bool,
     /// Scatterings of the light: all of them, or one.
     pub bounces: bool,
-    /// Scatterings whose light the links of a bake carry exactly; vectors describe all further ones. 0: vectors describe the light of links, too.
+    /// Scatterings of light that links carry sample by sample; vectors describe the light of all further scatterings. 0: links carry the light that
+    /// vectors describe.
     #[schemars(range(min = 0, max = 16))]
     pub linked: u32,
     /// With a bake around the mean of the examples: the light that the mean itself transfers is there. The paper's equation 10 leaves this light out.

@@ -135,8 +135,7 @@ impl Technique for Prt {
             let mut one = vec![[0.0f32; 3]; all as usize];
             one[of_prt.vector as usize] = [of_prt.strength; 3];
             let one = graph.buffer_from("prt.vector", &one);
-            let radiosities = if self.light.has_links() { self.light.restore(graph, one, None) } else { one };
-            lit.irradiances = self.light.receive(graph, one, radiosities);
+            lit.irradiances = self.light.sent(graph, one);
         }
         let mut notes = [moment.notes, &left_out(moment.scene), &idle_notes("shadow", &settings.shadow)].concat();
         // Shadow maps take the place of the visibility, and pictures of single samples have no light: the first lights are enough for the layer.

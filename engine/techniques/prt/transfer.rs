@@ -230,6 +230,9 @@ impl Senders {
                 row[*first as usize..].iter_mut().zip(values).for_each(|(sum, value)| *sum += value * share);
             });
         }
+        if links.senders.is_empty() {
+            links = Links::default();
+        }
         let lost = lost as f32 / seen.len().max(1) as f32;
         let rank = plan.settings.receivers as usize;
         if rank == 0 {

@@ -12,9 +12,12 @@ pub fn need(room: &Baking) -> u64 {
         cluster * (24 * u64::from(room.directions) + 12 * cluster + 8 * vectors + 4 * u64::from(room.rays));
     let stored = samples * (64 + 2 * u64::from(room.visibility + room.light) + 4 * 300);
     let transfer = samples * if room.receivers > 0 { 2 * u64::from(room.receivers) } else { 4 * vectors };
+    // A sample has as many links as parts of the least share fit into its hemisphere; in files and on the device.
+    let links = if room.links > 0.0 { (1.0 / room.links).min(f64::from(room.rays / 4)) as u64 } else { 0 };
+    let linked = samples * (14 * links + 4 * u64::from(room.light));
     // All scatterings are solved between all vectors.
     let solved = 32 * vectors * vectors;
-    (100 << 20) + solved + 2 * of_cluster + 2 * stored + 2 * transfer
+    (100 << 20) + solved + 2 * of_cluster + 2 * stored + 2 * transfer + linked
 }
 
 /// Refuses a bake that needs more than `free` bytes; `None`: unknown.
