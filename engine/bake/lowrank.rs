@@ -1,11 +1,11 @@
 //! The leading right singular vectors of large matrices, where all eigenvalues would cost too much.
 //!
-//! Products are summed in f64 in a fixed order, and the subspace iteration begins with fixed numbers, so the same rows give the same bits on
-//! every machine and with any number of threads.
+//! Products are summed in f64 in an order that does not depend on the number of threads, and the subspace iteration begins with fixed numbers, so the
+//! same rows give the same bits on the same kind of processor.
 
 use std::thread;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, Dyn};
 
 use super::{
     eigen::leading,
@@ -17,8 +17,11 @@ use crate::{Error, ErrorKind, Result};
 const MORE: usize = 12;
 /// Steps of the subspace iteration. The error of a vector falls in each by the ratio of its eigenvalue to the first one that is left out.
 const STEPS: usize = 12;
-/// Values of a row that stay in the first cache while products are summed.
-const STRIP: usize = 512;
+/// Columns of a product that a thread computes at once.
+const COLUMNS: usize = 64;
+
+/// A matrix whose values lie in steps of any size.
+type View<'a> = DMatrixView<'a, f64, Dyn, Dyn>;
 
 /// Orthonormal vectors in descending order of the part of the rows that they describe.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -46,10 +49,10 @@ impl LowRank {
         &self.vectors[index * self.columns..][..self.columns]
     }
 
-    /// The coefficients of a row.
-    pub fn project(&self, row: &[f32]) -> Vec<f64> {
-        let row: Vec<f64> = row.iter().map(|value| f64::from(*value)).collect();
-        (0..self.len()).map(|index| dot(&row, self.vector(index))).collect()
+    /// The coefficients of rows of [`Self::columns`] values: those of a row one after the other.
+    pub fn project(&self, rows: &[f32]) -> Vec<f64> {
+        let values: Vec<f64> = rows.iter().map(|value| f64::from(*value)).collect();
+        product(turned(&self.vectors, self.columns), whole(&values, self.columns)).data.into()
     }
 }
 
@@ -67,25 +70,19 @@ pub fn low_rank(rows: &[f32], columns: usize, count: usize) -> Result<LowRank> {
         return Ok(LowRank { columns, ..LowRank::default() });
     }
     let values: Vec<f64> = rows.iter().map(|value| f64::from(*value)).collect();
+    // A column for each row.
+    let (matrix, turned) = (whole(&values, columns), turned(&values, columns));
     // The smaller of the two matrices of products.
-    let of_columns = columns <= lines;
-    let (size, gram) = match of_columns {
-        true => (columns, products(&transposed(&values, columns), lines)),
-        false => (lines, products(&values, columns)),
+    let (squares, found) = match columns <= lines {
+        true => subspace(&squared(matrix, turned), count)?,
+        false => {
+            let (squares, shares) = subspace(&squared(turned, matrix), count)?;
+            (squares, product(matrix, of(&shares)))
+        }
     };
-    let (squares, found) = subspace(&gram, size, count)?;
     let mut out = LowRank { columns, vectors: Vec::new(), squares: Vec::new() };
-    for (square, vector) in squares.iter().zip(&found) {
-        let mut vector = match of_columns {
-            true => vector.clone(),
-            false => {
-                let mut sum = vec![0.0; columns];
-                for (row, share) in values.chunks_exact(columns).zip(vector) {
-                    sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += share * value);
-                }
-                sum
-            }
-        };
+    for (square, vector) in squares.iter().zip(found.column_iter()) {
+        let mut vector: Vec<f64> = vector.iter().copied().collect();
         for index in 0..out.len() {
             let along = dot(&vector, out.vector(index));
             vector.iter_mut().zip(out.vector(index)).for_each(|(value, other)| *value -= along * other);
@@ -102,52 +99,63 @@ pub fn low_rank(rows: &[f32], columns: usize, count: usize) -> Result<LowRank> {
     Ok(out)
 }
 
-/// The matrix with rows and columns exchanged.
-fn transposed(values: &[f64], columns: usize) -> Vec<f64> {
-    let lines = values.len() / columns.max(1);
-    let mut out = vec![0.0; values.len()];
-    for (line, row) in values.chunks_exact(columns).enumerate() {
-        row.iter().enumerate().for_each(|(column, value)| out[column * lines + line] = *value);
-    }
+/// The matrix with these columns of `size` values.
+fn whole(values: &[f64], size: usize) -> View<'_> {
+    DMatrixView::from_slice_with_strides(values, size, values.len() / size.max(1), 1, size)
+}
+
+/// The matrix with these rows of `size` values.
+fn turned(values: &[f64], size: usize) -> View<'_> {
+    DMatrixView::from_slice_with_strides(values, values.len() / size.max(1), size, size, 1)
+}
+
+fn of(matrix: &DMatrix<f64>) -> View<'_> {
+    whole(matrix.as_slice(), matrix.nrows())
+}
+
+/// The product of a matrix with its transpose.
+fn squared(a: View<'_>, turned: View<'_>) -> DMatrix<f64> {
+    let mut out = products(a, turned, true);
+    out.fill_upper_triangle_with_lower_triangle();
     out
 }
 
-/// Products of all pairs of rows: a whole symmetric matrix, row after row.
-fn products(values: &[f64], columns: usize) -> Vec<f64> {
-    let size = values.len() / columns.max(1);
-    let mut out = vec![0.0; size * size];
+/// The product of two matrices.
+fn product(a: View<'_>, b: View<'_>) -> DMatrix<f64> {
+    products(a, b, false)
+}
+
+/// `lower`: only the lower triangle and some values above it are needed.
+fn products(a: View<'_>, b: View<'_>, lower: bool) -> DMatrix<f64> {
+    let (lines, inner, columns) = (a.nrows(), b.nrows(), b.ncols());
+    let mut out = DMatrix::zeros(lines, columns);
+    if lines == 0 || columns == 0 {
+        return out;
+    }
     let threads = thread::available_parallelism().map_or(1, usize::from).clamp(1, 16);
-    // Rows of the lower triangle grow, so threads take every so many rows.
     let mut parts: Vec<Vec<(usize, &mut [f64])>> = (0..threads).map(|_| Vec::new()).collect();
-    for (row, products) in out.chunks_exact_mut(size.max(1)).enumerate() {
-        parts[row / 4 % threads].push((row, products));
+    for (block, values) in out.as_mut_slice().chunks_mut(COLUMNS * lines).enumerate() {
+        parts[block % threads].push((block * COLUMNS, values));
     }
     thread::scope(|scope| {
-        for part in &mut parts {
+        for part in parts {
             scope.spawn(move || {
-                for first in (0..columns).step_by(STRIP) {
-                    let last = (first + STRIP).min(columns);
-                    let strip = |row: usize| &values[row * columns + first..row * columns + last];
-                    for (row, products) in part.iter_mut() {
-                        let a = strip(*row);
-                        for (other, product) in products.iter_mut().enumerate().take(*row + 1) {
-                            *product += dot(a, strip(other));
-                        }
-                    }
+                for (first, values) in part {
+                    let count = values.len() / lines;
+                    let above = if lower { first } else { 0 };
+                    let mut out = DMatrixViewMut::from_slice(values, lines, count);
+                    let a = a.rows(above, lines - above);
+                    out.rows_mut(above, lines - above).gemm(1.0, &a, &b.view((0, first), (inner, count)), 0.0);
                 }
             });
         }
     });
-    for row in 0..size {
-        for column in 0..row {
-            out[column * size + row] = out[row * size + column];
-        }
-    }
     out
 }
 
-/// The leading eigenvalues of a symmetric matrix without negative ones, and their vectors.
-fn subspace(gram: &[f64], size: usize, count: usize) -> Result<(Vec<f64>, Vec<Vec<f64>>)> {
+/// The leading eigenvalues of a symmetric matrix without negative ones, and their vectors as columns.
+fn subspace(gram: &DMatrix<f64>, count: usize) -> Result<(Vec<f64>, DMatrix<f64>)> {
+    let size = gram.nrows();
     let wide = (count + MORE).min(size);
     let mut state = 0x9e37_79b9_7f4a_7c15u64;
     let mut random = move || {
@@ -158,52 +166,21 @@ fn subspace(gram: &[f64], size: usize, count: usize) -> Result<(Vec<f64>, Vec<Ve
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64 - 0.5
     };
-    let mut basis: Vec<f64> = (0..wide * size).map(|_| random()).collect();
-    orthonormal(&mut basis, size);
+    let mut basis = DMatrix::from_fn(size, wide, |_, _| random());
+    orthonormal(basis.as_mut_slice(), size);
     let whole = wide == size;
     for _ in 0..if whole { 0 } else { STEPS } {
-        basis = times(gram, &basis, size);
-        orthonormal(&mut basis, size);
+        basis = product(of(gram), of(&basis));
+        orthonormal(basis.as_mut_slice(), size);
     }
-    let image = times(gram, &basis, size);
-    let mut small = DMatrix::zeros(wide, wide);
-    for a in 0..wide {
-        for b in 0..=a {
-            let value = dot(&basis[a * size..][..size], &image[b * size..][..size]);
-            small[(a, b)] = value;
-            small[(b, a)] = value;
-        }
-    }
+    let image = product(of(gram), of(&basis));
+    let small = product(turned(basis.as_slice(), size), of(&image));
+    // The same on both sides of the diagonal.
+    let small = 0.5 * (&small + small.transpose());
     let total = small.trace().max(0.0);
     let (squares, shares, _) = leading(small, Keep::Count(count), total)?;
-    let vectors = shares.iter().map(|shares| {
-        let mut vector = vec![0.0; size];
-        for (share, along) in shares.iter().zip(basis.chunks_exact(size)) {
-            vector.iter_mut().zip(along).for_each(|(sum, value)| *sum += share * value);
-        }
-        vector
-    });
-    let vectors = vectors.collect();
-    Ok((squares, vectors))
-}
-
-/// The products of a symmetric matrix with vectors.
-fn times(gram: &[f64], vectors: &[f64], size: usize) -> Vec<f64> {
-    let mut out = vec![0.0; vectors.len()];
-    let count = vectors.len() / size.max(1);
-    let each = count.div_ceil(thread::available_parallelism().map_or(1, usize::from).clamp(1, 16)).max(1);
-    thread::scope(|scope| {
-        for (outs, ins) in out.chunks_mut(each * size).zip(vectors.chunks(each * size)) {
-            scope.spawn(move || {
-                for (row, products) in gram.chunks_exact(size).enumerate() {
-                    for (out, vector) in outs.chunks_exact_mut(size).zip(ins.chunks_exact(size)) {
-                        out[row] = dot(products, vector);
-                    }
-                }
-            });
-        }
-    });
-    out
+    let shares = DMatrix::from_fn(wide, shares.len(), |line, column| shares[column][line]);
+    Ok((squares, product(of(&basis), of(&shares))))
 }
 
 /// Gram and Schmidt's orthonormalisation, twice, which is exact to rounding. Vectors that depend on the ones before become 0.

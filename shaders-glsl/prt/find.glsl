@@ -1,45 +1,44 @@
 // The sample that stands for a point of a surface: near, on the same plane, on the same side, of the same material and as free.
-// Before including: prt/prt.glsl, lib/scene.glsl, and declare `grid`, `starts`, `order`, `samples` and `clearances`.
+// Before including: prt/prt.glsl, lib/scene.glsl, lib/gbuffer.glsl, and declare `grid`, `starts`, `order` and `near`. The cells have lists of all samples
+// around them; `near` has for each entry what decides, packed by `Nearby::packed`.
 
-// `clearance`: free distance above the point, metres; negative: not known.
-
+// `clearance`: free distance above the point, metres.
 uint nearest_sample(vec3 position, vec3 side, uint material, float clearance) {
-    float most = PRT_CLEAR * grid.radius;
+    float clear = min(clearance / (PRT_CLEAR * grid.radius), 1.0);
     vec3 at = (position - grid.origin) / grid.cell;
+    ivec3 own = ivec3(floor(at));
     uint found = NONE;
     float least = 1e30;
-    // Two cells along each axis hold all samples within half a cell; if there is none, three cells.
-    for (uint ring = 0u; ring < 2u && found == NONE; ++ring) {
-        ivec3 low = ring == 0u ? ivec3(floor(at - 0.5)) : ivec3(floor(at)) - 1;
-        ivec3 high = ring == 0u ? low + 1 : low + 2;
-        low = max(low, ivec3(0));
-        high = min(high, ivec3(grid.counts) - 1);
-        for (int z = low.z; z <= high.z; ++z) {
-            for (int y = low.y; y <= high.y; ++y) {
-                uint first_cell = prt_cell(grid, ivec3(low.x, y, z));
-                // Cells of a row lie side by side.
-                uint from = starts[first_cell], to = starts[first_cell + uint(high.x - low.x) + 1u];
-                for (uint k = from; k < to; ++k) {
-                    uint number = order[k];
-                    float facing = dot(samples[number].side, side);
-                    vec3 way = samples[number].position - position;
-                    // A sample of another surface, beside or behind this one, is worse than a farther one.
-                    float off = dot(way, side);
-                    float score = (dot(way, way) + 64.0 * off * off) * (facing > 0.9 ? 1.0 : 3.0 - 2.0 * facing);
-                    if (samples[number].material != material) score *= 4.0;
-                    if (clearance >= 0.0) {
-                        // Light behind a picture is not the light beside it.
-                        float a = min(clearance, most), b = min(clearances[number], most);
-                        float ratio = max(a, b) / max(min(a, b), 0.02 * most);
-                        score *= ratio * ratio;
-                    }
-                    if (facing > (ring == 0u ? 0.3 : 0.0) && score < least) {
-                        least = score;
-                        found = number;
-                    }
-                }
+    // If the own cell has no sample, the lists of its neighbours at the corners have all samples of all neighbours.
+    for (uint turn = 0u; turn < 9u; ++turn) {
+        if (turn == 1u && found != NONE) break;
+        uint corner = turn - 1u;
+        ivec3 cell = own;
+        if (turn > 0u) cell += 2 * ivec3(corner & 1u, (corner >> 1u) & 1u, corner >> 2u) - 1;
+        if (any(lessThan(cell, ivec3(0))) || any(greaterThanEqual(cell, ivec3(grid.counts)))) continue;
+        uint row = prt_cell(grid, cell);
+        uint to = starts[row + 1u];
+        vec3 local = at - vec3(cell) + 1.0;
+        for (uint k = starts[row]; k < to; ++k) {
+            uvec4 words = near[k];
+            vec3 towards = octahedral_decode(unpackSnorm2x16(words.z));
+            float facing = dot(towards, side);
+            if (facing <= (turn == 0u ? 0.3 : 0.0)) continue;
+            vec3 way = 3.0 * vec3(unpackUnorm2x16(words.x), unpackUnorm2x16(words.y).x) - local;
+            // A sample of another surface, beside or behind this one, is worse than a farther one. Along the mean normal, so that a curved surface is
+            // not off its own tangent plane.
+            float off = dot(way, normalize(towards + side));
+            float score = (dot(way, way) + 64.0 * off * off) * (facing > 0.9 ? 1.0 : 3.0 - 2.0 * facing);
+            if (words.y >> 16u != (material & 0xffffu)) score *= 4.0;
+            // Light behind a picture is not the light beside it.
+            float other = unpackHalf2x16(words.w).x;
+            float ratio = max(clear, other) / max(min(clear, other), 0.02);
+            score *= ratio * ratio;
+            if (score < least) {
+                least = score;
+                found = k;
             }
         }
     }
-    return found;
+    return found == NONE ? NONE : order[found];
 }

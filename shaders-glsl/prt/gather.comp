@@ -8,6 +8,7 @@
 #include "lib/material.glsl"
 #include "lib/sampling.glsl"
 #include "lib/points.glsl"
+#include "lib/gbuffer.glsl"
 #define SURFACE_BINDING 1
 #include "lib/hit_surface.glsl"
 #include "lib/trace.glsl"
@@ -21,7 +22,7 @@ layout(binding = 10, scalar) readonly buffer Starts { uint starts[]; };
 layout(binding = 11, scalar) readonly buffer Order { uint order[]; };
 // NONE: nothing; PRT_LOST: a surface without samples.
 layout(binding = 12, scalar) writeonly buffer Seen { uint seen[]; };
-layout(binding = 13, scalar) readonly buffer Clearances { float clearances[]; };  // of all samples, metres
+layout(binding = 13, scalar) readonly buffer Near { uvec4 near[]; };  // of each entry of `order`
 
 #include "prt/find.glsl"
 
@@ -31,6 +32,7 @@ layout(push_constant, scalar) uniform Push {
     uint first_sample;
     uint receivers;
     uint rays;         // of each sample
+    float slit;        // width of slits without samples, metres
     uint seed;
 };
 
@@ -54,16 +56,12 @@ void main() {
                 if (dot(side, direction) > 0.0) side = -side;
                 uint material = INSTANCE_AT(hit.instance).material;
                 float most = PRT_CLEAR * grid.radius;
-                found = nearest_sample(p.position, side, material, -1.0);
-                // In a gap, or beside one, the free distance above the surface tells which samples are in the gap, too.
-                if (hit.t < most || found != NONE && clearances[found] < most) {
-                    Ray up = Ray(p.position + 2.0 * surface_gap(p) * side, 0.0, side, most);
-                    Hit above = trace(up, TRACE_SHADOW, pcg4d(uvec4(number, i, 23u, seed)).x, false);
-                    float clearance = above.instance == NONE ? most : above.t;
-                    found = nearest_sample(p.position, side, material, clearance);
-                    // A gap without samples is dark.
-                    if (found != NONE && clearance < grid.radius && clearances[found] > PRT_OTHER_GAP * clearance) found = NONE;
-                }
+                // The free distance above the surface tells which samples are in the same gap.
+                Ray up = Ray(p.position + 2.0 * surface_gap(p) * side, 0.0, side, most);
+                Hit above = trace(up, TRACE_SHADOW, pcg4d(uvec4(number, i, 23u, seed)).x, false);
+                float clearance = above.instance == NONE ? most : above.t;
+                // Slits have no samples and are dark.
+                if (clearance >= slit) found = nearest_sample(p.position, side, material, clearance);
                 if (found == NONE) found = PRT_LOST;
             }
         }

@@ -24,6 +24,7 @@ layout(push_constant, scalar) uniform Push {
     uint first;     // number of the first particle
     uint starts_of; // number of starts
     uint seed;
+    float most;     // of the free distances above hits, metres; 0: they are not measured
 };
 
 void main() {
@@ -49,12 +50,18 @@ void main() {
         if (any(isnan(normal)) || dot(normal, side) <= 0.0) normal = side;
         float gap = surface_gap(p);
         if (hits >= PRT_FIRST_HIT) {
+            float clearance = 0.0;
+            if (most > 0.0) {
+                Hit above = trace(Ray(p.position + 2.0 * gap * side, 0.0, side, most), TRACE_SHADOW, salt, false);
+                clearance = above.instance == NONE ? most : above.t;
+            }
             points[i * PRT_HITS + kept] = PrtPoint(p.position, hit.instance, side, hit.triangle, normal,
-                INSTANCE_AT(hit.instance).material, hit.barycentrics, gap, 0.0);
+                INSTANCE_AT(hit.instance).material, hit.barycentrics, gap, clearance);
             ++kept;
         }
+        // The way that the particle came is free. A step along the normal may end behind another surface that touches this one, inside of furniture.
+        origin = p.position - direction * min(gap / max(dot(side, -direction), 1e-4), 0.5 * hit.t);
         direction = frame_around(side) * sample_cosine(unit_floats(point_words(place, hits + 1u, seed)));
-        origin = p.position + (side + direction) * gap;
     }
     counts[i] = kept;
 }

@@ -7,10 +7,11 @@ const uint PRT_FIRST_HIT = 5u; // export
 const uint PRT_HITS = 8u; // export
 // A ray met a surface without samples.
 const uint PRT_LOST = 0xfffffffeu; // export
+// Samples on a plane whose least distance is 1, of one square metre, when no further sample fits in (random sequential adsorption: discs of half that
+// radius cover 0.547 of the plane).
+const float PRT_DENSITY = 0.697; // export
 // Free distance above a surface that counts as wide, in distances of samples.
 const float PRT_CLEAR = 2.0; // export
-// A sample whose free distance is more times that of a hit in a gap is not in this gap.
-const float PRT_OTHER_GAP = 3.0;
 // Lights whose visibility is gathered at once.
 const uint PRT_LIGHTS = 8u; // export
 // Scatterings of the paths that a bake is compared with.
@@ -37,7 +38,7 @@ struct PrtPoint {
     uint material;
     vec2 barycentrics;
     float gap;          // distance by which rays start off the surface, metres
-    float area;         // of the surface that the sample stands for, m²
+    float area;         // of the surface that the sample stands for, m²; of a hit: free distance above the surface, metres
 };
 
 // Cells of equal size that cover all samples. `starts` has the first sample of each cell, `order` the samples cell after cell.
@@ -74,6 +75,11 @@ struct PrtMesh {
     uint first;         // of its values
     uint sides;         // 1, or 2 for double-sided surfaces: front and back of each vertex
 };
+
+// What a sample counts in the mean over samples, by its area, m²: about 1 on open surfaces. Samples without an area of their own count a little.
+float prt_weight(float area, float radius) {
+    return max(PRT_DENSITY * area / (radius * radius), 0.01);
+}
 
 uint prt_cell(PrtGrid grid, ivec3 at) {
     return (uint(at.z) * grid.counts.y + uint(at.y)) * grid.counts.x + uint(at.x);

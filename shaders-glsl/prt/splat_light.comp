@@ -12,14 +12,14 @@ layout(binding = 2, scalar) readonly buffer Drawn { uint drawn[]; };         // 
 layout(binding = 3, scalar) readonly buffer Samples { PrtPoint samples[]; };
 layout(binding = 4, scalar) readonly buffer Irradiances { vec3 irradiances[]; };
 layout(binding = 5, scalar) readonly buffer Visible { float visible[]; };
-layout(binding = 6, scalar) writeonly buffer Values { vec4 values[]; };      // two for each: irradiance; shares of lights
+layout(binding = 6, scalar) writeonly buffer Values { vec4 values[]; };      // two for each: irradiance and weight; shares of lights
 
 layout(push_constant, scalar) uniform Push {
     uint count;        // splats that are drawn
     uint samples_all;
     uint first_light;
     uint lights;       // at most PRT_SPREAD_LIGHTS
-    float least_area;  // that a sample counts with, m²
+    float radius;      // least distance of two samples on a plane, metres
 };
 
 void main() {
@@ -31,11 +31,11 @@ void main() {
     float whole = 0.0;
     for (uint k = 0u; k < splat.count; ++k) {
         uint s = members[splat.first + k];
-        float area = max(samples[s].area, least_area);
-        whole += area;
-        light += area * irradiances[s];
-        for (uint l = 0u; l < lights; ++l) seen[l] += area * visible[(first_light + l) * samples_all + s];
+        float weight = prt_weight(samples[s].area, radius);
+        whole += weight;
+        light += weight * irradiances[s];
+        for (uint l = 0u; l < lights; ++l) seen[l] += weight * visible[(first_light + l) * samples_all + s];
     }
-    values[2u * i] = vec4(light / whole, 0.0);
+    values[2u * i] = vec4(light / whole, whole / float(splat.count));
     values[2u * i + 1u] = seen / whole;
 }

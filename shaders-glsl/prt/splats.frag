@@ -13,7 +13,7 @@ layout(binding = 5) uniform sampler2D depth;
 
 layout(location = 0) flat in vec4 place;
 layout(location = 1) flat in vec3 normal;
-layout(location = 2) flat in vec3 light;
+layout(location = 2) flat in vec4 light;    // irradiance; weight
 layout(location = 3) flat in vec4 seen;
 
 layout(location = 0) out vec4 light_sum;
@@ -32,7 +32,7 @@ void main() {
     float facing = dot(n, normal);
     if (facing <= 0.5) discard;
     // Without a step at the rim.
-    float weight = (exp(-0.5 * square) - exp(-0.5 * PRT_SPLAT_END * PRT_SPLAT_END)) * facing * facing;
-    light_sum = vec4(light * weight, weight);
+    float weight = (exp(-0.5 * square) - exp(-0.5 * PRT_SPLAT_END * PRT_SPLAT_END)) * facing * facing * light.a;
+    light_sum = vec4(light.rgb * weight, weight);
     seen_sum = seen * weight;
 }

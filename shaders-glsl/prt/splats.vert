@@ -16,14 +16,14 @@ layout(push_constant, scalar) uniform Push {
 
 layout(location = 0) flat out vec4 place;   // position, metres; standard deviation, metres
 layout(location = 1) flat out vec3 normal;
-layout(location = 2) flat out vec3 light;
+layout(location = 2) flat out vec4 light;   // irradiance; weight
 layout(location = 3) flat out vec4 seen;
 
 void main() {
     PrtSplat s = splats[drawn[gl_InstanceIndex]];
     place = vec4(s.position, splat * s.spacing);
     normal = s.normal;
-    light = values[2 * gl_InstanceIndex].rgb;
+    light = values[2 * gl_InstanceIndex];
     seen = values[2 * gl_InstanceIndex + 1];
     vec3 eye = to_camera(view, s.position);
     // The first axis of the ellipse is parallel to the picture, the second one is foreshortened.

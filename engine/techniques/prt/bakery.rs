@@ -5,8 +5,10 @@ use glam::Vec3;
 use super::{
     Baking, Plan,
     cap::Cap,
+    clusters,
+    grid::Nearby,
     plan,
-    samples::{self, Grid, Thinning, Triangles},
+    samples::{self, Thinning, Triangles},
     settings::too_many_vectors,
 };
 use crate::{
@@ -18,7 +20,7 @@ use crate::{
     resident::Resident,
     scene::{Pose, Scene},
     shaders::{
-        consts::{PRT_CLEAR, PRT_FIRST_HIT, PRT_HITS},
+        consts::{PRT_CLEAR, PRT_DENSITY, PRT_FIRST_HIT, PRT_HITS},
         prt::{clearances, depths, examples, gather, particles},
         types::{self, PrtPoint},
     },
@@ -49,8 +51,9 @@ pub struct Bakery {
 #[derive(Debug)]
 struct Uploaded {
     samples: OwnedBuffer,
-    clearances: OwnedBuffer,
-    grid: Grid,
+    /// Candidates for each cell, and their numbers.
+    near: OwnedBuffer,
+    nearby: Nearby,
     starts: OwnedBuffer,
     order: OwnedBuffer,
 }
@@ -108,9 +111,9 @@ impl Bakery {
         if !(whole > 0.0 && whole.is_finite()) {
             return Err(Error::input("the scene has no surface that light reaches"));
         }
-        let pilot = (samples::DENSITY * whole / PILOT).sqrt();
+        let pilot = (PRT_DENSITY * whole / PILOT).sqrt();
         let Thinned { samples: mut found, escaped, stayed, .. } =
-            self.thinned(baking, starts, (pilot, 4), &mut triangles, stop)?;
+            self.thinned(baking, starts, (Thinning::new(pilot), 2), &mut triangles, stop)?;
         if found.len() < 16 {
             let what = format!("particles from {} places inside the scene hit next to nothing", starts.len());
             return Err(Error::input(what).help("Name a point inside the room with --inside X,Y,Z"));
@@ -121,19 +124,27 @@ impl Bakery {
         if stayed < LEAST_INSIDE {
             return Err(open(format!("{:.0} % of all particles leave it at once", 100.0 * (1.0 - stayed))));
         }
-        samples::weigh(&mut found, &triangles, pilot);
-        let reached: f32 = found.iter().map(|sample| sample.area).sum();
-        let radius = (samples::DENSITY * reached / baking.samples as f32).sqrt();
+        samples::weigh(&mut found, &triangles, pilot, &[]);
+        // Gaps that are narrow for the samples to come; their least distance is not known yet.
+        let clear = self.clearances(&found, 2.0 * PRT_CLEAR * pilot, baking.seed)?;
+        let parts: Vec<[f32; 2]> = found.iter().zip(&clear).map(|(sample, clear)| [sample.area, *clear]).collect();
+        let gaps = baking.gaps as f32;
+        let radius = samples::radius_for(&parts, baking.samples, gaps);
+        let thinning = if gaps < 1.0 { Thinning::with_gaps(radius, gaps) } else { Thinning::new(radius) };
         let Thinned { samples: mut found, places, escaped, .. } =
-            self.thinned(baking, starts, (radius, MOST_ROUNDS), &mut triangles, stop)?;
+            self.thinned(baking, starts, (thinning, MOST_ROUNDS), &mut triangles, stop)?;
         if found.len() > plan::MOST_SAMPLES {
             let what = format!("{} samples, at most {} are possible", found.len(), plan::MOST_SAMPLES);
             return Err(Error::usage(what).at("room.samples"));
         }
-        samples::weigh(&mut found, &triangles, radius);
+        let shares: Vec<f32> = match gaps < 1.0 {
+            true => found.iter().map(|hit| samples::share_in_gap(hit.area, radius, gaps)).collect(),
+            false => Vec::new(),
+        };
+        samples::weigh(&mut found, &triangles, radius, &shares);
         // A sample that stands for no surface is of no use.
         found.retain(|sample| sample.area > 0.0);
-        let (sorted, clusters) = samples::cluster(found, baking);
+        let (sorted, clusters) = clusters::cluster(found, baking);
         let [low, high] = samples::bounds(&triangles.list);
         let plan = Plan {
             scene: self.scene.name.clone(),
@@ -158,17 +169,16 @@ impl Bakery {
         &mut self,
         baking: &Baking,
         starts: &[Vec3],
-        (radius, rounds): (f32, u32),
+        (mut thinning, rounds): (Thinning, u32),
         triangles: &mut Triangles,
         stop: &Stop,
     ) -> Result<Thinned> {
-        let mut thinning = Thinning::new(radius);
         let mut places = Vec::new();
         let mut escaped = [0u64; 2];
         let mut stayed = [0usize; 2];
         for round in 0..rounds {
             stop.check()?;
-            let found = self.particles(baking, starts, round * PARTICLES)?;
+            let found = self.particles(baking, starts, round * PARTICLES, thinning.most_clear())?;
             escaped.iter_mut().zip(found.escaped).for_each(|(sum, more)| *sum += more);
             stayed[0] += found.hits.iter().filter(|hits| !hits.is_empty()).count();
             stayed[1] += found.hits.len();
@@ -182,7 +192,7 @@ impl Bakery {
                 let hits = found.hits.iter().filter_map(|hits| hits.get(turn));
                 kept += hits.filter(|hit| thinning.offer(hit)).count();
             }
-            if thinning.samples.len() > plan::MOST_SAMPLES || kept * 400 < thinning.samples.len() {
+            if thinning.samples.len() > plan::MOST_SAMPLES || kept * 100 < thinning.samples.len() {
                 break;
             }
         }
@@ -198,12 +208,12 @@ impl Bakery {
     pub fn places(&mut self, plan: &Plan, count: u32) -> Result<Vec<[f32; 3]>> {
         let starts: Vec<Vec3> = plan.starts.iter().map(|start| Vec3::from(*start)).collect();
         // Particles after all those of a bake.
-        let found = self.particles(&plan.settings, &starts, MOST_ROUNDS * PARTICLES)?;
+        let found = self.particles(&plan.settings, &starts, MOST_ROUNDS * PARTICLES, 0.0)?;
         Ok(free_places(&found.hits, count))
     }
 
-    /// The hits of a round of particles.
-    pub(super) fn particles(&mut self, baking: &Baking, starts: &[Vec3], first: u32) -> Result<Round> {
+    /// The hits of a round of particles. `most`: of the free distances above hits, metres; 0: they are not measured.
+    pub(super) fn particles(&mut self, baking: &Baking, starts: &[Vec3], first: u32, most: f32) -> Result<Round> {
         let mut graph = Graph::new("prt.particles");
         let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
         let rays = self.rays.frame(&mut graph, &handles);
@@ -221,12 +231,13 @@ impl Bakery {
                     first,
                     starts_of: places.len() as u32,
                     seed: baking.seed,
+                    most,
                 },
             },
             rays,
             handles
         );
-        let hits = PRT_FIRST_HIT + PRT_HITS;
+        let hits = PRT_FIRST_HIT + 2 * PRT_HITS;
         graph.compute(args, PARTICLES).rays(u64::from(PARTICLES) * u64::from(hits));
         let (points, counts) = (graph.read_buffer(points), graph.read_buffer(counts));
         let frame = self.runner.run(&graph)?;
@@ -244,21 +255,24 @@ impl Bakery {
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`.
     pub fn upload(&mut self, plan: &Plan, samples: &[PrtPoint]) -> Result<()> {
-        let grid = Grid::new(samples, plan.radius);
-        let clearances = self.clearances(plan, samples)?;
+        let clearances = self.clearances(samples, PRT_CLEAR * plan.radius, plan.settings.seed)?;
+        let gaps = plan.settings.gaps as f32;
+        let share = |clear: &f32| samples::share_in_gap(*clear, plan.radius, gaps);
+        let nearby = Nearby::new(samples, plan.radius, &clearances.iter().map(share).collect::<Vec<_>>());
+        let near = nearby.packed(samples, &clearances, PRT_CLEAR * plan.radius);
         let buffer = |name, bytes: &[u8]| OwnedBuffer::with_contents(&self.gpu, name, bytes);
         self.on_device = Some(Uploaded {
             samples: buffer("prt.samples", bytemuck::cast_slice(samples))?,
-            clearances: buffer("prt.clearances", bytemuck::cast_slice(&clearances))?,
-            starts: buffer("prt.cells", bytemuck::cast_slice(&grid.starts))?,
-            order: buffer("prt.order", bytemuck::cast_slice(&grid.order))?,
-            grid,
+            near: buffer("prt.near", bytemuck::cast_slice(&near))?,
+            starts: buffer("prt.cells", bytemuck::cast_slice(&nearby.starts))?,
+            order: buffer("prt.order", bytemuck::cast_slice(&nearby.order))?,
+            nearby,
         });
         Ok(())
     }
 
-    /// The free distance above each sample, at most `PRT_CLEAR` distances of samples, metres.
-    fn clearances(&mut self, plan: &Plan, samples: &[PrtPoint]) -> Result<Vec<f32>> {
+    /// The free distance above each sample, at most `most`, metres.
+    fn clearances(&mut self, samples: &[PrtPoint], most: f32, seed: u32) -> Result<Vec<f32>> {
         let count = samples.len() as u32;
         let mut graph = Graph::new("prt.clearances");
         let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
@@ -268,7 +282,7 @@ impl Bakery {
             clearances::Args {
                 samples: graph.buffer_from("prt.samples", samples),
                 clearances,
-                push: clearances::Push { count, most: PRT_CLEAR * plan.radius, seed: plan.settings.seed },
+                push: clearances::Push { count, most, seed },
             },
             rays
         );
@@ -320,10 +334,10 @@ impl Bakery {
         let args = traced!(
             gather::Args {
                 samples: graph.import_buffer(&uploaded.samples),
-                grid: graph.uniform(&uploaded.grid.grid),
+                grid: graph.uniform(&uploaded.nearby.grid),
                 starts: graph.import_buffer(&uploaded.starts),
                 order: graph.import_buffer(&uploaded.order),
-                clearances: graph.import_buffer(&uploaded.clearances),
+                near: graph.import_buffer(&uploaded.near),
                 seen,
                 push: gather::Push {
                     first: 0,
@@ -331,15 +345,16 @@ impl Bakery {
                     first_sample: plan.range(cluster).start as u32,
                     receivers: count,
                     rays: of_sample,
+                    slit: if plan.settings.gaps < 1.0 { samples::SLIT * plan.radius } else { 0.0 },
                     seed: plan.settings.seed,
                 },
             },
             rays,
             handles
         );
-        // Finding a sample takes up to some hundred steps, and there may be a second search with a ray before.
-        let turns = 2 * (self.rays.most_turns() + 512);
-        let items = Items::new(of_sample).rays(3 * u64::from(count)).turns(turns);
+        // A ray, one above its hit, and some hundred steps to find a sample.
+        let turns = 2 * self.rays.most_turns() + 512;
+        let items = Items::new(of_sample).rays(2 * u64::from(count)).turns(turns);
         graph.compute_over(args, count, items);
         let read = graph.read_buffer(seen);
         Ok(self.runner.run(&graph)?.buffer(read))

@@ -3,7 +3,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 8 | `lucprt\r\n` |
-//! | 4 | version, 2 |
+//! | 4 | version, 3 |
 //! | 4 | bytes of the header |
 //! | … | header: JSON, the [`Plan`] and the bytes of each part |
 //! | … | the samples, 64 bytes each: position, instance, normal of the side, triangle, shading normal, material, barycentrics, gap, area |
@@ -32,7 +32,7 @@ use crate::{
 };
 
 const FILE: Container =
-    Container { magic: *b"lucprt\r\n", version: 2, name: "a file of precomputed transfer", command: "prt bake" };
+    Container { magic: *b"lucprt\r\n", version: 3, name: "a file of precomputed transfer", command: "prt bake" };
 /// Largest size of a file that is read, bytes.
 const MOST_BYTES: u64 = 8 << 30;
 

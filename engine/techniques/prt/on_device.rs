@@ -5,7 +5,7 @@ use half::f16;
 
 use super::{
     Plan, Settings, Stored, bakery,
-    samples::Grid,
+    grid::Grid,
     solve::{self, Solved},
 };
 use crate::{
@@ -169,7 +169,8 @@ impl OnDevice {
                 .max()
                 .unwrap_or(0) as u64;
         if largest > most {
-            let what = format!("has {largest} bytes of one kind of vectors or links, and the device's buffers hold {most}");
+            let what =
+                format!("has {largest} bytes of one kind of vectors or links, and the device's buffers hold {most}");
             let error = Error::input(what);
             return Err(
                 error.help(

@@ -1,22 +1,26 @@
-//! Samples on surfaces without a mesh: thinning, areas, clusters, and the grid in which samples are found (Leonhardt and Bohn, section 4.1).
+//! Samples on surfaces without a mesh: thinning and areas (Leonhardt and Bohn, section 4.1).
+
+use std::collections::HashMap;
 
 use glam::{Vec2, Vec3};
 
-use super::Baking;
+use super::grid::Nearby;
 use crate::{
     scene::{Pose, Scene},
-    shaders::types::{PrtGrid, PrtPoint},
+    shaders::{
+        consts::{PRT_CLEAR, PRT_DENSITY},
+        types::PrtPoint,
+    },
 };
 
-/// Samples on a plane whose least distance is 1, of one square metre, when no further sample fits in (random sequential adsorption: discs of
-/// half that radius cover 0.547 of the plane).
-pub(super) const DENSITY: f32 = 0.697;
+/// Width of slits without samples, as a share of the least distance of samples: light changes in them over distances that no sample can show.
+pub(super) const SLIT: f32 = 0.05;
+/// Weight of the square of a step between parallel surfaces beside that of a way along them, as in `prt/find.glsl`.
+const STEP: f32 = 64.0;
 /// Points on surfaces for each sample, from which its area follows.
 const POINTS: usize = 50;
 /// Hits of a triangle below which they are stray ones, as a share of those that its area would have.
 const STRAY: f64 = 0.02;
-/// Cells of a grid at most.
-const MOST_CELLS: f64 = 8e6;
 
 pub(super) fn position(point: &PrtPoint) -> Vec3 {
     Vec3::from(point.position)
@@ -30,27 +34,48 @@ pub(super) fn side(point: &PrtPoint) -> Vec3 {
 #[derive(Debug)]
 pub(super) struct Thinning {
     radius: f32,
-    cells: std::collections::HashMap<[i32; 3], Vec<u32>>,
+    /// Least distance of two samples in the narrowest gaps, as a share of the radius; `None`: the same everywhere.
+    gaps: Option<f32>,
+    cells: HashMap<[i32; 3], Vec<u32>>,
     pub samples: Vec<PrtPoint>,
 }
 
 impl Thinning {
     /// `radius`: least distance of two samples on a plane, metres.
     pub fn new(radius: f32) -> Self {
-        Self { radius, cells: Default::default(), samples: Vec::new() }
+        Self { radius, gaps: None, cells: HashMap::new(), samples: Vec::new() }
+    }
+
+    /// The same with samples closer to each other in gaps. The areas of all candidates are free distances above their surfaces, metres.
+    pub fn with_gaps(radius: f32, gaps: f32) -> Self {
+        Self { gaps: Some(gaps), ..Self::new(radius) }
+    }
+
+    /// Largest free distance that counts, metres; 0: none does.
+    pub fn most_clear(&self) -> f32 {
+        self.gaps.map_or(0.0, |_| PRT_CLEAR * self.radius)
     }
 
     /// Keeps a candidate if no sample is too close. The least distance shrinks with the angle between the normals, so that curved
-    /// surfaces have more samples, and two sides of a sheet do not count for each other.
+    /// surfaces have more samples, and two sides of a sheet do not count for each other. Slits have no samples, so they are dark.
     pub fn offer(&mut self, candidate: &PrtPoint) -> bool {
+        if self.gaps.is_some() && candidate.area < SLIT * self.radius {
+            return false;
+        }
         let at = position(candidate);
         let cell = |v: Vec3| (v / self.radius).floor().as_ivec3();
+        let share = |point: &PrtPoint| self.gaps.map_or(1.0, |gaps| share_in_gap(point.area, self.radius, gaps));
+        let own_share = share(candidate);
         let close = |other: &u32| {
             let other = &self.samples[*other as usize];
             // A picture on a wall has samples of its own.
             let strange = if other.material == candidate.material { 1.0 } else { 0.6 };
             let least = strange * self.radius * (0.5 + 0.5 * side(other).dot(side(candidate)));
-            position(other).distance_squared(at) < least * least
+            // A step to a parallel surface counts as a way along the surface that is longer.
+            let way = position(other) - at;
+            let step = way.dot((side(other) + side(candidate)).normalize_or_zero());
+            let away = way.length_squared() + STEP * step * step;
+            away < least * least && away < (least * own_share.min(share(other))).powi(2)
         };
         let any = |cell: [i32; 3]| self.cells.get(&cell).is_some_and(|others| others.iter().any(close));
         // Most candidates are too close to a sample of their own cell.
@@ -58,7 +83,7 @@ impl Thinning {
         if any(own) {
             return false;
         }
-        let [low, high] = [-self.radius, self.radius].map(|by| cell(at + by));
+        let [low, high] = [-self.radius, self.radius].map(|by| cell(at + by * own_share));
         for z in low.z..=high.z {
             for y in low.y..=high.y {
                 for x in low.x..=high.x {
@@ -74,85 +99,22 @@ impl Thinning {
     }
 }
 
-/// The grid of samples.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Grid {
-    pub grid: PrtGrid,
-    /// First entry of `order` of each cell, and its end.
-    pub starts: Vec<u32>,
-    /// Numbers of samples, cell after cell.
-    pub order: Vec<u32>,
+/// Least distance of samples where the free distance above the surface is `clear`, as a share of that on open surfaces. Light changes within a gap over
+/// distances like its width.
+pub(super) fn share_in_gap(clear: f32, radius: f32, gaps: f32) -> f32 {
+    (clear / (PRT_CLEAR * radius)).clamp(gaps, 1.0)
 }
 
-impl Grid {
-    /// `radius`: least distance of two samples on a plane, metres.
-    pub fn new(samples: &[PrtPoint], radius: f32) -> Self {
-        let (mut low, mut high) = (Vec3::splat(f32::MAX), Vec3::splat(f32::MIN));
-        for sample in samples {
-            (low, high) = (low.min(position(sample)), high.max(position(sample)));
-        }
-        if samples.is_empty() {
-            (low, high) = (Vec3::ZERO, Vec3::ZERO);
-        }
-        let size = (high - low).as_dvec3();
-        let mut cell = f64::from(2.0 * radius).max(1e-6);
-        while (size / cell + 1.0).element_product() > MOST_CELLS {
-            cell *= 1.25;
-        }
-        let counts = (size / cell).floor().as_uvec3() + 1;
-        let grid = PrtGrid { origin: low.to_array(), cell: cell as f32, counts: counts.to_array(), radius };
-        let cells: Vec<usize> = samples.iter().map(|sample| cell_of(&grid, position(sample))).collect();
-        let mut starts = vec![0u32; counts.element_product() as usize + 1];
-        cells.iter().for_each(|cell| starts[cell + 1] += 1);
-        for cell in 1..starts.len() {
-            starts[cell] += starts[cell - 1];
-        }
-        let mut next = starts.clone();
-        let mut order = vec![0u32; samples.len()];
-        for (number, cell) in cells.iter().enumerate() {
-            order[next[*cell] as usize] = number as u32;
-            next[*cell] += 1;
-        }
-        Self { grid, starts, order }
+/// The radius with which surfaces have so many samples: parts of the surface are given by their areas, m², and the free distances above them, metres.
+pub(super) fn radius_for(parts: &[[f32; 2]], samples: u32, gaps: f32) -> f32 {
+    let whole: f32 = parts.iter().map(|[area, _]| area).sum();
+    let mut radius = (PRT_DENSITY * whole / samples as f32).sqrt();
+    // More gaps count as narrow with a larger radius, so the radius approaches its value from below.
+    for _ in 0..32 {
+        let weighted = parts.iter().map(|[area, clear]| area / share_in_gap(*clear, radius, gaps).powi(2));
+        radius = (PRT_DENSITY * weighted.sum::<f32>() / samples as f32).sqrt();
     }
-
-    /// The sample that stands for a point of a surface. Twin of `nearest_sample` of `prt/find.glsl`, without its second search.
-    fn nearest(&self, samples: &[PrtPoint], at: Vec3, normal: Vec3, material: u32) -> Option<usize> {
-        let counts = glam::UVec3::from(self.grid.counts).as_ivec3();
-        let place = (at - Vec3::from(self.grid.origin)) / self.grid.cell;
-        let low = (place - 0.5).floor().as_ivec3();
-        let (low, high) = (low.max(glam::IVec3::ZERO), (low + 1).min(counts - 1));
-        let mut found = None;
-        let mut least = f32::MAX;
-        for z in low.z..=high.z {
-            for y in low.y..=high.y {
-                for x in low.x..=high.x {
-                    let cell = ((z * counts.y + y) * counts.x + x) as usize;
-                    for number in &self.order[self.starts[cell] as usize..self.starts[cell + 1] as usize] {
-                        let sample = &samples[*number as usize];
-                        let facing = side(sample).dot(normal);
-                        let way = position(sample) - at;
-                        let off = way.dot(normal);
-                        let turned = if facing > 0.9 { 1.0 } else { 3.0 - 2.0 * facing };
-                        let strange = if sample.material == material { 1.0 } else { 4.0 };
-                        let score = (way.length_squared() + 64.0 * off * off) * turned * strange;
-                        // A sample far away or on a parallel surface does not stand for this one.
-                        let apart = off.abs().max(0.25 * way.length()) > 0.5 * self.grid.radius;
-                        if facing > 0.3 && !apart && score < least {
-                            (least, found) = (score, Some(*number as usize));
-                        }
-                    }
-                }
-            }
-        }
-        found
-    }
-}
-
-fn cell_of(grid: &PrtGrid, at: Vec3) -> usize {
-    let counts = glam::UVec3::from(grid.counts);
-    let cell = ((at - Vec3::from(grid.origin)) / grid.cell).floor().max(Vec3::ZERO).as_uvec3().min(counts - 1);
-    ((cell.z * counts.y + cell.y) * counts.x + cell.x) as usize
+    radius
 }
 
 /// A triangle of a scene and its material.
@@ -296,9 +258,10 @@ fn quasi(number: u64) -> Vec2 {
     if uv.x + uv.y > 1.0 { 1.0 - uv } else { uv }
 }
 
-/// Gives each sample the area of the surface that is nearest to it. Sides that no particle reached have no samples and count for none.
-pub(super) fn weigh(samples: &mut [PrtPoint], triangles: &Triangles, radius: f32) {
-    let grid = Grid::new(samples, radius);
+/// Gives each sample the area of the surface that is nearest to it. Sides that no particle reached have no samples and count for none. `radius`, `shares`:
+/// as for [`Nearby::new`].
+pub(super) fn weigh(samples: &mut [PrtPoint], triangles: &Triangles, radius: f32, shares: &[f32]) {
+    let nearby = Nearby::new(samples, radius, shares);
     let whole = area(&triangles.list);
     let reached = triangles.reached();
     let each = whole / (POINTS * samples.len().max(1)) as f64;
@@ -318,7 +281,7 @@ pub(super) fn weigh(samples: &mut [PrtPoint], triangles: &Triangles, radius: f32
             let [a, b, c] = triangle;
             let at = *a + (*b - *a) * uv.x + (*c - *a) * uv.y;
             for (normal, reached) in [normal, -normal].into_iter().zip(reached) {
-                let found = if *reached == Some(false) { None } else { grid.nearest(samples, at, normal, *material) };
+                let found = if *reached == Some(false) { None } else { nearby.nearest(samples, at, normal, *material) };
                 let Some(found) = found else { continue };
                 // A side that is too small for hits belongs to a sample of the same plane.
                 let sample = &samples[found];
@@ -333,47 +296,6 @@ pub(super) fn weigh(samples: &mut [PrtPoint], triangles: &Triangles, radius: f32
         // Each side of a triangle has its whole area.
         sample.area = (f64::from(count) * each) as f32;
     }
-}
-
-/// Sorts samples by clusters, and returns the number of samples of each. Roots are found as samples are, with a larger radius; each
-/// sample goes to the nearest root, and rather to one with a similar normal and the same material.
-pub(super) fn cluster(samples: Vec<PrtPoint>, baking: &Baking) -> (Vec<PrtPoint>, Vec<u32>) {
-    let whole: f32 = samples.iter().map(|sample| sample.area).sum();
-    let wanted = (samples.len() as f32 / baking.cluster as f32).round().max(1.0);
-    let mut radius = (DENSITY * whole / wanted).sqrt();
-    let corners = samples.iter().map(position);
-    let size = corners.clone().fold(Vec3::MIN, Vec3::max) - corners.fold(Vec3::MAX, Vec3::min);
-    // Samples that look in opposite directions are never too close.
-    let largest = 2.0 * radius.max(size.length());
-    // Furniture is smaller than the radius and has roots of its own, so the radius grows until their number fits.
-    let roots = loop {
-        let mut thinning = Thinning::new(radius.max(1e-6));
-        for sample in &samples {
-            thinning.offer(sample);
-        }
-        if thinning.samples.len() as f32 <= 1.1 * wanted || radius > largest {
-            thinning.samples.truncate((1.1 * wanted) as usize);
-            break thinning.samples;
-        }
-        radius *= 1.05;
-    };
-    let mut of: Vec<(usize, PrtPoint)> = samples
-        .into_iter()
-        .map(|sample| {
-            let score = |root: &PrtPoint| {
-                let facing = side(root).dot(side(&sample));
-                let strange = if root.material == sample.material { 1.0 } else { 1.5 };
-                position(root).distance(position(&sample)) * (2.0 - facing) * strange
-            };
-            let best = (0..roots.len()).min_by(|a, b| score(&roots[*a]).total_cmp(&score(&roots[*b])));
-            (best.unwrap_or(0), sample)
-        })
-        .collect();
-    of.sort_by_key(|(cluster, _)| *cluster);
-    let mut counts = vec![0u32; roots.len()];
-    of.iter().for_each(|(cluster, _)| counts[*cluster] += 1);
-    counts.retain(|count| *count > 0);
-    (of.into_iter().map(|(_, sample)| sample).collect(), counts)
 }
 
 #[cfg(test)]
@@ -404,7 +326,7 @@ mod tests {
         for (index, a) in samples.iter().enumerate() {
             assert!(samples[..index].iter().all(|b| position(a).distance(position(b)) >= 0.05));
         }
-        let wanted = DENSITY / 0.05f32.powi(2);
+        let wanted = PRT_DENSITY / 0.05f32.powi(2);
         // Quasi-random candidates and the border of the square add some.
         assert!((samples.len() as f32 / wanted - 1.0).abs() < 0.15, "{} {wanted}", samples.len());
     }
@@ -428,7 +350,7 @@ mod tests {
     #[test]
     fn areas_sum_to_the_surface_and_only_to_its_lit_side() {
         let (mut samples, triangles) = square(0.05);
-        weigh(&mut samples, &triangles, 0.05);
+        weigh(&mut samples, &triangles, 0.05, &[]);
         let whole: f32 = samples.iter().map(|sample| sample.area).sum();
         assert!((whole - 1.0).abs() < 1e-3, "{whole}");
         let mean = 1.0 / samples.len() as f32;
@@ -444,24 +366,57 @@ mod tests {
         assert!(thinning.offer(&point(Vec3::X * 0.09, Vec3::Z)));
     }
 
-    #[test]
-    fn samples_that_look_at_each_other_are_one_cluster_if_one_is_wanted() {
-        let ways = [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y];
-        let samples: Vec<PrtPoint> = ways.iter().map(|way| PrtPoint { area: 1.0, ..point(-*way, *way) }).collect();
-        for (size, clusters) in [(8, 1), (4, 1), (2, 2)] {
-            let (sorted, counts) = cluster(samples.clone(), &Baking { cluster: size, ..Baking::default() });
-            assert_eq!((sorted.len(), counts.len()), (4, clusters), "{size}: {counts:?}");
-        }
+    /// Hits on two planes with a distance between them, which face each other; their areas are the free distances.
+    fn hits(apart: f32) -> impl Iterator<Item = PrtPoint> {
+        (0..40_000u32).map(move |i| {
+            let fraction = |by: f64| (0.5 + by * f64::from(i)).fract() as f32;
+            let at = Vec3::new(fraction(0.754_877_666_246_693), 0.0, fraction(0.569_840_290_998_053));
+            let (at, side) = if i % 2 == 0 { (at, Vec3::Y) } else { (at + apart * Vec3::Y, -Vec3::Y) };
+            PrtPoint { area: apart, ..point(at, side) }
+        })
     }
 
     #[test]
-    fn clusters_hold_all_samples_once() {
-        let (mut samples, triangles) = square(0.05);
-        weigh(&mut samples, &triangles, 0.05);
-        let all = samples.len();
-        let baking = Baking { cluster: 40, ..Baking::default() };
-        let (sorted, counts) = cluster(samples, &baking);
-        assert_eq!((sorted.len(), counts.iter().sum::<u32>() as usize), (all, all));
-        assert!(counts.len() > 3 && counts.iter().all(|count| *count < 120), "{counts:?}");
+    fn gaps_have_more_samples_and_slits_have_none() {
+        let count = |apart: f32| {
+            let mut thinning = Thinning::with_gaps(0.1, 0.4);
+            hits(apart).for_each(|hit| {
+                thinning.offer(&hit);
+            });
+            thinning.samples.len() as f32
+        };
+        let open = count(0.5);
+        // Half of two distances of samples is free; then less than the least share.
+        assert!((count(0.1) / open - 4.0).abs() < 0.6, "{} {open}", count(0.1));
+        assert!((count(0.02) / open - 1.0 / 0.16).abs() < 1.2, "{} {open}", count(0.02));
+        assert_eq!(count(0.004), 0.0);
+        assert!(Thinning::new(0.1).offer(&hits(0.004).next().unwrap()));
+    }
+
+    #[test]
+    fn steps_have_samples_on_both_planes_and_curved_surfaces_do_not_count_as_steps() {
+        let mut thinning = Thinning::new(0.1);
+        assert!(thinning.offer(&point(Vec3::ZERO, Vec3::Y)));
+        assert!(!thinning.offer(&point(Vec3::new(0.05, 0.005, 0.0), Vec3::Y)));
+        assert!(thinning.offer(&point(Vec3::new(0.05, 0.02, 0.0), Vec3::Y)));
+        // On a sphere of 0.3 m, 9 cm away.
+        let on_sphere = |angle: f32| {
+            point(0.3 * Vec3::new(angle.sin(), angle.cos(), 0.0), Vec3::new(angle.sin(), angle.cos(), 0.0))
+        };
+        let mut thinning = Thinning::new(0.1);
+        assert!(
+            thinning.offer(&on_sphere(0.0)) && !thinning.offer(&on_sphere(0.3)) && thinning.offer(&on_sphere(0.35))
+        );
+    }
+
+    #[test]
+    fn the_radius_suits_the_number_of_samples() {
+        let open = radius_for(&[[10.0, 1e9]], 1000, 0.4);
+        assert!((PRT_DENSITY * 10.0 / open.powi(2) - 1000.0).abs() < 0.1);
+        // All of it in gaps of half the least distance: samples are as close as they may.
+        let narrow = radius_for(&[[10.0, 0.5 * open]], 1000, 0.4);
+        assert!((narrow / open - 2.5).abs() < 1e-3, "{narrow} {open}");
+        let mixed = radius_for(&[[5.0, 1e9], [5.0, 0.0]], 1000, 0.4);
+        assert!((PRT_DENSITY * (5.0 + 5.0 / 0.16) / mixed.powi(2) - 1000.0).abs() < 0.1);
     }
 }

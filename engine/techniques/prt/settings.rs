@@ -17,6 +17,10 @@ pub struct Baking {
     /// Samples on all surfaces that light reaches, about.
     #[schemars(range(min = 16, max = 1_000_000))]
     pub samples: u32,
+    /// Least distance of samples in the narrowest gaps, as a share of that on open surfaces; 1: the same everywhere. The distance shrinks where less than
+    /// two distances of samples are free above the surface.
+    #[schemars(range(min = 0.1, max = 1))]
+    pub gaps: f64,
     /// Samples of a cluster, about.
     #[schemars(range(min = 8, max = 4096))]
     pub cluster: u32,
@@ -59,12 +63,13 @@ impl Default for Baking {
     fn default() -> Self {
         Self {
             samples: 45_000,
+            gaps: 0.4,
             cluster: 1000,
             directions: 2016,
             visibility: 50,
             light: 24,
             examples: 1000,
-            rays: 1024,
+            rays: 512,
             receivers: 48,
             links: 0.0035,
             keep: 1.0,
@@ -77,7 +82,7 @@ impl Default for Baking {
 impl Baking {
     /// The paper's choices: ten vectors of light around the mean of the examples, and a fifth of all coefficients between clusters and samples.
     pub fn paper() -> Self {
-        Self { light: 10, receivers: 0, links: 0.0, keep: 0.2, centred: true, ..Self::default() }
+        Self { gaps: 1.0, light: 10, receivers: 0, links: 0.0, keep: 0.2, centred: true, ..Self::default() }
     }
 
     /// # Errors

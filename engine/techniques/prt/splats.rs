@@ -22,7 +22,7 @@ pub struct Splats {
     tree: Tree,
     splats: OwnedBuffer,
     members: OwnedBuffer,
-    least_area: f32,
+    radius: f32,
 }
 
 impl Splats {
@@ -35,7 +35,7 @@ impl Splats {
         Ok(Self {
             splats: buffer("prt.splats", bytemuck::cast_slice(&tree.splats))?,
             members: buffer("prt.members", bytemuck::cast_slice(&tree.members))?,
-            least_area: 0.01 * radius * radius,
+            radius,
             tree,
         })
     }
@@ -84,7 +84,7 @@ impl Seen<'_> {
                 samples_all: light.count,
                 first_light,
                 lights,
-                least_area: self.splats.least_area,
+                radius: self.splats.radius,
             },
         };
         graph.compute(args, self.count.max(1));

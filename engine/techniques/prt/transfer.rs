@@ -97,8 +97,8 @@ impl Basis {
         all.vectors.resize(count * vectors, 0.0);
         all.squares.resize(vectors, 0.0);
         let mut sizes = vec![0.0f64; vectors];
-        for light in 0..lights {
-            let coefficients = all.project(&column(direct, light, lights));
+        let rows: Vec<f32> = (0..lights).flat_map(|light| column(direct, light, lights)).collect();
+        for coefficients in all.project(&rows).chunks_exact(vectors.max(1)) {
             sizes.iter_mut().zip(coefficients).for_each(|(sum, along)| *sum += along * along / lights as f64);
         }
         let mut sizes: Vec<f32> = sizes.into_iter().map(|square| square.sqrt() as f32).collect();
@@ -246,11 +246,13 @@ impl Senders {
         let found = low_rank(&dense, all, rank)?;
         let whole: f64 = dense.iter().map(|value| f64::from(*value).powi(2)).sum();
         let left = if whole > 0.0 { 1.0 - found.squares.iter().sum::<f64>() / whole } else { 0.0 };
-        let mut values = Vec::with_capacity(receivers.len() * found.len());
-        for (row, root) in dense.chunks_exact(all.max(1)).zip(&roots) {
-            values
-                .extend(found.project(row).into_iter().map(|along| f16::from_f64(along / f64::from(root.max(1e-20)))));
-        }
+        let coefficients = found.project(&dense);
+        let rows = coefficients.chunks_exact(found.len().max(1)).zip(&roots);
+        let divided = |(row, root): (&[f64], &f32)| {
+            let root = f64::from(root.max(1e-20));
+            row.iter().map(move |along| f16::from_f64(along / root)).collect::<Vec<_>>()
+        };
+        let values = rows.flat_map(divided).collect();
         let divided = |(value, size): (&f64, &f32)| if *size > 0.0 { (value / f64::from(*size)) as f32 } else { 0.0 };
         let rows =
             found.vectors.chunks_exact(all.max(1)).flat_map(|v| v.iter().zip(&self.sizes).map(divided)).collect();

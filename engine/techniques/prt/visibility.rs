@@ -50,10 +50,7 @@ impl Visibility {
         for (index, vector) in found.vectors.chunks_exact(directions).enumerate() {
             vector.iter().enumerate().for_each(|(at, value)| basis[at * count + index] = f16::from_f64(*value));
         }
-        let mut coefficients = Vec::with_capacity(count * depths.len() / directions.max(1));
-        for row in around.chunks_exact(directions) {
-            coefficients.extend(found.project(row).into_iter().map(f16::from_f64));
-        }
+        let coefficients = found.project(&around).into_iter().map(f16::from_f64).collect();
         let mut out = Self { vectors: count as u32, mean, basis, coefficients, error: 0.0 };
         out.error = far * out.error_of(&depths);
         Ok(out)
