@@ -183,16 +183,19 @@ fn a_check_finds_the_closed_form_and_what_one_scattering_leaves_out() {
     with_gpu(|gpu| {
         let (albedo, scene) = (0.5, closed(Vec3::splat(0.5)));
         let stored = baked(gpu, &scene, &small());
-        let options = CheckOptions { lights: 6, samples: 400, paths: 256, seed: 3 };
+        let options = CheckOptions { lights: 8, samples: 400, paths: 256, seed: 3 };
         let of = |settings: Settings| check(gpu, &scene, &stored, &settings, options, &Stop::default()).unwrap();
         let diffuse = Settings { gloss: false, ..Settings::default() };
         let found = of(diffuse.clone());
-        assert_eq!(found.len(), 6);
+        assert_eq!(found.len(), 8);
         // The same bits; strength and radius of lights do not count.
         assert_eq!(found, of(Settings { strength: 3.0, radius: 0.2, ..diffuse.clone() }));
         assert!(found.iter().all(|light| light.distance_to_surface > 0.0 && light.distance_to_surface < 1.0));
+        // The light of a lamp that is no farther from a wall than samples are from each other is a matter of chance.
         let mean = |list: &[LightErrors], part: fn(&LightErrors) -> Option<RelativeError>| {
-            list.iter().map(|light| part(light).unwrap().energy).sum::<f64>() / list.len() as f64
+            let far: Vec<_> = list.iter().filter(|light| light.distance_to_surface > 0.1).collect();
+            assert!(far.len() >= 4);
+            far.iter().map(|light| part(light).unwrap().energy).sum::<f64>() / far.len() as f64
         };
         // All light of a box is ρ/(1 − ρ) of the direct light, that after one scattering is ρ: a share of 1 − ρ.
         let [all, once] = [true, false].map(|bounces| {

@@ -19,6 +19,8 @@ const MORE: usize = 12;
 const STEPS: usize = 12;
 /// Columns of a product that a thread computes at once.
 const COLUMNS: usize = 64;
+/// Sizes up to which nalgebra 0.34 multiplies vector by vector, which reads views with steps beyond their slices.
+const SMALL: usize = 5;
 
 /// A matrix whose values lie in steps of any size.
 type View<'a> = DMatrixView<'a, f64, Dyn, Dyn>;
@@ -144,8 +146,15 @@ fn products(a: View<'_>, b: View<'_>, lower: bool) -> DMatrix<f64> {
                     let count = values.len() / lines;
                     let above = if lower { first } else { 0 };
                     let mut out = DMatrixViewMut::from_slice(values, lines, count);
-                    let a = a.rows(above, lines - above);
-                    out.rows_mut(above, lines - above).gemm(1.0, &a, &b.view((0, first), (inner, count)), 0.0);
+                    let (a, b) = (a.rows(above, lines - above), b.view((0, first), (inner, count)));
+                    let mut out = out.rows_mut(above, lines - above);
+                    if (lines - above).min(inner).min(count) > SMALL {
+                        out.gemm(1.0, &a, &b, 0.0);
+                        continue;
+                    }
+                    for (line, column) in (0..count).flat_map(|column| (0..a.nrows()).map(move |line| (line, column))) {
+                        out[(line, column)] = (0..inner).map(|i| a[(line, i)] * b[(i, column)]).sum();
+                    }
                 }
             });
         }

@@ -125,8 +125,10 @@ impl Bakery {
             return Err(open(format!("{:.0} % of all particles leave it at once", 100.0 * (1.0 - stayed))));
         }
         samples::weigh(&mut found, &triangles, pilot, &[]);
-        // Gaps that are narrow for the samples to come; their least distance is not known yet.
-        let clear = self.clearances(&found, 2.0 * PRT_CLEAR * pilot, baking.seed)?;
+        // How narrow a gap is for the samples to come depends on their least distance, which is not known yet.
+        let [low, high] = samples::bounds(&triangles.list);
+        let far = low.distance(high);
+        let clear = self.clearances(&found, far, baking.seed)?;
         let parts: Vec<[f32; 2]> = found.iter().zip(&clear).map(|(sample, clear)| [sample.area, *clear]).collect();
         let gaps = baking.gaps as f32;
         let radius = samples::radius_for(&parts, baking.samples, gaps);
@@ -145,14 +147,13 @@ impl Bakery {
         // A sample that stands for no surface is of no use.
         found.retain(|sample| sample.area > 0.0);
         let (sorted, clusters) = clusters::cluster(found, baking);
-        let [low, high] = samples::bounds(&triangles.list);
         let plan = Plan {
             scene: self.scene.name.clone(),
             parts: plan::parts(&self.scene),
             settings: baking.clone(),
             starts: starts.iter().map(|start| start.to_array()).collect(),
             radius,
-            far: low.distance(high),
+            far,
             clusters,
             samples: Digest::of(bytemuck::cast_slice(&sorted)),
             escaped,

@@ -51,7 +51,9 @@ fn split(samples: &mut [PrtPoint], wanted: usize, turn: f32) -> (usize, usize) {
     samples.sort_by(|a, b| of(a, axis).total_cmp(&of(b, axis)));
     // Where the spread within both groups is least: there the sum of the squared means times the numbers is largest.
     let whole: f64 = samples.iter().map(|sample| of(sample, axis)).sum();
-    let (low, high) = ((3 * count / 10).max(1), (7 * count / 10).max(1).min(count - 1));
+    // Neither group is much smaller than a cluster.
+    let least = (7 * count / (10 * wanted)).clamp(1, count / 2);
+    let (low, high) = (least, count - least);
     let mut best = (f64::NEG_INFINITY, count / 2);
     let mut sum = 0.0;
     for (index, sample) in samples.iter().enumerate() {
@@ -84,6 +86,7 @@ fn along_curve(at: Vec3, size: f32) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3Swizzles;
 
     fn point(at: Vec3, side: Vec3) -> PrtPoint {
         PrtPoint { position: at.to_array(), side: side.to_array(), area: 1.0, ..PrtPoint::default() }
