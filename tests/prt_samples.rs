@@ -57,12 +57,20 @@ fn spread(values: &[f64]) -> (f64, f64) {
 /// Checks the distances of nearest neighbours on a surface without an edge. When no further sample fits in, every point of the surface is within
 /// one radius r of a sample, so they are in r to 2 r. A distribution on that range with the mean m has a variance of (m − r)(2 r − m) at most
 /// (Bhatia and Davis 2000), so its coefficient of variation is below 0.354. Random points have √(4/π − 1) = 0.523.
-fn check_neighbours(distances: &[f64], least: f64, radius: f64) {
-    // The facets of a sphere are small steps, which count as a longer way.
-    assert!(distances.iter().all(|d| *d >= 0.95 * least), "{:?} {least}", distances.iter().copied().reduce(f64::min));
+fn check_neighbours(points: &[PrtPoint], least: f64, radius: f64) {
+    // A way off the tangent plane counts eight times (`PRT_STEP`). The facets of a sphere are such steps.
+    let counted = |a: &PrtPoint, b: &PrtPoint| {
+        let normal = (Vec3::from(a.side) + Vec3::from(b.side)).as_dvec3().normalize_or_zero();
+        let way = at(b) - at(a);
+        (way.length_squared() + 64.0 * way.dot(normal).powi(2)).sqrt()
+    };
+    for (number, a) in points.iter().enumerate() {
+        assert!(points[..number].iter().all(|b| counted(a, b) >= 0.999 * least), "{number}: {least}");
+    }
+    let distances = nearest(&points.iter().map(at).collect::<Vec<_>>());
     let far = distances.iter().filter(|d| **d > 2.0 * radius).count();
     assert!(far as f64 <= 0.005 * distances.len() as f64, "{far} of {}", distances.len());
-    let (mean, variation) = spread(distances);
+    let (mean, variation) = spread(&distances);
     let bound = ((mean - least) * (2.0 * radius - mean)).sqrt() / mean;
     assert!(mean > least && variation < bound && bound < 0.36, "{variation}, at most {bound}");
 }
@@ -78,7 +86,7 @@ fn samples_of_a_sphere_have_even_distances_and_a_blue_spectrum() {
         assert!((count / wanted - 1.0).abs() < 0.03, "{count} instead of {wanted}");
         // On a sphere of radius 1 the least distance shrinks by d²/4, the normals of facets differ by up to one facet.
         let facet = PI / f64::from(RINGS);
-        check_neighbours(&nearest(&places), radius * (1.0 - 0.25 * (radius + facet).powi(2)), radius);
+        check_neighbours(&samples, radius * (1.0 - 0.25 * (radius + facet).powi(2)), radius);
         // Squares of distances of random points on a sphere are evenly distributed in 0 to 4, so pairs of each distance can be counted.
         let mut pairs = [0.0f64; 40];
         for (i, a) in places.iter().enumerate() {
@@ -154,9 +162,10 @@ fn samples_of_a_box_have_even_distances_and_faces_have_equal_numbers() {
         let (radius, samples) = points(gpu, &closed(Vec3::splat(0.5)), 3000);
         let mut counts = Vec::new();
         for normal in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z] {
-            let face: Vec<&PrtPoint> = samples.iter().filter(|s| Vec3::from(s.side).dot(normal) > 0.9).collect();
-            let places: Vec<DVec3> = face.iter().map(|sample| at(sample)).collect();
-            check_neighbours(&nearest(&places), radius, radius);
+            let face: Vec<PrtPoint> =
+                samples.iter().filter(|s| Vec3::from(s.side).dot(normal) > 0.9).copied().collect();
+            let places: Vec<DVec3> = face.iter().map(at).collect();
+            check_neighbours(&face, radius, radius);
             let area: f64 = face.iter().map(|sample| f64::from(sample.area)).sum();
             // 2 m × 2 m; points nearer to the samples of the next face count there: less than half a radius at four edges.
             assert!((area / 4.0 - 1.0).abs() < 0.02, "{area}");

@@ -1,12 +1,11 @@
 // The sample that stands for a point of a surface: near, on the same plane, on the same side, of the same material and as free.
-// Before including: prt/prt.glsl, lib/scene.glsl, lib/gbuffer.glsl, and declare `grid`, `starts`, `order` and `near`. The cells have lists of all samples
-// around them; `near` has for each entry what decides, packed by `Nearby::packed`.
+// Before including: prt/prt.glsl, lib/scene.glsl, lib/gbuffer.glsl, and declare `grid`, `starts`, `order` and `candidates`. Each cell lists the samples around it;
+// `candidates` has the samples.
 
 // `clearance`: free distance above the point, metres.
 uint nearest_sample(vec3 position, vec3 side, uint material, float clearance) {
     float clear = min(clearance / (PRT_CLEAR * grid.radius), 1.0);
-    vec3 at = (position - grid.origin) / grid.cell;
-    ivec3 own = ivec3(floor(at));
+    ivec3 own = ivec3(floor((position - grid.origin) / grid.cell));
     uint found = NONE;
     float least = 1e30;
     // If the own cell has no sample, the lists of its neighbours at the corners have all samples of all neighbours.
@@ -18,27 +17,27 @@ uint nearest_sample(vec3 position, vec3 side, uint material, float clearance) {
         if (any(lessThan(cell, ivec3(0))) || any(greaterThanEqual(cell, ivec3(grid.counts)))) continue;
         uint row = prt_cell(grid, cell);
         uint to = starts[row + 1u];
-        vec3 local = at - vec3(cell) + 1.0;
         for (uint k = starts[row]; k < to; ++k) {
-            uvec4 words = near[k];
-            vec3 towards = octahedral_decode(unpackSnorm2x16(words.z));
+            uint number = order[k];
+            vec3 towards = octahedral_decode(unpackSnorm2x16(candidates[number].side));
             float facing = dot(towards, side);
             if (facing <= (turn == 0u ? 0.3 : 0.0)) continue;
-            vec3 way = 3.0 * vec3(unpackUnorm2x16(words.x), unpackUnorm2x16(words.y).x) - local;
+            vec3 way = candidates[number].position - position;
             // A sample of another surface, beside or behind this one, is worse than a farther one. Along the mean normal, so that a curved surface is
             // not off its own tangent plane.
             float off = dot(way, normalize(towards + side));
-            float score = (dot(way, way) + 64.0 * off * off) * (facing > 0.9 ? 1.0 : 3.0 - 2.0 * facing);
-            if (words.y >> 16u != (material & 0xffffu)) score *= 4.0;
+            float score = (dot(way, way) + PRT_STEP * off * off) * (facing > 0.9 ? 1.0 : 3.0 - 2.0 * facing);
+            uint surface = candidates[number].surface;
+            if ((surface & 0xffffu) != (material & 0xffffu)) score *= 4.0;
             // Light behind a picture is not the light beside it.
-            float other = unpackHalf2x16(words.w).x;
+            float other = unpackHalf2x16(surface >> 16u).x;
             float ratio = max(clear, other) / max(min(clear, other), 0.02);
             score *= ratio * ratio;
             if (score < least) {
                 least = score;
-                found = k;
+                found = number;
             }
         }
     }
-    return found == NONE ? NONE : order[found];
+    return found;
 }

@@ -22,7 +22,7 @@ layout(binding = 10, scalar) readonly buffer Starts { uint starts[]; };
 layout(binding = 11, scalar) readonly buffer Order { uint order[]; };
 // NONE: nothing; PRT_LOST: a surface without samples.
 layout(binding = 12, scalar) writeonly buffer Seen { uint seen[]; };
-layout(binding = 13, scalar) readonly buffer Near { uvec4 near[]; };  // of each entry of `order`
+layout(binding = 13, scalar) readonly buffer Candidates { PrtCandidate candidates[]; };
 
 #include "prt/find.glsl"
 

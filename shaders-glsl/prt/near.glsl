@@ -41,7 +41,7 @@ PrtNear near_samples(vec3 position, vec3 n, PrtKernel kernel) {
                     if (facing <= (turn == 0u ? 0.5 : 0.0)) continue;
                     // Away from the tangent plane counts more, so that light does not leak over steps and between sheets.
                     float off = dot(way, n);
-                    square += 64.0 * off * off;
+                    square += PRT_STEP * off * off;
                     // By area, so that places with many samples do not count more than others.
                     float weight = exp(-square * inverse) * facing * facing * prt_weight(samples[i].area, grid.radius);
                     if (turn == 1u) weight += 1e-12 / (1e-9 + square);

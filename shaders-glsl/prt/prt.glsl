@@ -10,6 +10,9 @@ const uint PRT_LOST = 0xfffffffeu; // export
 // Samples on a plane whose least distance is 1, of one square metre, when no further sample fits in (random sequential adsorption: discs of half that
 // radius cover 0.547 of the plane).
 const float PRT_DENSITY = 0.697; // export
+// Weight of the square of a way off a tangent plane beside that of a way along this plane: samples on a step, on another sheet or behind it count as far
+// away.
+const float PRT_STEP = 64.0; // export
 // Free distance above a surface that counts as wide, in distances of samples.
 const float PRT_CLEAR = 2.0; // export
 // Lights whose visibility is gathered at once.
@@ -39,6 +42,13 @@ struct PrtPoint {
     vec2 barycentrics;
     float gap;          // distance by which rays start off the surface, metres
     float area;         // of the surface that the sample stands for, m²; of a hit: free distance above the surface, metres
+};
+
+// What decides which sample stands for a point.
+struct PrtCandidate {
+    vec3 position;      // metres
+    uint side;          // normal of the triangle on the lit side: octahedral, two signed words of 16 bits
+    uint surface;       // last 16 bits of the material; above: free distance above the sample, 1: PRT_CLEAR distances of samples or more, a half
 };
 
 // Cells of equal size that cover all samples. `starts` has the first sample of each cell, `order` the samples cell after cell.

@@ -27,7 +27,7 @@ void main() {
     // Away from the tangent plane counts more, so that light does not leak over steps and between sheets.
     vec3 n = decode_normal(texelFetch(pixel_normal, pixel, 0));
     float off = max(abs(dot(way, normal)), abs(dot(way, n)));
-    float square = (dot(way, way) + 64.0 * off * off) / (place.w * place.w);
+    float square = (dot(way, way) + PRT_STEP * off * off) / (place.w * place.w);
     if (square >= PRT_SPLAT_END * PRT_SPLAT_END) discard;
     float facing = dot(n, normal);
     if (facing <= 0.5) discard;

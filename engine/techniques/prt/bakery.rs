@@ -6,7 +6,7 @@ use super::{
     Baking, Plan,
     cap::Cap,
     clusters,
-    grid::Nearby,
+    grid::{Nearby, packed},
     plan,
     samples::{self, Thinning, Triangles},
     settings::too_many_vectors,
@@ -51,8 +51,7 @@ pub struct Bakery {
 #[derive(Debug)]
 struct Uploaded {
     samples: OwnedBuffer,
-    /// Candidates for each cell, and their numbers.
-    near: OwnedBuffer,
+    candidates: OwnedBuffer,
     nearby: Nearby,
     starts: OwnedBuffer,
     order: OwnedBuffer,
@@ -113,7 +112,7 @@ impl Bakery {
         }
         let pilot = (PRT_DENSITY * whole / PILOT).sqrt();
         let Thinned { samples: mut found, escaped, stayed, .. } =
-            self.thinned(baking, starts, (Thinning::new(pilot), 2), &mut triangles, stop)?;
+            self.thinned(baking, starts, (Thinning::new(pilot, 1.0), 2), &mut triangles, stop)?;
         if found.len() < 16 {
             let what = format!("particles from {} places inside the scene hit next to nothing", starts.len());
             return Err(Error::input(what).help("Name a point inside the room with --inside X,Y,Z"));
@@ -132,17 +131,14 @@ impl Bakery {
         let parts: Vec<[f32; 2]> = found.iter().zip(&clear).map(|(sample, clear)| [sample.area, *clear]).collect();
         let gaps = baking.gaps as f32;
         let radius = samples::radius_for(&parts, baking.samples, gaps);
-        let thinning = if gaps < 1.0 { Thinning::with_gaps(radius, gaps) } else { Thinning::new(radius) };
+        let thinning = Thinning::new(radius, gaps);
         let Thinned { samples: mut found, places, escaped, .. } =
             self.thinned(baking, starts, (thinning, MOST_ROUNDS), &mut triangles, stop)?;
         if found.len() > plan::MOST_SAMPLES {
             let what = format!("{} samples, at most {} are possible", found.len(), plan::MOST_SAMPLES);
             return Err(Error::usage(what).at("room.samples"));
         }
-        let shares: Vec<f32> = match gaps < 1.0 {
-            true => found.iter().map(|hit| samples::share_in_gap(hit.area, radius, gaps)).collect(),
-            false => Vec::new(),
-        };
+        let shares: Vec<f32> = found.iter().map(|hit| samples::share_in_gap(hit.area, radius, gaps)).collect();
         samples::weigh(&mut found, &triangles, radius, &shares);
         // A sample that stands for no surface is of no use.
         found.retain(|sample| sample.area > 0.0);
@@ -260,11 +256,11 @@ impl Bakery {
         let gaps = plan.settings.gaps as f32;
         let share = |clear: &f32| samples::share_in_gap(*clear, plan.radius, gaps);
         let nearby = Nearby::new(samples, plan.radius, &clearances.iter().map(share).collect::<Vec<_>>());
-        let near = nearby.packed(samples, &clearances, PRT_CLEAR * plan.radius);
+        let candidates = packed(samples, &clearances, PRT_CLEAR * plan.radius);
         let buffer = |name, bytes: &[u8]| OwnedBuffer::with_contents(&self.gpu, name, bytes);
         self.on_device = Some(Uploaded {
             samples: buffer("prt.samples", bytemuck::cast_slice(samples))?,
-            near: buffer("prt.near", bytemuck::cast_slice(&near))?,
+            candidates: buffer("prt.candidates", bytemuck::cast_slice(&candidates))?,
             starts: buffer("prt.cells", bytemuck::cast_slice(&nearby.starts))?,
             order: buffer("prt.order", bytemuck::cast_slice(&nearby.order))?,
             nearby,
@@ -338,7 +334,7 @@ impl Bakery {
                 grid: graph.uniform(&uploaded.nearby.grid),
                 starts: graph.import_buffer(&uploaded.starts),
                 order: graph.import_buffer(&uploaded.order),
-                near: graph.import_buffer(&uploaded.near),
+                candidates: graph.import_buffer(&uploaded.candidates),
                 seen,
                 push: gather::Push {
                     first: 0,
@@ -346,7 +342,7 @@ impl Bakery {
                     first_sample: plan.range(cluster).start as u32,
                     receivers: count,
                     rays: of_sample,
-                    slit: if plan.settings.gaps < 1.0 { samples::SLIT * plan.radius } else { 0.0 },
+                    slit: samples::slit(plan.radius, plan.settings.gaps as f32),
                     seed: plan.settings.seed,
                 },
             },

@@ -4,7 +4,10 @@ use glam::{IVec3, UVec3, Vec3};
 use half::f16;
 
 use super::samples::{position, side};
-use crate::shaders::types::{PrtGrid, PrtPoint};
+use crate::shaders::{
+    consts::PRT_STEP,
+    types::{PrtCandidate, PrtGrid, PrtPoint},
+};
 
 /// Cells of a grid at most.
 const MOST_CELLS: f64 = 8e6;
@@ -40,6 +43,8 @@ pub struct Nearby {
     pub starts: Vec<u32>,
     /// Numbers of samples, cell after cell. A sample is in the lists of all cells within its reach.
     pub order: Vec<u32>,
+    /// Least distance of samples around each sample, as a share of that on open surfaces; empty: 1.
+    shares: Vec<f32>,
 }
 
 impl Nearby {
@@ -48,7 +53,7 @@ impl Nearby {
         let grid = cells(samples, radius, radius, radius);
         let counts = UVec3::from(grid.counts).as_ivec3();
         let around = |(sample, at): (usize, Vec3)| {
-            // A point is not farther from the next sample than the least distance. Few of the gaps are filled so well.
+            // A point is no farther from the next sample than the least distance if all places are filled. Gaps are not, so half as much is added.
             let share = shares.get(sample).map_or(1.0, |share| (1.5 * share).min(1.0));
             let reach = share * radius / grid.cell;
             let [low, high] = [-reach, reach].map(|by| (at + by).floor().as_ivec3().clamp(IVec3::ZERO, counts - 1));
@@ -64,33 +69,11 @@ impl Nearby {
         };
         let places = samples.iter().enumerate().map(|(number, sample)| (number, place(&grid, position(sample))));
         let (starts, order) = listed(&grid, places.flat_map(around));
-        Self { grid, starts, order }
+        Self { grid, starts, order, shares: shares.to_vec() }
     }
 
-    /// What a shader reads of each entry of `order`, side by side. Words: position along X and Y; along Z, and the material; the octahedral normal of
-    /// the side; the free distance above the sample in most distances that count, a half. Positions have 16 bits from -1 to 2 cells, relative to the cell.
-    pub fn packed(&self, samples: &[PrtPoint], clearances: &[f32], most: f32) -> Vec<[u32; 4]> {
-        let counts = UVec3::from(self.grid.counts);
-        let cell = |number: u32| {
-            let row = number / counts.x;
-            UVec3::new(number % counts.x, row % counts.y, row / counts.y).as_vec3()
-        };
-        let mut out = Vec::with_capacity(self.order.len());
-        for number in 0..counts.element_product() {
-            let corner = cell(number);
-            for index in &self.order[self.starts[number as usize] as usize..self.starts[number as usize + 1] as usize] {
-                let sample = &samples[*index as usize];
-                let at = (place(&self.grid, position(sample)) - corner + 1.0) / 3.0;
-                let [x, y, z] = (at.clamp(Vec3::ZERO, Vec3::ONE) * 65535.0).round().as_uvec3().to_array();
-                let [u, v] = octahedral(side(sample)).map(|value| u32::from((value * 32767.0).round() as i16 as u16));
-                let clear = f16::from_f32((clearances[*index as usize] / most).min(1.0));
-                out.push([x | y << 16, z | sample.material << 16, u | v << 16, clear.to_bits().into()]);
-            }
-        }
-        out
-    }
-
-    /// The sample that stands for a point of a surface. Twin of `nearest_sample` of `prt/find.glsl`, without free distances and neighbouring cells.
+    /// The sample that stands for a point of a surface. Like `nearest_sample` of `prt/find.glsl`, but without neighbouring cells; the free distance above the
+    /// point is not known.
     pub fn nearest(&self, samples: &[PrtPoint], at: Vec3, normal: Vec3, material: u32) -> Option<usize> {
         let place = place(&self.grid, at);
         if place.min_element() < 0.0 || place.cmpge(UVec3::from(self.grid.counts).as_vec3()).any() {
@@ -103,10 +86,12 @@ impl Nearby {
             let sample = &samples[*number as usize];
             let facing = side(sample).dot(normal);
             let way = position(sample) - at;
-            let off = way.dot(normal);
+            let off = way.dot((side(sample) + normal).normalize_or_zero());
             let turned = if facing > 0.9 { 1.0 } else { 3.0 - 2.0 * facing };
             let strange = if sample.material == material { 1.0 } else { 4.0 };
-            let score = (way.length_squared() + 64.0 * off * off) * turned * strange;
+            // An open surface beside a gap belongs to its own samples, not to closer ones in the gap.
+            let share = self.shares.get(*number as usize).copied().unwrap_or(1.0);
+            let score = (way.length_squared() + PRT_STEP * off * off) * turned * strange / (share * share);
             // A sample far away or on a parallel surface does not stand for this one.
             let apart = off.abs().max(0.25 * way.length()) > 0.5 * self.grid.radius;
             if facing > 0.3 && !apart && score < least {
@@ -115,6 +100,16 @@ impl Nearby {
         }
         found
     }
+}
+
+/// The samples for `prt/find.glsl`. `clearances`: free distances above them, at most `most`, metres.
+pub(super) fn packed(samples: &[PrtPoint], clearances: &[f32], most: f32) -> Vec<PrtCandidate> {
+    let of = |(sample, clear): (&PrtPoint, &f32)| {
+        let [u, v] = octahedral(side(sample)).map(|value| u32::from((value * 32767.0).round() as i16 as u16));
+        let clear = u32::from(f16::from_f32(clear / most).to_bits());
+        PrtCandidate { position: sample.position, side: u | v << 16, surface: (sample.material & 0xffff) | clear << 16 }
+    };
+    samples.iter().zip(clearances).map(of).collect()
 }
 
 /// A direction as a point of a square, −1 to 1. Twin of `octahedral_encode` of `lib/gbuffer.glsl`.
@@ -215,6 +210,29 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn open_surfaces_beside_a_gap_belong_to_their_own_samples() {
+        let at = |x: f32| PrtPoint { position: [x, 0.0, 0.0], side: [0.0, 1.0, 0.0], ..PrtPoint::default() };
+        let samples = [at(0.0), at(0.1)];
+        let nearest =
+            |x: f32, shares: &[f32]| Nearby::new(&samples, 0.1, shares).nearest(&samples, x * Vec3::X, Vec3::Y, 0);
+        assert_eq!([0.04, 0.06].map(|x| nearest(x, &[])), [Some(0), Some(1)]);
+        // The second sample is in a gap.
+        assert_eq!([0.06, 0.09].map(|x| nearest(x, &[1.0, 0.4])), [Some(0), Some(1)]);
+    }
+
+    #[test]
+    fn packed_samples_keep_their_sides_and_free_distances() {
+        let samples = points(30);
+        for (sample, near) in samples.iter().zip(packed(&samples, &[0.03; 30], 0.2)) {
+            let words =
+                [near.side as u16 as i16, (near.side >> 16) as u16 as i16].map(|word| f32::from(word) / 32767.0);
+            assert_eq!((near.position, words), (sample.position, octahedral(side(sample))));
+            assert!((f16::from_bits((near.surface >> 16) as u16).to_f32() - 0.15).abs() < 1e-4);
+        }
+        assert_eq!(octahedral(-Vec3::Z).map(f32::abs), [1.0, 1.0]);
     }
 
     #[test]

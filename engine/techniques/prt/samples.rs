@@ -8,15 +8,13 @@ use super::grid::Nearby;
 use crate::{
     scene::{Pose, Scene},
     shaders::{
-        consts::{PRT_CLEAR, PRT_DENSITY},
+        consts::{PRT_CLEAR, PRT_DENSITY, PRT_STEP},
         types::PrtPoint,
     },
 };
 
 /// Width of slits without samples, as a share of the least distance of samples: light changes in them over distances that no sample can show.
-pub(super) const SLIT: f32 = 0.05;
-/// Weight of the square of a step between parallel surfaces beside that of a way along them, as in `prt/find.glsl`.
-const STEP: f32 = 64.0;
+const SLIT: f32 = 0.05;
 /// Points on surfaces for each sample, from which its area follows.
 const POINTS: usize = 50;
 /// Hits of a triangle below which they are stray ones, as a share of those that its area would have.
@@ -34,37 +32,33 @@ pub(super) fn side(point: &PrtPoint) -> Vec3 {
 #[derive(Debug)]
 pub(super) struct Thinning {
     radius: f32,
-    /// Least distance of two samples in the narrowest gaps, as a share of the radius; `None`: the same everywhere.
-    gaps: Option<f32>,
+    /// Least distance of two samples in the narrowest gaps, as a share of the radius; 1: the same everywhere.
+    gaps: f32,
     cells: HashMap<[i32; 3], Vec<u32>>,
     pub samples: Vec<PrtPoint>,
 }
 
 impl Thinning {
-    /// `radius`: least distance of two samples on a plane, metres.
-    pub fn new(radius: f32) -> Self {
-        Self { radius, gaps: None, cells: HashMap::new(), samples: Vec::new() }
-    }
-
-    /// The same with samples closer to each other in gaps. The areas of all candidates are free distances above their surfaces, metres.
-    pub fn with_gaps(radius: f32, gaps: f32) -> Self {
-        Self { gaps: Some(gaps), ..Self::new(radius) }
+    /// `radius`: least distance of two samples on a plane, metres. `gaps`: that in the narrowest gaps, as a share of it. If it is below 1, the areas of all
+    /// candidates are free distances above their surfaces, metres.
+    pub fn new(radius: f32, gaps: f32) -> Self {
+        Self { radius, gaps, cells: HashMap::new(), samples: Vec::new() }
     }
 
     /// Largest free distance that counts, metres; 0: none does.
     pub fn most_clear(&self) -> f32 {
-        self.gaps.map_or(0.0, |_| PRT_CLEAR * self.radius)
+        if self.gaps < 1.0 { PRT_CLEAR * self.radius } else { 0.0 }
     }
 
     /// Keeps a candidate if no sample is too close. The least distance shrinks with the angle between the normals, so that curved
     /// surfaces have more samples, and two sides of a sheet do not count for each other. Slits have no samples, so they are dark.
     pub fn offer(&mut self, candidate: &PrtPoint) -> bool {
-        if self.gaps.is_some() && candidate.area < SLIT * self.radius {
+        if candidate.area < slit(self.radius, self.gaps) {
             return false;
         }
         let at = position(candidate);
         let cell = |v: Vec3| (v / self.radius).floor().as_ivec3();
-        let share = |point: &PrtPoint| self.gaps.map_or(1.0, |gaps| share_in_gap(point.area, self.radius, gaps));
+        let share = |point: &PrtPoint| share_in_gap(point.area, self.radius, self.gaps);
         let own_share = share(candidate);
         let close = |other: &u32| {
             let other = &self.samples[*other as usize];
@@ -74,7 +68,7 @@ impl Thinning {
             // A step to a parallel surface counts as a way along the surface that is longer.
             let way = position(other) - at;
             let step = way.dot((side(other) + side(candidate)).normalize_or_zero());
-            let away = way.length_squared() + STEP * step * step;
+            let away = way.length_squared() + PRT_STEP * step * step;
             away < least * least && away < (least * own_share.min(share(other))).powi(2)
         };
         let any = |cell: [i32; 3]| self.cells.get(&cell).is_some_and(|others| others.iter().any(close));
@@ -103,6 +97,11 @@ impl Thinning {
 /// distances like its width.
 pub(super) fn share_in_gap(clear: f32, radius: f32, gaps: f32) -> f32 {
     (clear / (PRT_CLEAR * radius)).clamp(gaps, 1.0)
+}
+
+/// Width of slits without samples, metres.
+pub(super) fn slit(radius: f32, gaps: f32) -> f32 {
+    if gaps < 1.0 { SLIT * radius } else { 0.0 }
 }
 
 /// The radius with which surfaces have so many samples: parts of the surface are given by their areas, m², and the free distances above them, metres.
@@ -308,7 +307,7 @@ mod tests {
 
     /// Samples on a square of one metre, and its triangles.
     fn square(radius: f32) -> (Vec<PrtPoint>, Triangles) {
-        let mut thinning = Thinning::new(radius);
+        let mut thinning = Thinning::new(radius, 1.0);
         for i in 0..60_000u32 {
             let fraction = |by: f64| (0.5 + by * f64::from(i)).fract() as f32;
             let at = Vec3::new(fraction(0.754_877_666_246_693), 0.0, fraction(0.569_840_290_998_053));
@@ -359,7 +358,7 @@ mod tests {
 
     #[test]
     fn two_sides_of_a_sheet_have_samples_of_their_own() {
-        let mut thinning = Thinning::new(0.1);
+        let mut thinning = Thinning::new(0.1, 1.0);
         assert!(thinning.offer(&point(Vec3::ZERO, Vec3::Y)));
         assert!(thinning.offer(&point(Vec3::ZERO, -Vec3::Y)));
         assert!(!thinning.offer(&point(Vec3::X * 0.09, Vec3::Y)));
@@ -379,7 +378,7 @@ mod tests {
     #[test]
     fn gaps_have_more_samples_and_slits_have_none() {
         let count = |apart: f32| {
-            let mut thinning = Thinning::with_gaps(0.1, 0.4);
+            let mut thinning = Thinning::new(0.1, 0.4);
             hits(apart).for_each(|hit| {
                 thinning.offer(&hit);
             });
@@ -390,12 +389,12 @@ mod tests {
         assert!((count(0.1) / open - 4.0).abs() < 0.6, "{} {open}", count(0.1));
         assert!((count(0.02) / open - 1.0 / 0.16).abs() < 1.2, "{} {open}", count(0.02));
         assert_eq!(count(0.004), 0.0);
-        assert!(Thinning::new(0.1).offer(&hits(0.004).next().unwrap()));
+        assert!(Thinning::new(0.1, 1.0).offer(&hits(0.004).next().unwrap()));
     }
 
     #[test]
     fn steps_have_samples_on_both_planes_and_curved_surfaces_do_not_count_as_steps() {
-        let mut thinning = Thinning::new(0.1);
+        let mut thinning = Thinning::new(0.1, 1.0);
         assert!(thinning.offer(&point(Vec3::ZERO, Vec3::Y)));
         assert!(!thinning.offer(&point(Vec3::new(0.05, 0.005, 0.0), Vec3::Y)));
         assert!(thinning.offer(&point(Vec3::new(0.05, 0.02, 0.0), Vec3::Y)));
@@ -403,7 +402,7 @@ mod tests {
         let on_sphere = |angle: f32| {
             point(0.3 * Vec3::new(angle.sin(), angle.cos(), 0.0), Vec3::new(angle.sin(), angle.cos(), 0.0))
         };
-        let mut thinning = Thinning::new(0.1);
+        let mut thinning = Thinning::new(0.1, 1.0);
         assert!(
             thinning.offer(&on_sphere(0.0)) && !thinning.offer(&on_sphere(0.3)) && thinning.offer(&on_sphere(0.35))
         );

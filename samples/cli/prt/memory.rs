@@ -10,8 +10,8 @@ pub fn need(room: &Baking) -> u64 {
     let cluster = 2 * u64::from(room.cluster);
     let of_cluster =
         cluster * (40 * u64::from(room.directions) + 12 * cluster + 8 * vectors + 4 * u64::from(room.rays));
-    // A sample is in about 21 lists of its neighbourhood, 20 bytes each.
-    let stored = samples * (64 + 420 + 2 * u64::from(room.visibility + room.light) + 4 * 300);
+    // A sample is in about 21 lists of its neighbourhood, 4 bytes each.
+    let stored = samples * (64 + 20 + 84 + 2 * u64::from(room.visibility + room.light) + 4 * 300);
     let transfer = samples * if room.receivers > 0 { 2 * u64::from(room.receivers) } else { 4 * vectors };
     // A sample has as many links as parts of the least share fit into its hemisphere; in files and on the device.
     let links = if room.links > 0.0 { (1.0 / room.links).min(f64::from(room.rays / 4)) as u64 } else { 0 };
