@@ -13,6 +13,7 @@
 #include "lib/hit_surface.glsl"
 #include "lib/trace.glsl"
 #include "prt/prt.glsl"
+#include "prt/ray.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -42,10 +43,8 @@ void main() {
     uint number = first_sample + receiver;
     PrtPoint s = samples[number];
     mat3 frame = frame_around(s.normal);
-    PointPlace place;
     for (uint i = first; i < first + count; ++i) {
-        place = point_place(uvec2(number & 0xffffu, number >> 16u), i, POINTS_APART, seed);
-        vec3 direction = frame * sample_cosine(unit_floats(point_words(place, 0u, seed)));
+        vec3 direction = frame * prt_ray(number, i, seed);
         uint found = NONE;
         if (dot(direction, s.side) > 0.0) {
             Ray ray = Ray(s.position + (s.side + direction) * s.gap, 0.0, direction, 1e30);

@@ -1,15 +1,21 @@
 // Light of the samples around a point: their mean with Gaussian weights, over those of the same side and plane.
-// Before including: lib/scene.glsl, prt/prt.glsl, and declare `grid`, `starts`, `order`, `samples`, `irradiances` and `visible`.
+// Before including: lib/scene.glsl, prt/prt.glsl, and declare `grid`, `starts`, `order`, `samples`, `irradiances` and `visible`. With PRT_LOBE (prt/lobe.glsl)
+// the radiance over a lobe of directions is found, too: declare `terms`.
 
 struct PrtKernel {
     float splat;       // standard deviation of the weights, in distances of samples
     uint count;        // samples
     uint first_light;  // of those whose visibility is gathered
     uint lights;       // at most PRT_LIGHTS
+#ifdef PRT_LOBE
+    bool glossy;       // with the radiance
+    PrtLobe lobe;
+#endif
 };
 
 struct PrtNear {
     vec3 irradiance;
+    vec3 radiance;     // mean over the lobe, W/(m² sr); 0 without a lobe
     float visible[PRT_LIGHTS];
     uint nearest;
     float away;        // of the nearest one, in distances of samples
@@ -18,6 +24,7 @@ struct PrtNear {
 PrtNear near_samples(vec3 position, vec3 n, PrtKernel kernel) {
     PrtNear found;
     found.irradiance = vec3(0.0);
+    found.radiance = vec3(0.0);
     found.nearest = NONE;
     found.away = 1e30;
     float lights[PRT_LIGHTS];
@@ -43,7 +50,7 @@ PrtNear near_samples(vec3 position, vec3 n, PrtKernel kernel) {
                     float off = dot(way, n);
                     square += PRT_STEP * off * off;
                     // By area, so that places with many samples do not count more than others.
-                    float weight = exp(-square * inverse) * facing * facing * prt_weight(samples[i].area, grid.radius);
+                    float weight = exp(-square * inverse) * facing * facing * prt_weight(samples[i].area, samples[i].open, grid.radius);
                     if (turn == 1u) weight += 1e-12 / (1e-9 + square);
                     if (square < found.away) {
                         found.away = square;
@@ -52,6 +59,13 @@ PrtNear near_samples(vec3 position, vec3 n, PrtKernel kernel) {
                     if (weight < 1e-9 && turn == 0u) continue;
                     sum += weight;
                     found.irradiance += weight * irradiances[i];
+#ifdef PRT_LOBE
+                    if (kernel.glossy) {
+                        vec3[PRT_LOBES] of;
+                        for (uint k = 0u; k < PRT_LOBES; ++k) of[k] = terms[PRT_LOBES * i + k];
+                        found.radiance += weight * prt_radiance(kernel.lobe, samples[i].normal, max(irradiances[i], vec3(0.0)) / BRDF_PI, of);
+                    }
+#endif
                     for (uint l = 0u; l < kernel.lights; ++l) lights[l] += weight * visible[(kernel.first_light + l) * kernel.count + i];
                 }
             }
@@ -59,6 +73,7 @@ PrtNear near_samples(vec3 position, vec3 n, PrtKernel kernel) {
     }
     float scale = sum > 0.0 ? 1.0 / sum : 0.0;
     found.irradiance *= scale;
+    found.radiance *= scale;
     for (uint l = 0u; l < PRT_LIGHTS; ++l) found.visible[l] = lights[l] * scale;
     found.away = sqrt(found.away) / grid.radius;
     return found;

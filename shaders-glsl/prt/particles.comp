@@ -56,7 +56,7 @@ void main() {
                 clearance = above.instance == NONE ? most : above.t;
             }
             points[i * PRT_HITS + kept] = PrtPoint(p.position, hit.instance, side, hit.triangle, normal,
-                INSTANCE_AT(hit.instance).material, hit.barycentrics, gap, clearance);
+                INSTANCE_AT(hit.instance).material, hit.barycentrics, gap, clearance, 1.0);
             ++kept;
         }
         // The way that the particle came is free. A step along the normal may end behind another surface that touches this one, inside of furniture.

@@ -10,6 +10,7 @@
 #define LIGHTS_BINDING 17
 #include "lib/lights.glsl"
 #include "prt/prt.glsl"
+#include "prt/lobe.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -19,6 +20,8 @@ layout(constant_id = 1) const uint GLOSS = 1u;
 layout(constant_id = 2) const uint MAPPED = 0u;
 // 1: splats or vertices have left sums of weighted light in `spread_light` and `spread_visible`. Pixels that they missed are gathered.
 layout(constant_id = 3) const uint SPREAD = 0u;
+// 1: glossy surfaces reflect the transferred light by its directions, with `terms`.
+layout(constant_id = 4) const uint DIRECTIONS = 0u;
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D albedo;
@@ -41,6 +44,7 @@ layout(binding = 18, rgba16f) uniform writeonly image2D irradiance;
 layout(binding = 19, rgba16f) uniform writeonly image2D shadow;  // share of the first light that is seen
 layout(binding = 20) uniform sampler2D spread_light;    // rgb: irradiance times weight; a: weight
 layout(binding = 21) uniform sampler2D spread_visible;  // shares of PRT_SPREAD_LIGHTS lights times weight
+layout(binding = 22, scalar) readonly buffer Terms { vec3 terms[]; };  // directional coefficients, PRT_LOBES of each sample
 
 layout(push_constant, scalar) uniform Push {
     uint count;        // samples
@@ -52,20 +56,22 @@ layout(push_constant, scalar) uniform Push {
 
 #include "prt/near.glsl"
 
-PrtNear light_around(ivec2 pixel, vec3 position, vec3 n, uint lights) {
+PrtNear light_around(ivec2 pixel, vec3 position, vec3 n, PrtKernel kernel) {
     if (SPREAD != 0u) {
         vec4 sum = texelFetch(spread_light, pixel, 0);
         if (sum.a >= PRT_LEAST_WEIGHT) {
             vec4 seen = texelFetch(spread_visible, pixel, 0) / sum.a;
             PrtNear found;
             found.irradiance = sum.rgb / sum.a;
+            // Images carry no directions, so the samples around the pixel tell them.
+            found.radiance = kernel.glossy ? near_samples(position, n, kernel).radiance : vec3(0.0);
             for (uint l = 0u; l < PRT_LIGHTS; ++l) found.visible[l] = l < PRT_SPREAD_LIGHTS ? seen[l] : 0.0;
             found.nearest = NONE;
             found.away = 0.0;
             return found;
         }
     }
-    return near_samples(position, n, PrtKernel(splat, count, first_light, lights));
+    return near_samples(position, n, kernel);
 }
 
 vec3 color_of(uint number) {
@@ -97,7 +103,11 @@ void main() {
     vec3 p = screen_position(view, pixel, 1.0, z);
     uint at_once = SPREAD != 0u ? PRT_SPREAD_LIGHTS : PRT_LIGHTS;
     uint lights = min(light_count - min(first_light, light_count), at_once);
-    PrtNear found = light_around(pixel, p, n, lights);
+    vec4 gloss = texelFetch(specular, pixel, 0);
+    vec3 v = to_camera(view, p);
+    Brdf brdf = brdf_of(color.rgb, GLOSS != 0u ? gloss.rgb : vec3(0.0), gloss.a, dot(n, v));
+    bool glossy = DIRECTIONS != 0u && last != 0u && brdf.f90 > 0.0;
+    PrtNear found = light_around(pixel, p, n, PrtKernel(splat, count, first_light, lights, glossy, prt_lobe(n, v, brdf.alpha)));
     if (SHOW == PRT_SHOW_SAMPLES || SHOW == PRT_SHOW_CLUSTERS) {
         vec3 shown = vec3(0.0);
         if (found.nearest != NONE) {
@@ -115,13 +125,10 @@ void main() {
         store(pixel, shown, shown, shown, vec3(value), 0.0);
         return;
     }
-    vec4 gloss = texelFetch(specular, pixel, 0);
     vec3 lit = vec3(0.0);
     if (MAPPED != 0u) {
         lit = texelFetch(mapped, pixel, 0).rgb;
     } else {
-        vec3 v = to_camera(view, p);
-        Brdf brdf = brdf_of(color.rgb, GLOSS != 0u ? gloss.rgb : vec3(0.0), gloss.a, dot(n, v));
         lit = first_light == 0u ? texelFetch(emission, pixel, 0).rgb : imageLoad(direct, pixel).rgb;
         for (uint l = 0u; l < lights; ++l) {
             Light one = light(first_light + l);
@@ -134,9 +141,9 @@ void main() {
         }
     }
     vec3 e = max(found.irradiance, vec3(0.0));
-    // All reflected energy of the light that comes from everywhere, as `albedo.comp` counts it.
-    vec3 reflectance = color.rgb + (GLOSS != 0u ? max(gloss.rgb - 0.04, 0.0) : vec3(0.0));
-    vec3 bounced = color.a * reflectance * e / BRDF_PI;
+    // Without directions, the microfacets reflect light that comes from everywhere alike.
+    vec3 facing_light = glossy ? found.radiance : e / BRDF_PI;
+    vec3 bounced = color.a * (brdf.matt * e / BRDF_PI + brdf.shine * facing_light);
     if (first_light == 0u) imageStore(shadow, pixel, vec4(vec3(found.visible[0]), 1.0));
     imageStore(direct, pixel, vec4(lit, 1.0));
     if (last != 0u) {

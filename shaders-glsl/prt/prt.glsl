@@ -30,6 +30,8 @@ const uint PRT_SHOW_LIGHT = 0u; // export
 const uint PRT_SHOW_SAMPLES = 1u; // export
 const uint PRT_SHOW_CLUSTERS = 2u; // export
 const uint PRT_SHOW_TRANSFER = 3u; // export
+// Directional coefficients of a sample beside its irradiance.
+const uint PRT_LOBES = 5u; // export
 
 // A place where a particle hit a surface, or a sample.
 struct PrtPoint {
@@ -42,6 +44,7 @@ struct PrtPoint {
     vec2 barycentrics;
     float gap;          // distance by which rays start off the surface, metres
     float area;         // of the surface that the sample stands for, m²; of a hit: free distance above the surface, metres
+    float open;         // share of the hemisphere, weighted by the cosine, that is free within a distance of samples
 };
 
 // What decides which sample stands for a point.
@@ -86,10 +89,11 @@ struct PrtMesh {
     uint sides;         // 1, or 2 for double-sided surfaces: front and back of each vertex
 };
 
-// The weight of a sample in the mean over the samples around a pixel, by its area, m²: about 1 on open surfaces. Many samples with small areas in a gap do
-// not count more than others. The square keeps the darkness behind a picture away from the wall beside it: a pixel that is seen is rarely in a gap.
-float prt_weight(float area, float radius) {
-    float part = max(PRT_DENSITY * area / (radius * radius), 0.03);
+// The weight of a sample in the mean over the samples around a pixel: about 1 on open surfaces. By area, because many samples with small areas in a gap do
+// not count more than others. The powers keep the darkness behind a picture, and the shadow along its frame, away from the wall beside it: a pixel that is seen
+// is rarely in a gap. `area`: of the sample, m²; `open`: its share of the hemisphere that is free.
+float prt_weight(float area, float open, float radius) {
+    float part = max(PRT_DENSITY * area / (radius * radius), 0.03) * open * open;
     return part * part;
 }
 

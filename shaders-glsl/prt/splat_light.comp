@@ -31,7 +31,7 @@ void main() {
     float whole = 0.0;
     for (uint k = 0u; k < splat.count; ++k) {
         uint s = members[splat.first + k];
-        float weight = prt_weight(samples[s].area, radius);
+        float weight = prt_weight(samples[s].area, samples[s].open, radius);
         whole += weight;
         light += weight * irradiances[s];
         for (uint l = 0u; l < lights; ++l) seen[l] += weight * visible[(first_light + l) * samples_all + s];

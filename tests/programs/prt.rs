@@ -5,6 +5,8 @@ mod prt_lab;
 #[path = "../tracer_lab/mod.rs"]
 mod tracer_lab;
 
+#[path = "../prt_glossy.rs"]
+mod prt_glossy;
 #[path = "../prt_light.rs"]
 mod prt_light;
 #[path = "../prt_links.rs"]

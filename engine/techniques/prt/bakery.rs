@@ -21,7 +21,7 @@ use crate::{
     scene::{Pose, Scene},
     shaders::{
         consts::{PRT_CLEAR, PRT_DENSITY, PRT_FIRST_HIT, PRT_HITS},
-        prt::{clearances, depths, examples, gather, particles},
+        prt::{clearances, depths, examples, gather, openness, particles},
         types::{self, PrtPoint},
     },
 };
@@ -32,6 +32,8 @@ const PARTICLES: u32 = 1 << 16;
 const MOST_ROUNDS: u32 = 96;
 /// Least share of the particles that are still in the scene when their hits begin to count. A cube with one side open keeps about a quarter (0.8⁵ · 5/6).
 const LEAST_INSIDE: f64 = 0.05;
+/// Rays that tell how open the surroundings of a sample are.
+const OPEN_RAYS: u32 = 64;
 /// Samples from which the area that light reaches is estimated.
 const PILOT: f32 = 3000.0;
 
@@ -142,6 +144,8 @@ impl Bakery {
         samples::weigh(&mut found, &triangles, radius, &shares);
         // A sample that stands for no surface is of no use.
         found.retain(|sample| sample.area > 0.0);
+        let open = self.openness(&found, radius, baking.seed)?;
+        found.iter_mut().zip(open).for_each(|(sample, open)| sample.open = open);
         let (sorted, clusters) = clusters::cluster(found, baking);
         let plan = Plan {
             scene: self.scene.name.clone(),
@@ -285,6 +289,26 @@ impl Bakery {
         );
         graph.compute(args, count).rays(count.into());
         let read = graph.read_buffer(clearances);
+        Ok(self.runner.run(&graph)?.buffer(read))
+    }
+
+    /// The share of the hemisphere above each sample, weighted by the cosine, in which nothing is nearer than `most`, metres.
+    fn openness(&mut self, samples: &[PrtPoint], most: f32, seed: u32) -> Result<Vec<f32>> {
+        let count = samples.len() as u32;
+        let mut graph = Graph::new("prt.openness");
+        let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
+        let rays = self.rays.frame(&mut graph, &handles);
+        let shares = graph.buffer("prt.openness", 4 * u64::from(count));
+        let args = traced!(
+            openness::Args {
+                samples: graph.buffer_from("prt.samples", samples),
+                shares,
+                push: openness::Push { count, rays: OPEN_RAYS, most, seed },
+            },
+            rays
+        );
+        graph.compute(args, count).rays(u64::from(count) * u64::from(OPEN_RAYS));
+        let read = graph.read_buffer(shares);
         Ok(self.runner.run(&graph)?.buffer(read))
     }
 

@@ -178,18 +178,21 @@ impl Transfer {
             out.sparse(&self.values)
         }
         self.links.write(out);
+        out.words(&self.met);
     }
 
-    /// Reads the transfer to a cluster. `all`: vectors of light; `senders`: samples of the bake.
+    /// Reads the transfer to a cluster. `all`: vectors of light; `senders`: samples of the bake; `kept`: rays of each sample.
     pub(super) fn read(
         from: &mut Reader<'_>,
         samples: usize,
-        [all, senders]: [usize; 2],
+        [all, senders, kept]: [usize; 3],
         low_rank: bool,
     ) -> Result<Self> {
         let (rank, left, lost, rows) = (from.word()?, from.float()?, from.float()?, from.floats()?);
         let values = if low_rank && rank == 0 || rank > 0 { from.halves()? } else { from.sparse()? };
-        let out = Self { rank, rows, values, left, lost, links: Links::read(from, samples, senders)? };
+        let links = Links::read(from, samples, senders)?;
+        let out = Self { rank, rows, values, left, lost, links, met: from.words()? };
+        long("samples that rays meet", out.met.len(), samples.saturating_mul(kept))?;
         long("rows of receivers", out.rows.len(), all.saturating_mul(rank as usize))?;
         let stride = if low_rank { rank as usize } else { all };
         long("transferred light", out.values.len(), samples.saturating_mul(stride))?;

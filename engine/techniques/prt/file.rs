@@ -3,14 +3,15 @@
 //! | bytes | content |
 //! |---|---|
 //! | 8 | `lucprt\r\n` |
-//! | 4 | version, 3 |
+//! | 4 | version, 4 |
 //! | 4 | bytes of the header |
 //! | … | header: JSON, the [`Plan`] and the bytes of each part |
-//! | … | the samples, 64 bytes each: position, instance, normal of the side, triangle, shading normal, material, barycentrics, gap, area |
-//! | … | for each cluster: distances, basis, transfer with its links; lists begin with their lengths |
+//! | … | the samples, 68 bytes each: position, instance, normal of the side, triangle, shading normal, material, barycentrics, gap, area, free share of the hemisphere |
+//! | … | for each cluster: distances, basis, transfer with its links and the first rays; lists begin with their lengths |
 //! | 32 | BLAKE3 digest of all bytes before |
 //!
-//! Numbers are little-endian. Lists have 16-bit floats, but for the sizes of vectors, the rows of receivers and the numbers of links.
+//! Numbers are little-endian. Lists have 16-bit floats, but for the sizes of vectors, the rows of receivers, the numbers of links and those of the samples that rays
+//! meet.
 
 use std::path::Path;
 
@@ -32,7 +33,7 @@ use crate::{
 };
 
 const FILE: Container =
-    Container { magic: *b"lucprt\r\n", version: 3, name: "a file of precomputed transfer", command: "prt bake" };
+    Container { magic: *b"lucprt\r\n", version: 4, name: "a file of precomputed transfer", command: "prt bake" };
 /// Largest size of a file that is read, bytes.
 const MOST_BYTES: u64 = 8 << 30;
 
@@ -77,6 +78,8 @@ pub struct Summary {
     pub transfer_bytes: u64,
     /// Bytes of the links.
     pub link_bytes: u64,
+    /// Bytes of the samples that the first rays meet, for directional coefficients.
+    pub directional_bytes: u64,
     /// Links of a sample, mean.
     pub links: f64,
     /// Share of the light that links carry, if all samples have the same radiosity.
@@ -232,6 +235,7 @@ impl Stored {
             basis_bytes: sum(&|c| 2 * self.bases[c].values.len() as u64 + 4 * self.bases[c].sizes.len() as u64),
             transfer_bytes: sum(&|c| self.transfers[c].bytes()),
             link_bytes: sum(&|c| self.transfers[c].links.bytes()),
+            directional_bytes: sum(&|c| 4 * self.transfers[c].met.len() as u64),
             links: sum(&|c| self.transfers[c].links.senders.len() as u64) as f64 / self.samples.len().max(1) as f64,
             linked: sum(&|c| self.transfers[c].links.rays.iter().map(|rays| u64::from(*rays)).sum()) as f64
                 / (self.samples.len().max(1) as f64 * f64::from(self.plan.settings.rays)),
@@ -262,7 +266,7 @@ fn check(plan: &Plan, samples: &[PrtPoint]) -> Result<()> {
     }
     let finite = |s: &PrtPoint| {
         let all = [s.position, s.side, s.normal].concat();
-        all.iter().chain([&s.gap, &s.area]).all(|value| value.is_finite()) && s.area >= 0.0
+        all.iter().chain([&s.gap, &s.area, &s.open]).all(|value| value.is_finite()) && s.area >= 0.0 && s.open > 0.0
     };
     if samples.iter().all(finite) { Ok(()) } else { Err(Error::input("a sample has numbers that are not finite")) }
 }

@@ -15,7 +15,8 @@ use crate::{
     resident::Resident,
     scene::{Pose, Scene},
     shaders::{
-        prt::{albedo, lit, mix, project, radiosity, receive, restore, scatter},
+        consts,
+        prt::{albedo, directions, lit, mix, project, radiosity, receive, restore, scatter},
         types::{PrtCap, PrtPoint, PrtReceiver, PrtVector},
     },
 };
@@ -43,12 +44,16 @@ pub struct OnDevice {
     functions: OwnedBuffer,
     senders: OwnedBuffer,
     shares: OwnedBuffer,
+    /// The samples that the first rays of each sample meet, the number of these rays, and the seed of their directions; `None`: the bake has none.
+    met: Option<(OwnedBuffer, u32, u32)>,
     /// Scatterings whose light links carry; `None`: there are no links.
     linked: Option<u32>,
     /// Rows of the receivers' vectors; `None`: samples have their parts of the vectors of light.
     mixed: Option<(OwnedBuffer, u32)>,
     /// Numbers that a frame multiplies: for each sample and light point; for each sample; between bases.
     pub products: [u64; 3],
+    /// Rays whose light a frame adds up for directional coefficients.
+    pub directions: u64,
 }
 
 /// Light at the samples.
@@ -179,6 +184,12 @@ impl OnDevice {
             );
         }
         products[2] = 3 * (all * all) as u64 + rounds * mixed.len() as u64;
+        let kept = plan.settings.kept_rays() as u64;
+        let directions = kept * stored.samples.len() as u64;
+        if 4 * directions > most || 12 * u64::from(consts::PRT_LOBES) * stored.samples.len() as u64 > most {
+            let what = format!("keeps {directions} rays, too many for the device's buffers of {most} bytes");
+            return Err(Error::input(what).help("Bake with fewer samples, or keep fewer rays (room.directional)"));
+        }
         let grid = Grid::new(&stored.samples, plan.radius);
         let buffer = |name, bytes: &[u8]| {
             let filled = if bytes.is_empty() { &[0; 16][..] } else { bytes };
@@ -207,6 +218,15 @@ impl OnDevice {
             functions: buffer("prt.functions", bytemuck::cast_slice(&functions))?,
             senders: buffer("prt.senders", bytemuck::cast_slice(&senders))?,
             shares: buffer("prt.shares", bytemuck::cast_slice(&shares))?,
+            met: match kept {
+                0 => None,
+                kept => {
+                    let met: Vec<u32> = stored.transfers.iter().flat_map(|transfer| &transfer.met).copied().collect();
+                    let met = buffer("prt.met", bytemuck::cast_slice(&met))?;
+                    Some((met, kept as u32, plan.settings.seed))
+                }
+            },
+            directions,
             linked: links.then_some(*linked),
             mixed: match plan.settings.receivers {
                 0 => None,
@@ -272,6 +292,21 @@ impl OnDevice {
             irradiances = self.receive(graph, projected, radiosities);
         }
         Lit { direct, irradiances, visible }
+    }
+
+    /// Directional coefficients of the transferred light of the samples, [`consts::PRT_LOBES`] of each, W/(m² sr); `None`: the bake has none.
+    pub fn directions(&self, graph: &mut Graph, lit: &Lit, settings: &Settings) -> Option<Buffer> {
+        let (met, rays, seed) = self.met.as_ref()?;
+        let terms = graph.buffer("prt.directions", 12 * u64::from(consts::PRT_LOBES) * u64::from(self.count));
+        let args = directions::Args {
+            met: graph.import_buffer(met),
+            // The light before the last scattering: its sum over the rays is the light that arrives.
+            radiosities: self.radiosity(graph, lit.direct, settings.bounces.then_some(lit.irradiances)),
+            terms,
+            push: directions::Push { count: self.count, rays: *rays, seed: *seed },
+        };
+        graph.compute(args, self.count);
+        Some(terms)
     }
 
     /// Irradiance of the samples by light that has these coefficients of all vectors, and nothing beside them.

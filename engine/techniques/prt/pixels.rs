@@ -8,7 +8,7 @@ use super::{
     spread::Spreading,
 };
 use crate::{
-    graph::{Format, Graph, Image},
+    graph::{Buffer, Format, Graph, Image},
     passes::{
         direct::{self, Direct, Lights},
         gbuffer::{self, GBuffer},
@@ -56,6 +56,8 @@ pub struct Shown {
 pub struct Drawing<'a> {
     pub light: &'a OnDevice,
     pub lit: &'a Lit,
+    /// Directional coefficients of the samples; `None`: glossy surfaces reflect transferred light evenly.
+    pub directions: Option<Buffer>,
     pub spread: Spreading<'a>,
     pub handles: &'a Handles,
     pub settings: &'a PictureSettings,
@@ -116,6 +118,7 @@ impl Drawing<'_> {
                 shadow,
                 spread_light: spread.as_ref().map_or(unused, |spread| spread.sums.light),
                 spread_visible: spread.as_ref().map_or(unused, |spread| spread.sums.visible),
+                terms: self.directions.unwrap_or(self.lit.irradiances),
                 push: pixels::Push {
                     count: self.light.count,
                     splat: of_prt.splat,
@@ -128,6 +131,7 @@ impl Drawing<'_> {
                     gloss: of_prt.gloss.into(),
                     mapped: mapped.is_some().into(),
                     spread: spread.is_some().into(),
+                    directions: self.directions.is_some().into(),
                 },
             };
             graph.compute(args, view.extent);

@@ -46,6 +46,10 @@ pub struct Baking {
     /// meet: the light of that sample arrives as is, without vectors. 0: there are no links, as in the paper.
     #[schemars(range(min = 0, max = 1))]
     pub links: f64,
+    /// Rays of each sample that are kept: the light along them gives the directional coefficients with which glossy surfaces reflect transferred light. At most
+    /// `rays` are there. 0: glossy surfaces reflect it evenly, as diffuse ones do.
+    #[schemars(range(min = 0, max = 1024))]
+    pub directional: u32,
     /// Share of the coefficients that are kept, the largest of each cluster; all smaller ones become 0.
     #[schemars(range(min = 0.01, max = 1), extend("x-needs" = {"receivers": {"const": 0}}))]
     pub keep: f64,
@@ -72,6 +76,7 @@ impl Default for Baking {
             rays: 512,
             receivers: 48,
             links: 0.0035,
+            directional: 64,
             keep: 1.0,
             centred: false,
             seed: 0,
@@ -82,7 +87,21 @@ impl Default for Baking {
 impl Baking {
     /// The paper's choices: ten vectors of light around the mean of the examples, and a fifth of all coefficients between clusters and samples.
     pub fn paper() -> Self {
-        Self { gaps: 1.0, light: 10, receivers: 0, links: 0.0, keep: 0.2, centred: true, ..Self::default() }
+        Self {
+            gaps: 1.0,
+            light: 10,
+            receivers: 0,
+            links: 0.0,
+            directional: 0,
+            keep: 0.2,
+            centred: true,
+            ..Self::default()
+        }
+    }
+
+    /// Rays of each sample that are kept.
+    pub(super) fn kept_rays(&self) -> usize {
+        self.directional.min(self.rays) as usize
     }
 
     /// # Errors
@@ -162,8 +181,12 @@ pub struct Settings {
     /// Distance of two eyes: left and right view side by side, each of the picture's size, with the camera between them. Both look straight ahead. 0: one view.
     #[schemars(range(min = 0, max = 10), extend("x-unit" = "m"))]
     pub eyes: f32,
-    /// Direct light has highlights. If off, Lambert's law alone.
+    /// Surfaces have highlights. If off, Lambert's law alone.
     pub gloss: bool,
+    /// Glossy surfaces reflect transferred light by its directions, if the bake has directional coefficients (`room.directional`). If off, they reflect it
+    /// evenly, with all its energy.
+    #[schemars(extend("x-needs" = {"gloss": {"const": true}}))]
+    pub directional: bool,
     /// Scatterings of the light: all of them, or one.
     pub bounces: bool,
     /// Scatterings of light that links carry sample by sample; vectors describe the light of all further scatterings. 0: links carry the light that
@@ -195,6 +218,7 @@ impl Default for Settings {
             splat_pixels: 2.0,
             eyes: 0.0,
             gloss: true,
+            directional: true,
             bounces: true,
             linked: 3,
             mean: true,

@@ -101,8 +101,8 @@ impl Technique for Prt {
     }
 
     fn prepared_by(settings: &PictureSettings) -> PictureSettings {
-        let Settings { gloss, bounces, mean, spread, .. } = settings.prt;
-        let prt = Settings { gloss, bounces, mean, spread, ..Settings::default() };
+        let Settings { gloss, bounces, mean, linked, spread, .. } = settings.prt;
+        let prt = Settings { gloss, bounces, mean, linked, spread, ..Settings::default() };
         PictureSettings { prt, ..PictureSettings::default() }
     }
 
@@ -142,7 +142,11 @@ impl Technique for Prt {
         let by_samples = of_prt.direct == Shadows::Samples && !matches!(mode, Mode::Samples | Mode::Clusters);
         let visible = if by_samples { count } else { count.min(consts::PRT_SPREAD_LIGHTS) };
         let spread = self.spreader.light(graph, handles, (&self.light, &lit), visible, of_prt);
-        let drawing = Drawing { light: &self.light, lit: &lit, spread, handles, settings, mode };
+        // The indirect light is a layer of all pictures of light.
+        let of_light = !matches!(mode, Mode::Samples | Mode::Clusters | Mode::Transfer);
+        let directed = of_light && of_prt.gloss && of_prt.directional;
+        let directions = if directed { self.light.directions(graph, &lit, of_prt) } else { None };
+        let drawing = Drawing { light: &self.light, lit: &lit, directions, spread, handles, settings, mode };
         let shown = if of_prt.eyes > 0.0 {
             let eyes = [-0.5, 0.5].map(|side| drawing.draw(graph, &view.beside(side * of_prt.eyes), &mut notes));
             eyes::side_by_side(graph, eyes, mode, moment.shot.layers)
@@ -159,7 +163,8 @@ impl Technique for Prt {
             .color("shadow", images.shadow)
             .number("visibility_products", (of_points * u64::from(points * count)) as f64)
             .number("transfer_products", of_samples as f64)
-            .number("basis_products", of_bases as f64);
+            .number("basis_products", of_bases as f64)
+            .number("directions", if directions.is_some() { self.light.directions as f64 } else { 0.0 });
         if let Some((name, number)) = counted {
             picture = picture.number(name, f64::from(number));
         }

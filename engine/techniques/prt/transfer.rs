@@ -46,6 +46,8 @@ pub struct Transfer {
     pub lost: f32,
     /// Pairs of samples whose light is not in `values`.
     pub links: Links,
+    /// For each sample the samples that its first rays meet; no number of a sample: none.
+    pub met: Vec<u32>,
 }
 
 impl Basis {
@@ -234,9 +236,11 @@ impl Senders {
             links = Links::default();
         }
         let lost = lost as f32 / seen.len().max(1) as f32;
+        let kept = plan.settings.kept_rays();
+        let met: Vec<u32> = seen.chunks_exact(rays).flat_map(|seen| &seen[..kept]).copied().collect();
         let rank = plan.settings.receivers as usize;
         if rank == 0 {
-            return Ok(Transfer { lost, links, ..thinned(dense, &self.sizes, plan.settings.keep) });
+            return Ok(Transfer { lost, links, met, ..thinned(dense, &self.sizes, plan.settings.keep) });
         }
         // Samples count with their areas, and vectors with the size of their coefficients.
         let roots: Vec<f32> = receivers.iter().map(|sample| sample.area.sqrt()).collect();
@@ -256,7 +260,7 @@ impl Senders {
         let divided = |(value, size): (&f64, &f32)| if *size > 0.0 { (value / f64::from(*size)) as f32 } else { 0.0 };
         let rows =
             found.vectors.chunks_exact(all.max(1)).flat_map(|v| v.iter().zip(&self.sizes).map(divided)).collect();
-        Ok(Transfer { rank: found.len() as u32, rows, values, left: left.max(0.0).sqrt() as f32, lost, links })
+        Ok(Transfer { rank: found.len() as u32, rows, values, left: left.max(0.0).sqrt() as f32, lost, links, met })
     }
 }
 

@@ -19,7 +19,7 @@ use crate::{
 /// The name of such jobs.
 pub const KIND: &str = "prt";
 /// Increased whenever the computation changes.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// Numbers of the stages. All machines put the same samples on the surfaces; the one unit of the last stage keeps them for the file.
 pub const VISIBILITY: u32 = 0;
@@ -224,7 +224,8 @@ pub(super) fn basis(bytes: &[u8], plan: &Plan, cluster: usize) -> Result<Basis> 
 pub(super) fn transfer(bytes: &[u8], plan: &Plan, cluster: usize) -> Result<Transfer> {
     let mut reader = Reader(bytes);
     let samples = plan.clusters[cluster] as usize;
-    let out = Transfer::read(&mut reader, samples, [plan.all_vectors(), plan.count()], plan.settings.receivers > 0)?;
+    let counts = [plan.all_vectors(), plan.count(), plan.settings.kept_rays()];
+    let out = Transfer::read(&mut reader, samples, counts, plan.settings.receivers > 0)?;
     reader.end()?;
     Ok(out)
 }

@@ -110,9 +110,14 @@ pub fn check(args: &PrtCheckArgs, console: Console) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     console::print(
-        "lights by their distance to surfaces; error: root mean square over that of the truth; energy: light over that of the truth",
+        "lights by their distance to surfaces; error: root mean square over that of the truth; most: the same without the twentieth of the samples that is off most; energy: light over that of the truth",
     )?;
-    console::print("distance   lights  direct error  energy  indirect error  energy  with exact direct light  energy")?;
+    console::print(
+        "                   direct                       indirect                     with exact direct light",
+    )?;
+    console::print(
+        "distance   lights     error      most   energy     error      most   energy     error      most   energy",
+    )?;
     for (from, of) in lines.iter().filter(|(_, of)| !of.is_empty()) {
         let [direct, indirect, transferred] = [
             joined(of, |light| light.direct),
@@ -120,12 +125,12 @@ pub fn check(args: &PrtCheckArgs, console: Console) -> Result<ExitCode> {
             joined(of, |light| light.transferred),
         ];
         console::print(&format!(
-            "{:<9}  {:>6}  {}  {}  {}",
+            "{:<9}  {:>6}{}{}{}",
             format!("{from} m"),
             of.len(),
-            cells(direct, 10),
-            cells(indirect, 12),
-            cells(transferred, 21)
+            cells(direct),
+            cells(indirect),
+            cells(transferred)
         ))?;
     }
     Ok(ExitCode::SUCCESS)
@@ -137,13 +142,16 @@ fn joined(lights: &[LightErrors], of: fn(&LightErrors) -> Option<RelativeError>)
     let count = all.len() as f64;
     (!all.is_empty()).then(|| RelativeError {
         error: (all.iter().map(|one| one.error.powi(2)).sum::<f64>() / count).sqrt(),
+        most: (all.iter().map(|one| one.most.powi(2)).sum::<f64>() / count).sqrt(),
         energy: all.iter().map(|one| one.energy).sum::<f64>() / count,
     })
 }
 
-fn cells(error: Option<RelativeError>, width: usize) -> String {
+fn cells(error: Option<RelativeError>) -> String {
     match error {
-        Some(RelativeError { error, energy }) => format!("{:>width$.1} %  {energy:>6.3}", 100.0 * error),
-        None => format!("{:>width$}    {:>6}", "dark", ""),
+        Some(RelativeError { error, most, energy }) => {
+            format!("  {:>6.1} %  {:>6.1} %  {energy:>7.3}", 100.0 * error, 100.0 * most)
+        }
+        None => format!("  {:>8}  {:>8}  {:>7}", "dark", "", ""),
     }
 }

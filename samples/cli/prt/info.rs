@@ -66,6 +66,7 @@ pub fn lines(summary: &Summary) -> Vec<String> {
         basis_bytes,
         transfer_bytes,
         link_bytes,
+        directional_bytes,
         links,
         linked,
         kept,
@@ -91,6 +92,7 @@ pub fn lines(summary: &Summary) -> Vec<String> {
             "links       {link_bytes} bytes, {links:.1} of each sample; they carry {:.1} % of even light",
             100.0 * linked
         ),
+        format!("directions  {directional_bytes} bytes"),
         format!(
             "particles   {:.1} % left the scene; {:.2} % of the rays met a surface without samples",
             100.0 * escaped,

@@ -11,14 +11,16 @@ pub fn need(room: &Baking) -> u64 {
     let of_cluster =
         cluster * (40 * u64::from(room.directions) + 12 * cluster + 8 * vectors + 4 * u64::from(room.rays));
     // A sample is in about 21 lists of its neighbourhood, 4 bytes each.
-    let stored = samples * (64 + 20 + 84 + 2 * u64::from(room.visibility + room.light) + 4 * 300);
+    let stored = samples * (68 + 20 + 84 + 2 * u64::from(room.visibility + room.light) + 4 * 300);
     let transfer = samples * if room.receivers > 0 { 2 * u64::from(room.receivers) } else { 4 * vectors };
     // A sample has as many links as parts of the least share fit into its hemisphere; in files and on the device.
     let links = if room.links > 0.0 { (1.0 / room.links).min(f64::from(room.rays / 4)) as u64 } else { 0 };
     let linked = samples * (14 * links + 4 * u64::from(room.light));
+    // In a file, and on the device.
+    let directions = 8 * samples * u64::from(room.directional.min(room.rays));
     // All scatterings are solved between all vectors.
     let solved = 32 * vectors * vectors;
-    (100 << 20) + solved + 2 * of_cluster + 2 * stored + 2 * transfer + linked
+    (100 << 20) + solved + 2 * of_cluster + 2 * stored + 2 * transfer + linked + directions
 }
 
 /// Refuses a bake that needs more than `free` bytes; `None`: unknown.
@@ -65,7 +67,7 @@ mod tests {
         let room = Baking { samples: 1_000_000, cluster: 4096, ..Baking::default() };
         let bytes = need(&room);
         // 1 GB at least: samples, the light of 300 lights, and the coefficients of receivers.
-        assert!(bytes > 1_000_000 * (64 + 4 * 300 + 96) && bytes < 32 << 30, "{bytes}");
+        assert!(bytes > 1_000_000 * (68 + 4 * 300 + 96) && bytes < 32 << 30, "{bytes}");
         expect_free(&room, Some(bytes)).unwrap();
         expect_free(&room, None).unwrap();
         let error = expect_free(&room, Some(bytes - 1)).unwrap_err();

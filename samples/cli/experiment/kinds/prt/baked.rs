@@ -187,6 +187,7 @@ fn facts(summary: &Summary, whole: bool) -> Vec<(String, f64)> {
         ("bytes basis", summary.basis_bytes as f64),
         ("bytes transfer", summary.transfer_bytes as f64),
         ("bytes links", summary.link_bytes as f64),
+        ("bytes directions", summary.directional_bytes as f64),
         ("kept", summary.kept),
     ];
     let errors = [("distance error", summary.distance_error), ("left", summary.left)];
