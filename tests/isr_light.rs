@@ -208,7 +208,8 @@ fn direct_light_by_the_inverse_square_and_by_equation_16() {
             let mut all = vec![point(lamp, intensity)];
             all.extend_from_slice(kinds);
             let lights = lights(&mut graph, &all);
-            let choices = Direct { paper_law, specular: false, light_radius: 2.0, light_power: 0.9 };
+            let choices =
+                Direct { paper_law, specular: false, light_radius: 2.0, light_power: 0.9, ..Direct::default() };
             let lit = direct::light(&mut graph, &g, lights, &choices);
             read(gpu, graph, [lit.direct, lit.diffuse])
         };

@@ -128,7 +128,7 @@ fn lit(gpu: &Gpu, matters: &[Matter], degrees: f64, suns: &[(DVec3, f64)]) -> Ve
         })
         .collect();
     let lights = isr_lab::lights(&mut graph, &lights);
-    let choices = Direct { paper_law: false, specular: true, light_radius: 0.0, light_power: 1.0 };
+    let choices = Direct::default();
     let lit = direct::light(&mut graph, &g, lights, &choices);
     let [direct] = isr_lab::read(gpu, graph, [lit.direct]);
     direct.iter().map(|p| pixel(&[*p])).collect()

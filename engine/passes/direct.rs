@@ -34,6 +34,17 @@ pub struct Direct {
     pub light_radius: f32,
     /// Paper law: power of the brightest light.
     pub light_power: f32,
+    /// Directional lights light, too.
+    pub suns: bool,
+    /// Factor on the light of all lights.
+    pub strength: f32,
+}
+
+impl Default for Direct {
+    /// Radiometry of all lights, with microfacets.
+    fn default() -> Self {
+        Self { paper_law: false, specular: true, light_radius: 0.0, light_power: 1.0, suns: true, strength: 1.0 }
+    }
 }
 
 /// What [`light`] writes, RGBA16F, at the resolution of the G-buffer.
@@ -64,7 +75,12 @@ pub fn light(graph: &mut Graph, g: &GBuffer, lights: Lights, choices: &Direct) -
         lights: lights.lights,
         shadows: lights.shadows,
         shadow_maps: lights.shadow_maps,
-        push: direct::Push { light_radius: choices.light_radius, light_power: choices.light_power },
+        push: direct::Push {
+            light_radius: choices.light_radius,
+            light_power: choices.light_power,
+            suns: choices.suns.into(),
+            strength: choices.strength,
+        },
         spec: direct::Spec { paper_law: choices.paper_law.into(), specular: choices.specular.into() },
     };
     graph.compute(args, extent);

@@ -30,6 +30,8 @@ layout(binding = 7, rgba16f) uniform writeonly image2D diffuse;  // what leaves 
 layout(push_constant, scalar) uniform Push {
     float light_radius;  // l_r of lights without a range, metres; 0: the camera's far distance
     float light_power;   // l_pow
+    uint suns;           // 1: directional lights light, too
+    float strength;      // factor on the light of all lights
 };
 
 // [ISR 16]
@@ -69,6 +71,7 @@ void main() {
     vec3 shine = vec3(0.0);
     for (uint i = 0u; i < light_count; ++i) {
         Light one = light(i);
+        if (suns == 0u && one.kind == LIGHT_DIRECTIONAL) continue;
         vec3 to_light;
         vec3 e = light_irradiance(one, p, to_light);
         float cosine = dot(n, to_light);
@@ -82,7 +85,7 @@ void main() {
         if (cosine <= 0.0 || e == vec3(0.0)) {
             continue;
         }
-        e *= shadow_factor(one, p, n);
+        e *= strength * shadow_factor(one, p, n);
         matt += e * cosine;
         if (SPECULAR != 0) {
             shine += e * (layered ? brdf_cosine(brdf, n, v, to_light) : brdf_specular_cosine(brdf, n, v, to_light));

@@ -25,7 +25,8 @@ struct PrtLobe {
 PrtLobe prt_lobe(vec3 n, vec3 v, float alpha) {
     PrtLobe lobe;
     // A rough surface reflects more from above than a mirror (Lagarde and de Rousiers, Moving Frostbite to Physically Based Rendering, 2014).
-    lobe.main = normalize(mix(n, reflect(-v, n), (1.0 - alpha) * (sqrt(1.0 - alpha) + alpha)));
+    vec3 main = mix(n, reflect(-v, n), (1.0 - alpha) * (sqrt(1.0 - alpha) + alpha));
+    lobe.main = dot(main, main) > 1e-8 ? normalize(main) : n;
     // Means of c = cos²θ and of its square for the facets, in closed form, and where the forms lose their digits, by their series.
     float a2 = alpha * alpha, k = 1.0 - a2, log_a2 = log(a2);
     float c = 0.5 + k * (1.0 / 6.0 + k * (1.0 / 12.0 + k * (0.05 + k / 30.0)));

@@ -11,7 +11,7 @@ use lucerna::{
     image::Layers,
     scene::{Material, Pose, Scene, View},
     technique::{Ready, Shot, Technique},
-    techniques::prt::{Baked, Bakery, Baking, Mode, PictureSettings, Prt, Sampled, Stored, starts, units},
+    techniques::prt::{Baked, Bakery, Baking, Direct, Mode, PictureSettings, Prt, Sampled, Stored, starts, units},
 };
 
 pub fn small() -> Baking {
@@ -82,8 +82,10 @@ pub fn picture(
     reading.layers(&frame)
 }
 
+/// Diffuse surfaces, and shadows by the samples.
 pub fn diffuse() -> PictureSettings {
     let mut settings = PictureSettings::default();
     settings.prt.gloss = false;
+    settings.prt.direct = Direct::Samples;
     settings
 }

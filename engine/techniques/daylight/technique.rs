@@ -344,7 +344,7 @@ impl Technique for Daylight {
         let view = &moment.view;
         let gbuffer = gbuffer::draw(graph, &handles, view, &settings.gbuffer);
         let shadows = shadow::draw(graph, &handles, view, &settings.shadow);
-        let choices = Direct { paper_law: false, specular: of_day.gloss, light_radius: 0.0, light_power: 1.0 };
+        let choices = Direct { specular: of_day.gloss, ..Direct::default() };
         let lit = direct::light(graph, &gbuffer, Lights::from(&shadows), &choices);
         let image = |graph: &mut Graph, name: &str| graph.image(name, Format::RGBA16F, view.extent);
         let [total, indirect, irradiance] =

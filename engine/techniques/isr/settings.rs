@@ -388,6 +388,7 @@ impl Settings {
             specular: self.specular,
             light_radius: self.light_radius,
             light_power: self.light_power,
+            ..Direct::default()
         }
     }
 

@@ -32,6 +32,8 @@ const PARTICLES: u32 = 1 << 16;
 const MOST_ROUNDS: u32 = 96;
 /// Least share of the particles that are still in the scene when their hits begin to count. A cube with one side open keeps about a quarter (0.8⁵ · 5/6).
 const LEAST_INSIDE: f64 = 0.05;
+/// Share by which the number of samples may differ from the one that is asked for.
+const FAR_FROM_ASKED: f32 = 0.1;
 /// Rays that tell how open the surroundings of a sample are.
 const OPEN_RAYS: u32 = 64;
 /// Samples from which the area that light reaches is estimated.
@@ -132,10 +134,18 @@ impl Bakery {
         let clear = self.clearances(&found, far, baking.seed)?;
         let parts: Vec<[f32; 2]> = found.iter().zip(&clear).map(|(sample, clear)| [sample.area, *clear]).collect();
         let gaps = baking.gaps as f32;
-        let radius = samples::radius_for(&parts, baking.samples, gaps);
-        let thinning = Thinning::new(radius, gaps);
-        let Thinned { samples: mut found, places, escaped, .. } =
-            self.thinned(baking, starts, (thinning, MOST_ROUNDS), &mut triangles, stop)?;
+        let mut radius = samples::radius_for(&parts, baking.samples, gaps);
+        let thin = |of: &mut Self, triangles: &mut Triangles, radius: f32| {
+            of.thinned(baking, starts, (Thinning::new(radius, gaps), MOST_ROUNDS), triangles, stop)
+        };
+        let mut thinned = thin(self, &mut triangles, radius)?;
+        // Steps and curved surfaces have samples that the estimate does not know of.
+        let more = thinned.samples.len() as f32 / baking.samples as f32;
+        if (more - 1.0).abs() > FAR_FROM_ASKED {
+            radius *= more.sqrt();
+            thinned = thin(self, &mut triangles, radius)?;
+        }
+        let Thinned { samples: mut found, places, escaped, .. } = thinned;
         if found.len() > plan::MOST_SAMPLES {
             let what = format!("{} samples, at most {} are possible", found.len(), plan::MOST_SAMPLES);
             return Err(Error::usage(what).at("room.samples"));

@@ -218,7 +218,7 @@ fn transferred(
     let one =
         Light { position: place, kind: consts::LIGHT_POINT, intensity: [1.0; 3], spot_offset: 1.0, ..Light::default() };
     let lights = graph.buffer_from("scene.lights", &lights_bytes(&[one]));
-    let lit = light.light(&mut graph, plan, (lights, 1), settings);
+    let lit = light.light(&mut graph, plan, (lights, 1), None, settings);
     let read = [lit.direct, lit.irradiances].map(|buffer| graph.read_buffer(buffer));
     let frame = runner.run(&graph)?;
     Ok(read.map(|read| frame.buffer(read)))

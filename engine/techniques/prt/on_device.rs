@@ -12,11 +12,12 @@ use crate::{
     Error, Result,
     gpu::{Gpu, OwnedBuffer},
     graph::{Buffer, Graph, Runner},
+    passes::shadow::ShadowMaps,
     resident::Resident,
     scene::{Pose, Scene},
     shaders::{
         consts,
-        prt::{albedo, directions, lit, mix, project, radiosity, receive, restore, scatter},
+        prt::{albedo, directions, lit, lit_by_maps, mix, project, radiosity, receive, restore, scatter},
         types::{PrtCap, PrtPoint, PrtReceiver, PrtVector},
     },
 };
@@ -236,18 +237,48 @@ impl OnDevice {
         })
     }
 
-    /// The light of a frame's lights at the samples. `lights`: the lights of the frame, and their number.
+    /// The light of a frame's lights at the samples. `lights`: the lights of the frame, and their number; `maps`: their shadow maps, in the place of the stored
+    /// distances.
     pub fn light(
         &self,
         graph: &mut Graph,
         plan: &Plan,
         (lights, light_count): (Buffer, u32),
+        maps: Option<&ShadowMaps>,
         settings: &Settings,
     ) -> Lit {
         let count = self.count;
-        let samples = graph.import_buffer(&self.samples);
         let direct = graph.buffer("prt.direct", 12 * u64::from(count));
         let visible = graph.buffer("prt.visible", 4 * u64::from(count) * u64::from(light_count.max(1)));
+        match maps {
+            None => self.by_distances(graph, plan, (lights, light_count), (direct, visible), settings),
+            Some(maps) => {
+                let args = lit_by_maps::Args {
+                    samples: graph.import_buffer(&self.samples),
+                    lights,
+                    shadows: maps.shadows,
+                    shadow_maps: maps.maps,
+                    direct,
+                    visible,
+                    push: lit_by_maps::Push { count, strength: settings.strength },
+                };
+                graph.compute(args, count);
+            }
+        }
+        self.scattered(graph, direct, visible)
+    }
+
+    /// Direct light by the stored distances.
+    fn by_distances(
+        &self,
+        graph: &mut Graph,
+        plan: &Plan,
+        (lights, light_count): (Buffer, u32),
+        (direct, visible): (Buffer, Buffer),
+        settings: &Settings,
+    ) {
+        let count = self.count;
+        let samples = graph.import_buffer(&self.samples);
         let offsets = points_of_lights(settings);
         let args = lit::Args {
             samples,
@@ -268,6 +299,10 @@ impl OnDevice {
             },
         };
         graph.compute(args, count).rays(u64::from(count) * offsets.len() as u64 * u64::from(light_count));
+    }
+
+    /// The transferred light of this direct light.
+    fn scattered(&self, graph: &mut Graph, direct: Buffer, visible: Buffer) -> Lit {
         let mut radiosities = self.radiosity(graph, direct, None);
         let projected = self.project(graph, radiosities);
         let all = self.vectors();

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{
-    Direct as Shadows, Mode, PictureSettings,
+    Mode, PictureSettings,
     on_device::{Lit, OnDevice},
     spread::Spreading,
 };
@@ -12,10 +12,11 @@ use crate::{
     passes::{
         direct::{self, Direct, Lights},
         gbuffer::{self, GBuffer},
-        shadow, skybox,
+        shadow::ShadowMaps,
+        skybox,
     },
     resident::Handles,
-    scene::{Note, View},
+    scene::View,
     shaders::{consts, prt::pixels},
 };
 
@@ -62,11 +63,13 @@ pub struct Drawing<'a> {
     pub handles: &'a Handles,
     pub settings: &'a PictureSettings,
     pub mode: Mode,
+    /// Shadow maps of all lights; `None`: the visibility of the samples decides.
+    pub maps: Option<&'a ShadowMaps>,
 }
 
 impl Drawing<'_> {
     /// Draws a view.
-    pub fn draw(&self, graph: &mut Graph, view: &View, notes: &mut Vec<Note>) -> Shown {
+    pub fn draw(&self, graph: &mut Graph, view: &View) -> Shown {
         let (handles, of_prt) = (self.handles, &self.settings.prt);
         let show = match self.mode {
             Mode::Samples => consts::PRT_SHOW_SAMPLES,
@@ -75,11 +78,10 @@ impl Drawing<'_> {
             _ => consts::PRT_SHOW_LIGHT,
         };
         let gbuffer = gbuffer::draw(graph, handles, view, &self.settings.gbuffer);
-        let mapped = (of_prt.direct == Shadows::Maps && show == consts::PRT_SHOW_LIGHT).then(|| {
-            let shadows = shadow::draw(graph, handles, view, &self.settings.shadow);
-            notes.extend(shadows.notes.iter().filter(|note| !notes.contains(note)).cloned().collect::<Vec<_>>());
-            let choices = Direct { paper_law: false, specular: of_prt.gloss, light_radius: 0.0, light_power: 1.0 };
-            direct::light(graph, &gbuffer, Lights::from(&shadows), &choices).direct
+        let mapped = self.maps.filter(|_| show == consts::PRT_SHOW_LIGHT).map(|maps| {
+            let choices =
+                Direct { specular: of_prt.gloss, suns: false, strength: of_prt.strength, ..Direct::default() };
+            direct::light(graph, &gbuffer, Lights::from(maps), &choices).direct
         });
         let image = |graph: &mut Graph, name: &str| graph.image(name, Format::RGBA16F, view.extent);
         let [total, direct, indirect, irradiance, shadow] =

@@ -7,8 +7,12 @@ use crate::{
     Error, Result,
     passes::{gbuffer, shadow},
     settings::{Described, JsonSchema, described},
+    shaders::consts::MAX_SHADOW_SLOTS,
     technique,
 };
+
+/// Shadow maps of a point light.
+const CUBE: u32 = 6;
 
 /// Settings that decide the bytes of a bake.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -132,10 +136,12 @@ pub(super) fn too_many_vectors(what: String) -> Error {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Direct {
-    /// By the visibility of the samples, as in the paper: soft shadows at the distance of the samples.
+    /// By shadow maps, if the lights are points and if there are maps for all of them (ten point lights); else by samples.
     #[default]
+    Auto,
+    /// By the visibility of the samples, as in the paper: soft shadows at the distance of the samples.
     Samples,
-    /// By shadow maps.
+    /// By shadow maps, at the pixels and at the samples. Lights are points.
     Maps,
 }
 
@@ -159,16 +165,16 @@ pub struct Settings {
     /// How the direct light is shadowed.
     pub direct: Direct,
     /// Points that stand for a light.
-    #[schemars(range(min = 1, max = 256))]
+    #[schemars(range(min = 1, max = 256), extend("x-needs" = {"direct": {"enum": ["auto", "samples"]}}))]
     pub points: u32,
     /// Radius of lights: their points are on a sphere.
-    #[schemars(range(min = 0, max = 100), extend("x-unit" = "m"))]
+    #[schemars(range(min = 0, max = 100), extend("x-unit" = "m", "x-needs" = {"direct": {"enum": ["auto", "samples"]}}))]
     pub radius: f32,
     /// A light that is farther away than the stored distance by less than this share of it is visible.
-    #[schemars(range(min = 0, max = 1))]
+    #[schemars(range(min = 0, max = 1), extend("x-needs" = {"direct": {"enum": ["auto", "samples"]}}))]
     pub bias: f32,
     /// Distance of that kind, in addition to the share, in distances of samples.
-    #[schemars(range(min = 0, max = 100))]
+    #[schemars(range(min = 0, max = 100), extend("x-needs" = {"direct": {"enum": ["auto", "samples"]}}))]
     pub bias_distance: f32,
     /// Standard deviation of the Gaussian weights of samples in a pixel, in distances of samples.
     #[schemars(range(min = 0.3, max = 1))]
@@ -205,6 +211,17 @@ pub struct Settings {
 
 described!(Settings);
 
+impl Settings {
+    /// Whether shadow maps shadow so many lights.
+    pub(super) fn by_maps(&self, lights: u32) -> bool {
+        match self.direct {
+            Direct::Auto => self.radius == 0.0 && CUBE * lights <= MAX_SHADOW_SLOTS,
+            Direct::Samples => false,
+            Direct::Maps => true,
+        }
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {
@@ -238,9 +255,10 @@ pub struct PictureSettings {
 }
 
 impl technique::Settings for PictureSettings {
-    /// Diffuse surfaces, without the transfer of the mean (equation 10).
+    /// Diffuse surfaces and shadows by the samples, without the transfer of the mean (equation 10).
     fn paper() -> Option<Self> {
-        Some(Self { prt: Settings { gloss: false, mean: false, ..Settings::default() }, ..Self::default() })
+        let prt = Settings { direct: Direct::Samples, gloss: false, mean: false, ..Settings::default() };
+        Some(Self { prt, ..Self::default() })
     }
 
     fn validate(&self) -> Result<()> {

@@ -1,7 +1,7 @@
 //! Precomputed transfer behind the interface of all techniques.
 
 use super::{
-    Baked, Direct as Shadows, PictureSettings, Settings, Stored, eyes,
+    Baked, PictureSettings, Settings, Stored, eyes,
     left_out::left_out,
     on_device::OnDevice,
     pixels::{Drawing, Shown},
@@ -10,6 +10,7 @@ use super::{
 use crate::{
     Error, Result,
     graph::Graph,
+    passes::shadow,
     settings::{Described, Description, idle_notes},
     shaders::consts,
     technique::{self, Making, Moment, Picture, Technique},
@@ -125,7 +126,12 @@ impl Technique for Prt {
         let mode = moment.shot.mode;
         let lights = &handles.moment.lights;
         let count = lights.len() as u32;
-        let mut lit = self.light.light(graph, &self.baked.stored.plan, (handles.lights, count), of_prt);
+        // Pictures of single samples have no light.
+        let of_light = !matches!(mode, Mode::Samples | Mode::Clusters | Mode::Transfer);
+        let by_maps = of_light && of_prt.by_maps(count);
+        let maps = by_maps.then(|| shadow::draw(graph, handles, view, &settings.shadow));
+        let plan = &self.baked.stored.plan;
+        let mut lit = self.light.light(graph, plan, (handles.lights, count), maps.as_ref(), of_prt);
         if mode == Mode::Transfer {
             let all = self.light.vectors();
             if of_prt.vector >= all {
@@ -137,21 +143,21 @@ impl Technique for Prt {
             let one = graph.buffer_from("prt.vector", &one);
             lit.irradiances = self.light.sent(graph, one);
         }
-        let mut notes = [moment.notes, &left_out(moment.scene), &idle_notes("shadow", &settings.shadow)].concat();
-        // Shadow maps take the place of the visibility, and pictures of single samples have no light: the first lights are enough for the layer.
-        let by_samples = of_prt.direct == Shadows::Samples && !matches!(mode, Mode::Samples | Mode::Clusters);
-        let visible = if by_samples { count } else { count.min(consts::PRT_SPREAD_LIGHTS) };
+        let of_maps = maps.as_ref().map_or(&[][..], |maps| &maps.notes);
+        let notes = [moment.notes, of_maps, &left_out(moment.scene), &idle_notes("shadow", &settings.shadow)].concat();
+        // Where shadow maps take the place of the visibility, and where there is no light, the first lights are enough for the layer.
+        let visible = if of_light && !by_maps { count } else { count.min(consts::PRT_SPREAD_LIGHTS) };
         let spread = self.spreader.light(graph, handles, (&self.light, &lit), visible, of_prt);
         // The indirect light is a layer of all pictures of light.
-        let of_light = !matches!(mode, Mode::Samples | Mode::Clusters | Mode::Transfer);
         let directed = of_light && of_prt.gloss && of_prt.directional;
         let directions = if directed { self.light.directions(graph, &lit, of_prt) } else { None };
-        let drawing = Drawing { light: &self.light, lit: &lit, directions, spread, handles, settings, mode };
+        let maps = maps.as_ref();
+        let drawing = Drawing { light: &self.light, lit: &lit, directions, spread, handles, settings, mode, maps };
         let shown = if of_prt.eyes > 0.0 {
-            let eyes = [-0.5, 0.5].map(|side| drawing.draw(graph, &view.beside(side * of_prt.eyes), &mut notes));
+            let eyes = [-0.5, 0.5].map(|side| drawing.draw(graph, &view.beside(side * of_prt.eyes)));
             eyes::side_by_side(graph, eyes, mode, moment.shot.layers)
         } else {
-            drawing.draw(graph, view, &mut notes)
+            drawing.draw(graph, view)
         };
         let points = if of_prt.radius > 0.0 { of_prt.points } else { 1 };
         let [of_points, of_samples, of_bases] = self.light.products;
@@ -161,7 +167,10 @@ impl Technique for Prt {
             .color("indirect", images.indirect)
             .color("irradiance", images.irradiance)
             .color("shadow", images.shadow)
-            .number("visibility_products", (of_points * u64::from(points * count)) as f64)
+            .number(
+                "visibility_products",
+                if maps.is_none() { (of_points * u64::from(points * count)) as f64 } else { 0.0 },
+            )
             .number("transfer_products", of_samples as f64)
             .number("basis_products", of_bases as f64)
             .number("directions", if directions.is_some() { self.light.directions as f64 } else { 0.0 });
