@@ -23,11 +23,11 @@ layout(binding = 9, scalar) readonly buffer Chosen { uint chosen[]; };
 layout(binding = 10, scalar) readonly buffer Places { vec3 places[]; };
 // Irradiance before any scattering: light after light for each chosen sample.
 layout(binding = 11, scalar) writeonly buffer Direct { float direct[]; };
-// Sum over the paths of the irradiance after at least one scattering: light after light for both halves of the paths of each chosen sample.
+// Sum over the paths of the irradiance after at least one scattering: light after light for each part of the paths of each chosen sample.
 layout(binding = 12, scalar) buffer Indirect { vec3 indirect[]; };
 
 layout(push_constant, scalar) uniform Push {
-    uint first;   // path of a half
+    uint first;   // path of a part
     uint count;
     uint chosen_of;
     uint lights;
@@ -47,24 +47,24 @@ float irradiance_at(vec3 position, vec3 side, vec3 normal, float gap, uint light
 
 void main() {
     uint row = gl_GlobalInvocationID.x;
-    if (row >= 2u * chosen_of) return;
-    uint number = chosen[row / 2u];
+    if (row >= PRT_CHECK_PARTS * chosen_of) return;
+    uint number = chosen[row / PRT_CHECK_PARTS], part = row % PRT_CHECK_PARTS;
     PrtPoint s = samples[number];
-    if (first == 0u && row % 2u == 0u) {
+    if (first == 0u && part == 0u) {
         for (uint l = 0u; l < lights; ++l) {
-            direct[row / 2u * lights + l] = irradiance_at(s.position, s.side, s.normal, s.gap, l, 0u);
+            direct[row / PRT_CHECK_PARTS * lights + l] = irradiance_at(s.position, s.side, s.normal, s.gap, l, 0u);
         }
     }
     for (uint i = first; i < first + count; ++i) {
-        // The halves have sequences of their own, so their errors do not depend on each other.
-        PointPlace place = point_place(uvec2(number & 0xffffu, number >> 16u | (row % 2u) << 8u), i, POINTS_APART, seed);
+        // The parts have sequences of their own, so their errors do not depend on each other.
+        PointPlace place = point_place(uvec2(number & 0xffffu, number >> 16u | part << 8u), i, POINTS_APART, seed);
         vec3 throughput = vec3(1.0);
         vec3 position = s.position, side = s.side, normal = s.normal;
         float gap = s.gap;
         for (uint bounce = 0u; bounce < PRT_CHECK_BOUNCES; ++bounce) {
             vec3 direction = frame_around(normal) * sample_cosine(unit_floats(point_words(place, 2u * bounce, seed)));
             if (dot(direction, side) <= 0.0) break;
-            uint salt = pcg4d(uvec4(number, 2u * i + row % 2u, bounce, seed)).x;
+            uint salt = pcg4d(uvec4(number, PRT_CHECK_PARTS * i + part, bounce, seed)).x;
             Hit hit = trace(Ray(position + (side + direction) * gap, 0.0, direction, 1e30), TRACE_SHADOW, salt, false);
             if (hit.instance == NONE) break;
             SurfacePoint p = surface_point(hit.instance, hit.triangle, hit.barycentrics);

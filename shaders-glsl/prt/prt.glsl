@@ -19,6 +19,8 @@ const float PRT_CLEAR = 2.0; // export
 const uint PRT_LIGHTS = 8u; // export
 // Scatterings of the paths that a bake is compared with.
 const uint PRT_CHECK_BOUNCES = 256u;
+// Parts of the paths of a sample. Each one has a mean of its own.
+const uint PRT_CHECK_PARTS = 4u; // export
 // Lights whose visibility splats and vertices carry to the pixels at once: the channels of an image.
 const uint PRT_SPREAD_LIGHTS = 4u; // export
 // Sums of weights below this one are too small to divide by.

@@ -25,7 +25,7 @@ pub struct CheckOptions {
     pub lights: u32,
     /// Samples at which light is compared: each one stands for the same area.
     pub samples: u32,
-    /// Paths that are followed from each of these samples.
+    /// Paths that are followed from each of these samples, rounded up to four equal parts.
     pub paths: u32,
     pub seed: u32,
 }
@@ -41,7 +41,7 @@ impl Default for CheckOptions {
 pub struct RelativeError {
     /// Root mean square of the error over that of the truth, over all samples and colours. The noise of the truth is taken away.
     pub error: f64,
-    /// The same without the samples that are off most, a twentieth of all.
+    /// The same without the samples that are off most, a twentieth of all, as half of the paths tell; the other half tells the error of the rest.
     pub most: f64,
     /// Sum of the light over that of the truth.
     pub energy: f64,
@@ -65,37 +65,55 @@ pub struct LightErrors {
 /// One sample in this number is left out as one of those that are off most.
 const WORST: usize = 20;
 
+/// Means of the paths of a sample, one for each part of them.
+type Parts = [f64; consts::PRT_CHECK_PARTS as usize];
+
+/// Squares of a sample, each of two estimates that do not depend on each other, so that noise is not in their sums.
+#[derive(Clone, Copy, Default)]
+struct Squares {
+    /// Of the error and of the truth, by all paths.
+    all: [f64; 2],
+    /// Of the error, by the first half of the paths, with their noise.
+    first: f64,
+    /// Of the error and of the truth, by the second half.
+    second: [f64; 2],
+}
+
 /// Sums from which a [`RelativeError`] follows.
 #[derive(Default)]
 struct Sums {
-    /// Square of the error of each sample, and that of its truth.
-    squares: Vec<[f64; 2]>,
+    samples: Vec<Squares>,
     found: f64,
     truth: f64,
 }
 
 impl Sums {
-    /// Adds the light of a sample in some colours, each with two independent estimates of its truth.
-    fn add(&mut self, colours: impl IntoIterator<Item = (f64, [f64; 2])>) {
-        let mut square = [0.0; 2];
-        for (found, [a, b]) in colours {
-            square[0] += (found - a) * (found - b);
-            square[1] += a * b;
+    /// Adds the light of a sample in some colours, each with its truth.
+    fn add(&mut self, colours: impl IntoIterator<Item = (f64, Parts)>) {
+        let mut of = Squares::default();
+        for (found, [a, b, c, d]) in colours {
+            let (first, second) = (0.5 * (a + b), 0.5 * (c + d));
+            let pairs = [(&mut of.all, [first, second]), (&mut of.second, [c, d])];
+            for (square, [one, other]) in pairs {
+                square[0] += (found - one) * (found - other);
+                square[1] += one * other;
+            }
+            of.first += (found - first).powi(2);
             self.found += found;
-            self.truth += 0.5 * (a + b);
+            self.truth += 0.5 * (first + second);
         }
-        self.squares.push(square);
+        self.samples.push(of);
     }
 
     fn error(mut self) -> Option<RelativeError> {
-        let relative = |list: &[[f64; 2]]| {
-            let [off, square] = [0, 1].map(|of| list.iter().map(|sample| sample[of]).sum::<f64>());
+        let relative = |list: &[Squares], squares: fn(&Squares) -> [f64; 2]| {
+            let [off, square] = [0, 1].map(|of| list.iter().map(|sample| squares(sample)[of]).sum::<f64>());
             (square > 0.0).then(|| (off.max(0.0) / square).sqrt())
         };
-        let error = relative(&self.squares).filter(|_| self.truth > 0.0)?;
-        self.squares.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        let kept = self.squares.len() - self.squares.len() / WORST;
-        let most = relative(&self.squares[..kept]).unwrap_or(error);
+        let error = relative(&self.samples, |sample| sample.all).filter(|_| self.truth > 0.0)?;
+        self.samples.sort_by(|a, b| a.first.total_cmp(&b.first));
+        let kept = self.samples.len() - self.samples.len() / WORST;
+        let most = relative(&self.samples[..kept], |sample| sample.second).unwrap_or(error);
         Some(RelativeError { error, most, energy: self.found / self.truth })
     }
 }
@@ -104,7 +122,7 @@ impl Sums {
 struct Truth {
     /// Light after light for each sample.
     direct: Vec<f32>,
-    /// Light after light for both halves of the paths of each sample.
+    /// Light after light for all parts of the paths of each sample.
     indirect: Vec<[f32; 3]>,
 }
 
@@ -154,13 +172,16 @@ pub fn check(
         let mut sums = [(); 3].map(|()| Sums::default());
         for (row, sample) in chosen.iter().enumerate() {
             let sample = *sample as usize;
-            sums[0].add([(f64::from(direct[sample][0]), [f64::from(truth.direct[row * count + number]); 2])]);
-            let half = |half: usize| truth.indirect[(2 * row + half) * count + number];
-            let scale = 1.0 / f64::from(paths.div_ceil(2));
+            sums[0].add([(
+                f64::from(direct[sample][0]),
+                [f64::from(truth.direct[row * count + number]); consts::PRT_CHECK_PARTS as usize],
+            )]);
+            let part = |part: usize| truth.indirect[(consts::PRT_CHECK_PARTS as usize * row + part) * count + number];
+            let scale = 1.0 / f64::from(paths.div_ceil(consts::PRT_CHECK_PARTS));
             for (sums, found) in sums[1..].iter_mut().zip([&indirect, &by_exact]) {
                 let colour = |channel: usize| {
-                    let both = [0, 1].map(|of| f64::from(half(of)[channel]) * scale);
-                    (f64::from(found[sample][channel].max(0.0)), both)
+                    let truth: Parts = std::array::from_fn(|of| f64::from(part(of)[channel]) * scale);
+                    (f64::from(found[sample][channel].max(0.0)), truth)
                 };
                 sums.add([0, 1, 2].map(colour));
             }
@@ -233,9 +254,10 @@ impl Bakery {
         let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
         let rays = self.rays.frame(&mut graph, &handles);
         let direct = graph.buffer("prt.direct", 4 * each);
-        let indirect = graph.buffer("prt.indirect", 2 * 12 * each);
+        let parts = consts::PRT_CHECK_PARTS;
+        let indirect = graph.buffer("prt.indirect", u64::from(parts) * 12 * each);
         graph.fill(indirect, 0);
-        let paths = options.paths.div_ceil(2);
+        let paths = options.paths.div_ceil(parts);
         let args = traced!(
             check::Args {
                 samples: graph.import_buffer(self.uploaded()?),
@@ -252,8 +274,8 @@ impl Bakery {
         // Some scatterings, with a ray to each light.
         let of_path = 6 * (1 + u64::from(lights));
         let items =
-            Items::new(paths).rays(2 * u64::from(rows) * of_path).turns(of_path * (self.rays.most_turns() + 16));
-        graph.compute_over(args, 2 * rows, items);
+            Items::new(paths).rays(u64::from(parts * rows) * of_path).turns(of_path * (self.rays.most_turns() + 16));
+        graph.compute_over(args, parts * rows, items);
         let (direct, indirect) = (graph.read_buffer(direct), graph.read_buffer(indirect));
         let frame = self.runner.run(&graph)?;
         Ok(Truth { direct: frame.buffer(direct), indirect: frame.buffer(indirect) })
@@ -267,21 +289,23 @@ mod tests {
     #[test]
     fn darkness_has_no_error() {
         let mut sums = Sums::default();
-        sums.add([(0.1, [0.0, 0.0])]);
+        sums.add([(0.1, [0.0; 4])]);
         assert_eq!(sums.error(), None);
     }
 
     #[test]
     fn noise_of_the_truth_is_no_error() {
         let mut sums = Sums::default();
-        // Two sequences that do not depend on each other, in [-1, 1).
+        // Sequences that do not depend on each other, in [-1, 1).
         let noise = |i: u64, step: f64| 2.0 * (i as f64 * step).fract() - 1.0;
         for i in 0..100_000u64 {
             let truth = 2.0 + (i as f64).sin();
-            sums.add([(1.1 * truth, [5f64, 3.0].map(|step| truth + noise(i, step.sqrt())))]);
+            sums.add([(1.1 * truth, [5f64, 3.0, 2.0, 7.0].map(|step| truth + noise(i, step.sqrt())))]);
         }
         let found = sums.error().unwrap();
         assert!((found.error - 0.1).abs() < 0.01 && (found.energy - 1.1).abs() < 0.01, "{found:?}");
+        // Samples of little noise are taken for good ones, and so are those of little error.
+        assert!((found.most - 0.1).abs() < 0.01, "{found:?}");
     }
 
     #[test]
@@ -289,7 +313,7 @@ mod tests {
         let mut sums = Sums::default();
         for i in 0..40 {
             let off = if i % 20 == 7 { 1.0 } else { 0.1 };
-            sums.add([0.5, 1.0].map(|truth| (truth * (1.0 + off), [truth; 2])));
+            sums.add([0.5, 1.0].map(|truth| (truth * (1.0 + off), [truth; 4])));
         }
         let found = sums.error().unwrap();
         assert!(

@@ -39,8 +39,8 @@ pub struct PrtCheckArgs {
     #[arg(long, value_name = "N", default_value_t = CheckOptions::default().samples, value_parser = clap::value_parser!(u32).range(1..=100_000), help_heading = "Check")]
     pub samples: u32,
 
-    /// Paths that are followed from each of these samples
-    #[arg(long, value_name = "N", default_value_t = CheckOptions::default().paths, value_parser = clap::value_parser!(u32).range(2..=1_000_000), help_heading = "Check")]
+    /// Paths that are followed from each of these samples, in four parts
+    #[arg(long, value_name = "N", default_value_t = CheckOptions::default().paths, value_parser = clap::value_parser!(u32).range(4..=1_000_000), help_heading = "Check")]
     pub paths: u32,
 
     /// Seed of the paths
