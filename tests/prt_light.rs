@@ -4,13 +4,13 @@ use crate::{
     prt_lab::{baked, closed, diffuse, picture, sampled, small},
     tracer_lab::{Stage, matt, mean, render, view},
 };
-use glam::{Mat4, Vec3, vec3};
+use glam::{Vec3, vec3};
 use lucerna::{
     Stop,
     gpu::testing::with_gpu,
-    scene::{LightKind, Material, Scene},
+    scene::{Material, Scene},
     techniques::prt::{
-        Baking, Direct, Mode, PictureSettings, Sampled, Settings, Stored,
+        Baking, Direct, Mode, Sampled, Settings, Stored,
         check::{CheckOptions, LightErrors, RelativeError, check},
         solve,
     },
@@ -177,53 +177,6 @@ fn pictures_have_the_light_of_the_path_tracer() {
         for (found, wanted) in mean(&mapped, "direct").into_iter().zip(mean(&truth, "direct")) {
             assert!((found / wanted - 1.0).abs() < 0.02, "{found} {wanted}");
         }
-    });
-}
-
-#[test]
-fn suns_are_off_and_the_strength_of_lights_counts_in_both_kinds_of_shadows() {
-    with_gpu(|gpu| {
-        let scene = room();
-        let stored = baked(gpu, &scene, &Baking { samples: 1000, rays: 64, examples: 60, ..small() });
-        let eye = view(vec3(1.6, 1.9, 1.2), vec3(-0.6, 0.7, -0.6), 75.0, [24, 18]);
-        let mut with_sun = Stage { scene: room() };
-        with_sun.light(LightKind::Directional, Vec3::ONE, 3.0, Mat4::from_rotation_x(-1.0));
-        for direct in [Direct::Samples, Direct::Maps, Direct::Auto] {
-            let mut settings = diffuse();
-            settings.prt.direct = direct;
-            let of = |scene: &Scene, settings: &PictureSettings| {
-                let layers = picture(gpu, scene, &stored, &eye, settings, Mode::Total);
-                ["direct", "indirect"].map(|name| layers.layer(name).unwrap().data.clone())
-            };
-            let once = of(&scene, &settings);
-            assert_eq!(once, of(&with_sun.scene, &settings), "{direct:?}");
-            settings.prt.strength = 2.0;
-            for (once, twice) in once.iter().zip(of(&scene, &settings)) {
-                let off = once.iter().zip(&twice).map(|(once, twice)| (2.0 * once - twice).abs()).fold(0.0, f32::max);
-                assert!(off < 1e-2 && once.iter().any(|value| *value > 0.1), "{direct:?}: {off}");
-            }
-        }
-    });
-}
-
-#[test]
-fn shadow_maps_are_the_default_for_lights_that_have_some() {
-    with_gpu(|gpu| {
-        let mut stage = Stage { scene: room() };
-        let stored = baked(gpu, &stage.scene, &Baking { samples: 1000, rays: 64, examples: 60, ..small() });
-        let eye = view(vec3(1.6, 1.9, 1.2), vec3(-0.6, 0.7, -0.6), 75.0, [24, 18]);
-        let of = |scene: &Scene, direct: Direct, radius: f32| {
-            let mut settings = PictureSettings::default();
-            (settings.prt.direct, settings.prt.radius) = (direct, radius);
-            picture(gpu, scene, &stored, &eye, &settings, Mode::Total).layers
-        };
-        let [auto, maps, samples] = [Direct::Auto, Direct::Maps, Direct::Samples];
-        assert!(of(&stage.scene, auto, 0.0) == of(&stage.scene, maps, 0.0));
-        assert!(of(&stage.scene, auto, 0.1) == of(&stage.scene, samples, 0.1));
-        assert!(of(&stage.scene, samples, 0.0) != of(&stage.scene, maps, 0.0));
-        // Eleven lights need more maps than there are.
-        (0..10).for_each(|i| stage.point(vec3(0.1 * i as f32 - 0.5, 1.5, 0.3), Vec3::ONE));
-        assert!(of(&stage.scene, auto, 0.0) == of(&stage.scene, samples, 0.0));
     });
 }
 

@@ -11,7 +11,7 @@ use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     image::Layers,
     scene::{Camera, Material, Projection, Scene, Transform, View},
-    techniques::prt::{Bakery, Baking, Mode, Settings, Stored, solve, starts},
+    techniques::prt::{Bakery, Baking, Mode, PictureSettings, Settings, Stored, solve, starts},
 };
 
 /// Mean of a layer over pixels and colours.
@@ -114,6 +114,9 @@ fn lamps_behind_walls_and_in_closed_furniture_light_nothing_outside() {
         // Outside, below the floor, and in the middle of the cabinet.
         for lamp in [vec3(6.0, 1.5, 0.3), vec3(0.2, -1.0, 0.1), vec3(0.0, 4.0, 0.0), vec3(-1.1, 0.7, -1.1)] {
             let dark = shown(&moved(&scene, lamp), &stored);
+            let by_maps = picture(gpu, &moved(&scene, lamp), &stored, &eye, &PictureSettings::default(), Mode::Total);
+            let by_maps = ["direct", "indirect"].map(|name| mean(&by_maps, name));
+            assert!(by_maps.iter().zip(lit).all(|(found, lit)| found.abs() <= 1e-3 * lit), "{lamp}: {by_maps:?}");
             assert!(dark[0] <= 1e-3 * lit[0] && dark[1].abs() <= 1e-3 * lit[1], "{lamp}: {dark:?} of {lit:?}");
         }
         // The bake's own lamp is in the cabinet: both its inside and the room have samples.

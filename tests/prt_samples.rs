@@ -157,6 +157,23 @@ fn areas_of_a_sphere_sum_to_its_surface() {
 }
 
 #[test]
+fn a_room_of_small_things_has_about_as_many_samples_as_were_asked_for() {
+    with_gpu(|gpu| {
+        // Boxes of some centimetres, near to each other: at the distance of the samples all of them are steps and gaps.
+        let mut stage = Stage { scene: closed(Vec3::splat(0.5)) };
+        for i in 0..150 {
+            let low = Vec3::new(-0.8 + 0.11 * (i % 15) as f32, -0.999, -0.5 + 0.11 * (i / 15) as f32);
+            stage.cuboid(0, low, low + Vec3::new(0.06, 0.05 + 0.01 * (i % 4) as f32, 0.06), false);
+        }
+        for asked in [600, 2400] {
+            let (_, samples) = points(gpu, &stage.scene, asked);
+            let more = samples.len() as f64 / f64::from(asked);
+            assert!((more - 1.0).abs() < 0.15, "{} instead of {asked}", samples.len());
+        }
+    });
+}
+
+#[test]
 fn samples_of_a_box_have_even_distances_and_faces_have_equal_numbers() {
     with_gpu(|gpu| {
         let (radius, samples) = points(gpu, &closed(Vec3::splat(0.5)), 3000);

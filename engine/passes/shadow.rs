@@ -3,7 +3,7 @@
 
 mod slots;
 
-pub use slots::{Assignment, assign, project};
+pub use slots::{Assignment, assign, local_maps, project};
 
 use crate::settings::{Described, JsonSchema, described};
 use crate::{Error, Result};
@@ -121,10 +121,21 @@ pub struct ShadowMaps {
 
 /// Draws the shadow maps of all lights of the scene. Lights get maps in the order of the list, until all maps are taken.
 pub fn draw(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings) -> ShadowMaps {
+    draw_of(graph, scene, view, settings, |_| true)
+}
+
+/// The same for the lights that `casts` chooses. All other lights have no maps.
+pub fn draw_of(
+    graph: &mut Graph,
+    scene: &Handles,
+    view: &View,
+    settings: &Settings,
+    casts: impl Fn(&types::Light) -> bool,
+) -> ShadowMaps {
     let settings = sane(settings);
     let assignment = match settings.kind {
         Kind::Off => Assignment::none(scene.moment.lights.len()),
-        _ => assign(&scene.moment.lights, &scene.bounds(), view, &settings),
+        _ => assign(&scene.moment.lights, &scene.bounds(), view, &settings, casts),
     };
     let shadows = graph.buffer_from("shadow.slots", &block(&assignment, &settings));
     let notes = assignment.unshadowed.iter().map(|light| Note {

@@ -49,14 +49,14 @@ PrtNear near_samples(vec3 position, vec3 n, PrtKernel kernel) {
                     // Away from the tangent plane counts more, so that light does not leak over steps and between sheets.
                     float off = dot(way, n);
                     square += PRT_STEP * off * off;
-                    // By area, so that places with many samples do not count more than others.
-                    float weight = exp(-square * inverse) * facing * facing * prt_weight(samples[i].area, samples[i].open, grid.radius);
+                    float kernel_weight = exp(-square * inverse) * facing * facing;
+                    float weight = kernel_weight * prt_weight(samples[i].area, samples[i].open, grid.radius);
                     if (turn == 1u) weight += 1e-12 / (1e-9 + square);
                     if (square < found.away) {
                         found.away = square;
                         found.nearest = i;
                     }
-                    if (weight < 1e-9 && turn == 0u) continue;
+                    if (kernel_weight < 1e-9 && turn == 0u) continue;
                     sum += weight;
                     found.irradiance += weight * irradiances[i];
 #ifdef PRT_LOBE

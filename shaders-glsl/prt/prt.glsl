@@ -46,7 +46,7 @@ struct PrtPoint {
     vec2 barycentrics;
     float gap;          // distance by which rays start off the surface, metres
     float area;         // of the surface that the sample stands for, m²; of a hit: free distance above the surface, metres
-    float open;         // share of the hemisphere, weighted by the cosine, that is free within a distance of samples
+    float open;         // share of the hemisphere, weighted by the cosine, that is free within a distance of samples; 0.1 at least
 };
 
 // What decides which sample stands for a point.

@@ -1,4 +1,4 @@
-// Light of splats: the mean of their samples, by area.
+// Light of splats: the mean of their samples, by area and free share.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require

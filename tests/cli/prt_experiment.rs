@@ -91,7 +91,7 @@ fn the_shipped_experiment_gives_all_its_tables() {
             .map(|row| number(row, side))
             .unwrap()
     };
-    let (paper, ours) = ("the paper's settings", "the defaults");
+    let (paper, ours) = ("the paper's settings", "the default bake");
     assert!((of("coefficients kept", paper) - 20.0).abs() < 0.5 && of("coefficients kept", ours) > 99.0);
     assert_eq!([of("vectors of light, d₂", paper), of("vectors of light, d₂", ours)], [10.0, 24.0]);
     assert!((600.0..1600.0).contains(&of("samples", ours)), "{sizes:?}");

@@ -19,6 +19,8 @@ mod prt_odd;
 mod prt_pixels;
 #[path = "../prt_samples.rs"]
 mod prt_samples;
+#[path = "../prt_shadows.rs"]
+mod prt_shadows;
 #[path = "../prt_transfer.rs"]
 mod prt_transfer;
 #[path = "../prt_units.rs"]

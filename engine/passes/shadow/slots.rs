@@ -32,17 +32,23 @@ impl Assignment {
     }
 }
 
-/// Gives maps to lights in their order until [`consts::MAX_SHADOW_SLOTS`] are taken. `bounds`: the scene's, which limit
+/// Gives maps to the lights that `casts` chooses, in their order, until [`consts::MAX_SHADOW_SLOTS`] are taken. `bounds`: the scene's, which limit
 /// the reach of lights without a range.
-pub fn assign(lights: &[types::Light], bounds: &Aabb, view: &View, settings: &Settings) -> Assignment {
+pub fn assign(
+    lights: &[types::Light],
+    bounds: &Aabb,
+    view: &View,
+    settings: &Settings,
+    casts: impl Fn(&types::Light) -> bool,
+) -> Assignment {
     let mut out = Assignment::none(lights.len());
     if !bounds.is_finite() {
         return out;
     }
-    for (index, light) in lights.iter().enumerate() {
+    for (index, light) in lights.iter().enumerate().filter(|(_, light)| casts(light)) {
         let slots = match light.kind {
             consts::LIGHT_DIRECTIONAL => cascades(light, bounds, view, settings),
-            consts::LIGHT_SPOT if outer_angle(light) <= WIDEST_SPOT => vec![spot(light, bounds, settings)],
+            _ if local_maps(light) == 1 => vec![spot(light, bounds, settings)],
             _ => faces(light, bounds, settings).to_vec(),
         };
         if out.slots.len() + slots.len() > consts::MAX_SHADOW_SLOTS as usize {
@@ -53,6 +59,11 @@ pub fn assign(lights: &[types::Light], bounds: &Aabb, view: &View, settings: &Se
         out.slots.extend(slots);
     }
     out
+}
+
+/// Maps of a point or spot light.
+pub fn local_maps(light: &types::Light) -> u32 {
+    if light.kind == consts::LIGHT_SPOT && outer_angle(light) <= WIDEST_SPOT { 1 } else { 6 }
 }
 
 /// Where a spot light's cone ends, radians.
@@ -241,7 +252,7 @@ mod tests {
         let mut lights = vec![light(LIGHT_SPOT), light(LIGHT_DIRECTIONAL)];
         lights.extend([light(LIGHT_POINT); 10]);
         lights.push(light(LIGHT_SPOT));
-        let got = assign(&lights, &bounds(), &view(Vec3::ZERO, 0.0), &Settings::default());
+        let got = assign(&lights, &bounds(), &view(Vec3::ZERO, 0.0), &Settings::default(), |_| true);
         let counts: Vec<u32> = got.lights.iter().map(|l| l.count).collect();
         assert_eq!(counts, [1, 4, 6, 6, 6, 6, 6, 6, 6, 6, 6, 0, 1]);
         assert_eq!(got.unshadowed, [11]);
@@ -268,14 +279,14 @@ mod tests {
             let b = bounds();
             prop_assume!(point.cmpge(b.min).all() && point.cmple(b.max).all());
             let settings = Settings { cascades, ..Settings::default() };
-            let got = assign(&[light(consts::LIGHT_DIRECTIONAL)], &b, &view, &settings);
+            let got = assign(&[light(consts::LIGHT_DIRECTIONAL)], &b, &view, &settings, |_| true);
             prop_assert!(got.slots.iter().any(|s| project(s, point).is_some()), "{point}");
         }
 
         #[test]
         fn cascades_move_in_whole_texels_and_keep_their_size(step in [-0.3f32..0.3, -0.3..0.3, -0.3..0.3]) {
             let settings = Settings { distance: 30.0, ..Settings::default() };
-            let at = |p: Vec3| assign(&[light(consts::LIGHT_DIRECTIONAL)], &bounds(), &view(p, 0.4), &settings).slots;
+            let at = |p: Vec3| assign(&[light(consts::LIGHT_DIRECTIONAL)], &bounds(), &view(p, 0.4), &settings, |_| true).slots;
             let (a, b) = (at(Vec3::ZERO), at(step.into()));
             prop_assert_eq!(a.len(), b.len());
             for (a, b) in a.iter().zip(&b) {
@@ -294,7 +305,7 @@ mod tests {
             prop_assume!(d.length() > 0.1);
             let light = light(consts::LIGHT_POINT);
             let point = Vec3::from(light.position) + d.normalize() * 10.0;
-            let got = assign(&[light], &bounds(), &view(Vec3::ZERO, 0.0), &Settings::default());
+            let got = assign(&[light], &bounds(), &view(Vec3::ZERO, 0.0), &Settings::default(), |_| true);
             let depths: Vec<f32> = got.slots.iter().filter_map(|s| project(s, point)).map(|p| p.z).collect();
             prop_assert!(!depths.is_empty());
             for depth in depths {
@@ -308,7 +319,7 @@ mod tests {
             let along = Vec3::from(light.direction);
             let side = glam::Quat::from_axis_angle(along, turn) * along.any_orthonormal_vector();
             let point = Vec3::from(light.position) + (along * angle.cos() + side * angle.sin()) * distance;
-            let slot = assign(&[light], &bounds(), &view(Vec3::ZERO, 0.0), &Settings::default()).slots[0];
+            let slot = assign(&[light], &bounds(), &view(Vec3::ZERO, 0.0), &Settings::default(), |_| true).slots[0];
             let place = project(&slot, point);
             prop_assert!(place.is_some_and(|p| p.truncate().abs().max_element() < 0.999), "{place:?}");
         }

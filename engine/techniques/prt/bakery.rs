@@ -34,8 +34,11 @@ const MOST_ROUNDS: u32 = 96;
 const LEAST_INSIDE: f64 = 0.05;
 /// Share by which the number of samples may differ from the one that is asked for.
 const FAR_FROM_ASKED: f32 = 0.1;
+/// Corrections of the distance of samples for their number.
+const MOST_CORRECTIONS: u32 = 3;
 /// Rays that tell how open the surroundings of a sample are.
 const OPEN_RAYS: u32 = 64;
+const LEAST_OPEN: f32 = 0.1;
 /// Samples from which the area that light reaches is estimated.
 const PILOT: f32 = 3000.0;
 
@@ -140,10 +143,25 @@ impl Bakery {
         };
         let mut thinned = thin(self, &mut triangles, radius)?;
         // Steps and curved surfaces have samples that the estimate does not know of.
-        let more = thinned.samples.len() as f32 / baking.samples as f32;
-        if (more - 1.0).abs() > FAR_FROM_ASKED {
-            radius *= more.sqrt();
-            thinned = thin(self, &mut triangles, radius)?;
+        let more = |found: &Thinned| found.samples.len() as f32 / baking.samples as f32;
+        let apart = |of: f32| of.max(0.01).ln().abs();
+        let mut power = 0.5;
+        for _ in 0..MOST_CORRECTIONS {
+            let before = more(&thinned);
+            if before <= 0.0 || (before - 1.0).abs() <= FAR_FROM_ASKED {
+                break;
+            }
+            let other = radius * before.clamp(0.25, 4.0).powf(power);
+            // The same particles come again.
+            triangles.forget();
+            let again = thin(self, &mut triangles, other)?;
+            let after = more(&again);
+            // Slits come and go with the distance, so the number may jump away.
+            if apart(after) >= apart(before) {
+                break;
+            }
+            power = ((other / radius).ln() / (before / after).ln()).clamp(0.3, 2.0);
+            (radius, thinned) = (other, again);
         }
         let Thinned { samples: mut found, places, escaped, .. } = thinned;
         if found.len() > plan::MOST_SAMPLES {
@@ -302,24 +320,27 @@ impl Bakery {
         Ok(self.runner.run(&graph)?.buffer(read))
     }
 
-    /// The share of the hemisphere above each sample, weighted by the cosine, in which nothing is nearer than `most`, metres.
+    /// The share of the hemisphere above each sample, weighted by the cosine, in which nothing is nearer than `most`, metres; [`LEAST_OPEN`] at least.
     fn openness(&mut self, samples: &[PrtPoint], most: f32, seed: u32) -> Result<Vec<f32>> {
         let count = samples.len() as u32;
         let mut graph = Graph::new("prt.openness");
         let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
         let rays = self.rays.frame(&mut graph, &handles);
-        let shares = graph.buffer("prt.openness", 4 * u64::from(count));
+        let free = graph.buffer("prt.openness", 4 * u64::from(count));
+        graph.fill(free, 0);
         let args = traced!(
             openness::Args {
                 samples: graph.buffer_from("prt.samples", samples),
-                shares,
-                push: openness::Push { count, rays: OPEN_RAYS, most, seed },
+                free,
+                push: openness::Push { first: 0, count: OPEN_RAYS, samples_all: count, most, seed },
             },
             rays
         );
-        graph.compute(args, count).rays(u64::from(count) * u64::from(OPEN_RAYS));
-        let read = graph.read_buffer(shares);
-        Ok(self.runner.run(&graph)?.buffer(read))
+        graph.compute_over(args, count, Items::new(OPEN_RAYS).rays(count.into()).turns(self.rays.most_turns()));
+        let read = graph.read_buffer(free);
+        let free: Vec<u32> = self.runner.run(&graph)?.buffer(read);
+        // A sample in a hole is not without any weight, because nothing else may be there.
+        Ok(free.into_iter().map(|free| (free as f32 / OPEN_RAYS as f32).max(LEAST_OPEN)).collect())
     }
 
     /// Distances from the samples of a cluster in the directions of its cap, metres: a row for each sample. Negative: below the horizon.

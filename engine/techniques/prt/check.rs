@@ -127,7 +127,7 @@ struct Truth {
 }
 
 /// Compares the light that a bake transfers with light by following paths, for points of 1 W/sr as lights. The scene's own lights are off. `settings`:
-/// of the pictures, but for the strength and the radius of lights; the truth knows `gloss` alone, and always has all scatterings.
+/// of the pictures, but for the strength and the radius of lights, and always with shadows by the samples; the truth knows `gloss` alone, and always has all scatterings.
 ///
 /// # Errors
 /// `Input` if the light of all scatterings is not finite; `Usage` if there is nothing to compare; `OutOfMemory`, `DeviceLost`, `Interrupted`.
@@ -210,7 +210,7 @@ fn chosen(stored: &Stored, count: u32) -> Vec<u32> {
     out
 }
 
-/// Direct and indirect irradiance at all samples by a light of 1 W/sr at each of these places, as pictures have them, W/m². `settings`: of the pictures;
+/// Direct and indirect irradiance at all samples by a light of 1 W/sr at each of these places, as pictures with shadows by the samples have them, W/m². `settings`: of the pictures;
 /// the strength of lights counts, and so do their radius and their points.
 ///
 /// # Errors

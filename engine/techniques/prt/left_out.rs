@@ -2,7 +2,10 @@
 
 use glam::Vec3;
 
-use crate::scene::{LightKind, Material, Note, NoteKind, Scene};
+use crate::{
+    passes::shadow,
+    scene::{LightKind, Material, Note, NoteKind, Scene},
+};
 
 /// Names in a note at most.
 const MOST_NAMES: usize = 5;
@@ -15,7 +18,7 @@ pub fn simplified(scene: &Scene) -> Vec<Note> {
     notes.extend(named("mirrors reflect light as diffuse surfaces", &|m| m.is_mirror()));
     notes.extend(named("unlit surfaces neither stop nor reflect light", &|m| m.unlit));
     if scene.animations.iter().any(|of| of.channels.iter().any(|c| moves(scene, c.node))) {
-        notes.push(note("animations", "surfaces that move are baked where they rest".into()));
+        notes.push(note("animations", "surfaces that move are baked where they rest; in shadow maps they move".into()));
     }
     notes
 }
@@ -34,6 +37,12 @@ pub(super) fn left_out(scene: &Scene) -> Vec<Note> {
     notes.extend(named(scene, "some surfaces glow, but they light nothing", &|m| m.emissive != Vec3::ZERO && !m.unlit));
     notes.extend(simplified(scene));
     notes
+}
+
+/// A note if shadow maps have settings of their own, although there are no maps.
+pub(super) fn idle_maps(settings: &shadow::Settings) -> Vec<Note> {
+    let changed = *settings != shadow::Settings::default();
+    changed.then(|| note("shadow", "has no effect, because shadows are by the samples".into())).into_iter().collect()
 }
 
 fn note(place: &str, text: String) -> Note {

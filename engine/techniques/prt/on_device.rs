@@ -187,7 +187,7 @@ impl OnDevice {
         products[2] = 3 * (all * all) as u64 + rounds * mixed.len() as u64;
         let kept = plan.settings.kept_rays() as u64;
         let directions = kept * stored.samples.len() as u64;
-        if 4 * directions > most || 12 * u64::from(consts::PRT_LOBES) * stored.samples.len() as u64 > most {
+        if 4 * directions > most || kept > 0 && 12 * u64::from(consts::PRT_LOBES) * stored.samples.len() as u64 > most {
             let what = format!("keeps {directions} rays, too many for the device's buffers of {most} bytes");
             return Err(Error::input(what).help("Bake with fewer samples, or keep fewer rays (room.directional)"));
         }

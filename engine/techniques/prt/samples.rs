@@ -151,6 +151,11 @@ impl Triangles {
         out
     }
 
+    /// Forgets all hits.
+    pub fn forget(&mut self) {
+        self.hits.fill([0; 2]);
+    }
+
     /// Counts the hit of a particle.
     pub fn count(&mut self, hit: &PrtPoint) {
         if let Some((at, back)) = self.find(hit) {

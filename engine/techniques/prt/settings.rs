@@ -11,9 +11,6 @@ use crate::{
     technique,
 };
 
-/// Shadow maps of a point light.
-const CUBE: u32 = 6;
-
 /// Settings that decide the bytes of a bake.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -136,7 +133,7 @@ pub(super) fn too_many_vectors(what: String) -> Error {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Direct {
-    /// By shadow maps, if the lights are points and if there are maps for all of them (ten point lights); else by samples.
+    /// By shadow maps, if the lights are points and if there are maps for all of them (64: six for a point light, one for a narrow spot light); else by samples.
     #[default]
     Auto,
     /// By the visibility of the samples, as in the paper: soft shadows at the distance of the samples.
@@ -168,7 +165,7 @@ pub struct Settings {
     #[schemars(range(min = 1, max = 256), extend("x-needs" = {"direct": {"enum": ["auto", "samples"]}}))]
     pub points: u32,
     /// Radius of lights: their points are on a sphere.
-    #[schemars(range(min = 0, max = 100), extend("x-unit" = "m", "x-needs" = {"direct": {"enum": ["auto", "samples"]}}))]
+    #[schemars(range(min = 0, max = 100), extend("x-unit" = "m", "x-needs" = {"direct": {"enum": ["auto", "samples"]}, "points": {"minimum": 2}}))]
     pub radius: f32,
     /// A light that is farther away than the stored distance by less than this share of it is visible.
     #[schemars(range(min = 0, max = 1), extend("x-needs" = {"direct": {"enum": ["auto", "samples"]}}))]
@@ -212,13 +209,15 @@ pub struct Settings {
 described!(Settings);
 
 impl Settings {
-    /// Whether shadow maps shadow so many lights.
-    pub(super) fn by_maps(&self, lights: u32) -> bool {
-        match self.direct {
-            Direct::Auto => self.radius == 0.0 && CUBE * lights <= MAX_SHADOW_SLOTS,
-            Direct::Samples => false,
-            Direct::Maps => true,
-        }
+    /// The settings with `auto` decided. `maps`: shadow maps that all lights need; `None`: shadow maps are off.
+    pub(super) fn decided(&self, maps: Option<u32>) -> Self {
+        let points = self.radius == 0.0 || self.points == 1;
+        let direct = match self.direct {
+            Direct::Auto if points && maps.is_some_and(|maps| maps <= MAX_SHADOW_SLOTS) => Direct::Maps,
+            Direct::Auto => Direct::Samples,
+            chosen => chosen,
+        };
+        Self { direct, ..self.clone() }
     }
 }
 

@@ -50,7 +50,7 @@ impl Spreader {
             Spread::Splats => Way::Splats(Splats::new(gpu, stored)?),
             Spread::Vertices => Way::Vertices(Vertices::new(gpu, scene)?),
         };
-        // Not all devices blend 32 bits. The weights of a pixel sum to about 1, so halves are off by a thousandth.
+        // Not all devices blend 32 bits. The weights of a pixel on an open surface sum to about 1, so halves are off by a thousandth.
         let format = if gpu.caps().blend_float32 { Format::RGBA32F } else { Format::RGBA16F };
         Ok(Self { way, format })
     }

@@ -1,8 +1,8 @@
 //! Precomputed transfer behind the interface of all techniques.
 
 use super::{
-    Baked, PictureSettings, Settings, Stored, eyes,
-    left_out::left_out,
+    Baked, Direct, PictureSettings, Settings, Stored, eyes,
+    left_out::{idle_maps, left_out},
     on_device::OnDevice,
     pixels::{Drawing, Shown},
     spread::Spreader,
@@ -12,7 +12,7 @@ use crate::{
     graph::Graph,
     passes::shadow,
     settings::{Described, Description, idle_notes},
-    shaders::consts,
+    shaders::{consts, types},
     technique::{self, Making, Moment, Picture, Technique},
 };
 
@@ -128,8 +128,11 @@ impl Technique for Prt {
         let count = lights.len() as u32;
         // Pictures of single samples have no light.
         let of_light = !matches!(mode, Mode::Samples | Mode::Clusters | Mode::Transfer);
-        let by_maps = of_light && of_prt.by_maps(count);
-        let maps = by_maps.then(|| shadow::draw(graph, handles, view, &settings.shadow));
+        let local = |light: &types::Light| light.kind != consts::LIGHT_DIRECTIONAL;
+        let needed = lights.iter().filter(|light| local(light)).map(shadow::local_maps).sum();
+        let of_prt = &of_prt.decided((settings.shadow.kind != shadow::Kind::Off).then_some(needed));
+        let by_maps = of_light && of_prt.direct == Direct::Maps;
+        let maps = by_maps.then(|| shadow::draw_of(graph, handles, view, &settings.shadow, local));
         let plan = &self.baked.stored.plan;
         let mut lit = self.light.light(graph, plan, (handles.lights, count), maps.as_ref(), of_prt);
         if mode == Mode::Transfer {
@@ -144,7 +147,8 @@ impl Technique for Prt {
             lit.irradiances = self.light.sent(graph, one);
         }
         let of_maps = maps.as_ref().map_or(&[][..], |maps| &maps.notes);
-        let notes = [moment.notes, of_maps, &left_out(moment.scene), &idle_notes("shadow", &settings.shadow)].concat();
+        let idle = if by_maps { idle_notes("shadow", &settings.shadow) } else { idle_maps(&settings.shadow) };
+        let notes = [moment.notes, of_maps, &left_out(moment.scene), &idle_notes("prt", of_prt), &idle].concat();
         // Where shadow maps take the place of the visibility, and where there is no light, the first lights are enough for the layer.
         let visible = if of_light && !by_maps { count } else { count.min(consts::PRT_SPREAD_LIGHTS) };
         let spread = self.spreader.light(graph, handles, (&self.light, &lit), visible, of_prt);

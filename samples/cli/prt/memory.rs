@@ -20,7 +20,7 @@ pub fn need(room: &Baking) -> u64 {
     let directions = 8 * samples * u64::from(room.directional.min(room.rays));
     // All scatterings are solved between all vectors.
     let solved = 32 * vectors * vectors;
-    (100 << 20) + solved + 2 * of_cluster + 2 * stored + 2 * transfer + linked + directions
+    (160 << 20) + solved + 2 * of_cluster + 2 * stored + 2 * transfer + linked + directions
 }
 
 /// Refuses a bake that needs more than `free` bytes; `None`: unknown.

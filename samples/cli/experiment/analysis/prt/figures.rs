@@ -65,7 +65,7 @@ pub(super) fn bake(results: &Results, cases: &[Case<'_>]) -> Result<Option<Secti
 /// Figures 4 and 5; `None` without pictures that have a reference.
 pub(super) fn light(results: &Results, cases: &[Case<'_>]) -> Result<Option<Section>> {
     let mut section = Section::new("Figures 4 and 5: shadow, indirect light and all light beside the path tracer");
-    section.text("`paper` has the paper's settings with the transfer of the mean, `ours` the defaults; the same lights with more points are area lights.");
+    section.text("`paper` has the paper's settings with the transfer of the mean, `ours` those of the default bake; both have shadows by the samples, and diffuse surfaces; the same lights with more points are area lights.");
     let lit = |case: &&Case<'_>| case.truth.is_some() && case.shows_light() && !case.run.method.starts_with("study");
     // One set for each reference: all techniques by its light.
     let mut sets: Vec<(&str, Vec<&Case<'_>>)> = Vec::new();

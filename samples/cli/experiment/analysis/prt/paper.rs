@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// The techniques with the paper's settings and with the defaults.
-pub(super) const SIDES: [(&str, &str); 2] = [("paper", "the paper's settings"), ("ours", "the defaults")];
+pub(super) const SIDES: [(&str, &str); 2] = [("paper", "the paper's settings"), ("ours", "the default bake")];
 /// The paper's frames a second with a point light, and with an area light of 25 points.
 const FRAMES: [f64; 2] = [30.0, 25.0];
 /// The paper's time of the precomputation, hours, about.
@@ -40,7 +40,7 @@ pub(super) fn section(results: &Results, cases: &[Case<'_>]) -> Result<Option<Se
     let mut section = Section::new("Section 6: sizes and times beside the paper's");
     section.text(
         "Two bakes of the built-in `parlour`. *The paper's settings*: ten vectors of light around the mean of the examples, and the fifth of all coefficients \
-         between vectors and samples that counts most. *The defaults*: 24 vectors of light around zero, and 48 vectors of the receivers in place of the \
+         between vectors and samples that counts most. *The default bake*: 24 vectors of light around zero, and 48 vectors of the receivers in place of the \
          coefficients. The paper's room, program and GPU are other ones, so its figures stand here for their order of size alone. Its 4.47 MB of \
          visibility are those of the means and coefficients; the vectors, which a picture needs too, are counted apart here. The paper's transfer of 21 MB \
          holds what it keeps of the coefficients for red, green and blue; the transfer here has no colour, because albedos are applied when a picture is made.",
