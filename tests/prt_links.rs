@@ -4,12 +4,14 @@ use crate::{
     prt_lab::{baked, small},
     prt_light::room,
 };
+use glam::{Vec3, vec3};
 use lucerna::{
     Stop,
     gpu::testing::with_gpu,
+    shaders::types::PrtPoint,
     techniques::prt::{
         Baking, Settings, Stored,
-        check::{CheckOptions, at_samples, check},
+        check::{CheckOptions, RelativeError, at_samples, check},
         solve,
     },
 };
@@ -81,9 +83,34 @@ fn links_lower_the_error_of_light_near_surfaces() {
         let options = CheckOptions { lights: 6, samples: 150, paths: 256, seed: 0 };
         let [by_vectors, by_links] = [0, 3].map(|linked| {
             let found = check(gpu, &scene, &stored, &diffuse(linked), options, &Stop::default()).unwrap();
-            let errors: Vec<f64> = found.iter().filter_map(|light| Some(light.transferred?.error)).collect();
-            (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()
+            let errors = |of: fn(&RelativeError) -> f64| {
+                let all: Vec<f64> = found.iter().filter_map(|light| Some(of(&light.transferred?))).collect();
+                (all.iter().map(|error| error * error).sum::<f64>() / all.len() as f64).sqrt()
+            };
+            [errors(|of| of.error), errors(|of| of.most)]
         });
-        assert!(by_links < 0.8 * by_vectors, "{by_links} {by_vectors}");
+        assert!(by_links[0] < by_vectors[0] && by_links[1] < by_vectors[1], "{by_links:?} {by_vectors:?}");
+        // The same samples and rays with many more vectors: what is left is the error of the vectors alone.
+        let many = baked(gpu, &scene, &Baking { light: 64, receivers: 0, ..stored.plan.settings.clone() });
+        assert!(many.samples == stored.samples);
+        let albedos = vec![[0.6; 3]; stored.samples.len()];
+        let near = |at: Vec3| -> Vec<[f32; 3]> {
+            let of = |sample: &PrtPoint| {
+                let way = at - Vec3::from(sample.position);
+                [Vec3::from(sample.normal).dot(way).max(0.0) / way.length().powi(3); 3]
+            };
+            stored.samples.iter().map(of).collect()
+        };
+        let mut sums = [0.0; 2];
+        for at in [vec3(-1.8, 1.2, 0.3), vec3(1.7, 0.4, -1.2), vec3(0.0, 2.3, 0.8)] {
+            let light = near(at);
+            let of = |stored: &Stored, linked| solve::indirect(stored, &albedos, &light, &diffuse(linked)).unwrap();
+            let (truth, found) = (of(&many, 16), [0, 3].map(|linked| of(&stored, linked)));
+            let whole = norm(&stored, |i| truth[i][0]);
+            let [by_vectors, by_links] = found.map(|found| norm(&stored, |i| found[i][0] - truth[i][0]) / whole);
+            assert!(by_links < 0.9 * by_vectors, "{at}: {by_links} {by_vectors}");
+            sums = [sums[0] + by_links, sums[1] + by_vectors];
+        }
+        assert!(sums[0] < 0.6 * sums[1], "{sums:?}");
     });
 }
