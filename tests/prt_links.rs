@@ -87,7 +87,7 @@ fn links_lower_the_error_of_light_near_surfaces() {
                 let all: Vec<f64> = found.iter().filter_map(|light| Some(of(&light.transferred?))).collect();
                 (all.iter().map(|error| error * error).sum::<f64>() / all.len() as f64).sqrt()
             };
-            [errors(|of| of.error), errors(|of| of.most)]
+            [errors(|of| of.error), errors(|of| of.trimmed)]
         });
         assert!(by_links[0] < by_vectors[0] && by_links[1] < by_vectors[1], "{by_links:?} {by_vectors:?}");
         // The same samples and rays with many more vectors: what is left is the error of the vectors alone.

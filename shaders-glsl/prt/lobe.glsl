@@ -13,10 +13,10 @@ float[PRT_LOBES] prt_zernike(vec2 at) {
                             2.4494897 * (at.x * at.x - at.y * at.y));
 }
 
-// Directions from which a glossy surface sends light to a viewer, taken as a lobe around a main direction.
+// Directions from which a glossy surface sends light to a viewer, taken as a lobe around a dominant direction.
 struct PrtLobe {
-    vec3 main;          // unit
-    float cosine;       // mean cosine of the angle to `main`
+    vec3 dominant;      // unit
+    float cosine;       // mean cosine of the angle to `dominant`
     float square;       // mean of the square of this cosine
 };
 
@@ -25,8 +25,8 @@ struct PrtLobe {
 PrtLobe prt_lobe(vec3 n, vec3 v, float alpha) {
     PrtLobe lobe;
     // A rough surface reflects more from above than a mirror (Lagarde and de Rousiers, Moving Frostbite to Physically Based Rendering, 2014).
-    vec3 main = mix(n, reflect(-v, n), (1.0 - alpha) * (sqrt(1.0 - alpha) + alpha));
-    lobe.main = dot(main, main) > 1e-8 ? normalize(main) : n;
+    vec3 way = mix(n, reflect(-v, n), (1.0 - alpha) * (sqrt(1.0 - alpha) + alpha));
+    lobe.dominant = dot(way, way) > 1e-8 ? normalize(way) : n;
     // Means of c = cos²θ and of its square for the facets, in closed form, and where the forms lose their digits, by their series.
     float a2 = alpha * alpha, k = 1.0 - a2, log_a2 = log(a2);
     float c = 0.5 + k * (1.0 / 6.0 + k * (1.0 / 12.0 + k * (0.05 + k / 30.0)));
@@ -43,8 +43,8 @@ PrtLobe prt_lobe(vec3 n, vec3 v, float alpha) {
 // Mean of the radiance over a lobe. `mean`: irradiance over π; `normal`: of the sample; `terms`: its coefficients.
 vec3 prt_radiance(PrtLobe lobe, vec3 normal, vec3 mean, vec3[PRT_LOBES] terms) {
     mat3 frame = frame_around(normal);
-    vec2 at = vec2(dot(frame[0], lobe.main), dot(frame[1], lobe.main));
-    // The mean of ω ωᵀ over a lobe is along · m mᵀ + even · 1.
+    vec2 at = vec2(dot(frame[0], lobe.dominant), dot(frame[1], lobe.dominant));
+    // The mean of ω ωᵀ over a lobe is along · d dᵀ + even · 1.
     float along = 1.5 * lobe.square - 0.5, even = 0.5 - 0.5 * lobe.square;
     vec3 sum = mean + 2.0 * lobe.cosine * (at.x * terms[0] + at.y * terms[1]);
     sum += 1.7320508 * (2.0 * (along * dot(at, at) + 2.0 * even) - 1.0) * terms[2];

@@ -41,8 +41,9 @@ impl Default for CheckOptions {
 pub struct RelativeError {
     /// Root mean square of the error over that of the truth, over all samples and colours. The noise of the truth is taken away.
     pub error: f64,
-    /// The same without the samples that are off most, a twentieth of all, as half of the paths tell; the other half tells the error of the rest.
-    pub most: f64,
+    /// The same without the twentieth of the samples whose error is largest. One half of the paths finds these samples, and the other half gives the error of all
+    /// other samples, so that noise does not choose.
+    pub trimmed: f64,
     /// Sum of the light over that of the truth.
     pub energy: f64,
 }
@@ -62,7 +63,7 @@ pub struct LightErrors {
     pub transferred: Option<RelativeError>,
 }
 
-/// One sample in this number is left out as one of those that are off most.
+/// One in so many samples is left out of the trimmed error.
 const WORST: usize = 20;
 
 /// Means of the paths of a sample, one for each part of them.
@@ -113,8 +114,8 @@ impl Sums {
         let error = relative(&self.samples, |sample| sample.all).filter(|_| self.truth > 0.0)?;
         self.samples.sort_by(|a, b| a.first.total_cmp(&b.first));
         let kept = self.samples.len() - self.samples.len() / WORST;
-        let most = relative(&self.samples[..kept], |sample| sample.second).unwrap_or(error);
-        Some(RelativeError { error, most, energy: self.found / self.truth })
+        let trimmed = relative(&self.samples[..kept], |sample| sample.second).unwrap_or(error);
+        Some(RelativeError { error, trimmed, energy: self.found / self.truth })
     }
 }
 
@@ -127,7 +128,8 @@ struct Truth {
 }
 
 /// Compares the light that a bake transfers with light by following paths, for points of 1 W/sr as lights. The scene's own lights are off. `settings`:
-/// of the pictures, but for the strength and the radius of lights, and always with shadows by the samples; the truth knows `gloss` alone, and always has all scatterings.
+/// of the pictures, but for the strength and the radius of lights, and always with shadows by the samples; the truth knows `gloss` alone, and always has all
+/// scatterings.
 ///
 /// # Errors
 /// `Input` if the light of all scatterings is not finite; `Usage` if there is nothing to compare; `OutOfMemory`, `DeviceLost`, `Interrupted`.
@@ -210,8 +212,8 @@ fn chosen(stored: &Stored, count: u32) -> Vec<u32> {
     out
 }
 
-/// Direct and indirect irradiance at all samples by a light of 1 W/sr at each of these places, as pictures with shadows by the samples have them, W/m². `settings`: of the pictures;
-/// the strength of lights counts, and so do their radius and their points.
+/// Direct and indirect irradiance at all samples by a light of 1 W/sr at each of these places, as pictures with shadows by the samples have them, W/m².
+/// `settings`: of the pictures; the strength of lights counts, and so do their radius and their points.
 ///
 /// # Errors
 /// `Input` if the light of all scatterings is not finite; `OutOfMemory`, `DeviceLost`, `Interrupted`.
@@ -305,11 +307,11 @@ mod tests {
         let found = sums.error().unwrap();
         assert!((found.error - 0.1).abs() < 0.01 && (found.energy - 1.1).abs() < 0.01, "{found:?}");
         // Samples of little noise are taken for good ones, and so are those of little error.
-        assert!((found.most - 0.1).abs() < 0.01, "{found:?}");
+        assert!((found.trimmed - 0.1).abs() < 0.01, "{found:?}");
     }
 
     #[test]
-    fn one_sample_in_twenty_is_left_out_of_most() {
+    fn one_sample_in_twenty_is_left_out_of_the_trimmed_error() {
         let mut sums = Sums::default();
         for i in 0..40 {
             let off = if i % 20 == 7 { 1.0 } else { 0.1 };
@@ -317,7 +319,7 @@ mod tests {
         }
         let found = sums.error().unwrap();
         assert!(
-            (found.most - 0.1).abs() < 1e-9 && (found.error - (0.01f64 * 0.95 + 0.05).sqrt()).abs() < 1e-9,
+            (found.trimmed - 0.1).abs() < 1e-9 && (found.error - (0.01f64 * 0.95 + 0.05).sqrt()).abs() < 1e-9,
             "{found:?}"
         );
     }

@@ -110,13 +110,13 @@ pub fn check(args: &PrtCheckArgs, console: Console) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     console::print(
-        "lights by their distance to surfaces; error: root mean square over that of the truth; most: the same without the twentieth of the samples that is off most; energy: light over that of the truth",
+        "lights by their distance to surfaces; error: root mean square over that of the truth; trimmed: the same without the worst twentieth of the samples; energy: light over that of the truth",
     )?;
     console::print(
         "                   direct                       indirect                     with exact direct light",
     )?;
     console::print(
-        "distance   lights     error      most   energy     error      most   energy     error      most   energy",
+        "distance   lights     error   trimmed   energy     error   trimmed   energy     error   trimmed   energy",
     )?;
     for (from, of) in lines.iter().filter(|(_, of)| !of.is_empty()) {
         let [direct, indirect, transferred] = [
@@ -142,15 +142,15 @@ fn joined(lights: &[LightErrors], of: fn(&LightErrors) -> Option<RelativeError>)
     let count = all.len() as f64;
     (!all.is_empty()).then(|| RelativeError {
         error: (all.iter().map(|one| one.error.powi(2)).sum::<f64>() / count).sqrt(),
-        most: (all.iter().map(|one| one.most.powi(2)).sum::<f64>() / count).sqrt(),
+        trimmed: (all.iter().map(|one| one.trimmed.powi(2)).sum::<f64>() / count).sqrt(),
         energy: all.iter().map(|one| one.energy).sum::<f64>() / count,
     })
 }
 
 fn cells(error: Option<RelativeError>) -> String {
     match error {
-        Some(RelativeError { error, most, energy }) => {
-            format!("  {:>6.1} %  {:>6.1} %  {energy:>7.3}", 100.0 * error, 100.0 * most)
+        Some(RelativeError { error, trimmed, energy }) => {
+            format!("  {:>6.1} %  {:>6.1} %  {energy:>7.3}", 100.0 * error, 100.0 * trimmed)
         }
         None => format!("  {:>8}  {:>8}  {:>7}", "dark", "", ""),
     }
