@@ -1,7 +1,7 @@
 //! Precomputed transfer: glossy surfaces reflect transferred light by its directions.
 
 use crate::{
-    prt_lab::{baked, diffuse, picture, small},
+    prt_lab::{baked, diffuse, picture, small, walls},
     tracer_lab::{Stage, mean, render, view},
 };
 use glam::{DVec3, Vec3, vec3};
@@ -124,14 +124,7 @@ fn hall() -> Scene {
     let blue = stage.material(Material::diffuse("blue", vec3(0.1, 0.1, 0.8)));
     let metal = Material { metallic: 1.0, roughness: 0.5, ..Material::diffuse("metal", Vec3::splat(0.8)) };
     let metal = stage.material(metal);
-    let (x, y, z) = (Vec3::X * 4.0, Vec3::Y * 2.5, Vec3::Z * 3.0);
-    let low = vec3(-2.0, 0.0, -1.5);
-    stage.quad(red, low, y, z);
-    stage.quad(blue, low + x, z, y);
-    stage.quad(metal, low, z, x);
-    stage.quad(white, low + y, x, z);
-    stage.quad(white, low, x, y);
-    stage.quad(white, low + z, y, x);
+    walls(&mut stage, [red, blue, metal, white, white, white]);
     stage.point(vec3(-1.0, 1.6, 0.2), Vec3::splat(5.0));
     stage.scene
 }

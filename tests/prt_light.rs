@@ -1,7 +1,7 @@
 //! Precomputed transfer: closed forms, its slow twin, and the path tracer.
 
 use crate::{
-    prt_lab::{baked, closed, diffuse, picture, sampled, small},
+    prt_lab::{baked, closed, diffuse, picture, sampled, small, walls},
     tracer_lab::{Stage, matt, mean, render, view},
 };
 use glam::{Vec3, vec3};
@@ -21,14 +21,7 @@ pub fn room() -> Scene {
     let mut stage = Stage::new();
     let white = stage.material(Material::diffuse("white", Vec3::splat(0.7)));
     let red = stage.material(Material::diffuse("red", vec3(0.7, 0.1, 0.1)));
-    let (x, y, z) = (Vec3::X * 4.0, Vec3::Y * 2.5, Vec3::Z * 3.0);
-    let low = vec3(-2.0, 0.0, -1.5);
-    stage.quad(red, low, y, z);
-    stage.quad(white, low + x, z, y);
-    stage.quad(white, low, z, x);
-    stage.quad(white, low + y, x, z);
-    stage.quad(white, low, x, y);
-    stage.quad(white, low + z, y, x);
+    walls(&mut stage, [red, white, white, white, white, white]);
     stage.cuboid(white, vec3(0.3, 0.001, -0.6), vec3(0.9, 1.0, 0.2), false);
     stage.point(vec3(-0.4, 1.6, 0.4), Vec3::splat(5.0));
     stage.scene

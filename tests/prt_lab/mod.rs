@@ -64,6 +64,18 @@ pub fn closed(albedo: Vec3) -> Scene {
     stage.scene
 }
 
+/// The inside of a room of 4×2.5×3 m, from −2, 0, −1.5. Materials: at −X and at +X, floor, ceiling, at −Z and at +Z.
+pub fn walls(stage: &mut Stage, [left, right, floor, ceiling, back, front]: [u32; 6]) {
+    let (x, y, z) = (Vec3::X * 4.0, Vec3::Y * 2.5, Vec3::Z * 3.0);
+    let low = vec3(-2.0, 0.0, -1.5);
+    stage.quad(left, low, y, z);
+    stage.quad(right, low + x, z, y);
+    stage.quad(floor, low, z, x);
+    stage.quad(ceiling, low + y, x, z);
+    stage.quad(back, low, x, y);
+    stage.quad(front, low + z, y, x);
+}
+
 pub fn picture(
     gpu: &Gpu,
     scene: &Scene,
