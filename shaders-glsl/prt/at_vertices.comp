@@ -7,7 +7,7 @@
 
 layout(local_size_x = 64) in;
 
-layout(binding = 0, scalar) readonly buffer Samples { PrtPoint samples[]; };
+layout(binding = 0, scalar) readonly buffer Samples { PrtSample samples[]; };
 layout(binding = 1, scalar) uniform GridBlock { PrtGrid grid; };
 layout(binding = 2, scalar) readonly buffer Starts { uint starts[]; };
 layout(binding = 3, scalar) readonly buffer Order { uint order[]; };

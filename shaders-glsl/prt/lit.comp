@@ -11,7 +11,7 @@
 
 layout(local_size_x = 64) in;
 
-layout(binding = 0, scalar) readonly buffer Samples { PrtPoint samples[]; };
+layout(binding = 0, scalar) readonly buffer Samples { PrtSample samples[]; };
 layout(binding = 1, scalar) readonly buffer Clusters { uint clusters[]; };      // of each sample
 layout(binding = 2, scalar) readonly buffer Caps { PrtCap caps[]; };
 layout(binding = 3, scalar) readonly buffer Rows { uint rows[]; };              // halves: of directions and of samples
@@ -37,7 +37,7 @@ float row_product(uint a, uint b, uint words) {
 }
 
 // Share of a point of a light that a sample sees: the four directions around it, those above the horizon.
-float seen_share(PrtPoint s, PrtCap cap, uint row, vec3 direction, float far) {
+float seen_share(PrtSample s, PrtCap cap, uint row, vec3 direction, float far) {
     vec2 place = cap_place(cap, direction) * float(cap.side) - 0.5;
     vec2 corner = floor(place);
     vec2 f = place - corner;
@@ -61,7 +61,7 @@ float seen_share(PrtPoint s, PrtCap cap, uint row, vec3 direction, float far) {
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= count) return;
-    PrtPoint s = samples[i];
+    PrtSample s = samples[i];
     PrtCap cap = caps[clusters[i]];
     uint row = cap.first_sample_row + (i - cap.first_sample) * cap.words;
     vec3 sum = vec3(0.0);

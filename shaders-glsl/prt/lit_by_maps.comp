@@ -10,7 +10,7 @@
 
 layout(local_size_x = 64) in;
 
-layout(binding = 0, scalar) readonly buffer Samples { PrtPoint samples[]; };
+layout(binding = 0, scalar) readonly buffer Samples { PrtSample samples[]; };
 layout(binding = 4, scalar) writeonly buffer Direct { vec3 direct[]; };    // irradiance, W/m²
 layout(binding = 5, scalar) writeonly buffer Visible { float visible[]; }; // share of each light that a sample sees; light after light
 
@@ -22,7 +22,7 @@ layout(push_constant, scalar) uniform Push {
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= count) return;
-    PrtPoint s = samples[i];
+    PrtSample s = samples[i];
     vec3 sum = vec3(0.0);
     for (uint l = 0u; l < light_count; ++l) {
         Light one = light(l);

@@ -50,7 +50,7 @@ PrtNear near_samples(vec3 position, vec3 n, PrtKernel kernel) {
                     float off = dot(way, n);
                     square += PRT_STEP * off * off;
                     float kernel_weight = exp(-square * inverse) * facing * facing;
-                    float weight = kernel_weight * prt_weight(samples[i].area, samples[i].open, grid.radius);
+                    float weight = kernel_weight * samples[i].weight;
                     if (turn == 1u) weight += 1e-12 / (1e-9 + square);
                     if (square < found.away) {
                         found.away = square;

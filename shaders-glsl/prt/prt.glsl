@@ -49,6 +49,14 @@ struct PrtPoint {
     float open;         // share of the hemisphere, weighted by the cosine, that is free within a distance of samples; 0.1 at least
 };
 
+// A sample as the passes of a picture read it.
+struct PrtSample {
+    vec3 position;      // metres
+    float weight;       // in the mean over the samples around a pixel; about 1 on open surfaces
+    vec3 normal;        // shading normal on the lit side, unit
+    vec3 side;          // normal of the triangle on the lit side, unit
+};
+
 // What decides which sample stands for a point.
 struct PrtCandidate {
     vec3 position;      // metres
@@ -90,14 +98,6 @@ struct PrtMesh {
     uint first;         // of its values
     uint sides;         // 1, or 2 for double-sided surfaces: front and back of each vertex
 };
-
-// The weight of a sample in the mean over the samples around a pixel: about 1 on open surfaces. By area, because many samples with small areas in a gap do
-// not count more than others. The powers keep the darkness behind a picture, and the shadow along its frame, away from the wall beside it: a pixel that is seen
-// is rarely in a gap. `area`: of the sample, m²; `open`: its share of the hemisphere that is free.
-float prt_weight(float area, float open, float radius) {
-    float part = max(PRT_DENSITY * area / (radius * radius), 0.03) * open * open;
-    return part * part;
-}
 
 uint prt_cell(PrtGrid grid, ivec3 at) {
     return (uint(at.z) * grid.counts.y + uint(at.y)) * grid.counts.x + uint(at.x);

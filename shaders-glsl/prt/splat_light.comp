@@ -9,7 +9,7 @@ layout(local_size_x = 64) in;
 layout(binding = 0, scalar) readonly buffer Splats { PrtSplat splats[]; };
 layout(binding = 1, scalar) readonly buffer Members { uint members[]; };     // samples, splat after splat
 layout(binding = 2, scalar) readonly buffer Drawn { uint drawn[]; };         // numbers of splats
-layout(binding = 3, scalar) readonly buffer Samples { PrtPoint samples[]; };
+layout(binding = 3, scalar) readonly buffer Samples { PrtSample samples[]; };
 layout(binding = 4, scalar) readonly buffer Irradiances { vec3 irradiances[]; };
 layout(binding = 5, scalar) readonly buffer Visible { float visible[]; };
 layout(binding = 6, scalar) writeonly buffer Values { vec4 values[]; };      // two for each: irradiance and weight; shares of lights
@@ -19,7 +19,6 @@ layout(push_constant, scalar) uniform Push {
     uint samples_all;
     uint first_light;
     uint lights;       // at most PRT_SPREAD_LIGHTS
-    float radius;      // least distance of two samples on a plane, metres
 };
 
 void main() {
@@ -31,7 +30,7 @@ void main() {
     float whole = 0.0;
     for (uint k = 0u; k < splat.count; ++k) {
         uint s = members[splat.first + k];
-        float weight = prt_weight(samples[s].area, samples[s].open, radius);
+        float weight = samples[s].weight;
         whole += weight;
         light += weight * irradiances[s];
         for (uint l = 0u; l < lights; ++l) seen[l] += weight * visible[(first_light + l) * samples_all + s];

@@ -6,6 +6,7 @@ use half::f16;
 use super::{
     Plan, Settings, Stored, bakery,
     grid::Grid,
+    samples,
     solve::{self, Solved},
 };
 use crate::{
@@ -18,7 +19,7 @@ use crate::{
     shaders::{
         consts,
         prt::{albedo, directions, lit, lit_by_maps, mix, project, radiosity, receive, restore, scatter},
-        types::{PrtCap, PrtPoint, PrtReceiver, PrtVector},
+        types::{PrtCap, PrtPoint, PrtReceiver, PrtSample, PrtVector},
     },
 };
 
@@ -196,7 +197,8 @@ impl OnDevice {
             let filled = if bytes.is_empty() { &[0; 16][..] } else { bytes };
             OwnedBuffer::with_contents(gpu, name, filled)
         };
-        let samples = buffer("prt.samples", bytemuck::cast_slice(&stored.samples))?;
+        let samples: Vec<PrtSample> = stored.samples.iter().map(|of| samples::for_pictures(of, plan.radius)).collect();
+        let samples = buffer("prt.samples", bytemuck::cast_slice(&samples))?;
         let Solved { inverse, shift, fixed, linked } = solved;
         for ((vector, shift), fixed) in vectors.iter_mut().zip(shift).zip(fixed) {
             (vector.shift, vector.fixed_value) = (*shift, *fixed);

@@ -22,20 +22,17 @@ pub struct Splats {
     tree: Tree,
     splats: OwnedBuffer,
     members: OwnedBuffer,
-    radius: f32,
 }
 
 impl Splats {
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`.
     pub fn new(gpu: &Gpu, stored: &Stored) -> Result<Self> {
-        let radius = stored.plan.radius;
-        let tree = Tree::new(&stored.samples, &stored.plan.clusters, radius);
+        let tree = Tree::new(&stored.samples, &stored.plan.clusters, stored.plan.radius);
         let buffer = |name, bytes: &[u8]| OwnedBuffer::with_contents(gpu, name, bytes);
         Ok(Self {
             splats: buffer("prt.splats", bytemuck::cast_slice(&tree.splats))?,
             members: buffer("prt.members", bytemuck::cast_slice(&tree.members))?,
-            radius,
             tree,
         })
     }
@@ -79,13 +76,7 @@ impl Seen<'_> {
             irradiances: lit.irradiances,
             visible: lit.visible,
             values,
-            push: splat_light::Push {
-                count: self.count,
-                samples_all: light.count,
-                first_light,
-                lights,
-                radius: self.splats.radius,
-            },
+            push: splat_light::Push { count: self.count, samples_all: light.count, first_light, lights },
         };
         graph.compute(args, self.count.max(1));
         let args = splats::Args {
