@@ -23,14 +23,23 @@ pub fn simplified(scene: &Scene) -> Vec<Note> {
     notes
 }
 
+/// A note if the scene has no light that is transferred.
+pub fn unlit(scene: &Scene) -> Option<Note> {
+    let lit = scene.lights.iter().any(|light| light.kind != LightKind::Directional && light.intensity > 0.0);
+    let text = "the scene has no point or spot light: pictures are black without --light X,Y,Z,INTENSITY";
+    (!lit).then(|| note("lights", text.into()))
+}
+
 /// Notes on all that a picture leaves out or simplifies.
 pub(super) fn left_out(scene: &Scene) -> Vec<Note> {
     let mut notes = Vec::new();
     let suns =
         scene.lights.iter().filter(|light| light.kind == LightKind::Directional && light.intensity > 0.0).count();
     if suns > 0 {
-        notes.push(note("lights", format!("{suns} suns are off: only point and spot lights are transferred")));
+        let suns = if suns == 1 { "a sun is".into() } else { format!("{suns} suns are") };
+        notes.push(note("lights", format!("{suns} off: only point and spot lights are transferred")));
     }
+    notes.extend(unlit(scene));
     if scene.environment.is_some() {
         notes.push(note("environment", "the environment is shown, but lights nothing".into()));
     }
@@ -81,6 +90,7 @@ fn moves(scene: &Scene, node: u32) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Light;
 
     #[test]
     fn materials_are_named_and_many_are_counted() {
@@ -91,6 +101,24 @@ mod tests {
         scene.materials.extend((0..6).map(|i| glass(&i.to_string())));
         assert!(texts(&scene)[0].ends_with("pane, material 2, 0, 1, 2 and 3 more"), "{:?}", texts(&scene));
         scene.materials = vec![Material { unlit: true, emissive: Vec3::ONE, ..glass("lamp") }];
-        assert_eq!(left_out(&scene).len(), 2);
+        assert_eq!(left_out(&scene).len(), 3);
+    }
+
+    #[test]
+    fn scenes_whose_lights_are_not_transferred_are_named() {
+        let light = |kind: LightKind, intensity: f32| Light { name: String::new(), kind, color: Vec3::ONE, intensity };
+        let of = |lights: &[Light]| unlit(&Scene { lights: lights.to_vec(), ..Scene::default() }).is_some();
+        let [sun, lamp, off] = [
+            light(LightKind::Directional, 1.0),
+            light(LightKind::Point { range: None }, 1.0),
+            light(LightKind::Point { range: None }, 0.0),
+        ];
+        assert!(of(&[]) && of(&[sun.clone()]) && of(&[sun.clone(), off]) && !of(&[sun, lamp]));
+        let texts: Vec<String> =
+            left_out(&Scene { lights: vec![light(LightKind::Directional, 1.0)], ..Scene::default() })
+                .into_iter()
+                .map(|note| note.text)
+                .collect();
+        assert!(texts[0].starts_with("a sun is off") && texts[1].contains("pictures are black"), "{texts:?}");
     }
 }

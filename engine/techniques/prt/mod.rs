@@ -37,7 +37,7 @@ pub use bakery::Bakery;
 pub use cap::Cap;
 pub use file::{Stored, Summary};
 pub use grid::{Grid, Nearby};
-pub use left_out::simplified;
+pub use left_out::{simplified, unlit};
 pub use links::Links;
 pub use on_device::points_of_lights;
 pub use plan::{MOST_SAMPLES, MOST_VECTORS, Plan, parts, starts};

@@ -81,7 +81,7 @@ impl Bakery {
         let Thinned { samples: mut found, escaped, stayed, .. } =
             self.thinned(baking, starts, (Thinning::new(pilot, 1.0), 2), &mut triangles, stop)?;
         if found.len() < 16 {
-            let what = format!("particles from {} places inside the scene hit next to nothing", starts.len());
+            let what = format!("nearly all particles meet no surface (points from which they start: {})", starts.len());
             return Err(Error::input(what).help("Name a point inside the room with --inside X,Y,Z"));
         }
         if escaped > 0.7 {

@@ -78,7 +78,7 @@ pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
     image::probe_output(&args.run.output, args.run.overwrite)?;
     let interrupt = Interrupt::install();
     let stage = Stage::open(&args.stage)?;
-    for note in stage.notes().iter().chain(&prt::simplified(&stage.scene)) {
+    for note in stage.notes().iter().chain(&prt::simplified(&stage.scene)).chain(&prt::unlit(&stage.scene)) {
         console.info(&format!("note: {}: {}", note.place, note.text));
     }
     let gpu = Gpu::new(args.run.device.options()?)?;
