@@ -102,6 +102,19 @@ fn scenes_that_are_no_room_are_refused_and_named() {
 }
 
 #[test]
+fn a_start_in_the_middle_of_the_scene_is_named() {
+    if !device() {
+        return;
+    }
+    let lab = Lab::new();
+    // A solid body in the open: its camera is outside, and particles from the middle stay inside the body.
+    let body = Obj::default().cuboid("wall", [[0.0, 0.0, 0.0], [1.0, 2.0, 1.0]], false);
+    body.write(&lab, "body", &matt("wall", 0.5));
+    let said = ["particles start in its middle, 0.500,1.000,0.500", "--inside X,Y,Z"];
+    bake(&lab, "body.obj", &["--default-light", "never"]).expect(0, &said);
+}
+
+#[test]
 fn closed_white_rooms_are_refused_when_their_light_has_no_end() {
     if !device() {
         return;
@@ -157,7 +170,7 @@ fn two_rooms_are_baked_and_a_lamp_lights_its_own() {
     let lamps = ["0.3,2,0.4,5", "6.3,2,0.4,5"];
     let first = ["--light", lamps[0], "--default-light", "never"];
     bake(&lab, "rooms.obj", &first)
-        .expect(0, &["do not reach 1 rooms, which are baked, too; points in them:", "--inside chooses rooms"]);
+        .expect(0, &["do not reach a room, which is baked, too; a point in it:", "--inside chooses rooms"]);
     let cameras = [0.0, 6.0].map(|x: f32| {
         format!("position = [{:?}, 2.5, 1.8]\ntarget = [{:?}, 1.0, -0.5]\nyfov_degrees = 80.0\n", x + 1.8, x - 0.5)
     });

@@ -28,7 +28,7 @@ pub fn small() -> Baking {
 
 pub fn sampled(gpu: &Gpu, scene: &Scene, baking: &Baking) -> Result<(Bakery, Sampled)> {
     let mut bakery = Bakery::new(gpu, scene)?;
-    let sampled = bakery.sample(baking, &starts(scene), &Stop::default())?;
+    let sampled = bakery.sample(baking, &starts(scene).0, &Stop::default())?;
     Ok((bakery, sampled))
 }
 
@@ -40,7 +40,7 @@ pub fn baked(gpu: &Gpu, scene: &Scene, baking: &Baking) -> Stored {
 /// As [`baked`], with the rooms that lights do not reach.
 pub fn baked_with_rooms(gpu: &Gpu, scene: &Scene, baking: &Baking) -> Stored {
     let mut bakery = Bakery::new(gpu, scene).unwrap();
-    let (starts, _) = bakery.starts(baking, &Stop::default()).unwrap();
+    let starts = bakery.starts(baking, &Stop::default()).unwrap().points;
     let sampled = bakery.sample(baking, &starts, &Stop::default()).unwrap();
     stored(bakery, sampled)
 }

@@ -113,7 +113,8 @@ mod tests {
             light(LightKind::Point { range: None }, 1.0),
             light(LightKind::Point { range: None }, 0.0),
         ];
-        assert!(of(&[]) && of(&[sun.clone()]) && of(&[sun.clone(), off]) && !of(&[sun, lamp]));
+        let suns = std::slice::from_ref(&sun);
+        assert!(of(&[]) && of(suns) && of(&[sun.clone(), off]) && !of(&[sun, lamp]));
         let texts: Vec<String> =
             left_out(&Scene { lights: vec![light(LightKind::Directional, 1.0)], ..Scene::default() })
                 .into_iter()

@@ -41,6 +41,7 @@ pub use left_out::{simplified, unlit};
 pub use links::Links;
 pub use on_device::points_of_lights;
 pub use plan::{MOST_SAMPLES, MOST_VECTORS, Plan, parts, starts};
+pub use rooms::Starts;
 pub use sampling::Sampled;
 pub use settings::{Baking, Direct, PictureSettings, Settings, Spread};
 pub use technique::{Mode, Prt};

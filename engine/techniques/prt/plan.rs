@@ -136,8 +136,9 @@ pub fn parts(scene: &Scene) -> Vec<Part> {
     ]
 }
 
-/// Points inside a scene from which particles may start: its lights and cameras, and if there are none, its middle.
-pub fn starts(scene: &Scene) -> Vec<Vec3> {
+/// Points inside a scene from which particles may start: its lights and cameras, and if none is inside, its middle. Also whether it is the middle:
+/// that point may be inside a solid body.
+pub fn starts(scene: &Scene) -> (Vec<Vec3>, bool) {
     let pose = crate::scene::Pose::rest(scene);
     let [low, high] = samples::bounds(&samples::Triangles::new(scene).list);
     let inside = |at: &Vec3| at.cmpgt(low).all() && at.cmplt(high).all();
@@ -151,8 +152,9 @@ pub fn starts(scene: &Scene) -> Vec<Vec3> {
     };
     let mut starts = of(&|node| node.light.is_some_and(local));
     starts.extend(of(&|node| node.camera.is_some()));
-    if starts.is_empty() && low.x <= high.x {
+    let guessed = starts.is_empty() && low.x <= high.x;
+    if guessed {
         starts.push(0.5 * (low + high));
     }
-    starts
+    (starts, guessed)
 }

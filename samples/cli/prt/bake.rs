@@ -7,7 +7,7 @@ use lucerna::{
     Error, ErrorKind, Result,
     gpu::Gpu,
     image,
-    techniques::prt::{self, Bakery, Baking, Stored, units},
+    techniques::prt::{self, Bakery, Baking, Starts, Stored, units},
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -65,6 +65,29 @@ struct Keys {
     room: Baking,
 }
 
+/// Notes on places from which particles start although nobody named them.
+fn notes_on(starts: &Starts) -> Vec<String> {
+    let mut notes = Vec::new();
+    let place = |at: &Vec3| format!("{:.3},{:.3},{:.3}", at.x, at.y, at.z);
+    if let (true, Some(middle)) = (starts.guessed, starts.points.first()) {
+        notes.push(format!(
+            "note: no light and no camera is inside the scene, so particles start in its middle, {}, which may be inside a solid body; \
+             --inside X,Y,Z names a point of the free space",
+            place(middle)
+        ));
+    }
+    if starts.rooms > 0 {
+        let places: Vec<String> = starts.points[starts.points.len() - starts.rooms..].iter().map(place).collect();
+        let rooms = match starts.rooms {
+            1 => "a room, which is baked, too; a point in it".into(),
+            rooms => format!("{rooms} rooms, which are baked, too; points in them"),
+        };
+        let places = places.join(" ");
+        notes.push(format!("note: lights and cameras do not reach {rooms}: {places}; --inside chooses rooms"));
+    }
+    notes
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -92,18 +115,12 @@ pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
         _ => error,
     };
     let mut bakery = Bakery::new(&gpu, &stage.scene)?;
-    let (starts, rooms) = match args.inside.is_empty() {
+    let starts = match args.inside.is_empty() {
         true => bakery.starts(&keys.room, &Interrupt::stop()).map_err(blamed)?,
-        false => (args.inside.iter().map(|inside| inside.0).collect(), 0),
+        false => Starts { points: args.inside.iter().map(|inside| inside.0).collect(), rooms: 0, guessed: false },
     };
-    if rooms > 0 {
-        let places = starts[starts.len() - rooms..].iter().map(|at| format!("{:.3},{:.3},{:.3}", at.x, at.y, at.z));
-        console.info(&format!(
-            "note: lights and cameras do not reach {rooms} rooms, which are baked, too; points in them: {}; --inside chooses rooms",
-            places.collect::<Vec<_>>().join(" ")
-        ));
-    }
-    let sampled = bakery.sample(&keys.room, &starts, &Interrupt::stop()).map_err(blamed)?;
+    notes_on(&starts).iter().for_each(|note| console.info(note));
+    let sampled = bakery.sample(&keys.room, &starts.points, &Interrupt::stop()).map_err(blamed)?;
     let (plan, samples) = (sampled.plan.clone(), sampled.samples.clone());
     let of_samples = begun.elapsed().as_secs_f64();
     console.info(&format!(

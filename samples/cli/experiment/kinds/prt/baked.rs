@@ -118,7 +118,7 @@ fn known(file: &Path, about: &Path) -> Result<Option<Found>> {
 fn make(gpu: &Gpu, scene: &Scene, baking: &Baking, folder: &Path, stop: &Stop) -> Result<Option<Found>> {
     let begun = Instant::now();
     let mut bakery = Bakery::new(gpu, scene)?;
-    let (starts, _) = bakery.starts(baking, stop)?;
+    let starts = bakery.starts(baking, stop)?.points;
     let sampled = bakery.sample(baking, &starts, stop)?;
     let of_samples = begun.elapsed().as_secs_f64();
     let temporary = tempfile::tempdir_in(folder).map_err(|error| {
