@@ -410,6 +410,13 @@ fn formats_and_shapes_must_fit() {
         tinted(g, Targets::new().color(image, Load::Discard).stencil(StencilLoad::Keep));
     });
     assert_eq!(found, one(Shape, "test.tint", "-"), "stencil of no depth");
+    for layers in [1, 7] {
+        let found = mistakes(|g| {
+            let image = g.image_with("a", ImageDesc::new(Format::RGBA32F, SMALL).layers(layers));
+            tinted(g, Targets::new().color(image, Load::Discard).views());
+        });
+        assert_eq!(found, one(Shape, "test.tint", "a"), "{layers} layers as views");
+    }
     let found = mistakes(|g| {
         let image = rgba(g, "a");
         write(g, image.mip(1));

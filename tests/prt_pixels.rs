@@ -229,6 +229,15 @@ fn two_eyes_see_what_each_sees_alone_and_share_the_light() {
                     assert_eq!(values, &alone.data[at..at + of], "{} at {x} {y} of eye {eye}", layer.name);
                 }
             }
+            // One pass over the surfaces where the device can, and the same pixels as by two.
+            settings.prt.multiview = false;
+            let apart = picture(gpu, &scene, &stored, &view, &settings);
+            assert_eq!(apart.layers, both.layers);
+            let surfaces =
+                |passes: &str| passes.split_whitespace().filter(|word| word.starts_with("passes.gbuffer.")).count();
+            let views = if gpu.caps().multiview { 2 } else { 1 };
+            assert!(surfaces(&both.passes) > 0);
+            assert_eq!(surfaces(&apart.passes), views * surfaces(&both.passes));
             let count = |passes: &str, of: &str| passes.split_whitespace().filter(|word| *word == of).count();
             let of = |name: &str| count(&both.passes, name);
             let lit = if settings.prt.direct == Direct::Maps { "prt.lit_by_maps" } else { "prt.lit" };

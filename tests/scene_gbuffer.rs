@@ -1,11 +1,11 @@
 //! The G-buffer of known scenes against closed forms.
 
 use crate::scene_kit::*;
-use glam::{Mat4, Quat, Vec2, Vec3};
+use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 use lucerna::{
     gpu::testing::with_gpu,
     graph::{Graph, Runner},
-    passes::gbuffer::{Blended, Normals, Settings},
+    passes::gbuffer::{self, Blended, GBuffer, Normals, Settings},
     scene::{AlphaMode, Camera, Material, Projection, Sampler, Scene, Texture, TextureRef, View},
     shaders::{test::view as view_shader, types},
 };
@@ -248,6 +248,45 @@ fn culling_changes_no_pixel() {
         let on = surfaces(gpu, &crowd(true), &view, Settings::default());
         let off = surfaces(gpu, &crowd(true), &view, Settings { culling: false, ..Settings::default() });
         assert_eq!(on, off);
+    });
+}
+
+#[test]
+fn two_eyes_in_one_pass_have_the_pixels_of_two_passes() {
+    let mut scene = crowd(true);
+    // Of the dithered kind: its pattern is that of each view.
+    let pane = Material {
+        alpha: AlphaMode::Blend,
+        base_color: Vec4::new(0.9, 0.2, 0.2, 0.4),
+        ..Material::diffuse("pane", Vec3::ONE)
+    };
+    let ball = mesh(&mut scene, sphere(24), pane);
+    place(&mut scene, ball, Mat4::from_translation(Vec3::new(0.3, 0.2, 1.0)));
+    let middle = view(Vec3::new(0.0, 0.0, 4.0), Vec3::ZERO, EXTENT);
+    let [left, right] = [-0.8, 0.8].map(|side| middle.beside(side));
+    with_gpu(|gpu| {
+        if !gpu.caps().multiview {
+            return;
+        }
+        let of = |multiview: bool| {
+            let (frame, reads) = frame(gpu, &scene, |graph, handles| {
+                let settings = Settings::default();
+                let eyes = gbuffer::draw_eyes(graph, handles, [&left, &right], &settings, multiview);
+                eyes.map(|GBuffer { albedo, normal, depth, specular, emission, hardware, .. }| {
+                    [albedo, normal, depth, specular, emission, hardware].map(|image| graph.read_image(image))
+                })
+            });
+            reads.map(|eye| eye.map(|read| frame.image(read).to_f32()))
+        };
+        let (one_pass, two_passes) = (of(true), of(false));
+        assert_eq!(one_pass, two_passes);
+        assert_ne!(one_pass[0][2], one_pass[1][2]);
+        // Each eye sees what a single view from there sees, and something.
+        for (eye, of_eye) in [left, right].iter().zip(&one_pass) {
+            let depth: Vec<f32> = of_eye[2].iter().map(|pixel| pixel[0]).collect();
+            assert_eq!(depth, surfaces(gpu, &scene, eye, Settings::default()).depth);
+            assert!(depth.iter().filter(|depth| **depth < 1.0).count() > 300);
+        }
     });
 }
 

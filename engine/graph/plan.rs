@@ -133,6 +133,11 @@ impl Shape {
 }
 
 impl Plan {
+    /// Whether the other plan has the same passes, resources and barriers.
+    pub(super) fn does_the_same(&self, other: &Self) -> bool {
+        (&self.passes, &self.physical, &self.barriers) == (&other.passes, &other.physical, &other.barriers)
+    }
+
     /// Plans `graph`.
     ///
     /// # Errors

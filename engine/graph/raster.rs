@@ -48,6 +48,7 @@ pub struct Targets {
     pub(crate) depth: Option<(Image, Depth)>,
     pub(crate) stencil: Option<StencilLoad>,
     pub(crate) area: Option<[u32; 4]>,
+    pub(crate) views: bool,
 }
 
 impl Targets {
@@ -82,6 +83,14 @@ impl Targets {
     #[must_use]
     pub fn area(mut self, x: u32, y: u32, width: u32, height: u32) -> Self {
         self.area = Some([x, y, width, height]);
+        self
+    }
+
+    /// Draws everything once into each layer of the targets, where `gl_ViewIndex` is the number of the layer (multiview). All targets have as many
+    /// layers, 2 to 6. Only with [`Caps::multiview`](crate::gpu::Caps::multiview).
+    #[must_use]
+    pub fn views(mut self) -> Self {
+        self.views = true;
         self
     }
 }

@@ -38,7 +38,12 @@ macro_rules! bits {
 
             /// Each bit alone.
             pub fn each(self) -> impl Iterator<Item = Self> {
-                (0..32).map(|b| Self(1 << b)).filter(move |b| self.contains(*b))
+                let mut rest = self.0;
+                std::iter::from_fn(move || {
+                    let lowest = rest & rest.wrapping_neg();
+                    rest ^= lowest;
+                    (lowest != 0).then_some(Self(lowest))
+                })
             }
         }
 

@@ -3,14 +3,18 @@
 
 use crate::settings::{JsonSchema, described};
 use crate::{
-    graph::{Compare, Cull, Depth, Extent, Format, Graph, Image, Load, Raster, Stencil, StencilLoad, Targets, Uniform},
+    graph::{
+        Compare, Cull, Depth, Extent, Format, Graph, Image, ImageDesc, Load, Raster, Stencil, StencilLoad, Targets,
+        Uniform,
+    },
     resident::{Batches, Cutout, Handles},
     scene::{View, cull::Frustum},
     shaders::{
-        passes::{gbuffer as shader, gbuffer_behind as behind_shader},
+        passes::{gbuffer as shader, gbuffer_behind as behind_shader, gbuffer_eyes as eyes_shader},
         types,
     },
 };
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 /// How normals are stored.
@@ -81,32 +85,90 @@ pub struct GBuffer {
 
 /// Draws the scene as `view` sees it.
 pub fn draw(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings) -> GBuffer {
-    layer(graph, scene, view, settings, None)
+    let gbuffer = empty(graph, scene, view, 1, settings);
+    surfaces(graph, scene, &gbuffer, &batches(scene, &[view], settings), settings, Of::View);
+    gbuffer
 }
 
 /// The next layer of a depth peeling: the nearest surface behind the linear depths `nearer` (R32F, same extent). Back faces of single-sided
 /// surfaces are drawn, with the normal of their front.
 pub fn draw_behind(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, nearer: Image) -> GBuffer {
-    layer(graph, scene, view, settings, Some(nearer))
+    let gbuffer = empty(graph, scene, view, 1, settings);
+    surfaces(graph, scene, &gbuffer, &batches(scene, &[view], settings), settings, Of::Behind(nearer));
+    gbuffer
 }
 
-fn layer(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, nearer: Option<Image>) -> GBuffer {
-    let extent = Extent::from(view.extent);
+/// Draws the scene as two eyes see it, both views of the same extent. `multiview`: in one pass over the scene, only with
+/// [`Caps::multiview`](crate::gpu::Caps::multiview); otherwise in two, with the same pixels.
+pub fn draw_eyes(
+    graph: &mut Graph,
+    scene: &Handles,
+    views: [&View; 2],
+    settings: &Settings,
+    multiview: bool,
+) -> [GBuffer; 2] {
+    let batches = batches(scene, &views, settings);
+    if !multiview {
+        return views.map(|view| {
+            let gbuffer = empty(graph, scene, view, 1, settings);
+            surfaces(graph, scene, &gbuffer, &batches, settings, Of::View);
+            gbuffer
+        });
+    }
+    let both = empty(graph, scene, views[0], 2, settings);
+    let eyes = graph.uniform(&types::Eyes { views: views.map(View::uniform) });
+    surfaces(graph, scene, &both, &batches, settings, Of::Eyes(eyes));
+    let of_eye = |eye: u32, view| GBuffer {
+        albedo: both.albedo.layer(eye),
+        normal: both.normal.layer(eye),
+        depth: both.depth.layer(eye),
+        specular: both.specular.layer(eye),
+        emission: both.emission.layer(eye),
+        hardware: both.hardware.layer(eye),
+        view,
+    };
+    let right = graph.uniform(&views[1].uniform());
+    [of_eye(0, both.view), of_eye(1, right)]
+}
+
+/// What a pass over the scene draws.
+#[derive(Clone, Copy, Debug)]
+enum Of {
+    View,
+    /// The surfaces behind these linear depths.
+    Behind(Image),
+    /// Two views, each into a layer of its own.
+    Eyes(Uniform<types::Eyes>),
+}
+
+/// Images of so many layers, without contents.
+fn empty(graph: &mut Graph, scene: &Handles, view: &View, layers: u32, settings: &Settings) -> GBuffer {
     let normal_format = match settings.normals {
         Normals::Bytes => Format::RGBA8,
         Normals::Octahedral => Format::RG16,
     };
-    let gbuffer = GBuffer {
-        albedo: graph.image("gbuffer.albedo", Format::RGBA8Srgb, extent),
-        normal: graph.image("gbuffer.normal", normal_format, extent),
-        depth: graph.image("gbuffer.depth", Format::R32F, extent),
-        specular: graph.image("gbuffer.specular", Format::RGBA8, extent),
-        emission: graph.image("gbuffer.emission", Format::RGBA16F, extent),
-        hardware: graph.image("gbuffer.hardware", scene.depth_stencil, extent),
-        view: graph.uniform(&view.uniform()),
+    let mut image = |name: &str, format: Format| {
+        graph.image_with(name, ImageDesc::new(format, Extent::from(view.extent)).layers(layers))
     };
-    let frustum = settings.culling.then(|| Frustum::new(view));
-    let batches = Batches::new(&scene.moment, frustum.as_ref(), view.position);
+    GBuffer {
+        albedo: image("gbuffer.albedo", Format::RGBA8Srgb),
+        normal: image("gbuffer.normal", normal_format),
+        depth: image("gbuffer.depth", Format::R32F),
+        specular: image("gbuffer.specular", Format::RGBA8),
+        emission: image("gbuffer.emission", Format::RGBA16F),
+        hardware: image("gbuffer.hardware", scene.depth_stencil),
+        view: graph.uniform(&view.uniform()),
+    }
+}
+
+/// The draws for some views, near the middle of their cameras first.
+fn batches(scene: &Handles, views: &[&View], settings: &Settings) -> Batches {
+    let frusta: Vec<Frustum> = views.iter().filter(|_| settings.culling).map(|view| Frustum::new(view)).collect();
+    let middle = views.iter().map(|view| view.position).sum::<Vec3>() / views.len() as f32;
+    Batches::of_views(&scene.moment, &frusta, middle)
+}
+
+fn surfaces(graph: &mut Graph, scene: &Handles, gbuffer: &GBuffer, batches: &Batches, settings: &Settings, of: Of) {
     let visible = batches.visible_buffer(graph, "gbuffer.visible");
     let drawn = batches.list.iter().filter(|b| b.cutout != Cutout::Blend || settings.blended != Blended::Hidden);
     let drawn: Vec<_> = drawn.collect();
@@ -126,14 +188,14 @@ fn layer(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, n
             let seed = graph.seed;
             let draw =
                 batch.map_or_else(|| crate::graph::Draw::indexed(scene.indices, Vec::new()), |batch| batch.draw(scene));
-            let targets = targets(&gbuffer, index == 0);
+            let targets = targets(gbuffer, index == 0);
             // Of coplanar surfaces the first one drawn is visible. Rays choose the same surface (lib/trace_compute.glsl).
             let state = Raster::new().depth_compare(Compare::Greater).stencil(Stencil::write(1));
-            // The two generated types have the same fields.
+            // The generated types have the same fields.
             macro_rules! args {
-                ($shader:ident $(, $more:ident)?) => {
+                ($shader:ident, $view:ident: $value:expr $(, $more:ident)?) => {
                     $shader::Args {
-                        view: gbuffer.view,
+                        $view: $value,
                         instances: scene.instances,
                         visible,
                         positions: scene.positions,
@@ -149,16 +211,19 @@ fn layer(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, n
                     }
                 };
             }
-            let pass = match nearer {
-                None => graph.raster(targets, state.cull(sided), args!(shader), draw),
-                Some(nearer) => graph.raster(targets, state.cull(Cull::None), args!(behind_shader, nearer), draw),
+            let state = if matches!(of, Of::Behind(_)) { state.cull(Cull::None) } else { state.cull(sided) };
+            let pass = match of {
+                Of::View => graph.raster(targets, state, args!(shader, view: gbuffer.view), draw),
+                Of::Behind(nearer) => {
+                    graph.raster(targets, state, args!(behind_shader, view: gbuffer.view, nearer), draw)
+                }
+                Of::Eyes(eyes) => graph.raster(targets.views(), state, args!(eyes_shader, eyes: eyes), draw),
             };
             if let Some(batch) = batch {
                 pass.named(format!("passes.gbuffer.{:?}.{:?}", batch.cutout, batch.sided).to_lowercase());
             }
         }
     });
-    gbuffer
 }
 
 fn targets(gbuffer: &GBuffer, first: bool) -> Targets {

@@ -64,6 +64,11 @@ impl Batches {
         Self::filtered(moment, |i| frustum.is_none_or(|f| f.sees(&i.bounds)), eye)
     }
 
+    /// As [`Batches::new`], with the instances that at least one of several frusta sees; no frusta: all.
+    pub fn of_views(moment: &Moment, frusta: &[Frustum], eye: Vec3) -> Self {
+        Self::filtered(moment, |i| frusta.is_empty() || frusta.iter().any(|f| f.sees(&i.bounds)), eye)
+    }
+
     /// As [`Batches::new`], without a difference between the sides of triangles: for shadow maps.
     pub fn of_casters(moment: &Moment, frustum: Option<&Frustum>, eye: Vec3) -> Self {
         let mut all = Self::filtered(moment, |i| i.casts && frustum.is_none_or(|f| f.sees(&i.bounds)), eye);

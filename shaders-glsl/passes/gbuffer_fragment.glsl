@@ -1,4 +1,4 @@
-// Fragment stage of passes/gbuffer, and with BEHIND of passes/gbuffer_behind.
+// Fragment stage of passes/gbuffer, with BEHIND of passes/gbuffer_behind, and with EYES of passes/gbuffer_eyes.
 #include "lib/view.glsl"
 #include "lib/pixel_depth.glsl"
 #include "lib/scene.glsl"
@@ -10,7 +10,7 @@ layout(constant_id = 0) const uint CUTOUT = 0; // 0: all opaque; 1: alpha below 
 layout(constant_id = 1) const uint OCTAHEDRAL = 0; // 1: the normal attachment is RG16
 layout(constant_id = 2) const uint SHARP = 0; // 1: textures at their finest level
 
-layout(binding = 0, scalar) uniform ViewBlock { View view; };
+#include "passes/gbuffer_view.glsl"
 layout(binding = 1, scalar) readonly buffer Instances { Instance instances[]; };
 
 layout(push_constant, scalar) uniform Push { uint seed; };

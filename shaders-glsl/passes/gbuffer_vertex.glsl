@@ -1,8 +1,8 @@
-// Vertex stage of passes/gbuffer and passes/gbuffer_behind.
+// Vertex stage of passes/gbuffer and passes/gbuffer_behind, and with EYES of passes/gbuffer_eyes.
 #include "lib/view.glsl"
 #include "lib/scene.glsl"
 
-layout(binding = 0, scalar) uniform ViewBlock { View view; };
+#include "passes/gbuffer_view.glsl"
 layout(binding = 1, scalar) readonly buffer Instances { Instance instances[]; };
 layout(binding = 2, scalar) readonly buffer Visible { uint visible[]; };
 layout(binding = 3, scalar) readonly buffer Positions { vec3 positions[]; };

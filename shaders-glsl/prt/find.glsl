@@ -1,9 +1,9 @@
-// The sample that stands for a point of a surface: near, on the same plane, on the same side, of the same material and as free.
+// The sample that stands for a point of a surface: near, on the same plane, on the same side, of the same connected component and as free.
 // Before including: prt/prt.glsl, lib/scene.glsl, lib/gbuffer.glsl, and declare `grid`, `starts`, `order` and `candidates`. Each cell lists the samples around it;
 // `candidates` has the samples.
 
 // `clearance`: free distance above the point, metres.
-uint nearest_sample(vec3 position, vec3 side, uint material, float clearance) {
+uint nearest_sample(vec3 position, vec3 side, uint component, float clearance) {
     float clear = min(clearance / (PRT_CLEAR * grid.radius), 1.0);
     ivec3 own = ivec3(floor((position - grid.origin) / grid.cell));
     uint found = NONE;
@@ -28,7 +28,7 @@ uint nearest_sample(vec3 position, vec3 side, uint material, float clearance) {
             float off = dot(way, normalize(towards + side));
             float score = (dot(way, way) + PRT_STEP * off * off) * (facing > 0.9 ? 1.0 : 3.0 - 2.0 * facing);
             uint surface = candidates[number].surface;
-            if ((surface & 0xffffu) != (material & 0xffffu)) score *= 4.0;
+            if ((surface & 0xffffu) != (component & 0xffffu)) score *= PRT_STRANGE;
             // Light behind a picture is not the light beside it.
             float other = unpackHalf2x16(surface >> 16u).x;
             float ratio = max(clear, other) / max(min(clear, other), 0.02);

@@ -24,6 +24,9 @@ layout(binding = 11, scalar) readonly buffer Order { uint order[]; };
 // NONE: nothing; PRT_LOST: a surface without samples.
 layout(binding = 12, scalar) writeonly buffer Seen { uint seen[]; };
 layout(binding = 13, scalar) readonly buffer Candidates { PrtCandidate candidates[]; };
+// The first triangle of each instance, and the connected component of each triangle.
+layout(binding = 14, scalar) readonly buffer Firsts { uint firsts[]; };
+layout(binding = 15, scalar) readonly buffer Components { uint components[]; };
 
 #include "prt/find.glsl"
 
@@ -53,14 +56,14 @@ void main() {
                 SurfacePoint p = surface_point(hit.instance, hit.triangle, hit.barycentrics);
                 vec3 side = normalize(p.area);
                 if (dot(side, direction) > 0.0) side = -side;
-                uint material = INSTANCE_AT(hit.instance).material;
+                uint component = components[firsts[hit.instance] + hit.triangle];
                 float most = PRT_CLEAR * grid.radius;
                 // The free distance above the surface tells which samples are in the same gap.
                 Ray up = Ray(p.position + 2.0 * surface_gap(p) * side, 0.0, side, most);
                 Hit above = trace(up, TRACE_SHADOW, pcg4d(uvec4(number, i, 23u, seed)).x, false);
                 float clearance = above.instance == NONE ? most : above.t;
                 // Slits have no samples and are dark.
-                if (clearance >= slit) found = nearest_sample(p.position, side, material, clearance);
+                if (clearance >= slit) found = nearest_sample(p.position, side, component, clearance);
                 if (found == NONE) found = PRT_LOST;
             }
         }

@@ -13,6 +13,8 @@ const float PRT_DENSITY = 0.697; // export
 // Weight of the square of a way off a tangent plane beside that of a way along this plane: samples on a step, on another sheet or behind it count as far
 // away.
 const float PRT_STEP = 64.0; // export
+// Factor on the square of the distance to a sample of another connected component: books on a shelf have colours of their own.
+const float PRT_STRANGE = 16.0; // export
 // Free distance above a surface that counts as wide, in distances of samples.
 const float PRT_CLEAR = 2.0; // export
 // Lights whose visibility is gathered at once.
@@ -61,7 +63,7 @@ struct PrtSample {
 struct PrtCandidate {
     vec3 position;      // metres
     uint side;          // normal of the triangle on the lit side: octahedral, two signed words of 16 bits
-    uint surface;       // last 16 bits of the material; above: free distance above the sample, 1: PRT_CLEAR distances of samples or more, a half
+    uint surface;       // last 16 bits of the number of the connected component; above: free distance above the sample, 1: PRT_CLEAR distances of samples or more, a half
 };
 
 // Cells of equal size that cover all samples. `starts` has the first sample of each cell, `order` the samples cell after cell.

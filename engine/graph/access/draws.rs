@@ -9,6 +9,9 @@ use crate::graph::{
     vocab::{Access, Layout, MistakeKind, Scope, Stages, Usage},
 };
 
+/// Views of one pass that each device with multiview can draw.
+const MOST_VIEWS: u32 = 6;
+
 impl Collector<'_> {
     pub(super) fn targets(&mut self, bound: &Bound, targets: &Targets, state: &Raster) {
         let mut first: Option<(String, Extent, u32)> = None;
@@ -33,8 +36,13 @@ impl Collector<'_> {
             let what = format!("the area {w}×{h} at ({x}, {y}) does not fit into {e}");
             self.mistake(MistakeKind::Shape, name.clone(), what);
         }
-        if first.is_none() {
-            self.mistake(MistakeKind::Shape, "-", "nothing to draw onto");
+        match &first {
+            None => self.mistake(MistakeKind::Shape, "-", "nothing to draw onto"),
+            Some((name, _, layers)) if targets.views && !(2..=MOST_VIEWS).contains(layers) => {
+                let what = format!("{layers} layers cannot be views, 2 to {MOST_VIEWS} can");
+                self.mistake(MistakeKind::Shape, name.clone(), what);
+            }
+            Some(_) => {}
         }
         let outputs = bound.shader.color_outputs as usize;
         if outputs != targets.colors.len() || outputs > 8 {

@@ -181,6 +181,10 @@ impl Recorder<'_> {
     }
 
     fn raster(&mut self, index: usize, bound: &Bound, targets: &Targets, state: &Raster, draw: &Draw) -> Result<()> {
+        if targets.views && !self.gpu.caps().multiview {
+            let what = "the device cannot draw several views in one pass (multiview)";
+            return Err(Error::new(ErrorKind::Runtime, what).help("Draw each view in a pass of its own"));
+        }
         let raster = self.raster_state(targets, state);
         let pipeline = self.gpu.raster_pipeline(bound.shader, &bound.spec, &raster)?;
         let first = targets.colors.first().map(|(i, _)| *i).or(targets.depth.map(|(i, _)| i));
@@ -210,6 +214,7 @@ impl Recorder<'_> {
                 extent: vk::Extent2D { width: full.width, height: full.height },
             })
             .layer_count(first.layers)
+            .view_mask(raster.view_mask)
             .color_attachments(&colors);
         if let Some(depth) = &depth {
             info = info.depth_attachment(depth);
@@ -255,6 +260,8 @@ impl Recorder<'_> {
     fn raster_state(&self, targets: &Targets, state: &Raster) -> RasterState {
         let read_only = matches!(targets.depth, Some((_, Depth::ReadOnly)));
         let depth = targets.depth.map(|(image, _)| self.format(image));
+        let layers = targets.colors.first().map(|(i, _)| i.layers).or(targets.depth.map(|(i, _)| i.layers));
+        let views = if targets.views { (1 << layers.unwrap_or(1)) - 1 } else { 0 };
         let blend = |image: Image| match self.format(image).class() {
             Class::Uint | Class::Sint => None,
             _ => vulkan::blend(state.blend),
@@ -280,7 +287,7 @@ impl Recorder<'_> {
                 reference: s.reference.into(),
             }),
             blend: targets.colors.iter().map(|(i, _)| blend(*i)).collect(),
-            view_mask: 0,
+            view_mask: views,
         }
     }
 

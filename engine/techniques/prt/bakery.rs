@@ -4,7 +4,7 @@ use super::{
     Plan,
     cap::Cap,
     grid::{Nearby, packed},
-    samples,
+    samples::{self, Triangles},
 };
 use crate::{
     Error, ErrorKind, Result,
@@ -37,6 +37,8 @@ pub struct Bakery {
 struct Uploaded {
     samples: OwnedBuffer,
     candidates: OwnedBuffer,
+    firsts: OwnedBuffer,
+    components: OwnedBuffer,
     nearby: Nearby,
     starts: OwnedBuffer,
     order: OwnedBuffer,
@@ -64,11 +66,16 @@ impl Bakery {
         let gaps = plan.settings.gaps as f32;
         let share = |clear: &f32| samples::share_in_gap(*clear, plan.radius, gaps);
         let nearby = Nearby::new(samples, plan.radius, &clearances.iter().map(share).collect::<Vec<_>>());
-        let candidates = packed(samples, &clearances, PRT_CLEAR * plan.radius);
+        let triangles = Triangles::new(&self.scene);
+        let components: Vec<u32> = samples.iter().map(|sample| triangles.component(sample)).collect();
+        let candidates = packed(samples, &components, &clearances, PRT_CLEAR * plan.radius);
+        let (firsts, components) = triangles.components();
         let buffer = |name, bytes: &[u8]| OwnedBuffer::with_contents(&self.gpu, name, bytes);
         self.on_device = Some(Uploaded {
             samples: buffer("prt.samples", bytemuck::cast_slice(samples))?,
             candidates: buffer("prt.candidates", bytemuck::cast_slice(&candidates))?,
+            firsts: buffer("prt.firsts", bytemuck::cast_slice(firsts))?,
+            components: buffer("prt.components", bytemuck::cast_slice(&components))?,
             starts: buffer("prt.cells", bytemuck::cast_slice(&nearby.starts))?,
             order: buffer("prt.order", bytemuck::cast_slice(&nearby.order))?,
             nearby,
@@ -123,6 +130,8 @@ impl Bakery {
                 starts: graph.import_buffer(&uploaded.starts),
                 order: graph.import_buffer(&uploaded.order),
                 candidates: graph.import_buffer(&uploaded.candidates),
+                firsts: graph.import_buffer(&uploaded.firsts),
+                components: graph.import_buffer(&uploaded.components),
                 seen,
                 push: gather::Push {
                     first: 0,

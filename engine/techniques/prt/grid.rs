@@ -5,7 +5,7 @@ use half::f16;
 
 use super::samples::{position, side};
 use crate::shaders::{
-    consts::PRT_STEP,
+    consts::{PRT_STEP, PRT_STRANGE},
     types::{PrtCandidate, PrtGrid, PrtPoint},
 };
 
@@ -74,7 +74,13 @@ impl Nearby {
 
     /// The sample that stands for a point of a surface. Like `nearest_sample` of `prt/find.glsl`, but without neighbouring cells; the free distance above the
     /// point is not known.
-    pub fn nearest(&self, samples: &[PrtPoint], at: Vec3, normal: Vec3, material: u32) -> Option<usize> {
+    pub fn nearest(
+        &self,
+        (samples, components): (&[PrtPoint], &[u32]),
+        at: Vec3,
+        normal: Vec3,
+        component: u32,
+    ) -> Option<usize> {
         let place = place(&self.grid, at);
         if place.min_element() < 0.0 || place.cmpge(UVec3::from(self.grid.counts).as_vec3()).any() {
             return None;
@@ -88,7 +94,7 @@ impl Nearby {
             let way = position(sample) - at;
             let off = way.dot((side(sample) + normal).normalize_or_zero());
             let turned = if facing > 0.9 { 1.0 } else { 3.0 - 2.0 * facing };
-            let strange = if sample.material == material { 1.0 } else { 4.0 };
+            let strange = if components[*number as usize] == component { 1.0 } else { PRT_STRANGE };
             // An open surface beside a gap belongs to its own samples, not to closer ones in the gap.
             let share = self.shares.get(*number as usize).copied().unwrap_or(1.0);
             let score = (way.length_squared() + PRT_STEP * off * off) * turned * strange / (share * share);
@@ -102,14 +108,14 @@ impl Nearby {
     }
 }
 
-/// The samples for `prt/find.glsl`. `clearances`: free distances above them, at most `most`, metres.
-pub(super) fn packed(samples: &[PrtPoint], clearances: &[f32], most: f32) -> Vec<PrtCandidate> {
-    let of = |(sample, clear): (&PrtPoint, &f32)| {
+/// The samples for `prt/find.glsl`, with the components of their surfaces. `clearances`: free distances above them, at most `most`, metres.
+pub(super) fn packed(samples: &[PrtPoint], components: &[u32], clearances: &[f32], most: f32) -> Vec<PrtCandidate> {
+    let of = |((sample, component), clear): ((&PrtPoint, &u32), &f32)| {
         let [u, v] = octahedral(side(sample)).map(|value| u32::from((value * 32767.0).round() as i16 as u16));
         let clear = u32::from(f16::from_f32(clear / most).to_bits());
-        PrtCandidate { position: sample.position, side: u | v << 16, surface: (sample.material & 0xffff) | clear << 16 }
+        PrtCandidate { position: sample.position, side: u | v << 16, surface: (component & 0xffff) | clear << 16 }
     };
-    samples.iter().zip(clearances).map(of).collect()
+    samples.iter().zip(components).zip(clearances).map(of).collect()
 }
 
 /// A direction as a point of a square, −1 to 1. Twin of `octahedral_encode` of `lib/gbuffer.glsl`.
@@ -216,8 +222,9 @@ mod tests {
     fn open_surfaces_beside_a_gap_belong_to_their_own_samples() {
         let at = |x: f32| PrtPoint { position: [x, 0.0, 0.0], side: [0.0, 1.0, 0.0], ..PrtPoint::default() };
         let samples = [at(0.0), at(0.1)];
-        let nearest =
-            |x: f32, shares: &[f32]| Nearby::new(&samples, 0.1, shares).nearest(&samples, x * Vec3::X, Vec3::Y, 0);
+        let nearest = |x: f32, shares: &[f32]| {
+            Nearby::new(&samples, 0.1, shares).nearest((&samples, &[0; 2]), x * Vec3::X, Vec3::Y, 0)
+        };
         assert_eq!([0.04, 0.06].map(|x| nearest(x, &[])), [Some(0), Some(1)]);
         // The second sample is in a gap.
         assert_eq!([0.06, 0.09].map(|x| nearest(x, &[1.0, 0.4])), [Some(0), Some(1)]);
@@ -226,10 +233,11 @@ mod tests {
     #[test]
     fn packed_samples_keep_their_sides_and_free_distances() {
         let samples = points(30);
-        for (sample, near) in samples.iter().zip(packed(&samples, &[0.03; 30], 0.2)) {
+        for (sample, near) in samples.iter().zip(packed(&samples, &[7; 30], &[0.03; 30], 0.2)) {
             let words =
                 [near.side as u16 as i16, (near.side >> 16) as u16 as i16].map(|word| f32::from(word) / 32767.0);
             assert_eq!((near.position, words), (sample.position, octahedral(side(sample))));
+            assert_eq!(near.surface & 0xffff, 7);
             assert!((f16::from_bits((near.surface >> 16) as u16).to_f32() - 0.15).abs() < 1e-4);
         }
         assert_eq!(octahedral(-Vec3::Z).map(f32::abs), [1.0, 1.0]);
@@ -239,10 +247,10 @@ mod tests {
     fn points_outside_of_all_cells_have_no_sample() {
         let samples = points(50);
         let nearby = Nearby::new(&samples, 0.1, &[]);
-        assert_eq!(nearby.nearest(&samples, Vec3::splat(-9.0), Vec3::X, 0), None);
-        assert_eq!(nearby.nearest(&samples, Vec3::splat(9.0), Vec3::X, 0), None);
+        assert_eq!(nearby.nearest((&samples, &[0; 50]), Vec3::splat(-9.0), Vec3::X, 0), None);
+        assert_eq!(nearby.nearest((&samples, &[0; 50]), Vec3::splat(9.0), Vec3::X, 0), None);
         let at = position(&samples[7]);
-        assert_eq!(nearby.nearest(&samples, at, side(&samples[7]), 0), Some(7));
-        assert_eq!(Nearby::new(&[], 0.1, &[]).nearest(&[], Vec3::ZERO, Vec3::X, 0), None);
+        assert_eq!(nearby.nearest((&samples, &[0; 50]), at, side(&samples[7]), 0), Some(7));
+        assert_eq!(Nearby::new(&[], 0.1, &[]).nearest((&[], &[]), Vec3::ZERO, Vec3::X, 0), None);
     }
 }

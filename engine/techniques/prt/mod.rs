@@ -10,6 +10,7 @@ mod cap;
 pub mod check;
 mod clusters;
 mod coded;
+mod components;
 mod eyes;
 mod file;
 mod grid;

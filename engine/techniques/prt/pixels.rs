@@ -70,6 +70,18 @@ pub struct Drawing<'a> {
 impl Drawing<'_> {
     /// Draws a view.
     pub fn draw(&self, graph: &mut Graph, view: &View) -> Shown {
+        let gbuffer = gbuffer::draw(graph, self.handles, view, &self.settings.gbuffer);
+        self.shade(graph, view, gbuffer)
+    }
+
+    /// Draws the views of two eyes.
+    pub fn draw_eyes(&self, graph: &mut Graph, views: [&View; 2], multiview: bool) -> [Shown; 2] {
+        let [left, right] = gbuffer::draw_eyes(graph, self.handles, views, &self.settings.gbuffer, multiview);
+        [(views[0], left), (views[1], right)].map(|(view, gbuffer)| self.shade(graph, view, gbuffer))
+    }
+
+    /// The light of the surfaces of a view.
+    fn shade(&self, graph: &mut Graph, view: &View, gbuffer: GBuffer) -> Shown {
         let (handles, of_prt) = (self.handles, &self.settings.prt);
         let show = match self.mode {
             Mode::Samples => consts::PRT_SHOW_SAMPLES,
@@ -77,7 +89,6 @@ impl Drawing<'_> {
             Mode::Transfer => consts::PRT_SHOW_TRANSFER,
             _ => consts::PRT_SHOW_LIGHT,
         };
-        let gbuffer = gbuffer::draw(graph, handles, view, &self.settings.gbuffer);
         let mapped = self.maps.filter(|_| show == consts::PRT_SHOW_LIGHT).map(|maps| {
             let choices =
                 Direct { specular: of_prt.gloss, suns: false, strength: of_prt.strength, ..Direct::default() };

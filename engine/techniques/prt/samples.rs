@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::{Vec2, Vec3};
 
-use super::grid::Nearby;
+use super::{components::components, grid::Nearby};
 use crate::{
     scene::{Pose, Scene},
     shaders::{
@@ -36,13 +36,15 @@ pub(super) struct Thinning {
     gaps: f32,
     cells: HashMap<[i32; 3], Vec<u32>>,
     pub samples: Vec<PrtPoint>,
+    /// The connected component that each sample is on.
+    components: Vec<u32>,
 }
 
 impl Thinning {
     /// `radius`: least distance of two samples on a plane, metres. `gaps`: that in the narrowest gaps, as a share of it. If it is below 1, the areas of all
     /// candidates are free distances above their surfaces, metres.
     pub fn new(radius: f32, gaps: f32) -> Self {
-        Self { radius, gaps, cells: HashMap::new(), samples: Vec::new() }
+        Self { radius, gaps, cells: HashMap::new(), samples: Vec::new(), components: Vec::new() }
     }
 
     /// Largest free distance that counts, metres; 0: none does.
@@ -52,7 +54,7 @@ impl Thinning {
 
     /// Keeps a candidate if no sample is too close. The least distance shrinks with the angle between the normals, so that curved
     /// surfaces have more samples, and two sides of a sheet do not count for each other. Slits have no samples, so they are dark.
-    pub fn offer(&mut self, candidate: &PrtPoint) -> bool {
+    pub fn offer(&mut self, candidate: &PrtPoint, component: u32) -> bool {
         if candidate.area < slit(self.radius, self.gaps) {
             return false;
         }
@@ -61,9 +63,9 @@ impl Thinning {
         let share = |point: &PrtPoint| share_in_gap(point.area, self.radius, self.gaps);
         let own_share = share(candidate);
         let close = |other: &u32| {
+            // A picture on a wall has samples of its own, and so has each book on a shelf.
+            let strange = if self.components[*other as usize] == component { 1.0 } else { 0.6 };
             let other = &self.samples[*other as usize];
-            // A picture on a wall has samples of its own.
-            let strange = if other.material == candidate.material { 1.0 } else { 0.6 };
             let least = strange * self.radius * (0.5 + 0.5 * side(other).dot(side(candidate)));
             // A step to a parallel surface counts as a way along the surface that is longer.
             let way = position(other) - at;
@@ -89,6 +91,7 @@ impl Thinning {
         }
         self.cells.entry(own).or_default().push(self.samples.len() as u32);
         self.samples.push(*candidate);
+        self.components.push(component);
         true
     }
 }
@@ -125,7 +128,7 @@ pub(super) fn radius_for(parts: &[[f32; 2]], samples: u32, gaps: f32) -> f32 {
     radius
 }
 
-/// A triangle of a scene and its material.
+/// A triangle of a scene, and the connected component of its mesh; each instance has components of its own.
 pub(super) type Triangle = ([Vec3; 3], u32);
 
 /// The triangles of a scene at rest.
@@ -143,21 +146,34 @@ impl Triangles {
     pub fn new(scene: &Scene) -> Self {
         let pose = Pose::rest(scene);
         let mut out = Self::default();
+        let mut first = 0;
         for (node, mesh) in scene.nodes.iter().enumerate().filter_map(|(node, of)| Some((node, of.mesh?))) {
             let Some((mesh, world)) = scene.meshes.get(mesh as usize).zip(pose.world.get(node)) else { continue };
             for primitive in &mesh.primitives {
                 let Some(material) = scene.materials.get(primitive.material as usize) else { continue };
                 out.firsts.push(out.list.len() as u32);
+                let (components, number) = components(&primitive.positions, &primitive.indices);
                 let corner = |index: &u32| match primitive.positions.get(*index as usize) {
                     Some(position) if !material.unlit => world.transform_point3(*position),
                     _ => Vec3::ZERO,
                 };
-                let triangle = |t: &[u32]| ([corner(&t[0]), corner(&t[1]), corner(&t[2])], primitive.material);
-                out.list.extend(primitive.indices.chunks_exact(3).map(triangle));
+                let triangle = |(t, of): (&[u32], u32)| ([corner(&t[0]), corner(&t[1]), corner(&t[2])], first + of);
+                out.list.extend(primitive.indices.chunks_exact(3).zip(components).map(triangle));
+                first += number;
             }
         }
         out.hits = vec![[0; 2]; out.list.len()];
         out
+    }
+
+    /// The component of the surface that a hit is on.
+    pub fn component(&self, hit: &PrtPoint) -> u32 {
+        self.find(hit).map_or(0, |(at, _)| self.list[at].1)
+    }
+
+    /// The first triangle of each instance, and the component of each triangle.
+    pub fn components(&self) -> (&[u32], Vec<u32>) {
+        (&self.firsts, self.list.iter().map(|(_, component)| *component).collect())
     }
 
     /// Forgets all hits.
@@ -275,12 +291,13 @@ fn quasi(number: u64) -> Vec2 {
 /// as for [`Nearby::new`].
 pub(super) fn weigh(samples: &mut [PrtPoint], triangles: &Triangles, radius: f32, shares: &[f32]) {
     let nearby = Nearby::new(samples, radius, shares);
+    let components: Vec<u32> = samples.iter().map(|sample| triangles.component(sample)).collect();
     let whole = area(&triangles.list);
     let reached = triangles.reached();
     let each = whole / (POINTS * samples.len().max(1)) as f64;
     let mut counts = vec![0u32; samples.len()];
     let (mut sum, mut number) = (0.0f64, 0u64);
-    for ((triangle, material), reached) in triangles.list.iter().zip(&reached) {
+    for ((triangle, component), reached) in triangles.list.iter().zip(&reached) {
         let normal = doubled_area(triangle);
         let part = 0.5 * f64::from(normal.length());
         if !part.is_finite() || part <= 0.0 || each <= 0.0 {
@@ -294,7 +311,11 @@ pub(super) fn weigh(samples: &mut [PrtPoint], triangles: &Triangles, radius: f32
             let [a, b, c] = triangle;
             let at = *a + (*b - *a) * uv.x + (*c - *a) * uv.y;
             for (normal, reached) in [normal, -normal].into_iter().zip(reached) {
-                let found = if *reached == Some(false) { None } else { nearby.nearest(samples, at, normal, *material) };
+                let found = if *reached == Some(false) {
+                    None
+                } else {
+                    nearby.nearest((samples, &components), at, normal, *component)
+                };
                 let Some(found) = found else { continue };
                 // A side that is too small for hits belongs to a sample of the same plane.
                 let sample = &samples[found];
@@ -325,7 +346,7 @@ mod tests {
         for i in 0..60_000u32 {
             let fraction = |by: f64| (0.5 + by * f64::from(i)).fract() as f32;
             let at = Vec3::new(fraction(0.754_877_666_246_693), 0.0, fraction(0.569_840_290_998_053));
-            thinning.offer(&point(at, Vec3::Y));
+            thinning.offer(&point(at, Vec3::Y), 0);
         }
         let [a, b, c, d] = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(x, z)| Vec3::new(x, 0.0, z));
         // Seen from its upper side, which is the back of these triangles.
@@ -373,10 +394,13 @@ mod tests {
     #[test]
     fn two_sides_of_a_sheet_have_samples_of_their_own() {
         let mut thinning = Thinning::new(0.1, 1.0);
-        assert!(thinning.offer(&point(Vec3::ZERO, Vec3::Y)));
-        assert!(thinning.offer(&point(Vec3::ZERO, -Vec3::Y)));
-        assert!(!thinning.offer(&point(Vec3::X * 0.09, Vec3::Y)));
-        assert!(thinning.offer(&point(Vec3::X * 0.09, Vec3::Z)));
+        assert!(thinning.offer(&point(Vec3::ZERO, Vec3::Y), 0));
+        assert!(thinning.offer(&point(Vec3::ZERO, -Vec3::Y), 0));
+        assert!(!thinning.offer(&point(Vec3::X * 0.09, Vec3::Y), 0));
+        // The neighbour of another component is nearer than that, but not too near.
+        assert!(!thinning.offer(&point(Vec3::X * 0.05, Vec3::Y), 1));
+        assert!(thinning.offer(&point(Vec3::X * 0.07, Vec3::Y), 1));
+        assert!(thinning.offer(&point(Vec3::X * 0.09, Vec3::Z), 0));
     }
 
     /// Hits on two planes with a distance between them, which face each other; their areas are the free distances.
@@ -394,7 +418,7 @@ mod tests {
         let count = |apart: f32| {
             let mut thinning = Thinning::new(0.1, 0.4);
             hits(apart).for_each(|hit| {
-                thinning.offer(&hit);
+                thinning.offer(&hit, 0);
             });
             thinning.samples.len() as f32
         };
@@ -403,22 +427,24 @@ mod tests {
         assert!((count(0.1) / open - 4.0).abs() < 0.6, "{} {open}", count(0.1));
         assert!((count(0.02) / open - 1.0 / 0.16).abs() < 1.2, "{} {open}", count(0.02));
         assert_eq!(count(0.004), 0.0);
-        assert!(Thinning::new(0.1, 1.0).offer(&hits(0.004).next().unwrap()));
+        assert!(Thinning::new(0.1, 1.0).offer(&hits(0.004).next().unwrap(), 0));
     }
 
     #[test]
     fn steps_have_samples_on_both_planes_and_curved_surfaces_do_not_count_as_steps() {
         let mut thinning = Thinning::new(0.1, 1.0);
-        assert!(thinning.offer(&point(Vec3::ZERO, Vec3::Y)));
-        assert!(!thinning.offer(&point(Vec3::new(0.05, 0.005, 0.0), Vec3::Y)));
-        assert!(thinning.offer(&point(Vec3::new(0.05, 0.02, 0.0), Vec3::Y)));
+        assert!(thinning.offer(&point(Vec3::ZERO, Vec3::Y), 0));
+        assert!(!thinning.offer(&point(Vec3::new(0.05, 0.005, 0.0), Vec3::Y), 0));
+        assert!(thinning.offer(&point(Vec3::new(0.05, 0.02, 0.0), Vec3::Y), 0));
         // On a sphere of 0.3 m, 9 cm away.
         let on_sphere = |angle: f32| {
             point(0.3 * Vec3::new(angle.sin(), angle.cos(), 0.0), Vec3::new(angle.sin(), angle.cos(), 0.0))
         };
         let mut thinning = Thinning::new(0.1, 1.0);
         assert!(
-            thinning.offer(&on_sphere(0.0)) && !thinning.offer(&on_sphere(0.3)) && thinning.offer(&on_sphere(0.35))
+            thinning.offer(&on_sphere(0.0), 0)
+                && !thinning.offer(&on_sphere(0.3), 0)
+                && thinning.offer(&on_sphere(0.35), 0)
         );
     }
 

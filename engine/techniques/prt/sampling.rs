@@ -192,7 +192,7 @@ impl Bakery {
             // Hits of one particle depend on each other, so those of all particles come in turns.
             for turn in 0..PRT_HITS as usize {
                 let hits = found.hits.iter().filter_map(|hits| hits.get(turn));
-                kept += hits.filter(|hit| thinning.offer(hit)).count();
+                kept += hits.filter(|hit| thinning.offer(hit, triangles.component(hit))).count();
             }
             if thinning.samples.len() > plan::MOST_SAMPLES || kept * 100 < thinning.samples.len() {
                 break;

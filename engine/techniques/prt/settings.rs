@@ -184,6 +184,9 @@ pub struct Settings {
     /// Distance of two eyes: left and right view side by side, each of the picture's size, with the camera between them. Both look straight ahead. 0: one view.
     #[schemars(range(min = 0, max = 10), extend("x-unit" = "m"))]
     pub eyes: f32,
+    /// Both eyes are drawn in one pass over the surfaces where the device can (multiview), elsewhere in two. Off: always in two. Same pixels.
+    #[schemars(extend("x-needs" = {"eyes": {"exclusiveMinimum": 0}}))]
+    pub multiview: bool,
     /// Surfaces have highlights. If off, Lambert's law alone.
     pub gloss: bool,
     /// Glossy surfaces reflect transferred light by its directions, if the bake has directional coefficients (`room.directional`). If off, they reflect it
@@ -233,6 +236,7 @@ impl Default for Settings {
             spread: Spread::default(),
             splat_pixels: 2.0,
             eyes: 0.0,
+            multiview: true,
             gloss: true,
             directional: true,
             bounces: true,

@@ -79,6 +79,8 @@ pub struct Prt {
     baked: Baked,
     light: OnDevice,
     spreader: Spreader,
+    /// The device can draw several views in one pass.
+    multiview: bool,
 }
 
 impl Prt {
@@ -116,7 +118,7 @@ impl Technique for Prt {
         baked.expect_scene(scene)?;
         let light = OnDevice::new(gpu, scene, &baked.stored, &settings.prt).map_err(|error| baked.blamed(error))?;
         let spreader = Spreader::new(gpu, scene, &baked.stored, settings.prt.spread)?;
-        Ok(Self { baked: baked.clone(), light, spreader })
+        Ok(Self { baked: baked.clone(), light, spreader, multiview: gpu.caps().multiview })
     }
 
     fn frame(&mut self, graph: &mut Graph, moment: &Moment<'_, Mode>, settings: &PictureSettings) -> Result<Picture> {
@@ -158,7 +160,8 @@ impl Technique for Prt {
         let maps = maps.as_ref();
         let drawing = Drawing { light: &self.light, lit: &lit, directions, spread, handles, settings, mode, maps };
         let shown = if of_prt.eyes > 0.0 {
-            let eyes = [-0.5, 0.5].map(|side| drawing.draw(graph, &view.beside(side * of_prt.eyes)));
+            let [left, right] = [-0.5, 0.5].map(|side| view.beside(side * of_prt.eyes));
+            let eyes = drawing.draw_eyes(graph, [&left, &right], self.multiview && of_prt.multiview);
             eyes::side_by_side(graph, eyes, mode, moment.shot.layers)
         } else {
             drawing.draw(graph, view)

@@ -1,0 +1,6 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_multiview : require
+#define EYES
+#include "passes/gbuffer_vertex.glsl"
