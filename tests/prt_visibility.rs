@@ -143,7 +143,7 @@ fn the_penumbra_of_a_disc_is_that_of_its_closed_form() {
             let [low, high] = [-1.0, 1.0].map(|side| share((away + side * width).max(0.0)));
             found - (high + more) > 0.0 || found - (low - more) < 0.0
         };
-        // Mean over rings: two of 64 points of the lamp more or less.
+        // Mean over rings: two or three of 64 points of the lamp more or less.
         for ring in 0..28 {
             let away = 0.1 * f64::from(ring) + 0.05;
             let ring: Vec<f32> = (0..width)
@@ -152,7 +152,7 @@ fn the_penumbra_of_a_disc_is_that_of_its_closed_form() {
                 .map(|(_, share)| share)
                 .collect();
             let mean = f64::from(ring.iter().sum::<f32>()) / ring.len() as f64;
-            assert!(!outside(away, mean, slack(away), 2.0 / 64.0), "{away}: {mean} instead of {}", share(away));
+            assert!(!outside(away, mean, slack(away), 2.5 / 64.0), "{away}: {mean} instead of {}", share(away));
         }
         // Each pixel of lines over the shadow: samples are one by one off by a cell and a distance of samples.
         for y in [width / 2, width / 2 + 5, width / 2 - 8] {
