@@ -27,18 +27,6 @@ layout(push_constant, scalar) uniform Push {
     float most;     // of the free distances above hits, metres; 0: they are not measured
 };
 
-// Whether another surface rises within a distance along the surface. Light changes there over distances like this one, so such a point stands for next to
-// nothing around it.
-bool in_edge(vec3 origin, vec3 side, float distance, uint salt) {
-    mat3 frame = frame_around(side);
-    for (uint way = 0u; way < 4u; ++way) {
-        vec3 along = (way & 1u) == 0u ? frame[way >> 1u] : -frame[way >> 1u];
-        Hit hit = trace(Ray(origin, 0.0, normalize(along + 0.2 * side), distance), TRACE_SHADOW, salt, false);
-        if (hit.instance != NONE) return true;
-    }
-    return false;
-}
-
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= particles) return;
@@ -66,7 +54,6 @@ void main() {
             if (most > 0.0) {
                 Hit above = trace(Ray(p.position + 2.0 * gap * side, 0.0, side, most), TRACE_SHADOW, salt, false);
                 clearance = above.instance == NONE ? most : above.t;
-                if (in_edge(p.position + 2.0 * gap * side, side, PRT_EDGE * clearance / PRT_CLEAR, salt)) clearance = 0.0;
             }
             points[i * PRT_HITS + kept] = PrtPoint(p.position, hit.instance, side, hit.triangle, normal,
                 INSTANCE_AT(hit.instance).material, hit.barycentrics, gap, clearance, 1.0);

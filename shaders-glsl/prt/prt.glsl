@@ -15,8 +15,6 @@ const float PRT_DENSITY = 0.697; // export
 const float PRT_STEP = 64.0; // export
 // Factor on the square of the distance to a sample of another connected component: books on a shelf have colours of their own.
 const float PRT_STRANGE = 16.0; // export
-// Distance of samples from inner edges, as a share of the distance of samples; less in gaps.
-const float PRT_EDGE = 0.06;
 // Free distance above a surface that counts as wide, in distances of samples.
 const float PRT_CLEAR = 2.0; // export
 // Lights whose visibility is gathered at once.

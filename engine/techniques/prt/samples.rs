@@ -397,10 +397,10 @@ mod tests {
         assert!(thinning.offer(&point(Vec3::ZERO, Vec3::Y), 0));
         assert!(thinning.offer(&point(Vec3::ZERO, -Vec3::Y), 0));
         assert!(!thinning.offer(&point(Vec3::X * 0.09, Vec3::Y), 0));
-        // The neighbour of another component is nearer than that, but not too near.
-        assert!(!thinning.offer(&point(Vec3::X * 0.05, Vec3::Y), 1));
-        assert!(thinning.offer(&point(Vec3::X * 0.07, Vec3::Y), 1));
         assert!(thinning.offer(&point(Vec3::X * 0.09, Vec3::Z), 0));
+        // The neighbour of another component is nearer than that, but not too near.
+        assert!(!thinning.offer(&point(Vec3::X * -0.05, Vec3::Y), 1));
+        assert!(thinning.offer(&point(Vec3::X * -0.07, Vec3::Y), 1));
     }
 
     /// Hits on two planes with a distance between them, which face each other; their areas are the free distances.
