@@ -3,11 +3,13 @@
 use crate::{
     prt_lab::{baked, small},
     prt_light::room,
+    tracer_lab::Stage,
 };
 use glam::{Vec3, vec3};
 use lucerna::{
     Stop,
     gpu::testing::with_gpu,
+    scene::{Material, Mesh, Node, Primitive, Scene},
     shaders::types::PrtPoint,
     techniques::prt::{
         Baking, Settings, Stored,
@@ -72,6 +74,47 @@ fn scatterings_through_links_come_to_an_end() {
             norm(&stored, |i| found[i][0] - last[i][0]) / whole
         });
         assert!(off.is_sorted_by(|a, b| a > b) && off[3] < 1e-3, "{off:?}");
+    });
+}
+
+/// A room with a row of 24 boxes like books of four colours. They are one mesh of one material, and every third one stands out.
+fn row() -> Scene {
+    let mut scene = room();
+    let colors = [vec3(0.85, 0.05, 0.05), vec3(0.05, 0.75, 0.05), vec3(0.05, 0.05, 0.85), vec3(0.8, 0.7, 0.05)];
+    let mut row = Primitive { material: scene.materials.len() as u32, ..Primitive::default() };
+    scene.materials.push(Material::diffuse("books", Vec3::ONE));
+    for book in 0..24 {
+        let mut stage = Stage::new();
+        let out = if book % 3 == 0 { 0.03 } else { 0.0 };
+        let low = vec3(-1.0 + 0.061 * book as f32, 0.0, -1.49);
+        stage.cuboid(0, low, low + vec3(0.06, 0.8, 0.3 + out), false);
+        for side in stage.scene.meshes.iter().flat_map(|mesh| &mesh.primitives) {
+            let first = row.positions.len() as u32;
+            row.indices.extend(side.indices.iter().map(|index| first + index));
+            row.positions.extend(&side.positions);
+            row.normals.extend(&side.normals);
+            row.tangents.extend(&side.tangents);
+            row.colors.extend(side.positions.iter().map(|_| colors[book % 4].extend(1.0)));
+        }
+    }
+    let mesh = Some(scene.meshes.len() as u32);
+    scene.meshes.push(Mesh { primitives: vec![row], ..Mesh::default() });
+    scene.nodes.push(Node { mesh, ..Node::default() });
+    scene
+}
+
+#[test]
+fn the_colour_of_a_book_is_not_that_of_its_neighbour() {
+    with_gpu(|gpu| {
+        let scene = row();
+        let stored = baked(gpu, &scene, &Baking { samples: 3000, cluster: 600, rays: 512, ..small() });
+        let options = CheckOptions { lights: 8, samples: 3000, paths: 128, seed: 0 };
+        let found = check(gpu, &scene, &stored, &diffuse(3), options, &Stop::default()).unwrap();
+        let all: Vec<RelativeError> = found.iter().filter_map(|light| light.transferred).collect();
+        let mean = |of: fn(&RelativeError) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
+        // Samples that know only the material of their surface have 0.063 and 0.051.
+        let errors = [mean(|of| of.error), mean(|of| of.trimmed)];
+        assert!(errors.iter().all(|error| *error < 0.042), "{errors:?}");
     });
 }
 

@@ -231,6 +231,15 @@ mod tests {
     }
 
     #[test]
+    fn a_point_prefers_samples_of_its_own_component() {
+        let at = |x: f32| PrtPoint { position: [x, 0.0, 0.0], side: [0.0, 1.0, 0.0], ..PrtPoint::default() };
+        let samples = [at(0.0), at(0.05)];
+        let nearby = Nearby::new(&samples, 0.1, &[]);
+        let nearest = |component| nearby.nearest((&samples, &[3, 4]), 0.035 * Vec3::X, Vec3::Y, component);
+        assert_eq!([3, 4, 5].map(nearest), [Some(0), Some(1), Some(1)]);
+    }
+
+    #[test]
     fn packed_samples_keep_their_sides_and_free_distances() {
         let samples = points(30);
         for (sample, near) in samples.iter().zip(packed(&samples, &[7; 30], &[0.03; 30], 0.2)) {
