@@ -21,6 +21,19 @@ fn set(id: String, title: String, like: &Picture, exposure: f64) -> Comparison {
     Comparison::new(id, title, like.width, like.height).exposure(exposure)
 }
 
+/// The exposure of signed light, EV: the largest channel of most pixels is below 1, in the mean over the pictures. Luminance is no measure of such light, because red and
+/// blue have little of it.
+fn signed_stops<'a>(pictures: impl Iterator<Item = &'a Picture>) -> f64 {
+    let bright = |picture: &Picture| {
+        let mut peaks: Vec<f32> = picture.pixels.iter().map(|[r, g, b]| r.max(*g).max(*b)).collect();
+        peaks.sort_by(f32::total_cmp);
+        peaks.get(peaks.len() * 49 / 50).copied().filter(|peak| *peak > 0.0 && peak.is_finite())
+    };
+    let logarithms: Vec<f64> = pictures.filter_map(bright).map(|peak| f64::from(peak).log2()).collect();
+    let mean = logarithms.iter().sum::<f64>() / logarithms.len().max(1) as f64;
+    -(4.0 * mean).round() / 4.0
+}
+
 /// Figures 1 and 3; `None` without their pictures.
 pub(super) fn bake(results: &Results, cases: &[Case<'_>]) -> Result<Option<Section>> {
     let showing = |what: &'static str| cases.iter().filter(move |case| case.setting("/show") == what);
@@ -42,14 +55,15 @@ pub(super) fn bake(results: &Results, cases: &[Case<'_>]) -> Result<Option<Secti
         }
     }
     let mut signed: Option<Comparison> = None;
-    for case in showing("transfer") {
-        let picture = results.picture(Layer(case.run, ""))?;
+    let transfers = showing("transfer").map(|case| Ok((case, results.picture(Layer(case.run, ""))?)));
+    let transfers: Vec<_> = transfers.collect::<Result<_>>()?;
+    let stops = signed_stops(transfers.iter().map(|(_, picture)| picture));
+    for (case, picture) in transfers {
         let current = match signed.take() {
             Some(set) => set,
             None => {
                 let title = format!("Figure 3: {}, {}", case.run.scene, case.run.view);
-                set("figure-3".into(), title, &picture, Display::default().stops(&picture))
-                    .values("transferred light, W/m², for a coefficient of 1")
+                set("figure-3".into(), title, &picture, stops).values("transferred light, W/m², for a coefficient of 1")
             }
         };
         signed = Some(current.with(format!("vector {}", case.number("/picture/prt/vector")), picture.pixels));
@@ -99,4 +113,25 @@ pub(super) fn light(results: &Results, cases: &[Case<'_>]) -> Result<Option<Sect
         }
     }
     Ok((!sets.is_empty()).then_some(section))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signed_light_is_shown_by_its_largest_channel() {
+        let picture = |peak: f32| Picture {
+            width: 100,
+            height: 1,
+            display_referred: false,
+            // One pixel is far too bright.
+            pixels: (0..100).map(|i| if i == 7 { [900.0, 0.0, 0.0] } else { [0.0, 0.0, peak] }).collect(),
+        };
+        assert_eq!(signed_stops([picture(0.25)].iter()), 2.0);
+        assert_eq!(signed_stops([picture(0.25), picture(1.0)].iter()), 1.0);
+        // Pictures without light have no say.
+        assert_eq!(signed_stops([picture(0.5), picture(0.0)].iter()), 1.0);
+        assert_eq!(signed_stops([picture(0.0)].iter()).abs(), 0.0);
+    }
 }
