@@ -40,7 +40,7 @@ fn a_second_room_without_a_way_to_the_light_has_samples_and_the_inside_of_furnit
         // A hollow cabinet behind the wall.
         stage.cuboid(wall, vec3(1.2, -0.2, -0.2), vec3(1.5, 0.1, 0.1), true);
         stage.point(vec3(0.2, 0.3, -0.1), Vec3::ONE);
-        let mut places = starts(&stage.scene).0;
+        let mut places = starts(&stage.scene).points;
         let mut bakery = Bakery::new(gpu, &stage.scene).unwrap();
         let area = |bakery: &mut Bakery, places: &[Vec3]| {
             let baking = Baking { samples: 1000, ..small() };

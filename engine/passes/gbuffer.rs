@@ -85,17 +85,13 @@ pub struct GBuffer {
 
 /// Draws the scene as `view` sees it.
 pub fn draw(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings) -> GBuffer {
-    let gbuffer = empty(graph, scene, view, 1, settings);
-    surfaces(graph, scene, &gbuffer, &batches(scene, &[view], settings), settings, Of::View);
-    gbuffer
+    one(graph, scene, view, &batches(scene, &[view], settings), settings, Of::View)
 }
 
 /// The next layer of a depth peeling: the nearest surface behind the linear depths `nearer` (R32F, same extent). Back faces of single-sided
 /// surfaces are drawn, with the normal of their front.
 pub fn draw_behind(graph: &mut Graph, scene: &Handles, view: &View, settings: &Settings, nearer: Image) -> GBuffer {
-    let gbuffer = empty(graph, scene, view, 1, settings);
-    surfaces(graph, scene, &gbuffer, &batches(scene, &[view], settings), settings, Of::Behind(nearer));
-    gbuffer
+    one(graph, scene, view, &batches(scene, &[view], settings), settings, Of::Behind(nearer))
 }
 
 /// Draws the scene as two eyes see it, both views of the same extent. `multiview`: in one pass over the scene, only with
@@ -109,11 +105,7 @@ pub fn draw_eyes(
 ) -> [GBuffer; 2] {
     let batches = batches(scene, &views, settings);
     if !multiview {
-        return views.map(|view| {
-            let gbuffer = empty(graph, scene, view, 1, settings);
-            surfaces(graph, scene, &gbuffer, &batches, settings, Of::View);
-            gbuffer
-        });
+        return views.map(|view| one(graph, scene, view, &batches, settings, Of::View));
     }
     let both = empty(graph, scene, views[0], 2, settings);
     let eyes = graph.uniform(&types::Eyes { views: views.map(View::uniform) });
@@ -131,14 +123,22 @@ pub fn draw_eyes(
     [of_eye(0, both.view), of_eye(1, right)]
 }
 
-/// What a pass over the scene draws.
+/// The surfaces that a pass over the scene draws.
 #[derive(Clone, Copy, Debug)]
 enum Of {
+    /// The nearest ones of one view.
     View,
-    /// The surfaces behind these linear depths.
+    /// The nearest ones of one view behind these linear depths.
     Behind(Image),
-    /// Two views, each into a layer of its own.
+    /// The nearest ones of two views, each into a layer of its own.
     Eyes(Uniform<types::Eyes>),
+}
+
+/// The surfaces of one view.
+fn one(graph: &mut Graph, scene: &Handles, view: &View, batches: &Batches, settings: &Settings, of: Of) -> GBuffer {
+    let gbuffer = empty(graph, scene, view, 1, settings);
+    surfaces(graph, scene, &gbuffer, batches, settings, of);
+    gbuffer
 }
 
 /// Images of so many layers, without contents.

@@ -61,7 +61,7 @@ pub struct Batches {
 impl Batches {
     /// The instances that `frustum` sees (`None`: all), near `eye` first.
     pub fn new(moment: &Moment, frustum: Option<&Frustum>, eye: Vec3) -> Self {
-        Self::filtered(moment, |i| frustum.is_none_or(|f| f.sees(&i.bounds)), eye)
+        Self::of_views(moment, frustum.map_or(&[], std::slice::from_ref), eye)
     }
 
     /// As [`Batches::new`], with the instances that at least one of several frusta sees; no frusta: all.

@@ -28,7 +28,7 @@ pub fn small() -> Baking {
 
 pub fn sampled(gpu: &Gpu, scene: &Scene, baking: &Baking) -> Result<(Bakery, Sampled)> {
     let mut bakery = Bakery::new(gpu, scene)?;
-    let sampled = bakery.sample(baking, &starts(scene).0, &Stop::default())?;
+    let sampled = bakery.sample(baking, &starts(scene).points, &Stop::default())?;
     Ok((bakery, sampled))
 }
 

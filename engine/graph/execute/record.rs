@@ -185,10 +185,11 @@ impl Recorder<'_> {
             let what = "the device cannot draw several views in one pass (multiview)";
             return Err(Error::new(ErrorKind::Runtime, what).help("Draw each view in a pass of its own"));
         }
-        let raster = self.raster_state(targets, state);
-        let pipeline = self.gpu.raster_pipeline(bound.shader, &bound.spec, &raster)?;
         let first = targets.colors.first().map(|(i, _)| *i).or(targets.depth.map(|(i, _)| i));
         let Some(first) = first else { return Err(mismatch("targets")) };
+        let views = if targets.views { (1 << first.layers) - 1 } else { 0 };
+        let raster = RasterState { view_mask: views, ..self.raster_state(targets, state) };
+        let pipeline = self.gpu.raster_pipeline(bound.shader, &bound.spec, &raster)?;
         let full = self.extent(first);
         let mut colors = Vec::with_capacity(targets.colors.len());
         for (image, load) in &targets.colors {
@@ -260,8 +261,6 @@ impl Recorder<'_> {
     fn raster_state(&self, targets: &Targets, state: &Raster) -> RasterState {
         let read_only = matches!(targets.depth, Some((_, Depth::ReadOnly)));
         let depth = targets.depth.map(|(image, _)| self.format(image));
-        let layers = targets.colors.first().map(|(i, _)| i.layers).or(targets.depth.map(|(i, _)| i.layers));
-        let views = if targets.views { (1 << layers.unwrap_or(1)) - 1 } else { 0 };
         let blend = |image: Image| match self.format(image).class() {
             Class::Uint | Class::Sint => None,
             _ => vulkan::blend(state.blend),
@@ -287,7 +286,7 @@ impl Recorder<'_> {
                 reference: s.reference.into(),
             }),
             blend: targets.colors.iter().map(|(i, _)| blend(*i)).collect(),
-            view_mask: views,
+            view_mask: 0,
         }
     }
 

@@ -136,9 +136,19 @@ pub fn parts(scene: &Scene) -> Vec<Part> {
     ]
 }
 
-/// Points inside a scene from which particles may start: its lights and cameras, and if none is inside, its middle. Also whether it is the middle:
-/// that point may be inside a solid body.
-pub fn starts(scene: &Scene) -> (Vec<Vec3>, bool) {
+/// The places from which particles start.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Starts {
+    /// World space, metres. Those of rooms that particles from lights and cameras do not reach come last.
+    pub points: Vec<Vec3>,
+    /// Number of such rooms, 8 at most.
+    pub rooms: usize,
+    /// No light and no camera is inside the scene, so the first point is the middle of the scene. It may be inside a solid body.
+    pub guessed: bool,
+}
+
+/// Points inside a scene from which particles may start: its lights and cameras, and if none is inside, its middle. No point: the scene has no surface.
+pub fn starts(scene: &Scene) -> Starts {
     let pose = crate::scene::Pose::rest(scene);
     let [low, high] = samples::bounds(&samples::Triangles::new(scene).list);
     let inside = |at: &Vec3| at.cmpgt(low).all() && at.cmplt(high).all();
@@ -150,11 +160,11 @@ pub fn starts(scene: &Scene) -> (Vec<Vec3>, bool) {
         let light = scene.lights.get(light as usize);
         light.is_some_and(|light| light.kind != crate::scene::LightKind::Directional)
     };
-    let mut starts = of(&|node| node.light.is_some_and(local));
-    starts.extend(of(&|node| node.camera.is_some()));
-    let guessed = starts.is_empty() && low.x <= high.x;
+    let mut points = of(&|node| node.light.is_some_and(local));
+    points.extend(of(&|node| node.camera.is_some()));
+    let guessed = points.is_empty() && low.x <= high.x;
     if guessed {
-        starts.push(0.5 * (low + high));
+        points.push(0.5 * (low + high));
     }
-    (starts, guessed)
+    Starts { points, rooms: 0, guessed }
 }

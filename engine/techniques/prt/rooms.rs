@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{
-    Bakery, Baking,
+    Bakery, Baking, Starts,
     samples::{self, Triangles},
 };
 use crate::{Error, Result, Stop, shaders::types::PrtPoint};
@@ -19,29 +19,18 @@ const NEW: f64 = 0.75;
 /// Least mean distance between two hits of a particle, as a share of that in the known rooms: cabinets and boxes are hollow, too.
 const LEAST: f64 = 0.25;
 
-/// Where particles start.
-#[derive(Clone, Debug)]
-pub struct Starts {
-    /// Metres. Those of rooms that particles from lights and cameras do not reach come last.
-    pub points: Vec<Vec3>,
-    /// Number of such rooms, 8 at most.
-    pub rooms: usize,
-    /// No light and no camera is inside the scene, so the first point is its middle.
-    pub guessed: bool,
-}
-
 impl Bakery {
     /// Points from which particles start: [`plan::starts`](super::starts), and a point of each room that particles from there do not reach.
     ///
     /// # Errors
     /// `Input` if the scene has no surface; `OutOfMemory`, `DeviceLost`, `Interrupted`.
     pub fn starts(&mut self, baking: &Baking, stop: &Stop) -> Result<Starts> {
-        let (mut points, guessed) = super::starts(&self.scene);
-        if points.is_empty() {
+        let mut starts = super::starts(&self.scene);
+        if starts.points.is_empty() {
             return Err(Error::input("the scene has no surface that light reaches"));
         }
-        let rooms = self.rooms(baking, &mut points, stop)?;
-        Ok(Starts { points, rooms, guessed })
+        starts.rooms = self.rooms(baking, &mut starts.points, stop)?;
+        Ok(starts)
     }
 
     /// Adds a point of each room that particles from `starts` do not reach, and returns the number of such rooms, 8 at most. Particles start at

@@ -147,19 +147,22 @@ impl Triangles {
         let pose = Pose::rest(scene);
         let mut out = Self::default();
         let mut first = 0;
+        // Instances of a mesh have the same components, each with numbers of its own.
+        let mut known: HashMap<(u32, usize), (Vec<u32>, u32)> = HashMap::new();
         for (node, mesh) in scene.nodes.iter().enumerate().filter_map(|(node, of)| Some((node, of.mesh?))) {
-            let Some((mesh, world)) = scene.meshes.get(mesh as usize).zip(pose.world.get(node)) else { continue };
-            for primitive in &mesh.primitives {
+            let Some((of, world)) = scene.meshes.get(mesh as usize).zip(pose.world.get(node)) else { continue };
+            for (number, primitive) in of.primitives.iter().enumerate() {
                 let Some(material) = scene.materials.get(primitive.material as usize) else { continue };
                 out.firsts.push(out.list.len() as u32);
-                let (components, number) = components(&primitive.positions, &primitive.indices);
+                let found = || components(&primitive.positions, &primitive.indices);
+                let (components, count) = known.entry((mesh, number)).or_insert_with(found);
                 let corner = |index: &u32| match primitive.positions.get(*index as usize) {
                     Some(position) if !material.unlit => world.transform_point3(*position),
                     _ => Vec3::ZERO,
                 };
-                let triangle = |(t, of): (&[u32], u32)| ([corner(&t[0]), corner(&t[1]), corner(&t[2])], first + of);
-                out.list.extend(primitive.indices.chunks_exact(3).zip(components).map(triangle));
-                first += number;
+                let triangle = |(t, of): (&[u32], &u32)| ([corner(&t[0]), corner(&t[1]), corner(&t[2])], first + of);
+                out.list.extend(primitive.indices.chunks_exact(3).zip(components.iter()).map(triangle));
+                first += *count;
             }
         }
         out.hits = vec![[0; 2]; out.list.len()];

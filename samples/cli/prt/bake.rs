@@ -117,7 +117,7 @@ pub fn bake(args: &PrtBakeArgs, console: Console) -> Result<ExitCode> {
     let mut bakery = Bakery::new(&gpu, &stage.scene)?;
     let starts = match args.inside.is_empty() {
         true => bakery.starts(&keys.room, &Interrupt::stop()).map_err(blamed)?,
-        false => Starts { points: args.inside.iter().map(|inside| inside.0).collect(), rooms: 0, guessed: false },
+        false => Starts { points: args.inside.iter().map(|inside| inside.0).collect(), ..Starts::default() },
     };
     notes_on(&starts).iter().for_each(|note| console.info(note));
     let sampled = bakery.sample(&keys.room, &starts.points, &Interrupt::stop()).map_err(blamed)?;
