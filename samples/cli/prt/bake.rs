@@ -83,7 +83,8 @@ fn notes_on(starts: &Starts) -> Vec<String> {
             rooms => format!("{rooms} rooms, which are baked, too; points in them"),
         };
         let places = places.join(" ");
-        notes.push(format!("note: lights and cameras do not reach {rooms}: {places}; --inside chooses rooms"));
+        let from = if starts.guessed { "particles from there" } else { "lights and cameras" };
+        notes.push(format!("note: {from} do not reach {rooms}: {places}; --inside chooses rooms"));
     }
     notes
 }
