@@ -1,7 +1,7 @@
 //! Links: light of samples that see much of each other, beside the vectors.
 
 use crate::{
-    prt_lab::{baked, small},
+    prt_lab::{baked, closed, small},
     prt_light::room,
     tracer_lab::Stage,
 };
@@ -115,6 +115,45 @@ fn the_colour_of_a_book_is_not_that_of_its_neighbour() {
         // Samples that know only the material of their surface have 0.063 and 0.051.
         let errors = [mean(|of| of.error), mean(|of| of.trimmed)];
         assert!(errors.iter().all(|error| *error < 0.042), "{errors:?}");
+    });
+}
+
+/// Light that grows along the floor of a closed box, at the walls just above it.
+#[test]
+fn light_goes_smoothly_from_sample_to_sample() {
+    with_gpu(|gpu| {
+        let few = Baking { samples: 600, cluster: 300, light: 64, receivers: 0, rays: 2048, gaps: 1.0, ..small() };
+        let stored = baked(gpu, &closed(Vec3::splat(0.5)), &few);
+        let floor = |at: Vec3| if at.y < -0.999 { 1.0 + at.x } else { 0.0 };
+        let count = stored.samples.len();
+        let direct: Vec<[f32; 3]> =
+            stored.samples.iter().map(|sample| [floor(Vec3::from(sample.position)); 3]).collect();
+        let settings = Settings { bounces: false, ..diffuse(1) };
+        let found = solve::indirect(&stored, &vec![[1.0; 3]; count], &direct, &settings).unwrap();
+        let (mut off, mut whole, mut low) = (0.0f32, 0.0f32, 0);
+        for (sample, found) in stored.samples.iter().zip(&found) {
+            let (at, normal) = (Vec3::from(sample.position), Vec3::from(sample.normal));
+            if normal.y.abs() > 0.5 || at.y > -0.9 {
+                continue;
+            }
+            // Even points of a disc, lifted to directions with the density of the cosine.
+            let [side, up] = [normal.cross(Vec3::Y), Vec3::Y];
+            let rays = 4096;
+            let seen = (0..rays).map(|ray| {
+                let (radius, angle) = (((ray as f32 + 0.5) / rays as f32).sqrt(), 2.399_963_2 * ray as f32);
+                let [x, y] = [radius * angle.cos(), radius * angle.sin()];
+                let way = side * x + up * y + normal * (1.0 - radius * radius).sqrt();
+                let hit = at + way * (-(1.0 + at.y) / way.y);
+                if way.y < 0.0 && hit.abs().max_element() < 1.0001 { floor(hit) } else { 0.0 }
+            });
+            let truth = seen.sum::<f32>() / rays as f32;
+            off += sample.area * (found[0] - truth).powi(2);
+            whole += sample.area * truth * truth;
+            low += 1;
+        }
+        let error = (off / whole).sqrt();
+        // The nearest sample alone has 0.022.
+        assert!(low > 20 && error < 0.019, "{error} of {low}");
     });
 }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::{
-    prt_lab::{baked, closed, diffuse, picture, small},
+    prt_lab::{baked, closed, diffuse, picture, sampled, small},
     tracer_lab::{Stage, flat_view},
 };
 use glam::{DVec3, Vec3, dvec3, vec3};
@@ -65,6 +65,32 @@ fn distances_in_a_box_are_those_to_its_sides() {
         // At edges between sides few distances are far off, and they are no more than the bake states.
         assert!(root < 0.04 && (stored.summary().distance_error / root - 1.0).abs() < 0.03, "{root}");
         assert!(over < 0.012 && most < 2.0, "{most} {over}");
+    });
+}
+
+#[test]
+fn distances_that_no_single_buffer_holds_are_there() {
+    with_gpu(|gpu| {
+        let scene = closed(Vec3::splat(0.5));
+        let (mut bakery, sampled) =
+            sampled(gpu, &scene, &Baking { samples: 1300, cluster: 1300, directions: 16384, ..small() }).unwrap();
+        let (plan, samples) = (&sampled.plan, &sampled.samples);
+        bakery.upload(plan, samples).unwrap();
+        let cluster = (0..plan.clusters.len()).max_by_key(|of| plan.clusters[*of]).unwrap();
+        let cap = plan.cap(samples, cluster);
+        let found = bakery.depths(plan, cluster, &cap).unwrap();
+        let (range, directions) = (plan.range(cluster), cap.directions());
+        assert_eq!(found.len(), range.len() * directions);
+        assert!(4 * found.len() > 1 << 26, "{} {directions}: one buffer holds this", range.len());
+        for (sample, row) in samples[range].iter().zip(found.chunks_exact(directions)) {
+            let (at, side) = (Vec3::from(sample.position), Vec3::from(sample.side));
+            for number in (0..directions).step_by(97) {
+                let way = cap.direction(number);
+                if way.dot(side) > 1e-3 {
+                    assert!((f64::from(row[number]) - to_cube(at, way)).abs() < 1e-4, "{at} {way} {}", row[number]);
+                }
+            }
+        }
     });
 }
 

@@ -64,7 +64,15 @@ void main() {
                 float clearance = above.instance == NONE ? most : above.t;
                 // Slits have no samples and are dark.
                 if (clearance >= slit) found = nearest_sample(p.position, side, component, clearance);
-                if (found == NONE) found = PRT_LOST;
+                if (found == NONE) {
+                    found = PRT_LOST;
+                } else {
+                    // The samples around a point share it: a random step in its plane, as wide as the surface of a sample, leads to one of them. The mean over the
+                    // steps goes smoothly from sample to sample, where the nearest one alone would make a stair of the light.
+                    vec2 away = (unit_floats(pcg4d(uvec4(number, i, 29u, seed)).xy) - 0.5) * sqrt(samples[found].area);
+                    uint other = nearest_sample(p.position + frame_around(side) * vec3(away, 0.0), side, component, clearance);
+                    if (other != NONE) found = other;
+                }
             }
         }
         seen[receiver * rays + i] = found;

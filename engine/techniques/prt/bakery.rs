@@ -1,5 +1,7 @@
 //! The computations of a bake on the device: distances, gathered samples and the light of examples (`shaders-glsl/prt`).
 
+use std::ops::Range;
+
 use super::{
     Plan,
     cap::Cap,
@@ -19,6 +21,9 @@ use crate::{
         types::{self, PrtPoint},
     },
 };
+
+/// Bytes of the rows of samples that are computed at once; devices with smaller buffers have fewer.
+const MOST_BYTES: u64 = 1 << 26;
 
 /// The scene of a bake on a device.
 #[derive(Debug)]
@@ -88,17 +93,20 @@ impl Bakery {
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`, `Interrupted`.
     pub fn depths(&mut self, plan: &Plan, cluster: usize, cap: &Cap) -> Result<Vec<f32>> {
+        self.rows(plan.range(cluster), cap.directions(), |of, range| of.depths_of(plan, range, cap))
+    }
+
+    fn depths_of(&mut self, plan: &Plan, Range { start, end }: Range<u32>, cap: &Cap) -> Result<Vec<f32>> {
         let uploaded = self.on_device.as_ref().ok_or_else(not_uploaded)?;
-        let count = plan.clusters[cluster];
+        let count = end - start;
         let directions = cap.directions() as u32;
         let mut graph = Graph::new("prt.depths");
         let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
         let rays = self.rays.frame(&mut graph, &handles);
         let depths = graph.buffer("prt.depths", 4 * u64::from(count) * u64::from(directions));
-        let first = plan.range(cluster).start as u32;
         let args = traced!(
             depths::Args {
-                cap: graph.uniform(&device_cap(cap, [first, count])),
+                cap: graph.uniform(&device_cap(cap, [start, count])),
                 samples: graph.import_buffer(&uploaded.samples),
                 depths,
                 push: depths::Push { first: 0, count: directions, far: plan.far, seed: plan.settings.seed },
@@ -116,8 +124,12 @@ impl Bakery {
     /// # Errors
     /// As [`Self::depths`].
     pub fn gather(&mut self, plan: &Plan, cluster: usize) -> Result<Vec<u32>> {
+        self.rows(plan.range(cluster), plan.settings.rays as usize, |of, range| of.gather_of(plan, range))
+    }
+
+    fn gather_of(&mut self, plan: &Plan, Range { start, end }: Range<u32>) -> Result<Vec<u32>> {
         let uploaded = self.on_device.as_ref().ok_or_else(not_uploaded)?;
-        let count = plan.clusters[cluster];
+        let count = end - start;
         let of_sample = plan.settings.rays;
         let mut graph = Graph::new("prt.gather");
         let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
@@ -136,7 +148,7 @@ impl Bakery {
                 push: gather::Push {
                     first: 0,
                     count: of_sample,
-                    first_sample: plan.range(cluster).start as u32,
+                    first_sample: start,
                     receivers: count,
                     rays: of_sample,
                     slit: samples::slit(plan.radius, plan.settings.gaps as f32),
@@ -160,8 +172,18 @@ impl Bakery {
     /// # Errors
     /// As [`Self::depths`].
     pub fn lit(&mut self, plan: &Plan, cluster: usize, places: &[[f32; 3]], nearest: f32) -> Result<Vec<f32>> {
+        self.rows(plan.range(cluster), places.len(), |of, range| of.lit_of(plan, range, places, nearest))
+    }
+
+    fn lit_of(
+        &mut self,
+        plan: &Plan,
+        Range { start, end }: Range<u32>,
+        places: &[[f32; 3]],
+        nearest: f32,
+    ) -> Result<Vec<f32>> {
         let uploaded = self.on_device.as_ref().ok_or_else(not_uploaded)?;
-        let count = plan.clusters[cluster];
+        let count = end - start;
         let lights = places.len() as u32;
         let mut graph = Graph::new("prt.examples");
         let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
@@ -175,7 +197,7 @@ impl Bakery {
                 push: examples::Push {
                     first: 0,
                     count: lights,
-                    first_sample: plan.range(cluster).start as u32,
+                    first_sample: start,
                     receivers: count,
                     lights,
                     nearest,
@@ -192,6 +214,22 @@ impl Bakery {
 }
 
 impl Bakery {
+    /// Rows of `columns` words for the samples of a range, by ranges of samples whose rows fit into a buffer.
+    fn rows<T>(
+        &mut self,
+        samples: Range<usize>,
+        columns: usize,
+        mut of: impl FnMut(&mut Self, Range<u32>) -> Result<Vec<T>>,
+    ) -> Result<Vec<T>> {
+        let most = self.gpu.caps().limits.storage_range.min(MOST_BYTES);
+        let each = (most / (4 * columns.max(1) as u64)).max(1) as usize;
+        let mut out = Vec::new();
+        for start in samples.clone().step_by(each) {
+            out.extend(of(self, start as u32..samples.end.min(start.saturating_add(each)) as u32)?);
+        }
+        Ok(out)
+    }
+
     /// The samples on the device.
     pub(super) fn uploaded(&self) -> Result<&OwnedBuffer> {
         self.on_device.as_ref().map(|uploaded| &uploaded.samples).ok_or_else(not_uploaded)

@@ -218,8 +218,18 @@ impl Triangles {
 
     /// Whether next to no particle met the front of a triangle. A few slip through the edges of rooms, where two surfaces meet.
     fn is_strange(&self, at: usize, usual: f64) -> bool {
-        let hits = f64::from(self.hits[at][0]);
-        hits == 0.0 || hits < STRAY * usual * 0.5 * f64::from(doubled_area(&self.list[at].0).length())
+        self.hits[at][0] == 0 || self.are_stray(at, 0, usual)
+    }
+
+    /// Whether the hits of a side of a triangle, 1 for its back, are far fewer than those of other surfaces of its size.
+    fn are_stray(&self, at: usize, side: usize, usual: f64) -> bool {
+        let area = 0.5 * f64::from(doubled_area(&self.list[at].0).length());
+        f64::from(self.hits[at][side]) < STRAY * usual * area
+    }
+
+    /// Whether a hit is one of a few on its side of a triangle: its particle slipped through an edge into a closed space. `usual`: [`Self::usual`].
+    pub fn is_stray(&self, hit: &PrtPoint, usual: f64) -> bool {
+        self.find(hit).is_some_and(|(at, back)| self.are_stray(at, back.into(), usual))
     }
 
     /// Whether a hit is on the front of a triangle that particles do not meet. `usual`: [`Self::usual`].
@@ -247,7 +257,7 @@ impl Triangles {
         out
     }
 
-    /// Whether particles reach each side of each triangle; `None`: the side is so small that they may have missed it by chance.
+    /// Whether particles reach each side of each triangle, more than a few stray ones; `None`: the side is so small that they may have missed it by chance.
     fn reached(&self) -> Vec<[Option<bool>; 2]> {
         let parts: Vec<f64> = self.list.iter().map(|(t, _)| 0.5 * f64::from(doubled_area(t).length())).collect();
         let (mut all, mut of_hit) = (0.0, 0.0);
@@ -258,12 +268,13 @@ impl Triangles {
             }
         }
         let density = if of_hit > 0.0 { all / of_hit } else { 0.0 };
-        let reached = |count: u32, part: f64| match count {
+        let usual = self.usual();
+        let reached = |at: usize, side: usize| match self.hits[at][side] {
             // Corners have fewer hits than open walls, and some have none by chance.
-            0 if part * density < 20.0 => None,
-            count => Some(count > 0),
+            0 if parts[at] * density < 20.0 => None,
+            count => Some(count > 0 && !self.are_stray(at, side, usual)),
         };
-        self.hits.iter().zip(&parts).map(|(hits, part)| hits.map(|count| reached(count, *part))).collect()
+        (0..self.list.len()).map(|at| [0, 1].map(|side| reached(at, side))).collect()
     }
 }
 
@@ -378,7 +389,15 @@ mod tests {
         assert_eq!(triangles.usual(), 2000.0);
         let strange = |triangles: &Triangles| (0..4).map(|at| triangles.is_strange(at, 2000.0)).collect::<Vec<_>>();
         assert_eq!(strange(&triangles), [true, true, true, false]);
+        let hit = |triangle: u32, side: Vec3| PrtPoint { triangle, ..point(Vec3::Y, side) };
+        let stray = |triangles: &Triangles, triangle, side| triangles.is_stray(&hit(triangle, side), 2000.0);
+        // The square has hits on its back alone, and the triangle above it has few on both sides.
+        assert!(!stray(&triangles, 0, Vec3::Y) && stray(&triangles, 0, Vec3::NEG_Y));
+        assert!(stray(&triangles, 2, Vec3::Y) && stray(&triangles, 2, Vec3::NEG_Y));
+        assert_eq!(triangles.reached()[..3], [[Some(false), Some(true)], [Some(false), Some(true)], [Some(false); 2]]);
         triangles.hits[2] = [21, 0];
+        assert!(!stray(&triangles, 2, Vec3::NEG_Y));
+        assert_eq!(triangles.reached()[2], [Some(true), Some(false)]);
         assert_eq!(strange(&triangles), [true, true, false, false]);
         assert!(triangles.unseen(100, 2000.0).iter().all(|[at, _]| at.y == 0.0));
         assert_eq!(Triangles::default().usual(), 0.0);

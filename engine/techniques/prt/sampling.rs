@@ -104,6 +104,9 @@ impl Bakery {
             let what = format!("{} samples, at most {} are possible", found.len(), plan::MOST_SAMPLES);
             return Err(Error::usage(what).at("room.samples"));
         }
+        // A few particles slip through edges into closed furniture.
+        let usual = triangles.usual();
+        found.retain(|hit| !triangles.is_stray(hit, usual));
         let shares: Vec<f32> = found.iter().map(|hit| samples::share_in_gap(hit.area, radius, gaps)).collect();
         samples::weigh(&mut found, &triangles, radius, &shares);
         // A sample that stands for no surface is of no use.
