@@ -28,6 +28,8 @@ pub struct View {
     /// Pixels.
     pub extent: [u32; 2],
     projection: Projection,
+    /// Where each pixel looks, from its middle to the right and down, pixels.
+    shift: Vec2,
 }
 
 impl View {
@@ -45,6 +47,7 @@ impl View {
             far: 0.0,
             extent: extent.map(|e| e.max(1)),
             projection: camera.projection,
+            shift: Vec2::ZERO,
         };
         let (near, far) = match camera.projection {
             Projection::Perspective { znear, zfar, .. } => (znear, zfar.unwrap_or(DEFAULT_FAR)),
@@ -112,6 +115,20 @@ impl View {
         self
     }
 
+    /// The same camera, in whose image each pixel shows what is at `pixels` from its middle, to the right and down. For anti-aliasing by the mean of several
+    /// images.
+    #[must_use]
+    pub fn shifted(mut self, pixels: Vec2) -> Self {
+        self.shift = pixels;
+        self.set_range(self.near, self.far);
+        self
+    }
+
+    /// The shift as a part of the image, x to the right and y down.
+    fn shift_uv(&self) -> Vec2 {
+        self.shift / Vec2::new(self.extent[0] as f32, self.extent[1] as f32)
+    }
+
     fn set_range(&mut self, near: f32, far: f32) {
         self.near = if near.is_finite() { near } else { 0.01 };
         if matches!(self.projection, Projection::Perspective { .. }) {
@@ -125,6 +142,10 @@ impl View {
             Projection::Perspective { .. } => perspective(half, self.near, self.far),
             Projection::Orthographic { .. } => orthographic(half, self.near, self.far),
         };
+        if self.shift != Vec2::ZERO {
+            let uv = self.shift_uv();
+            self.clip_from_view = Mat4::from_translation(Vec3::new(-2.0 * uv.x, 2.0 * uv.y, 0.0)) * self.clip_from_view;
+        }
         self.clip_from_world = self.clip_from_view * self.view_from_world;
     }
 
@@ -154,6 +175,8 @@ impl View {
         let [right, up, forward] = self.axes();
         let half = self.half_extent();
         let (x, y) = (right * half.x, up * half.y);
+        let uv = self.shift_uv();
+        let aside = 2.0 * (uv.x * x - uv.y * y);
         let mut out = shaders::types::View {
             view_from_world: self.view_from_world.to_cols_array_2d(),
             clip_from_view: self.clip_from_view.to_cols_array_2d(),
@@ -169,12 +192,12 @@ impl View {
         };
         let far = self.far;
         if self.is_orthographic() {
-            out.base_o = (self.position - x + y).to_array();
+            out.base_o = (self.position - x + y + aside).to_array();
             out.base_u = (2.0 * x).to_array();
             out.base_v = (-2.0 * y).to_array();
             out.frustum_o = (forward * far).to_array();
         } else {
-            out.frustum_o = ((forward - x + y) * far).to_array();
+            out.frustum_o = ((forward - x + y + aside) * far).to_array();
             out.frustum_u = (2.0 * x * far).to_array();
             out.frustum_v = (-2.0 * y * far).to_array();
         }
@@ -269,6 +292,22 @@ mod tests {
     }
 
     #[test]
+    fn a_pixel_of_a_shifted_view_shows_what_is_beside_its_middle() {
+        for orthographic in [false, true] {
+            let view = View::new(&camera(orthographic, Some(40.0)), somewhere(), [64, 48]);
+            let shifted = view.shifted(Vec2::new(0.3, -0.4));
+            let extent = Vec2::new(64.0, 48.0);
+            let pixel = Vec2::new(17.5, 30.5);
+            let beside = view.world_from_depth((pixel + Vec2::new(0.3, -0.4)) / extent, 0.2);
+            assert!(shifted.world_from_depth(pixel / extent, 0.2).distance(beside) < 1e-5);
+            let clip = shifted.clip_from_world * beside.extend(1.0);
+            let uv = Vec2::new(0.5 + 0.5 * clip.x / clip.w, 0.5 - 0.5 * clip.y / clip.w);
+            assert!((uv * extent).distance(pixel) < 1e-3, "{uv}");
+            assert_eq!(shifted.with_far(50.0).shifted(Vec2::ZERO), view.with_far(50.0));
+        }
+    }
+
+    #[test]
     fn a_scaled_or_mirrored_camera_node_is_only_a_place() {
         let plain = View::new(&camera(false, None), somewhere(), [64, 48]);
         let scaled = View::new(&camera(false, None), somewhere() * Mat4::from_scale(Vec3::splat(3.0)), [64, 48]);
@@ -299,8 +338,9 @@ mod tests {
         #[test]
         fn reconstruction_agrees_with_the_inverse_matrix(
             orthographic: bool, x in 0.0f32..1.0, y in 0.0f32..1.0, distance in 0.6f32..39.0,
+            right in -1.0f32..1.0, down in -1.0f32..1.0,
         ) {
-            let view = View::new(&camera(orthographic, Some(40.0)), somewhere(), [1024, 768]);
+            let view = View::new(&camera(orthographic, Some(40.0)), somewhere(), [1024, 768]).shifted(Vec2::new(right, down));
             let point = view.world_from_depth(Vec2::new(x, y), distance / view.far);
             let eye = view.view_from_world.transform_point3(point);
             prop_assert!((-eye.z - distance).abs() < 1e-4 * distance.max(1.0));

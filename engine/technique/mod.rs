@@ -171,6 +171,11 @@ pub trait Technique: Sized {
     /// is ready if these are equal.
     fn prepared_by(settings: &Self::Settings) -> Self::Settings;
 
+    /// Pictures that programs render for one still, whose mean has smooth edges: as many as cost little. 1: a single one costs much.
+    fn stills(_: &Self::Settings) -> u32 {
+        8
+    }
+
     /// Number of rays that [`Self::ready`] traces for each object, for limits on the work that untrusted settings may cause.
     fn rays(_: &Self::Settings) -> u64 {
         0

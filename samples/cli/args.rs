@@ -4,7 +4,9 @@ use std::{ops::Range, path::PathBuf, str::FromStr};
 
 use clap::{ArgAction, Args};
 
-use crate::{config::SettingsArgs, console::Console, progress::ProgressMode, reference::Span, stage::StageArgs};
+use crate::{
+    config::SettingsArgs, console::Console, progress::ProgressMode, reference::Span, smooth::SmoothArgs, stage::StageArgs,
+};
 
 /// Options of `render`, the same for every technique.
 #[derive(Args, Clone, Debug)]
@@ -64,6 +66,9 @@ pub struct RenderArgs {
     /// Exposure: colours of .png files are multiplied by 2^EV [default: 0, or chosen from the first picture if it is very dark or bright]
     #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
     pub exposure: Option<f64>,
+
+    #[command(flatten)]
+    pub smooth: SmoothArgs,
 
     /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Picture")]

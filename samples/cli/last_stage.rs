@@ -103,7 +103,14 @@ fn without_nulls(value: &Value) -> Value {
 
 /// The tone mapping stage of a run over frames.
 #[derive(Debug)]
-pub struct LastStage(Option<Tonemap>);
+pub struct LastStage {
+    gpu: Gpu,
+    /// With the exposure of the run; `None`: pictures stay radiance.
+    settings: Option<tonemap::Settings>,
+    tonemap: Option<Tonemap>,
+    /// For pictures in host memory.
+    still: Option<Still>,
+}
 
 impl LastStage {
     /// `ev`: stops added before the exposure of the settings.
@@ -111,8 +118,9 @@ impl LastStage {
     /// # Errors
     /// `OutOfMemory`; `Usage` if the stops are too many.
     pub fn new(gpu: &Gpu, settings: Option<&tonemap::Settings>, ev: f64) -> Result<Self> {
-        let exposed = settings.map(|settings| exposed(settings, ev));
-        exposed.map(|settings| Tonemap::new(gpu, &settings)).transpose().map(Self)
+        let settings = settings.map(|settings| exposed(settings, ev));
+        let tonemap = settings.as_ref().map(|settings| Tonemap::new(gpu, settings)).transpose()?;
+        Ok(Self { gpu: gpu.clone(), settings, tonemap, still: None })
     }
 
     /// The picture after the stage. `dt`: seconds since the previous frame.
@@ -120,10 +128,25 @@ impl LastStage {
     /// # Errors
     /// `Usage` if the picture cannot be tone mapped as the settings ask.
     pub fn frame(&mut self, graph: &mut Graph, picture: Image, dt: f32) -> Result<Image> {
-        match &mut self.0 {
+        match &mut self.tonemap {
             Some(tonemap) => Ok(tonemap.frame(graph, picture, Some(dt))?.mapped),
             None => Ok(picture),
         }
+    }
+}
+
+impl LastStage {
+    /// Applies the stage to a picture in host memory, as [`Self::frame`]. The picture before the stage becomes the layer `light`.
+    ///
+    /// # Errors
+    /// As [`still`].
+    pub fn mean(&mut self, layers: &mut Layers, dt: f32) -> Result<()> {
+        let Some(settings) = &self.settings else { return Ok(()) };
+        let still = match &mut self.still {
+            Some(still) => still,
+            none => none.insert(Still::new(&self.gpu, settings)?),
+        };
+        developed(still, layers, Some(dt))
     }
 }
 
@@ -136,10 +159,14 @@ fn exposed(settings: &tonemap::Settings, ev: f64) -> tonemap::Settings {
 /// # Errors
 /// `Input` for bad values if the settings refuse them; `OutOfMemory`, `DeviceLost`.
 pub fn still(gpu: &Gpu, settings: &tonemap::Settings, ev: f64, layers: &mut Layers) -> Result<()> {
+    developed(&mut Still::new(gpu, &exposed(settings, ev))?, layers, None)
+}
+
+fn developed(still: &mut Still, layers: &mut Layers, dt: Option<f32>) -> Result<()> {
     let Some(main) = layers.layers.iter().position(|layer| layer.name.is_empty()) else { return Ok(()) };
     let Some(pixels) = layers.layers[main].rgb_pixels() else { return Ok(()) };
     let pixels = pixels.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect();
-    let mapped = Still::new(gpu, &exposed(settings, ev))?.map(layers.width, layers.height, pixels, None, None)?;
+    let mapped = still.map(layers.width, layers.height, pixels, None, dt)?;
     let light = Layer { name: "light".into(), ..layers.layers[main].clone() };
     layers.layers[main] = Layer::rgb("", &mapped.pixels);
     layers.layers.push(light);

@@ -17,6 +17,7 @@ use crate::{
     lights::{Point, Sun},
     progress::ProgressMode,
     render::Again,
+    smooth::{MOST, Smooth, SmoothArgs},
     source::{self, SceneArgs},
     stage::{Eye, Stage, StageArgs},
 };
@@ -61,6 +62,11 @@ pub struct Record {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sun: Option<Sun>,
     pub seed: u32,
+    #[serde(default, skip_serializing_if = "Smooth::is_none")]
+    pub aa: Smooth,
+    /// Layers that anti-aliasing leaves as they are at the middles of the pixels.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub exact: Vec<String>,
     /// The image of the render graph that was written instead of the result (`--view`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub view: Option<String>,
@@ -151,6 +157,8 @@ impl Record {
             light: args.light.clone(),
             sun: args.sun,
             seed: 0,
+            aa: Smooth::default(),
+            exact: Vec::new(),
             view: None,
             mode: None,
             f32: false,
@@ -188,6 +196,9 @@ impl Record {
             if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
                 return wrong(key, value.to_string(), "numbers above 0");
             }
+        }
+        if !(1..=MOST).contains(&self.aa.count) {
+            return wrong("aa.count", self.aa.count.to_string(), &format!("1 to {MOST}"));
         }
         for (key, value) in [("time", self.time), ("exposure", self.exposure)] {
             if !value.is_finite() {
@@ -240,6 +251,7 @@ impl Record {
             fps: self.fps,
             time_limit: None,
             exposure: Some(self.exposure),
+            smooth: SmoothArgs { count: Some(self.aa.count), filter: self.aa.filter },
             seed: self.seed,
             settings: SettingsArgs::default(),
             paper: false,
@@ -283,6 +295,7 @@ mod tests {
     use crate::{
         args::{DeviceArgs, TalkArgs},
         signals::Interrupt,
+        smooth::Filter,
     };
 
     #[test]
@@ -316,6 +329,8 @@ mod tests {
             light: vec!["1,2,-3,4".parse().unwrap()],
             sun: Some("-10,20".parse().unwrap()),
             seed: u32::MAX,
+            aa: Smooth { count: 4, filter: Filter::Box },
+            exact: vec!["depth".into()],
             view: None,
             mode: Some("direct".into()),
             f32: true,
@@ -339,6 +354,7 @@ mod tests {
         assert_eq!((args.stage.scene.unit, args.stage.time, args.fps, args.f32), (Some(0.01), -0.1, 24.0, true));
         assert_eq!(args.stage.scene.ground.options, again.ground.clone().unwrap());
         assert!(args.stage.scene.ground.ground && args.stage.light == again.light && args.stage.sun == again.sun);
+        assert_eq!((args.smooth.count, args.smooth.filter), (Some(4), Filter::Box));
         assert_eq!((args.exposure, args.seed, args.stage.default_light), (Some(1.5), u32::MAX, DefaultLight::Never));
         // No option may write a file, or read a file that the record does not name.
         assert!(args.output.is_empty() && args.dump.is_none() && args.timings.is_none() && args.stage.camera.is_none());
@@ -350,6 +366,7 @@ mod tests {
             (Record { width: 0, ..record.clone() }, "width"),
             (Record { height: MAX_SIDE + 1, ..record.clone() }, "height"),
             (Record { fps: 0.0, ..record.clone() }, "fps"),
+            (Record { aa: Smooth { count: 0, ..Smooth::default() }, ..record.clone() }, "aa.count"),
             (Record { unit: Some(-1.0), ..record.clone() }, "unit"),
             (Record { frame: 1, ..record.clone() }, "frame"),
             (Record { frame: u32::MAX, ..record.clone() }, "frame"),

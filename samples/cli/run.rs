@@ -24,6 +24,7 @@ use crate::{
     program,
     record::{BakeFile, Record, Source},
     render::Label,
+    smooth::{Smooth, SmoothArgs},
     stage::Stage,
     timings::Timings,
 };
@@ -37,6 +38,7 @@ pub struct Run<'a> {
     label: String,
     /// The exposure is chosen by the first frame.
     fit_exposure: bool,
+    pub smooth: Smooth,
     pub stage: Stage,
     pub outputs: Outputs,
     pub frames: Range<u32>,
@@ -117,7 +119,9 @@ impl<'a> Run<'a> {
             Some(mode) if mode != technique.name => format!("{}-{mode}", technique.name),
             _ => technique.name.to_owned(),
         };
+        let smooth = smoothing(args, &technique, frames.len())?;
         let record = Record {
+            aa: smooth,
             first_frame: frames.start,
             frame: frames.start,
             fps: args.fps,
@@ -134,6 +138,7 @@ impl<'a> Run<'a> {
             console,
             label,
             fit_exposure: exposure.is_none() && radiance && !developed,
+            smooth,
             stage,
             outputs,
             frames,
@@ -201,6 +206,11 @@ impl<'a> Run<'a> {
     fn values(&self, frame: u32) -> Values<'_> {
         let (scene, camera) = (&self.stage.scene.name, &self.stage.placed.name);
         Values { scene, camera, technique: &self.label, frame, layer: "" }
+    }
+
+    /// Names the layers of the next picture that have no mean.
+    pub fn name_exact(&mut self, layers: Vec<String>) {
+        self.record.exact = layers;
     }
 
     /// Names the file of a bake in the metadata of pictures.
@@ -290,23 +300,17 @@ impl<'a> Run<'a> {
     }
 
     /// Records a finished frame.
-    pub fn done(&mut self, frame: u32, seconds: f64, milliseconds: f64, files: Vec<String>, report: &Report) {
-        self.timings.add(frame, report);
+    /// `runs`: the time and the report of each picture that was rendered for it.
+    pub fn done(&mut self, frame: u32, seconds: f64, milliseconds: f64, files: Vec<String>, runs: &[(f64, Report)]) {
         let numbers = std::mem::take(&mut self.numbers);
         self.done.push(Done { frame, seconds, milliseconds, files, numbers, runs: Vec::new() });
-        self.record_time(milliseconds, report);
+        runs.iter().for_each(|(milliseconds, report)| self.again(*milliseconds, report));
     }
 
-    /// Records a repetition of the last frame.
+    /// Records one more rendering of the last frame.
     pub fn again(&mut self, milliseconds: f64, report: &Report) {
-        if let Some(done) = self.done.last() {
-            self.timings.add(done.frame, report);
-        }
-        self.record_time(milliseconds, report);
-    }
-
-    fn record_time(&mut self, milliseconds: f64, report: &Report) {
         if let Some(done) = self.done.last_mut() {
+            self.timings.add(done.frame, report);
             done.runs.push(RunTime { milliseconds, gpu_milliseconds: report.gpu_ms() });
         }
     }
@@ -351,6 +355,7 @@ impl<'a> Run<'a> {
             "scene": self.stage.scene.name,
             "camera": self.stage.placed.name,
             "technique": self.label,
+            "aa": self.smooth,
             "config": config::to_value(&self.record)?,
             "phases_ms": phases,
             "frames": console::to_json(&self.done)?,
@@ -362,4 +367,17 @@ impl<'a> Run<'a> {
             "complete": self.done.len() == self.frames.len(),
         }))
     }
+}
+
+/// The anti-aliasing of the pictures of a run: what the user asks for, else that of the technique for stills by its own settings.
+fn smoothing(args: &RenderArgs, technique: &Label, frames: usize) -> Result<Smooth> {
+    let SmoothArgs { count, filter } = args.smooth;
+    let whole = args.view.is_none() && args.dump.is_none() && !args.list_passes;
+    let usual = if technique.radiance && whole && !args.paper && frames == 1 { technique.stills } else { 1 };
+    let count = count.unwrap_or(usual);
+    if count > 1 && !technique.radiance {
+        let what = format!("the picture of this mode of {} is not light, so it has no mean", technique.name);
+        return Err(Error::usage(what).at("--aa").help("Leave --aa out, or render all light"));
+    }
+    Ok(Smooth { count, filter })
 }

@@ -1,6 +1,6 @@
 //! All that decides the bytes of a bake: scene, receivers, times, settings.
 
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::{Adaptive, Baking, Comparison, Course, SunPath, Weather, cube, probes::Grid};
@@ -374,7 +374,7 @@ impl Plan {
             a.to_cols_array().iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-4 * size)
         };
         // The depth range of the projection follows the scene's bounds.
-        let mut projection = view.clip_from_view.to_cols_array();
+        let mut projection = view.shifted(Vec2::ZERO).clip_from_view.to_cols_array();
         for at in [10, 14] {
             projection[at] = clip_from_view[at];
         }

@@ -94,6 +94,10 @@ impl Technique for Fiv {
         PictureSettings { fiv, ..PictureSettings::default() }
     }
 
+    fn stills(PictureSettings { fiv, .. }: &PictureSettings) -> u32 {
+        if matches!(fiv.method, Method::Vectors | Method::Unshadowed) { 8 } else { 1 }
+    }
+
     fn rays(PictureSettings { fiv, .. }: &PictureSettings) -> u64 {
         let numbers = [fiv.azimuths, fiv.polars, fiv.radii, fiv.turns, 6, fiv.size, fiv.size, fiv.split, fiv.split];
         numbers.iter().fold(1u64, |rays, &n| rays.saturating_mul(n.into()))

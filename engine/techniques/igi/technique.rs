@@ -70,6 +70,10 @@ impl Technique for Igi {
         PictureSettings { igi, ..PictureSettings::default() }
     }
 
+    fn stills(_: &PictureSettings) -> u32 {
+        1
+    }
+
     fn ready(making: Making<'_, Infallible>, settings: &PictureSettings) -> Result<Self> {
         Self::new(making.gpu, making.scene, making.resident, &settings.igi)
     }
