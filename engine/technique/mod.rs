@@ -171,9 +171,9 @@ pub trait Technique: Sized {
     /// is ready if these are equal.
     fn prepared_by(settings: &Self::Settings) -> Self::Settings;
 
-    /// Pictures that programs render for one still, whose mean has smooth edges: as many as cost little. 1: a single one costs much.
-    fn stills(_: &Self::Settings) -> u32 {
-        8
+    /// A usual picture takes about a second on a CPU driver, so that programs may render several for a still, whose mean has smooth edges.
+    fn is_cheap(_: &Self::Settings) -> bool {
+        true
     }
 
     /// Number of rays that [`Self::ready`] traces for each object, for limits on the work that untrusted settings may cause.

@@ -5,7 +5,8 @@ use std::{ops::Range, path::PathBuf, str::FromStr};
 use clap::{ArgAction, Args};
 
 use crate::{
-    config::SettingsArgs, console::Console, progress::ProgressMode, reference::Span, smooth::SmoothArgs, stage::StageArgs,
+    config::SettingsArgs, console::Console, progress::ProgressMode, reference::Span, smooth::SmoothArgs,
+    stage::StageArgs,
 };
 
 /// Options of `render`, the same for every technique.

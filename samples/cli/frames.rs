@@ -64,6 +64,7 @@ pub fn frames<T: Technique>(
 
     let gpu = Gpu::new(args.device.options()?)?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
+    run.smooth_on(&gpu);
     let opened = started.elapsed();
     let settings = staged.technique;
     let last = LastStage::new(&gpu, staged.tonemap.as_ref(), run.exposure())?;
@@ -139,8 +140,7 @@ impl<T: Technique> Work<'_, T> {
         let mut graph = Graph::new(T::NAME);
         (graph.frame, graph.seed) = (of.frame, seed);
         let view = of.view.shifted(place);
-        let picture =
-            self.ready.frame(&mut graph, (&run.stage.scene, &of.pose), &view, of.shot, &self.settings)?;
+        let picture = self.ready.frame(&mut graph, (&run.stage.scene, &of.pose), &view, of.shot, &self.settings)?;
         Ok((graph, picture))
     }
 

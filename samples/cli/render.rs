@@ -35,8 +35,8 @@ pub struct Label {
     pub radiance: bool,
     /// The exposure that suits a built-in scene does not suit the technique.
     pub own_light: bool,
-    /// Pictures of a still ([`Technique::stills`]).
-    pub stills: u32,
+    /// [`Technique::is_cheap`].
+    pub cheap: bool,
 }
 
 impl Label {
@@ -44,7 +44,7 @@ impl Label {
         let named = T::Mode::ALL.len() > 1;
         let mode_name = named.then(|| mode.name());
         let radiance = mode.is_radiance();
-        Self { name: T::NAME, mode: mode_name, radiance, own_light: T::OWN_LIGHT, stills: T::stills(settings) }
+        Self { name: T::NAME, mode: mode_name, radiance, own_light: T::OWN_LIGHT, cheap: T::is_cheap(settings) }
     }
 }
 
@@ -172,7 +172,8 @@ pub fn again<T: Technique>(asked: &Again<'_>) -> Result<Option<Fresh>> {
     if given.baked.is_none() && T::Baked::NEEDED {
         return Err(Error::input("is missing: the metadata do not name the bake of the picture").at("bake"));
     }
-    let mut run = Run::new(Label::of::<T>(given.mode, &staged.technique), &args, asked.console(), &staged, Some(asked.format))?;
+    let mut run =
+        Run::new(Label::of::<T>(given.mode, &staged.technique), &args, asked.console(), &staged, Some(asked.format))?;
     run.name_bake(asked.record.bake.clone());
     frames::frames(&given, &args, staged, &mut run, asked.interrupt, Instant::now())?;
     Ok(run.fresh())

@@ -4,7 +4,7 @@ use std::{ops::Range, path::Path, time::Duration};
 
 use lucerna::{
     Error, ErrorKind, Result,
-    gpu::Gpu,
+    gpu::{DeviceKind, Gpu},
     graph::Report,
     image::{self, Format, Layers, Metadata, WriteOptions},
     scene::{Note, NoteKind, View},
@@ -24,7 +24,7 @@ use crate::{
     program,
     record::{BakeFile, Record, Source},
     render::Label,
-    smooth::{Smooth, SmoothArgs},
+    smooth::{self, Smooth, SmoothArgs},
     stage::Stage,
     timings::Timings,
 };
@@ -39,6 +39,8 @@ pub struct Run<'a> {
     /// The exposure is chosen by the first frame.
     fit_exposure: bool,
     pub smooth: Smooth,
+    /// The technique is so cheap that a CPU driver renders several pictures for a still; `None`: nobody does.
+    several: Option<bool>,
     pub stage: Stage,
     pub outputs: Outputs,
     pub frames: Range<u32>,
@@ -119,9 +121,10 @@ impl<'a> Run<'a> {
             Some(mode) if mode != technique.name => format!("{}-{mode}", technique.name),
             _ => technique.name.to_owned(),
         };
-        let smooth = smoothing(args, &technique, frames.len())?;
+        let smooth = smoothing(args, &technique)?;
+        let plain = args.view.is_none() && args.dump.is_none() && !args.list_passes && !args.paper;
+        let several = plain && technique.radiance && frames.len() == 1 && args.smooth.count.is_none();
         let record = Record {
-            aa: smooth,
             first_frame: frames.start,
             frame: frames.start,
             fps: args.fps,
@@ -139,6 +142,7 @@ impl<'a> Run<'a> {
             label,
             fit_exposure: exposure.is_none() && radiance && !developed,
             smooth,
+            several: several.then_some(technique.cheap),
             stage,
             outputs,
             frames,
@@ -206,6 +210,14 @@ impl<'a> Run<'a> {
     fn values(&self, frame: u32) -> Values<'_> {
         let (scene, camera) = (&self.stage.scene.name, &self.stage.placed.name);
         Values { scene, camera, technique: &self.label, frame, layer: "" }
+    }
+
+    /// Chooses the anti-aliasing of stills by the device, if the user has not: a GPU renders several pictures of every technique in little time.
+    pub fn smooth_on(&mut self, gpu: &Gpu) {
+        if self.several.is_some_and(|cheap| cheap || gpu.describe().kind != DeviceKind::Cpu) {
+            self.smooth.count = smooth::STILL;
+        }
+        self.record.aa = self.smooth;
     }
 
     /// Names the layers of the next picture that have no mean.
@@ -369,15 +381,13 @@ impl<'a> Run<'a> {
     }
 }
 
-/// The anti-aliasing of the pictures of a run: what the user asks for, else that of the technique for stills by its own settings.
-fn smoothing(args: &RenderArgs, technique: &Label, frames: usize) -> Result<Smooth> {
+/// The anti-aliasing that the user asks for.
+fn smoothing(args: &RenderArgs, technique: &Label) -> Result<Smooth> {
     let SmoothArgs { count, filter } = args.smooth;
-    let whole = args.view.is_none() && args.dump.is_none() && !args.list_passes;
-    let usual = if technique.radiance && whole && !args.paper && frames == 1 { technique.stills } else { 1 };
-    let count = count.unwrap_or(usual);
-    if count > 1 && !technique.radiance {
-        let what = format!("the picture of this mode of {} is not light, so it has no mean", technique.name);
+    if count.is_some_and(|count| count > 1) && !technique.radiance {
+        let mode = technique.mode.unwrap_or("this mode");
+        let what = format!("the picture of {mode} of {} is not light, so it has no mean", technique.name);
         return Err(Error::usage(what).at("--aa").help("Leave --aa out, or render all light"));
     }
-    Ok(Smooth { count, filter })
+    Ok(Smooth { count: count.unwrap_or(1), filter })
 }

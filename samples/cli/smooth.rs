@@ -8,6 +8,8 @@ use glam::Vec2;
 use lucerna::image::{Layer, Layers};
 use serde::{Deserialize, Serialize};
 
+/// Pictures of a still, if nothing else is asked for.
+pub const STILL: u32 = 8;
 /// Pictures of a mean at most.
 pub const MOST: u32 = 1024;
 
@@ -28,7 +30,7 @@ pub enum Filter {
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct SmoothArgs {
     /// Anti-aliasing: the picture is the mean of N, each seen past the middles of the pixels in another direction; normals and depths stay those of
-    /// the middles. 1: none
+    /// the middles. 1: none [default: 8 for stills, 1 for sequences, with --paper, and where a picture takes a CPU driver seconds]
     #[arg(long = "aa", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST)), conflicts_with_all = ["view", "dump", "list_passes"], help_heading = "Picture")]
     pub count: Option<u32>,
 
@@ -89,7 +91,8 @@ impl Filter {
 fn blackman_harris(at: f64) -> f64 {
     use std::f64::consts::TAU;
     let terms = [-0.48829, 0.14128, -0.01168].into_iter().zip(1..);
-    let waves: f64 = terms.map(|(factor, wave)| factor * (TAU * f64::from(wave) * at).sin() / (TAU * f64::from(wave))).sum();
+    let waves: f64 =
+        terms.map(|(factor, wave)| factor * (TAU * f64::from(wave) * at).sin() / (TAU * f64::from(wave))).sum();
     at + waves / 0.35875
 }
 
@@ -98,10 +101,13 @@ fn blackman_harris(at: f64) -> f64 {
 fn lattice(count: u32) -> Vec<[f64; 2]> {
     let point = |i: u32, step: u32| [i, (u64::from(i) * u64::from(step) % u64::from(count)) as u32];
     let apart = |step: u32| {
-        (1..count).map(|i| {
-            let around = point(i, step).map(|at| u64::from(at.min(count - at)));
-            around[0] * around[0] + around[1] * around[1]
-        }).min().unwrap_or(0)
+        (1..count)
+            .map(|i| {
+                let around = point(i, step).map(|at| u64::from(at.min(count - at)));
+                around[0] * around[0] + around[1] * around[1]
+            })
+            .min()
+            .unwrap_or(0)
     };
     // Steps that share a divisor with the count would put several points into a row.
     let steps = (1..count.max(2)).filter(|step| divisor(*step, count) == 1);
@@ -198,8 +204,11 @@ mod tests {
             places.iter().map(|place| f64::from(place.x * place.x)).sum::<f64>() / 1021.0
         };
         // Variances in closed form: 1/12, 1/6, and 9 (1/12 − (0.48829 − 0.14128/4 + 0.01168/9) / (2 π² 0.35875)) for the window.
-        let window: f64 = 9.0 * (1.0 / 12.0 - (0.48829 - 0.14128 / 4.0 + 0.01168 / 9.0) / (2.0 * std::f64::consts::PI.powi(2) * 0.35875));
-        for (filter, variance) in [(Filter::Box, 1.0 / 12.0), (Filter::Tent, 1.0 / 6.0), (Filter::BlackmanHarris, window)] {
+        let window: f64 = 9.0
+            * (1.0 / 12.0 - (0.48829 - 0.14128 / 4.0 + 0.01168 / 9.0) / (2.0 * std::f64::consts::PI.powi(2) * 0.35875));
+        for (filter, variance) in
+            [(Filter::Box, 1.0 / 12.0), (Filter::Tent, 1.0 / 6.0), (Filter::BlackmanHarris, window)]
+        {
             let found = second(filter);
             assert!((found / variance - 1.0).abs() < 5e-3, "{filter:?} {found} {variance}");
         }

@@ -51,5 +51,7 @@ mod reference;
 mod render;
 #[path = "../cli/rerun.rs"]
 mod rerun;
+#[path = "../cli/smooth.rs"]
+mod smooth;
 #[path = "../cli/tonemap.rs"]
 mod tonemap;

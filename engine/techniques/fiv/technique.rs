@@ -94,8 +94,8 @@ impl Technique for Fiv {
         PictureSettings { fiv, ..PictureSettings::default() }
     }
 
-    fn stills(PictureSettings { fiv, .. }: &PictureSettings) -> u32 {
-        if matches!(fiv.method, Method::Vectors | Method::Unshadowed) { 8 } else { 1 }
+    fn is_cheap(PictureSettings { fiv, .. }: &PictureSettings) -> bool {
+        matches!(fiv.method, Method::Vectors | Method::Unshadowed)
     }
 
     fn rays(PictureSettings { fiv, .. }: &PictureSettings) -> u64 {

@@ -70,8 +70,8 @@ impl Technique for Igi {
         PictureSettings { igi, ..PictureSettings::default() }
     }
 
-    fn stills(_: &PictureSettings) -> u32 {
-        1
+    fn is_cheap(_: &PictureSettings) -> bool {
+        false
     }
 
     fn ready(making: Making<'_, Infallible>, settings: &PictureSettings) -> Result<Self> {

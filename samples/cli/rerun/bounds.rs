@@ -6,6 +6,8 @@ use crate::record::Record;
 
 /// Maximum of frames, from the first frame of the run to the recorded frame.
 const FRAMES: u64 = 1000;
+/// Maximum of pictures whose means these frames are.
+const PICTURES: u64 = 8 * FRAMES;
 /// Maximum of paths of a reference picture: some minutes on a GPU.
 const PATHS: u64 = 10_000_000_000;
 /// Maximum of rays for each object before the first frame, such as for the vectors of an occluder: some minutes on a GPU.
@@ -46,6 +48,7 @@ pub fn check(record: &Record, extent: [u32; 2], long: bool) -> Result<()> {
     }
     let frames = u64::from(record.frame).saturating_sub(record.first_frame.into()) + 1;
     over("frame", frames, FRAMES, "frames")?;
+    over("aa.count", frames.saturating_mul(record.aa.count.into()), PICTURES, "pictures")?;
     let pixels = u64::from(width) * u64::from(height);
     if record.view.is_some() {
         over("width", pixels, PIXELS, "pixels")?;
@@ -93,6 +96,7 @@ mod tests {
         for (changes, number, place) in [
             (json!({ "frame": 4_000_000_000u32 }), "4000000001", "frame"),
             (json!({ "first_frame": 5, "frame": 1005 }), "1001", "frame"),
+            (json!({ "frame": 999, "aa": { "count": 16, "filter": "box" } }), "16000", "aa.count"),
             (json!({ "settings": { "samples": 400_000_000 } }), "12800000000", "settings.samples"),
             (json!({ "settings": { "samples": u64::MAX } }), "18446744073709551615", "settings.samples"),
             (json!({ "view": "x", "width": 16384, "height": 16384 }), "268435456", "width"),

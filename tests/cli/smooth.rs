@@ -1,0 +1,134 @@
+//! `--aa`: stills with smooth edges, as means of pictures that look past the middles of the pixels.
+
+use std::{fs, path::Path};
+
+use crate::support::{Ran, command, device, isr, lucerna, ran};
+use lucerna::{
+    image::{self, Layers},
+    scene::Limits,
+};
+
+fn path(folder: &tempfile::TempDir, name: &str) -> String {
+    folder.path().join(name).to_str().unwrap().to_owned()
+}
+
+fn room<'a>(more: &[&'a str]) -> Ran {
+    let all: Vec<&'a str> =
+        ["render", "--builtin", "cornell", "--size", "96x80", "-q"].into_iter().chain(more.iter().copied()).collect();
+    isr(all)
+}
+
+fn read(name: &str) -> Layers {
+    image::read(name, &Limits::default()).unwrap()
+}
+
+fn sum(layers: &Layers) -> f64 {
+    layers.main().unwrap().data.iter().map(|value| f64::from(*value)).sum()
+}
+
+fn config(name: &str) -> serde_json::Value {
+    image::metadata(Path::new(name)).unwrap().config
+}
+
+#[test]
+fn a_still_is_the_mean_of_eight_and_its_edges_are_smooth() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let [usual, one, eight, many] = [None, Some("1"), Some("8"), Some("64")].map(|count| {
+        let name = path(&folder, &format!("{}.exr", count.unwrap_or("usual")));
+        let options: Vec<&str> = count.map_or(vec!["-o", &name], |count| vec!["-o", &name, "--aa", count]);
+        room(&options).expect(0, &[]);
+        name
+    });
+    assert!(fs::read(&usual).unwrap() == fs::read(&eight).unwrap());
+    let flip = |test: &str| {
+        let report = lucerna(["compare", "-q", "-m", "flip", "--json", &many, test]).expect(0, &[]).json();
+        report["tests"][0]["measures"]["flip"]["value"].as_f64().unwrap_or_else(|| panic!("{report}"))
+    };
+    let [of_one, of_eight] = [flip(&one), flip(&eight)];
+    assert!(of_eight < 0.02 && of_eight < 0.5 * of_one, "{of_eight} {of_one}");
+    let [one_picture, mean, best] = [&one, &eight, &many].map(|name| read(name));
+    assert!((sum(&mean) / sum(&best) - 1.0).abs() < 5e-3);
+    for exact in ["normal", "depth"] {
+        assert!(one_picture.layer(exact).unwrap().data == mean.layer(exact).unwrap().data, "{exact}");
+    }
+    assert!(one_picture.layer("direct").unwrap().data != mean.layer("direct").unwrap().data);
+    // The file says so, and can be made again.
+    let [of_one, of_eight] = [config(&one), config(&eight)];
+    assert_eq!(of_eight["aa"], serde_json::json!({ "count": 8, "filter": "box" }));
+    let exact = of_eight["exact"].to_string();
+    assert!(exact.contains("normal") && exact.contains("depth") && !exact.contains("direct"), "{exact}");
+    assert!(of_one.get("aa").is_none() && of_one.get("exact").is_none(), "{of_one}");
+    let report = lucerna(["rerun", "--json", "-q", &eight]).expect(0, &[]).json();
+    assert_eq!(report["same_file"], true, "{report}");
+}
+
+#[test]
+fn filters_keep_the_light_and_tone_mapping_comes_after_the_mean() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let made = |name: &str, more: &[&str]| {
+        let name = path(&folder, name);
+        room(&[&["-o", &name, "--f32", "--aa", "5"], more].concat()).expect(0, &[]);
+        (read(&name), name)
+    };
+    let (even, _) = made("box.exr", &[]);
+    for filter in ["tent", "blackman-harris"] {
+        let (other, name) = made(&format!("{filter}.exr"), &["--aa-filter", filter]);
+        assert!(
+            (sum(&other) / sum(&even) - 1.0).abs() < 5e-3 && other.main().unwrap().data != even.main().unwrap().data
+        );
+        assert_eq!(config(&name)["aa"]["filter"], filter);
+    }
+    let (mapped, name) = made("mapped.exr", &["-D", "tonemap.operator=reinhard"]);
+    assert_eq!(mapped.layer("light").unwrap().data, even.main().unwrap().data);
+    assert!(mapped.main().unwrap().data != even.main().unwrap().data);
+    let report = lucerna(["rerun", "--json", "-q", &name]).expect(0, &[]).json();
+    assert_eq!(report["same_file"], true, "{report}");
+}
+
+#[test]
+fn papers_sequences_and_images_of_the_graph_have_single_pictures() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let name = path(&folder, "a-{frame}.exr");
+    let first = path(&folder, "a-0.exr");
+    for more in [&["--paper"][..], &["--frames", "0..2"], &["--view", "gbuffer.normal"]] {
+        let ran = room(&[&["-o", &name, "--overwrite", "--json"], more].concat()).expect(0, &[]);
+        assert_eq!(ran.json()["aa"]["count"], 1, "{more:?}");
+        assert!(config(&first).get("aa").is_none(), "{more:?}");
+    }
+    let ran = room(&["-o", &name, "--overwrite", "--json", "--paper", "--aa", "3"]).expect(0, &[]).json();
+    assert_eq!((&ran["aa"]["count"], ran["frames"][0]["runs"].as_array().unwrap().len()), (&3.into(), 3));
+    for (wrong, parts) in [
+        (&["--aa", "0"][..], &["--aa", "1..=1024"][..]),
+        (&["--aa", "2", "--view", "gbuffer.normal"], &["--aa", "--view"]),
+        (&["--aa", "2", "--list-passes"], &["--aa", "--list-passes"]),
+        (&["--aa-filter", "gauss"], &["box", "tent", "blackman-harris"]),
+        (&["--aa", "2", "--mode", "occlusion"], &["--aa", "occlusion"]),
+    ] {
+        room(wrong).expect(2, parts);
+    }
+}
+
+/// The light of earlier frames goes on from the picture at the middles of the pixels.
+#[test]
+fn frames_of_a_sequence_with_history_can_be_made_again() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let name = path(&folder, "i-{frame}.exr");
+    let all = ["render", "--builtin", "cornell", "--size", "48x40", "-q", "--frames", "0..3", "--aa", "2", "-o", &name];
+    let more = ["-D", "igi.vpls=64", "-D", "igi.history=4"];
+    ran(command(env!("CARGO_BIN_EXE_igi")).args(all.into_iter().chain(more))).expect(0, &[]);
+    let last = path(&folder, "i-2.exr");
+    let report = lucerna(["rerun", "--json", "-q", &last]).expect(0, &[]).json();
+    assert_eq!(report["same_file"], true, "{report}");
+}
