@@ -129,7 +129,15 @@ fn folders_that_are_missing_or_cannot_be_written() {
     let error = image::write(&missing, &picture(1), &WriteOptions::default()).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Output);
     assert!(error.to_string().contains("renders cannot be used") && error.to_string().contains("Create it"), "{error}");
-    assert_eq!(image::probe_output(&missing, false).unwrap_err().kind(), ErrorKind::Output);
+    // Programs ask before they work, and the folder is made then.
+    image::probe_output(&missing, false).unwrap();
+    image::write(&missing, &picture(1), &WriteOptions::default()).unwrap();
+    let under = missing.join("deep/frame.png");
+    let error = image::probe_output(&under, false).unwrap_err();
+    assert!(
+        error.kind() == ErrorKind::Output && error.to_string().contains("frame.png/deep cannot be made"),
+        "{error}"
+    );
 
     // The target is a folder.
     fs::create_dir(folder.path().join("folder.png")).unwrap();

@@ -192,9 +192,16 @@ pub fn leave_nothing_unfinished() {
     std::mem::forget(unfinished);
 }
 
-/// Checks before work starts that [`write_atomic`] has a chance: the folder exists and takes new files, `path` is no
-/// folder, and is free unless `overwrite`. Creates and removes an empty temporary file.
+/// Checks before work starts that [`write_atomic`] has a chance: the folder takes new files, `path` is no folder, and is free unless `overwrite`. Makes
+/// the folder if it is missing, with those above it. Creates and removes an empty temporary file.
+///
+/// # Errors
+/// `Output`, naming the path.
 pub fn probe_output(path: &Path, overwrite: bool) -> Result<()> {
+    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists()) {
+        let what = format!("the folder {} cannot be made", folder.display());
+        fs::create_dir_all(folder).map_err(|error| failed(path, &what, error).help("Name another"))?;
+    }
     let target = inspect(path, overwrite)?;
     if target.device {
         return Ok(());

@@ -96,7 +96,7 @@ impl Outputs {
         self.targets.iter().any(|(pattern, _)| pattern.text() == STDOUT)
     }
 
-    /// Checks that the files of a frame can be written: the folders exist, and no file exists, unless overwriting is allowed.
+    /// Checks that the files of a frame can be written: their folders are made, and no file exists, unless overwriting is allowed.
     ///
     /// # Errors
     /// `Usage` if two files have one name, `Output` if one cannot be written.
@@ -184,8 +184,13 @@ mod tests {
             assert_eq!(outputs(&names, frames).unwrap_err().exit_code(), 2, "{names:?}");
         }
         assert_eq!(outputs(&["a.exr", "a.exr"], 1).unwrap().probe(&VALUES, &[]).unwrap_err().exit_code(), 2);
-        let missing = outputs(&["no/such/folder/a.exr"], 1).unwrap().probe(&VALUES, &[]).unwrap_err();
-        assert!(missing.exit_code() == 1 && missing.to_string().contains("no/such/folder"), "{missing}");
+        // A file has the name of the folder.
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        std::fs::write(&file, "").unwrap();
+        let under = file.join("deep/a.exr").to_string_lossy().into_owned();
+        let refused = outputs(&[&under], 1).unwrap().probe(&VALUES, &[]).unwrap_err();
+        assert!(refused.exit_code() == 1 && refused.to_string().contains("file/deep"), "{refused}");
     }
 
     #[test]

@@ -170,9 +170,9 @@ impl<'a> Run<'a> {
             image::probe_output(path, overwrite)?;
         }
         if let Some(folder) = self.args.dump.as_deref().filter(|folder| !folder.is_dir()) {
-            return Err(Error::new(ErrorKind::Output, "is not a folder")
-                .in_file(folder)
-                .help("Create it, or name another"));
+            std::fs::create_dir_all(folder).map_err(|error| {
+                Error::new(ErrorKind::Output, "the folder cannot be made").in_file(folder).caused_by(error)
+            })?;
         }
         Ok(())
     }

@@ -425,7 +425,7 @@ fn what_cannot_be_exported_is_refused_and_named() {
     fs::write(lab.at("cut.day"), &whole[..whole.len() - 40]).unwrap();
     lab.export("cut.day", "out", &[]).expect(3, &["cut.day", "cut off"]);
     // Folders.
-    lab.export("even.day", "none/out", &[]).expect(1, &["none"]);
+    lab.export("even.day", "floor.gltf/out", &[]).expect(1, &["floor.gltf/out"]);
     lab.export("even.day", "floor.gltf", &[]).expect(1, &["floor.gltf"]);
     fs::create_dir(lab.at("full")).unwrap();
     fs::write(lab.at("full/notes.txt"), "mine").unwrap();

@@ -136,8 +136,10 @@ fn the_file_is_glb_and_wrong_names_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).display().to_string();
     lucerna(["export-gltf", "--builtin", "cornell", "-o", &at("a.gltf")]).expect(2, &["not named .glb"]);
-    lucerna(["export-gltf", "--builtin", "cornell", "-o", &at("none/a.glb")]).expect(1, &["none"]);
     lucerna(["export-gltf", "--builtin", "cornell", "-q", "-o", &at("a.glb")]).expect(0, &[]);
+    lucerna(["export-gltf", "--builtin", "cornell", "-o", &at("a.glb/b.glb")]).expect(1, &["a.glb/b.glb"]);
+    lucerna(["export-gltf", "--builtin", "cornell", "-q", "-o", &at("new/folder/a.glb")]).expect(0, &[]);
+    assert!(fs::exists(at("new/folder/a.glb")).unwrap());
     lucerna(["export-gltf", "--builtin", "cornell", "-o", &at("a.glb")]).expect(1, &["a.glb", "exists already"]);
     let bytes = fs::read(at("a.glb")).unwrap();
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;

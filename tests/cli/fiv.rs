@@ -171,3 +171,24 @@ fn things_stand_on_a_ground_and_the_picture_can_be_made_again() {
     let pixels = image::read(at("c.exr"), &Default::default()).unwrap().main().unwrap().rgb_pixels().unwrap();
     assert!(pixels[0][1] > 0.0 && pixels.iter().all(|p| (p[1] - pixels[0][1]).abs() < 1e-3 * pixels[0][1]));
 }
+
+#[test]
+fn the_first_picture_has_few_vectors_unless_all_are_asked_for() {
+    let config = |more: &[&str]| {
+        let printed =
+            fiv(&[&["render", "--builtin", "shadows", "--print-config"], more].concat()).expect(0, &[]).stdout;
+        let value = |key: &str| {
+            let line = printed.lines().find(|line| line.starts_with(&format!("{key} = ")));
+            line.unwrap_or_else(|| panic!("{key}: {printed}")).split(' ').nth(2).unwrap().parse::<u32>().unwrap()
+        };
+        ["size", "azimuths", "polars", "radii"].map(value)
+    };
+    let (few, all) = ([16, 24, 13, 12], [32, 64, 33, 30]);
+    assert_eq!(config(&[]), few);
+    assert_eq!(config(&["-D", "fiv.method=online"]), few);
+    assert_eq!(config(&["--full"]), all);
+    // The truth has the whole environment.
+    assert_eq!(config(&["-D", "fiv.method=brute-force"]), all);
+    assert_eq!(config(&["-D", "fiv.polars=9"]), [16, 24, 9, 12]);
+    fiv(&["render", "--full", "--vectors", "a.fiv"]).expect(2, &["--full", "--vectors"]);
+}

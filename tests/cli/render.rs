@@ -190,7 +190,7 @@ fn frames_and_layers_get_their_own_files() {
 }
 
 #[test]
-fn nothing_is_overwritten_unasked_and_a_missing_folder_is_named() {
+fn nothing_is_overwritten_unasked_and_missing_folders_are_made() {
     if !device() {
         return;
     }
@@ -201,9 +201,13 @@ fn nothing_is_overwritten_unasked_and_a_missing_folder_is_named() {
     assert_eq!(fs::read_to_string(&name).unwrap(), "precious");
     isr(with(&["-o", &name, "--overwrite"])).expect(0, &[]);
     assert!(fs::read(&name).unwrap().starts_with(b"\x89PNG"));
-    isr(with(&["-o", &path(&folder, "no/such/folder/a.png")])).expect(1, &["no/such/folder"]);
-    isr(with(&["-o", &path(&folder, "b.png"), "--timings", &path(&folder, "none/t.csv")])).expect(1, &["t.csv"]);
+    isr(with(&["-o", &path(&folder, "a.png/under/b.png")])).expect(1, &["a.png/under"]);
+    isr(with(&["-o", &path(&folder, "b.png"), "--timings", &path(&folder, "a.png/t.csv")])).expect(1, &["t.csv"]);
     assert_eq!(files(folder.path()), ["a.png"]);
+    let (csv, dumped) = (path(&folder, "times/t.csv"), path(&folder, "all/images"));
+    isr(with(&["-o", &path(&folder, "new/folder/a.png"), "--timings", &csv, "--dump", &dumped])).expect(0, &[]);
+    assert!(fs::exists(path(&folder, "new/folder/a.png")).unwrap() && fs::exists(&csv).unwrap());
+    assert!(!files(Path::new(&dumped)).is_empty());
 }
 
 #[test]

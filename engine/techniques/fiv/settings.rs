@@ -245,6 +245,12 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// Fewer samples and texels, for a picture in seconds.
+    pub fn preview() -> Self {
+        let Grid { azimuths, polars, radii } = Grid::of(24, 13, 12);
+        Self { size: 16, azimuths, polars, radii, ..Self::default() }
+    }
+
     /// The numbers of samples along the three coordinates.
     pub fn grid(&self) -> Grid {
         Grid { azimuths: self.azimuths, polars: self.polars, radii: self.radii }

@@ -4,12 +4,13 @@ use std::{path::PathBuf, process::ExitCode};
 
 use lucerna::{
     Result,
-    technique::{AllLight, Bake},
-    techniques::fiv::{Baked, Fiv},
+    technique::{AllLight, Bake, Settings as _},
+    techniques::fiv::{Baked, Fiv, Method, PictureSettings, Settings},
 };
 
 use crate::{
     args::RenderArgs,
+    last_stage::Staged,
     render::{self, Given},
 };
 
@@ -22,6 +23,11 @@ pub struct FivArgs {
     /// File of `fiv precompute`; vectors that the file does not contain are computed
     #[arg(long, value_name = "FILE.fiv", help_heading = "Technique")]
     pub vectors: Option<PathBuf>,
+
+    /// As many vectors as `fiv precompute` makes by default, which takes minutes to an hour on a CPU. Without this option and without --vectors their
+    /// number is that of a preview
+    #[arg(long, conflicts_with = "vectors", help_heading = "Technique")]
+    pub full: bool,
 }
 
 /// Renders the frames of a command line.
@@ -31,9 +37,32 @@ pub struct FivArgs {
 pub fn render(args: &FivArgs) -> Result<ExitCode> {
     let baked = args.vectors.as_deref().map(Baked::read).transpose()?;
     let mut given = Given::<Fiv>::by(&args.common, AllLight)?;
+    if baked.is_none() && !args.full {
+        preview(args, &mut given)?;
+    }
     if let Some(baked) = &baked {
         // The settings in the picture's metadata are then sufficient to render the picture again.
         given.base.fiv = baked.stored.plan.settings(&given.base.fiv);
     }
     render::render(&args.common, &Given { baked, ..given })
+}
+
+/// The first picture of a user takes seconds: where vectors are computed for this run alone, there are fewer, unless the user chose their number.
+fn preview(args: &FivArgs, given: &mut Given<Fiv>) -> Result<()> {
+    let settings = &args.common.settings;
+    let over = |base: &PictureSettings| -> Result<Settings> {
+        Ok(Staged::effective(settings, base, PictureSettings::validate)?.technique.fiv)
+    };
+    let fewer = PictureSettings { fiv: Settings::preview(), ..given.base.clone() };
+    let [full, chosen] = [over(&given.base)?, over(&fewer)?];
+    if !matches!(full.method, Method::Vectors | Method::Online) {
+        return Ok(());
+    }
+    given.base = fewer;
+    if full != chosen && !settings.print_config {
+        args.common.talk.console().info(
+            "note: few vectors are computed, for a quick picture; --full computes all, `fiv precompute` keeps them in a file, and -D fiv.azimuths=…, fiv.polars, fiv.radii and fiv.size choose their number",
+        );
+    }
+    Ok(())
 }

@@ -239,7 +239,7 @@ fn prepare(folder: &Path, overwrite: bool) -> Result<()> {
         Error::new(ErrorKind::Output, "cannot be used as a folder").in_file(folder).caused_by(error)
     };
     if !folder.exists() {
-        return fs::create_dir(folder).map_err(failed);
+        return fs::create_dir_all(folder).map_err(failed);
     }
     let mut entries = fs::read_dir(folder).map_err(failed)?;
     if entries.next().is_some() && !overwrite {
