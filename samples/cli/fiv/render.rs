@@ -4,7 +4,7 @@ use std::{path::PathBuf, process::ExitCode};
 
 use lucerna::{
     Result,
-    technique::{AllLight, Bake, Settings as _},
+    technique::{AllLight, Bake},
     techniques::fiv::{Baked, Fiv, Method, PictureSettings, Settings},
 };
 
