@@ -115,7 +115,7 @@ impl View {
         self
     }
 
-    /// The same camera, in whose image each pixel shows what is at `pixels` from its middle, to the right and down. For anti-aliasing by the mean of several
+    /// The same camera, whose pixels look at the place `pixels` away from their middles, to the right and down. For anti-aliasing by the mean of several
     /// images.
     #[must_use]
     pub fn shifted(mut self, pixels: Vec2) -> Self {

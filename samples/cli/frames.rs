@@ -188,7 +188,7 @@ impl<T: Technique> Work<'_, T> {
         self.write(run, of, (layers, view), begun, progress, |time| vec![(time, report)])
     }
 
-    /// Renders the pictures of a frame whose pixels look past their middles in several directions, and writes their mean.
+    /// Renders the pictures of a frame whose pixels look at different places around their middles, and writes their mean.
     fn mean(&mut self, run: &mut Run<'_>, of: &OfFrame<T::Mode>, progress: &mut Frames) -> Result<Option<()>> {
         let begun = Instant::now();
         let mut mean = Mean::default();

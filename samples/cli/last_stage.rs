@@ -133,9 +133,7 @@ impl LastStage {
             None => Ok(picture),
         }
     }
-}
 
-impl LastStage {
     /// Applies the stage to a picture in host memory, as [`Self::frame`]. The picture before the stage becomes the layer `light`.
     ///
     /// # Errors

@@ -38,8 +38,9 @@ pub struct Run<'a> {
     label: String,
     /// The exposure is chosen by the first frame.
     fit_exposure: bool,
+    /// Anti-aliasing; that of the device after [`Self::smooth_on`].
     pub smooth: Smooth,
-    /// The technique is so cheap that a CPU driver renders several pictures for a still; `None`: nobody does.
+    /// Whether a CPU driver renders several pictures for a still, as GPUs do; `None`: no device does.
     several: Option<bool>,
     pub stage: Stage,
     pub outputs: Outputs,
@@ -311,8 +312,7 @@ impl<'a> Run<'a> {
         self.numbers = numbers.iter().map(|(name, number)| ((*name).to_owned(), json!(number))).collect();
     }
 
-    /// Records a finished frame.
-    /// `runs`: the time and the report of each picture that was rendered for it.
+    /// Records a finished frame. `milliseconds`: of all of it, with the readback. `runs`: the time and the report of each picture that was rendered for it.
     pub fn done(&mut self, frame: u32, seconds: f64, milliseconds: f64, files: Vec<String>, runs: &[(f64, Report)]) {
         let numbers = std::mem::take(&mut self.numbers);
         self.done.push(Done { frame, seconds, milliseconds, files, numbers, runs: Vec::new() });

@@ -1,4 +1,4 @@
-//! Anti-aliasing: a picture as the mean of several, each of which looks past the middles of the pixels in another direction.
+//! Anti-aliasing: a picture as the mean of several pictures, whose pixels look at different places around their middles.
 //!
 //! The places are those of a lattice, and the filter decides how far from the middle they are: the density of the places is the filter, so all pictures
 //! have the same weight. The first place is the middle of the pixel. Layers that are no light (normals, depths) come from there alone.
@@ -13,11 +13,11 @@ pub const STILL: u32 = 8;
 /// Pictures of a mean at most.
 pub const MOST: u32 = 1024;
 
-/// How much the surroundings of a pixel count.
+/// Weight of the places around the middle of a pixel.
 #[derive(ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Filter {
-    /// The square of the pixel: nearest to its own limit with few pictures
+    /// The square of the pixel: the least noise with few pictures
     #[default]
     Box,
     /// A pyramid two pixels wide
@@ -29,12 +29,12 @@ pub enum Filter {
 /// Options of anti-aliasing.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct SmoothArgs {
-    /// Anti-aliasing: the picture is the mean of N, each seen past the middles of the pixels in another direction; normals and depths stay those of
-    /// the middles. 1: none [default: 8 for stills, 1 for sequences, with --paper, and where a picture takes a CPU driver seconds]
+    /// Anti-aliasing: the picture is the mean of N pictures, whose pixels look at different places around their middles; normals and depths are those
+    /// of the middles. 1: none [default: 8 for stills; 1 for sequences, with --paper, and on CPU drivers where one picture takes seconds]
     #[arg(long = "aa", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST)), conflicts_with_all = ["view", "dump", "list_passes"], help_heading = "Picture")]
     pub count: Option<u32>,
 
-    /// How much the surroundings of a pixel count with --aa
+    /// Weight of the places around the middle of a pixel, for --aa
     #[arg(long = "aa-filter", value_enum, default_value_t, value_name = "FILTER", help_heading = "Picture")]
     pub filter: Filter,
 }

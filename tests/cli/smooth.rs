@@ -1,4 +1,4 @@
-//! `--aa`: stills with smooth edges, as means of pictures that look past the middles of the pixels.
+//! `--aa`: stills with smooth edges, as means of pictures whose pixels look at different places around their middles.
 
 use std::{fs, path::Path};
 

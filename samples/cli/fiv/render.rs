@@ -47,7 +47,7 @@ pub fn render(args: &FivArgs) -> Result<ExitCode> {
     render::render(&args.common, &Given { baked, ..given })
 }
 
-/// The first picture of a user takes seconds: where vectors are computed for this run alone, there are fewer, unless the user chose their number.
+/// Vectors that are computed for this run alone are few, unless the user chose their number: a first picture takes seconds.
 fn preview(args: &FivArgs, given: &mut Given<Fiv>) -> Result<()> {
     let settings = &args.common.settings;
     let over = |base: &PictureSettings| -> Result<Settings> {
@@ -61,7 +61,7 @@ fn preview(args: &FivArgs, given: &mut Given<Fiv>) -> Result<()> {
     given.base = fewer;
     if full != chosen && !settings.print_config {
         args.common.talk.console().info(
-            "note: few vectors are computed, for a quick picture; --full computes all, `fiv precompute` keeps them in a file, and -D fiv.azimuths=…, fiv.polars, fiv.radii and fiv.size choose their number",
+            "note: few vectors are computed, for a quick picture; --full computes all of them, and `fiv precompute` writes all into a file for --vectors",
         );
     }
     Ok(())
