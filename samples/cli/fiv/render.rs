@@ -24,8 +24,8 @@ pub struct FivArgs {
     #[arg(long, value_name = "FILE.fiv", help_heading = "Technique")]
     pub vectors: Option<PathBuf>,
 
-    /// As many vectors as `fiv precompute` makes by default, which takes minutes to an hour on a CPU. Without this option and without --vectors their
-    /// number is that of a preview
+    /// Compute as many vectors as `fiv precompute` does by default, which takes a CPU minutes. Without this option and without --vectors, few vectors are
+    /// computed
     #[arg(long, conflicts_with = "vectors", help_heading = "Technique")]
     pub full: bool,
 }
