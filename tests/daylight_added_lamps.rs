@@ -102,11 +102,9 @@ fn an_added_object_has_the_light_of_lamps_of_the_path_tracer() {
                 names.iter().map(sum).sum::<f64>()
             };
             for channel in 0..3 {
-                let [found, wanted] =
-                    [&picture, &truth].map(|layers| mean(layers, &["direct", "indirect"], channel));
-                let [direct, indirect] = ["direct", "indirect"].map(|name| {
-                    [mean(&picture, &[name], channel), mean(&truth, &[name], channel)]
-                });
+                let [found, wanted] = [&picture, &truth].map(|layers| mean(layers, &["direct", "indirect"], channel));
+                let [direct, indirect] = ["direct", "indirect"]
+                    .map(|name| [mean(&picture, &[name], channel), mean(&truth, &[name], channel)]);
                 eprintln!(
                     "{}, channel {channel}: {:.3} of the path tracer; direct {direct:.4?}, indirect {indirect:.4?}",
                     group.name,

@@ -163,7 +163,10 @@ fn a_bake_in_blocks_comes_back_from_its_file_and_lights_pictures_as_one_without(
             let tiles = finish::tiles(&plan, &gathered, |_| Ok(())).unwrap();
             let stored = Stored { plan, tiles, probes: Vec::new(), corners: Vec::new() };
             let (ours, theirs) = (stored.summary(), plain.summary());
-            eprintln!("{format:?}: {} bytes of {}, {:?}, worst {}", ours.bytes, theirs.bytes, ours.kinds, ours.worst_tile);
+            eprintln!(
+                "{format:?}: {} bytes of {}, {:?}, worst {}",
+                ours.bytes, theirs.bytes, ours.kinds, ours.worst_tile
+            );
             assert!(stored.has_blocks() && ours.bytes < theirs.bytes && ours.worst_tile <= 0.0501, "{ours:?}");
             let bytes = stored.encode().unwrap();
             assert!(Stored::decode(&bytes).unwrap() == stored);
@@ -174,8 +177,7 @@ fn a_bake_in_blocks_comes_back_from_its_file_and_lights_pictures_as_one_without(
             let read = stored.without_blocks();
             assert!(!read.has_blocks());
             let picture = |stored: Stored, settings: &PictureSettings| {
-                let baked =
-                    Baked { stored: Arc::new(stored), frames: None, stream: None, file: None, digest: None };
+                let baked = Baked { stored: Arc::new(stored), frames: None, stream: None, file: None, digest: None };
                 Studio::with(gpu, scene.clone(), eye, &baked, settings).irradiance(settings)
             };
             let mut settings = PictureSettings::default();

@@ -268,7 +268,11 @@ fn probes_leave_solids_or_have_no_light() {
 }
 
 fn stored(gpu: &Gpu, scene: &Scene, grid: Option<Grid>, settings: Baking) -> Stored {
-    stored_of(gpu, scene, Plan { probes: grid.clone(), ..plan(scene, grid.unwrap_or(around(Vec3::ZERO, 1.0)), settings) })
+    stored_of(
+        gpu,
+        scene,
+        Plan { probes: grid.clone(), ..plan(scene, grid.unwrap_or(around(Vec3::ZERO, 1.0)), settings) },
+    )
 }
 
 /// A whole bake of a plan.
@@ -336,7 +340,8 @@ fn the_device_decodes_probes_as_the_processor_does_and_without_negative_light() 
             let field = Field::new(gpu, &stored).unwrap().unwrap();
             let mut graph = Graph::new("probes");
             let tiles = stored.probes.iter().map(|brick| &brick.light);
-            let light = field.decode(&mut graph, tiles, Moment { weights: &weights, sun, patches: &patches, lamps: &[] });
+            let light =
+                field.decode(&mut graph, tiles, Moment { weights: &weights, sun, patches: &patches, lamps: &[] });
             let read = graph.read_buffer(light);
             let light: Vec<[f32; 3]> = Runner::new(gpu).run(&graph).unwrap().buffer(read);
             let mut weakened = 0;

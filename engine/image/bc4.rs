@@ -96,8 +96,7 @@ fn refitted(wanted: &[f32; 16], codes: &[u8; 16]) -> Option<[f32; 2]> {
         (at, bt) = (at + a * value, bt + b * value);
     }
     let determinant = aa * bb - ab * ab;
-    (determinant.abs() > 1e-6)
-        .then(|| [(at * bb - bt * ab) / determinant, (bt * aa - at * ab) / determinant])
+    (determinant.abs() > 1e-6).then(|| [(at * bb - bt * ab) / determinant, (bt * aa - at * ab) / determinant])
 }
 
 #[cfg(test)]

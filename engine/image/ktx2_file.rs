@@ -82,12 +82,7 @@ pub fn encode_ktx2(
 ///
 /// # Errors
 /// As [`encode_ktx2`].
-pub fn encode_ktx2_cube(
-    format: Ktx2Format,
-    side: u32,
-    levels: &[Vec<u8>],
-    about: &[(&str, &str)],
-) -> Result<Vec<u8>> {
+pub fn encode_ktx2_cube(format: Ktx2Format, side: u32, levels: &[Vec<u8>], about: &[(&str, &str)]) -> Result<Vec<u8>> {
     encode(format, [side; 2], 6, levels, about)
 }
 

@@ -198,7 +198,9 @@ fn several_days_are_in_one_table() {
     // One day of them, with all its steps.
     let one = export("primitives", &at("year.day"), &at("one"), &["--date", "2026-12-21", "--all"]);
     let maps = one["lightmaps"].as_array().unwrap();
-    assert!(maps.iter().all(|map| map["date"] == "2026-12-21") && maps.len() >= days[1]["times"].as_array().unwrap().len());
+    assert!(
+        maps.iter().all(|map| map["date"] == "2026-12-21") && maps.len() >= days[1]["times"].as_array().unwrap().len()
+    );
     assert_eq!(one["days"].as_array().unwrap().len(), 2);
     let (bake, out) = (at("year.day"), at("bad"));
     let words = ["export", "--builtin", "primitives", "--bake", bake.to_str().unwrap(), "-o", out.to_str().unwrap()];
@@ -225,7 +227,8 @@ fn a_part_of_a_day_has_no_light_outside() {
     assert!(rebuilt(&at("out"), &table, 32_400.0).iter().all(|value| *value == 0.0));
     let (bake, out) = (at("part.day"), at("bad"));
     let words = ["export", "--builtin", "primitives", "--bake", bake.to_str().unwrap(), "-o", out.to_str().unwrap()];
-    daylight(&[&words[..], &["--time", "09:00"]].concat()).expect(2, &["09:00", "from 10:00:00 until 14:00:00", "--time"]);
+    daylight(&[&words[..], &["--time", "09:00"]].concat())
+        .expect(2, &["09:00", "from 10:00:00 until 14:00:00", "--time"]);
 }
 
 /// The direction of a texel of a cube map by the table of the Vulkan specification ("Cube Map Face Selection").

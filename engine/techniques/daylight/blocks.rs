@@ -170,7 +170,9 @@ impl Blocks {
     pub fn read(hdr: u32, pairs: u32, bytes: Vec<u8>, layout: &Layout) -> Result<Self> {
         let mut values = Vec::new();
         let mut rest = bytes.as_slice();
-        for coding in std::iter::repeat_n(Coding::Hdr, hdr as usize).chain(std::iter::repeat_n(Coding::Pair, pairs as usize)) {
+        for coding in
+            std::iter::repeat_n(Coding::Hdr, hdr as usize).chain(std::iter::repeat_n(Coding::Pair, pairs as usize))
+        {
             let (image, after) =
                 rest.split_at_checked(layout.bytes(coding)).ok_or_else(|| Error::input("blocks that are cut off"))?;
             values.extend(layout.decode(image, coding)?);
@@ -214,7 +216,8 @@ mod tests {
     /// A tile of 10×7 texels with a hole.
     fn layout() -> (Layout, Vec<[u32; 2]>) {
         let there = |x: u32, y: u32| !(4..8).contains(&x) || y > 4;
-        let texels: Vec<[u32; 2]> = (0..7).flat_map(|y| (0..10).map(move |x| [x, y])).filter(|[x, y]| there(*x, *y)).collect();
+        let texels: Vec<[u32; 2]> =
+            (0..7).flat_map(|y| (0..10).map(move |x| [x, y])).filter(|[x, y]| there(*x, *y)).collect();
         let mut mask = vec![0u32; 3];
         texels.iter().for_each(|[x, y]| mask[(y * 10 + x) as usize / 32] |= 1 << ((y * 10 + x) % 32));
         (Layout::new(&mask, [10, 7]), texels)
@@ -258,7 +261,8 @@ mod tests {
     #[test]
     fn images_are_found_in_their_bytes_and_damaged_ones_are_refused() {
         let (layout, texels) = layout();
-        let values = |scale: f32| -> Vec<f32> { texels.iter().flat_map(|[x, _]| [0.05 * scale * *x as f32; 3]).collect() };
+        let values =
+            |scale: f32| -> Vec<f32> { texels.iter().flat_map(|[x, _]| [0.05 * scale * *x as f32; 3]).collect() };
         let parts = [(0.5, Coding::Hdr), (1.0, Coding::Pair), (-2.0, Coding::Pair)];
         let images = parts.map(|(scale, coding)| layout.encode(&values(scale), coding));
         let read = Blocks::read(1, 2, images.concat(), &layout).unwrap();

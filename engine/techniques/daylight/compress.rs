@@ -38,7 +38,8 @@ impl Layer {
         let Some(parts) = Parts::new(light, columns, aim)? else { return Ok(with(Self::none(light.dimensions))) };
         let (mut best, _) = parts.compressed(Choice::PLAIN)?;
         for share in SHARES {
-            let (layer, within) = parts.compressed(Choice { codings: texels.codings(), layout: Some(layout), share })?;
+            let (layer, within) =
+                parts.compressed(Choice { codings: texels.codings(), layout: Some(layout), share })?;
             if within && layer.bytes() < best.bytes() {
                 best = layer;
             }
@@ -125,13 +126,8 @@ impl<'a> Parts<'a> {
 fn joined(mut images: Vec<Image>, texels: usize, layout: Option<&Layout>) -> Result<Layer> {
     images.sort_by_key(|image| image.stored);
     let count = |stored: Stored| images.iter().filter(|image| image.stored == stored).count() as u32;
-    let [wide, narrow, hdr, pairs] = [
-        Stored::Wide,
-        Stored::Narrow,
-        Stored::Blocks(Coding::Hdr),
-        Stored::Blocks(Coding::Pair),
-    ]
-    .map(count);
+    let [wide, narrow, hdr, pairs] =
+        [Stored::Wide, Stored::Narrow, Stored::Blocks(Coding::Hdr), Stored::Blocks(Coding::Pair)].map(count);
     let stride = Layer::stride(wide, narrow) as usize;
     let mut words = vec![0u32; texels * stride];
     for (texel, row) in words.chunks_exact_mut(stride.max(1)).enumerate() {

@@ -95,7 +95,8 @@ impl Layer {
         };
         let plain = self.wide + self.narrow;
         let table = rows(0..self.wide).chain(rows(plain..self.images())).chain(rows(self.wide..plain)).collect();
-        let (before, stride) = (Self::stride(self.wide, self.narrow) as usize, Self::stride(wide, self.narrow) as usize);
+        let (before, stride) =
+            (Self::stride(self.wide, self.narrow) as usize, Self::stride(wide, self.narrow) as usize);
         let texels = blocks.texels();
         let mut words = Vec::with_capacity(texels * stride);
         for texel in 0..texels {

@@ -113,6 +113,7 @@ impl BlockPages {
 
     /// The textures of BC6H, of BC5 and of BC4; `other` in place of those that are not there.
     pub fn images(&self, graph: &mut Graph, other: Image) -> [Image; 3] {
-        [&self.hdr, &self.pairs, &self.blues].map(|image| image.as_ref().map_or(other, |image| graph.import_image(image)))
+        [&self.hdr, &self.pairs, &self.blues]
+            .map(|image| image.as_ref().map_or(other, |image| graph.import_image(image)))
     }
 }

@@ -233,7 +233,10 @@ fn left_out(scene: &Scene, groups: &[Group], added: Option<&Stored>) -> Vec<Note
         if !groups.is_empty() {
             notes.push(note("--add", "the added objects cast no shadows in the light of lamps"));
             let of_tiles = stored.tiles.iter().any(|tile| tile.lamps.images() > 0);
-            if of_tiles && !stored.probes.is_empty() && stored.probes.iter().all(|brick| brick.light.lamps.images() == 0) {
+            if of_tiles
+                && !stored.probes.is_empty()
+                && stored.probes.iter().all(|brick| brick.light.lamps.images() == 0)
+            {
                 let text = "the probes of the bake have no light of lamps, as in files of older versions";
                 notes.push(note("--add", text));
             }

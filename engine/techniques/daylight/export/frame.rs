@@ -56,8 +56,7 @@ pub fn irradiance(stored: &Stored, moment: &Moment) -> Vec<[f32; 3]> {
         let sky = tile.sky.mix(moment.patches.iter().copied().enumerate());
         let lamps = tile.lamps.mix(moment.lamps.iter().map(|share| [*share; 3]).enumerate());
         for (texel, [x, y]) in stored.plan.covered(number as u32, &tile.mask).enumerate() {
-            let parts =
-                [tile.sun.decode(texel, &sun), tile.sky.decode(texel, &sky), tile.lamps.decode(texel, &lamps)];
+            let parts = [tile.sun.decode(texel, &sun), tile.sky.decode(texel, &sky), tile.lamps.decode(texel, &lamps)];
             let sum: [f32; 3] = std::array::from_fn(|channel| parts.iter().map(|part| part[channel]).sum());
             out[(y * width + x) as usize] = sum.map(|value: f32| value.max(0.0));
         }

@@ -74,12 +74,7 @@ impl Lamps {
 }
 
 /// Appends the points of a curve from `begin`, which is there already, to `end`.
-fn follow(
-    of: &impl Fn(f64) -> Result<f64>,
-    begin: [f64; 2],
-    end: [f64; 2],
-    points: &mut Vec<[f64; 2]>,
-) -> Result<()> {
+fn follow(of: &impl Fn(f64) -> Result<f64>, begin: [f64; 2], end: [f64; 2], points: &mut Vec<[f64; 2]>) -> Result<()> {
     let [from, to] = [begin[0], end[0]];
     if to - from > SWITCHING {
         let part = |share: f64| from + share * (to - from);

@@ -81,8 +81,7 @@ impl Writer<'_> {
         if let Kind::Cube { .. } = self.stored.plan.receivers {
             let side = extent[0] / FACES;
             let faces = export::faces(light, self.sources, side);
-            let faces: Vec<Levels> =
-                faces.iter().map(|(light, own)| export::levels(light, own, [side; 2])).collect();
+            let faces: Vec<Levels> = faces.iter().map(|(light, own)| export::levels(light, own, [side; 2])).collect();
             let (format, levels) = self.texels(&faces, clock);
             return encode_ktx2_cube(format, side, &levels, &about);
         }
@@ -97,9 +96,7 @@ impl Writer<'_> {
             (0..levels).map(|level| of.iter().flat_map(|face| face[level].iter().copied()).collect()).collect()
         };
         match self.format {
-            TexelArg::Half => {
-                (Ktx2Format::R16g16b16a16Sfloat, joined(faces.iter().map(Levels::halves).collect()))
-            }
+            TexelArg::Half => (Ktx2Format::R16g16b16a16Sfloat, joined(faces.iter().map(Levels::halves).collect())),
             TexelArg::Bc6h => {
                 let (blocks, errors): (Vec<_>, Vec<f64>) = faces.iter().map(Levels::blocks).unzip();
                 let error = errors.into_iter().fold(0.0, f64::max);

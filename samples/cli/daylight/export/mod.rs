@@ -25,7 +25,11 @@ use self::{
     light::Writer,
     moments::{Clock, OneDay},
 };
-use crate::{args::TalkArgs, console::Console, stage::{Stage, StageArgs}};
+use crate::{
+    args::TalkArgs,
+    console::Console,
+    stage::{Stage, StageArgs},
+};
 
 /// Options of `daylight export`.
 #[derive(clap::Args, Clone, Debug)]

@@ -4,11 +4,7 @@ use half::f16;
 use lucerna::{
     Error, Result,
     image::{Ktx2Format, encode_ktx2},
-    techniques::daylight::{
-        Course, NEXT_DAY, Plan, Weather,
-        export::Moment,
-        steps::Steps,
-    },
+    techniques::daylight::{Course, NEXT_DAY, Plan, Weather, export::Moment, steps::Steps},
 };
 use serde_json::{Value, json};
 
