@@ -135,11 +135,11 @@ fn a_tile_has_the_same_bits_whatever_else_is_baked() {
         assert!(alone == after_others);
         let skies = units::skies(&plan).unwrap();
         let tile = units::compress(&plan, &alone, &skies).unwrap();
-        let decoded = units::Tile::decode(&tile.encode(), &plan, 16 * 14).unwrap();
+        let decoded = units::Tile::decode(&tile.encode(), &plan, 16 * 14, None).unwrap();
         assert!(decoded == tile);
         let bytes = tile.encode();
         for length in (0..bytes.len()).step_by(97) {
-            assert!(units::Tile::decode(&bytes[..length], &plan, 16 * 14).is_err());
+            assert!(units::Tile::decode(&bytes[..length], &plan, 16 * 14, None).is_err());
         }
     });
 }

@@ -27,11 +27,11 @@ use lucerna::{
 
 const PATCHES: usize = 146;
 
-fn eye() -> View {
+pub fn eye() -> View {
     view(vec3(0.0, 2.2, 4.5), vec3(0.0, 0.7, 0.0), 45.0, [40, 30])
 }
 
-fn baking() -> Baking {
+pub fn baking() -> Baking {
     Baking {
         samples: 64,
         probe_samples: 1024,
@@ -48,7 +48,7 @@ fn day() -> Day {
 }
 
 /// Two hours of a day at the equator.
-fn plan(scene: &Scene, grid: Grid, settings: Baking) -> Plan {
+pub fn plan(scene: &Scene, grid: Grid, settings: Baking) -> Plan {
     let lit = |hour: f64| {
         let seconds = 3600.0 * hour;
         Lit { seconds, sun: day().sun(seconds).direction(0.0) }
@@ -175,7 +175,7 @@ fn a_sphere_with_an_opening_has_the_light_of_an_integrating_sphere() {
 }
 
 /// A white floor between a red and a blue wall, with a hanging board that shades a part.
-fn room() -> Scene {
+pub fn room() -> Scene {
     let mut stage = Stage::new();
     let white = stage.material(Material::diffuse("white", vec3(0.8, 0.8, 0.8)));
     let red = stage.material(Material::diffuse("red", vec3(0.8, 0.2, 0.1)));
@@ -268,7 +268,15 @@ fn probes_leave_solids_or_have_no_light() {
 }
 
 fn stored(gpu: &Gpu, scene: &Scene, grid: Option<Grid>, settings: Baking) -> Stored {
-    let plan = Plan { probes: grid.clone(), ..plan(scene, grid.unwrap_or(around(Vec3::ZERO, 1.0)), settings) };
+    stored_of(
+        gpu,
+        scene,
+        Plan { probes: grid.clone(), ..plan(scene, grid.unwrap_or(around(Vec3::ZERO, 1.0)), settings) },
+    )
+}
+
+/// A whole bake of a plan.
+pub fn stored_of(gpu: &Gpu, scene: &Scene, plan: Plan) -> Stored {
     let skies = units::skies(&plan).unwrap();
     let mut transport = transport(gpu, scene, &plan);
     let unit = |transport: &mut Transport, index: u32| units::unit(&plan, transport, index, &skies).unwrap();
@@ -332,7 +340,8 @@ fn the_device_decodes_probes_as_the_processor_does_and_without_negative_light() 
             let field = Field::new(gpu, &stored).unwrap().unwrap();
             let mut graph = Graph::new("probes");
             let tiles = stored.probes.iter().map(|brick| &brick.light);
-            let light = field.decode(&mut graph, tiles, Moment { weights: &weights, sun, patches: &patches });
+            let light =
+                field.decode(&mut graph, tiles, Moment { weights: &weights, sun, patches: &patches, lamps: &[] });
             let read = graph.read_buffer(light);
             let light: Vec<[f32; 3]> = Runner::new(gpu).run(&graph).unwrap().buffer(read);
             let mut weakened = 0;
@@ -385,10 +394,19 @@ fn picture(gpu: &Gpu, scene: &Scene, stored: &Arc<Stored>, added: Added) -> luce
     let mut settings = PictureSettings::default();
     settings.daylight.time = "09:00".into();
     settings.daylight.added = added;
+    picture_by(gpu, scene, stored, &settings)
+}
+
+pub fn picture_by(
+    gpu: &Gpu,
+    scene: &Scene,
+    stored: &Arc<Stored>,
+    settings: &PictureSettings,
+) -> lucerna::Result<Layers> {
     let baked = Baked { stored: stored.clone(), frames: None, stream: None, file: None, digest: None };
-    let mut ready = Ready::<Daylight>::new(gpu, scene, &settings, Some(&baked), &mut |_, _| true)?;
+    let mut ready = Ready::<Daylight>::new(gpu, scene, settings, Some(&baked), &mut |_, _| true)?;
     let mut graph = Graph::new(Daylight::NAME);
-    let picture = ready.frame(&mut graph, (scene, &Pose::rest(scene)), &eye(), Shot::default(), &settings)?;
+    let picture = ready.frame(&mut graph, (scene, &Pose::rest(scene)), &eye(), Shot::default(), settings)?;
     let reading = picture.read(&mut graph, true, false);
     let frame = Runner::new(gpu).run(&graph)?;
     Ok(reading.layers(&frame))

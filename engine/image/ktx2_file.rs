@@ -1,4 +1,4 @@
-//! KTX 2.0 files out: one 2D image with its levels, uncompressed or in blocks of BC6H ("KTX File Format Specification", version 2.0, Khronos).
+//! KTX 2.0 files out: one 2D image, or the six faces of a cube, with levels, uncompressed or in blocks of BC6H ("KTX File Format Specification", version 2.0, Khronos).
 //!
 //! The crate `ktx2` reads such files and describes formats, but does not write files.
 
@@ -75,13 +75,31 @@ pub fn encode_ktx2(
     levels: &[Vec<u8>],
     about: &[(&str, &str)],
 ) -> Result<Vec<u8>> {
+    encode(format, extent, 1, levels, about)
+}
+
+/// The bytes of a file of a cube map. `levels`: in each one the faces +X, -X, +Y, -Y, +Z, -Z, one after the other.
+///
+/// # Errors
+/// As [`encode_ktx2`].
+pub fn encode_ktx2_cube(format: Ktx2Format, side: u32, levels: &[Vec<u8>], about: &[(&str, &str)]) -> Result<Vec<u8>> {
+    encode(format, [side; 2], 6, levels, about)
+}
+
+fn encode(
+    format: Ktx2Format,
+    extent: [u32; 2],
+    faces: u32,
+    levels: &[Vec<u8>],
+    about: &[(&str, &str)],
+) -> Result<Vec<u8>> {
     let most = 32 - extent[0].max(extent[1]).leading_zeros() as usize;
     if extent.contains(&0) || levels.is_empty() || levels.len() > most {
         let [width, height] = extent;
         return Err(Error::usage(format!("{} levels of an image of {width}×{height} texels", levels.len())));
     }
     for (level, bytes) in levels.iter().enumerate() {
-        let wanted = format.level_bytes(level_extent(extent, level));
+        let wanted = faces as usize * format.level_bytes(level_extent(extent, level));
         if bytes.len() != wanted {
             return Err(Error::usage(format!("level {level} has {} bytes, {wanted} are needed", bytes.len())));
         }
@@ -117,7 +135,7 @@ pub fn encode_ktx2(
     }
     let mut out = Vec::with_capacity(end);
     out.extend(IDENTIFIER);
-    let words = [format.known().value(), type_size, extent[0], extent[1], 0, 0, 1, levels.len() as u32, 0];
+    let words = [format.known().value(), type_size, extent[0], extent[1], 0, 0, faces, levels.len() as u32, 0];
     let index = [first as u32, descriptor.len() as u32, after as u32, texts.len() as u32];
     out.extend(words.into_iter().chain(index).flat_map(u32::to_le_bytes));
     out.extend([0; 16]);

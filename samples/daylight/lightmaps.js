@@ -28,6 +28,9 @@ export function readKtx2(buffer) {
 }
 
 export class Lightmaps {
+    // The light from outside at each minute of each day.
+    pictures = new Map();
+
     static async load(folder) {
         const get = async (name) => {
             const answer = await fetch(`${folder}/${name}`);
@@ -37,9 +40,13 @@ export class Lightmaps {
         const ktx2 = async (name) => readKtx2(await (await get(name)).arrayBuffer());
         const out = new Lightmaps();
         out.table = await (await get('daylight.json')).json();
-        if (out.table.version !== 1) throw new Error(`version ${out.table.version} is not known, only 1`);
+        if (![1, 2].includes(out.table.version)) throw new Error(`version ${out.table.version} is not known, only 1 and 2`);
         out.sources = (await ktx2(out.table.sources)).data;
-        out.moments = await ktx2(out.table.moments.file);
+        // The days of the bake; a bake of one day has its members beside the others.
+        out.days = out.table.days ?? [out.table];
+        for (const day of out.days) out.pictures.set(day, await ktx2(day.moments.file));
+        out.day = out.days[0];
+        out.groups = out.table.lamps ?? [];
         out.layers = [];
         for (const layer of out.table.layers) {
             const pages = await Promise.all(layer.pages.map(ktx2));
@@ -48,10 +55,27 @@ export class Lightmaps {
         return out;
     }
 
+    // Chooses the day of the times that follow.
+    use(date) {
+        const found = this.days.find(({ day }) => day.date === date);
+        if (!found) throw new Error(`${date} is not in the export; it has ${this.days.map(({ day }) => day.date).join(', ')}`);
+        this.day = found;
+    }
+
+    // How bright each group of lamps burns by the schedule, 0 to 1.
+    burning(seconds) {
+        return (this.day.switches ?? []).map((points) => {
+            const next = points.findIndex(([at]) => at > seconds);
+            if (next <= 0) return points[next < 0 ? points.length - 1 : 0][1];
+            const [[begin, from], [end, to]] = [points[next - 1], points[next]];
+            return from + ((to - from) * (seconds - begin)) / (end - begin);
+        });
+    }
+
     // The light from outside: { sun: [r, g, b], direction: [x, y, z], patches: [[r, g, b], …] }.
     moment(seconds) {
-        const { first_seconds, step_seconds, rows, patches, sun_column, direction_column } = this.table.moments;
-        const x = (seconds - first_seconds) / step_seconds, { width, data } = this.moments;
+        const { first_seconds, step_seconds, rows, patches, sun_column, direction_column } = this.day.moments;
+        const x = (seconds - first_seconds) / step_seconds, { width, data } = this.pictures.get(this.day);
         const dark = x < 0 || x > rows - 1;
         const row = Math.min(Math.max(Math.floor(x), 0), rows - 1), next = Math.min(row + 1, rows - 1), part = dark ? 0 : x - row;
         const at = (column) => [0, 1, 2].map((channel) => {
@@ -64,23 +88,24 @@ export class Lightmaps {
 
     // Two baked times and their weights: a line between them, and over a night the nearer one.
     weights(seconds) {
-        const { times, nights, day } = this.table, count = times.length;
+        const { times, nights, day, first_column: first = 0 } = this.day, count = times.length;
         if (!count) return [];
         // After the last time comes the first one of the next day.
         const found = times.findIndex((time) => time > seconds), next = found < 0 ? count : found;
         const before = (next + count - 1) % count, after = next % count;
         const begin = times[before] - (next === 0 ? day.seconds : 0), end = times[after] + (next === count ? day.seconds : 0);
         const part = (seconds - begin) / (end - begin);
-        if (nights.includes(before)) return [[part < 0.5 ? before : after, 1]];
-        return [[before, 1 - part], [after, part]];
+        if (nights.includes(before)) return [[first + (part < 0.5 ? before : after), 1]];
+        return [[first + before, 1 - part], [first + after, part]];
     }
 
-    // Irradiance of all texels at a time: four numbers for each, row after row from the top.
-    light(seconds) {
+    // Irradiance of all texels at a time: four numbers for each, row after row from the top. `lamps`: how bright each group burns.
+    light(seconds, lamps = this.burning(seconds)) {
         const { width, height, tiles } = this.table, { sun, patches } = this.moment(seconds);
         const mixtures = {
             times: this.weights(seconds).map(([time, weight]) => [time, sun.map((channel) => channel * weight)]),
             patches: patches.map((colour, patch) => [patch, colour]),
+            lamps: lamps.map((share, group) => [group, [share, share, share]]),
         };
         const own = new Float32Array(4 * width * height);
         for (const { name, dimensions, columns, pages, coefficients } of this.layers) {

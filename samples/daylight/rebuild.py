@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """The lightmap of any time of the day from what `daylight export` wrote, with numpy alone.
 
-usage: rebuild.py FOLDER HH:MM[:SS] [-o FILE.pfm] [--compare FILE.exr]
+usage: rebuild.py FOLDER HH:MM[:SS] [--date YYYY-MM-DD] [--lamps SHARE,…] [-o FILE.pfm] [--compare FILE.exr]
 
-docs/daylight-export.md describes the files. With --compare the result is held against an EXR file of `daylight export`.
+docs/daylight-export.md describes the files. Lamps burn by the schedule of the export, or as bright as --lamps says for each group. With --compare the
+result is held against an EXR file of `daylight export`.
 """
 import argparse
 import json
@@ -70,10 +71,13 @@ class Export:
     def __init__(self, folder):
         self.folder = pathlib.Path(folder)
         self.table = json.loads((self.folder / "daylight.json").read_text())
-        if self.table["version"] != 1:
-            raise SystemExit(f"{folder}: version {self.table['version']} is not known, only 1")
+        if self.table["version"] not in (1, 2):
+            raise SystemExit(f"{folder}: version {self.table['version']} is not known, only 1 and 2")
         self.sources = self.read(self.table["sources"])[..., 0]
-        self.moments = self.read(self.table["moments"]["file"]).astype(np.float32)
+        # The days of the bake; a bake of one day has its members beside the others.
+        self.days = self.table.get("days", [self.table])
+        self.groups = [group["name"] for group in self.table.get("lamps", [])]
+        self.use(self.days[0]["day"]["date"])
         self.layers = []
         for layer in self.table["layers"]:
             coefficients = self.read(layer["table"])[..., 0] if layer["table"] else np.zeros((0, layer["columns"]), np.float32)
@@ -82,9 +86,21 @@ class Export:
     def read(self, name):
         return read_ktx2(self.folder / name)
 
+    def use(self, date):
+        """Chooses the day of the times that follow."""
+        found = [day for day in self.days if day["day"]["date"] == date]
+        if not found:
+            raise SystemExit(f"{date} is not in the export; it has {', '.join(day['day']['date'] for day in self.days)}")
+        self.day = found[0]
+        self.moments = self.read(self.day["moments"]["file"]).astype(np.float32)
+
+    def burning(self, seconds):
+        """How bright each group of lamps burns by the schedule, 0 to 1."""
+        return np.array([np.interp(seconds, *np.transpose(switch)) for switch in self.day.get("switches", [])])
+
     def moment(self, seconds):
         """The row of the light from outside at a time: radiances of the patches of the sky, irradiance of the sun, its direction."""
-        about = self.table["moments"]
+        about = self.day["moments"]
         x = (seconds - about["first_seconds"]) / about["step_seconds"]
         if x < 0 or x > about["rows"] - 1:
             return np.zeros_like(self.moments[0])
@@ -94,8 +110,8 @@ class Export:
 
     def weights(self, seconds):
         """For each baked time its weight: the line between the two times around the moment, and over a night the nearer one."""
-        times, length = self.table["times"], self.table["day"]["seconds"]
-        out = np.zeros(len(times))
+        times, length, first = self.day["times"], self.day["day"]["seconds"], self.day.get("first_column", 0)
+        out = np.zeros(sum(len(day["times"]) for day in self.days))
         if times:
             # After the last time comes the first one of the next day.
             following = int(np.searchsorted(times, seconds, side="right"))
@@ -103,19 +119,21 @@ class Export:
             begin = times[before] - (length if following == 0 else 0)
             end = times[after] + (length if following == len(times) else 0)
             part = (seconds - begin) / (end - begin)
-            if before in self.table["nights"]:
+            if before in self.day["nights"]:
                 part = 0 if part < 0.5 else 1
-            out[before] += 1 - part
-            out[after] += part
+            out[first + before] += 1 - part
+            out[first + after] += part
         return out
 
-    def light(self, seconds):
-        """Irradiance, rows × columns × 3, W/m²."""
-        row, about = self.moment(seconds)[:, :3], self.table["moments"]
+    def light(self, seconds, lamps=None):
+        """Irradiance, rows × columns × 3, W/m². `lamps`: how bright each group burns, or None for the schedule."""
+        row, about = self.moment(seconds)[:, :3], self.day["moments"]
+        lamps = self.burning(seconds) if lamps is None else np.asarray(lamps)
         # For each dimension of a layer the colour of its light.
         mixtures = {
             "times": self.weights(seconds)[:, None] * row[about["sun_column"]],
             "patches": row[: about["patches"]],
+            "lamps": np.repeat(lamps[:, None], 3, axis=1),
         }
         own = np.zeros((self.table["height"], self.table["width"], 3), np.float32)
         for layer, coefficients, pages in self.layers:
@@ -136,7 +154,7 @@ class Export:
 def seconds_of(export, text):
     """Seconds after the begin of the day. Exact on days without a change of the clock; `lightmaps` of the table says them for all days."""
     for lightmap in export.table["lightmaps"]:
-        if lightmap["time"].startswith(text):
+        if lightmap["time"].startswith(text) and lightmap.get("date", export.day["day"]["date"]) == export.day["day"]["date"]:
             return lightmap["seconds"]
     return sum(int(part) * unit for part, unit in zip(text.split(":"), (3600, 60, 1)))
 
@@ -156,11 +174,17 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("time")
+    parser.add_argument("--date")
+    parser.add_argument("--lamps", type=lambda text: [float(share) for share in text.split(",")])
     parser.add_argument("-o", "--output", type=pathlib.Path)
     parser.add_argument("--compare", type=pathlib.Path)
     options = parser.parse_args()
     export = Export(options.folder)
-    light = export.light(seconds_of(export, options.time))
+    if options.date:
+        export.use(options.date)
+    if options.lamps is not None and len(options.lamps) != len(export.groups):
+        raise SystemExit(f"--lamps has {len(options.lamps)} numbers, the export has {len(export.groups)} groups of lamps: {', '.join(export.groups)}")
+    light = export.light(seconds_of(export, options.time), options.lamps)
     print(f"{options.time}: {light.shape[1]}×{light.shape[0]} texels, mean {light.mean():.4g} W/m², largest {light.max():.4g}")
     if options.output:
         write_pfm(options.output, light)

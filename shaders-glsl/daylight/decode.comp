@@ -6,6 +6,7 @@
 #include "lib/gbuffer.glsl"
 #include "lib/scene.glsl"
 #include "lib/view.glsl"
+#define DAY_BLOCKS
 #include "daylight/tiles.glsl"
 #include "daylight/cube.glsl"
 
@@ -59,6 +60,15 @@ struct TexelLight {
 
 uint fetched = 0u;
 
+// Adds a layer at a texel: its images in words, then those in blocks.
+void add_layer(inout DaySums sums, uint tile, uint layer, uint texel, uvec2 inside, uint second) {
+    day_layer(sums, tile, layer, texel, second);
+    if (BLOCKS == 0u) return;
+    uint first = tiles[tile].first[layer] + tiles[tile].wide[layer] + tiles[tile].narrow[layer];
+    day_blocks(sums.first, sums.second, tile, layer, first, (side + 3u) / 4u * 4u, inside, second);
+    sums.fetches += tiles[tile].hdr[layer] + tiles[tile].pairs[layer];
+}
+
 // Three values of a frame from two words.
 vec3 frame_value(uint low, uint high, uint texel) {
     vec2 a = unpackHalf2x16(low);
@@ -69,11 +79,12 @@ vec3 frame_value(uint low, uint high, uint texel) {
 TexelLight texel_light(uvec2 texel) {
     uvec2 tile = texel / side;
     uint number = tile.y * columns + tile.x;
-    uint at = day_texel(number, texel - tile * side);
+    uvec2 inside = texel - tile * side;
+    uint at = day_texel(number, inside);
     if (at == NONE) return TexelLight(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
     DaySums of_sun = DaySums(vec3(0.0), vec3(0.0), 0u);
     if (FRAMES == 0u) {
-        day_layer(of_sun, number, 0u, at, LOGARITHMS != 0u ? second : 0u);
+        add_layer(of_sun, number, 0u, at, inside, LOGARITHMS != 0u ? second : 0u);
     } else {
         uint i = tiles[number].first_texel + at;
         uint word = 3u * i / 2u;
@@ -89,8 +100,8 @@ TexelLight texel_light(uvec2 texel) {
         of_sun.fetches = FRAMES - 1u;
     }
     DaySums of_sky = DaySums(vec3(0.0), vec3(0.0), 0u);
-    day_layer(of_sky, number, 1u, at, 0u);
-    day_layer(of_sky, number, 2u, at, 0u);
+    add_layer(of_sky, number, 1u, at, inside, 0u);
+    add_layer(of_sky, number, 2u, at, inside, 0u);
     fetched += of_sun.fetches + of_sky.fetches;
     return TexelLight(of_sun.first, of_sun.second, of_sky.first, 1.0);
 }

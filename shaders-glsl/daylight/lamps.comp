@@ -34,6 +34,8 @@ layout(push_constant, scalar) uniform Push {
     uint count;
 };
 
+#include "daylight/lamp.glsl"
+
 void main() {
     uint receiver = gl_GlobalInvocationID.x;
     if (receiver >= settings.receivers) return;
@@ -46,37 +48,13 @@ void main() {
             DayVertex vertex = start;
             if (k > 0u) vertex = vertices[path * DAY_VERTICES + k - 1u];
             uvec4 hash = pcg4d(uvec4(settings.first_receiver + receiver, number, k, settings.seed ^ 0x2545f491u));
-            vec2 u = unit_floats(hash.xy);
-            float chosen;
-            LightTarget to = LIGHT_TARGET(pick_light(vertex.position, vertex.geometric, u.x, hash.zw, chosen));
-            if (!(chosen > 0.0)) continue;
-            vec3 arrives, to_light, target;
-            uint group;
-            if (to.instance == TARGET_PUNCTUAL) {
-                Light one = light(to.index);
-                arrives = light_irradiance(one, vertex.position, to_light) / chosen;
-                target = one.position;
-                group = groups[to.index];
-            } else {
-                SurfacePoint point = surface_point(to.instance, to.index, sample_triangle(u));
-                uint material = INSTANCE_AT(to.instance).material;
-                bool both = (MATERIAL_AT(material).flags & MATERIAL_DOUBLE_SIDED) != 0u;
-                vec3 away = vertex.position - point.position;
-                float facing = dot(point.area, away);
-                float distance2 = dot(away, away);
-                if (!(facing > 0.0 || (both && facing < 0.0)) || distance2 == 0.0) continue;
-                to_light = -away * inversesqrt(distance2);
-                // The length of `point.area` is twice the triangle's area.
-                float angle = 0.5 * abs(facing) / (distance2 * sqrt(distance2));
-                arrives = triangle_emission(to.instance, point) * (angle / chosen);
-                target = point.position + point.area * (sign(facing) * surface_gap(point) / length(point.area));
-                group = groups[settings.lights + material];
-            }
-            float cosine = dot(vertex.normal, to_light);
-            if (group == NONE || cosine <= 0.0 || dot(vertex.geometric, to_light) <= 0.0 || arrives == vec3(0.0)) continue;
-            if (trace_any(Ray(vertex.position, 0.0, target - vertex.position, 0.99999), TRACE_SHADOW, hash.y)) continue;
-            uint at = 2u * (receiver * settings.groups + group) + (number & 1u);
-            sums[at] += vertex.weight * arrives * cosine;
+            DayLamp lamp;
+            if (!day_lamp(vertex.position, vertex.geometric, hash, settings.lights, lamp)) continue;
+            float cosine = dot(vertex.normal, lamp.to_light);
+            if (cosine <= 0.0 || dot(vertex.geometric, lamp.to_light) <= 0.0) continue;
+            if (trace_any(Ray(vertex.position, 0.0, lamp.target - vertex.position, 0.99999), TRACE_SHADOW, hash.y)) continue;
+            uint at = 2u * (receiver * settings.groups + lamp.group) + (number & 1u);
+            sums[at] += vertex.weight * lamp.arrives * cosine;
         }
     }
 }

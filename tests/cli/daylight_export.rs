@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 
 use crate::support::{Ran, command, device, files, ran};
 
-fn daylight(arguments: &[&str]) -> Ran {
+pub fn daylight(arguments: &[&str]) -> Ran {
     ran(command(env!("CARGO_BIN_EXE_daylight")).args(arguments))
 }
 
@@ -118,6 +118,7 @@ impl Lab {
                 narrow: 0,
                 table: Vec::new(),
                 words: Vec::new(),
+                blocks: None,
                 worst: 0.0,
                 worst_dimension: 0,
                 hidden: 0,
@@ -146,11 +147,11 @@ impl Lab {
     }
 }
 
-fn pixels(path: impl AsRef<Path>) -> Layers {
+pub fn pixels(path: impl AsRef<Path>) -> Layers {
     image::read(path, &Limits::default()).unwrap()
 }
 
-fn json_of(path: impl AsRef<Path>) -> Value {
+pub fn json_of(path: impl AsRef<Path>) -> Value {
     serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
@@ -162,7 +163,7 @@ fn document(path: impl AsRef<Path>) -> Value {
 }
 
 /// The largest level of a KTX 2.0 file: format, columns, rows, bytes.
-fn ktx2(path: impl AsRef<Path>) -> (u32, usize, usize, Vec<u8>) {
+pub fn ktx2(path: impl AsRef<Path>) -> (u32, usize, usize, Vec<u8>) {
     let bytes = fs::read(path).unwrap();
     assert_eq!(&bytes[..12], b"\xabKTX 20\xbb\r\n\x1a\n");
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
@@ -171,7 +172,7 @@ fn ktx2(path: impl AsRef<Path>) -> (u32, usize, usize, Vec<u8>) {
 }
 
 /// The numbers of a KTX 2.0 file, whatever their kind.
-fn numbers(path: impl AsRef<Path>) -> (usize, Vec<f32>) {
+pub fn numbers(path: impl AsRef<Path>) -> (usize, Vec<f32>) {
     let (format, columns, _, bytes) = ktx2(path);
     let values = match format {
         38 => bytes.iter().map(|b| f32::from(b.cast_signed()) / 127.0).collect(),
@@ -351,18 +352,18 @@ fn the_pages_and_the_table_rebuild_the_lightmaps() {
 }
 
 /// A layer of an export.
-struct Read {
-    name: String,
+pub struct Read {
+    pub name: String,
     of_times: bool,
-    columns: usize,
-    table: Vec<f32>,
-    pages: Vec<(usize, Vec<f32>)>,
+    pub columns: usize,
+    pub table: Vec<f32>,
+    pub pages: Vec<(usize, Vec<f32>)>,
     /// Of each page whether it has signed bytes.
     narrow: Vec<bool>,
 }
 
 impl Read {
-    fn new(folder: &Path, layer: &Value) -> Self {
+    pub fn new(folder: &Path, layer: &Value) -> Self {
         let names = || layer["pages"].as_array().unwrap().iter().map(|name| folder.join(name.as_str().unwrap()));
         let (columns, table) = numbers(folder.join(layer["table"].as_str().unwrap()));
         assert_eq!(layer["columns"], columns);
@@ -419,7 +420,7 @@ fn what_cannot_be_exported_is_refused_and_named() {
     let receivers = Kind::View { camera: "eye".into(), view_from_world: [0.0; 16], clip_from_view: [0.0; 16] };
     let seen = Stored { plan: Plan { receivers, ..stored.plan.clone() }, corners: Vec::new(), ..stored };
     fs::write(lab.at("view.day"), seen.encode().unwrap()).unwrap();
-    lab.export("view.day", "out", &[]).expect(3, &["view.day", "one camera", "--kind lightmap"]);
+    lab.export("view.day", "out", &[]).expect(3, &["view.day", "one camera", "--kind lightmap or --kind cube"]);
     // Files that are not whole.
     let whole = fs::read(&bake).unwrap();
     fs::write(lab.at("cut.day"), &whole[..whole.len() - 40]).unwrap();

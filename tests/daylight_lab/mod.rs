@@ -56,7 +56,18 @@ fn layer(texels: u32, dimensions: u32, images: u32, seed: u32) -> Layer {
         }
     };
     let table = (0..images).flat_map(|image| (0..dimensions).map(move |t| along(image, t))).collect();
-    Layer { dimensions, wide, narrow, table, words, worst: 0.0, worst_dimension: 0, hidden: 0, noise: 0.0 }
+    Layer {
+        dimensions,
+        wide,
+        narrow,
+        table,
+        words,
+        blocks: None,
+        worst: 0.0,
+        worst_dimension: 0,
+        hidden: 0,
+        noise: 0.0,
+    }
 }
 
 /// The day of [`stored`]: polar day, so that the sun shines over midnight, too.
@@ -141,7 +152,11 @@ pub struct Studio {
 
 impl Studio {
     pub fn new(gpu: &Gpu, scene: Scene, view: View, baked: &Baked) -> Self {
-        let ready = Ready::new(gpu, &scene, &PictureSettings::default(), Some(baked), &mut |_, _| true).unwrap();
+        Self::with(gpu, scene, view, baked, &PictureSettings::default())
+    }
+
+    pub fn with(gpu: &Gpu, scene: Scene, view: View, baked: &Baked, settings: &PictureSettings) -> Self {
+        let ready = Ready::new(gpu, &scene, settings, Some(baked), &mut |_, _| true).unwrap();
         Self { scene, view, ready, runner: Runner::new(gpu) }
     }
 

@@ -19,6 +19,8 @@ mod daylight;
 mod daylight_experiment;
 #[path = "../cli/daylight_export.rs"]
 mod daylight_export;
+#[path = "../cli/daylight_export_more.rs"]
+mod daylight_export_more;
 #[path = "../cli/daylight_pictures.rs"]
 mod daylight_pictures;
 #[path = "../cli/experiment.rs"]

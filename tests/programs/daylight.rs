@@ -5,6 +5,10 @@ mod daylight_lab;
 #[path = "../tracer_lab/mod.rs"]
 mod tracer_lab;
 
+#[path = "../daylight_added_lamps.rs"]
+mod daylight_added_lamps;
+#[path = "../daylight_blocks.rs"]
+mod daylight_blocks;
 #[path = "../daylight_cube.rs"]
 mod daylight_cube;
 #[path = "../daylight_day.rs"]

@@ -68,6 +68,8 @@ pub struct Summary {
     pub raw_bytes: u64,
     /// Bytes of the images and coefficients.
     pub bytes: u64,
+    /// Images of 16-bit floats, of signed bytes, in BC6H, and in BC5 with BC4, of all tiles.
+    pub kinds: [u64; 4],
     /// Bytes of the places of triangles in the lightmap.
     pub places_bytes: u64,
     /// Mean number of images of a tile for the light of the sun.
@@ -181,7 +183,8 @@ impl Stored {
         let mut tiles = Vec::new();
         for (index, length) in lengths.iter().enumerate() {
             let (tile, after) = rest.split_at(*length as usize);
-            let decoded = Tile::decode(tile, &plan, texels(&plan, index as u32));
+            let [_, _, columns, rows] = plan.tile(index as u32);
+            let decoded = Tile::decode(tile, &plan, (columns * rows) as usize, Some([columns, rows]));
             tiles.push(decoded.map_err(|error| error.at(format!("tiles[{index}]")))?);
             rest = after;
         }
@@ -203,6 +206,35 @@ impl Stored {
     /// What the probes are within; `None` if there are none.
     pub fn probe_summary(&self) -> Option<probes::Summary> {
         self.plan.probes.as_ref().map(|grid| probes::summary(grid, &self.probes))
+    }
+
+    /// Whether images are in blocks.
+    pub fn has_blocks(&self) -> bool {
+        self.tiles.iter().flat_map(Tile::layers).any(|layer| layer.in_blocks() > 0)
+    }
+
+    /// The same light without blocks ([`Layer::without_blocks`](super::layer::Layer::without_blocks)).
+    #[must_use]
+    pub fn without_blocks(&self) -> Self {
+        let mut out = self.clone();
+        out.plan.settings.format = super::Texels::Plain;
+        for tile in &mut out.tiles {
+            for layer in [&mut tile.sun, &mut tile.sky, &mut tile.lamps] {
+                *layer = layer.without_blocks();
+            }
+        }
+        out
+    }
+
+    /// Images of 16-bit floats, of signed bytes, in BC6H, and in BC5 with BC4, of all tiles.
+    pub fn kinds(&self) -> [u64; 4] {
+        let mut kinds = [0; 4];
+        for layer in self.tiles.iter().flat_map(Tile::layers) {
+            let [hdr, pairs] = layer.blocks.as_ref().map_or([0, 0], |blocks| [blocks.hdr, blocks.pairs]);
+            let of_layer = [layer.wide, layer.narrow, hdr, pairs];
+            kinds.iter_mut().zip(of_layer).for_each(|(sum, count)| *sum += u64::from(count));
+        }
+        kinds
     }
 
     /// What the bake holds and what it is within.
@@ -236,6 +268,7 @@ impl Stored {
         Summary {
             raw_bytes: 6 * texels * times as u64,
             bytes: self.tiles.iter().map(|tile| tile.layers().iter().map(|layer| layer.bytes()).sum::<u64>()).sum(),
+            kinds: self.kinds(),
             places_bytes: 12 * self.corners.len() as u64,
             images: images as f64 / lit.clone().count().max(1) as f64,
             most_images: self.tiles.iter().map(|tile| tile.sun.images()).max().unwrap_or(0),
@@ -262,10 +295,4 @@ fn relative(light: f64, square: f64, lines: f64) -> f64 {
 /// Number of probes of a brick.
 fn of_brick(plan: &Plan, index: u32) -> usize {
     plan.probes.as_ref().map_or(0, |grid| grid.brick(index).len())
-}
-
-/// Number of texels of a tile.
-fn texels(plan: &Plan, index: u32) -> usize {
-    let [_, _, columns, rows] = plan.tile(index);
-    columns as usize * rows as usize
 }

@@ -3,7 +3,8 @@
 use std::{collections::HashMap, thread};
 
 use super::{
-    Plan,
+    Plan, Texels,
+    blocks::Layout,
     columns::Measured,
     filter::Filter,
     gathered::Gathered,
@@ -52,6 +53,8 @@ fn tile(plan: &Plan, gathered: &[Gathered], filter: Option<&Filter>, index: usiz
     let dimensions = plan.dimensions();
     let columns = units::kinds(skies);
     let lit = &gathered[index];
+    let [_, _, width, height] = plan.tile(index as u32);
+    let layout = (plan.settings.format != Texels::Plain).then(|| Layout::new(&lit.mask, [width, height]));
     let mut layers = Vec::new();
     let near: Option<Vec<_>> =
         filter.map(|filter| (0..lit.spots.len()).map(|texel| filter.weights(index, texel)).collect());
@@ -71,7 +74,7 @@ fn tile(plan: &Plan, gathered: &[Gathered], filter: Option<&Filter>, index: usiz
         }
         let exact = !plan.settings.noise_floor;
         let measured = Measured { dimensions: dimensions[which], rows: &mean, noise: if exact { &[] } else { &noise } };
-        let layer = units::layer(plan, measured, columns)?;
+        let layer = units::layer(plan, measured, columns, layout.as_ref())?;
         if which == 0 {
             errors = units::errors(&layer, measured);
         }

@@ -24,7 +24,7 @@ use std::{
 
 use half::f16;
 
-use super::{Stored, layer::Layer, units::Tile};
+use super::{Stored, blocks::Blocks, layer::Layer, units::Tile};
 use crate::{Error, ErrorKind, Result, bake::Digest, image};
 
 pub(super) const MAGIC: &[u8; 8] = b"lucfrm\r\n";
@@ -71,7 +71,8 @@ fn of_step(identity: &Digest, record: &[u8]) -> Digest {
 fn still(stored: &Stored) -> Stored {
     let mut still = stored.clone();
     for Tile { sun, .. } in &mut still.tiles {
-        *sun = Layer { wide: 0, narrow: 0, table: Vec::new(), words: Vec::new(), ..sun.clone() };
+        let blocks = sun.blocks.as_ref().map(|_| Blocks::default());
+        *sun = Layer { wide: 0, narrow: 0, table: Vec::new(), words: Vec::new(), blocks, ..sun.clone() };
     }
     still
 }

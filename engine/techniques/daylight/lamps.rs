@@ -76,6 +76,13 @@ pub fn groups(scene: &Scene, wanted: &[String]) -> Result<Vec<Group>> {
     Ok(out)
 }
 
+/// The group of each placed light of a scene, in the order of the lights of the device: those of the nodes.
+pub(super) fn placed(scene: &Scene, groups: &[Group]) -> impl Iterator<Item = Option<usize>> {
+    let placed = scene.nodes.iter().filter_map(|node| node.light);
+    let placed = placed.filter(|light| (*light as usize) < scene.lights.len());
+    placed.map(|light| groups.iter().position(|group| group.lights.contains(&light)))
+}
+
 /// Whether a name fits a pattern in which `*` at either end stands for any text.
 fn fits(pattern: &str, name: &str) -> bool {
     match (pattern.strip_prefix('*'), pattern.strip_suffix('*')) {

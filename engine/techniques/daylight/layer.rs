@@ -7,11 +7,8 @@
 
 use half::f16;
 
-use super::columns::{Columns, Measured, Rest, Weighted, left_out, level, project};
+use super::blocks::Blocks;
 use crate::{Error, Result};
-
-/// Largest part of the tolerance that the rounding of one image to bytes may take.
-const ROUNDING: f64 = 1.0 / 16.0;
 
 /// Light of a tile for some dimensions.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,8 +22,10 @@ pub struct Layer {
     /// Coefficients: for each image one number for each dimension. The scale of the image's values is part of them. Files have 24 bits of them
     /// ([`rounded`]).
     pub table: Vec<f32>,
-    /// For each texel the values of all images, three each; rows are filled up to whole words.
+    /// For each texel the values of all images that are not in blocks, three each; rows are filled up to whole words.
     pub words: Vec<u32>,
+    /// Images in blocks; they come last. `None`: blocks were not allowed.
+    pub blocks: Option<Blocks>,
     /// Root mean square of the error of the worst column whose noise does not hide it, relative to the column's mean.
     pub worst: f32,
     /// The worst column.
@@ -49,7 +48,28 @@ pub struct Aim {
 impl Layer {
     /// Number of images.
     pub fn images(&self) -> u32 {
-        self.wide + self.narrow
+        self.wide + self.narrow + self.in_blocks()
+    }
+
+    /// Number of images in blocks.
+    pub fn in_blocks(&self) -> u32 {
+        self.blocks.as_ref().map_or(0, Blocks::images)
+    }
+
+    /// A layer without light.
+    pub fn none(dimensions: usize) -> Self {
+        Self {
+            dimensions: dimensions as u32,
+            wide: 0,
+            narrow: 0,
+            table: Vec::new(),
+            words: Vec::new(),
+            blocks: None,
+            worst: 0.0,
+            worst_dimension: 0,
+            hidden: 0,
+            noise: 0.0,
+        }
     }
 
     /// Words of one texel.
@@ -59,110 +79,49 @@ impl Layer {
 
     /// Bytes in files.
     pub fn bytes(&self) -> u64 {
-        3 * self.table.len() as u64 + 4 * self.words.len() as u64
+        let of_blocks = self.blocks.as_ref().map_or(0, |blocks| blocks.bytes.len() as u64);
+        3 * self.table.len() as u64 + 4 * self.words.len() as u64 + of_blocks
     }
 
-    /// Compresses the light of a tile: three rows (red, green, blue) for each texel. If the noise is known, the tolerance is for the light
-    /// without it, and noise is no reason for an image.
-    ///
-    /// # Errors
-    /// `Runtime` if the decomposition does not converge, or if a value is not finite.
-    pub fn compress(light: Measured<'_>, columns: Columns<'_>, aim: Aim) -> Result<Self> {
-        let Measured { dimensions, rows, .. } = light;
-        let texels = rows.len() / dimensions.max(1) / 3;
-        let none = Self {
-            dimensions: dimensions as u32,
-            wide: 0,
-            narrow: 0,
-            table: Vec::new(),
-            words: Vec::new(),
-            worst: 0.0,
-            worst_dimension: 0,
-            hidden: 0,
-            noise: 0.0,
+    /// The same light without blocks, for devices that cannot sample them and for files of other programs: their images become 16-bit floats, which hold
+    /// all values that blocks have up to their rounding.
+    pub fn without_blocks(&self) -> Self {
+        let Some(blocks) = self.blocks.as_ref().filter(|blocks| blocks.images() > 0) else {
+            return Self { blocks: None, ..self.clone() };
         };
-        let weights = columns.weights(light);
-        if texels == 0 || weights.iter().all(|w| *w == 0.0) {
-            return Ok(none);
-        }
-        let Weighted { scaled, basis } = Weighted::new(light, &weights, aim.most)?;
-        let mut rest = Rest::new(light, columns);
-        let mut images: Vec<Image> = Vec::new();
-        let mut state = rest.state(aim.tolerance);
-        for index in 0..basis.len() {
-            if state.within {
-                keep_means(&mut images, &mut rest, light);
-                state = rest.state(aim.tolerance);
-                if state.within {
-                    break;
-                }
+        let (dimensions, wide) = (self.dimensions as usize, self.wide + blocks.images());
+        let rows = |images: std::ops::Range<u32>| {
+            self.table[images.start as usize * dimensions..images.end as usize * dimensions].iter().copied()
+        };
+        let plain = self.wide + self.narrow;
+        let table = rows(0..self.wide).chain(rows(plain..self.images())).chain(rows(self.wide..plain)).collect();
+        let (before, stride) =
+            (Self::stride(self.wide, self.narrow) as usize, Self::stride(wide, self.narrow) as usize);
+        let texels = blocks.texels();
+        let mut words = Vec::with_capacity(texels * stride);
+        for texel in 0..texels {
+            let own: Vec<u8> =
+                self.words[texel * before..(texel + 1) * before].iter().flat_map(|word| word.to_le_bytes()).collect();
+            let (halves, bytes) = own.split_at(6 * self.wide as usize);
+            let mut row = halves.to_vec();
+            for image in 0..blocks.images() {
+                row.extend(blocks.value(texel, image).into_iter().flat_map(f16::to_le_bytes));
             }
-            let vector = basis.vector(index);
-            // In units of light: what a dimension has at a coefficient of 1. Dimensions without light stay without.
-            let along: Vec<f64> =
-                vector.iter().zip(&weights).map(|(v, w)| if *w > 0.0 { v / w } else { 0.0 }).collect();
-            let values: Vec<f32> = project(&scaled, vector).map(|value| value as f32).collect();
-            let image = Image::new(&values, along, vector, aim, images.last().is_none_or(|i| i.wide));
-            rest.remove(&image.table, &image.decoded);
-            rest.remove_noise(vector, &weights);
-            images.push(image);
-            state = rest.state(aim.tolerance);
+            row.extend_from_slice(&bytes[..3 * self.narrow as usize]);
+            row.resize(4 * stride, 0);
+            words.extend(row.as_chunks::<4>().0.iter().map(|bytes| u32::from_le_bytes(*bytes)));
         }
-        // Where noise ended the images before the tolerance was reached, the mean is known all the same.
-        keep_means(&mut images, &mut rest, light);
-        state = rest.state(aim.tolerance);
-        if let Some((colour, along)) = level(light, columns, &known(&images), aim.tolerance)
-            && images.len() < aim.most
-        {
-            let values: Vec<f32> = colour.iter().copied().cycle().take(3 * texels).collect();
-            // Bytes hold a colour well enough.
-            let image = Image::new(&values, along, &[], aim, false);
-            rest.remove(&image.table, &image.decoded);
-            images.push(image);
-            state = rest.state(aim.tolerance);
-        }
-        let wide = images.iter().filter(|i| i.wide).count() as u32;
-        let narrow = images.len() as u32 - wide;
-        let stride = Self::stride(wide, narrow) as usize;
-        let mut words = vec![0u32; texels * stride];
-        for (texel, row) in words.chunks_exact_mut(stride.max(1)).enumerate().take(if stride == 0 { 0 } else { texels })
-        {
-            let mut bytes = Vec::with_capacity(4 * stride);
-            for image in &images {
-                for channel in 0..3 {
-                    let code = image.codes[3 * texel + channel];
-                    match image.wide {
-                        true => bytes.extend_from_slice(&(code as u16).to_le_bytes()),
-                        false => bytes.push(code as u8),
-                    }
-                }
-            }
-            bytes.resize(4 * stride, 0);
-            for (word, bytes) in row.iter_mut().zip(bytes.chunks_exact(4)) {
-                *word = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
-            }
-        }
-        let table = images.iter().flat_map(|i| i.table.iter().copied()).collect();
-        Ok(Self {
-            wide,
-            narrow,
-            table,
-            words,
-            worst: state.worst as f32,
-            worst_dimension: state.column as u32,
-            hidden: state.hidden as u32,
-            noise: state.noise as f32,
-            ..none
-        })
+        Self { wide, table, words, blocks: None, ..self.clone() }
     }
 
     /// The light of a texel for given coefficients of the images: three values for each image ([`Self::mix`]).
     pub fn decode(&self, texel: usize, coefficients: &[[f32; 3]]) -> [f32; 3] {
         let stride = Self::stride(self.wide, self.narrow) as usize;
         let Some(words) = self.words.get(texel * stride..(texel + 1) * stride) else { return [0.0; 3] };
+        let plain = (self.wide + self.narrow) as usize;
         let byte = |at: usize| (words[at / 4] >> (8 * (at % 4))) as u8;
         let mut sum = [0.0; 3];
-        for (index, coefficients) in coefficients.iter().take(self.images() as usize).enumerate() {
+        for (index, coefficients) in coefficients.iter().take(plain).enumerate() {
             let wide = index < self.wide as usize;
             for (channel, sum) in sum.iter_mut().enumerate() {
                 let value = if wide {
@@ -173,6 +132,13 @@ impl Layer {
                     f32::from(byte(at) as i8)
                 };
                 *sum += value * coefficients[channel];
+            }
+        }
+        if let Some(blocks) = &self.blocks {
+            let coefficients = coefficients.iter().skip(plain).take(blocks.images() as usize);
+            for (image, coefficients) in (0..).zip(coefficients) {
+                let value = blocks.value(texel, image).map(f16::to_f32);
+                (0..3).for_each(|channel| sum[channel] += value[channel] * coefficients[channel]);
             }
         }
         sum
@@ -210,39 +176,14 @@ impl Layer {
         if self.table.len() != images * dimensions || self.words.len() != words {
             return wrong("lists of other lengths than their numbers say".into());
         }
+        if self.blocks.as_ref().is_some_and(|blocks| blocks.images() > 0 && blocks.texels() != texels) {
+            return wrong("blocks of another number of texels".into());
+        }
         if self.table.iter().any(|value| !value.is_finite()) {
             return wrong("a coefficient that is not finite".into());
         }
         Ok(())
     }
-}
-
-/// What each dimension has of images, and their values.
-fn known(images: &[Image]) -> Vec<(&[f32], &[f32])> {
-    images.iter().map(|image| (image.table.as_slice(), image.decoded.as_slice())).collect()
-}
-
-/// Gives the first image what the mean of each dimension misses, so that neighbouring tiles fit together where a wall is even: the error that the
-/// tolerance allows would otherwise be a step at their border.
-fn keep_means(images: &mut [Image], rest: &mut Rest, light: Measured<'_>) {
-    let missing = left_out(light, &known(images));
-    let Some(first) = images.first_mut() else { return };
-    let count = first.decoded.len().max(1) as f64;
-    let mean = first.decoded.iter().map(|value| f64::from(*value)).sum::<f64>() / count;
-    let square = first.decoded.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>() / count;
-    // An image that is dark here and bright there cannot carry a mean.
-    if mean * mean < 0.1 * square || square == 0.0 {
-        return;
-    }
-    let changed: Vec<f32> = first
-        .table
-        .iter()
-        .zip(missing.iter().map(|channels| channels.iter().sum::<f64>() / 3.0))
-        .map(|(along, missing)| if *along == 0.0 { 0.0 } else { rounded((f64::from(*along) + missing / mean) as f32) })
-        .collect();
-    let added: Vec<f32> = changed.iter().zip(&first.table).map(|(new, old)| new - old).collect();
-    rest.remove(&added, &first.decoded);
-    first.table = changed;
 }
 
 /// A number of 24 bits: that of 32 bits without its last byte. Coefficients at dusk are a millionth of those at noon, which is too little for
@@ -252,49 +193,10 @@ pub fn rounded(value: f32) -> f32 {
     if near.is_finite() { near } else { value }
 }
 
-/// An image as it is stored.
-struct Image {
-    wide: bool,
-    /// Bits of the values, a texel's three after each other.
-    codes: Vec<u32>,
-    /// Values as they are decoded, without the scale.
-    decoded: Vec<f32>,
-    table: Vec<f32>,
-}
-
-impl Image {
-    /// `may_be_wide`: all images before this one are wide.
-    fn new(values: &[f32], along: Vec<f64>, vector: &[f64], aim: Aim, may_be_wide: bool) -> Self {
-        let largest = values.iter().fold(0.0f32, |most, v| most.max(v.abs()));
-        let steepest = vector.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-        let step = f64::from(largest) / 127.0;
-        // The rounding error is even within a step.
-        let rounding = step / 12f64.sqrt() * steepest;
-        let wide = may_be_wide && rounding > ROUNDING * aim.tolerance;
-        // Values of 16 bits stay near 1, where they are most precise and never too large.
-        let scale = if wide { f64::from(largest).max(1e-30) } else { step.max(1e-30) };
-        let table: Vec<f32> = along.iter().map(|a| rounded((a * scale) as f32)).collect();
-        let (codes, decoded) = values
-            .iter()
-            .map(|value| {
-                let value = f64::from(*value) / scale;
-                if wide {
-                    let half = f16::from_f64(value);
-                    (u32::from(half.to_bits()), half.to_f32())
-                } else {
-                    let byte = value.round().clamp(-127.0, 127.0) as i8;
-                    (u32::from(byte as u8), f32::from(byte))
-                }
-            })
-            .unzip();
-        Self { wide, codes, decoded, table }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::{
-        super::columns::{DARK, mixed},
+        super::columns::{Columns, DARK, Measured, mixed},
         *,
     };
 

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use super::{
     Baked,
+    pages::BlockPages,
     pictures::{fits, packed},
     steps::Mixture,
     stream::Stream,
@@ -23,6 +24,7 @@ pub(super) struct OnDevice {
     gpu: Gpu,
     tiles: OwnedBuffer,
     words: OwnedBuffer,
+    pages: BlockPages,
     frames: Option<FrameStore>,
 }
 
@@ -74,8 +76,14 @@ impl OnDevice {
             gpu: gpu.clone(),
             tiles: OwnedBuffer::with_contents(gpu, "daylight.tiles", bytemuck::cast_slice(&tiles))?,
             words: OwnedBuffer::with_contents(gpu, "daylight.words", bytemuck::cast_slice(&words))?,
+            pages: BlockPages::new(gpu, baked).map_err(|error| baked.blamed(error))?,
             frames,
         })
+    }
+
+    /// The textures of images in blocks.
+    pub fn pages(&self) -> &BlockPages {
+        &self.pages
     }
 
     pub fn tiles(&self, graph: &mut Graph) -> Buffer {

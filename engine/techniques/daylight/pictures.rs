@@ -1,11 +1,13 @@
 //! The tiles of a bake as shaders read them (`tiles.glsl`).
 
-use super::{layer::Layer, units::Tile};
+use super::{blocks::Blocks, layer::Layer, units::Tile};
 use crate::{Error, ErrorKind, Result, gpu::Gpu, shaders::types};
 
 /// Tiles with their number of columns, and their words, as the device reads them.
 pub(super) fn packed<'a>(list: impl Iterator<Item = (&'a Tile, u32)>) -> (Vec<types::DayTile>, Vec<u32>) {
     let (mut tiles, mut words, mut first, mut texels) = (Vec::new(), Vec::new(), 0, 0);
+    // Images in blocks lie on pages ([`super::pages`]).
+    let mut slots = [0, 0];
     for (tile, columns) in list {
         let mut entry = types::DayTile {
             mask: words.len() as u32,
@@ -26,6 +28,10 @@ pub(super) fn packed<'a>(list: impl Iterator<Item = (&'a Tile, u32)>) -> (Vec<ty
             entry.first_word[which] = words.len() as u32;
             (entry.wide[which], entry.narrow[which], entry.first[which]) = (wide, narrow, first);
             words.extend_from_slice(&layer.words);
+            let in_blocks = layer.blocks.as_ref().map_or([0, 0], |Blocks { hdr, pairs, .. }| [*hdr, *pairs]);
+            [entry.hdr[which], entry.pairs[which]] = in_blocks;
+            [entry.first_hdr[which], entry.first_pair[which]] = slots;
+            slots = [slots[0] + in_blocks[0], slots[1] + in_blocks[1]];
             first += layer.images();
         }
         tiles.push(entry);

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Adaptive, Comparison, Weather};
+use super::{Adaptive, Comparison, Texels, Weather};
 use crate::{
     Error, Result,
     passes::{gbuffer, shadow},
@@ -58,6 +58,9 @@ pub struct Baking {
     /// Maximum of images of a tile; 0: as many as the tolerance needs.
     #[schemars(range(min = 0, max = 4096))]
     pub images: u32,
+    /// Values of the images of texels. Blocks are a quarter to a sixth of 16-bit floats. An image is in blocks only if the tolerance holds after they
+    /// are decoded; else it is as `plain`. Images of probes are always plain.
+    pub format: Texels,
     /// Side of a tile, texels. Each tile has its own images. 0: one tile for the whole picture, as in the paper.
     #[schemars(range(min = 4, max = 128), extend("x-zero" = true, "x-unit" = "texels"))]
     pub tile: u32,
@@ -105,6 +108,7 @@ impl Default for Baking {
             noise_floor: true,
             filter: 5,
             images: 0,
+            format: Texels::default(),
             tile: 32,
             density: 8.0,
             face: 256,
@@ -168,6 +172,19 @@ pub enum Added {
     Screen,
 }
 
+/// How images in blocks reach a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampling {
+    /// Textures on GPUs that can sample blocks, decoded elsewhere: CPU drivers gain nothing by textures, and Mesa's rounds BC4 and BC5 to 8 bits.
+    #[default]
+    Auto,
+    /// Textures of blocks, a quarter to a sixth of the memory.
+    Textures,
+    /// Decoded to 16-bit floats when the bake is read.
+    Decoded,
+}
+
 /// How the light of the sky is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -199,6 +216,8 @@ pub struct Settings {
     pub added: Added,
     /// How the light of the sky is found.
     pub sky: SkyLight,
+    /// How images of the bake that are in blocks reach a picture.
+    pub blocks: Sampling,
     /// Direct light of the sun has highlights. If off, Lambert's law alone.
     pub gloss: bool,
     /// Haze of the air: 1 is clear mountain air, 10 is thick haze.
@@ -232,6 +251,7 @@ impl Default for Settings {
             interpolation: Interpolation::default(),
             added: Added::default(),
             sky: SkyLight::default(),
+            blocks: Sampling::default(),
             gloss: true,
             turbidity: weather.turbidity(),
             ground_albedo: weather.ground_albedo(),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use super::{
-    Added, Baked, Course, Group, PictureSettings, Settings, Sky, SkyLight, Stored, added,
+    Added, Baked, Course, Group, PictureSettings, Sampling, Settings, Sky, SkyLight, Stored, added,
     cube::Around,
     lamps,
     on_device::OnDevice,
@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     Error, Result,
-    gpu::{Gpu, OwnedImage},
+    gpu::{DeviceKind, Gpu, OwnedImage},
     graph::{Format, Graph},
     passes::{
         direct::{self, Direct, Lights},
@@ -62,7 +62,7 @@ impl technique::Mode for Mode {
     fn doc(self) -> &'static str {
         match self {
             Self::Total => "All light",
-            Self::Direct => "Direct light of the sun only",
+            Self::Direct => "Direct light of the sun only, and of point and spot lamps on added objects",
             Self::Indirect => "Baked light only: the sun's after scattering, and all light of the sky and of lamps",
             Self::Irradiance => "Irradiance of the baked light, without the surfaces' colours",
         }
@@ -183,6 +183,23 @@ impl Daylight {
     }
 }
 
+/// Whether blocks become textures.
+///
+/// # Errors
+/// `Usage` if that is wanted and the device cannot sample blocks.
+fn as_textures(gpu: &Gpu, sampling: Sampling) -> Result<bool> {
+    let caps = gpu.caps();
+    match sampling {
+        Sampling::Auto => Ok(caps.compressed_bc && caps.kind != DeviceKind::Cpu),
+        Sampling::Decoded => Ok(false),
+        Sampling::Textures if caps.compressed_bc => Ok(true),
+        Sampling::Textures => {
+            let error = Error::usage("this device cannot sample blocks (textureCompressionBC)").at("daylight.blocks");
+            Err(error.help("Choose `auto` or `decoded`"))
+        }
+    }
+}
+
 /// The sky as a picture.
 fn picture_of(sky: &Sky) -> Environment {
     let [width, height] = SKY;
@@ -207,14 +224,22 @@ fn switched(materials: &[types::Material], groups: &[Group], burning: &[f32]) ->
     out
 }
 
-/// Light that a scene has and that is not in a bake. `added`: there are objects that the bake does not know.
-fn left_out(scene: &Scene, groups: &[Group], added: bool) -> Vec<Note> {
+/// Light that a scene has and that is not in a bake. `added`: the bake, if there are objects that it does not know.
+fn left_out(scene: &Scene, groups: &[Group], added: Option<&Stored>) -> Vec<Note> {
     let note = |place: &str, text: &str| Note { kind: NoteKind::Ignored, place: place.into(), text: text.into() };
     let mut notes = Vec::new();
-    if added {
+    if let Some(stored) = added {
         notes.push(note("--add", "the added objects block no indirect light and reflect none to the scene"));
         if !groups.is_empty() {
-            notes.push(note("--add", "baked lamps do not light the added objects"));
+            notes.push(note("--add", "the added objects cast no shadows in the light of lamps"));
+            let of_tiles = stored.tiles.iter().any(|tile| tile.lamps.images() > 0);
+            if of_tiles
+                && !stored.probes.is_empty()
+                && stored.probes.iter().all(|brick| brick.light.lamps.images() == 0)
+            {
+                let text = "the probes of the bake have no light of lamps, as in files of older versions";
+                notes.push(note("--add", text));
+            }
         }
     }
     let off = |(number, light): (usize, &crate::scene::Light)| {
@@ -257,8 +282,9 @@ impl Technique for Daylight {
         Settings::description()
     }
 
-    fn prepared_by(_: &PictureSettings) -> PictureSettings {
-        PictureSettings::default()
+    fn prepared_by(settings: &PictureSettings) -> PictureSettings {
+        let daylight = Settings { blocks: settings.daylight.blocks, ..Settings::default() };
+        PictureSettings { daylight, ..PictureSettings::default() }
     }
 
     fn upload(gpu: &Gpu, scene: &Scene) -> Result<Resident> {
@@ -266,11 +292,15 @@ impl Technique for Daylight {
         Resident::new(gpu, &Scene { environment: None, ..scene.clone() })
     }
 
-    fn ready(making: Making<'_, Baked>, _: &PictureSettings) -> Result<Self> {
+    fn ready(making: Making<'_, Baked>, settings: &PictureSettings) -> Result<Self> {
         let Making { gpu, scene, baked, .. } = making;
-        let Some(baked) = baked else {
+        let Some(given) = baked else {
             let error = Error::usage("there is no baked light").at("daylight");
             return Err(error.help("Bake it with `daylight bake SCENE -o FILE.day`, and name the file with --bake"));
+        };
+        let baked = match given.stored.has_blocks() && !as_textures(gpu, settings.daylight.blocks)? {
+            true => &Baked { stored: Arc::new(given.stored.without_blocks()), ..given.clone() },
+            false => given,
         };
         let stored = &baked.stored;
         let base = scene.before_added();
@@ -320,7 +350,7 @@ impl Technique for Daylight {
         let burning = lamps::burning(of_day, &plan.lamps, course, seconds, elevation)?;
         let materials = switched(&moment.handles.material_table, &plan.lamps, &burning);
         let burning: Vec<[f32; 3]> = burning.into_iter().map(|share| [share; 3]).collect();
-        let left = left_out(moment.scene, &plan.lamps, self.added.is_some());
+        let left = left_out(moment.scene, &plan.lamps, self.added.map(|_| &*self.baked.stored));
         let mixture = self.steps[day].mixture(seconds, of_day.interpolation);
         let upcoming: Vec<usize> = match self.light.has_frames() {
             true => self.upcoming(day, of_day, graph.frame).collect(),
@@ -367,12 +397,14 @@ impl Technique for Daylight {
         let second = (coefficients.len() / mixtures.len()) as u32;
         let fetches = graph.buffer("daylight.fetches", 4 * FETCH_SUMS);
         graph.fill(fetches, 0);
+        let [block_hdr, block_pairs, block_blues] = self.light.pages().images(graph, gbuffer.albedo);
         let args = decode::Args {
             places: places.unwrap_or(gbuffer.depth),
             spec: decode::Spec {
                 texels_of: self.around.as_ref().map_or(places.is_some().into(), |_| consts::DAY_CUBE),
                 frames: if self.light.has_frames() { mixture.times().count() as u32 + 1 } else { 0 },
                 logarithms: logarithms.into(),
+                blocks: self.light.pages().are_there().into(),
             },
             view: gbuffer.view,
             normal: gbuffer.normal,
@@ -392,13 +424,22 @@ impl Technique for Daylight {
             frame2: frames.buffers[2],
             frame3: frames.buffers[3],
             fetches,
+            block_hdr,
+            block_pairs,
+            block_blues,
             push: decode::Push { side, columns, texels, second, alpha, sun: light, weights },
         };
         graph.compute(args, view.extent);
+        let mut of_lamps = Vec::new();
         if let (Some(first), Some(field)) = (of_probes, &self.probes) {
             let linear = mixture.linear();
             let mask = added::mask(graph, &handles, view, &gbuffer, first);
-            let moment = probes::Moment { weights: &linear, sun: light, patches: &patches };
+            let groups = lamps::placed(moment.scene, &self.baked.stored.plan.lamps);
+            let burn = added::burning(&moment.handles.moment.lights, groups, &burning);
+            if !burn.is_empty() {
+                of_lamps = added::shine(graph, &handles, burn, (view, &gbuffer), [mask, lit.direct], settings);
+            }
+            let moment = probes::Moment { weights: &linear, sun: light, patches: &patches, lamps: &burning };
             let tiles = self.baked.stored.probes.iter().map(|brick| &brick.light);
             let light = field.decode(graph, tiles, moment);
             let pixels = probes::Pixels { mask, direct: lit.direct, total, indirect, irradiance };
@@ -413,7 +454,7 @@ impl Technique for Daylight {
             Mode::Irradiance => irradiance,
         };
         let of_shadows = idle_notes("shadow", &settings.shadow);
-        let notes = [moment.notes, &shadows.notes, &left, &of_shadows].concat();
+        let notes = [moment.notes, &shadows.notes, &of_lamps, &left, &of_shadows].concat();
         let picture =
             Picture::new(shown).color("direct", lit.direct).color("indirect", indirect).color("irradiance", irradiance);
         let picture = picture.counting("fetches", fetches);

@@ -34,7 +34,7 @@ use crate::{
 /// Paths of a texel in one batch at most.
 const BATCH: u32 = 16;
 /// Maximum of loop iterations that choosing one lamp takes: a descent of the light tree.
-const LAMP_TURNS: u64 = 64;
+pub(super) const LAMP_TURNS: u64 = 64;
 /// Texels of [`Transport::sparse`], about.
 const SPARSE: usize = 2048;
 /// Vertices of a batch at most: 100 MB, because every device allows buffers of 128 MiB.
@@ -51,9 +51,9 @@ pub struct Transport {
     pub(super) rays: Rays,
     pub(super) suns: OwnedBuffer,
     /// The lamps that are sampled, made for the first tile.
-    lamps: Option<LightTable>,
+    pub(super) lamps: Option<LightTable>,
     /// The group of each light, and of each material.
-    groups: OwnedBuffer,
+    pub(super) groups: OwnedBuffer,
     sources: Sources,
 }
 
@@ -317,8 +317,7 @@ impl Transport {
                 graph.compute_over(args, [times, count], items);
             }
             if groups > 0 {
-                let lights = &handles.moment.lights;
-                let table = self.lamps.get_or_insert_with(|| tables::lights(&self.scene, &self.pose, lights, Lit::All));
+                let table = lamp_table(&mut self.lamps, (&self.scene, &self.pose), &handles.moment.lights);
                 if table.tree {
                     let args = traced!(
                         lamps::Args {
@@ -378,14 +377,21 @@ fn suns_of(gpu: &Gpu, plan: &Plan) -> Result<OwnedBuffer> {
     OwnedBuffer::with_contents(gpu, "daylight.suns", bytemuck::cast_slice(&suns))
 }
 
+/// The lamps as they are sampled, made once.
+pub(super) fn lamp_table<'a>(
+    known: &'a mut Option<LightTable>,
+    (scene, pose): (&Scene, &Pose),
+    lights: &[types::Light],
+) -> &'a LightTable {
+    known.get_or_insert_with(|| tables::lights(scene, pose, lights, Lit::All))
+}
+
 /// A scene in which only the lamps of these groups shine, and the group of each of its placed lights and then of each material (`u32::MAX`: none).
 fn with_lamps(scene: &Scene, groups: &[Group]) -> (Scene, Vec<u32>) {
     let mut scene = Scene { environment: None, ..scene.clone() };
     let number = |of: &dyn Fn(&Group) -> bool| groups.iter().position(of).map_or(u32::MAX, |group| group as u32);
-    // Lights of the device are those of the nodes, in order.
-    let placed =
-        scene.nodes.iter().filter_map(|node| node.light).filter(|light| (*light as usize) < scene.lights.len());
-    let mut out: Vec<u32> = placed.map(|light| number(&|group| group.lights.contains(&light))).collect();
+    let placed = super::lamps::placed(&scene, groups);
+    let mut out: Vec<u32> = placed.map(|group| group.map_or(u32::MAX, |group| group as u32)).collect();
     for (index, light) in scene.lights.iter_mut().enumerate() {
         if number(&|group| group.lights.contains(&(index as u32))) == u32::MAX {
             light.intensity = 0.0;

@@ -2,7 +2,8 @@
 //! are there, they become the compressed [`Tile`]s of a file ([`super::finish`]).
 
 use super::{
-    Plan, Sky, Transport, Weather,
+    Plan, Sky, Texels, Transport, Weather,
+    blocks::{Blocks, Coding, Layout},
     columns::{Columns, Measured},
     gathered::Gathered,
     layer::{Aim, Layer, rounded},
@@ -18,7 +19,7 @@ use crate::{
 /// The name of such jobs.
 pub const KIND: &str = "daylight";
 /// Increased whenever the computation changes.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Largest number that a list in a unit may have.
 const MOST_WORDS: u64 = 1 << 32;
 
@@ -133,7 +134,7 @@ fn opened<T>(store: &Store, index: u32, decode: impl Fn(&[u8]) -> Result<T>) -> 
     decode(&payload.bytes()?).map_err(again)
 }
 
-/// Compresses light as it was gathered, without a filter.
+/// Compresses light as it was gathered, without a filter and without blocks.
 ///
 /// # Errors
 /// As [`Layer::compress`].
@@ -143,22 +144,26 @@ pub fn compress(plan: &Plan, light: &Light, skies: &[f32]) -> Result<Tile> {
         false => Measured { noise: &[], ..light },
     });
     let columns = kinds(skies);
-    let sun = layer(plan, measured[0], columns[0])?;
-    let (sky, lamps) = (layer(plan, measured[1], columns[1])?, layer(plan, measured[2], columns[2])?);
+    let sun = layer(plan, measured[0], columns[0], None)?;
+    let (sky, lamps) = (layer(plan, measured[1], columns[1], None)?, layer(plan, measured[2], columns[2], None)?);
     let errors = errors(&sun, measured[0]);
     Ok(Tile { sun, sky, lamps, mask: light.mask.clone(), light: errors })
 }
 
-/// One kind of light of a tile, compressed within the tolerance of a plan.
+/// One kind of light of a tile, compressed within the tolerance of a plan. `layout`: the blocks of the tile; `None`: none are allowed.
 ///
 /// # Errors
 /// As [`Layer::compress`].
-pub fn layer(plan: &Plan, light: Measured<'_>, columns: Columns<'_>) -> Result<Layer> {
+pub fn layer(plan: &Plan, light: Measured<'_>, columns: Columns<'_>, layout: Option<&Layout>) -> Result<Layer> {
     let most = match plan.settings.images {
         0 => light.dimensions,
         images => light.dimensions.min(images as usize),
     };
-    Layer::compress(light, columns, Aim { tolerance: plan.settings.tolerance, most })
+    let aim = Aim { tolerance: plan.settings.tolerance, most };
+    match layout {
+        None => Layer::compress(light, columns, aim),
+        Some(layout) => Layer::in_these(light, columns, aim, (plan.settings.format, layout)),
+    }
 }
 
 /// For each column the sum of its light and the sum of its squared errors as decoded.
@@ -206,18 +211,22 @@ impl Tile {
             for number in [layer.worst, layer.noise] {
                 out.extend_from_slice(&number.to_le_bytes());
             }
+            if let Some(blocks) = &layer.blocks {
+                [blocks.hdr, blocks.pairs].iter().for_each(|count| out.extend_from_slice(&count.to_le_bytes()));
+            }
             out.extend_from_slice(&(layer.words.len() as u64).to_le_bytes());
             layer.table.iter().for_each(|value| out.extend_from_slice(&rounded(*value).to_le_bytes()[1..]));
             layer.words.iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
+            out.extend_from_slice(layer.blocks.as_ref().map_or(&[], |blocks| &blocks.bytes));
         }
         out
     }
 
-    /// Reads the bytes of a unit for a tile of `texels` texels.
+    /// Reads the bytes of a unit for a tile of `texels` texels. `extent`: columns and rows of a tile that may have blocks.
     ///
     /// # Errors
     /// `Input` if they are not those of a tile of the plan.
-    pub fn decode(bytes: &[u8], plan: &Plan, texels: usize) -> Result<Self> {
+    pub fn decode(bytes: &[u8], plan: &Plan, texels: usize, extent: Option<[u32; 2]>) -> Result<Self> {
         let mut rest = Rest(bytes);
         let words = rest.word()? as usize;
         if words != texels.div_ceil(32) {
@@ -232,10 +241,12 @@ impl Tile {
             return Err(Error::input(format!("a tile with {times} times, {dimensions} are needed")));
         }
         let light = (0..times).map(|_| Ok([rest.double()?, rest.double()?])).collect::<Result<Vec<_>>>()?;
-        let sun = rest.layer()?;
-        let sky = rest.layer()?;
+        let layout = extent.filter(|_| plan.settings.format != Texels::Plain).map(|extent| Layout::new(&mask, extent));
+        let layout = layout.as_ref();
+        let sun = rest.layer(layout)?;
+        let sky = rest.layer(layout)?;
         let groups = lamps;
-        let lamps = rest.layer()?;
+        let lamps = rest.layer(layout)?;
         sun.validate(there as usize, dimensions).map_err(|error| error.at("light of the sun"))?;
         sky.validate(there as usize, patches).map_err(|error| error.at("light of the sky"))?;
         lamps.validate(there as usize, groups).map_err(|error| error.at("light of lamps"))?;
@@ -296,19 +307,30 @@ impl<'a> Rest<'a> {
         }
     }
 
-    fn layer(&mut self) -> Result<Layer> {
+    /// `layout`: the blocks of the tile, if it may have any.
+    fn layer(&mut self, layout: Option<&Layout>) -> Result<Layer> {
         let mut number = || self.word();
         let [dimensions, wide, narrow, worst_dimension, hidden] =
             [number()?, number()?, number()?, number()?, number()?];
         let [worst, noise] = [self.float()?, self.float()?];
+        let [hdr, pairs] = if layout.is_some() { [self.word()?, self.word()?] } else { [0, 0] };
         let words = self.length()?;
-        if wide > dimensions || narrow > dimensions {
-            return Err(Error::input(format!("{wide} and {narrow} images of {dimensions} dimensions")));
+        if [wide, narrow, hdr, pairs].iter().any(|count| *count > dimensions) {
+            let what = format!("{wide}, {narrow}, {hdr} and {pairs} images of {dimensions} dimensions");
+            return Err(Error::input(what));
         }
-        let table =
-            self.take((wide as usize + narrow as usize).saturating_mul(3 * dimensions as usize))?.chunks_exact(3);
+        let images = [wide, narrow, hdr, pairs].iter().map(|count| *count as usize).sum::<usize>();
+        let table = self.take(images.saturating_mul(3 * dimensions as usize))?.chunks_exact(3);
         let table = table.map(|bytes| f32::from_le_bytes([0, bytes[0], bytes[1], bytes[2]])).collect();
         let words = (0..words).map(|_| self.word()).collect::<Result<_>>()?;
-        Ok(Layer { dimensions, wide, narrow, table, words, worst, worst_dimension, hidden, noise })
+        let blocks = match layout {
+            None => None,
+            Some(layout) => {
+                let of = |coding, count: u32| layout.bytes(coding).saturating_mul(count as usize);
+                let bytes = self.take(of(Coding::Hdr, hdr).saturating_add(of(Coding::Pair, pairs)))?;
+                Some(Blocks::read(hdr, pairs, bytes.to_vec(), layout)?)
+            }
+        };
+        Ok(Layer { dimensions, wide, narrow, table, words, blocks, worst, worst_dimension, hidden, noise })
     }
 }

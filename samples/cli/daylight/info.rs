@@ -96,6 +96,7 @@ pub fn lines(summary: &Summary) -> Vec<String> {
         places_bytes,
         images,
         most_images,
+        kinds: [wide, narrow, hdr, pairs],
         worst_tile,
         hidden,
         worst_frame,
@@ -109,6 +110,7 @@ pub fn lines(summary: &Summary) -> Vec<String> {
         format!("size       {bytes} bytes; all frames as 16-bit floats: {raw_bytes} ({share:.1} % saved)"),
         format!("places     {places_bytes} bytes: where each triangle is in the lightmap"),
         format!("images     {images:.1} per tile, at most {most_images}"),
+        format!("values     {wide} images of 16-bit floats, {narrow} of bytes, {hdr} in BC6H, {pairs} in BC5 and BC4"),
         format!(
             "error      worst step of a tile {:.1} % beside the noise; the noise hides such errors in {:.1} % of the steps of tiles",
             100.0 * worst_tile,

@@ -1,10 +1,11 @@
-//! The irradiance of a lightmap at a time, by the processor.
+//! The irradiance of the texels of a bake at a time, by the processor.
 
 use half::f16;
 
 use super::super::{
-    Course, Interpolation, Sky, Stored, Weather,
+    Course, Interpolation, Kind, Sky, Stored, Weather,
     atlas::{self, Texel, padding_sources},
+    cube::FACES,
     steps::Steps,
 };
 use crate::{
@@ -15,7 +16,7 @@ use crate::{
 /// The source of a texel that no surface is near.
 pub const NOWHERE: u32 = u32::MAX;
 
-/// The light from outside at a time.
+/// The light at a time.
 #[derive(Clone, Debug)]
 pub struct Moment {
     /// Unit vector towards the sun.
@@ -26,10 +27,12 @@ pub struct Moment {
     pub patches: Vec<[f32; 3]>,
     /// The lit times of the bake around the time, and their weights.
     pub weights: Vec<(usize, f32)>,
+    /// How bright each group of lamps burns, 0 to 1; empty: none burns.
+    pub lamps: Vec<f32>,
 }
 
 impl Moment {
-    /// The light of the line between two of the day's `steps`. `seconds`: after the begin of the day.
+    /// The light of the line between two of the day's `steps`, with lamps that are off. `seconds`: after the begin of the day.
     ///
     /// # Errors
     /// `Usage` if the weather is impossible.
@@ -39,7 +42,7 @@ impl Moment {
         let clear = 1.0 - weather.overcast() as f32;
         let sun = shine.irradiance.map_or(sky.sun_irradiance(), |sun| sun.map(|channel| channel * clear));
         let weights = steps.mixture(seconds, Interpolation::Linear).linear();
-        Ok(Self { direction: shine.direction, sun, patches: sky.patches(), weights })
+        Ok(Self { direction: shine.direction, sun, patches: sky.patches(), weights, lamps: Vec::new() })
     }
 }
 
@@ -51,8 +54,9 @@ pub fn irradiance(stored: &Stored, moment: &Moment) -> Vec<[f32; 3]> {
     for (number, tile) in stored.tiles.iter().enumerate() {
         let sun = tile.sun.mix(moment.weights.iter().map(of_sun));
         let sky = tile.sky.mix(moment.patches.iter().copied().enumerate());
+        let lamps = tile.lamps.mix(moment.lamps.iter().map(|share| [*share; 3]).enumerate());
         for (texel, [x, y]) in stored.plan.covered(number as u32, &tile.mask).enumerate() {
-            let parts = [tile.sun.decode(texel, &sun), tile.sky.decode(texel, &sky)];
+            let parts = [tile.sun.decode(texel, &sun), tile.sky.decode(texel, &sky), tile.lamps.decode(texel, &lamps)];
             let sum: [f32; 3] = std::array::from_fn(|channel| parts.iter().map(|part| part[channel]).sum());
             out[(y * width + x) as usize] = sum.map(|value: f32| value.max(0.0));
         }
@@ -61,24 +65,49 @@ pub fn irradiance(stored: &Stored, moment: &Moment) -> Vec<[f32; 3]> {
 }
 
 /// For each texel the texel whose light it shows: itself on a surface; the nearest one on a surface in the padding around charts, so that
-/// bilinear filtering finds no dark texels; [`NOWHERE`] elsewhere. Numbers are row · width + column.
+/// bilinear filtering finds no dark texels; [`NOWHERE`] elsewhere. Numbers are row · width + column. The faces of a cube are padded each by itself.
 pub fn sources(stored: &Stored) -> Vec<u32> {
     let [width, height] = stored.plan.extent;
-    let mut texels = Vec::new();
-    for (number, tile) in stored.tiles.iter().enumerate() {
-        let there: Vec<[u32; 2]> = stored.plan.covered(number as u32, &tile.mask).collect();
-        texels.extend(there.into_iter().map(|[x, y]| Texel { x, y, triangle: 0, barycentric: [0.0; 2] }));
-    }
+    let side = match stored.plan.receivers {
+        Kind::Cube { .. } => (width / FACES).max(1),
+        _ => width.max(1),
+    };
+    let mut parts: Vec<Vec<Texel>> = vec![Vec::new(); width.div_ceil(side) as usize];
     let mut out = vec![NOWHERE; width as usize * height as usize];
-    let padding = atlas::Settings::default().padding;
-    for (texel, source) in padding_sources(width, height, padding, &texels) {
-        out[texel as usize] = source;
+    for (number, tile) in stored.tiles.iter().enumerate() {
+        for [x, y] in stored.plan.covered(number as u32, &tile.mask) {
+            parts[(x / side) as usize].push(Texel { x: x % side, y, triangle: 0, barycentric: [0.0; 2] });
+            out[(y * width + x) as usize] = y * width + x;
+        }
     }
-    for Texel { x, y, .. } in texels {
-        let own = y * width + x;
-        out[own as usize] = own;
+    let padding = atlas::Settings::default().padding;
+    for (part, texels) in (0..).zip(parts) {
+        let of_whole = |texel: u32| texel / side * width + part * side + texel % side;
+        for (texel, source) in padding_sources(side, height, padding, &texels) {
+            out[of_whole(texel) as usize] = of_whole(source);
+        }
     }
     out
+}
+
+/// The faces of a cube that lie beside one another, each by itself, in the order and with the axes of Vulkan, OpenGL and KTX: +X, -X, +Y, -Y, +Z, -Z
+/// as seen from outside. So faces around the horizon are mirrored, those above and below are turned upside down.
+pub fn faces(light: &[[f32; 3]], sources: &[u32], side: u32) -> Vec<(Vec<[f32; 3]>, Vec<u32>)> {
+    let width = FACES * side;
+    let face = |face: u32| {
+        let upright = face / 2 != 1;
+        let from = |x: u32, y: u32| match upright {
+            true => y * width + face * side + side - 1 - x,
+            false => (side - 1 - y) * width + face * side + x,
+        };
+        let texels = (0..side).flat_map(|y| (0..side).map(move |x| [x, y]));
+        let there = |[x, y]: [u32; 2]| sources.get(from(x, y) as usize).copied().unwrap_or(NOWHERE);
+        let colours = texels.clone().map(|at| light.get(there(at) as usize).copied().unwrap_or_default()).collect();
+        // Each texel has its light already; what counts is whether it has any.
+        let own = texels.map(|[x, y]| if there([x, y]) == NOWHERE { NOWHERE } else { y * side + x }).collect();
+        (colours, own)
+    };
+    (0..FACES).map(face).collect()
 }
 
 /// The light with its padding filled.

@@ -5,6 +5,6 @@ mod frame;
 mod pages;
 mod unwrapped;
 
-pub use frame::{Levels, Moment, NOWHERE, filled, irradiance, levels, sources};
+pub use frame::{Levels, Moment, NOWHERE, faces, filled, irradiance, levels, sources};
 pub use pages::{Page, Pages, Spot, layers};
 pub use unwrapped::{Unwrapping, unwrapped};

@@ -9,7 +9,7 @@ use super::super::{Stored, layer::Layer, units::Tile};
 pub struct Pages {
     /// Short name: `sun`.
     pub name: &'static str,
-    /// What a column of the table belongs to: `times` or `patches`.
+    /// What a column of the table belongs to: `times`, `patches` or `lamps`.
     pub dimensions: &'static str,
     /// Columns of the table.
     pub columns: u32,
@@ -43,9 +43,16 @@ pub struct Spot {
 /// Largest side of a page, texels, if a tile is not larger.
 const MOST_SIDE: u32 = 2048;
 
-/// All kinds of light of a bake.
-pub fn layers(stored: &Stored) -> Vec<Pages> {
-    vec![Pages::new(stored, "sun", "times", |tile| &tile.sun), Pages::new(stored, "sky", "patches", |tile| &tile.sky)]
+/// The kinds of light of a bake: sun, sky, and lamps if they are wanted.
+pub fn layers(stored: &Stored, lamps: bool) -> Vec<Pages> {
+    let mut out = vec![
+        Pages::new(stored, "sun", "times", |tile| &tile.sun),
+        Pages::new(stored, "sky", "patches", |tile| &tile.sky),
+    ];
+    if lamps {
+        out.push(Pages::new(stored, "lamps", "lamps", |tile| &tile.lamps));
+    }
+    out
 }
 
 impl Pages {

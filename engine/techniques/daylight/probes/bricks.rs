@@ -11,6 +11,7 @@ use crate::{
     Error, Result,
     techniques::daylight::{
         Plan,
+        layer::Layer,
         units::{self, Tile},
     },
 };
@@ -78,7 +79,7 @@ impl Brick {
         if !positions.iter().all(|position| position.is_finite()) || !distances.iter().all(finite) {
             return Err(Error::input("a probe with a place that is not finite"));
         }
-        Ok(Self { positions, distances, light: Tile::decode(tail, plan, probes * DIRECTIONS)? })
+        Ok(Self { positions, distances, light: Tile::decode(tail, plan, probes * DIRECTIONS, None)? })
     }
 }
 
@@ -112,7 +113,7 @@ pub fn summary(grid: &Grid, bricks: &[Brick]) -> Summary {
         spacing: grid.spacing,
         bytes: bricks
             .iter()
-            .map(|b| b.light.sun.bytes() + b.light.sky.bytes() + (BYTES * b.positions.len()) as u64)
+            .map(|b| b.light.layers().map(Layer::bytes).iter().sum::<u64>() + (BYTES * b.positions.len()) as u64)
             .sum(),
         images: images as f64 / there().count().max(1) as f64,
         worst: there().map(|brick| f64::from(brick.light.sun.worst)).fold(0.0, f64::max),

@@ -31,12 +31,14 @@ pub struct Field {
     distances: OwnedBuffer,
 }
 
-/// The light of a moment: the baked times with their weights, the colour of the sun, and the radiance of the patches of the sky.
+/// The light of a moment: the baked times with their weights, the colour of the sun, the radiance of the patches of the sky, and how bright each group
+/// of lamps burns.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment<'a> {
     pub weights: &'a [(usize, f32)],
     pub sun: [f32; 3],
     pub patches: &'a [[f32; 3]],
+    pub lamps: &'a [[f32; 3]],
 }
 
 /// The images that change at the pixels of added objects.
@@ -94,7 +96,7 @@ impl Field {
         tiles: impl Iterator<Item = &'a Tile> + Clone,
         moment: Moment<'_>,
     ) -> Buffer {
-        let Moment { weights, sun, patches } = moment;
+        let Moment { weights, sun, patches, lamps } = moment;
         let bytes = 12 * u64::from(consts::PROBE_TERMS) * u64::from(self.grid.probes());
         let light = graph.buffer("daylight.probe_light", bytes);
         let args = probe_decode::Args {
@@ -104,7 +106,7 @@ impl Field {
             words: graph.import_buffer(&self.words),
             coefficients: graph.buffer_from(
                 "daylight.probe_coefficients",
-                &coefficients(tiles, &[weights.to_vec()], &Sources { sun, patches, lamps: &[] }),
+                &coefficients(tiles, &[weights.to_vec()], &Sources { sun, patches, lamps }),
             ),
         };
         graph.compute(args, self.grid.probes());

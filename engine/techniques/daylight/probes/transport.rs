@@ -14,12 +14,12 @@ use crate::{
     rays::traced,
     shaders::{
         consts,
-        daylight::{probe_sky, probe_suns, probe_walk},
+        daylight::{probe_lamps, probe_sky, probe_suns, probe_walk},
         types,
     },
     techniques::daylight::{
         Plan, Transport,
-        transport::{Light, settings},
+        transport::{LAMP_TURNS, Light, lamp_table, settings},
     },
 };
 
@@ -48,6 +48,7 @@ struct Buffers {
     counts: OwnedBuffer,
     sun: OwnedBuffer,
     sky: OwnedBuffer,
+    lamps: OwnedBuffer,
 }
 
 impl Transport {
@@ -63,7 +64,7 @@ impl Transport {
         let places: Vec<Vec3> = grid.brick(brick).into_iter().map(|at| grid.position(at)).collect();
         // Random numbers of probes differ from those of texels.
         let first = 0x8000_0000 | (brick * consts::PROBE_BRICK.pow(3));
-        let buffers = self.buffers(places.len() as u32, plan.times.len() as u32)?;
+        let buffers = self.buffers(places.len() as u32, plan.dimensions())?;
         let spacing = Vec3::from(grid.spacing);
         let (margin, most) = (0.1 * spacing.min_element(), 0.45 * spacing);
         let mut offsets = vec![Vec3::ZERO; places.len()];
@@ -94,12 +95,11 @@ impl Transport {
             distances.iter_mut().zip(starts.chunks_exact(now as usize)).for_each(|(d, starts)| d.add(starts));
         }
         let valid: Vec<bool> = distances.iter().map(|distances| !distances.is_inside()).collect();
-        let [sun, sky] = self.sums(&buffers)?;
-        let light = summed(&sun, &sky, &valid, plan.times.len(), samples);
+        let light = summed(self.sums(&buffers)?, &valid, plan.dimensions(), samples);
         Ok(Gathered { positions, distances: distances.iter().map(Distances::map).collect(), light })
     }
 
-    fn buffers(&self, probes: u32, times: u32) -> Result<Buffers> {
+    fn buffers(&self, probes: u32, [times, patches, groups]: [usize; 3]) -> Result<Buffers> {
         let buffer = |name, bytes: u64| OwnedBuffer::new(&self.gpu, name, BufferDesc::device(bytes.max(16)));
         let paths = u64::from(probes * BATCH);
         let terms = 12 * u64::from(probes) * TERMS as u64;
@@ -111,8 +111,9 @@ impl Transport {
             )?,
             escapes: buffer("daylight.escapes", paths * size_of::<types::DayEscape>() as u64)?,
             counts: buffer("daylight.counts", paths * 4)?,
-            sun: buffer("daylight.sun", 2 * terms * u64::from(times))?,
-            sky: buffer("daylight.sky", terms * u64::from(consts::SKY_PATCHES))?,
+            sun: buffer("daylight.sun", 2 * terms * times as u64)?,
+            sky: buffer("daylight.sky", terms * patches as u64)?,
+            lamps: buffer("daylight.lamps", 2 * terms * groups as u64)?,
         })
     }
 
@@ -127,6 +128,7 @@ impl Transport {
         lit: bool,
     ) -> Result<Vec<types::DayStart>> {
         let (count, times) = (positions.len() as u32, plan.times.len() as u32);
+        let groups = plan.lamps.len();
         let mut graph = Graph::new("daylight.probes");
         let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
         let rays = self.rays.frame(&mut graph, &handles);
@@ -135,17 +137,20 @@ impl Transport {
         let vertices = graph.import_buffer(&buffers.vertices);
         let escapes = graph.import_buffer(&buffers.escapes);
         let counts = graph.import_buffer(&buffers.counts);
-        let settings = graph.uniform(&settings(plan, first, [count, now, first_sample], 0));
+        let lights = handles.moment.lights.len() as u32;
+        let settings = graph.uniform(&settings(plan, first, [count, now, first_sample], lights));
         let positions: Vec<[f32; 3]> = positions.iter().map(|position| position.to_array()).collect();
         let probes = graph.buffer_from("daylight.probes", &positions);
         let args = traced!(probe_walk::Args { settings, probes, starts, vertices, escapes, counts }, rays, handles);
         let (paths, bounces) = (count * now, u64::from(plan.settings.vertices()));
         graph.compute(args, paths).rays(u64::from(paths) * bounces);
         if lit {
-            let [sun, sky] = [&buffers.sun, &buffers.sky].map(|buffer| graph.import_buffer(buffer));
+            let [sun, sky, lamps] =
+                [&buffers.sun, &buffers.sky, &buffers.lamps].map(|buffer| graph.import_buffer(buffer));
             if first_sample == 0 {
-                graph.fill(sun, 0);
-                graph.fill(sky, 0);
+                [sun, sky, lamps].into_iter().for_each(|sums| {
+                    graph.fill(sums, 0);
+                });
             }
             if times > 0 {
                 let args = traced!(
@@ -165,6 +170,40 @@ impl Transport {
                 graph.compute_over(args, [times, count], items);
             }
             graph.compute(probe_sky::Args { settings, starts, escapes, sums: sky }, count);
+            let at = (&self.scene, &self.pose);
+            let table = (groups > 0).then(|| lamp_table(&mut self.lamps, at, &handles.moment.lights));
+            let table = table.filter(|table| table.tree);
+            if let Some(table) = table {
+                let tables = [
+                    graph.buffer_from("daylight.light-columns", &table.columns),
+                    graph.buffer_from("daylight.light-targets", &table.targets),
+                    graph.buffer_from("daylight.instance-lights", &table.instances),
+                    graph.buffer_from("daylight.light-nodes", &table.nodes),
+                ];
+                let [light_columns, light_targets, instance_lights, light_nodes] = tables;
+                let args = traced!(
+                    probe_lamps::Args {
+                        settings,
+                        probes,
+                        vertices,
+                        counts,
+                        starts,
+                        sums: lamps,
+                        groups: graph.import_buffer(&self.groups),
+                        lights: handles.lights,
+                        light_columns,
+                        light_targets,
+                        instance_lights,
+                        light_nodes,
+                        push: probe_lamps::Push { first: 0, count: now },
+                    },
+                    rays,
+                    handles
+                );
+                let turns = (bounces + 1) * (most_turns + LAMP_TURNS);
+                let items = Items::new(now).rays(u64::from(count) * (bounces + 1)).turns(turns);
+                graph.compute_over(args, count, items);
+            }
         }
         let read = graph.read_buffer(starts);
         let mut starts: Vec<types::DayStart> = self.runner.run(&graph)?.buffer(read);
@@ -172,56 +211,70 @@ impl Transport {
         Ok(starts)
     }
 
-    fn sums(&mut self, buffers: &Buffers) -> Result<[Vec<[f32; 3]>; 2]> {
+    /// The sums of the sun, of the sky and of lamps.
+    fn sums(&mut self, buffers: &Buffers) -> Result<[Vec<[f32; 3]>; 3]> {
         let mut graph = Graph::new("daylight.probes");
-        let sums = [&buffers.sun, &buffers.sky].map(|buffer| graph.import_buffer(buffer));
-        let [sun, sky] = sums.map(|buffer| graph.read_buffer(buffer));
+        let sums = [&buffers.sun, &buffers.sky, &buffers.lamps].map(|buffer| graph.import_buffer(buffer));
+        let reads = sums.map(|buffer| graph.read_buffer(buffer));
         let frame = self.runner.run(&graph)?;
-        Ok([frame.buffer(sun), frame.buffer(sky)])
+        Ok(reads.map(|read| frame.buffer(read)))
     }
 }
 
+/// For each normal the irradiance of the harmonics of a sum.
+fn of_normals(sums: &[[f32; 3]], at: usize, channel: usize) -> [f64; DIRECTIONS] {
+    let terms = sums[TERMS * at..TERMS * (at + 1)].iter().map(|term| f64::from(term[channel]));
+    let mut radiance = [0.0; TERMS];
+    radiance.iter_mut().zip(terms).for_each(|(out, term)| *out = term);
+    let terms = convolved(radiance);
+    directions().map(|normal| irradiance(&terms, normal))
+}
+
 /// Rows of irradiance for all normals of the valid probes, from sums of harmonics in the order of the device.
-fn summed(sun: &[[f32; 3]], sky: &[[f32; 3]], valid: &[bool], times: usize, samples: u32) -> Light {
-    let patches = consts::SKY_PATCHES as usize;
-    let directions = directions();
-    // For each normal the irradiance of each sum.
-    let of = |sums: &[[f32; 3]], at: usize, channel: usize| -> [f64; DIRECTIONS] {
-        let terms = sums[TERMS * at..TERMS * (at + 1)].iter().map(|term| f64::from(term[channel]));
-        let mut radiance = [0.0; TERMS];
-        radiance.iter_mut().zip(terms).for_each(|(out, term)| *out = term);
-        let terms = convolved(radiance);
-        directions.map(|normal| irradiance(&terms, normal))
-    };
-    let (even_count, odd_count) = (f64::from(samples.div_ceil(2)), f64::from(samples / 2));
+fn summed(
+    [sun, sky, lamps]: [Vec<[f32; 3]>; 3],
+    valid: &[bool],
+    [times, patches, groups]: [usize; 3],
+    samples: u32,
+) -> Light {
     let mut light = Light { mask: vec![0; (valid.len() * DIRECTIONS).div_ceil(32)], ..Light::default() };
     for (probe, _) in valid.iter().enumerate().filter(|(_, valid)| **valid) {
         for texel in probe * DIRECTIONS..(probe + 1) * DIRECTIONS {
             light.mask[texel / 32] |= 1 << (texel % 32);
         }
-        let begin = [light.sun.len(), light.sky.len()];
-        light.sun.resize(begin[0] + 3 * DIRECTIONS * times, 0.0);
-        light.noise.resize(begin[0] + 3 * DIRECTIONS * times, 0.0);
-        light.sky.resize(begin[1] + 3 * DIRECTIONS * patches, 0.0);
+        halves(&sun, probe, times, samples, [&mut light.sun, &mut light.noise]);
+        halves(&lamps, probe, groups, samples, [&mut light.lamps, &mut light.lamps_noise]);
+        let begin = light.sky.len();
+        light.sky.resize(begin + 3 * DIRECTIONS * patches, 0.0);
         for channel in 0..3 {
-            for time in 0..times {
-                let at = 2 * (probe * times + time);
-                let (even, odd) = (of(sun, at, channel), of(sun, at + 1, channel));
-                for direction in 0..DIRECTIONS {
-                    let out = begin[0] + (3 * direction + channel) * times + time;
-                    let [even, odd] = [even[direction], odd[direction]];
-                    light.sun[out] = ((even + odd) / f64::from(samples)) as f32;
-                    light.noise[out] = (0.5 * (odd / odd_count.max(1.0) - even / even_count)) as f32;
-                }
-            }
             for patch in 0..patches {
-                let values = of(sky, probe * patches + patch, channel);
+                let values = of_normals(&sky, probe * patches + patch, channel);
                 for (direction, value) in values.into_iter().enumerate() {
-                    light.sky[begin[1] + (3 * direction + channel) * patches + patch] =
+                    light.sky[begin + (3 * direction + channel) * patches + patch] =
                         (value / f64::from(samples)) as f32;
                 }
             }
         }
     }
     light
+}
+
+/// Appends the rows of a probe, of means and of noise, from the sums of even and of odd samples of each dimension.
+fn halves(sums: &[[f32; 3]], probe: usize, dimensions: usize, samples: u32, [means, noises]: [&mut Vec<f32>; 2]) {
+    let (even_count, odd_count) = (f64::from(samples.div_ceil(2)), f64::from(samples / 2));
+    let begin = means.len();
+    means.resize(begin + 3 * DIRECTIONS * dimensions, 0.0);
+    noises.resize(begin + 3 * DIRECTIONS * dimensions, 0.0);
+    for channel in 0..3 {
+        for dimension in 0..dimensions {
+            let at = 2 * (probe * dimensions + dimension);
+            let (even, odd) = (of_normals(sums, at, channel), of_normals(sums, at + 1, channel));
+            for direction in 0..DIRECTIONS {
+                let out = begin + (3 * direction + channel) * dimensions + dimension;
+                let [even, odd] = [even[direction], odd[direction]];
+                means[out] = ((even + odd) / f64::from(samples)) as f32;
+                noises[out] = (0.5 * (odd / odd_count.max(1.0) - even / even_count)) as f32;
+            }
+        }
+    }
 }

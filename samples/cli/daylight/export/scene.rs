@@ -1,10 +1,10 @@
-//! The scene as glTF with a second set of texture coordinates for the lightmap.
+//! The scene as glTF, for lightmaps with a further set of texture coordinates.
 
 use lucerna::{
     Result,
     scene::{Pose, Scene},
     techniques::daylight::{
-        Stored,
+        Kind, Stored,
         export::{Unwrapping, unwrapped},
     },
 };
@@ -18,7 +18,8 @@ use crate::{
     stage::Stage,
 };
 
-/// The bytes of the .glb file, whose materials name the picture `lightmap`, and the lightmap's set of texture coordinates.
+/// The bytes of the .glb file. If the bake is a lightmap, its materials name the picture `lightmap`, and the set of texture coordinates of the lightmap
+/// comes back.
 ///
 /// # Errors
 /// As [`unwrapped`]; `Runtime` if the file would be larger than glTF allows.
@@ -28,10 +29,16 @@ pub fn glb_of(
     lightmap: &str,
     args: &DayExportArgs,
     console: Console,
-) -> Result<(Vec<u8>, u32)> {
+) -> Result<(Vec<u8>, Option<u32>)> {
+    let (_, view) = stage.at(args.stage.time, args.stage.size)?;
+    if let Kind::Cube { .. } = stored.plan.receivers {
+        let scene = unlit_by_itself(stage.scene.clone());
+        let Parts { document, binary, notes } = export_gltf::parts(&scene, &Pose::rest(&scene), &view)?;
+        notes.iter().for_each(|note| console.info(&format!("note: {note}")));
+        return Ok((glb(&document, binary)?, None));
+    }
     let Unwrapping { scene, uv_set, vertices } = unwrapped(&stage.scene, stored)?;
     let scene = unlit_by_itself(scene);
-    let (_, view) = stage.at(args.stage.time, args.stage.size)?;
     // The light was baked on the scene at rest.
     let Parts { mut document, binary, notes } = export_gltf::parts(&scene, &Pose::rest(&scene), &view)?;
     notes.iter().for_each(|note| console.info(&format!("note: {note}")));
@@ -40,7 +47,7 @@ pub fn glb_of(
         vertices[0], vertices[1]
     ));
     name_lightmap(&mut document, &scene, lightmap, uv_set);
-    Ok((glb(&document, binary)?, uv_set))
+    Ok((glb(&document, binary)?, Some(uv_set)))
 }
 
 /// The scene without its lights: the light is that of sun and sky.

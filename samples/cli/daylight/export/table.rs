@@ -1,37 +1,38 @@
 //! The principal components of a bake: images, coefficients, and the table that names them.
 
-use half::f16;
 use lucerna::{
     Result,
     image::{Ktx2Format, encode_ktx2},
     techniques::daylight::{
-        Course, Stored, Weather,
-        export::{self, Moment, Page, Pages},
-        steps::Steps,
+        Calendar, Kind, Stored, Weather,
+        export::{self, Page, Pages},
     },
 };
 use serde_json::{Value, json};
 
-use super::Folder;
+use super::{
+    Folder, Lamps,
+    moments::{self, OneDay},
+};
 use crate::program;
 
 /// What the numbers of lightmaps are.
 pub const UNIT: &str = "irradiance in W/m2, linear Rec. 709; reflected radiance = albedo / pi * irradiance";
 
-/// Seconds between two rows of the light from outside.
-const STEP: u32 = 60;
-
-/// Writes the images and gives the document that describes them.
+/// Writes the images and gives the document that describes them. `uv_set`: the lightmap's texture coordinates; a cube has none.
+///
+/// # Errors
+/// `Output`; `Usage` if the weather is impossible.
 pub fn write(
     folder: &mut Folder<'_>,
     stored: &Stored,
-    (day, steps): (&Course, &Steps),
+    days: &[OneDay],
     weather: Weather,
-    uv_set: u32,
+    lamps: &Lamps,
+    uv_set: Option<u32>,
 ) -> Result<Value> {
     let plan = &stored.plan;
-    let calendar = &plan.calendar;
-    let layers = export::layers(stored);
+    let layers = export::layers(stored, lamps.is_there());
     let mut described = Vec::new();
     for pages in &layers {
         described.push(layer(folder, pages)?);
@@ -50,35 +51,86 @@ pub fn write(
             tile
         })
         .collect();
-    Ok(json!({
+    let mut scene = json!({ "name": plan.scene, "file": "scene.glb" });
+    if let Some(uv_set) = uv_set {
+        scene["texcoord"] = json!(uv_set);
+    }
+    let mut document = json!({
         "format": "lucerna daylight export",
         "version": 1,
         "generator": format!("lucerna {}", program::VERSION),
-        "scene": { "name": plan.scene, "file": "scene.glb", "texcoord": uv_set },
+        "scene": scene,
         "unit": UNIT,
         "width": plan.extent[0],
         "height": plan.extent[1],
         "sources": "sources.ktx2",
-        "day": {
-            "date": calendar.date,
-            "zone": calendar.zone,
-            "latitude": calendar.latitude,
-            "longitude": calendar.longitude,
-            "north": calendar.north,
-            "seconds": day.length(),
-        },
         "weather": {
             "turbidity": weather.turbidity(),
             "ground_albedo": weather.ground_albedo(),
             "overcast": weather.overcast(),
         },
-        "times": plan.times[plan.of_day(0)].iter().map(|time| time.seconds).collect::<Vec<_>>(),
-        "nights": steps.nights().collect::<Vec<_>>(),
-        "moments": moments(folder, (day, steps), weather)?,
         "tolerance": plan.settings.tolerance,
         "layers": described,
         "tiles": tiles,
-    }))
+    });
+    let mut of_days = Vec::new();
+    for day in days {
+        of_days.push(one_day(folder, stored, day, weather, lamps, days.len() > 1)?);
+    }
+    // Readers of one day find the first one.
+    for (key, value) in of_days[0].as_object().into_iter().flatten() {
+        document[key] = value.clone();
+    }
+    if lamps.is_there() {
+        document["lamps"] = lamps.listed();
+    }
+    if let Kind::Cube { position, .. } = &plan.receivers {
+        document["kind"] = json!("cube");
+        document["position"] = json!(position);
+    }
+    if days.len() > 1 {
+        document["days"] = json!(of_days);
+    }
+    // Readers of version 1 know lightmaps of one day under sun and sky.
+    if lamps.is_there() || days.len() > 1 || uv_set.is_none() || days[0].span.is_some() {
+        document["version"] = json!(2);
+    }
+    Ok(document)
+}
+
+/// What the table says of a day.
+fn one_day(
+    folder: &mut Folder<'_>,
+    stored: &Stored,
+    day: &OneDay,
+    weather: Weather,
+    lamps: &Lamps,
+    several: bool,
+) -> Result<Value> {
+    let Calendar { zone, latitude, longitude, north, .. } = &stored.plan.calendar;
+    let mut out = json!({
+        "day": {
+            "date": day.date,
+            "zone": zone,
+            "latitude": latitude,
+            "longitude": longitude,
+            "north": north,
+            "seconds": day.course.length(),
+        },
+        "times": day.times(&stored.plan).collect::<Vec<_>>(),
+        "nights": day.steps.nights().collect::<Vec<_>>(),
+        "moments": moments::write(folder, day, weather, several)?,
+    });
+    if several {
+        out["first_column"] = json!(day.first_column(&stored.plan));
+    }
+    if let Some(span) = day.span {
+        out["span"] = json!(span);
+    }
+    if lamps.is_there() {
+        out["switches"] = lamps.switches(&day.course)?;
+    }
+    Ok(out)
 }
 
 /// Writes the pages and the table of one kind of light.
@@ -105,52 +157,4 @@ fn layer(folder: &mut Folder<'_>, pages: &Pages) -> Result<Value> {
 fn page_bytes(page: &Page) -> Result<Vec<u8>> {
     let format = if page.wide { Ktx2Format::R16g16b16a16Sfloat } else { Ktx2Format::R8g8b8a8Snorm };
     encode_ktx2(format, page.extent, &[page.bytes()], &[])
-}
-
-/// Writes the light from outside for each minute: a row of the radiances of all patches of the sky, then the irradiance of the sun, then the
-/// direction towards it. Rows begin and end with the last minutes that have light.
-fn moments(folder: &mut Folder<'_>, (day, steps): (&Course, &Steps), weather: Weather) -> Result<Value> {
-    let count = (day.length() / f64::from(STEP)).ceil() as u32 + 1;
-    let rows = rows(day, steps, weather, count)?;
-    let dark = |row: &Vec<[f32; 3]>| row[..row.len() - 1].iter().flatten().all(|value| *value == 0.0);
-    let first = rows.iter().position(|row| !dark(row)).unwrap_or(0);
-    let last = rows.iter().rposition(|row| !dark(row)).unwrap_or(0);
-    let rows = &rows[first..=last];
-    let half = |value: f32| f16::from_f32(value.min(f16::MAX.to_f32())).to_le_bytes();
-    let bytes = rows.iter().flatten().flat_map(|[r, g, b]| [*r, *g, *b, 1.0].map(half)).flatten().collect();
-    let columns = rows[0].len() as u32;
-    let file = "moments.ktx2";
-    let extent = [columns, rows.len() as u32];
-    folder.write(file.into(), &encode_ktx2(Ktx2Format::R16g16b16a16Sfloat, extent, &[bytes], &[])?)?;
-    Ok(json!({
-        "file": file,
-        "first_seconds": first as u32 * STEP,
-        "step_seconds": STEP,
-        "rows": rows.len(),
-        "patches": columns - 2,
-        "sun_column": columns - 2,
-        "direction_column": columns - 1,
-    }))
-}
-
-/// The rows of all minutes of a day.
-fn rows(day: &Course, steps: &Steps, weather: Weather, count: u32) -> Result<Vec<Vec<[f32; 3]>>> {
-    let row = |minute: u32| {
-        let moment = Moment::new(day, steps, f64::from(minute * STEP), weather)?;
-        Ok([moment.patches, vec![moment.sun, moment.direction]].concat())
-    };
-    let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get() as u32);
-    let share = count.div_ceil(threads);
-    std::thread::scope(|scope| {
-        let row = &row;
-        let parts: Vec<_> = (0..threads)
-            .map(|part| (part * share).min(count)..((part + 1) * share).min(count))
-            .map(|minutes| scope.spawn(move || minutes.map(row).collect::<Result<Vec<_>>>()))
-            .collect();
-        let mut out = Vec::with_capacity(count as usize);
-        for part in parts {
-            out.extend(part.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?);
-        }
-        Ok(out)
-    })
 }
