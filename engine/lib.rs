@@ -21,7 +21,7 @@
 //! let mut graph = Graph::new("frame"); // the passes of one frame, in order
 //! let handles = resident.frame(&mut graph, &scene, 0.0);
 //! let view = View::of_camera(&scene, &Pose::rest(&scene), 0, [320, 240])?.fit_far(&handles.bounds());
-//! let picture = isr::picture(&mut graph, &handles, &view, (&scene).into(), &Default::default())?;
+//! let picture = isr::picture(&mut graph, &handles, &view, &scene, &Default::default())?;
 //! let total = graph.read_image(picture.outputs.total);
 //! let pixels = Runner::new(&gpu).run(&graph)?.image(total).to_f32(); // linear radiance, top row first
 //! image::write(&path, &image::Layers::rgba(320, 240, pixels.concat()), &Default::default())?;

@@ -21,7 +21,7 @@ fn corner() -> (Eye, Vec<Patch>) {
 fn declare(graph: &mut Graph, eye: &Eye, buffers: &Buffers, lamp: Vec3, settings: &Settings) -> Outputs {
     let gbuffer = gbuffer(graph, eye, buffers);
     let lights = lights(graph, &[point(vec3(0.2, 1.0, -0.6), lamp)]);
-    let inputs = Inputs { gbuffer, lights, ambient: Irradiance::default(), senders: None };
+    let inputs = Inputs { gbuffer, lights, surroundings: Default::default(), senders: None };
     frame(graph, &inputs, settings).unwrap()
 }
 
@@ -106,7 +106,7 @@ fn an_orthographic_camera_gathers_the_same_light() {
         let mut graph = Graph::new("orthographic");
         let gbuffer = gbuffer_seen(&mut graph, &view, &buffers);
         let lights = lights(&mut graph, &[]);
-        let inputs = Inputs { gbuffer, lights, ambient: Irradiance::default(), senders: None };
+        let inputs = Inputs { gbuffer, lights, surroundings: Default::default(), senders: None };
         let out = frame(&mut graph, &inputs, &Settings { blur_radius: 4, ..Settings::default() }).unwrap();
         let [indirect] = read(gpu, graph, [out.indirect]);
         let (mut ratios, mut count) = (0.0, 0.0);
@@ -224,7 +224,7 @@ fn wrong_settings_are_refused_before_any_pass() {
     let gbuffer = gbuffer(&mut graph, &eye, &buffers);
     let lights = lights(&mut graph, &[]);
     let before = graph.pass_count();
-    let inputs = Inputs { gbuffer, lights, ambient: Irradiance::default(), senders: None };
+    let inputs = Inputs { gbuffer, lights, surroundings: Default::default(), senders: None };
     let error = frame(&mut graph, &inputs, &Settings { samples: 47, ..Settings::default() }).unwrap_err();
     assert_eq!(error.to_string(), "samples: 47 is not allowed; allowed: 24, 48, 80");
     assert_eq!(graph.pass_count(), before);

@@ -402,6 +402,7 @@ fn gather_is_the_reference() {
             let (coarse, sender) = coarse(&mut graph, buffers);
             let extent = graph.extent(coarse.depth);
             let gathered = graph.image("gathered", Format::RGBA16F, extent);
+            let seen = graph.image("seen", Format::RGBA16F, extent);
             let args = shaders::isr::gather::Args {
                 view: graph.uniform(&view(&eye).uniform()),
                 sender,
@@ -409,6 +410,7 @@ fn gather_is_the_reference() {
                 normal: coarse.normal,
                 depth: coarse.depth,
                 gathered,
+                seen,
                 filtered: sender,
                 mean_depth: coarse.depth,
                 peeled: [coarse.depth; 3],

@@ -347,7 +347,7 @@ fn samples_follow_the_depth() {
             let mut graph = Graph::new("by depth");
             let gbuffer = gbuffer(&mut graph, &eye, &buffers);
             let lights = lights(&mut graph, &[]);
-            let inputs = Inputs { gbuffer, lights, ambient: Irradiance::default(), senders: None };
+            let inputs = Inputs { gbuffer, lights, surroundings: Default::default(), senders: None };
             let settings = Settings { resolution: Resolution::Full, blur: Blur::None, ..settings };
             let out = frame(&mut graph, &inputs, &settings).unwrap();
             let [gathered] = read(gpu, graph, [out.gathered]);

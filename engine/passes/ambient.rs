@@ -91,7 +91,7 @@ impl Irradiance {
         smooth + suns.map(|sun| Vec3::new(n.dot(sun[0]), n.dot(sun[1]), n.dot(sun[2])).max(Vec3::ZERO)).sum::<Vec3>()
     }
 
-    /// The buffer of `passes/ambient.glsl`.
+    /// The buffer of `lib/ambient.glsl`.
     pub fn upload(&self, graph: &mut Graph) -> Buffer {
         match self.table.is_empty() {
             true => graph.buffer_from("ambient", &vec![[0.0f32; 3]; SIDE * SIDE + SUNS]),

@@ -22,6 +22,9 @@ pub struct Compose {
     pub occlude_ambient: bool,
     pub k_ssao: f32,
     pub k_isr: f32,
+    /// Coarse light of the sky (rgb: the share of its irradiance that arrives, times alpha) and of emissive surfaces (radiance of a white receiver, W/(sr·m²)).
+    /// `None`: the environment lights every surface, times accessibility.
+    pub area: Option<[Image; 2]>,
 }
 
 /// What [`sum`] writes, at full resolution.
@@ -67,12 +70,16 @@ pub fn sum(
         total: result.total,
         indirect: result.indirect,
         accessibility: result.accessibility,
+        // Bindings need images; without light by rays the shader does not read them.
+        sky: choices.area.map_or(gathered, |[sky, _]| sky),
+        lamps: choices.area.map_or(gathered, |[_, lamps]| lamps),
         push: compose::Push { k_ssao: choices.k_ssao, k_isr: choices.k_isr, epsilon: choices.epsilon },
         spec: compose::Spec {
             factor: choices.factor,
             plane: choices.plane.into(),
             tint: choices.tint.into(),
             occlude_ambient: choices.occlude_ambient.into(),
+            area: choices.area.is_some().into(),
         },
     };
     graph.compute(args, extent);

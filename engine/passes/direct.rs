@@ -38,12 +38,14 @@ pub struct Direct {
     pub suns: bool,
     /// Factor on the light of all lights.
     pub strength: f32,
+    /// [`Lit::diffuse`] contains emission.
+    pub glow: bool,
 }
 
 impl Default for Direct {
     /// Radiometry of all lights, with microfacets.
     fn default() -> Self {
-        Self { paper_law: false, specular: true, light_radius: 0.0, light_power: 1.0, suns: true, strength: 1.0 }
+        Self { paper_law: false, specular: true, light_radius: 0.0, light_power: 1.0, suns: true, strength: 1.0, glow: true }
     }
 }
 
@@ -52,7 +54,7 @@ impl Default for Direct {
 pub struct Lit {
     /// Radiance towards the camera, with emission.
     pub direct: Image,
-    /// Radiance that is equal in all directions: the diffuse reflection and the emission.
+    /// Radiance that is equal in all directions: the diffuse reflection and, if [`Direct::glow`] is on, the emission.
     pub diffuse: Image,
 }
 
@@ -80,6 +82,7 @@ pub fn light(graph: &mut Graph, g: &GBuffer, lights: Lights, choices: &Direct) -
             light_power: choices.light_power,
             suns: choices.suns.into(),
             strength: choices.strength,
+            glow: choices.glow.into(),
         },
         spec: direct::Spec { paper_law: choices.paper_law.into(), specular: choices.specular.into() },
     };

@@ -24,6 +24,7 @@
 //! glass or from a mirror is missing. Single-sided surfaces emit from their front only.
 
 mod alias;
+mod area_lights;
 pub mod bands;
 mod environment;
 mod job;
@@ -45,6 +46,7 @@ pub use technique::{Mode, Reference};
 #[doc(hidden)]
 pub mod tables {
     pub use super::{
+        area_lights::{AreaHandles, AreaLights},
         environment::{Importance, importance, radiance_map},
         lights::{LightTable, table as lights},
         sharp::{has_sharp, may_be_sharp},

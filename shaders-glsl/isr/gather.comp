@@ -38,6 +38,7 @@ layout(binding = 5, rgba16f) uniform writeonly image2D gathered;
 layout(binding = 6) uniform sampler2D filtered;  // mip levels of the senders, rgb times mask
 layout(binding = 7) uniform sampler2D mean_depth;  // mip levels: r linear depth of geometry, g share of geometry
 layout(binding = 8) uniform sampler2D peeled[3];   // linear depth of further layers, in a picture wider by peeled_scale
+layout(binding = 9, rgba16f) uniform writeonly image2D seen;  // r: sum of the form factors of the senders
 
 layout(push_constant, scalar) uniform Push {
     float reach;            // of the indirect samples, coarse pixels
@@ -91,6 +92,7 @@ void main() {
     vec3 n = texelFetch(normal, pixel, 0).xyz;
     if (z >= 1.0 || dot(n, n) < 1e-8) {
         imageStore(gathered, pixel, vec4(0.0));
+        imageStore(seen, pixel, vec4(0.0));
         return;
     }
     n = normalize(n);
@@ -162,4 +164,5 @@ void main() {
         occlusion *= 2.0 * ISR_PI / float(samples); // [ISR 26]
     }
     imageStore(gathered, pixel, vec4(light, occlusion));
+    imageStore(seen, pixel, vec4(min(factors, MOST)));
 }

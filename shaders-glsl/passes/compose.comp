@@ -17,6 +17,8 @@ layout(constant_id = 1) const uint PLANE = 1;
 layout(constant_id = 2) const uint TINT = 1;
 // 0: occlusion darkens direct light [ISR 29]. 1: it darkens ambient light only.
 layout(constant_id = 3) const uint OCCLUDE_AMBIENT = 1;
+// 0: the environment lights every surface, times accessibility. 1: its unshadowed share is in `sky`, and light of emissive triangles in `lamps`.
+layout(constant_id = 4) const uint AREA = 0;
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1, scalar) readonly buffer Ambient { vec3 ambient[]; };
@@ -32,6 +34,8 @@ layout(binding = 10) uniform sampler2D specular;  // rgb F0, a roughness
 layout(binding = 11, rgba16f) uniform writeonly image2D total;
 layout(binding = 12, rgba16f) uniform writeonly image2D indirect;
 layout(binding = 13, r32f) uniform writeonly image2D accessibility;
+layout(binding = 14) uniform sampler2D sky;      // coarse: rgb share times a
+layout(binding = 15) uniform sampler2D lamps;    // coarse: radiance of a white receiver
 
 layout(push_constant, scalar) uniform Push {
     float k_ssao;
@@ -39,19 +43,34 @@ layout(push_constant, scalar) uniform Push {
     float epsilon;  // of the depth weight; same unit as the depth difference
 };
 
-#include "passes/ambient.glsl"
+#include "lib/ambient.glsl"
 
 // Below this share of the largest possible weight no coarse texel matches, and the nearest in depth is taken.
 const float NO_MATCH = 0.01;
 
-vec4 upsample(ivec2 pixel, float z, vec3 n, vec3 p) {
+struct Coarse {
+    vec4 gathered;
+    vec4 sky;
+    vec3 lamps;
+};
+
+Coarse coarse_at(ivec2 texel) {
+    Coarse light = Coarse(texelFetch(gathered, texel, 0), vec4(0.0), vec3(0.0));
+    if (AREA != 0) {
+        light.sky = texelFetch(sky, texel, 0);
+        light.lamps = texelFetch(lamps, texel, 0).rgb;
+    }
+    return light;
+}
+
+Coarse upsample(ivec2 pixel, float z, vec3 n, vec3 p) {
     ivec2 last = textureSize(coarse_depth, 0) - 1;
     vec2 at = (vec2(pixel) + 0.5) / float(FACTOR) - 0.5;
     ivec2 base = ivec2(floor(at));
     vec2 f = at - vec2(base);
-    vec4 sum = vec4(0.0);
+    Coarse sum = Coarse(vec4(0.0), vec4(0.0), vec3(0.0));
     float weights = 0.0;
-    vec4 nearest = vec4(0.0);
+    Coarse nearest = sum;
     float nearest_off = 1e30;
     for (int i = 0; i < 4; ++i) {
         ivec2 corner = ivec2(i & 1, i >> 1);
@@ -61,7 +80,7 @@ vec4 upsample(ivec2 pixel, float z, vec3 n, vec3 p) {
         if (coarse_z >= 1.0) {
             continue;
         }
-        vec4 value = texelFetch(gathered, coarse, 0);
+        Coarse value = coarse_at(coarse);
         float off = abs(z - coarse_z);
         if (PLANE != 0) {
             vec3 x = screen_position(view, coarse, float(FACTOR), coarse_z);
@@ -73,14 +92,17 @@ vec4 upsample(ivec2 pixel, float z, vec3 n, vec3 p) {
             float like = max(dot(n, m) * inversesqrt(max(dot(m, m), 1e-12)), 0.0);
             w *= like * like * like * like;
         }
-        sum += w * value;
+        sum.gathered += w * value.gathered;
+        sum.sky += w * value.sky;
+        sum.lamps += w * value.lamps;
         weights += w;
         if (off < nearest_off) {
             nearest_off = off;
             nearest = value;
         }
     }
-    return weights * epsilon < NO_MATCH ? nearest : sum / weights; // [ISR 28]
+    if (weights * epsilon < NO_MATCH) return nearest;
+    return Coarse(sum.gathered / weights, sum.sky / weights, sum.lamps / weights); // [ISR 28]
 }
 
 void main() {
@@ -99,7 +121,8 @@ void main() {
     vec4 color = texelFetch(albedo, pixel, 0);
     vec3 n = decode_normal(texelFetch(normal, pixel, 0));
     vec3 p = screen_position(view, pixel, 1.0, z);
-    vec4 coarse = upsample(pixel, z, n, p);
+    Coarse light_around = upsample(pixel, z, n, p);
+    vec4 coarse = light_around.gathered;
     float open = 1.0 - clamp(coarse.a, 0.0, 1.0);
     float lit = clamp(open + 1.0 - k_ssao, 0.0, 1.0);
     vec3 bounced = k_isr * coarse.rgb * (TINT != 0 ? color.rgb : vec3(1.0));
@@ -114,8 +137,11 @@ void main() {
     around += max(gloss.rgb - 0.04, 0.0) * ambient_irradiance(mirrored);
     around *= color.a * own.a / 3.14159265358979;
     vec3 direct_part = OCCLUDE_AMBIENT != 0 ? light.rgb : (light.rgb - glow) * lit + glow;
-    vec3 sum = direct_part + around * lit + bounced; // [ISR 29]
+    vec4 share = light_around.sky;
+    around *= AREA != 0 ? share.rgb / max(share.a, 1e-6) : vec3(lit);
+    bounced += AREA != 0 ? color.a * color.rgb * light_around.lamps : vec3(0.0);
+    vec3 sum = direct_part + around + bounced; // [ISR 29]
     imageStore(total, pixel, vec4(sum, 1.0));
-    imageStore(indirect, pixel, vec4(around * lit + bounced, 1.0));
+    imageStore(indirect, pixel, vec4(around + bounced, 1.0));
     imageStore(accessibility, pixel, vec4(open));
 }

@@ -25,13 +25,14 @@ layout(binding = 3) uniform sampler2D depth;
 layout(binding = 4) uniform sampler2D specular;
 layout(binding = 5) uniform sampler2D emission;
 layout(binding = 6, rgba16f) uniform writeonly image2D direct;   // all that leaves towards the camera, with emission
-layout(binding = 7, rgba16f) uniform writeonly image2D diffuse;  // what leaves in all directions: by Lambert's law, and emission
+layout(binding = 7, rgba16f) uniform writeonly image2D diffuse;  // what leaves in all directions: by Lambert's law, and emission if `glow` is 1
 
 layout(push_constant, scalar) uniform Push {
     float light_radius;  // l_r of lights without a range, metres; 0: the camera's far distance
     float light_power;   // l_pow
     uint suns;           // 1: directional lights light, too
     float strength;      // factor on the light of all lights
+    uint glow;           // 1: `diffuse` contains emission
 };
 
 // [ISR 16]
@@ -54,7 +55,7 @@ void main() {
     vec4 color = texelFetch(albedo, pixel, 0);
     vec3 n = decode_normal(texelFetch(normal, pixel, 0));
     vec4 gloss = texelFetch(specular, pixel, 0);
-    vec3 glow = texelFetch(emission, pixel, 0).rgb;
+    vec3 emitted = texelFetch(emission, pixel, 0).rgb;
     vec3 p = screen_position(view, pixel, 1.0, z);
     vec3 v = to_camera(view, p);
 
@@ -92,6 +93,6 @@ void main() {
         }
     }
     vec3 reflected = color.a * color.rgb * matt * (PAPER_LAW != 0 ? 1.0 : 1.0 / BRDF_PI);
-    imageStore(diffuse, pixel, vec4(reflected + glow, 1.0));
-    imageStore(direct, pixel, vec4((layered ? vec3(0.0) : reflected) + color.a * shine + glow, 1.0));
+    imageStore(diffuse, pixel, vec4(reflected + (glow != 0u ? emitted : vec3(0.0)), 1.0));
+    imageStore(direct, pixel, vec4((layered ? vec3(0.0) : reflected) + color.a * shine + emitted, 1.0));
 }

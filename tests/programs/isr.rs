@@ -5,6 +5,8 @@ mod isr_lab;
 #[path = "../scene_kit/mod.rs"]
 mod scene_kit;
 
+#[path = "../isr_area.rs"]
+mod isr_area;
 #[path = "../isr_closed_forms.rs"]
 mod isr_closed_forms;
 #[path = "../isr_frame.rs"]

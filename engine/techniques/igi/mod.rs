@@ -50,17 +50,14 @@ pub use technique::{GATHERED, Mode};
 
 use crate::{
     Result,
-    gpu::{Gpu, OwnedBuffer, OwnedImage},
+    gpu::Gpu,
     graph::{Buffer, ComputeArgs, Format, Graph, Image, Items, PassRef, RangedArgs, Uniform},
     passes::gbuffer::GBuffer,
     rays::{RayHandles, Rays},
     resident::{Handles, Resident},
     scene::{Aabb, Pose, Scene},
     shaders::{self, consts, types},
-    tracer::{
-        Sources,
-        tables::{self, LightTable},
-    },
+    tracer::tables::{self, AreaLights},
 };
 
 /// Maximum of loop iterations that choosing one light takes, besides its ray: one descent of the path tracer's light tree.
@@ -78,16 +75,12 @@ pub struct Igi {
     in_compute: bool,
     /// The device has ray queries.
     queries: bool,
-    environment: OwnedImage,
-    environment_edges: OwnedBuffer,
-    /// Columns and rows of the environment's importance table. Directions within one cell have equal probability density.
-    cells: [u32; 2],
+    /// The emissive triangles and the environment.
+    areas: AreaLights,
     /// [`starts::sky_moments`] of the environment, W/m²; `None` without an environment.
     moments: Option<[f64; 3]>,
     /// Whether the material of each instance is double-sided.
     double_sided: Vec<bool>,
-    /// The emissive triangles, and the pose for which the table was built.
-    lights: Option<(Pose, LightTable)>,
     /// The scene may have mirrors or glass.
     sharp: bool,
     /// Diagonal of the bounding box of all lit surfaces in the rest pose, metres. Settings that are shares of the scene's size
@@ -193,8 +186,6 @@ impl Igi {
     pub fn new(gpu: &Gpu, scene: &Scene, resident: &Resident, settings: &Settings) -> Result<Self> {
         let queries = gpu.caps().ray_query;
         let in_compute = settings.visibility.in_compute(queries)?;
-        let importance = tables::importance(scene.environment.as_ref());
-        let edges = bytemuck::cast_slice(&importance.edges);
         let double_sided = |primitive: &crate::scene::Primitive| {
             scene.materials.get(primitive.material as usize).is_some_and(|material| material.double_sided)
         };
@@ -206,12 +197,9 @@ impl Igi {
             boxes: (!in_compute && settings.imperfect).then(|| Rays::in_compute(gpu, scene, resident)).transpose()?,
             in_compute,
             queries,
-            environment: tables::radiance_map(gpu, scene.environment.as_ref())?,
-            environment_edges: OwnedBuffer::with_contents(gpu, "igi.environment", edges)?,
-            cells: importance.cells,
+            areas: AreaLights::new(gpu, scene)?,
             moments: scene.environment.as_ref().filter(|e| !e.pixels.is_empty()).map(starts::sky_moments),
             double_sided: meshes.flat_map(|mesh| mesh.primitives.iter().map(double_sided)).collect(),
-            lights: None,
             sharp: tables::has_sharp(scene),
             size: diagonal(&resident.lit_bounds_in(scene, &Pose::rest(scene))),
             turns,
@@ -233,31 +221,13 @@ impl Igi {
             Some(boxes) if settings.imperfect => boxes.frame(graph, handles),
             _ => rays,
         };
-        if self.lights.as_ref().is_none_or(|(of, _)| of != pose) {
-            self.lights = Some((pose.clone(), tables::lights(scene, pose, &[], Sources::Emissive)));
-        }
-        let empty = LightTable {
-            suns: 0,
-            columns: vec![types::AliasEntry::default()],
-            targets: vec![types::LightTarget::default()],
-            nodes: vec![types::LightNode::default()],
-            tree: false,
-            instances: vec![u32::MAX],
-        };
-        let table = self.lights.as_ref().map_or(&empty, |(_, table)| table);
+        let areas = self.areas.frame(graph, scene, pose);
         let bounds = handles.moment.lit_bounds();
         let (low, high) = if bounds.is_empty() { Default::default() } else { (bounds.min, bounds.max) };
         // A scene may be empty or flat in the rest pose and have a size in this pose.
         let diagonal = if self.size > 0.0 { self.size } else { diagonal(&bounds) };
-        let sky = self.moments.is_some();
-        let environment = scene.environment.as_ref();
         let block = types::IgiSettings {
-            environment: types::EnvironmentMap {
-                size: environment.map_or([1, 1], |e| [e.width as i32, e.height as i32]),
-                cells: self.cells,
-                rotation: environment.map_or(0.0, |e| e.rotation),
-                scale: environment.map_or(0.0, |e| e.scale),
-            },
+            environment: areas.map,
             low: low.to_array(),
             high: high.to_array(),
             paths: settings.paths() * settings.candidates,
@@ -266,8 +236,8 @@ impl Igi {
             diffuse_only: (!settings.specular).into(),
             seed: graph.seed,
             samples: settings.direct_samples,
-            tree: table.tree.into(),
-            sky: sky.into(),
+            tree: areas.tree.into(),
+            sky: areas.sky.into(),
             slots: consts::TEXTURE_SLOTS,
             two: 2,
         };
@@ -277,13 +247,13 @@ impl Igi {
             block,
             rays,
             hidden_by,
-            environment: graph.import_image(&self.environment),
-            environment_edges: graph.import_buffer(&self.environment_edges),
-            light_columns: graph.buffer_from("igi.light-columns", &table.columns),
-            light_targets: graph.buffer_from("igi.light-targets", &table.targets),
-            instance_lights: graph.buffer_from("igi.instance-lights", &table.instances),
-            light_nodes: graph.buffer_from("igi.light-nodes", &table.nodes),
-            direct_rays: lights + (u32::from(table.tree) + u32::from(sky)) * settings.direct_samples,
+            environment: areas.environment,
+            environment_edges: areas.environment_edges,
+            light_columns: areas.light_columns,
+            light_targets: areas.light_targets,
+            instance_lights: areas.instance_lights,
+            light_nodes: areas.light_nodes,
+            direct_rays: lights + (u32::from(areas.tree) + u32::from(areas.sky)) * settings.direct_samples,
             least: settings.bound * diagonal,
             diagonal,
             seed: graph.seed,
@@ -295,10 +265,9 @@ impl Igi {
     /// Shoots the light paths of a frame and returns the virtual lights that they leave.
     fn shoot(&self, graph: &mut Graph, handles: &Handles, shared: &Shared, settings: &Settings) -> Vpls {
         let paths = settings.paths() * settings.candidates;
-        let table = self.lights.as_ref().map(|(_, table)| table);
         let sided =
             |target: &types::LightTarget| self.double_sided.get(target.instance as usize).copied().unwrap_or(false);
-        let emissive = table.filter(|table| table.tree);
+        let emissive = self.areas.table().filter(|table| table.tree);
         let triangles = emissive.map_or((&[][..], &[][..]), |table| (&table.targets[..], &table.nodes[..]));
         let bounds = handles.moment.lit_bounds();
         let sources = starts::sources(&handles.moment.lights, triangles, sided, self.moments, &bounds);

@@ -20,14 +20,17 @@
 //! The dissertation's future work is there too, switched off by default: surfaces beyond the border of the picture, behind others, or
 //! turned away ([`senders`]), full resolution, and numbers of samples that follow the depth ([`Settings::samples_by_depth`]).
 
+mod area;
 mod picture;
 pub mod senders;
 mod settings;
 mod technique;
+mod unseen;
 
+pub use area::{Area, AreaFrame, Surroundings};
 pub use picture::{Picture, PictureSettings, picture};
 pub use settings::{
-    Blur, Downsample, Estimator, LightLaw, Occlude, Patch, Pattern, Preset, Receiver, Resolution, Sender, Settings,
+    AreaLights, Blur, Downsample, Estimator, LightLaw, Occlude, Patch, Pattern, Preset, Receiver, Resolution, Sender, Settings,
     Upsample,
 };
 pub use technique::{Isr, Mode};
@@ -39,7 +42,8 @@ use crate::{
         ambient::Irradiance,
         bilateral, blur,
         compose::{self, Compose},
-        direct, downsample,
+        direct::{self, Direct},
+        downsample,
         gbuffer::GBuffer,
     },
     shaders,
@@ -67,8 +71,8 @@ pub struct Outputs {
 pub struct Inputs {
     pub gbuffer: GBuffer,
     pub lights: direct::Lights,
-    /// Light of the environment; default none.
-    pub ambient: Irradiance,
+    /// Light of the environment and of glowing surfaces; default none.
+    pub surroundings: Surroundings,
     /// Surfaces beside those of the frame that send light ([`senders::draw`]).
     pub senders: Option<senders::Senders>,
 }
@@ -84,13 +88,34 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
     let extent = graph.extent(g.depth);
     let factor = settings.resolution.factor();
 
-    let lit = direct::light(graph, &g, inputs.lights, &settings.direct());
+    let area = inputs.surroundings.area.filter(|_| settings.area_lights == AreaLights::Rays);
+    let direct = Direct { glow: area.is_none(), ..settings.direct() };
+    let lit = direct::light(graph, &g, inputs.lights, &direct);
 
     let aware = settings.downsample == Downsample::DepthAware;
     let coarse = downsample::gbuffer(graph, &g, factor, aware);
     let sender = match settings.sender {
         Sender::Albedo => coarse.albedo,
         Sender::Lit => downsample::color(graph, lit.diffuse, &g, factor, aware),
+    };
+
+    let none = Irradiance::default();
+    let ambient = if settings.environment { &inputs.surroundings.ambient } else { &none }.upload(graph);
+    let filter = |graph: &mut Graph, gathered: Image| match settings.blur {
+        Blur::None => gathered,
+        _ if settings.blur_radius == 0 => gathered,
+        Blur::Gaussian => blur::gaussian(graph, gathered, settings.blur_radius),
+        Blur::Bilateral => {
+            bilateral::blur(graph, gathered, &coarse, view, factor, settings.blur_radius, settings.blur_range)
+        }
+    };
+    let by_rays = area.map(|area| {
+        let found = area.light(graph, &g, &coarse, ambient, settings);
+        found.map(|image| filter(graph, image))
+    });
+    let sender = match by_rays.filter(|_| settings.sender == Sender::Lit && settings.indirect) {
+        Some(light) => AreaFrame::sent(graph, sender, &coarse, light, ambient),
+        None => sender,
     };
 
     let mean_depth = if settings.samples_by_depth {
@@ -107,7 +132,8 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
     };
     let behind = inputs.senders.map(|s| s.behind).unwrap_or_default();
     let gather = |graph: &mut Graph, sender: Image| {
-        let gathered = graph.image("isr.gathered", Format::RGBA16F, graph.extent(coarse.depth));
+        let [gathered, seen] =
+            ["isr.gathered", "isr.seen"].map(|name| graph.image(name, Format::RGBA16F, graph.extent(coarse.depth)));
         let longer = extent.width.max(extent.height) as f32;
         let reach = if settings.reach > 0.0 { settings.reach } else { 0.75 * longer };
         let filtered = if settings.prefilter {
@@ -150,6 +176,7 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
             normal: coarse.normal,
             depth: coarse.depth,
             gathered,
+            seen,
             filtered,
             mean_depth,
             peeled: behind.map(|layer| layer.unwrap_or(coarse.depth)),
@@ -157,25 +184,31 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
             spec,
         };
         graph.compute(args, graph.extent(gathered));
-        gathered
-    };
-    let filter = |graph: &mut Graph, gathered: Image| match settings.blur {
-        Blur::None => gathered,
-        _ if settings.blur_radius == 0 => gathered,
-        Blur::Gaussian => blur::gaussian(graph, gathered, settings.blur_radius),
-        Blur::Bilateral => {
-            bilateral::blur(graph, gathered, &coarse, view, factor, settings.blur_radius, settings.blur_range)
-        }
+        (gathered, seen)
     };
 
     let first = inputs.senders.filter(|_| settings.indirect);
     let mut senders = first;
-    let mut gathered = gather(graph, sender);
+    let unseen = settings.unseen > 0.0 && first.is_none() && settings.indirect && settings.sender == Sender::Lit;
+    let unseen = by_rays.filter(|_| unseen).map(|light| unseen::Unseen::new(graph, sender, &coarse, light));
+    // Filtered, with the light of surfaces that the picture does not show.
+    let filled = |graph: &mut Graph, gathered: Image, seen: Image, scatterings: u32| {
+        let gathered = filter(graph, gathered);
+        match unseen {
+            Some(unseen) => {
+                let seen = filter(graph, seen);
+                unseen.filled(graph, gathered, seen, settings.unseen, scatterings)
+            }
+            None => gathered,
+        }
+    };
+    let (mut gathered, mut seen) = gather(graph, sender);
     if let Some(senders) = senders {
         gathered = senders.gather(graph, &g, &coarse, gathered, settings);
     }
-    let mut blurred = filter(graph, gathered);
-    for _ in 1..settings.bounces {
+    let scatterings = |bounce: u32| if bounce == settings.bounces { bounce } else { 0 };
+    let mut blurred = filled(graph, gathered, seen, scatterings(1));
+    for bounce in 2..=settings.bounces {
         let next = graph.image("isr.sender", Format::RGBA16F, graph.extent(coarse.depth));
         let args = shaders::isr::bounce::Args {
             sender,
@@ -185,16 +218,14 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
             spec: shaders::isr::bounce::Spec::default(),
         };
         graph.compute(args, graph.extent(next));
-        gathered = gather(graph, next);
+        (gathered, seen) = gather(graph, next);
         senders = senders.zip(first).map(|(senders, first)| senders.bounce(graph, &first, settings));
         if let Some(senders) = senders {
             gathered = senders.gather(graph, &g, &coarse, gathered, settings);
         }
-        blurred = filter(graph, gathered);
+        blurred = filled(graph, gathered, seen, scatterings(bounce));
     }
 
-    let none = Irradiance::default();
-    let ambient = if settings.environment { &inputs.ambient } else { &none }.upload(graph);
     let choices = Compose {
         factor,
         plane: settings.upsample == Upsample::Plane,
@@ -203,6 +234,7 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
         occlude_ambient: settings.occlude == Occlude::Ambient,
         k_ssao: settings.k_ssao,
         k_isr: settings.k_isr,
+        area: by_rays.map(|light| [light.sky, light.lamps]),
     };
     let composed = compose::sum(graph, &g, ambient, lit.direct, blurred, &coarse, &choices);
     Ok(Outputs {

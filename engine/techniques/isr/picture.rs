@@ -1,12 +1,11 @@
 //! Everything from a scene on the device to the final picture.
 
 use super::super::allowed::radiance;
-use super::{Inputs, Outputs, Settings, frame, senders};
+use super::{Inputs, Outputs, Settings, Surroundings, frame, senders};
 use crate::{
     Result,
     graph::Graph,
     passes::{
-        ambient::Irradiance,
         direct::Lights,
         gbuffer::{self, GBuffer, Normals},
         shadow::{self, ShadowMaps},
@@ -56,7 +55,8 @@ pub struct Picture {
     pub outputs: Outputs,
 }
 
-/// Declares G-buffer, shadow maps, [`frame`] and sky. `ambient`: [`Irradiance::of`] the scene's environment, computed once.
+/// Declares G-buffer, shadow maps, [`frame`] and sky. `surroundings`: a scene or the irradiance of its environment, without rays; or with rays by
+/// [`super::Area::frame`].
 ///
 /// # Errors
 /// `Usage` if a setting is out of its range.
@@ -64,17 +64,18 @@ pub fn picture(
     graph: &mut Graph,
     scene: &Handles,
     view: &View,
-    ambient: Irradiance,
+    surroundings: impl Into<Surroundings>,
     settings: &PictureSettings,
 ) -> Result<Picture> {
     settings.validate()?;
+    let surroundings = surroundings.into();
     let gbuffer = gbuffer::draw(graph, scene, view, &settings.gbuffer);
     let shadows = shadow::draw(graph, scene, view, &settings.shadow);
     let lights = Lights::from(&shadows);
     let senders = graph.scope("isr.senders", |graph| {
-        senders::draw(graph, scene, view, lights, &settings.gbuffer, &settings.shadow, &settings.isr)
+        senders::draw(graph, scene, view, (lights, &surroundings), &settings.gbuffer, &settings.shadow, &settings.isr)
     });
-    let inputs = Inputs { gbuffer, lights, ambient, senders };
+    let inputs = Inputs { gbuffer, lights, surroundings, senders };
     let outputs = graph.scope("isr", |graph| frame(graph, &inputs, &settings.isr))?;
     skybox::draw(graph, scene, &gbuffer, settings.background.into(), outputs.total);
     Ok(Picture { gbuffer, shadows, outputs })

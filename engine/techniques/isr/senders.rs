@@ -7,7 +7,7 @@
 //!
 //! For further bounces ([`Settings::bounces`]) these views gather too: each from all of them and from a small picture of the frame.
 
-use super::{Sender, Settings};
+use super::{AreaLights, Sender, Settings, Surroundings};
 use crate::{
     graph::{Buffer, Extent, Format, Graph, Image, ImageDesc, Uniform},
     passes::{
@@ -218,7 +218,7 @@ pub fn draw(
     graph: &mut Graph,
     scene: &Handles,
     view: &View,
-    frame_lights: Lights,
+    (frame_lights, surroundings): (Lights, &Surroundings),
     gbuffers: &gbuffer::Settings,
     shadows: &shadow::Settings,
     settings: &Settings,
@@ -229,11 +229,19 @@ pub fn draw(
     let lights = lights(graph, scene, frame_lights, shadows);
     let extent = Extent::from(view.extent).div_ceil(settings.sender_scale);
     let size = [extent.width, extent.height];
+    let area = surroundings.area.filter(|_| settings.area_lights == AreaLights::Rays);
+    let ambient = area.map(|_| surroundings.ambient.upload(graph));
     let lit = |graph: &mut Graph, gbuffer: GBuffer, view: &View, hole: f32| {
-        let direct = Direct { specular: false, ..settings.direct() };
+        let direct = Direct { specular: false, glow: area.is_none(), ..settings.direct() };
         let color = match settings.sender {
             Sender::Albedo => gbuffer.albedo,
-            Sender::Lit => direct::light(graph, &gbuffer, lights, &direct).diffuse,
+            Sender::Lit => {
+                let lit = direct::light(graph, &gbuffer, lights, &direct).diffuse;
+                match area.zip(ambient) {
+                    Some((area, ambient)) => area.added(graph, lit, &gbuffer, ambient, settings),
+                    None => lit,
+                }
+            }
         };
         SenderView { gbuffer, color, uniform: view.uniform(), hole }
     };

@@ -123,7 +123,7 @@ pub enum Receiver {
 pub enum Occlude {
     /// Direct light, as in [ISR 29].
     Direct,
-    /// Light of the environment only: direct light has its own shadows.
+    /// Light of the environment only, where it comes without rays: direct light and rays have their own shadows.
     Ambient,
 }
 
@@ -135,6 +135,16 @@ pub enum LightLaw {
     Paper,
     /// W/sr over squared distance, ρ/π.
     Physical,
+}
+
+/// The way in which light of the sky and of glowing surfaces reaches the surfaces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum AreaLights {
+    /// The sky lights every surface, times accessibility. Glowing surfaces send light if the picture shows them.
+    Image,
+    /// Rays find the part of the sky and of the glowing surfaces that a surface sees, also of those outside of the picture. Surfaces send this light on.
+    Rays,
 }
 
 /// All choices. `Default` is physically lit; [`Settings::paper`] is the dissertation's.
@@ -250,8 +260,18 @@ pub struct Settings {
     /// l_pow of the brightest light.
     #[schemars(range(min = 0, max = 1e9), extend("x-needs" = {"light_law": {"const": "paper"}}))]
     pub light_power: f32,
-    /// Light of the environment, times accessibility: on matt surfaces, and blurred on metals. The dissertation has none.
+    /// Light of the environment: on matt surfaces, and blurred on metals. The dissertation has none.
     pub environment: bool,
+    /// The way in which light of the sky and of glowing surfaces reaches the surfaces.
+    pub area_lights: AreaLights,
+    /// Rays of each texel of the coarse buffers to the sky, and as many to glowing surfaces.
+    #[schemars(range(min = 2, max = 64), extend("x-needs" = {"area_lights": {"const": "rays"}}))]
+    pub area_rays: u32,
+    /// Brightness of the surfaces that the picture does not show, relative to those that it shows to the receiver. They are where rays meet surfaces. Light
+    /// that is scattered more often than `bounces` times is estimated as in a closed room, by the same share. 0: they are dark. Only in scenes
+    /// with a sky or glowing surfaces, and without `border`, `layers` and `cameras`, which look for these surfaces.
+    #[schemars(range(min = 0, max = 1), extend("x-needs" = {"area_lights": {"const": "rays"}}))]
+    pub unseen: f32,
     /// Direct light is reflected by GGX facets over the matt base; otherwise by Lambert's law alone.
     pub specular: bool,
 }
@@ -297,6 +317,9 @@ impl Default for Settings {
             light_radius: 0.0,
             light_power: 1.0,
             environment: true,
+            area_lights: AreaLights::Rays,
+            area_rays: 4,
+            unseen: 0.75,
             specular: true,
         }
     }
@@ -376,6 +399,7 @@ impl Settings {
             occlude: Occlude::Direct,
             light_law: LightLaw::Paper,
             environment: false,
+            area_lights: AreaLights::Image,
             specular: false,
             ..Self::default()
         }

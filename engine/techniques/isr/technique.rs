@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 
-use super::{PictureSettings, picture};
+use super::{Area, AreaLights, PictureSettings, Surroundings, picture};
 use crate::{
     Result,
     graph::Graph,
@@ -62,9 +62,10 @@ impl Settings for PictureSettings {
 }
 
 /// Image-space radiosity, prepared for a scene.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Isr {
     ambient: Irradiance,
+    area: Option<Area>,
 }
 
 impl Technique for Isr {
@@ -79,12 +80,18 @@ impl Technique for Isr {
         super::Settings::description()
     }
 
-    fn prepared_by(_: &PictureSettings) -> PictureSettings {
-        PictureSettings::default()
+    fn prepared_by(settings: &PictureSettings) -> PictureSettings {
+        let isr = super::Settings { area_lights: settings.isr.area_lights, ..Default::default() };
+        PictureSettings { isr, ..PictureSettings::default() }
     }
 
-    fn ready(making: Making<'_, Infallible>, _: &PictureSettings) -> Result<Self> {
-        Ok(Self { ambient: making.scene.into() })
+    fn ready(making: Making<'_, Infallible>, settings: &PictureSettings) -> Result<Self> {
+        let Making { gpu, scene, resident, .. } = making;
+        let area = match settings.isr.area_lights {
+            AreaLights::Image => None,
+            AreaLights::Rays => Area::new(gpu, scene, resident)?,
+        };
+        Ok(Self { ambient: scene.into(), area })
     }
 
     fn frame(&mut self, graph: &mut Graph, moment: &Moment<'_, Mode>, settings: &PictureSettings) -> Result<Picture> {
@@ -96,7 +103,10 @@ impl Technique for Isr {
             skybox::draw(graph, handles, &gbuffer, settings.background.into(), lit.direct);
             (Picture::new(lit.direct), gbuffer, shadows)
         } else {
-            let made = picture(graph, handles, view, self.ambient.clone(), settings)?;
+            let area = self.area.as_mut().filter(|_| settings.isr.area_lights == AreaLights::Rays);
+            let area = area.map(|area| area.frame(graph, moment.scene, moment.pose, handles));
+            let surroundings = Surroundings { ambient: self.ambient.clone(), area };
+            let made = picture(graph, handles, view, surroundings, settings)?;
             let out = made.outputs;
             let shown = match moment.shot.mode {
                 Mode::Indirect => Picture::new(out.indirect),

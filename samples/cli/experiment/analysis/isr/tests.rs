@@ -1,4 +1,4 @@
-use lucerna::techniques::isr::{PictureSettings, Preset, Settings};
+use lucerna::techniques::isr::{AreaLights, PictureSettings, Preset, Settings};
 use lucerna_scenes as builtin;
 
 use super::{
@@ -34,7 +34,8 @@ fn the_presets_of_the_experiment_are_those_of_the_program() {
         let method = experiment.methods.iter().find(|method| method.name == name).unwrap();
         let settings = kinds::find("isr").unwrap().effective(method, &Default::default()).unwrap();
         let settings: PictureSettings = serde_json::from_value(settings).unwrap();
-        assert_eq!(settings.isr, Settings { specular: false, ..preset.settings() }, "{name}");
+        let of_the_image = Settings { specular: false, area_lights: AreaLights::Image, ..preset.settings() };
+        assert_eq!(settings.isr, of_the_image, "{name}");
     }
 }
 
