@@ -22,7 +22,7 @@ use super::{Job, MOST_SAMPLES, Rendered, Times, Warm, on_device, read};
 use crate::{
     config,
     experiment::file::Changes,
-    framing::DefaultLight,
+    default_light::DefaultLight,
     lights::{self, Point},
 };
 
