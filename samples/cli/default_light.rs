@@ -1,10 +1,7 @@
 //! Adds lights to dark scenes, so that every file gives a picture. A note tells the user what was added.
 
 use glam::{Mat4, Quat, Vec3};
-use lucerna::scene::{
-    Environment, Light, LightKind, Pose, Scene, View,
-    bvh::Bvh,
-};
+use lucerna::scene::{Environment, Light, LightKind, Pose, Scene, View, bvh::Bvh};
 use serde::{Deserialize, Serialize};
 
 use crate::{

@@ -50,8 +50,26 @@ pub struct Survey<'a> {
     max: Vec3,
     middle: Vec3,
     floor: Vec3,
-    /// For each of [`PLACES`], the ways to the walls in all directions, metres; `None` where no wall was hit.
-    ways: Vec<Vec<Option<f32>>>,
+    /// For each of [`PLACES`], what is in all directions.
+    ways: Vec<Vec<Way>>,
+}
+
+/// What a ray hits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Way {
+    /// The front of a surface, at this distance, metres.
+    Wall(f32),
+    /// The back of a surface: the ray begins inside a solid object, or behind a wall.
+    Back,
+    /// Nothing.
+    Open,
+}
+
+impl Way {
+    /// Distance to a wall, metres.
+    fn wall(self) -> Option<f32> {
+        if let Self::Wall(distance) = self { Some(distance) } else { None }
+    }
 }
 
 impl<'a> Survey<'a> {
@@ -64,17 +82,21 @@ impl<'a> Survey<'a> {
         survey.floor -= Vec3::Y * survey.inside(middle, Vec3::NEG_Y)?;
         let around = |[x, z]: [f32; 2]| {
             let place = middle + Vec3::new(x * half.x, 0.0, z * half.z);
-            directions().map(|direction| survey.inside(place, direction)).collect()
+            directions().map(|direction| survey.way(place, direction)).collect()
         };
         survey.ways = PLACES.into_iter().map(around).collect();
         Some(survey)
     }
 
-    /// Distance to the nearest surface, metres, if the ray hits its front. From inside a solid object rays hit backs only.
-    fn inside(&self, from: Vec3, direction: Vec3) -> Option<f32> {
-        let hit = self.bvh.closest(&Ray::new(from, direction))?;
+    fn way(&self, from: Vec3, direction: Vec3) -> Way {
+        let Some(hit) = self.bvh.closest(&Ray::new(from, direction)) else { return Way::Open };
         let [a, b, c] = self.bvh.triangles()[hit.triangle as usize];
-        ((b - a).cross(c - a).dot(direction) < 0.0).then_some(hit.t)
+        if (b - a).cross(c - a).dot(direction) < 0.0 { Way::Wall(hit.t) } else { Way::Back }
+    }
+
+    /// Distance to the nearest surface, metres, if the ray hits its front.
+    fn inside(&self, from: Vec3, direction: Vec3) -> Option<f32> {
+        self.way(from, direction).wall()
     }
 
     /// An interior: large enough for people, walls around most places with their front towards them, room to move, a floor below.
@@ -86,9 +108,10 @@ impl<'a> Survey<'a> {
             return None;
         }
         let free = FREE * 0.5 * size.x.min(size.z);
-        let is_around = |ways: &&Vec<Option<f32>>| {
-            let walls = ways.iter().flatten().count() as u32;
-            walls >= WALLS && ways.iter().flatten().filter(|&&way| way >= free).count() as u32 >= DIRECTIONS / 4
+        let is_around = |ways: &&Vec<Way>| {
+            let walls: Vec<f32> = ways.iter().filter_map(|way| way.wall()).collect();
+            let long = walls.iter().filter(|&&way| way >= free).count() as u32;
+            walls.len() as u32 >= WALLS && long >= DIRECTIONS / 4
         };
         if self.ways.iter().filter(is_around).count() < AROUND {
             return None;
@@ -97,23 +120,30 @@ impl<'a> Survey<'a> {
         let top = ceiling.map_or(max.y, |ceiling| ceiling.y);
         let length = size.x.max(size.z);
         let height = floor.y + (EYE.0 * (top - floor.y)).min(EYE.1 * length);
-        let (eye, forward) = self.view(Vec3::new(middle.x, height, middle.z))?;
+        let (eye, forward) = self.view(height)?;
         Some(Interior { eye, forward, ceiling, floor, length })
     }
 
-    /// The place of the eye and its direction: at a wall or in a corner, with the longest ways before it.
-    fn view(&self, centre: Vec3) -> Option<(Vec3, Vec3)> {
+    /// The place of the eye at this height and its direction: at a wall or in a corner, with the longest ways before it.
+    fn view(&self, height: f32) -> Option<(Vec3, Vec3)> {
         let size = self.max - self.min;
         let along = if size.x >= size.z { Vec3::X } else { Vec3::NEG_Z };
         let corner = Vec3::new(size.x, 0.0, size.z).normalize_or(Vec3::X);
         let corners = [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]].map(|[x, z]| corner * Vec3::new(x, 1.0, z));
-        let candidates = [along, -along, Vec3::Y.cross(along), -Vec3::Y.cross(along)].into_iter().chain(corners);
-        let views = candidates.filter_map(|forward| {
-            let eye = centre - forward * BACK * self.inside(centre, -forward)?;
-            Some((self.depth(eye, forward), eye, forward))
+        let forwards: Vec<Vec3> =
+            [along, -along, Vec3::Y.cross(along), -Vec3::Y.cross(along)].into_iter().chain(corners).collect();
+        // The middle may be in a piece of furniture at the height of the eye.
+        let views = PLACES.into_iter().flat_map(|[x, z]| {
+            let centre = Vec3::new(self.middle.x + 0.5 * x * size.x, height, self.middle.z + 0.5 * z * size.z);
+            forwards.iter().filter_map(move |&forward| {
+                let eye = centre - forward * BACK * self.inside(centre, -forward)?;
+                Some((self.depth(eye, forward), eye, forward))
+            })
         });
         // The first of equal ones.
-        views.reduce(|best, view| if view.0 > 1.02 * best.0 { view } else { best }).map(|(_, eye, forward)| (eye, forward))
+        views
+            .reduce(|best, view| if view.0 > 1.02 * best.0 { view } else { best })
+            .map(|(_, eye, forward)| (eye, forward))
     }
 
     /// Mean length of the ways before an eye, metres.
@@ -132,14 +162,14 @@ impl<'a> Survey<'a> {
 
     /// The mean of the horizontal directions in which no wall was hit, if they are all on one side.
     fn one_open_side(&self) -> Option<Vec3> {
-        let open = self.ways.iter().flat_map(|ways| directions().zip(ways).filter(|(_, way)| way.is_none()));
+        let open = self.ways.iter().flat_map(|ways| directions().zip(ways).filter(|(_, way)| **way == Way::Open));
         let (sum, count) = open.fold((Vec3::ZERO, 0), |(sum, count), (direction, _)| (sum + direction, count + 1));
         (count > 0 && sum.length() > 0.8 * count as f32).then(|| sum.normalize_or_zero())
     }
 
     /// For a box with one open side (the Cornell box), the horizontal direction out of it.
     pub fn opening(&self) -> Option<Vec3> {
-        let walls = self.ways.first()?.iter().flatten().count() as u32;
+        let walls = self.ways.first()?.iter().filter_map(|way| way.wall()).count() as u32;
         self.one_open_side().filter(|_| walls >= BOX)
     }
 }

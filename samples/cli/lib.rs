@@ -26,6 +26,7 @@ pub mod inspect;
 pub mod interior;
 pub mod last_stage;
 pub mod lights;
+pub mod listed;
 pub mod notes;
 pub mod outputs;
 pub mod pattern;

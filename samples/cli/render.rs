@@ -197,8 +197,14 @@ pub fn again<T: Technique>(asked: &Again<'_>) -> Result<Option<Fresh>> {
     if given.baked.is_none() && T::Baked::NEEDED {
         return Err(Error::input("is missing: the metadata do not name the bake of the picture").at("bake"));
     }
-    let mut run =
-        Run::new(Label::of::<T>(given.mode, &staged.technique), &args, asked.console(), &staged, Some(asked.format), None)?;
+    let mut run = Run::new(
+        Label::of::<T>(given.mode, &staged.technique),
+        &args,
+        asked.console(),
+        &staged,
+        Some(asked.format),
+        None,
+    )?;
     run.name_bake(asked.record.bake.clone());
     run.tell();
     frames::frames(&given, &args, staged, &mut run, asked.interrupt, Instant::now())?;

@@ -59,8 +59,7 @@ impl Subject {
         let union = |list: &[(Part, Aabb)]| list.iter().map(|(_, around)| *around).reduce(Aabb::union);
         let whole = union(&boxes)?;
         let width = |around: &Aabb| (around.max - around.min).x.max((around.max - around.min).z);
-        let standing: Vec<_> =
-            boxes.iter().copied().filter(|(_, b)| b.max.y - b.min.y > FLAT * width(b)).collect();
+        let standing: Vec<_> = boxes.iter().copied().filter(|(_, b)| b.max.y - b.min.y > FLAT * width(b)).collect();
         let narrow = union(&standing).filter(|around| width(around) < NARROW * width(&whole));
         let (list, bounds) = narrow.map_or((boxes, whole), |bounds| (standing, bounds));
         Some(Self { poses, parts: list.into_iter().map(|(part, _)| part).collect(), bounds, whole })

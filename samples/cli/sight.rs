@@ -58,7 +58,8 @@ impl<'a> Sight<'a> {
         let mut sight = Self { scene, bvh, view, points: Vec::new() };
         let [width, height] = RAYS;
         for ray in 0..width * height {
-            let uv = Vec2::new((ray % width) as f32 + 0.5, (ray / width) as f32 + 0.5) / Vec2::from(RAYS.map(|n| n as f32));
+            let uv =
+                Vec2::new((ray % width) as f32 + 0.5, (ray / width) as f32 + 0.5) / Vec2::from(RAYS.map(|n| n as f32));
             sight.points.extend(sight.first(uv));
         }
         sight
@@ -210,7 +211,8 @@ mod tests {
 
     /// A square of side 2 at `place` whose front looks along +Z after the turn, for each material.
     fn squares(list: &[(Vec3, Quat, Material)]) -> Scene {
-        let positions = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec();
+        let positions =
+            [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec();
         let mut scene = Scene::default();
         for (index, (translation, rotation, material)) in list.iter().enumerate() {
             let primitive = Primitive {

@@ -21,6 +21,8 @@ mod daylight_experiment;
 mod daylight_export;
 #[path = "../cli/daylight_pictures.rs"]
 mod daylight_pictures;
+#[path = "../cli/door.rs"]
+mod door;
 #[path = "../cli/experiment.rs"]
 mod experiment;
 #[path = "../cli/export_gltf.rs"]
@@ -29,6 +31,8 @@ mod export_gltf;
 mod export_pov;
 #[path = "../cli/faults.rs"]
 mod faults;
+#[path = "../cli/first_picture.rs"]
+mod first_picture;
 #[path = "../cli/fiv.rs"]
 mod fiv;
 #[path = "../cli/igi.rs"]

@@ -2,13 +2,13 @@
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
 use crate::{
     bake::{self, JoinArgs},
     daylight::{self, DayArgs, DayBakeArgs, DayExportArgs, DayFramesArgs, DayInfoArgs},
     program,
     programs::help,
 };
+use clap::{Parser, Subcommand};
 
 /// Indirect light for every time of day, baked once and lit live.
 #[derive(Parser, Debug)]

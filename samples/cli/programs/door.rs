@@ -7,12 +7,13 @@ use lucerna::{Error, Result};
 use lucerna_scenes as builtin;
 
 use super::TECHNIQUES;
-use crate::config::nearest;
+use crate::{
+    config::nearest,
+    listed::{PICTURES, has_ending},
+};
 
 /// Endings of scene files.
 const SCENES: [&str; 3] = ["gltf", "glb", "obj"];
-/// Endings of pictures.
-const PICTURES: [&str; 6] = ["exr", "hdr", "pfm", "png", "jpg", "jpeg"];
 
 /// The words of a command line as they are meant, program first: with `render` where a scene or an option stands in the place of a command.
 ///
@@ -49,15 +50,21 @@ pub fn meant(program: &Command, mut words: Vec<OsString>) -> Result<Vec<OsString
 }
 
 fn built_in(program: &str, name: &str) -> Error {
-    Error::usage(format!("'{name}' is a built-in scene, and no file")).help(format!("{program} render --builtin {name}"))
+    Error::usage(format!("'{name}' is a built-in scene, and no file"))
+        .help(format!("{program} render --builtin {name}"))
 }
 
 /// Checks the word after `lucerna render`.
 fn technique(word: Option<&str>) -> Result<()> {
-    let Some(word) = word.filter(|word| !word.starts_with('-') && !TECHNIQUES.contains(word) && *word != "help") else { return Ok(()) };
+    let Some(word) = word.filter(|word| !word.starts_with('-') && !TECHNIQUES.contains(word) && *word != "help") else {
+        return Ok(());
+    };
     if word.contains(['.', '/', '\\']) || Path::new(word).exists() {
         return match ending(word, &PICTURES) {
-            true => Err(Error::usage(format!("'{word}' is a picture, not a scene")).help("`lucerna tonemap` develops pictures")),
+            true => {
+                Err(Error::usage(format!("'{word}' is a picture, not a scene"))
+                    .help("`lucerna tonemap` develops pictures"))
+            }
             false => Ok(()),
         };
     }
@@ -66,14 +73,15 @@ fn technique(word: Option<&str>) -> Result<()> {
     }
     // Two letters of a short name that changed places make it unlike itself for `nearest`.
     let swapped = || TECHNIQUES.into_iter().find(|name| strsim::osa_distance(word, name) <= 1);
-    let hint = nearest(word, TECHNIQUES).or_else(swapped).map(|name| format!(" (did you mean '{name}'?)")).unwrap_or_default();
+    let hint =
+        nearest(word, TECHNIQUES).or_else(swapped).map(|name| format!(" (did you mean '{name}'?)")).unwrap_or_default();
     let what = format!("'{word}' is neither a technique{hint} nor a scene file");
-    Err(Error::usage(what).help(format!("Techniques: {}. Scene files end in .gltf, .glb or .obj", TECHNIQUES.join(", "))))
+    Err(Error::usage(what)
+        .help(format!("Techniques: {}. Scene files end in .gltf, .glb or .obj", TECHNIQUES.join(", "))))
 }
 
 fn ending(name: &str, known: &[&str]) -> bool {
-    let ending = Path::new(name).extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase);
-    ending.is_some_and(|ending| known.contains(&ending.as_str()))
+    has_ending(Path::new(name), known)
 }
 
 #[cfg(test)]

@@ -2,13 +2,13 @@
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
 use crate::{
     bake::{self, JoinArgs},
     fiv::{self, EnvironmentArgs, FivArgs, PrecomputeArgs, SteadyArgs},
     program,
     programs::help,
 };
+use clap::{Parser, Subcommand};
 
 /// Soft shadows under an environment from fullsphere irradiance vectors.
 #[derive(Parser, Debug)]

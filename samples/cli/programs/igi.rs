@@ -2,16 +2,16 @@
 
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
-use lucerna::{
-    Result,
-    techniques::igi::{Igi, Mode},
-};
 use crate::{
     args::RenderArgs,
     program,
     programs::help,
     render::{self, Given},
+};
+use clap::{Args, Parser, Subcommand};
+use lucerna::{
+    Result,
+    techniques::igi::{Igi, Mode},
 };
 
 /// Instant global illumination: direct light by shadow rays, indirect light by ray-traced virtual point lights.

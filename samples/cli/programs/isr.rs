@@ -2,6 +2,12 @@
 
 use std::process::ExitCode;
 
+use crate::{
+    args::RenderArgs,
+    program,
+    programs::help,
+    render::{self, Given},
+};
 use clap::{
     Args, Parser, Subcommand,
     builder::{PossibleValuesParser, TypedValueParser},
@@ -9,12 +15,6 @@ use clap::{
 use lucerna::{
     Result,
     techniques::isr::{Isr, Mode, PictureSettings, Preset},
-};
-use crate::{
-    args::RenderArgs,
-    program,
-    programs::help,
-    render::{self, Given},
 };
 
 /// Image-space radiosity: one bounce of indirect light and ambient occlusion from what the camera sees.

@@ -2,9 +2,6 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
-use clap::{Parser, Subcommand};
-use clap_complete::Shell;
-use lucerna::Result;
 use crate::{
     args::TalkArgs,
     bake::{self, BakeCommand, JoinArgs},
@@ -14,7 +11,7 @@ use crate::{
     experiment::command::{self as experiment, ReportArgs, ReproduceArgs},
     export_gltf::{self, ExportGltfArgs},
     export_pov::{self, ExportPovArgs},
-    info, inspect, program,
+    info, inspect, listed, program,
     programs::{help, pages, suited::AnyArgs},
     reference::{self, ReferenceArgs},
     rerun::{self, RerunArgs},
@@ -23,6 +20,9 @@ use crate::{
     tonemap::{self, TonemapArgs},
     views::{self, command::ViewsArgs},
 };
+use clap::{Parser, Subcommand};
+use clap_complete::Shell;
+use lucerna::Result;
 use lucerna_scenes as builtin;
 
 /// Renders scenes, develops, compares and explains pictures, bakes light, runs experiments.
@@ -53,8 +53,9 @@ enum Command {
     },
     /// Say what is in an image and how it was made
     Info {
-        /// .exr, .png, .hdr, .pfm or .jpg
-        image: PathBuf,
+        /// .exr, .png, .hdr, .pfm or .jpg; folders and patterns ('out/*.exr') stand for their images
+        #[arg(required = true, value_name = "IMAGE")]
+        images: Vec<String>,
         #[command(flatten)]
         talk: TalkArgs,
         /// Print one JSON document
@@ -169,8 +170,11 @@ fn run(command: Command, console: Console) -> Result<ExitCode> {
         // Commands that choose their exit code themselves.
         Command::Render(args) => return args.run(),
         Command::Reproduce(args) => return experiment::reproduce(&args, console),
-        Command::Compare(args) => return compare::run(&args, console),
-        Command::Tonemap(args) => return tonemap::run(&args, console),
+        Command::Compare(mut args) => {
+            args.tests = listed::expanded(&args.tests)?;
+            return compare::run(&args, console);
+        }
+        Command::Tonemap(args) => return super::tonemap::run(*args, console),
         Command::Reference(args) => return reference::run(&args, console),
         Command::Rerun(args) => return rerun::run(&args, console),
         Command::Bake(command) => return command.run(),
@@ -183,13 +187,7 @@ fn run(command: Command, console: Console) -> Result<ExitCode> {
                 false => console::print(&summary.text()),
             }?;
         }
-        Command::Info { image, json, .. } => {
-            let layers = info::read(&image)?;
-            match json {
-                true => console::print_json(&info::json(&layers)),
-                false => console::print(&info::text(&image, &layers)),
-            }?;
-        }
+        Command::Info { images, json, .. } => info::run(&images, json)?,
         Command::ExportPov(args) => export_pov::run(&args)?,
         Command::ExportGltf(args) => export_gltf::run(&args)?,
         Command::Devices { require_gpu, json, .. } => {

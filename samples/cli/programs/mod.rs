@@ -49,10 +49,19 @@ mod tests {
             let short = render.render_help().to_string();
             assert!(short.lines().count() <= 60, "{name}: {} lines\n{short}", short.lines().count());
             let long = render.render_long_help().to_string();
-            let places: Vec<usize> = ["\nOutput:", "\nPicture:", "\nTechnique:", "\nSettings:", "\nDevice:", "\nMessages:", "\nGround:", "\nExit codes:"]
-                .iter()
-                .filter_map(|part| long.find(part))
-                .collect();
+            let places: Vec<usize> = [
+                "\nOutput:",
+                "\nPicture:",
+                "\nTechnique:",
+                "\nSettings:",
+                "\nDevice:",
+                "\nMessages:",
+                "\nGround:",
+                "\nExit codes:",
+            ]
+            .iter()
+            .filter_map(|part| long.find(part))
+            .collect();
             assert!(places.len() >= 7 && places.is_sorted(), "{name}: {places:?}\n{long}");
         }
     }

@@ -46,7 +46,8 @@ pub fn man(folder: &Path, overwrite: bool, console: Console) -> Result<()> {
 fn pages(command: &Command, list: &mut Vec<(String, Vec<u8>)>) -> Result<()> {
     let page = clap_mangen::Man::new(command.clone());
     let mut text = Vec::new();
-    page.render(&mut text).map_err(|error| Error::new(ErrorKind::Runtime, "a man page cannot be made").caused_by(error))?;
+    page.render(&mut text)
+        .map_err(|error| Error::new(ErrorKind::Runtime, "a man page cannot be made").caused_by(error))?;
     list.push((page.get_filename(), text));
     command.get_subcommands().filter(|sub| !sub.is_hide_set()).try_for_each(|sub| pages(sub, list))
 }

@@ -2,13 +2,13 @@
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
 use crate::{
     bake::{self, JoinArgs},
     program,
     programs::help,
     prt::{self, PrtArgs, PrtBakeArgs, PrtCheckArgs, PrtInfoArgs},
 };
+use clap::{Parser, Subcommand};
 
 /// Precomputed radiance transfer for lights that move inside a room.
 #[derive(Parser, Debug)]

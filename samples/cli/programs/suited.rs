@@ -115,7 +115,10 @@ fn chosen(common: RenderArgs) -> Result<ExitCode> {
         Suited::Igi => Igi::NAME,
         Suited::Fiv => Fiv::NAME,
     };
-    common.talk.console().info(&format!("technique: {name}, because {why} (`lucerna render isr|igi|fiv SCENE` chooses another)"));
+    common
+        .talk
+        .console()
+        .info(&format!("technique: {name}, because {why} (`lucerna render isr|igi|fiv SCENE` chooses another)"));
     match technique {
         Suited::Isr => render::render_on(Some(stage), &common, &Given::<Isr>::by(&common, Mode::ALL[0])?),
         Suited::Igi => render::render_on(Some(stage), &common, &Given::<Igi>::by(&common, Mode::ALL[0])?),

@@ -3,8 +3,11 @@
 use std::process::ExitCode;
 
 use clap::Parser;
+use lucerna::Result;
+
 use crate::{
-    program,
+    console::Console,
+    listed, program,
     programs::help,
     tonemap::{self, TonemapArgs},
 };
@@ -21,5 +24,14 @@ pub struct Arguments {
 pub fn main() -> ExitCode {
     let Arguments { tonemap } = help::parse::<Arguments>();
     let console = tonemap.talk.console();
-    program::run(console, || tonemap::run(&tonemap, console))
+    program::run(console, || run(tonemap, console))
+}
+
+/// Develops pictures. Folders and patterns stand for their pictures.
+///
+/// # Errors
+/// Any error of the run. Its kind decides the exit code.
+pub fn run(mut args: TonemapArgs, console: Console) -> Result<ExitCode> {
+    args.inputs = listed::expanded(&args.inputs)?;
+    tonemap::run(&args, console)
 }

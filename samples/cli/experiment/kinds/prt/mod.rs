@@ -21,8 +21,8 @@ use self::cut::Cut;
 use super::{Job, MOST_SAMPLES, Rendered, Times, Warm, on_device, read};
 use crate::{
     config,
-    experiment::file::Changes,
     default_light::DefaultLight,
+    experiment::file::Changes,
     lights::{self, Point},
 };
 
