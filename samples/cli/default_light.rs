@@ -23,7 +23,8 @@ const SKY: [Vec3; 3] = [Vec3::new(0.24, 0.32, 0.44), Vec3::new(0.34, 0.34, 0.34)
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DefaultLight {
-    /// If the scene has no light, no environment, and no emissive surface without a texture
+    /// If the scene has no light and no environment, and its emissive surfaces (without textures) do not light the picture; a picture that would be black
+    /// gets a light, too, and is made again
     #[default]
     Auto,
     Always,

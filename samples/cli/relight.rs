@@ -19,6 +19,8 @@ use crate::{
 
 /// Brightness from which a pixel can be told from black on a screen, linear.
 const VISIBLE: f32 = 0.02;
+/// Highest exposure at which a picture is judged, EV. At higher ones light that leaks through shadow maps would count.
+const MOST_EV: f32 = 10.0;
 /// A picture is black if it shows less than this share of its surfaces.
 const SHOWN: f32 = 0.1;
 /// A picture with this share of visible pixels is not black, however much of it shows surfaces.
@@ -49,7 +51,7 @@ pub fn dark(picture: &Layers, stage: &Stage, pose: &Pose, view: &View) -> Option
 /// Share of the pixels that can be told from black, with the exposure that suits the picture.
 fn shown(picture: &Layers) -> f32 {
     let Some(pixels) = picture.main().and_then(|layer| layer.rgb_pixels()) else { return 1.0 };
-    let least = VISIBLE / (exposure::fitting(picture) as f32).exp2();
+    let least = VISIBLE / (exposure::fitting(picture) as f32).min(MOST_EV).exp2();
     let visible = pixels.iter().filter(|[r, g, b]| r.max(*g).max(*b) >= least).count();
     visible as f32 / pixels.len().max(1) as f32
 }
@@ -138,7 +140,7 @@ mod tests {
         };
         assert_eq!((of(0, 1.0), of(3, 1.0), of(100, 0.5)), (0.0, 0.03, 1.0));
         // The exposure is chosen by what is lit, however weak it is.
-        assert_eq!((of(40, 1e-6), of(40, 1e6)), (0.4, 0.4));
+        assert_eq!((of(40, 1e-4), of(40, 1e6), of(100, 1e-6)), (0.4, 0.4, 0.0));
         assert_eq!(shown(&Layers::new(1, 1)), 1.0);
     }
 }

@@ -195,6 +195,9 @@ impl<'a> Run<'a> {
             "{}: {triangles} triangles, {materials} materials, {lights} lights, camera '{}'",
             scene.name, self.stage.placed.name
         ));
+        if triangles == 0 {
+            self.console.info("note: meshes: the scene has no triangles, so the picture shows no surfaces");
+        }
         self.stage.notes().iter().for_each(|note| self.tell_note(note));
     }
 

@@ -250,7 +250,7 @@ mod tests {
         assert!((coverage - 4.0 / (height * height * 4.0 / 3.0)).abs() < 0.03, "{coverage}");
         // The back of a surface with one side is not drawn.
         let behind = squares(&[(Vec3::ZERO, Quat::from_rotation_y(3.0), Material::diffuse("wall", Vec3::ONE))]);
-        assert_eq!(with_sight(&behind, Vec3::Z * 4.0, Sight::coverage), 0.0);
+        assert_eq!(with_sight(&behind, Vec3::Z * 4.0, |sight| sight.coverage()), 0.0);
     }
 
     #[test]
@@ -261,7 +261,7 @@ mod tests {
         // A lamp of side 2 that shines on a wall 2 m behind it, both seen from its front or its back.
         for (turn, lit) in [(to_wall, true), (Quat::IDENTITY, false)] {
             let scene = squares(&[(Vec3::X * 0.5, Quat::IDENTITY, wall()), (Vec3::new(-0.5, 0.0, 2.0), turn, lamp())]);
-            assert_eq!(with_sight(&scene, Vec3::Z * 5.0, Sight::is_lit_by_surfaces), lit);
+            assert_eq!(with_sight(&scene, Vec3::Z * 5.0, |sight| sight.is_lit_by_surfaces()), lit);
         }
         // Irradiance in the middle of a wall that faces a small lamp: radiance · area / distance².
         let scene = squares(&[(Vec3::ZERO, Quat::IDENTITY, wall()), (Vec3::Z * 40.0, to_wall, lamp())]);
@@ -272,8 +272,8 @@ mod tests {
         });
         // A picture that shows only lamps needs no other light; a picture without surfaces is not lit by any.
         let glow = squares(&[(Vec3::ZERO, Quat::IDENTITY, lamp())]);
-        assert!(with_sight(&glow, Vec3::Z * 2.0, Sight::is_lit_by_surfaces));
-        assert!(!with_sight(&glow, Vec3::Z * -2.0, Sight::is_lit_by_surfaces));
+        assert!(with_sight(&glow, Vec3::Z * 2.0, |sight| sight.is_lit_by_surfaces()));
+        assert!(!with_sight(&glow, Vec3::Z * -2.0, |sight| sight.is_lit_by_surfaces()));
     }
 
     #[test]

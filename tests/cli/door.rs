@@ -71,7 +71,7 @@ fn several_pictures_are_told_at_once() {
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     for (name, value) in [("a.pfm", 0.25), ("b.pfm", 0.5), ("c.exr", 0.5)] {
         let layers = lucerna::image::Layers::rgb(2, 2, vec![value; 12]);
-        lucerna::image::write(path(name).as_ref(), &layers, &Default::default()).unwrap();
+        lucerna::image::write(std::path::Path::new(&path(name)), &layers, &Default::default()).unwrap();
     }
     let list = lucerna(["info", "--json", &path("*.pfm")]).expect(0, &[]).json();
     assert_eq!((list.as_array().unwrap().len(), list[1]["info"]["width"].as_u64()), (2, Some(2)));

@@ -2,6 +2,11 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
+use clap::{Parser, Subcommand};
+use clap_complete::Shell;
+use lucerna::Result;
+use lucerna_scenes as builtin;
+
 use crate::{
     args::TalkArgs,
     bake::{self, BakeCommand, JoinArgs},
@@ -17,13 +22,9 @@ use crate::{
     rerun::{self, RerunArgs},
     settings_list,
     source::SceneArgs,
-    tonemap::{self, TonemapArgs},
+    tonemap::TonemapArgs,
     views::{self, command::ViewsArgs},
 };
-use clap::{Parser, Subcommand};
-use clap_complete::Shell;
-use lucerna::Result;
-use lucerna_scenes as builtin;
 
 /// Renders scenes, develops, compares and explains pictures, bakes light, runs experiments.
 ///
