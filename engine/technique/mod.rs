@@ -158,6 +158,8 @@ pub trait Technique: Sized {
     const UNITS: &'static str = "units";
     /// The technique brings its own light, so an exposure that suits the scene's lights does not suit its pictures.
     const OWN_LIGHT: bool = false;
+    /// The scene's lights light its pictures, not the environment alone.
+    const LAMPS: bool = true;
 
     type Settings: Settings;
     type Mode: Mode;

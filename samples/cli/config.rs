@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use lucerna::{Error, ErrorKind, Result, image};
+use lucerna::{Error, ErrorKind, Result, image, settings::Description, techniques::descriptions};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::Value;
 
@@ -217,8 +217,20 @@ fn unknown(tree: &Value, path: &[String]) -> String {
     let mut keys = Vec::new();
     leaves(tree, &mut String::new(), &mut keys);
     let asked = path.join(".");
+    let (own, others): (Vec<_>, Vec<_>) = descriptions().into_iter().partition(|(name, _)| tree.get(*name).is_some());
+    // The settings of a technique are in a group of its name.
+    let of = own.first().map(|(name, _)| format!(" of {name}")).unwrap_or_default();
     let hint = nearest(&asked, keys.iter().map(String::as_str)).map(|k| format!(" (did you mean '{k}'?)"));
-    format!("unknown setting '{asked}'{}; allowed: {}", hint.unwrap_or_default(), keys.join(", "))
+    let has = |(name, description): &(&'static str, &Description)| {
+        let key = asked.strip_prefix(&format!("{name}.")).unwrap_or(&asked);
+        description.key(key).is_some().then_some(*name)
+    };
+    let elsewhere: Vec<&str> = others.iter().filter_map(has).collect();
+    let elsewhere = match &elsewhere[..] {
+        [] => String::new(),
+        names => format!("; it is a setting of {}", names.join(" and ")),
+    };
+    format!("unknown setting '{asked}'{of}{}{elsewhere}; allowed: {}", hint.unwrap_or_default(), keys.join(", "))
 }
 
 fn leaves(tree: &Value, prefix: &mut String, keys: &mut Vec<String>) {

@@ -47,7 +47,7 @@ fn ready<T: Technique>(
     }
 }
 
-/// Renders the frames of a run.
+/// Renders the frames of a run. A watched run ([`Run::watched`]) whose first frame would be black ends before it writes anything.
 ///
 /// # Errors
 /// Any error of the run.
@@ -99,6 +99,9 @@ pub fn frames<T: Technique>(
             break;
         }
     }
+    if run.dark.is_some() {
+        return Ok(());
+    }
     run.finish(&work.gpu)
 }
 
@@ -128,7 +131,7 @@ struct Rendered {
     view: View,
 }
 
-// In all functions `None` means: the user has requested a stop, and there is no whole picture.
+// In all functions `None` means: the user has requested a stop, and there is no whole picture; or the picture would be black.
 impl<T: Technique> Work<'_, T> {
     /// Time since the frame before, for the adaptation of the tone mapping, seconds.
     fn step(&self) -> f32 {
@@ -223,6 +226,9 @@ impl<T: Technique> Work<'_, T> {
         progress: &mut Frames,
         runs: impl FnOnce(f64) -> Vec<(f64, Report)>,
     ) -> Result<Option<()>> {
+        if run.is_dark(&layers, &of.pose, &view) {
+            return Ok(None);
+        }
         run.expose(&layers);
         layers.metadata = run.metadata(&self.gpu, &view, of.frame)?;
         let milliseconds = begun.elapsed().as_secs_f64() * 1e3;

@@ -1,50 +1,90 @@
-//! Adds a camera and lights to scenes without them, so that every file gives a picture. A note tells the user what was added.
+//! Adds a camera to scenes without one, so that every file gives a picture. A note tells the user what was added.
 
-use glam::{Mat4, Quat, Vec3};
-use lucerna::scene::{
-    Aabb, Camera, Environment, Light, LightKind, Material, Node, Note, NoteKind, Projection, Scene, Transform,
-};
-use serde::{Deserialize, Serialize};
+use glam::{Mat4, Vec2, Vec3};
+use lucerna::scene::{Aabb, Camera, Node, Note, NoteKind, Pose, Projection, Scene, Transform, bvh::Bvh};
 
 use crate::{
-    interior::{self, Interior},
-    scene_bounds,
+    interior::{Interior, Survey},
+    scene_bounds::Subject,
 };
 
 /// Full vertical angle of view of an added camera, radians.
 const YFOV: f32 = 45.0 * std::f32::consts::PI / 180.0;
 /// The same in an interior.
 const YFOV_INTERIOR: f32 = 60.0 * std::f32::consts::PI / 180.0;
-/// Factor on the distance from which an added camera just sees the whole scene.
-const MARGIN: f32 = 1.05;
+/// Height and width of the picture, over those of the part that shows the subject.
+const MARGIN: f32 = 1.08;
 /// Direction from the middle of the scene to an added camera: to the right, above, in front.
 const VIEW_FROM: Vec3 = Vec3::new(0.55, 0.4, 1.0);
-/// Irradiance of an added sun on a plane that faces it, W/m². With the added sky, a white wall that faces the sun stays below radiance 1.
-const SUN: f32 = 2.0;
-/// Height of an added lamp, as share of the height of the interior. On the floor its irradiance is that of the added sun.
-const LAMP: f32 = 0.8;
-/// Direction towards an added sun.
-const SUN_FROM: Vec3 = Vec3::new(0.5, 1.0, 0.6);
-/// Radiance of an added sky, W/(sr·m²): above, at the horizon, below.
-const SKY: [Vec3; 3] = [Vec3::new(0.24, 0.32, 0.44), Vec3::new(0.34, 0.34, 0.34), Vec3::new(0.12, 0.11, 0.09)];
+/// The same for flat ground, which shows too little of itself from there.
+const VIEW_GROUND: Vec3 = Vec3::new(0.5, 0.9, 0.9);
+/// Share of [`VIEW_FROM`] in the direction from which a panel is seen; the rest is its normal.
+const ASIDE: f32 = 0.35;
+/// Steps in which aim and distance of a camera are found.
+const TURNS: usize = 16;
+/// A subject is flat if its smallest size is below this share of the next one.
+const FLAT: f32 = 0.12;
+/// A subject has a front if the vector sum of its areas has this share of their sum; in closed bodies it is zero.
+const FRONT: f32 = 0.25;
 
 /// Adds a camera that sees the whole scene, if the scene has no camera.
 pub fn add_missing_camera(scene: &mut Scene, aspect: f32) {
     if scene.nodes.iter().any(|node| node.camera.is_some()) {
         return;
     }
-    let (name, text, (world_from_view, projection)) = match interior::find(scene) {
+    let bvh = Bvh::build(scene, &Pose::playing(scene, 0.0));
+    let survey = Survey::of(&bvh);
+    let room = survey.as_ref().and_then(Survey::interior);
+    let (name, text, (world_from_view, projection)) = match room {
         Some(interior) => ("inside", "a camera was added inside the room", in_interior(&interior)),
         None => {
-            let bounds =
-                scene_bounds::over_animations(scene).unwrap_or(Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE });
-            let from = interior::opening(scene).unwrap_or(VIEW_FROM);
-            ("fitted", "a camera was added that sees the whole scene", fitted(&bounds, aspect, from))
+            let subject = Subject::of(scene);
+            let opening = survey.and_then(|survey| survey.opening());
+            let from = opening.unwrap_or_else(|| towards_front(&bvh, subject.as_ref()));
+            let text = match &subject {
+                Some(subject) if subject.bounds != subject.whole => {
+                    "a camera was added that sees the whole scene but its wide ground"
+                }
+                _ => "a camera was added that sees the whole scene",
+            };
+            ("fitted", text, fitted(scene, subject.as_ref(), aspect, from))
         }
     };
     scene.cameras.push(Camera { name: name.into(), projection });
     add_node(scene, "added camera", world_from_view, |node, scene| node.camera = Some(scene.cameras.len() as u32 - 1));
     note(scene, "cameras", &format!("the scene has no camera: {text}"));
+}
+
+/// The direction to a camera that sees the front of the subject.
+fn towards_front(bvh: &Bvh, subject: Option<&Subject>) -> Vec3 {
+    let Some(subject) = subject else { return VIEW_FROM };
+    let (mut sum, mut total) = (Vec3::ZERO, 0.0);
+    for [a, b, c] in bvh.triangles() {
+        let area = (*b - *a).cross(*c - *a);
+        // Ground below the subject tells nothing about its front.
+        let centre = (*a + *b + *c) / 3.0;
+        let inside = (centre - subject.bounds.centre()).abs().cmple(subject.bounds.half() * 1.001 + 1e-6).all();
+        if inside && area.is_finite() {
+            sum += area;
+            total += area.length();
+        }
+    }
+    let front = if total > 0.0 { sum / total } else { Vec3::ZERO };
+    let size = subject.bounds.max - subject.bounds.min;
+    let thin = Vec3::AXES.into_iter().min_by(|a, b| size.dot(*a).total_cmp(&size.dot(*b))).unwrap_or(Vec3::Z);
+    let next = Vec3::AXES.into_iter().filter(|axis| *axis != thin).map(|axis| size.dot(axis)).fold(f32::MAX, f32::min);
+    let flat = size.dot(thin) < FLAT * next;
+    // Things that show the same from both sides are seen from the usual one.
+    let side = if front.dot(thin) < -FRONT { -1.0 } else { 1.0 };
+    match flat {
+        true if thin == Vec3::Y => VIEW_GROUND * Vec3::new(1.0, side, 1.0),
+        true => side * thin + ASIDE * VIEW_FROM,
+        false if front.length() > FRONT => {
+            let sign = |front: f32, from: f32| if front < -FRONT * 0.5 { -from } else { from };
+            Vec3::new(sign(front.x, VIEW_FROM.x), sign(front.y, VIEW_FROM.y), sign(front.z, VIEW_FROM.z))
+        }
+        false => VIEW_FROM,
+    }
 }
 
 /// A camera at one end of an interior, looking along it.
@@ -56,78 +96,8 @@ fn in_interior(room: &Interior) -> (Mat4, Projection) {
     (world, Projection::Perspective { yfov: YFOV_INTERIOR, aspect: None, znear, zfar: Some(room.length * 2.0) })
 }
 
-/// When default lights are added.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum DefaultLight {
-    /// If the scene has no light, no environment, and no emissive surface without a texture
-    #[default]
-    Auto,
-    Always,
-    Never,
-}
-
-/// Note for scenes without other lights. It does not apply to the path tracer.
-pub const EMISSIVE_ALONE: &str = "only emissive surfaces light the scene; with isr only the emissive surfaces in the picture give \
-                                  light (--default-light always adds a sun and a sky, --light adds a lamp)";
-
-/// Adds default lights to a dark scene, or as `choice` demands: a lamp to an interior, else a sun and a sky.
-///
-/// A surface with an emissive texture counts as a display and not as a lamp, because displays are too weak to light a scene.
-pub fn add_missing_light(scene: &mut Scene, choice: DefaultLight) {
-    let lamp = |m: &Material| m.emissive.max_element() > 0.0 && m.emissive_texture.is_none();
-    let lit = scene.environment.is_some() || scene.nodes.iter().any(|node| node.light.is_some());
-    let lamps = scene.materials.iter().any(lamp);
-    if !lit && lamps && choice != DefaultLight::Always {
-        note(scene, "lights", EMISSIVE_ALONE);
-    }
-    if choice == DefaultLight::Never || (choice == DefaultLight::Auto && (lit || lamps)) {
-        return;
-    }
-    if let Some((under, floor)) = interior::find(scene).and_then(|room| Some((room.ceiling?, room.floor))) {
-        // A sun cannot light a closed room, and techniques without shadows for the sky would let it shine through the walls.
-        let height = under.y - floor.y;
-        let lamp = Light {
-            name: "default lamp".into(),
-            kind: LightKind::Point { range: None },
-            color: Vec3::ONE,
-            intensity: SUN * (LAMP * height).powi(2),
-        };
-        add_light(scene, lamp, Mat4::from_translation(floor + Vec3::Y * LAMP * height));
-        note(
-            scene,
-            "lights",
-            "the scene has no light: a lamp was added inside the room (--default-light never adds none)",
-        );
-        return;
-    }
-    let light = Light { name: "default sun".into(), kind: LightKind::Directional, color: Vec3::ONE, intensity: SUN };
-    add_light(scene, light, Mat4::from_quat(Quat::from_rotation_arc(Vec3::Z, SUN_FROM.normalize())));
-    scene.environment.get_or_insert_with(default_sky);
-    note(scene, "lights", "a sun and a sky were added (--default-light never adds none)");
-}
-
-/// Adds a light with the transform `world`.
-pub fn add_light(scene: &mut Scene, light: Light, world: Mat4) {
-    let name = light.name.clone();
-    scene.lights.push(light);
-    add_node(scene, &name, world, |node, scene| node.light = Some(scene.lights.len() as u32 - 1));
-}
-
-/// Bluish above, grey at the horizon, brown below.
-pub fn default_sky() -> Environment {
-    let (width, height) = (8, 64);
-    let [above, horizon, below] = SKY;
-    let pixels = (0..height * width)
-        .map(|i| {
-            let elevation = 1.0 - 2.0 * ((i / width) as f32 + 0.5) / height as f32;
-            horizon.lerp(if elevation > 0.0 { above } else { below }, elevation.abs().sqrt())
-        })
-        .collect();
-    Environment { name: "default sky".into(), width, height, pixels, rotation: 0.0, scale: 1.0 }
-}
-
-fn add_node(scene: &mut Scene, name: &str, world: Mat4, fill: impl FnOnce(&mut Node, &Scene)) {
+/// Adds a node with the transform `world`. `fill` gives it a camera or a light.
+pub fn add_node(scene: &mut Scene, name: &str, world: Mat4, fill: impl FnOnce(&mut Node, &Scene)) {
     let (scale, rotation, translation) = world.to_scale_rotation_translation();
     let local = Transform::Trs { translation, rotation, scale };
     let mut node = Node { name: name.into(), local, ..Node::default() };
@@ -135,86 +105,123 @@ fn add_node(scene: &mut Scene, name: &str, world: Mat4, fill: impl FnOnce(&mut N
     scene.nodes.push(node);
 }
 
-fn note(scene: &mut Scene, place: &str, text: &str) {
+/// Adds a note about something that was added.
+pub fn note(scene: &mut Scene, place: &str, text: &str) {
     scene.notes.push(Note { kind: NoteKind::Approximated, place: place.into(), text: text.into() });
 }
 
-/// A camera in the direction `from` of the middle of `bounds`. The picture shows every corner of `bounds`, with a small margin.
-fn fitted(bounds: &Aabb, aspect: f32, from: Vec3) -> (Mat4, Projection) {
+/// A camera in the direction `from` of the subject. Its picture shows all of the subject, with a small margin, as large as possible.
+fn fitted(scene: &Scene, subject: Option<&Subject>, aspect: f32, from: Vec3) -> (Mat4, Projection) {
+    let unit = Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE };
+    let (bounds, whole) = subject.map_or((unit, unit), |subject| (subject.bounds, subject.whole));
+    let outline = subject.map_or_else(|| unit.corners().to_vec(), |subject| subject.outline(scene));
     let radius = bounds.half().length().max(1e-4);
-    let back = from.normalize();
-    let right = Vec3::Y.cross(back).normalize();
-    let up = back.cross(right);
-    let slope = (YFOV * 0.5).tan();
-    let needed = |corner: Vec3| {
-        let p = corner - bounds.centre();
-        p.dot(back) + (p.dot(right).abs() / (slope * aspect)).max(p.dot(up).abs() / slope)
-    };
-    let distance = bounds.corners().into_iter().map(needed).fold(radius, f32::max) * MARGIN;
-    let position = bounds.centre() + back * distance;
+    let high = (YFOV * 0.5).tan() / MARGIN;
+    let slopes = Vec2::new(high * aspect, high);
+    let from = from.normalize();
+    let front = outline.iter().map(|p| (*p - bounds.centre()).dot(from)).fold(0.0, f32::max) + 0.05 * radius;
+    let mut distance = front + radius / high.min(high * aspect);
+    let mut back = from;
+    // The camera stays on the line from the middle of the subject; its aim and its distance follow what the picture shows.
+    for _ in 0..TURNS {
+        let (low, top) = extent(&outline, bounds.centre() + distance * from, back);
+        let [right, up, _] = axes(back);
+        back = (back - 0.5 * (low.x + top.x) * right - 0.5 * (low.y + top.y) * up).normalize();
+        let (low, top) = extent(&outline, bounds.centre() + distance * from, back);
+        let filled = (low.abs().max(top.abs()) / slopes).max_element();
+        distance = front.max(distance * filled.clamp(0.5, 2.0));
+    }
+    let position = bounds.centre() + distance * from;
+    let [right, up, back] = axes(back);
     let world = Mat4::from_cols(right.extend(0.0), up.extend(0.0), back.extend(0.0), position.extend(1.0));
-    let (znear, zfar) = ((distance - radius) * 0.5, Some((distance + radius) * 2.0));
-    (world, Projection::Perspective { yfov: YFOV, aspect: None, znear: znear.max(radius * 1e-3), zfar })
+    let depths = |points: &[Vec3]| points.iter().map(|p| (position - *p).dot(back)).collect::<Vec<f32>>();
+    let near = depths(&outline).into_iter().fold(f32::MAX, f32::min) * 0.2;
+    let far = depths(&[whole.corners(), bounds.corners()].concat()).into_iter().fold(distance, f32::max) * 1.5;
+    (world, Projection::Perspective { yfov: YFOV, aspect: None, znear: near.max(radius * 1e-3), zfar: Some(far) })
+}
+
+/// Vectors to the right, upwards and backwards of a camera that looks along `-back`.
+fn axes(back: Vec3) -> [Vec3; 3] {
+    let right = Vec3::Y.cross(back).normalize_or(Vec3::X);
+    [right, back.cross(right), back]
+}
+
+/// The lowest and the highest slopes at which points are seen, to the right and up.
+fn extent(points: &[Vec3], eye: Vec3, back: Vec3) -> (Vec2, Vec2) {
+    let [right, up, back] = axes(back);
+    let slopes = points.iter().map(|p| {
+        let way = *p - eye;
+        Vec2::new(way.dot(right), way.dot(up)) / (-way.dot(back)).max(1e-6)
+    });
+    slopes.fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(low, top), slope| (low.min(slope), top.max(slope)))
 }
 
 #[cfg(test)]
 mod tests {
     use glam::Vec4;
-    use lucerna::scene::{Mesh, Primitive, TextureRef};
+    use lucerna::scene::{Mesh, Primitive};
 
     use super::*;
 
-    fn cube(min: Vec3, max: Vec3) -> Scene {
-        let (normals, tangents) = (vec![Vec3::Y; 2], vec![Vec4::ZERO; 2]);
-        let primitive = Primitive { positions: vec![min, max], normals, tangents, ..Primitive::default() };
+    /// A scene of these positions, with a triangle of three of them for each entry of `indices`.
+    fn of(positions: Vec<Vec3>, indices: Vec<u32>) -> Scene {
+        let (normals, tangents) = (vec![Vec3::Y; positions.len()], vec![Vec4::ZERO; positions.len()]);
+        let primitive = Primitive { positions, normals, tangents, indices, ..Primitive::default() };
         Scene {
             meshes: vec![Mesh { primitives: vec![primitive], ..Mesh::default() }],
             nodes: vec![Node { mesh: Some(0), ..Node::default() }],
-            materials: vec![Material::default()],
+            materials: vec![lucerna::scene::Material::default()],
             ..Scene::default()
         }
     }
 
     #[test]
-    fn the_added_camera_sees_every_corner() {
+    fn the_added_camera_sees_every_corner_and_no_more_than_the_margin() {
         for (min, max) in [(Vec3::splat(-1.0), Vec3::ONE), (Vec3::new(100.0, 0.0, -3.0), Vec3::new(400.0, 2.0, 0.0))] {
             for aspect in [0.3, 1.0, 2.5] {
-                let mut scene = cube(min, max);
+                let mut scene = of(Aabb { min, max }.corners().to_vec(), Vec::new());
                 add_missing_camera(&mut scene, aspect);
                 let view_from_world = scene.nodes.last().unwrap().local.matrix().inverse();
                 let Projection::Perspective { yfov, znear, zfar, .. } = scene.cameras[0].projection else { panic!() };
-                for corner in 0..8 {
-                    let pick = |bit: u32| (corner >> bit & 1) as f32;
-                    let point = min + (max - min) * Vec3::new(pick(0), pick(1), pick(2));
-                    let seen = view_from_world.transform_point3(point);
-                    let half = (yfov * 0.5).tan() * -seen.z * 1.001;
-                    assert!(seen.x.abs() <= half * aspect && seen.y.abs() <= half, "{seen}");
+                let mut widest = 0f32;
+                for corner in scene.meshes[0].primitives[0].positions.clone() {
+                    let seen = view_from_world.transform_point3(corner);
+                    let half = (yfov * 0.5).tan() * -seen.z;
+                    let place = (seen.x / (half * aspect)).abs().max((seen.y / half).abs());
+                    assert!(place <= 1.01 / MARGIN, "{seen}");
                     assert!((znear..=zfar.unwrap()).contains(&-seen.z), "{seen}");
+                    widest = widest.max(place);
                 }
+                assert!(widest > 0.98 / MARGIN, "{widest}");
             }
         }
     }
 
     #[test]
-    fn nothing_is_added_where_something_is() {
-        let mut scene = cube(Vec3::ZERO, Vec3::ONE);
-        scene.cameras.push(Camera { name: "own".into(), projection: fitted_projection() });
-        scene.nodes[0].camera = Some(0);
-        scene.materials[0].emissive = Vec3::X;
-        add_missing_camera(&mut scene, 1.0);
-        add_missing_light(&mut scene, DefaultLight::Auto);
-        assert!(scene.nodes.len() == 1 && scene.environment.is_none());
-        assert!(scene.notes.len() == 1 && scene.notes[0].text.contains("emissive"), "{:?}", scene.notes);
-        scene.materials[0].emissive_texture = Some(TextureRef::new(0));
-        add_missing_light(&mut scene, DefaultLight::Never);
-        assert!(scene.lights.is_empty());
-        add_missing_light(&mut scene, DefaultLight::Auto);
-        assert!(scene.lights.len() == 1 && scene.environment.is_some() && scene.notes.len() == 2);
-        // Lights shine along −Z of their node. The added sun must shine from above.
-        assert!(scene.nodes[1].local.matrix().transform_vector3(Vec3::NEG_Z).y < -0.5);
+    fn panels_are_seen_from_their_front() {
+        let square = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        for turn in 0..4 {
+            let rotation = glam::Quat::from_rotation_y(turn as f32 * std::f32::consts::FRAC_PI_2);
+            let positions = square.map(|[x, y]| rotation * Vec3::new(x, y, 0.0)).to_vec();
+            let mut scene = of(positions, vec![0, 1, 2, 0, 2, 3]);
+            add_missing_camera(&mut scene, 1.5);
+            let back = scene.nodes[1].local.matrix().z_axis.truncate();
+            assert!(back.dot(rotation * Vec3::Z) > 0.8, "{turn} {back}");
+        }
+        // A triangle of no size, and nothing at all.
+        for mut scene in [of(vec![Vec3::ONE; 3], vec![0, 1, 2]), Scene::default()] {
+            add_missing_camera(&mut scene, 1.5);
+            assert!(scene.nodes.last().unwrap().local.matrix().is_finite());
+        }
     }
 
-    fn fitted_projection() -> Projection {
-        fitted(&Aabb { min: Vec3::ZERO, max: Vec3::ONE }, 1.0, VIEW_FROM).1
+    #[test]
+    fn a_scene_with_a_camera_keeps_it() {
+        let mut scene = of(vec![Vec3::ZERO, Vec3::ONE], Vec::new());
+        let projection = Projection::Perspective { yfov: 1.0, aspect: None, znear: 0.1, zfar: None };
+        scene.cameras.push(Camera { name: "own".into(), projection });
+        scene.nodes[0].camera = Some(0);
+        add_missing_camera(&mut scene, 1.0);
+        assert!(scene.nodes.len() == 1 && scene.cameras.len() == 1 && scene.notes.is_empty());
     }
 }

@@ -9,6 +9,8 @@ use lucerna::{
 };
 use serde_json::{Value, json};
 
+use crate::{console, listed};
+
 /// Statistics of a channel.
 struct Statistics {
     min: f32,
@@ -34,6 +36,32 @@ impl Statistics {
         }
         this.mean /= count.max(1) as f64;
         this
+    }
+}
+
+/// Prints what is in images. JSON: an object for one image, a list for a folder, a pattern or several images.
+///
+/// # Errors
+/// `Input` if an image cannot be read.
+pub fn run(names: &[String], json: bool) -> Result<()> {
+    let files = listed::expanded(names)?;
+    let one = matches!(names, [name] if files == [name.clone()]);
+    let mut list = Vec::new();
+    for file in &files {
+        let path = Path::new(file);
+        let layers = read(path)?;
+        match json {
+            true => list.push(self::json(&layers)),
+            false => console::print(&text(path, &layers))?,
+        }
+    }
+    match (json, one) {
+        (false, _) => Ok(()),
+        (true, true) => console::print_json(&list.swap_remove(0)),
+        (true, false) => {
+            let named = files.iter().zip(list).map(|(file, info)| json!({ "file": file, "info": info }));
+            console::print_json(&named.collect())
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use glam::{Mat4, Quat, Vec3};
 use lucerna::scene::{Animation, Channel, Interpolation, Keys, Light, LightKind, Scene, Transform};
 use serde::{Deserialize, Serialize};
 
-use crate::framing::{self, DefaultLight};
+use crate::default_light::{self, DefaultLight};
 
 /// Default irradiance of a sun, W/m².
 const SUN: f32 = 2.0;
@@ -112,6 +112,13 @@ impl TryFrom<String> for Sun {
     }
 }
 
+impl Point {
+    /// A light that does not move: metres, W/sr.
+    pub fn still(position: Vec3, intensity: f32) -> Self {
+        Self { position, intensity, to: None }
+    }
+}
+
 impl Sun {
     /// Unit vector towards the sun.
     fn direction(&self) -> Vec3 {
@@ -123,16 +130,16 @@ impl Sun {
 /// Adds lights, and default lights as `when` says.
 pub fn light(scene: &mut Scene, points: &[Point], sun: Option<&Sun>, when: DefaultLight) {
     add(scene, points, sun);
-    framing::add_missing_light(scene, when);
+    default_light::add_missing_light(scene, when, None);
 }
 
 /// Adds the lights. With a sun it also adds the default sky, if the scene has no environment.
-fn add(scene: &mut Scene, points: &[Point], sun: Option<&Sun>) {
+pub fn add(scene: &mut Scene, points: &[Point], sun: Option<&Sun>) {
     for (i, point) in points.iter().enumerate() {
         let name = format!("light {i}");
         let kind = LightKind::Point { range: None };
         let light = Light { name, kind, color: Vec3::ONE, intensity: point.intensity };
-        framing::add_light(scene, light, Mat4::from_translation(point.position));
+        default_light::add_light(scene, light, Mat4::from_translation(point.position));
         if let (Some((to, seconds)), Some(node)) = (point.to, scene.nodes.last_mut()) {
             node.local = Transform::Trs { translation: point.position, rotation: Quat::IDENTITY, scale: Vec3::ONE };
             let channel = Channel {
@@ -148,8 +155,8 @@ fn add(scene: &mut Scene, points: &[Point], sun: Option<&Sun>) {
         let light =
             Light { name: "sun".into(), kind: LightKind::Directional, color: Vec3::ONE, intensity: sun.irradiance };
         // Lights shine down −Z of their node.
-        framing::add_light(scene, light, Mat4::from_quat(Quat::from_rotation_arc(Vec3::Z, sun.direction())));
-        scene.environment.get_or_insert_with(framing::default_sky);
+        default_light::add_light(scene, light, Mat4::from_quat(Quat::from_rotation_arc(Vec3::Z, sun.direction())));
+        scene.environment.get_or_insert_with(default_light::default_sky);
     }
 }
 

@@ -12,7 +12,7 @@ use crate::{
     camera::CameraFile,
     changed::Change,
     config::SettingsArgs,
-    framing::DefaultLight,
+    default_light::DefaultLight,
     ground::{GroundArgs, GroundOptions},
     lights::{Point, Sun},
     progress::ProgressMode,

@@ -18,10 +18,12 @@ use crate::{
     outputs::Fresh,
     program::{self, STOPPED_EARLY},
     record::{BakeFile, Record},
+    relight::Tries,
     rerun::bounds,
     run::Run,
     settings_list,
     signals::Interrupt,
+    stage::Stage,
 };
 
 /// What a technique shows, for file names and metadata.
@@ -104,6 +106,14 @@ pub fn unless_stopped<T>(result: Result<T>, interrupt: &Interrupt) -> Result<Opt
 /// # Errors
 /// Any error of the run. Its kind decides the exit code.
 pub fn render<T: Technique>(args: &RenderArgs, given: &Given<T>) -> Result<ExitCode> {
+    render_on(None, args, given)
+}
+
+/// Runs `render` for one technique. `stage`: the scene and the camera of `args`, if they were read already.
+///
+/// # Errors
+/// Any error of the run. Its kind decides the exit code.
+pub fn render_on<T: Technique>(mut stage: Option<Stage>, args: &RenderArgs, given: &Given<T>) -> Result<ExitCode> {
     let started = Instant::now();
     let staged = Staged::effective(&args.settings, &given.base, T::Settings::validate)?;
     if args.settings.print_config {
@@ -111,15 +121,30 @@ pub fn render<T: Technique>(args: &RenderArgs, given: &Given<T>) -> Result<ExitC
         return Ok(ExitCode::SUCCESS);
     }
     let interrupt = Interrupt::install();
-    let mut run = Run::new(Label::of::<T>(given.mode, &staged.technique), args, args.talk.console(), &staged, None)?;
-    run.name_bake(given.baked.as_ref().and_then(BakeFile::of));
-    frames::frames(given, args, staged, &mut run, &interrupt, started)?;
-    Ok(match run.progress() {
-        _ if args.list_passes => ExitCode::SUCCESS,
-        (done, asked) if done == asked => ExitCode::SUCCESS,
-        (0, _) => ExitCode::from(interrupt.exit_code()),
-        _ => ExitCode::from(STOPPED_EARLY),
-    })
+    let label = Label::of::<T>(given.mode, &staged.technique);
+    let all_light = given.mode == T::Mode::default() && label.radiance;
+    let mut tries = Tries::new(args, all_light, T::LAMPS);
+    loop {
+        let args = tries.args();
+        let mut run = Run::new(label, &args, args.talk.console(), &staged, None, stage.take())?;
+        run.name_bake(given.baked.as_ref().and_then(BakeFile::of));
+        run.watched = tries.watched();
+        match tries.note() {
+            Some(note) => run.note(&[note]),
+            None => run.tell(),
+        }
+        frames::frames(given, &args, staged.clone(), &mut run, &interrupt, started)?;
+        if let Some(dark) = run.dark.filter(|_| !interrupt.requested()) {
+            tries.next(dark);
+            continue;
+        }
+        return Ok(match run.progress() {
+            _ if args.list_passes => ExitCode::SUCCESS,
+            (done, asked) if done == asked => ExitCode::SUCCESS,
+            (0, _) => ExitCode::from(interrupt.exit_code()),
+            _ => ExitCode::from(STOPPED_EARLY),
+        });
+    }
 }
 
 /// A request to make a picture again.
@@ -172,9 +197,16 @@ pub fn again<T: Technique>(asked: &Again<'_>) -> Result<Option<Fresh>> {
     if given.baked.is_none() && T::Baked::NEEDED {
         return Err(Error::input("is missing: the metadata do not name the bake of the picture").at("bake"));
     }
-    let mut run =
-        Run::new(Label::of::<T>(given.mode, &staged.technique), &args, asked.console(), &staged, Some(asked.format))?;
+    let mut run = Run::new(
+        Label::of::<T>(given.mode, &staged.technique),
+        &args,
+        asked.console(),
+        &staged,
+        Some(asked.format),
+        None,
+    )?;
     run.name_bake(asked.record.bake.clone());
+    run.tell();
     frames::frames(&given, &args, staged, &mut run, asked.interrupt, Instant::now())?;
     Ok(run.fresh())
 }

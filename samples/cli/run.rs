@@ -7,7 +7,7 @@ use lucerna::{
     gpu::{DeviceKind, Gpu},
     graph::Report,
     image::{self, Format, Layers, Metadata, WriteOptions},
-    scene::{Note, NoteKind, View},
+    scene::{Note, NoteKind, Pose, View},
 };
 use lucerna_scenes as builtin;
 use serde::Serialize;
@@ -23,6 +23,7 @@ use crate::{
     pattern::Values,
     program,
     record::{BakeFile, Record, Source},
+    relight::{self, Dark},
     render::Label,
     smooth::{self, Smooth, SmoothArgs},
     stage::Stage,
@@ -54,6 +55,10 @@ pub struct Run<'a> {
     numbers: serde_json::Map<String, Value>,
     /// Wall-clock time of the steps before the first frame.
     pub phases: Vec<(&'static str, Duration)>,
+    /// A black picture is not written but made again with a light.
+    pub watched: bool,
+    /// The picture would be black.
+    pub dark: Option<Dark>,
 }
 
 #[derive(Debug, Serialize)]
@@ -79,13 +84,14 @@ struct RunTime {
 
 impl<'a> Run<'a> {
     /// Reads the scene and checks that all outputs can be written. With `memory` the run writes no files, and keeps the last picture as the
-    /// bytes of a file of this format.
+    /// bytes of a file of this format. `stage`: the scene and the camera, if they were read already.
     pub fn new<S: Serialize>(
         technique: Label,
         args: &'a RenderArgs,
         console: Console,
         settings: &Staged<S>,
         memory: Option<Format>,
+        stage: Option<Stage>,
     ) -> Result<Self> {
         let frames = Frames::of(args.frames.as_ref());
         // The names are checked before the scene is read, so that a wrong name is reported at once.
@@ -95,7 +101,7 @@ impl<'a> Run<'a> {
             None => Outputs::new(&args.output, frames.len(), options),
         };
         outputs(options.clone())?;
-        let stage = Stage::open(&args.stage)?;
+        let stage = stage.map_or_else(|| Stage::open(&args.stage), Ok)?;
         let suits = match &stage.source {
             Source::Builtin(name) if !technique.own_light => builtin::exposure(name).map(f64::from),
             Source::Builtin(_) | Source::File(_) => None,
@@ -153,11 +159,12 @@ impl<'a> Run<'a> {
             warnings: Vec::new(),
             numbers: serde_json::Map::new(),
             phases: Vec::new(),
+            watched: false,
+            dark: None,
         };
         if !args.list_passes {
             run.probe()?;
         }
-        run.tell();
         Ok(run)
     }
 
@@ -178,7 +185,8 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    fn tell(&self) {
+    /// Tells the user about the scene.
+    pub fn tell(&self) {
         let scene = &self.stage.scene;
         let triangles: usize =
             scene.meshes.iter().flat_map(|mesh| &mesh.primitives).map(|primitive| primitive.indices.len() / 3).sum();
@@ -187,6 +195,9 @@ impl<'a> Run<'a> {
             "{}: {triangles} triangles, {materials} materials, {lights} lights, camera '{}'",
             scene.name, self.stage.placed.name
         ));
+        if triangles == 0 {
+            self.console.info("note: meshes: the scene has no triangles, so the picture shows no surfaces");
+        }
         self.stage.notes().iter().for_each(|note| self.tell_note(note));
     }
 
@@ -256,6 +267,14 @@ impl<'a> Run<'a> {
     /// The exposure, EV: given by the user, or chosen by the first frame.
     pub fn exposure(&self) -> f64 {
         self.record.exposure
+    }
+
+    /// Whether the picture of the first frame would be black and should be made again.
+    pub fn is_dark(&mut self, picture: &Layers, pose: &Pose, view: &View) -> bool {
+        if self.watched && self.done.is_empty() {
+            self.dark = relight::dark(picture, &self.stage, pose, view);
+        }
+        self.dark.is_some()
     }
 
     /// Chooses the exposure by the first frame, if the user gave none.

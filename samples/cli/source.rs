@@ -12,6 +12,7 @@ use crate::{
     added::{self, Added},
     args::positive,
     changed::{self, Change},
+    config::nearest,
     ground::GroundArgs,
     record::Source,
 };
@@ -97,13 +98,24 @@ pub fn environment(path: &Path) -> Result<(Environment, Vec<Note>)> {
             // The latitude-longitude picture is twice as large as the probe, and both are in memory at the same time.
             let limits = Limits::default();
             let limits = Limits { max_alloc: limits.max_alloc / 4, ..limits };
-            let picture = image::read(path, &limits)?;
+            let picture = image::read(path, &limits).map_err(|error| like_built_in(error, path))?;
             let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
             let plain = !picture.metadata.extra.contains_key("envmap");
             let unfolded = plain.then(|| image::from_angular_map(&picture)).flatten();
             let found = environment::from_picture(unfolded.as_ref().unwrap_or(&picture), name, &Limits::default());
             found.map_err(|error| error.in_file(path))
         }
+    }
+}
+
+/// Names the built-in environment that is most like a file that does not exist.
+fn like_built_in(error: Error, path: &Path) -> Error {
+    let asked = path.to_str().filter(|_| !path.exists());
+    match asked.and_then(|asked| nearest(asked, builtin::ENVIRONMENTS.iter().copied())) {
+        Some(name) => {
+            error.help(format!("Did you mean {name:?}? Built-in environments: {}", builtin::ENVIRONMENTS.join(", ")))
+        }
+        None => error,
     }
 }
 

@@ -13,8 +13,8 @@ use lucerna::{
 use crate::{
     args::{Size, finite},
     camera::{self, Choice},
-    fingerprint,
-    framing::{self, DefaultLight},
+    default_light::{self, DefaultLight},
+    fingerprint, framing,
     lights::{self, Point, Sun},
     placed::Placed,
     record::{self, Source},
@@ -29,6 +29,8 @@ pub struct Stage {
     pub fingerprint: String,
     pub placed: Placed,
     pub eye: record::View,
+    /// Default lights were added.
+    pub default_light: bool,
     extents: Extents,
 }
 
@@ -96,7 +98,7 @@ impl Stage {
             scene.notes.extend(notes);
         }
         let mut fingerprint = fingerprint::scene(&scene);
-        lights::light(&mut scene, &args.light, args.sun.as_ref(), args.default_light);
+        lights::add(&mut scene, &args.light, args.sun.as_ref());
         let named_file = || {
             args.camera.as_deref().is_some_and(|asked| {
                 Path::new(asked).is_file() || camera::in_list(asked).is_some_and(|(file, _)| Path::new(file).is_file())
@@ -109,12 +111,6 @@ impl Stage {
         if !from_file {
             framing::add_missing_camera(&mut scene, args.size.aspect());
         }
-        // After lights and cameras, so that both are the same with and without the added objects.
-        if !args.scene.add.is_empty() {
-            args.scene.add(&mut scene)?;
-            fingerprint = fingerprint::scene(&scene);
-        }
-        let extents = Extents::of(&scene);
         let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
         let choice = match (&args.eye, &args.camera) {
             (Some(Eye { view: record::View::File(file), .. }), _) => Choice::File(file.clone()),
@@ -133,7 +129,18 @@ impl Stage {
                 (Placed::from_file(name, &file), record::View::File(file))
             }
         };
-        Ok(Self { scene, source, fingerprint, placed, eye, extents })
+        let pose = Pose::playing(&scene, args.time as f32);
+        let view = placed.view(&pose, args.size);
+        let lights = scene.lights.len();
+        default_light::add_missing_light(&mut scene, args.default_light, Some((&pose, &view)));
+        let default_light = scene.lights.len() > lights;
+        // After lights and cameras, so that both are the same with and without the added objects.
+        if !args.scene.add.is_empty() {
+            args.scene.add(&mut scene)?;
+            fingerprint = fingerprint::scene(&scene);
+        }
+        let extents = Extents::of(&scene);
+        Ok(Self { scene, source, fingerprint, placed, eye, default_light, extents })
     }
 
     /// Notes about the scene for the user.

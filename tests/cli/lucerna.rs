@@ -110,7 +110,10 @@ fn what_is_no_image_is_refused_with_its_name() {
     std::fs::write(&text, "not an image").unwrap();
     lucerna([Path::new("info"), &text]).expect(3, &["note.exr"]);
     lucerna(["info", "no/such.png"]).expect(3, &["no/such.png"]);
-    lucerna([Path::new("info"), folder.path()]).expect(3, &["folder"]);
+    // In a folder, every picture is read.
+    lucerna([Path::new("info"), folder.path()]).expect(3, &["note.exr"]);
+    let empty = tempfile::tempdir().unwrap();
+    lucerna([Path::new("info"), empty.path()]).expect(3, &["a folder without pictures"]);
     // A picture without its recipe cannot be made again.
     let foreign = picture(folder.path(), "foreign.png", Metadata::default());
     lucerna(["rerun", &foreign]).expect(3, &["foreign.png", "does not say how it was made"]);

@@ -23,6 +23,8 @@ mod daylight_export;
 mod daylight_export_more;
 #[path = "../cli/daylight_pictures.rs"]
 mod daylight_pictures;
+#[path = "../cli/door.rs"]
+mod door;
 #[path = "../cli/experiment.rs"]
 mod experiment;
 #[path = "../cli/export_gltf.rs"]
@@ -31,6 +33,8 @@ mod export_gltf;
 mod export_pov;
 #[path = "../cli/faults.rs"]
 mod faults;
+#[path = "../cli/first_picture.rs"]
+mod first_picture;
 #[path = "../cli/fiv.rs"]
 mod fiv;
 #[path = "../cli/igi.rs"]

@@ -77,6 +77,7 @@ impl technique::Settings for PictureSettings {
 
 impl Technique for Fiv {
     const NAME: &'static str = "fiv";
+    const LAMPS: bool = false;
     const ABOUT: &'static str = "shadows from fullsphere irradiance vectors, and by brute force; layer irradiance";
     const UNITS: &'static str = "samples";
 

@@ -27,7 +27,16 @@ pub use plan::PlanArgs;
 pub use rate::Rate;
 pub use status::StatusArgs;
 
-use crate::{args::TalkArgs, console::Console, reference::Span, signals::Interrupt};
+use crate::{
+    args::TalkArgs,
+    console::Console,
+    daylight::{self, DayBakeArgs},
+    fiv::{self, PrecomputeArgs},
+    programs::daylight::never,
+    prt::{self, PrtBakeArgs},
+    reference::Span,
+    signals::Interrupt,
+};
 
 /// Options of commands that compute units.
 #[derive(clap::Args, Clone, Debug)]
@@ -133,8 +142,17 @@ pub fn remove(store: Store, console: Console) -> Result<()> {
 }
 
 /// Options of `lucerna bake`.
-#[derive(clap::Subcommand, Clone, Debug)]
+#[derive(clap::Subcommand, Debug)]
 pub enum BakeCommand {
+    /// Compute the light of a scene for all times of a day (as `daylight bake`)
+    #[command(args_override_self = true, mut_arg("default_light", never), mut_arg("output", |arg| arg.value_name("FILE.day")))]
+    Daylight(Box<DayBakeArgs>),
+    /// Compute the transport of light in a room (as `prt bake`)
+    #[command(args_override_self = true, mut_arg("output", |arg| arg.value_name("FILE.prt")))]
+    Prt(Box<PrtBakeArgs>),
+    /// Compute the vectors of occluders under an environment (as `fiv precompute`)
+    #[command(args_override_self = true, mut_arg("output", |arg| arg.value_name("FILE.fiv")))]
+    Fiv(Box<PrecomputeArgs>),
     /// List the finished, missing and damaged units of a job
     Status(StatusArgs),
     /// Read all bytes of a job's units; exit code 3 if some are damaged, 8 if some are missing
@@ -146,6 +164,9 @@ pub enum BakeCommand {
 impl BakeCommand {
     pub fn talk(&self) -> &TalkArgs {
         match self {
+            Self::Daylight(args) => &args.run.talk,
+            Self::Prt(args) => &args.run.talk,
+            Self::Fiv(args) => &args.run.talk,
             Self::Status(args) | Self::Verify(args) => &args.talk,
             Self::Plan(args) => &args.talk,
         }
@@ -156,7 +177,11 @@ impl BakeCommand {
     /// # Errors
     /// Whatever fails, with the kind that decides the exit code.
     pub fn run(&self) -> Result<ExitCode> {
+        let console = self.talk().console();
         match self {
+            Self::Daylight(args) => daylight::bake(args, console),
+            Self::Prt(args) => prt::bake(args, console),
+            Self::Fiv(args) => fiv::precompute(args, console),
             Self::Status(args) => status::status(args, false),
             Self::Verify(args) => status::status(args, true),
             Self::Plan(args) => plan::plan(args),

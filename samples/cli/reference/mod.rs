@@ -24,7 +24,7 @@ use crate::{
     bake::Ended,
     config::{self, SettingsArgs},
     console::{self, Console},
-    exposure, framing,
+    default_light, exposure,
     last_stage::{self, Staged},
     outputs::{self, Fresh, Outputs},
     pattern::{Pattern, Values},
@@ -152,7 +152,8 @@ fn picture(
         checkpoint.probe(args.restart)?;
     }
     // The note about emissive surfaces is for image-space techniques and does not apply to path tracing.
-    for note in stage.notes().iter().filter(|n| n.kind != NoteKind::Repaired && n.text != framing::EMISSIVE_ALONE) {
+    for note in stage.notes().iter().filter(|n| n.kind != NoteKind::Repaired && n.text != default_light::EMISSIVE_ALONE)
+    {
         console.info(&format!("note: {}: {}", note.place, note.text));
     }
     // The device does not get the stop request. The tracer stops between two tiles and keeps all results; an interrupted tile would be lost.

@@ -10,7 +10,7 @@ use crate::{
     camera::CameraFile,
     config,
     console::{self, Console},
-    framing::{self, DefaultLight},
+    default_light::{self, DefaultLight},
     source::SceneArgs,
 };
 
@@ -58,7 +58,7 @@ pub fn run(args: &ViewsArgs, console: Console) -> Result<()> {
     }
     let (mut scene, _) = args.scene.open()?;
     // `render` adds lights to dark scenes. The rule for dark views needs the same lights.
-    framing::add_missing_light(&mut scene, DefaultLight::Auto);
+    default_light::add_missing_light(&mut scene, DefaultLight::Auto, None);
     let list = list(&scene, args)?;
     let heading = "# Written by `lucerna views`; `render --camera FILE.toml#NAME` takes one view. Lengths in metres.\n";
     let text = format!("{heading}{}", config::to_toml(&list)?);

@@ -44,7 +44,7 @@ use serde_json::Value;
 use crate::{
     args::Size,
     config,
-    framing::DefaultLight,
+    default_light::DefaultLight,
     ground::GroundOptions,
     lights::{Point, Sun},
     source,

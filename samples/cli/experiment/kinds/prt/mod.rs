@@ -21,8 +21,8 @@ use self::cut::Cut;
 use super::{Job, MOST_SAMPLES, Rendered, Times, Warm, on_device, read};
 use crate::{
     config,
+    default_light::DefaultLight,
     experiment::file::Changes,
-    framing::DefaultLight,
     lights::{self, Point},
 };
 
