@@ -25,6 +25,7 @@ layout(push_constant, scalar) uniform Push {
     float log_contrast;   // log10 of the contrast of the base
     float detail;
     float saturation;
+    float limit;          // largest ratio of luminance and local adaptation, either way; 0: none
 };
 
 float extended_reinhard(float l, float largest) {
@@ -54,6 +55,10 @@ float display_luminance(float l, float a, float range) {
         float gamma = decades > 0.0 ? min(log_contrast / decades, 1.0) : 1.0;
         float whole = decade * log2(max(l, max(1e-6 * s.high, TONEMAP_SMALLEST)));
         float base = GLOBAL != 0u ? whole : decade * log2(max(a, max(1e-6 * s.high, TONEMAP_SMALLEST)));
+        if (limit > 0.0) {
+            float most = decade * log2(limit);
+            base = clamp(base, whole - most, whole + most);
+        }
         return exp2((gamma * (base - top) + detail * (whole - base)) / decade);
     }
     float largest = white > 0.0 ? white : s.high * s.scale;
@@ -73,6 +78,9 @@ void shade(ivec2 pixel, float range) {
     } else {
         float l = tonemap_luminance(rgb);
         float a = GLOBAL != 0u ? l : texelFetch(adaptation, pixel, 0).r;
+        if (limit > 0.0 && OPERATOR != TONEMAP_BILATERAL) {
+            a = clamp(a, l / limit, l * limit);
+        }
         float shown = l > 0.0 ? max(display_luminance(l, a, range), 0.0) : 0.0;
         // Ratios below 1e-30 in l were set to 0 above, so this is finite.
         vec3 ratio = l > 0.0 ? rgb / l : vec3(0.0);

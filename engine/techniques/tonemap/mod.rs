@@ -28,7 +28,7 @@ pub mod statistics;
 mod still;
 
 pub use clean::{BadCounts, clean};
-pub use settings::{BadValues, Identify, Local, Mark, Mode, Operator, Settings};
+pub use settings::{BadValues, Identify, Local, Mark, Mode, NO_LIMIT, Operator, Settings, ThresholdUnit};
 pub use still::{Mapped, Still, apply};
 
 use crate::{
@@ -169,7 +169,8 @@ pub fn curve(graph: &mut Graph, color: Image, adaptation: Image, statistics: Buf
         white: settings.white,
         log_contrast: settings.base_contrast.log10(),
         detail: settings.detail,
-        saturation: settings.saturation,
+        saturation: settings.saturation(),
+        limit: settings.contrast_limit().unwrap_or(0.0),
     };
     let spec = curve::Spec { operator, global: (settings.mode() == Mode::Global).into() };
     let args = curve::Args { color, adaptation, statistics, mapped, push, spec };

@@ -12,6 +12,7 @@ use crate::{
     last_stage::Staged,
     progress::ProgressMode,
     render,
+    screen::ScreenArgs,
     setting_options::SettingOptions,
     stage::StageArgs,
 };
@@ -67,6 +68,9 @@ pub struct ReferenceArgs {
     /// Exposure: colours of .png files are multiplied by 2^EV [default: 0, or chosen from the picture if it is very dark or bright]
     #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
     pub exposure: Option<f64>,
+
+    #[command(flatten)]
+    pub screen: ScreenArgs,
 
     /// The options that are settings: --bounces, --seed.
     #[command(flatten)]
