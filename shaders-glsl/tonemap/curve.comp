@@ -25,12 +25,18 @@ layout(push_constant, scalar) uniform Push {
     float log_contrast;   // log10 of the contrast of the base
     float detail;
     float saturation;
+    float bias;           // Drago
     float limit;          // largest ratio of luminance and local adaptation, either way; 0: none
 };
 
 float extended_reinhard(float l, float largest) {
     // In this order no intermediate overflows.
     return (1.0 + l / largest / largest) * l / (1.0 + l);
+}
+
+// ln(1 + x) that keeps its digits where x is small.
+float drago_log(float x) {
+    return x < 0.01 ? x * (1.0 - x * (0.5 - x * (1.0 / 3.0 - x * 0.25))) : log(1.0 + x);
 }
 
 // `range`: Ashikhmin, of the whole picture.
@@ -61,6 +67,13 @@ float display_luminance(float l, float a, float range) {
         }
         return exp2((gamma * (base - top) + detail * (whole - base)) / decade);
     }
+    if (OPERATOR == TONEMAP_DRAGO) {
+        // Equation 4 of Drago 2003, in units of the adaptation luminance.
+        float adapted = s.log_average / pow(1.0 + bias - 0.85, 5.0);
+        float most = max(s.high, TONEMAP_SMALLEST) / adapted;
+        float share = pow(min(l / max(s.high, TONEMAP_SMALLEST), 1.0), log2(bias) / log2(0.5));
+        return drago_log(l / adapted) / log(2.0 + 8.0 * share) / (drago_log(most) / log(10.0));
+    }
     float largest = white > 0.0 ? white : s.high * s.scale;
     return extended_reinhard(l * s.scale, max(largest, TONEMAP_SMALLEST));
 }
@@ -69,7 +82,7 @@ void shade(ivec2 pixel, float range) {
     vec4 texel = texelFetch(color, pixel, 0);
     precise vec3 rgb = exposure * tonemap_clean(texel.rgb);
     vec3 result;
-    if (OPERATOR == TONEMAP_LINEAR || OPERATOR >= TONEMAP_ACES) {
+    if (OPERATOR == TONEMAP_LINEAR || OPERATOR >= TONEMAP_ACES && OPERATOR <= TONEMAP_NEUTRAL) {
         rgb *= statistics.scale;
         result = OPERATOR == TONEMAP_LINEAR ? rgb
                : OPERATOR == TONEMAP_ACES   ? tonemap_aces(rgb)

@@ -4,6 +4,7 @@
 pub mod ashikhmin;
 pub mod bilateral;
 pub mod curves;
+pub mod drago;
 pub mod identify;
 pub mod plane;
 pub mod pyramid;
@@ -34,7 +35,7 @@ pub fn tonemap_masked(
 ) -> Vec<[f32; 3]> {
     let picture = Picture::new(width, height, pixels, settings);
     match settings.operator {
-        Operator::Ashikhmin | Operator::Reinhard | Operator::Bilateral | Operator::ReinhardGlobal => {
+        Operator::Ashikhmin | Operator::Reinhard | Operator::Bilateral | Operator::ReinhardGlobal | Operator::Drago => {
             picture.scaled(&picture.display(mask))
         }
         Operator::Linear => picture.pixels.clone(),
@@ -151,6 +152,10 @@ impl<'a> Picture<'a> {
             Operator::Reinhard if settings.mode() == Mode::Global => both(&|l, _| reinhard::global(l, white)),
             Operator::Reinhard => both(&reinhard::local),
             Operator::ReinhardGlobal => both(&|l, _| reinhard::global(l, white)),
+            Operator::Drago => {
+                let bias = f64::from(settings.bias);
+                both(&|l, _| drago::display(l, max, self.statistics.log_average, bias))
+            }
             Operator::Bilateral => {
                 let base = bilateral::Base::new(min, max, f64::from(settings.base_contrast));
                 let detail = f64::from(settings.detail);

@@ -161,10 +161,12 @@ pub fn curve(graph: &mut Graph, color: Image, adaptation: Image, statistics: Buf
         Operator::Aces => consts::TONEMAP_ACES,
         Operator::Agx => consts::TONEMAP_AGX,
         Operator::Neutral => consts::TONEMAP_NEUTRAL,
+        Operator::Drago => consts::TONEMAP_DRAGO,
     };
     let push = curve::Push {
         exposure: settings.exposure.exp2(),
         display: settings.display,
+        bias: settings.bias,
         key: settings.key,
         white: settings.white,
         log_contrast: settings.base_contrast.log10(),

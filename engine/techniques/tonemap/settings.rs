@@ -38,11 +38,15 @@ pub enum Operator {
     Agx,
     /// Khronos PBR Neutral (specification of 2024): colours below 0.76 keep hue and saturation.
     Neutral,
+    /// Drago, Myszkowski, Annen, Chiba, "Adaptive logarithmic mapping for displaying high contrast scenes", 2003. With l = L / L_wa,
+    /// L_wa = log-average / (1 + `bias` − 0.85)⁵: L_d = ln(1 + l) / (log₁₀(1 + l_max) · ln(2 + 8 (l / l_max)^(ln `bias` / ln 0.5))) (equation 4), 1 being
+    /// white. Beyond l_max the last power stays 1. The paper's own transfer function of the display is left to the file.
+    Drago,
 }
 
 impl Operator {
     /// All, with the names that settings have for them.
-    pub const ALL: [(&'static str, Self); 8] = [
+    pub const ALL: [(&'static str, Self); 9] = [
         ("ashikhmin", Self::Ashikhmin),
         ("reinhard", Self::Reinhard),
         ("bilateral", Self::Bilateral),
@@ -51,6 +55,7 @@ impl Operator {
         ("aces", Self::Aces),
         ("agx", Self::Agx),
         ("neutral", Self::Neutral),
+        ("drago", Self::Drago),
     ];
 
     /// The name that settings have for it.
@@ -65,7 +70,10 @@ impl Operator {
 
     /// What it does depends on the luminances of the whole picture.
     pub fn needs_statistics(self, settings: &Settings) -> bool {
-        self.has_local() || (self == Self::ReinhardGlobal && settings.white == 0.0) || settings.normalize
+        self.has_local()
+            || self == Self::Drago
+            || (self == Self::ReinhardGlobal && settings.white == 0.0)
+            || settings.normalize
     }
 }
 
@@ -206,6 +214,10 @@ pub struct Settings {
     #[schemars(extend("x-option" = "Look"))]
     #[schemars(range(min = 1e-6, max = 1e6), extend("x-needs" = {"operator": {"const": "reinhard"}}))]
     pub key: f32,
+    /// Drago: how much dark light is brightened; 0.85 is the paper's, lower values compress less and are darker.
+    #[schemars(extend("x-option" = "Look"))]
+    #[schemars(range(min = 0.5, max = 1), extend("x-needs" = {"operator": {"const": "drago"}}))]
+    pub bias: f32,
     /// Reinhard and reinhard-global: the light that becomes pure white; 0: the brightest of the picture.
     ///
     /// Reinhard: in units of l. Extended Reinhard: in units of L. 0 depends on [`Settings::percentile`].
@@ -238,13 +250,13 @@ pub struct Settings {
     #[schemars(extend("x-option" = "Look"))]
     #[schemars(range(min = 0, max = 16), extend("x-needs" = {"operator": {"const": "bilateral"}, "mode": {"not": {"const": "global"}}}))]
     pub detail: f32,
-    /// Ashikhmin, Reinhard, bilateral and reinhard-global: strength of colours; 1 keeps their ratios, as in the papers; 0 is grey. Left out: 0.7,
-    /// of reinhard-global 1.
+    /// Ashikhmin, Reinhard, bilateral, reinhard-global and drago: strength of colours; 1 keeps their ratios, as in the papers; 0 is grey. Left out:
+    /// 0.7 for ashikhmin and bilateral, 0.85 for reinhard and drago, 1 for reinhard-global.
     ///
     /// The exponent of the ratios of colour to luminance (Tumblin and Turk 1999). An operator that compresses luminance and keeps the ratios makes
     /// dark places look too colourful.
     #[schemars(extend("x-option" = "Look"))]
-    #[schemars(range(min = 0, max = 4), extend("x-needs" = {"operator": {"enum": ["ashikhmin", "reinhard", "bilateral", "reinhard-global"]}}))]
+    #[schemars(range(min = 0, max = 4), extend("x-needs" = {"operator": {"enum": ["ashikhmin", "reinhard", "bilateral", "reinhard-global", "drago"]}}))]
     pub saturation: Option<f32>,
     /// Local operators: largest ratio of a pixel's luminance to its local adaptation, either way; beyond it the pixel follows the global curve, so
     /// that edges get no halos. 1: global; 1e6: no limit, as in the papers. Left out: 1.2 for ashikhmin, no limit for the others.
@@ -306,6 +318,7 @@ impl Default for Settings {
             radius: 10,
             contrast: 0.5,
             key: 0.18,
+            bias: 0.85,
             white: 0.0,
             scales: 8,
             phi: 8.0,
@@ -346,7 +359,11 @@ impl Settings {
 
     /// The saturation that is used.
     pub fn saturation(&self) -> f32 {
-        self.saturation.unwrap_or(if self.operator.has_local() { 0.7 } else { 1.0 })
+        self.saturation.unwrap_or(match self.operator {
+            Operator::Ashikhmin | Operator::Bilateral => 0.7,
+            Operator::Reinhard | Operator::Drago => 0.85,
+            _ => 1.0,
+        })
     }
 
     /// The contrast limit that is used; `None`: no limit.

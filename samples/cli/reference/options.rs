@@ -128,7 +128,7 @@ impl ReferenceArgs {
         let mut args = self.settings.clone();
         args.define.extend(self.options.defines("reference"));
         args.define.extend(self.spp.map(|samples| format!("samples={samples}")));
-        Staged::effective(&args, &Settings::default(), |settings: &Settings| {
+        Staged::effective(&args, &Settings::default(), false, |settings: &Settings| {
             settings.validate()?;
             settings.reference.validate().map_err(|error| error.at("reference"))
         })

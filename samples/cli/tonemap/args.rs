@@ -124,6 +124,7 @@ Operators:
   ashikhmin        (default) keeps the contrast that the eye would see in the scene
   reinhard         photographic dodging and burning; needs no exposure
   bilateral        compresses large areas and keeps fine detail; needs no exposure
+  drago            one logarithmic curve for pictures of any range; needs no exposure
   linear           exposure only; clips values above white
   reinhard-global  a soft shoulder: does not clip lights below --white
   aces, agx        film-like curves of games and films
