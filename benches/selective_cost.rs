@@ -33,7 +33,7 @@ struct Options {
 
 fn options() -> Result<Options> {
     let mut options = Options {
-        settings: Settings { local: Local::Literal, ..Settings::default() },
+        settings: Settings { local: Local::Literal, ..Settings::paper() },
         thresholds: vec![],
         rounds: 3,
         out: None,

@@ -121,7 +121,7 @@ struct Row {
 }
 
 fn rows(literal: bool) -> Vec<Row> {
-    let of = |operator, mode, local| Settings { operator, mode: Some(mode), local, ..Settings::default() };
+    let of = |operator, mode, local| Settings { operator, mode: Some(mode), local, ..Settings::paper() };
     let (ashikhmin, reinhard) = (Operator::Ashikhmin, Operator::Reinhard);
     let row = |name, settings, ours, theirs| Row { name, settings, ours, theirs };
     const SIMPLE: &[&str] = &["--tmo", "ashikhmin", "--tmoAshSimple", "true"];

@@ -33,7 +33,7 @@ fn run(gpu: &Gpu, width: u32, height: u32, pixels: &[[f32; 4]], settings: &Setti
 }
 
 fn with(operator: Operator, mode: Mode) -> Settings {
-    Settings { operator, mode: Some(mode), ..Settings::default() }
+    Settings { operator, mode: Some(mode), ..Settings::paper() }
 }
 
 /// A pixel whose contrast is at the limit to the last bits may fall on either side: such pixels are counted, all others are near.

@@ -49,7 +49,7 @@ fn averages(photograph: &Photograph) -> f64 {
 fn pictures(photograph: &Photograph, operator: Operator) -> [f64; 3] {
     let Photograph { width, height, ref pixels } = *photograph;
     let of = |local| {
-        let settings = Settings { operator, local, ..Settings::default() };
+        let settings = Settings { operator, local, ..Settings::paper() };
         twin::tonemap(width, height, pixels, &settings)
     };
     let (exact, found) = (of(Local::Literal), of(Local::Pyramid));

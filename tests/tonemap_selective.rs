@@ -64,7 +64,7 @@ fn adapt(gpu: &Gpu, size: [u32; 2], luminance: &[f32], importance: &[f32], mark:
     let images = [owned(gpu, "luminance", size, luminance), owned(gpu, "importance", size, importance)];
     let mut graph = Graph::new("mark");
     let [image, importance] = images.map(|i| graph.import_image(&i));
-    let settings = Settings { mark, radius: 3, local: Local::Literal, ..Settings::default() };
+    let settings = Settings { mark, radius: 3, local: Local::Literal, ..Settings::paper() };
     let statistics = statistics(&mut graph, 1.0);
     let extent = graph.extent(image);
     let adapted = mark::adapt(&mut graph, image, importance, statistics, extent, &settings).unwrap();
@@ -252,7 +252,7 @@ fn sobel_marks_steps_by_their_height_and_not_by_chance() {
         let step = |low: f32, high: f32| -> Vec<f32> {
             (0..size[0] * size[1]).map(|i| if i % size[0] < 6 { low } else { high }).collect()
         };
-        let with = |threshold| Settings { threshold: Some(threshold), ..Settings::default() };
+        let with = |threshold| Settings { threshold: Some(threshold), ..Settings::paper() };
         // Along an edge of one pixel the kernels give four times the step, in the two columns beside it, also at the border.
         let columns: Vec<bool> = (0..117).map(|i| [5, 6].contains(&(i % 13))).collect();
         assert_eq!(map(gpu, size, &step(1.0, 1.5), None, &with(1.999)), columns);
@@ -282,7 +282,7 @@ fn normalisation_acts_on_the_threshold_of_sobel() {
             let mut graph = Graph::new("identify");
             let image = graph.import_image(&image);
             let statistics = statistics(&mut graph, scale);
-            let importance = identify::importance(&mut graph, image, statistics, None, &Settings::default());
+            let importance = identify::importance(&mut graph, image, statistics, None, &Settings::paper());
             let token = graph.read_image(importance);
             assert_eq!(red(&run(gpu, graph).image(token)).iter().sum::<f32>(), expected, "factor {scale}");
         }
@@ -298,7 +298,7 @@ fn a_mask_is_or_ed_in_at_full_size() {
             let mask = noise(100 + seed as u32, count);
             for identify in [Identify::Sobel, Identify::Saliency] {
                 for identify_scale in [1, 2, 4] {
-                    let settings = Settings { identify, identify_scale, threshold: Some(0.3), ..Settings::default() };
+                    let settings = Settings { identify, identify_scale, threshold: Some(0.3), ..Settings::paper() };
                     let found = map(gpu, size, &luminance, None, &settings);
                     let both = map(gpu, size, &luminance, Some(&mask), &settings);
                     let expected: Vec<bool> = (0..count).map(|i| found[i] || mask[i] > 0.5).collect();
@@ -316,14 +316,14 @@ fn at_reduced_size_a_box_has_one_answer() {
         let (width, height) = (21, 10);
         let luminance: Vec<f32> = (0..width * height).map(|i| if i % width < 8 { 1.0 } else { 2.0 }).collect();
         for (factor, columns) in [(1, 7..9), (2, 6..10), (4, 4..12)] {
-            let settings = Settings { identify_scale: factor, threshold: Some(3.99), ..Settings::default() };
+            let settings = Settings { identify_scale: factor, threshold: Some(3.99), ..Settings::paper() };
             let expected: Vec<bool> = (0..width * height).map(|i| columns.contains(&(i % width))).collect();
             assert_eq!(map(gpu, [width, height], &luminance, None, &settings), expected, "reduced {factor} times");
         }
         // Boxes that the border cuts average what is inside: a constant image stays constant.
         for size in SIZES {
             let luminance = vec![0.7; (size[0] * size[1]) as usize];
-            let settings = Settings { identify_scale: 4, threshold: Some(1e-6), ..Settings::default() };
+            let settings = Settings { identify_scale: 4, threshold: Some(1e-6), ..Settings::paper() };
             assert!(!map(gpu, size, &luminance, None, &settings).contains(&true), "{size:?}");
         }
     });
@@ -333,7 +333,7 @@ fn at_reduced_size_a_box_has_one_answer() {
 fn saliency_sees_what_stands_out_whatever_the_unit() {
     with_gpu(|gpu| {
         let size = [96, 64];
-        let settings = Settings { identify: Identify::Saliency, threshold: Some(0.1), ..Settings::default() };
+        let settings = Settings { identify: Identify::Saliency, threshold: Some(0.1), ..Settings::paper() };
         let flat = map(gpu, size, &vec![0.3; 96 * 64], None, &settings);
         assert!(!flat.contains(&true), "a constant image has nothing salient");
         assert!(!map(gpu, size, &vec![0.0; 96 * 64], None, &settings).contains(&true), "nor has a black one");
@@ -365,7 +365,7 @@ fn saliency_by_default_marks_a_part_of_a_photograph() {
             let layers = image::read(assets.join("hdr").join(name), &Limits::default()).unwrap();
             let pixels = layers.main().unwrap().rgb_pixels().unwrap();
             let luminance: Vec<f32> = pixels.iter().map(|p| luminance_of(p.map(|v| v.max(0.0))) as f32).collect();
-            let settings = Settings { identify: Identify::Saliency, ..Settings::default() };
+            let settings = Settings { identify: Identify::Saliency, ..Settings::paper() };
             let found = map(gpu, [layers.width, layers.height], &luminance, None, &settings);
             let share = found.iter().filter(|f| **f).count() as f32 / found.len() as f32;
             println!("{name}: {:.1} % salient", 100.0 * share);
@@ -400,12 +400,15 @@ fn tiles_of_a_picture_have_the_map_of_the_whole() {
                 threshold: Some(threshold),
                 radius: 2,
                 mark: Mark::Compact,
-                ..Settings::default()
+                ..Settings::paper()
             };
-            let map = |mut still: Still| still.map(width, height, pixels.clone(), Some(&mask), None).unwrap().pixels;
+            let map = |mut still: Still| still.map(width, height, pixels.clone(), Some(&mask), None).unwrap();
             let whole = map(Still::new(gpu, &settings).unwrap());
             let tiled = map(Still::new(gpu, &settings).unwrap().tiles(80));
-            assert!(whole == tiled, "{identify:?} at 1/{identify_scale}");
+            assert!(whole.pixels == tiled.pixels, "{identify:?} at 1/{identify_scale}");
+            assert_eq!(whole.important, tiled.important);
+            let marked = whole.important.unwrap();
+            assert!(0 < marked && marked < u64::from(width * height), "{marked} marked");
         }
     });
 }
@@ -430,7 +433,7 @@ fn selective_is_local_where_marked_and_global_elsewhere() {
                         threshold: Some(1e18),
                         radius: 3,
                         scales: 4,
-                        ..Settings::default()
+                        ..Settings::paper()
                     };
                     tonemap::apply(gpu, width, height, &pixels, Some(mask), &settings).unwrap().pixels
                 };

@@ -53,14 +53,16 @@ fn pictures(assets: &Path) -> Vec<Picture> {
     paths.iter().filter_map(|path| Picture::read(path)).collect()
 }
 
-/// All operators in all modes; local ones in all ways of computing them, but for the bilateral operator, whose fast way is an
+/// All operators in all modes, with the usual settings and those of the papers; local ones in all ways of computing them, but for the bilateral operator, whose fast way is an
 /// approximation.
 fn all() -> Vec<Settings> {
     let mut all = Vec::new();
-    for (_, operator) in Operator::ALL {
+    for (base, (_, operator)) in
+        [Settings::default(), Settings::paper()].iter().flat_map(|base| Operator::ALL.map(|o| (base, o)))
+    {
         for mode in [Mode::Global, Mode::Local, Mode::Selective] {
             for local in [Local::Fast, Local::Pyramid, Local::Literal] {
-                let settings = Settings { operator, mode: Some(mode), local, ..Settings::default() };
+                let settings = Settings { operator, mode: Some(mode), local, ..base.clone() };
                 let same = mode == Mode::Global && local != Local::Fast;
                 let approximate = operator == Operator::Bilateral && mode != Mode::Global && local != Local::Literal;
                 if settings.validate().is_ok() && !same && !approximate {
@@ -93,6 +95,9 @@ fn compare(gpu: &Gpu, pictures: &[Picture]) {
     for settings in all() {
         let mut name =
             format!("{} {:?} {:?}", settings.operator.name(), settings.mode(), settings.local).to_lowercase();
+        if settings.contrast_limit.is_some() {
+            name += " paper";
+        }
         if settings.identify == Identify::Saliency || settings.identify_scale > 1 {
             name = format!("selective {:?} 1/{}", settings.identify, settings.identify_scale).to_lowercase();
         }
@@ -161,7 +166,7 @@ fn no_halo_and_no_blocks_at_the_strongest_edges_that_the_slow_program_lacks() {
             for mode in [Mode::Local, Mode::Selective] {
                 for local in [Local::Fast, Local::Literal] {
                     // Wide enough that the fast bilateral filter works with blocks.
-                    let wide = Settings { spatial: 0.1, ..Settings::default() };
+                    let wide = Settings { spatial: 0.1, ..Settings::paper() };
                     let settings = Settings { operator, mode: Some(mode), local, ..wide };
                     let mut device = tonemap::Still::new(gpu, &settings).unwrap();
                     let approximate = operator == Operator::Bilateral && local == Local::Fast;

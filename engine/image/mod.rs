@@ -63,13 +63,24 @@ pub struct WriteOptions {
     pub gamma: Option<f32>,
     /// All layers of EXR files in 32 bits.
     pub f32: bool,
+    /// PNG files have the alpha of the layer even if it hides light, see [`Report::alpha_left_out`].
+    pub keep_alpha: bool,
     /// The layer for formats that hold one; `None`: the picture ([`Layers::main`]).
     pub layer: Option<String>,
 }
 
 impl Default for WriteOptions {
     fn default() -> Self {
-        Self { overwrite: false, png_bits: 8, jpeg_quality: 92, exposure_ev: 0.0, gamma: None, f32: false, layer: None }
+        Self {
+            overwrite: false,
+            png_bits: 8,
+            jpeg_quality: 92,
+            exposure_ev: 0.0,
+            gamma: None,
+            f32: false,
+            keep_alpha: false,
+            layer: None,
+        }
     }
 }
 
@@ -98,7 +109,8 @@ impl Report {
         self.nan == 0 && self.infinite == 0
     }
 
-    fn count(layers: &[&Layer], width: u32) -> Self {
+    /// Unusual samples of these layers, whose rows have `width` pixels.
+    pub fn count(layers: &[&Layer], width: u32) -> Self {
         let mut report = Self::default();
         for layer in layers {
             let channels = layer.channels.len().max(1);

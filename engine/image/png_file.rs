@@ -24,7 +24,8 @@ pub(super) fn encode(picture: &Layers, layer: &Layer, options: &WriteOptions, re
     let alpha = layer.channel("A").filter(|_| layer.channels.len() > 1);
     let grey = layer.channels.len() - usize::from(alpha.is_some()) == 1;
     let colours = &colours[..if grey { 1 } else { 3 }];
-    report.alpha_left_out = alpha.is_some_and(|alpha| hides_light(layer, colours, alpha, options));
+    report.alpha_left_out =
+        !options.keep_alpha && alpha.is_some_and(|alpha| hides_light(layer, colours, alpha, options));
     let alpha = alpha.filter(|_| !report.alpha_left_out);
     let depth = match options.png_bits {
         8 => png::BitDepth::Eight,

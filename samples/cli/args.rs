@@ -5,8 +5,8 @@ use std::{ops::Range, path::PathBuf, str::FromStr};
 use clap::{ArgAction, Args};
 
 use crate::{
-    config::SettingsArgs, console::Console, progress::ProgressMode, reference::Span, smooth::SmoothArgs,
-    stage::StageArgs,
+    config::SettingsArgs, console::Console, progress::ProgressMode, reference::Span, screen::ScreenArgs,
+    smooth::SmoothArgs, stage::StageArgs,
 };
 
 /// Options of `render`, the same for every technique.
@@ -67,6 +67,9 @@ pub struct RenderArgs {
     /// Exposure: colours of .png files are multiplied by 2^EV [default: 0, or chosen from the first picture if it is very dark or bright]
     #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
     pub exposure: Option<f64>,
+
+    #[command(flatten)]
+    pub screen: ScreenArgs,
 
     #[command(flatten)]
     pub smooth: SmoothArgs,

@@ -21,6 +21,7 @@ use crate::{
     progress::Frames,
     render::{Given, unless_stopped},
     run::Run,
+    screen::Screen,
     signals::Interrupt,
     smooth::Mean,
 };
@@ -72,7 +73,8 @@ pub fn frames<T: Technique>(
     let uploaded = started.elapsed();
     run.phases = vec![("load", loaded), ("device", opened - loaded), ("upload", uploaded - opened)];
 
-    let mut work = Work { args, settings, interrupt, ready, runner: Runner::new(&gpu), last, gpu };
+    let screen = Screen::new(&gpu, run.curve());
+    let mut work = Work { args, settings, interrupt, ready, runner: Runner::new(&gpu), last, screen, gpu };
     let layers = run.outputs.wants_layers() || args.view.is_some() || args.dump.is_some() || args.list_passes;
     let mut progress = Frames::new(args.progress, console.is_quiet(), run.frames.len() as u64);
     for frame in run.frames.clone() {
@@ -113,6 +115,7 @@ struct Work<'a, T: Technique> {
     ready: Ready<T>,
     runner: Runner,
     last: LastStage,
+    screen: Screen,
     gpu: Gpu,
 }
 
@@ -231,8 +234,12 @@ impl<T: Technique> Work<'_, T> {
         }
         run.expose(&layers);
         layers.metadata = run.metadata(&self.gpu, &view, of.frame)?;
+        let shown = match run.curve() {
+            Some(_) => self.screen.shown(&layers, run.exposure(), Some(self.step()))?,
+            None => None,
+        };
         let milliseconds = begun.elapsed().as_secs_f64() * 1e3;
-        let files = run.write(&layers, of.frame)?;
+        let files = run.write(&layers, shown.as_ref(), of.frame)?;
         self.interrupt.keep();
         progress.frame(of.frame, milliseconds, &files);
         run.done(of.frame, of.shot.seconds, milliseconds, files, &runs(milliseconds));

@@ -33,17 +33,17 @@ const GREY: f32 = 18.0;
 const GROUP: &str = "tonemap";
 
 impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
-    /// The settings in effect over `base`, checked by `check`.
+    /// The settings in effect over `base`, checked by `check`. `paper`: tone mapping has the settings of the papers by default.
     ///
     /// # Errors
     /// `Usage` or, with the file's name, `Input`, naming the key.
-    pub fn effective(args: &SettingsArgs, base: &S, check: impl Fn(&S) -> Result<()>) -> Result<Self> {
+    pub fn effective(args: &SettingsArgs, base: &S, paper: bool, check: impl Fn(&S) -> Result<()>) -> Result<Self> {
         let checked = |settings: &Self| {
             check(&settings.technique)?;
             settings.tonemap.as_ref().map_or(Ok(()), |tonemap| tonemap.validate().map_err(|error| error.at(GROUP)))
         };
-        let settings = Self::unchecked(args, base)?;
-        args.blamed(checked(&settings), || checked(&Self::unchecked(&args.file_alone(), base)?))?;
+        let settings = Self::unchecked(args, base, paper)?;
+        args.blamed(checked(&settings), || checked(&Self::unchecked(&args.file_alone(), base, paper)?))?;
         Ok(settings)
     }
 
@@ -66,7 +66,7 @@ impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
         Ok(staged)
     }
 
-    fn unchecked(args: &SettingsArgs, base: &S) -> Result<Self> {
+    fn unchecked(args: &SettingsArgs, base: &S, paper: bool) -> Result<Self> {
         let asked = args.define.iter().any(|define| define.starts_with("tonemap."));
         let in_file = |text: String| text.parse::<toml::Table>().is_ok_and(|table| table.contains_key(GROUP));
         // Errors of the file are reported below, with its name.
@@ -74,7 +74,7 @@ impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
         let over = |settings: tonemap::Settings| -> Result<Self> {
             args.effective(&Self { technique: base.clone(), tonemap: wanted.then_some(settings) })
         };
-        let plain = tonemap::Settings::default();
+        let plain = if paper { tonemap::Settings::paper() } else { tonemap::Settings::default() };
         let grey = tonemap::Settings { normalize: true, exposure: GREY.log2(), ..plain.clone() };
         let mut settings = over(plain.clone())?;
         if settings.tonemap.as_ref().is_some_and(|s| s.operator == Operator::Ashikhmin) {
@@ -182,6 +182,7 @@ mod tests {
         Staged::effective(
             &SettingsArgs { define, ..SettingsArgs::default() },
             &PictureSettings::default(),
+            false,
             PictureSettings::validate,
         )
     }
@@ -211,7 +212,7 @@ mod tests {
             std::fs::write(&file, text).unwrap();
             let define = defines.iter().map(|&d| d.to_owned()).collect();
             let args = SettingsArgs { define, file: Some(file.clone()), ..SettingsArgs::default() };
-            let settings = Staged::effective(&args, &PictureSettings::default(), PictureSettings::validate);
+            let settings = Staged::effective(&args, &PictureSettings::default(), false, PictureSettings::validate);
             settings.map(|_| ()).map_err(|error| (error.exit_code(), error.to_string()))
         };
         for (text, key) in [("[isr]\nbounces = 9", "isr.bounces: 9"), ("[tonemap]\nradius = 99", "tonemap.radius: 99")]
@@ -243,13 +244,25 @@ mod tests {
     }
 
     #[test]
+    fn the_papers_tone_mapping() {
+        let of = |paper| {
+            let define = vec!["tonemap.operator=ashikhmin".to_owned()];
+            let args = SettingsArgs { define, ..SettingsArgs::default() };
+            let settings = Staged::effective(&args, &PictureSettings::default(), paper, PictureSettings::validate);
+            settings.unwrap().tonemap.unwrap()
+        };
+        assert_eq!((of(true).saturation(), of(true).contrast_limit(), of(true).normalize), (1.0, None, true));
+        assert_eq!((of(false).saturation(), of(false).contrast_limit()), (0.7, Some(1.2)));
+    }
+
+    #[test]
     fn printed_settings_read_back_the_same() {
         let settings = with(&["tonemap.operator=reinhard", "isr.samples=24"]).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("s.toml");
         std::fs::write(&file, config::to_toml(&settings).unwrap()).unwrap();
         let args = SettingsArgs { file: Some(file), ..SettingsArgs::default() };
-        let read = Staged::effective(&args, &PictureSettings::default(), PictureSettings::validate).unwrap();
+        let read = Staged::effective(&args, &PictureSettings::default(), false, PictureSettings::validate).unwrap();
         assert_eq!(read, settings);
     }
 }

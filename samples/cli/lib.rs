@@ -43,6 +43,7 @@ pub mod report;
 pub mod rerun;
 pub mod run;
 pub mod scene_bounds;
+pub mod screen;
 pub mod setting_options;
 pub mod settings_list;
 pub mod sight;

@@ -4,7 +4,7 @@ use std::{collections::HashSet, path::Path};
 
 use lucerna::{
     Error, ErrorKind, Result,
-    image::{self, Format, Layers, Metadata, WriteOptions},
+    image::{self, Format, Layers, Metadata, Report, WriteOptions},
 };
 
 use crate::pattern::{Pattern, Values};
@@ -91,6 +91,12 @@ impl Outputs {
         in_memory || self.targets.iter().any(|(pattern, format)| *format == Format::Exr || pattern.has_layer())
     }
 
+    /// True if a file is for screens and shows the picture: a .png or .jpg file without `{layer}` in its name.
+    pub fn wants_screen(&self) -> bool {
+        let in_memory = self.memory.as_ref().is_some_and(|(format, _)| is_for_screens(*format));
+        in_memory || self.targets.iter().any(|(pattern, format)| is_for_screens(*format) && !pattern.has_layer())
+    }
+
     /// True if the image goes to standard output.
     pub fn uses_stdout(&self) -> bool {
         self.targets.iter().any(|(pattern, _)| pattern.text() == STDOUT)
@@ -117,20 +123,34 @@ impl Outputs {
         Ok(())
     }
 
-    /// Writes the files of a frame. Returns their names and reports about unusual values.
+    /// Writes the files of a frame. `shown`: the picture of files for screens with the exposure applied, if they do not show `layers`. Returns the names
+    /// of the files and reports about unusual values.
     ///
     /// # Errors
     /// `Output`: the named file was not written; the files before it are complete.
-    pub fn write(&mut self, values: &Values<'_>, layers: &Layers) -> Result<Vec<(String, image::Report)>> {
+    pub fn write(
+        &mut self,
+        values: &Values<'_>,
+        layers: &Layers,
+        shown: Option<&Layers>,
+    ) -> Result<Vec<(String, Report)>> {
         let mut written = Vec::new();
+        let exposed = WriteOptions { exposure_ev: 0.0, ..self.options.clone() };
+        let choose = |format: Format| match shown {
+            Some(shown) if is_for_screens(format) => (shown, &exposed),
+            _ => (layers, &self.options),
+        };
         if let Some((format, last)) = &mut self.memory {
-            let (fresh, report) = Fresh::new(*format, layers, &self.options)?;
+            let (picture, options) = choose(*format);
+            let (fresh, report) = Fresh::new(*format, picture, options)?;
             *last = Some(fresh);
-            written.push(("(in memory)".to_owned(), report));
+            written.push(("(in memory)".to_owned(), report_of(layers, picture, report)));
         }
         for (pattern, format) in &self.targets {
             if !pattern.has_layer() {
-                written.push(self.write_one(&pattern.fill(values), *format, layers)?);
+                let (picture, options) = choose(*format);
+                let (name, report) = write_one(&pattern.fill(values), *format, picture, options)?;
+                written.push((name, report_of(layers, picture, report)));
                 continue;
             }
             for layer in &layers.layers {
@@ -140,25 +160,40 @@ impl Outputs {
                     metadata: layers.metadata.clone(),
                     ..Layers::new(layers.width, layers.height)
                 };
-                written.push(self.write_one(&pattern.fill(&Values { layer: shown, ..*values }), *format, &single)?);
+                let name = pattern.fill(&Values { layer: shown, ..*values });
+                written.push(write_one(&name, *format, &single, &self.options)?);
             }
         }
         Ok(written)
     }
+}
 
-    fn write_one(&self, name: &str, format: Format, layers: &Layers) -> Result<(String, image::Report)> {
-        if name == STDOUT {
-            use std::io::Write;
-            let (bytes, report) = image::encode(format, layers, &self.options)?;
-            let mut out = std::io::stdout().lock();
-            out.write_all(&bytes).and_then(|()| out.flush()).map_err(|error| {
-                Error::new(ErrorKind::Output, "could not write to standard output").caused_by(error)
-            })?;
-            return Ok((name.to_owned(), report));
+fn is_for_screens(format: Format) -> bool {
+    matches!(format, Format::Png | Format::Jpeg)
+}
+
+/// The report about a written file. A picture for screens has lost the values that are not finite, so `layers` tell about them.
+fn report_of(layers: &Layers, picture: &Layers, written: Report) -> Report {
+    match layers.main() {
+        Some(main) if !std::ptr::eq(layers, picture) => {
+            Report { alpha_left_out: written.alpha_left_out, ..Report::count(&[main], layers.width) }
         }
-        let report = image::write(Path::new(name), layers, &self.options)?;
-        Ok((name.to_owned(), report))
+        _ => written,
     }
+}
+
+fn write_one(name: &str, format: Format, layers: &Layers, options: &WriteOptions) -> Result<(String, Report)> {
+    if name == STDOUT {
+        use std::io::Write;
+        let (bytes, report) = image::encode(format, layers, options)?;
+        let mut out = std::io::stdout().lock();
+        out.write_all(&bytes)
+            .and_then(|()| out.flush())
+            .map_err(|error| Error::new(ErrorKind::Output, "could not write to standard output").caused_by(error))?;
+        return Ok((name.to_owned(), report));
+    }
+    let report = image::write(Path::new(name), layers, options)?;
+    Ok((name.to_owned(), report))
 }
 
 #[cfg(test)]
@@ -197,7 +232,7 @@ mod tests {
     fn a_file_for_each_layer() {
         let folder = tempfile::tempdir().unwrap();
         let name = folder.path().join("x-{layer}-{frame:03}.pfm").to_string_lossy().into_owned();
-        let written = outputs(&[&name], 2).unwrap().write(&VALUES, &picture()).unwrap();
+        let written = outputs(&[&name], 2).unwrap().write(&VALUES, &picture(), None).unwrap();
         let mut files: Vec<String> =
             std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
         files.sort();

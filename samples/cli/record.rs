@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use lucerna::{Error, Result, bake::Digest, technique::Bake};
+use lucerna::{Error, Result, bake::Digest, technique::Bake, techniques::tonemap::Operator};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -17,6 +17,7 @@ use crate::{
     lights::{Point, Sun},
     progress::ProgressMode,
     render::Again,
+    screen::{self, ScreenArgs},
     smooth::{MOST, Smooth, SmoothArgs},
     source::{self, SceneArgs},
     stage::{Eye, Stage, StageArgs},
@@ -53,6 +54,9 @@ pub struct Record {
     pub fps: f64,
     /// EV.
     pub exposure: f64,
+    /// The curve of .png and .jpg files; `None`: they show the light as it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub operator: Option<Operator>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub environment: Option<String>,
     #[serde(default)]
@@ -152,6 +156,7 @@ impl Record {
             time: args.time,
             fps: 30.0,
             exposure: 0.0,
+            operator: None,
             environment: args.environment.as_ref().map(|path| path.to_string_lossy().into_owned()),
             default_light: args.default_light,
             light: args.light.clone(),
@@ -251,6 +256,7 @@ impl Record {
             fps: self.fps,
             time_limit: None,
             exposure: Some(self.exposure),
+            screen: self.screen_args()?,
             smooth: SmoothArgs { count: Some(self.aa.count), filter: self.aa.filter },
             seed: self.seed,
             settings: SettingsArgs::default(),
@@ -259,6 +265,18 @@ impl Record {
             talk: asked.talk.clone(),
             progress: ProgressMode::default(),
         })
+    }
+
+    /// The options for files for screens.
+    ///
+    /// # Errors
+    /// `Input` for operators that are no curves.
+    pub fn screen_args(&self) -> Result<ScreenArgs> {
+        let operator = self.operator.unwrap_or(Operator::Linear);
+        if screen::named(operator.name()).is_none() {
+            return Err(Error::input(format!("{} is no curve", operator.name())).at("operator"));
+        }
+        Ok(ScreenArgs { operator: Some(operator) })
     }
 
     /// The files that are read to make the picture again, as text for messages.

@@ -115,7 +115,7 @@ pub fn render<T: Technique>(args: &RenderArgs, given: &Given<T>) -> Result<ExitC
 /// Any error of the run. Its kind decides the exit code.
 pub fn render_on<T: Technique>(mut stage: Option<Stage>, args: &RenderArgs, given: &Given<T>) -> Result<ExitCode> {
     let started = Instant::now();
-    let staged = Staged::effective(&args.settings, &given.base, T::Settings::validate)?;
+    let staged = Staged::effective(&args.settings, &given.base, args.paper, T::Settings::validate)?;
     if args.settings.print_config {
         console::print(settings_list::with_docs(&config::to_toml(&staged)?).trim_end())?;
         return Ok(ExitCode::SUCCESS);

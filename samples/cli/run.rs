@@ -8,6 +8,7 @@ use lucerna::{
     graph::Report,
     image::{self, Format, Layers, Metadata, WriteOptions},
     scene::{Note, NoteKind, Pose, View},
+    techniques::tonemap::Operator,
 };
 use lucerna_scenes as builtin;
 use serde::Serialize;
@@ -117,6 +118,7 @@ impl<'a> Run<'a> {
         let developed = settings.tonemap.is_some() && radiance;
         // A normalised picture needs no automatic exposure.
         let normal = settings.tonemap.as_ref().is_some_and(|tonemap| tonemap.normalize);
+        let curve = args.screen.curve(args.paper, radiance, developed)?;
         let exposure = args.exposure.or(suits.filter(|_| radiance && !normal));
         // Tone mapping applies the exposure, so that the file must not apply it again.
         options.exposure_ev = if developed { 0.0 } else { exposure.unwrap_or(0.0) as f32 };
@@ -136,6 +138,7 @@ impl<'a> Run<'a> {
             frame: frames.start,
             fps: args.fps,
             exposure: exposure.unwrap_or(0.0),
+            operator: curve,
             seed: args.seed,
             view: args.view.clone(),
             mode: technique.mode.map(str::to_owned),
@@ -277,6 +280,11 @@ impl<'a> Run<'a> {
         self.dark.is_some()
     }
 
+    /// The curve of files for screens; `None`: they show the light as it is, or there is no such file.
+    pub fn curve(&self) -> Option<Operator> {
+        self.record.operator.filter(|_| self.outputs.wants_screen())
+    }
+
     /// Chooses the exposure by the first frame, if the user gave none.
     pub fn expose(&mut self, picture: &Layers) {
         if self.done.is_empty() && exposure::is_black(picture) {
@@ -296,11 +304,11 @@ impl<'a> Run<'a> {
         self.outputs.expose(ev);
     }
 
-    /// Writes the files of a frame and returns their names.
-    pub fn write(&mut self, layers: &Layers, frame: u32) -> Result<Vec<String>> {
+    /// Writes the files of a frame and returns their names. `shown`: the picture of files for screens, if it is another one.
+    pub fn write(&mut self, layers: &Layers, shown: Option<&Layers>, frame: u32) -> Result<Vec<String>> {
         let (scene, camera) = (&self.stage.scene.name, &self.stage.placed.name);
         let values = Values { scene, camera, technique: &self.label, frame, layer: "" };
-        let written = self.outputs.write(&values, layers)?;
+        let written = self.outputs.write(&values, layers, shown)?;
         for (name, report) in &written {
             if !report.is_finite() {
                 let first = report.first.as_deref().unwrap_or_default();

@@ -25,11 +25,18 @@ layout(push_constant, scalar) uniform Push {
     float log_contrast;   // log10 of the contrast of the base
     float detail;
     float saturation;
+    float bias;           // Drago
+    float limit;          // largest ratio of luminance and local adaptation, either way; 0: none
 };
 
 float extended_reinhard(float l, float largest) {
     // In this order no intermediate overflows.
     return (1.0 + l / largest / largest) * l / (1.0 + l);
+}
+
+// ln(1 + x) that keeps its digits where x is small.
+float drago_log(float x) {
+    return x < 0.01 ? x * (1.0 - x * (0.5 - x * (1.0 / 3.0 - x * 0.25))) : log(1.0 + x);
 }
 
 // `range`: Ashikhmin, of the whole picture.
@@ -54,7 +61,18 @@ float display_luminance(float l, float a, float range) {
         float gamma = decades > 0.0 ? min(log_contrast / decades, 1.0) : 1.0;
         float whole = decade * log2(max(l, max(1e-6 * s.high, TONEMAP_SMALLEST)));
         float base = GLOBAL != 0u ? whole : decade * log2(max(a, max(1e-6 * s.high, TONEMAP_SMALLEST)));
+        if (limit > 0.0) {
+            float most = decade * log2(limit);
+            base = clamp(base, whole - most, whole + most);
+        }
         return exp2((gamma * (base - top) + detail * (whole - base)) / decade);
+    }
+    if (OPERATOR == TONEMAP_DRAGO) {
+        // Equation 4 of Drago 2003, in units of the adaptation luminance.
+        float adapted = s.log_average / pow(1.0 + bias - 0.85, 5.0);
+        float most = max(s.high, TONEMAP_SMALLEST) / adapted;
+        float share = pow(min(l / max(s.high, TONEMAP_SMALLEST), 1.0), log2(bias) / log2(0.5));
+        return drago_log(l / adapted) / log(2.0 + 8.0 * share) / (drago_log(most) / log(10.0));
     }
     float largest = white > 0.0 ? white : s.high * s.scale;
     return extended_reinhard(l * s.scale, max(largest, TONEMAP_SMALLEST));
@@ -64,7 +82,7 @@ void shade(ivec2 pixel, float range) {
     vec4 texel = texelFetch(color, pixel, 0);
     precise vec3 rgb = exposure * tonemap_clean(texel.rgb);
     vec3 result;
-    if (OPERATOR == TONEMAP_LINEAR || OPERATOR >= TONEMAP_ACES) {
+    if (OPERATOR == TONEMAP_LINEAR || OPERATOR >= TONEMAP_ACES && OPERATOR <= TONEMAP_NEUTRAL) {
         rgb *= statistics.scale;
         result = OPERATOR == TONEMAP_LINEAR ? rgb
                : OPERATOR == TONEMAP_ACES   ? tonemap_aces(rgb)
@@ -73,6 +91,9 @@ void shade(ivec2 pixel, float range) {
     } else {
         float l = tonemap_luminance(rgb);
         float a = GLOBAL != 0u ? l : texelFetch(adaptation, pixel, 0).r;
+        if (limit > 0.0 && OPERATOR != TONEMAP_BILATERAL) {
+            a = clamp(a, l / limit, l * limit);
+        }
         float shown = l > 0.0 ? max(display_luminance(l, a, range), 0.0) : 0.0;
         // Ratios below 1e-30 in l were set to 0 above, so this is finite.
         vec3 ratio = l > 0.0 ? rgb / l : vec3(0.0);

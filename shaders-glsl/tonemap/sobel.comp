@@ -11,6 +11,8 @@ layout(binding = 0) uniform sampler2D luminance;
 layout(binding = 1, scalar) readonly buffer Statistics { TonemapStatistics statistics; };
 #include "tonemap/importance.glsl"
 
+layout(constant_id = 1) const uint RELATIVE = 0;  // 1: the threshold counts in log-averages of the picture
+
 float at(ivec2 pixel) {
     return texelFetch(luminance, clamp(pixel, ivec2(0), textureSize(luminance, 0) - 1), 0).r;
 }
@@ -38,5 +40,6 @@ void main() {
     precise float magnitude = 4.0 * sqrt(x * x + y * y);
     // Of very bright pixels, rounding alone would be over any threshold.
     float mean = 0.25 * left + 0.25 * right + 0.25 * above + 0.25 * below;
-    store_importance(pixel, magnitude * statistics.scale > threshold && magnitude > 1e-4 * mean);
+    bool over = RELATIVE != 0u ? magnitude > threshold * statistics.frame_log_average : magnitude * statistics.scale > threshold;
+    store_importance(pixel, over && magnitude > 1e-4 * mean);
 }

@@ -8,6 +8,7 @@ const uint TONEMAP_REINHARD_GLOBAL = 4;  // export
 const uint TONEMAP_ACES = 5;  // export
 const uint TONEMAP_AGX = 6;  // export
 const uint TONEMAP_NEUTRAL = 7;  // export
+const uint TONEMAP_DRAGO = 8;  // export
 
 // Of the luminances of a picture, as the operators use them. All after the exposure.
 struct TonemapStatistics {

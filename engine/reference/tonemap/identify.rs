@@ -1,10 +1,10 @@
 //! Which pixels are important: Michael 2010, section 4.4.2, and the definitions of `techniques::tonemap::identify`.
 
 use super::plane::Plane;
-use crate::techniques::tonemap::{Identify, Settings};
+use crate::techniques::tonemap::{Identify, Settings, ThresholdUnit};
 
-/// Which pixels are important, by the settings.
-pub fn important(luminance: &Plane, settings: &Settings) -> Vec<bool> {
+/// Which pixels are important, by the settings. `log_average`: of the luminance.
+pub fn important(luminance: &Plane, log_average: f64, settings: &Settings) -> Vec<bool> {
     let factor = settings.identify_scale as usize;
     let small = shrink(luminance, factor);
     let map = match settings.identify {
@@ -12,7 +12,11 @@ pub fn important(luminance: &Plane, settings: &Settings) -> Vec<bool> {
         Identify::Saliency => saliency(&small),
     };
     let at = |i: usize| map[(i % luminance.width / factor, i / luminance.width / factor)];
-    (0..luminance.values.len()).map(|i| at(i) > f64::from(settings.threshold())).collect()
+    let unit = match (settings.identify, settings.threshold_unit) {
+        (Identify::Sobel, ThresholdUnit::LogAverage) => log_average,
+        _ => 1.0,
+    };
+    (0..luminance.values.len()).map(|i| at(i) > f64::from(settings.threshold()) * unit).collect()
 }
 
 /// Averages over boxes of `factor`² pixels; those at the right and lower border average what lies inside.

@@ -4,6 +4,7 @@
 pub mod ashikhmin;
 pub mod bilateral;
 pub mod curves;
+pub mod drago;
 pub mod identify;
 pub mod plane;
 pub mod pyramid;
@@ -34,7 +35,7 @@ pub fn tonemap_masked(
 ) -> Vec<[f32; 3]> {
     let picture = Picture::new(width, height, pixels, settings);
     match settings.operator {
-        Operator::Ashikhmin | Operator::Reinhard | Operator::Bilateral | Operator::ReinhardGlobal => {
+        Operator::Ashikhmin | Operator::Reinhard | Operator::Bilateral | Operator::ReinhardGlobal | Operator::Drago => {
             picture.scaled(&picture.display(mask))
         }
         Operator::Linear => picture.pixels.clone(),
@@ -114,7 +115,7 @@ impl<'a> Picture<'a> {
 
     /// Which pixels get local adaptation in the selective mode: identified, or in the mask.
     pub fn important(&self, mask: Option<&[bool]>) -> Vec<bool> {
-        let mut important = identify::important(&self.luminance, self.settings);
+        let mut important = identify::important(&self.luminance, self.statistics.log_average, self.settings);
         for (important, masked) in important.iter_mut().zip(mask.unwrap_or_default()) {
             *important |= masked;
         }
@@ -137,7 +138,7 @@ impl<'a> Picture<'a> {
         let settings = self.settings;
         let Statistics { min, max, .. } = self.statistics;
         let own = self.own();
-        let level = self.adaptation(mask);
+        let level = self.limited(&own, self.adaptation(mask));
         let white = if settings.white > 0.0 { f64::from(settings.white) } else { self.white(max) };
         let both = |f: &(dyn Fn(f64, f64) -> f64 + Sync)| {
             Plane::from_fn(own.width, own.height, |x, y| f(own[(x, y)], level[(x, y)]).max(0.0))
@@ -151,6 +152,10 @@ impl<'a> Picture<'a> {
             Operator::Reinhard if settings.mode() == Mode::Global => both(&|l, _| reinhard::global(l, white)),
             Operator::Reinhard => both(&reinhard::local),
             Operator::ReinhardGlobal => both(&|l, _| reinhard::global(l, white)),
+            Operator::Drago => {
+                let bias = f64::from(settings.bias);
+                both(&|l, _| drago::display(l, max, self.statistics.log_average, bias))
+            }
             Operator::Bilateral => {
                 let base = bilateral::Base::new(min, max, f64::from(settings.base_contrast));
                 let detail = f64::from(settings.detail);
@@ -158,6 +163,19 @@ impl<'a> Picture<'a> {
             }
             _ => own.clone(),
         }
+    }
+
+    /// Local adaptation within the contrast limit. Both in the operator's own unit.
+    fn limited(&self, own: &Plane, level: Plane) -> Plane {
+        let Some(limit) = self.settings.contrast_limit().map(f64::from) else { return level };
+        Plane::from_fn(own.width, own.height, |x, y| {
+            let (own, level) = (own[(x, y)], level[(x, y)]);
+            if self.settings.operator == Operator::Bilateral {
+                level.clamp(own - limit.log10(), own + limit.log10())
+            } else {
+                level.clamp(own / limit, own * limit)
+            }
+        })
     }
 
     /// The white that stands for 0: the largest luminance in the operator's unit.
@@ -170,7 +188,7 @@ impl<'a> Picture<'a> {
 
     /// Colour scaled by L_d / L, its ratios to luminance raised to the saturation. What has no luminance is black.
     fn scaled(&self, display: &Plane) -> Vec<[f32; 3]> {
-        let saturation = f64::from(self.settings.saturation);
+        let saturation = f64::from(self.settings.saturation());
         let pixel = |(i, p): (usize, &[f32; 3])| {
             let l = self.luminance.values[i];
             if l == 0.0 {

@@ -13,7 +13,7 @@ type Pixels = Vec<[f32; 3]>;
 fn all() -> Vec<Settings> {
     let modes = [Mode::Global, Mode::Local, Mode::Selective];
     let with = |(_, operator): (&str, Operator)| {
-        modes.map(|mode| Settings { operator, mode: Some(mode), ..Settings::default() })
+        modes.map(|mode| Settings { operator, mode: Some(mode), ..Settings::paper() })
     };
     Operator::ALL.into_iter().flat_map(with).filter(|s| s.validate().is_ok()).collect()
 }
@@ -247,12 +247,8 @@ fn selection_goes_from_global_to_local() {
     let (width, height) = (48, 40);
     let pixels = picture(width, height);
     for operator in [Operator::Ashikhmin, Operator::Reinhard, Operator::Bilateral] {
-        let with = |mode, threshold| Settings {
-            operator,
-            mode: Some(mode),
-            threshold: Some(threshold),
-            ..Settings::default()
-        };
+        let with =
+            |mode, threshold| Settings { operator, mode: Some(mode), threshold: Some(threshold), ..Settings::paper() };
         let adapted = |s: &Settings, mask: Option<&[bool]>| Picture::new(width, height, &pixels, s).adaptation(mask);
         let [global, local] = [Mode::Global, Mode::Local].map(|m| adapted(&with(m, 0.1), None));
         assert_eq!(adapted(&with(Mode::Selective, 1e18), None), global);

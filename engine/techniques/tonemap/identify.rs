@@ -2,12 +2,14 @@
 //!
 //! | [`Identify`] | a pixel is important where |
 //! |---|---|
-//! | `sobel` | √(x² + y²) > threshold; x and y are the luminance filtered by the kernels (1 2 1)ᵀ (−1 0 1) and their transpose, not normalised; and over 10⁻⁴ of the mean luminance of the pixels that they weigh, below which a step of a bright place would be rounding |
+//! | `sobel` | √(x² + y²) > threshold · unit; x and y are the luminance filtered by the kernels (1 2 1)ᵀ (−1 0 1) and their transpose, not normalised; and over 10⁻⁴ of the mean luminance of the pixels that they weigh, below which a step of a bright place would be rounding |
 //! | `saliency` | the mean of \|C − S\| / (C + S) (0 where both are 0) over the six pairs of a centre level c = 0, 1, 2 and a surround level c + 3, c + 4 is > threshold |
 //! | a mask | its red channel is over 0.5, whatever else is found (objects that matter by what they are, thesis 6.3.2) |
 //!
-//! Luminance is that of the operator: after exposure and normalisation. Its unit is that of the picture, so the thesis'
-//! threshold of 0.1 means a step of 0.025 along an edge of one pixel. Samples beyond the border are those of the border.
+//! Luminance is that of the operator: after exposure and normalisation. The unit is the log-average of the whole picture's luminance
+//! ([`ThresholdUnit::LogAverage`]), so that neither the exposure nor the unit of the picture change which pixels are important (but for the 10⁻⁶ of the
+//! log-average); a threshold of 2 means a step of half the log-average along an edge of one pixel. The thesis has the unit of the picture
+//! ([`ThresholdUnit::Luminance`]): its threshold of 0.1 means a step of 0.025. Samples beyond the border are those of the border.
 //!
 //! The levels of saliency: G₀ is the luminance, G₍ₖ₊₁₎ is Gₖ filtered by (1 3 3 1) / 8 in both directions between its pixels, every
 //! second sample, sizes halved and rounded up; read bilinearly at ((x + ½) / 2ᵏ − ½). This is the intensity channel of Itti and
@@ -18,7 +20,7 @@
 //! At reduced size f, both work on the luminance averaged over boxes of f × f pixels (those at the right and lower border average what lies
 //! inside), and pixel (x, y) takes the answer of (⌊x / f⌋, ⌊y / f⌋). The mask stays at full size.
 
-use super::{Identify, Settings};
+use super::{Identify, Settings, ThresholdUnit};
 use crate::{
     graph::{Buffer, Extent, Format, Graph, Image},
     shaders::tonemap::{octave, saliency, shrink, sobel, spread},
@@ -47,8 +49,8 @@ pub fn grid(settings: &Settings) -> u32 {
     }
 }
 
-/// The map of important pixels of `luminance` (R32F): 1 or 0, R32F, of the same size. `statistics` hold the factor of
-/// normalisation; `mask` has the size of `luminance` (others are cut or count as 0 outside).
+/// The map of important pixels of `luminance` (R32F): 1 or 0, R32F, of the same size. `statistics` hold the log-average of the whole picture and the
+/// factor of normalisation; `mask` has the size of `luminance` (others are cut or count as 0 outside).
 pub fn importance(
     graph: &mut Graph,
     luminance: Image,
@@ -86,7 +88,8 @@ fn found(graph: &mut Graph, luminance: Image, statistics: Buffer, mask: Option<I
     match settings.identify {
         Identify::Sobel => {
             let importance = graph.image("tonemap.importance", Format::R32F, extent);
-            let (push, spec) = (sobel::Push { threshold }, sobel::Spec { has_mask });
+            let relative = (settings.threshold_unit == ThresholdUnit::LogAverage).into();
+            let (push, spec) = (sobel::Push { threshold }, sobel::Spec { has_mask, relative });
             graph.compute(sobel::Args { luminance, statistics, mask, importance, push, spec }, extent);
             importance
         }

@@ -28,7 +28,7 @@ pub mod statistics;
 mod still;
 
 pub use clean::{BadCounts, clean};
-pub use settings::{BadValues, Identify, Local, Mark, Mode, Operator, Settings};
+pub use settings::{BadValues, Identify, Local, Mark, Mode, NO_LIMIT, Operator, Settings, ThresholdUnit};
 pub use still::{Mapped, Still, apply};
 
 use crate::{
@@ -161,15 +161,18 @@ pub fn curve(graph: &mut Graph, color: Image, adaptation: Image, statistics: Buf
         Operator::Aces => consts::TONEMAP_ACES,
         Operator::Agx => consts::TONEMAP_AGX,
         Operator::Neutral => consts::TONEMAP_NEUTRAL,
+        Operator::Drago => consts::TONEMAP_DRAGO,
     };
     let push = curve::Push {
         exposure: settings.exposure.exp2(),
         display: settings.display,
+        bias: settings.bias,
         key: settings.key,
         white: settings.white,
         log_contrast: settings.base_contrast.log10(),
         detail: settings.detail,
-        saturation: settings.saturation,
+        saturation: settings.saturation(),
+        limit: settings.contrast_limit().unwrap_or(0.0),
     };
     let spec = curve::Spec { operator, global: (settings.mode() == Mode::Global).into() };
     let args = curve::Args { color, adaptation, statistics, mapped, push, spec };

@@ -38,11 +38,15 @@ pub enum Operator {
     Agx,
     /// Khronos PBR Neutral (specification of 2024): colours below 0.76 keep hue and saturation.
     Neutral,
+    /// Drago, Myszkowski, Annen, Chiba, "Adaptive logarithmic mapping for displaying high contrast scenes", 2003. With l = L / L_wa,
+    /// L_wa = log-average / (1 + `bias` − 0.85)⁵: L_d = ln(1 + l) / (log₁₀(1 + l_max) · ln(2 + 8 (l / l_max)^(ln `bias` / ln 0.5))) (equation 4), 1 being
+    /// white. Beyond l_max the last power stays 1. The paper's own transfer function of the display is left to the file.
+    Drago,
 }
 
 impl Operator {
     /// All, with the names that settings have for them.
-    pub const ALL: [(&'static str, Self); 8] = [
+    pub const ALL: [(&'static str, Self); 9] = [
         ("ashikhmin", Self::Ashikhmin),
         ("reinhard", Self::Reinhard),
         ("bilateral", Self::Bilateral),
@@ -51,6 +55,7 @@ impl Operator {
         ("aces", Self::Aces),
         ("agx", Self::Agx),
         ("neutral", Self::Neutral),
+        ("drago", Self::Drago),
     ];
 
     /// The name that settings have for it.
@@ -65,7 +70,10 @@ impl Operator {
 
     /// What it does depends on the luminances of the whole picture.
     pub fn needs_statistics(self, settings: &Settings) -> bool {
-        self.has_local() || (self == Self::ReinhardGlobal && settings.white == 0.0) || settings.normalize
+        self.has_local()
+            || self == Self::Drago
+            || (self == Self::ReinhardGlobal && settings.white == 0.0)
+            || settings.normalize
     }
 }
 
@@ -121,6 +129,16 @@ pub enum Identify {
     Sobel,
     /// Centre against surround at several scales.
     Saliency,
+}
+
+/// In what unit [`Settings::threshold`] counts for [`Identify::Sobel`]. Saliency is a ratio and has no unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ThresholdUnit {
+    /// Log-averages of the picture's luminance: exposure and the unit of the file do not change which pixels are marked.
+    LogAverage,
+    /// Luminance after the exposure, as in the thesis.
+    Luminance,
 }
 
 /// How the work on unimportant pixels is avoided. All give the same picture.
@@ -196,6 +214,10 @@ pub struct Settings {
     #[schemars(extend("x-option" = "Look"))]
     #[schemars(range(min = 1e-6, max = 1e6), extend("x-needs" = {"operator": {"const": "reinhard"}}))]
     pub key: f32,
+    /// Drago: how much dark light is brightened; 0.85 is the paper's, lower values compress less and are darker.
+    #[schemars(extend("x-option" = "Look"))]
+    #[schemars(range(min = 0.5, max = 1), extend("x-needs" = {"operator": {"const": "drago"}}))]
+    pub bias: f32,
     /// Reinhard and reinhard-global: the light that becomes pure white; 0: the brightest of the picture.
     ///
     /// Reinhard: in units of l. Extended Reinhard: in units of L. 0 depends on [`Settings::percentile`].
@@ -228,12 +250,21 @@ pub struct Settings {
     #[schemars(extend("x-option" = "Look"))]
     #[schemars(range(min = 0, max = 16), extend("x-needs" = {"operator": {"const": "bilateral"}, "mode": {"not": {"const": "global"}}}))]
     pub detail: f32,
-    /// Ashikhmin, Reinhard, bilateral and reinhard-global: strength of colours; 1 leaves them, as in the papers; 0 is grey.
+    /// Ashikhmin, Reinhard, bilateral, reinhard-global and drago: strength of colours; 1 keeps their ratios, as in the papers; 0 is grey. Left out:
+    /// 0.7 for ashikhmin and bilateral, 0.85 for reinhard and drago, 1 for reinhard-global.
     ///
-    /// The exponent of the ratios of colour to luminance.
+    /// The exponent of the ratios of colour to luminance (Tumblin and Turk 1999). An operator that compresses luminance and keeps the ratios makes
+    /// dark places look too colourful.
     #[schemars(extend("x-option" = "Look"))]
-    #[schemars(range(min = 0, max = 4), extend("x-needs" = {"operator": {"enum": ["ashikhmin", "reinhard", "bilateral", "reinhard-global"]}}))]
-    pub saturation: f32,
+    #[schemars(range(min = 0, max = 4), extend("x-needs" = {"operator": {"enum": ["ashikhmin", "reinhard", "bilateral", "reinhard-global", "drago"]}}))]
+    pub saturation: Option<f32>,
+    /// Local operators: largest ratio of a pixel's luminance to its local adaptation, either way; beyond it the pixel follows the global curve, so
+    /// that edges get no halos. 1: global; 1e6: no limit, as in the papers. Left out: 1.2 for ashikhmin, no limit for the others.
+    ///
+    /// L_a is limited to L / limit … L · limit (bilateral: the base B). Not in the papers.
+    #[schemars(extend("x-option" = "Local and selective operators"))]
+    #[schemars(range(min = 1, max = 1e6), extend("x-needs" = {"operator": {"enum": ["ashikhmin", "reinhard", "bilateral"]}, "mode": {"not": {"const": "global"}}}))]
+    pub contrast_limit: Option<f32>,
     #[schemars(extend("x-needs" = {"operator": {"enum": ["ashikhmin", "reinhard", "bilateral"]}, "mode": {"not": {"const": "global"}}}))]
     /// How local adaptation is computed.
     #[schemars(extend("x-option" = "Local and selective operators"))]
@@ -242,12 +273,17 @@ pub struct Settings {
     #[schemars(extend("x-option" = "Local and selective operators"))]
     #[schemars(extend("x-needs" = {"mode": {"const": "selective"}}))]
     pub identify: Identify,
-    /// Selective: threshold of the measure; a lower threshold marks more pixels. Left out: 0.1 for sobel (luminance), 0.4 for saliency (0 to 1).
+    /// Selective: threshold of the measure; a lower threshold marks more pixels. Left out: for sobel 2 log-averages, or 0.1 with the unit luminance; 0.4
+    /// for saliency (0 to 1).
     ///
-    /// The thesis names 0.1 for Sobel and no threshold for saliency: 0.1 would be four fifths of a photograph, 0.4 is a quarter to a third.
+    /// The thesis names 0.1 of the picture's unit for Sobel, and no threshold for saliency. Two log-averages are 14 to 40 % of a photograph. For saliency
+    /// 0.1 would be four fifths of a photograph, 0.4 is a quarter to a third.
     #[schemars(extend("x-option" = "Local and selective operators"))]
     #[schemars(range(min = 0, max = 1e18), extend("x-needs" = {"mode": {"const": "selective"}}))]
     pub threshold: Option<f32>,
+    /// Selective: the unit of the threshold for sobel.
+    #[schemars(extend("x-needs" = {"mode": {"const": "selective"}, "identify": {"const": "sobel"}}))]
+    pub threshold_unit: ThresholdUnit,
     /// Selective: identification on the picture reduced so many times.
     #[schemars(extend("enum" = [1, 2, 4], "x-needs" = {"mode": {"const": "selective"}}))]
     pub identify_scale: u32,
@@ -282,6 +318,7 @@ impl Default for Settings {
             radius: 10,
             contrast: 0.5,
             key: 0.18,
+            bias: 0.85,
             white: 0.0,
             scales: 8,
             phi: 8.0,
@@ -290,10 +327,12 @@ impl Default for Settings {
             range: 0.4,
             base_contrast: 5.0,
             detail: 1.0,
-            saturation: 1.0,
+            saturation: None,
+            contrast_limit: None,
             local: Local::Fast,
             identify: Identify::Sobel,
             threshold: None,
+            threshold_unit: ThresholdUnit::LogAverage,
             identify_scale: 1,
             mark: Mark::EarlyZ,
             bad_values: BadValues::Zero,
@@ -304,7 +343,35 @@ impl Default for Settings {
     }
 }
 
+/// A [`Settings::contrast_limit`] from which there is no limit.
+pub const NO_LIMIT: f32 = 1e6;
+
 impl Settings {
+    /// The settings of the papers: colours keep their ratios, no limit of contrast, the threshold counts in the picture's unit.
+    pub fn paper() -> Self {
+        Self {
+            saturation: Some(1.0),
+            contrast_limit: Some(NO_LIMIT),
+            threshold_unit: ThresholdUnit::Luminance,
+            ..Self::default()
+        }
+    }
+
+    /// The saturation that is used.
+    pub fn saturation(&self) -> f32 {
+        self.saturation.unwrap_or(match self.operator {
+            Operator::Ashikhmin | Operator::Bilateral => 0.7,
+            Operator::Reinhard | Operator::Drago => 0.85,
+            _ => 1.0,
+        })
+    }
+
+    /// The contrast limit that is used; `None`: no limit.
+    pub fn contrast_limit(&self) -> Option<f32> {
+        let usual = if self.operator == Operator::Ashikhmin { 1.2 } else { NO_LIMIT };
+        Some(self.contrast_limit.unwrap_or(usual)).filter(|limit| *limit < NO_LIMIT)
+    }
+
     /// The mode that is used.
     pub fn mode(&self) -> Mode {
         self.mode.unwrap_or(if self.operator.has_local() { Mode::Local } else { Mode::Global })
@@ -312,9 +379,10 @@ impl Settings {
 
     /// The threshold that is used.
     pub fn threshold(&self) -> f32 {
-        self.threshold.unwrap_or(match self.identify {
-            Identify::Sobel => 0.1,
-            Identify::Saliency => 0.4,
+        self.threshold.unwrap_or(match (self.identify, self.threshold_unit) {
+            (Identify::Sobel, ThresholdUnit::LogAverage) => 2.0,
+            (Identify::Sobel, ThresholdUnit::Luminance) => 0.1,
+            (Identify::Saliency, _) => 0.4,
         })
     }
 

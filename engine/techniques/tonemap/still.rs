@@ -7,7 +7,7 @@ use super::{
 use crate::{
     Error, Result,
     gpu::{Gpu, ImageDesc, OwnedBuffer, OwnedImage, Region},
-    graph::{Buffer, Extent, Format, Frame, Graph, Image, Runner},
+    graph::{Buffer, Extent, Format, Frame, Graph, Image, Pixels, Runner},
     shaders::types::TonemapStatistics,
 };
 
@@ -32,6 +32,8 @@ pub struct Mapped {
     /// What the picture had of bad values.
     pub bad: BadCounts,
     pub statistics: TonemapStatistics,
+    /// Selective: number of important pixels.
+    pub important: Option<u64>,
 }
 
 /// Tone maps one picture: `width · height` linear Rec. 709 pixels, premultiplied, top row first; `mask`: as many values, over 0.5 where
@@ -141,28 +143,27 @@ impl Still {
         let limit = self.runner.gpu().caps().limits.image_2d;
         let fits = self.tile.map_or(count <= WHOLE, |side| width <= side && height <= side);
         let source = Source { width, pixels: &pixels, mask };
-        let (pixels, statistics) = if fits && width <= limit && height <= limit {
+        let Developed { pixels, statistics, important } = if fits && width <= limit && height <= limit {
             let tile = Tile { core: [0, 0, width, height], whole: [0, 0, width, height] };
             let mut graph = Graph::new("tonemap");
             let input = self.input(&mut graph, &source, &tile)?;
             let output = self.tonemap.frame(&mut graph, input, dt)?;
             let (mapped, found) = (graph.read_image(output.mapped), graph.read_buffer(output.statistics));
+            let important = output.important.map(|map| graph.read_image(map));
             let mut frame = self.runner.run(&graph)?;
-            (frame.take_floats(mapped), statistics_of(&frame.buffer(found)))
+            Developed {
+                pixels: frame.take_floats(mapped),
+                statistics: statistics_of(&frame.buffer(found)),
+                important: important.map(|map| marked(&frame.image(map), &tile)),
+            }
         } else {
             self.tiled(width, height, &source, dt)?
         };
-        Ok(Mapped { pixels, bad, statistics })
+        Ok(Mapped { pixels, bad, statistics, important })
     }
 
     /// Statistics over all tiles first, then the operator on each.
-    fn tiled(
-        &mut self,
-        width: u32,
-        height: u32,
-        source: &Source<'_>,
-        dt: Option<f32>,
-    ) -> Result<(Vec<[f32; 4]>, TonemapStatistics)> {
+    fn tiled(&mut self, width: u32, height: u32, source: &Source<'_>, dt: Option<f32>) -> Result<Developed> {
         let settings = self.tonemap.settings.clone();
         let gpu = self.runner.gpu().clone();
         let picture = Extent::new(width, height);
@@ -212,7 +213,7 @@ impl Still {
         }
 
         let mut pixels = vec![[0.0; 4]; picture.pixels() as usize];
-        let mut statistics = TonemapStatistics::default();
+        let (mut statistics, mut important) = (TonemapStatistics::default(), None);
         for tile in Tile::all(width, height, side, apron, grid) {
             let mut graph = Graph::new("tonemap tile");
             let input = self.input(&mut graph, source, &tile)?;
@@ -221,8 +222,12 @@ impl Still {
             let imported = graph.import_buffer(result);
             let output: Output = map(&mut graph, &input, luminance, imported, picture, &settings)?;
             let (mapped, found) = (graph.read_image(output.mapped), graph.read_buffer(output.statistics));
+            let map = output.important.map(|map| graph.read_image(map));
             let mut frame: Frame = self.runner.run(&graph)?;
             statistics = statistics_of(&frame.buffer(found));
+            if let Some(map) = map {
+                *important.get_or_insert(0) += marked(&frame.image(map), &tile);
+            }
             let mapped = frame.take_floats(mapped);
             let [x, y, w, h] = tile.core.map(|v| v as usize);
             let [from_x, from_y, stride, _] = tile.whole.map(|v| v as usize);
@@ -232,7 +237,7 @@ impl Still {
                 pixels[to..to + w].copy_from_slice(&mapped[from..from + w]);
             }
         }
-        Ok((pixels, statistics))
+        Ok(Developed { pixels, statistics, important })
     }
 
     fn input(&self, graph: &mut Graph, source: &Source<'_>, tile: &Tile) -> Result<Input> {
@@ -247,6 +252,23 @@ impl Still {
         };
         Ok(Input { color, mask })
     }
+}
+
+/// What comes from the device.
+struct Developed {
+    pixels: Vec<[f32; 4]>,
+    statistics: TonemapStatistics,
+    important: Option<u64>,
+}
+
+/// Number of important pixels in the core of a tile. `map`: R32F of the whole tile.
+fn marked(map: &Pixels, tile: &Tile) -> u64 {
+    let [x, y, w, h] = tile.core.map(|v| v as usize);
+    let [from_x, from_y, stride, _] = tile.whole.map(|v| v as usize);
+    let rows = (0..h).map(|row| 4 * ((y - from_y + row) * stride + x - from_x));
+    // A pixel is 0, or 1, whose bytes are not all 0.
+    let in_row = |from: usize| map.bytes[from..from + 4 * w].chunks_exact(4).filter(|v| **v != [0; 4]).count();
+    rows.map(in_row).sum::<usize>() as u64
 }
 
 /// A picture with the width of its rows.

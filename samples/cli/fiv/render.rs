@@ -51,7 +51,7 @@ pub fn render(args: &FivArgs) -> Result<ExitCode> {
 fn preview(args: &FivArgs, given: &mut Given<Fiv>) -> Result<()> {
     let settings = &args.common.settings;
     let over = |base: &PictureSettings| -> Result<Settings> {
-        Ok(Staged::effective(settings, base, PictureSettings::validate)?.technique.fiv)
+        Ok(Staged::effective(settings, base, args.common.paper, PictureSettings::validate)?.technique.fiv)
     };
     let fewer = PictureSettings { fiv: Settings::preview(), ..given.base.clone() };
     let [full, chosen] = [over(&given.base)?, over(&fewer)?];

@@ -15,6 +15,7 @@ use lucerna::{
     image::{Format, Layer, Layers, Metadata, WriteOptions},
     scene::{NoteKind, View},
     technique::Mode as _,
+    techniques::tonemap::Operator,
     tracer::{Mode, Progress, Tracer},
 };
 use lucerna_scenes as builtin;
@@ -32,6 +33,7 @@ use crate::{
     progress::ProgressMode,
     record::{Record, Source},
     render::Again,
+    screen::Screen,
     setting_options::SettingOptions,
     settings_list,
     signals::Interrupt,
@@ -107,6 +109,7 @@ pub fn again(asked: &Again<'_>) -> Result<Option<Fresh>> {
         restart: false,
         shard: None,
         exposure: Some(asked.record.exposure),
+        screen: asked.record.screen_args()?,
         settings: SettingsArgs::default(),
         device: asked.device.clone(),
         talk: asked.talk.clone(),
@@ -124,6 +127,7 @@ fn picture(
     interrupt: &Interrupt,
 ) -> Result<(ExitCode, Option<Fresh>)> {
     let begun = Instant::now();
+    let curve = args.screen.curve(false, true, tonemap.is_some())?;
     let options = WriteOptions { overwrite: args.overwrite || args.resume, f32: true, ..WriteOptions::default() };
     let outputs = |options: WriteOptions| match memory {
         Some(format) => Ok(Outputs::in_memory(format, options)),
@@ -224,12 +228,16 @@ fn picture(
         // The metadata are those of a run with exactly this number of samples.
         let made = Settings { samples: done.samples.floor() as u64, ..settings.clone() };
         let made = Staged { technique: made, tonemap };
-        layers.metadata = metadata(args, &stage, &gpu, &tracer.view()?, &made, ev)?;
+        layers.metadata = metadata(args, &stage, &gpu, &tracer.view()?, &made, (ev, curve))?;
         let part = done.samples.fract();
         if part != 0.0 {
             layers.metadata.extra.insert("part of a sample".into(), format!("{part:.6}"));
         }
-        let written = outputs.write(&values, &layers)?;
+        let shown = match curve.filter(|_| outputs.wants_screen()) {
+            Some(curve) => Screen::new(&gpu, Some(curve)).shown(&layers, ev, None)?,
+            None => None,
+        };
+        let written = outputs.write(&values, &layers, shown.as_ref())?;
         let saved = saving.map(|saving| saving.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
         Ok::<_, Error>((written, layers, saved.transpose()?.unwrap_or(false)))
     })?;
@@ -334,11 +342,12 @@ fn metadata(
     gpu: &Gpu,
     view: &View,
     settings: &Staged<Settings>,
-    exposure: f64,
+    (exposure, operator): (f64, Option<Operator>),
 ) -> Result<Metadata> {
     let about = gpu.describe();
     let record = Record {
         exposure,
+        operator,
         seed: settings.technique.reference.seed,
         mode: (args.show != Mode::Total).then(|| args.show.name().to_owned()),
         f32: true,

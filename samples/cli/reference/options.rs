@@ -12,6 +12,7 @@ use crate::{
     last_stage::Staged,
     progress::ProgressMode,
     render,
+    screen::ScreenArgs,
     setting_options::SettingOptions,
     stage::StageArgs,
 };
@@ -67,6 +68,9 @@ pub struct ReferenceArgs {
     /// Exposure: colours of .png files are multiplied by 2^EV [default: 0, or chosen from the picture if it is very dark or bright]
     #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
     pub exposure: Option<f64>,
+
+    #[command(flatten)]
+    pub screen: ScreenArgs,
 
     /// The options that are settings: --bounces, --seed.
     #[command(flatten)]
@@ -124,7 +128,7 @@ impl ReferenceArgs {
         let mut args = self.settings.clone();
         args.define.extend(self.options.defines("reference"));
         args.define.extend(self.spp.map(|samples| format!("samples={samples}")));
-        Staged::effective(&args, &Settings::default(), |settings: &Settings| {
+        Staged::effective(&args, &Settings::default(), false, |settings: &Settings| {
             settings.validate()?;
             settings.reference.validate().map_err(|error| error.at("reference"))
         })

@@ -17,6 +17,8 @@ use crate::{
     setting_options::SettingOptions,
 };
 
+use super::alpha::Alpha;
+
 const LOOK: &str = "Look";
 const OUTPUT: &str = "Output";
 const INPUT: &str = "Input";
@@ -36,14 +38,24 @@ pub struct TonemapArgs {
     #[arg(short, long, value_name = "OUT", required_unless_present = "print_config", help_heading = OUTPUT)]
     pub output: Vec<String>,
 
-    /// Brightness in stops: +1 is twice as much light; auto measures the picture (auto+0.5: half a stop more), of a sequence its first frame
-    /// [default: 0]
+    /// Brightness in stops: +1 is twice as much light; auto measures the picture (auto+0.5: half a stop more), of a sequence its first frame;
+    /// 0 takes the values as they are [default: auto; ashikhmin: by the luminance of white if an EXR file states it]
     #[arg(long, value_name = "EV|auto", allow_hyphen_values = true, help_heading = LOOK)]
     pub exposure: Option<Exposure>,
 
     /// Encoding of light in .png and .jpg files: the sRGB curve of nearly all screens, or a power
     #[arg(long, value_name = "G|srgb", default_value = "srgb", help_heading = LOOK)]
     pub gamma: Gamma,
+
+    /// Alpha of the picture: keep it; drop it and show all light, over black; or over:COLOUR (over:white, over:#336699) [default: keep, but
+    /// not in .png files where alpha would hide more than a hundredth of the light]
+    #[arg(long, value_name = "CHOICE", help_heading = LOOK)]
+    pub alpha: Option<Alpha>,
+
+    /// Use the papers' settings as defaults: light as it is in the file (--exposure 0), colours that keep their ratios, no limit of contrast,
+    /// the thesis' threshold
+    #[arg(long, help_heading = "Settings")]
+    pub paper: bool,
 
     /// The options that are settings, such as --operator.
     #[command(flatten)]
@@ -109,18 +121,19 @@ pub struct TonemapArgs {
 
 const HELP: &str = "\
 Operators:
-  ashikhmin        (default) keeps the contrast that the eye would see in the scene; needs light in cd/m²
-  reinhard         photographic dodging and burning; needs no units: try it first if a picture is too dark
-  bilateral        compresses large areas and keeps fine detail; needs no units
+  ashikhmin        (default) keeps the contrast that the eye would see in the scene
+  reinhard         photographic dodging and burning; needs no exposure
+  bilateral        compresses large areas and keeps fine detail; needs no exposure
+  drago            one logarithmic curve for pictures of any range; needs no exposure
   linear           exposure only; clips values above white
   reinhard-global  a soft shoulder: does not clip lights below --white
-  aces, agx        film-like curves of games and films; they expect a well exposed picture (--exposure auto)
+  aces, agx        film-like curves of games and films
   neutral          Khronos PBR Neutral: does not change the colours of products
 
 Colour: pictures are converted to linear Rec. 709 by their metadata (EXR chromaticities, XYZ, luminance with chroma; PRIMARIES and XYZE \
 of .hdr; sRGB or gAMA of .png; .jpg is sRGB). Without metadata they are taken as Rec. 709. Colours outside of Rec. 709 become negative, \
 and --bad-values applies to them. White is not adapted. .png and .jpg are written in sRGB, .exr .hdr .pfm as linear light relative to \
-the screen's white. .png and .exr keep alpha; .jpg shows the picture over black.
+the screen's white. .png and .exr keep alpha (--alpha); .jpg shows the picture over black.
 
 Exit codes: 0 all done; 2 wrong usage; 3 a picture cannot be read; 1 a file cannot be written; 4 no device; 5 out of memory; 6 device \
 lost; 8 stopped early, with complete files; 130 stopped before any file was written. After a failed picture the other pictures are \
@@ -128,7 +141,7 @@ still processed; the first failure decides the code.
 
 Examples:
   tonemap church.hdr -o church.png
-  tonemap church.hdr -o church.jpg --operator reinhard --exposure +1 --quality 95
+  tonemap church.hdr -o church.jpg --exposure auto+1 --quality 95
   tonemap photos/*.exr -o developed/               a folder, one device for all
   tonemap shot-####.exr -o out-####.png --fps 24   a sequence: the eye adapts from frame to frame
   isr render room.gltf -o - | tonemap - -o a.png   in a pipe
@@ -185,6 +198,17 @@ impl FromStr for Exposure {
     }
 }
 
+/// How the exposure of a picture is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Metering {
+    /// It is that of the settings.
+    None,
+    /// It is measured, and that of the settings is added.
+    Auto,
+    /// From the luminance of white that the file states, if the operator works in cd/m²; else measured.
+    ByFile,
+}
+
 /// `--gamma`: `None` is the sRGB curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gamma(pub Option<f32>);
@@ -202,6 +226,29 @@ impl FromStr for Gamma {
 }
 
 impl TonemapArgs {
+    /// How the exposure of a picture is found.
+    ///
+    /// # Errors
+    /// As [`Self::config`].
+    pub(super) fn metering(&self) -> Result<Metering> {
+        if let Some(exposure) = self.exposure {
+            return Ok(if exposure.auto { Metering::Auto } else { Metering::None });
+        }
+        // The settings are computed over two different bases. A value that follows its base in both cases was not set by the user.
+        let unit = |settings: &Settings| (settings.exposure, settings.normalize);
+        let plain = self.base();
+        let other = Config { tonemap: Settings { exposure: 1.0, normalize: true, ..plain.tonemap.clone() } };
+        let followed = |base: &Config| -> Result<bool> {
+            Ok(unit(&self.over(base, &self.settings.define)?.tonemap) == unit(&base.tonemap))
+        };
+        let set = !(followed(&plain)? && followed(&other)?);
+        Ok(if set || self.paper { Metering::None } else { Metering::ByFile })
+    }
+
+    fn base(&self) -> Config {
+        Config { tonemap: if self.paper { Settings::paper() } else { Settings::default() } }
+    }
+
     /// Defaults, then the file, then the options, then `-D`.
     ///
     /// # Errors
@@ -218,8 +265,12 @@ impl TonemapArgs {
 
     /// The settings with these `-D`, not checked.
     fn with(&self, define: &[String]) -> Result<Config> {
+        self.over(&self.base(), define)
+    }
+
+    fn over(&self, base: &Config, define: &[String]) -> Result<Config> {
         let file = self.settings.file.as_deref();
-        let mut config: Config = config::effective(&Config::default(), file, &self.options.defines("tonemap"))?;
+        let mut config: Config = config::effective(base, file, &self.options.defines("tonemap"))?;
         if let Some(exposure) = self.exposure {
             config.tonemap.exposure = exposure.stops;
         }

@@ -1,5 +1,6 @@
 //! `tonemap`: tone maps HDR pictures, all on one device.
 
+mod alpha;
 mod args;
 mod auto_exposure;
 mod names;
@@ -27,7 +28,8 @@ use serde_json::{Value, json};
 pub use args::{Config, TonemapArgs};
 pub use recipe::{Again, again};
 
-use args::Gamma;
+use alpha::Alpha;
+use args::{Gamma, Metering};
 use names::{Input, OutputName, PIPE};
 use picture::Done;
 
@@ -53,9 +55,9 @@ const LIMITS: Limits = Limits {
 /// The configuration of a run: settings and output options.
 #[derive(Clone, Debug)]
 struct Making {
-    /// The exposure is measured.
-    auto: bool,
+    metering: Metering,
     gamma: Gamma,
+    alpha: Option<Alpha>,
     fps: f64,
     mask: Option<PathBuf>,
     png_bits: u8,
@@ -65,17 +67,18 @@ struct Making {
 }
 
 impl Making {
-    fn of(args: &TonemapArgs) -> Self {
-        Self {
-            auto: args.exposure.is_some_and(|exposure| exposure.auto),
+    fn of(args: &TonemapArgs) -> Result<Self> {
+        Ok(Self {
+            metering: args.metering()?,
             gamma: args.gamma,
+            alpha: args.alpha,
             fps: args.fps,
             mask: args.mask.clone(),
             png_bits: if args.bits == "16" { 16 } else { 8 },
             jpeg_quality: args.quality,
             f32: args.f32,
             overwrite: args.overwrite,
-        }
+        })
     }
 }
 
@@ -86,7 +89,7 @@ struct Run {
     config: Config,
     outputs: Vec<(OutputName, Format)>,
     mask: Option<Layers>,
-    /// The exposure that `--exposure auto` measured for the current sequence, stops.
+    /// The exposure that was measured for the current sequence, stops.
     metered: Option<f32>,
     /// Number of the previous frame.
     before: Option<u32>,
@@ -154,7 +157,7 @@ pub fn run(args: &TonemapArgs, console: Console) -> Result<ExitCode> {
     }
     let (inputs, notes) = names::inputs(&args.inputs, args.layer.as_deref(), args.frames.as_ref(), args.sequence)?;
     notes.iter().for_each(|note| console.warning(note));
-    let making = Making::of(args);
+    let making = Making::of(args)?;
     let mut run = Run { making, console, config, outputs: outputs(args)?, mask: None, metered: None, before: None };
     run.probe(&inputs)?;
     if let Some(path) = &args.mask {
@@ -318,6 +321,7 @@ impl Run {
             jpeg_quality: self.making.jpeg_quality,
             gamma: self.making.gamma.0,
             f32: self.making.f32,
+            keep_alpha: self.making.alpha == Some(Alpha::Keep),
             ..WriteOptions::default()
         }
     }

@@ -10,11 +10,18 @@ use lucerna::{
     Error, ErrorKind, Result,
     gpu::Description,
     image::{self, Format, Layer, Layers, Metadata, WriteOptions},
-    techniques::tonemap::{BadCounts, BadValues, Mapped, Mode, Settings, Still},
+    techniques::tonemap::{BadCounts, BadValues, Mode, Operator, Settings, Still},
 };
 use serde_json::{Value, json};
 
-use super::{Config, PIPE, Run, auto_exposure, names::Input, recipe::Recipe};
+use super::{
+    Config, PIPE, Run,
+    alpha::{self, Alpha},
+    args::Metering,
+    auto_exposure,
+    names::Input,
+    recipe::Recipe,
+};
 use crate::{config, console::Console, outputs::ALPHA_LEFT_OUT, program};
 
 /// A picture that was written.
@@ -32,6 +39,10 @@ pub(super) struct Done {
     light: [f32; 3],
     /// Number of pixels with a channel above the screen's white, which .png and .jpg clip.
     over_white: u64,
+    /// Number of pixels that a .png file with alpha shows darker than they are; `None`: no alpha, or not kept.
+    hidden: Option<u64>,
+    /// Number of pixels that selective tone mapping has marked.
+    important: Option<u64>,
     pub reading: Duration,
     mapping: Duration,
     /// Time without reading and writing.
@@ -45,8 +56,13 @@ pub(super) struct Unwritten {
     files: Vec<(String, Format)>,
     layers: Layers,
     options: WriteOptions,
+    /// Share of the pixels whose light alpha hides in .png files.
+    hidden: f64,
     console: Console,
 }
+
+/// Share of the pixels whose light alpha may hide without a warning: rims and glints.
+const HIDDEN: f64 = 0.01;
 
 impl Unwritten {
     /// Writes all files. Returns their names and the time.
@@ -63,8 +79,14 @@ impl Unwritten {
             } else {
                 image::write(Path::new(name), &self.layers, &self.options)?
             };
+            let share = percent(self.hidden);
             if report.alpha_left_out {
-                self.console.warning(&format!("{name}: {}", ALPHA_LEFT_OUT));
+                self.console
+                    .warning(&format!("{name}: {ALPHA_LEFT_OUT}; {share} of the pixels shine where alpha hides them"));
+            } else if *format == Format::Png && self.hidden > HIDDEN {
+                self.console.warning(&format!(
+                    "{name}: alpha hides light in {share} of the pixels; --alpha drop shows all light, over black; an .exr file keeps both"
+                ));
             }
         }
         Ok((self.files.into_iter().map(|(name, _)| name).collect(), begun.elapsed()))
@@ -129,7 +151,7 @@ impl Run {
         picture.warnings.iter().for_each(|what| self.console.warning(&format!("{}: {what}", input.name)));
         // Frees the input, because pictures can be very large.
         picture.layers.clear();
-        let settings = self.exposed(input, &pixels);
+        let settings = self.exposed(input, &picture, &pixels);
         still.tonemap().set(&settings)?;
         let mask = self.mask(width, height)?;
         let dt = input.sequence.map(|_| {
@@ -138,22 +160,29 @@ impl Run {
             (f64::from(frames) / self.making.fps) as f32
         });
         self.before = Some(input.frame);
-        let mapped = still.map(width, height, pixels, mask.as_deref(), dt)?;
+        let mut mapped = still.map(width, height, pixels, mask.as_deref(), dt)?;
         self.tell_bad(input, &mapped.bad);
         if mapped.statistics.frame_high == 0.0 {
             self.console.warning(&format!("{}: nothing in the picture is brighter than black", input.name));
         }
+        let count = mapped.pixels.len() as f64;
+        if let Some(important) = mapped.important {
+            let share = percent(important as f64 / count);
+            self.console.info(&format!("note: {}: {share} of the pixels are marked as detail", input.name));
+        }
+        let with_alpha = alpha && Alpha::apply(self.making.alpha, &mut mapped.pixels);
+        let hidden = with_alpha.then(|| alpha::hidden(&mapped.pixels));
         let mapping = begun.elapsed();
 
         let over = |pixel: &&[f32; 4]| pixel[..3].iter().any(|&v| v > 1.0);
         let over_white = mapped.pixels.iter().filter(over).count() as u64;
-        let (bad, s) = (mapped.bad, mapped.statistics);
+        let (bad, s, important) = (mapped.bad, mapped.statistics, mapped.important);
         let layers = Layers {
             metadata: self.metadata(about, input, &picture, &settings)?,
-            ..Layers::new(width, height).with(layer_of(mapped, alpha))
+            ..Layers::new(width, height).with(layer_of(mapped.pixels, with_alpha))
         };
         let files = self.files(input);
-        for (name, _) in files.iter().filter(|(_, format)| alpha && *format == Format::Jpeg) {
+        for (name, _) in files.iter().filter(|(_, format)| with_alpha && *format == Format::Jpeg) {
             self.console.detail(&format!("{name}: .jpg holds no alpha; the picture is shown over black"));
         }
         let done = Done {
@@ -166,27 +195,42 @@ impl Run {
             exposure: settings.exposure,
             light: [s.low, s.high, s.log_average],
             over_white,
+            hidden,
+            important,
             reading: Duration::ZERO,
             mapping,
             working: Duration::ZERO,
             writing: Duration::ZERO,
         };
-        Ok((done, Unwritten { files, layers, options: self.write_options(), console: self.console }))
+        let hidden = hidden.unwrap_or(0) as f64 / count;
+        Ok((done, Unwritten { files, layers, options: self.write_options(), hidden, console: self.console }))
     }
 
-    /// The settings of a picture, including a measured exposure with `--exposure auto`.
-    fn exposed(&mut self, input: &Input, pixels: &[[f32; 4]]) -> Settings {
+    /// The settings of a picture, with the exposure that is found for it.
+    fn exposed(&mut self, input: &Input, picture: &Layers, pixels: &[[f32; 4]]) -> Settings {
         let mut settings = self.settings().clone();
-        if !self.making.auto {
-            return settings;
-        }
-        let metered = match self.metered.filter(|_| input.sequence == Some(false)) {
-            Some(stops) => stops,
-            None => auto_exposure::stops(pixels, settings.operator),
+        let stated = match self.making.metering {
+            Metering::None => return settings,
+            Metering::Auto => None,
+            Metering::ByFile => white_luminance(picture).filter(|_| settings.operator == Operator::Ashikhmin),
         };
-        self.metered = Some(metered);
-        self.console.detail(&format!("{}: measured exposure {metered:+.2} EV", input.name));
-        settings.exposure = (settings.exposure + metered).clamp(-40.0, 40.0);
+        let within_sequence = input.sequence == Some(false);
+        let stops = match (stated, self.metered.filter(|_| within_sequence)) {
+            (Some(white), _) => white.log2(),
+            (None, Some(stops)) => stops,
+            (None, None) => auto_exposure::stops(pixels, settings.operator),
+        };
+        self.metered = Some(stops);
+        settings.exposure = (settings.exposure + stops).clamp(-40.0, 40.0);
+        // These operators scale the picture themselves.
+        let scales_itself = matches!(settings.operator, Operator::Reinhard | Operator::Bilateral | Operator::Drago);
+        if !within_sequence && !scales_itself {
+            let why = match stated {
+                Some(white) => format!("the file states white as {white} cd/m²"),
+                None => "measured; --exposure 0 takes the light as it is".into(),
+            };
+            self.console.info(&format!("note: {}: exposure {:+.2} EV ({why})", input.name, settings.exposure));
+        }
         settings
     }
 
@@ -238,9 +282,21 @@ impl Run {
     }
 }
 
-/// The layer to write: three channels, or four if the input has alpha.
-fn layer_of(mapped: Mapped, alpha: bool) -> Layer {
-    let mut data = mapped.pixels.into_flattened();
+/// The luminance of red, green and blue of 1 by the attribute `whiteLuminance` of an EXR file, cd/m².
+///
+/// The `EXPOSURE` of an .hdr file is no such unit: programs write 1 for files whose values have no unit. Pixels are divided by it when they are read.
+fn white_luminance(picture: &Layers) -> Option<f32> {
+    let stated = picture.metadata.extra.get("whiteLuminance")?.parse::<f32>().ok()?;
+    Some(stated).filter(|white| (1e-6..=1e9).contains(white))
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.1} %", 100.0 * share)
+}
+
+/// The layer to write: three channels, or four with alpha.
+fn layer_of(pixels: Vec<[f32; 4]>, alpha: bool) -> Layer {
+    let mut data = pixels.into_flattened();
     if alpha {
         return Layer::new("", &["R", "G", "B", "A"], data);
     }
@@ -267,6 +323,8 @@ impl Done {
     pub(super) fn json(&self) -> Value {
         let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
         let finite = |value: f32| value.is_finite().then_some(value);
+        let pixels = f64::from(self.size[0]) * f64::from(self.size[1]);
+        let share = |count: u64| count as f64 / pixels;
         json!({
             "input": self.input,
             "frame": self.frame,
@@ -283,6 +341,8 @@ impl Done {
             "exposure": self.exposure,
             "luminance": { "low": finite(self.light[0]), "high": finite(self.light[1]), "log_average": finite(self.light[2]) },
             "pixels_over_white": self.over_white,
+            "share_marked": self.important.map(share),
+            "share_hidden_by_alpha": self.hidden.map(share),
             "milliseconds": {
                 "read": milliseconds(self.reading),
                 "map": milliseconds(self.mapping),

@@ -14,7 +14,8 @@ use serde_json::Value;
 
 use super::{
     Config, LIMITS, Making, Run,
-    args::Gamma,
+    alpha::Alpha,
+    args::{Gamma, Metering},
     names::{self, Input},
 };
 use crate::{args::DeviceArgs, config, console::Console, outputs::Fresh, program, signals::Interrupt};
@@ -27,6 +28,9 @@ pub(super) struct Recipe {
     input: String,
     gamma: Curve,
     settings: Value,
+    /// As `--alpha` takes it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    alpha: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     sequence: Option<Sequence>,
     /// The metadata of the input picture.
@@ -92,6 +96,7 @@ impl Recipe {
             input: input.name.clone(),
             gamma: making.gamma.0.map_or_else(|| Curve::Named("srgb".into()), Curve::Power),
             settings: config::to_value(settings)?,
+            alpha: making.alpha.map(|alpha| alpha.to_string()),
             sequence,
             source: source.clone(),
             layer: input.layer.clone(),
@@ -112,6 +117,8 @@ impl Recipe {
             Curve::Named(name) => name.parse(),
         };
         let gamma = gamma.map_err(|what| Error::input(what).at("gamma"))?;
+        let alpha = self.alpha.as_deref().map(str::parse::<Alpha>).transpose();
+        let alpha = alpha.map_err(|what| Error::input(what).at("alpha"))?;
         if ![8, 16].contains(&self.bits) {
             return Err(wrong("bits", self.bits.to_string(), "8 and 16"));
         }
@@ -123,8 +130,9 @@ impl Recipe {
             return Err(wrong("sequence.fps", fps.to_string(), "numbers above 0"));
         }
         Ok(Making {
-            auto: false,
+            metering: Metering::None,
             gamma,
+            alpha,
             fps,
             mask: self.mask.clone(),
             png_bits: self.bits,
@@ -256,6 +264,7 @@ mod tests {
             (json!({ "gamma": "rec709" }), "gamma"),
             (json!({ "gamma": 1e30 }), "gamma"),
             (json!({ "bits": 12 }), "bits"),
+            (json!({ "alpha": "over:blu" }), "alpha"),
             (json!({ "quality": 0 }), "quality"),
             (json!({ "sequence": { "frame": 0, "fps": 0.0 } }), "sequence.fps"),
         ] {

@@ -29,7 +29,9 @@ struct Settings {
 
 pub(super) fn settings(paper: bool, changes: &Changes) -> Result<Value> {
     no_paper("tonemap", paper)?;
-    let settings: Settings = config::with(&Settings::default(), changes)?;
+    // The operators as their papers define them.
+    let base = Settings { tonemap: tonemap::Settings::paper() };
+    let settings: Settings = config::with(&base, changes)?;
     settings.tonemap.validate()?;
     config::to_value(&settings)
 }
