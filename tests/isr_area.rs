@@ -176,7 +176,8 @@ fn a_ceiling_above_a_lamp_is_lit_by_the_floor() {
 fn a_furnace_has_the_light_of_all_scatterings() {
     // Walls that emit 1 W/(sr·m²) and reflect a half: 1 / (1 - 0.5) everywhere, of which the picture shows a part of the walls.
     let mut scene = Scene::default();
-    let half = Material { ior: 1.0, emissive: Vec3::ONE, double_sided: true, ..Material::diffuse("wall", Vec3::splat(0.5)) };
+    let half =
+        Material { ior: 1.0, emissive: Vec3::ONE, double_sided: true, ..Material::diffuse("wall", Vec3::splat(0.5)) };
     let wall = mesh(&mut scene, square(), half);
     for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
         for side in [-1.0, 1.0] {

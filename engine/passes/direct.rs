@@ -45,7 +45,15 @@ pub struct Direct {
 impl Default for Direct {
     /// Radiometry of all lights, with microfacets.
     fn default() -> Self {
-        Self { paper_law: false, specular: true, light_radius: 0.0, light_power: 1.0, suns: true, strength: 1.0, glow: true }
+        Self {
+            paper_law: false,
+            specular: true,
+            light_radius: 0.0,
+            light_power: 1.0,
+            suns: true,
+            strength: 1.0,
+            glow: true,
+        }
     }
 }
 

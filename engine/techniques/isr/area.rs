@@ -9,7 +9,11 @@ use crate::{
     Result,
     gpu::Gpu,
     graph::{Buffer, Format, Graph, Image},
-    passes::{ambient::Irradiance, downsample::{self, Coarse}, gbuffer::GBuffer},
+    passes::{
+        ambient::Irradiance,
+        downsample::{self, Coarse},
+        gbuffer::GBuffer,
+    },
     rays::{RayHandles, Rays, traced},
     resident::{Handles, Resident},
     scene::{Pose, Scene},
@@ -106,12 +110,8 @@ impl AreaFrame {
         };
         let (rays, tree) = (settings.area_rays, self.lights.tree);
         let sky = self.lights.sky && settings.environment;
-        let settings = graph.uniform(&types::IsrAreaSettings {
-            environment: self.lights.map,
-            seed: graph.seed,
-            rays,
-            two: 2,
-        });
+        let settings =
+            graph.uniform(&types::IsrAreaSettings { environment: self.lights.map, seed: graph.seed, rays, two: 2 });
         let spec = area::Spec { sky: sky.into(), tree: tree.into() };
         let args = traced!(
             area::Args {

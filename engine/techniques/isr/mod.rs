@@ -30,8 +30,8 @@ mod unseen;
 pub use area::{Area, AreaFrame, Surroundings};
 pub use picture::{Picture, PictureSettings, picture};
 pub use settings::{
-    AreaLights, Blur, Downsample, Estimator, LightLaw, Occlude, Patch, Pattern, Preset, Receiver, Resolution, Sender, Settings,
-    Upsample,
+    AreaLights, Blur, Downsample, Estimator, LightLaw, Occlude, Patch, Pattern, Preset, Receiver, Resolution, Sender,
+    Settings, Upsample,
 };
 pub use technique::{Isr, Mode};
 
