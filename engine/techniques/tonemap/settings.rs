@@ -276,7 +276,7 @@ pub struct Settings {
     /// Selective: threshold of the measure; a lower threshold marks more pixels. Left out: for sobel 2 log-averages, or 0.1 with the unit luminance; 0.4
     /// for saliency (0 to 1).
     ///
-    /// The thesis names 0.1 of the picture's unit for Sobel, and no threshold for saliency. Two log-averages are 14 to 40 % of a photograph. For saliency
+    /// The thesis names 0.1 of the picture's unit for Sobel, and no threshold for saliency. Two log-averages are 3 to 40 % of a photograph. For saliency
     /// 0.1 would be four fifths of a photograph, 0.4 is a quarter to a third.
     #[schemars(extend("x-option" = "Local and selective operators"))]
     #[schemars(range(min = 0, max = 1e18), extend("x-needs" = {"mode": {"const": "selective"}}))]
