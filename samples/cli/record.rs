@@ -342,6 +342,7 @@ mod tests {
             time: -0.1,
             fps: 24.0,
             exposure: 1.5,
+            operator: Some(Operator::Neutral),
             environment: None,
             default_light: DefaultLight::Never,
             light: vec!["1,2,-3,4".parse().unwrap()],
