@@ -6,7 +6,6 @@ use glam::{DVec2, DVec3, Mat4, Vec3, dvec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::Graph,
-    passes::ambient::Irradiance,
     reference::isr_scene::{Buffers, Eye, Patch},
     scene::{Camera, Projection, View},
     techniques::isr::{self, Blur, Inputs, Outputs, Resolution, Sender, Settings, frame},

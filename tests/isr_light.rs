@@ -48,7 +48,8 @@ fn composing_is_equations_27_to_29() {
             let normal = image(&mut graph, "coarse normal", coarse_extent, &vec![[0.0, 0.0, 1.0, 0.0]; cw * ch]);
             let coarse = image(&mut graph, "gathered", coarse_extent, &gathered);
             let direct_image = image(&mut graph, "direct", Extent::new(16, 8), &direct);
-            let choices = Compose { factor: 2, plane, epsilon: 1e-3, tint, occlude_ambient, k_ssao: 0.6, k_isr: 0.7 };
+            let choices =
+                Compose { factor: 2, plane, epsilon: 1e-3, tint, occlude_ambient, k_ssao: 0.6, k_isr: 0.7, area: None };
             let sum = compose::sum(
                 &mut graph,
                 &g,
@@ -133,6 +134,7 @@ fn upsampling_falls_back_to_the_nearest_in_depth() {
             occlude_ambient: false,
             k_ssao: 0.5,
             k_isr: 1.0,
+            area: None,
         };
         let sum =
             compose::sum(&mut graph, &g, ambient, direct, coarse, &Coarse { albedo: depth, normal, depth }, &choices);
@@ -178,6 +180,7 @@ fn upsampling_takes_from_what_faces_alike() {
             occlude_ambient: false,
             k_ssao: 0.5,
             k_isr: 1.0,
+            area: None,
         };
         let sum =
             compose::sum(&mut graph, &g, ambient, direct, coarse, &Coarse { albedo: depth, normal, depth }, &choices);

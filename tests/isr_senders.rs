@@ -7,7 +7,7 @@ use glam::{DQuat, DVec3, Mat4, Quat, Vec3, dvec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::{Graph, Runner},
-    passes::{ambient::Irradiance, gbuffer as layers},
+    passes::gbuffer as layers,
     reference::isr_scene::{Buffers, Eye, Patch},
     resident::Resident,
     scene::{Camera, Material, Pose, Projection, Scene, View},
@@ -46,7 +46,7 @@ fn indirect(
         .collect();
     let senders = Senders::pack(&mut graph, &views, None);
     let lights = lights(&mut graph, &[]);
-    let inputs = Inputs { gbuffer: own, lights, ambient: Irradiance::default(), senders };
+    let inputs = Inputs { gbuffer: own, lights, surroundings: Default::default(), senders };
     let out = frame(&mut graph, &inputs, settings).unwrap();
     let [indirect] = read(gpu, graph, [out.indirect]);
     indirect
@@ -254,7 +254,7 @@ fn gathered(gpu: &Gpu, eye: &Eye, own: &Buffers, other: Option<(&Eye, &Buffers)>
         })
         .collect();
     let senders = Senders::pack(&mut graph, &views, None);
-    let inputs = Inputs { gbuffer, lights: lights(&mut graph, &[]), ambient: Irradiance::default(), senders };
+    let inputs = Inputs { gbuffer, lights: lights(&mut graph, &[]), surroundings: Default::default(), senders };
     let settings = Settings {
         resolution: Resolution::Full,
         blur: Blur::None,
