@@ -163,7 +163,8 @@ mod tests {
         let mut odd = [0.0; 16];
         (odd[1], odd[2], odd[3]) = (f32::NAN, f32::NEG_INFINITY, 7.0);
         let read = decode_bc4(encode_bc4(&odd));
-        assert!(read[2] < -0.9 && read[3] > 0.9 && read[0].abs() < 0.1 && read[1].abs() < 0.1, "{read:?}");
+        // The sum of the squares is least with an endpoint below 1, because fourteen values are 0.
+        assert!(read[2] < -0.9 && read[3] > 0.8 && read[0].abs() < 0.1 && read[1].abs() < 0.1, "{read:?}");
         // -128 is -1, as -127 is.
         assert_eq!(decode_bc4([0x80, 0x80, 0, 0, 0, 0, 0, 0]), [-1.0; 16]);
     }
