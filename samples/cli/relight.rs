@@ -21,6 +21,8 @@ use crate::{
 const VISIBLE: f32 = 0.02;
 /// Highest exposure at which a picture is judged, EV. At higher ones light that leaks through shadow maps would count.
 const MOST_EV: f32 = 10.0;
+/// The same for pictures under the sun that the program adds, whose strength is known.
+const MOST_EV_OF_SUN: f32 = 5.0;
 /// A picture is black if it shows less than this share of its surfaces.
 const SHOWN: f32 = 0.1;
 /// A picture with this share of visible pixels is not black, however much of it shows surfaces.
@@ -38,7 +40,7 @@ pub struct Dark {
 /// Whether a picture would be black: hardly any of the surfaces that it shows can be told from black. Pictures without surfaces are not, because no light
 /// changes them.
 pub fn dark(picture: &Layers, stage: &Stage, pose: &Pose, view: &View) -> Option<Dark> {
-    let shown = shown(picture);
+    let shown = shown(picture, if stage.default_light { MOST_EV_OF_SUN } else { MOST_EV });
     if shown >= PLENTY {
         return None;
     }
@@ -48,10 +50,10 @@ pub fn dark(picture: &Layers, stage: &Stage, pose: &Pose, view: &View) -> Option
     is_dark.then(|| Dark { lamp: sight.lamp(SUN), default_light: stage.default_light })
 }
 
-/// Share of the pixels that can be told from black, with the exposure that suits the picture.
-fn shown(picture: &Layers) -> f32 {
+/// Share of the pixels that can be told from black, with the exposure that suits the picture, but at most `most` EV.
+fn shown(picture: &Layers, most: f32) -> f32 {
     let Some(pixels) = picture.main().and_then(|layer| layer.rgb_pixels()) else { return 1.0 };
-    let least = VISIBLE / (exposure::fitting(picture) as f32).min(MOST_EV).exp2();
+    let least = VISIBLE / (exposure::fitting(picture) as f32).min(most).exp2();
     let visible = pixels.iter().filter(|[r, g, b]| r.max(*g).max(*b) >= least).count();
     visible as f32 / pixels.len().max(1) as f32
 }
@@ -136,11 +138,11 @@ mod tests {
         let of = |lit: usize, value: f32| {
             let mut data = vec![0.0; 300];
             data[..3 * lit].fill(value);
-            shown(&Layers::rgb(100, 1, data))
+            shown(&Layers::rgb(100, 1, data), MOST_EV)
         };
         assert_eq!((of(0, 1.0), of(3, 1.0), of(100, 0.5)), (0.0, 0.03, 1.0));
         // The exposure is chosen by what is lit, however weak it is.
         assert_eq!((of(40, 1e-4), of(40, 1e6), of(100, 1e-6)), (0.4, 0.4, 0.0));
-        assert_eq!(shown(&Layers::new(1, 1)), 1.0);
+        assert_eq!(shown(&Layers::new(1, 1), MOST_EV), 1.0);
     }
 }

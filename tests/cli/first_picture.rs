@@ -63,8 +63,7 @@ fn a_camera_in_a_closed_box_gets_a_lamp_beside_it() {
     let scene = write(folder.path(), "box.obj", &text);
     let camera = write(folder.path(), "c.toml", "position = [0.3, 0, 0.3]\ntarget = [0, 0, -0.5]\nyfov_degrees = 60");
     let output = folder.path().join("a.exr").to_str().unwrap().to_owned();
-    // Light of the sky would pass through the walls, because this technique has no shadows for it.
-    let more = ["--unit", "0.5", "--camera", &camera, "--light", "0,9,0,5", "-D", "isr.environment=false"];
+    let more = ["--unit", "0.5", "--camera", &camera, "--light", "0,9,0,5"];
     let said = isr(&scene, &output, &more).expect(0, &["a lamp beside the camera (--light "]);
     assert!(mean(&output) > 0.01, "{}: {}", mean(&output), said.stderr);
     lucerna(["rerun", "-q", &output]).expect(0, &[]);
