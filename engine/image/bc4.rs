@@ -131,7 +131,7 @@ mod tests {
                 assert!((ours - theirs).abs() < 1e-6, "{block:?}: {ours} {theirs}");
             }
             // Any bits are a block.
-            let odd: [u8; 8] = std::array::from_fn(|i| (number * 7919 + i * 104_729 >> 3) as u8);
+            let odd: [u8; 8] = std::array::from_fn(|i| ((number * 7919 + i * 104_729) >> 3) as u8);
             for (ours, theirs) in decode_bc4(odd).iter().zip(theirs(odd)) {
                 assert!((ours - theirs).abs() < 1e-6, "{odd:?}: {ours} {theirs}");
             }

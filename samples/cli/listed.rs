@@ -77,7 +77,7 @@ mod tests {
         assert_eq!(of(named("*.exr"))[..2], [named("b.exr"), named("c.exr")]);
         std::fs::create_dir(folder.path().join("empty")).unwrap();
         for wrong in [named("empty"), named("*.hdr"), named("[.exr")] {
-            assert_eq!(expanded(&[wrong.clone()]).unwrap_err().exit_code(), 3, "{wrong}");
+            assert_eq!(expanded(std::slice::from_ref(&wrong)).unwrap_err().exit_code(), 3, "{wrong}");
         }
     }
 }
