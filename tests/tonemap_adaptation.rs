@@ -26,7 +26,7 @@ fn settings(operator: Operator) -> Settings {
 
 /// With neighbourhoods that are small beside the pictures here.
 fn in_mode(operator: Operator, mode: Mode) -> Settings {
-    let reaches = Settings { radius: 4, scales: 4, spatial: 0.03, ..Settings::default() };
+    let reaches = Settings { radius: 4, scales: 4, spatial: 0.03, ..Settings::paper() };
     Settings { operator, mode: Some(mode), adapt_limit: 0.0, ..reaches }
 }
 

@@ -48,7 +48,7 @@ fn expected(pixels: &[[f32; 4]], percentile: f32) -> (f32, f32, f64) {
 }
 
 fn settings(percentile: f32) -> Settings {
-    Settings { mode: Some(Mode::Global), percentile, ..Settings::default() }
+    Settings { mode: Some(Mode::Global), percentile, ..Settings::paper() }
 }
 
 #[test]
