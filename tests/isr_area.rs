@@ -156,11 +156,16 @@ fn a_ceiling_above_a_lamp_is_lit_by_the_floor() {
     let scene = builtin::load("cornell-area").unwrap();
     let pose = Pose::rest(&scene);
     let view = View::of_camera(&scene, &pose, 0, [120, 90]).unwrap();
-    let paths = path::Settings { samples: 200, bounces: 1, diffuse_only: true, every: 3, ..Default::default() };
-    let truth = path::trace(&scene, &pose, &Bvh::build(&scene, &pose), &view, &paths);
-    // Where surfaces that look down have only light that other surfaces send.
+    let bvh = Bvh::build(&scene, &pose);
+    let traced = |bounces| {
+        let paths = path::Settings { samples: 200, bounces, diffuse_only: true, every: 3, ..Default::default() };
+        path::trace(&scene, &pose, &bvh, &view, &paths)
+    };
+    // Paths of one scattering find the lamp's light, those of two the light that other surfaces send.
+    let (first, truth) = (traced(1), traced(2));
+    let none = |light: Vec3| light == Vec3::ZERO;
     let kept: Vec<usize> = (0..truth.albedo.len())
-        .filter(|&pixel| truth.albedo[pixel] != Vec3::ZERO && truth.direct[pixel] == Vec3::ZERO)
+        .filter(|&pixel| none(first.direct[pixel]) && none(first.indirect[pixel]) && !none(truth.indirect[pixel]))
         .collect();
     assert!(kept.len() > 50, "{}", kept.len());
     let expected: Vec3 = kept.iter().map(|&pixel| truth.indirect[pixel]).sum();
