@@ -2,7 +2,7 @@
 //! with signs for blue (12 bits a texel). Values of images have both signs, so the forms without signs cannot hold them.
 //!
 //! No crate was found that encodes these forms: `intel_tex_2`, `block_compression` and `texpresso` have the forms without signs alone. The encoders are
-//! [`image::encode_bc6h`] and [`image::encode_bc4`]; tests decode them with the crate `bcdec_rs`.
+//! `encode_bc6h` and `encode_bc4` of [`crate::image`]; tests decode them with the crate `bcdec_rs`.
 
 use half::f16;
 use serde::{Deserialize, Serialize};
