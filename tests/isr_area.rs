@@ -164,7 +164,8 @@ fn a_ceiling_above_a_lamp_is_lit_by_the_floor() {
     // Paths of one scattering find the lamp's light, those of two the light that other surfaces send.
     let (first, truth) = (traced(1), traced(2));
     let none = |light: Vec3| light == Vec3::ZERO;
-    let kept: Vec<usize> = (0..truth.albedo.len())
+    // The ceiling is in the uppermost rows; in lower ones paths may miss the small lamp by chance.
+    let kept: Vec<usize> = (0..15 * 120)
         .filter(|&pixel| none(first.direct[pixel]) && none(first.indirect[pixel]) && !none(truth.indirect[pixel]))
         .collect();
     assert!(kept.len() > 50, "{}", kept.len());
@@ -179,7 +180,7 @@ fn a_ceiling_above_a_lamp_is_lit_by_the_floor() {
         let by_rays = share(&base);
         let in_the_picture = share(&Settings { area_lights: AreaLights::Image, ..base.clone() });
         println!("by rays {by_rays}, in the picture {in_the_picture}");
-        assert!(by_rays.min_element() > 0.3 && by_rays.max_element() < 1.2, "{by_rays}");
+        assert!(by_rays.min_element() > 0.7 && by_rays.max_element() < 1.2, "{by_rays}");
         assert!(in_the_picture.max_element() < 0.5 * by_rays.min_element(), "{in_the_picture}");
     });
 }
