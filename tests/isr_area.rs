@@ -158,17 +158,17 @@ fn a_ceiling_above_a_lamp_is_lit_by_the_floor() {
     let view = View::of_camera(&scene, &pose, 0, [120, 90]).unwrap();
     let bvh = Bvh::build(&scene, &pose);
     let traced = |bounces| {
-        let paths = path::Settings { samples: 200, bounces, diffuse_only: true, every: 3, ..Default::default() };
+        let paths = path::Settings { samples: 200, bounces, diffuse_only: true, every: 2, ..Default::default() };
         path::trace(&scene, &pose, &bvh, &view, &paths)
     };
     // Paths of one scattering find the lamp's light, those of two the light that other surfaces send.
     let (first, truth) = (traced(1), traced(2));
     let none = |light: Vec3| light == Vec3::ZERO;
     // The ceiling is in the uppermost rows; in lower ones paths may miss the small lamp by chance.
-    let kept: Vec<usize> = (0..15 * 120)
+    let kept: Vec<usize> = (0..18 * 120)
         .filter(|&pixel| none(first.direct[pixel]) && none(first.indirect[pixel]) && !none(truth.indirect[pixel]))
         .collect();
-    assert!(kept.len() > 50, "{}", kept.len());
+    assert!(kept.len() > 40, "{}", kept.len());
     let expected: Vec3 = kept.iter().map(|&pixel| truth.indirect[pixel]).sum();
     with_gpu(|gpu| {
         // One scattering, as the paths have.
