@@ -19,7 +19,7 @@ const EXTENT: [u32; 2] = [48, 48];
 /// All light of a picture, and its indirect part.
 fn render(gpu: &Gpu, scene: &Scene, view: &View, settings: &Settings) -> [Vec<Vec3>; 2] {
     let mut resident = Resident::new(gpu, scene).unwrap();
-    let mut area = Area::new(gpu, scene, &resident).unwrap().unwrap();
+    let mut area = Area::new(gpu, scene, &resident, &Settings::default()).unwrap().unwrap();
     let mut graph = Graph::new("isr.area");
     graph.seed = 7;
     let pose = Pose::rest(scene);

@@ -31,9 +31,9 @@ pub enum DefaultLight {
     Never,
 }
 
-/// Note for scenes without other lights. It does not apply to the path tracer.
-pub const EMISSIVE_ALONE: &str = "only emissive surfaces light the scene; with isr only the emissive surfaces in the picture give \
-                                  light (--default-light always adds a sun and a sky, --light adds a lamp)";
+/// Note for scenes without other lights.
+const EMISSIVE_ALONE: &str =
+    "only emissive surfaces light the scene (--default-light always adds a sun and a sky, --light adds a lamp)";
 
 /// Adds default lights to a dark scene, or as `choice` demands: a lamp to an interior, else a sun and a sky. `seen`: the pose and the view of the
 /// picture. Without them, emissive surfaces light a scene wherever they are.
@@ -57,7 +57,7 @@ pub fn add_missing_light(scene: &mut Scene, choice: DefaultLight, seen: Option<(
     let bvh = Bvh::build(scene, &Pose::playing(scene, 0.0));
     let room = Survey::of(&bvh).and_then(|survey| survey.interior());
     if let Some((under, floor)) = room.and_then(|room| Some((room.ceiling?, room.floor))) {
-        // A sun cannot light a closed room, and techniques without shadows for the sky would let it shine through the walls.
+        // A sun and a sky cannot light a closed room.
         let height = under.y - floor.y;
         let lamp = Light {
             name: "default lamp".into(),

@@ -9,8 +9,6 @@ mod pyramids;
 mod tonemap_adaptation;
 #[path = "../tonemap_agreement.rs"]
 mod tonemap_agreement;
-#[path = "../tonemap_defaults.rs"]
-mod tonemap_defaults;
 #[path = "../tonemap_operators.rs"]
 mod tonemap_operators;
 #[path = "../tonemap_pyramid.rs"]

@@ -13,6 +13,8 @@ pub mod statistics;
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod usual;
 
 use crate::techniques::tonemap::{BadValues, Local, Mode, Operator, Settings};
 use plane::Plane;

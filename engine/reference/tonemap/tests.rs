@@ -19,7 +19,7 @@ fn all() -> Vec<Settings> {
 }
 
 /// Four decades of smooth and noisy colour.
-fn picture(width: u32, height: u32) -> Pixels {
+pub(super) fn picture(width: u32, height: u32) -> Pixels {
     let pixel = |i: u32| {
         let (x, y) = (i % width, i / width);
         let noise = (x.wrapping_mul(374_761_393) ^ y.wrapping_mul(668_265_263)).wrapping_mul(1_274_126_177) >> 16;

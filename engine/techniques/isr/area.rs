@@ -4,7 +4,7 @@
 //! sky is stored as its unshadowed share, so that surfaces under the open sky have no noise and keep the exact irradiance of
 //! [`crate::passes::ambient`]. Surfaces in the picture send this light on.
 
-use super::Settings;
+use super::{AreaLights as Choice, Settings};
 use crate::{
     Result,
     gpu::Gpu,
@@ -24,7 +24,7 @@ use crate::{
     tracer::tables::{AreaHandles, AreaLights},
 };
 
-/// The data of a scene that rays to its sky and its glowing surfaces need.
+/// The data of a scene that rays to its sky, to its glowing surfaces and into the open need.
 #[derive(Debug)]
 pub struct Area {
     rays: Rays,
@@ -32,12 +32,13 @@ pub struct Area {
 }
 
 impl Area {
-    /// Builds acceleration structures and tables. `None` if the scene has neither an environment nor emissive surfaces.
+    /// Builds acceleration structures and tables. `None` if the settings need no rays: those of [`super::AreaLights::Rays`] do in scenes with an
+    /// environment or emissive surfaces, and in all scenes for [`Settings::unseen`].
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
-    pub fn new(gpu: &Gpu, scene: &Scene, resident: &Resident) -> Result<Option<Self>> {
-        if !AreaLights::any(scene) {
+    pub fn new(gpu: &Gpu, scene: &Scene, resident: &Resident, settings: &Settings) -> Result<Option<Self>> {
+        if settings.area_lights != Choice::Rays || !(AreaLights::any(scene) || settings.fills()) {
             return Ok(None);
         }
         Ok(Some(Self { rays: Rays::new(gpu, scene, resident)?, lights: AreaLights::new(gpu, scene)? }))
@@ -94,6 +95,11 @@ impl AreaLight {
 }
 
 impl AreaFrame {
+    /// The scene has a sky or glowing surfaces.
+    pub(super) fn has_lights(&self) -> bool {
+        self.lights.sky || self.lights.tree
+    }
+
     /// Declares the rays. `coarse`: the coarse buffers of `g`. `ambient`: of [`Irradiance::upload`].
     pub(super) fn light(
         &self,

@@ -1,5 +1,5 @@
 //! Image-space radiosity (the ISR dissertation, chapters 3 to 5): one bounce of diffuse light and ambient occlusion from what
-//! the G-buffer of a frame holds, with nothing precomputed.
+//! the G-buffer of a frame holds, without precomputed light.
 //!
 //! [`frame`] declares every pass after G-buffer and shadow maps; [`picture`] declares those too. What it computes: the light
 //! that visible surfaces reflect onto visible surfaces. Surfaces outside the image, behind others or turned away send nothing:
@@ -11,10 +11,13 @@
 //! - [`Estimator::Area`] sums form factors to the whole cells that samples stand for, which converges to the irradiance;
 //!   the dissertation's sum does not ([`Estimator`] has the factor). So `k_isr` is 1 and not 0.5.
 //! - The sender is direct light as the surface reflects it, averaged from full resolution, and not the albedo
-//!   ([`Sender`]). It has no highlights, and no light of the environment.
+//!   ([`Sender`]). It has no highlights.
 //! - Samples lie on rings that are denser near the pixel, moved from texel to texel, and averaged by a bilateral blur.
 //! - The receiver's albedo tints what it gathers; the dissertation adds it as it is ([`Receiver`]).
-//! - Occlusion darkens only light of the environment ([`Occlude`]).
+//! - Light of the sky and of glowing surfaces comes by rays ([`AreaLights`]): walls and lamps outside of the image decide about it. The dissertation has point lights
+//!   alone, and no ray. Without rays the sky lights every surface, and occlusion darkens only its light ([`Occlude`]).
+//! - Where rays meet surfaces that the image does not show, they send a share of the light of those that it shows ([`Settings::unseen`]), and further
+//!   scatterings are estimated as in a closed room. In the dissertation these surfaces are dark.
 //! - Further bounces ([`Settings::bounces`]) gather again in the same frame; nothing is kept from frame to frame.
 //!
 //! The dissertation's future work is there too, switched off by default: surfaces beyond the border of the picture, behind others, or
@@ -56,7 +59,7 @@ pub struct Outputs {
     pub total: Image,
     /// Direct light with emission.
     pub direct: Image,
-    /// Gathered light and light of the environment, as they enter the sum.
+    /// Gathered light and light of the environment and of glowing surfaces, as they enter the sum.
     pub indirect: Image,
     /// R32F: 1 open, 0 occluded.
     pub occlusion: Image,
@@ -89,6 +92,7 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
     let factor = settings.resolution.factor();
 
     let area = inputs.surroundings.area.filter(|_| settings.area_lights == AreaLights::Rays);
+    let area = area.filter(|area| area.has_lights() || settings.fills());
     let direct = Direct { glow: area.is_none(), ..settings.direct() };
     let lit = direct::light(graph, &g, inputs.lights, &direct);
 
@@ -189,8 +193,7 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
 
     let first = inputs.senders.filter(|_| settings.indirect);
     let mut senders = first;
-    let unseen = settings.unseen > 0.0 && first.is_none() && settings.indirect && settings.sender == Sender::Lit;
-    let unseen = by_rays.filter(|_| unseen).map(|light| unseen::Unseen::new(graph, sender, &coarse, light));
+    let unseen = by_rays.filter(|_| settings.fills()).map(|light| unseen::Unseen::new(graph, sender, &coarse, light));
     // Filtered, with the light of surfaces that the picture does not show.
     let filled = |graph: &mut Graph, gathered: Image, seen: Image, scatterings: u32| {
         let gathered = filter(graph, gathered);

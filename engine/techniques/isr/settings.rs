@@ -268,8 +268,8 @@ pub struct Settings {
     #[schemars(range(min = 2, max = 64), extend("x-needs" = {"area_lights": {"const": "rays"}}))]
     pub area_rays: u32,
     /// Brightness of the surfaces that the picture does not show, relative to those that it shows to the receiver. They are where rays meet surfaces. Light
-    /// that is scattered more often than `bounces` times is estimated as in a closed room, by the same share. 0: they are dark. Only in scenes
-    /// with a sky or glowing surfaces, and without `border`, `layers` and `cameras`, which look for these surfaces.
+    /// that is scattered more often than `bounces` times is estimated as in a closed room, by the same share. 0: they are dark. Has no effect
+    /// with `border`, `layers` and `cameras`, which look for these surfaces.
     #[schemars(range(min = 0, max = 1), extend("x-needs" = {"area_lights": {"const": "rays"}}))]
     pub unseen: f32,
     /// Direct light is reflected by GGX facets over the matt base; otherwise by Lambert's law alone.
@@ -414,6 +414,12 @@ impl Settings {
             light_power: self.light_power,
             ..Direct::default()
         }
+    }
+
+    /// Surfaces that the picture does not show send light ([`Self::unseen`]).
+    pub(super) fn fills(&self) -> bool {
+        let looks = self.border > 0.0 || self.layers > 1 || self.cameras > 0;
+        self.unseen > 0.0 && !looks && self.indirect && self.sender == Sender::Lit
     }
 
     /// # Errors

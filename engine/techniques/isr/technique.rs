@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 
-use super::{Area, AreaLights, PictureSettings, Surroundings, picture};
+use super::{Area, PictureSettings, Surroundings, picture};
 use crate::{
     Result,
     graph::Graph,
@@ -81,16 +81,15 @@ impl Technique for Isr {
     }
 
     fn prepared_by(settings: &PictureSettings) -> PictureSettings {
-        let isr = super::Settings { area_lights: settings.isr.area_lights, ..Default::default() };
+        // Rays need acceleration structures; whether there are rays is all that counts here.
+        let unseen = f32::from(u8::from(settings.isr.fills()));
+        let isr = super::Settings { area_lights: settings.isr.area_lights, unseen, ..Default::default() };
         PictureSettings { isr, ..PictureSettings::default() }
     }
 
     fn ready(making: Making<'_, Infallible>, settings: &PictureSettings) -> Result<Self> {
         let Making { gpu, scene, resident, .. } = making;
-        let area = match settings.isr.area_lights {
-            AreaLights::Image => None,
-            AreaLights::Rays => Area::new(gpu, scene, resident)?,
-        };
+        let area = Area::new(gpu, scene, resident, &settings.isr)?;
         Ok(Self { ambient: scene.into(), area })
     }
 
@@ -103,8 +102,7 @@ impl Technique for Isr {
             skybox::draw(graph, handles, &gbuffer, settings.background.into(), lit.direct);
             (Picture::new(lit.direct), gbuffer, shadows)
         } else {
-            let area = self.area.as_mut().filter(|_| settings.isr.area_lights == AreaLights::Rays);
-            let area = area.map(|area| area.frame(graph, moment.scene, moment.pose, handles));
+            let area = self.area.as_mut().map(|area| area.frame(graph, moment.scene, moment.pose, handles));
             let surroundings = Surroundings { ambient: self.ambient.clone(), area };
             let made = picture(graph, handles, view, surroundings, settings)?;
             let out = made.outputs;

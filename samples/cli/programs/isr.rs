@@ -67,5 +67,5 @@ pub fn render(args: &IsrArgs) -> Result<ExitCode> {
 
 /// Reads a preset.
 fn preset() -> impl TypedValueParser<Value = Preset> {
-    PossibleValuesParser::new(["fast", "balanced", "best"]).try_map(|name| name.parse::<Preset>())
+    PossibleValuesParser::new(Preset::ALL.map(|(name, _)| name)).try_map(|name| name.parse::<Preset>())
 }

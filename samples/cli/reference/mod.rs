@@ -25,7 +25,7 @@ use crate::{
     bake::Ended,
     config::{self, SettingsArgs},
     console::{self, Console},
-    default_light, exposure,
+    exposure,
     last_stage::{self, Staged},
     outputs::{self, Fresh, Outputs},
     pattern::{Pattern, Values},
@@ -155,9 +155,7 @@ fn picture(
     if !args.resume {
         checkpoint.probe(args.restart)?;
     }
-    // The note about emissive surfaces is for image-space techniques and does not apply to path tracing.
-    for note in stage.notes().iter().filter(|n| n.kind != NoteKind::Repaired && n.text != default_light::EMISSIVE_ALONE)
-    {
+    for note in stage.notes().iter().filter(|n| n.kind != NoteKind::Repaired) {
         console.info(&format!("note: {}: {}", note.place, note.text));
     }
     // The device does not get the stop request. The tracer stops between two tiles and keeps all results; an interrupted tile would be lost.

@@ -1,28 +1,13 @@
 //! What the usual settings have that the papers lack, by the CPU twin: a threshold that does not depend on the exposure, a limit of contrast,
 //! weaker colours. And the points of Drago's curve.
 
-use lucerna::{
-    reference::tonemap::{Picture, drago, plane::luminance_of, tonemap},
-    techniques::tonemap::{Mode, Operator, Settings, ThresholdUnit},
-};
+use super::{Picture, drago, plane::luminance_of, tests::picture, tonemap};
+use crate::techniques::tonemap::{Mode, Operator, Settings, ThresholdUnit};
 
 const SIZE: (u32, u32) = (64, 48);
 
-/// Four decades of smooth and noisy colour.
-fn picture() -> Vec<[f32; 3]> {
-    let (width, height) = SIZE;
-    let pixel = |i: u32| {
-        let (x, y) = (i % width, i / width);
-        let noise = (x.wrapping_mul(374_761_393) ^ y.wrapping_mul(668_265_263)).wrapping_mul(1_274_126_177) >> 16;
-        let level = 10f32.powf(3.0 * ((x + 2 * y) as f32 / (width + 2 * height) as f32) - 2.0);
-        let level = if (x / 7 + y / 5) % 3 == 0 { 6.0 * level } else { level };
-        [1.0, 0.8, 0.3].map(|c| c * level * (1.0 + noise as f32 / 400_000.0))
-    };
-    (0..width * height).map(pixel).collect()
-}
-
 fn shown(settings: &Settings) -> Vec<[f32; 3]> {
-    tonemap(SIZE.0, SIZE.1, &picture(), settings)
+    tonemap(SIZE.0, SIZE.1, &picture(SIZE.0, SIZE.1), settings)
 }
 
 fn close(a: &[[f32; 3]], b: &[[f32; 3]], what: &str) {
@@ -33,7 +18,7 @@ fn close(a: &[[f32; 3]], b: &[[f32; 3]], what: &str) {
 
 #[test]
 fn a_threshold_in_log_averages_does_not_depend_on_the_exposure() {
-    let pixels = picture();
+    let pixels = picture(SIZE.0, SIZE.1);
     let share = |threshold_unit, exposure| {
         let settings = Settings { mode: Some(Mode::Selective), threshold_unit, exposure, ..Settings::default() };
         let map = Picture::new(SIZE.0, SIZE.1, &pixels, &settings).important(None);
@@ -68,7 +53,7 @@ fn a_contrast_limit_goes_from_global_to_local() {
 
 #[test]
 fn weaker_colours_have_the_power_of_the_ratios() {
-    let pixels = picture();
+    let pixels = picture(SIZE.0, SIZE.1);
     for (_, operator) in Operator::ALL {
         let with =
             |saturation| shown(&Settings { operator, mode: Some(Mode::Global), saturation, ..Settings::paper() });
