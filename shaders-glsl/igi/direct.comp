@@ -26,6 +26,7 @@
 #include "igi/igi.glsl"
 #include "lib/vpl.glsl"
 #include "igi/vpl_surface.glsl"
+#include "igi/soft.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -37,6 +38,12 @@ layout(binding = 4) uniform sampler2D specular;
 layout(binding = 5) uniform sampler2D emission;
 layout(binding = 6, rgba32f) uniform image2D direct; // radiance with emission, W/(sr·m²)
 layout(binding = 13, scalar) uniform SettingsBlock { IgiSettings settings; };
+
+// 1: light of emissive surfaces and of the sky goes into images of its own, divided by soft_color(); a: difference between
+// the luminances of both halves of the samples.
+layout(constant_id = 0) const uint APART = 0;
+layout(binding = 14, rgba32f) uniform image2D lamps;
+layout(binding = 15, rgba32f) uniform image2D sky;
 
 layout(push_constant, scalar) uniform Push {
     uint first; // shadow ray
@@ -50,6 +57,7 @@ void main() {
     if (any(greaterThanEqual(pixel, imageSize(direct)))) return;
     float z = texelFetch(depth, pixel, 0).r;
     vec3 sum = vec3(0.0);
+    vec4 from_lamps = vec4(0.0), from_sky = vec4(0.0);
     if (z < 1.0) {
         vec4 color = texelFetch(albedo, pixel, 0);
         vec4 gloss = texelFetch(specular, pixel, 0);
@@ -62,13 +70,31 @@ void main() {
         p.viewer = to_camera(view, p.position);
         p.brdf = lit_brdf(color.rgb, gloss.rgb, gloss.a, dot(p.normal, p.viewer));
         // Unlit surfaces show their colour, which is in the emission buffer.
+        if (APART != 0u && first != 0u) {
+            from_lamps = imageLoad(lamps, pixel);
+            from_sky = imageLoad(sky, pixel);
+        }
+        uint sky_from = light_count + settings.tree * settings.samples;
         uint last = color.a > 0.5 ? min(first + count, direct_rays()) : 0u;
         for (uint i = first; i < last; ++i) {
             Ray ray;
             vec3 light = direct_ray(i, p, uvec2(pixel), ray);
             if (light == vec3(0.0)) continue;
-            if (!trace_any(ray, TRACE_SHADOW, pcg4d(uvec4(pixel, i, settings.seed)).y)) sum += light;
+            if (trace_any(ray, TRACE_SHADOW, pcg4d(uvec4(pixel, i, settings.seed)).y)) continue;
+            if (APART != 0u && i >= light_count) {
+                vec3 even = light / soft_color(color.rgb, gloss.rgb);
+                float side = soft_side((i - light_count) % settings.samples, settings.samples);
+                vec4 part = vec4(even, side * dot(even, SOFT_LUMINANCE));
+                if (i < sky_from) from_lamps += part;
+                else from_sky += part;
+            } else {
+                sum += light;
+            }
         }
+    }
+    if (APART != 0u) {
+        imageStore(lamps, pixel, from_lamps);
+        imageStore(sky, pixel, from_sky);
     }
     imageStore(direct, pixel, vec4(sum, 1.0));
 }

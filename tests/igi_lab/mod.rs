@@ -97,7 +97,16 @@ pub fn room(albedo: Vec3) -> Stage {
 
 /// Settings for diffuse surfaces only, without a bound, with one bounce.
 pub fn plain(vpls: u32) -> Settings {
-    Settings { vpls, candidates: 1, bounces: 1, bound: 0.0, specular: false, direct_samples: 4, ..Settings::default() }
+    Settings {
+        vpls,
+        candidates: 1,
+        bounces: 1,
+        bound: 0.0,
+        specular: false,
+        direct_samples: 4,
+        direct_filter: 0,
+        ..Settings::default()
+    }
 }
 
 /// Mean of red, green and blue over the picture.

@@ -141,6 +141,80 @@ pub fn smoothed(
     sum / weights
 }
 
+/// The pixel shows a surface that light falls on.
+pub fn is_lit(buffers: &Buffers, i: usize) -> bool {
+    buffers.depth[i] < 1.0 && buffers.mask[i] > 0.5
+}
+
+/// Direct light of lamps and the sky after `iterations` of the filter for its noise; alpha: variance. `None` where there is no lit surface.
+pub fn soft(
+    eye: &Eye,
+    buffers: &Buffers,
+    kinds: [&Texels; 2],
+    iterations: u32,
+    [sharpness, range, contrast]: [f64; 3],
+) -> Vec<Option<DVec4>> {
+    let (columns, rows) = (buffers.width as i64, buffers.height as i64);
+    let cell = |i: usize| (i as i64 % columns, i as i64 / columns);
+    let count = buffers.depth.len();
+    let luminance = |c: DVec4| c.truncate().dot(dvec3(0.2126, 0.7152, 0.0722));
+    let surface = |i: usize| {
+        let (x, y) = cell(i);
+        (place(eye, buffers, (x as usize, y as usize)), buffers.normal[i].normalize(), buffers.depth[i])
+    };
+    // Pixels of the surface around pixel `i`, with their offset in pixels divided by `step`.
+    let around = |i: usize, step: i64| {
+        let (x, y) = cell(i);
+        let offsets = (-2..=2).flat_map(|b| (-2..=2).map(move |a| (a, b)));
+        offsets.filter_map(move |(a, b): (i64, i64)| {
+            let (u, v) = (x + a * step, y + b * step);
+            let inside = (0..columns).contains(&u) && (0..rows).contains(&v);
+            let other = (v * columns + u) as usize;
+            (inside && is_lit(buffers, other)).then_some((other, a, b))
+        })
+    };
+    let mut light: Vec<Option<DVec4>> = (0..count)
+        .map(|i| {
+            if !is_lit(buffers, i) {
+                return None;
+            }
+            let (p, n, z) = surface(i);
+            let (mut sum, mut weights) = (0.0, 0.0);
+            for (other, ..) in around(i, 2) {
+                let (q, m, _) = surface(other);
+                let off = n.dot(q - p) / (z * eye.far * range);
+                let weight = n.dot(m).max(1e-12).powf(sharpness) * (-0.5 * off * off).exp();
+                sum += weight * kinds.iter().map(|kind| f64::from(kind[other][3]).powi(2)).sum::<f64>();
+                weights += weight;
+            }
+            Some((color(kinds[0][i]) + color(kinds[1][i])).extend(sum / weights))
+        })
+        .collect();
+    for turn in 0..iterations {
+        let step = |i: usize| {
+            let own = light[i]?;
+            let (p, n, z) = surface(i);
+            let (mut out, mut kept) = (DVec4::ZERO, 1.0);
+            for (other, a, b) in around(i, 1 << turn).filter(|(other, ..)| *other != i) {
+                let there = light[other]?;
+                let (q, m, far) = surface(other);
+                let kernel = |k: i64| [6.0, 4.0, 1.0][k.unsigned_abs() as usize];
+                // The mean of both distances to the other's plane, relative to the mean of the depths.
+                let off = 0.5 * (n + m).dot(q - p) / (0.5 * (z + far) * eye.far * range);
+                let differs = (luminance(there) - luminance(own)).abs() / (contrast * (own.w + there.w).sqrt() + 1e-20);
+                let weight = kernel(a) * kernel(b) / 256.0
+                    * n.dot(m).max(1e-12).powf(sharpness)
+                    * (-0.5 * off * off - differs).exp();
+                out += (there.truncate() * weight).extend(there.w * weight * weight);
+                kept -= weight;
+            }
+            Some(out + (own.truncate() * kept).extend(own.w * kept * kept))
+        };
+        light = (0..count).map(step).collect();
+    }
+    light
+}
+
 /// The data of the history, for [`blended`].
 pub struct Past<'a> {
     pub eye: &'a Eye,

@@ -29,6 +29,8 @@ mod igi_odd;
 mod igi_raster;
 #[path = "../igi_sixty.rs"]
 mod igi_sixty;
+#[path = "../igi_soft.rs"]
+mod igi_soft;
 #[path = "../igi_time.rs"]
 mod igi_time;
 #[path = "../igi_twins.rs"]

@@ -1,18 +1,29 @@
 //! Filters that compute the irradiance of every pixel from coarse or interleaved irradiance: the discontinuity buffer, edge-avoiding
-//! smoothing, and joint bilateral upsampling.
+//! smoothing, and joint bilateral upsampling. And the filter for the noise of direct light.
 
 use super::Settings;
 use crate::{
     graph::{Buffer, Format, Graph, Image},
     passes::gbuffer::GBuffer,
-    shaders::igi::{discontinuity, guide, smooth, upsample},
+    shaders::igi::{discontinuity, guide, smooth, soft_filter, soft_noise, upsample},
 };
+
+/// Exponent of the cosine between normals in the weights of [`soft_light`].
+const SOFT_SHARPNESS: f32 = 16.0;
+/// Distance from the pixels' planes, relative to their depth, at which its weight falls to 0.6.
+const SOFT_RANGE: f32 = 0.01;
+/// Standard deviations by which the light of two pixels may differ with weight 0.37.
+const SOFT_CONTRAST: f32 = 4.0;
 
 /// Guide image for all filters, one texel for every [`Settings::downsample`]-th pixel: rgb unit normal, a linear depth / far.
 pub fn guide(graph: &mut Graph, g: &GBuffer, settings: &Settings) -> Image {
-    let extent = graph.extent(g.depth).div_ceil(settings.downsample);
+    guide_of(graph, g, settings.downsample, settings.scattered)
+}
+
+fn guide_of(graph: &mut Graph, g: &GBuffer, factor: u32, scattered: bool) -> Image {
+    let extent = graph.extent(g.depth).div_ceil(factor);
     let guide = graph.image("igi.guide", Format::RGBA32F, extent);
-    let push = guide::Push { factor: settings.downsample, scattered: settings.scattered.into() };
+    let push = guide::Push { factor, scattered: scattered.into() };
     let args = guide::Args { normal: g.normal, depth: g.depth, guide, push };
     graph.compute(args, extent);
     guide
@@ -94,4 +105,29 @@ pub fn upsample(graph: &mut Graph, g: &GBuffer, guide: Image, coarse: Image, set
     };
     graph.compute(args, extent);
     (irradiance, unmatched)
+}
+
+/// Direct light of emissive surfaces and of the sky without most of its noise, as radiance divided by the surfaces' colours; alpha: variance of its
+/// luminance, -1 where there is no lit surface. `kinds`: the light of emissive surfaces and of the sky; alpha: the difference between the
+/// luminances of both halves of the samples. The sum over all pixels does not change (Schied et al. 2017, with exchanges that keep the light;
+/// `igi/soft_filter.comp`).
+pub fn soft_light(graph: &mut Graph, g: &GBuffer, kinds: [Image; 2], iterations: u32) -> Image {
+    let extent = graph.extent(g.depth);
+    let guide = guide_of(graph, g, 1, false);
+    let [lamps, sky] = kinds;
+    let mut light = graph.image("igi.direct_noise", Format::RGBA32F, extent);
+    let push = soft_noise::Push { sharpness: SOFT_SHARPNESS, range: SOFT_RANGE };
+    graph.compute(soft_noise::Args { view: g.view, guide, lamps, sky, albedo: g.albedo, light, push }, extent);
+    for turn in 0..iterations {
+        let filtered = graph.image("igi.direct_filtered", Format::RGBA32F, extent);
+        let push = soft_filter::Push {
+            stride: 1 << turn,
+            sharpness: SOFT_SHARPNESS,
+            range: SOFT_RANGE,
+            contrast: SOFT_CONTRAST,
+        };
+        graph.compute(soft_filter::Args { view: g.view, guide, light, filtered, push }, extent);
+        light = filtered;
+    }
+    light
 }

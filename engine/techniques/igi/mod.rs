@@ -13,6 +13,8 @@
 //!   ([`Settings::compensation`]).
 //! - More paths are shot than needed. Their virtual lights are candidates, and the frame draws its virtual lights among them
 //!   with a probability that follows the light that they send to the view ([`Settings::candidates`]).
+//! - A filter removes the noise of direct light from emissive surfaces and from the sky ([`Settings::direct_filter`]). The paper's point lights
+//!   have no such noise.
 //! - Every kind of light sends paths: point, spot and directional lights, emissive surfaces, the environment. The paper has
 //!   point lights only.
 //! - 1/π is explicit: a virtual light has a flux Φ and sends Φ cos θ / π W/sr; the paper's L is Φ/π, its ρ our ρ/π.
@@ -26,6 +28,7 @@ mod traced;
 
 mod cache;
 mod compensation;
+mod direct;
 pub mod filters;
 mod gather;
 pub mod halton;
@@ -51,8 +54,7 @@ pub use technique::{GATHERED, Mode};
 use crate::{
     Result,
     gpu::Gpu,
-    graph::{Buffer, ComputeArgs, Format, Graph, Image, Items, PassRef, RangedArgs, Uniform},
-    passes::gbuffer::GBuffer,
+    graph::{Buffer, ComputeArgs, Graph, Image, Items, PassRef, RangedArgs, Uniform},
     rays::{RayHandles, Rays},
     resident::{Handles, Resident},
     scene::{Aabb, Pose, Scene},
@@ -109,6 +111,8 @@ struct Shared {
     light_nodes: Buffer,
     /// Shadow rays per point for direct light.
     direct_rays: u32,
+    /// Iterations of the filter for direct light from emissive surfaces and from the sky; 0 if the scene has neither.
+    direct_filter: u32,
     /// min_d of the bounded geometry term, metres.
     least: f32,
     /// Diagonal of the bounding box of all lit surfaces in the rest pose, metres.
@@ -254,6 +258,7 @@ impl Igi {
             instance_lights: areas.instance_lights,
             light_nodes: areas.light_nodes,
             direct_rays: lights + (u32::from(areas.tree) + u32::from(areas.sky)) * settings.direct_samples,
+            direct_filter: if areas.tree || areas.sky { settings.direct_filter } else { 0 },
             least: settings.bound * diagonal,
             diagonal,
             seed: graph.seed,
@@ -298,31 +303,6 @@ impl Igi {
             graph.compute(args, paths).rays(paths.into());
         }
         vpls
-    }
-
-    /// Direct and emitted radiance of the visible surfaces, W/(sr·m²).
-    fn direct(&self, graph: &mut Graph, handles: &Handles, g: &GBuffer, shared: &Shared) -> Image {
-        let extent = graph.extent(g.depth);
-        let direct = graph.image("igi.direct", Format::RGBA32F, extent);
-        graph.clear(direct, [0.0; 4]);
-        let args = traced_lit!(
-            shaders::igi::direct::Args {
-                view: g.view,
-                albedo: g.albedo,
-                normal: g.normal,
-                depth: g.depth,
-                specular: g.specular,
-                emission: g.emission,
-                direct,
-                push: shaders::igi::direct::Push::default(),
-            },
-            shared.rays,
-            handles,
-            shared,
-            lamps
-        );
-        graph.compute_over(args, extent, self.items(shared.direct_rays, extent.pixels()));
-        direct
     }
 
     /// A loop of `count` rays in each of `invocations` invocations.

@@ -119,6 +119,11 @@ fn unused(scene: &Scene, s: &Settings, frames: u32) -> Vec<Note> {
             s.direct_samples != default.direct_samples && !lit,
             "emissive surfaces or an environment, and the scene has none",
         ),
+        (
+            "direct_filter",
+            s.direct_filter != default.direct_filter && s.direct_filter > 0 && !lit,
+            "emissive surfaces or an environment, and the scene has none",
+        ),
         ("picks", s.picks != default.picks && s.indirect && !s.picks_from(lights), &many),
         ("refine", s.refine != default.refine && even, sparse),
         ("upsample_sigma", s.upsample_sigma != default.upsample_sigma && even, sparse),

@@ -1,0 +1,143 @@
+//! The filter for the noise of direct light from emissive surfaces and from the sky: against its twin, and what it does to pictures.
+
+use crate::igi_lab::{
+    Studio, mean,
+    twins::{Texels, is_lit, soft},
+};
+use crate::isr_lab::{Random, gbuffer, image, read, scene};
+use glam::{DVec4, dvec3};
+use lucerna::{
+    gpu::testing::with_gpu,
+    graph::{Extent, Graph},
+    reference::isr_scene::{Buffers, Eye},
+    scene::{Pose, View},
+    techniques::igi::{Settings, filters},
+};
+use lucerna_scenes as builtin;
+
+const SIZE: (usize, usize) = (45, 34);
+
+/// Surfaces with edges, steps and background, and random light with halves that differ by about its noise.
+fn stage() -> (Eye, Buffers, [Texels; 2]) {
+    let (_, patches) = scene(SIZE.0, SIZE.1);
+    let eye = Eye::look_at(dvec3(0.3, 1.2, 0.9), dvec3(0.0, 0.25, -1.3), 0.8, 10.0, SIZE.0, SIZE.1);
+    let mut buffers = Buffers::cast(&eye, &patches, 1);
+    // Unlit surfaces, which have no part in it.
+    buffers.mask.iter_mut().step_by(7).for_each(|mask| *mask = 0.0);
+    let mut random = Random(21);
+    let mut noise = || -> Texels {
+        let texel = |_| {
+            let [r, g, b, a] = random.texel();
+            [r, g, b, 0.5 * a - 0.2]
+        };
+        (0..SIZE.0 * SIZE.1).map(texel).collect()
+    };
+    let kinds = [noise(), noise()];
+    (eye, buffers, kinds)
+}
+
+fn filtered(gpu: &lucerna::gpu::Gpu, eye: &Eye, buffers: &Buffers, kinds: &[Texels; 2], turns: u32) -> Vec<[f32; 4]> {
+    let mut graph = Graph::new("soft");
+    let g = gbuffer(&mut graph, eye, buffers);
+    let extent = Extent::new(SIZE.0 as u32, SIZE.1 as u32);
+    let lamps = image(&mut graph, "lamps", extent, &kinds[0]);
+    let sky = image(&mut graph, "sky", extent, &kinds[1]);
+    let light = filters::soft_light(&mut graph, &g, [lamps, sky], turns);
+    let [light] = read(gpu, graph, [light]);
+    light
+}
+
+#[test]
+fn it_agrees_with_its_twin_and_keeps_the_light() {
+    with_gpu(|gpu| {
+        let (eye, buffers, kinds) = stage();
+        for turns in [0, 1, 2, 4] {
+            let found = filtered(gpu, &eye, &buffers, &kinds, turns);
+            let expected = soft(&eye, &buffers, [&kinds[0], &kinds[1]], turns, [16.0, 0.01, 4.0]);
+            let (mut before, mut after) = (DVec4::ZERO, DVec4::ZERO);
+            let mut seen = 0;
+            for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
+                let found = glam::Vec4::from(*found).as_dvec4();
+                let Some(expected) = expected else {
+                    assert_eq!(found.w, -1.0, "{turns} turns, pixel {i} shows nothing");
+                    continue;
+                };
+                seen += 1;
+                let off = (found - *expected).abs().max_element();
+                assert!(off < 2e-4, "{turns} turns, pixel {i}: {found} instead of {expected}");
+                before += kinds.iter().map(|kind| glam::Vec4::from(kind[i]).as_dvec4()).sum::<DVec4>();
+                after += found;
+            }
+            assert!(seen > 600 && seen < found.len(), "{seen} pixels show something");
+            let change = (after / before - 1.0).truncate().abs().max_element();
+            assert!(change < 1e-5, "{turns} turns change the light by {change}");
+        }
+    });
+}
+
+#[test]
+fn light_stays_on_its_surface() {
+    with_gpu(|gpu| {
+        let (eye, buffers, mut kinds) = stage();
+        // The surface of the first pixel that shows something has light, with much noise; others have none.
+        let first = (0..buffers.depth.len()).find(|i| is_lit(&buffers, *i)).unwrap();
+        let alike = |i: usize| buffers.normal[i].dot(buffers.normal[first]) > 0.99;
+        for (i, texel) in kinds[0].iter_mut().enumerate() {
+            texel[3] = 2.0;
+            if !alike(i) {
+                *texel = [0.0, 0.0, 0.0, 2.0];
+            }
+        }
+        kinds[1].fill([0.0; 4]);
+        let found = filtered(gpu, &eye, &buffers, &kinds, 3);
+        let (mut lit, mut dark) = (0.0f32, 0.0f32);
+        for (i, texel) in found.iter().enumerate().filter(|(i, _)| is_lit(&buffers, *i)) {
+            let place = if alike(i) { &mut lit } else { &mut dark };
+            *place = place.max(texel[0]);
+        }
+        assert!(lit > 0.5 && dark < 1e-3 * lit, "{dark} beside {lit}");
+    });
+}
+
+/// Mean relative squared error of luminance, with 0.01 in the denominator.
+fn error(found: &[[f32; 4]], truth: &[[f32; 4]]) -> f64 {
+    let luminance = |p: &[f32; 4]| 0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2]);
+    let each = |(a, b)| ((luminance(a) - luminance(b)) / (luminance(b) + 0.01)).powi(2);
+    found.iter().zip(truth).map(each).sum::<f64>() / found.len() as f64
+}
+
+#[test]
+fn pictures_have_less_noise_and_as_much_light() {
+    with_gpu(|gpu| {
+        // A sky behind columns, a sky through a door and lamps, an emissive rectangle.
+        for (name, less) in [("figure", 2.0), ("garage", 4.0), ("cornell-area", 1.5)] {
+            let scene = builtin::load(name).unwrap();
+            let view = View::of_camera(&scene, &Pose::rest(&scene), 0, [96, 72]).unwrap();
+            let mut studio = Studio::new(gpu, &scene);
+            let mut direct = |direct_samples, direct_filter| {
+                let settings = Settings { indirect: false, direct_samples, direct_filter, ..Settings::default() };
+                studio.render(&view, &settings, 3).direct
+            };
+            let truth = direct(512, 0);
+            let (noisy, filtered) = (direct(16, 0), direct(16, Settings::default().direct_filter));
+            let (before, after) = (error(&noisy, &truth), error(&filtered, &truth));
+            let light = mean(&filtered) / mean(&noisy);
+            println!("{name}: error {before:.3e} to {after:.3e}, light {light:.5}");
+            assert!(after * less < before, "{name}: error {before} before and {after} after the filter");
+            assert!((light - 1.0).abs() < 2e-3, "{name}: {light} times the light");
+        }
+    });
+}
+
+#[test]
+fn without_a_sky_and_glowing_surfaces_no_bit_changes() {
+    with_gpu(|gpu| {
+        let scene = builtin::load("cornell").unwrap();
+        let view = View::of_camera(&scene, &Pose::rest(&scene), 0, [48, 48]).unwrap();
+        let mut studio = Studio::new(gpu, &scene);
+        let mut direct = |direct_filter| {
+            studio.render(&view, &Settings { indirect: false, direct_filter, ..Settings::default() }, 0).direct
+        };
+        assert_eq!(direct(0), direct(5));
+    });
+}
