@@ -155,7 +155,7 @@ fn measure(gpu: &Gpu, name: &str, scene: &Scene, options: &Options) -> Result<()
     let ratio = rate("gathering") / rate("benchmark");
     let pixels = f64::from(options.size[0]) * f64::from(options.size[1]);
     // Of pixels that show geometry at most; shadow rays from behind, or of light that does not arrive, are not traced.
-    let direct = pixels * f64::from(direct_rays(scene, &pose, settings.direct_samples));
+    let direct = pixels * f64::from(direct_rays(scene, &pose, &settings));
     let ms = |stage: &str| best.get(stage).copied().unwrap_or(0.0);
     if options.json {
         let stages: Vec<String> = best.iter().map(|(stage, ms)| format!("\"{stage}_ms\":{ms:.4}")).collect();
@@ -188,14 +188,16 @@ fn measure(gpu: &Gpu, name: &str, scene: &Scene, options: &Options) -> Result<()
 }
 
 /// Shadow rays of a point at most: one to each light, and samples of emissive surfaces and of the sky.
-fn direct_rays(scene: &Scene, pose: &Pose, samples: u32) -> u32 {
+fn direct_rays(scene: &Scene, pose: &Pose, settings: &Settings) -> u32 {
+    let samples = settings.direct_samples;
     let emits = |primitive: &scene::Primitive| {
         scene.materials.get(primitive.material as usize).is_some_and(|m| m.emissive != glam::Vec3::ZERO)
     };
     let mut meshes = scene.nodes.iter().filter_map(|node| scene.meshes.get(node.mesh? as usize));
     let surfaces = meshes.any(|mesh| mesh.primitives.iter().any(emits));
     let sky = scene.environment.as_ref().is_some_and(|sky| !sky.pixels.is_empty());
-    lucerna::resident::lights(scene, pose).len() as u32 + (u32::from(surfaces) + u32::from(sky)) * samples
+    let soft = (u32::from(surfaces) + u32::from(sky)) * samples + u32::from(sky) * settings.glossy_rays();
+    lucerna::resident::lights(scene, pose).len() as u32 + soft
 }
 
 /// Milliseconds of the ray benchmark's pass for a list of rays.

@@ -5,12 +5,13 @@ use crate::igi_lab::{
     twins::{Texels, is_lit, soft},
 };
 use crate::isr_lab::{Random, gbuffer, image, read, scene};
-use glam::{DVec4, dvec3};
+use crate::tracer_lab::{Stage, view};
+use glam::{DVec4, Vec3, dvec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
     graph::{Extent, Graph},
     reference::isr_scene::{Buffers, Eye},
-    scene::{Pose, View},
+    scene::{Environment, Material, Pose, View},
     techniques::igi::{Settings, filters},
 };
 use lucerna_scenes as builtin;
@@ -125,6 +126,41 @@ fn pictures_have_less_noise_and_as_much_light() {
             println!("{name}: error {before:.3e} to {after:.3e}, light {light:.5}");
             assert!(after * less < before, "{name}: error {before} before and {after} after the filter");
             assert!((light - 1.0).abs() < 2e-3, "{name}: {light} times the light");
+        }
+    });
+}
+
+#[test]
+fn highlights_of_the_sky_have_no_bright_points() {
+    with_gpu(|gpu| {
+        // Samples of an even sky rarely find the narrow highlight of a smooth surface, which then is far too bright.
+        for (roughness, metallic) in [(0.1, 0.0), (0.3, 0.0), (0.2, 1.0)] {
+            let mut stage = Stage::new();
+            let material = Material { roughness, metallic, ..Material::diffuse("glossy", Vec3::splat(0.2)) };
+            let material = stage.material(material);
+            stage.sphere(material, Vec3::ZERO, 1.0, 40, false);
+            stage.scene.environment = Some(Environment::constant(Vec3::ONE));
+            let view = view(vec3(0.0, 0.0, 2.5), vec3(0.0, 0.0, -1.0), 40.0, [32, 32]);
+            let mut studio = Studio::new(gpu, &stage.scene);
+            let mut direct = |direct_samples| {
+                let settings = Settings { indirect: false, direct_samples, direct_filter: 0, ..Settings::default() };
+                studio.render(&view, &settings, 5).direct
+            };
+            let (found, truth) = (direct(16), direct(2048));
+            let seen = truth.iter().filter(|p| p[0] > 0.0).count();
+            assert!(seen > 500, "{seen} pixels show the sphere");
+            let light = mean(&found) / mean(&truth);
+            let (most, steady) = found
+                .iter()
+                .zip(&truth)
+                .filter(|(_, b)| b[0] > 0.0)
+                .fold((0.0f32, 0.0f32), |all, (a, b)| (all.0.max(a[0] / b[0]), all.1.max(b[0])));
+            println!("roughness {roughness}, metallic {metallic}: light {light:.4}, brightest point {most:.2}");
+            assert!((light - 1.0).abs() < 0.01, "roughness {roughness}: {light} times the light");
+            assert!(
+                most < 2.0 && steady < 1.01,
+                "roughness {roughness}: a point of {most} times its light, or {steady} of the sky's"
+            );
         }
     });
 }

@@ -83,7 +83,8 @@ void main() {
             if (trace_any(ray, TRACE_SHADOW, pcg4d(uvec4(pixel, i, settings.seed)).y)) continue;
             if (APART != 0u && i >= light_count) {
                 vec3 even = light / soft_color(color.rgb, gloss.rgb);
-                float side = soft_side((i - light_count) % settings.samples, settings.samples);
+                uint soft = i - light_count, kinds = (settings.tree + settings.sky) * settings.samples;
+                float side = soft < kinds ? soft_side(soft % settings.samples, settings.samples) : soft_side(soft - kinds, settings.glossy);
                 vec4 part = vec4(even, side * dot(even, SOFT_LUMINANCE));
                 if (i < sky_from) from_lamps += part;
                 else from_sky += part;

@@ -12,6 +12,7 @@ struct IgiSettings {
     uint diffuse_only;     // 1: no gloss, no mirrors, no glass
     uint seed;
     uint samples;          // shadow rays per pixel to emissive surfaces, and as many to the environment
+    uint glossy;           // shadow rays per pixel to highlights of the environment on smooth surfaces
     uint tree;             // 1: the scene has emissive surfaces
     uint sky;              // 1: the scene has an environment
     // Loop bounds that are not compile-time constants: compilers of CPU drivers would unroll the loops, which takes minutes.

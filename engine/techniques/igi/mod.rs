@@ -230,6 +230,7 @@ impl Igi {
         let (low, high) = if bounds.is_empty() { Default::default() } else { (bounds.min, bounds.max) };
         // A scene may be empty or flat in the rest pose and have a size in this pose.
         let diagonal = if self.size > 0.0 { self.size } else { diagonal(&bounds) };
+        let glossy = if areas.sky { settings.glossy_rays() } else { 0 };
         let block = types::IgiSettings {
             environment: areas.map,
             low: low.to_array(),
@@ -240,6 +241,7 @@ impl Igi {
             diffuse_only: (!settings.specular).into(),
             seed: graph.seed,
             samples: settings.direct_samples,
+            glossy,
             tree: areas.tree.into(),
             sky: areas.sky.into(),
             slots: consts::TEXTURE_SLOTS,
@@ -257,7 +259,7 @@ impl Igi {
             light_targets: areas.light_targets,
             instance_lights: areas.instance_lights,
             light_nodes: areas.light_nodes,
-            direct_rays: lights + (u32::from(areas.tree) + u32::from(areas.sky)) * settings.direct_samples,
+            direct_rays: lights + (u32::from(areas.tree) + u32::from(areas.sky)) * settings.direct_samples + glossy,
             direct_filter: if areas.tree || areas.sky { settings.direct_filter } else { 0 },
             least: settings.bound * diagonal,
             diagonal,

@@ -180,7 +180,8 @@ pub struct Settings {
     /// Maximum of mirrors and glass surfaces in a row, along camera rays and along light paths.
     #[schemars(range(min = 0, max = 16), extend("x-unit" = "surfaces", "x-needs" = {"specular": {"const": true}}))]
     pub specular_depth: u32,
-    /// Shadow rays per pixel to emissive surfaces, and as many to the environment. Each punctual light has one ray.
+    /// Shadow rays per pixel to emissive surfaces, and as many to the environment. Smooth surfaces have a quarter more for highlights of the
+    /// environment. Each punctual light has one ray.
     #[schemars(range(min = 1, max = 4096), extend("x-unit" = "rays"))]
     pub direct_samples: u32,
     /// Iterations of the filter that removes the noise of direct light from emissive surfaces and from the environment. Pixels on the same
@@ -294,6 +295,11 @@ impl Settings {
     /// The upsampling filter runs.
     pub(super) fn upsamples(&self) -> bool {
         self.downsample > 1 || (self.fused && self.interleave > 1)
+    }
+
+    /// Shadow rays per pixel to highlights of the environment on smooth surfaces.
+    pub fn glossy_rays(&self) -> u32 {
+        if self.specular { self.direct_samples.div_ceil(4) } else { 0 }
     }
 
     /// Short rays compensate the bound. Without a bound there is nothing to compensate.

@@ -42,9 +42,9 @@ impl Shining {
         }
     }
 
-    /// Shadow rays per point, with `samples` rays to emissive surfaces and as many to the environment.
-    pub fn rays(self, samples: u32) -> u32 {
-        self.lamps + (u32::from(self.surfaces) + u32::from(self.sky)) * samples
+    /// Shadow rays per point, with `samples` rays to emissive surfaces and as many to the environment, and `glossy` rays to its highlights.
+    pub fn rays(self, samples: u32, glossy: u32) -> u32 {
+        self.lamps + (u32::from(self.surfaces) + u32::from(self.sky)) * samples + u32::from(self.sky) * glossy
     }
 }
 

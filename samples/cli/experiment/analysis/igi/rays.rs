@@ -79,7 +79,8 @@ pub(super) fn rates(results: &Results) -> Result<Section> {
             let Some(settings) = settings(results, run)? else { continue };
             let picture = results.picture(Layer(run, ""))?;
             let spent = stages::spent(results, run)?;
-            let direct = run.shining.map(|shining| shining.rays(settings.igi.direct_samples));
+            let igi = &settings.igi;
+            let direct = run.shining.map(|shining| shining.rays(igi.direct_samples, igi.glossy_rays()));
             let rays = at_most(&settings, [picture.width, picture.height], direct);
             let counted = results.times(run)?.fact(GATHERED).filter(|rays| *rays > 0.0);
             let all = COLUMNS.map(|column| column.0).into_iter().zip(rays).chain([(Part::Gathering, counted)]);
