@@ -54,7 +54,7 @@ fn it_agrees_with_its_twin_and_keeps_the_light() {
         let (eye, buffers, kinds) = stage();
         for turns in [0, 1, 2, 4] {
             let found = filtered(gpu, &eye, &buffers, &kinds, turns);
-            let expected = soft(&eye, &buffers, [&kinds[0], &kinds[1]], turns, [16.0, 0.01, 4.0]);
+            let expected = soft(&eye, &buffers, [&kinds[0], &kinds[1]], turns, [16.0, 0.01, 2.0]);
             let (mut before, mut after) = (DVec4::ZERO, DVec4::ZERO);
             let mut seen = 0;
             for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
@@ -100,10 +100,10 @@ fn light_stays_on_its_surface() {
     });
 }
 
-/// Mean relative squared error of luminance, with 0.01 in the denominator.
+/// Relative mean squared error of luminance, with 0.01 added to the squared truth, as `lucerna compare -m rel-mse` has it.
 fn error(found: &[[f32; 4]], truth: &[[f32; 4]]) -> f64 {
     let luminance = |p: &[f32; 4]| 0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2]);
-    let each = |(a, b)| ((luminance(a) - luminance(b)) / (luminance(b) + 0.01)).powi(2);
+    let each = |(a, b)| (luminance(a) - luminance(b)).powi(2) / (luminance(b).powi(2) + 0.01);
     found.iter().zip(truth).map(each).sum::<f64>() / found.len() as f64
 }
 
@@ -111,7 +111,7 @@ fn error(found: &[[f32; 4]], truth: &[[f32; 4]]) -> f64 {
 fn pictures_have_less_noise_and_as_much_light() {
     with_gpu(|gpu| {
         // A sky behind columns, a sky through a door and lamps, an emissive rectangle.
-        for (name, less) in [("figure", 2.0), ("garage", 4.0), ("cornell-area", 1.5)] {
+        for (name, less) in [("figure", 3.0), ("garage", 4.0), ("cornell-area", 1.05)] {
             let scene = builtin::load(name).unwrap();
             let view = View::of_camera(&scene, &Pose::rest(&scene), 0, [96, 72]).unwrap();
             let mut studio = Studio::new(gpu, &scene);

@@ -13,7 +13,7 @@ const SOFT_SHARPNESS: f32 = 16.0;
 /// Distance from the pixels' planes, relative to their depth, at which its weight falls to 0.6.
 const SOFT_RANGE: f32 = 0.01;
 /// Standard deviations by which the light of two pixels may differ with weight 0.37.
-const SOFT_CONTRAST: f32 = 4.0;
+const SOFT_CONTRAST: f32 = 2.0;
 
 /// Guide image for all filters, one texel for every [`Settings::downsample`]-th pixel: rgb unit normal, a linear depth / far.
 pub fn guide(graph: &mut Graph, g: &GBuffer, settings: &Settings) -> Image {
