@@ -1,10 +1,9 @@
 //! Operators that solve an equation for the whole picture (Fattal, Mantiuk), and the photoreceptors, whose statistics are the picture's:
 //! the solver against exact solutions, the device against the CPU twin in all sizes, residuals, the same bits each time.
 
-use lucerna::settings::Described;
 use lucerna::{
     gpu::{Gpu, ImageDesc, OwnedImage, Region, testing::with_gpu},
-    graph::{Extent, Format, Graph, Image, Runner},
+    graph::{Format, Graph, Image, Runner},
     reference::tonemap::{
         self as twin,
         plane::Plane,
@@ -18,7 +17,7 @@ use lucerna::{
 };
 
 /// Largest |b − Ax| / |b| that the operators may leave, in f32.
-const RESIDUAL: f32 = 2e-4;
+const RESIDUAL: f32 = 5e-5;
 
 const NEW: [Operator; 3] = [Operator::ReinhardDevlin, Operator::Fattal, Operator::Mantiuk];
 const SOLVED: [Operator; 2] = [Operator::Fattal, Operator::Mantiuk];
@@ -70,10 +69,9 @@ fn solved(gpu: &Gpu, levels: &[(Option<TwinEdges>, TwinEdges)]) -> (Plane, Tonem
     let weights = levels.iter().filter_map(|(weights, _)| weights.as_ref()).map(&mut edges).collect();
     let solution = solve::solve(&mut graph, &Wanted { flows, weights });
     let (values, state) = (graph.read_image(solution.values), graph.read_buffer(solution.state));
-    let mut frame = Runner::new(gpu).run(&graph).unwrap();
+    let frame = Runner::new(gpu).run(&graph).unwrap();
     let state: TonemapSolve = frame.buffer(state)[0];
     let found: Vec<f32> = bytemuck::pod_collect_to_vec(&frame.image(values).bytes);
-    let _ = &mut frame;
     let mean = found.iter().map(|v| f64::from(*v)).sum::<f64>() / found.len() as f64;
     let Plane { width, height, .. } = levels[0].1.across;
     (Plane { width, height, values: found.iter().map(|v| f64::from(*v) - mean).collect() }, state)
@@ -104,7 +102,7 @@ fn the_solver_finds_exact_cosines_of_any_size() {
     });
 }
 
-/// Wanted differences that no picture has, with weights over three decades, on all levels of a pyramid.
+/// Wanted differences that no picture has, with weights over a decade, on all levels of a pyramid.
 #[test]
 fn weighted_pyramids_are_solved_as_by_the_slow_solver() {
     with_gpu(|gpu| {
@@ -116,7 +114,7 @@ fn weighted_pyramids_are_solved_as_by_the_slow_solver() {
                 let noise = |a: (usize, usize), b: (usize, usize), seed: f64| {
                     ((a.0 * 12 + a.1 * 79 + b.0 * 37 + b.1 * 5) as f64 + seed + k).sin()
                 };
-                let weights = TwinEdges::of(level.width, level.height, |a, b| 10f64.powf(1.5 * noise(a, b, 0.3)));
+                let weights = TwinEdges::of(level.width, level.height, |a, b| 10f64.powf(0.5 * noise(a, b, 0.3)));
                 let flow =
                     TwinEdges::of(level.width, level.height, |a, b| noise(a, b, 2.0)).with(&weights, |g, w| g * w);
                 levels.push((weights, flow));
@@ -166,9 +164,12 @@ fn solutions_leave_next_to_nothing_and_are_the_same_bits_each_time() {
                 let mut once = || still.map(width, height, pixels.clone(), None, None).unwrap();
                 let (one, again) = (once(), once());
                 assert!(one.pixels == again.pixels, "{operator:?} {width}×{height}");
-                let residual = one.residual.unwrap();
-                println!("{operator:?} {width}×{height}: {residual:e}");
-                assert!(residual <= RESIDUAL, "{operator:?} {width}×{height}: {residual:e}");
+                let (residual, steps) = one.residual.unwrap();
+                println!("{operator:?} {width}×{height}: {residual:e}, {steps} steps");
+                assert!(
+                    residual <= RESIDUAL && steps < 40,
+                    "{operator:?} {width}×{height}: {residual:e}, {steps} steps"
+                );
                 assert!(one.pixels.iter().flatten().all(|v| v.is_finite() && *v >= 0.0));
             }
         }
@@ -244,9 +245,4 @@ fn no_compression_keeps_the_contrasts_of_the_picture() {
             assert!((shown[1].powf(1.0 / 2.2) - wanted).abs() < 1e-3, "pixel {i}: {} {wanted}", shown[1]);
         }
     });
-}
-
-#[test]
-fn zz_table() {
-    std::fs::write("/tmp/w1_table.md", Settings::description().table()).unwrap();
 }

@@ -8,7 +8,8 @@
 
 Both programs get the same settings, as far as both have them, and the light of the file as it is. Compared is luminance: that of ours from a
 .pfm file, of theirs from a TIFF of floats. Operators end with different fits to the display; so the logarithm of their luminance is first
-mapped by the line (slope and offset, least squares) that brings it nearest to ours. The correlation does not depend on that.
+mapped by the line (slope and offset, least squares) that brings it nearest to ours. The correlation does not depend on that. The operator of
+Reinhard and Devlin is also compared with its formula.
 """
 
 import argparse
@@ -65,6 +66,17 @@ def codes(light):
     return 255 * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
 
 
+def receptors(light):
+    """Reinhard and Devlin by the formula, in 64 bits: f = 0, c = 0, a = 1, m by the key."""
+    light = np.maximum(light.astype(np.float64), 0)
+    own = luminance(light)
+    low, high = np.log(max(own.min(), 1e-6 * own.max())), np.log(own.max())
+    key = np.clip((high - np.log(1e-6 + own[own > 0]).mean()) / (high - low), 0, 1)
+    with np.errstate(all="ignore"):
+        response = np.where(light > 0, light / (light + own[..., None] ** (0.3 + 0.7 * key**1.4)), 0)
+    return (response - response.min()) / (response.max() - response.min())
+
+
 def compared(ours, theirs):
     """Correlation of the logarithms, slope of the line from theirs to ours, mean absolute difference in codes of 8 bits."""
     theirs = np.where(np.isfinite(theirs), theirs, 0)
@@ -87,6 +99,15 @@ def main():
     names = [Path(name).stem for name in PHOTOGRAPHS]
     print("| operator | value | " + " | ".join(names) + " |\n|---|---|" + "---|" * len(names))
     folder = Path(tempfile.mkdtemp())
+    row = []
+    for name in PHOTOGRAPHS:
+        photograph, ours = arguments.assets / "hdr" / name, folder / "ours.pfm"
+        pictures = []
+        for options in (["linear", "--exposure", "0"], ["reinhard-devlin", *OPERATORS["reinhard-devlin"][0]]):
+            run([arguments.tonemap, photograph, "-o", ours, "--overwrite", "-q", "--operator", *options])
+            pictures.append(read_pfm(ours))
+        row.append(f"{np.abs(codes(receptors(pictures[0])) - codes(pictures[1])).max():.5f}")
+    print("| reinhard-devlin | largest difference from the formula in 64 bits, codes | " + " | ".join(row) + " |")
     for operator, (own, peer) in OPERATORS.items():
         rows = {"correlation of log luminance": [], "slope to ours": [], "mean difference, codes": []}
         for name in PHOTOGRAPHS:

@@ -354,7 +354,7 @@ impl Settings {
     /// The contrast limit that is used; `None`: no limit.
     pub fn contrast_limit(&self) -> Option<f32> {
         let usual = if self.operator == Operator::Ashikhmin { 1.2 } else { NO_LIMIT };
-        Some(self.contrast_limit.unwrap_or(usual)).filter(|limit| *limit < NO_LIMIT)
+        Some(self.contrast_limit.unwrap_or(usual)).filter(|limit| *limit < NO_LIMIT && !self.operator.solves())
     }
 
     /// The mode that is used.

@@ -36,8 +36,8 @@ pub struct Mapped {
     pub statistics: TonemapStatistics,
     /// Selective: number of important pixels.
     pub important: Option<u64>,
-    /// Fattal and Mantiuk: |b − Ax| / |b| of the equation that was solved, in f32 as the device has it.
-    pub residual: Option<f32>,
+    /// Fattal and Mantiuk: |b − Ax| / |b| of the equation that was solved, in f32 as the device has it, and the steps that it took.
+    pub residual: Option<(f32, u32)>,
 }
 
 /// Tone maps one picture: `width · height` linear Rec. 709 pixels, premultiplied, top row first; `mask`: as many values, over 0.5 where
@@ -299,12 +299,12 @@ struct Developed {
     pixels: Vec<[f32; 4]>,
     statistics: TonemapStatistics,
     important: Option<u64>,
-    residual: Option<f32>,
+    residual: Option<(f32, u32)>,
 }
 
-/// What a solution leaves of the right side.
-fn left(found: &[TonemapSolve]) -> f32 {
-    found.first().map_or(f32::NAN, |state| state.residual)
+/// What a solution leaves of the right side, and its steps.
+fn left(found: &[TonemapSolve]) -> (f32, u32) {
+    found.first().map_or((f32::NAN, 0), |state| (state.residual, state.steps))
 }
 
 /// Number of important pixels in the core of a tile. `map`: R32F of the whole tile.
