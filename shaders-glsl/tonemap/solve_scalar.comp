@@ -51,9 +51,11 @@ void main() {
         solve.done = sum > 0.0 ? 0u : 1u;
         solve.steps += 1u;
     } else if (stage == TONEMAP_SOLVE_NEXT) {
+        // An error that grows so much in one step is rounding: there is nothing left to find.
+        bool lost = !(sum < 16.0 * solve.energy);
         solve.beta = sum / solve.energy;
         solve.energy = sum;
-        solve.done = sum > tolerance * solve.first ? 0u : 1u;
+        solve.done = !lost && sum > tolerance * solve.first ? 0u : 1u;
     } else if (stage == TONEMAP_SOLVE_RIGHT) {
         solve.right = sum;
     } else if (stage == TONEMAP_SOLVE_RESIDUAL) {

@@ -22,9 +22,9 @@ use crate::{
 use std::mem::offset_of;
 
 /// Error of the differences of the solution, relative to the solution's own, at which the steps end.
-pub const TOLERANCE: f32 = 1e-6;
+pub const TOLERANCE: f32 = 3e-6;
 /// Most steps.
-const STEPS: u32 = 60;
+const STEPS: u32 = 40;
 
 /// Values along the edges to the right and below of each pixel, R32F each; 0 where no pixel follows.
 #[derive(Clone, Copy, Debug)]
