@@ -30,11 +30,11 @@ OPERATORS = {
         ["--tmo", "reinhard05", "--tmoR05Brightness", "0", "--tmoR05Chroma", "0", "--tmoR05Lightness", "1"],
     ),
     "fattal": (
-        ["-D", "tonemap.alpha=0.1", "--beta", "0.9"],
+        ["-D", "tonemap.alpha=0.1", "--beta", "0.9", "--saturation", "1"],
         ["--tmo", "fattal", "--tmoFatAlpha", "0.1", "--tmoFatBeta", "0.9", "--tmoFatNoise", "0", "--tmoFatNew", "true"],
     ),
     "mantiuk": (
-        ["--contrast-scale", "0.3"],
+        ["--contrast-scale", "0.3", "--saturation", "1"],
         ["--tmo", "mantiuk06", "--tmoM06Contrast", "0.3", "--tmoM06Detail", "1", "--tmoM06ContrastEqual", "false"],
     ),
 }
