@@ -48,6 +48,18 @@ fn cases() -> Vec<(String, Settings, Settings)> {
             ],
             Operator::ReinhardGlobal => &[("white", |s| s.white = 3.0)],
             Operator::Drago => &[("bias", |s| s.bias = 0.7)],
+            Operator::ReinhardDevlin => &[
+                ("intensity", |s| s.intensity = 1.5),
+                ("receptor_contrast", |s| s.receptor_contrast = Some(0.45)),
+                ("chromatic", |s| s.chromatic = 0.6),
+                ("adaptation", |s| s.adaptation = 0.3),
+            ],
+            Operator::Fattal => {
+                &[("alpha", |s| s.alpha = 0.5), ("beta", |s| s.beta = 0.7), ("clipped", |s| s.clipped = Some(3.0))]
+            }
+            Operator::Mantiuk => {
+                &[("contrast_scale", |s| s.contrast_scale = 0.6), ("clipped", |s| s.clipped = Some(3.0))]
+            }
             Operator::Bilateral => &[
                 ("spatial", |s| s.spatial = 0.08),
                 ("range", |s| s.range = 0.9),
@@ -102,6 +114,6 @@ fn every_setting_does_on_the_device_as_by_the_definition() {
             }
         }
     });
-    assert!(means.len() == 18 || means.is_empty(), "{means:?}");
+    assert!(means.len() == 26 || means.is_empty(), "{means:?}");
     assert!(means.values().all(|does| *does), "{means:?}");
 }

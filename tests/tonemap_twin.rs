@@ -63,7 +63,7 @@ fn all() -> Vec<Settings> {
         for mode in [Mode::Global, Mode::Local, Mode::Selective] {
             for local in [Local::Fast, Local::Pyramid, Local::Literal] {
                 let settings = Settings { operator, mode: Some(mode), local, ..base.clone() };
-                let same = mode == Mode::Global && local != Local::Fast;
+                let same = (mode == Mode::Global || operator.solves()) && local != Local::Fast;
                 let approximate = operator == Operator::Bilateral && mode != Mode::Global && local != Local::Literal;
                 if settings.validate().is_ok() && !same && !approximate {
                     all.push(settings);

@@ -42,6 +42,9 @@ float drago_log(float x) {
 // `range`: Ashikhmin, of the whole picture.
 float display_luminance(float l, float a, float range) {
     TonemapStatistics s = statistics;
+    if (OPERATOR == TONEMAP_SOLVED) {
+        return a;
+    }
     if (OPERATOR == TONEMAP_ASHIKHMIN) {
         return ashikhmin_display(l * s.scale, a * s.scale, s.low * s.scale, s.high * s.scale, range, display) / display;
     }

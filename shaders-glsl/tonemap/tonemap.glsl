@@ -9,6 +9,8 @@ const uint TONEMAP_ACES = 5;  // export
 const uint TONEMAP_AGX = 6;  // export
 const uint TONEMAP_NEUTRAL = 7;  // export
 const uint TONEMAP_DRAGO = 8;  // export
+// Display luminance is in `adaptation` already.
+const uint TONEMAP_SOLVED = 9;  // export
 
 // Of the luminances of a picture, as the operators use them. All after the exposure.
 struct TonemapStatistics {

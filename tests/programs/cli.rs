@@ -61,3 +61,5 @@ mod rerun;
 mod smooth;
 #[path = "../cli/tonemap.rs"]
 mod tonemap;
+#[path = "../cli/tonemap_light.rs"]
+mod tonemap_light;

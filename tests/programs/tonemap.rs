@@ -19,5 +19,7 @@ mod tonemap_reduction;
 mod tonemap_selective;
 #[path = "../tonemap_settings.rs"]
 mod tonemap_settings;
+#[path = "../tonemap_solved.rs"]
+mod tonemap_solved;
 #[path = "../tonemap_twin.rs"]
 mod tonemap_twin;

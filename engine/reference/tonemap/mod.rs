@@ -5,12 +5,18 @@ pub mod ashikhmin;
 pub mod bilateral;
 pub mod curves;
 pub mod drago;
+pub mod fattal;
 pub mod identify;
+pub mod mantiuk;
 pub mod plane;
 pub mod pyramid;
+pub mod receptor;
 pub mod reinhard;
+pub mod solve;
 pub mod statistics;
 
+#[cfg(test)]
+mod solved_tests;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
@@ -44,6 +50,8 @@ pub fn tonemap_masked(
         Operator::Aces => picture.each(curves::aces),
         Operator::Agx => picture.each(curves::agx),
         Operator::Neutral => picture.each(curves::neutral),
+        Operator::ReinhardDevlin => picture.received(),
+        Operator::Fattal | Operator::Mantiuk => picture.scaled(&picture.solved()),
     }
 }
 
@@ -79,6 +87,47 @@ impl<'a> Picture<'a> {
 
     fn each(&self, curve: impl Fn([f64; 3]) -> [f64; 3]) -> Vec<[f32; 3]> {
         self.pixels.iter().map(|p| curve(p.map(f64::from)).map(|v| v as f32)).collect()
+    }
+
+    /// Reinhard and Devlin.
+    fn received(&self) -> Vec<[f32; 3]> {
+        let (settings, Statistics { min, max, log_average }) = (self.settings, self.statistics);
+        let mean = |c: usize| self.pixels.iter().map(|p| f64::from(p[c])).sum::<f64>() / self.pixels.len() as f64;
+        let receptor = receptor::Receptor {
+            mean: [0, 1, 2].map(mean),
+            intensity: settings.intensity.into(),
+            contrast: settings.receptor_contrast.map_or_else(|| receptor::contrast(min, max, log_average), f64::from),
+            chromatic: settings.chromatic.into(),
+            adaptation: settings.adaptation.into(),
+        };
+        receptor::stretched(&self.pixels.iter().map(|p| receptor.response(*p)).collect::<Vec<_>>())
+    }
+
+    /// log₁₀ L, L being at least 10⁻⁶ L_max, for the operators that solve an equation.
+    pub fn logarithm(&self) -> Plane {
+        let least = (bilateral::DARKEST * self.statistics.max).max(1e-30);
+        self.luminance.map(|l| l.max(least).log10())
+    }
+
+    /// Display luminance of every pixel by Fattal and Mantiuk.
+    fn solved(&self) -> Plane {
+        let (settings, logarithm) = (self.settings, self.logarithm());
+        if logarithm.values.is_empty() {
+            return logarithm;
+        }
+        let codes = settings.operator == Operator::Mantiuk;
+        let solution = if codes {
+            mantiuk::solution(&logarithm, settings.contrast_scale.into())
+        } else {
+            fattal::solution(&logarithm, settings.alpha.into(), settings.beta.into())
+        };
+        let ends = statistics::statistics(&solution.values, settings.clipped().into());
+        let median = statistics::statistics(&solution.values, 50.0).min;
+        if codes {
+            solution.map(|x| mantiuk::shown(x, [ends.min, median, ends.max]))
+        } else {
+            solution.map(|x| fattal::shown(x, [ends.min, ends.max]))
+        }
     }
 
     /// Local adaptation of every pixel as the operator and the mode want it, in the operator's own unit: L, the scaled l of Reinhard,

@@ -2,6 +2,9 @@
 
 use std::{ops::Index, thread};
 
+/// Pixels below which starting threads would take longer than they save.
+const ALONE: usize = 1 << 12;
+
 /// `width · height` numbers, top row first. Samples outside the image are those of the nearest edge pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plane {
@@ -20,6 +23,10 @@ impl Plane {
     fn from_rows(width: usize, height: usize, row: impl Fn(usize, &mut [f64]) + Sync) -> Self {
         let mut values = vec![0.0; width * height];
         if values.is_empty() {
+            return Self { width, height, values };
+        }
+        if values.len() < ALONE {
+            values.chunks_mut(width).enumerate().for_each(|(y, values)| row(y, values));
             return Self { width, height, values };
         }
         let cores = thread::available_parallelism().map_or(1, |n| n.get());

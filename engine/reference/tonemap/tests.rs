@@ -202,7 +202,7 @@ fn scaling_the_picture_does_what_the_papers_say() {
             _ if settings.mode() == Mode::Selective => {}
             // But for the log-average's δ of 10⁻⁶.
             Operator::Reinhard => close(&exposed, &shown, 1e-3, &name),
-            Operator::Bilateral => close(&exposed, &shown, 1e-5, &name),
+            Operator::Bilateral | Operator::Fattal | Operator::Mantiuk => close(&exposed, &shown, 1e-5, &name),
             Operator::Linear => close(&exposed, &scaled, 1e-6, &name),
             _ => assert!(exposed.iter().flatten().zip(shown.iter().flatten()).any(|(a, b)| a > b), "{name}"),
         }
@@ -214,7 +214,8 @@ fn scaling_the_picture_does_what_the_papers_say() {
 
 #[test]
 fn mirrored_and_repeated_pictures_give_mirrored_and_repeated_results() {
-    let (width, height) = (44u32, 33u32);
+    // Pyramids begin at the left, so that only a width that is a power of two has mirrored levels.
+    let (width, height) = (64u32, 33u32);
     let pixels = picture(width, height);
     let mirrored =
         |p: &[[f32; 3]]| -> Pixels { p.chunks(width as usize).flat_map(|r| r.iter().rev().copied()).collect() };

@@ -1,7 +1,8 @@
 //! Tone mapping: from scene luminances to what a display can show.
 //!
 //! Three local operators (Ashikhmin 2002, Reinhard 2002, a bilateral one after Durand and Dorsey 2002), each global, local or selective
-//! (Michael 2010, chapter 4), and the curves that programs offer beside them. [`Operator`] and [`Settings`] hold the definitions.
+//! (Michael 2010, chapter 4), two that solve an equation for the whole picture (Fattal 2002, Mantiuk 2006: [`whole`]), and the curves that
+//! programs offer beside them. [`Operator`] and [`Settings`] hold the definitions.
 //!
 //! Every local operator is in two parts, which is what makes it fit for selection: **local adaptation** L_a of each pixel, an average of
 //! luminances around it ([`local`]), and a **curve** from L and L_a to display luminance, with statistics of the whole picture
@@ -21,14 +22,19 @@ mod clean;
 pub mod identify;
 pub mod local;
 pub mod mark;
+mod operator;
 pub mod pyramid;
+pub mod receptor;
 pub mod search;
 mod settings;
+pub mod solve;
 pub mod statistics;
 mod still;
+pub mod whole;
 
 pub use clean::{BadCounts, clean};
-pub use settings::{BadValues, Identify, Local, Mark, Mode, NO_LIMIT, Operator, Settings, ThresholdUnit};
+pub use operator::Operator;
+pub use settings::{BadValues, Identify, Local, Mark, Mode, NO_LIMIT, Settings, ThresholdUnit};
 pub use still::{Mapped, Still, apply};
 
 use crate::{
@@ -60,12 +66,15 @@ pub struct Output {
     pub mapped: Image,
     /// R32F: luminance after the exposure.
     pub luminance: Image,
-    /// R32F: local adaptation, in the same unit; of the bilateral operator the luminance of the base. Global: `luminance`.
+    /// R32F: local adaptation, in the same unit; of the bilateral operator the luminance of the base; of Fattal's and Mantiuk's the display luminance.
+    /// Global: `luminance`.
     pub adaptation: Image,
     /// One `types::TonemapStatistics`.
     pub statistics: Buffer,
     /// Selective: R32F, 1 where a pixel is important, 0 elsewhere.
     pub important: Option<Image>,
+    /// Fattal and Mantiuk: one `types::TonemapSolve`, with what the solution leaves.
+    pub solve: Option<Buffer>,
 }
 
 /// Tone mapping with its adaptation, which goes on from frame to frame.
@@ -118,24 +127,41 @@ impl Tonemap {
         let input = input.into();
         let statistics = graph.import_buffer(&self.statistics);
         graph.scope("tonemap", |graph| {
-            let luminance = statistics::whole(graph, input.color, statistics, dt, &self.settings);
+            let (luminance, sums) = statistics::whole(graph, input.color, statistics, dt, &self.settings);
             let picture = graph.extent(input.color);
-            map(graph, &input, luminance, statistics, picture, &self.settings)
+            let receptor = (self.settings.operator == Operator::ReinhardDevlin).then(|| {
+                let receptor = graph.buffer("tonemap.receptor", receptor::BYTES);
+                let known = receptor::Known { sums, receptor, statistics, pixels: picture.pixels() };
+                receptor::empty(graph, receptor);
+                receptor::sums(graph, input.color, picture.into(), &known, &self.settings);
+                receptor::range(graph, input.color, picture.into(), &known, &self.settings);
+                known
+            });
+            map(graph, &input, &Light { luminance, statistics, receptor, picture }, &self.settings)
         })
     }
 }
 
-/// Adaptation and curve. `picture`: extent of the whole picture, of which the input may be a part.
-fn map(
-    graph: &mut Graph,
-    input: &Input,
+/// What is known of the light before the operator.
+struct Light {
     luminance: Image,
     statistics: Buffer,
+    /// Reinhard and Devlin.
+    receptor: Option<receptor::Known>,
+    /// Extent of the whole picture, of which the input may be a part.
     picture: Extent,
-    settings: &Settings,
-) -> Result<Output> {
-    let mut important = None;
+}
+
+/// Adaptation and curve.
+fn map(graph: &mut Graph, input: &Input, light: &Light, settings: &Settings) -> Result<Output> {
+    let Light { luminance, statistics, receptor, picture } = *light;
+    let (mut important, mut solve) = (None, None);
     let adaptation = match settings.mode() {
+        _ if settings.operator.solves() => {
+            let (display, state) = whole::display(graph, luminance, statistics, settings)?;
+            solve = Some(state);
+            display
+        }
         Mode::Global => luminance,
         Mode::Local => local::adaptation(graph, luminance, None, statistics, picture, settings)?,
         Mode::Selective => {
@@ -144,11 +170,14 @@ fn map(
             mark::adapt(graph, luminance, importance, statistics, picture, settings)?
         }
     };
-    let mapped = curve(graph, input.color, adaptation, statistics, settings);
-    Ok(Output { mapped, luminance, adaptation, statistics, important })
+    let mapped = match receptor {
+        Some(known) => receptor::mapped(graph, input.color, &known, settings),
+        None => curve(graph, input.color, adaptation, statistics, settings),
+    };
+    Ok(Output { mapped, luminance, adaptation, statistics, important, solve })
 }
 
-/// The curve of the operator for every pixel.
+/// The curve of the operator for every pixel. [`Operator::ReinhardDevlin`] has its own passes ([`receptor`]); here it is linear.
 pub fn curve(graph: &mut Graph, color: Image, adaptation: Image, statistics: Buffer, settings: &Settings) -> Image {
     let extent = graph.extent(color);
     let mapped = graph.image("tonemap.mapped", Format::RGBA32F, extent);
@@ -156,12 +185,13 @@ pub fn curve(graph: &mut Graph, color: Image, adaptation: Image, statistics: Buf
         Operator::Ashikhmin => consts::TONEMAP_ASHIKHMIN,
         Operator::Reinhard => consts::TONEMAP_REINHARD,
         Operator::Bilateral => consts::TONEMAP_BILATERAL,
-        Operator::Linear => consts::TONEMAP_LINEAR,
+        Operator::Linear | Operator::ReinhardDevlin => consts::TONEMAP_LINEAR,
         Operator::ReinhardGlobal => consts::TONEMAP_REINHARD_GLOBAL,
         Operator::Aces => consts::TONEMAP_ACES,
         Operator::Agx => consts::TONEMAP_AGX,
         Operator::Neutral => consts::TONEMAP_NEUTRAL,
         Operator::Drago => consts::TONEMAP_DRAGO,
+        Operator::Fattal | Operator::Mantiuk => consts::TONEMAP_SOLVED,
     };
     let push = curve::Push {
         exposure: settings.exposure.exp2(),

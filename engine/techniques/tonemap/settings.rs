@@ -1,81 +1,13 @@
 //! What can be chosen in tone mapping.
 
 use super::super::allowed::wrong;
-use super::identify;
+use super::{Operator, identify};
 use crate::{
     Result,
     settings::{Described, described},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-/// How luminances become display luminances. L is the luminance of a pixel after [`Settings::exposure`], L_a its local adaptation,
-/// which is L itself in [`Mode::Global`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Operator {
-    /// Ashikhmin, "A tone mapping algorithm for high contrast images", 2002: L_d = TM(L_a) + TVI(TM(L_a)) / TVI(L_a) · (L − L_a),
-    /// TM(L) = L_dmax · (C(L) − C(L_min)) / (C(L_max) − C(L_min)). Luminances are taken as cd/m².
-    Ashikhmin,
-    /// Reinhard, Stark, Shirley, Ferwerda, "Photographic tone reproduction for digital images", 2002. With l = key · L / log-average:
-    /// global l (1 + l / white²) / (1 + l) (equation 4), local l / (1 + l_a) (equation 9), l_a by dodging and burning.
-    Reinhard,
-    /// Durand, Dorsey, "Fast bilateral filtering for the display of high-dynamic-range images", 2002. With B the base, the bilateral
-    /// filter of log₁₀ L, and D = log₁₀ L − B the detail: log₁₀ L_d = γ (B − log₁₀ L_max) + `detail` · D,
-    /// γ = log₁₀(`base_contrast`) / (log₁₀ L_max − log₁₀ L_min), at most 1, L_min
-    /// being at least 10⁻⁴ L_max. L is taken as at least 10⁻⁶ L_max. Global: B = log₁₀ L.
-    Bilateral,
-    /// The values as they are, times 2^exposure.
-    Linear,
-    /// Extended Reinhard without a key: L (1 + L / white²) / (1 + L); `white` 0 is L_max.
-    ReinhardGlobal,
-    /// Stephen Hill's fit of the ACES reference rendering and output transforms for sRGB displays (BakingLab, 2015), per channel
-    /// between its two matrices. No exposure factor is hidden in it.
-    Aces,
-    /// Troy Sobotka's AgX (2022), base look: inset matrix, log₂ from −12.47393 to 4.026069 onto 0 to 1, the sigmoid
-    /// y = 1/2 + 2 (x − t) (1 + (4^p − |T|^−p) |x − t|^p)^(−1/p) with t = 20/33, p = 3 and T = t below t, p = 3.25 and T = 1 − t above,
-    /// outset matrix (the inverse of the inset), and the power 2.2, which makes it linear.
-    Agx,
-    /// Khronos PBR Neutral (specification of 2024): colours below 0.76 keep hue and saturation.
-    Neutral,
-    /// Drago, Myszkowski, Annen, Chiba, "Adaptive logarithmic mapping for displaying high contrast scenes", 2003. With l = L / L_wa,
-    /// L_wa = log-average / (1 + `bias` − 0.85)⁵: L_d = ln(1 + l) / (log₁₀(1 + l_max) · ln(2 + 8 (l / l_max)^(ln `bias` / ln 0.5))) (equation 4), 1 being
-    /// white. Beyond l_max the last power stays 1. The paper's own transfer function of the display is left to the file.
-    Drago,
-}
-
-impl Operator {
-    /// All, with the names that settings have for them.
-    pub const ALL: [(&'static str, Self); 9] = [
-        ("ashikhmin", Self::Ashikhmin),
-        ("reinhard", Self::Reinhard),
-        ("bilateral", Self::Bilateral),
-        ("linear", Self::Linear),
-        ("reinhard-global", Self::ReinhardGlobal),
-        ("aces", Self::Aces),
-        ("agx", Self::Agx),
-        ("neutral", Self::Neutral),
-        ("drago", Self::Drago),
-    ];
-
-    /// The name that settings have for it.
-    pub fn name(self) -> &'static str {
-        Self::ALL.iter().find(|(_, o)| *o == self).map_or("", |(name, _)| name)
-    }
-
-    /// It has a local component, and so the modes local and selective.
-    pub fn has_local(self) -> bool {
-        matches!(self, Self::Ashikhmin | Self::Reinhard | Self::Bilateral)
-    }
-
-    /// What it does depends on the luminances of the whole picture.
-    pub fn needs_statistics(self, settings: &Settings) -> bool {
-        self.has_local()
-            || self == Self::Drago
-            || (self == Self::ReinhardGlobal && settings.white == 0.0)
-            || settings.normalize
-    }
-}
 
 /// Which pixels get local adaptation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -87,6 +19,17 @@ pub enum Mode {
     Local,
     /// Local only where there is detail (Michael 2010, section 4.4).
     Selective,
+}
+
+impl Mode {
+    /// The name that settings have for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Global => "global",
+            Self::Local => "local",
+            Self::Selective => "selective",
+        }
+    }
 }
 
 /// How local adaptation is computed.
@@ -218,6 +161,38 @@ pub struct Settings {
     #[schemars(extend("x-option" = "Look"))]
     #[schemars(range(min = 0.5, max = 1), extend("x-needs" = {"operator": {"const": "drago"}}))]
     pub bias: f32,
+    /// Reinhard-devlin: f, how bright the picture becomes; 0 is the paper's.
+    #[schemars(extend("x-option" = "Look"))]
+    #[schemars(range(min = -8, max = 8), extend("x-needs" = {"operator": {"const": "reinhard-devlin"}}))]
+    pub intensity: f32,
+    /// Reinhard-devlin: contrast m. Left out: 0.3 + 0.7 k^1.4 by the key of the picture, k = ln(L_max / log-average) / ln(L_max / L_min),
+    /// L_min being at least 10⁻⁶ L_max; 0.3 where that is 0 / 0.
+    #[schemars(range(min = 0.1, max = 1), extend("x-needs" = {"operator": {"const": "reinhard-devlin"}}))]
+    pub receptor_contrast: Option<f32>,
+    /// Reinhard-devlin: c, share of each channel's own light in what it adapts to; the rest is luminance. 0 keeps colours, 1 takes a colour cast away.
+    #[schemars(extend("x-option" = "Look"))]
+    #[schemars(range(min = 0, max = 1), extend("x-needs" = {"operator": {"const": "reinhard-devlin"}}))]
+    pub chromatic: f32,
+    /// Reinhard-devlin: a, share of the pixel's own light in what it adapts to; the rest is the mean of the picture. 1 compresses most,
+    /// and leaves little contrast in pictures of a wide range.
+    #[schemars(extend("x-option" = "Look"))]
+    #[schemars(range(min = 0, max = 1), extend("x-needs" = {"operator": {"const": "reinhard-devlin"}}))]
+    pub adaptation: f32,
+    /// Fattal: the gradient that stays as it is, as a share of the mean gradient of its level; larger ones become smaller.
+    #[schemars(range(min = 1e-3, max = 10), extend("x-needs" = {"operator": {"const": "fattal"}}))]
+    pub alpha: f32,
+    /// Fattal: strength of the compression; 1 is none, 0.8 to 0.9 are the paper's.
+    #[schemars(extend("x-option" = "Look"))]
+    #[schemars(range(min = 0.5, max = 1), extend("x-needs" = {"operator": {"const": "fattal"}}))]
+    pub beta: f32,
+    /// Mantiuk: factor of the response to contrasts; 1 leaves them; the lower it is, the more is left of weak contrasts beside strong ones.
+    #[schemars(extend("x-option" = "Look"))]
+    #[schemars(range(min = 0.01, max = 1), extend("x-needs" = {"operator": {"const": "mantiuk"}}))]
+    pub contrast_scale: f32,
+    /// Fattal and Mantiuk: percent of the darkest and of the brightest pixels of the result that the display may lose. Left out: 0.5 for fattal, 0.1 for
+    /// mantiuk. Counted as in [`Settings::percentile`]. Fattal: they are black and white. Mantiuk: the one that is farther from the median is.
+    #[schemars(range(min = 0, max = 49), extend("x-unit" = "percent", "x-needs" = {"operator": {"enum": ["fattal", "mantiuk"]}}))]
+    pub clipped: Option<f32>,
     /// Reinhard and reinhard-global: the light that becomes pure white; 0: the brightest of the picture.
     ///
     /// Reinhard: in units of l. Extended Reinhard: in units of L. 0 depends on [`Settings::percentile`].
@@ -250,13 +225,13 @@ pub struct Settings {
     #[schemars(extend("x-option" = "Look"))]
     #[schemars(range(min = 0, max = 16), extend("x-needs" = {"operator": {"const": "bilateral"}, "mode": {"not": {"const": "global"}}}))]
     pub detail: f32,
-    /// Ashikhmin, Reinhard, bilateral, reinhard-global and drago: strength of colours; 1 keeps their ratios, as in the papers; 0 is grey. Left out:
-    /// 0.7 for ashikhmin and bilateral, 0.85 for reinhard and drago, 1 for reinhard-global.
+    /// Ashikhmin, Reinhard, bilateral, reinhard-global, drago, fattal and mantiuk: strength of colours; 1 keeps their ratios, as in most papers; 0 is grey.
+    /// Left out: 0.7 for ashikhmin and bilateral, 0.85 for reinhard and drago, 0.5 for fattal, 0.6 for mantiuk, 1 for reinhard-global.
     ///
     /// The exponent of the ratios of colour to luminance (Tumblin and Turk 1999). An operator that compresses luminance and keeps the ratios makes
     /// dark places look too colourful.
     #[schemars(extend("x-option" = "Look"))]
-    #[schemars(range(min = 0, max = 4), extend("x-needs" = {"operator": {"enum": ["ashikhmin", "reinhard", "bilateral", "reinhard-global", "drago"]}}))]
+    #[schemars(range(min = 0, max = 4), extend("x-needs" = {"operator": {"enum": ["ashikhmin", "reinhard", "bilateral", "reinhard-global", "drago", "fattal", "mantiuk"]}}))]
     pub saturation: Option<f32>,
     /// Local operators: largest ratio of a pixel's luminance to its local adaptation, either way; beyond it the pixel follows the global curve, so
     /// that edges get no halos. 1: global; 1e6: no limit, as in the papers. Left out: 1.2 for ashikhmin, no limit for the others.
@@ -319,6 +294,14 @@ impl Default for Settings {
             contrast: 0.5,
             key: 0.18,
             bias: 0.85,
+            intensity: 0.0,
+            receptor_contrast: None,
+            chromatic: 0.0,
+            adaptation: 0.9,
+            alpha: 0.1,
+            beta: 0.9,
+            contrast_scale: 0.3,
+            clipped: None,
             white: 0.0,
             scales: 8,
             phi: 8.0,
@@ -362,6 +345,8 @@ impl Settings {
         self.saturation.unwrap_or(match self.operator {
             Operator::Ashikhmin | Operator::Bilateral => 0.7,
             Operator::Reinhard | Operator::Drago => 0.85,
+            Operator::Fattal => 0.5,
+            Operator::Mantiuk => 0.6,
             _ => 1.0,
         })
     }
@@ -369,12 +354,18 @@ impl Settings {
     /// The contrast limit that is used; `None`: no limit.
     pub fn contrast_limit(&self) -> Option<f32> {
         let usual = if self.operator == Operator::Ashikhmin { 1.2 } else { NO_LIMIT };
-        Some(self.contrast_limit.unwrap_or(usual)).filter(|limit| *limit < NO_LIMIT)
+        Some(self.contrast_limit.unwrap_or(usual)).filter(|limit| *limit < NO_LIMIT && !self.operator.solves())
     }
 
     /// The mode that is used.
     pub fn mode(&self) -> Mode {
-        self.mode.unwrap_or(if self.operator.has_local() { Mode::Local } else { Mode::Global })
+        let local = self.operator.has_local() || self.operator.solves();
+        self.mode.unwrap_or(if local { Mode::Local } else { Mode::Global })
+    }
+
+    /// The share of clipped pixels that is used, percent.
+    pub fn clipped(&self) -> f32 {
+        self.clipped.unwrap_or(if self.operator == Operator::Fattal { 0.5 } else { 0.1 })
     }
 
     /// The threshold that is used.
@@ -416,11 +407,17 @@ impl Settings {
     /// # Errors
     /// `Usage`, naming the key, the value found and the values allowed.
     pub fn validate(&self) -> Result<()> {
-        if let Some(mode) = self.mode.filter(|m| *m != Mode::Global && !self.operator.has_local()) {
-            let mode = if mode == Mode::Local { "local" } else { "selective" };
-            let allowed =
-                format!("global, for the operator {} is a curve without local component", self.operator.name());
-            return wrong("mode", mode, &allowed);
+        let name = self.operator.name();
+        match self.mode {
+            Some(mode) if self.operator.solves() && mode != Mode::Local => {
+                let allowed = format!("local, for the operator {name} works on the picture as a whole");
+                return wrong("mode", mode.name(), &allowed);
+            }
+            Some(mode) if !self.operator.solves() && !self.operator.has_local() && mode != Mode::Global => {
+                let allowed = format!("global, for the operator {name} is a curve without local component");
+                return wrong("mode", mode.name(), &allowed);
+            }
+            _ => {}
         }
         Self::description().check(self)
     }
@@ -438,7 +435,7 @@ mod tests {
             let settings = Settings { operator, ..Settings::default() };
             settings.validate().unwrap();
             assert_eq!(operator.name(), name);
-            assert_eq!(settings.mode() == Mode::Global, !operator.has_local());
+            assert_eq!(settings.mode() == Mode::Global, !operator.has_local() && !operator.solves());
             let parsed: Settings = toml::from_str(&format!("operator = \"{name}\"")).unwrap();
             assert_eq!(parsed, settings);
         }
@@ -451,6 +448,11 @@ mod tests {
         let wanted =
             "mode: local is not allowed; allowed: global, for the operator aces is a curve without local component";
         assert_eq!(message(curve), wanted);
+        for mode in [Mode::Global, Mode::Selective] {
+            let whole = Settings { operator: Operator::Fattal, mode: Some(mode), ..Settings::default() };
+            let wanted = "is not allowed; allowed: local, for the operator fattal works on the picture as a whole";
+            assert_eq!(message(whole), format!("mode: {} {wanted}", mode.name()));
+        }
         let wanted = "exposure: NaN or infinity is not allowed; allowed: -40 to 40";
         assert_eq!(message(Settings { exposure: f32::NAN, ..Settings::default() }), wanted);
         let wanted = "radius: 17 is not allowed; allowed: 1 to 16";

@@ -23,7 +23,8 @@ impl From<Extent> for Rectangle {
 }
 
 impl Rectangle {
-    fn size(&self) -> [u32; 2] {
+    /// Width and height.
+    pub(super) fn size(&self) -> [u32; 2] {
         [0, 1].map(|i| (self.last[i] - self.first[i] + 1).max(0) as u32)
     }
 }
@@ -65,9 +66,9 @@ pub fn count_digits(graph: &mut Graph, luminance: Image, part: Rectangle, found:
     graph.compute(histogram::Args { luminance, found, bins, push }, [width, height.div_ceil(64)]);
 }
 
-/// Goes on to the next digit, and empties the bins.
-pub fn select_digit(graph: &mut Graph, found: Buffer, bins: Buffer, pixels: u64, shift: u32, settings: &Settings) {
-    let push = select::Push { ranks: ranks(pixels, settings.percentile), shift };
+/// Goes on to the next digit of the values at `ranks`, and empties the bins.
+pub fn select_digit(graph: &mut Graph, found: Buffer, bins: Buffer, ranks: [u32; 2], shift: u32) {
+    let push = select::Push { ranks, shift };
     graph.compute(select::Args { found, bins, push }, 1);
 }
 
@@ -101,8 +102,14 @@ pub fn finish(graph: &mut Graph, from: Sums, statistics: Buffer, dt: Option<f32>
     graph.compute(finish::Args { sums: from.sums, found: from.found, statistics, push }, 1);
 }
 
-/// Luminance and statistics of a whole image.
-pub fn whole(graph: &mut Graph, color: Image, statistics: Buffer, dt: Option<f32>, settings: &Settings) -> Image {
+/// Luminance and statistics of a whole image; the sums stay in the buffer that comes last.
+pub fn whole(
+    graph: &mut Graph,
+    color: Image,
+    statistics: Buffer,
+    dt: Option<f32>,
+    settings: &Settings,
+) -> (Image, Buffer) {
     let part = Rectangle::from(graph.extent(color));
     let pixels = graph.extent(color).pixels();
     let sums = graph.buffer("tonemap.sums", SUMS_BYTES);
@@ -115,9 +122,9 @@ pub fn whole(graph: &mut Graph, color: Image, statistics: Buffer, dt: Option<f32
         graph.fill(bins, 0);
         for shift in DIGITS {
             count_digits(graph, luminance, part, found, bins, shift);
-            select_digit(graph, found, bins, pixels, shift, settings);
+            select_digit(graph, found, bins, ranks(pixels, settings.percentile), shift);
         }
     }
     finish(graph, Sums { sums, found }, statistics, dt, settings);
-    luminance
+    (luminance, sums)
 }

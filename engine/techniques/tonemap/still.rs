@@ -1,14 +1,16 @@
 //! Pictures in main memory, of any size.
 
 use super::{
-    BadCounts, Input, Local, Mode, Output, Settings, Tonemap, bilateral, clean, identify, map, pyramid,
+    BadCounts, Input, Light, Local, Mode, Operator, Output, Settings, Tonemap, bilateral, clean, identify, map,
+    pyramid, receptor,
     statistics::{self, Rectangle, Sums},
+    whole,
 };
 use crate::{
     Error, Result,
     gpu::{Gpu, ImageDesc, OwnedBuffer, OwnedImage, Region},
     graph::{Buffer, Extent, Format, Frame, Graph, Image, Pixels, Runner},
-    shaders::types::TonemapStatistics,
+    shaders::types::{TonemapSolve, TonemapStatistics},
 };
 
 /// Pixels of the largest picture that is done in one piece.
@@ -34,6 +36,8 @@ pub struct Mapped {
     pub statistics: TonemapStatistics,
     /// Selective: number of important pixels.
     pub important: Option<u64>,
+    /// Fattal and Mantiuk: |b − Ax| / |b| of the equation that was solved, in f32 as the device has it, and the steps that it took.
+    pub residual: Option<(f32, u32)>,
 }
 
 /// Tone maps one picture: `width · height` linear Rec. 709 pixels, premultiplied, top row first; `mask`: as many values, over 0.5 where
@@ -143,23 +147,33 @@ impl Still {
         let limit = self.runner.gpu().caps().limits.image_2d;
         let fits = self.tile.map_or(count <= WHOLE, |side| width <= side && height <= side);
         let source = Source { width, pixels: &pixels, mask };
-        let Developed { pixels, statistics, important } = if fits && width <= limit && height <= limit {
+        let whole = self.tonemap.settings.operator.solves();
+        if whole {
+            whole::check(width, height, &self.tonemap.settings)?;
+            if width > limit || height > limit {
+                return wrong(format!("a picture of {width}×{height} pixels; allowed by the device: {limit}×{limit}"));
+            }
+        }
+        let fits = (fits || whole) && width <= limit && height <= limit;
+        let Developed { pixels, statistics, important, residual } = if fits {
             let tile = Tile { core: [0, 0, width, height], whole: [0, 0, width, height] };
             let mut graph = Graph::new("tonemap");
             let input = self.input(&mut graph, &source, &tile)?;
             let output = self.tonemap.frame(&mut graph, input, dt)?;
             let (mapped, found) = (graph.read_image(output.mapped), graph.read_buffer(output.statistics));
             let important = output.important.map(|map| graph.read_image(map));
+            let solve = output.solve.map(|state| graph.read_buffer(state));
             let mut frame = self.runner.run(&graph)?;
             Developed {
                 pixels: frame.take_floats(mapped),
                 statistics: statistics_of(&frame.buffer(found)),
                 important: important.map(|map| marked(&frame.image(map), &tile)),
+                residual: solve.map(|state| left(&frame.buffer(state))),
             }
         } else {
             self.tiled(width, height, &source, dt)?
         };
-        Ok(Mapped { pixels, bad, statistics, important })
+        Ok(Mapped { pixels, bad, statistics, important, residual })
     }
 
     /// Statistics over all tiles first, then the operator on each.
@@ -199,7 +213,8 @@ impl Still {
                     let (found, bins) = (graph.import_buffer(&found), graph.import_buffer(&bins));
                     statistics::count_digits(&mut graph, luminance, tile.part(), found, bins, shift);
                     if last {
-                        statistics::select_digit(&mut graph, found, bins, picture.pixels(), shift, &settings);
+                        let ranks = statistics::ranks(picture.pixels(), settings.percentile);
+                        statistics::select_digit(&mut graph, found, bins, ranks, shift);
                     }
                 }
                 if last && turn == digits.len() {
@@ -212,6 +227,29 @@ impl Still {
             }
         }
 
+        // The receptors of Reinhard and Devlin first have sums, then a range.
+        let receptor = owned("tonemap.receptor", receptor::BYTES)?;
+        let known = |graph: &mut Graph| receptor::Known {
+            sums: graph.import_buffer(&sums),
+            receptor: graph.import_buffer(&receptor),
+            statistics: graph.import_buffer(result),
+            pixels: picture.pixels(),
+        };
+        let has_receptors = settings.operator == Operator::ReinhardDevlin;
+        for turn in if has_receptors { 0..2 } else { 0..0 } {
+            for (i, tile) in plain.iter().enumerate() {
+                let mut graph = Graph::new("tonemap receptors");
+                let input = self.input(&mut graph, &Source { mask: None, ..*source }, tile)?;
+                let known = known(&mut graph);
+                if turn == 0 && i == 0 {
+                    receptor::empty(&mut graph, known.receptor);
+                }
+                let pass = if turn == 0 { receptor::sums } else { receptor::range };
+                pass(&mut graph, input.color, tile.part(), &known, &settings);
+                self.runner.run(&graph)?;
+            }
+        }
+
         let mut pixels = vec![[0.0; 4]; picture.pixels() as usize];
         let (mut statistics, mut important) = (TonemapStatistics::default(), None);
         for tile in Tile::all(width, height, side, apron, grid) {
@@ -219,8 +257,10 @@ impl Still {
             let input = self.input(&mut graph, source, &tile)?;
             let unused = scratch_sums(&mut graph);
             let luminance = statistics::luminance(&mut graph, input.color, tile.extent().into(), unused, &settings);
-            let imported = graph.import_buffer(result);
-            let output: Output = map(&mut graph, &input, luminance, imported, picture, &settings)?;
+            let known = known(&mut graph);
+            let receptor = has_receptors.then_some(known);
+            let light = Light { luminance, statistics: known.statistics, receptor, picture };
+            let output: Output = map(&mut graph, &input, &light, &settings)?;
             let (mapped, found) = (graph.read_image(output.mapped), graph.read_buffer(output.statistics));
             let map = output.important.map(|map| graph.read_image(map));
             let mut frame: Frame = self.runner.run(&graph)?;
@@ -237,7 +277,7 @@ impl Still {
                 pixels[to..to + w].copy_from_slice(&mapped[from..from + w]);
             }
         }
-        Ok(Developed { pixels, statistics, important })
+        Ok(Developed { pixels, statistics, important, residual: None })
     }
 
     fn input(&self, graph: &mut Graph, source: &Source<'_>, tile: &Tile) -> Result<Input> {
@@ -259,6 +299,12 @@ struct Developed {
     pixels: Vec<[f32; 4]>,
     statistics: TonemapStatistics,
     important: Option<u64>,
+    residual: Option<(f32, u32)>,
+}
+
+/// What a solution leaves of the right side, and its steps.
+fn left(found: &[TonemapSolve]) -> (f32, u32) {
+    found.first().map_or((f32::NAN, 0), |state| (state.residual, state.steps))
 }
 
 /// Number of important pixels in the core of a tile. `map`: R32F of the whole tile.

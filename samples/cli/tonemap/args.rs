@@ -125,6 +125,9 @@ Operators:
   reinhard         photographic dodging and burning; needs no exposure
   bilateral        compresses large areas and keeps fine detail; needs no exposure
   drago            one logarithmic curve for pictures of any range; needs no exposure
+  reinhard-devlin  the response of the eye's receptors, colour by colour; chromatic takes a colour cast away
+  fattal           compresses strong gradients and keeps weak ones: shows all detail; needs no exposure
+  mantiuk          compresses contrasts by how visible they are; needs no exposure
   linear           exposure only; clips values above white
   reinhard-global  a soft shoulder: does not clip lights below --white
   aces, agx        film-like curves of games and films

@@ -223,7 +223,8 @@ impl Run {
         self.metered = Some(stops);
         settings.exposure = (settings.exposure + stops).clamp(-40.0, 40.0);
         // These operators scale the picture themselves.
-        let scales_itself = matches!(settings.operator, Operator::Reinhard | Operator::Bilateral | Operator::Drago);
+        let scales_itself = matches!(settings.operator, Operator::Reinhard | Operator::Bilateral | Operator::Drago)
+            || settings.operator.solves();
         if !within_sequence && !scales_itself {
             let why = match stated {
                 Some(white) => format!("the file states white as {white} cd/m²"),
