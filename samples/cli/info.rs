@@ -9,7 +9,10 @@ use lucerna::{
 };
 use serde_json::{Value, json};
 
-use crate::{console, listed};
+use crate::{
+    console, listed,
+    piped::{self, PIPE, STDIN},
+};
 
 /// Statistics of a channel.
 struct Statistics {
@@ -45,11 +48,12 @@ impl Statistics {
 /// `Input` if an image cannot be read.
 pub fn run(names: &[String], json: bool) -> Result<()> {
     let files = listed::expanded(names)?;
+    piped::once(files.iter().map(String::as_str))?;
     let one = matches!(names, [name] if files == [name.clone()]);
     let mut list = Vec::new();
     for file in &files {
-        let path = Path::new(file);
-        let layers = read(path)?;
+        let path = Path::new(if file == PIPE { STDIN } else { file });
+        let layers = if file == PIPE { from_standard_input()? } else { read(path)? };
         match json {
             true => list.push(self::json(&layers)),
             false => console::print(&text(path, &layers))?,
@@ -72,6 +76,12 @@ fn channels(layer: &Layer) -> impl Iterator<Item = (&str, Statistics)> {
         .iter()
         .enumerate()
         .map(move |(i, name)| (name.as_str(), Statistics::of(layer.data.iter().skip(i).step_by(count.max(1)).copied())))
+}
+
+fn from_standard_input() -> Result<Layers> {
+    let limits = Limits::default();
+    let layers = piped::bytes(limits.max_file).and_then(|bytes| image::decode(&bytes, &limits));
+    layers.map_err(|error| error.in_file(STDIN))
 }
 
 /// Reads an image of any format.

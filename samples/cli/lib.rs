@@ -30,6 +30,7 @@ pub mod listed;
 pub mod notes;
 pub mod outputs;
 pub mod pattern;
+pub mod piped;
 mod placed;
 pub mod program;
 pub mod programs;

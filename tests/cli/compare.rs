@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::support::{Ran, files, lucerna};
+use crate::support::{Ran, command, files, lucerna, ran};
 use lucerna::image::{self, Layer, Layers, WriteOptions, srgb};
 
 const SIDE: u32 = 24;
@@ -47,6 +47,25 @@ fn a_table_and_the_same_numbers_as_json() {
     let psnr = &same["tests"][0]["measures"]["psnr"];
     assert!(psnr["value"].is_null() && psnr["infinite"] == true && psnr["note"].as_str().unwrap().contains("equal"));
     assert_eq!(value(&same, 0, "ssim"), 1.0);
+}
+
+#[test]
+fn pictures_come_from_standard_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let [a, b] = [("a.exr", 0.5), ("b.exr", 0.25)].map(|(n, v)| write(folder.path(), n, v, SIDE));
+    let piped = |arguments: &[&str]| ran(command("lucerna").args(arguments).stdin(std::fs::File::open(&b).unwrap()));
+    let measured = |json: &serde_json::Value| value(json, 0, "mae");
+    let from_file = compare(&[&a, &b, "-m", "mae", "--json"]).expect(0, &[]).json();
+    let from_pipe = piped(&["compare", &a, "-", "-m", "mae", "--json"]).expect(0, &[]).json();
+    assert_eq!(measured(&from_pipe), measured(&from_file));
+    let layer = piped(&["compare", &format!("{a}:direct"), "-:direct", "-m", "mae", "--json"]).expect(0, &[]).json();
+    assert!((measured(&layer) - 0.5 * measured(&from_file)).abs() < 1e-6, "{layer}");
+    let twice = piped(&["compare", "-", "-", "-m", "mae"]);
+    twice.expect(2, &["standard input (-) is named twice"]);
+    let text = piped(&["info", "-"]).expect(0, &[]).stdout;
+    assert!(text.starts_with("standard input\n  24×24"), "{text}");
+    let wrong = ran(command("lucerna").args(["info", "-"]).stdin(std::process::Stdio::null()));
+    wrong.expect(3, &["standard input"]);
 }
 
 #[test]

@@ -18,7 +18,8 @@ const HDR: &str = "Conversion of light to screen values";
 #[derive(Args, Clone, Debug)]
 #[command(after_help = HELP)]
 pub struct CompareArgs {
-    /// The reference image: .exr, .hdr, .pfm, .png or .jpg; FILE:LAYER selects a layer of an EXR file
+    /// The reference image: .exr, .hdr, .pfm, .png or .jpg; FILE:LAYER selects a layer of an EXR file, `-` is
+    /// standard input
     #[arg(value_name = "REFERENCE")]
     pub reference: String,
 

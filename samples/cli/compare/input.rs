@@ -3,12 +3,16 @@
 use std::path::Path;
 
 use lucerna::{
-    Error, Result,
+    Error, Result, image,
     measure::{self, Picture},
+    scene::Limits,
 };
 
 use super::CompareArgs;
-use crate::console::Console;
+use crate::{
+    console::Console,
+    piped::{self, PIPE, STDIN},
+};
 
 /// An error that ends the comparison.
 pub(super) struct Stop {
@@ -45,8 +49,10 @@ impl Images {
     /// # Errors
     /// `Input` for files that cannot be read, for missing layers, and for HDR images compared with screen codes without an exposure.
     pub fn read(args: &CompareArgs, console: Console) -> Result<Self, Stop> {
+        let all = std::iter::once(&args.reference).chain(&args.tests).chain(&args.baseline);
+        piped::once(all.map(|name| split(name).0))?;
         let mut notes = Vec::new();
-        let mut one = |name: &String| image(name, args, &mut notes);
+        let mut one = |name: &String| read(name, args, &mut notes);
         let reference = one(&args.reference)?;
         let tests = args.tests.iter().map(&mut one).collect::<Result<Vec<_>>>()?;
         let baseline = args.baseline.as_ref().map(&mut one).transpose()?;
@@ -95,10 +101,14 @@ impl Images {
     }
 }
 
-fn image(name: &str, args: &CompareArgs, notes: &mut Vec<String>) -> Result<Image> {
+fn read(name: &str, args: &CompareArgs, notes: &mut Vec<String>) -> Result<Image> {
     let (file, own) = split(name);
     let layer = own.or(args.layer.as_deref());
-    let mut picture = Picture::read_telling(file, layer, |what| notes.push(format!("{name}: {what}")))?;
+    let tell = |what: &String| notes.push(format!("{name}: {what}"));
+    let mut picture = match file == PIPE {
+        true => from_standard_input(layer, tell).map_err(|error| error.in_file(STDIN))?,
+        false => Picture::read_telling(file, layer, tell)?,
+    };
     if let Some(value) = args.nan_as {
         let count = picture.replace_non_finite(value as f32);
         if count > 0 {
@@ -108,6 +118,15 @@ fn image(name: &str, args: &CompareArgs, notes: &mut Vec<String>) -> Result<Imag
     Ok(Image { name: name.to_owned(), picture })
 }
 
+fn from_standard_input(layer: Option<&str>, tell: impl FnMut(&String)) -> Result<Picture> {
+    let limits = Limits::default();
+    let bytes = piped::bytes(limits.max_file)?;
+    let layers = image::decode(&bytes, &limits)?;
+    layers.warnings.iter().for_each(tell);
+    let picture = Picture::from_layers(&layers, layer)?;
+    Ok(Picture { display_referred: image::is_display_referred(&bytes), ..picture })
+}
+
 /// Splits `FILE:LAYER`. An existing file with a colon in its name is not split.
 pub(crate) fn split(name: &str) -> (&str, Option<&str>) {
     if Path::new(name).exists() {
@@ -115,7 +134,7 @@ pub(crate) fn split(name: &str) -> (&str, Option<&str>) {
     }
     match name.rsplit_once(':') {
         // Not the drive of `C:\picture.exr`.
-        Some((file, layer)) if !layer.contains(['/', '\\']) && file.len() > 1 => (file, Some(layer)),
+        Some((file, layer)) if !layer.contains(['/', '\\']) && (file.len() > 1 || file == PIPE) => (file, Some(layer)),
         _ => (name, None),
     }
 }

@@ -54,7 +54,8 @@ enum Command {
     },
     /// Say what is in an image and how it was made
     Info {
-        /// .exr, .png, .hdr, .pfm or .jpg; folders and patterns ('out/*.exr') stand for their images
+        /// .exr, .png, .hdr, .pfm or .jpg; folders and patterns ('out/*.exr') stand for their images, `-` for
+        /// standard input
         #[arg(required = true, value_name = "IMAGE")]
         images: Vec<String>,
         #[command(flatten)]

@@ -9,7 +9,6 @@ mod recipe;
 
 use std::{
     collections::HashSet,
-    io::Read,
     path::{Path, PathBuf},
     process::ExitCode,
     sync::mpsc,
@@ -36,6 +35,7 @@ use picture::Done;
 use crate::{
     config,
     console::{self, Console},
+    piped,
     program::{self, STOPPED_EARLY},
     progress::Frames,
     settings_list,
@@ -262,16 +262,7 @@ fn outputs(args: &TonemapArgs) -> Result<Vec<(OutputName, Format)>> {
 
 fn read(input: &Input) -> Result<Layers> {
     let Some(path) = &input.path else {
-        let mut bytes = Vec::new();
-        std::io::stdin()
-            .lock()
-            .take(LIMITS.max_file + 1)
-            .read_to_end(&mut bytes)
-            .map_err(|error| Error::input("cannot be read").caused_by(error))?;
-        if bytes.len() as u64 > LIMITS.max_file {
-            return Err(Error::input(format!("more than {} bytes", LIMITS.max_file)));
-        }
-        return image::decode(&bytes, &LIMITS);
+        return image::decode(&piped::bytes(LIMITS.max_file)?, &LIMITS);
     };
     image::read(path, &LIMITS)
 }

@@ -2,13 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::{args::Frames, compare::split};
+pub use crate::piped::{PIPE, STDIN};
+use crate::{args::Frames, compare::split, piped};
 use lucerna::{Error, Result};
-
-/// What messages call standard input.
-pub const STDIN: &str = "standard input";
-/// Standard input or output.
-pub const PIPE: &str = "-";
 
 /// One picture to be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -100,9 +96,7 @@ pub fn inputs(
     sequence: bool,
 ) -> Result<(Vec<Input>, Vec<String>)> {
     let (mut list, mut notes) = (Vec::new(), Vec::new());
-    if names.iter().filter(|name| *name == PIPE).count() > 1 {
-        return Err(Error::usage("standard input (-) is named twice"));
-    }
+    piped::once(names.iter().map(String::as_str))?;
     let mut numbered = false;
     for name in names {
         if name == PIPE {
