@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How luminances become display luminances. L is the luminance of a pixel after [`Settings::exposure`], L_a its local adaptation,
-/// which is L itself in [`Mode::Global`].
+/// which is L itself in [`Mode::Global`](super::Mode::Global).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Operator {

@@ -1,6 +1,6 @@
 //! Operators that solve one equation for the whole picture: Fattal 2002 and Mantiuk 2006.
 //!
-//! Both say which differences of log₁₀ L the neighbours shall have ([`fattal`], [`mantiuk`]), [`solve`](super::solve) finds the logarithm that has
+//! Both say which differences of log₁₀ L the neighbours shall have ([`fattal`], [`mantiuk`]), [`solve`] finds the logarithm that has
 //! them, and [`display`] fits it to the display.
 
 use super::{
