@@ -196,7 +196,7 @@ mod tests {
         let tonemap = both.tonemap.as_ref().unwrap();
         assert_eq!((tonemap.operator, tonemap.exposure, both.technique.isr.samples), (Operator::Agx, 0.1, 24));
         for bad in
-            ["tonemap.operater=agx", "tonemap.operator=fattal", "isr.sampels=3", "tonemap.radius=99", "isr.samples=25"]
+            ["tonemap.operater=agx", "tonemap.operator=ward", "isr.sampels=3", "tonemap.radius=99", "isr.samples=25"]
         {
             let error = with(&[bad]).unwrap_err();
             assert_eq!(error.exit_code(), 2, "{bad}: {error}");

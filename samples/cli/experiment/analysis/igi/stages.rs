@@ -53,7 +53,18 @@ const PARTS: &[(Part, &[&str])] = &[
     (Part::Choosing, &["igi.points", "igi.importance", "igi.cumulate", "igi.resample", "fill igi.importances"]),
     (Part::Sorting, &["igi.light_tree_*"]),
     (Part::Visible, &["passes.gbuffer*"]),
-    (Part::Direct, &["igi.direct", "clear igi.direct"]),
+    (
+        Part::Direct,
+        &[
+            "igi.direct",
+            "clear igi.direct",
+            "clear igi.direct_lamps",
+            "clear igi.direct_sky",
+            "igi.soft_noise",
+            "igi.soft_filter",
+            "igi.soft_add",
+        ],
+    ),
     (
         Part::Trees,
         &[
