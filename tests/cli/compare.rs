@@ -53,7 +53,9 @@ fn a_table_and_the_same_numbers_as_json() {
 fn pictures_come_from_standard_input() {
     let folder = tempfile::tempdir().unwrap();
     let [a, b] = [("a.exr", 0.5), ("b.exr", 0.25)].map(|(n, v)| write(folder.path(), n, v, SIDE));
-    let piped = |arguments: &[&str]| ran(command("lucerna").args(arguments).stdin(std::fs::File::open(&b).unwrap()));
+    let piped = |arguments: &[&str]| {
+        ran(command(env!("CARGO_BIN_EXE_lucerna")).args(arguments).stdin(std::fs::File::open(&b).unwrap()))
+    };
     let measured = |json: &serde_json::Value| value(json, 0, "mae");
     let from_file = compare(&[&a, &b, "-m", "mae", "--json"]).expect(0, &[]).json();
     let from_pipe = piped(&["compare", &a, "-", "-m", "mae", "--json"]).expect(0, &[]).json();
@@ -64,7 +66,7 @@ fn pictures_come_from_standard_input() {
     twice.expect(2, &["standard input (-) is named twice"]);
     let text = piped(&["info", "-"]).expect(0, &[]).stdout;
     assert!(text.starts_with("standard input\n  24×24"), "{text}");
-    let wrong = ran(command("lucerna").args(["info", "-"]).stdin(std::process::Stdio::null()));
+    let wrong = ran(command(env!("CARGO_BIN_EXE_lucerna")).args(["info", "-"]).stdin(std::process::Stdio::null()));
     wrong.expect(3, &["standard input"]);
 }
 

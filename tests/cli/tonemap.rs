@@ -258,7 +258,7 @@ fn wrong_usage_names_what_is_allowed() {
     let (a, b) = (write(folder, "a.exr", &ramp(4, 4, false)), write(folder, "b.exr", &ramp(4, 4, false)));
     let out = name(folder, "o.png");
     for (arguments, part) in [
-        (vec![&*a, "-o", &*out, "--operator", "fattal"], "ashikhmin"),
+        (vec![&*a, "-o", &*out, "--operator", "ward"], "ashikhmin"),
         (vec![&a, "-o", &out, "--operator", "aces", "--mode", "local"], "allowed: global"),
         (vec![&a, "-o", &out, "-D", "tonemap.radios=4"], "tonemap.radius"),
         (vec![&a, "-o", &out, "-D", "tonemap.radius=99"], "tonemap.radius: 99 is not allowed; allowed: 1 to 16"),
