@@ -60,7 +60,9 @@ fn pictures_come_from_standard_input() {
     let from_file = compare(&[&a, &b, "-m", "mae", "--json"]).expect(0, &[]).json();
     let from_pipe = piped(&["compare", &a, "-", "-m", "mae", "--json"]).expect(0, &[]).json();
     assert_eq!(measured(&from_pipe), measured(&from_file));
-    let layer = piped(&["compare", &format!("{a}:direct"), "-:direct", "-m", "mae", "--json"]).expect(0, &[]).json();
+    // Words with a hyphen come after `--`.
+    let layer = piped(&["compare", "-m", "mae", "--json", "--", &format!("{a}:direct"), "-:direct"]);
+    let layer = layer.expect(0, &[]).json();
     assert!((measured(&layer) - 0.5 * measured(&from_file)).abs() < 1e-6, "{layer}");
     let twice = piped(&["compare", "-", "-", "-m", "mae"]);
     twice.expect(2, &["standard input (-) is named twice"]);
