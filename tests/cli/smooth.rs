@@ -12,9 +12,12 @@ fn path(folder: &tempfile::TempDir, name: &str) -> String {
     folder.path().join(name).to_str().unwrap().to_owned()
 }
 
+/// Light of unseen surfaces is off: its noise has nothing to do with edges.
 fn room<'a>(more: &[&'a str]) -> Ran {
-    let all: Vec<&'a str> =
-        ["render", "--builtin", "cornell", "--size", "96x80", "-q"].into_iter().chain(more.iter().copied()).collect();
+    let all: Vec<&'a str> = ["render", "--builtin", "cornell", "--size", "96x80", "-q", "-D", "isr.unseen=0"]
+        .into_iter()
+        .chain(more.iter().copied())
+        .collect();
     isr(all)
 }
 
@@ -50,8 +53,7 @@ fn a_still_is_the_mean_of_eight_and_its_edges_are_smooth() {
     let [of_one, of_eight] = [flip(&one), flip(&eight)];
     assert!(of_eight < 0.02 && of_eight < 0.5 * of_one, "{of_eight} {of_one}");
     let [one_picture, mean, best] = [&one, &eight, &many].map(|name| read(name));
-    // Eight places in a pixel leave 0.6 % at this size; 16 leave 0.1 %.
-    assert!((sum(&mean) / sum(&best) - 1.0).abs() < 8e-3);
+    assert!((sum(&mean) / sum(&best) - 1.0).abs() < 5e-3);
     for exact in ["normal", "depth"] {
         assert!(one_picture.layer(exact).unwrap().data == mean.layer(exact).unwrap().data, "{exact}");
     }
