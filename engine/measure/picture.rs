@@ -78,12 +78,20 @@ impl Picture {
         layer: Option<&str>,
         tell: impl FnMut(&String),
     ) -> Result<Self> {
-        let (path, limits) = (path.as_ref(), crate::scene::Limits::default());
-        let bytes = image::read_file_checked(path, limits.max_file)?;
-        let layers = image::decode(&bytes, &limits).map_err(|error| error.in_file(path))?;
+        let path = path.as_ref();
+        let bytes = image::read_file_checked(path, crate::scene::Limits::default().max_file)?;
+        Self::decode_telling(&bytes, layer, tell).map_err(|error| error.in_file(path))
+    }
+
+    /// As [`read_telling`](Self::read_telling), from the bytes of a file.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read), without the name of a file.
+    pub fn decode_telling(bytes: &[u8], layer: Option<&str>, tell: impl FnMut(&String)) -> Result<Self> {
+        let layers = image::decode(bytes, &crate::scene::Limits::default())?;
         layers.warnings.iter().for_each(tell);
-        let picture = Self::from_layers(&layers, layer).map_err(|error| error.in_file(path))?;
-        Ok(Self { display_referred: image::is_display_referred(&bytes), ..picture })
+        let picture = Self::from_layers(&layers, layer)?;
+        Ok(Self { display_referred: image::is_display_referred(bytes), ..picture })
     }
 
     /// The rectangle of `size` whose first pixel is `origin`.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use lucerna::{
-    Error, Result, image,
+    Error, Result,
     measure::{self, Picture},
     scene::Limits,
 };
@@ -106,7 +106,9 @@ fn read(name: &str, args: &CompareArgs, notes: &mut Vec<String>) -> Result<Image
     let layer = own.or(args.layer.as_deref());
     let tell = |what: &String| notes.push(format!("{name}: {what}"));
     let mut picture = match file == PIPE {
-        true => from_standard_input(layer, tell).map_err(|error| error.in_file(STDIN))?,
+        true => piped::bytes(Limits::default().max_file)
+            .and_then(|bytes| Picture::decode_telling(&bytes, layer, tell))
+            .map_err(|error| error.in_file(STDIN))?,
         false => Picture::read_telling(file, layer, tell)?,
     };
     if let Some(value) = args.nan_as {
@@ -116,15 +118,6 @@ fn read(name: &str, args: &CompareArgs, notes: &mut Vec<String>) -> Result<Image
         }
     }
     Ok(Image { name: name.to_owned(), picture })
-}
-
-fn from_standard_input(layer: Option<&str>, tell: impl FnMut(&String)) -> Result<Picture> {
-    let limits = Limits::default();
-    let bytes = piped::bytes(limits.max_file)?;
-    let layers = image::decode(&bytes, &limits)?;
-    layers.warnings.iter().for_each(tell);
-    let picture = Picture::from_layers(&layers, layer)?;
-    Ok(Picture { display_referred: image::is_display_referred(&bytes), ..picture })
 }
 
 /// Splits `FILE:LAYER`. An existing file with a colon in its name is not split.
