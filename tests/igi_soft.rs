@@ -1,4 +1,4 @@
-//! The filter for the noise of direct light from emissive surfaces and from the sky: against its twin, and what it does to pictures.
+//! The filter for the noise of direct light from emissive surfaces and from the sky: against its twin, and its effect on pictures.
 
 use crate::igi_lab::{
     Studio, mean,
@@ -19,31 +19,27 @@ use lucerna_scenes as builtin;
 const SIZE: (usize, usize) = (45, 34);
 
 /// Surfaces with edges, steps and background, and random light with halves that differ by about its noise.
-fn stage() -> (Eye, Buffers, [Texels; 2]) {
+fn stage() -> (Eye, Buffers, Texels) {
     let (_, patches) = scene(SIZE.0, SIZE.1);
     let eye = Eye::look_at(dvec3(0.3, 1.2, 0.9), dvec3(0.0, 0.25, -1.3), 0.8, 10.0, SIZE.0, SIZE.1);
     let mut buffers = Buffers::cast(&eye, &patches, 1);
     // Unlit surfaces, which have no part in it.
     buffers.mask.iter_mut().step_by(7).for_each(|mask| *mask = 0.0);
     let mut random = Random(21);
-    let mut noise = || -> Texels {
-        let texel = |_| {
-            let [r, g, b, a] = random.texel();
-            [r, g, b, 0.5 * a - 0.2]
-        };
-        (0..SIZE.0 * SIZE.1).map(texel).collect()
+    let texel = |_| {
+        let [r, g, b, a] = random.texel();
+        [r, g, b, 0.5 * a - 0.2]
     };
-    let kinds = [noise(), noise()];
-    (eye, buffers, kinds)
+    let noisy = (0..SIZE.0 * SIZE.1).map(texel).collect();
+    (eye, buffers, noisy)
 }
 
-fn filtered(gpu: &lucerna::gpu::Gpu, eye: &Eye, buffers: &Buffers, kinds: &[Texels; 2], turns: u32) -> Vec<[f32; 4]> {
+fn filtered(gpu: &lucerna::gpu::Gpu, eye: &Eye, buffers: &Buffers, noisy: &Texels, turns: u32) -> Vec<[f32; 4]> {
     let mut graph = Graph::new("soft");
     let g = gbuffer(&mut graph, eye, buffers);
     let extent = Extent::new(SIZE.0 as u32, SIZE.1 as u32);
-    let lamps = image(&mut graph, "lamps", extent, &kinds[0]);
-    let sky = image(&mut graph, "sky", extent, &kinds[1]);
-    let light = filters::soft_light(&mut graph, &g, [lamps, sky], turns);
+    let soft = image(&mut graph, "soft", extent, noisy);
+    let light = filters::soft_light(&mut graph, &g, soft, turns);
     let [light] = read(gpu, graph, [light]);
     light
 }
@@ -51,10 +47,10 @@ fn filtered(gpu: &lucerna::gpu::Gpu, eye: &Eye, buffers: &Buffers, kinds: &[Texe
 #[test]
 fn it_agrees_with_its_twin_and_keeps_the_light() {
     with_gpu(|gpu| {
-        let (eye, buffers, kinds) = stage();
+        let (eye, buffers, noisy) = stage();
         for turns in [0, 1, 2, 4] {
-            let found = filtered(gpu, &eye, &buffers, &kinds, turns);
-            let expected = soft(&eye, &buffers, [&kinds[0], &kinds[1]], turns, [16.0, 0.01, 2.0]);
+            let found = filtered(gpu, &eye, &buffers, &noisy, turns);
+            let expected = soft(&eye, &buffers, &noisy, turns, [16.0, 0.01, 2.0]);
             let (mut before, mut after) = (DVec4::ZERO, DVec4::ZERO);
             let mut seen = 0;
             for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
@@ -66,7 +62,7 @@ fn it_agrees_with_its_twin_and_keeps_the_light() {
                 seen += 1;
                 let off = (found - *expected).abs().max_element();
                 assert!(off < 2e-4, "{turns} turns, pixel {i}: {found} instead of {expected}");
-                before += kinds.iter().map(|kind| glam::Vec4::from(kind[i]).as_dvec4()).sum::<DVec4>();
+                before += glam::Vec4::from(noisy[i]).as_dvec4();
                 after += found;
             }
             assert!(seen > 600 && seen < found.len(), "{seen} pixels show something");
@@ -79,18 +75,17 @@ fn it_agrees_with_its_twin_and_keeps_the_light() {
 #[test]
 fn light_stays_on_its_surface() {
     with_gpu(|gpu| {
-        let (eye, buffers, mut kinds) = stage();
+        let (eye, buffers, mut noisy) = stage();
         // The surface of the first pixel that shows something has light, with much noise; others have none.
         let first = (0..buffers.depth.len()).find(|i| is_lit(&buffers, *i)).unwrap();
         let alike = |i: usize| buffers.normal[i].dot(buffers.normal[first]) > 0.99;
-        for (i, texel) in kinds[0].iter_mut().enumerate() {
+        for (i, texel) in noisy.iter_mut().enumerate() {
             texel[3] = 2.0;
             if !alike(i) {
                 *texel = [0.0, 0.0, 0.0, 2.0];
             }
         }
-        kinds[1].fill([0.0; 4]);
-        let found = filtered(gpu, &eye, &buffers, &kinds, 3);
+        let found = filtered(gpu, &eye, &buffers, &noisy, 3);
         let (mut lit, mut dark) = (0.0f32, 0.0f32);
         for (i, texel) in found.iter().enumerate().filter(|(i, _)| is_lit(&buffers, *i)) {
             let place = if alike(i) { &mut lit } else { &mut dark };

@@ -26,7 +26,6 @@
 #include "igi/igi.glsl"
 #include "lib/vpl.glsl"
 #include "igi/vpl_surface.glsl"
-#include "igi/soft.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -39,11 +38,10 @@ layout(binding = 5) uniform sampler2D emission;
 layout(binding = 6, rgba32f) uniform image2D direct; // radiance with emission, W/(sr·m²)
 layout(binding = 13, scalar) uniform SettingsBlock { IgiSettings settings; };
 
-// 1: light of emissive surfaces and of the sky goes into images of its own, divided by soft_color(); a: difference between
-// the luminances of both halves of the samples.
+// 1: light of emissive surfaces and of the sky goes into an image of its own, divided by soft_color(); a: difference between the luminances of
+// both halves of the samples, the sum of the differences of both kinds. They do not depend on each other, so the squares add up on average.
 layout(constant_id = 0) const uint APART = 0;
-layout(binding = 14, rgba32f) uniform image2D lamps;
-layout(binding = 15, rgba32f) uniform image2D sky;
+layout(binding = 14, rgba32f) uniform image2D soft;
 
 layout(push_constant, scalar) uniform Push {
     uint first; // shadow ray
@@ -51,13 +49,21 @@ layout(push_constant, scalar) uniform Push {
 };
 
 #include "igi/vpl_direct.glsl"
+#include "igi/soft.glsl"
+
+// soft_side() of shadow ray i, which is not to a point, spot or directional light.
+float direct_side(uint i) {
+    bool highlight = i >= first_highlight();
+    uint j = highlight ? i - first_highlight() : (i - light_count) % settings.samples;
+    return soft_side(j, highlight ? settings.glossy : settings.samples);
+}
 
 void main() {
     ivec2 pixel = spread_texel();
     if (any(greaterThanEqual(pixel, imageSize(direct)))) return;
     float z = texelFetch(depth, pixel, 0).r;
     vec3 sum = vec3(0.0);
-    vec4 from_lamps = vec4(0.0), from_sky = vec4(0.0);
+    vec4 apart = vec4(0.0);
     if (z < 1.0) {
         vec4 color = texelFetch(albedo, pixel, 0);
         vec4 gloss = texelFetch(specular, pixel, 0);
@@ -69,12 +75,8 @@ void main() {
         p.above = stepped_back(view, p.position, gap) + p.normal * gap;
         p.viewer = to_camera(view, p.position);
         p.brdf = lit_brdf(color.rgb, gloss.rgb, gloss.a, dot(p.normal, p.viewer));
+        if (APART != 0u && first != 0u) apart = imageLoad(soft, pixel);
         // Unlit surfaces show their colour, which is in the emission buffer.
-        if (APART != 0u && first != 0u) {
-            from_lamps = imageLoad(lamps, pixel);
-            from_sky = imageLoad(sky, pixel);
-        }
-        uint sky_from = light_count + settings.tree * settings.samples;
         uint last = color.a > 0.5 ? min(first + count, direct_rays()) : 0u;
         for (uint i = first; i < last; ++i) {
             Ray ray;
@@ -83,19 +85,12 @@ void main() {
             if (trace_any(ray, TRACE_SHADOW, pcg4d(uvec4(pixel, i, settings.seed)).y)) continue;
             if (APART != 0u && i >= light_count) {
                 vec3 even = light / soft_color(color.rgb, gloss.rgb);
-                uint soft = i - light_count, kinds = (settings.tree + settings.sky) * settings.samples;
-                float side = soft < kinds ? soft_side(soft % settings.samples, settings.samples) : soft_side(soft - kinds, settings.glossy);
-                vec4 part = vec4(even, side * dot(even, SOFT_LUMINANCE));
-                if (i < sky_from) from_lamps += part;
-                else from_sky += part;
+                apart += vec4(even, direct_side(i) * dot(even, SOFT_LUMINANCE));
             } else {
                 sum += light;
             }
         }
     }
-    if (APART != 0u) {
-        imageStore(lamps, pixel, from_lamps);
-        imageStore(sky, pixel, from_sky);
-    }
+    if (APART != 0u) imageStore(soft, pixel, apart);
     imageStore(direct, pixel, vec4(sum, 1.0));
 }

@@ -1,4 +1,4 @@
-// Light of the sky and of emissive surfaces together, and the variance of its luminance. The squared difference between
+// Light of the sky and of emissive surfaces, and the variance of its luminance. The squared difference between
 // two halves of the samples estimates it. One pixel's difference says little, and bright samples would raise their own variance, so the mean over
 // neighbours on the same surface is stored.
 #version 460
@@ -12,10 +12,9 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D guide; // from igi/guide.comp
-layout(binding = 2) uniform sampler2D lamps; // from igi/direct.comp; a: difference between halves of the samples
-layout(binding = 3) uniform sampler2D sky;
-layout(binding = 4) uniform sampler2D albedo; // a: 0 for unlit surfaces
-layout(binding = 5, rgba32f) uniform writeonly image2D light; // a: variance; -1 where there is no lit surface
+layout(binding = 2) uniform sampler2D soft; // from igi/direct.comp; a: difference between halves of the samples
+layout(binding = 3) uniform sampler2D albedo; // a: 0 for unlit surfaces
+layout(binding = 4, rgba32f) uniform writeonly image2D light; // a: variance; -1 where there is no lit surface
 
 layout(push_constant, scalar) uniform Push {
     float sharpness; // exponent of the cosine between normals
@@ -44,12 +43,11 @@ void main() {
             float off = off_plane(plane, (vec2(other) + 0.5) / view.extent, there.w);
             float likeness = max(dot(own.xyz, there.xyz), 1e-12);
             float w = exp2(sharpness * log2(likeness) - 0.72134752 * off * off);
-            vec2 differences = vec2(texelFetch(lamps, other, 0).a, texelFetch(sky, other, 0).a);
-            sum += w * dot(differences, differences);
+            float difference = texelFetch(soft, other, 0).a;
+            sum += w * difference * difference;
             weights += w;
         }
     }
     // The pixel itself has a weight of about 1.
-    vec3 both = texelFetch(lamps, pixel, 0).rgb + texelFetch(sky, pixel, 0).rgb;
-    imageStore(light, pixel, vec4(both, sum / weights));
+    imageStore(light, pixel, vec4(texelFetch(soft, pixel, 0).rgb, sum / weights));
 }

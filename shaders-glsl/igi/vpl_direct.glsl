@@ -20,9 +20,14 @@ Brdf lit_brdf(vec3 albedo, vec3 f0, float roughness, float nv) {
     return brdf_of(albedo, settings.diffuse_only != 0u ? vec3(0.0) : f0, roughness, nv);
 }
 
+// Number of a point's first shadow ray to highlights of the sky, after those to lights, to emissive surfaces and to the sky.
+uint first_highlight() {
+    return light_count + (settings.tree + settings.sky) * settings.samples;
+}
+
 // Number of shadow rays per point.
 uint direct_rays() {
-    return light_count + (settings.tree + settings.sky) * settings.samples + settings.glossy;
+    return first_highlight() + settings.glossy;
 }
 
 // Largest GGX width for which highlights of the sky also have samples of their own. Samples of the sky find narrower ones by chance: few of them
@@ -65,8 +70,7 @@ vec3 highlight_ray(uint j, LitPoint p, uvec2 place, inout Ray ray) {
 // Shadow ray number i. Returns the radiance (W/(sr·m²)) that the point reflects towards the viewer if the ray is not occluded.
 vec3 direct_ray(uint i, LitPoint p, uvec2 place, out Ray ray) {
     ray = Ray(p.above, 0.0, vec3(0.0, 1.0, 0.0), 0.99999);
-    uint soft = light_count + (settings.tree + settings.sky) * settings.samples;
-    if (i >= soft) return highlight_ray(i - soft, p, place, ray);
+    if (i >= first_highlight()) return highlight_ray(i - first_highlight(), p, place, ray);
     vec3 arrives = vec3(0.0); // irradiance on a plane that faces the light
     vec3 highlight = vec3(0.0); // the part of `arrives` whose highlight other samples have
     vec3 to_light = p.normal;

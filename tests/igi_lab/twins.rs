@@ -146,11 +146,11 @@ pub fn is_lit(buffers: &Buffers, i: usize) -> bool {
     buffers.depth[i] < 1.0 && buffers.mask[i] > 0.5
 }
 
-/// Direct light of lamps and the sky after `iterations` of the filter for its noise; alpha: variance. `None` where there is no lit surface.
+/// Direct light after `iterations` of the filter for its noise; alpha: variance. `noisy`: alpha is the difference between halves of the samples. `None` where there is no lit surface.
 pub fn soft(
     eye: &Eye,
     buffers: &Buffers,
-    kinds: [&Texels; 2],
+    noisy: &Texels,
     iterations: u32,
     [sharpness, range, contrast]: [f64; 3],
 ) -> Vec<Option<DVec4>> {
@@ -184,10 +184,10 @@ pub fn soft(
                 let (q, m, _) = surface(other);
                 let off = n.dot(q - p) / (z * eye.far * range);
                 let weight = n.dot(m).max(1e-12).powf(sharpness) * (-0.5 * off * off).exp();
-                sum += weight * kinds.iter().map(|kind| f64::from(kind[other][3]).powi(2)).sum::<f64>();
+                sum += weight * f64::from(noisy[other][3]).powi(2);
                 weights += weight;
             }
-            Some((color(kinds[0][i]) + color(kinds[1][i])).extend(sum / weights))
+            Some(color(noisy[i]).extend(sum / weights))
         })
         .collect();
     for turn in 0..iterations {

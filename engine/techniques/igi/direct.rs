@@ -17,12 +17,8 @@ impl Igi {
         graph.clear(direct, [0.0; 4]);
         let apart = shared.direct_filter > 0;
         // A binding needs an image; without the filter the shader does not touch it.
-        let of_kinds = if apart { extent } else { Extent::new(1, 1) };
-        let [lamps, sky] = ["igi.direct_lamps", "igi.direct_sky"].map(|name| {
-            let image = graph.image(name, Format::RGBA32F, of_kinds);
-            graph.clear(image, [0.0; 4]);
-            image
-        });
+        let soft = graph.image("igi.soft", Format::RGBA32F, if apart { extent } else { Extent::new(1, 1) });
+        graph.clear(soft, [0.0; 4]);
         let args = traced_lit!(
             shaders::igi::direct::Args {
                 view: g.view,
@@ -32,8 +28,7 @@ impl Igi {
                 specular: g.specular,
                 emission: g.emission,
                 direct,
-                lamps,
-                sky,
+                soft,
                 spec: shaders::igi::direct::Spec { apart: apart.into() },
                 push: shaders::igi::direct::Push::default(),
             },
@@ -44,7 +39,7 @@ impl Igi {
         );
         graph.compute_over(args, extent, self.items(shared.direct_rays, extent.pixels()));
         if apart {
-            let light = filters::soft_light(graph, g, [lamps, sky], shared.direct_filter);
+            let light = filters::soft_light(graph, g, soft, shared.direct_filter);
             graph.compute(soft_add::Args { albedo: g.albedo, specular: g.specular, light, direct }, extent);
         }
         direct

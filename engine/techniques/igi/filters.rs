@@ -1,5 +1,5 @@
 //! Filters that compute the irradiance of every pixel from coarse or interleaved irradiance: the discontinuity buffer, edge-avoiding
-//! smoothing, and joint bilateral upsampling. And the filter for the noise of direct light.
+//! smoothing, and joint bilateral upsampling. One more filter removes the noise of direct light.
 
 use super::Settings;
 use crate::{
@@ -108,18 +108,17 @@ pub fn upsample(graph: &mut Graph, g: &GBuffer, guide: Image, coarse: Image, set
 }
 
 /// Direct light of emissive surfaces and of the sky without most of its noise, as radiance divided by the surfaces' colours; alpha: variance of its
-/// luminance, -1 where there is no lit surface. `kinds`: the light of emissive surfaces and of the sky; alpha: the difference between the
-/// luminances of both halves of the samples. The sum over all pixels does not change (Schied et al. 2017, with exchanges that keep the light;
+/// luminance, -1 where there is no lit surface. `soft`: the light with noise; alpha: the difference between the luminances of both
+/// halves of the samples. The sum over all pixels does not change (Schied et al. 2017, with exchanges that keep the light;
 /// `igi/soft_filter.comp`).
-pub fn soft_light(graph: &mut Graph, g: &GBuffer, kinds: [Image; 2], iterations: u32) -> Image {
+pub fn soft_light(graph: &mut Graph, g: &GBuffer, soft: Image, iterations: u32) -> Image {
     let extent = graph.extent(g.depth);
     let guide = guide_of(graph, g, 1, false);
-    let [lamps, sky] = kinds;
-    let mut light = graph.image("igi.direct_noise", Format::RGBA32F, extent);
+    let mut light = graph.image("igi.soft_noise", Format::RGBA32F, extent);
     let push = soft_noise::Push { sharpness: SOFT_SHARPNESS, range: SOFT_RANGE };
-    graph.compute(soft_noise::Args { view: g.view, guide, lamps, sky, albedo: g.albedo, light, push }, extent);
+    graph.compute(soft_noise::Args { view: g.view, guide, soft, albedo: g.albedo, light, push }, extent);
     for turn in 0..iterations {
-        let filtered = graph.image("igi.direct_filtered", Format::RGBA32F, extent);
+        let filtered = graph.image("igi.soft_filtered", Format::RGBA32F, extent);
         let push = soft_filter::Push {
             stride: 1 << turn,
             sharpness: SOFT_SHARPNESS,

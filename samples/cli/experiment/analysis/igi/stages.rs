@@ -55,15 +55,7 @@ const PARTS: &[(Part, &[&str])] = &[
     (Part::Visible, &["passes.gbuffer*"]),
     (
         Part::Direct,
-        &[
-            "igi.direct",
-            "clear igi.direct",
-            "clear igi.direct_lamps",
-            "clear igi.direct_sky",
-            "igi.soft_noise",
-            "igi.soft_filter",
-            "igi.soft_add",
-        ],
+        &["igi.direct", "clear igi.direct", "clear igi.soft", "igi.soft_noise", "igi.soft_filter", "igi.soft_add"],
     ),
     (
         Part::Trees,
