@@ -214,7 +214,7 @@ fn tiles_change_no_bit_of_photoreceptors() {
                 assert!(whole == map(&mut Still::new(gpu, &settings).unwrap().tiles(side)), "tiles of {side}");
             }
         }
-        // What solves an equation is never cut.
+        // Operators that solve an equation are never cut into tiles.
         let mut tiled = Still::new(gpu, &with(Operator::Fattal)).unwrap().tiles(20);
         let cut = tiled.map(width, height, pixels.clone(), None, None).unwrap().pixels;
         assert!(cut == apply(gpu, width, height, &pixels, None, &with(Operator::Fattal)).unwrap().pixels);

@@ -1,4 +1,4 @@
-// Contrasts of one level of a pyramid of log10 L: how much each of them weighs, and what it becomes (Mantiuk 2006).
+// Contrasts of one level of a pyramid of log10 L: the weight and the mapped value of each (Mantiuk 2006).
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require

@@ -1,4 +1,4 @@
-// What the shaders of the solver share: the state of the conjugate gradients, and the weights of the edges between pixels.
+// Shared by the shaders of the solver: the state of the conjugate gradients, and the weights of the edges between pixels.
 //
 // The edge to the right of a pixel has its weight in `across`, the edge below it in `down`; both are 0 where no pixel follows.
 
@@ -17,7 +17,7 @@ struct TonemapSolve {
 const uint TONEMAP_DOT_ROWS = 32;  // export
 // Invocations of solve_scalar.
 const uint TONEMAP_SOLVE_SUMS = 256;
-// What solve_scalar makes of a sum.
+// Uses of a sum by solve_scalar.
 const uint TONEMAP_SOLVE_FIRST = 0;  // export
 const uint TONEMAP_SOLVE_STEP = 1;  // export
 const uint TONEMAP_SOLVE_NEXT = 2;  // export

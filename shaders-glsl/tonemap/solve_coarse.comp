@@ -1,6 +1,6 @@
 // The coarsest level, of at most TONEMAP_COARSE² pixels, by one group: relaxations red-black and then as many black-red, which makes
 // the whole symmetric, as conjugate gradients need it. Right side and solution are freed of their means: the sum of a right side is 0 but for
-// rounding, and relaxation would make much of what is left of it.
+// rounding, and relaxation would amplify the rest.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -22,7 +22,7 @@ const int SWEEPS = 24;
 shared float values[18][18];
 shared float columns[16];
 
-// Mean over the level of what the invocations have; 0 outside.
+// Mean over the level of the values of the invocations; 0 outside.
 float mean(float value, ivec2 at, ivec2 extent) {
     barrier();
     values[at.y + 1][at.x + 1] = value;

@@ -29,7 +29,7 @@ float weight(ivec2 at, bool vertical) {
     return vertical ? texelFetch(down, at, 0).r : texelFetch(across, at, 0).r;
 }
 
-// Of one row or column of fine pixels, from pixel `at` along `way`; `fourth`: there is a pixel behind the third.
+// A row or column of fine pixels, from pixel `at` along `way`; `fourth`: there is a pixel behind the third.
 float behind(ivec2 at, ivec2 way, bool fourth) {
     bool vertical = way.y != 0;
     float inverse = 0.5 / weight(at, vertical) + 1.0 / weight(at + way, vertical);

@@ -1,5 +1,5 @@
-// One level of the operator A (or of the right side b): what flows from a pixel along its edges, and its share of what flows from the
-// pixel of the next coarser level, of which it is one of up to four. Along an edge flows weight · (own − other), or minus what `flow_…` say.
+// One level of the operator A (or of the right side b): the flow from a pixel along its edges, and its share of the flow from the
+// pixel of the next coarser level, of which it is one of up to four. Along an edge flows weight · (own − other), or minus the value of `flow_…`.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require

@@ -1,4 +1,4 @@
-// What is left of the right side: b − Ax, A being the weighted differences to the four neighbours.
+// The residual b − Ax, A being the weighted differences to the four neighbours.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require

@@ -1,4 +1,4 @@
-// The right side of the next coarser level: the transpose of what solve_prolong does.
+// The right side of the next coarser level, by the transpose of solve_prolong.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require

@@ -1,4 +1,4 @@
-// The end of a sum of solve_dot, and what the conjugate gradients make of it.
+// The end of a sum of solve_dot, and the step of the conjugate gradients that needs this sum.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -41,7 +41,7 @@ void main() {
     }
     if (lane != 0u) return;
     float sum = shares[0];
-    // Comparisons with NaN are false, so that it ends the work too.
+    // Comparisons with NaN are false, so NaN ends the work, too.
     if (stage == TONEMAP_SOLVE_FIRST) {
         solve.energy = sum;
         solve.first = sum;

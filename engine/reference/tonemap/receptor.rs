@@ -2,7 +2,7 @@
 
 use super::plane::luminance_of;
 
-/// What the operator asks about a picture, and what is chosen.
+/// Statistics of a picture, and the settings of the operator.
 #[derive(Clone, Copy, Debug)]
 pub struct Receptor {
     /// Means of the channels.

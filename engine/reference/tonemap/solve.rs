@@ -59,7 +59,7 @@ fn members(width: usize, height: usize, x: usize, y: usize) -> impl Iterator<Ite
 }
 
 /// Least squares Σ w (difference − g)² over the edges of all `levels`, each of weights w and weights times wanted differences w g.
-/// Of all solutions that with the mean 0.
+/// The solution has the mean 0.
 pub fn solve(levels: &[(Edges, Edges)]) -> Plane {
     let (_, first) = &levels[0];
     let (width, height) = (first.across.width, first.across.height);

@@ -107,7 +107,7 @@ fn response_to_contrast_has_the_slope_of_its_threshold() {
         let slope = (mantiuk::response(1.0001 * g) - mantiuk::response(0.9999 * g)) / (2e-4 * g);
         assert!((slope * mantiuk::threshold(g, linear) - 1.0).abs() < 1e-3, "{g}: {slope}");
     }
-    // Of a weak contrast three tenths are left, of a strong one far less.
+    // Three tenths of a weak contrast are left, and far less of a strong one.
     let left = |g: f64| mantiuk::contrast(0.3 * mantiuk::response(g)) / g;
     assert!((left(0.01) - 0.3).abs() < 1e-12 && left(1.0) < 0.15, "{} {}", left(0.01), left(1.0));
     // The median is half of white's code, the farther percentile white or black.

@@ -24,7 +24,7 @@ use crate::{
     tracer::tables::{AreaHandles, AreaLights},
 };
 
-/// The data of a scene that rays to its sky, to its glowing surfaces and into the open need.
+/// The data that rays to the sky, to glowing surfaces and to unseen surfaces of a scene need.
 #[derive(Debug)]
 pub struct Area {
     rays: Rays,

@@ -81,7 +81,7 @@ impl Technique for Isr {
     }
 
     fn prepared_by(settings: &PictureSettings) -> PictureSettings {
-        // Rays need acceleration structures; whether there are rays is all that counts here.
+        // Only whether there are rays counts, because rays need acceleration structures.
         let unseen = f32::from(u8::from(settings.isr.fills()));
         let isr = super::Settings { area_lights: settings.isr.area_lights, unseen, ..Default::default() };
         PictureSettings { isr, ..PictureSettings::default() }

@@ -73,7 +73,7 @@ pub struct Output {
     pub statistics: Buffer,
     /// Selective: R32F, 1 where a pixel is important, 0 elsewhere.
     pub important: Option<Image>,
-    /// Fattal and Mantiuk: one `types::TonemapSolve`, with what the solution leaves.
+    /// Fattal and Mantiuk: one `types::TonemapSolve`, with the residual of the solution.
     pub solve: Option<Buffer>,
 }
 
@@ -142,7 +142,7 @@ impl Tonemap {
     }
 }
 
-/// What is known of the light before the operator.
+/// Light and statistics before the operator runs.
 struct Light {
     luminance: Image,
     statistics: Buffer,

@@ -86,7 +86,7 @@ impl Operator {
         matches!(self, Self::Fattal | Self::Mantiuk)
     }
 
-    /// What it does depends on the luminances of the whole picture.
+    /// Its result depends on the luminances of the whole picture.
     pub fn needs_statistics(self, settings: &Settings) -> bool {
         self.has_local()
             || self.solves()

@@ -1,4 +1,4 @@
-//! Reinhard and Devlin 2005: what the operator asks about the whole picture, and its passes.
+//! Reinhard and Devlin 2005: statistics of the whole picture, and the passes of the operator.
 //!
 //! Nothing here adapts in time: means and range are those of the frame.
 
@@ -19,7 +19,7 @@ pub const BYTES: u64 = size_of::<TonemapReceptor>() as u64;
 /// Buffers of the statistics of a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Known {
-    /// Of [`super::statistics::luminance`] for the whole picture.
+    /// Sums of [`super::statistics::luminance`] over the whole picture.
     pub sums: Buffer,
     /// One `types::TonemapReceptor`.
     pub receptor: Buffer,

@@ -41,7 +41,7 @@ impl Edges {
     }
 }
 
-/// What the differences are wanted to be.
+/// The wanted differences.
 #[derive(Clone, Debug)]
 pub struct Wanted {
     /// For each level, finest first: weight times wanted difference (the next pixel less this one).
@@ -50,7 +50,7 @@ pub struct Wanted {
     pub weights: Vec<Edges>,
 }
 
-/// What is computed.
+/// Result of the solver.
 #[derive(Clone, Copy, Debug)]
 pub struct Solution {
     /// R32F.
@@ -111,7 +111,7 @@ pub fn state(graph: &mut Graph) -> Buffer {
     state
 }
 
-/// What becomes of a sum: the stage of `solve_scalar`, and where a mean goes.
+/// Use of a sum: the stage of `solve_scalar`, and the place of a mean.
 #[derive(Clone, Copy, Debug)]
 pub struct Sum {
     pub stage: u32,
@@ -125,7 +125,7 @@ pub fn sums(graph: &mut Graph, extent: Extent) -> Buffer {
     graph.buffer("tonemap.sums", 4 * u64::from(x) * u64::from(y))
 }
 
-/// What is summed over all pixels.
+/// Values that are summed over all pixels.
 #[derive(Clone, Copy, Debug)]
 pub enum Of {
     Values(Image),
@@ -134,7 +134,7 @@ pub enum Of {
     Difference(Image, Image),
 }
 
-/// Sums over all pixels and does with it what `sum` says. `buffers`: state, room for sums, means.
+/// Sums over all pixels; `sum` names the use of the result. `buffers`: state, room for sums, means.
 pub fn dot(graph: &mut Graph, of: Of, buffers: [Buffer; 3], sum: &Sum) {
     let [solve, sums, means] = buffers;
     let (one, two, product) = match of {
@@ -205,7 +205,7 @@ impl Solver {
             self.dot(graph, rest, steepest, consts::TONEMAP_SOLVE_NEXT);
             graph.compute(solve_turn::Args { steepest, solve, direction }, extent);
         }
-        // What is left of the right side, from the solution itself: the steps only follow what they believe to be left.
+        // The residual is computed from the solution, because the steps only update an estimate of it, with rounding errors.
         let done = offset_of!(TonemapSolve, done) as u64;
         graph.fill(solve.range(done..done + 4), 0);
         self.flow(graph, Some(values), None, image);
@@ -228,7 +228,7 @@ impl Solver {
         }
         for (k, term) in self.terms.iter().enumerate().rev() {
             let edges = given.map_or(term.weights, |flows| Some(flows[k]));
-            // What is not there is not read: anything written stands for it.
+            // A binding needs an image. The shader does not read this one, so any written image will do.
             let Some(any) = pyramid.get(k).copied().or(edges.map(|edges| edges.across)) else { continue };
             let args = solve_flow::Args {
                 values: any,
@@ -280,7 +280,7 @@ impl Solver {
 fn couple(graph: &mut Graph, fine: &Level, extent: Extent, own: Option<Edges>, any: Edges) -> Edges {
     let coarse = Edges::new(graph, "solve.weights", extent);
     let Extent { width, height, .. } = fine.extent;
-    // `any` stands for what is not read.
+    // A binding needs an image; the shader does not read `any`.
     let (Edges { across, down }, added) = (fine.weights.unwrap_or(any), own.unwrap_or(any));
     let args = solve_couple::Args {
         across,

@@ -302,7 +302,7 @@ struct Developed {
     residual: Option<(f32, u32)>,
 }
 
-/// What a solution leaves of the right side, and its steps.
+/// Relative residual of a solution, and its steps.
 fn left(found: &[TonemapSolve]) -> (f32, u32) {
     found.first().map_or((f32::NAN, 0), |state| (state.residual, state.steps))
 }

@@ -1,7 +1,7 @@
 //! Operators that solve one equation for the whole picture: Fattal 2002 and Mantiuk 2006.
 //!
-//! Both say which differences of log₁₀ L the neighbours shall have ([`fattal`], [`mantiuk`]), [`solve`] finds the logarithm that has
-//! them, and [`display`] fits it to the display.
+//! Both choose the differences of log₁₀ L between neighbours ([`fattal`], [`mantiuk`]). [`solve`] finds the logarithm whose differences are nearest to
+//! them, and [`display`] fits this logarithm to the display.
 
 use super::{
     Operator, Settings,
