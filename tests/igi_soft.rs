@@ -39,7 +39,7 @@ fn filtered(gpu: &lucerna::gpu::Gpu, eye: &Eye, buffers: &Buffers, noisy: &Texel
     let g = gbuffer(&mut graph, eye, buffers);
     let extent = Extent::new(SIZE.0 as u32, SIZE.1 as u32);
     let soft = image(&mut graph, "soft", extent, noisy);
-    let light = filters::soft_light(&mut graph, &g, soft, turns);
+    let light = filters::soft_light(&mut graph, &g, soft, turns, false);
     let [light] = read(gpu, graph, [light]);
     light
 }

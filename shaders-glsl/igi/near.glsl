@@ -12,6 +12,7 @@ struct NearPath {
     float gap;     // step off the surface, metres
     vec3 weight;   // irradiance at the receiver per irradiance at `position`
     vec3 light;    // irradiance at the receiver, sum over its paths so far, W/m²
+    float half_light; // luminance of `light` after half of the paths
 };
 
 layout(binding = 75, scalar) buffer NearPaths { NearPath near_paths[]; };

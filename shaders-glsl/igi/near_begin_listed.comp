@@ -43,5 +43,6 @@ void main() {
     path.position = stepped_back(view, path.position, path.gap);
     path.weight = vec3(1.0 / float(paths));
     path.light = number == 0u ? vec3(0.0) : near_paths[slot].light;
+    path.half_light = 0.0;
     near_paths[slot] = path;
 }

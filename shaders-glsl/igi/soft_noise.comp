@@ -19,6 +19,7 @@ layout(binding = 4, rgba32f) uniform writeonly image2D light; // a: variance; -1
 layout(push_constant, scalar) uniform Push {
     float sharpness; // exponent of the cosine between normals
     float range;     // distance from the pixel's plane, relative to its depth, with weight 0.6
+    uint rare;       // 1: a difference of the pixel itself that is larger than the mean is its variance
 };
 
 void main() {
@@ -49,5 +50,9 @@ void main() {
         }
     }
     // The pixel itself has a weight of about 1.
-    imageStore(light, pixel, vec4(texelFetch(soft, pixel, 0).rgb, sum / weights));
+    float variance = sum / weights;
+    vec4 noisy = texelFetch(soft, pixel, 0);
+    // A rare bright path stands alone among neighbours with little noise; the mean would take its light for a detail.
+    if (rare != 0u) variance = max(variance, noisy.a * noisy.a);
+    imageStore(light, pixel, vec4(noisy.rgb, variance));
 }

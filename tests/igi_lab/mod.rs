@@ -102,6 +102,8 @@ pub fn plain(vpls: u32) -> Settings {
         candidates: 1,
         bounces: 1,
         bound: 0.0,
+        compensation: 0,
+        compensation_filter: 0,
         specular: false,
         direct_samples: 4,
         direct_filter: 0,

@@ -3,17 +3,17 @@
 //! the bound removes. The light of virtual lights on these surfaces is bounded as well. The next segment of the short path
 //! compensates this bound, up to the number of bounces.
 
-use super::{Igi, LightTree, Settings, Shared, Vpls, dispatch, gather::listed_groups};
+use super::{Igi, LightTree, Settings, Shared, Vpls, dispatch, filters, gather::listed_groups};
 use crate::{
     Error, Result,
-    graph::{Buffer, Extent, Graph, Image},
+    graph::{Buffer, Extent, Format, Graph, Image},
     passes::gbuffer::GBuffer,
     resident::Handles,
     shaders::{
         consts::TEXTURE_SLOTS,
         igi::{
-            near_begin, near_begin_listed, near_begin_tree, near_direct, near_end, near_end_listed, near_end_tree,
-            near_pick, near_trace,
+            near_add, near_begin, near_begin_listed, near_begin_tree, near_direct, near_end, near_end_listed,
+            near_end_tree, near_pick, near_trace,
         },
         types,
     },
@@ -62,7 +62,8 @@ impl Igi {
         Err(Error::usage(what).at(key).help(less))
     }
 
-    /// Adds the compensated light to the coarse irradiance, which has every [`Settings::downsample`]-th pixel.
+    /// Adds the compensated light to the coarse irradiance, which has every [`Settings::downsample`]-th pixel. A filter removes the noise of this
+    /// light ([`Settings::compensation_filter`]).
     #[allow(clippy::too_many_arguments)]
     pub(super) fn compensate(
         &self,
@@ -78,6 +79,12 @@ impl Igi {
         let extent = graph.extent(irradiance);
         let texels = extent.width * extent.height;
         let near_paths = held(graph, texels.min(HELD));
+        let apart = settings.filters_compensation();
+        let target = if apart { graph.image("igi.near_light", Format::RGBA32F, extent) } else { irradiance };
+        if apart {
+            // The last pass of the paths reads its image where it does not keep the light apart, so the image needs content.
+            graph.clear(target, [0.0; 4]);
+        }
         for first in (0..texels).step_by(HELD as usize) {
             let count = HELD.min(texels - first);
             for number in 0..settings.compensation {
@@ -94,8 +101,13 @@ impl Igi {
                 graph.compute(args, count);
                 self.follow(graph, handles, shared, (vpls, tree), settings, (near_paths, count, number, None));
             }
-            let push = near_end::Push { first, count };
-            graph.compute(near_end::Args { irradiance, near_paths, push }, count);
+            let push = near_end::Push { first, count, paths: settings.compensation };
+            let spec = near_end::Spec { apart: apart.into() };
+            graph.compute(near_end::Args { irradiance: target, near_paths, push, spec }, count);
+        }
+        if apart {
+            let light = filters::soft_light(graph, g, target, settings.compensation_filter, true);
+            graph.compute(near_add::Args { light, irradiance }, extent);
         }
     }
 

@@ -39,7 +39,7 @@ impl Igi {
         );
         graph.compute_over(args, extent, self.items(shared.direct_rays, extent.pixels()));
         if apart {
-            let light = filters::soft_light(graph, g, soft, shared.direct_filter);
+            let light = filters::soft_light(graph, g, soft, shared.direct_filter, false);
             graph.compute(soft_add::Args { albedo: g.albedo, specular: g.specular, light, direct }, extent);
         }
         direct

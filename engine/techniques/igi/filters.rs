@@ -109,13 +109,14 @@ pub fn upsample(graph: &mut Graph, g: &GBuffer, guide: Image, coarse: Image, set
 
 /// Direct light of emissive surfaces and of the sky without most of its noise, as radiance divided by the surfaces' colours; alpha: variance of its
 /// luminance, -1 where there is no lit surface. `soft`: the light with noise; alpha: the difference between the luminances of both
-/// halves of the samples. The sum over all pixels does not change (Schied et al. 2017, with exchanges that keep the light;
+/// halves of the samples. `rare`: some pixels have a rare bright sample, which stands alone among neighbours with little noise. The sum over all pixels
+/// does not change (Schied et al. 2017, with exchanges that keep the light;
 /// `igi/soft_filter.comp`).
-pub fn soft_light(graph: &mut Graph, g: &GBuffer, soft: Image, iterations: u32) -> Image {
+pub fn soft_light(graph: &mut Graph, g: &GBuffer, soft: Image, iterations: u32, rare: bool) -> Image {
     let extent = graph.extent(g.depth);
     let guide = guide_of(graph, g, 1, false);
     let mut light = graph.image("igi.soft_noise", Format::RGBA32F, extent);
-    let push = soft_noise::Push { sharpness: SOFT_SHARPNESS, range: SOFT_RANGE };
+    let push = soft_noise::Push { sharpness: SOFT_SHARPNESS, range: SOFT_RANGE, rare: rare.into() };
     graph.compute(soft_noise::Args { view: g.view, guide, soft, albedo: g.albedo, light, push }, extent);
     for turn in 0..iterations {
         let filtered = graph.image("igi.soft_filtered", Format::RGBA32F, extent);

@@ -95,6 +95,10 @@ pub struct Settings {
     /// Short rays per gathered pixel that add back the light that the bound removes. 0: this light is missing.
     #[schemars(range(min = 0, max = 64), extend("x-unit" = "rays", "x-needs" = {"bound": {"exclusiveMinimum": 0}}))]
     pub compensation: u32,
+    /// Iterations of the filter that removes the noise of the compensated light, like [`Settings::direct_filter`] for direct light. 0: no filter; the
+    /// light is right on average in every pixel.
+    #[schemars(range(min = 0, max = 5), extend("x-unit" = "iterations", "x-needs" = {"compensation": {"minimum": 1}, "bound": {"exclusiveMinimum": 0}, "downsample": {"maximum": 1}}))]
+    pub compensation_filter: u32,
     /// Side of a cell of the irradiance cache, as share of the scene's diagonal. The cache holds the light of virtual
     /// lights on surfaces that mirrors and glass show. 0: no cache; each of these surfaces gathers.
     #[schemars(range(min = 0.002, max = 0.2), extend("x-zero" = true, "x-needs" = {"indirect": {"const": true}, "specular": {"const": true}}))]
@@ -198,10 +202,11 @@ impl Default for Settings {
             candidates: 8,
             bounces: 2,
             judges: 96,
-            bound: 0.02,
+            bound: 0.1,
             picks: 0,
             proposals: 4,
-            compensation: 0,
+            compensation: 8,
+            compensation_filter: 4,
             cache: 0.0,
             cache_cells: CACHE_CELLS,
             imperfect: false,
@@ -245,6 +250,8 @@ impl Settings {
             interleave: 3,
             upsample_normal: 1.0,
             upsample_range: 0.0,
+            bound: 0.02,
+            compensation: 0,
             direct_filter: 0,
             ..Self::default()
         }
@@ -253,6 +260,11 @@ impl Settings {
     /// Number of light paths whose virtual lights are kept.
     pub fn paths(&self) -> u32 {
         (self.vpls / self.bounces.max(1)).max(1)
+    }
+
+    /// Whether the filter for the noise of compensated light runs.
+    pub(super) fn filters_compensation(&self) -> bool {
+        self.compensation_filter > 0 && self.downsample == 1
     }
 
     /// Whether receivers pick from `vpls` virtual lights. If there are few lights, gathering from all costs less and has no noise.
