@@ -193,7 +193,7 @@ def main():
             continue
         place, _ = render(given.folder, name, scene, "truth", ["--aa", "64"], given)
         truth = {"place": place, "pictures": [pfm(place / f"{i:04}.pfm") for i in range(given.frames)]}
-        depth = [exr_channel(place / f"{i:04}.exr", "depth.Z") for i in range(given.frames)]
+        depth = [exr_channel(place / f"{i:04}.exr", "Z") for i in range(given.frames)]
         near = [None] * given.frames
         for i in range(SETTLED, given.frames):
             near[i] = numpy.min(depth[i - SETTLED : i], axis=0) < 0.97 * depth[i]

@@ -42,7 +42,7 @@ struct Seen<'a> {
 struct Before<'a> {
     seen: Seen<'a>,
     average: &'a Texels,
-    spread: &'a Texels,
+    swing: &'a Texels,
 }
 
 impl Seen<'_> {
@@ -108,7 +108,7 @@ fn recalled(before: &Before<'_>, at: DVec2) -> (DVec3, f64) {
     (sum.clamp(low, high), count)
 }
 
-/// The blended radiance of a pixel with its number of frames, and the deviation from frame to frame.
+/// The blended radiance of a pixel with its number of frames, and its swing from frame to frame.
 fn resolved(now: &Seen<'_>, motion: &Texels, before: &Before<'_>, most: f64, pixel: IVec2) -> (DVec4, DVec3) {
     let mut own = color(&now.fresh[now.index(pixel)]);
     let around_it: Vec<DVec3> = around(pixel).map(|at| ycocg(color(&now.fresh[now.index(at)]))).collect();
@@ -159,7 +159,8 @@ fn resolved(now: &Seen<'_>, motion: &Texels, before: &Before<'_>, most: f64, pix
     let (average, count) = recalled(before, at);
     let mut average = ycocg(average);
     let nearest = then.index((at + 0.5).floor().as_ivec2());
-    let mut spread = color(&before.spread[nearest]);
+    let moves = moved[3] > 0.0 && !sky;
+    let mut swing = if moves { DVec3::ZERO } else { color(&before.swing[nearest]) };
     let mut count = (count + 1.0).min(most);
     let brightest = around(pixel).filter(|at| now.is_inside(*at) && *at != pixel);
     let brightest = brightest.map(|at| ycocg(color(&now.fresh[now.index(at)])).x).fold(0.0, f64::max);
@@ -168,18 +169,31 @@ fn resolved(now: &Seen<'_>, motion: &Texels, before: &Before<'_>, most: f64, pix
     if luma > limit {
         own *= limit / luma;
     }
-    let half = deviation.max(spread) + 1e-4 * mean.x;
+    let half = (0.75 * deviation).max(4.0 * swing) + 0.02 * mean.x;
     let off = ((average - mean).abs() / half).max_element();
     if off > 1.0 {
         average = mean + (average - mean) / off;
         count = (count / off).max(1.0);
-    } else {
-        let step = ycocg(own) - color(&then.fresh[nearest]);
-        let square = spread * spread + (0.5 * step * step - spread * spread) / count;
-        spread = dvec3(square.x.sqrt(), square.y.sqrt(), square.z.sqrt());
+        swing /= off;
     }
+    let last_fresh = &then.fresh[nearest];
+    let step = ycocg(own) - color(last_fresh);
+    // Of a step back, the part up to the size of the step before; little of it if the pixel shows the same surface as before.
+    let before_it = f64::from(last_fresh[3]);
+    let mut back = if step.x * before_it < 0.0 { (before_it / step.x).abs().min(1.0) } else { 0.0 };
+    let there = (at + 0.5).floor().as_ivec2().clamp(IVec2::ZERO, then.size() - 1);
+    let (sky_now, sky_then) = (now.depth(pixel) >= 1.0, then.depth(there) >= 1.0);
+    let place = now.place(pixel);
+    let distance = then.view.axes()[2].as_dvec3().dot(place - then.view.position.as_dvec3());
+    let n = then.normal(there);
+    let close = n.dot(now.normal(pixel)) >= 0.9 && n.dot(then.place(there) - place).abs() <= 0.001 * distance;
+    if sky_now == sky_then && (sky_now || close) {
+        back /= 16.0;
+    }
+    let square = swing * swing + (back * step * step - swing * swing) / count;
+    swing = if moves { DVec3::ZERO } else { dvec3(square.x.sqrt(), square.y.sqrt(), square.z.sqrt()) };
     let past = rgb(average);
-    ((past + (own - past) / count).max(DVec3::ZERO).extend(count), spread)
+    ((past + (own - past) / count).max(DVec3::ZERO).extend(count), swing)
 }
 
 /// Fails if more than `most` of the texels are further than `slack` from the twin.
@@ -221,8 +235,8 @@ fn the_average_agrees_with_its_twin() {
             let mut texels = |scale: f32| -> Texels { (0..all).map(|_| random.texel().map(|v| scale * v)).collect() };
             let (mut fresh, old_fresh) = (texels(1.0), texels(1.0));
             let mut average = texels(0.6);
-            let spread: Texels =
-                texels(0.25).iter().map(|t| [t[0] + 0.05, 0.1 * t[1] + 0.1, 0.1 * t[2] + 0.1, 0.0]).collect();
+            let swing: Texels =
+                texels(0.25).iter().map(|t| [t[0] + 0.02, 0.1 * t[1] + 0.05, 0.1 * t[2] + 0.05, 0.0]).collect();
             for (i, texel) in average.iter_mut().enumerate() {
                 texel[3] = 1.0 + (i % 9) as f32;
             }
@@ -249,7 +263,7 @@ fn the_average_agrees_with_its_twin() {
                 .map(|i| then.normal[i].normalize_or_zero().as_vec3().extend(then.depth[i] as f32).to_array())
                 .collect();
             let old_ycocg: Texels =
-                old_fresh.iter().map(|t| ycocg(color(t)).as_vec3().extend(0.0).to_array()).collect();
+                old_fresh.iter().map(|t| ycocg(color(t)).as_vec3().extend(t[3] - 0.5).to_array()).collect();
 
             let mut graph = Graph::new("temporal");
             graph.frame = 7;
@@ -260,7 +274,7 @@ fn the_average_agrees_with_its_twin() {
                 average: image(&mut graph, "old", extent(), &average),
                 guide: image(&mut graph, "old guide", extent(), &guides),
                 fresh: image(&mut graph, "old fresh", extent(), &old_ycocg),
-                spread: image(&mut graph, "old spread", extent(), &spread),
+                swing: image(&mut graph, "old swing", extent(), &swing),
             };
             let motion_image = image(&mut graph, "motion", extent(), &motion);
             let fresh_image = image(&mut graph, "fresh", extent(), &fresh);
@@ -268,17 +282,17 @@ fn the_average_agrees_with_its_twin() {
                 ("average", Format::RGBA32F),
                 ("guide", Format::RGBA32F),
                 ("kept", Format::RGBA16F),
-                ("spread", Format::RGBA16F),
+                ("swing", Format::RGBA16F),
             ]
             .map(|(name, format)| graph.image(name, format, extent()));
             let settings = Settings { frames: 6 };
             temporal::blend(&mut graph, &g, (motion_image, fresh_image), &past, next, now_shift, settings);
-            let [blended, guide, kept, deviations] = read(gpu, graph, next);
+            let [blended, guide, kept, swings] = read(gpu, graph, next);
 
             let history = Before {
                 seen: Seen { view: seen, buffers: &then, fresh: &old_ycocg },
                 average: &average,
-                spread: &spread,
+                swing: &swing,
             };
             let pixels = || (0..all).map(|i| ivec2((i % SIZE.0) as i32, (i / SIZE.0) as i32));
             let expected: Vec<_> = pixels().map(|pixel| resolved(&now, &motion, &history, 6.0, pixel)).collect();
@@ -286,7 +300,7 @@ fn the_average_agrees_with_its_twin() {
             // Rounding decides about surfaces and places exactly at a threshold.
             agree(&blended, &wanted, 1e-3, 2 * all / 100, &format!("camera {turn}"));
             let wanted: Vec<DVec4> = expected.iter().map(|(_, s)| s.extend(0.0)).collect();
-            agree(&deviations, &wanted, 2e-3, 2 * all / 100, &format!("deviation, camera {turn}"));
+            agree(&swings, &wanted, 2e-3, 2 * all / 100, &format!("swing, camera {turn}"));
             let share = |of: &dyn Fn(f64) -> bool| expected.iter().filter(|(e, _)| of(e.w)).count();
             let (alone, limited, whole) = (
                 share(&|n| n == 1.0),

@@ -5,8 +5,8 @@
 //! from there. L. Yang, S. Liu and M. Salvi (2020) survey the method. Four measures keep the past out of the picture:
 //! - What another surface hid in the last frame has no past. Pixels beside an edge count as visible, so that edges keep their average.
 //! - The past is limited to the range of colours around the pixel (variance clipping in YCoCg, Salvi 2016), so that shadows and
-//!   highlights do not leave traces. The range is also as wide as the pixel usually differs from frame to frame, because a thin wire is
-//!   missing in most frames.
+//!   highlights do not leave traces. The range is also as wide as the pixel swings between surfaces from frame to frame,
+//!   because a thin wire is missing in most frames. Where something moves, it is not.
 //! - What had to be limited counts as fewer frames.
 //! - A bright sample that is alone in place and time at most doubles the light. All else is averaged as linear radiance, so the mean
 //!   light stays the same.
@@ -73,21 +73,21 @@ pub struct Past {
     pub average: Image,
     /// Unit normal; alpha: linear depth / far.
     pub guide: Image,
-    /// Radiance of the frame alone, YCoCg.
+    /// Radiance of the frame alone, YCoCg; alpha: its luma less that of the frame before.
     pub fresh: Image,
-    /// Standard deviation of radiance from frame to frame, YCoCg.
-    pub spread: Image,
+    /// How far the radiance swings from frame to frame (root mean square), YCoCg.
+    pub swing: Image,
 }
 
 /// Blends `fresh`, the radiance of this frame, with the average of `past`. Writes the four images of the next frame's past, in the order of
-/// [`Past`]: average, guide (RGBA32F), fresh, spread (RGBA16F). `motion`: of [`motion::draw`]. `shift`: where the pixels of this frame look,
+/// [`Past`]: average, guide (RGBA32F), fresh, swing (RGBA16F). `motion`: of [`motion::draw`]. `shift`: where the pixels of this frame look,
 /// from their middles to the right and down, pixels.
 pub fn blend(
     graph: &mut Graph,
     g: &GBuffer,
     (motion, fresh): (Image, Image),
     past: &Past,
-    [blended, guide, kept, spread]: [Image; 4],
+    [blended, guide, kept, swings]: [Image; 4],
     shift: Vec2,
     settings: Settings,
 ) {
@@ -101,11 +101,11 @@ pub fn blend(
         old: past.average,
         old_guide: past.guide,
         old_fresh: past.fresh,
-        old_spread: past.spread,
+        old_swing: past.swing,
         blended,
         guide,
         kept,
-        spread,
+        swings,
         push: shader::Push { frame: graph.frame, most: settings.frames as f32, shift: shift.to_array() },
     };
     let extent = graph.extent(blended);
@@ -138,11 +138,11 @@ pub fn accumulate(
         let this = types::HistoryFrame { view: view.uniform(), next, shift: view.shift().to_array() };
         let this = graph.buffer_from("temporal.history.this", &[this]);
         graph.copy_buffer(this, frame_next);
-        let [average, guide, kept, spread] = [
+        let [average, guide, kept, swing] = [
             ("temporal.history.average", Format::RGBA32F),
             ("temporal.history.guide", Format::RGBA32F),
             ("temporal.history.fresh", Format::RGBA16F),
-            ("temporal.history.spread", Format::RGBA16F),
+            ("temporal.history.swing", Format::RGBA16F),
         ]
         .map(|(name, format)| graph.history(name, format, extent));
         let past = Past {
@@ -150,9 +150,9 @@ pub fn accumulate(
             average: average.0.nearest(),
             guide: guide.0.nearest(),
             fresh: kept.0.nearest(),
-            spread: spread.0.nearest(),
+            swing: swing.0.nearest(),
         };
-        let next = [average.1, guide.1, kept.1, spread.1];
+        let next = [average.1, guide.1, kept.1, swing.1];
         blend(graph, g, (motion, fresh), &past, next, view.shift(), settings);
         average.1
     }))

@@ -89,7 +89,7 @@ pub fn frames<T: Technique>(
         let shot = Shot { seconds, frames, mode: given.mode, layers, temporal };
         let of = OfFrame { frame, pose, view, shot };
         if args.list_passes {
-            let (mut graph, mut picture) = work.declared(run, &of, run.smooth.place(frame), args.seed)?;
+            let (mut graph, mut picture) = work.declared(run, &of, run.smooth.place(frame), work.seed(run, frame))?;
             picture.develop(|picture| work.last.frame(&mut graph, picture, work.step()))?;
             return console::print(graph.plan()?.list_passes().trim_end());
         }
@@ -151,6 +151,12 @@ impl<T: Technique> Work<'_, T> {
         Ok((graph, picture))
     }
 
+    /// The seed of the only picture of a frame. Noise of other random numbers is averaged over time, too.
+    fn seed(&self, run: &Run<'_>, frame: u32) -> u32 {
+        let other = if run.smooth.temporal.is_some() { frame.wrapping_mul(0x9e37_79b9) } else { 0 };
+        self.args.seed.wrapping_add(other)
+    }
+
     /// Runs a frame and reads its picture. `held`: the history does not advance.
     fn rendered(
         &mut self,
@@ -182,7 +188,7 @@ impl<T: Technique> Work<'_, T> {
     /// Renders and writes a frame.
     fn single(&mut self, run: &mut Run<'_>, of: &OfFrame<T::Mode>, progress: &mut Frames) -> Result<Option<()>> {
         let begun = Instant::now();
-        let declared = self.declared(run, of, run.smooth.place(of.frame), self.args.seed);
+        let declared = self.declared(run, of, run.smooth.place(of.frame), self.seed(run, of.frame));
         let Some((mut graph, mut picture)) = unless_stopped(declared, self.interrupt)? else { return Ok(None) };
         let step = self.step();
         picture.develop(|picture| self.last.frame(&mut graph, picture, step))?;
@@ -257,7 +263,8 @@ impl<T: Technique> Work<'_, T> {
                 return Ok(Some(()));
             }
             let begun = Instant::now();
-            let (mut graph, mut picture) = self.declared(run, of, run.smooth.place(of.frame), self.args.seed)?;
+            let (mut graph, mut picture) =
+                self.declared(run, of, run.smooth.place(of.frame), self.seed(run, of.frame))?;
             // A time step of 0 leaves the adaptation unchanged.
             picture.develop(|picture| self.last.frame(&mut graph, picture, 0.0))?;
             let last = repeat + 1 == self.args.repeat;

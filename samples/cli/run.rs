@@ -234,7 +234,7 @@ impl<'a> Run<'a> {
         if self.unasked.is_some_and(|cheap| cheap || gpu.describe().kind != DeviceKind::Cpu) {
             match self.frames.len() {
                 1 => self.smooth.count = smooth::STILL,
-                _ => self.smooth.temporal = Some(self.args.smooth.frames.unwrap_or(temporal::FRAMES)),
+                _ => self.smooth.temporal = Some(self.args.smooth.aa_frames.unwrap_or(temporal::FRAMES)),
             }
         }
         self.record.aa = self.smooth;
@@ -415,7 +415,7 @@ impl<'a> Run<'a> {
 
 /// The anti-aliasing that the user asks for.
 fn smoothing(args: &RenderArgs, technique: &Label) -> Result<Smooth> {
-    let SmoothArgs { aa, filter, frames } = args.smooth;
+    let SmoothArgs { aa, filter, aa_frames: frames } = args.smooth;
     let wrong = |what: String, help: &str| Err(Error::usage(what).at("--aa").help(help));
     let asked = !matches!(aa, None | Some(Aa::Mean(1)));
     if asked && !technique.radiance {

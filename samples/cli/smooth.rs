@@ -70,7 +70,7 @@ pub struct SmoothArgs {
 
     /// Most frames in the average of --aa temporal: more are smoother at rest, fewer follow change faster [default: 8]
     #[arg(long = "aa-frames", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(temporal::MOST)), help_heading = "Picture")]
-    pub frames: Option<u32>,
+    pub aa_frames: Option<u32>,
 }
 
 /// Anti-aliasing of a picture.
@@ -100,7 +100,7 @@ impl Smooth {
     /// The options that ask for this.
     pub fn args(&self) -> SmoothArgs {
         let aa = if self.temporal.is_some() { Aa::Temporal } else { Aa::Mean(self.count) };
-        SmoothArgs { aa: Some(aa), filter: self.filter, frames: self.temporal }
+        SmoothArgs { aa: Some(aa), filter: self.filter, aa_frames: self.temporal }
     }
 
     /// Where the pictures look, from the middle of each pixel to the right and down, pixels. The first one looks at the middle.
@@ -269,7 +269,7 @@ mod tests {
             Smooth { count: 5, ..Smooth::default() },
             Smooth { temporal: Some(3), ..Smooth::default() },
         ] {
-            let SmoothArgs { aa, frames, .. } = smooth.args();
+            let SmoothArgs { aa, aa_frames: frames, .. } = smooth.args();
             let again = match aa {
                 Some(Aa::Mean(count)) => Smooth { count, temporal: frames, ..Smooth::default() },
                 _ => Smooth { temporal: frames, ..Smooth::default() },

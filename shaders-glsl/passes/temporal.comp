@@ -2,9 +2,9 @@
 // a survey). Each pixel finds its surface in the last frame. It takes over the average from there unless another surface hid it, and limits
 // it to the range of colours that this frame shows around the pixel (Karis 2014; variance clipping, Salvi 2016).
 //
-// A wire that is thinner than a pixel is missing in most frames, and so is its colour in the range. The range therefore also covers the
-// usual difference between a frame and the next one at this pixel. The difference of successive values does not count slow
-// change, which must not widen the range (von Neumann et al. 1941).
+// A wire that is thinner than a pixel is missing in most frames, and so is its colour in the range. The range is therefore also as wide as
+// the pixel swings from frame to frame: a step that takes back the step before it is a swing. Objects and shadows that pass swing a
+// little with their edges, and must not widen the range: near what moves swings do not count, and on one surface they count little.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -24,12 +24,12 @@ layout(binding = 4) uniform sampler2D motion;     // from passes/motion.frag; w 
 layout(binding = 5) uniform sampler2D fresh;      // radiance of this frame
 layout(binding = 6) uniform sampler2D old;        // average of the frames before; a: number of frames in it
 layout(binding = 7) uniform sampler2D old_guide;  // xyz: unit normal; w: linear depth / far
-layout(binding = 8) uniform sampler2D old_fresh;  // radiance of the last frame, YCoCg
-layout(binding = 9) uniform sampler2D old_spread; // deviation from frame to frame, YCoCg
+layout(binding = 8) uniform sampler2D old_fresh;  // radiance of the last frame, YCoCg; a: its luma less that of the frame before
+layout(binding = 9) uniform sampler2D old_swing;  // how far the radiance swings from frame to frame, YCoCg
 layout(binding = 10, rgba32f) uniform writeonly image2D blended;
 layout(binding = 11, rgba32f) uniform writeonly image2D guide;
 layout(binding = 12, rgba16f) uniform writeonly image2D kept;
-layout(binding = 13, rgba16f) uniform writeonly image2D spread;
+layout(binding = 13, rgba16f) uniform writeonly image2D swings;
 
 layout(push_constant, scalar) uniform Push {
     uint frame;
@@ -39,6 +39,12 @@ layout(push_constant, scalar) uniform Push {
 
 // Maximum distance from the old surface, relative to its depth.
 const float RANGE = 0.02;
+// Weight of a swing of the same surface.
+const float SHADED = 0.0625;
+// Maximum distance from the old surface of what a pixel shows, relative to its depth.
+const float CLOSE = 0.001;
+// A smaller difference, relative to the light, is no change.
+const float REST = 0.02;
 // Largest value of a 16-bit float.
 const float LARGEST = 65504.0;
 
@@ -109,6 +115,7 @@ void main() {
 
     bool sky = z >= 1.0;
     vec3 n = decode_normal(texelFetch(normal, front, 0));
+    vec3 own_n = decode_normal(texelFetch(normal, pixel, 0));
     vec4 moved = texelFetch(motion, front, 0);
     vec4 was = sky ? vec4(normalize(view_ray(view, screen_uv(view, front, 1.0))), 0.0)
         : vec4(moved.w > 0.0 ? moved.xyz : screen_position(view, front, 1.0, z), 1.0);
@@ -123,14 +130,16 @@ void main() {
     }
     past = past && was_visible(last.view, ivec2(floor(seen + 0.5)), size, sky, was.xyz, n);
 
-    vec3 result = own, difference = vec3(0.0);
+    vec3 result = own, swing = vec3(0.0), step = vec3(0.0);
     float count = 1.0;
     if (past) {
         vec4 average = recalled(at, size);
         vec3 color = ycocg_of(average.rgb);
         ivec2 nearest = clamp(ivec2(floor(at + 0.5)), ivec2(0), size - 1);
-        difference = texelFetch(old_spread, nearest, 0).xyz;
-        vec3 half_width = max(AROUND * deviation, OVER_TIME * difference) + 1e-4 * mean.x + 1e-30;
+        // Edges of what moves do not swing.
+        bool moves = !sky && moved.w > 0.0;
+        if (!moves) swing = texelFetch(old_swing, nearest, 0).xyz;
+        vec3 half_width = max(AROUND * deviation, OVER_TIME * swing) + REST * mean.x + 1e-30;
         float off = beyond(color, mean, half_width);
         count = min(average.a + 1.0, most);
         // A sample of great brightness that is alone in place and time at most doubles the light.
@@ -140,14 +149,22 @@ void main() {
         if (off > 1.0) {
             color = mean + (color - mean) / off;
             count = max(count / off, 1.0);
-        } else {
-            vec3 step = ycocg_of(own) - texelFetch(old_fresh, nearest, 0).xyz;
-            difference = sqrt(mix(difference * difference, 0.5 * step * step, 1.0 / count));
+            swing /= off;
         }
+        vec4 last_fresh = texelFetch(old_fresh, nearest, 0);
+        step = ycocg_of(own) - last_fresh.xyz;
+        // The part of the step that takes back the one before. A swing without another surface may be a shadow that passes.
+        vec4 there = texelFetch(old_guide, nearest, 0);
+        vec3 place = screen_position(view, pixel, 1.0, own_z);
+        bool same = own_z >= 1.0 ? there.w >= 1.0
+            : same_surface(last.view, nearest, there, place, own_n, plane_range(last.view, place, CLOSE));
+        float back = step.x * last_fresh.w < 0.0 ? min(abs(last_fresh.w / step.x), 1.0) : 0.0;
+        if (same) back *= SHADED;
+        swing = moves ? vec3(0.0) : sqrt(mix(swing * swing, back * step * step, 1.0 / count));
         result = max(mix(rgb_of(color), own, 1.0 / count), vec3(0.0));
     }
     imageStore(blended, pixel, vec4(result, count));
-    imageStore(guide, pixel, vec4(own_z >= 1.0 ? vec3(0.0) : decode_normal(texelFetch(normal, pixel, 0)), own_z));
-    imageStore(kept, pixel, vec4(clamp(ycocg_of(own), vec3(-LARGEST), vec3(LARGEST)), 0.0));
-    imageStore(spread, pixel, vec4(min(difference, vec3(LARGEST)), 0.0));
+    imageStore(guide, pixel, vec4(own_z >= 1.0 ? vec3(0.0) : own_n, own_z));
+    imageStore(kept, pixel, clamp(vec4(ycocg_of(own), step.x), vec4(-LARGEST), vec4(LARGEST)));
+    imageStore(swings, pixel, vec4(min(swing, vec3(LARGEST)), 0.0));
 }

@@ -3,9 +3,9 @@
 #define PASSES_TEMPORAL
 
 // Half width of the range of colours, in standard deviations of the pixels around (Salvi 2016).
-const float AROUND = 1.0;
-// The same, in standard deviations from frame to frame.
-const float OVER_TIME = 1.0;
+const float AROUND = 0.75;
+// The same, in swings from frame to frame.
+const float OVER_TIME = 4.0;
 
 // Luma and two differences of colours, an orthogonal basis in which ranges of colours are narrow (Malvar and Sullivan 2003).
 vec3 ycocg_of(vec3 rgb) {
