@@ -139,7 +139,6 @@ def sequences(folder):
     yield "shadows-moving", ["--builtin", "shadows-moving"]
     yield "office", ["--builtin", "office"]
     yield "office-camera", moving_camera(folder, "office", 14, 0.5)
-    yield "street-camera", moving_camera(folder, "street", 10, 1.0)
 
 
 def render(folder, name, scene, way, options, given):

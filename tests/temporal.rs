@@ -169,7 +169,7 @@ fn what_moves_keeps_its_average_and_leaves_no_ghost() {
         println!("{uncovered} pixels uncovered: error {ghost}, {without} without anti-aliasing, {stale} of a ghost");
         assert!(uncovered > 60 && stale > 0.3, "{uncovered} {stale}");
         assert!(ghost < 1.5 * without + 0.02 && ghost < 0.2 * stale, "{ghost} {without} {stale}");
-        // Inside of the block all counts are whole, although it crosses two pixels a frame.
+        // Inside of the block there is an average, although it crosses two pixels a frame. Its light changes, so that fewer frames count.
         let width = SIZE[0] as usize;
         let inside = |i: usize| {
             [0, 1, 2, width, 2 * width]
@@ -177,8 +177,8 @@ fn what_moves_keeps_its_average_and_leaves_no_ghost() {
                 .all(|off| is_block(&now[(i + off).saturating_sub(1 + width).min(now.len() - 1)]))
         };
         let counts: Vec<f32> = (0..now.len()).filter(|&i| inside(i)).map(|i| last[i][3]).collect();
-        let whole = counts.iter().filter(|count| **count > 7.0).count();
-        println!("{whole} of {} pixels of the block have seven frames or more", counts.len());
+        let whole = counts.iter().filter(|count| **count > 2.5).count();
+        println!("{whole} of {} pixels of the block have an average", counts.len());
         assert!(counts.len() > 60 && whole as f64 > 0.8 * counts.len() as f64, "{counts:?}");
     });
 }
@@ -199,14 +199,14 @@ fn a_turning_camera_keeps_surfaces_and_sky() {
         let sky = |i: usize| right[i].z > 2.0 * right[i].x;
         for (name, of) in [("sky", true), ("surfaces", false)] {
             let chosen: Vec<usize> = (0..right.len()).filter(|&i| sky(i) == of && i % 64 < 50).collect();
-            let whole = chosen.iter().filter(|&&i| last[i][3] > 6.0).count() as f64 / chosen.len() as f64;
-            println!("{name}: {} pixels, {whole} of them whole", chosen.len());
+            let whole = chosen.iter().filter(|&&i| last[i][3] > 3.0).count() as f64 / chosen.len() as f64;
+            println!("{name}: {} pixels, {whole} have an average", chosen.len());
             assert!(chosen.len() > 200 && whole > 0.6, "{name}: {whole}");
         }
         let single = Film::new(gpu, &scene, None).shoot(&pose, &turned(11));
         let errors = [&last, &single].map(|picture| error(picture, &right, |i| i % 64 < 50));
         println!("error of a turning camera: {errors:?}");
-        assert!(errors[0] < 0.7 * errors[1], "{errors:?}");
+        assert!(errors[0] < 0.8 * errors[1], "{errors:?}");
     });
 }
 
