@@ -7,9 +7,10 @@ use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     graph::{Graph, Runner},
+    passes::motion,
     resident::Resident,
     scene::{Material, Pose, Scene, View},
-    techniques::igi::{Igi, PictureSettings, Settings, history::motion_of},
+    techniques::igi::{Igi, PictureSettings, Settings},
 };
 use lucerna_scenes as builtin;
 
@@ -225,7 +226,7 @@ fn the_motion_of_nodes_and_of_deforming_meshes_is_known() {
             graph.frame = frame as u32;
             let handles = resident.frame_in(&mut graph, &scene, pose);
             let g = lucerna::passes::gbuffer::draw(&mut graph, &handles, &seen, &Default::default());
-            let motion = motion_of(&mut graph, &handles, &g, &seen);
+            let motion = motion::draw(&mut graph, &handles, &g, &seen, "igi");
             let tokens = [motion, g.depth].map(|image| graph.read_image(image));
             let frame = runner.run(&graph).unwrap();
             last = (frame.image(tokens[0]).to_f32(), frame.image(tokens[1]).to_f32());
@@ -258,7 +259,7 @@ fn the_motion_of_nodes_and_of_deforming_meshes_is_known() {
             let handles = resident.frame_in(&mut graph, &scene, pose);
             let seen = View::of_camera(&scene, pose, 0, [128, 96]).unwrap().with_far(30.0);
             let g = lucerna::passes::gbuffer::draw(&mut graph, &handles, &seen, &Default::default());
-            let motion = motion_of(&mut graph, &handles, &g, &seen);
+            let motion = motion::draw(&mut graph, &handles, &g, &seen, "igi");
             let tokens = [motion, g.depth].map(|image| graph.read_image(image));
             let frame = runner.run(&graph).unwrap();
             shots.push((seen, frame.image(tokens[0]).to_f32(), frame.image(tokens[1]).to_f32()));

@@ -228,7 +228,10 @@ fn the_history_agrees_with_its_twin() {
                 .map(|i| then.normal[i].normalize_or_zero().as_vec3().extend(then.depth[i] as f32).to_array())
                 .collect();
             let past = history::Past {
-                frame: graph.buffer_from("frame", &[types::HistoryFrame { view: seen.uniform(), next: 7 }]),
+                frame: graph.buffer_from(
+                    "frame",
+                    &[types::HistoryFrame { view: seen.uniform(), next: 7, ..Default::default() }],
+                ),
                 irradiance: image(&mut graph, "old", extent(), &old),
                 guide: image(&mut graph, "old guide", extent(), &guides),
                 trend: image(&mut graph, "old trend", extent(), &trend),

@@ -124,6 +124,11 @@ impl View {
         self
     }
 
+    /// Where each pixel looks, from its middle to the right and down, pixels ([`Self::shifted`]).
+    pub fn shift(&self) -> Vec2 {
+        self.shift
+    }
+
     /// The shift as a part of the image, x to the right and y down.
     fn shift_uv(&self) -> Vec2 {
         self.shift / Vec2::new(self.extent[0] as f32, self.extent[1] as f32)

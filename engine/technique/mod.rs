@@ -20,6 +20,7 @@ use crate::{
     bake::Digest,
     gpu::Gpu,
     graph::Graph,
+    passes::temporal,
     resident::{Handles, Resident},
     scene::{Note, Pose, Scene, View},
     settings::Description,
@@ -124,12 +125,15 @@ pub struct Shot<M> {
     pub mode: M,
     /// The program needs all layers or the list of passes, not only the total.
     pub layers: bool,
+    /// Temporal anti-aliasing: the total is the average over the frames. The caller shifts each frame's view ([`temporal::place`]), and all
+    /// frames have one `Runner`. The other layers are those of the frame.
+    pub temporal: Option<temporal::Settings>,
 }
 
 impl<M: Mode> Default for Shot<M> {
     /// One frame at second 0 with all layers.
     fn default() -> Self {
-        Self { seconds: 0.0, frames: 1, mode: M::default(), layers: true }
+        Self { seconds: 0.0, frames: 1, mode: M::default(), layers: true, temporal: None }
     }
 }
 
@@ -242,7 +246,7 @@ impl<T: Technique> Ready<T> {
     /// Declares one frame of the scene. The far plane of `view` is fitted to the scene in `pose`.
     ///
     /// # Errors
-    /// As [`Technique::frame`].
+    /// As [`Technique::frame`]; `Usage` for temporal anti-aliasing of a picture that is not radiance or has no G-buffer.
     pub fn frame(
         &mut self,
         graph: &mut Graph,
@@ -255,10 +259,20 @@ impl<T: Technique> Ready<T> {
         let view = view.fit_far(&handles.bounds());
         let moment = Moment { scene, pose, handles: &handles, view, shot, notes: self.resident.notes() };
         let mut picture = self.technique.frame(graph, &moment, settings)?;
+        let mut shown = view;
+        if let Some(settings) = shot.temporal {
+            let Some(gbuffer) = picture.gbuffer.filter(|_| shot.mode.is_radiance()) else {
+                let what = format!("{} has no radiance with a G-buffer in mode {}", T::NAME, shot.mode.name());
+                return Err(Error::usage(what).at("temporal").help("Leave temporal anti-aliasing out"));
+            };
+            picture.total = temporal::accumulate(graph, &handles, (&gbuffer, &view), picture.total, settings)?;
+            // The average stands at the middles of the pixels.
+            shown = view.shifted(glam::Vec2::ZERO);
+        }
         if let Some(gbuffer) = picture.gbuffer.take() {
             gbuffer_layers::add(&mut picture, &gbuffer, &view);
         }
-        picture.view = Some(view);
+        picture.view = Some(shown);
         Ok(picture)
     }
 }

@@ -23,7 +23,7 @@ use crate::{
     run::Run,
     screen::Screen,
     signals::Interrupt,
-    smooth::Mean,
+    smooth::{Mean, of_the_frame},
 };
 
 /// Prepares a technique. `None` if the user has requested a stop meanwhile.
@@ -85,14 +85,15 @@ pub fn frames<T: Technique>(
         }
         let seconds = args.stage.time + f64::from(frame) / args.fps;
         let (pose, view) = run.stage.at(seconds, args.stage.size)?;
-        let shot = Shot { seconds, frames: run.frames.len() as u32, mode: given.mode, layers };
+        let (frames, temporal) = (run.frames.len() as u32, run.smooth.temporal());
+        let shot = Shot { seconds, frames, mode: given.mode, layers, temporal };
         let of = OfFrame { frame, pose, view, shot };
         if args.list_passes {
-            let (mut graph, mut picture) = work.declared(run, &of, Vec2::ZERO, args.seed)?;
+            let (mut graph, mut picture) = work.declared(run, &of, run.smooth.place(frame), work.seed(run, frame))?;
             picture.develop(|picture| work.last.frame(&mut graph, picture, work.step()))?;
             return console::print(graph.plan()?.list_passes().trim_end());
         }
-        let done = if run.smooth.is_none() {
+        let done = if run.smooth.count == 1 {
             work.single(run, &of, &mut progress)?
         } else {
             work.mean(run, &of, &mut progress)?
@@ -150,6 +151,12 @@ impl<T: Technique> Work<'_, T> {
         Ok((graph, picture))
     }
 
+    /// The seed of the only picture of a frame. Noise of other random numbers is averaged over time, too.
+    fn seed(&self, run: &Run<'_>, frame: u32) -> u32 {
+        let other = if run.smooth.temporal.is_some() { frame.wrapping_mul(0x9e37_79b9) } else { 0 };
+        self.args.seed.wrapping_add(other)
+    }
+
     /// Runs a frame and reads its picture. `held`: the history does not advance.
     fn rendered(
         &mut self,
@@ -181,7 +188,7 @@ impl<T: Technique> Work<'_, T> {
     /// Renders and writes a frame.
     fn single(&mut self, run: &mut Run<'_>, of: &OfFrame<T::Mode>, progress: &mut Frames) -> Result<Option<()>> {
         let begun = Instant::now();
-        let declared = self.declared(run, of, Vec2::ZERO, self.args.seed);
+        let declared = self.declared(run, of, run.smooth.place(of.frame), self.seed(run, of.frame));
         let Some((mut graph, mut picture)) = unless_stopped(declared, self.interrupt)? else { return Ok(None) };
         let step = self.step();
         picture.develop(|picture| self.last.frame(&mut graph, picture, step))?;
@@ -191,6 +198,9 @@ impl<T: Technique> Work<'_, T> {
         let Rendered { layers, frame, view } = rendered;
         let report = frame.report.clone();
         drop(frame);
+        if run.smooth.temporal.is_some() {
+            run.name_exact(of_the_frame(&layers));
+        }
         self.write(run, of, (layers, view), begun, progress, |time| vec![(time, report)])
     }
 
@@ -253,7 +263,8 @@ impl<T: Technique> Work<'_, T> {
                 return Ok(Some(()));
             }
             let begun = Instant::now();
-            let (mut graph, mut picture) = self.declared(run, of, Vec2::ZERO, self.args.seed)?;
+            let (mut graph, mut picture) =
+                self.declared(run, of, run.smooth.place(of.frame), self.seed(run, of.frame))?;
             // A time step of 0 leaves the adaptation unchanged.
             picture.develop(|picture| self.last.frame(&mut graph, picture, 0.0))?;
             let last = repeat + 1 == self.args.repeat;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use lucerna::{Error, Result, bake::Digest, technique::Bake, techniques::tonemap::Operator};
+use lucerna::{Error, Result, bake::Digest, passes::temporal, technique::Bake, techniques::tonemap::Operator};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -18,7 +18,7 @@ use crate::{
     progress::ProgressMode,
     render::Again,
     screen::{self, ScreenArgs},
-    smooth::{MOST, Smooth, SmoothArgs},
+    smooth::{MOST, Smooth},
     source::{self, SceneArgs},
     stage::{Eye, Stage, StageArgs},
 };
@@ -205,6 +205,12 @@ impl Record {
         if !(1..=MOST).contains(&self.aa.count) {
             return wrong("aa.count", self.aa.count.to_string(), &format!("1 to {MOST}"));
         }
+        if let Some(frames) =
+            self.aa.temporal.filter(|frames| self.aa.count > 1 || !(1..=temporal::MOST).contains(frames))
+        {
+            let allowed = format!("1 to {}, with one picture a frame", temporal::MOST);
+            return wrong("aa.temporal", frames.to_string(), &allowed);
+        }
         for (key, value) in [("time", self.time), ("exposure", self.exposure)] {
             if !value.is_finite() {
                 return wrong(key, value.to_string(), "finite numbers");
@@ -257,7 +263,7 @@ impl Record {
             time_limit: None,
             exposure: Some(self.exposure),
             screen: self.screen_args()?,
-            smooth: SmoothArgs { count: Some(self.aa.count), filter: self.aa.filter },
+            smooth: self.aa.args(),
             seed: self.seed,
             settings: SettingsArgs::default(),
             paper: false,
@@ -313,7 +319,7 @@ mod tests {
     use crate::{
         args::{DeviceArgs, TalkArgs},
         signals::Interrupt,
-        smooth::Filter,
+        smooth::{Aa, Filter},
     };
 
     #[test]
@@ -348,7 +354,7 @@ mod tests {
             light: vec!["1,2,-3,4".parse().unwrap()],
             sun: Some("-10,20".parse().unwrap()),
             seed: u32::MAX,
-            aa: Smooth { count: 4, filter: Filter::Box },
+            aa: Smooth { count: 4, ..Smooth::default() },
             exact: vec!["depth".into()],
             view: None,
             mode: Some("direct".into()),
@@ -373,7 +379,7 @@ mod tests {
         assert_eq!((args.stage.scene.unit, args.stage.time, args.fps, args.f32), (Some(0.01), -0.1, 24.0, true));
         assert_eq!(args.stage.scene.ground.options, again.ground.clone().unwrap());
         assert!(args.stage.scene.ground.ground && args.stage.light == again.light && args.stage.sun == again.sun);
-        assert_eq!((args.smooth.count, args.smooth.filter), (Some(4), Filter::Box));
+        assert_eq!((args.smooth.aa, args.smooth.filter), (Some(Aa::Mean(4)), Filter::Box));
         assert_eq!((args.exposure, args.seed, args.stage.default_light), (Some(1.5), u32::MAX, DefaultLight::Never));
         // No option may write a file, or read a file that the record does not name.
         assert!(args.output.is_empty() && args.dump.is_none() && args.timings.is_none() && args.stage.camera.is_none());
@@ -386,6 +392,8 @@ mod tests {
             (Record { height: MAX_SIDE + 1, ..record.clone() }, "height"),
             (Record { fps: 0.0, ..record.clone() }, "fps"),
             (Record { aa: Smooth { count: 0, ..Smooth::default() }, ..record.clone() }, "aa.count"),
+            (Record { aa: Smooth { temporal: Some(8), ..record.aa }, ..record.clone() }, "aa.temporal"),
+            (Record { aa: Smooth { temporal: Some(0), ..Smooth::default() }, ..record.clone() }, "aa.temporal"),
             (Record { unit: Some(-1.0), ..record.clone() }, "unit"),
             (Record { frame: 1, ..record.clone() }, "frame"),
             (Record { frame: u32::MAX, ..record.clone() }, "frame"),

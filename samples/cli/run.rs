@@ -7,6 +7,7 @@ use lucerna::{
     gpu::{DeviceKind, Gpu},
     graph::Report,
     image::{self, Format, Layers, Metadata, WriteOptions},
+    passes::temporal,
     scene::{Note, NoteKind, Pose, View},
     techniques::tonemap::Operator,
 };
@@ -26,7 +27,7 @@ use crate::{
     record::{BakeFile, Record, Source},
     relight::{self, Dark},
     render::Label,
-    smooth::{self, Smooth, SmoothArgs},
+    smooth::{self, Aa, Smooth, SmoothArgs},
     stage::Stage,
     timings::Timings,
 };
@@ -42,8 +43,8 @@ pub struct Run<'a> {
     fit_exposure: bool,
     /// Anti-aliasing; that of the device after [`Self::smooth_on`].
     pub smooth: Smooth,
-    /// Whether a CPU driver renders several pictures for a still, as GPUs do; `None`: no device does.
-    several: Option<bool>,
+    /// Whether a CPU driver smooths edges unasked, as GPUs do; `None`: no device does.
+    unasked: Option<bool>,
     pub stage: Stage,
     pub outputs: Outputs,
     pub frames: Range<u32>,
@@ -132,7 +133,7 @@ impl<'a> Run<'a> {
         };
         let smooth = smoothing(args, &technique)?;
         let plain = args.view.is_none() && args.dump.is_none() && !args.list_passes && !args.paper;
-        let several = plain && technique.radiance && frames.len() == 1 && args.smooth.count.is_none();
+        let unasked = plain && technique.radiance && args.smooth.aa.is_none();
         let record = Record {
             first_frame: frames.start,
             frame: frames.start,
@@ -152,7 +153,7 @@ impl<'a> Run<'a> {
             label,
             fit_exposure: exposure.is_none() && radiance && !developed,
             smooth,
-            several: several.then_some(technique.cheap),
+            unasked: unasked.then_some(technique.cheap),
             stage,
             outputs,
             frames,
@@ -227,10 +228,14 @@ impl<'a> Run<'a> {
         Values { scene, camera, technique: &self.label, frame, layer: "" }
     }
 
-    /// Chooses the anti-aliasing of stills by the device, if the user has not: a GPU renders several pictures of every technique in little time.
+    /// Chooses the anti-aliasing by the device, if the user has not. Stills are means of several pictures, which a GPU renders in little time with
+    /// every technique. Sequences are averaged over time.
     pub fn smooth_on(&mut self, gpu: &Gpu) {
-        if self.several.is_some_and(|cheap| cheap || gpu.describe().kind != DeviceKind::Cpu) {
-            self.smooth.count = smooth::STILL;
+        if self.unasked.is_some_and(|cheap| cheap || gpu.describe().kind != DeviceKind::Cpu) {
+            match self.frames.len() {
+                1 => self.smooth.count = smooth::STILL,
+                _ => self.smooth.temporal = Some(self.args.smooth.aa_frames.unwrap_or(temporal::FRAMES)),
+            }
         }
         self.record.aa = self.smooth;
     }
@@ -410,11 +415,26 @@ impl<'a> Run<'a> {
 
 /// The anti-aliasing that the user asks for.
 fn smoothing(args: &RenderArgs, technique: &Label) -> Result<Smooth> {
-    let SmoothArgs { count, filter } = args.smooth;
-    if count.is_some_and(|count| count > 1) && !technique.radiance {
+    let SmoothArgs { aa, filter, aa_frames: frames } = args.smooth;
+    let wrong = |what: String, help: &str| Err(Error::usage(what).at("--aa").help(help));
+    let asked = !matches!(aa, None | Some(Aa::Mean(1)));
+    if asked && !technique.radiance {
         let mode = technique.mode.unwrap_or("this mode");
         let what = format!("the picture of {mode} of {} is not light, so it has no mean", technique.name);
-        return Err(Error::usage(what).at("--aa").help("Leave --aa out, or render all light"));
+        return wrong(what, "Leave --aa out, or render all light");
     }
-    Ok(Smooth { count: count.unwrap_or(1), filter })
+    let single =
+        [("--view", args.view.is_some()), ("--dump", args.dump.is_some()), ("--list-passes", args.list_passes)];
+    if let Some((option, _)) = single.into_iter().find(|(_, given)| *given && matches!(aa, Some(Aa::Mean(2..)))) {
+        return wrong(format!("the argument '--aa <N>' cannot be used with '{option}'"), "Leave one of them out");
+    }
+    if frames.is_some() && matches!(aa, Some(Aa::Mean(_))) {
+        let what = "'--aa-frames <N>' is for --aa temporal, and --aa asks for the mean of pictures".to_owned();
+        return wrong(what, "Leave --aa-frames out, or give --aa temporal");
+    }
+    Ok(match aa {
+        Some(Aa::Temporal) => Smooth { count: 1, filter, temporal: Some(frames.unwrap_or(temporal::FRAMES)) },
+        Some(Aa::Mean(count)) => Smooth { count, filter, temporal: None },
+        None => Smooth { filter, ..Smooth::default() },
+    })
 }

@@ -2,10 +2,17 @@
 //!
 //! The places are those of a lattice, and the filter decides how far from the middle they are: the density of the places is the filter, so all pictures
 //! have the same weight. The first place is the middle of the pixel. Layers that are no light (normals, depths) come from there alone.
+//!
+//! For sequences there is temporal anti-aliasing as well: each frame is one picture, and the average goes over time ([`lucerna::passes::temporal`]).
+
+use std::str::FromStr;
 
 use clap::ValueEnum;
 use glam::Vec2;
-use lucerna::image::{Layer, Layers};
+use lucerna::{
+    image::{Layer, Layers},
+    passes::temporal,
+};
 use serde::{Deserialize, Serialize};
 
 /// Pictures of a still, if nothing else is asked for.
@@ -26,17 +33,44 @@ pub enum Filter {
     BlackmanHarris,
 }
 
+/// The value of `--aa`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aa {
+    /// The mean of so many pictures.
+    Mean(u32),
+    /// The average over the frames.
+    Temporal,
+}
+
+impl FromStr for Aa {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "temporal" {
+            return Ok(Self::Temporal);
+        }
+        let count = text.parse().ok().filter(|count| (1..=MOST).contains(count));
+        count.map(Self::Mean).ok_or_else(|| format!("expected a number in 1..={MOST}, or temporal"))
+    }
+}
+
 /// Options of anti-aliasing.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct SmoothArgs {
     /// Anti-aliasing: the picture is the mean of N pictures, whose pixels look at different places around their middles; normals and depths are those
-    /// of the middles. 1: none [default: 8 for stills; 1 for sequences, with --paper, and on CPU drivers where one picture takes seconds]
-    #[arg(long = "aa", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST)), conflicts_with_all = ["view", "dump", "list_passes"], help_heading = "Picture")]
-    pub count: Option<u32>,
+    /// of the middles. 1: none. temporal: each frame is one picture, averaged with the frames before it, where they show the same
+    /// surfaces; layers are those of the frame [default: 8 for stills, temporal for sequences; 1 with --paper, and on CPU drivers where one picture
+    /// takes seconds]
+    #[arg(long, value_name = "N|temporal", help_heading = "Picture")]
+    pub aa: Option<Aa>,
 
     /// Weight of the places around the middle of a pixel, for --aa
     #[arg(long = "aa-filter", value_enum, default_value_t, value_name = "FILTER", help_heading = "Picture")]
     pub filter: Filter,
+
+    /// Most frames in the average of --aa temporal: more are smoother at rest, fewer follow change faster [default: 8]
+    #[arg(long = "aa-frames", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(temporal::MOST)), help_heading = "Picture")]
+    pub aa_frames: Option<u32>,
 }
 
 /// Anti-aliasing of a picture.
@@ -46,24 +80,47 @@ pub struct Smooth {
     /// Pictures of the mean.
     pub count: u32,
     pub filter: Filter,
+    /// Most frames of the average over time; `None`: each frame stands for itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temporal: Option<u32>,
 }
 
 impl Default for Smooth {
     /// None.
     fn default() -> Self {
-        Self { count: 1, filter: Filter::default() }
+        Self { count: 1, filter: Filter::default(), temporal: None }
     }
 }
 
 impl Smooth {
     pub fn is_none(&self) -> bool {
-        self.count == 1
+        self.count == 1 && self.temporal.is_none()
+    }
+
+    /// The options that ask for this.
+    pub fn args(&self) -> SmoothArgs {
+        let aa = if self.temporal.is_some() { Aa::Temporal } else { Aa::Mean(self.count) };
+        SmoothArgs { aa: Some(aa), filter: self.filter, aa_frames: self.temporal }
     }
 
     /// Where the pictures look, from the middle of each pixel to the right and down, pixels. The first one looks at the middle.
     pub fn places(&self) -> Vec<Vec2> {
         let lattice = lattice(self.count.clamp(1, MOST));
         lattice.into_iter().map(|[x, y]| Vec2::new(self.filter.place(x) as f32, self.filter.place(y) as f32)).collect()
+    }
+
+    /// Where the only picture of a frame looks.
+    pub fn place(&self, frame: u32) -> Vec2 {
+        if self.temporal.is_none() {
+            return Vec2::ZERO;
+        }
+        let share = temporal::place(frame);
+        Vec2::new(self.filter.place(share.x) as f32, self.filter.place(share.y) as f32)
+    }
+
+    /// For the engine.
+    pub fn temporal(&self) -> Option<temporal::Settings> {
+        self.temporal.map(|frames| temporal::Settings { frames })
     }
 }
 
@@ -156,6 +213,12 @@ impl Mean {
     }
 }
 
+/// The names of the layers that temporal anti-aliasing leaves as they are: all but the picture, before and after tone mapping.
+pub fn of_the_frame(layers: &Layers) -> Vec<String> {
+    let names = layers.layers.iter().map(|layer| layer.name.clone());
+    names.filter(|name| !["", "light"].contains(&name.as_str())).collect()
+}
+
 /// Colours have means; directions, distances and numbers have none.
 fn is_light(layer: &Layer) -> bool {
     layer.channels == ["R", "G", "B"]
@@ -166,7 +229,7 @@ mod tests {
     use super::*;
 
     fn places(count: u32, filter: Filter) -> Vec<Vec2> {
-        Smooth { count, filter }.places()
+        Smooth { count, filter, temporal: None }.places()
     }
 
     #[test]
@@ -193,6 +256,40 @@ mod tests {
         };
         let least = (0..8).flat_map(|a| (0..a).map(move |b| (a, b))).map(|(a, b)| apart(eight[a], eight[b]));
         assert!((least.fold(1.0, f32::min) - 8f32.sqrt() / 8.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn values_are_numbers_or_temporal() {
+        assert_eq!(("1".parse(), "temporal".parse()), (Ok(Aa::Mean(1)), Ok(Aa::Temporal)));
+        for bad in ["0", "1025", "-1", "", "Temporal", "taa"] {
+            assert!(bad.parse::<Aa>().unwrap_err().contains("1..=1024, or temporal"), "{bad}");
+        }
+        for smooth in [
+            Smooth::default(),
+            Smooth { count: 5, ..Smooth::default() },
+            Smooth { temporal: Some(3), ..Smooth::default() },
+        ] {
+            let SmoothArgs { aa, aa_frames: frames, .. } = smooth.args();
+            let again = match aa {
+                Some(Aa::Mean(count)) => Smooth { count, temporal: frames, ..Smooth::default() },
+                _ => Smooth { temporal: frames, ..Smooth::default() },
+            };
+            assert_eq!(again, smooth);
+        }
+    }
+
+    #[test]
+    fn frames_look_at_places_of_the_filter_and_the_first_at_the_middle() {
+        for filter in [Filter::Box, Filter::Tent, Filter::BlackmanHarris] {
+            let smooth = Smooth { filter, temporal: Some(8), ..Smooth::default() };
+            assert!(smooth.place(0).length() < 1e-6);
+            let widest = [0.5, 1.0, 1.5][filter as usize];
+            let places: Vec<Vec2> = (0..512).map(|frame| smooth.place(frame)).collect();
+            assert!(places.iter().all(|place| place.abs().max_element() <= widest));
+            let mean = places.iter().sum::<Vec2>() / 512.0;
+            assert!(mean.length() < 0.01, "{mean}");
+        }
+        assert_eq!(Smooth::default().place(7), Vec2::ZERO);
     }
 
     #[test]

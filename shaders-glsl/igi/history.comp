@@ -11,6 +11,7 @@
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
 #include "lib/gbuffer.glsl"
+#include "lib/reproject.glsl"
 #include "igi/history.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -19,7 +20,7 @@ layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1, scalar) readonly buffer Before { HistoryFrame before[]; };
 layout(binding = 2) uniform sampler2D normal;
 layout(binding = 3) uniform sampler2D depth;
-layout(binding = 4) uniform sampler2D motion;     // from igi/motion.frag; w 0: the surface did not move
+layout(binding = 4) uniform sampler2D motion;     // from passes/motion.frag; w 0: the surface did not move
 layout(binding = 5) uniform sampler2D irradiance; // of this frame only
 layout(binding = 6) uniform sampler2D old;        // average of the frames before; a: number of frames in it
 layout(binding = 7) uniform sampler2D old_guide;  // xyz: unit normal; w: linear depth / far
@@ -41,8 +42,6 @@ layout(push_constant, scalar) uniform Push {
     float range;  // maximum distance from the old surface, relative to its depth
 };
 
-// Minimum cosine between the normals of the same surface in two frames.
-const float ALIKE = 0.9;
 // Probes that are read on each side.
 const int REACH = 2;
 // A smaller relative change is rounding.
@@ -61,15 +60,10 @@ vec4 reproject(vec3 was, vec3 n, out vec2 at, out vec4 going) {
     at = vec2(0.0);
     going = vec4(0.0);
     if (before[0].next != frame || then.far <= 0.0) return vec4(0.0);
-    vec4 clip = then.clip_from_world * vec4(was, 1.0);
-    if (clip.w <= 0.0) return vec4(0.0);
     ivec2 size = textureSize(old, 0);
-    at = (vec2(0.5) + vec2(0.5, -0.5) * clip.xy / clip.w) * vec2(size) - 0.5;
-    if (any(lessThan(at, vec2(-1.0))) || any(greaterThan(at, vec2(size)))) return vec4(0.0);
-    // Without motion, rounding would interpolate between texels and blur the average.
-    vec2 whole = floor(at + 0.5);
-    if (all(lessThan(abs(at - whole), vec2(2e-3)))) at = whole;
-    float near = range * (then.orthographic != 0u ? then.far : depth_of(then, was) * then.far);
+    if (!last_place(then, vec4(was, 1.0), size, at)) return vec4(0.0);
+    at = settled(at);
+    float near = plane_range(then, was, range);
     ivec2 corner = ivec2(floor(at));
     vec2 part = at - vec2(corner);
     vec4 sum = vec4(0.0), goings = vec4(0.0);
@@ -82,8 +76,7 @@ vec4 reproject(vec3 was, vec3 n, out vec2 at, out vec4 going) {
         if (weight <= 0.0 || any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, size))) continue;
         vec4 there = texelFetch(old_guide, texel, 0);
         vec4 value = texelFetch(old, texel, 0);
-        if (there.w >= 1.0 || value.a <= 0.0 || dot(there.xyz, n) < ALIKE) continue;
-        if (abs(dot(there.xyz, screen_position(then, texel, 1.0, there.w) - was)) > near) continue;
+        if (value.a <= 0.0 || !same_surface(then, texel, there, was, n, near)) continue;
         sum += weight * value;
         goings += weight * texelFetch(old_trend, texel, 0);
         weights += weight;

@@ -1,12 +1,6 @@
-// Data of the history, which passes from one frame to the next. Before including: lib/view.glsl.
+// Data of the history, which passes from one frame to the next.
 #ifndef LIB_IGI_HISTORY
 #define LIB_IGI_HISTORY
-
-// The frame that wrote the history.
-struct HistoryFrame {
-    View view;
-    uint next; // number of the next frame
-};
 
 // A surface point at which the next frame gathers the light of the same paths again, to measure the change of the light.
 struct HistoryProbe {

@@ -95,16 +95,21 @@ fn filters_keep_the_light_and_tone_mapping_comes_after_the_mean() {
 }
 
 #[test]
-fn papers_sequences_and_images_of_the_graph_have_single_pictures() {
+fn papers_and_images_of_the_graph_have_single_pictures() {
     if !device() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
     let name = path(&folder, "a-{frame}.exr");
     let first = path(&folder, "a-0.exr");
-    for more in [&["--paper"][..], &["--frames", "0..2"], &["--view", "gbuffer.normal"]] {
+    for more in [
+        &["--paper"][..],
+        &["--paper", "--frames", "0..2"],
+        &["--view", "gbuffer.normal"],
+        &["--mode", "occlusion", "--frames", "0..2"],
+    ] {
         let ran = room(&[&["-o", &name, "--overwrite", "--json"], more].concat()).expect(0, &[]);
-        assert_eq!(ran.json()["aa"]["count"], 1, "{more:?}");
+        assert_eq!(ran.json()["aa"], serde_json::json!({ "count": 1, "filter": "box" }), "{more:?}");
         assert!(config(&first).get("aa").is_none(), "{more:?}");
     }
     let ran = room(&["-o", &name, "--overwrite", "--json", "--paper", "--aa", "3"]).expect(0, &[]).json();
@@ -115,9 +120,59 @@ fn papers_sequences_and_images_of_the_graph_have_single_pictures() {
         (&["--aa", "2", "--list-passes"], &["--aa", "--list-passes"]),
         (&["--aa-filter", "gauss"], &["box", "tent", "blackman-harris"]),
         (&["--aa", "2", "--mode", "occlusion"], &["--aa", "occlusion"]),
+        (&["--aa", "temporal", "--mode", "occlusion"], &["--aa", "occlusion"]),
+        (&["--aa", "Temporal"], &["--aa", "1..=1024, or temporal"]),
+        (&["--aa", "2", "--aa-frames", "4"], &["--aa-frames", "temporal"]),
+        (&["--aa", "temporal", "--aa-frames", "0"], &["--aa-frames", "1..=256"]),
     ] {
         room(wrong).expect(2, parts);
     }
+}
+
+/// A sequence is averaged over time unless asked otherwise: its first frame is a single picture, later ones have smooth edges at its cost.
+#[test]
+fn a_sequence_is_averaged_over_time_and_its_frames_can_be_made_again() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let sequence = |name: &str, more: &[&str]| {
+        let name = path(&folder, &format!("{name}-{{frame}}.exr"));
+        let report = room(&[&["-o", &name, "--frames", "4..16", "--json"], more].concat()).expect(0, &[]).json();
+        ([4, 15].map(|frame| name.replace("{frame}", &frame.to_string())), report)
+    };
+    let (usual, report) = sequence("usual", &[]);
+    assert_eq!(report["aa"], serde_json::json!({ "count": 1, "filter": "box", "temporal": 8 }));
+    let (asked, _) = sequence("asked", &["--aa", "temporal", "--aa-frames", "8"]);
+    let (more, _) = sequence("more", &["--aa-frames", "16"]);
+    let (single, _) = sequence("single", &["--aa", "1"]);
+    let (best, _) = sequence("best", &["--aa", "64"]);
+    assert!(usual.iter().zip(&asked).all(|(a, b)| fs::read(a).unwrap() == fs::read(b).unwrap()));
+    let flip = |test: &str| {
+        let report = lucerna(["compare", "-q", "-m", "flip", "--json", &best[1], test]).expect(0, &[]).json();
+        report["tests"][0]["measures"]["flip"]["value"].as_f64().unwrap_or_else(|| panic!("{report}"))
+    };
+    let [of_usual, of_more, of_single] = [&usual, &more, &single].map(|files| flip(&files[1]));
+    println!("FLIP: {of_usual}, {of_more} of 16 frames, {of_single} of single pictures");
+    assert!(of_usual < 0.6 * of_single && of_more < 0.6 * of_single, "{of_usual} {of_more} {of_single}");
+    // The light of one frame; the mean over frames is nearer (tests/temporal.rs).
+    assert!((sum(&read(&usual[1])) / sum(&read(&best[1])) - 1.0).abs() < 2e-2);
+    // The file says so: its layers are those of the frame alone. The matrices are those of the middles.
+    let meta = |name: &str| image::metadata(Path::new(name)).unwrap();
+    let about = meta(&usual[1]);
+    assert_eq!(about.config["aa"]["temporal"], 8);
+    let exact = about.config["exact"].to_string();
+    assert!(["normal", "depth", "direct", "indirect"].iter().all(|name| exact.contains(name)), "{exact}");
+    assert_eq!(about.world_to_ndc, meta(&single[1]).world_to_ndc);
+    assert!(read(&usual[1]).layer("depth").unwrap().data != read(&single[1]).layer("depth").unwrap().data);
+    // Frame 15 follows from all frames from 4 on.
+    for file in [&usual[0], &usual[1], &more[1]] {
+        let report = lucerna(["rerun", "--json", "-q", file]).expect(0, &[]).json();
+        assert_eq!(report["same_file"], true, "{file}: {report}");
+    }
+    // Repeated runs for times change nothing.
+    let (again, _) = sequence("again", &["--repeat", "2"]);
+    assert!(read(&again[1]).main().unwrap().data == read(&usual[1]).main().unwrap().data);
 }
 
 /// The light of earlier frames goes on from the picture at the middles of the pixels.

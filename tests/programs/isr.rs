@@ -4,6 +4,8 @@
 mod isr_lab;
 #[path = "../scene_kit/mod.rs"]
 mod scene_kit;
+#[path = "../tracer_lab/mod.rs"]
+mod tracer_lab;
 
 #[path = "../isr_area.rs"]
 mod isr_area;
@@ -21,3 +23,7 @@ mod isr_reference;
 mod isr_senders;
 #[path = "../isr_senders_scene.rs"]
 mod isr_senders_scene;
+#[path = "../temporal.rs"]
+mod temporal;
+#[path = "../temporal_twin.rs"]
+mod temporal_twin;

@@ -17,21 +17,19 @@
 
 use super::{Igi, Settings, Shared, Vpls, halton};
 use crate::{
-    graph::{Buffer, Draw, Extent, Format, Graph, Image, Load, Raster, Targets},
-    passes::gbuffer::GBuffer,
-    resident::{Batches, Handles},
-    scene::{View, cull::Frustum},
+    graph::{Buffer, Extent, Format, Graph, Image},
+    passes::{gbuffer::GBuffer, motion},
+    resident::Handles,
+    scene::View,
     shaders::{
         consts,
-        igi::{history, motion, probe, probe_light, recall, remember},
+        igi::{history, probe, probe_light, recall, remember},
         types,
     },
 };
 
 /// Maximum of virtual lights whose light is gathered at a probe.
 const PROBE_LIGHTS: u32 = 256;
-/// Bytes of a position.
-const POSITION: u64 = 12;
 
 /// The data of the last frame, and the light of its paths in this frame.
 #[derive(Clone, Copy, Debug)]
@@ -157,10 +155,11 @@ impl Igi {
         let extent = graph.extent(fresh);
         let frame = graph.frame;
         let grid = Grid::new(extent, settings.downsample);
-        let motion = motion_of(graph, handles, g, view);
+        let motion = motion::draw(graph, handles, g, view, "igi");
         let (frame_before, frame_next) =
             graph.history_buffer("igi.history.frame", size_of::<types::HistoryFrame>() as u64);
-        let this = types::HistoryFrame { view: view.uniform(), next: frame.wrapping_add(1) };
+        let this =
+            types::HistoryFrame { view: view.uniform(), next: frame.wrapping_add(1), shift: view.shift().to_array() };
         let this = graph.buffer_from("igi.history.this", &[this]);
         graph.copy_buffer(this, frame_next);
 
@@ -261,44 +260,6 @@ impl Igi {
         let lights = self.items(vpls.count.div_ceil(stride), grid.count().into());
         graph.compute_over(args, grid.count(), lights);
     }
-}
-
-/// Motion image: the world position in the last frame of each visible surface that moved, alpha 1; alpha 0 elsewhere. Stores instances
-/// and deformed vertices for the next frame.
-pub fn motion_of(graph: &mut Graph, handles: &Handles, g: &GBuffer, view: &View) -> Image {
-    let extent = graph.extent(g.depth);
-    let motion = graph.image("igi.motion", Format::RGBA32F, extent);
-    let (before_instances, next) = graph.history_buffer("igi.history.instances", handles.instances.bytes());
-    graph.copy_buffer(handles.instances, next);
-    // In the vertex streams, deformed primitives are stored after all undeformed ones.
-    let deformed = handles.moment.instances.iter().filter(|i| i.deformed).map(|i| i.first_vertex).min();
-    let before_positions = match deformed {
-        Some(first) => {
-            let written = handles.positions.range(u64::from(first) * POSITION..handles.positions.bytes());
-            let (before, next) = graph.history_buffer("igi.history.positions", written.bytes());
-            graph.copy_buffer(written, next);
-            before
-        }
-        // Without deformed primitives the shader does not read this buffer.
-        None => handles.positions,
-    };
-    let frustum = Frustum::new(view);
-    let batches = Batches::new(&handles.moment, Some(&frustum), view.position);
-    let visible = batches.visible_buffer(graph, "igi.visible");
-    let calls: Vec<_> = batches.list.iter().flat_map(|batch| batch.calls.iter().copied()).collect();
-    let args = motion::Args {
-        view: g.view,
-        instances: handles.instances,
-        visible,
-        positions: handles.positions,
-        before_instances,
-        before_positions,
-        depth: g.depth,
-        push: motion::Push { first_deformed: deformed.unwrap_or(u32::MAX) },
-    };
-    let targets = Targets::new().color(motion, Load::Clear([0.0; 4]));
-    graph.raster(targets, Raster::new(), args, Draw::indexed(handles.indices, calls));
-    motion
 }
 
 #[cfg(test)]

@@ -90,7 +90,7 @@ const PARTS: &[(Part, &[&str])] = &[
         Part::History,
         &[
             "igi.history*",
-            "igi.motion",
+            "passes.motion",
             "igi.probe*",
             "igi.recall",
             "igi.remember",
