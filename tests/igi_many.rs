@@ -376,7 +376,8 @@ fn what_the_bound_takes_is_put_back_behind_mirrors() {
     with_gpu(|gpu| {
         let (stage, seen) = mirrored();
         let mut studio = Studio::new(gpu, &stage.scene);
-        let settings = Settings { bounces: 2, vpls: 400, candidates: 1, bound: 0.15, ..Settings::default() };
+        let settings =
+            Settings { bounces: 2, vpls: 400, candidates: 1, bound: 0.15, compensation: 0, ..Settings::default() };
         let mut energy = [0.0; 3];
         for seed in 1..=6 {
             let all = [

@@ -13,7 +13,7 @@ use lucerna_scenes as builtin;
 
 /// The default settings with fewer lights and rays.
 fn small() -> Settings {
-    Settings { vpls: 40, candidates: 2, direct_samples: 4, ..Settings::default() }
+    Settings { vpls: 40, bounces: 2, candidates: 2, direct_samples: 4, ..Settings::default() }
 }
 
 fn fast() -> Settings {

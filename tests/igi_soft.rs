@@ -1,4 +1,5 @@
-//! The filter for the noise of direct light from emissive surfaces and from the sky: against its twin, and its effect on pictures.
+//! The filter for the noise of direct light from emissive surfaces and from the sky, and of compensated light: against its twin, and its effect on
+//! pictures.
 
 use crate::igi_lab::{
     Studio, mean,
@@ -34,12 +35,19 @@ fn stage() -> (Eye, Buffers, Texels) {
     (eye, buffers, noisy)
 }
 
-fn filtered(gpu: &lucerna::gpu::Gpu, eye: &Eye, buffers: &Buffers, noisy: &Texels, turns: u32) -> Vec<[f32; 4]> {
+fn filtered(
+    gpu: &lucerna::gpu::Gpu,
+    eye: &Eye,
+    buffers: &Buffers,
+    noisy: &Texels,
+    turns: u32,
+    rare: bool,
+) -> Vec<[f32; 4]> {
     let mut graph = Graph::new("soft");
     let g = gbuffer(&mut graph, eye, buffers);
     let extent = Extent::new(SIZE.0 as u32, SIZE.1 as u32);
     let soft = image(&mut graph, "soft", extent, noisy);
-    let light = filters::soft_light(&mut graph, &g, soft, turns, false);
+    let light = filters::soft_light(&mut graph, &g, soft, turns, rare);
     let [light] = read(gpu, graph, [light]);
     light
 }
@@ -48,9 +56,9 @@ fn filtered(gpu: &lucerna::gpu::Gpu, eye: &Eye, buffers: &Buffers, noisy: &Texel
 fn it_agrees_with_its_twin_and_keeps_the_light() {
     with_gpu(|gpu| {
         let (eye, buffers, noisy) = stage();
-        for turns in [0, 1, 2, 4] {
-            let found = filtered(gpu, &eye, &buffers, &noisy, turns);
-            let expected = soft(&eye, &buffers, &noisy, turns, [16.0, 0.01, 2.0]);
+        for (turns, rare) in [(0, false), (1, false), (2, false), (4, false), (0, true), (3, true)] {
+            let found = filtered(gpu, &eye, &buffers, &noisy, turns, rare);
+            let expected = soft(&eye, &buffers, &noisy, turns, rare);
             let (mut before, mut after) = (DVec4::ZERO, DVec4::ZERO);
             let mut seen = 0;
             for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
@@ -85,7 +93,7 @@ fn light_stays_on_its_surface() {
                 *texel = [0.0, 0.0, 0.0, 2.0];
             }
         }
-        let found = filtered(gpu, &eye, &buffers, &noisy, 3);
+        let found = filtered(gpu, &eye, &buffers, &noisy, 3, false);
         let (mut lit, mut dark) = (0.0f32, 0.0f32);
         for (i, texel) in found.iter().enumerate().filter(|(i, _)| is_lit(&buffers, *i)) {
             let place = if alike(i) { &mut lit } else { &mut dark };
@@ -157,6 +165,37 @@ fn highlights_of_the_sky_have_no_bright_points() {
                 "roughness {roughness}: a point of {most} times its light, or {steady} of the sky's"
             );
         }
+    });
+}
+
+/// Mean squared difference of luminance over the squared mean of the truth: bright spots weigh most.
+fn spread(found: &[[f32; 4]], truth: &[[f32; 4]]) -> f64 {
+    let each = |(a, b): (&[f32; 4], &[f32; 4])| f64::from(a[1] - b[1]).powi(2);
+    found.iter().zip(truth).map(each).sum::<f64>() / found.len() as f64 / mean(truth).powi(2)
+}
+
+#[test]
+fn virtual_lights_leave_no_spots_on_the_walls() {
+    with_gpu(|gpu| {
+        let scene = builtin::load("cornell").unwrap();
+        let view = View::of_camera(&scene, &Pose::rest(&scene), 0, [64, 64]).unwrap();
+        let mut studio = Studio::new(gpu, &scene);
+        let mut irradiance = |settings: Settings| studio.render(&view, &settings, 0).irradiance;
+        let usual = Settings::default();
+        // So many virtual lights have small spots even with a short bound.
+        let truth = irradiance(Settings { vpls: 8000, candidates: 1, bound: 0.01, compensation: 0, ..usual.clone() });
+        let spots = irradiance(Settings { bound: 0.02, compensation: 0, ..usual.clone() });
+        let noisy = irradiance(Settings { compensation_filter: 0, ..usual.clone() });
+        let found = irradiance(usual);
+        let errors = [&spots, &noisy, &found].map(|of| error(of, &truth));
+        let points = [&spots, &noisy, &found].map(|of| spread(of, &truth));
+        let light = [mean(&found) / mean(&noisy), mean(&found) / mean(&truth)];
+        println!(
+            "short bound, without and with filter: errors {errors:.4?}, weight of spots {points:.4?}; light {light:.4?}"
+        );
+        assert!(errors[2] < 0.6 * errors[0] && errors[2] < 0.8 * errors[1], "errors {errors:?}");
+        assert!(points[2] < 0.5 * points[0] && points[2] < 0.8 * points[1], "weights of spots {points:?}");
+        assert!((light[0] - 1.0).abs() < 1e-4 && (light[1] - 1.0).abs() < 0.05, "{light:?} times the light");
     });
 }
 

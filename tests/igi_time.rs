@@ -172,7 +172,7 @@ fn first_frames_and_cuts_and_gaps_stand_for_themselves() {
         let (scene, ..) = room();
         let pose = Pose::rest(&scene);
         let seen = eye(SMALL);
-        let base = Settings { specular: false, direct_samples: 1, vpls: 24, ..Settings::default() };
+        let base = Settings { specular: false, direct_samples: 1, bounces: 2, vpls: 24, ..Settings::default() };
         let single = |frame: u32, view: &View| {
             let mut film = Film::new(gpu, &scene, &with_history(base.clone(), 1));
             film.frame = frame;
@@ -338,7 +338,7 @@ fn a_resting_scene_does_not_flicker() {
         let (scene, ..) = room();
         let seen = eye(TINY);
         let poses = vec![Pose::rest(&scene); 44];
-        let base = Settings { specular: false, direct_samples: 1, vpls: 60, ..Settings::default() };
+        let base = Settings { specular: false, direct_samples: 1, bounces: 2, vpls: 60, ..Settings::default() };
         let all = films(gpu, &scene, &poses, &seen, &[with_history(base.clone(), 32), with_history(base, 1)]);
         // Change from frame to frame, and standard deviation over twelve frames.
         let unrest = |shots: &[Shot]| {
@@ -378,7 +378,7 @@ fn moving_lights_leave_no_ghosts() {
                 pose
             })
             .collect();
-        let base = Settings { specular: false, direct_samples: 1, vpls: 60, ..Settings::default() };
+        let base = Settings { specular: false, direct_samples: 1, bounces: 2, vpls: 60, ..Settings::default() };
         let right = Settings { vpls: 600, candidates: 1, ..base.clone() };
         let deaf = Settings { history_lag: 10.0, ..with_history(base.clone(), 32) };
         let all = films(
@@ -420,7 +420,7 @@ fn light_that_goes_out_is_gone() {
                 pose
             })
             .collect();
-        let base = Settings { specular: false, direct_samples: 1, vpls: 60, ..Settings::default() };
+        let base = Settings { specular: false, direct_samples: 1, bounces: 2, vpls: 60, ..Settings::default() };
         let right = Settings { vpls: 600, candidates: 1, ..base.clone() };
         let all = films(gpu, &scene, &poses, &seen, &[right, with_history(base.clone(), 1), with_history(base, 32)]);
         let sum = |shot: &Shot| shot.irradiance.iter().map(brightness).sum::<f64>();
@@ -439,7 +439,7 @@ fn what_comes_into_view_has_no_past_and_the_rest_keeps_it() {
     with_gpu(|gpu| {
         let (scene, ..) = room();
         let pose = Pose::rest(&scene);
-        let base = Settings { specular: false, direct_samples: 1, vpls: 40, ..Settings::default() };
+        let base = Settings { specular: false, direct_samples: 1, bounces: 2, vpls: 40, ..Settings::default() };
         let mut film = Film::new(gpu, &scene, &with_history(base.clone(), 32));
         let at = |frame: u32| {
             let x = 0.01 * frame as f32 + if frame == 15 { 0.25 } else { 0.0 };
@@ -472,7 +472,8 @@ fn a_figure_that_walks_is_no_worse_than_without_a_past() {
         let scene = builtin::load("figure").unwrap();
         let poses: Vec<Pose> = (0..8).map(|frame| Pose::playing(&scene, 0.3 + frame as f32 / 30.0)).collect();
         let seen = View::of_camera(&scene, &poses[0], 0, SMALL).unwrap();
-        let base = Settings { specular: false, direct_samples: 1, vpls: 40, candidates: 4, ..Settings::default() };
+        let base =
+            Settings { specular: false, direct_samples: 1, bounces: 2, vpls: 40, candidates: 4, ..Settings::default() };
         let right = Settings { vpls: 300, candidates: 1, ..base.clone() };
         let all = films(gpu, &scene, &poses, &seen, &[right, with_history(base.clone(), 1), with_history(base, 16)]);
         let surface = |i: usize| all[0].iter().all(|shot| shot.depth[i] < 1.0);

@@ -133,7 +133,7 @@ impl<'a> Run<'a> {
         };
         let smooth = smoothing(args, &technique)?;
         let plain = args.view.is_none() && args.dump.is_none() && !args.list_passes && !args.paper;
-        let unasked = plain && technique.radiance && args.smooth.aa.is_none();
+        let unasked = plain && technique.radiance && args.smooth.aa.is_none() && args.smooth.aa_frames.is_none();
         let record = Record {
             first_frame: frames.start,
             frame: frames.start,
@@ -229,13 +229,11 @@ impl<'a> Run<'a> {
     }
 
     /// Chooses the anti-aliasing by the device, if the user has not. Stills are means of several pictures, which a GPU renders in little time with
-    /// every technique. Sequences are averaged over time.
+    /// every technique. The average over time of a sequence flickers while the camera rests, so sequences have it on request alone.
     pub fn smooth_on(&mut self, gpu: &Gpu) {
-        if self.unasked.is_some_and(|cheap| cheap || gpu.describe().kind != DeviceKind::Cpu) {
-            match self.frames.len() {
-                1 => self.smooth.count = smooth::STILL,
-                _ => self.smooth.temporal = Some(self.args.smooth.aa_frames.unwrap_or(temporal::FRAMES)),
-            }
+        let unasked = self.unasked.is_some_and(|cheap| cheap || gpu.describe().kind != DeviceKind::Cpu);
+        if unasked && self.frames.len() == 1 {
+            self.smooth.count = smooth::STILL;
         }
         self.record.aa = self.smooth;
     }
@@ -435,6 +433,6 @@ fn smoothing(args: &RenderArgs, technique: &Label) -> Result<Smooth> {
     Ok(match aa {
         Some(Aa::Temporal) => Smooth { count: 1, filter, temporal: Some(frames.unwrap_or(temporal::FRAMES)) },
         Some(Aa::Mean(count)) => Smooth { count, filter, temporal: None },
-        None => Smooth { filter, ..Smooth::default() },
+        None => Smooth { filter, temporal: frames, ..Smooth::default() },
     })
 }

@@ -59,7 +59,7 @@ impl FromStr for Aa {
 pub struct SmoothArgs {
     /// Anti-aliasing: the picture is the mean of N pictures, whose pixels look at different places around their middles; normals and depths are those
     /// of the middles. 1: none. temporal: each frame is one picture, averaged with the frames before it, where they show the same
-    /// surfaces; layers are those of the frame [default: 8 for stills, temporal for sequences; 1 with --paper, and on CPU drivers where one picture
+    /// surfaces; layers are those of the frame [default: 8 for stills; 1 for sequences, with --paper, and on CPU drivers where one picture
     /// takes seconds]
     #[arg(long, value_name = "N|temporal", help_heading = "Picture")]
     pub aa: Option<Aa>,
@@ -68,7 +68,7 @@ pub struct SmoothArgs {
     #[arg(long = "aa-filter", value_enum, default_value_t, value_name = "FILTER", help_heading = "Picture")]
     pub filter: Filter,
 
-    /// Most frames in the average of --aa temporal: more are smoother at rest, fewer follow change faster [default: 8]
+    /// Most frames in the average of --aa temporal, which it implies: more are smoother at rest, fewer follow change faster [default: 8]
     #[arg(long = "aa-frames", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(temporal::MOST)), help_heading = "Picture")]
     pub aa_frames: Option<u32>,
 }

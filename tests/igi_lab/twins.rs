@@ -146,14 +146,10 @@ pub fn is_lit(buffers: &Buffers, i: usize) -> bool {
     buffers.depth[i] < 1.0 && buffers.mask[i] > 0.5
 }
 
-/// Direct light after `iterations` of the filter for its noise; alpha: variance. `noisy`: alpha is the difference between halves of the samples. `None` where there is no lit surface.
-pub fn soft(
-    eye: &Eye,
-    buffers: &Buffers,
-    noisy: &Texels,
-    iterations: u32,
-    [sharpness, range, contrast]: [f64; 3],
-) -> Vec<Option<DVec4>> {
+/// Light after `iterations` of the filter for its noise; alpha: variance. `noisy`: alpha is the difference between halves of the samples. `rare`: a
+/// larger difference of the pixel itself is its variance. `None` where there is no lit surface.
+pub fn soft(eye: &Eye, buffers: &Buffers, noisy: &Texels, iterations: u32, rare: bool) -> Vec<Option<DVec4>> {
+    let [sharpness, range, contrast] = [16.0, 0.01, 2.0];
     let (columns, rows) = (buffers.width as i64, buffers.height as i64);
     let cell = |i: usize| (i as i64 % columns, i as i64 / columns);
     let count = buffers.depth.len();
@@ -187,7 +183,8 @@ pub fn soft(
                 sum += weight * f64::from(noisy[other][3]).powi(2);
                 weights += weight;
             }
-            Some(color(noisy[i]).extend(sum / weights))
+            let least = if rare { f64::from(noisy[i][3]).powi(2) } else { 0.0 };
+            Some(color(noisy[i]).extend((sum / weights).max(least)))
         })
         .collect();
     for turn in 0..iterations {

@@ -200,7 +200,7 @@ impl Default for Settings {
         Self {
             vpls: 180,
             candidates: 8,
-            bounces: 2,
+            bounces: 4,
             judges: 96,
             bound: 0.1,
             picks: 0,
@@ -240,7 +240,7 @@ impl Default for Settings {
 
 impl Settings {
     /// The paper's fastest variant: 180 virtual lights, boxes, a quarter of the resolution, tiles of 3×3. The paper states neither
-    /// the number of bounces nor min_d, so these have the default values. It has point lights alone, and direct light
+    /// the number of bounces nor min_d; here it has two bounces, and a bound without compensation. It has point lights alone, and direct light
     /// without a filter.
     pub fn paper() -> Self {
         Self {
@@ -250,6 +250,7 @@ impl Settings {
             interleave: 3,
             upsample_normal: 1.0,
             upsample_range: 0.0,
+            bounces: 2,
             bound: 0.02,
             compensation: 0,
             direct_filter: 0,
@@ -397,7 +398,7 @@ mod tests {
         let raster = Settings { visibility: Visibility::Raster, ..Settings::default() };
         for vpls in [0, 1, 2049] {
             let error = message(Settings { vpls, ..raster.clone() });
-            assert!(error.starts_with(&format!("vpls: {vpls} is not allowed; allowed: 2 to 2048")), "{error}");
+            assert!(error.starts_with(&format!("vpls: {vpls} is not allowed; allowed: 4 to 2048")), "{error}");
         }
         for cache in [0.3, 0.001, -1.0] {
             let error = message(Settings { cache, ..Settings::default() });

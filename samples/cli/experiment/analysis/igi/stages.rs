@@ -84,7 +84,7 @@ const PARTS: &[(Part, &[&str])] = &[
         ],
     ),
     (Part::Refining, &["igi.refine*"]),
-    (Part::Compensation, &["igi.near*", "fill igi.near"]),
+    (Part::Compensation, &["igi.near*", "fill igi.near", "clear igi.near_light"]),
     (Part::Filters, &["igi.guide", "igi.discontinuity", "igi.smooth", "igi.upsample", "fill igi.unmatched"]),
     (
         Part::History,
@@ -125,9 +125,9 @@ pub(super) struct Spent {
 
 impl Spent {
     /// Sums the times of passes, given in the order in which they ran. Passes of short paths belong to the part that has started the paths: the
-    /// visible surfaces, or the ray trees.
+    /// visible surfaces, or the ray trees. The filter runs for direct light and for the light of short paths.
     fn of<'a>(frame: Option<f64>, passes: impl IntoIterator<Item = (&'a str, f64)>) -> Self {
-        let (mut parts, mut in_trees) = (Vec::<(Part, f64)>::new(), false);
+        let (mut parts, mut in_trees, mut apart) = (Vec::<(Part, f64)>::new(), false, false);
         for (name, ms) in passes {
             let mut part = part_of(name).unwrap_or(Part::Other);
             in_trees |= name.starts_with("igi.near_begin_tree");
@@ -135,6 +135,11 @@ impl Spent {
                 part = Part::Trees;
             }
             in_trees &= !name.starts_with("igi.near_end_tree");
+            apart |= name.starts_with("clear igi.near_light");
+            if apart && part == Part::Direct {
+                part = Part::Compensation;
+            }
+            apart &= !name.starts_with("igi.near_add");
             match parts.iter_mut().find(|(known, _)| *known == part) {
                 Some((_, sum)) => *sum += ms,
                 None => parts.push((part, ms)),
@@ -224,8 +229,12 @@ mod tests {
         let passes = [
             ("upload", 1.0),
             ("igi.shoot", 2.0),
+            ("igi.soft_filter", 20.0),
+            ("clear igi.near_light", 0.5),
             ("igi.near_begin", 3.0),
-            ("igi.near_trace", 4.0),
+            ("igi.near_trace", 3.0),
+            ("igi.soft_filter#2", 0.25),
+            ("igi.near_add", 0.25),
             ("igi.near_begin_tree", 5.0),
             ("igi.near_trace#2", 6.0),
             ("igi.near_end_tree", 7.0),
@@ -234,9 +243,9 @@ mod tests {
             ("igi.refine", 10.0),
             ("passes.skybox", 11.0),
         ];
-        let spent = Spent::of(Some(70.0), passes);
+        let spent = Spent::of(Some(90.0), passes);
         assert_eq!(spent.part(Part::Compensation), 15.0);
-        assert_eq!(spent.direct(), 18.0);
+        assert_eq!(spent.direct(), 38.0);
         assert_eq!(spent.indirect(), 25.0);
         assert_eq!(spent.gathering_and_filters(), 34.0);
         let sum: f64 = spent.shares().iter().map(|cell| if let Cell::Number(n) = cell { *n } else { 0.0 }).sum();
