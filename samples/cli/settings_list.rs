@@ -98,7 +98,7 @@ mod tests {
         let plain = config::to_toml(&PictureSettings::default()).unwrap();
         let text = with_docs(&plain);
         assert_eq!(plain.parse::<toml::Table>().unwrap(), text.parse::<toml::Table>().unwrap());
-        assert!(text.contains("# Allowed: 1 to 8.\n# Needs indirect = true.\nbounces = 2\n"), "{text}");
+        assert!(text.contains("# Allowed: 1 to 8.\n# Needs indirect = true.\nbounces = 4\n"), "{text}");
     }
 
     #[test]

@@ -107,7 +107,8 @@ mod tests {
 
     #[test]
     fn rays_follow_from_settings_and_pixels() {
-        let base = Settings { vpls: 180, bounces: 1, candidates: 1, specular: false, ..Settings::default() };
+        let base =
+            Settings { vpls: 180, bounces: 1, candidates: 1, compensation: 0, specular: false, ..Settings::default() };
         let of = |igi: Settings| at_most(&PictureSettings { igi, ..Default::default() }, [81, 60], Some(5));
         assert_eq!(of(base.clone()), [Some(180.0), None, Some(5.0 * 4860.0), Some(180.0 * 4860.0), None]);
         let coarse = Settings { downsample: 4, interleave: 3, ..base.clone() };
