@@ -14,7 +14,7 @@ fn igi(more: &[&str]) -> support::Ran {
 #[test]
 fn wrong_settings_are_refused_and_named() {
     for (arguments, part) in [
-        (&["-D", "igi.vpls=0"][..], "2 to 10000"),
+        (&["-D", "igi.vpls=0"][..], "4 to 10000"),
         (&["-D", "igi.bounces=9"], "1 to 8"),
         (&["-D", "igi.downsample=5"], "1 to 4"),
         (&["-D", "igi.bound=-1"], "0 to 1"),
@@ -29,13 +29,13 @@ fn wrong_settings_are_refused_and_named() {
     }
     // Before anything is read, and also where they are only to be printed.
     let before = ["render", "no-such.glb", "-D", "igi.vpls=0"];
-    ran(command(env!("CARGO_BIN_EXE_igi")).args(before)).expect(2, &["igi.vpls: 0", "2 to 10000"]);
+    ran(command(env!("CARGO_BIN_EXE_igi")).args(before)).expect(2, &["igi.vpls: 0", "4 to 10000"]);
     igi(&["--print-config", "-D", "background=[0.0,-1.0,0.0]"]).expect(2, &["background[1]: -1", "not below 0"]);
     // In a file: its name, and the code of wrong input.
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("s.toml");
     std::fs::write(&file, "[igi]\nvpls = 0\n").unwrap();
-    igi(&["--settings", file.to_str().unwrap()]).expect(3, &["s.toml: igi.vpls: 0", "2 to 10000"]);
+    igi(&["--settings", file.to_str().unwrap()]).expect(3, &["s.toml: igi.vpls: 0", "4 to 10000"]);
     let shown = igi(&["--paper", "--print-config"]).expect(0, &[]).stdout;
     for line in ["downsample = 4", "interleave = 3", "imperfect = true", "candidates = 1"] {
         assert!(shown.contains(line), "{line} is not in {shown}");
@@ -101,7 +101,7 @@ fn what_is_not_shown_is_said() {
     }
     let folder = tempfile::tempdir().unwrap();
     let name = folder.path().join("picture.png");
-    let small = ["render", "--builtin", "conference", "--size", "8x6", "-D", "igi.vpls=2", "-D", "igi.candidates=1"];
+    let small = ["render", "--builtin", "conference", "--size", "8x6", "-D", "igi.vpls=4", "-D", "igi.candidates=1"];
     let ran = ran(command(env!("CARGO_BIN_EXE_igi")).args(small).arg("-o").arg(&name)).expect(0, &[]);
     for part in ["\"glass\": direct light does not pass through glass", "caustics of direct light are missing"] {
         assert!(ran.stderr.contains(part), "{part} is not in {}", ran.stderr);
@@ -112,7 +112,7 @@ fn what_is_not_shown_is_said() {
 
 #[test]
 fn too_many_lights_for_maps_are_refused_and_the_most_named() {
-    igi(&["-D", "igi.visibility=raster", "-D", "igi.vpls=5000"]).expect(2, &["igi.vpls: 5000", "2 to 2048"]);
+    igi(&["-D", "igi.visibility=raster", "-D", "igi.vpls=5000"]).expect(2, &["igi.vpls: 5000", "4 to 2048"]);
 }
 
 #[test]

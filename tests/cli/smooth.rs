@@ -172,7 +172,7 @@ fn a_sequence_is_averaged_over_time_and_its_frames_can_be_made_again() {
         assert_eq!(report["same_file"], true, "{file}: {report}");
     }
     // Repeated runs for times change nothing.
-    let (again, _) = sequence("again", &["--repeat", "2"]);
+    let (again, _) = sequence("again", &["--aa", "temporal", "--repeat", "2"]);
     assert!(read(&again[1]).main().unwrap().data == read(&usual[1]).main().unwrap().data);
 }
 
