@@ -17,7 +17,6 @@ import pathlib
 import struct
 import subprocess
 import sys
-import zlib
 
 import numpy
 
@@ -33,56 +32,15 @@ def run(command):
 
 
 def pfm(path):
-    """Linear RGB, row by row from the top: an array of height x width x 3."""
+    """A layer, row by row from the top: an array of height x width x channels."""
     head, size, scale, data = path.read_bytes().split(b"\n", 3)
-    assert head == b"PF", head
     width, height = map(int, size.split())
     order = "<f4" if float(scale) < 0 else ">f4"
-    return numpy.frombuffer(data, order).reshape(height, width, 3)[::-1].astype(numpy.float64)
+    return numpy.frombuffer(data, order).reshape(height, width, {b"PF": 3, b"Pf": 1}[head])[::-1].astype(numpy.float64)
 
 
-def exr_channel(path, wanted):
-    """A channel of an EXR file of scan lines, uncompressed or ZIP: an array of height x width."""
-    data = path.read_bytes()
-    at, header = 8, {}
-    while data[at]:
-        name, rest = data[at:].split(b"\0", 2)[:2]
-        at += len(name) + len(rest) + 2
-        (size,) = struct.unpack_from("<i", data, at)
-        header[name.decode()] = data[at + 4 : at + 4 + size]
-        at += 4 + size
-    at += 1
-    left, top, right, bottom = struct.unpack("<4i", header["dataWindow"])
-    width, height = right - left + 1, bottom - top + 1
-    channels, rest = [], header["channels"]
-    while rest[0]:
-        name, rest = rest.split(b"\0", 1)
-        (kind,) = struct.unpack_from("<i", rest)
-        channels.append((name.decode(), ["<u4", "<f2", "<f4"][kind]))
-        rest = rest[16:]
-    rows = {0: 1, 2: 1, 3: 16}[header["compression"][0]]
-    blocks = -(-height // rows)
-    out = numpy.zeros((height, width))
-    for offset in struct.unpack_from(f"<{blocks}Q", data, at):
-        y, size = struct.unpack_from("<ii", data, offset)
-        raw = data[offset + 8 : offset + 8 + size]
-        count = min(rows, height - (y - top))
-        full = count * width * sum(int(kind[2]) for _, kind in channels)
-        if size < full:
-            coded = numpy.frombuffer(zlib.decompress(raw), numpy.uint8).astype(numpy.int64)
-            coded[1:] -= 128
-            halves = (numpy.cumsum(coded) % 256).astype(numpy.uint8)
-            raw = numpy.empty_like(halves)
-            middle = (len(halves) + 1) // 2
-            raw[0::2], raw[1::2] = halves[:middle], halves[middle:]
-            raw = raw.tobytes()
-        place = 0
-        for row in range(count):
-            for name, kind in channels:
-                if name == wanted:
-                    out[y - top + row] = numpy.frombuffer(raw, kind, width, place)
-                place += width * int(kind[2])
-    return out
+def layer(place, frame, name):
+    return place / f"{frame:04}-{name}.pfm"
 
 
 def moving_camera(folder, builtin, yaw, pan):
@@ -147,17 +105,17 @@ def render(folder, name, scene, way, options, given):
     report = place / "run.json"
     if not (given.keep and report.exists()):
         # With a given exposure all ways have the same one.
-        outputs = ["-o", place / "{frame:04}.pfm", "-o", place / "{frame:04}.exr", "-o", place / "{frame:04}.png"]
+        outputs = ["-o", place / "{frame:04}-{layer}.pfm", "-o", place / "{frame:04}.png"]
         command = ["isr", "render", *scene, "--size", given.size, "--frames", f"0..{given.frames}", "--exposure", given.exposure]
-        report.write_text(run([*command, *options, *outputs, "--f32", "--overwrite", "--json", "-q"]))
+        report.write_text(run([*command, *options, *outputs, "--overwrite", "--json", "-q"]))
     return place, json.loads(report.read_text())
 
 
 def measures(truth, place, near, frames):
     out = {"flip": [], "rel-mse": [], "ghost": [], "flicker": []}
-    pictures = [pfm(place / f"{i:04}.pfm") for i in range(frames)]
+    pictures = [pfm(layer(place, i, "picture")) for i in range(frames)]
     for i in range(SETTLED, frames):
-        files = [folder / f"{i:04}.pfm" for folder in (truth["place"], place)]
+        files = [layer(folder, i, "picture") for folder in (truth["place"], place)]
         report = json.loads(run(["lucerna", "compare", "-q", "--json", "-m", "flip,rel-mse", *files]))
         found = report["tests"][0]["measures"]
         for measure in ("flip", "rel-mse"):
@@ -191,8 +149,8 @@ def main():
         if given.only and name not in given.only:
             continue
         place, _ = render(given.folder, name, scene, "truth", ["--aa", "64"], given)
-        truth = {"place": place, "pictures": [pfm(place / f"{i:04}.pfm") for i in range(given.frames)]}
-        depth = [exr_channel(place / f"{i:04}.exr", "Z") for i in range(given.frames)]
+        truth = {"place": place, "pictures": [pfm(layer(place, i, "picture")) for i in range(given.frames)]}
+        depth = [pfm(layer(place, i, "depth"))[:, :, 0] for i in range(given.frames)]
         near = [None] * given.frames
         for i in range(SETTLED, given.frames):
             near[i] = numpy.min(depth[i - SETTLED : i], axis=0) < 0.97 * depth[i]
@@ -201,7 +159,7 @@ def main():
             place, report = render(given.folder, name, scene, way, options, given)
             given.keep = keep
             found = measures(truth, place, near, given.frames)
-            light = numpy.mean([pfm(place / f"{i:04}.pfm").sum() / truth["pictures"][i].sum() for i in range(SETTLED, given.frames)])
+            light = numpy.mean([pfm(layer(place, i, "picture")).sum() / truth["pictures"][i].sum() for i in range(SETTLED, given.frames)])
             times = sorted(sum(run["milliseconds"] for run in frame["runs"]) for frame in report["frames"])
             cells = [number(found[key], ".4f") for key in ("flip", "rel-mse", "ghost", "flicker")]
             print(f"| {name} | {way} | {' | '.join(cells)} | {100 * (light - 1):+.2f} % | {times[len(times) // 2]:.0f} |", flush=True)

@@ -43,7 +43,7 @@ pub struct Run<'a> {
     fit_exposure: bool,
     /// Anti-aliasing; that of the device after [`Self::smooth_on`].
     pub smooth: Smooth,
-    /// Whether a CPU driver smooths edges unasked, as GPUs do; `None`: no device does.
+    /// Whether a CPU driver smooths the edges of a still unasked, as GPUs do; `None`: no device does.
     unasked: Option<bool>,
     pub stage: Stage,
     pub outputs: Outputs,
@@ -133,7 +133,8 @@ impl<'a> Run<'a> {
         };
         let smooth = smoothing(args, &technique)?;
         let plain = args.view.is_none() && args.dump.is_none() && !args.list_passes && !args.paper;
-        let unasked = plain && technique.radiance && args.smooth.aa.is_none() && args.smooth.aa_frames.is_none();
+        let asked = args.smooth.aa.is_some() || args.smooth.aa_frames.is_some();
+        let unasked = plain && technique.radiance && frames.len() == 1 && !asked;
         let record = Record {
             first_frame: frames.start,
             frame: frames.start,
@@ -231,8 +232,7 @@ impl<'a> Run<'a> {
     /// Chooses the anti-aliasing by the device, if the user has not. Stills are means of several pictures, which a GPU renders in little time with
     /// every technique. The average over time of a sequence flickers while the camera rests, so sequences have it on request alone.
     pub fn smooth_on(&mut self, gpu: &Gpu) {
-        let unasked = self.unasked.is_some_and(|cheap| cheap || gpu.describe().kind != DeviceKind::Cpu);
-        if unasked && self.frames.len() == 1 {
+        if self.unasked.is_some_and(|cheap| cheap || gpu.describe().kind != DeviceKind::Cpu) {
             self.smooth.count = smooth::STILL;
         }
         self.record.aa = self.smooth;
@@ -415,8 +415,8 @@ impl<'a> Run<'a> {
 fn smoothing(args: &RenderArgs, technique: &Label) -> Result<Smooth> {
     let SmoothArgs { aa, filter, aa_frames: frames } = args.smooth;
     let wrong = |what: String, help: &str| Err(Error::usage(what).at("--aa").help(help));
-    let asked = !matches!(aa, None | Some(Aa::Mean(1)));
-    if asked && !technique.radiance {
+    let none = matches!(aa, None | Some(Aa::Mean(1))) && frames.is_none();
+    if !none && !technique.radiance {
         let mode = technique.mode.unwrap_or("this mode");
         let what = format!("the picture of {mode} of {} is not light, so it has no mean", technique.name);
         return wrong(what, "Leave --aa out, or render all light");
@@ -431,8 +431,8 @@ fn smoothing(args: &RenderArgs, technique: &Label) -> Result<Smooth> {
         return wrong(what, "Leave --aa-frames out, or give --aa temporal");
     }
     Ok(match aa {
-        Some(Aa::Temporal) => Smooth { count: 1, filter, temporal: Some(frames.unwrap_or(temporal::FRAMES)) },
         Some(Aa::Mean(count)) => Smooth { count, filter, temporal: None },
-        None => Smooth { filter, temporal: frames, ..Smooth::default() },
+        Some(Aa::Temporal) => Smooth { count: 1, filter, temporal: frames.or(Some(temporal::FRAMES)) },
+        None => Smooth { count: 1, filter, temporal: frames },
     })
 }

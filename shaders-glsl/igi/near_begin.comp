@@ -7,6 +7,7 @@
 #include "lib/gbuffer.glsl"
 #include "igi/texel.glsl"
 #include "lib/vpl.glsl"
+#include "igi/soft.glsl"
 #include "igi/near.glsl"
 
 layout(local_size_x = 64) in;
@@ -41,6 +42,6 @@ void main() {
     path.position = stepped_back(view, path.position, path.gap);
     path.weight = vec3(1.0 / float(paths));
     path.light = number == 0u ? vec3(0.0) : near_paths[slot].light;
-    path.half_light = number == paths / 2u ? dot(path.light, vec3(0.2126, 0.7152, 0.0722)) : near_paths[slot].half_light;
+    path.half_light = number == paths / 2u ? dot(path.light, SOFT_LUMINANCE) : near_paths[slot].half_light;
     near_paths[slot] = path;
 }

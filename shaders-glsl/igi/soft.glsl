@@ -1,5 +1,5 @@
-// Direct light of the sky and of emissive surfaces: kept apart from other direct light and without the surface's colour, so that a filter
-// removes its noise and no detail of textures.
+// Direct light of the sky and of emissive surfaces, and compensated light: kept apart from other light and without the surface's colour, so that a
+// filter removes its noise and no detail of textures.
 #ifndef LIB_IGI_SOFT
 #define LIB_IGI_SOFT
 

@@ -1,4 +1,4 @@
-// One iteration of the filter for the noise of direct light from the sky and from emissive surfaces. It exchanges light with 5 × 5 pixels in the
+// One iteration of the filter for the noise of direct light from the sky and from emissive surfaces, and of compensated light. It exchanges light with 5 × 5 pixels in the
 // same plane with a similar normal, whose light differs by no more than their noise explains; their distance doubles with each iteration (Schied
 // et al., Spatiotemporal Variance-Guided Filtering, HPG 2017, section 4.3, after Dammertz et al. 2010). There the weighted mean is divided by the
 // sum of the weights, which loses light: a rare bright pixel becomes darker, and its neighbours do not become brighter by as much, up to 4 % of the

@@ -1,4 +1,4 @@
-// Light of the sky and of emissive surfaces, and the variance of its luminance. The squared difference between
+// Light with noise, and the variance of its luminance. The squared difference between
 // two halves of the samples estimates it. One pixel's difference says little, and bright samples would raise their own variance, so the mean over
 // neighbours on the same surface is stored.
 #version 460
@@ -12,7 +12,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D guide; // from igi/guide.comp
-layout(binding = 2) uniform sampler2D soft; // from igi/direct.comp; a: difference between halves of the samples
+layout(binding = 2) uniform sampler2D soft; // from igi/direct.comp or igi/near_end.comp; a: difference between halves of the samples
 layout(binding = 3) uniform sampler2D albedo; // a: 0 for unlit surfaces
 layout(binding = 4, rgba32f) uniform writeonly image2D light; // a: variance; -1 where there is no lit surface
 

@@ -1,5 +1,5 @@
 //! Filters that compute the irradiance of every pixel from coarse or interleaved irradiance: the discontinuity buffer, edge-avoiding
-//! smoothing, and joint bilateral upsampling. One more filter removes the noise of direct light.
+//! smoothing, and joint bilateral upsampling. One more filter removes the noise of direct and of compensated light.
 
 use super::Settings;
 use crate::{
@@ -107,11 +107,10 @@ pub fn upsample(graph: &mut Graph, g: &GBuffer, guide: Image, coarse: Image, set
     (irradiance, unmatched)
 }
 
-/// Direct light of emissive surfaces and of the sky without most of its noise, as radiance divided by the surfaces' colours; alpha: variance of its
-/// luminance, -1 where there is no lit surface. `soft`: the light with noise; alpha: the difference between the luminances of both
-/// halves of the samples. `rare`: some pixels have a rare bright sample, which stands alone among neighbours with little noise. The sum over all pixels
-/// does not change (Schied et al. 2017, with exchanges that keep the light;
-/// `igi/soft_filter.comp`).
+/// `soft` without most of its noise; alpha: variance of its luminance, -1 where there is no lit surface. `soft`: direct light of emissive surfaces and
+/// of the sky, as radiance divided by the surfaces' colours, or compensated irradiance, W/m²; alpha: the difference between the luminances of both
+/// halves of the samples. `rare`: some pixels have a rare bright sample, which stands alone among neighbours with little noise. The sum over all
+/// pixels does not change (Schied et al. 2017, with exchanges that keep the light; `igi/soft_filter.comp`).
 pub fn soft_light(graph: &mut Graph, g: &GBuffer, soft: Image, iterations: u32, rare: bool) -> Image {
     let extent = graph.extent(g.depth);
     let guide = guide_of(graph, g, 1, false);

@@ -97,7 +97,7 @@ pub struct Settings {
     pub compensation: u32,
     /// Iterations of the filter that removes the noise of the compensated light, like [`Settings::direct_filter`] for direct light. 0: no filter; the
     /// light is right on average in every pixel.
-    #[schemars(range(min = 0, max = 5), extend("x-unit" = "iterations", "x-needs" = {"compensation": {"minimum": 1}, "bound": {"exclusiveMinimum": 0}, "downsample": {"const": 1}}))]
+    #[schemars(range(min = 0, max = 5), extend("x-unit" = "iterations", "x-needs" = {"compensation": {"minimum": 1}, "downsample": {"const": 1}}))]
     pub compensation_filter: u32,
     /// Side of a cell of the irradiance cache, as share of the scene's diagonal. The cache holds the light of virtual
     /// lights on surfaces that mirrors and glass show. 0: no cache; each of these surfaces gathers.
