@@ -20,6 +20,8 @@ const SQUARES: u32 = 96;
 const GREY: Vec3 = Vec3::new(0.694, 0.665, 0.604);
 /// Full vertical angle of the camera in front, radians.
 const YFOV: f32 = 0.7;
+/// Room around a single thing and for its shadow in a picture of it.
+const MARGIN: f32 = 1.25;
 
 /// How things are put on a ground.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,13 +80,16 @@ impl Ground {
 struct Fit {
     scale: f32,
     foot: Vec3,
+    /// Size of the box around it after scaling, metres.
+    extents: Vec3,
     height: f32,
     width: f32,
 }
 
 /// A new scene of `ground.copies` of each of the things, in turns, on a ground in the plane y = 0: a spiral of even density around
 /// the origin. Cameras of the things are left out; three others stand there: `front`, `above`, and `ground`, which sees the ground from
-/// straight above without the things on it, as far as shadows of about 45° reach. Animations go on in all copies; lights are those of
+/// straight above without the things on it, as far as shadows of about 45° reach. A single thing fills the view of the first two.
+/// Animations go on in all copies; lights are those of
 /// the first ones. The environment is the first that a thing has.
 ///
 /// # Errors
@@ -120,7 +125,7 @@ pub fn on_ground(things: &[Scene], ground: &Ground) -> Result<Scene> {
         let local = Transform::Trs { translation: foot, rotation: Quat::IDENTITY, scale: Vec3::splat(fit.scale) };
         stand(&mut out, thing, &bases[which], (k, k < things.len()), local);
     }
-    cameras(&mut out, spread, height, size);
+    cameras(&mut out, (spread, height, size), (count == 1).then(|| fits[0].extents));
     out.environment = things.iter().find_map(|thing| thing.environment.clone());
     if things.iter().any(|thing| thing.nodes.iter().any(|node| node.camera.is_some())) {
         let text = "cameras of things that are put on a ground are left out".into();
@@ -152,7 +157,8 @@ fn fit(thing: &Scene, ground: &Ground) -> Result<Fit> {
     let scale = ground.height.map_or(1.0, |height| height / if size.y > 0.0 { size.y } else { size.max_element() });
     let middle = around.centre();
     let foot = Vec3::new(middle.x, around.min.y, middle.z);
-    Ok(Fit { scale, foot, height: size.y * scale, width: size.x.max(size.z) * scale })
+    let extents = size * scale;
+    Ok(Fit { scale, foot, extents, height: extents.y, width: extents.x.max(extents.z) })
 }
 
 /// Places in a spiral of even density, neighbours about `apart` from each other, their middle at the origin.
@@ -229,7 +235,8 @@ pub(super) fn stand(out: &mut Scene, thing: &Scene, base: &Base, (number, first)
     }
 }
 
-fn cameras(out: &mut Scene, spread: f32, height: f32, size: f32) {
+/// Three cameras. `alone`: the extents of the only thing, metres, which the first two see as large as its shadow allows.
+fn cameras(out: &mut Scene, (spread, height, size): (f32, f32, f32), alone: Option<Vec3>) {
     let mut camera = |name: &str, projection: Projection, eye: Vec3, back: Vec3, up: Vec3| {
         let right = up.cross(back).normalize();
         let world =
@@ -241,9 +248,13 @@ fn cameras(out: &mut Scene, spread: f32, height: f32, size: f32) {
         out.nodes.push(Node { name: name.into(), local, camera, ..Node::default() });
     };
     let target = Vec3::Y * (0.4 * height);
-    for (name, from) in [("front", Vec3::new(0.15, 0.55, 1.0)), ("above", Vec3::new(0.1, 1.6, 1.0))] {
-        let distance = (0.9 * spread + 0.75 * size) / (0.5 * YFOV).tan();
+    let front = if alone.is_some() { Vec3::new(0.5, 0.7, 1.0) } else { Vec3::new(0.15, 0.55, 1.0) };
+    for (name, from) in [("front", front), ("above", Vec3::new(0.1, 1.6, 1.0))] {
         let back = from.normalize();
+        let distance = match alone {
+            Some(extents) => fitted(extents, target, back),
+            None => (0.9 * spread + 0.75 * size) / (0.5 * YFOV).tan(),
+        };
         let znear = 0.02 * distance;
         let lens = Projection::Perspective { yfov: YFOV, aspect: None, znear, zfar: None };
         camera(name, lens, target + back * distance, back, Vec3::Y);
@@ -253,6 +264,20 @@ fn cameras(out: &mut Scene, spread: f32, height: f32, size: f32) {
     let (znear, zfar) = (eye - 0.5 * OVER * height, eye + 4.0 * size);
     let above = Projection::Orthographic { xmag: half, ymag: half, znear, zfar };
     camera("ground", above, Vec3::Y * eye, Vec3::Y, Vec3::NEG_Z);
+}
+
+/// The distance from `target`, metres, at which a camera in direction `back` sees a box on the ground, with the room around it, in a
+/// picture as high as wide.
+fn fitted(extents: Vec3, target: Vec3, back: Vec3) -> f32 {
+    let right = Vec3::Y.cross(back).normalize();
+    let up = back.cross(right);
+    let corners = (0..8).map(|k| {
+        let side = |bit: u32| if k >> bit & 1 == 1 { 0.5 } else { -0.5 };
+        Vec3::new(side(0), side(1) + 0.5, side(2)) * extents - target
+    });
+    corners
+        .map(|p| p.dot(right).abs().max(p.dot(up).abs()) * MARGIN / (0.5 * YFOV).tan() + p.dot(back))
+        .fold(0f32, f32::max)
 }
 
 /// A square of half side `half` in the plane y = 0, seen from above.
@@ -301,6 +326,7 @@ mod tests {
     use super::*;
     use crate::builtin;
     use crate::scene::View;
+    use glam::BVec3;
 
     fn stage(things: &[&str], ground: &Ground) -> Scene {
         let things: Vec<Scene> = things.iter().map(|name| builtin::load(name).unwrap()).collect();
@@ -316,6 +342,24 @@ mod tests {
             scene.meshes[mesh as usize].primitives.iter().map(of).reduce(Aabb::union).unwrap()
         });
         all.collect()
+    }
+
+    #[test]
+    fn a_single_thing_is_seen_whole_and_large() {
+        for name in ["hare", "queen", "tree", "pot"] {
+            let scene = stage(&[name], &Ground::default());
+            let (pose, around) = (Pose::rest(&scene), boxes(&scene)[0]);
+            for camera in 0..2 {
+                let view = View::of_camera(&scene, &pose, camera, [256, 256]).unwrap();
+                let clip_from_world = view.clip_from_world;
+                let corners = (0..8).map(|k| {
+                    let side = BVec3::new(k & 1 == 1, k & 2 == 2, k & 4 == 4);
+                    clip_from_world.project_point3(Vec3::select(side, around.max, around.min))
+                });
+                let most = corners.map(|p| p.x.abs().max(p.y.abs())).fold(0f32, f32::max);
+                assert!((0.6..0.9).contains(&most), "{name}, camera {camera}: {most}");
+            }
+        }
     }
 
     #[test]

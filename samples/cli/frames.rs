@@ -157,13 +157,14 @@ impl<T: Technique> Work<'_, T> {
         self.args.seed.wrapping_add(other)
     }
 
-    /// Runs a frame and reads its picture. `held`: the history does not advance.
+    /// Runs a frame and reads its picture. `held`: the history does not advance. `told` is called with the share that is done.
     fn rendered(
         &mut self,
         run: &mut Run<'_>,
         of: &OfFrame<T::Mode>,
         (mut graph, picture): (Graph, Picture),
         held: bool,
+        told: &mut dyn FnMut(f64),
     ) -> Result<Option<Rendered>> {
         run.note(&picture.notes);
         let view = picture.view.unwrap_or(of.view);
@@ -172,7 +173,7 @@ impl<T: Technique> Work<'_, T> {
             None => picture.read(&mut graph, run.outputs.wants_layers(), false),
         };
         let dump = self.args.dump.as_ref().map(|folder| (folder, graph.dump()));
-        let result = if held { self.runner.run_held(&graph) } else { self.runner.run(&graph) };
+        let result = self.runner.run_told(&graph, held, told);
         // An interrupted frame is not written, unless it is complete.
         let Some(frame) = unless_stopped(result, self.interrupt)? else { return Ok(None) };
         run.note(&reading.notes(&frame));
@@ -194,7 +195,8 @@ impl<T: Technique> Work<'_, T> {
         picture.develop(|picture| self.last.frame(&mut graph, picture, step))?;
         // Repetitions must not advance the history: the next frame follows the first run of this frame.
         let held = self.args.repeat > 1;
-        let Some(rendered) = self.rendered(run, of, (graph, picture), held)? else { return Ok(None) };
+        let mut told = |share: f64| progress.within(of.frame, share);
+        let Some(rendered) = self.rendered(run, of, (graph, picture), held, &mut told)? else { return Ok(None) };
         let Rendered { layers, frame, view } = rendered;
         let report = frame.report.clone();
         drop(frame);
@@ -218,7 +220,10 @@ impl<T: Technique> Work<'_, T> {
             let declared = self.declared(run, of, place, seed);
             let Some(declared) = unless_stopped(declared, self.interrupt)? else { return Ok(None) };
             let held = number > 0 || self.args.repeat > 1;
-            let Some(rendered) = self.rendered(run, of, declared, held)? else { return Ok(None) };
+            let (before, all) = (runs.len() as f64, f64::from(run.smooth.count));
+            let mut told = |share: f64| progress.within(of.frame, (before + share) / all);
+            let Some(rendered) = self.rendered(run, of, declared, held, &mut told)? else { return Ok(None) };
+            progress.within(of.frame, (before + 1.0) / all);
             mean.add(rendered.layers, number == 0);
             view = rendered.view;
             runs.push((begun.elapsed().as_secs_f64() * 1e3, rendered.frame.report.clone()));

@@ -16,6 +16,9 @@ const PAUSE: Duration = Duration::from_secs(5);
 /// The same for a bar, which overwrites itself.
 const BAR_PAUSE: Duration = Duration::from_millis(200);
 
+/// Work that takes less has no bar within its items.
+const PATIENCE: Duration = Duration::from_secs(1);
+
 /// How progress is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum ProgressMode {
@@ -69,6 +72,8 @@ pub struct Moment {
 #[derive(Debug)]
 pub struct Meter {
     mode: ProgressMode,
+    /// A bar on this terminal would have too little work.
+    few: bool,
     started: Instant,
     shown: Instant,
 }
@@ -76,8 +81,10 @@ pub struct Meter {
 impl Meter {
     /// `quiet`: `-q` was given. `few`: there is too little work for a bar.
     pub fn new(mode: ProgressMode, quiet: bool, few: bool) -> Self {
-        let mode = mode.resolved(std::io::stderr().is_terminal(), quiet, few);
-        Self { mode, started: Instant::now(), shown: Instant::now() }
+        let terminal = std::io::stderr().is_terminal();
+        let few = few && terminal && mode == ProgressMode::Auto;
+        let mode = mode.resolved(terminal, quiet, few);
+        Self { mode, few, started: Instant::now(), shown: Instant::now() }
     }
 
     /// Whether anything is shown at all.
@@ -89,6 +96,22 @@ impl Meter {
     pub fn due(&self) -> bool {
         let pause = if self.mode == ProgressMode::Bar { BAR_PAUSE } else { PAUSE };
         self.shows() && self.shown.elapsed() >= pause
+    }
+
+    /// Whether a line within an item of work is due: on terminals that is a bar, which the item's own line replaces.
+    pub fn due_within(&self) -> bool {
+        let soon = self.mode_within() == ProgressMode::Bar && self.seconds() >= PATIENCE.as_secs_f64();
+        self.shows() && self.shown.elapsed() >= if soon { BAR_PAUSE } else { PAUSE }
+    }
+
+    /// Work with few items has a line for each, but a bar within them.
+    fn mode_within(&self) -> ProgressMode {
+        if self.few && self.mode == ProgressMode::Plain { ProgressMode::Bar } else { self.mode }
+    }
+
+    /// Shows a line within an item of work.
+    pub fn show_within(&mut self, moment: &Moment) {
+        self.show_as(self.mode_within(), moment);
     }
 
     /// Whether the items that need no work are shown too: lines about them would hide the other lines.
@@ -108,9 +131,13 @@ impl Meter {
 
     /// Shows a line.
     pub fn show(&mut self, moment: &Moment) {
+        self.show_as(self.mode, moment);
+    }
+
+    fn show_as(&mut self, mode: ProgressMode, moment: &Moment) {
         self.shown = Instant::now();
-        let text = line(self.mode, moment, self.seconds());
-        match self.mode {
+        let text = line(mode, moment, self.seconds());
+        match mode {
             ProgressMode::Auto | ProgressMode::None => {}
             ProgressMode::Bar => console::stderr_bar(&text, moment.last),
             _ => console::stderr_line(&text),
@@ -179,6 +206,27 @@ impl Frames {
     /// Reports a finished picture by its name, like [`Frames::frame`].
     pub fn named(&mut self, name: &str, milliseconds: f64, files: &[String]) {
         self.step(name, json!(name), milliseconds, files);
+    }
+
+    /// Reports how much of the next frame is done, 0 to 1, if a line is due: a slow frame must not look like one that has stopped.
+    pub fn within(&mut self, frame: u32, share: f64) {
+        if !self.meter.due_within() {
+            return;
+        }
+        let (done, total) = (self.done as f64 + share, self.total as f64);
+        let seconds = self.meter.seconds();
+        let seconds_left = (share > 0.0).then(|| seconds / done * (total - done).max(0.0));
+        let left = seconds_left.map_or(String::new(), |left| format!(", {} left", span(left)));
+        let next = self.done + 1;
+        self.meter.show_within(&Moment {
+            done,
+            total,
+            unit: "frames",
+            seconds_left,
+            text: format!("frame {frame} ({next}/{}): {:.0} %{left}", self.total, 100.0 * share),
+            facts: into_facts(json!({ "frame": frame })),
+            last: false,
+        });
     }
 
     fn step(&mut self, name: &str, frame: Value, milliseconds: f64, files: &[String]) {
@@ -250,6 +298,22 @@ mod tests {
         assert_eq!([Auto.resolved(true, true, false), Auto.resolved(true, false, true)], [None, Plain]);
         assert_eq!([Auto.resolved(true, false, false), Auto.resolved(false, false, false)], [Bar, Plain]);
         assert_eq!([Bar.resolved(true, true, true), Bar.resolved(false, false, false)], [Bar, Plain]);
+    }
+
+    #[test]
+    fn within_a_single_item_a_terminal_has_a_bar() {
+        use ProgressMode::{Bar, None, Plain};
+        let meter = |mode, few| Meter { mode, few, started: Instant::now(), shown: Instant::now() };
+        for (mode, few, within) in [(Plain, true, Bar), (Plain, false, Plain), (Bar, false, Bar), (None, true, None)] {
+            assert_eq!(meter(mode, few).mode_within(), within);
+            assert!(!meter(mode, few).due_within(), "no work has begun");
+        }
+        let later = |mode| Meter {
+            started: Instant::now() - 2 * PATIENCE,
+            shown: Instant::now() - PATIENCE,
+            ..meter(mode, false)
+        };
+        assert_eq!([Bar, Plain, None].map(|mode| later(mode).due_within()), [true, false, false]);
     }
 
     #[test]

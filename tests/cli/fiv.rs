@@ -165,6 +165,13 @@ fn things_stand_on_a_ground_and_the_picture_can_be_made_again() {
     fiv(&[&base[..], &ground, &SMALL, &["-o", &at("a.exr")]].concat()).expect(0, &[]);
     lucerna(["rerun", &at("a.exr")]).expect(0, &[]);
     fiv(&[&base[..], &["--ground", "--sunk=7", "-o", &at("b.exr")]].concat()).expect(2, &["ground.sunk", "7"]);
+    // A quick picture of a single mesh has fewer texels than one of several things.
+    let size = |more: &[&str]| {
+        let words = [&base[..], more, &["--json", "--overwrite", "-o", &at("d.exr")]].concat();
+        let told: Value = serde_json::from_str(&fiv(&words).expect(0, &[]).stdout).unwrap();
+        told["config"]["settings"]["fiv"]["size"].as_u64()
+    };
+    assert_eq!([size(&[]), size(&["--ground"])], [Some(8), Some(16)]);
     // The camera above the ground sees only the ground, which has one colour without shadows.
     let open = ["--camera", "ground", "-D", "fiv.method=unshadowed", "-o", &at("c.exr")];
     fiv(&[&base[..], &ground, &open].concat()).expect(0, &[]);
@@ -190,5 +197,17 @@ fn the_first_picture_has_few_vectors_unless_all_are_asked_for() {
     // The truth has the whole environment.
     assert_eq!(config(&["-D", "fiv.method=brute-force"]), all);
     assert_eq!(config(&["-D", "fiv.polars=9"]), [16, 24, 9, 12]);
+    let method = |more: &[&str]| {
+        let asked = [&["render", "--builtin", "shadows", "--print-config"], more].concat();
+        let printed = fiv(&asked).expect(0, &[]).stdout;
+        let line = printed.lines().find(|line| line.starts_with("method = ")).unwrap().to_owned();
+        line.split('"').nth(1).unwrap().to_owned()
+    };
+    // Only the vectors that the picture needs, unless a setting needs all of them.
+    assert_eq!(method(&[]), "online");
+    for more in [&["--full"][..], &["-D", "fiv.suns=2"], &["-D", "fiv.specular=summed"], &["-D", "fiv.method=vectors"]]
+    {
+        assert_eq!(method(more), "vectors", "{more:?}");
+    }
     fiv(&["render", "--full", "--vectors", "a.fiv"]).expect(2, &["--full", "--vectors"]);
 }

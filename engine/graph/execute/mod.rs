@@ -16,7 +16,7 @@ use std::{borrow::Borrow, sync::Arc, time::Instant};
 use ash::vk;
 
 use self::{
-    parts::{Pace, Parts},
+    parts::{Pace, Parts, Told},
     pool::{Memory, Pool, device_format},
     record::Recorder,
 };
@@ -97,7 +97,7 @@ impl Runner {
     /// `DeviceLost`, naming the pass. Earlier parts may have run then: the next frame has no history, and imported images whose layout
     /// changes have no contents.
     pub fn run(&mut self, graph: impl Borrow<Graph>) -> Result<Frame> {
-        self.run_then(graph.borrow(), true)
+        self.run_then(graph.borrow(), true, &mut |_| {})
     }
 
     /// As [`Runner::run`], but the history stays that of the frame before: the same frame can run again.
@@ -105,10 +105,19 @@ impl Runner {
     /// # Errors
     /// As [`Runner::run`].
     pub fn run_held(&mut self, graph: impl Borrow<Graph>) -> Result<Frame> {
-        self.run_then(graph.borrow(), false)
+        self.run_then(graph.borrow(), false, &mut |_| {})
     }
 
-    fn run_then(&mut self, graph: &Graph, turn: bool) -> Result<Frame> {
+    /// As [`Runner::run`], or with `held` as [`Runner::run_held`]. `told` is called while the graph runs, with the share of its rays that are
+    /// traced, 0 to 1: seldom on short graphs.
+    ///
+    /// # Errors
+    /// As [`Runner::run`].
+    pub fn run_told(&mut self, graph: impl Borrow<Graph>, held: bool, told: &mut dyn FnMut(f64)) -> Result<Frame> {
+        self.run_then(graph.borrow(), !held, told)
+    }
+
+    fn run_then(&mut self, graph: &Graph, turn: bool, told: &mut dyn FnMut(f64)) -> Result<Frame> {
         let begun = Instant::now();
         let plan = graph.plan()?;
         let plan_ms = milliseconds(begun);
@@ -121,10 +130,16 @@ impl Runner {
             }
             self.approved = Some(plan.clone());
         }
-        self.execute(graph, &plan, plan_ms, turn).map_err(|e| e.at(graph.name()))
+        self.execute(graph, &plan, (plan_ms, turn), told).map_err(|e| e.at(graph.name()))
     }
 
-    fn execute(&mut self, graph: &Graph, plan: &Plan, plan_ms: f64, turn: bool) -> Result<Frame> {
+    fn execute(
+        &mut self,
+        graph: &Graph,
+        plan: &Plan,
+        (plan_ms, turn): (f64, bool),
+        told: &mut dyn FnMut(f64),
+    ) -> Result<Frame> {
         let begun = Instant::now();
         let (memory, fresh) = self.pool.acquire(&self.gpu, graph, plan)?;
         self.sets.reset()?;
@@ -140,7 +155,9 @@ impl Runner {
         }
         let statistics = self.statistics.as_ref().filter(|_| counted > 0);
         let held = (memory.clone(), self.uniforms.clone(), self.staging.clone());
-        let parts = Parts::new(&self.gpu, graph.name(), Arc::new(held), &mut self.pace);
+        let limits = over::limits(&self.gpu, graph, self.dispatch_rays)?;
+        let told = Told::new(over::rays(graph, limits), told);
+        let parts = Parts::new(&self.gpu, graph.name(), Arc::new(held), (&mut self.pace, told));
         let mut commands = parts.begin()?;
         transfer::clear_fresh(&self.gpu, &mut commands, &fresh);
         if let Some(timestamps) = &self.timestamps {
@@ -150,7 +167,6 @@ impl Runner {
         if let Some(statistics) = statistics {
             statistics.reset(&mut commands);
         }
-        let limits = over::limits(&self.gpu, graph, self.dispatch_rays)?;
         // For each pass, the query that counts it.
         let mut queries: Vec<Option<u32>> = Vec::with_capacity(plan.passes.len());
         let mut times = Vec::with_capacity(plan.passes.len());

@@ -33,6 +33,15 @@ pub(super) fn limits(gpu: &Gpu, graph: &Graph, asked: Option<u64>) -> Result<Lim
     Ok(Limits { rays, turns: limited.then_some(TURNS_LIMITED) })
 }
 
+/// Rays of all passes of a graph.
+pub(super) fn rays(graph: &Graph, limits: Limits) -> u64 {
+    let of = |pass: &Pass| match &pass.work {
+        Work::Compute { over: Some(over), .. } => over.pieces(limits).map(|piece| piece.rays).sum(),
+        _ => pass.rays,
+    };
+    graph.passes.iter().map(of).fold(0, u64::saturating_add)
+}
+
 impl<'a> Recorder<'a> {
     /// Records pass `index`, and gives the part before it to the device if that is long enough. Returns the number of launches.
     pub fn pass(&mut self, index: usize, pass: &'a Pass, query: Option<(&Statistics, u32)>) -> Result<usize> {

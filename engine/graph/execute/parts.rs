@@ -71,6 +71,27 @@ struct Running {
     rays: u64,
 }
 
+/// Who is told how much of a graph is done.
+pub(super) struct Told<'a> {
+    done: u64,
+    all: u64,
+    told: &'a mut dyn FnMut(f64),
+}
+
+impl<'a> Told<'a> {
+    /// `all`: rays of the graph.
+    pub fn new(all: u64, told: &'a mut dyn FnMut(f64)) -> Self {
+        Self { done: 0, all, told }
+    }
+
+    fn ended(&mut self, rays: u64) {
+        self.done = self.done.saturating_add(rays).min(self.all);
+        if self.all > 0 {
+            (self.told)(self.done as f64 / self.all as f64);
+        }
+    }
+}
+
 /// The parts of one graph.
 pub(super) struct Parts<'a> {
     gpu: &'a Gpu,
@@ -78,6 +99,7 @@ pub(super) struct Parts<'a> {
     /// The resources of all parts.
     held: Arc<dyn Any + Send + Sync>,
     pace: &'a mut Pace,
+    told: Told<'a>,
     /// Rays and passes of the part in recording.
     rays: u64,
     passes: u32,
@@ -91,9 +113,14 @@ pub(super) struct Parts<'a> {
 
 impl<'a> Parts<'a> {
     /// None yet. `held` lives until the last part has ended.
-    pub fn new(gpu: &'a Gpu, name: &'a str, held: Arc<dyn Any + Send + Sync>, pace: &'a mut Pace) -> Self {
+    pub fn new(
+        gpu: &'a Gpu,
+        name: &'a str,
+        held: Arc<dyn Any + Send + Sync>,
+        (pace, told): (&'a mut Pace, Told<'a>),
+    ) -> Self {
         let running = VecDeque::with_capacity(AHEAD);
-        Self { gpu, name, held, pace, rays: 0, passes: 0, running, given: 0, ended: None, waited: Duration::ZERO }
+        Self { gpu, name, held, pace, told, rays: 0, passes: 0, running, given: 0, ended: None, waited: Duration::ZERO }
     }
 
     /// Begins recording a part.
@@ -143,6 +170,7 @@ impl<'a> Parts<'a> {
         let from = self.ended.map_or(submitted, |ended| ended.max(submitted));
         self.pace.took(rays, now - from, blocked < (now - from) / 8);
         self.ended = Some(now);
+        self.told.ended(rays);
         Ok(())
     }
 

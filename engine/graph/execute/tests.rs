@@ -116,13 +116,28 @@ fn long_graphs_run_in_parts_and_short_ones_in_one() {
         assert!((4..=20).contains(&report.submissions), "{} parts", report.submissions);
         assert!(report.passes.iter().all(|pass| pass.gpu_ms.is_some_and(|ms| ms >= 0.0)), "{report}");
         assert!(parts == whole);
+        // The shares of a long graph grow to the whole.
+        let shares = {
+            let mut graph = Graph::new("told");
+            let image = graph.image("sums", Format::RGBA32F, SMALL);
+            for _ in 0..30 {
+                graph
+                    .compute(pattern::Args { image_out: image, push: pattern::Push { tag: 1.0 } }, SMALL)
+                    .rays(1 << 25);
+            }
+            let mut shares = Vec::new();
+            Runner::new(gpu).run_told(&graph, false, &mut |share| shares.push(share)).unwrap();
+            shares
+        };
+        assert!(shares.len() >= 4 && shares.is_sorted(), "{shares:?}");
+        assert!((0.01..0.3).contains(&shares[0]) && *shares.last().unwrap() == 1.0, "{shares:?}");
         // A pass longer than a part may be is a part.
         let (parts, report) = chain(30, u64::MAX);
         assert_eq!(report.submissions, 32);
         assert!(parts == whole);
         // Each of 1024 passes has a mark of its own.
         let mut pace = Pace::default();
-        let mut parts = Parts::new(gpu, "small", Arc::new(()), &mut pace);
+        let mut parts = Parts::new(gpu, "small", Arc::new(()), (&mut pace, Told::new(0, &mut |_| {})));
         assert_eq!((0..2048).position(|_| parts.is_full(1)), Some(1024));
     });
 }

@@ -251,6 +251,11 @@ impl Settings {
         Self { size: 16, azimuths, polars, radii, ..Self::default() }
     }
 
+    /// The settings that need stored vectors ([`Method::Vectors`]): a change of one asks for them.
+    pub fn of_stored_vectors(&self) -> impl PartialEq + use<> {
+        (self.turns, self.suns, self.adaptive, self.masks)
+    }
+
     /// The numbers of samples along the three coordinates.
     pub fn grid(&self) -> Grid {
         Grid { azimuths: self.azimuths, polars: self.polars, radii: self.radii }

@@ -55,6 +55,6 @@ pub fn main() -> ExitCode {
             let console = args.talk.console();
             program::run(console, || fiv::steady(&args, console))
         }
-        Command::Render(args) => program::run(args.common.talk.console(), || fiv::render(&args)),
+        Command::Render(args) => program::run(args.common.talk.console(), || fiv::render(&args, None)),
     }
 }

@@ -90,7 +90,7 @@ impl AnyArgs {
             None => chosen(self.common),
             Some(By::Isr(args)) => isr::render(&args),
             Some(By::Igi(args)) => igi::render(&args),
-            Some(By::Fiv(args)) => fiv::render(&args),
+            Some(By::Fiv(args)) => fiv::render(&args, None),
             Some(By::Daylight(args)) => daylight::render(&args),
             Some(By::Prt(args)) => prt::render(&args),
             Some(By::Reference(args)) => reference::run(&args, console),
@@ -122,7 +122,7 @@ fn chosen(common: RenderArgs) -> Result<ExitCode> {
     match technique {
         Suited::Isr => render::render_on(Some(stage), &common, &Given::<Isr>::by(&common, Mode::ALL[0])?),
         Suited::Igi => render::render_on(Some(stage), &common, &Given::<Igi>::by(&common, Mode::ALL[0])?),
-        Suited::Fiv => fiv::render(&FivArgs { common, vectors: None, full: false }),
+        Suited::Fiv => fiv::render(&FivArgs { common, vectors: None, full: false }, Some(stage)),
     }
 }
 
@@ -144,11 +144,16 @@ fn suited(stage: &Stage, sequence: bool) -> (Suited, &'static str) {
     }
     let bvh = Bvh::build(scene, &Pose::playing(scene, 0.0));
     let room = Survey::of(&bvh).is_some_and(|survey| survey.interior().is_some());
-    if room && lamps {
-        return (Suited::Igi, "lamps light a room, also from outside of the picture");
+    if room {
+        let why = if lamps {
+            "lamps light a room, also from outside of the picture"
+        } else {
+            "the sky lights a room through its openings"
+        };
+        return (Suited::Igi, why);
     }
     let triangles: usize = primitives.iter().map(|primitive| primitive.indices.len() / 3).sum();
-    if !lamps && !room && !sequence && triangles <= FEW {
+    if !lamps && !sequence && triangles <= FEW {
         return (Suited::Fiv, "an environment alone lights the scene");
     }
     (Suited::Isr, "it is the quickest")
@@ -176,6 +181,7 @@ mod tests {
         for (words, technique) in [
             ("--builtin furnace", Suited::Igi),
             ("--builtin conference", Suited::Igi),
+            ("--builtin conference --environment grove", Suited::Igi),
             ("--builtin cornell", Suited::Isr),
             ("--builtin furnace-sphere", Suited::Fiv),
             ("--builtin furnace-sphere --light 0,3,0,9", Suited::Isr),
