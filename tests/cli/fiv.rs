@@ -1,6 +1,8 @@
 //! `fiv` from the outside: files of vectors, also those of earlier versions, what is wrong with them, pictures. Needs a device (each test
 //! says so when there is none).
 
+use serde_json::Value;
+
 use crate::support;
 use std::{fs, path::Path};
 
@@ -167,7 +169,8 @@ fn things_stand_on_a_ground_and_the_picture_can_be_made_again() {
     fiv(&[&base[..], &["--ground", "--sunk=7", "-o", &at("b.exr")]].concat()).expect(2, &["ground.sunk", "7"]);
     // A quick picture of a single mesh has fewer texels than one of several things.
     let size = |more: &[&str]| {
-        let words = [&base[..], more, &["--json", "--overwrite", "-o", &at("d.exr")]].concat();
+        let out = at("d.exr");
+        let words = [&base[..], more, &["--json", "--overwrite", "-o", &out]].concat();
         let told: Value = serde_json::from_str(&fiv(&words).expect(0, &[]).stdout).unwrap();
         told["config"]["settings"]["fiv"]["size"].as_u64()
     };

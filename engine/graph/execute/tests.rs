@@ -27,7 +27,7 @@ fn said(spoil: impl FnOnce(&mut Plan)) -> Option<Result<(), String>> {
     let options = GpuOptions { print_messages: false, ..GpuOptions::default() };
     let result = testing::run(options, |gpu| {
         if gpu.validation_active() {
-            ran = Some(Runner::new(gpu).execute(&graph, &plan, 0.0, true).map(|_| ()));
+            ran = Some(Runner::new(gpu).execute(&graph, &plan, (0.0, true), &mut |_| {}).map(|_| ()));
         }
     });
     ran.map(|_| result)
@@ -137,7 +137,8 @@ fn long_graphs_run_in_parts_and_short_ones_in_one() {
         assert!(parts == whole);
         // Each of 1024 passes has a mark of its own.
         let mut pace = Pace::default();
-        let mut parts = Parts::new(gpu, "small", Arc::new(()), (&mut pace, Told::new(0, &mut |_| {})));
+        let mut unheard = |_: f64| {};
+        let mut parts = Parts::new(gpu, "small", Arc::new(()), (&mut pace, Told::new(0, &mut unheard)));
         assert_eq!((0..2048).position(|_| parts.is_full(1)), Some(1024));
     });
 }
