@@ -119,7 +119,7 @@ fn pictures_from_files_are_those_without_and_can_be_made_again() {
         fiv(&[&base[..], more].concat())
     };
     picture(&env, &at("a.exr"), &["--vectors", &vectors]).expect(0, &[]);
-    picture(&env, &at("b.exr"), &SMALL).expect(0, &[]);
+    picture(&env, &at("b.exr"), &[&["--full"][..], &SMALL].concat()).expect(0, &[]);
     let pixels = |name: &str| image::read(at(name), &Default::default()).unwrap().main().unwrap().data.clone();
     assert!(pixels("a.exr") == pixels("b.exr"));
     lucerna(["rerun", &at("a.exr")]).expect(0, &[]);
