@@ -20,7 +20,7 @@ const SQUARES: u32 = 96;
 const GREY: Vec3 = Vec3::new(0.694, 0.665, 0.604);
 /// Full vertical angle of the camera in front, radians.
 const YFOV: f32 = 0.7;
-/// Room around a single thing and for its shadow in a picture of it.
+/// Factor on the size of a single thing in a picture of it: room around the thing, and for its shadow.
 const MARGIN: f32 = 1.25;
 
 /// How things are put on a ground.
@@ -89,8 +89,7 @@ struct Fit {
 /// A new scene of `ground.copies` of each of the things, in turns, on a ground in the plane y = 0: a spiral of even density around
 /// the origin. Cameras of the things are left out; three others stand there: `front`, `above`, and `ground`, which sees the ground from
 /// straight above without the things on it, as far as shadows of about 45° reach. A single thing fills the view of the first two.
-/// Animations go on in all copies; lights are those of
-/// the first ones. The environment is the first that a thing has.
+/// Animations go on in all copies; lights are those of the first ones. The environment is the first that a thing has.
 ///
 /// # Errors
 /// `Usage` if a number is out of its range; `Input` if a thing has no triangles.

@@ -223,6 +223,11 @@ impl Material {
     pub fn is_mirror(&self) -> bool {
         self.roughness < 0.05 && self.metallic > 0.5
     }
+
+    /// Metal everywhere, which reflects nearly no light diffusely. A texture of metallic may leave other places; such materials do not count.
+    pub fn is_metal(&self) -> bool {
+        !self.unlit && self.metallic > 0.5 && self.metallic_roughness_texture.is_none()
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

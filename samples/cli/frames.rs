@@ -173,7 +173,7 @@ impl<T: Technique> Work<'_, T> {
             None => picture.read(&mut graph, run.outputs.wants_layers(), false),
         };
         let dump = self.args.dump.as_ref().map(|folder| (folder, graph.dump()));
-        let result = self.runner.run_told(&graph, held, told);
+        let result = self.runner.run_with_progress(&graph, held, told);
         // An interrupted frame is not written, unless it is complete.
         let Some(frame) = unless_stopped(result, self.interrupt)? else { return Ok(None) };
         run.note(&reading.notes(&frame));

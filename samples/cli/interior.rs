@@ -1,7 +1,10 @@
 //! Detects interiors: scenes that a camera should see from the inside.
 
 use glam::Vec3;
-use lucerna::scene::bvh::{Bvh, Ray};
+use lucerna::scene::{
+    Pose, Scene,
+    bvh::{Bvh, Ray},
+};
 
 /// Number of horizontal directions in which rays are traced from each place.
 const DIRECTIONS: u32 = 24;
@@ -70,6 +73,12 @@ impl Way {
     fn wall(self) -> Option<f32> {
         if let Self::Wall(distance) = self { Some(distance) } else { None }
     }
+}
+
+/// Whether a scene is a room that a camera should see from the inside.
+pub fn is_room(scene: &Scene) -> bool {
+    let bvh = Bvh::build(scene, &Pose::playing(scene, 0.0));
+    Survey::of(&bvh).is_some_and(|survey| survey.interior().is_some())
 }
 
 impl<'a> Survey<'a> {

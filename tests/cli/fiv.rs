@@ -1,16 +1,15 @@
 //! `fiv` from the outside: files of vectors, also those of earlier versions, what is wrong with them, pictures. Needs a device (each test
 //! says so when there is none).
 
-use serde_json::Value;
-
-use crate::support;
 use std::{fs, path::Path};
 
-use crate::support::{command, device, files, lucerna, ran};
 use lucerna::{
     image::{self, Layers, WriteOptions},
     techniques::fiv::Stored,
 };
+use serde_json::{Value, json};
+
+use crate::support::{self, command, device, files, lucerna, ran};
 
 const SMALL: [&str; 8] = ["-D", "fiv.azimuths=6", "-D", "fiv.polars=5", "-D", "fiv.radii=4", "-D", "fiv.size=8"];
 
@@ -208,9 +207,53 @@ fn the_first_picture_has_few_vectors_unless_all_are_asked_for() {
     };
     // Only the vectors that the picture needs, unless a setting needs all of them.
     assert_eq!(method(&[]), "online");
+    let single = fiv(&["render", "--builtin", "furnace-sphere", "--print-config"]).expect(0, &[]).stdout;
+    assert!(single.contains("\nsize = 8"), "a single mesh has fewer texels: {single}");
+    let none = fiv(&["render", "--print-config"]).expect(0, &[]).stdout;
+    assert!(none.contains("\nsize = 16"), "{none}");
     for more in [&["--full"][..], &["-D", "fiv.suns=2"], &["-D", "fiv.specular=summed"], &["-D", "fiv.method=vectors"]]
     {
         assert_eq!(method(more), "vectors", "{more:?}");
     }
     fiv(&["render", "--full", "--vectors", "a.fiv"]).expect(2, &["--full", "--vectors"]);
+}
+
+#[test]
+fn metals_are_not_black_in_a_quick_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    // A triangle whose corners are (0 0 0), (1 0 0) and (0 1 0), metres.
+    let gltf = |metallic: f32| {
+        json!({
+            "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
+            "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "material": 0 }] }],
+            "materials": [{ "pbrMetallicRoughness": { "metallicFactor": metallic, "roughnessFactor": 0.5 } }],
+            "accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] }],
+            "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+            "buffers": [{ "byteLength": 36, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA" }]
+        })
+    };
+    let (metal, plastic) = (at("metal.gltf"), at("plastic.gltf"));
+    for (path, metallic) in [(&metal, 1.0), (&plastic, 0.0)] {
+        fs::write(path, gltf(metallic).to_string()).unwrap();
+    }
+    let config = |scene: &str, more: &[&str]| {
+        let words = [&["render", scene, "--environment", "area", "--print-config"], more].concat();
+        fiv(&words).expect(0, &[]).stdout
+    };
+    let has = |config: String, lines: &[&str]| {
+        lines.iter().for_each(|line| assert!(config.contains(&format!("\n{line}")), "{line}: {config}"));
+    };
+    has(config(&metal, &[]), &["specular = \"summed\"", "method = \"vectors\"", "size = 8"]);
+    has(config(&metal, &["-D", "fiv.specular=off"]), &["specular = \"off\"", "method = \"online\""]);
+    has(config(&metal, &["-D", "fiv.method=online"]), &["specular = \"off\"", "method = \"online\""]);
+    has(config(&plastic, &[]), &["specular = \"off\"", "method = \"online\"", "size = 8"]);
+    if !device() {
+        return;
+    }
+    let of = |scene: &str, name: &str| {
+        lucerna(["render", scene, "--environment", "area", "--size", "16x12", "-o", &at(name)]).expect(0, &[]).stderr
+    };
+    assert!(of(&metal, "a.png").contains("technique: isr"));
+    assert!(of(&plastic, "b.png").contains("technique: fiv"));
 }

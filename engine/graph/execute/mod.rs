@@ -16,7 +16,7 @@ use std::{borrow::Borrow, sync::Arc, time::Instant};
 use ash::vk;
 
 use self::{
-    parts::{Pace, Parts, Told},
+    parts::{Pace, Parts, Progress},
     pool::{Memory, Pool, device_format},
     record::Recorder,
 };
@@ -113,7 +113,12 @@ impl Runner {
     ///
     /// # Errors
     /// As [`Runner::run`].
-    pub fn run_told(&mut self, graph: impl Borrow<Graph>, held: bool, told: &mut dyn FnMut(f64)) -> Result<Frame> {
+    pub fn run_with_progress(
+        &mut self,
+        graph: impl Borrow<Graph>,
+        held: bool,
+        told: &mut dyn FnMut(f64),
+    ) -> Result<Frame> {
         self.run_then(graph.borrow(), !held, told)
     }
 
@@ -156,7 +161,7 @@ impl Runner {
         let statistics = self.statistics.as_ref().filter(|_| counted > 0);
         let held = (memory.clone(), self.uniforms.clone(), self.staging.clone());
         let limits = over::limits(&self.gpu, graph, self.dispatch_rays)?;
-        let told = Told::new(over::rays(graph, limits), told);
+        let told = Progress::new(over::rays(graph, limits), told);
         let parts = Parts::new(&self.gpu, graph.name(), Arc::new(held), (&mut self.pace, told));
         let mut commands = parts.begin()?;
         transfer::clear_fresh(&self.gpu, &mut commands, &fresh);

@@ -72,13 +72,13 @@ struct Running {
 }
 
 /// Who is told how much of a graph is done.
-pub(super) struct Told<'a> {
+pub(super) struct Progress<'a> {
     done: u64,
     all: u64,
     told: &'a mut dyn FnMut(f64),
 }
 
-impl<'a> Told<'a> {
+impl<'a> Progress<'a> {
     /// `all`: rays of the graph.
     pub fn new(all: u64, told: &'a mut dyn FnMut(f64)) -> Self {
         Self { done: 0, all, told }
@@ -99,7 +99,7 @@ pub(super) struct Parts<'a> {
     /// The resources of all parts.
     held: Arc<dyn Any + Send + Sync>,
     pace: &'a mut Pace,
-    told: Told<'a>,
+    told: Progress<'a>,
     /// Rays and passes of the part in recording.
     rays: u64,
     passes: u32,
@@ -117,7 +117,7 @@ impl<'a> Parts<'a> {
         gpu: &'a Gpu,
         name: &'a str,
         held: Arc<dyn Any + Send + Sync>,
-        (pace, told): (&'a mut Pace, Told<'a>),
+        (pace, told): (&'a mut Pace, Progress<'a>),
     ) -> Self {
         let running = VecDeque::with_capacity(AHEAD);
         Self { gpu, name, held, pace, told, rays: 0, passes: 0, running, given: 0, ended: None, waited: Duration::ZERO }

@@ -126,7 +126,7 @@ fn long_graphs_run_in_parts_and_short_ones_in_one() {
                     .rays(1 << 25);
             }
             let mut shares = Vec::new();
-            Runner::new(gpu).run_told(&graph, false, &mut |share| shares.push(share)).unwrap();
+            Runner::new(gpu).run_with_progress(&graph, false, &mut |share| shares.push(share)).unwrap();
             shares
         };
         assert!(shares.len() >= 4 && shares.is_sorted(), "{shares:?}");
@@ -138,7 +138,7 @@ fn long_graphs_run_in_parts_and_short_ones_in_one() {
         // Each of 1024 passes has a mark of its own.
         let mut pace = Pace::default();
         let mut unheard = |_: f64| {};
-        let mut parts = Parts::new(gpu, "small", Arc::new(()), (&mut pace, Told::new(0, &mut unheard)));
+        let mut parts = Parts::new(gpu, "small", Arc::new(()), (&mut pace, Progress::new(0, &mut unheard)));
         assert_eq!((0..2048).position(|_| parts.is_full(1)), Some(1024));
     });
 }

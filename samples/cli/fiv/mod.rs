@@ -15,7 +15,7 @@ use lucerna::{
 use lucerna_scenes as builtin;
 
 pub use precompute::{PrecomputeArgs, precompute};
-pub use render::{FivArgs, render};
+pub use render::{FivArgs, has_metals, render};
 pub use steady::{SteadyArgs, steady};
 
 use crate::{args::TalkArgs, console::Console};

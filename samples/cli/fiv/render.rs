@@ -4,20 +4,20 @@ use std::{path::PathBuf, process::ExitCode};
 
 use lucerna::{
     Result,
-    scene::{Pose, bvh::Bvh},
+    scene::Scene,
     technique::{AllLight, Bake},
-    techniques::fiv::{Baked, Fiv, Method, PictureSettings, Settings},
+    techniques::fiv::{Baked, Fiv, Method, PictureSettings, Settings, Specular},
 };
 
 use crate::{
     args::RenderArgs,
-    interior::Survey,
+    interior::is_room,
     last_stage::Staged,
     render::{self, Given},
     stage::Stage,
 };
 
-/// Texels along an edge of the environment's cube in a quick picture of a scene that fills the picture: a quarter of the rays of other scenes.
+/// Texels along an edge of the environment's cube in a quick picture of a scene that fills the picture or has metals: a quarter of the rays of other scenes.
 const COARSE: u32 = 8;
 
 /// Options of `fiv render`.
@@ -40,10 +40,9 @@ pub struct FivArgs {
 ///
 /// # Errors
 /// Any error of the run. Its kind decides the exit code.
-pub fn render(args: &FivArgs, stage: Option<Stage>) -> Result<ExitCode> {
+pub fn render(args: &FivArgs, mut stage: Option<Stage>) -> Result<ExitCode> {
     let baked = args.vectors.as_deref().map(Baked::read).transpose()?;
     let mut given = Given::<Fiv>::by(&args.common, AllLight)?;
-    let mut stage = stage;
     if baked.is_none() && !args.full {
         preview(args, &mut given, &mut stage)?;
     }
@@ -54,51 +53,53 @@ pub fn render(args: &FivArgs, stage: Option<Stage>) -> Result<ExitCode> {
     render::render_on(stage, &args.common, &Given { baked, ..given })
 }
 
-/// A first picture takes seconds and has no smears: only the vectors that its pixels look up are computed, and few of them. Settings of the user hold.
+/// Replaces the defaults by those of a picture in seconds: few vectors, and only those that its pixels look up. Settings of the user stay. Reads the
+/// scene, if it is named.
 fn preview(args: &FivArgs, given: &mut Given<Fiv>, stage: &mut Option<Stage>) -> Result<()> {
-    let settings = &args.common.settings;
+    let RenderArgs { settings, paper, stage: place, talk, .. } = &args.common;
     let over = |fiv: Settings| -> Result<Settings> {
         let base = PictureSettings { fiv, ..given.base.clone() };
-        Ok(Staged::effective(settings, &base, args.common.paper, PictureSettings::validate)?.technique.fiv)
+        Ok(Staged::effective(settings, &base, *paper, PictureSettings::validate)?.technique.fiv)
     };
     let full = over(given.base.fiv.clone())?;
     if !matches!(full.method, Method::Vectors | Method::Online) {
         return Ok(());
     }
-    let mut fewer = Settings::preview();
-    let chosen = over(Settings { method: Method::Online, ..fewer.clone() });
-    // Some settings need stored vectors.
-    let stored = full.of_stored_vectors() != given.base.fiv.of_stored_vectors();
-    if !stored && chosen.is_ok() {
-        fewer.method = Method::Online;
+    let named = place.scene.scene.is_some() || place.scene.builtin.is_some();
+    if stage.is_none() && named {
+        *stage = Some(Stage::open(place)?);
     }
-    if !settings.print_config {
-        let stage = match stage {
-            Some(stage) => stage,
-            None => stage.insert(Stage::open(&args.common.stage)?),
-        };
-        if over(fewer.clone())?.method == Method::Online && fills_the_picture(stage) {
-            fewer.size = COARSE;
-        }
+    let scene = stage.as_ref().map(|stage| &stage.scene);
+    let stored = Settings::preview();
+    let online = Settings { method: Method::Online, ..stored.clone() };
+    // Metals are black without their glossy reflection, whose time grows with the number of texels.
+    let glossy = Settings { size: COARSE, specular: Specular::Summed, ..stored.clone() };
+    let needs_stored = full.of_stored_vectors() != given.base.fiv.of_stored_vectors() || over(online.clone()).is_err();
+    let mut fewer = if needs_stored { stored } else { online };
+    if scene.is_some_and(has_metals) && over(glossy.clone()).is_ok_and(|chosen| chosen.specular == Specular::Summed) {
+        fewer = glossy;
     }
-    let chosen = over(fewer.clone())?;
-    given.base.fiv = fewer;
-    if full != chosen && !settings.print_config {
-        let which =
-            if chosen.method == Method::Online { "only the vectors that the picture needs" } else { "few vectors" };
-        args.common.talk.console().info(&format!(
+    let online = over(fewer.clone())?.method == Method::Online;
+    if online && scene.is_some_and(fills_the_picture) {
+        fewer.size = COARSE;
+    }
+    if full != over(fewer.clone())? && !settings.print_config {
+        let which = if online { "only the vectors that the picture needs" } else { "few vectors" };
+        talk.console().info(&format!(
             "note: {which} are computed, for a quick picture; --full computes all of them, and `fiv precompute` writes all into a file for --vectors",
         ));
     }
+    given.base.fiv = fewer;
     Ok(())
 }
 
+/// Whether a mesh of the scene is of metal.
+pub fn has_metals(scene: &Scene) -> bool {
+    let used = scene.nodes.iter().filter_map(|node| scene.meshes.get(node.mesh? as usize));
+    used.flat_map(|mesh| &mesh.primitives).any(|primitive| scene.materials[primitive.material as usize].is_metal())
+}
+
 /// Whether the scene is a room, or a single mesh: each pixel then shows a surface that shadows itself, which takes many rays.
-fn fills_the_picture(stage: &Stage) -> bool {
-    let scene = &stage.scene;
-    if scene.nodes.iter().filter(|node| node.mesh.is_some()).count() == 1 {
-        return true;
-    }
-    let bvh = Bvh::build(scene, &Pose::playing(scene, 0.0));
-    Survey::of(&bvh).is_some_and(|survey| survey.interior().is_some())
+fn fills_the_picture(scene: &Scene) -> bool {
+    scene.nodes.iter().filter(|node| node.mesh.is_some()).count() == 1 || is_room(scene)
 }

@@ -5,7 +5,6 @@ use std::process::ExitCode;
 use clap::{Args, Subcommand};
 use lucerna::{
     Result,
-    scene::{Pose, bvh::Bvh},
     technique::{Mode, Technique},
     techniques::{fiv::Fiv, igi::Igi, isr::Isr},
 };
@@ -19,7 +18,7 @@ use crate::{
     args::{RenderArgs, TalkArgs},
     daylight::{self, DayArgs},
     fiv::{self, FivArgs},
-    interior::Survey,
+    interior::is_room,
     prt::{self, PrtArgs},
     reference::{self, ReferenceArgs},
     render::{self, Given},
@@ -142,9 +141,7 @@ fn suited(stage: &Stage, sequence: bool) -> (Suited, &'static str) {
     if primitives.iter().any(|primitive| optical(primitive.material)) {
         return (Suited::Igi, "the scene has mirrors or glass");
     }
-    let bvh = Bvh::build(scene, &Pose::playing(scene, 0.0));
-    let room = Survey::of(&bvh).is_some_and(|survey| survey.interior().is_some());
-    if room {
+    if is_room(scene) {
         let why = if lamps {
             "lamps light a room, also from outside of the picture"
         } else {
@@ -153,7 +150,8 @@ fn suited(stage: &Stage, sequence: bool) -> (Suited, &'static str) {
         return (Suited::Igi, why);
     }
     let triangles: usize = primitives.iter().map(|primitive| primitive.indices.len() / 3).sum();
-    if !lamps && !sequence && triangles <= FEW {
+    // Metals take long with `fiv`.
+    if !lamps && !sequence && triangles <= FEW && !fiv::has_metals(scene) {
         return (Suited::Fiv, "an environment alone lights the scene");
     }
     (Suited::Isr, "it is the quickest")
