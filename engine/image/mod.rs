@@ -217,6 +217,14 @@ pub fn encode(format: Format, picture: &Layers, options: &WriteOptions) -> Resul
     Ok((bytes, report))
 }
 
+/// The codes that a PNG file of this layer with eight bits has: red, green and blue of each pixel, without alpha. For windows.
+///
+/// # Errors
+/// `Usage` if the layer has two or more than four channels.
+pub fn screen(layer: &Layer, options: &WriteOptions) -> Result<Vec<[u8; 3]>> {
+    png_file::screen(layer, options)
+}
+
 /// Reads an image file of any of the formats, whatever its name. Errors name the file and the place in it.
 pub fn read(path: impl AsRef<Path>, limits: &Limits) -> Result<Layers> {
     let path = path.as_ref();

@@ -67,6 +67,15 @@ pub(super) fn encode(picture: &Layers, layer: &Layer, options: &WriteOptions, re
     Ok(out)
 }
 
+/// What a PNG file of eight bits would show on a screen: red, green and blue of each pixel, alpha left out.
+pub(super) fn screen(layer: &Layer, options: &WriteOptions) -> Result<Vec<[u8; 3]>> {
+    let colours = layer.colours().ok_or_else(|| {
+        Error::usage(format!("layer {:?} has the channels {}; a screen shows RGB or one channel", layer.name, layer.channels.join(" ")))
+    })?;
+    let source = Samples { layer, colours: &colours, alpha: None, mapping: Mapping::of(layer), options };
+    Ok(source.eight_bits().as_chunks::<3>().0.to_vec())
+}
+
 /// Share of the light of a picture that may lie where alpha is none: a pixel or two at the rim of a mask.
 const HIDDEN: f64 = 0.01;
 

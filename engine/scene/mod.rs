@@ -335,7 +335,7 @@ pub enum LightKind {
     },
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
     pub name: String,
     pub projection: Projection,

@@ -161,8 +161,9 @@ impl Description {
         Ok(idle.collect())
     }
 
-    /// The first condition of a key that is not met; that of a key which it needs comes before it.
-    fn missing(&self, key: &Key, values: &Map<String, Value>) -> Option<String> {
+    /// The first condition of a key that is not met, with the value found: the reason why the key has no effect. That of a key which it needs comes
+    /// before it. `values`: those of all keys.
+    pub fn missing(&self, key: &Key, values: &Map<String, Value>) -> Option<String> {
         key.needs.iter().find_map(|(name, condition)| {
             let deeper = self.key(name).and_then(|needed| self.missing(needed, values));
             deeper.or_else(|| {

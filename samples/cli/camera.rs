@@ -103,7 +103,7 @@ pub enum Choice {
     File(CameraFile),
 }
 
-/// Resolves `--camera` against the names of a scene's cameras: an index, a name, a file, a view of a list (`LIST.toml#NAME`).
+/// Resolves `--camera` against the names of a scene's cameras: an index, a name, numbers, a file, a view of a list (`LIST.toml#NAME`).
 pub fn choose(asked: &str, names: &[&str]) -> Result<Choice> {
     if let Ok(index) = asked.parse::<usize>() {
         return match index < names.len() {
@@ -116,6 +116,9 @@ pub fn choose(asked: &str, names: &[&str]) -> Result<Choice> {
     if let Some(index) = exact.or_else(relaxed) {
         return Ok(Choice::Scene(index));
     }
+    if let Some(camera) = in_numbers(asked)? {
+        return Ok(Choice::File(camera));
+    }
     if let Some((file, view)) = in_list(asked) {
         return ViewList::read(Path::new(file))?.find(view).map(|view| Choice::File(view.camera()));
     }
@@ -124,6 +127,26 @@ pub fn choose(asked: &str, names: &[&str]) -> Result<Choice> {
         return CameraFile::read(path).map(Choice::File);
     }
     Err(unknown(asked, names))
+}
+
+/// The camera of `X,Y,Z,TX,TY,TZ[,FOV[,NEAR]]`: its place and its target in metres, its vertical angle of view in degrees, and its near plane in metres;
+/// `None` if `asked` is no list of six to eight numbers.
+///
+/// # Errors
+/// `Usage` if the numbers make no camera.
+pub fn in_numbers(asked: &str) -> Result<Option<CameraFile>> {
+    let numbers: Option<Vec<f32>> = asked.split(',').map(|number| number.trim().parse().ok()).collect();
+    let Some(numbers) = numbers.filter(|numbers| (6..=8).contains(&numbers.len())) else { return Ok(None) };
+    let camera = CameraFile {
+        position: Vec3::from_slice(&numbers),
+        target: Vec3::from_slice(&numbers[3..]),
+        up: up(),
+        yfov_degrees: numbers.get(6).copied().unwrap_or_else(yfov),
+        znear: numbers.get(7).copied().unwrap_or_else(znear),
+        zfar: None,
+    };
+    camera.check().map_err(|what| Error::usage(what).at("--camera"))?;
+    Ok(Some(camera))
 }
 
 /// Splits `LIST.toml#VIEW` into file and view.
@@ -151,6 +174,18 @@ mod tests {
             assert!(choose(bad, &names).is_err(), "{bad}");
         }
         assert!(choose("fron", &names).unwrap_err().to_string().contains("did you mean 'front'"));
+    }
+
+    #[test]
+    fn numbers_are_a_camera() {
+        let Choice::File(camera) = choose("1, 2,3,1,2,-7", &[]).unwrap() else { panic!() };
+        assert_eq!((camera.position, camera.target), (Vec3::new(1.0, 2.0, 3.0), Vec3::new(1.0, 2.0, -7.0)));
+        assert_eq!((camera.yfov_degrees, camera.znear), (45.0, 0.05));
+        let Choice::File(camera) = choose("1,2,3,1,2,-7,60,0.5", &[]).unwrap() else { panic!() };
+        assert_eq!((camera.yfov_degrees, camera.znear), (60.0, 0.5));
+        for bad in ["1,2,3,1,2,3", "1,2,3,1,9,3", "1,2,3,4,5,6,0", "1,2,3,4,5,6,60,0", "1,2,3,nan,5,6", "1,2,3,4,5", "1,2,3,4,5,6,7,8,9"] {
+            assert_eq!(choose(bad, &[]).unwrap_err().exit_code(), 2, "{bad}");
+        }
     }
 
     #[test]

@@ -3,11 +3,22 @@
 //! glTF lights are in candela and lux: a scene in bright sunlight has radiances of thousands.
 
 use lucerna::image::Layers;
+use lucerna_scenes as builtin;
+
+use crate::record::Source;
 
 /// If the median of the brightest channel is in this range, W/(sr·m²), the exposure stays 0.
 const FINE: std::ops::RangeInclusive<f32> = 0.01..=1.0;
 /// The median after a changed exposure.
 const TARGET: f32 = 0.2;
+
+/// The exposure that suits the lights of a built-in scene, EV; `None` for files.
+pub fn of_source(source: &Source) -> Option<f64> {
+    match source {
+        Source::Builtin(name) => builtin::exposure(name).map(f64::from),
+        Source::File(_) => None,
+    }
+}
 
 /// Whether all pixels are black.
 pub fn is_black(picture: &Layers) -> bool {

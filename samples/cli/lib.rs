@@ -54,4 +54,5 @@ pub mod source;
 pub mod stage;
 pub mod timings;
 pub mod tonemap;
+pub mod view;
 pub mod views;

@@ -6,7 +6,7 @@ use lucerna::scene::{Camera, Pose, Scene, View};
 use crate::{args::Size, camera::CameraFile};
 
 /// A camera in its place.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
     /// Name for files and metadata, never empty.
     pub name: String,

@@ -11,7 +11,6 @@ use lucerna::{
     scene::{Note, NoteKind, Pose, View},
     techniques::tonemap::Operator,
 };
-use lucerna_scenes as builtin;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -24,7 +23,7 @@ use crate::{
     outputs::{ALPHA_LEFT_OUT, Fresh, Outputs},
     pattern::Values,
     program,
-    record::{BakeFile, Record, Source},
+    record::{BakeFile, Record},
     relight::{self, Dark},
     render::Label,
     smooth::{self, Aa, Smooth, SmoothArgs},
@@ -104,10 +103,7 @@ impl<'a> Run<'a> {
         };
         outputs(options.clone())?;
         let stage = stage.map_or_else(|| Stage::open(&args.stage), Ok)?;
-        let suits = match &stage.source {
-            Source::Builtin(name) if !technique.own_light => builtin::exposure(name).map(f64::from),
-            Source::Builtin(_) | Source::File(_) => None,
-        };
+        let suits = exposure::of_source(&stage.source).filter(|_| !technique.own_light);
         if settings.tonemap.is_some() && !technique.radiance {
             let what = format!(
                 "tone mapping needs radiance, but the picture of this mode of {} is not radiance",

@@ -14,7 +14,7 @@ use lucerna::{
 };
 
 /// The curves of `--operator`. Operators that need more of a picture than its exposure are settings (`-D tonemap.operator`).
-const CURVES: [Operator; 5] =
+pub const CURVES: [Operator; 5] =
     [Operator::Linear, Operator::ReinhardGlobal, Operator::Aces, Operator::Agx, Operator::Neutral];
 
 /// The curve without `--operator`.

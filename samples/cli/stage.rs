@@ -44,8 +44,9 @@ pub struct StageArgs {
     #[arg(long, value_name = "WxH", default_value = "1024x768", help_heading = "Picture")]
     pub size: Size,
 
-    /// Camera by name, by index, from a .toml file, or from a list of views (LIST.toml#NAME); default: the scene's first camera
-    #[arg(long, value_name = "NAME|INDEX|FILE", help_heading = "Picture")]
+    /// Camera by name, by index, from a .toml file, from a list of views (LIST.toml#NAME), or at a place that looks at a point:
+    /// X,Y,Z,X,Y,Z in metres, then, if wanted, the vertical angle of view in degrees and the near plane in metres; default: the scene's first camera
+    #[arg(long, value_name = "NAME|INDEX|FILE|NUMBERS", allow_hyphen_values = true, help_heading = "Picture")]
     pub camera: Option<String>,
 
     /// Time of an animated scene, seconds; in a sequence the time of frame 0
@@ -101,7 +102,9 @@ impl Stage {
         lights::add(&mut scene, &args.light, args.sun.as_ref());
         let named_file = || {
             args.camera.as_deref().is_some_and(|asked| {
-                Path::new(asked).is_file() || camera::in_list(asked).is_some_and(|(file, _)| Path::new(file).is_file())
+                Path::new(asked).is_file()
+                    || matches!(camera::in_numbers(asked), Ok(Some(_)))
+                    || camera::in_list(asked).is_some_and(|(file, _)| Path::new(file).is_file())
             })
         };
         let from_file = match &args.eye {
@@ -172,6 +175,9 @@ fn first_placed(scene: &Scene) -> usize {
 fn name_of(file: &str) -> String {
     if let Some((_, view)) = camera::in_list(file) {
         return view.to_owned();
+    }
+    if matches!(camera::in_numbers(file), Ok(Some(_))) {
+        return "view".into();
     }
     Path::new(file).file_stem().map_or_else(|| "camera".into(), |stem| stem.to_string_lossy().into_owned())
 }

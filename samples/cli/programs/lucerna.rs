@@ -23,6 +23,7 @@ use crate::{
     settings_list,
     source::SceneArgs,
     tonemap::TonemapArgs,
+    view::{self, ViewArgs},
     views::{self, command::ViewsArgs},
 };
 
@@ -42,6 +43,9 @@ enum Command {
     /// Render a scene into images, by the technique that suits it or by a named one
     #[command(args_override_self = true)]
     Render(Box<AnyArgs>),
+    /// Open a window: every technique live, beside the path tracer
+    #[command(args_override_self = true)]
+    View(Box<ViewArgs>),
     /// Say what is in a scene, and what of it is not supported
     Inspect {
         #[command(flatten)]
@@ -138,6 +142,7 @@ impl Command {
     fn console(&self) -> Console {
         match self {
             Self::Render(args) => args.talk().console(),
+            Self::View(args) => args.talk.console(),
             Self::Completions { .. } => Console::new(false, 0),
             Self::Man { talk, .. } => talk.console(),
             Self::Views(args) => args.talk.console(),
@@ -171,6 +176,7 @@ fn run(command: Command, console: Console) -> Result<ExitCode> {
     match command {
         // Commands that choose their exit code themselves.
         Command::Render(args) => return args.run(),
+        Command::View(args) => return view::run(*args),
         Command::Reproduce(args) => return experiment::reproduce(&args, console),
         Command::Compare(mut args) => {
             args.tests = listed::expanded(&args.tests)?;

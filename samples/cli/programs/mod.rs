@@ -9,7 +9,7 @@ pub mod isr;
 pub mod lucerna;
 mod pages;
 pub mod prt;
-mod suited;
+pub mod suited;
 pub mod tonemap;
 
 use clap::{Command, CommandFactory};

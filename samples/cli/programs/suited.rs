@@ -105,15 +105,21 @@ enum Suited {
     Fiv,
 }
 
+impl Suited {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Isr => Isr::NAME,
+            Self::Igi => Igi::NAME,
+            Self::Fiv => Fiv::NAME,
+        }
+    }
+}
+
 /// Renders by the technique that suits the scene.
 fn chosen(common: RenderArgs) -> Result<ExitCode> {
     let stage = Stage::open(&common.stage)?;
     let (technique, why) = suited(&stage, common.frames.is_some());
-    let name = match technique {
-        Suited::Isr => Isr::NAME,
-        Suited::Igi => Igi::NAME,
-        Suited::Fiv => Fiv::NAME,
-    };
+    let name = technique.name();
     common
         .talk
         .console()
@@ -123,6 +129,12 @@ fn chosen(common: RenderArgs) -> Result<ExitCode> {
         Suited::Igi => render::render_on(Some(stage), &common, &Given::<Igi>::by(&common, Mode::ALL[0])?),
         Suited::Fiv => fiv::render(&FivArgs { common, vectors: None, full: false }, Some(stage)),
     }
+}
+
+/// Name of the technique that suits a still of a scene, and why it does.
+pub fn by_name(stage: &Stage) -> (&'static str, &'static str) {
+    let (technique, why) = suited(stage, false);
+    (technique.name(), why)
 }
 
 /// The technique that suits a scene, and why it does. `sequence`: several frames are rendered.

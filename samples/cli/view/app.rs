@@ -1,0 +1,477 @@
+//! The window's state, and what it asks its sides for.
+
+use std::{
+    collections::BTreeMap,
+    path::PathBuf,
+    sync::{Arc, mpsc},
+    time::{Duration, Instant},
+};
+
+use egui::Context;
+use glam::Mat4;
+use lucerna::{Error, ErrorKind, Result, gpu::GpuOptions, scene::Pose, techniques::tonemap::Operator};
+
+use super::{
+    ViewArgs, controls, fly::Fly, keys,
+    measured::{Answer, MapOf, Measuring, Question},
+    panel::Descriptions, picture,
+    session::Wake, side::{FilePicture, Side},
+    wanted::{Look, Wanted},
+};
+use crate::{args::Size, placed::Placed, programs::suited, record, stage::{Stage, StageArgs}};
+
+/// What the window shows of both sides.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Compare {
+    /// Side A alone.
+    #[default]
+    One,
+    /// A on the left of a line, B on the right.
+    Split,
+    /// A beside B, each whole.
+    Beside,
+    /// The difference of what both show.
+    Difference,
+    /// A map of a measure.
+    Map(MapOf),
+}
+
+impl Compare {
+    pub const ALL: [(Self, &'static str); 6] = [
+        (Self::One, "A alone"),
+        (Self::Split, "split"),
+        (Self::Beside, "side by side"),
+        (Self::Difference, "difference"),
+        (Self::Map(MapOf::Flip), "FLIP map"),
+        (Self::Map(MapOf::RelativeError), "relative error map"),
+    ];
+}
+
+/// A scene that a thread reads.
+type Reading = mpsc::Receiver<(StageArgs, Result<Stage>)>;
+
+/// A picture that another process writes.
+pub(super) struct Writing {
+    pub file: PathBuf,
+    pub child: std::process::Child,
+}
+
+/// The viewer.
+pub struct Viewer {
+    pub(super) options: GpuOptions,
+    pub(super) wake: Wake,
+    pub(super) args: StageArgs,
+    pub(super) stage: Option<Arc<Stage>>,
+    reading: Option<Reading>,
+    /// The technique was named, so a new scene keeps it.
+    pub(super) named: bool,
+    pub(super) sides: [Side; 2],
+    pub(super) compare: Compare,
+    /// Place of the line between both sides, share of the width.
+    pub(super) divider: f32,
+    /// B is shown alone while a key is held.
+    pub(super) flipped: bool,
+    pub(super) measuring: Option<Measuring>,
+    pub(super) descriptions: Descriptions,
+    /// Of the scene, while `fly` is none.
+    pub(super) camera: usize,
+    pub(super) fly: Option<Fly>,
+    pub(super) seconds: f64,
+    pub(super) playing: bool,
+    pub(super) moved: BTreeMap<usize, Mat4>,
+    /// The lamp that the mouse holds: its node.
+    pub(super) held: Option<usize>,
+    pub(super) exposure: Option<f64>,
+    pub(super) curve: Option<Operator>,
+    pub(super) false_colour: bool,
+    /// Size of the picture on the screen, pixels.
+    pub(super) size: Size,
+    pub(super) panels: bool,
+    pub(super) help: bool,
+    /// Pixel under the mouse.
+    pub(super) pixel: Option<[u32; 2]>,
+    pub(super) message: Option<(String, Instant)>,
+    pub(super) trouble: Option<String>,
+    pub(super) writing: Option<Writing>,
+    last_move: Option<Instant>,
+    files: u64,
+    times: controls::Times,
+}
+
+/// Time after a movement at which the still begins.
+const REST: Duration = Duration::from_millis(180);
+/// Time for which a message stands.
+const MESSAGE: Duration = Duration::from_secs(6);
+
+impl Viewer {
+    /// A viewer that reads the scene of a command line, if it names one.
+    ///
+    /// # Errors
+    /// `Usage` for an unknown technique.
+    pub fn new(args: ViewArgs, wake: Wake) -> Result<Self> {
+        let technique = args.technique.clone();
+        let mut sides = [Side::new("A", technique.as_deref().unwrap_or("isr")), Side::new("B", super::wanted::TRUTH)];
+        sides[0].bake.clone_from(&args.bake);
+        if args.paper {
+            sides[0].set_paper(true);
+        }
+        if let Some(settings) = args.settings(&sides[0])? {
+            sides[0].settings = Arc::new(settings);
+        }
+        let mut viewer = Self {
+            options: args.device.options()?,
+            wake,
+            named: technique.is_some(),
+            sides,
+            compare: args.compare.into(),
+            divider: 0.5,
+            flipped: false,
+            measuring: None,
+            descriptions: Descriptions::default(),
+            stage: None,
+            reading: None,
+            camera: 0,
+            fly: None,
+            seconds: args.stage.time,
+            playing: false,
+            moved: BTreeMap::new(),
+            held: None,
+            exposure: args.exposure,
+            curve: Some(Operator::Aces),
+            false_colour: false,
+            size: Size { width: 0, height: 0 },
+            panels: !args.bare,
+            help: false,
+            pixel: None,
+            message: None,
+            trouble: None,
+            writing: None,
+            last_move: None,
+            files: 0,
+            times: controls::Times::default(),
+            args: args.stage,
+        };
+        let scene = &viewer.args.scene;
+        if scene.scene.is_some() || scene.builtin.is_some() {
+            let args = viewer.args.clone();
+            viewer.read(args);
+        }
+        Ok(viewer)
+    }
+
+    /// Reads a scene on a thread of its own.
+    pub(super) fn read(&mut self, args: StageArgs) {
+        let (sender, receiver) = mpsc::channel();
+        let wake = self.wake.clone();
+        let work = move || {
+            let stage = Stage::open(&args);
+            // The window may be closed.
+            let _ = sender.send((args, stage));
+            (wake.0)();
+        };
+        match std::thread::Builder::new().name("lucerna reads".into()).spawn(work) {
+            Ok(_) => self.reading = Some(receiver),
+            Err(error) => self.trouble = Some(format!("no thread could be started: {error}")),
+        }
+    }
+
+    pub(super) fn is_reading(&self) -> bool {
+        self.reading.is_some()
+    }
+
+    /// Takes a scene that was read.
+    fn take(&mut self) {
+        let Some(reading) = &self.reading else { return };
+        let (args, stage) = match reading.try_recv() {
+            Ok(read) => read,
+            Err(mpsc::TryRecvError::Empty) => return,
+            Err(mpsc::TryRecvError::Disconnected) => {
+                self.reading = None;
+                return;
+            }
+        };
+        self.reading = None;
+        match stage {
+            Ok(stage) => self.open(args, stage),
+            // The scene before stays.
+            Err(error) => self.trouble = Some(error.to_string()),
+        }
+    }
+
+    fn open(&mut self, args: StageArgs, stage: Stage) {
+        self.trouble = None;
+        if !self.named && !self.sides[0].about.baked {
+            let (technique, why) = suited::by_name(&stage);
+            self.sides[0].start_with(technique);
+            self.say(format!("{technique}, because {why}"));
+        }
+        (self.fly, self.camera) = match &stage.eye {
+            record::View::Scene(index) => (None, *index),
+            record::View::File(file) => {
+                let view = stage.placed.view(&Pose::playing(&stage.scene, 0.0), Size { width: 4, height: 3 });
+                (Some(Fly::from_view(&view, stage.placed.camera.projection, (file.target - file.position).length())), 0)
+            }
+        };
+        self.moved.clear();
+        self.held = None;
+        self.seconds = args.time;
+        self.args = args;
+        self.stage = Some(Arc::new(stage));
+    }
+
+    /// Shows a text for some seconds.
+    pub(super) fn say(&mut self, text: impl Into<String>) {
+        self.message = Some((text.into(), Instant::now()));
+    }
+
+    /// Something moves: quick pictures for a moment.
+    pub(super) fn moves(&mut self) {
+        self.last_move = Some(Instant::now());
+    }
+
+    fn is_moving(&self) -> bool {
+        self.playing || self.last_move.is_some_and(|at| at.elapsed() < REST)
+    }
+
+    /// The camera in its place.
+    pub(super) fn placed(&self) -> Option<Placed> {
+        let stage = self.stage.as_ref()?;
+        match &self.fly {
+            Some(fly) => Some(fly.placed()),
+            None => (self.camera < stage.scene.cameras.len()).then(|| Placed::of_scene(&stage.scene, self.camera)),
+        }
+    }
+
+    /// The camera as one that flies: the scene's camera becomes one.
+    pub(super) fn flying(&mut self) -> Option<&mut Fly> {
+        if self.fly.is_none() {
+            let stage = self.stage.clone()?;
+            let placed = self.placed()?;
+            let pose = Pose::playing(&stage.scene, self.seconds as f32);
+            let view = placed.view(&pose, Size { width: 4, height: 3 });
+            // What is in the middle, else the middle of the scene.
+            let (position, middle) = (view.position, controls::middle(&stage));
+            let distance = self.depth_at([self.size.width / 2, self.size.height / 2]).unwrap_or_else(|| position.distance(middle));
+            self.fly = Some(Fly::from_view(&view, placed.camera.projection, distance.max(0.05)));
+        }
+        self.fly.as_mut()
+    }
+
+    /// Distance along the line of sight at a pixel, metres, if the picture has it.
+    pub(super) fn depth_at(&self, [x, y]: [u32; 2]) -> Option<f32> {
+        let shown = self.sides[0].shown()?;
+        let layer = shown.layers.layer("depth")?;
+        let at = (y.min(shown.size.height - 1) * shown.size.width + x.min(shown.size.width - 1)) as usize;
+        layer.data.get(at).copied().filter(|depth| *depth < 1e9)
+    }
+
+    pub(super) fn look(&self) -> Look {
+        if self.false_colour { Look::FalseColour } else { Look::Light(self.curve) }
+    }
+
+    /// The exposure that is shown: that of the user, or the one that suits A.
+    pub(super) fn ev(&self) -> f64 {
+        self.exposure.or_else(|| self.sides[0].shown().map(|shown| shown.exposure)).unwrap_or(0.0)
+    }
+
+    pub(super) fn shows_both(&self) -> bool {
+        self.compare != Compare::One || self.flipped
+    }
+
+    /// The size of a side's picture.
+    pub(super) fn size_of_side(&self) -> Size {
+        match self.compare {
+            Compare::Beside => Size { width: (self.size.width / 2).max(1), height: self.size.height },
+            _ => self.size,
+        }
+    }
+
+    /// Asks the sides for what they are to show.
+    fn ask(&mut self) {
+        let (Some(stage), Some(camera)) = (self.stage.clone(), self.placed()) else { return };
+        let size = self.size_of_side();
+        if size.width < 8 || size.height < 8 {
+            return;
+        }
+        let moving = self.is_moving();
+        let (both, waits) = (self.shows_both(), self.waits());
+        // B has the exposure of A, so that both can be compared.
+        let auto = self.sides[0].shown().filter(|shown| Arc::ptr_eq(&shown.of.stage, &stage)).map(|shown| shown.exposure);
+        for (number, side) in self.sides.iter_mut().enumerate().take(if both { 2 } else { 1 }) {
+            let exposure = self.exposure.or(auto.filter(|_| number == 1));
+            if number == 1 && waits {
+                continue;
+            }
+            let wanted = Wanted {
+                stage: stage.clone(),
+                technique: side.technique,
+                mode: side.mode.clone(),
+                settings: side.settings.clone(),
+                bake: side.bake.clone(),
+                camera: camera.clone(),
+                size,
+                seconds: self.seconds,
+                moved: self.moved.clone(),
+                shows: side.shows.clone(),
+                pictures: side.pictures,
+                samples: side.samples,
+                moving,
+                exposure,
+                look: if self.false_colour { Look::FalseColour } else { Look::Light(self.curve) },
+            };
+            if let Err(error) = side.ask(wanted, &self.options, &self.wake) {
+                self.trouble = Some(error.to_string());
+            }
+        }
+    }
+
+    /// Compares the light of both sides.
+    fn measure(&mut self) -> Result<()> {
+        let (Some((a, of_a, _)), Some((b, of_b, _))) = (self.sides[0].light(), self.sides[1].light()) else { return Ok(()) };
+        if [a.width, a.height] != [b.width, b.height] || self.is_moving() {
+            return Ok(());
+        }
+        let map = if let Compare::Map(map) = self.compare { Some(map) } else { None };
+        let exposure = self.ev();
+        let measuring = match &self.measuring {
+            Some(measuring) => measuring,
+            None => self.measuring.insert(Measuring::start(self.wake.clone())?),
+        };
+        measuring.ask(Question { a, b, of: [of_a, of_b], map, exposure });
+        Ok(())
+    }
+
+    /// The newest numbers.
+    pub(super) fn answer(&self) -> (Option<Arc<Answer>>, Option<String>) {
+        self.measuring.as_ref().map(Measuring::answer).unwrap_or_default()
+    }
+
+    /// Files that were dropped on the window.
+    fn dropped(&mut self, context: &Context) {
+        let files: Vec<PathBuf> = context.input(|input| input.raw.dropped_files.iter().filter_map(|file| file.path.clone()).collect());
+        for file in files {
+            self.open_file(file);
+        }
+    }
+
+    /// Opens a scene, a bake, an environment or a picture, by what the file is.
+    pub(super) fn open_file(&mut self, file: PathBuf) {
+        let extension = file.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+        match extension.as_str() {
+            "gltf" | "glb" | "obj" | "bin" => {
+                let mut args = StageArgs { camera: None, eye: None, ..self.args.clone() };
+                (args.scene.scene, args.scene.builtin, args.scene.unit) = (Some(file), None, None);
+                (args.scene.add, args.scene.set, args.light, args.sun) = (Vec::new(), Vec::new(), Vec::new(), None);
+                self.read(args);
+            }
+            "day" | "prt" | "fiv" => {
+                let technique = match extension.as_str() {
+                    "day" => "daylight",
+                    "prt" => "prt",
+                    _ => "fiv",
+                };
+                self.sides[0].start_with(technique);
+                self.sides[0].bake = Some(file);
+                self.named = true;
+            }
+            "hdr" if self.stage.is_some() => {
+                let args = StageArgs { environment: Some(file), ..self.args.clone() };
+                self.read(args);
+            }
+            "exr" | "png" | "pfm" | "jpg" | "jpeg" | "hdr" => match lucerna::image::read(&file, &lucerna::scene::Limits::default()) {
+                Ok(layers) => {
+                    self.files += 1;
+                    self.say(format!("{} is side B", file.display()));
+                    // Above the numbers of rendered pictures.
+                    let number = (1 << 40) + self.files;
+                    self.sides[1].file = Some(FilePicture { path: file, layers: Arc::new(layers), number });
+                    if self.compare == Compare::One {
+                        self.compare = Compare::Split;
+                    }
+                }
+                Err(error) => self.trouble = Some(error.to_string()),
+            },
+            _ => {
+                let error = Error::new(ErrorKind::Input, "is no scene, bake, environment or picture that the viewer opens")
+                    .in_file(&file)
+                    .help("Scenes: .gltf, .glb, .obj; bakes: .day, .prt, .fiv; environments: .hdr; pictures: .exr, .png, .pfm, .jpg");
+                self.trouble = Some(error.to_string());
+            }
+        }
+    }
+
+    /// Looks after a picture that another process writes.
+    fn written(&mut self, context: &Context) {
+        let Some(writing) = &mut self.writing else { return };
+        match writing.child.try_wait() {
+            Ok(None) => context.request_repaint_after(Duration::from_millis(100)),
+            Ok(Some(status)) if status.success() => {
+                let text = format!("wrote {}", writing.file.display());
+                self.writing = None;
+                self.say(text);
+            }
+            Ok(Some(status)) => {
+                self.trouble = Some(format!("the picture was not written: {status}; the terminal says why"));
+                self.writing = None;
+            }
+            Err(error) => {
+                self.trouble = Some(format!("the picture was not written: {error}"));
+                self.writing = None;
+            }
+        }
+    }
+
+    /// B waits for the exposure of A.
+    fn waits(&self) -> bool {
+        self.exposure.is_none() && self.sides[0].file.is_none() && self.sides[0].shown().is_none()
+    }
+
+    fn advance(&mut self, context: &Context) {
+        if self.playing {
+            let step = context.input(|input| f64::from(input.stable_dt)).min(0.25);
+            let end = self.stage.as_ref().map_or(0.0, |stage| controls::duration(stage));
+            self.seconds = if end > 0.0 { (self.seconds + step) % end } else { 0.0 };
+            self.playing = end > 0.0;
+            context.request_repaint();
+        }
+        if let Some(at) = self.last_move {
+            let since = at.elapsed();
+            match REST.checked_sub(since) {
+                Some(left) => context.request_repaint_after(left + Duration::from_millis(5)),
+                None => self.last_move = None,
+            }
+        }
+        if let Some((_, at)) = &self.message {
+            match MESSAGE.checked_sub(at.elapsed()) {
+                Some(left) => context.request_repaint_after(left),
+                None => self.message = None,
+            }
+        }
+    }
+
+    /// Builds the user interface of a frame.
+    pub fn frame(&mut self, context: &Context) {
+        self.take();
+        self.dropped(context);
+        keys::pressed(self, context);
+        self.advance(context);
+        self.times.pictures(self.sides[0].shown().as_deref());
+        if self.panels {
+            controls::bars(self, context);
+            controls::panel(self, context);
+        }
+        picture::area(self, context);
+        keys::help(self, context);
+        self.written(context);
+        self.ask();
+        if self.shows_both()
+            && let Err(error) = self.measure()
+        {
+            self.trouble = Some(error.to_string());
+        }
+    }
+
+    pub(super) fn times(&self) -> &controls::Times {
+        &self.times
+    }
+}

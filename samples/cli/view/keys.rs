@@ -1,0 +1,237 @@
+//! Keys, and the page that explains them.
+
+use std::{path::PathBuf, process::Command, sync::Arc};
+
+use egui::{Context, Key, Modifiers};
+use glam::Vec3;
+use serde_json::json;
+
+use super::{
+    app::{Compare, Viewer, Writing},
+    command::{self, Common},
+};
+
+/// What keys and the mouse do.
+pub const HELP: [(&str, &str); 24] = [
+    ("Drag", "look around; on a lamp: move the lamp; on the line: move the line"),
+    ("Alt drag, middle drag", "turn around what is in the middle"),
+    ("Shift drag", "move beside the picture"),
+    ("Wheel", "nearer and farther; with Ctrl: speed of flying"),
+    ("Double click", "turn to the surface under the mouse"),
+    ("W A S D, Q E", "fly; with Shift: four times as fast"),
+    ("R", "back to the scene's camera, and lamps to their places"),
+    ("N", "the scene's next camera"),
+    ("Enter", "play or stop the animation"),
+    ("C", "the next way to compare A and B"),
+    ("Space", "B, as long as it is held"),
+    ("Z", "exchange A and B"),
+    ("X", "false colour"),
+    ("+ −, 0", "exposure up and down by half a stop; automatic exposure"),
+    ("P, Shift P", "write the picture of A as .png, as .exr"),
+    ("Ctrl C", "copy the command that makes the picture of A"),
+    ("Ctrl R", "read the scene again"),
+    ("Tab", "show or hide the panels"),
+    ("F1", "this page"),
+    ("F2", "isr, with exponential shadow maps"),
+    ("F3", "isr"),
+    ("F4", "direct light, with exponential shadow maps"),
+    ("F5", "direct light"),
+    ("F10", "the path tracer"),
+];
+
+/// Seconds of a frame at most, for flying: after a pause the camera must not jump.
+const LONGEST: f32 = 0.1;
+
+/// Acts on the keys of a frame.
+pub fn pressed(viewer: &mut Viewer, context: &Context) {
+    let hit = |key: Key| context.input_mut(|input| input.consume_key(Modifiers::NONE, key));
+    if hit(Key::F1) {
+        viewer.help = !viewer.help;
+    }
+    if context.wants_keyboard_input() {
+        return;
+    }
+    if viewer.help && hit(Key::Escape) {
+        viewer.help = false;
+    }
+    // Copying is an event of its own.
+    let copies = context.input(|input| input.events.iter().any(|event| matches!(event, egui::Event::Copy)));
+    if copies {
+        copy(viewer, context);
+    }
+    if context.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::R)) {
+        let args = viewer.args.clone();
+        viewer.read(args);
+    }
+    if context.input_mut(|input| input.consume_key(Modifiers::SHIFT, Key::P)) {
+        screenshot(viewer, "exr");
+    }
+    if hit(Key::P) {
+        screenshot(viewer, "png");
+    }
+    if hit(Key::Tab) {
+        viewer.panels = !viewer.panels;
+    }
+    if hit(Key::C) {
+        let at = Compare::ALL.iter().position(|(compare, _)| *compare == viewer.compare).unwrap_or(0);
+        viewer.compare = Compare::ALL[(at + 1) % Compare::ALL.len()].0;
+    }
+    if hit(Key::Z) {
+        viewer.sides.swap(0, 1);
+    }
+    if hit(Key::X) {
+        viewer.false_colour = !viewer.false_colour;
+    }
+    if hit(Key::R) {
+        viewer.fly = None;
+        viewer.moved.clear();
+        viewer.moves();
+    }
+    if hit(Key::N)
+        && let Some(stage) = &viewer.stage
+    {
+        let next = if viewer.fly.is_some() { viewer.camera } else { viewer.camera + 1 };
+        viewer.camera = next % stage.scene.cameras.len().max(1);
+        viewer.fly = None;
+    }
+    if hit(Key::Enter) {
+        viewer.playing = !viewer.playing;
+    }
+    let brighter = hit(Key::Plus) || hit(Key::Equals) || context.input_mut(|input| input.consume_key(Modifiers::SHIFT, Key::Plus));
+    if brighter {
+        viewer.exposure = Some(viewer.ev() + 0.5);
+    }
+    if hit(Key::Minus) {
+        viewer.exposure = Some(viewer.ev() - 0.5);
+    }
+    if hit(Key::Num0) {
+        viewer.exposure = None;
+    }
+    viewer.flipped = context.input(|input| input.key_down(Key::Space));
+    for (key, mode, shadow) in
+        [(Key::F2, "isr", "exponential"), (Key::F3, "isr", "pcf"), (Key::F4, "direct", "exponential"), (Key::F5, "direct", "pcf")]
+    {
+        if hit(key) {
+            let side = &mut viewer.sides[0];
+            if side.technique != "isr" {
+                side.start_with("isr");
+            }
+            side.mode = mode.to_owned();
+            let mut settings = (*side.settings).clone();
+            settings["shadow"]["kind"] = json!(shadow);
+            side.settings = Arc::new(settings);
+            viewer.named = true;
+        }
+    }
+    if hit(Key::F10) {
+        viewer.sides[0].start_with(super::wanted::TRUTH);
+        viewer.named = true;
+    }
+    flies(viewer, context);
+}
+
+fn flies(viewer: &mut Viewer, context: &Context) {
+    let (way, fast, seconds) = context.input(|input| {
+        if input.modifiers.command || input.modifiers.ctrl {
+            return (Vec3::ZERO, false, 0.0);
+        }
+        let along = |more: Key, less: Key| f32::from(input.key_down(more)) - f32::from(input.key_down(less));
+        let way = Vec3::new(along(Key::D, Key::A), along(Key::E, Key::Q), along(Key::W, Key::S));
+        (way, input.modifiers.shift, input.stable_dt.min(LONGEST))
+    });
+    if way == Vec3::ZERO {
+        return;
+    }
+    if let Some(fly) = viewer.flying() {
+        fly.fly(way, seconds * if fast { 4.0 } else { 1.0 });
+        viewer.moves();
+        context.request_repaint();
+    }
+}
+
+/// The command of side A, or why there is none.
+fn words(viewer: &Viewer) -> Result<Vec<String>, String> {
+    let Some(stage) = &viewer.stage else { return Err("there is no scene".into()) };
+    if !viewer.moved.is_empty() {
+        return Err("a lamp was moved, and no option moves a lamp of a scene (R puts it back)".into());
+    }
+    let common = Common {
+        args: &viewer.args,
+        source: &stage.source,
+        fly: viewer.fly.as_ref(),
+        camera: viewer.camera,
+        size: viewer.size_of_side(),
+        seconds: viewer.seconds,
+        exposure: viewer.ev(),
+        look: viewer.look(),
+    };
+    command::words(&common, &viewer.sides[0]).ok_or_else(|| "no command makes this: it is a file, a layer or false colour".into())
+}
+
+/// Copies the command of side A.
+pub fn copy(viewer: &mut Viewer, context: &Context) {
+    match words(viewer) {
+        Ok(words) => {
+            let text = format!("lucerna {}", command::quoted(&words));
+            context.copy_text(text.clone());
+            viewer.say(format!("copied: {text}"));
+        }
+        Err(why) => viewer.say(format!("not copied: {why}")),
+    }
+}
+
+/// Writes the picture of side A by its command, in another process, so that the file has the metadata and the bytes of `render`.
+pub fn screenshot(viewer: &mut Viewer, extension: &str) {
+    if viewer.writing.is_some() {
+        viewer.say("a picture is being written already");
+        return;
+    }
+    let words = match words(viewer) {
+        Ok(words) => words,
+        Err(why) => {
+            viewer.say(format!("not written: {why}"));
+            return;
+        }
+    };
+    let name = viewer.stage.as_ref().map_or_else(|| "scene".to_owned(), |stage| stage.scene.name.clone());
+    let name: String = name.chars().map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' }).collect();
+    let file = free(&name, viewer.sides[0].technique, extension);
+    let started = std::env::current_exe()
+        .and_then(|program| Command::new(program).args(words).arg("-q").arg("-o").arg(&file).spawn());
+    match started {
+        Ok(child) => {
+            viewer.say(format!("writing {}", file.display()));
+            viewer.writing = Some(Writing { file, child });
+        }
+        Err(error) => viewer.trouble = Some(format!("the picture could not be written: {error}")),
+    }
+}
+
+/// The first name that no file has.
+fn free(scene: &str, technique: &str, extension: &str) -> PathBuf {
+    let name = |number: u32| PathBuf::from(format!("{scene}-{technique}-{number:03}.{extension}"));
+    (1..10_000).map(name).find(|file| !file.exists()).unwrap_or_else(|| name(10_000))
+}
+
+/// The page of keys.
+pub fn help(viewer: &mut Viewer, context: &Context) {
+    let mut open = viewer.help;
+    egui::Window::new("Keys and mouse").open(&mut open).resizable(false).collapsible(false).anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]).show(
+        context,
+        |ui| {
+            egui::Grid::new("keys").num_columns(2).spacing([24.0, 5.0]).show(ui, |ui| {
+                for (key, what) in HELP {
+                    ui.strong(key);
+                    ui.label(what);
+                    ui.end_row();
+                }
+            });
+        },
+    );
+    viewer.help = open;
+    // For a scene that does not move, playing would draw for ever.
+    if viewer.playing && viewer.stage.as_ref().is_some_and(|stage| stage.scene.animations.is_empty()) {
+        viewer.playing = false;
+        viewer.say("the scene has no animation");
+    }
+}

@@ -1,0 +1,261 @@
+//! The thread that renders what a side of the window wants. The newest request counts; older ones are dropped.
+//!
+//! While something moves, pictures are quick: one for each request, and smaller ones where a whole one takes long. At rest a still follows that `render`
+//! would write, bit by bit. A request interrupts a still, and quick pictures that take more than a second.
+
+use std::{
+    sync::{
+        Arc, Condvar, Mutex, MutexGuard,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+    },
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+use lucerna::{
+    Error, ErrorKind, Result, Stop,
+    gpu::{Gpu, GpuOptions},
+};
+
+use super::{
+    painted::Painter,
+    still, truth,
+    wanted::{Shown, Wanted},
+};
+
+/// A quick picture that takes longer may be interrupted by the next request.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// What the thread does.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Doing {
+    #[default]
+    Nothing,
+    /// Opens the device, or prepares a technique. Finished and whole number of units, if they are known.
+    Preparing(String, Option<(u64, u64)>),
+    /// Renders, with the share that is done.
+    Rendering(f64),
+}
+
+/// A thread that renders.
+#[derive(Debug)]
+pub struct Session {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// What the thread and the window share.
+#[derive(Debug)]
+pub(super) struct Shared {
+    state: Mutex<State>,
+    changed: Condvar,
+    /// Asks the device to stop.
+    stop: Arc<AtomicBool>,
+    numbers: AtomicU64,
+    waker: Wake,
+}
+
+/// Tells the window that there is something new.
+#[derive(Clone)]
+pub struct Wake(pub Arc<dyn Fn() + Send + Sync>);
+
+impl std::fmt::Debug for Wake {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Wake")
+    }
+}
+
+#[derive(Debug, Default)]
+struct State {
+    /// The newest request, until the thread takes it.
+    wanted: Option<Wanted>,
+    shown: Option<Arc<Shown>>,
+    failed: Option<Arc<Error>>,
+    doing: Doing,
+    /// Device and driver.
+    device: String,
+    /// When the present picture was begun.
+    begun: Option<Instant>,
+    /// A request interrupts the present work at once.
+    fine: bool,
+    closing: bool,
+}
+
+impl Session {
+    /// Starts the thread. `name`: for debuggers.
+    ///
+    /// # Errors
+    /// `Runtime` if the system gives no thread.
+    pub fn start(name: &str, options: GpuOptions, waker: Wake) -> Result<Self> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let shared = Arc::new(Shared {
+            state: Mutex::default(),
+            changed: Condvar::new(),
+            stop: stop.clone(),
+            numbers: AtomicU64::new(0),
+            waker,
+        });
+        let options = GpuOptions { stop: Some(Stop::by(stop)), ..options };
+        let (name, of_thread) = (format!("lucerna {name}"), shared.clone());
+        let thread = std::thread::Builder::new().name(name).spawn(move || of_thread.work(&options));
+        let thread = thread
+            .map_err(|error| Error::new(ErrorKind::Runtime, "no thread for the picture could be started").caused_by(error))?;
+        Ok(Self { shared, thread: Some(thread) })
+    }
+
+    /// Asks for a picture. A request that is not begun yet is dropped.
+    pub fn ask(&self, wanted: Wanted) {
+        let mut state = self.shared.lock();
+        let late = state.begun.is_some_and(|begun| begun.elapsed() > PATIENCE);
+        if state.fine || late {
+            self.shared.stop.store(true, Ordering::Relaxed);
+        }
+        state.wanted = Some(wanted);
+        drop(state);
+        self.shared.changed.notify_all();
+    }
+
+    /// The newest picture.
+    pub fn shown(&self) -> Option<Arc<Shown>> {
+        self.shared.lock().shown.clone()
+    }
+
+    /// What the thread does, and why the last request failed.
+    pub fn status(&self) -> (Doing, Option<Arc<Error>>) {
+        let state = self.shared.lock();
+        (state.doing.clone(), state.failed.clone())
+    }
+
+    /// Device and driver; empty until the device is open.
+    pub fn device(&self) -> String {
+        self.shared.lock().device.clone()
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        self.shared.lock().closing = true;
+        self.shared.stop.store(true, Ordering::Relaxed);
+        self.shared.changed.notify_all();
+        if let Some(thread) = self.thread.take() {
+            // A panic of the thread was reported by the hook of the program.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+
+    /// Waits for the next request; `None`: the window closes.
+    pub fn next(&self) -> Option<Wanted> {
+        let mut state = self.lock();
+        (state.begun, state.fine) = (None, false);
+        if state.wanted.is_none() && std::mem::take(&mut state.doing) != Doing::Nothing {
+            (self.waker.0)();
+        }
+        loop {
+            if state.closing {
+                return None;
+            }
+            if let Some(wanted) = state.wanted.take() {
+                // From here on only a newer request stops the device.
+                self.stop.store(false, Ordering::Relaxed);
+                state.begun = Some(Instant::now());
+                state.failed = None;
+                return Some(wanted);
+            }
+            state = self.changed.wait(state).unwrap_or_else(|poisoned| poisoned.into_inner());
+        }
+    }
+
+    /// A newer request waits, or the window closes.
+    pub fn is_old(&self) -> bool {
+        let state = self.lock();
+        state.closing || state.wanted.is_some()
+    }
+
+    /// From here on a request interrupts the work at once. False: there is one already.
+    pub fn may_be_interrupted(&self) -> bool {
+        let mut state = self.lock();
+        state.fine = true;
+        !state.closing && state.wanted.is_none()
+    }
+
+    pub fn does(&self, doing: Doing) {
+        let changed = {
+            let mut state = self.lock();
+            std::mem::replace(&mut state.doing, doing.clone()) != doing
+        };
+        if changed {
+            (self.waker.0)();
+        }
+    }
+
+    pub fn is_on(&self, device: String) {
+        self.lock().device = device;
+    }
+
+    pub fn show(&self, shown: Shown) {
+        let shown = Shown { number: self.numbers.fetch_add(1, Ordering::Relaxed) + 1, ..shown };
+        self.lock().shown = Some(Arc::new(shown));
+        (self.waker.0)();
+    }
+
+    /// Reports the failure of a request, unless a newer one is the reason.
+    pub fn fail(&self, error: Error) {
+        let asked = self.stop.load(Ordering::Relaxed);
+        if asked && matches!(error.kind(), ErrorKind::Interrupted | ErrorKind::DeviceLost) {
+            return;
+        }
+        self.lock().failed = Some(Arc::new(error));
+        (self.waker.0)();
+    }
+
+    /// Renders requests until the window closes. A lost device is opened again for the next request.
+    fn work(&self, options: &GpuOptions) {
+        let mut next = self.next();
+        while let Some(wanted) = next {
+            self.does(Doing::Preparing("the device".into(), None));
+            let gpu = match Gpu::new(options.clone()) {
+                Ok(gpu) => gpu,
+                Err(error) => {
+                    self.fail(error);
+                    next = self.next();
+                    continue;
+                }
+            };
+            self.is_on(gpu.describe().to_string());
+            next = self.work_on(&gpu, wanted);
+        }
+    }
+
+    /// Renders requests on a device until it is lost. Returns the request that is to be rendered on a new one.
+    fn work_on(&self, gpu: &Gpu, first: Wanted) -> Option<Wanted> {
+        let mut painter = Painter::new(gpu);
+        let mut wanted = first;
+        loop {
+            let (used, result) = if wanted.is_truth() {
+                (wanted.clone(), truth::work(self, gpu, &mut painter, wanted))
+            } else {
+                (wanted.clone(), still::work(self, gpu, &mut painter, wanted))
+            };
+            wanted = match result {
+                Ok(Some(next)) => next,
+                Ok(None) => return None,
+                Err(error) => {
+                    let lost = error.kind() == ErrorKind::DeviceLost;
+                    let asked = self.stop.load(Ordering::Relaxed);
+                    self.fail(error);
+                    if lost {
+                        // A device that was stopped within a pass counts as lost. The request that stopped it comes next.
+                        return if asked { self.next() } else { Some(used).filter(|_| !self.is_old()).or_else(|| self.next()) };
+                    }
+                    self.next()?
+                }
+            };
+        }
+    }
+}

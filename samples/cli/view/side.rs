@@ -1,0 +1,195 @@
+//! One side of the window: what it shows, and the thread that renders it.
+
+use std::{path::PathBuf, sync::Arc};
+
+use egui::{ColorImage, Context, TextureHandle, TextureOptions};
+use lucerna::{Result, gpu::GpuOptions, image::Layers};
+use serde_json::Value;
+
+use super::{
+    live::{self, About},
+    painted,
+    session::{Session, Wake},
+    wanted::{Shown, Shows, TRUTH, Wanted},
+};
+use crate::{args::Size, smooth};
+
+/// Paths a pixel after which the path tracer rests.
+const SAMPLES: u64 = 1024;
+
+/// A picture of a file beside rendered ones.
+#[derive(Clone, Debug)]
+pub struct FilePicture {
+    pub path: PathBuf,
+    pub layers: Arc<Layers>,
+    pub number: u64,
+}
+
+/// A side of the window.
+pub struct Side {
+    name: &'static str,
+    pub technique: &'static str,
+    pub about: About,
+    pub mode: String,
+    pub settings: Arc<Value>,
+    pub bake: Option<PathBuf>,
+    pub pictures: u32,
+    pub samples: u64,
+    pub shows: Shows,
+    /// Shown in the place of a technique.
+    pub file: Option<FilePicture>,
+    session: Option<Session>,
+    asked: Option<Wanted>,
+    texture: Option<(u64, TextureHandle)>,
+}
+
+impl std::fmt::Debug for Side {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Side {} ({})", self.name, self.technique)
+    }
+}
+
+impl Side {
+    /// A side that shows a technique; the path tracer for an unknown name.
+    pub fn new(name: &'static str, technique: &str) -> Self {
+        let known = lucerna::techniques::NAMES.iter().copied().find(|known| *known == technique).unwrap_or(TRUTH);
+        let about = live::about(known).unwrap_or_else(|| About {
+            about: "",
+            modes: Vec::new(),
+            settings: Value::Null,
+            paper: None,
+            baked: false,
+            cheap: true,
+        });
+        let mut side = Self {
+            name,
+            technique: known,
+            mode: String::new(),
+            settings: Arc::new(about.settings.clone()),
+            about,
+            bake: None,
+            pictures: 1,
+            samples: SAMPLES,
+            shows: Shows::Picture,
+            file: None,
+            session: None,
+            asked: None,
+            texture: None,
+        };
+        side.start_with(known);
+        side
+    }
+
+    /// Shows another technique, with its defaults.
+    pub fn start_with(&mut self, technique: &'static str) {
+        let Some(about) = live::about(technique) else { return };
+        self.technique = technique;
+        self.mode = about.modes.first().map(|(name, _)| (*name).to_owned()).unwrap_or_default();
+        self.settings = Arc::new(preview(technique, &about));
+        // `render` takes the mean of several pictures where one takes about a second on a CPU driver.
+        self.pictures = if about.cheap { smooth::STILL } else { 1 };
+        self.shows = Shows::Picture;
+        self.about = about;
+    }
+
+    /// The settings of the paper, or the defaults.
+    pub fn set_paper(&mut self, paper: bool) {
+        let settings = self.about.paper.clone().filter(|_| paper);
+        self.settings = Arc::new(settings.unwrap_or_else(|| preview(self.technique, &self.about)));
+    }
+
+    /// The settings that a fresh side of this technique has.
+    pub fn defaults(&self) -> Value {
+        preview(self.technique, &self.about)
+    }
+
+    /// Asks for a picture, unless it was asked for already.
+    ///
+    /// # Errors
+    /// As [`Session::start`].
+    pub fn ask(&mut self, wanted: Wanted, options: &GpuOptions, wake: &Wake) -> Result<()> {
+        let known = |before: &Wanted| {
+            before.same_light(&wanted) && before.exposure == wanted.exposure && before.look == wanted.look
+        };
+        if self.file.is_some() || self.asked.as_ref().is_some_and(known) {
+            return Ok(());
+        }
+        let session = match &self.session {
+            Some(session) => session,
+            None => self.session.insert(Session::start(self.name, options.clone(), wake.clone())?),
+        };
+        session.ask(wanted.clone());
+        self.asked = Some(wanted);
+        Ok(())
+    }
+
+    pub fn session(&self) -> Option<&Session> {
+        self.session.as_ref()
+    }
+
+    /// The newest rendered picture.
+    pub fn shown(&self) -> Option<Arc<Shown>> {
+        self.session.as_ref()?.shown().filter(|_| self.file.is_none())
+    }
+
+    /// The light that is shown, its number, and whether it is finished.
+    pub fn light(&self) -> Option<(Arc<Layers>, u64, bool)> {
+        match &self.file {
+            Some(file) => Some((file.layers.clone(), file.number, true)),
+            None => self.shown().map(|shown| (shown.layers.clone(), shown.number, shown.finished)),
+        }
+    }
+
+    /// The codes that are shown, with their size.
+    pub fn codes(&self, ev: f64) -> Option<(Size, Vec<[u8; 3]>)> {
+        match &self.file {
+            Some(FilePicture { layers, .. }) => {
+                Some((Size { width: layers.width, height: layers.height }, painted::of_file(layers, ev)))
+            }
+            None => self.shown().map(|shown| (shown.size, shown.pixels.clone())),
+        }
+    }
+
+    /// The newest picture as a texture, and whether its pixels are those of the screen.
+    pub fn texture(&mut self, context: &Context, ev: f64) -> Option<(TextureHandle, bool)> {
+        let (number, size, whole) = match (&self.file, self.shown()) {
+            (Some(file), _) => {
+                // Another exposure is another texture.
+                (file.number ^ ev.to_bits(), Size { width: file.layers.width, height: file.layers.height }, true)
+            }
+            (None, Some(shown)) => (shown.number, shown.size, shown.whole),
+            (None, None) => return None,
+        };
+        let fresh = self.texture.as_ref().is_some_and(|(of, _)| *of == number);
+        if !fresh {
+            let (_, codes) = self.codes(ev)?;
+            let image = image_of(size, &codes);
+            let options = if whole { TextureOptions::NEAREST } else { TextureOptions::LINEAR };
+            match &mut self.texture {
+                Some((of, texture)) => {
+                    texture.set(image, options);
+                    *of = number;
+                }
+                none => *none = Some((number, context.load_texture(self.name, image, options))),
+            }
+        }
+        self.texture.as_ref().map(|(_, texture)| (texture.clone(), whole))
+    }
+}
+
+/// A texture's image of codes.
+pub fn image_of(size: Size, codes: &[[u8; 3]]) -> ColorImage {
+    let pixels = codes.iter().map(|[r, g, b]| egui::Color32::from_rgb(*r, *g, *b)).collect();
+    ColorImage::new([size.width as usize, size.height as usize], pixels)
+}
+
+/// The settings with which a technique begins: its defaults, and for `fiv` those of a picture in seconds.
+fn preview(technique: &str, about: &About) -> Value {
+    use lucerna::techniques::fiv::{Fiv, Method, PictureSettings, Settings};
+    if technique != <Fiv as lucerna::technique::Technique>::NAME {
+        return about.settings.clone();
+    }
+    let quick = Settings { method: Method::Online, size: 8, ..Settings::preview() };
+    let staged = crate::last_stage::Staged { technique: PictureSettings { fiv: quick, ..PictureSettings::default() }, tonemap: None };
+    crate::config::to_value(&staged).unwrap_or_else(|_| about.settings.clone())
+}

@@ -1,0 +1,146 @@
+//! What a side of the window shows, and what it has: the messages between the window and the thread that renders.
+
+use std::{collections::BTreeMap, path::PathBuf, sync::Arc, time::Instant};
+
+use glam::Mat4;
+use lucerna::{
+    Result,
+    image::Layers,
+    scene::{Pose, View},
+    techniques::tonemap::Operator,
+    tracer,
+};
+use serde_json::Value;
+
+use crate::{args::Size, placed::Placed, stage::Stage};
+
+/// Name of the path tracer among the techniques; it makes a picture that grows.
+pub const TRUTH: &str = <tracer::Reference as lucerna::technique::Technique>::NAME;
+
+/// How the light of a picture is shown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Look {
+    /// As `render` writes it into a .png file, with this curve.
+    Light(Option<Operator>),
+    /// Luminance as colours, five decades.
+    FalseColour,
+}
+
+/// A part of a frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Shows {
+    /// The light of the technique.
+    #[default]
+    Picture,
+    /// A layer of the file: albedo, normal, depth, …
+    Layer(String),
+    /// An image of the render graph.
+    Image(String),
+}
+
+/// A request for a picture.
+#[derive(Clone, Debug)]
+pub struct Wanted {
+    pub stage: Arc<Stage>,
+    /// One of [`lucerna::techniques::NAMES`].
+    pub technique: &'static str,
+    /// Name of the mode of the technique.
+    pub mode: String,
+    /// Of the technique, and of the tone mapping after it.
+    pub settings: Arc<Value>,
+    /// File of a bake.
+    pub bake: Option<PathBuf>,
+    pub camera: Placed,
+    pub size: Size,
+    /// Time of an animated scene.
+    pub seconds: f64,
+    /// Lamps that were moved or turned: node and its place in the world.
+    pub moved: BTreeMap<usize, Mat4>,
+    pub shows: Shows,
+    /// Pictures of the mean of a still.
+    pub pictures: u32,
+    /// Paths a pixel of the path tracer.
+    pub samples: u64,
+    /// The camera, a lamp or the time moves, so that a quick picture is better than a fine one.
+    pub moving: bool,
+    /// EV; `None`: the one that suits the picture.
+    pub exposure: Option<f64>,
+    pub look: Look,
+}
+
+impl Wanted {
+    /// Whether another request is for the same light, shown in the same way or in another one.
+    pub fn same_light(&self, other: &Self) -> bool {
+        self.same_scene(other)
+            && self.mode == other.mode
+            && self.settings == other.settings
+            && self.camera == other.camera
+            && self.size == other.size
+            && self.seconds == other.seconds
+            && self.moved == other.moved
+            && self.shows == other.shows
+            && self.pictures == other.pictures
+            && self.samples == other.samples
+            && self.moving == other.moving
+    }
+
+    /// Whether another request is for the same technique in the same scene.
+    pub fn same_scene(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.stage, &other.stage) && self.technique == other.technique && self.bake == other.bake
+    }
+
+    pub fn is_truth(&self) -> bool {
+        self.technique == TRUTH
+    }
+
+    /// The pose and the view, at a size of the picture.
+    ///
+    /// # Errors
+    /// As [`Stage::at`].
+    pub fn placed(&self, size: Size) -> Result<(Pose, View)> {
+        let (mut pose, _) = self.stage.at(self.seconds, size)?;
+        for (node, place) in &self.moved {
+            if let Some(world) = pose.world.get_mut(*node) {
+                *world = *place;
+            }
+        }
+        let view = self.camera.view(&pose, size);
+        Ok((pose, view))
+    }
+}
+
+/// The time of a pass on the device.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PassTime {
+    pub name: String,
+    pub milliseconds: f64,
+}
+
+/// A picture that a thread has made.
+#[derive(Debug)]
+pub struct Shown {
+    /// Counts the pictures of a session.
+    pub number: u64,
+    pub size: Size,
+    /// Red, green and blue of each pixel on the screen.
+    pub pixels: Vec<[u8; 3]>,
+    /// The light, and the layers of a still.
+    pub layers: Arc<Layers>,
+    pub exposure: f64,
+    /// The picture is finished: no better one follows for the same request.
+    pub finished: bool,
+    /// It was rendered in the size that was asked for.
+    pub whole: bool,
+    /// The request.
+    pub of: Wanted,
+    pub milliseconds: f64,
+    pub passes: Arc<Vec<PassTime>>,
+    /// Names of the images of the render graph.
+    pub images: Arc<Vec<String>>,
+    pub notes: Vec<String>,
+    /// Paths a pixel of the path tracer.
+    pub samples: f64,
+    /// Estimated relative mean squared error of the path tracer.
+    pub noise: Option<f64>,
+    pub at: Instant,
+}
