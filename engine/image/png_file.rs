@@ -70,7 +70,11 @@ pub(super) fn encode(picture: &Layers, layer: &Layer, options: &WriteOptions, re
 /// What a PNG file of eight bits would show on a screen: red, green and blue of each pixel, alpha left out.
 pub(super) fn screen(layer: &Layer, options: &WriteOptions) -> Result<Vec<[u8; 3]>> {
     let colours = layer.colours().ok_or_else(|| {
-        Error::usage(format!("layer {:?} has the channels {}; a screen shows RGB or one channel", layer.name, layer.channels.join(" ")))
+        Error::usage(format!(
+            "layer {:?} has the channels {}; a screen shows RGB or one channel",
+            layer.name,
+            layer.channels.join(" ")
+        ))
     })?;
     let source = Samples { layer, colours: &colours, alpha: None, mapping: Mapping::of(layer), options };
     Ok(source.eight_bits().as_chunks::<3>().0.to_vec())

@@ -183,7 +183,15 @@ mod tests {
         assert_eq!((camera.yfov_degrees, camera.znear), (45.0, 0.05));
         let Choice::File(camera) = choose("1,2,3,1,2,-7,60,0.5", &[]).unwrap() else { panic!() };
         assert_eq!((camera.yfov_degrees, camera.znear), (60.0, 0.5));
-        for bad in ["1,2,3,1,2,3", "1,2,3,1,9,3", "1,2,3,4,5,6,0", "1,2,3,4,5,6,60,0", "1,2,3,nan,5,6", "1,2,3,4,5", "1,2,3,4,5,6,7,8,9"] {
+        for bad in [
+            "1,2,3,1,2,3",
+            "1,2,3,1,9,3",
+            "1,2,3,4,5,6,0",
+            "1,2,3,4,5,6,60,0",
+            "1,2,3,nan,5,6",
+            "1,2,3,4,5",
+            "1,2,3,4,5,6,7,8,9",
+        ] {
             assert_eq!(choose(bad, &[]).unwrap_err().exit_code(), 2, "{bad}");
         }
     }

@@ -12,13 +12,26 @@ use glam::Mat4;
 use lucerna::{Error, ErrorKind, Result, gpu::GpuOptions, scene::Pose, techniques::tonemap::Operator};
 
 use super::{
-    ViewArgs, controls, fly::Fly, keys,
+    ViewArgs,
+    cameras::Cameras,
+    controls,
+    fly::Fly,
+    keys,
     measured::{Answer, MapOf, Measuring, Question},
-    panel::Descriptions, picture,
-    session::Wake, side::{FilePicture, Side},
+    panel::Descriptions,
+    picture,
+    session::Wake,
+    side::{FilePicture, Side},
     wanted::{Look, Wanted},
+    watch::Watch,
 };
-use crate::{args::Size, placed::Placed, programs::suited, record, stage::{Stage, StageArgs}};
+use crate::{
+    args::Size,
+    placed::Placed,
+    programs::suited,
+    record,
+    stage::{Stage, StageArgs},
+};
 
 /// What the window shows of both sides.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -76,6 +89,7 @@ pub struct Viewer {
     /// Of the scene, while `fly` is none.
     pub(super) camera: usize,
     pub(super) fly: Option<Fly>,
+    pub(super) cameras: Cameras,
     pub(super) seconds: f64,
     pub(super) playing: bool,
     pub(super) moved: BTreeMap<usize, Mat4>,
@@ -94,6 +108,7 @@ pub struct Viewer {
     pub(super) trouble: Option<String>,
     pub(super) writing: Option<Writing>,
     last_move: Option<Instant>,
+    watch: Option<Watch>,
     files: u64,
     times: controls::Times,
 }
@@ -112,6 +127,7 @@ impl Viewer {
         let technique = args.technique.clone();
         let mut sides = [Side::new("A", technique.as_deref().unwrap_or("isr")), Side::new("B", super::wanted::TRUTH)];
         sides[0].bake.clone_from(&args.bake);
+        sides.iter_mut().for_each(|side| side.samples = args.spp);
         if args.paper {
             sides[0].set_paper(true);
         }
@@ -132,6 +148,7 @@ impl Viewer {
             reading: None,
             camera: 0,
             fly: None,
+            cameras: Cameras::default(),
             seconds: args.stage.time,
             playing: false,
             moved: BTreeMap::new(),
@@ -147,6 +164,7 @@ impl Viewer {
             trouble: None,
             writing: None,
             last_move: None,
+            watch: None,
             files: 0,
             times: controls::Times::default(),
             args: args.stage,
@@ -200,6 +218,18 @@ impl Viewer {
 
     fn open(&mut self, args: StageArgs, stage: Stage) {
         self.trouble = None;
+        self.watch = match &stage.source {
+            record::Source::File(file) => Some(Watch::start(file.into(), self.wake.clone())),
+            record::Source::Builtin(_) => None,
+        };
+        if self.stage.as_ref().is_some_and(|before| before.source == stage.source) {
+            // The same scene again: camera, time and technique stay.
+            self.camera = self.camera.min(stage.scene.cameras.len().saturating_sub(1));
+            self.moved.retain(|node, _| stage.scene.nodes.get(*node).is_some_and(|node| node.light.is_some()));
+            (self.args, self.stage) = (args, Some(Arc::new(stage)));
+            self.say("the scene was read again");
+            return;
+        }
         if !self.named && !self.sides[0].about.baked {
             let (technique, why) = suited::by_name(&stage);
             self.sides[0].start_with(technique);
@@ -251,7 +281,8 @@ impl Viewer {
             let view = placed.view(&pose, Size { width: 4, height: 3 });
             // What is in the middle, else the middle of the scene.
             let (position, middle) = (view.position, controls::middle(&stage));
-            let distance = self.depth_at([self.size.width / 2, self.size.height / 2]).unwrap_or_else(|| position.distance(middle));
+            let distance =
+                self.depth_at([self.size.width / 2, self.size.height / 2]).unwrap_or_else(|| position.distance(middle));
             self.fly = Some(Fly::from_view(&view, placed.camera.projection, distance.max(0.05)));
         }
         self.fly.as_mut()
@@ -296,7 +327,8 @@ impl Viewer {
         let moving = self.is_moving();
         let (both, waits) = (self.shows_both(), self.waits());
         // B has the exposure of A, so that both can be compared.
-        let auto = self.sides[0].shown().filter(|shown| Arc::ptr_eq(&shown.of.stage, &stage)).map(|shown| shown.exposure);
+        let auto =
+            self.sides[0].shown().filter(|shown| Arc::ptr_eq(&shown.of.stage, &stage)).map(|shown| shown.exposure);
         for (number, side) in self.sides.iter_mut().enumerate().take(if both { 2 } else { 1 }) {
             let exposure = self.exposure.or(auto.filter(|_| number == 1));
             if number == 1 && waits {
@@ -327,7 +359,9 @@ impl Viewer {
 
     /// Compares the light of both sides.
     fn measure(&mut self) -> Result<()> {
-        let (Some((a, of_a, _)), Some((b, of_b, _))) = (self.sides[0].light(), self.sides[1].light()) else { return Ok(()) };
+        let (Some((a, of_a, _)), Some((b, of_b, _))) = (self.sides[0].light(), self.sides[1].light()) else {
+            return Ok(());
+        };
         if [a.width, a.height] != [b.width, b.height] || self.is_moving() {
             return Ok(());
         }
@@ -348,7 +382,8 @@ impl Viewer {
 
     /// Files that were dropped on the window.
     fn dropped(&mut self, context: &Context) {
-        let files: Vec<PathBuf> = context.input(|input| input.raw.dropped_files.iter().filter_map(|file| file.path.clone()).collect());
+        let files: Vec<PathBuf> =
+            context.input(|input| input.raw.dropped_files.iter().filter_map(|file| file.path.clone()).collect());
         for file in files {
             self.open_file(file);
         }
@@ -374,27 +409,33 @@ impl Viewer {
                 self.sides[0].bake = Some(file);
                 self.named = true;
             }
+            "toml" => match self.cameras.read(&file) {
+                Ok(count) => self.say(format!("{count} cameras of {}", file.display())),
+                Err(error) => self.trouble = Some(error.to_string()),
+            },
             "hdr" if self.stage.is_some() => {
                 let args = StageArgs { environment: Some(file), ..self.args.clone() };
                 self.read(args);
             }
-            "exr" | "png" | "pfm" | "jpg" | "jpeg" | "hdr" => match lucerna::image::read(&file, &lucerna::scene::Limits::default()) {
-                Ok(layers) => {
-                    self.files += 1;
-                    self.say(format!("{} is side B", file.display()));
-                    // Above the numbers of rendered pictures.
-                    let number = (1 << 40) + self.files;
-                    self.sides[1].file = Some(FilePicture { path: file, layers: Arc::new(layers), number });
-                    if self.compare == Compare::One {
-                        self.compare = Compare::Split;
+            "exr" | "png" | "pfm" | "jpg" | "jpeg" | "hdr" => {
+                match lucerna::image::read(&file, &lucerna::scene::Limits::default()) {
+                    Ok(layers) => {
+                        self.files += 1;
+                        self.say(format!("{} is side B", file.display()));
+                        // Above the numbers of rendered pictures.
+                        let number = (1 << 40) + self.files;
+                        self.sides[1].file = Some(FilePicture { path: file, layers: Arc::new(layers), number });
+                        if self.compare == Compare::One {
+                            self.compare = Compare::Split;
+                        }
                     }
+                    Err(error) => self.trouble = Some(error.to_string()),
                 }
-                Err(error) => self.trouble = Some(error.to_string()),
-            },
+            }
             _ => {
                 let error = Error::new(ErrorKind::Input, "is no scene, bake, environment or picture that the viewer opens")
                     .in_file(&file)
-                    .help("Scenes: .gltf, .glb, .obj; bakes: .day, .prt, .fiv; environments: .hdr; pictures: .exr, .png, .pfm, .jpg");
+                    .help("Scenes: .gltf, .glb, .obj; bakes: .day, .prt, .fiv; cameras: .toml; environments: .hdr; pictures: .exr, .png, .pfm, .jpg");
                 self.trouble = Some(error.to_string());
             }
         }
@@ -451,6 +492,10 @@ impl Viewer {
 
     /// Builds the user interface of a frame.
     pub fn frame(&mut self, context: &Context) {
+        if self.reading.is_none() && self.watch.as_ref().is_some_and(Watch::changed) {
+            let args = self.args.clone();
+            self.read(args);
+        }
         self.take();
         self.dropped(context);
         keys::pressed(self, context);

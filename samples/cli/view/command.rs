@@ -30,7 +30,11 @@ pub fn words(common: &Common<'_>, side: &Side) -> Option<Vec<String>> {
     let truth = side.technique == TRUTH;
     let mut out: Vec<String> = Vec::new();
     let mut say = |words: &[&str]| out.extend(words.iter().map(|&word| word.to_owned()));
-    if truth { say(&["reference"]) } else { say(&["render", side.technique]) }
+    if truth {
+        say(&["reference"])
+    } else {
+        say(&["render", side.technique])
+    }
     scene(common, &mut say);
     say(&["--size", &common.size.to_string()]);
     match common.fly {
@@ -126,9 +130,8 @@ fn scene(common: &Common<'_>, say: &mut impl FnMut(&[&str])) {
 
 /// Words as a shell reads them.
 pub fn quoted(words: &[String]) -> String {
-    let plain = |word: &str| {
-        !word.is_empty() && word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c))
-    };
+    let plain =
+        |word: &str| !word.is_empty() && word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c));
     let quote = |word: &String| if plain(word) { word.clone() } else { format!("'{}'", word.replace('\'', r"'\''")) };
     words.iter().map(quote).collect::<Vec<_>>().join(" ")
 }

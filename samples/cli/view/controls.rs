@@ -11,7 +11,7 @@ use lucerna::{
 
 use super::{
     app::{Compare, Viewer},
-    keys, painted, panel,
+    cameras, keys, painted, panel,
     session::Doing,
     side::Side,
     wanted::{Shown, Shows, TRUTH},
@@ -46,7 +46,9 @@ impl Times {
     pub fn rate(&self) -> f64 {
         let recent: Vec<_> = self.at.iter().filter(|at| at.elapsed().as_secs_f64() < 1.0).collect();
         match (recent.first(), recent.last()) {
-            (Some(first), Some(last)) if recent.len() > 1 => (recent.len() - 1) as f64 / last.duration_since(**first).as_secs_f64().max(1e-3),
+            (Some(first), Some(last)) if recent.len() > 1 => {
+                (recent.len() - 1) as f64 / last.duration_since(**first).as_secs_f64().max(1e-3)
+            }
             _ => 0.0,
         }
     }
@@ -56,7 +58,8 @@ impl Times {
 pub fn middle(stage: &Stage) -> Vec3 {
     let pose = Pose::playing(&stage.scene, 0.0);
     let places = stage.scene.nodes.iter().zip(&pose.world).filter(|(node, _)| node.mesh.is_some());
-    let (sum, count) = places.fold((Vec3::ZERO, 0.0), |(sum, count), (_, world)| (sum + world.w_axis.truncate(), count + 1.0));
+    let (sum, count) =
+        places.fold((Vec3::ZERO, 0.0), |(sum, count), (_, world)| (sum + world.w_axis.truncate(), count + 1.0));
     if count > 0.0 { sum / count } else { Vec3::ZERO }
 }
 
@@ -73,13 +76,16 @@ pub fn bars(viewer: &mut Viewer, context: &Context) {
             let name = viewer.stage.as_ref().map_or("no scene", |stage| stage.scene.name.as_str());
             ui.label(name);
             ui.separator();
-            egui::ComboBox::from_id_salt("compare").selected_text(name_of(viewer.compare)).width(130.0).show_ui(ui, |ui| {
-                for (compare, name) in Compare::ALL {
-                    ui.selectable_value(&mut viewer.compare, compare, name);
-                }
-            })
-            .response
-            .on_hover_text("How A and B are shown (C)");
+            egui::ComboBox::from_id_salt("compare")
+                .selected_text(name_of(viewer.compare))
+                .width(130.0)
+                .show_ui(ui, |ui| {
+                    for (compare, name) in Compare::ALL {
+                        ui.selectable_value(&mut viewer.compare, compare, name);
+                    }
+                })
+                .response
+                .on_hover_text("How A and B are shown (C)");
             if viewer.shows_both() {
                 numbers(viewer, ui);
             }
@@ -87,13 +93,27 @@ pub fn bars(viewer: &mut Viewer, context: &Context) {
                 if ui.button("?").on_hover_text("Keys and mouse (F1)").clicked() {
                     viewer.help = !viewer.help;
                 }
-                if ui.button("PNG").on_hover_text("Write the picture of A as a .png file, by the command that `Copy as command` gives (P)").clicked() {
+                if ui
+                    .button("PNG")
+                    .on_hover_text(
+                        "Write the picture of A as a .png file, by the command that `Copy as command` gives (P)",
+                    )
+                    .clicked()
+                {
                     keys::screenshot(viewer, "png");
                 }
-                if ui.button("EXR").on_hover_text("Write the light and all layers of A as an .exr file (Shift P)").clicked() {
+                if ui
+                    .button("EXR")
+                    .on_hover_text("Write the light and all layers of A as an .exr file (Shift P)")
+                    .clicked()
+                {
                     keys::screenshot(viewer, "exr");
                 }
-                if ui.button("Copy as command").on_hover_text("The command line that makes the picture of A (Ctrl C)").clicked() {
+                if ui
+                    .button("Copy as command")
+                    .on_hover_text("The command line that makes the picture of A (Ctrl C)")
+                    .clicked()
+                {
                     keys::copy(viewer, ui.ctx());
                 }
             });
@@ -118,8 +138,9 @@ fn numbers(viewer: &Viewer, ui: &mut Ui) {
     let text = format!("relMSE {:.2e}  FLIP {:.4}  energy {:.3}", answer.rel_mse, answer.flip, answer.energy);
     let text = RichText::new(text).monospace();
     // Numbers of pictures that are no longer shown are grey.
-    ui.label(if answer.of == now { text } else { text.weak() })
-        .on_hover_text("A beside B, the reference: relative mean squared error, FLIP of what the screen shows, sum of the light");
+    ui.label(if answer.of == now { text } else { text.weak() }).on_hover_text(
+        "A beside B, the reference: relative mean squared error, FLIP of what the screen shows, sum of the light",
+    );
     if let Some(noise) = viewer.sides[1].shown().and_then(|shown| shown.noise) {
         ui.monospace(format!("noise of B {noise:.1e}"))
             .on_hover_text("Estimated relative mean squared error of B alone: a relMSE near it says nothing about A");
@@ -176,7 +197,9 @@ fn state(side: &Side, name: &str, ui: &mut Ui) {
     let text = match (&doing, shown.as_deref()) {
         (Doing::Preparing(what, None), _) => format!("{name}: preparing {what}"),
         (Doing::Preparing(what, Some((done, all))), _) => format!("{name}: preparing {what}, {done} of {all}"),
-        (_, Some(shown)) if shown.samples > 0.0 => format!("{name}: {size}, {:.0} of {} paths a pixel", shown.samples, side.samples),
+        (_, Some(shown)) if shown.samples > 0.0 => {
+            format!("{name}: {size}, {:.0} of {} paths a pixel", shown.samples, side.samples)
+        }
         (_, Some(shown)) => format!("{name}: {size}, {:.0} ms", shown.milliseconds),
         (_, None) => format!("{name}: the first picture"),
     };
@@ -263,7 +286,8 @@ fn picture(viewer: &mut Viewer, ui: &mut Ui) {
 fn camera(viewer: &mut Viewer, ui: &mut Ui) {
     let Some(stage) = viewer.stage.clone() else { return };
     egui::CollapsingHeader::new("Camera and time").default_open(true).show(ui, |ui| {
-        let names: Vec<String> = stage.scene.cameras.iter().enumerate().map(|(i, camera)| super::fly::name_of(camera, i)).collect();
+        let names: Vec<String> =
+            stage.scene.cameras.iter().enumerate().map(|(i, camera)| super::fly::name_of(camera, i)).collect();
         let now = match &viewer.fly {
             Some(_) => "free".to_owned(),
             None => names.get(viewer.camera).cloned().unwrap_or_default(),
@@ -276,6 +300,9 @@ fn camera(viewer: &mut Viewer, ui: &mut Ui) {
                     }
                 }
             });
+            if ui.button("Keep").on_hover_text("Keep this camera in the list below (K)").clicked() {
+                cameras::keep(viewer);
+            }
             if ui.button("Copy").on_hover_text("The camera as --camera has it").clicked()
                 && let Some(fly) = viewer.flying()
             {
@@ -283,13 +310,19 @@ fn camera(viewer: &mut Viewer, ui: &mut Ui) {
                 ui.ctx().copy_text(numbers);
             }
             if let Some(fly) = &mut viewer.fly {
-                ui.add(egui::DragValue::new(&mut fly.speed).speed(0.02).range(0.01..=1000.0).suffix(" m/s")).on_hover_text("Speed of flying (Ctrl wheel)");
+                ui.add(egui::DragValue::new(&mut fly.speed).speed(0.02).range(0.01..=1000.0).suffix(" m/s"))
+                    .on_hover_text("Speed of flying (Ctrl wheel)");
             }
         });
+        cameras::rows(viewer, ui);
         let end = duration(&stage);
         if end > 0.0 {
             ui.horizontal(|ui| {
-                if ui.button(if viewer.playing { "⏸" } else { "▶" }).on_hover_text("Play the animation (Enter)").clicked() {
+                if ui
+                    .button(if viewer.playing { "⏸" } else { "▶" })
+                    .on_hover_text("Play the animation (Enter)")
+                    .clicked()
+                {
                     viewer.playing = !viewer.playing;
                 }
                 if ui.add(egui::Slider::new(&mut viewer.seconds, 0.0..=end).suffix(" s")).changed() {
@@ -303,7 +336,8 @@ fn camera(viewer: &mut Viewer, ui: &mut Ui) {
 /// The lamps of the scene: places and directions.
 fn lamps(viewer: &mut Viewer, ui: &mut Ui) {
     let Some(stage) = viewer.stage.clone() else { return };
-    let lamps: Vec<(usize, u32)> = stage.scene.nodes.iter().enumerate().filter_map(|(node, of)| Some((node, of.light?))).collect();
+    let lamps: Vec<(usize, u32)> =
+        stage.scene.nodes.iter().enumerate().filter_map(|(node, of)| Some((node, of.light?))).collect();
     if lamps.is_empty() {
         return;
     }
@@ -311,17 +345,27 @@ fn lamps(viewer: &mut Viewer, ui: &mut Ui) {
         let pose = Pose::playing(&stage.scene, viewer.seconds as f32);
         for (node, light) in lamps {
             let Some(of) = stage.scene.lights.get(light as usize) else { continue };
-            let Some(world) = viewer.moved.get(&node).copied().or_else(|| pose.world.get(node).copied()) else { continue };
-            let name = [&stage.scene.nodes[node].name, &of.name].into_iter().find(|name| !name.is_empty()).map_or("lamp", String::as_str);
+            let Some(world) = viewer.moved.get(&node).copied().or_else(|| pose.world.get(node).copied()) else {
+                continue;
+            };
+            let name = [&stage.scene.nodes[node].name, &of.name]
+                .into_iter()
+                .find(|name| !name.is_empty())
+                .map_or("lamp", String::as_str);
             ui.horizontal(|ui| {
                 ui.add(egui::Label::new(name).truncate());
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    if ui.add_visible(viewer.moved.contains_key(&node), egui::Button::new("⟲").small().frame(false)).on_hover_text("Back to its place").clicked() {
+                    if ui
+                        .add_visible(viewer.moved.contains_key(&node), egui::Button::new("⟲").small().frame(false))
+                        .on_hover_text("Back to its place")
+                        .clicked()
+                    {
                         viewer.moved.remove(&node);
                         viewer.moves();
                         return;
                     }
-                    let moved = if matches!(of.kind, LightKind::Directional) { sun(ui, world) } else { place(ui, world) };
+                    let moved =
+                        if matches!(of.kind, LightKind::Directional) { sun(ui, world) } else { place(ui, world) };
                     if let Some(moved) = moved {
                         viewer.moved.insert(node, moved);
                         viewer.moves();
@@ -337,7 +381,10 @@ fn place(ui: &mut Ui, world: Mat4) -> Option<Mat4> {
     let mut place = world.w_axis.truncate();
     let mut changed = false;
     for axis in (0..3).rev() {
-        changed |= ui.add(egui::DragValue::new(&mut place[axis]).speed(0.01).max_decimals(2)).on_hover_text("Metres; the lamp can also be dragged in the picture").changed();
+        changed |= ui
+            .add(egui::DragValue::new(&mut place[axis]).speed(0.01).max_decimals(2))
+            .on_hover_text("Metres; the lamp can also be dragged in the picture")
+            .changed();
     }
     let mut moved = world;
     moved.w_axis = place.extend(1.0);
@@ -348,8 +395,12 @@ fn place(ui: &mut Ui, world: Mat4) -> Option<Mat4> {
 fn sun(ui: &mut Ui, world: Mat4) -> Option<Mat4> {
     let to_sun = world.transform_vector3(Vec3::Z).normalize_or(Vec3::Y);
     let (mut azimuth, mut elevation) = angles(to_sun);
-    let mut changed = ui.add(egui::DragValue::new(&mut elevation).speed(0.3).range(-90.0..=90.0).suffix("° up")).changed();
-    changed |= ui.add(egui::DragValue::new(&mut azimuth).speed(0.5).suffix("°")).on_hover_text("Azimuth: 0 over +Z, 90 over +X").changed();
+    let mut changed =
+        ui.add(egui::DragValue::new(&mut elevation).speed(0.3).range(-90.0..=90.0).suffix("° up")).changed();
+    changed |= ui
+        .add(egui::DragValue::new(&mut azimuth).speed(0.5).suffix("°"))
+        .on_hover_text("Azimuth: 0 over +Z, 90 over +X")
+        .changed();
     changed.then(|| turned(azimuth, elevation))
 }
 
@@ -431,9 +482,12 @@ fn technique(viewer: &mut Viewer, number: usize, ui: &mut Ui) {
             ui.add(egui::DragValue::new(&mut side.samples).speed(8.0).range(1..=1_048_576));
         } else {
             ui.label("Pictures of a still");
-            ui.add(egui::DragValue::new(&mut side.pictures).speed(0.1).range(1..=1024)).on_hover_text("Anti-aliasing at rest: --aa");
+            ui.add(egui::DragValue::new(&mut side.pictures).speed(0.1).range(1..=1024))
+                .on_hover_text("Anti-aliasing at rest: --aa");
         }
-        if side.about.paper.is_some() && ui.button("Paper").on_hover_text("The settings of the paper (--paper)").clicked() {
+        if side.about.paper.is_some()
+            && ui.button("Paper").on_hover_text("The settings of the paper (--paper)").clicked()
+        {
             side.set_paper(true);
         }
         if ui.button("Defaults").clicked() {
@@ -473,20 +527,23 @@ fn shows(side: &mut Side, ui: &mut Ui) {
 fn passes(viewer: &Viewer, ui: &mut Ui) {
     let Some(shown) = viewer.sides[0].shown().filter(|shown| !shown.passes.is_empty()) else { return };
     let all: f64 = shown.passes.iter().map(|pass| pass.milliseconds).sum();
-    egui::CollapsingHeader::new(format!("Passes of A: {all:.1} ms")).id_salt("passes").default_open(false).show(ui, |ui| {
-        history(viewer, ui);
-        for pass in shown.passes.iter() {
-            let share = if all > 0.0 { (pass.milliseconds / all) as f32 } else { 0.0 };
-            ui.horizontal(|ui| {
-                let (rect, _) = ui.allocate_exact_size(egui::vec2(60.0, 10.0), egui::Sense::hover());
-                let filled = egui::Rect::from_min_size(rect.min, egui::vec2(rect.width() * share, rect.height()));
-                ui.painter().rect_filled(rect, 1.0, ui.visuals().extreme_bg_color);
-                ui.painter().rect_filled(filled, 1.0, ui.visuals().selection.bg_fill);
-                ui.monospace(format!("{:7.2} ms", pass.milliseconds));
-                ui.add(egui::Label::new(RichText::new(&pass.name).small()).truncate()).on_hover_text(&pass.name);
-            });
-        }
-    });
+    egui::CollapsingHeader::new(format!("Passes of A: {all:.1} ms")).id_salt("passes").default_open(false).show(
+        ui,
+        |ui| {
+            history(viewer, ui);
+            for pass in shown.passes.iter() {
+                let share = if all > 0.0 { (pass.milliseconds / all) as f32 } else { 0.0 };
+                ui.horizontal(|ui| {
+                    let (rect, _) = ui.allocate_exact_size(egui::vec2(60.0, 10.0), egui::Sense::hover());
+                    let filled = egui::Rect::from_min_size(rect.min, egui::vec2(rect.width() * share, rect.height()));
+                    ui.painter().rect_filled(rect, 1.0, ui.visuals().extreme_bg_color);
+                    ui.painter().rect_filled(filled, 1.0, ui.visuals().selection.bg_fill);
+                    ui.monospace(format!("{:7.2} ms", pass.milliseconds));
+                    ui.add(egui::Label::new(RichText::new(&pass.name).small()).truncate()).on_hover_text(&pass.name);
+                });
+            }
+        },
+    );
 }
 
 /// The times of the last pictures as bars.
@@ -499,7 +556,8 @@ fn history(viewer: &Viewer, ui: &mut Ui) {
     for (index, time) in times.iter().enumerate() {
         let height = rect.height() * (time / most) as f32;
         let x = rect.left() + width * index as f32;
-        let bar = egui::Rect::from_min_max(egui::pos2(x, rect.bottom() - height), egui::pos2(x + width * 0.8, rect.bottom()));
+        let bar =
+            egui::Rect::from_min_max(egui::pos2(x, rect.bottom() - height), egui::pos2(x + width * 0.8, rect.bottom()));
         ui.painter().rect_filled(bar, 0.0, ui.visuals().selection.bg_fill);
     }
     response.on_hover_text(format!("Times of the last {} pictures, at most {most:.0} ms", times.len()));

@@ -46,6 +46,23 @@ impl Fly {
         fly
     }
 
+    /// The camera of a file. Its up vector is lost: this one always stands upright.
+    pub fn from_file(file: &CameraFile) -> Self {
+        let way = file.target - file.position;
+        let distance = way.length().max(1e-3);
+        let mut fly = Self {
+            position: file.position,
+            yaw: 0.0,
+            pitch: 0.0,
+            distance,
+            yfov_degrees: file.yfov_degrees,
+            znear: file.znear,
+            speed: distance.clamp(0.05, 1000.0) * 0.5,
+        };
+        fly.look(way.normalize_or(Vec3::NEG_Z));
+        fly
+    }
+
     fn look(&mut self, forward: Vec3) {
         self.pitch = forward.y.clamp(-1.0, 1.0).asin().clamp(-STEEPEST, STEEPEST);
         self.yaw = (-forward.x).atan2(-forward.z);

@@ -8,11 +8,12 @@ use serde_json::json;
 
 use super::{
     app::{Compare, Viewer, Writing},
+    cameras,
     command::{self, Common},
 };
 
 /// What keys and the mouse do.
-pub const HELP: [(&str, &str); 24] = [
+pub const HELP: [(&str, &str); 25] = [
     ("Drag", "look around; on a lamp: move the lamp; on the line: move the line"),
     ("Alt drag, middle drag", "turn around what is in the middle"),
     ("Shift drag", "move beside the picture"),
@@ -21,6 +22,7 @@ pub const HELP: [(&str, &str); 24] = [
     ("W A S D, Q E", "fly; with Shift: four times as fast"),
     ("R", "back to the scene's camera, and lamps to their places"),
     ("N", "the scene's next camera"),
+    ("K", "keep the camera in the list of cameras"),
     ("Enter", "play or stop the animation"),
     ("C", "the next way to compare A and B"),
     ("Space", "B, as long as it is held"),
@@ -94,10 +96,14 @@ pub fn pressed(viewer: &mut Viewer, context: &Context) {
         viewer.camera = next % stage.scene.cameras.len().max(1);
         viewer.fly = None;
     }
+    if hit(Key::K) {
+        cameras::keep(viewer);
+    }
     if hit(Key::Enter) {
         viewer.playing = !viewer.playing;
     }
-    let brighter = hit(Key::Plus) || hit(Key::Equals) || context.input_mut(|input| input.consume_key(Modifiers::SHIFT, Key::Plus));
+    let brighter =
+        hit(Key::Plus) || hit(Key::Equals) || context.input_mut(|input| input.consume_key(Modifiers::SHIFT, Key::Plus));
     if brighter {
         viewer.exposure = Some(viewer.ev() + 0.5);
     }
@@ -108,9 +114,12 @@ pub fn pressed(viewer: &mut Viewer, context: &Context) {
         viewer.exposure = None;
     }
     viewer.flipped = context.input(|input| input.key_down(Key::Space));
-    for (key, mode, shadow) in
-        [(Key::F2, "isr", "exponential"), (Key::F3, "isr", "pcf"), (Key::F4, "direct", "exponential"), (Key::F5, "direct", "pcf")]
-    {
+    for (key, mode, shadow) in [
+        (Key::F2, "isr", "exponential"),
+        (Key::F3, "isr", "pcf"),
+        (Key::F4, "direct", "exponential"),
+        (Key::F5, "direct", "pcf"),
+    ] {
         if hit(key) {
             let side = &mut viewer.sides[0];
             if side.technique != "isr" {
@@ -165,7 +174,8 @@ fn words(viewer: &Viewer) -> Result<Vec<String>, String> {
         exposure: viewer.ev(),
         look: viewer.look(),
     };
-    command::words(&common, &viewer.sides[0]).ok_or_else(|| "no command makes this: it is a file, a layer or false colour".into())
+    command::words(&common, &viewer.sides[0])
+        .ok_or_else(|| "no command makes this: it is a file, a layer or false colour".into())
 }
 
 /// Copies the command of side A.
@@ -208,17 +218,20 @@ pub fn screenshot(viewer: &mut Viewer, extension: &str) {
 }
 
 /// The first name that no file has.
-fn free(scene: &str, technique: &str, extension: &str) -> PathBuf {
-    let name = |number: u32| PathBuf::from(format!("{scene}-{technique}-{number:03}.{extension}"));
+pub fn free(scene: &str, what: &str, extension: &str) -> PathBuf {
+    let name = |number: u32| PathBuf::from(format!("{scene}-{what}-{number:03}.{extension}"));
     (1..10_000).map(name).find(|file| !file.exists()).unwrap_or_else(|| name(10_000))
 }
 
 /// The page of keys.
 pub fn help(viewer: &mut Viewer, context: &Context) {
     let mut open = viewer.help;
-    egui::Window::new("Keys and mouse").open(&mut open).resizable(false).collapsible(false).anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]).show(
-        context,
-        |ui| {
+    egui::Window::new("Keys and mouse")
+        .open(&mut open)
+        .resizable(false)
+        .collapsible(false)
+        .anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0])
+        .show(context, |ui| {
             egui::Grid::new("keys").num_columns(2).spacing([24.0, 5.0]).show(ui, |ui| {
                 for (key, what) in HELP {
                     ui.strong(key);
@@ -226,8 +239,7 @@ pub fn help(viewer: &mut Viewer, context: &Context) {
                     ui.end_row();
                 }
             });
-        },
-    );
+        });
     viewer.help = open;
     // For a scene that does not move, playing would draw for ever.
     if viewer.playing && viewer.stage.as_ref().is_some_and(|stage| stage.scene.animations.is_empty()) {

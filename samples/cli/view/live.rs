@@ -15,7 +15,11 @@ use lucerna::{
 use serde_json::Value;
 
 use crate::{
-    config::SettingsArgs, exposure, last_stage::{LastStage, Staged}, smooth::{Filter, Mean, Smooth}, stage::Stage,
+    config::SettingsArgs,
+    exposure,
+    last_stage::{LastStage, Staged},
+    smooth::{Filter, Mean, Smooth},
+    stage::Stage,
     view::wanted::{Shows, Wanted},
 };
 
@@ -265,5 +269,6 @@ pub fn with(name: &str, settings: &Value, args: &SettingsArgs) -> Result<Value> 
             crate::config::to_value(&Staged::effective(self.1, &base, false, T::Settings::validate)?)
         }
     }
-    techniques::visit(name, Over(settings, args)).unwrap_or_else(|| Err(Error::usage(format!("there is no technique {name:?}"))))
+    techniques::visit(name, Over(settings, args))
+        .unwrap_or_else(|| Err(Error::usage(format!("there is no technique {name:?}"))))
 }

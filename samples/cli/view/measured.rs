@@ -1,9 +1,7 @@
 //! Numbers and maps of two sides, computed beside the window.
 
 use std::{
-    sync::{
-        Arc, Condvar, Mutex, MutexGuard,
-    },
+    sync::{Arc, Condvar, Mutex, MutexGuard},
     thread::JoinHandle,
 };
 
@@ -90,9 +88,11 @@ impl Measuring {
     pub fn start(waker: Wake) -> Result<Self> {
         let shared = Arc::new((Mutex::new(State::default()), Condvar::new()));
         let of_thread = shared.clone();
-        let thread = std::thread::Builder::new().name("lucerna measures".into()).spawn(move || work(&of_thread, &waker));
         let thread =
-            thread.map_err(|error| Error::new(ErrorKind::Runtime, "no thread for measures could be started").caused_by(error))?;
+            std::thread::Builder::new().name("lucerna measures".into()).spawn(move || work(&of_thread, &waker));
+        let thread = thread.map_err(|error| {
+            Error::new(ErrorKind::Runtime, "no thread for measures could be started").caused_by(error)
+        })?;
         Ok(Self { shared, thread: Some(thread) })
     }
 
@@ -178,7 +178,8 @@ mod tests {
 
     #[test]
     fn numbers_are_those_of_the_measures() {
-        let question = Question { a: grey(0.4, 16), b: grey(0.5, 16), of: [1, 2], map: Some(MapOf::RelativeError), exposure: 0.0 };
+        let question =
+            Question { a: grey(0.4, 16), b: grey(0.5, 16), of: [1, 2], map: Some(MapOf::RelativeError), exposure: 0.0 };
         let found = answer(&question).unwrap();
         assert!((found.energy - 0.8).abs() < 1e-6);
         // (0.1)² / (0.5² + 0.01), in each channel.

@@ -4,6 +4,7 @@
 //! for painting. Pictures go through host memory: they are the bytes that `render` would write.
 
 mod app;
+mod cameras;
 mod command;
 mod controls;
 mod fly;
@@ -18,6 +19,7 @@ mod side;
 mod still;
 mod truth;
 mod wanted;
+mod watch;
 
 use std::{path::PathBuf, process::ExitCode, sync::Arc};
 
@@ -93,6 +95,10 @@ pub struct ViewArgs {
     /// Begin without bars and panel (Tab shows them)
     #[arg(long, help_heading = "Window")]
     pub bare: bool,
+
+    /// Paths a pixel after which the path tracer rests
+    #[arg(long, value_name = "N", default_value_t = side::SAMPLES, value_parser = clap::value_parser!(u64).range(1..=1 << 20), help_heading = "Picture")]
+    pub spp: u64,
 
     /// Exposure: colours are multiplied by 2^EV [default: the one that suits the picture]
     #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]

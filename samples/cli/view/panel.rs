@@ -27,11 +27,13 @@ pub fn show(ui: &mut Ui, descriptions: &Descriptions, tree: &mut Value, defaults
         let default = defaults.get(name).unwrap_or(&Value::Null);
         match (group, descriptions.0.get(name.as_str())) {
             (Value::Object(values), Some(description)) => {
-                let differs = values.iter().any(|(key, value)| default.get(key).is_some_and(|default| default != value));
+                let differs =
+                    values.iter().any(|(key, value)| default.get(key).is_some_and(|default| default != value));
                 let title = if differs { RichText::new(format!("{name} •")) } else { RichText::new(name.as_str()) };
-                egui::CollapsingHeader::new(title).id_salt(name).default_open(techniques::NAMES.contains(&name.as_str())).show(
-                    ui,
-                    |ui| {
+                egui::CollapsingHeader::new(title)
+                    .id_salt(name)
+                    .default_open(techniques::NAMES.contains(&name.as_str()))
+                    .show(ui, |ui| {
                         for key in &description.keys {
                             let unmet = description.missing(key, values);
                             if let Some(value) = values.get_mut(&key.name) {
@@ -39,8 +41,7 @@ pub fn show(ui: &mut Ui, descriptions: &Descriptions, tree: &mut Value, defaults
                                 changed |= row(ui, key, value, default, unmet);
                             }
                         }
-                    },
-                );
+                    });
             }
             (value, _) if !value.is_object() => changed |= plain(ui, name, value, default),
             _ => (),
@@ -54,7 +55,8 @@ fn row(ui: &mut Ui, key: &Key, value: &mut Value, default: &Value, unmet: Option
     let before = value.clone();
     ui.horizontal(|ui| {
         let weak = unmet.is_some();
-        let name = if weak { RichText::new(&key.name).color(Color32::from_gray(110)) } else { RichText::new(&key.name) };
+        let name =
+            if weak { RichText::new(&key.name).color(Color32::from_gray(110)) } else { RichText::new(&key.name) };
         let label = ui.add(egui::Label::new(name).selectable(false).truncate());
         label.on_hover_text(help(key, unmet.as_deref()));
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
@@ -177,7 +179,11 @@ fn number(ui: &mut Ui, key: &Key, value: &mut Value) {
     }
     if now != before {
         // Settings are 32-bit numbers. The shortest decimal of one is what a person would write.
-        *value = if whole { json!(now.round() as i64) } else { (now as f32).to_string().parse().map_or(Value::Null, |n: f64| json!(n)) };
+        *value = if whole {
+            json!(now.round() as i64)
+        } else {
+            (now as f32).to_string().parse().map_or(Value::Null, |n: f64| json!(n))
+        };
     }
 }
 
@@ -287,7 +293,8 @@ mod tests {
             for _ in 0..3 {
                 let mut changed = false;
                 let _ = context.run(egui::RawInput::default(), |context| {
-                    egui::CentralPanel::default().show(context, |ui| changed |= show(ui, &descriptions, &mut tree, &about.settings));
+                    egui::CentralPanel::default()
+                        .show(context, |ui| changed |= show(ui, &descriptions, &mut tree, &about.settings));
                 });
                 assert!(!changed && tree == about.settings, "{name}");
             }

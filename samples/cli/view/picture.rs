@@ -50,7 +50,13 @@ fn empty(viewer: &Viewer, ui: &Ui, rect: Rect) {
     } else {
         "Drop a scene here: .gltf, .glb or .obj"
     };
-    ui.painter().text(rect.center(), egui::Align2::CENTER_CENTER, text, egui::FontId::proportional(20.0), Color32::from_gray(170));
+    ui.painter().text(
+        rect.center(),
+        egui::Align2::CENTER_CENTER,
+        text,
+        egui::FontId::proportional(20.0),
+        Color32::from_gray(170),
+    );
 }
 
 /// The view of the whole picture.
@@ -79,7 +85,12 @@ fn paint(viewer: &mut Viewer, ui: &Ui, rect: Rect, scale: f32) {
         Rect::from_min_size(space.min + offset, fitted)
     };
     let image = |texture: &(TextureHandle, bool), space: Rect, clip: Rect| {
-        ui.painter().with_clip_rect(clip.intersect(ui.clip_rect())).image(texture.0.id(), fit(texture, space), WHOLE, Color32::WHITE);
+        ui.painter().with_clip_rect(clip.intersect(ui.clip_rect())).image(
+            texture.0.id(),
+            fit(texture, space),
+            WHOLE,
+            Color32::WHITE,
+        );
     };
     if viewer.flipped {
         b.iter().for_each(|b| image(b, rect, rect));
@@ -207,7 +218,10 @@ fn mouse(viewer: &mut Viewer, ui: &Ui, response: &egui::Response, rect: Rect, sc
         && let Some(start) = ui.input(|input| input.pointer.press_origin())
     {
         let lamps = placed_lamps(viewer, rect, view);
-        let nearest = lamps.iter().filter(|(_, at, _)| at.distance(start) < PICK).min_by(|a, b| a.1.distance(start).total_cmp(&b.1.distance(start)));
+        let nearest = lamps
+            .iter()
+            .filter(|(_, at, _)| at.distance(start) < PICK)
+            .min_by(|a, b| a.1.distance(start).total_cmp(&b.1.distance(start)));
         viewer.held = nearest.map(|(node, ..)| *node);
         let line = on_line(start) && viewer.held.is_none();
         ui.ctx().data_mut(|data| data.insert_temp(egui::Id::new("line"), line));

@@ -98,8 +98,9 @@ impl Session {
         let options = GpuOptions { stop: Some(Stop::by(stop)), ..options };
         let (name, of_thread) = (format!("lucerna {name}"), shared.clone());
         let thread = std::thread::Builder::new().name(name).spawn(move || of_thread.work(&options));
-        let thread = thread
-            .map_err(|error| Error::new(ErrorKind::Runtime, "no thread for the picture could be started").caused_by(error))?;
+        let thread = thread.map_err(|error| {
+            Error::new(ErrorKind::Runtime, "no thread for the picture could be started").caused_by(error)
+        })?;
         Ok(Self { shared, thread: Some(thread) })
     }
 
@@ -251,7 +252,11 @@ impl Shared {
                     self.fail(error);
                     if lost {
                         // A device that was stopped within a pass counts as lost. The request that stopped it comes next.
-                        return if asked { self.next() } else { Some(used).filter(|_| !self.is_old()).or_else(|| self.next()) };
+                        return if asked {
+                            self.next()
+                        } else {
+                            Some(used).filter(|_| !self.is_old()).or_else(|| self.next())
+                        };
                     }
                     self.next()?
                 }

@@ -15,7 +15,7 @@ use super::{
 use crate::{args::Size, smooth};
 
 /// Paths a pixel after which the path tracer rests.
-const SAMPLES: u64 = 1024;
+pub const SAMPLES: u64 = 1024;
 
 /// A picture of a file beside rendered ones.
 #[derive(Clone, Debug)]
@@ -190,6 +190,9 @@ fn preview(technique: &str, about: &About) -> Value {
         return about.settings.clone();
     }
     let quick = Settings { method: Method::Online, size: 8, ..Settings::preview() };
-    let staged = crate::last_stage::Staged { technique: PictureSettings { fiv: quick, ..PictureSettings::default() }, tonemap: None };
+    let staged = crate::last_stage::Staged {
+        technique: PictureSettings { fiv: quick, ..PictureSettings::default() },
+        tonemap: None,
+    };
     crate::config::to_value(&staged).unwrap_or_else(|_| about.settings.clone())
 }

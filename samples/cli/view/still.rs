@@ -11,7 +11,7 @@ use super::{
     live::{self, Live, Made, Take},
     painted::Painter,
     session::{Doing, Shared},
-    wanted::{PassTime, Shows, Shown, Wanted},
+    wanted::{PassTime, Shown, Shows, Wanted},
 };
 use crate::{args::Size, exposure};
 
@@ -47,7 +47,8 @@ impl Rate {
     fn took(&mut self, time: Duration, size: Size) {
         let pixel = time.as_secs_f64() / (f64::from(size.width) * f64::from(size.height));
         // The first picture makes pipelines, so a later one that is quicker counts at once.
-        self.pixel = Some(self.pixel.map_or(pixel, |before| if pixel < before { pixel } else { 0.5 * (pixel + before) }));
+        self.pixel =
+            Some(self.pixel.map_or(pixel, |before| if pixel < before { pixel } else { 0.5 * (pixel + before) }));
     }
 }
 
@@ -110,7 +111,8 @@ pub(super) fn work(shared: &Shared, gpu: &Gpu, painter: &mut Painter, first: Wan
     let mut wanted = first.clone();
     loop {
         // Another look at the same light needs no new light.
-        let again = kept.take().filter(|light| light.finished && light.of.same_light(&wanted) && same_tone(&light.of, &wanted));
+        let again =
+            kept.take().filter(|light| light.finished && light.of.same_light(&wanted) && same_tone(&light.of, &wanted));
         let result = match again {
             Some(mut light) => {
                 light.ev = chosen(live.as_ref(), &wanted).unwrap_or(light.ev);

@@ -14,7 +14,7 @@ use lucerna::{
 use super::{
     painted::Painter,
     session::{Doing, Shared},
-    wanted::{Shows, Shown, Wanted},
+    wanted::{Shown, Shows, Wanted},
 };
 use crate::{args::Size, exposure, last_stage::Staged};
 

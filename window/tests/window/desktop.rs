@@ -5,9 +5,14 @@ use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{
     AtomEnum, ClientMessageEvent, ConnectionExt, EventMask, ImageFormat, MapState, PropMode, Window,
 };
+use x11rb::protocol::xproto::{
+    BUTTON_PRESS_EVENT, BUTTON_RELEASE_EVENT, InputFocus, KEY_PRESS_EVENT, KEY_RELEASE_EVENT,
+};
+use x11rb::protocol::xtest::ConnectionExt as _;
 use x11rb::rust_connection::RustConnection;
 use x11rb::wrapper::ConnectionExt as _;
 
+#[allow(dead_code)] // Each test uses a part of it.
 pub struct Desktop {
     connection: RustConnection,
     window: Window,
@@ -22,10 +27,16 @@ pub fn until(what: &str, mut question: impl FnMut() -> bool) {
     }
 }
 
+#[allow(dead_code)]
 impl Desktop {
     /// Connects to the server and waits for the one window with this title.
     pub fn find(title: &str) -> Self {
-        let (connection, screen) = x11rb::connect(None).unwrap();
+        Self::find_on(None, title)
+    }
+
+    /// As [`Desktop::find`], on the server of this display; None: that of the environment.
+    pub fn find_on(display: Option<&str>, title: &str) -> Self {
+        let (connection, screen) = x11rb::connect(display).unwrap();
         let root = connection.setup().roots[screen].root;
         let mut desktop = Self { connection, window: 0 };
         until("the window appears", || {
@@ -101,5 +112,37 @@ impl Desktop {
     /// Moves the mouse to a place in the window.
     pub fn point(&self, x: i16, y: i16) {
         self.connection.warp_pointer(x11rb::NONE, self.window, 0, 0, 0, 0, x, y).unwrap().check().unwrap();
+    }
+
+    /// Gives the keyboard to the window, as a window manager does.
+    pub fn focus(&self) {
+        let now = x11rb::CURRENT_TIME;
+        self.connection.set_input_focus(InputFocus::PARENT, self.window, now).unwrap().check().unwrap();
+    }
+
+    /// Presses or releases the key of this symbol (that of Latin-1 for a letter).
+    pub fn key(&self, symbol: u32, down: bool) {
+        let setup = self.connection.setup();
+        let (first, last) = (setup.min_keycode, setup.max_keycode);
+        let map = self.connection.get_keyboard_mapping(first, last - first + 1).unwrap().reply().unwrap();
+        let columns = usize::from(map.keysyms_per_keycode);
+        let found = map.keysyms.chunks(columns).position(|keys| keys.first() == Some(&symbol));
+        let code = first + u8::try_from(found.expect("the keyboard has the key")).unwrap();
+        self.fake(if down { KEY_PRESS_EVENT } else { KEY_RELEASE_EVENT }, code);
+    }
+
+    /// Presses and releases a key.
+    pub fn hit(&self, symbol: u32) {
+        self.key(symbol, true);
+        self.key(symbol, false);
+    }
+
+    /// Presses or releases a button of the mouse: 1 is the left one.
+    pub fn button(&self, button: u8, down: bool) {
+        self.fake(if down { BUTTON_PRESS_EVENT } else { BUTTON_RELEASE_EVENT }, button);
+    }
+
+    fn fake(&self, kind: u8, detail: u8) {
+        self.connection.xtest_fake_input(kind, detail, 0, x11rb::NONE, 0, 0, 0).unwrap().check().unwrap();
     }
 }

@@ -1,0 +1,344 @@
+//! The viewer under an X server without a screen: what the window shows is what `render` writes, keys and mouse do what the page of keys says, and it
+//! ends when it is closed.
+#![cfg(unix)]
+
+#[path = "../../window/tests/window/desktop.rs"]
+mod desktop;
+mod support;
+
+use std::{
+    io::{BufRead, BufReader, Read},
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+    time::{Duration, Instant},
+};
+
+use desktop::Desktop;
+use lucerna::{
+    image::{self, srgb},
+    scene::Limits,
+};
+use support::{command, device, lucerna};
+
+/// Pictures come within seconds. This bound finds those that never come: a machine that does much else besides is slow.
+const BOUND: Duration = Duration::from_secs(120);
+const SIZE: [u16; 2] = [160, 120];
+
+const ESCAPE: u32 = 0xff1b;
+const TAB: u32 = 0xff09;
+const F1: u32 = 0xffbe;
+
+/// A letter as a symbol of X.
+fn letter(c: char) -> u32 {
+    u32::from(c)
+}
+
+/// An X server that ends with the test. `None`: Xvfb is not installed, which fails if `CI` is set.
+struct Server {
+    process: Child,
+    display: String,
+}
+
+impl Server {
+    fn start() -> Option<Self> {
+        let process = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", "1400x900x24", "-nolisten", "tcp"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn();
+        let Ok(mut process) = process else {
+            assert!(std::env::var_os("CI").is_none(), "Xvfb is not installed and CI is set");
+            eprintln!("SKIPPED: Xvfb is not installed");
+            return None;
+        };
+        let mut number = String::new();
+        BufReader::new(process.stdout.take().unwrap()).read_line(&mut number).unwrap();
+        Some(Self { process, display: format!(":{}", number.trim()) })
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// A running viewer.
+struct Viewer {
+    child: Child,
+    desktop: Desktop,
+    folder: tempfile::TempDir,
+    size: [u16; 2],
+}
+
+impl Viewer {
+    /// Opens a window of some size without panels.
+    fn open(server: &Server, size: [u16; 2], words: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let mut program = command(env!("CARGO_BIN_EXE_lucerna"));
+        program.arg("view").args(words.split_whitespace());
+        program.arg("--window").arg(format!("{}x{}", size[0], size[1])).current_dir(folder.path());
+        program.env("DISPLAY", &server.display).env_remove("WAYLAND_DISPLAY").env("LUCERNA_VALIDATION", "core");
+        let child = program.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        let desktop = Desktop::find_on(Some(&server.display), "lucerna");
+        desktop.focus();
+        desktop.point(4, 4);
+        Self { child, desktop, folder, size }
+    }
+
+    fn bare(server: &Server, words: &str) -> Self {
+        Self::open(server, SIZE, &format!("--bare {words}"))
+    }
+
+    fn picture(&self) -> Vec<[u8; 3]> {
+        self.desktop.picture([0, 0], self.size).unwrap_or_default()
+    }
+
+    /// Waits until the picture is as asked, and returns it.
+    #[track_caller]
+    fn until(&self, what: &str, good: impl Fn(&[[u8; 3]]) -> bool) -> Vec<[u8; 3]> {
+        let begun = Instant::now();
+        loop {
+            let picture = self.picture();
+            if good(&picture) {
+                return picture;
+            }
+            assert!(begun.elapsed() < BOUND, "it never happened: {what}");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Waits until the window shows exactly this.
+    #[track_caller]
+    fn shows(&self, what: &str, expected: &[[u8; 3]]) {
+        self.until(what, |picture| picture == expected);
+    }
+
+    /// Closes the window. It ends soon, without an error and without a message of the validation layer.
+    #[track_caller]
+    fn close(mut self) {
+        self.desktop.close();
+        let begun = Instant::now();
+        let status = loop {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                break status;
+            }
+            if begun.elapsed() > BOUND {
+                self.child.kill().unwrap();
+                panic!("the window does not close");
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        };
+        let mut said = String::new();
+        self.child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+        assert!(status.success(), "{status}: {said}");
+        for word in ["validation", "VUID", "panicked", "internal error", "error:"] {
+            assert!(!said.contains(word), "{said}");
+        }
+    }
+}
+
+impl Drop for Viewer {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// The codes of a picture that a command writes.
+#[track_caller]
+fn by_command(words: &str) -> Vec<[u8; 3]> {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("a.png");
+    let size = format!("{}x{}", SIZE[0], SIZE[1]);
+    let words = words.split_whitespace().chain(["--size", &size, "-q", "-o"]).map(str::to_owned);
+    lucerna(words.chain([file.display().to_string()])).expect(0, &[]);
+    codes(&file)
+}
+
+fn codes(file: &Path) -> Vec<[u8; 3]> {
+    let layers = image::read(file, &Limits::default()).unwrap();
+    layers.layers[0].rgb_pixels().unwrap().into_iter().map(|pixel| pixel.map(srgb::encode_u8)).collect()
+}
+
+/// The first file with this ending, when it is complete.
+fn written(folder: &Path, ending: &str) -> PathBuf {
+    let begun = Instant::now();
+    loop {
+        let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+        let found: Vec<PathBuf> = files.filter(|file| file.to_string_lossy().ends_with(ending)).collect();
+        if let Some(file) = found.into_iter().next() {
+            return file;
+        }
+        assert!(begun.elapsed() < BOUND, "no file {ending}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+fn ready() -> Option<Server> {
+    if device() { Server::start() } else { None }
+}
+
+#[test]
+fn the_window_shows_what_render_writes_and_keys_change_it() {
+    let Some(server) = ready() else { return };
+    let of = "render isr --builtin cornell --camera 0";
+    let whole = by_command(of);
+    let viewer = Viewer::bare(&server, "--technique isr --builtin cornell");
+    viewer.shows("the picture of render", &whole);
+
+    // F5: direct light.
+    viewer.desktop.hit(F1 + 4);
+    let direct = by_command(&format!("{of} --mode direct"));
+    assert_ne!(direct, whole);
+    viewer.shows("direct light", &direct);
+    // F2: with exponential shadow maps.
+    viewer.desktop.hit(F1 + 1);
+    viewer.shows("exponential shadow maps", &by_command(&format!("{of} -D shadow.kind=exponential")));
+    viewer.desktop.hit(F1 + 2);
+    viewer.shows("isr again", &whole);
+
+    // False colour, and back.
+    viewer.desktop.hit(letter('x'));
+    viewer.until("false colour", |picture| picture != whole);
+    viewer.desktop.hit(letter('x'));
+    viewer.shows("light again", &whole);
+
+    // Half a stop darker than the exposure of the built-in scene; 0 brings it back.
+    viewer.desktop.hit(letter('-'));
+    viewer.shows("a darker picture", &by_command(&format!("{of} --exposure 1.5")));
+    viewer.desktop.hit(letter('0'));
+    viewer.shows("the exposure of the scene", &whole);
+
+    // The page of keys covers the picture; Escape closes it.
+    viewer.desktop.hit(F1);
+    viewer.until("the page of keys", |picture| picture != whole);
+    viewer.desktop.hit(ESCAPE);
+    viewer.shows("the picture without the page", &whole);
+    viewer.close();
+}
+
+#[test]
+fn the_camera_moves_and_comes_back_and_files_are_what_the_window_shows() {
+    let Some(server) = ready() else { return };
+    let of = "render isr --builtin cornell --camera 0";
+    let whole = by_command(of);
+    let viewer = Viewer::bare(&server, "--technique isr --builtin cornell");
+    viewer.shows("the picture of render", &whole);
+
+    // P writes it, with the metadata of render.
+    viewer.desktop.hit(letter('p'));
+    let file = written(viewer.folder.path(), ".png");
+    assert_eq!(codes(&file), whole);
+    let again = lucerna(["rerun".as_ref(), file.as_os_str()]);
+    again.expect(0, &[]);
+
+    // Flying.
+    viewer.desktop.key(letter('w'), true);
+    std::thread::sleep(Duration::from_millis(300));
+    viewer.desktop.key(letter('w'), false);
+    viewer.until("another place", |picture| picture != whole);
+    viewer.desktop.hit(letter('r'));
+    viewer.shows("the scene's camera", &whole);
+
+    // Looking around, below the lamp, which would move instead.
+    viewer.desktop.point(40, 80);
+    viewer.desktop.button(1, true);
+    for step in 1..=10 {
+        viewer.desktop.point(40 + 2 * step, 80);
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    viewer.desktop.button(1, false);
+    viewer.until("another direction", |picture| picture != whole);
+    std::fs::remove_file(&file).unwrap();
+    // The file of the moved camera is the picture that rests.
+    viewer.desktop.hit(letter('p'));
+    let moved = codes(&written(viewer.folder.path(), ".png"));
+    assert_ne!(moved, whole);
+    viewer.shows("the picture of the file", &moved);
+    viewer.desktop.hit(letter('r'));
+    viewer.shows("the scene's camera again", &whole);
+    viewer.close();
+}
+
+#[test]
+fn a_stands_beside_the_path_tracer_and_the_window_closes_while_it_works() {
+    let Some(server) = ready() else { return };
+    let [width, height] = SIZE.map(usize::from);
+    let left = |picture: &[[u8; 3]]| -> Vec<[u8; 3]> {
+        picture.chunks(width).take(height).flat_map(|row| row[..width / 2 - 4].to_vec()).collect()
+    };
+    let right = |picture: &[[u8; 3]]| -> Vec<[u8; 3]> {
+        picture.chunks(width).take(height).flat_map(|row| row[width / 2 + 4..].to_vec()).collect()
+    };
+    // Below the letters A and B.
+    let below = |picture: Vec<[u8; 3]>| picture[(width / 2 - 4) * 30..].to_vec();
+    let whole = by_command("render isr --builtin cornell --camera 0");
+    let truth = by_command("reference --builtin cornell --camera 0 --spp 4 --exposure 2");
+    let viewer = Viewer::bare(&server, "--technique isr --builtin cornell --spp 4 --compare split");
+    viewer.until("both sides", |picture| {
+        picture.len() == width * height
+            && below(left(picture)) == below(left(&whole))
+            && below(right(picture)) == below(right(&truth))
+    });
+    // As long as Space is held, B alone.
+    viewer.desktop.key(letter(' '), true);
+    viewer.until("B alone", |picture| below(left(picture)) == below(left(&truth)));
+    viewer.desktop.key(letter(' '), false);
+    viewer.until("both sides again", |picture| below(left(picture)) == below(left(&whole)));
+    viewer.close();
+
+    let viewer = Viewer::bare(&server, "--technique reference --builtin office --spp 100000");
+    viewer.until("a picture that grows", |picture| picture.iter().flatten().any(|code| *code > 40));
+    viewer.close();
+}
+
+#[test]
+fn settings_of_the_command_line_are_those_of_the_window() {
+    let Some(server) = ready() else { return };
+    let settings = "-D isr.samples=24 -D isr.strength=2";
+    let expected = by_command(&format!("render isr --builtin cornell --camera 0 {settings}"));
+    let viewer = Viewer::bare(&server, &format!("--technique isr --builtin cornell {settings}"));
+    viewer.shows("the settings", &expected);
+    viewer.close();
+}
+
+#[test]
+fn a_window_with_panels_opens_and_a_scene_that_cannot_be_read_does_not_close_it() {
+    let Some(server) = ready() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let broken = folder.path().join("broken.glb");
+    std::fs::write(&broken, b"glTF, or not").unwrap();
+    let size = [900, 600];
+    let mut viewer = Viewer::open(&server, size, &broken.display().to_string());
+    let before = viewer.until("the panels", |picture| picture.iter().filter(|pixel| pixel[0] > 100).count() > 500);
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(viewer.child.try_wait().unwrap().is_none(), "the window closed");
+    viewer.desktop.hit(TAB);
+    viewer.until("no panels", |picture| picture != before);
+    viewer.close();
+}
+
+#[test]
+fn without_a_display_it_says_so() {
+    let mut program = command(env!("CARGO_BIN_EXE_lucerna"));
+    program
+        .args(["view", "--builtin", "cornell"])
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("WAYLAND_SOCKET");
+    support::ran(&mut program).expect(4, &["display", "lucerna render"]);
+}
+
+#[test]
+fn wrong_options_are_refused_before_a_window_opens() {
+    for (words, parts) in [
+        ("view --technique path", &["path"][..]),
+        ("view --paper --builtin cornell", &["--technique"]),
+        ("view --window 0x5", &["--window"]),
+        ("view --spp 0", &["--spp"]),
+    ] {
+        lucerna(words.split(' ')).expect(2, parts);
+    }
+}
