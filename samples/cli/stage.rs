@@ -29,6 +29,8 @@ pub struct Stage {
     pub fingerprint: String,
     pub placed: Placed,
     pub eye: record::View,
+    /// The camera was added: it is fitted to the shape of the picture.
+    pub added_camera: bool,
     /// Default lights were added.
     pub default_light: bool,
     extents: Extents,
@@ -111,9 +113,11 @@ impl Stage {
             Some(eye) => matches!(eye.view, record::View::File(_)),
             None => named_file(),
         };
+        let cameras = scene.cameras.len();
         if !from_file {
             framing::add_missing_camera(&mut scene, args.size.aspect());
         }
+        let added_camera = scene.cameras.len() > cameras;
         let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
         let choice = match (&args.eye, &args.camera) {
             (Some(Eye { view: record::View::File(file), .. }), _) => Choice::File(file.clone()),
@@ -143,7 +147,7 @@ impl Stage {
             fingerprint = fingerprint::scene(&scene);
         }
         let extents = Extents::of(&scene);
-        Ok(Self { scene, source, fingerprint, placed, eye, default_light, extents })
+        Ok(Self { scene, source, fingerprint, placed, eye, added_camera, default_light, extents })
     }
 
     /// Notes about the scene for the user.

@@ -391,7 +391,7 @@ fn report(layers: &Layers, done: &Progress, line: &ProgressLine, error: f64, end
 }
 
 /// Replaces the picture by the layer; the total becomes a layer.
-fn show(mode: Mode, layers: &mut Layers) {
+pub(crate) fn show(mode: Mode, layers: &mut Layers) {
     if mode == Mode::Total {
         return;
     }

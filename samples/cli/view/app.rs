@@ -89,6 +89,10 @@ pub struct Viewer {
     /// Of the scene, while `fly` is none.
     pub(super) camera: usize,
     pub(super) fly: Option<Fly>,
+    /// The camera of a file or of numbers, from which the window began, and the words that name it.
+    pub(super) named_camera: Option<(Placed, String)>,
+    /// Device of the command line.
+    pub(super) device: Option<String>,
     pub(super) cameras: Cameras,
     pub(super) seconds: f64,
     pub(super) playing: bool,
@@ -148,6 +152,8 @@ impl Viewer {
             reading: None,
             camera: 0,
             fly: None,
+            named_camera: None,
+            device: args.device.device.clone(),
             cameras: Cameras::default(),
             seconds: args.stage.time,
             playing: false,
@@ -235,13 +241,21 @@ impl Viewer {
             self.sides[0].start_with(technique);
             self.say(format!("{technique}, because {why}"));
         }
-        (self.fly, self.camera) = match &stage.eye {
-            record::View::Scene(index) => (None, *index),
-            record::View::File(file) => {
-                let view = stage.placed.view(&Pose::playing(&stage.scene, 0.0), Size { width: 4, height: 3 });
-                (Some(Fly::from_view(&view, stage.placed.camera.projection, (file.target - file.position).length())), 0)
+        (self.fly, self.camera, self.named_camera) = (None, 0, None);
+        match &stage.eye {
+            record::View::Scene(index) if stage.added_camera => {
+                // A camera that the program adds is fitted to the shape of a picture. This one stays as it is, whatever the window becomes.
+                let placed = Placed::of_scene(&stage.scene, *index);
+                let view = placed.view(&Pose::playing(&stage.scene, 0.0), Size { width: 4, height: 3 });
+                let distance = view.position.distance(controls::middle(&stage));
+                let fly = Fly::from_view(&view, placed.camera.projection, distance.max(0.05));
+                self.named_camera = Some((fly.placed(), fly.numbers()));
             }
-        };
+            record::View::Scene(index) => self.camera = *index,
+            record::View::File(_) => {
+                self.named_camera = Some((stage.placed.clone(), args.camera.clone().unwrap_or_default()));
+            }
+        }
         self.moved.clear();
         self.held = None;
         self.seconds = args.time;
@@ -266,26 +280,38 @@ impl Viewer {
     /// The camera in its place.
     pub(super) fn placed(&self) -> Option<Placed> {
         let stage = self.stage.as_ref()?;
-        match &self.fly {
-            Some(fly) => Some(fly.placed()),
-            None => (self.camera < stage.scene.cameras.len()).then(|| Placed::of_scene(&stage.scene, self.camera)),
+        match (&self.fly, &self.named_camera) {
+            (Some(fly), _) => Some(fly.placed()),
+            (None, Some((placed, _))) => Some(placed.clone()),
+            (None, None) => {
+                (self.camera < stage.scene.cameras.len()).then(|| Placed::of_scene(&stage.scene, self.camera))
+            }
         }
     }
 
     /// The camera as one that flies: the scene's camera becomes one.
     pub(super) fn flying(&mut self) -> Option<&mut Fly> {
         if self.fly.is_none() {
-            let stage = self.stage.clone()?;
-            let placed = self.placed()?;
-            let pose = Pose::playing(&stage.scene, self.seconds as f32);
-            let view = placed.view(&pose, Size { width: 4, height: 3 });
-            // What is in the middle, else the middle of the scene.
-            let (position, middle) = (view.position, controls::middle(&stage));
-            let distance =
-                self.depth_at([self.size.width / 2, self.size.height / 2]).unwrap_or_else(|| position.distance(middle));
-            self.fly = Some(Fly::from_view(&view, placed.camera.projection, distance.max(0.05)));
+            self.fly = self.as_flying();
         }
         self.fly.as_mut()
+    }
+
+    /// The camera as one that flies would see.
+    pub(super) fn as_flying(&self) -> Option<Fly> {
+        if let Some(fly) = &self.fly {
+            return Some(fly.clone());
+        }
+        let stage = self.stage.clone()?;
+        let placed = self.placed()?;
+        let pose = Pose::playing(&stage.scene, self.seconds as f32);
+        let view = placed.view(&pose, Size { width: 4, height: 3 });
+        // What is in the middle, else the middle of the scene.
+        let (position, middle) = (view.position, controls::middle(&stage));
+        let size = self.size_of_side();
+        let depth = self.depth_at([size.width / 2, size.height / 2]);
+        let distance = depth.unwrap_or_else(|| position.distance(middle));
+        Some(Fly::from_view(&view, placed.camera.projection, distance.max(0.05)))
     }
 
     /// Distance along the line of sight at a pixel, metres, if the picture has it.
@@ -325,13 +351,17 @@ impl Viewer {
             return;
         }
         let moving = self.is_moving();
-        let (both, waits) = (self.shows_both(), self.waits());
+        let (both, waits) = (self.shows_both(), self.waits(&stage));
+        if !both || self.sides[1].file.is_some() {
+            self.sides[1].rest();
+        }
         // B has the exposure of A, so that both can be compared.
         let auto =
-            self.sides[0].shown().filter(|shown| Arc::ptr_eq(&shown.of.stage, &stage)).map(|shown| shown.exposure);
+            self.sides[0].shown().filter(|shown| Arc::ptr_eq(&shown.of.stage, &stage) && self.sides[0].is_light());
+        let auto = auto.map(|shown| shown.exposure);
         for (number, side) in self.sides.iter_mut().enumerate().take(if both { 2 } else { 1 }) {
             let exposure = self.exposure.or(auto.filter(|_| number == 1));
-            if number == 1 && waits {
+            if side.file.is_some() || (number == 1 && waits) {
                 continue;
             }
             let wanted = Wanted {
@@ -463,8 +493,11 @@ impl Viewer {
     }
 
     /// B waits for the exposure of A.
-    fn waits(&self) -> bool {
-        self.exposure.is_none() && self.sides[0].file.is_none() && self.sides[0].shown().is_none()
+    fn waits(&self, stage: &Arc<Stage>) -> bool {
+        let a = &self.sides[0];
+        let failed = a.session().is_some_and(|session| session.status().1.is_some());
+        let there = a.shown().is_some_and(|shown| Arc::ptr_eq(&shown.of.stage, stage));
+        self.exposure.is_none() && a.file.is_none() && !failed && !there
     }
 
     fn advance(&mut self, context: &Context) {

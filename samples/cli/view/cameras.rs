@@ -74,7 +74,7 @@ impl Cameras {
 
 /// Keeps the camera of the window.
 pub fn keep(viewer: &mut Viewer) {
-    if let Some(fly) = viewer.flying().cloned() {
+    if let Some(fly) = viewer.as_flying() {
         let name = viewer.cameras.keep(&fly);
         viewer.say(format!("kept {name}"));
     }

@@ -6,7 +6,7 @@ use super::{
     side::Side,
     wanted::{Look, Shows, TRUTH},
 };
-use crate::{args::Size, record::Source, stage::StageArgs};
+use crate::{args::Size, default_light::DefaultLight, record::Source, stage::StageArgs};
 
 /// What both sides have in common.
 #[derive(Debug)]
@@ -16,6 +16,12 @@ pub struct Common<'a> {
     /// `None`: camera number `camera` of the scene.
     pub fly: Option<&'a Fly>,
     pub camera: usize,
+    /// Words that name the camera, in the place of its number.
+    pub named_camera: Option<&'a str>,
+    /// Device of the window's command line.
+    pub device: Option<&'a str>,
+    /// Default lights were added.
+    pub default_light: bool,
     pub size: Size,
     pub seconds: f64,
     pub exposure: f64,
@@ -28,6 +34,9 @@ pub fn words(common: &Common<'_>, side: &Side) -> Option<Vec<String>> {
         return None;
     }
     let truth = side.technique == TRUTH;
+    if truth && side.shows != Shows::Picture {
+        return None;
+    }
     let mut out: Vec<String> = Vec::new();
     let mut say = |words: &[&str]| out.extend(words.iter().map(|&word| word.to_owned()));
     if truth {
@@ -35,16 +44,16 @@ pub fn words(common: &Common<'_>, side: &Side) -> Option<Vec<String>> {
     } else {
         say(&["render", side.technique])
     }
-    scene(common, &mut say);
+    scene(common, side.technique, &mut say);
     say(&["--size", &common.size.to_string()]);
     match common.fly {
         Some(fly) => say(&["--camera", &fly.numbers()]),
-        None => say(&["--camera", &common.camera.to_string()]),
+        None => say(&["--camera", common.named_camera.unwrap_or(&common.camera.to_string())]),
     }
     if common.seconds != 0.0 {
-        say(&["--time", &common.seconds.to_string()]);
+        say(&[if side.technique == "daylight" { "--scene-time" } else { "--time" }, &common.seconds.to_string()]);
     }
-    let light = side.shows == Shows::Picture;
+    let light = side.is_light();
     if light {
         say(&["--exposure", &common.exposure.to_string()]);
     }
@@ -58,8 +67,8 @@ pub fn words(common: &Common<'_>, side: &Side) -> Option<Vec<String>> {
     {
         say(&["--operator", curve.map_or("linear", |curve| curve.name())]);
     }
-    if let Some((first, _)) = side.about.modes.first()
-        && side.mode != *first
+    if let Some(first) = side.about.modes.first()
+        && side.mode != first.name
     {
         say(&[if truth { "--show" } else { "--mode" }, &side.mode]);
     }
@@ -81,10 +90,13 @@ pub fn words(common: &Common<'_>, side: &Side) -> Option<Vec<String>> {
             say(&["-D", &change]);
         }
     }
+    if let Some(device) = common.device {
+        say(&["--device", device]);
+    }
     Some(out)
 }
 
-fn scene(common: &Common<'_>, say: &mut impl FnMut(&[&str])) {
+fn scene(common: &Common<'_>, technique: &str, say: &mut impl FnMut(&[&str])) {
     let StageArgs { scene, environment, light, sun, default_light, .. } = common.args;
     match common.source {
         Source::File(file) => say(&[file]),
@@ -120,11 +132,11 @@ fn scene(common: &Common<'_>, say: &mut impl FnMut(&[&str])) {
     if let Some(sun) = sun {
         say(&["--sun", &sun.to_string()]);
     }
-    if *default_light != crate::default_light::DefaultLight::Auto {
-        use clap::ValueEnum;
-        if let Some(value) = default_light.to_possible_value() {
-            say(&["--default-light", value.get_name()]);
-        }
+    // What was decided: another camera might decide otherwise, and a black picture would get a lamp. Baked daylight has its own light.
+    if *default_light != DefaultLight::Never && technique != "daylight" {
+        say(&["--default-light", if common.default_light { "always" } else { "never" }]);
+    } else if technique != "daylight" {
+        say(&["--default-light", "never"]);
     }
 }
 
@@ -139,6 +151,75 @@ pub fn quoted(words: &[String]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The program reads the command of each technique in each mode, for light, a layer and an image.
+    #[test]
+    fn every_command_is_one_that_the_program_reads() {
+        let line = |args: &[&str]| {
+            #[derive(clap::Parser, Debug)]
+            struct Line {
+                #[command(flatten)]
+                view: crate::view::ViewArgs,
+            }
+            <Line as clap::Parser>::try_parse_from(args).unwrap().view
+        };
+        let plain = line(&["view", "--builtin", "office", "--light", "0,1,2,3", "--sun", "-40,30"]);
+        let ground = line(&[
+            "view",
+            "a b.glb",
+            "--unit",
+            "0.01",
+            "--ground",
+            "--copies",
+            "2",
+            "--beside",
+            "c.glb",
+            "--default-light",
+            "never",
+        ]);
+        let fly = Fly::from_file(&crate::camera::in_numbers("-1,2,-3,-4,5,-6,50,0.01").unwrap().unwrap());
+        let mut count = 0;
+        for (args, source) in [(&plain, Source::Builtin("office".into())), (&ground, Source::File("a b.glb".into()))] {
+            for technique in lucerna::techniques::NAMES {
+                let mut side = Side::new("A", technique);
+                if side.about.baked {
+                    side.bake = Some("a.bake".into());
+                }
+                for mode in side.about.modes.clone() {
+                    side.mode = mode.name.to_owned();
+                    for shows in [Shows::Picture, Shows::Image("gbuffer.albedo".into())] {
+                        side.shows = shows;
+                        let common = Common {
+                            args: &args.stage,
+                            source: &source,
+                            fly: Some(&fly).filter(|_| count % 2 == 0),
+                            camera: 1,
+                            named_camera: None,
+                            device: Some("cpu"),
+                            default_light: count % 3 == 0,
+                            size: Size { width: 64, height: 48 },
+                            seconds: 0.5,
+                            exposure: -1.5,
+                            look: Look::Light(Some(lucerna::techniques::tonemap::Operator::Agx)),
+                        };
+                        let Some(words) = words(&common, &side) else {
+                            assert!(*technique == TRUTH && side.shows != Shows::Picture);
+                            continue;
+                        };
+                        let line = ["lucerna"]
+                            .into_iter()
+                            .map(str::to_owned)
+                            .chain(words.clone())
+                            .chain(["-o".into(), "a.png".into()]);
+                        let read = <crate::programs::lucerna::Arguments as clap::Parser>::try_parse_from(line);
+                        assert!(read.is_ok(), "{words:?}: {}", read.unwrap_err());
+                        count += 1;
+                    }
+                }
+            }
+        }
+        assert!(count > 20, "{count}");
+    }
 
     #[test]
     fn words_are_quoted_where_a_shell_would_break_them() {

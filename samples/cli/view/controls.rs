@@ -258,7 +258,7 @@ fn picture(viewer: &mut Viewer, ui: &mut Ui) {
     ui.horizontal(|ui| {
         ui.label("Exposure");
         let mut ev = viewer.ev();
-        if ui.add(egui::DragValue::new(&mut ev).speed(0.05).range(-40.0..=40.0).suffix(" EV")).changed() {
+        if ui.add(egui::DragValue::new(&mut ev).speed(0.05).range(-64.0..=64.0).suffix(" EV")).changed() {
             viewer.exposure = Some(ev);
         }
         let auto = ui.add_enabled(viewer.exposure.is_some(), egui::Button::new("auto"));
@@ -288,15 +288,17 @@ fn camera(viewer: &mut Viewer, ui: &mut Ui) {
     egui::CollapsingHeader::new("Camera and time").default_open(true).show(ui, |ui| {
         let names: Vec<String> =
             stage.scene.cameras.iter().enumerate().map(|(i, camera)| super::fly::name_of(camera, i)).collect();
-        let now = match &viewer.fly {
-            Some(_) => "free".to_owned(),
-            None => names.get(viewer.camera).cloned().unwrap_or_default(),
+        let now = match (&viewer.fly, &viewer.named_camera) {
+            (Some(_), _) => "free".to_owned(),
+            (None, Some((placed, _))) => placed.name.clone(),
+            (None, None) => names.get(viewer.camera).cloned().unwrap_or_default(),
         };
         ui.horizontal(|ui| {
             egui::ComboBox::from_id_salt("camera").selected_text(now).show_ui(ui, |ui| {
                 for (index, name) in names.iter().enumerate() {
-                    if ui.selectable_label(viewer.fly.is_none() && viewer.camera == index, name).clicked() {
-                        (viewer.camera, viewer.fly) = (index, None);
+                    let chosen = viewer.fly.is_none() && viewer.named_camera.is_none() && viewer.camera == index;
+                    if ui.selectable_label(chosen, name).clicked() {
+                        (viewer.camera, viewer.fly, viewer.named_camera) = (index, None, None);
                     }
                 }
             });
@@ -304,10 +306,9 @@ fn camera(viewer: &mut Viewer, ui: &mut Ui) {
                 cameras::keep(viewer);
             }
             if ui.button("Copy").on_hover_text("The camera as --camera has it").clicked()
-                && let Some(fly) = viewer.flying()
+                && let Some(fly) = viewer.as_flying()
             {
-                let numbers = fly.numbers();
-                ui.ctx().copy_text(numbers);
+                ui.ctx().copy_text(fly.numbers());
             }
             if let Some(fly) = &mut viewer.fly {
                 ui.add(egui::DragValue::new(&mut fly.speed).speed(0.02).range(0.01..=1000.0).suffix(" m/s"))
@@ -325,7 +326,14 @@ fn camera(viewer: &mut Viewer, ui: &mut Ui) {
                 {
                     viewer.playing = !viewer.playing;
                 }
-                if ui.add(egui::Slider::new(&mut viewer.seconds, 0.0..=end).suffix(" s")).changed() {
+                if ui
+                    .add(
+                        egui::Slider::new(&mut viewer.seconds, 0.0..=end)
+                            .clamping(egui::SliderClamping::Edits)
+                            .suffix(" s"),
+                    )
+                    .changed()
+                {
                     viewer.moves();
                 }
             });
@@ -460,9 +468,9 @@ fn technique(viewer: &mut Viewer, number: usize, ui: &mut Ui) {
         let side = &mut viewer.sides[number];
         if side.about.modes.len() > 1 {
             egui::ComboBox::from_id_salt("mode").selected_text(&side.mode).show_ui(ui, |ui| {
-                for (mode, doc) in side.about.modes.clone() {
-                    if ui.selectable_label(side.mode == mode, mode).on_hover_text(doc).clicked() {
-                        side.mode = mode.to_owned();
+                for mode in side.about.modes.clone() {
+                    if ui.selectable_label(side.mode == mode.name, mode.name).on_hover_text(mode.doc).clicked() {
+                        side.mode = mode.name.to_owned();
                     }
                 }
             });

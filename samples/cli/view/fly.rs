@@ -160,8 +160,10 @@ pub fn project(view: &View, point: Vec3) -> Option<Vec2> {
 pub fn unproject(view: &View, at: Vec2, depth: f32) -> Vec3 {
     let world_from_view: Mat4 = view.view_from_world.inverse();
     let (x, y) = (2.0 * at.x - 1.0, 2.0 * at.y - 1.0);
+    // Lines of sight of an orthographic camera are parallel.
+    let spread = if view.clip_from_view.w_axis.w == 1.0 { 1.0 } else { depth };
     let (sx, sy) = (view.clip_from_view.x_axis.x, view.clip_from_view.y_axis.y);
-    world_from_view.transform_point3(Vec3::new(x / sx * depth, y / sy * depth, -depth))
+    world_from_view.transform_point3(Vec3::new(x / sx * spread, y / sy * spread, -depth))
 }
 
 /// A camera that stands still in a scene, for names.

@@ -46,12 +46,31 @@ const LONGEST: f32 = 0.1;
 
 /// Acts on the keys of a frame.
 pub fn pressed(viewer: &mut Viewer, context: &Context) {
-    let hit = |key: Key| context.input_mut(|input| input.consume_key(Modifiers::NONE, key));
+    // A key that is held repeats, and a desktop's own keys come with Alt.
+    let hit = |key: Key| {
+        context.input(|input| {
+            input.events.iter().any(|event| {
+                matches!(event, egui::Event::Key { key: of, pressed: true, repeat: false, modifiers, .. }
+                    if *of == key && !modifiers.alt && !modifiers.command && !modifiers.shift)
+            })
+        })
+    };
     if hit(Key::F1) {
         viewer.help = !viewer.help;
     }
-    if context.wants_keyboard_input() {
-        return;
+    if hit(Key::Tab) {
+        viewer.panels = !viewer.panels;
+        // Tab would give the keyboard to the first widget.
+        context.memory_mut(|memory| memory.move_focus(egui::FocusDirection::None));
+    }
+    // Keys are for the picture, unless text is edited.
+    if let Some(id) = context.memory(|memory| memory.focused()) {
+        if egui::TextEdit::load_state(context, id).is_some() {
+            viewer.flipped = false;
+            return;
+        }
+        // Space and Enter would press a button that has the keyboard.
+        context.memory_mut(|memory| memory.surrender_focus(id));
     }
     if viewer.help && hit(Key::Escape) {
         viewer.help = false;
@@ -71,9 +90,6 @@ pub fn pressed(viewer: &mut Viewer, context: &Context) {
     if hit(Key::P) {
         screenshot(viewer, "png");
     }
-    if hit(Key::Tab) {
-        viewer.panels = !viewer.panels;
-    }
     if hit(Key::C) {
         let at = Compare::ALL.iter().position(|(compare, _)| *compare == viewer.compare).unwrap_or(0);
         viewer.compare = Compare::ALL[(at + 1) % Compare::ALL.len()].0;
@@ -92,9 +108,10 @@ pub fn pressed(viewer: &mut Viewer, context: &Context) {
     if hit(Key::N)
         && let Some(stage) = &viewer.stage
     {
-        let next = if viewer.fly.is_some() { viewer.camera } else { viewer.camera + 1 };
+        let next =
+            if viewer.fly.is_some() || viewer.named_camera.is_some() { viewer.camera } else { viewer.camera + 1 };
         viewer.camera = next % stage.scene.cameras.len().max(1);
-        viewer.fly = None;
+        (viewer.fly, viewer.named_camera) = (None, None);
     }
     if hit(Key::K) {
         cameras::keep(viewer);
@@ -102,8 +119,9 @@ pub fn pressed(viewer: &mut Viewer, context: &Context) {
     if hit(Key::Enter) {
         viewer.playing = !viewer.playing;
     }
-    let brighter =
-        hit(Key::Plus) || hit(Key::Equals) || context.input_mut(|input| input.consume_key(Modifiers::SHIFT, Key::Plus));
+    // On many keyboards the plus needs Shift.
+    let plus = context.input_mut(|input| input.consume_key(Modifiers::SHIFT, Key::Plus));
+    let brighter = plus || hit(Key::Plus) || hit(Key::Equals);
     if brighter {
         viewer.exposure = Some(viewer.ev() + 0.5);
     }
@@ -169,6 +187,9 @@ fn words(viewer: &Viewer) -> Result<Vec<String>, String> {
         source: &stage.source,
         fly: viewer.fly.as_ref(),
         camera: viewer.camera,
+        named_camera: viewer.named_camera.as_ref().map(|(_, words)| words.as_str()),
+        device: viewer.device.as_deref(),
+        default_light: stage.default_light,
         size: viewer.size_of_side(),
         seconds: viewer.seconds,
         exposure: viewer.ev(),

@@ -37,7 +37,6 @@ pub struct Made {
 }
 
 /// The choices for one picture besides those of the request.
-#[derive(Debug)]
 pub struct Take<'a> {
     pub pose: &'a Pose,
     pub view: View,
@@ -45,6 +44,8 @@ pub struct Take<'a> {
     pub layers: bool,
     /// EV before the tone mapping of the settings.
     pub exposure: f64,
+    /// False: what is prepared anew is not needed any more.
+    pub go_on: &'a dyn Fn() -> bool,
 }
 
 /// A technique that renders pictures of one scene.
@@ -130,14 +131,16 @@ struct Living<T: Technique> {
 
 impl<T: Technique> Living<T> {
     /// The settings of the request; what depends on them is prepared again.
-    fn prepare(&mut self, wanted: &Wanted, exposure: f64) -> Result<T::Settings> {
+    fn prepare(&mut self, wanted: &Wanted, take: &Take<'_>) -> Result<T::Settings> {
         let Staged { technique: settings, tonemap } = staged::<T>(&wanted.settings)?;
         let by = T::prepared_by(&settings);
         if by != self.by {
             let stage: &Arc<Stage> = &wanted.stage;
-            self.ready = Ready::new(&self.gpu, &stage.scene, &settings, self.baked.as_ref(), &mut |_, _| true)?;
+            self.ready =
+                Ready::new(&self.gpu, &stage.scene, &settings, self.baked.as_ref(), &mut |_, _| (take.go_on)())?;
             self.by = by;
         }
+        let exposure = take.exposure;
         let shown = wanted.settings.get("tonemap").cloned().unwrap_or_default();
         if self.last.as_ref().is_none_or(|(by, ev, _)| *by != shown || *ev != exposure) {
             self.last = Some((shown, exposure, LastStage::new(&self.gpu, tonemap.as_ref(), exposure)?));
@@ -181,14 +184,14 @@ impl<T: Technique> Living<T> {
 
 impl<T: Technique> Live for Living<T> {
     fn single(&mut self, wanted: &Wanted, take: &Take<'_>) -> Result<Made> {
-        let settings = self.prepare(wanted, take.exposure)?;
+        let settings = self.prepare(wanted, take)?;
         // Each picture stands for itself, as the first frame of `render`.
         self.runner.forget_history();
         self.rendered(wanted, take, &settings, (Vec2::ZERO, 0, true))
     }
 
     fn mean(&mut self, wanted: &Wanted, take: &Take<'_>, told: &mut dyn FnMut(f64)) -> Result<Made> {
-        let settings = self.prepare(wanted, take.exposure)?;
+        let settings = self.prepare(wanted, take)?;
         self.runner.forget_history();
         let places = Smooth { count: wanted.pictures, filter: Filter::default(), temporal: None }.places();
         let (mut mean, all) = (Mean::default(), places.len() as f64);
@@ -217,12 +220,20 @@ impl<T: Technique> Live for Living<T> {
     }
 }
 
+/// A mode of a technique.
+#[derive(Clone, Copy, Debug)]
+pub struct AboutMode {
+    pub name: &'static str,
+    pub doc: &'static str,
+    /// The picture is radiance.
+    pub is_light: bool,
+}
+
 /// What programs know of a technique without a scene.
 #[derive(Clone, Debug)]
 pub struct About {
     pub about: &'static str,
-    /// Names and docs of the modes.
-    pub modes: Vec<(&'static str, &'static str)>,
+    pub modes: Vec<AboutMode>,
     /// The default settings.
     pub settings: Value,
     pub paper: Option<Value>,
@@ -230,6 +241,12 @@ pub struct About {
     pub baked: bool,
     /// A usual picture takes about a second on a CPU driver.
     pub cheap: bool,
+}
+
+impl AboutMode {
+    fn of<M: Mode>(mode: &M) -> Self {
+        Self { name: mode.name(), doc: mode.doc(), is_light: mode.is_radiance() }
+    }
 }
 
 /// What is known of a technique; `None` for an unknown name.
@@ -244,7 +261,7 @@ pub fn about(name: &str) -> Option<About> {
             };
             About {
                 about: T::ABOUT,
-                modes: T::Mode::ALL.iter().map(|mode| (mode.name(), mode.doc())).collect(),
+                modes: T::Mode::ALL.iter().map(AboutMode::of).collect(),
                 settings: plain(T::Settings::default()),
                 paper: T::Settings::paper().map(plain),
                 baked: T::Baked::NEEDED,

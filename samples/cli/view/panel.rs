@@ -96,7 +96,8 @@ fn shown(value: &Value) -> String {
 }
 
 fn edit(ui: &mut Ui, key: &Key, value: &mut Value) {
-    if key.optional {
+    // With a default there is nothing to leave open.
+    if key.optional && key.default.is_null() {
         let mut given = !value.is_null();
         if ui.checkbox(&mut given, "").on_hover_text("Given; without it, the program decides").changed() {
             *value = if given { first(key) } else { Value::Null };
@@ -163,17 +164,18 @@ fn number(ui: &mut Ui, key: &Key, value: &mut Value) {
         allowed => {
             let mut field = egui::DragValue::new(&mut now).max_decimals(if whole { 0 } else { 6 });
             field = field.speed(if whole { 0.2 } else { (before.abs() * 0.01).max(0.001) });
-            if let Allowed::Range { least, most, .. } = allowed {
-                field = field.range(*least..=*most);
+            if let Allowed::Range { least, most, or_zero, .. } = allowed {
+                let least = if *or_zero { least.min(0.0) } else { *least };
+                field = field.range(least..=*most).clamp_existing_to_range(false);
             }
             if !key.unit.is_empty() {
                 field = field.suffix(format!(" {}", key.unit));
             }
             ui.add(field);
-            if let Allowed::Range { least, multiple_of: Some(step), .. } = allowed {
-                // Towards the value that the person aims at, and never back to the one before.
-                let steps = if now > before { (now / step).ceil() } else { (now / step).floor() };
-                now = (steps * step).max((least / step).ceil() * step);
+            if now != before
+                && let Allowed::Range { least, most, multiple_of, or_zero } = allowed
+            {
+                now = nearest((before, now), (*least, *most), *multiple_of, *or_zero);
             }
         }
     }
@@ -185,6 +187,17 @@ fn number(ui: &mut Ui, key: &Key, value: &mut Value) {
             (now as f32).to_string().parse().map_or(Value::Null, |n: f64| json!(n))
         };
     }
+}
+
+/// The allowed value towards which a person has moved another one.
+fn nearest((before, now): (f64, f64), (least, most): (f64, f64), step: Option<f64>, or_zero: bool) -> f64 {
+    if or_zero && now < least {
+        return if now < before || now <= 0.0 { 0.0 } else { least };
+    }
+    let Some(step) = step else { return now.clamp(least, most) };
+    // Towards the value that the person aims at, and never back to the one before.
+    let steps = if now > before { (now / step).ceil() } else { (now / step).floor() };
+    (steps * step).clamp((least / step).ceil() * step, (most / step).floor() * step)
 }
 
 /// A value without description: a number, a list of numbers, a word.
@@ -280,6 +293,24 @@ mod tests {
         let again = crate::config::to_value(&read).unwrap();
         for (group, values) in tree.as_object().unwrap() {
             assert_eq!(&again[group], values, "{group}");
+        }
+    }
+
+    #[test]
+    fn values_go_to_the_nearest_ones_that_are_allowed() {
+        let step = |before, now| nearest((before, now), (8.0, 60.0), Some(8.0), false);
+        assert_eq!([step(16.0, 17.0), step(16.0, 15.0), step(8.0, 1.0), step(56.0, 60.0)], [24.0, 8.0, 8.0, 56.0]);
+        let zero = |before, now| nearest((before, now), (0.5, 4.0), None, true);
+        assert_eq!([zero(0.5, 0.4), zero(0.0, 0.1), zero(1.0, 9.0), zero(0.0, -1.0)], [0.0, 0.5, 4.0, 0.0]);
+    }
+
+    #[test]
+    fn optional_settings_have_no_other_default_than_open() {
+        // A setting that is left open cannot be said on a command line.
+        for (name, description) in techniques::descriptions() {
+            for key in description.keys.iter().filter(|key| key.optional) {
+                assert!(key.default.is_null(), "{name}.{}", key.name);
+            }
         }
     }
 

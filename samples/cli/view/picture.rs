@@ -6,7 +6,9 @@ use lucerna::scene::{LightKind, Pose, View};
 
 use super::{
     app::{Compare, Viewer},
-    fly, painted,
+    fly,
+    measured::MapOf,
+    painted,
     side::image_of,
 };
 use crate::args::Size;
@@ -120,31 +122,51 @@ fn paint(viewer: &mut Viewer, ui: &Ui, rect: Rect, scale: f32) {
             if let (Some((size, a)), Some((other, b))) = (viewer.sides[0].codes(ev), viewer.sides[1].codes(ev))
                 && size == other
             {
-                let codes = painted::difference(&a, &b);
-                let texture = context.load_texture("difference", image_of(size, &codes), TextureOptions::NEAREST);
-                image(&(texture.clone(), true), rect, rect);
-                keep(&context, texture);
+                let key = (numbers(viewer), ev.to_bits(), "difference");
+                let texture = kept(&context, key, || image_of(size, &painted::difference(&a, &b)));
+                image(&(texture, true), rect, rect);
+                tag(ui, rect, "2 |A − B|");
+            } else {
+                tag(ui, rect, "A and B have other sizes, or one has no picture yet");
             }
-            tag(ui, rect, "2 |A − B|");
         }
         Compare::Map(of) => {
+            let name = if of == MapOf::Flip { "FLIP of A beside B" } else { "relative error of A beside B" };
             if let (Some(answer), _) = viewer.answer()
                 && let Some((found, [width, height], codes)) = &answer.map
                 && *found == of
             {
                 let size = Size { width: *width, height: *height };
-                let texture = context.load_texture("map", image_of(size, codes), TextureOptions::NEAREST);
-                image(&(texture.clone(), true), rect, rect);
-                keep(&context, texture);
+                let texture = kept(&context, (answer.of, ev.to_bits(), name), || image_of(size, codes));
+                image(&(texture, true), rect, rect);
+                tag(ui, rect, name);
+            } else {
+                tag(ui, rect, "no map yet: A and B have other sizes, or one has no picture");
             }
-            tag(ui, rect, "map of A beside B");
         }
     }
 }
 
-/// Keeps a texture until the next frame: the painter needs it after this one.
-fn keep(context: &Context, texture: TextureHandle) {
-    context.data_mut(|data| data.insert_temp(egui::Id::new("kept texture"), texture));
+/// What a texture of both sides is made of.
+type MadeOf = ([u64; 2], u64, &'static str);
+
+/// The texture of both sides, made anew where it is of something else.
+fn kept(context: &Context, of: MadeOf, image: impl FnOnce() -> egui::ColorImage) -> TextureHandle {
+    let id = egui::Id::new("texture of both sides");
+    let before = context.data(|data| data.get_temp::<(MadeOf, TextureHandle)>(id));
+    if let Some((made_of, texture)) = before
+        && made_of == of
+    {
+        return texture;
+    }
+    let texture = context.load_texture("both sides", image(), TextureOptions::NEAREST);
+    context.data_mut(|data| data.insert_temp(id, (of, texture.clone())));
+    texture
+}
+
+/// Numbers of the pictures of both sides.
+fn numbers(viewer: &Viewer) -> [u64; 2] {
+    [0, 1].map(|side: usize| viewer.sides[side].light().map_or(0, |(_, number, _)| number))
 }
 
 fn tag(ui: &Ui, space: Rect, text: &str) {

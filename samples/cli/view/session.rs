@@ -26,6 +26,9 @@ use super::{
 /// A quick picture that takes longer may be interrupted by the next request.
 const PATIENCE: Duration = Duration::from_secs(1);
 
+/// Numbers of pictures, of all sessions.
+static NUMBERS: AtomicU64 = AtomicU64::new(0);
+
 /// What the thread does.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Doing {
@@ -51,7 +54,6 @@ pub(super) struct Shared {
     changed: Condvar,
     /// Asks the device to stop.
     stop: Arc<AtomicBool>,
-    numbers: AtomicU64,
     waker: Wake,
 }
 
@@ -69,6 +71,9 @@ impl std::fmt::Debug for Wake {
 struct State {
     /// The newest request, until the thread takes it.
     wanted: Option<Wanted>,
+    /// The request that the thread has taken, and how often it was tried again after the device was lost.
+    now: Option<Wanted>,
+    tries: u32,
     shown: Option<Arc<Shown>>,
     failed: Option<Arc<Error>>,
     doing: Doing,
@@ -78,6 +83,8 @@ struct State {
     begun: Option<Instant>,
     /// A request interrupts the present work at once.
     fine: bool,
+    /// Nothing is wanted any more.
+    resting: bool,
     closing: bool,
 }
 
@@ -88,13 +95,7 @@ impl Session {
     /// `Runtime` if the system gives no thread.
     pub fn start(name: &str, options: GpuOptions, waker: Wake) -> Result<Self> {
         let stop = Arc::new(AtomicBool::new(false));
-        let shared = Arc::new(Shared {
-            state: Mutex::default(),
-            changed: Condvar::new(),
-            stop: stop.clone(),
-            numbers: AtomicU64::new(0),
-            waker,
-        });
+        let shared = Arc::new(Shared { state: Mutex::default(), changed: Condvar::new(), stop: stop.clone(), waker });
         let options = GpuOptions { stop: Some(Stop::by(stop)), ..options };
         let (name, of_thread) = (format!("lucerna {name}"), shared.clone());
         let thread = std::thread::Builder::new().name(name).spawn(move || of_thread.work(&options));
@@ -108,12 +109,26 @@ impl Session {
     pub fn ask(&self, wanted: Wanted) {
         let mut state = self.shared.lock();
         let late = state.begun.is_some_and(|begun| begun.elapsed() > PATIENCE);
-        if state.fine || late {
+        // Work of which the new request has a use goes on: preparations, and a quick picture while things still move.
+        let useful = state.now.as_ref().is_some_and(|now| {
+            let prepares = matches!(state.doing, Doing::Preparing(..));
+            now.same_scene(&wanted) && (prepares || (now.moving && wanted.moving))
+        });
+        if state.fine || (late && !useful) {
             self.shared.stop.store(true, Ordering::Relaxed);
         }
         state.wanted = Some(wanted);
+        state.resting = false;
         drop(state);
         self.shared.changed.notify_all();
+    }
+
+    /// Stops the present work, and drops what was asked for.
+    pub fn rest(&self) {
+        let mut state = self.shared.lock();
+        state.wanted = None;
+        state.resting = true;
+        self.shared.stop.store(true, Ordering::Relaxed);
     }
 
     /// The newest picture.
@@ -166,6 +181,7 @@ impl Shared {
                 self.stop.store(false, Ordering::Relaxed);
                 state.begun = Some(Instant::now());
                 state.failed = None;
+                (state.now, state.tries) = (Some(wanted.clone()), 0);
                 return Some(wanted);
             }
             state = self.changed.wait(state).unwrap_or_else(|poisoned| poisoned.into_inner());
@@ -175,14 +191,34 @@ impl Shared {
     /// A newer request waits, or the window closes.
     pub fn is_old(&self) -> bool {
         let state = self.lock();
-        state.closing || state.wanted.is_some()
+        state.closing || state.resting || state.wanted.is_some()
+    }
+
+    /// A request for another technique or scene waits, or the window closes.
+    pub fn is_other(&self, first: &Wanted) -> bool {
+        let state = self.lock();
+        state.closing || state.wanted.as_ref().is_some_and(|wanted| !wanted.same_scene(first))
+    }
+
+    /// The request to render on a new device: the present one once more, or the next one.
+    fn again(&self) -> Option<Wanted> {
+        let mut state = self.lock();
+        if state.closing || state.resting || state.wanted.is_some() || state.tries > 0 {
+            drop(state);
+            return self.next();
+        }
+        state.tries += 1;
+        state.failed = None;
+        state.begun = Some(Instant::now());
+        self.stop.store(false, Ordering::Relaxed);
+        state.now.clone()
     }
 
     /// From here on a request interrupts the work at once. False: there is one already.
     pub fn may_be_interrupted(&self) -> bool {
         let mut state = self.lock();
         state.fine = true;
-        !state.closing && state.wanted.is_none()
+        !state.closing && !state.resting && state.wanted.is_none()
     }
 
     pub fn does(&self, doing: Doing) {
@@ -200,7 +236,7 @@ impl Shared {
     }
 
     pub fn show(&self, shown: Shown) {
-        let shown = Shown { number: self.numbers.fetch_add(1, Ordering::Relaxed) + 1, ..shown };
+        let shown = Shown { number: NUMBERS.fetch_add(1, Ordering::Relaxed) + 1, ..shown };
         self.lock().shown = Some(Arc::new(shown));
         (self.waker.0)();
     }
@@ -208,7 +244,7 @@ impl Shared {
     /// Reports the failure of a request, unless a newer one is the reason.
     pub fn fail(&self, error: Error) {
         let asked = self.stop.load(Ordering::Relaxed);
-        if asked && matches!(error.kind(), ErrorKind::Interrupted | ErrorKind::DeviceLost) {
+        if error.kind() == ErrorKind::Interrupted || (asked && error.kind() == ErrorKind::DeviceLost) {
             return;
         }
         self.lock().failed = Some(Arc::new(error));
@@ -238,25 +274,18 @@ impl Shared {
         let mut painter = Painter::new(gpu);
         let mut wanted = first;
         loop {
-            let (used, result) = if wanted.is_truth() {
-                (wanted.clone(), truth::work(self, gpu, &mut painter, wanted))
+            let result = if wanted.is_truth() {
+                truth::work(self, gpu, &mut painter, wanted)
             } else {
-                (wanted.clone(), still::work(self, gpu, &mut painter, wanted))
+                still::work(self, gpu, &mut painter, wanted)
             };
             wanted = match result {
-                Ok(Some(next)) => next,
-                Ok(None) => return None,
+                Ok(next) => next?,
                 Err(error) => {
-                    let lost = error.kind() == ErrorKind::DeviceLost;
-                    let asked = self.stop.load(Ordering::Relaxed);
                     self.fail(error);
-                    if lost {
-                        // A device that was stopped within a pass counts as lost. The request that stopped it comes next.
-                        return if asked {
-                            self.next()
-                        } else {
-                            Some(used).filter(|_| !self.is_old()).or_else(|| self.next())
-                        };
+                    // A device that was stopped within a long pass is lost, too.
+                    if gpu.is_lost() {
+                        return self.again();
                     }
                     self.next()?
                 }

@@ -84,7 +84,8 @@ impl Side {
     pub fn start_with(&mut self, technique: &'static str) {
         let Some(about) = live::about(technique) else { return };
         self.technique = technique;
-        self.mode = about.modes.first().map(|(name, _)| (*name).to_owned()).unwrap_or_default();
+        self.mode = about.modes.first().map(|mode| mode.name.to_owned()).unwrap_or_default();
+        self.bake = None;
         self.settings = Arc::new(preview(technique, &about));
         // `render` takes the mean of several pictures where one takes about a second on a CPU driver.
         self.pictures = if about.cheap { smooth::STILL } else { 1 };
@@ -121,6 +122,20 @@ impl Side {
         session.ask(wanted.clone());
         self.asked = Some(wanted);
         Ok(())
+    }
+
+    /// The picture of the mode is light, which has an exposure.
+    pub fn is_light(&self) -> bool {
+        let mode = self.about.modes.iter().find(|mode| mode.name == self.mode);
+        self.shows == Shows::Picture && mode.is_none_or(|mode| mode.is_light)
+    }
+
+    /// Stops the work for this side; the next request goes on.
+    pub fn rest(&mut self) {
+        if let Some(session) = self.session.as_ref().filter(|_| self.asked.is_some()) {
+            session.rest();
+            self.asked = None;
+        }
     }
 
     pub fn session(&self) -> Option<&Session> {

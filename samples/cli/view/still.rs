@@ -67,7 +67,9 @@ struct Light {
 
 impl Light {
     fn of(live: &dyn Live, wanted: &Wanted, size: Size, made: Made, begun: Instant) -> Self {
-        let ev = chosen(live, wanted).unwrap_or_else(|| exposure::fitting(&made.layers));
+        let fitting =
+            || if live.is_light(wanted) && !wanted.is_developed() { exposure::fitting(&made.layers) } else { 0.0 };
+        let ev = chosen(live, wanted).unwrap_or_else(fitting);
         Self {
             of: wanted.clone(),
             size,
@@ -84,7 +86,7 @@ impl Light {
 
 /// The exposure of a request: that of the user, or the one of the scene's lights.
 fn chosen(live: &dyn Live, wanted: &Wanted) -> Option<f64> {
-    wanted.exposure.or_else(|| live.exposure(&wanted.stage).filter(|_| live.is_light(wanted)))
+    wanted.exposure.or_else(|| live.exposure(&wanted.stage))
 }
 
 fn times(report: &Report) -> Vec<PassTime> {
@@ -104,7 +106,7 @@ pub(super) fn work(shared: &Shared, gpu: &Gpu, painter: &mut Painter, first: Wan
     shared.does(preparing(None));
     let mut told = |done: u64, all: u64| {
         shared.does(preparing(Some((done, all))));
-        !shared.is_old()
+        !shared.is_other(&first)
     };
     let mut live = live::of(gpu, &first, &mut told)?;
     let (mut rate, mut kept) = (Rate::default(), None::<Light>);
@@ -124,7 +126,7 @@ pub(super) fn work(shared: &Shared, gpu: &Gpu, painter: &mut Painter, first: Wan
         match result {
             Ok(light) => kept = light,
             // A lost device needs a new start.
-            Err(error) if error.kind() == lucerna::ErrorKind::DeviceLost => return Err(error),
+            Err(error) if gpu.is_lost() => return Err(error),
             Err(error) => shared.fail(error),
         }
         wanted = match shared.next() {
@@ -136,7 +138,7 @@ pub(super) fn work(shared: &Shared, gpu: &Gpu, painter: &mut Painter, first: Wan
 
 /// The tone mapping of the settings has the exposure inside, so another exposure needs another picture.
 fn same_tone(before: &Wanted, now: &Wanted) -> bool {
-    before.exposure == now.exposure || now.settings.get("tonemap").is_none_or(serde_json::Value::is_null)
+    before.exposure == now.exposure || !now.is_developed()
 }
 
 /// Renders one request. Returns the still, if there is one.
@@ -151,7 +153,7 @@ fn picture(
     let long = rate.whole(wanted.size).is_none_or(|time| time > LONG);
     shared.does(Doing::Rendering(0.0));
     if wanted.moving || long {
-        let light = one(live, wanted, rate.size(wanted.size), false, rate)?;
+        let light = one(shared, live, wanted, (rate.size(wanted.size), false), rate)?;
         paint(shared, painter, live, &light)?;
     }
     if wanted.moving || !shared.may_be_interrupted() {
@@ -159,17 +161,19 @@ fn picture(
     }
     if mean {
         // Sharp before it is smooth.
-        let light = one(live, wanted, wanted.size, false, rate)?;
+        let light = one(shared, live, wanted, (wanted.size, false), rate)?;
         paint(shared, painter, live, &light)?;
     }
     let light = if mean {
         let begun = Instant::now();
         let (pose, view) = wanted.placed(wanted.size)?;
-        let take = Take { pose: &pose, view, layers: true, exposure: chosen(live, wanted).unwrap_or(0.0) };
+        let go_on = || !shared.is_other(wanted);
+        let take =
+            Take { pose: &pose, view, layers: true, exposure: chosen(live, wanted).unwrap_or(0.0), go_on: &go_on };
         let made = live.mean(wanted, &take, &mut |share| shared.does(Doing::Rendering(share)))?;
         Light::of(live, wanted, wanted.size, made, begun)
     } else {
-        one(live, wanted, wanted.size, true, rate)?
+        one(shared, live, wanted, (wanted.size, true), rate)?
     };
     let light = Light { finished: true, ..light };
     paint(shared, painter, live, &light)?;
@@ -177,11 +181,18 @@ fn picture(
 }
 
 /// One picture, with all layers or with the light alone.
-fn one(live: &mut dyn Live, wanted: &Wanted, size: Size, layers: bool, rate: &mut Rate) -> Result<Light> {
+fn one(
+    shared: &Shared,
+    live: &mut dyn Live,
+    wanted: &Wanted,
+    (size, layers): (Size, bool),
+    rate: &mut Rate,
+) -> Result<Light> {
     let begun = Instant::now();
     let (pose, view) = wanted.placed(size)?;
     let layers = layers || matches!(wanted.shows, Shows::Layer(_));
-    let take = Take { pose: &pose, view, layers, exposure: chosen(live, wanted).unwrap_or(0.0) };
+    let go_on = || !shared.is_other(wanted);
+    let take = Take { pose: &pose, view, layers, exposure: chosen(live, wanted).unwrap_or(0.0), go_on: &go_on };
     let made = live.single(wanted, &take)?;
     rate.took(begun.elapsed(), size);
     Ok(Light::of(live, wanted, size, made, begun))

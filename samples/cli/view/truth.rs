@@ -8,7 +8,9 @@ use std::{
 use lucerna::{
     Result,
     gpu::Gpu,
-    tracer::{PictureSettings, Tracer},
+    technique::Mode as _,
+    techniques::tonemap,
+    tracer::{Mode, PictureSettings, Tracer},
 };
 
 use super::{
@@ -16,12 +18,20 @@ use super::{
     session::{Doing, Shared},
     wanted::{Shown, Shows, Wanted},
 };
-use crate::{args::Size, exposure, last_stage::Staged};
+use crate::{
+    args::Size,
+    exposure,
+    last_stage::{self, Staged},
+    reference,
+};
 
 /// Time between two pictures of one that grows.
 const EVERY: Duration = Duration::from_millis(400);
 /// The sides are divided by this number while something moves.
 const MOVING: u32 = 3;
+
+/// The paths that were begun, for this request.
+type Begun = Option<Wanted>;
 
 /// Renders requests for the path tracer in one scene. Returns the first request for something else; `None` if the window closes.
 ///
@@ -33,14 +43,16 @@ pub(super) fn work(shared: &Shared, gpu: &Gpu, painter: &mut Painter, first: Wan
     let (pose, _) = first.placed(first.size)?;
     let mut tracer = Tracer::new(gpu, &stage.scene, &pose)?;
     let mut wanted = first.clone();
-    // The last request is finished, so another look at it needs no paths.
-    let mut finished: Option<Wanted> = None;
+    let mut begun: Begun = None;
     loop {
-        let again = finished.take().is_some_and(|before| before.same_light(&wanted));
-        match grow(shared, painter, &mut tracer, &wanted, again) {
-            Ok(done) => finished = done.then(|| wanted.clone()),
-            Err(error) if error.kind() == lucerna::ErrorKind::DeviceLost => return Err(error),
-            Err(error) => shared.fail(error),
+        let mut growing = Growing { shared, gpu, painter, tracer: &mut tracer };
+        let result = growing.grow(&wanted, &mut begun);
+        if let Err(error) = result {
+            begun = None;
+            if gpu.is_lost() {
+                return Err(error);
+            }
+            shared.fail(error);
         }
         wanted = match shared.next() {
             Some(next) if next.same_scene(&first) => next,
@@ -49,70 +61,93 @@ pub(super) fn work(shared: &Shared, gpu: &Gpu, painter: &mut Painter, first: Wan
     }
 }
 
-/// Adds paths until there are enough, or a newer request is there. True: enough.
-fn grow(shared: &Shared, painter: &mut Painter, tracer: &mut Tracer<'_>, wanted: &Wanted, again: bool) -> Result<bool> {
-    let begun = Instant::now();
-    let settings: Staged<PictureSettings> =
-        Staged::recorded(&wanted.settings, &PictureSettings::default(), PictureSettings::validate)?;
-    let part = |side: u32| if wanted.moving { side.div_ceil(MOVING) } else { side };
-    let size = Size { width: part(wanted.size.width), height: part(wanted.size.height) };
-    if !again {
-        let (pose, view) = wanted.placed(size)?;
-        tracer.set_pose(&pose);
-        tracer.start(&view, &settings.technique.reference)?;
-    }
-    let whole = if wanted.moving { 1 } else { wanted.samples.max(1) };
-    let mut samples = tracer.progress()?.samples;
-    if !again {
-        // One path a pixel first, so that there is a picture soon.
-        tracer.run(1, |_| true)?;
-    }
-    loop {
-        let progress = tracer.progress()?;
-        let done = progress.samples >= whole as f64;
-        if again || progress.samples > samples || done {
-            samples = progress.samples;
-            show(shared, painter, tracer, wanted, (samples, done && !wanted.moving, size == wanted.size), begun)?;
-        }
-        if done || shared.is_old() {
-            return Ok(done && !wanted.moving);
-        }
-        shared.does(Doing::Rendering((progress.samples / whole as f64).min(1.0)));
-        let since = Instant::now();
-        tracer.run(whole, |_| since.elapsed() < EVERY && !shared.is_old())?;
-    }
+/// Whether the paths of one request are those of another one: both may be shown in different ways, and with different numbers of paths.
+fn same_paths(before: &Wanted, now: &Wanted) -> bool {
+    let shown =
+        Wanted { samples: before.samples, shows: before.shows.clone(), mode: before.mode.clone(), ..now.clone() };
+    before.same_light(&shown)
 }
 
-fn show(
-    shared: &Shared,
-    painter: &mut Painter,
-    tracer: &Tracer<'_>,
-    wanted: &Wanted,
-    (samples, finished, whole): (f64, bool, bool),
-    begun: Instant,
-) -> Result<()> {
-    let sums = tracer.sums()?;
-    let layers = sums.layers();
-    let ev = wanted.exposure.or_else(|| exposure::of_source(&wanted.stage.source));
-    let ev = ev.unwrap_or_else(|| exposure::fitting(&layers));
-    let is_light = wanted.shows == Shows::Picture;
-    let pixels = painter.codes(wanted, &layers, is_light, ev)?;
-    shared.show(Shown {
-        number: 0,
-        size: Size { width: layers.width, height: layers.height },
-        pixels,
-        layers: Arc::new(layers),
-        exposure: ev,
-        finished,
-        whole,
-        of: wanted.clone(),
-        milliseconds: begun.elapsed().as_secs_f64() * 1e3,
-        passes: Arc::default(),
-        images: Arc::default(),
-        notes: tracer.notes().iter().map(|note| format!("{}: {}", note.place, note.text)).collect(),
-        samples,
-        noise: Some(sums.relative_error()).filter(|error| error.is_finite()),
-        at: Instant::now(),
-    });
-    Ok(())
+/// A picture that grows.
+struct Growing<'a, 's> {
+    shared: &'a Shared,
+    gpu: &'a Gpu,
+    painter: &'a mut Painter,
+    tracer: &'a mut Tracer<'s>,
+}
+
+impl Growing<'_, '_> {
+    /// Adds paths until there are enough, or a newer request is there.
+    fn grow(&mut self, wanted: &Wanted, begun: &mut Begun) -> Result<()> {
+        let since_request = Instant::now();
+        let settings: Staged<PictureSettings> =
+            Staged::recorded(&wanted.settings, &PictureSettings::default(), PictureSettings::validate)?;
+        let part = |side: u32| if wanted.moving { side.div_ceil(MOVING) } else { side };
+        let size = Size { width: part(wanted.size.width), height: part(wanted.size.height) };
+        if !begun.as_ref().is_some_and(|before| same_paths(before, wanted)) {
+            *begun = None;
+            let (pose, view) = wanted.placed(size)?;
+            self.tracer.set_pose(&pose);
+            self.tracer.start(&view, &settings.technique.reference)?;
+            // One path a pixel first, so that there is a picture soon.
+            self.tracer.run(1, |_| true)?;
+            *begun = Some(wanted.clone());
+        }
+        let whole = if wanted.moving { 1 } else { wanted.samples.max(1) };
+        let mut shown = None;
+        loop {
+            let progress = self.tracer.progress()?;
+            let done = progress.samples >= whole as f64;
+            if shown.is_none_or(|shown| progress.samples > shown) {
+                shown = Some(progress.samples);
+                let state = (progress.samples, done && !wanted.moving, size == wanted.size);
+                self.show(wanted, settings.tonemap.as_ref(), state, since_request)?;
+            }
+            if done || self.shared.is_old() {
+                return Ok(());
+            }
+            self.shared.does(Doing::Rendering((progress.samples / whole as f64).min(1.0)));
+            let since = Instant::now();
+            let shared = self.shared;
+            self.tracer.run(whole, |_| since.elapsed() < EVERY && !shared.is_old())?;
+        }
+    }
+
+    fn show(
+        &mut self,
+        wanted: &Wanted,
+        tonemap: Option<&tonemap::Settings>,
+        (samples, finished, whole): (f64, bool, bool),
+        begun: Instant,
+    ) -> Result<()> {
+        let sums = self.tracer.sums()?;
+        let mut layers = sums.layers();
+        let modes = <Mode as lucerna::technique::Mode>::ALL.iter().copied();
+        let mode = modes.into_iter().find(|mode| mode.name() == wanted.mode).unwrap_or_default();
+        reference::show(mode, &mut layers);
+        let ev = wanted.exposure.or_else(|| exposure::of_source(&wanted.stage.source));
+        let ev = ev.unwrap_or_else(|| if tonemap.is_some() { 0.0 } else { exposure::fitting(&layers) });
+        if let Some(tonemap) = tonemap {
+            last_stage::still(self.gpu, tonemap, ev, &mut layers)?;
+        }
+        let pixels = self.painter.codes(wanted, &layers, wanted.shows == Shows::Picture, ev)?;
+        self.shared.show(Shown {
+            number: 0,
+            size: Size { width: layers.width, height: layers.height },
+            pixels,
+            layers: Arc::new(layers),
+            exposure: ev,
+            finished,
+            whole,
+            of: wanted.clone(),
+            milliseconds: begun.elapsed().as_secs_f64() * 1e3,
+            passes: Arc::default(),
+            images: Arc::default(),
+            notes: self.tracer.notes().iter().map(|note| format!("{}: {}", note.place, note.text)).collect(),
+            samples,
+            noise: Some(sums.relative_error()).filter(|error| error.is_finite()),
+            at: Instant::now(),
+        });
+        Ok(())
+    }
 }

@@ -89,6 +89,11 @@ impl Wanted {
         Arc::ptr_eq(&self.stage, &other.stage) && self.technique == other.technique && self.bake == other.bake
     }
 
+    /// The settings map the light to a screen.
+    pub fn is_developed(&self) -> bool {
+        self.settings.get("tonemap").is_some_and(|tonemap| !tonemap.is_null())
+    }
+
     pub fn is_truth(&self) -> bool {
         self.technique == TRUTH
     }
