@@ -153,13 +153,13 @@ impl Fly {
 /// Where a point lies in a picture, shares of its width and height from the upper left corner; `None` behind the camera.
 pub fn project(view: &View, point: Vec3) -> Option<Vec2> {
     let clip = view.clip_from_world * point.extend(1.0);
-    (clip.w > 0.0).then(|| Vec2::new(clip.x / clip.w * 0.5 + 0.5, clip.y / clip.w * 0.5 + 0.5))
+    (clip.w > 0.0).then(|| Vec2::new(0.5 + 0.5 * clip.x / clip.w, 0.5 - 0.5 * clip.y / clip.w))
 }
 
 /// The point at a depth along the line of sight of a place in a picture. `at`: as in [`project`]; `depth`: metres along the axis of the camera.
 pub fn unproject(view: &View, at: Vec2, depth: f32) -> Vec3 {
     let world_from_view: Mat4 = view.view_from_world.inverse();
-    let (x, y) = (2.0 * at.x - 1.0, 2.0 * at.y - 1.0);
+    let (x, y) = (2.0 * at.x - 1.0, 1.0 - 2.0 * at.y);
     // Lines of sight of an orthographic camera are parallel.
     let spread = if view.clip_from_view.w_axis.w == 1.0 { 1.0 } else { depth };
     let (sx, sy) = (view.clip_from_view.x_axis.x, view.clip_from_view.y_axis.y);

@@ -284,7 +284,7 @@ mod tests {
         assert!(changes(&defaults, &defaults).is_empty());
         let mut tree = defaults.clone();
         tree["isr"]["samples"] = json!(24);
-        tree["isr"]["strength"] = json!(0.7);
+        tree["isr"]["k_isr"] = json!(0.7);
         tree["gbuffer"]["mips"] = json!(false);
         tree["background"] = json!([0.5, 0.25, 1.0]);
         let list = changes(&tree, &defaults);
