@@ -24,6 +24,7 @@ pub mod ground;
 pub mod info;
 pub mod inspect;
 pub mod interior;
+pub mod lamps;
 pub mod last_stage;
 pub mod lights;
 pub mod listed;

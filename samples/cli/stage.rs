@@ -15,6 +15,7 @@ use crate::{
     camera::{self, Choice},
     default_light::{self, DefaultLight},
     fingerprint, framing,
+    lamps::{self, Lamp, Put},
     lights::{self, Point, Sun},
     placed::Placed,
     record::{self, Source},
@@ -31,6 +32,8 @@ pub struct Stage {
     pub eye: record::View,
     /// The camera was added: it is fitted to the shape of the picture.
     pub added_camera: bool,
+    /// Lamps that were put elsewhere, by their nodes.
+    put: Vec<(usize, Put)>,
     /// Default lights were added.
     pub default_light: bool,
     extents: Extents,
@@ -67,6 +70,10 @@ pub struct StageArgs {
     /// Add a white sun, and a sky if there is no environment: degrees (azimuth 0 is over +Z, 90 over +X), W/m² [default: 2]
     #[arg(long, value_name = "AZIMUTH,ELEVATION[,IRRADIANCE]", allow_hyphen_values = true, help_heading = "Picture")]
     pub sun: Option<Sun>,
+
+    /// Put a lamp of the scene, by its number or name, elsewhere: metres; for a sun its azimuth and elevation, degrees. May be given more than once
+    #[arg(long, value_name = "LAMP=X,Y,Z", allow_hyphen_values = true, help_heading = "Picture")]
+    pub lamp: Vec<Lamp>,
 
     /// When to add default lights
     #[arg(long, value_enum, default_value_t, value_name = "WHEN", help_heading = "Picture")]
@@ -118,6 +125,7 @@ impl Stage {
             framing::add_missing_camera(&mut scene, args.size.aspect());
         }
         let added_camera = scene.cameras.len() > cameras;
+        let put = lamps::put(&mut scene, &args.lamp)?;
         let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
         let choice = match (&args.eye, &args.camera) {
             (Some(Eye { view: record::View::File(file), .. }), _) => Choice::File(file.clone()),
@@ -147,7 +155,7 @@ impl Stage {
             fingerprint = fingerprint::scene(&scene);
         }
         let extents = Extents::of(&scene);
-        Ok(Self { scene, source, fingerprint, placed, eye, added_camera, default_light, extents })
+        Ok(Self { scene, source, fingerprint, placed, eye, added_camera, put, default_light, extents })
     }
 
     /// Notes about the scene for the user.
@@ -160,7 +168,11 @@ impl Stage {
     /// # Errors
     /// `Input` if an object is too far away at this time.
     pub fn at(&self, seconds: f64, size: Size) -> Result<(Pose, View)> {
-        let pose = Pose::playing(&self.scene, seconds as f32);
+        let mut pose = Pose::playing(&self.scene, seconds as f32);
+        // The node's own place has the rounding errors of the nodes above it.
+        for (node, put) in &self.put {
+            pose.world[*node] = put.world(pose.world[*node]);
+        }
         self.extents.check(&self.scene, &pose)?;
         let view = self.placed.view(&pose, size);
         extent::near(view.position.abs().max_element())

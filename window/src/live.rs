@@ -22,6 +22,10 @@ const HIDDEN_PAUSE: Duration = Duration::from_millis(100);
 /// A hidden window looks so often whether it is shown again. A window manager may first show it and then say so.
 const HIDDEN_LOOK: Duration = Duration::from_secs(1);
 
+/// A CPU driver paints with the threads that the program computes with. It therefore paints so seldom at most.
+/// The app still runs for each input.
+const CPU_PAUSE: Duration = Duration::from_millis(45);
+
 /// A window with all that belongs to it.
 pub struct Live {
     // The order matters: fields are dropped from first to last.
@@ -39,6 +43,8 @@ pub struct Live {
     /// When the next frame is due.
     next: Option<Instant>,
     last: Instant,
+    /// When the last frame was painted; none before the first.
+    painted: Option<Instant>,
     hidden: bool,
     losses: u32,
     busy: u32,
@@ -86,6 +92,7 @@ impl Live {
             device: options.device.clone(),
             next: None,
             last: Instant::now(),
+            painted: None,
             hidden: false,
             losses: 0,
             busy: 0,
@@ -163,9 +170,11 @@ impl Live {
         for (id, delta) in output.textures_delta.set {
             self.textures.set(id, delta);
         }
-        let shown = if self.hidden {
+        let early = self.is_early();
+        let shown = if self.hidden || early.is_some() {
             Ok(())
         } else {
+            self.painted = Some(Instant::now());
             let primitives = self.context.tessellate(output.shapes, output.pixels_per_point);
             self.show(&primitives, output.pixels_per_point)
         };
@@ -173,6 +182,9 @@ impl Live {
             self.textures.free(id);
         }
         shown?;
+        if let Some(left) = early.filter(|_| !self.hidden) {
+            self.ask(left);
+        }
         if self.hidden {
             self.ask(HIDDEN_LOOK);
         }
@@ -180,6 +192,13 @@ impl Live {
         self.obey(&view.commands, closing);
         self.ask(view.repaint_delay);
         Ok(())
+    }
+
+    /// The time until the window paints again, if it is too early now.
+    fn is_early(&self) -> Option<Duration> {
+        let slow = self.presenter.as_ref().is_some_and(Presenter::is_cpu);
+        let since = self.painted.filter(|_| slow)?.elapsed();
+        CPU_PAUSE.checked_sub(since).filter(|left| !left.is_zero())
     }
 
     fn obey(&mut self, commands: &[ViewportCommand], closing: bool) {

@@ -8,7 +8,6 @@ use std::{
 };
 
 use egui::Context;
-use glam::Mat4;
 use lucerna::{Error, ErrorKind, Result, gpu::GpuOptions, scene::Pose, techniques::tonemap::Operator};
 
 use super::{
@@ -27,6 +26,7 @@ use super::{
 };
 use crate::{
     args::Size,
+    lamps::Put,
     placed::Placed,
     programs::suited,
     record,
@@ -96,7 +96,7 @@ pub struct Viewer {
     pub(super) cameras: Cameras,
     pub(super) seconds: f64,
     pub(super) playing: bool,
-    pub(super) moved: BTreeMap<usize, Mat4>,
+    pub(super) moved: BTreeMap<usize, Put>,
     /// The lamp that the mouse holds: its node.
     pub(super) held: Option<usize>,
     pub(super) exposure: Option<f64>,

@@ -1,12 +1,22 @@
 //! The command line that makes the picture of a side.
 
+use std::collections::BTreeMap;
+
+use lucerna::scene::Scene;
+
 use super::{
     fly::Fly,
     panel,
     side::Side,
     wanted::{Look, Shows, TRUTH},
 };
-use crate::{args::Size, default_light::DefaultLight, record::Source, stage::StageArgs};
+use crate::{
+    args::Size,
+    default_light::DefaultLight,
+    lamps::{self, Lamp, Put},
+    record::Source,
+    stage::StageArgs,
+};
 
 /// What both sides have in common.
 #[derive(Debug)]
@@ -20,6 +30,10 @@ pub struct Common<'a> {
     pub named_camera: Option<&'a str>,
     /// Device of the window's command line.
     pub device: Option<&'a str>,
+    /// Lamps that were moved in the window.
+    pub moved: &'a BTreeMap<usize, Put>,
+    /// The scene.
+    pub scene: &'a Scene,
     /// Default lights were added.
     pub default_light: bool,
     pub size: Size,
@@ -132,6 +146,19 @@ fn scene(common: &Common<'_>, technique: &str, say: &mut impl FnMut(&[&str])) {
     if let Some(sun) = sun {
         say(&["--sun", &sun.to_string()]);
     }
+    // Those of the window win over those of its command line.
+    let numbers = lamps::nodes(common.scene);
+    let here = |node: usize| common.moved.contains_key(&node);
+    for lamp in &common.args.lamp {
+        if !lamps::find(common.scene, &lamp.lamp).is_ok_and(here) {
+            say(&["--lamp", &lamp.to_string()]);
+        }
+    }
+    for (node, put) in common.moved {
+        if let Some(number) = numbers.iter().position(|of| of == node) {
+            say(&["--lamp", &Lamp { lamp: number.to_string(), put: *put }.to_string()]);
+        }
+    }
     // What was decided: another camera might decide otherwise, and a black picture would get a lamp. Baked daylight has its own light.
     if *default_light != DefaultLight::Never && technique != "daylight" {
         say(&["--default-light", if common.default_light { "always" } else { "never" }]);
@@ -178,6 +205,8 @@ mod tests {
             "never",
         ]);
         let fly = Fly::from_file(&crate::camera::in_numbers("-1,2,-3,-4,5,-6,50,0.01").unwrap().unwrap());
+        let scene = lucerna_scenes::load("cornell").unwrap();
+        let moved = BTreeMap::from([(lamps::nodes(&scene)[0], Put::At(glam::Vec3::new(-0.5, 1e-9, 3.25)))]);
         let mut count = 0;
         for (args, source) in [(&plain, Source::Builtin("office".into())), (&ground, Source::File("a b.glb".into()))] {
             for technique in lucerna::techniques::NAMES {
@@ -196,6 +225,8 @@ mod tests {
                             camera: 1,
                             named_camera: None,
                             device: Some("cpu"),
+                            moved: &moved,
+                            scene: &scene,
                             default_light: count % 3 == 0,
                             size: Size { width: 64, height: 48 },
                             seconds: 0.5,

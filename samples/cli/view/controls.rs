@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use egui::{Context, RichText, Ui};
 use glam::{Mat4, Vec3};
 use lucerna::{
-    scene::{LightKind, Pose},
+    scene::Pose,
     techniques::{self, tonemap::Operator},
 };
 
@@ -16,7 +16,11 @@ use super::{
     side::Side,
     wanted::{Shown, Shows, TRUTH},
 };
-use crate::{screen, stage::Stage};
+use crate::{
+    lamps::{self, Put},
+    screen,
+    stage::Stage,
+};
 
 /// Pictures whose times are kept.
 const KEPT: usize = 64;
@@ -344,36 +348,30 @@ fn camera(viewer: &mut Viewer, ui: &mut Ui) {
 /// The lamps of the scene: places and directions.
 fn lamps(viewer: &mut Viewer, ui: &mut Ui) {
     let Some(stage) = viewer.stage.clone() else { return };
-    let lamps: Vec<(usize, u32)> =
-        stage.scene.nodes.iter().enumerate().filter_map(|(node, of)| Some((node, of.light?))).collect();
-    if lamps.is_empty() {
+    let nodes = lamps::nodes(&stage.scene);
+    if nodes.is_empty() {
         return;
     }
-    egui::CollapsingHeader::new(format!("Lamps ({})", lamps.len())).default_open(lamps.len() < 4).show(ui, |ui| {
-        let pose = Pose::playing(&stage.scene, viewer.seconds as f32);
-        for (node, light) in lamps {
-            let Some(of) = stage.scene.lights.get(light as usize) else { continue };
-            let Some(world) = viewer.moved.get(&node).copied().or_else(|| pose.world.get(node).copied()) else {
-                continue;
-            };
-            let name = [&stage.scene.nodes[node].name, &of.name]
-                .into_iter()
-                .find(|name| !name.is_empty())
-                .map_or("lamp", String::as_str);
+    let title = format!("Lamps ({})", nodes.len());
+    egui::CollapsingHeader::new(title).id_salt("lamps").default_open(nodes.len() < 4).show(ui, |ui| {
+        let Ok((pose, _)) = stage.at(viewer.seconds, viewer.size_of_side()) else { return };
+        for node in nodes {
+            let world = viewer.moved.get(&node).map_or(pose.world[node], |put| put.world(pose.world[node]));
             ui.horizontal(|ui| {
-                ui.add(egui::Label::new(name).truncate());
+                ui.add(egui::Label::new(lamps::name(&stage.scene, node)).truncate());
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    if ui
-                        .add_visible(viewer.moved.contains_key(&node), egui::Button::new("⟲").small().frame(false))
-                        .on_hover_text("Back to its place")
-                        .clicked()
-                    {
+                    let back = egui::Button::new("⟲").small().frame(false);
+                    let back = ui.add_visible(viewer.moved.contains_key(&node), back);
+                    if back.on_hover_text("Back to its place").clicked() {
                         viewer.moved.remove(&node);
                         viewer.moves();
                         return;
                     }
-                    let moved =
-                        if matches!(of.kind, LightKind::Directional) { sun(ui, world) } else { place(ui, world) };
+                    let moved = if lamps::is_sun(&stage.scene, node) {
+                        sun(ui, viewer.moved.get(&node).copied(), world)
+                    } else {
+                        place(ui, world)
+                    };
                     if let Some(moved) = moved {
                         viewer.moved.insert(node, moved);
                         viewer.moves();
@@ -385,45 +383,27 @@ fn lamps(viewer: &mut Viewer, ui: &mut Ui) {
 }
 
 /// The place of a lamp. The new one, if it was changed.
-fn place(ui: &mut Ui, world: Mat4) -> Option<Mat4> {
+fn place(ui: &mut Ui, world: Mat4) -> Option<Put> {
     let mut place = world.w_axis.truncate();
     let mut changed = false;
     for axis in (0..3).rev() {
-        changed |= ui
-            .add(egui::DragValue::new(&mut place[axis]).speed(0.01).max_decimals(2))
-            .on_hover_text("Metres; the lamp can also be dragged in the picture")
-            .changed();
+        let field = ui.add(egui::DragValue::new(&mut place[axis]).speed(0.01).max_decimals(2));
+        changed |= field.on_hover_text("Metres; the lamp can also be dragged in the picture").changed();
     }
-    let mut moved = world;
-    moved.w_axis = place.extend(1.0);
-    changed.then_some(moved)
+    changed.then_some(Put::At(place))
 }
 
 /// The direction of a sun. The new one, if it was changed.
-fn sun(ui: &mut Ui, world: Mat4) -> Option<Mat4> {
-    let to_sun = world.transform_vector3(Vec3::Z).normalize_or(Vec3::Y);
-    let (mut azimuth, mut elevation) = angles(to_sun);
-    let mut changed =
-        ui.add(egui::DragValue::new(&mut elevation).speed(0.3).range(-90.0..=90.0).suffix("° up")).changed();
-    changed |= ui
-        .add(egui::DragValue::new(&mut azimuth).speed(0.5).suffix("°"))
-        .on_hover_text("Azimuth: 0 over +Z, 90 over +X")
-        .changed();
-    changed.then(|| turned(azimuth, elevation))
-}
-
-/// Azimuth and elevation of a direction towards a sun, degrees.
-fn angles(to_sun: Vec3) -> (f32, f32) {
-    (to_sun.x.atan2(to_sun.z).to_degrees(), to_sun.y.clamp(-1.0, 1.0).asin().to_degrees())
-}
-
-/// The place of a node whose light comes from there.
-fn turned(azimuth: f32, elevation: f32) -> Mat4 {
-    let (azimuth, elevation) = (azimuth.to_radians(), elevation.to_radians());
-    let z = Vec3::new(azimuth.sin() * elevation.cos(), elevation.sin(), azimuth.cos() * elevation.cos());
-    let x = Vec3::Y.cross(z).normalize_or(Vec3::X);
-    let y = z.cross(x);
-    Mat4::from_cols(x.extend(0.0), y.extend(0.0), z.extend(0.0), Vec3::ZERO.extend(1.0))
+fn sun(ui: &mut Ui, put: Option<Put>, world: Mat4) -> Option<Put> {
+    let [mut azimuth, mut elevation] = match put {
+        Some(Put::Towards(angles)) => angles,
+        _ => lamps::angles(world),
+    };
+    let field = egui::DragValue::new(&mut elevation).speed(0.3).max_decimals(1).range(-90.0..=90.0).suffix("° up");
+    let mut changed = ui.add(field).changed();
+    let field = ui.add(egui::DragValue::new(&mut azimuth).speed(0.5).max_decimals(1).suffix("°"));
+    changed |= field.on_hover_text("Azimuth: 0 over +Z, 90 over +X").changed();
+    changed.then_some(Put::Towards([azimuth, elevation]))
 }
 
 /// Technique and settings of a side.
@@ -585,20 +565,4 @@ fn notes(viewer: &Viewer, ui: &mut Ui) {
             ui.label(RichText::new(note).small());
         }
     });
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn suns_turn_to_where_their_angles_say() {
-        for (azimuth, elevation) in [(0.0, 10.0), (90.0, 45.0), (-120.0, 80.0), (30.0, -20.0)] {
-            let world = turned(azimuth, elevation);
-            let found = angles(world.transform_vector3(Vec3::Z));
-            assert!((found.0 - azimuth).abs() < 1e-2 && (found.1 - elevation).abs() < 1e-2, "{found:?}");
-            assert!((world.determinant() - 1.0).abs() < 1e-4);
-        }
-        assert!(turned(0.0, 90.0).is_finite());
-    }
 }

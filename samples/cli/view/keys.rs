@@ -179,9 +179,6 @@ fn flies(viewer: &mut Viewer, context: &Context) {
 /// The command of side A, or why there is none.
 fn words(viewer: &Viewer) -> Result<Vec<String>, String> {
     let Some(stage) = &viewer.stage else { return Err("there is no scene".into()) };
-    if !viewer.moved.is_empty() {
-        return Err("a lamp was moved, and no option moves a lamp of a scene (R puts it back)".into());
-    }
     let common = Common {
         args: &viewer.args,
         source: &stage.source,
@@ -189,6 +186,8 @@ fn words(viewer: &Viewer) -> Result<Vec<String>, String> {
         camera: viewer.camera,
         named_camera: viewer.named_camera.as_ref().map(|(_, words)| words.as_str()),
         device: viewer.device.as_deref(),
+        moved: &viewer.moved,
+        scene: &stage.scene,
         default_light: stage.default_light,
         size: viewer.size_of_side(),
         seconds: viewer.seconds,

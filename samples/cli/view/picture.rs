@@ -2,7 +2,7 @@
 
 use egui::{Color32, Context, CursorIcon, Pos2, Rect, Sense, Stroke, TextureHandle, TextureOptions, Ui};
 use glam::{Mat4, Vec2, Vec3};
-use lucerna::scene::{LightKind, Pose, View};
+use lucerna::scene::{Pose, View};
 
 use super::{
     app::{Compare, Viewer},
@@ -11,7 +11,7 @@ use super::{
     painted,
     side::image_of,
 };
-use crate::args::Size;
+use crate::{args::Size, lamps::Put};
 
 /// Radius in which a lamp is picked, points.
 const PICK: f32 = 12.0;
@@ -192,19 +192,16 @@ fn space_of_a(viewer: &Viewer, rect: Rect) -> Rect {
 /// Lamps with a place: node, place on the screen, place in the world.
 fn placed_lamps(viewer: &Viewer, rect: Rect, view: Option<&View>) -> Vec<(usize, Pos2, Mat4)> {
     let (Some(stage), Some(view)) = (&viewer.stage, view) else { return Vec::new() };
-    let pose = Pose::playing(&stage.scene, viewer.seconds as f32);
+    let Ok((pose, _)) = stage.at(viewer.seconds, viewer.size_of_side()) else { return Vec::new() };
     let space = space_of_a(viewer, rect);
-    let lamp = |(index, node): (usize, &lucerna::scene::Node)| {
-        let light = stage.scene.lights.get(node.light? as usize)?;
-        if matches!(light.kind, LightKind::Directional) {
-            return None;
-        }
-        let world = viewer.moved.get(&index).or_else(|| pose.world.get(index)).copied()?;
+    let lamp = |node: usize| {
+        let world = viewer.moved.get(&node).map_or(pose.world[node], |put| put.world(pose.world[node]));
         let at = fly::project(view, world.w_axis.truncate())?;
         let inside = (-0.1..1.1).contains(&at.x) && (-0.1..1.1).contains(&at.y);
-        inside.then(|| (index, on_screen(space, at), world))
+        inside.then(|| (node, on_screen(space, at), world))
     };
-    stage.scene.nodes.iter().enumerate().filter_map(lamp).collect()
+    let with_place = |node: &usize| !crate::lamps::is_sun(&stage.scene, *node);
+    crate::lamps::nodes(&stage.scene).into_iter().filter(with_place).filter_map(lamp).collect()
 }
 
 fn lamps(viewer: &Viewer, ui: &Ui, rect: Rect, view: Option<&View>) {
@@ -287,14 +284,13 @@ fn mouse(viewer: &mut Viewer, ui: &Ui, response: &egui::Response, rect: Rect, sc
 /// Moves a lamp in the plane through it that is parallel to the picture.
 fn drag_lamp(viewer: &mut Viewer, node: usize, at: Pos2, space: Rect, view: &View) {
     let Some(stage) = viewer.stage.clone() else { return };
-    let pose = Pose::playing(&stage.scene, viewer.seconds as f32);
-    let Some(mut world) = viewer.moved.get(&node).or_else(|| pose.world.get(node)).copied() else { return };
+    let Ok((pose, _)) = stage.at(viewer.seconds, viewer.size_of_side()) else { return };
+    let world = viewer.moved.get(&node).map_or(pose.world[node], |put| put.world(pose.world[node]));
     let depth = -view.view_from_world.transform_point3(world.w_axis.truncate()).z;
     let share = (at - space.min) / space.size();
     let place: Vec3 = fly::unproject(view, Vec2::new(share.x, share.y), depth);
     if place.is_finite() {
-        world.w_axis = place.extend(1.0);
-        viewer.moved.insert(node, world);
+        viewer.moved.insert(node, Put::At(place));
         viewer.moves();
     }
 }

@@ -2,7 +2,6 @@
 
 use std::{collections::BTreeMap, path::PathBuf, sync::Arc, time::Instant};
 
-use glam::Mat4;
 use lucerna::{
     Result,
     image::Layers,
@@ -12,7 +11,7 @@ use lucerna::{
 };
 use serde_json::Value;
 
-use crate::{args::Size, placed::Placed, stage::Stage};
+use crate::{args::Size, lamps::Put, placed::Placed, stage::Stage};
 
 /// Name of the path tracer among the techniques; it makes a picture that grows.
 pub const TRUTH: &str = <tracer::Reference as lucerna::technique::Technique>::NAME;
@@ -54,8 +53,8 @@ pub struct Wanted {
     pub size: Size,
     /// Time of an animated scene.
     pub seconds: f64,
-    /// Lamps that were moved or turned: node and its place in the world.
-    pub moved: BTreeMap<usize, Mat4>,
+    /// Lamps that were moved or turned, by their nodes.
+    pub moved: BTreeMap<usize, Put>,
     pub shows: Shows,
     /// Pictures of the mean of a still.
     pub pictures: u32,
@@ -106,7 +105,7 @@ impl Wanted {
         let (mut pose, _) = self.stage.at(self.seconds, size)?;
         for (node, place) in &self.moved {
             if let Some(world) = pose.world.get_mut(*node) {
-                *world = *place;
+                *world = place.world(*world);
             }
         }
         let view = self.camera.view(&pose, size);

@@ -15,6 +15,8 @@ pub struct Device {
     pub family: u32,
     /// The largest side of a texture in pixels.
     pub max_texture_side: u32,
+    /// The device is a driver that computes with the threads of the CPU.
+    pub is_cpu: bool,
     memory: vk::PhysicalDeviceMemoryProperties,
     /// The instance must outlive the device.
     pub surface: Rc<Surface>,
@@ -58,6 +60,7 @@ impl Device {
             queue,
             family: chosen.family,
             max_texture_side: properties.limits.max_image_dimension2_d,
+            is_cpu: properties.device_type == vk::PhysicalDeviceType::CPU,
             memory,
             surface: surface.clone(),
         }))

@@ -81,6 +81,11 @@ impl Presenter {
         self.device.max_texture_side as usize
     }
 
+    /// Whether painting takes the time of the CPU.
+    pub fn is_cpu(&self) -> bool {
+        self.device.is_cpu
+    }
+
     /// Draws a picture and hands it to the display. Changed textures are uploaded on the way.
     pub fn draw(&mut self, picture: &Picture<'_>, textures: &mut Textures) -> Result<Shown, Error> {
         let window = self.surface.window.clone();
