@@ -57,6 +57,39 @@ fn a_picture_passes_no_options_on() {
     assert_eq!(files(folder.path()), ["a.png", "victim.txt"]);
 }
 
+#[test]
+fn cameras_of_numbers_and_lamps_that_were_put_elsewhere_are_made_again() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let picture = |name: &str, words: &[&str]| {
+        let file = folder.path().join(name);
+        let of = ["render", "isr", "--builtin", "cornell", "--size", "32x24", "--aa", "1", "-q", "-o"];
+        let words = of.iter().copied().chain([file.to_str().unwrap()]).chain(words.iter().copied());
+        lucerna(words).expect(0, &[]);
+        file
+    };
+    let light = |file: &Path| image::read(file, &Limits::default()).unwrap().layers[0].data.clone();
+    let plain = picture("plain.exr", &[]);
+    for (name, words) in [
+        ("camera.exr", &["--camera", "0.3,0.3,-0.6,0.2,0.2,0.3,60,0.02"][..]),
+        ("lamp.exr", &["--lamp", "0=0.1,0.4,0.15"]),
+    ] {
+        let file = picture(name, words);
+        assert_ne!(light(&file), light(&plain), "{name}");
+        rerun(&file).expect(0, &[]);
+    }
+    for (words, parts) in [
+        (["--lamp", "7=1,2,3"], &["no lamp '7'", "0 '"][..]),
+        (["--lamp", "0=1,2"], &["no sun"]),
+        (["--lamp", "0"], &["LAMP=X,Y,Z"]),
+        (["--camera", "1,2,3,1,2,3"], &["do not span a plane"]),
+    ] {
+        lucerna(["render", "isr", "--builtin", "cornell"].iter().chain(&words)).expect(2, parts);
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn a_picture_starts_no_program() {

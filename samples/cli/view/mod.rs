@@ -4,9 +4,11 @@
 //! for painting. Pictures go through host memory: they are the bytes that `render` would write.
 
 mod app;
+mod bars;
 mod cameras;
 mod command;
 mod controls;
+mod files;
 mod fly;
 mod keys;
 pub mod live;

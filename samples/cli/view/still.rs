@@ -23,6 +23,9 @@ const LONG: f64 = 0.25;
 const SMALLEST: f64 = 8.0;
 /// They are divided by this number while the time of a picture is not known.
 const UNKNOWN: f64 = 4.0;
+/// Side of the shadow maps of quick pictures at least, texels, and by how much it is divided at most.
+const LEAST_SHADOW: u64 = 256;
+const MOST_SHADOW: u32 = 4;
 
 /// The time of the pictures of one technique in one scene.
 #[derive(Debug, Default)]
@@ -37,11 +40,16 @@ impl Rate {
         self.pixel.map(|pixel| pixel * f64::from(size.width) * f64::from(size.height))
     }
 
-    /// The size of a quick picture.
-    fn size(&self, asked: Size) -> Size {
+    /// By how much the sides of a quick picture are divided.
+    fn divisor(&self, asked: Size) -> u32 {
         // Whole numbers, so that the size does not change with every picture.
-        let by = self.whole(asked).map_or(UNKNOWN, |whole| (whole / AIM).sqrt().ceil().clamp(1.0, SMALLEST)) as u32;
-        Size { width: asked.width.div_ceil(by), height: asked.height.div_ceil(by) }
+        self.whole(asked).map_or(UNKNOWN, |whole| (whole / AIM).sqrt().ceil().clamp(1.0, SMALLEST)) as u32
+    }
+
+    /// The size of a quick picture.
+    #[cfg(test)]
+    fn size(&self, asked: Size) -> Size {
+        divided(asked, self.divisor(asked))
     }
 
     fn took(&mut self, time: Duration, size: Size) {
@@ -50,6 +58,22 @@ impl Rate {
         self.pixel =
             Some(self.pixel.map_or(pixel, |before| if pixel < before { pixel } else { 0.5 * (pixel + before) }));
     }
+}
+
+fn divided(size: Size, by: u32) -> Size {
+    Size { width: size.width.div_ceil(by), height: size.height.div_ceil(by) }
+}
+
+/// The request for a quick picture. Shadow maps take as long in a small picture as in a large one, so they are smaller, too.
+fn quick(wanted: &Wanted, by: u32) -> Wanted {
+    let mut settings = (*wanted.settings).clone();
+    if let Some(size) = settings.pointer_mut("/shadow/size")
+        && let Some(texels) = size.as_u64()
+    {
+        let fewer = texels / u64::from(by.min(MOST_SHADOW));
+        *size = fewer.max(LEAST_SHADOW.min(texels)).into();
+    }
+    Wanted { settings: Arc::new(settings), ..wanted.clone() }
 }
 
 /// Light that may be painted again in another way.
@@ -153,8 +177,10 @@ fn picture(
     let long = rate.whole(wanted.size).is_none_or(|time| time > LONG);
     shared.does(Doing::Rendering(0.0));
     if wanted.moving || long {
-        let light = one(shared, live, wanted, (rate.size(wanted.size), false), rate)?;
-        paint(shared, painter, live, &light)?;
+        let by = rate.divisor(wanted.size);
+        let quick = quick(wanted, by);
+        let light = one(shared, live, &quick, (divided(wanted.size, by), false), rate)?;
+        paint(shared, painter, live, &Light { of: wanted.clone(), ..light })?;
     }
     if wanted.moving || !shared.may_be_interrupted() {
         return Ok(None);
