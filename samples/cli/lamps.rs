@@ -1,4 +1,4 @@
-//! `--lamp`: lamps that stand elsewhere than in the scene's file, and suns that shine from elsewhere.
+//! `--put`: lamps that stand elsewhere than in the scene's file, and suns that shine from elsewhere.
 
 use std::{fmt, str::FromStr};
 
@@ -121,7 +121,7 @@ pub fn put(scene: &mut Scene, lamps: &[Lamp]) -> Result<Vec<(usize, Put)>> {
     let mut out = Vec::new();
     for lamp in lamps {
         let node = find(scene, &lamp.lamp)?;
-        let wrong = |what: &str| Err(Error::usage(format!("{lamp}: {what}")).at("--lamp"));
+        let wrong = |what: &str| Err(Error::usage(format!("{lamp}: {what}")).at("--put"));
         match (lamp.put, is_sun(scene, node)) {
             (Put::At(_), true) => return wrong("this light is a sun, which has AZIMUTH,ELEVATION and no place"),
             (Put::Towards(_), false) => return wrong("this light is no sun; it has a place X,Y,Z"),
@@ -172,7 +172,7 @@ pub fn find(scene: &Scene, asked: &str) -> Result<usize> {
     let hint = config::nearest(asked, names.iter().copied()).map(|name| format!(" (did you mean '{name}'?)"));
     let list: Vec<String> = names.iter().enumerate().map(|(number, name)| format!("{number} '{name}'")).collect();
     let known = if list.is_empty() { "no lamps".to_owned() } else { list.join(", ") };
-    Err(Error::usage(format!("no lamp '{asked}'{}; the scene has {known}", hint.unwrap_or_default())).at("--lamp"))
+    Err(Error::usage(format!("no lamp '{asked}'{}; the scene has {known}", hint.unwrap_or_default())).at("--put"))
 }
 
 #[cfg(test)]

@@ -68,7 +68,7 @@ pub struct Record {
     pub sun: Option<Sun>,
     /// Lamps that were put elsewhere.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub lamp: Vec<Lamp>,
+    pub put: Vec<Lamp>,
     pub seed: u32,
     #[serde(default, skip_serializing_if = "Smooth::is_none")]
     pub aa: Smooth,
@@ -165,7 +165,7 @@ impl Record {
             default_light: args.default_light,
             light: args.light.clone(),
             sun: args.sun,
-            lamp: args.lamp.clone(),
+            put: args.put.clone(),
             seed: 0,
             aa: Smooth::default(),
             exact: Vec::new(),
@@ -237,7 +237,7 @@ impl Record {
             environment: self.environment.as_ref().map(PathBuf::from),
             light: self.light.clone(),
             sun: self.sun,
-            lamp: self.lamp.clone(),
+            put: self.put.clone(),
             default_light: self.default_light,
             eye: Some(Eye { view: self.camera.clone(), name: camera.to_owned() }),
         })
@@ -345,7 +345,7 @@ mod tests {
             ground: Some(GroundOptions { copies: Some(3), sunk: Some(-0.2), ..GroundOptions::default() }),
             add: vec!["pot.glb@0,1,2".parse().unwrap()],
             set: vec!["wall.albedo=0.5,0.25,1".parse().unwrap()],
-            lamp: vec!["0=1,2,3".parse().unwrap()],
+            put: vec!["0=1,2,3".parse().unwrap()],
             fingerprint: "0".into(),
             width: 64,
             height: 48,

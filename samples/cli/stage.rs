@@ -73,7 +73,7 @@ pub struct StageArgs {
 
     /// Put a lamp of the scene, by its number or name, elsewhere: metres; for a sun its azimuth and elevation, degrees. May be given more than once
     #[arg(long, value_name = "LAMP=X,Y,Z", allow_hyphen_values = true, help_heading = "Picture")]
-    pub lamp: Vec<Lamp>,
+    pub put: Vec<Lamp>,
 
     /// When to add default lights
     #[arg(long, value_enum, default_value_t, value_name = "WHEN", help_heading = "Picture")]
@@ -125,7 +125,7 @@ impl Stage {
             framing::add_missing_camera(&mut scene, args.size.aspect());
         }
         let added_camera = scene.cameras.len() > cameras;
-        let put = lamps::put(&mut scene, &args.lamp)?;
+        let put = lamps::put(&mut scene, &args.put)?;
         let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
         let choice = match (&args.eye, &args.camera) {
             (Some(Eye { view: record::View::File(file), .. }), _) => Choice::File(file.clone()),

@@ -74,16 +74,16 @@ fn cameras_of_numbers_and_lamps_that_were_put_elsewhere_are_made_again() {
     let plain = picture("plain.exr", &[]);
     for (name, words) in [
         ("camera.exr", &["--camera", "0.3,0.3,-0.6,0.2,0.2,0.3,60,0.02"][..]),
-        ("lamp.exr", &["--lamp", "0=0.1,0.4,0.15"]),
+        ("put.exr", &["--put", "0=0.1,0.4,0.15"]),
     ] {
         let file = picture(name, words);
         assert_ne!(light(&file), light(&plain), "{name}");
         rerun(&file).expect(0, &[]);
     }
     for (words, parts) in [
-        (["--lamp", "7=1,2,3"], &["no lamp '7'", "0 '"][..]),
-        (["--lamp", "0=1,2"], &["no sun"]),
-        (["--lamp", "0"], &["LAMP=X,Y,Z"]),
+        (["--put", "7=1,2,3"], &["no lamp '7'", "0 '"][..]),
+        (["--put", "0=1,2"], &["no sun"]),
+        (["--put", "0"], &["LAMP=X,Y,Z"]),
         (["--camera", "1,2,3,1,2,3"], &["do not span a plane"]),
     ] {
         lucerna(["render", "isr", "--builtin", "cornell"].iter().chain(&words)).expect(2, parts);

@@ -330,7 +330,7 @@ fn a_stands_beside_the_path_tracer_and_the_window_closes_while_it_works() {
 #[test]
 fn settings_of_the_command_line_are_those_of_the_window() {
     let Some(server) = ready() else { return };
-    let settings = "-D isr.samples=24 -D isr.k_isr=2 --lamp 0=0.15,0.4,0.2";
+    let settings = "-D isr.samples=24 -D isr.k_isr=2 --put 0=0.15,0.4,0.2";
     let expected = by_command(&format!("render isr --builtin cornell --camera 0 {settings}"));
     let viewer = Viewer::bare(&server, &format!("--technique isr --builtin cornell {settings}"));
     viewer.shows("the settings", &expected);

@@ -149,14 +149,14 @@ fn scene(common: &Common<'_>, technique: &str, say: &mut impl FnMut(&[&str])) {
     // Those of the window win over those of its command line.
     let numbers = lamps::nodes(common.scene);
     let here = |node: usize| common.moved.contains_key(&node);
-    for lamp in &common.args.lamp {
+    for lamp in &common.args.put {
         if !lamps::find(common.scene, &lamp.lamp).is_ok_and(here) {
-            say(&["--lamp", &lamp.to_string()]);
+            say(&["--put", &lamp.to_string()]);
         }
     }
     for (node, put) in common.moved {
         if let Some(number) = numbers.iter().position(|of| of == node) {
-            say(&["--lamp", &Lamp { lamp: number.to_string(), put: *put }.to_string()]);
+            say(&["--put", &Lamp { lamp: number.to_string(), put: *put }.to_string()]);
         }
     }
     // What was decided: another camera might decide otherwise, and a black picture would get a lamp. Baked daylight has its own light.
