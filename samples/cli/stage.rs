@@ -125,7 +125,6 @@ impl Stage {
             framing::add_missing_camera(&mut scene, args.size.aspect());
         }
         let added_camera = scene.cameras.len() > cameras;
-        let put = lamps::put(&mut scene, &args.put)?;
         let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
         let choice = match (&args.eye, &args.camera) {
             (Some(Eye { view: record::View::File(file), .. }), _) => Choice::File(file.clone()),
@@ -149,6 +148,8 @@ impl Stage {
         let lights = scene.lights.len();
         default_light::add_missing_light(&mut scene, args.default_light, Some((&pose, &view)));
         let default_light = scene.lights.len() > lights;
+        // After the default lights, which may be put elsewhere, too.
+        let put = lamps::put(&mut scene, &args.put)?;
         // After lights and cameras, so that both are the same with and without the added objects.
         if !args.scene.add.is_empty() {
             args.scene.add(&mut scene)?;

@@ -1,6 +1,6 @@
 //! `lucerna view`: every technique live in a window, beside the truth.
 //!
-//! Two threads render, one a side ([`session`]), each on a device of its own, so that a long pass never blocks the window. The window has a third device
+//! Two threads render, one a side (`session.rs`), each on a device of its own, so that a long pass never blocks the window. The window has a third device
 //! for painting. Pictures go through host memory: they are the bytes that `render` would write.
 
 mod app;
