@@ -244,6 +244,9 @@ mod tests {
                             .chain(["-o".into(), "a.png".into()]);
                         let read = <crate::programs::lucerna::Arguments as clap::Parser>::try_parse_from(line);
                         assert!(read.is_ok(), "{words:?}: {}", read.unwrap_err());
+                        // The time of the scene, not that of the day.
+                        let time = if *technique == "daylight" { "--scene-time" } else { "--time" };
+                        assert!(words.windows(2).any(|pair| pair == [time, "0.5"]), "{words:?}");
                         count += 1;
                     }
                 }
