@@ -60,6 +60,9 @@ pub struct Record {
     pub operator: Option<Operator>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub environment: Option<String>,
+    /// Degrees by which the environment is turned.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub turn: Option<f64>,
     #[serde(default)]
     pub default_light: DefaultLight,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -162,6 +165,7 @@ impl Record {
             exposure: 0.0,
             operator: None,
             environment: args.environment.as_ref().map(|path| path.to_string_lossy().into_owned()),
+            turn: args.turn,
             default_light: args.default_light,
             light: args.light.clone(),
             sun: args.sun,
@@ -235,6 +239,7 @@ impl Record {
             camera: None,
             time: self.time,
             environment: self.environment.as_ref().map(PathBuf::from),
+            turn: self.turn,
             light: self.light.clone(),
             sun: self.sun,
             put: self.put.clone(),
@@ -345,6 +350,7 @@ mod tests {
             ground: Some(GroundOptions { copies: Some(3), sunk: Some(-0.2), ..GroundOptions::default() }),
             add: vec!["pot.glb@0,1,2".parse().unwrap()],
             set: vec!["wall.albedo=0.5,0.25,1".parse().unwrap()],
+            turn: Some(-30.5),
             put: vec!["0=1,2,3".parse().unwrap()],
             fingerprint: "0".into(),
             width: 64,

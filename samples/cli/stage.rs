@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use lucerna::{
-    Result,
+    Error, Result,
     scene::{
         Note, Pose, Scene, View,
         extent::{self, Extents},
@@ -62,6 +62,10 @@ pub struct StageArgs {
     #[arg(long, alias = "env", value_name = "FILE", help_heading = "Picture")]
     pub environment: Option<PathBuf>,
 
+    /// Turn the environment about the vertical, degrees: positive to the left as seen from the middle
+    #[arg(long, value_name = "DEGREES", value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
+    pub turn: Option<f64>,
+
     /// Add a white point light: position in metres, intensity in W/sr; with ,X2,Y2,Z2,SECONDS it moves to the second position and back in
     /// this time; may be given more than once
     #[arg(long, value_name = "X,Y,Z,INTENSITY", allow_hyphen_values = true, help_heading = "Picture")]
@@ -106,6 +110,13 @@ impl Stage {
             let (environment, notes) = source::environment(path)?;
             scene.environment = Some(environment);
             scene.notes.extend(notes);
+        }
+        if let Some(turn) = args.turn {
+            let Some(environment) = &mut scene.environment else {
+                let help = "--environment gives it one; the sky that --sun adds is the same on all sides";
+                return Err(Error::usage("the scene has no environment that could be turned").at("--turn").help(help));
+            };
+            environment.rotation += turn.to_radians() as f32;
         }
         let mut fingerprint = fingerprint::scene(&scene);
         lights::add(&mut scene, &args.light, args.sun.as_ref());

@@ -80,8 +80,15 @@ fn cameras_of_numbers_and_lamps_that_were_put_elsewhere_are_made_again() {
         assert_ne!(light(&file), light(&plain), "{name}");
         rerun(&file).expect(0, &[]);
     }
+    let turned = |name: &str, degrees: &str| {
+        let file = picture(name, &["--environment", "area", "--turn", degrees]);
+        rerun(&file).expect(0, &[]);
+        light(&file)
+    };
+    assert_ne!(turned("still.exr", "0"), turned("turned.exr", "-75"));
     for (words, parts) in [
-        (["--put", "7=1,2,3"], &["no lamp '7'", "0 '"][..]),
+        (["--turn", "10"], &["no environment that could be turned"][..]),
+        (["--put", "7=1,2,3"], &["no lamp '7'", "0 '"]),
         (["--put", "0=1,2"], &["no sun"]),
         (["--put", "0"], &["LAMP=X,Y,Z"]),
         (["--camera", "1,2,3,1,2,3"], &["do not span a plane"]),

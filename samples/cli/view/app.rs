@@ -94,6 +94,8 @@ pub struct Viewer {
     pub(super) cameras: Cameras,
     pub(super) seconds: f64,
     pub(super) playing: bool,
+    /// Turn of the environment that the mouse holds, degrees.
+    pub(super) turn: Option<f64>,
     pub(super) moved: BTreeMap<usize, Put>,
     /// The lamp that the mouse holds: its node.
     pub(super) held: Option<usize>,
@@ -155,6 +157,7 @@ impl Viewer {
             cameras: Cameras::default(),
             seconds: args.stage.time,
             playing: false,
+            turn: None,
             moved: BTreeMap::new(),
             held: None,
             exposure: args.exposure,

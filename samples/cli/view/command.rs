@@ -140,6 +140,9 @@ fn scene(common: &Common<'_>, technique: &str, say: &mut impl FnMut(&[&str])) {
     if let Some(environment) = environment {
         say(&["--environment", &environment.display().to_string()]);
     }
+    if let Some(turn) = common.args.turn {
+        say(&["--turn", &turn.to_string()]);
+    }
     for light in light {
         say(&["--light", &light.to_string()]);
     }

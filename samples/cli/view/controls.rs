@@ -16,7 +16,7 @@ use super::{
 use crate::{
     lamps::{self, Put},
     screen,
-    stage::Stage,
+    stage::{Stage, StageArgs},
 };
 /// The middle of a scene's objects, metres.
 pub fn middle(stage: &Stage) -> Vec3 {
@@ -112,6 +112,7 @@ fn camera(viewer: &mut Viewer, ui: &mut Ui) {
             }
         });
         cameras::rows(viewer, ui);
+        environment(viewer, &stage, ui);
         let end = duration(&stage);
         if end > 0.0 {
             ui.horizontal(|ui| {
@@ -133,6 +134,29 @@ fn camera(viewer: &mut Viewer, ui: &mut Ui) {
                     viewer.moves();
                 }
             });
+        }
+    });
+}
+
+/// Turns the environment. The scene is read again when the mouse lets go, because techniques prepare for an environment.
+fn environment(viewer: &mut Viewer, stage: &Stage, ui: &mut Ui) {
+    if stage.scene.environment.is_none() || stage.default_light {
+        return;
+    }
+    ui.horizontal(|ui| {
+        ui.label("Environment");
+        let mut turn = viewer.turn.unwrap_or_else(|| viewer.args.turn.unwrap_or(0.0));
+        let slider =
+            ui.add(egui::Slider::new(&mut turn, -180.0..=180.0).suffix("°").clamping(egui::SliderClamping::Edits));
+        let slider = slider.on_hover_text("Turn the environment (--turn)");
+        if slider.changed() {
+            viewer.turn = Some(turn);
+        }
+        if !slider.dragged()
+            && let Some(turn) = viewer.turn.take()
+        {
+            let args = StageArgs { turn: Some(turn), ..viewer.args.clone() };
+            viewer.read(args);
         }
     });
 }

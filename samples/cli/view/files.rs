@@ -117,6 +117,9 @@ impl Viewer {
             "gltf" | "glb" | "obj" | "bin" => {
                 let mut args = StageArgs { camera: None, eye: None, ..self.args.clone() };
                 (args.scene.scene, args.scene.builtin, args.scene.unit) = (Some(file), None, None);
+                args.put = Vec::new();
+                // An environment of the command line stays, and one that was dropped.
+                args.turn = args.turn.filter(|_| args.environment.is_some());
                 (args.scene.add, args.scene.set, args.light, args.sun) = (Vec::new(), Vec::new(), Vec::new(), None);
                 self.read(args);
             }
