@@ -12,7 +12,7 @@ use lucerna::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::source;
+use crate::{as_text::as_text, source};
 
 /// Before the name of a built-in scene or object.
 const BUILT_IN: &str = "builtin:";
@@ -67,19 +67,7 @@ impl fmt::Display for Added {
     }
 }
 
-impl From<Added> for String {
-    fn from(added: Added) -> Self {
-        added.to_string()
-    }
-}
-
-impl TryFrom<String> for Added {
-    type Error = String;
-
-    fn try_from(text: String) -> Result<Self, String> {
-        text.parse()
-    }
-}
+as_text!(Added);
 
 impl Added {
     /// The file that is read; `None` for built-in objects.

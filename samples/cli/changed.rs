@@ -9,7 +9,7 @@ use lucerna::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::config;
+use crate::{as_text::as_text, config};
 
 /// The only property that can be changed.
 const PROPERTY: &str = ".albedo";
@@ -42,19 +42,7 @@ impl FromStr for Change {
     }
 }
 
-impl TryFrom<String> for Change {
-    type Error = String;
-
-    fn try_from(text: String) -> Result<Self, String> {
-        text.parse()
-    }
-}
-
-impl From<Change> for String {
-    fn from(change: Change) -> Self {
-        change.to_string()
-    }
-}
+as_text!(Change);
 
 impl fmt::Display for Change {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -9,7 +9,7 @@ use lucerna::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::config;
+use crate::{as_text::as_text, config, lights::towards};
 
 /// Where a lamp is put.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,10 +25,8 @@ impl Put {
     pub fn world(self, before: Mat4) -> Mat4 {
         match self {
             Self::At(place) => Mat4::from_cols(before.x_axis, before.y_axis, before.z_axis, place.extend(1.0)),
-            Self::Towards([azimuth, elevation]) => {
-                let (azimuth, elevation) = (azimuth.to_radians(), elevation.to_radians());
-                let flat = elevation.cos();
-                let z = Vec3::new(azimuth.sin() * flat, elevation.sin(), azimuth.cos() * flat);
+            Self::Towards(angles) => {
+                let z = towards(angles);
                 let x = Vec3::Y.cross(z).normalize_or(Vec3::X);
                 let y = z.cross(x);
                 Mat4::from_cols(x.extend(0.0), y.extend(0.0), z.extend(0.0), before.w_axis)
@@ -80,19 +78,7 @@ impl fmt::Display for Lamp {
     }
 }
 
-impl TryFrom<String> for Lamp {
-    type Error = String;
-
-    fn try_from(text: String) -> Result<Self, String> {
-        text.parse()
-    }
-}
-
-impl From<Lamp> for String {
-    fn from(lamp: Lamp) -> Self {
-        lamp.to_string()
-    }
-}
+as_text!(Lamp);
 
 /// The nodes that carry a light, in the order of their numbers.
 pub fn nodes(scene: &Scene) -> Vec<usize> {

@@ -2,6 +2,7 @@
 
 pub mod added;
 pub mod args;
+mod as_text;
 pub mod bake;
 pub mod camera;
 pub mod changed;

@@ -6,7 +6,10 @@ use glam::{Mat4, Quat, Vec3};
 use lucerna::scene::{Animation, Channel, Interpolation, Keys, Light, LightKind, Scene, Transform};
 use serde::{Deserialize, Serialize};
 
-use crate::default_light::{self, DefaultLight};
+use crate::{
+    as_text::as_text,
+    default_light::{self, DefaultLight},
+};
 
 /// Default irradiance of a sun, W/m².
 const SUN: f32 = 2.0;
@@ -84,33 +87,8 @@ impl fmt::Display for Sun {
     }
 }
 
-impl From<Point> for String {
-    fn from(light: Point) -> Self {
-        light.to_string()
-    }
-}
-
-impl From<Sun> for String {
-    fn from(sun: Sun) -> Self {
-        sun.to_string()
-    }
-}
-
-impl TryFrom<String> for Point {
-    type Error = String;
-
-    fn try_from(text: String) -> Result<Self, String> {
-        text.parse()
-    }
-}
-
-impl TryFrom<String> for Sun {
-    type Error = String;
-
-    fn try_from(text: String) -> Result<Self, String> {
-        text.parse()
-    }
-}
+as_text!(Point);
+as_text!(Sun);
 
 impl Point {
     /// A light that does not move: metres, W/sr.
@@ -122,9 +100,14 @@ impl Point {
 impl Sun {
     /// Unit vector towards the sun.
     fn direction(&self) -> Vec3 {
-        let (azimuth, elevation) = (self.azimuth.to_radians(), self.elevation.to_radians());
-        Vec3::new(azimuth.sin() * elevation.cos(), elevation.sin(), azimuth.cos() * elevation.cos())
+        towards([self.azimuth, self.elevation])
     }
+}
+
+/// Unit vector of an azimuth (0 is +Z, 90 is +X) and an elevation, degrees.
+pub fn towards([azimuth, elevation]: [f32; 2]) -> Vec3 {
+    let (azimuth, elevation) = (azimuth.to_radians(), elevation.to_radians());
+    Vec3::new(azimuth.sin() * elevation.cos(), elevation.sin(), azimuth.cos() * elevation.cos())
 }
 
 /// Adds lights, and default lights as `when` says.
