@@ -109,10 +109,11 @@ impl Session {
     pub fn ask(&self, wanted: Wanted) {
         let mut state = self.shared.lock();
         let late = state.begun.is_some_and(|begun| begun.elapsed() > PATIENCE);
-        // Work of which the new request has a use goes on: preparations, and a quick picture while things still move.
+        // Work that the new request needs goes on: preparations, and a quick picture while the camera or a lamp still moves. The path tracer looks for
+        // requests after each tile, and keeps its paths if nobody interrupts a tile.
         let useful = state.now.as_ref().is_some_and(|now| {
             let prepares = matches!(state.doing, Doing::Preparing(..));
-            now.same_scene(&wanted) && (prepares || (now.moving && wanted.moving))
+            now.same_scene(&wanted) && (prepares || now.is_truth() || (now.moving && wanted.moving))
         });
         if state.fine || (late && !useful) {
             self.shared.stop.store(true, Ordering::Relaxed);
@@ -123,12 +124,14 @@ impl Session {
         self.shared.changed.notify_all();
     }
 
-    /// Stops the present work, and drops what was asked for.
+    /// Ends the present work, and drops the request that is not begun. The path tracer keeps its paths.
     pub fn rest(&self) {
         let mut state = self.shared.lock();
         state.wanted = None;
         state.resting = true;
-        self.shared.stop.store(true, Ordering::Relaxed);
+        if !state.now.as_ref().is_some_and(Wanted::is_truth) {
+            self.shared.stop.store(true, Ordering::Relaxed);
+        }
     }
 
     /// The newest picture.
@@ -291,5 +294,82 @@ impl Shared {
                 }
             };
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use clap::Parser;
+
+    use super::*;
+    use crate::{
+        args::Size,
+        stage::{Stage, StageArgs},
+        view::{
+            live,
+            wanted::{Look, Shows, TRUTH},
+        },
+    };
+
+    #[derive(Parser, Debug)]
+    struct Line {
+        #[command(flatten)]
+        stage: StageArgs,
+    }
+
+    #[test]
+    fn paths_are_kept_when_the_exposure_changes_and_when_the_side_rests() {
+        let options = GpuOptions::from_env().unwrap();
+        if let Err(error) = Gpu::new(options.clone()) {
+            assert!(std::env::var_os("CI").is_none(), "no Vulkan device and CI is set: {error}");
+            eprintln!("SKIPPED: this test needs a device: {error}");
+            return;
+        }
+        let args = Line::try_parse_from(["x", "--builtin", "cornell"]).unwrap().stage;
+        let stage = Arc::new(Stage::open(&args).unwrap());
+        let wanted = Wanted {
+            camera: stage.placed.clone(),
+            stage,
+            technique: TRUTH,
+            mode: "total".into(),
+            settings: Arc::new(live::about(TRUTH).unwrap().settings),
+            bake: None,
+            size: Size { width: 160, height: 120 },
+            seconds: 0.0,
+            moved: BTreeMap::new(),
+            shows: Shows::Picture,
+            pictures: 1,
+            samples: 1 << 20,
+            moving: false,
+            exposure: Some(0.0),
+            look: Look::Light(None),
+        };
+        let session = Session::start("test", options, Wake(Arc::new(|| {}))).unwrap();
+        // Waits for a picture with more paths than `before` and this exposure.
+        let more = |before: f64, exposure: f64| {
+            let begun = Instant::now();
+            loop {
+                let shown = session.shown().filter(|shown| shown.exposure == exposure);
+                if let Some(shown) = shown.filter(|shown| shown.samples > before) {
+                    return shown.samples;
+                }
+                assert!(begun.elapsed() < Duration::from_secs(120), "{:?}", session.status());
+                std::thread::sleep(Duration::from_millis(5));
+            }
+        };
+        session.ask(wanted.clone());
+        let first = more(8.0, 0.0);
+        // Later than the time after which other work is interrupted.
+        std::thread::sleep(PATIENCE);
+        session.ask(Wanted { exposure: Some(1.0), ..wanted.clone() });
+        let second = more(0.0, 1.0);
+        assert!(second > first, "{second} paths after {first}");
+        session.rest();
+        std::thread::sleep(Duration::from_millis(500));
+        session.ask(Wanted { exposure: Some(2.0), ..wanted });
+        let third = more(0.0, 2.0);
+        assert!(third >= second, "{third} paths after {second}");
     }
 }
