@@ -99,7 +99,7 @@ fn read(path: &Path) -> Outcome {
         return outcome(load(path, &LoadOptions::default()).map(|scene| {
             // Using it must be safe too.
             scene.validate().expect("a loaded scene is valid");
-            scene.notes.iter().map(|note| format!("{}: {}", note.place, note.text)).collect::<Vec<_>>().join("; ")
+            scene.notes.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
         }));
     }
     if ["png", "jpg", "jpeg", "webp", "bmp", "tga"].contains(&extension(path).as_str()) {

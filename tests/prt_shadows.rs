@@ -113,7 +113,7 @@ fn notes(gpu: &Gpu, stored: &Stored, settings: &PictureSettings) -> Vec<String> 
     let mut ready = Ready::<Prt>::new(gpu, &scene, settings, Some(&baked), &mut |_, _| true).unwrap();
     let mut graph = Graph::new("prt");
     let picture = ready.frame(&mut graph, (&scene, &Pose::rest(&scene)), &eye(), Shot::default(), settings).unwrap();
-    picture.notes.iter().map(|note| format!("{}: {}", note.place, note.text)).collect()
+    picture.notes.iter().map(ToString::to_string).collect()
 }
 
 #[test]

@@ -217,7 +217,8 @@ pub fn encode(format: Format, picture: &Layers, options: &WriteOptions) -> Resul
     Ok((bytes, report))
 }
 
-/// The codes that a PNG file of this layer with eight bits has: red, green and blue of each pixel, without alpha. For windows.
+/// The codes that a PNG file of this layer with eight bits has, for windows: red, green and blue of each pixel, row by row from the upper left corner,
+/// without alpha.
 ///
 /// # Errors
 /// `Usage` if the layer has two or more than four channels.

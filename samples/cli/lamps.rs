@@ -1,15 +1,19 @@
 //! `--put`: lamps that stand elsewhere than in the scene's file, and suns that shine from elsewhere.
 
-use std::{fmt, str::FromStr};
+use std::{collections::BTreeMap, fmt, str::FromStr};
 
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Quat, Vec3};
 use lucerna::{
     Error, Result,
     scene::{LightKind, Pose, Scene, Transform},
 };
 use serde::{Deserialize, Serialize};
 
-use crate::{as_text::as_text, config, lights::towards};
+use crate::{
+    as_text::as_text,
+    config,
+    lights::{numbers as numbers_of, towards},
+};
 
 /// Where a lamp is put.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,11 +30,18 @@ impl Put {
         match self {
             Self::At(place) => Mat4::from_cols(before.x_axis, before.y_axis, before.z_axis, place.extend(1.0)),
             Self::Towards(angles) => {
-                let z = towards(angles);
-                let x = Vec3::Y.cross(z).normalize_or(Vec3::X);
-                let y = z.cross(x);
-                Mat4::from_cols(x.extend(0.0), y.extend(0.0), z.extend(0.0), before.w_axis)
+                let turn = Quat::from_rotation_arc(Vec3::Z, towards(angles));
+                Mat4::from_rotation_translation(turn, before.w_axis.truncate())
             }
+        }
+    }
+}
+
+/// Puts lamps of a pose elsewhere, by their nodes.
+pub fn apply(pose: &mut Pose, moved: &BTreeMap<usize, Put>) {
+    for (node, put) in moved {
+        if let Some(world) = pose.world.get_mut(*node) {
+            *world = put.world(*world);
         }
     }
 }
@@ -58,9 +69,7 @@ impl FromStr for Lamp {
             "expected LAMP=X,Y,Z in metres, or LAMP=AZIMUTH,ELEVATION in degrees for a sun, like 0=1,2.5,0".to_owned()
         };
         let (lamp, numbers) = text.rsplit_once('=').filter(|(lamp, _)| !lamp.is_empty()).ok_or_else(wrong)?;
-        let one = |word: &str| word.trim().parse().ok().filter(|number: &f32| number.is_finite());
-        let numbers: Vec<f32> = numbers.split(',').map(|word| one(word).ok_or_else(wrong)).collect::<Result<_, _>>()?;
-        let put = match numbers[..] {
+        let put = match numbers_of(numbers).map_err(|_| wrong())?[..] {
             [x, y, z] => Put::At(Vec3::new(x, y, z)),
             [azimuth, elevation] if (-90.0..=90.0).contains(&elevation) => Put::Towards([azimuth, elevation]),
             _ => return Err(wrong()),
@@ -99,11 +108,12 @@ pub fn is_sun(scene: &Scene, node: usize) -> bool {
     light.is_some_and(|light| matches!(light.kind, LightKind::Directional))
 }
 
-/// The nodes of lamps that are put elsewhere. The scene's nodes are changed, too, for what reads the scene without a pose.
+/// Moves lamps of a scene, and returns their nodes with their places in the world: the place of the changed node itself has rounding errors of the nodes
+/// above.
 ///
 /// # Errors
 /// `Usage` for a lamp that the scene does not have, one that an animation moves, and a place for a sun or a direction for a lamp.
-pub fn put(scene: &mut Scene, lamps: &[Lamp]) -> Result<Vec<(usize, Put)>> {
+pub fn put(scene: &mut Scene, lamps: &[Lamp]) -> Result<Vec<(usize, Mat4)>> {
     let mut out = Vec::new();
     for lamp in lamps {
         let node = find(scene, &lamp.lamp)?;
@@ -119,18 +129,19 @@ pub fn put(scene: &mut Scene, lamps: &[Lamp]) -> Result<Vec<(usize, Put)>> {
         let rest = Pose::rest(scene);
         let parent =
             scene.nodes[node].parent.and_then(|parent| rest.world.get(parent as usize)).copied().unwrap_or_default();
-        let local = parent.inverse() * lamp.put.world(rest.world[node]);
+        let world = lamp.put.world(rest.world[node]);
+        let local = parent.inverse() * world;
         if !local.is_finite() {
             return wrong("the node above this lamp has no size, so the lamp has no place");
         }
         scene.nodes[node].local = Transform::Matrix(local);
-        out.push((node, lamp.put));
+        out.push((node, world));
     }
     Ok(out)
 }
 
-/// Whether an animation moves a node, or one above it.
-fn is_animated(scene: &Scene, node: usize) -> bool {
+/// Whether an animation moves a node, or a node above it.
+pub fn is_animated(scene: &Scene, node: usize) -> bool {
     let mut above = vec![node as u32];
     while let Some(parent) = above.last().and_then(|last| scene.nodes[*last as usize].parent) {
         above.push(parent);
@@ -185,11 +196,10 @@ mod tests {
     fn lamps_stand_where_they_are_put() {
         let mut moved = scene();
         let lamps: Vec<Lamp> = ["bulb=1,2,-3", "1=-120,35"].map(|text| text.parse().unwrap()).to_vec();
-        assert_eq!(
-            put(&mut moved, &lamps).unwrap(),
-            [(1, Put::At(Vec3::new(1.0, 2.0, -3.0))), (2, Put::Towards([-120.0, 35.0]))]
-        );
+        let put = put(&mut moved, &lamps).unwrap();
         let pose = Pose::rest(&moved);
+        assert_eq!(put.iter().map(|(node, _)| *node).collect::<Vec<_>>(), [1, 2]);
+        assert!(put.iter().all(|(node, world)| world.abs_diff_eq(pose.world[*node], 1e-5)));
         assert!(pose.world[1].w_axis.truncate().abs_diff_eq(Vec3::new(1.0, 2.0, -3.0), 1e-5));
         let found = angles(pose.world[2]);
         assert!((found[0] + 120.0).abs() < 1e-3 && (found[1] - 35.0).abs() < 1e-3, "{found:?}");

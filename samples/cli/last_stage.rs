@@ -101,6 +101,11 @@ fn without_nulls(value: &Value) -> Value {
     }
 }
 
+/// Whether settings, as JSON, have tone mapping.
+pub fn is_developed(settings: &Value) -> bool {
+    settings.get(GROUP).is_some_and(|tonemap| !tonemap.is_null())
+}
+
 /// The tone mapping stage of a run over frames.
 #[derive(Debug)]
 pub struct LastStage {

@@ -67,7 +67,11 @@ impl FromStr for Sun {
     }
 }
 
-fn numbers(text: &str) -> Result<Vec<f32>, String> {
+/// Finite numbers between commas.
+///
+/// # Errors
+/// The word that is no finite number.
+pub fn numbers(text: &str) -> Result<Vec<f32>, String> {
     let one = |word: &str| word.trim().parse().ok().filter(|x: &f32| x.is_finite());
     text.split(',').map(|word| one(word).ok_or_else(|| format!("'{word}' is not a number"))).collect()
 }

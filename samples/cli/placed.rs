@@ -22,7 +22,7 @@ impl Placed {
     pub fn of_scene(scene: &Scene, index: usize) -> Self {
         let camera = scene.cameras[index].clone();
         let node = scene.nodes.iter().position(|node| node.camera == Some(index as u32));
-        let name = if camera.name.is_empty() { format!("camera{index}") } else { camera.name.clone() };
+        let name = name_of(&camera, index);
         Self { name, camera, node, world_from_camera: Mat4::IDENTITY }
     }
 
@@ -41,4 +41,9 @@ impl Placed {
         let world_from_camera = self.node.map_or(self.world_from_camera, |node| pose.world[node]);
         View::new(&self.camera, world_from_camera, [size.width, size.height])
     }
+}
+
+/// The name of a camera of a scene; by its number if the scene has no name for the camera.
+pub fn name_of(camera: &Camera, index: usize) -> String {
+    if camera.name.is_empty() { format!("camera{index}") } else { camera.name.clone() }
 }

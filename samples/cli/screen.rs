@@ -21,7 +21,7 @@ pub const CURVES: [Operator; 5] =
 ///
 /// By the look of six built-in scenes (office, conference, garage, street, hall, parlour): `agx` without a look of its own is flat and pale, `neutral`
 /// takes 0.04 off every channel, which makes dim colours gaudy, and `reinhard-global` makes a picture dark if a window or a lamp is in it.
-const USUAL: Operator = Operator::Aces;
+pub const USUAL: Operator = Operator::Aces;
 
 /// Exposure of the ACES fit beside that of the picture, stops: 1 / 0.6, as three.js has it ("ACESFilmicToneMapping"), so that middle grey stays about as
 /// bright as without a curve.

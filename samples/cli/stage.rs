@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use glam::Mat4;
 use lucerna::{
     Error, Result,
     scene::{
@@ -15,7 +16,7 @@ use crate::{
     camera::{self, Choice},
     default_light::{self, DefaultLight},
     fingerprint, framing,
-    lamps::{self, Lamp, Put},
+    lamps::{self, Lamp},
     lights::{self, Point, Sun},
     placed::Placed,
     record::{self, Source},
@@ -30,10 +31,12 @@ pub struct Stage {
     pub fingerprint: String,
     pub placed: Placed,
     pub eye: record::View,
+    /// The scene has an environment of its own or of a file, which can be turned.
+    pub turns: bool,
     /// The camera was added: it is fitted to the shape of the picture.
     pub added_camera: bool,
-    /// Lamps that were put elsewhere, by their nodes.
-    put: Vec<(usize, Put)>,
+    /// Lamps that were put elsewhere: their nodes and their places in the world.
+    put: Vec<(usize, Mat4)>,
     /// Default lights were added.
     pub default_light: bool,
     extents: Extents,
@@ -62,7 +65,7 @@ pub struct StageArgs {
     #[arg(long, alias = "env", value_name = "FILE", help_heading = "Picture")]
     pub environment: Option<PathBuf>,
 
-    /// Turn the environment about the vertical, degrees: positive to the left as seen from the middle
+    /// Turn the environment about the vertical, degrees: positive is counter-clockwise as seen from above
     #[arg(long, value_name = "DEGREES", value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
     pub turn: Option<f64>,
 
@@ -75,8 +78,14 @@ pub struct StageArgs {
     #[arg(long, value_name = "AZIMUTH,ELEVATION[,IRRADIANCE]", allow_hyphen_values = true, help_heading = "Picture")]
     pub sun: Option<Sun>,
 
-    /// Put a lamp of the scene, by its number or name, elsewhere: metres; for a sun its azimuth and elevation, degrees. May be given more than once
-    #[arg(long, value_name = "LAMP=X,Y,Z", allow_hyphen_values = true, help_heading = "Picture")]
+    /// Move a lamp (its number or name) to X,Y,Z, metres, or turn a sun to AZIMUTH,ELEVATION, degrees (azimuth 0 is over +Z, 90 over +X). May be given
+    /// more than once
+    #[arg(
+        long,
+        value_name = "LAMP=X,Y,Z|LAMP=AZIMUTH,ELEVATION",
+        allow_hyphen_values = true,
+        help_heading = "Picture"
+    )]
     pub put: Vec<Lamp>,
 
     /// When to add default lights
@@ -111,6 +120,7 @@ impl Stage {
             scene.environment = Some(environment);
             scene.notes.extend(notes);
         }
+        let turns = scene.environment.is_some();
         if let Some(turn) = args.turn {
             let Some(environment) = &mut scene.environment else {
                 let help = "--environment gives it one; the sky that --sun adds is the same on all sides";
@@ -167,7 +177,7 @@ impl Stage {
             fingerprint = fingerprint::scene(&scene);
         }
         let extents = Extents::of(&scene);
-        Ok(Self { scene, source, fingerprint, placed, eye, added_camera, put, default_light, extents })
+        Ok(Self { scene, source, fingerprint, placed, eye, turns, added_camera, put, default_light, extents })
     }
 
     /// Notes about the scene for the user.
@@ -181,9 +191,8 @@ impl Stage {
     /// `Input` if an object is too far away at this time.
     pub fn at(&self, seconds: f64, size: Size) -> Result<(Pose, View)> {
         let mut pose = Pose::playing(&self.scene, seconds as f32);
-        // The node's own place has the rounding errors of the nodes above it.
-        for (node, put) in &self.put {
-            pose.world[*node] = put.world(pose.world[*node]);
+        for (node, world) in &self.put {
+            pose.world[*node] = *world;
         }
         self.extents.check(&self.scene, &pose)?;
         let view = self.placed.view(&pose, size);

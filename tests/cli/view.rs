@@ -378,3 +378,59 @@ fn wrong_options_are_refused_before_a_window_opens() {
         lucerna(words.split(' ')).expect(2, parts);
     }
 }
+
+#[test]
+fn lamps_are_dragged_and_the_file_has_the_moved_lamp() {
+    let Some(server) = ready() else { return };
+    let of = "render isr --builtin cornell --camera 0";
+    let whole = by_command(of);
+    let viewer = Viewer::bare(&server, "--technique isr --builtin cornell");
+    viewer.shows("the picture of render", &whole);
+    // The lamp of the box is in the middle of the picture near its upper edge; the ring around it stands where the mouse finds it.
+    let [width, height] = SIZE.map(|side| side as i16);
+    let found = (4..height / 2).step_by(3).find(|y| {
+        viewer.desktop.point(width / 2, *y);
+        std::thread::sleep(Duration::from_millis(150));
+        viewer
+            .picture()
+            .iter()
+            .filter(|pixel| pixel[0] > 240 && (190..230).contains(&pixel[1]) && pixel[2] < 120)
+            .count()
+            > 8
+    });
+    let y = found.expect("a ring around the lamp");
+    viewer.desktop.button(1, true);
+    for step in 1..=10 {
+        viewer.desktop.point(width / 2 - 2 * step, y + step);
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    viewer.desktop.button(1, false);
+    viewer.desktop.point(4, 4);
+    viewer.until("other light", |picture| picture.len() == whole.len() && *picture != whole[..]);
+    viewer.desktop.hit(letter('p'));
+    let file = written(viewer.folder.path(), ".png");
+    viewer.shows("the picture of the file", &codes(&file));
+    lucerna(["rerun".as_ref(), file.as_os_str()]).expect(0, &[]);
+    let said = lucerna(["info".as_ref(), "--json".as_ref(), file.as_os_str()]).expect(0, &[]).stdout;
+    assert!(said.contains("\"put\""), "{said}");
+    viewer.desktop.hit(letter('r'));
+    viewer.shows("the lamp in its place", &whole);
+    viewer.close();
+}
+
+#[test]
+fn a_file_that_is_mended_is_read_again() {
+    let Some(server) = ready() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let broken = folder.path().join("a.glb");
+    std::fs::write(&broken, b"no scene").unwrap();
+    let scene = folder.path().join("scene.glb");
+    lucerna(["export-gltf", "--builtin", "cornell", "-o", scene.to_str().unwrap(), "-q"]).expect(0, &[]);
+    let viewer = Viewer::bare(&server, &format!("--technique isr {}", broken.display()));
+    std::thread::sleep(Duration::from_secs(1));
+    std::fs::copy(&scene, &broken).unwrap();
+    viewer.until("the scene that the file has become", |picture| {
+        picture.iter().filter(|pixel| pixel[0] > 60).count() > 2000
+    });
+    viewer.close();
+}

@@ -15,8 +15,6 @@ use winit::window::Window;
 
 /// So many losses of the device in a row are an error.
 const MOST_LOSSES: u32 = 3;
-/// So many frames in a row for which the display gives no image are an error.
-const MOST_BUSY: u32 = 5;
 /// A hidden window lets its app run so often at most. Nothing else slows it: there is no display to wait for.
 const HIDDEN_PAUSE: Duration = Duration::from_millis(100);
 /// A hidden window looks so often whether it is shown again. A window manager may first show it and then say so.
@@ -47,7 +45,6 @@ pub struct Live {
     painted: Option<Instant>,
     hidden: bool,
     losses: u32,
-    busy: u32,
     frames: u64,
     lose_at: Vec<u64>,
 }
@@ -95,7 +92,6 @@ impl Live {
             painted: None,
             hidden: false,
             losses: 0,
-            busy: 0,
             frames: 0,
             lose_at: options.lose_at.clone(),
         })
@@ -232,16 +228,11 @@ impl Live {
         let picture = Picture { primitives, pixels_per_point, clear };
         loop {
             match self.draw(&picture) {
-                Ok(Shown::Yes) => (self.losses, self.busy) = (0, 0),
+                Ok(Shown::Yes) => self.losses = 0,
                 Ok(Shown::NoArea) => self.hidden = true,
                 Ok(Shown::Stale) => self.ask(Duration::ZERO),
-                Ok(Shown::Busy) if self.busy < MOST_BUSY => {
-                    self.busy += 1;
-                    self.ask(HIDDEN_PAUSE);
-                }
-                Ok(Shown::Busy) => {
-                    return Err(Error::Vulkan { call: "vkAcquireNextImageKHR", result: ash::vk::Result::TIMEOUT });
-                }
+                // A display keeps the images of a window that nobody sees.
+                Ok(Shown::Busy) => self.hidden = true,
                 Err(error) if error.is_loss() && self.losses + 1 < MOST_LOSSES => {
                     self.losses += 1;
                     log::warn!("{error}. The window makes a new device.");

@@ -196,7 +196,7 @@ mod tests {
     }
 
     fn text(note: Note) -> String {
-        format!("{}: {}", note.place, note.text)
+        note.to_string()
     }
 
     /// The notes of a sequence of two pictures.

@@ -14,20 +14,22 @@ use super::{
     ViewArgs, bars,
     cameras::Cameras,
     controls,
+    files::Reading,
     fly::Fly,
     keys,
-    measured::{Answer, MapOf, Measuring, Question},
+    measured::{Answer, MapOf, Measuring, Pictured, Question},
     panel::Descriptions,
     picture,
     session::Wake,
     side::Side,
-    wanted::{Look, Wanted},
+    wanted::{FilePicture, Look, Shown, Wanted},
     watch::Watch,
 };
 use crate::{
     args::Size,
-    lamps::Put,
+    lamps::{self, Put},
     placed::Placed,
+    screen,
     stage::{Stage, StageArgs},
 };
 
@@ -58,8 +60,14 @@ impl Compare {
     ];
 }
 
-/// A scene that a thread reads.
-pub(super) type Reading = mpsc::Receiver<(StageArgs, Result<Stage>)>;
+/// What the mouse holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Held {
+    /// A lamp, by its node.
+    Lamp(usize),
+    /// The line between both sides.
+    Line,
+}
 
 /// A picture that another process writes.
 pub(super) struct Writing {
@@ -74,6 +82,7 @@ pub struct Viewer {
     pub(super) args: StageArgs,
     pub(super) stage: Option<Arc<Stage>>,
     pub(super) reading: Option<Reading>,
+    pub(super) reading_picture: Option<mpsc::Receiver<Result<FilePicture>>>,
     /// The technique was named, so a new scene keeps it.
     pub(super) named: bool,
     pub(super) sides: [Side; 2],
@@ -97,8 +106,9 @@ pub struct Viewer {
     /// Turn of the environment that the mouse holds, degrees.
     pub(super) turn: Option<f64>,
     pub(super) moved: BTreeMap<usize, Put>,
-    /// The lamp that the mouse holds: its node.
-    pub(super) held: Option<usize>,
+    /// The pose of the scene in this frame of the window, with moved lamps.
+    pub(super) pose: Option<Pose>,
+    pub(super) held: Option<Held>,
     pub(super) exposure: Option<f64>,
     pub(super) curve: Option<Operator>,
     pub(super) false_colour: bool,
@@ -113,7 +123,6 @@ pub struct Viewer {
     pub(super) writing: Option<Writing>,
     last_move: Option<Instant>,
     pub(super) watch: Option<Watch>,
-    pub(super) files: u64,
     times: bars::Times,
 }
 
@@ -150,6 +159,7 @@ impl Viewer {
             descriptions: Descriptions::default(),
             stage: None,
             reading: None,
+            reading_picture: None,
             camera: 0,
             fly: None,
             named_camera: None,
@@ -159,9 +169,10 @@ impl Viewer {
             playing: false,
             turn: None,
             moved: BTreeMap::new(),
+            pose: None,
             held: None,
             exposure: args.exposure,
-            curve: Some(Operator::Aces),
+            curve: Some(screen::USUAL),
             false_colour: false,
             size: Size { width: 0, height: 0 },
             panels: !args.bare,
@@ -172,7 +183,6 @@ impl Viewer {
             writing: None,
             last_move: None,
             watch: None,
-            files: 0,
             times: bars::Times::default(),
             args: args.stage,
         };
@@ -185,7 +195,7 @@ impl Viewer {
     }
 
     pub(super) fn is_reading(&self) -> bool {
-        self.reading.is_some()
+        self.reading.is_some() || self.reading_picture.is_some()
     }
 
     /// Shows a text for some seconds.
@@ -227,22 +237,30 @@ impl Viewer {
         if let Some(fly) = &self.fly {
             return Some(fly.clone());
         }
-        let stage = self.stage.clone()?;
+        let (stage, pose) = (self.stage.as_ref()?, self.pose.as_ref()?);
         let placed = self.placed()?;
-        let pose = Pose::playing(&stage.scene, self.seconds as f32);
-        let view = placed.view(&pose, Size { width: 4, height: 3 });
-        // What is in the middle, else the middle of the scene.
-        let (position, middle) = (view.position, controls::middle(&stage));
+        let view = placed.view(pose, Size { width: 4, height: 3 });
+        // The surface in the middle of the picture, else the middle of the scene.
         let size = self.size_of_side();
         let depth = self.depth_at([size.width / 2, size.height / 2]);
-        let distance = depth.unwrap_or_else(|| position.distance(middle));
+        let distance = depth.unwrap_or_else(|| controls::middle(stage).distance(view.position));
         Some(Fly::from_view(&view, placed.camera.projection, distance.max(0.05)))
+    }
+
+    /// The pose of the scene with moved lamps.
+    fn posed(&self) -> Option<Pose> {
+        let (mut pose, _) = self.stage.as_ref()?.at(self.seconds, Size { width: 4, height: 3 }).ok()?;
+        lamps::apply(&mut pose, &self.moved);
+        Some(pose)
     }
 
     /// Distance along the line of sight at a pixel, metres, if the picture has it.
     pub(super) fn depth_at(&self, [x, y]: [u32; 2]) -> Option<f32> {
         let shown = self.sides[0].shown()?;
         let layer = shown.layers.layer("depth")?;
+        // A quick picture has fewer pixels than the space that it fills.
+        let Size { width, height } = shown.of.size;
+        let (x, y) = (x * shown.size.width / width.max(1), y * shown.size.height / height.max(1));
         let at = (y.min(shown.size.height - 1) * shown.size.width + x.min(shown.size.width - 1)) as usize;
         layer.data.get(at).copied().filter(|depth| *depth < 1e9)
     }
@@ -276,8 +294,8 @@ impl Viewer {
             return;
         }
         let moving = self.is_moving();
-        let (both, waits) = (self.shows_both(), self.waits(&stage));
-        if !both || self.sides[1].file.is_some() {
+        let (both, waits, look) = (self.shows_both(), self.waits(&stage), self.look());
+        if !both {
             self.sides[1].rest();
         }
         // B has the exposure of A, so that both can be compared.
@@ -286,12 +304,13 @@ impl Viewer {
         let auto = auto.map(|shown| shown.exposure);
         for (number, side) in self.sides.iter_mut().enumerate().take(if both { 2 } else { 1 }) {
             let exposure = self.exposure.or(auto.filter(|_| number == 1));
-            if side.file.is_some() || (number == 1 && waits) {
+            if number == 1 && waits {
                 continue;
             }
             let wanted = Wanted {
                 stage: stage.clone(),
                 technique: side.technique,
+                file: side.file.clone(),
                 mode: side.mode.clone(),
                 settings: side.settings.clone(),
                 bake: side.bake.clone(),
@@ -304,7 +323,7 @@ impl Viewer {
                 samples: side.samples,
                 moving,
                 exposure,
-                look: if self.false_colour { Look::FalseColour } else { Look::Light(self.curve) },
+                look,
             };
             if let Err(error) = side.ask(wanted, &self.options, &self.wake) {
                 self.trouble = Some(error.to_string());
@@ -314,19 +333,25 @@ impl Viewer {
 
     /// Compares the light of both sides.
     fn measure(&mut self) -> Result<()> {
-        let (Some((a, of_a, _)), Some((b, of_b, _))) = (self.sides[0].light(), self.sides[1].light()) else {
-            return Ok(());
-        };
-        if [a.width, a.height] != [b.width, b.height] || self.is_moving() {
+        let (Some(a), Some(b)) = (self.sides[0].shown(), self.sides[1].shown()) else { return Ok(()) };
+        if a.size != b.size || self.is_moving() {
             return Ok(());
         }
+        // A picture that has exposure and curve already is compared with pictures as the screen shows them.
+        let is_for_screens = |side: &Side| side.file.as_ref().is_some_and(|file| file.is_for_screens);
+        let screen = self.sides.iter().any(is_for_screens);
+        let of = [a.number, b.number];
+        let pictured = |shown: Arc<Shown>| match screen {
+            true => Pictured::Screen(shown),
+            false => Pictured::Light(shown.layers.clone()),
+        };
         let map = if let Compare::Map(map) = self.compare { Some(map) } else { None };
-        let exposure = self.ev();
+        let exposure = if screen { 0.0 } else { self.ev() };
         let measuring = match &self.measuring {
             Some(measuring) => measuring,
             None => self.measuring.insert(Measuring::start(self.wake.clone())?),
         };
-        measuring.ask(Question { a, b, of: [of_a, of_b], map, exposure });
+        measuring.ask(Question { a: pictured(a), b: pictured(b), of, map, exposure });
         Ok(())
     }
 
@@ -340,16 +365,20 @@ impl Viewer {
         let a = &self.sides[0];
         let failed = a.session().is_some_and(|session| session.status().1.is_some());
         let there = a.shown().is_some_and(|shown| Arc::ptr_eq(&shown.of.stage, stage));
-        self.exposure.is_none() && a.file.is_none() && !failed && !there
+        self.exposure.is_none() && !failed && !there
     }
 
     fn advance(&mut self, context: &Context) {
         if self.playing {
             let step = context.input(|input| f64::from(input.stable_dt)).min(0.25);
             let end = self.stage.as_ref().map_or(0.0, |stage| controls::duration(stage));
-            self.seconds = if end > 0.0 { (self.seconds + step) % end } else { 0.0 };
-            self.playing = end > 0.0;
-            context.request_repaint();
+            if end > 0.0 {
+                self.seconds = (self.seconds + step) % end;
+                context.request_repaint();
+            } else {
+                self.playing = false;
+                self.say("the scene has no animation");
+            }
         }
         if let Some(at) = self.last_move {
             let since = at.elapsed();
@@ -369,11 +398,12 @@ impl Viewer {
     /// Builds the user interface of a frame.
     pub fn frame(&mut self, context: &Context) {
         if self.reading.is_none() && self.watch.as_ref().is_some_and(Watch::changed) {
-            let args = self.args.clone();
+            let args = self.newest_args();
             self.read(args);
         }
         self.take();
         self.dropped(context);
+        self.pose = self.posed();
         keys::pressed(self, context);
         self.advance(context);
         self.times.pictures(self.sides[0].shown().as_deref());

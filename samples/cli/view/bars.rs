@@ -26,7 +26,7 @@ pub struct Times {
 impl Times {
     /// Notes a picture, if it is a new one.
     pub fn pictures(&mut self, shown: Option<&Shown>) {
-        let Some(shown) = shown.filter(|shown| shown.number != self.last) else { return };
+        let Some(shown) = shown.filter(|shown| shown.number != self.last && shown.fresh) else { return };
         self.last = shown.number;
         self.at.push_back(shown.at);
         self.milliseconds.push_back(shown.milliseconds);
@@ -114,12 +114,12 @@ fn numbers(viewer: &Viewer, ui: &mut Ui) {
         return;
     }
     let Some(answer) = answer else { return };
-    let now = [0, 1].map(|side: usize| viewer.sides[side].light().map_or(0, |(_, number, _)| number));
+    let now = [0, 1].map(|side: usize| viewer.sides[side].shown().map_or(0, |shown| shown.number));
     let text = format!("relMSE {:.2e}  FLIP {:.4}  energy {:.3}", answer.rel_mse, answer.flip, answer.energy);
     let text = RichText::new(text).monospace();
-    // Numbers of pictures that are no longer shown are grey.
+    // Numbers are grey while new ones are computed.
     ui.label(if answer.of == now { text } else { text.weak() }).on_hover_text(
-        "A beside B, the reference: relative mean squared error, FLIP of what the screen shows, sum of the light",
+        "A against reference B: relative mean squared error, FLIP, and the sum of all pixels of A divided by that of B",
     );
     if let Some(noise) = viewer.sides[1].shown().and_then(|shown| shown.noise) {
         ui.monospace(format!("noise of B {noise:.1e}"))

@@ -41,6 +41,7 @@ impl Cameras {
     pub fn read(&mut self, file: &Path) -> Result<usize> {
         let list = ViewList::read(file)?.views;
         let count = list.len();
+        self.unsaved |= !self.list.is_empty();
         for mut view in list {
             if self.list.iter().any(|kept| kept.name == view.name) {
                 view.name = self.free();
@@ -88,7 +89,7 @@ pub fn rows(viewer: &mut Viewer, ui: &mut Ui) {
             if ui.selectable_label(false, &view.name).on_hover_text("Go there").clicked() {
                 chosen = Some(view.camera());
             }
-            if ui.small_button("✖").on_hover_text("Forget it").clicked() {
+            if ui.small_button("✖").on_hover_text("Remove this camera").clicked() {
                 dropped = Some(index);
             }
         });

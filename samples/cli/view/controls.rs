@@ -15,16 +15,13 @@ use super::{
 };
 use crate::{
     lamps::{self, Put},
-    screen,
+    placed, scene_bounds, screen,
     stage::{Stage, StageArgs},
 };
-/// The middle of a scene's objects, metres.
+/// The middle of a scene's surfaces, metres; the origin without surfaces.
 pub fn middle(stage: &Stage) -> Vec3 {
-    let pose = Pose::playing(&stage.scene, 0.0);
-    let places = stage.scene.nodes.iter().zip(&pose.world).filter(|(node, _)| node.mesh.is_some());
-    let (sum, count) =
-        places.fold((Vec3::ZERO, 0.0), |(sum, count), (_, world)| (sum + world.w_axis.truncate(), count + 1.0));
-    if count > 0.0 { sum / count } else { Vec3::ZERO }
+    let around = scene_bounds::in_pose(&stage.scene, &Pose::playing(&stage.scene, 0.0));
+    around.map_or(Vec3::ZERO, |around| 0.5 * (around.min + around.max))
 }
 
 /// Length of the longest animation, seconds.
@@ -83,7 +80,7 @@ fn camera(viewer: &mut Viewer, ui: &mut Ui) {
     let Some(stage) = viewer.stage.clone() else { return };
     egui::CollapsingHeader::new("Camera and time").default_open(true).show(ui, |ui| {
         let names: Vec<String> =
-            stage.scene.cameras.iter().enumerate().map(|(i, camera)| super::fly::name_of(camera, i)).collect();
+            stage.scene.cameras.iter().enumerate().map(|(i, camera)| placed::name_of(camera, i)).collect();
         let now = match (&viewer.fly, &viewer.named_camera) {
             (Some(_), _) => "free".to_owned(),
             (None, Some((placed, _))) => placed.name.clone(),
@@ -140,7 +137,7 @@ fn camera(viewer: &mut Viewer, ui: &mut Ui) {
 
 /// Turns the environment. The scene is read again when the mouse lets go, because techniques prepare for an environment.
 fn environment(viewer: &mut Viewer, stage: &Stage, ui: &mut Ui) {
-    if stage.scene.environment.is_none() || stage.default_light {
+    if !stage.turns {
         return;
     }
     ui.horizontal(|ui| {
@@ -155,7 +152,7 @@ fn environment(viewer: &mut Viewer, stage: &Stage, ui: &mut Ui) {
         if !slider.dragged()
             && let Some(turn) = viewer.turn.take()
         {
-            let args = StageArgs { turn: Some(turn), ..viewer.args.clone() };
+            let args = StageArgs { turn: Some(turn), ..viewer.newest_args() };
             viewer.read(args);
         }
     });
@@ -164,21 +161,23 @@ fn environment(viewer: &mut Viewer, stage: &Stage, ui: &mut Ui) {
 /// The lamps of the scene: places and directions.
 fn lamps(viewer: &mut Viewer, ui: &mut Ui) {
     let Some(stage) = viewer.stage.clone() else { return };
-    let nodes = lamps::nodes(&stage.scene);
+    // No option moves a lamp that an animation moves.
+    let mut nodes = lamps::nodes(&stage.scene);
+    nodes.retain(|node| !lamps::is_animated(&stage.scene, *node));
     if nodes.is_empty() {
         return;
     }
     let title = format!("Lamps ({})", nodes.len());
     egui::CollapsingHeader::new(title).id_salt("lamps").default_open(nodes.len() < 4).show(ui, |ui| {
-        let Ok((pose, _)) = stage.at(viewer.seconds, viewer.size_of_side()) else { return };
+        let Some(pose) = viewer.pose.clone() else { return };
         for node in nodes {
-            let world = viewer.moved.get(&node).map_or(pose.world[node], |put| put.world(pose.world[node]));
+            let world = pose.world[node];
             ui.horizontal(|ui| {
                 ui.add(egui::Label::new(lamps::name(&stage.scene, node)).truncate());
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                     let back = egui::Button::new("⟲").small().frame(false);
                     let back = ui.add_visible(viewer.moved.contains_key(&node), back);
-                    if back.on_hover_text("Back to its place").clicked() {
+                    if back.on_hover_text("Reset the position").clicked() {
                         viewer.moved.remove(&node);
                         viewer.moves();
                         return;
@@ -240,9 +239,8 @@ fn side(viewer: &mut Viewer, number: usize, ui: &mut Ui) {
         technique(viewer, number, ui);
         let Viewer { sides, descriptions, .. } = viewer;
         let side = &mut sides[number];
-        let defaults = side.defaults();
         let mut tree = (*side.settings).clone();
-        if panel::show(ui, descriptions, &mut tree, &defaults) {
+        if panel::show(ui, descriptions, &mut tree, &side.defaults) {
             side.settings = std::sync::Arc::new(tree);
         }
     });
@@ -285,7 +283,7 @@ fn technique(viewer: &mut Viewer, number: usize, ui: &mut Ui) {
             ui.label("Paths a pixel");
             ui.add(egui::DragValue::new(&mut side.samples).speed(8.0).range(1..=1_048_576));
         } else {
-            ui.label("Pictures of a still");
+            ui.label("Samples of a pixel");
             ui.add(egui::DragValue::new(&mut side.pictures).speed(0.1).range(1..=1024))
                 .on_hover_text("Anti-aliasing at rest: --aa");
         }
@@ -330,7 +328,7 @@ fn shows(side: &mut Side, ui: &mut Ui) {
 /// What the user must know of the scene and of the picture.
 fn notes(viewer: &Viewer, ui: &mut Ui) {
     let Some(stage) = &viewer.stage else { return };
-    let of_scene = stage.notes().iter().map(|note| format!("{}: {}", note.place, note.text));
+    let of_scene = stage.notes().iter().map(ToString::to_string);
     let of_picture = viewer.sides[0].shown().map(|shown| shown.notes.clone()).unwrap_or_default();
     let all: Vec<String> = of_scene.chain(of_picture).collect();
     if all.is_empty() {

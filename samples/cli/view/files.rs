@@ -1,75 +1,129 @@
 //! What comes from files and goes into them: scenes, bakes, cameras, pictures.
 
 use std::{
+    io::Read,
     path::PathBuf,
     sync::{Arc, mpsc},
     time::Duration,
 };
 
 use egui::Context;
-use lucerna::{Error, ErrorKind, scene::Pose};
+use lucerna::{Error, ErrorKind, Result, scene::Pose};
 
 use super::{
     app::{Compare, Viewer},
-    controls,
+    controls, file,
     fly::Fly,
-    side::FilePicture,
     watch::Watch,
 };
 use crate::{
     args::Size,
+    lamps,
     placed::Placed,
     programs::suited,
     record,
     stage::{Stage, StageArgs},
 };
 
+/// A scene that a thread reads.
+pub(super) struct Reading {
+    args: StageArgs,
+    watch: Option<Watch>,
+    receiver: mpsc::Receiver<Result<Stage>>,
+}
+
+/// The answer of a thread, if there is one; an error if the thread has ended without an answer.
+fn answered<T>(receiver: &mpsc::Receiver<Result<T>>) -> Option<Result<T>> {
+    match receiver.try_recv() {
+        Ok(answer) => Some(answer),
+        Err(mpsc::TryRecvError::Empty) => None,
+        Err(mpsc::TryRecvError::Disconnected) => {
+            Some(Err(Error::new(ErrorKind::Runtime, "the file could not be read: its thread has ended")))
+        }
+    }
+}
+
 impl Viewer {
-    /// Reads a scene on a thread of its own.
+    /// The options of the scene that is read now, else of the scene that is shown.
+    pub(super) fn newest_args(&self) -> StageArgs {
+        self.reading.as_ref().map_or(&self.args, |reading| &reading.args).clone()
+    }
+
+    /// Reads a scene on a thread of its own. A scene that is being read is dropped.
     pub(super) fn read(&mut self, args: StageArgs) {
+        // From before the reading, so that no change of the file is missed.
+        let watch = args.scene.scene.clone().map(|file| Watch::start(file, self.wake.clone()));
+        let of_thread = args.clone();
+        let read = self.on_thread(move || Stage::open(&of_thread));
+        self.reading = read.map(|receiver| Reading { args, watch, receiver });
+    }
+
+    /// Reads a picture on a thread of its own, for side B.
+    fn read_picture(&mut self, path: PathBuf) {
+        self.reading_picture = self.on_thread(move || file::read(&path));
+    }
+
+    /// Runs some work on a thread of its own, which wakes the window at its end.
+    fn on_thread<T: Send + 'static>(
+        &mut self,
+        work: impl FnOnce() -> Result<T> + Send + 'static,
+    ) -> Option<mpsc::Receiver<Result<T>>> {
         let (sender, receiver) = mpsc::channel();
         let wake = self.wake.clone();
         let work = move || {
-            let stage = Stage::open(&args);
             // The window may be closed.
-            let _ = sender.send((args, stage));
+            let _ = sender.send(work());
             (wake.0)();
         };
         match std::thread::Builder::new().name("lucerna reads".into()).spawn(work) {
-            Ok(_) => self.reading = Some(receiver),
-            Err(error) => self.trouble = Some(format!("no thread could be started: {error}")),
+            Ok(_) => Some(receiver),
+            Err(error) => {
+                self.trouble = Some(format!("no thread could be started: {error}"));
+                None
+            }
         }
     }
 
-    /// Takes a scene that was read.
+    /// Takes a scene and a picture that were read.
     pub(super) fn take(&mut self) {
-        let Some(reading) = &self.reading else { return };
-        let (args, stage) = match reading.try_recv() {
-            Ok(read) => read,
-            Err(mpsc::TryRecvError::Empty) => return,
-            Err(mpsc::TryRecvError::Disconnected) => {
-                self.reading = None;
-                return;
+        if let Some(stage) = self.reading.as_ref().and_then(|reading| answered(&reading.receiver))
+            && let Some(Reading { args, watch, .. }) = self.reading.take()
+        {
+            self.watch = watch;
+            match stage {
+                Ok(stage) => self.open(args, stage),
+                // The scene before stays.
+                Err(error) => self.trouble = Some(error.to_string()),
             }
-        };
-        self.reading = None;
-        match stage {
-            Ok(stage) => self.open(args, stage),
-            // The scene before stays.
-            Err(error) => self.trouble = Some(error.to_string()),
+        }
+        if let Some(picture) = self.reading_picture.as_ref().and_then(answered) {
+            self.reading_picture = None;
+            match picture {
+                Ok(picture) => {
+                    self.say(format!("{} is side B", picture.path.display()));
+                    self.sides[1].file = Some(picture);
+                    if self.compare == Compare::One {
+                        self.compare = Compare::Split;
+                    }
+                }
+                Err(error) => self.trouble = Some(error.to_string()),
+            }
         }
     }
 
     fn open(&mut self, args: StageArgs, stage: Stage) {
         self.trouble = None;
-        self.watch = match &stage.source {
-            record::Source::File(file) => Some(Watch::start(file.into(), self.wake.clone())),
-            record::Source::Builtin(_) => None,
-        };
-        if self.stage.as_ref().is_some_and(|before| before.source == stage.source) {
-            // The same scene again: camera, time and technique stay.
+        if let Some(before) = self.stage.clone().filter(|before| before.source == stage.source) {
+            // The same scene again: camera, time and technique stay, and lamps that are the same ones.
             self.camera = self.camera.min(stage.scene.cameras.len().saturating_sub(1));
-            self.moved.retain(|node, _| stage.scene.nodes.get(*node).is_some_and(|node| node.light.is_some()));
+            let (old, new) = (&before.scene, &stage.scene);
+            let nodes = lamps::nodes(new);
+            let same = |node: usize| {
+                nodes.contains(&node)
+                    && lamps::name(old, node) == lamps::name(new, node)
+                    && lamps::is_sun(old, node) == lamps::is_sun(new, node)
+            };
+            self.moved.retain(|node, _| same(*node));
             (self.args, self.stage) = (args, Some(Arc::new(stage)));
             self.say("the scene was read again");
             return;
@@ -85,7 +139,7 @@ impl Viewer {
                 // A camera that the program adds is fitted to the shape of a picture. This one stays as it is, whatever the window becomes.
                 let placed = Placed::of_scene(&stage.scene, *index);
                 let view = placed.view(&Pose::playing(&stage.scene, 0.0), Size { width: 4, height: 3 });
-                let distance = view.position.distance(controls::middle(&stage));
+                let distance = controls::middle(&stage).distance(view.position);
                 let fly = Fly::from_view(&view, placed.camera.projection, distance.max(0.05));
                 self.named_camera = Some((fly.placed(), fly.numbers()));
             }
@@ -114,8 +168,8 @@ impl Viewer {
     pub(super) fn open_file(&mut self, file: PathBuf) {
         let extension = file.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
         match extension.as_str() {
-            "gltf" | "glb" | "obj" | "bin" => {
-                let mut args = StageArgs { camera: None, eye: None, ..self.args.clone() };
+            "gltf" | "glb" | "obj" => {
+                let mut args = StageArgs { camera: None, eye: None, ..self.newest_args() };
                 (args.scene.scene, args.scene.builtin, args.scene.unit) = (Some(file), None, None);
                 args.put = Vec::new();
                 // An environment of the command line stays, and one that was dropped.
@@ -137,25 +191,11 @@ impl Viewer {
                 Ok(count) => self.say(format!("{count} cameras of {}", file.display())),
                 Err(error) => self.trouble = Some(error.to_string()),
             },
-            "hdr" if self.stage.is_some() => {
-                let args = StageArgs { environment: Some(file), ..self.args.clone() };
+            "hdr" if self.stage.is_some() || self.reading.is_some() => {
+                let args = StageArgs { environment: Some(file), ..self.newest_args() };
                 self.read(args);
             }
-            "exr" | "png" | "pfm" | "jpg" | "jpeg" | "hdr" => {
-                match lucerna::image::read(&file, &lucerna::scene::Limits::default()) {
-                    Ok(layers) => {
-                        self.files += 1;
-                        self.say(format!("{} is side B", file.display()));
-                        // Above the numbers of rendered pictures.
-                        let number = (1 << 40) + self.files;
-                        self.sides[1].file = Some(FilePicture { path: file, layers: Arc::new(layers), number });
-                        if self.compare == Compare::One {
-                            self.compare = Compare::Split;
-                        }
-                    }
-                    Err(error) => self.trouble = Some(error.to_string()),
-                }
-            }
+            "exr" | "png" | "pfm" | "jpg" | "jpeg" | "hdr" => self.read_picture(file),
             _ => {
                 let error = Error::new(ErrorKind::Input, "is no scene, bake, environment or picture that the viewer opens")
                     .in_file(&file)
@@ -176,7 +216,13 @@ impl Viewer {
                 self.say(text);
             }
             Ok(Some(status)) => {
-                self.trouble = Some(format!("the picture was not written: {status}; the terminal says why"));
+                let mut said = String::new();
+                if let Some(errors) = &mut writing.child.stderr {
+                    // Without an answer the status says enough.
+                    let _ = errors.take(4096).read_to_string(&mut said);
+                }
+                let why = said.lines().last().map_or_else(|| status.to_string(), str::to_owned);
+                self.trouble = Some(format!("the picture was not written: {why}"));
                 self.writing = None;
             }
             Err(error) => {

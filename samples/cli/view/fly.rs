@@ -1,7 +1,7 @@
 //! The camera of the window: it flies, looks around, and turns around a point.
 
 use glam::{Mat4, Vec2, Vec3};
-use lucerna::scene::{Camera, Projection, View};
+use lucerna::scene::{Projection, View};
 
 use crate::{camera::CameraFile, placed::Placed};
 
@@ -97,7 +97,7 @@ impl Fly {
         self.position = target - self.forward() * self.distance;
     }
 
-    /// Moves the camera beside what it looks at. `drag`: as in [`Fly::turn`].
+    /// Moves the camera and its target parallel to the picture. `drag`: as in [`Fly::turn`].
     pub fn pan(&mut self, drag: Vec2) {
         let height = 2.0 * self.distance * (0.5 * self.yfov_degrees.to_radians()).tan();
         let up = self.right().cross(self.forward());
@@ -164,11 +164,6 @@ pub fn unproject(view: &View, at: Vec2, depth: f32) -> Vec3 {
     let spread = if view.clip_from_view.w_axis.w == 1.0 { 1.0 } else { depth };
     let (sx, sy) = (view.clip_from_view.x_axis.x, view.clip_from_view.y_axis.y);
     world_from_view.transform_point3(Vec3::new(x / sx * spread, y / sy * spread, -depth))
-}
-
-/// A camera that stands still in a scene, for names.
-pub fn name_of(camera: &Camera, index: usize) -> String {
-    if camera.name.is_empty() { format!("camera{index}") } else { camera.name.clone() }
 }
 
 #[cfg(test)]

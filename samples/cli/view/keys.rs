@@ -1,6 +1,10 @@
 //! Keys, and the page that explains them.
 
-use std::{path::PathBuf, process::Command, sync::Arc};
+use std::{
+    path::PathBuf,
+    process::{Command, Stdio},
+    sync::Arc,
+};
 
 use egui::{Context, Key, Modifiers};
 use glam::Vec3;
@@ -15,9 +19,9 @@ use super::{
 /// What keys and the mouse do.
 pub const HELP: [(&str, &str); 25] = [
     ("Drag", "look around; on a lamp: move the lamp; on the line: move the line"),
-    ("Alt drag, middle drag", "turn around what is in the middle"),
-    ("Shift drag", "move beside the picture"),
-    ("Wheel", "nearer and farther; with Ctrl: speed of flying"),
+    ("Alt drag, middle drag", "orbit around the point in the middle of the picture"),
+    ("Shift drag", "pan: move parallel to the picture"),
+    ("Wheel", "dolly in and out; with Ctrl: speed of flying"),
     ("Double click", "turn to the surface under the mouse"),
     ("W A S D, Q E", "fly; with Shift: four times as fast"),
     ("R", "back to the scene's camera, and lamps to their places"),
@@ -81,7 +85,7 @@ pub fn pressed(viewer: &mut Viewer, context: &Context) {
         copy(viewer, context);
     }
     if context.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::R)) {
-        let args = viewer.args.clone();
+        let args = viewer.newest_args();
         viewer.read(args);
     }
     if context.input_mut(|input| input.consume_key(Modifiers::SHIFT, Key::P)) {
@@ -107,10 +111,11 @@ pub fn pressed(viewer: &mut Viewer, context: &Context) {
     }
     if hit(Key::N)
         && let Some(stage) = &viewer.stage
+        && !stage.scene.cameras.is_empty()
     {
         let next =
             if viewer.fly.is_some() || viewer.named_camera.is_some() { viewer.camera } else { viewer.camera + 1 };
-        viewer.camera = next % stage.scene.cameras.len().max(1);
+        viewer.camera = next % stage.scene.cameras.len();
         (viewer.fly, viewer.named_camera) = (None, None);
     }
     if hit(Key::K) {
@@ -195,7 +200,7 @@ fn words(viewer: &Viewer) -> Result<Vec<String>, String> {
         look: viewer.look(),
     };
     command::words(&common, &viewer.sides[0])
-        .ok_or_else(|| "no command makes this: it is a file, a layer or false colour".into())
+        .ok_or_else(|| "no command makes this picture: it shows a file, a layer or false colour".into())
 }
 
 /// Copies the command of side A.
@@ -226,8 +231,9 @@ pub fn screenshot(viewer: &mut Viewer, extension: &str) {
     let name = viewer.stage.as_ref().map_or_else(|| "scene".to_owned(), |stage| stage.scene.name.clone());
     let name: String = name.chars().map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' }).collect();
     let file = free(&name, viewer.sides[0].technique, extension);
-    let started = std::env::current_exe()
-        .and_then(|program| Command::new(program).args(words).arg("-q").arg("-o").arg(&file).spawn());
+    let started = std::env::current_exe().and_then(|program| {
+        Command::new(program).args(words).arg("-q").arg("-o").arg(&file).stderr(Stdio::piped()).spawn()
+    });
     match started {
         Ok(child) => {
             viewer.say(format!("writing {}", file.display()));
@@ -261,9 +267,4 @@ pub fn help(viewer: &mut Viewer, context: &Context) {
             });
         });
     viewer.help = open;
-    // For a scene that does not move, playing would draw for ever.
-    if viewer.playing && viewer.stage.as_ref().is_some_and(|stage| stage.scene.animations.is_empty()) {
-        viewer.playing = false;
-        viewer.say("the scene has no animation");
-    }
 }

@@ -114,8 +114,8 @@ fn staged<T: Technique>(settings: &Value) -> Result<Staged<T::Settings>> {
 }
 
 /// The mode of a request; the first for an unknown name.
-fn mode<T: Technique>(name: &str) -> T::Mode {
-    T::Mode::ALL.iter().copied().find(|mode| mode.name() == name).unwrap_or_default()
+pub(super) fn mode<M: Mode>(name: &str) -> M {
+    M::ALL.iter().copied().find(|mode| mode.name() == name).unwrap_or_default()
 }
 
 struct Living<T: Technique> {
@@ -162,7 +162,7 @@ impl<T: Technique> Living<T> {
         let shot = Shot {
             seconds: wanted.seconds,
             frames: 1,
-            mode: mode::<T>(&wanted.mode),
+            mode: mode::<T::Mode>(&wanted.mode),
             layers: take.layers,
             temporal: None,
         };
@@ -212,7 +212,7 @@ impl<T: Technique> Live for Living<T> {
     }
 
     fn is_light(&self, wanted: &Wanted) -> bool {
-        mode::<T>(&wanted.mode).is_radiance() && wanted.shows == Shows::Picture
+        mode::<T::Mode>(&wanted.mode).is_radiance() && wanted.shows == Shows::Picture
     }
 
     fn exposure(&self, stage: &Stage) -> Option<f64> {

@@ -7,11 +7,11 @@ use std::{
 
 use lucerna::{
     Error, ErrorKind, Result,
-    image::Layers,
+    image::{Layers, srgb},
     measure::{Exposure, Measure, Options, Pair, Picture},
 };
 
-use super::{painted, session::Wake};
+use super::{painted, session::Wake, wanted::Shown};
 
 /// A map of two pictures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -32,14 +32,35 @@ impl MapOf {
     }
 }
 
+/// A picture to measure.
+#[derive(Clone, Debug)]
+pub enum Pictured {
+    Light(Arc<Layers>),
+    /// As the screen shows it.
+    Screen(Arc<Shown>),
+}
+
+impl Pictured {
+    fn picture(&self) -> Result<Picture> {
+        match self {
+            Self::Light(layers) => Picture::from_layers(layers, None),
+            Self::Screen(shown) => {
+                let pixels = shown.pixels.iter().map(|codes| codes.map(srgb::decode_u8)).collect();
+                Picture::new(shown.size.width, shown.size.height, pixels)
+            }
+        }
+    }
+}
+
 /// What is measured: B is the reference.
 #[derive(Clone, Debug)]
 pub struct Question {
-    pub a: Arc<Layers>,
-    pub b: Arc<Layers>,
+    pub a: Pictured,
+    pub b: Pictured,
     /// Numbers of the pictures.
     pub of: [u64; 2],
     pub map: Option<MapOf>,
+    /// EV at which FLIP looks at both.
     pub exposure: f64,
 }
 
@@ -49,14 +70,17 @@ impl Question {
     }
 }
 
-/// The answer.
+/// How far A is from B.
 #[derive(Clone, Debug)]
 pub struct Answer {
+    /// Numbers of the pictures.
     pub of: [u64; 2],
+    /// Relative mean squared error, and FLIP: as `lucerna compare` has them.
     pub rel_mse: f64,
     pub flip: f64,
     /// Sum of the light of A over that of B.
     pub energy: f64,
+    /// The map, its width and height, and its codes, row by row from the upper left corner.
     pub map: Option<(MapOf, [u32; 2], Vec<[u8; 3]>)>,
 }
 
@@ -153,8 +177,7 @@ fn work(shared: &(Mutex<State>, Condvar), waker: &Wake) {
 /// # Errors
 /// `Input` for pictures of different sizes.
 pub fn answer(question: &Question) -> Result<Answer> {
-    let picture = |layers: &Layers| Picture::from_layers(layers, None);
-    let (a, b) = (picture(&question.a)?, picture(&question.b)?);
+    let (a, b) = (question.a.picture()?, question.b.picture()?);
     let pair = Pair::new(&b, &a)?;
     // One thread, because the other ones render.
     let mut options = Options { threads: Some(1), ..Options::default() };
@@ -172,8 +195,8 @@ pub fn answer(question: &Question) -> Result<Answer> {
 mod tests {
     use super::*;
 
-    fn grey(value: f32, width: u32) -> Arc<Layers> {
-        Arc::new(Layers::rgb(width, 16, vec![value; (width * 16 * 3) as usize]))
+    fn grey(value: f32, width: u32) -> Pictured {
+        Pictured::Light(Arc::new(Layers::rgb(width, 16, vec![value; (width * 16 * 3) as usize])))
     }
 
     #[test]

@@ -8,6 +8,7 @@ mod bars;
 mod cameras;
 mod command;
 mod controls;
+mod file;
 mod files;
 mod fly;
 mod keys;

@@ -3,7 +3,7 @@
 use lucerna::{
     Result,
     gpu::Gpu,
-    image::{self, Layer, Layers, WriteOptions, srgb},
+    image::{self, Layer, Layers, WriteOptions},
     measure::magma,
     techniques::tonemap::Operator,
 };
@@ -17,6 +17,28 @@ use crate::screen::Screen;
 /// Decades of false colours.
 const DECADES: f32 = 5.0;
 
+/// What the values of a picture are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Values {
+    /// Light, which has an exposure and a curve.
+    Radiance,
+    /// Light as a screen shows it, exposure and curve included.
+    Screen,
+    /// No light: normals, numbers of lights, …
+    Numbers,
+}
+
+impl Values {
+    /// Those of a rendered picture. `is_light`: it is radiance before the tone mapping of the settings.
+    pub fn of(wanted: &Wanted, is_light: bool) -> Self {
+        match (is_light, wanted.is_developed()) {
+            (false, _) => Self::Numbers,
+            (true, true) => Self::Screen,
+            (true, false) => Self::Radiance,
+        }
+    }
+}
+
 /// Develops pictures on a device.
 #[derive(Debug)]
 pub(super) struct Painter {
@@ -29,11 +51,11 @@ impl Painter {
         Self { gpu: gpu.clone(), screen: None }
     }
 
-    /// The codes of a picture. `is_light`: exposure and curve are for it. `ev`: exposure.
+    /// The codes of a picture, row by row from the upper left corner. `ev`: exposure of radiance.
     ///
     /// # Errors
     /// As [`Screen::shown`].
-    pub fn codes(&mut self, wanted: &Wanted, layers: &Layers, is_light: bool, ev: f64) -> Result<Vec<[u8; 3]>> {
+    pub fn codes(&mut self, wanted: &Wanted, layers: &Layers, values: Values, ev: f64) -> Result<Vec<[u8; 3]>> {
         let plain = WriteOptions::default();
         if let Shows::Layer(name) = &wanted.shows
             && let Some(layer) = layers.layer(name)
@@ -41,14 +63,10 @@ impl Painter {
             return image::screen(layer, &plain);
         }
         let Some(main) = layers.main() else { return Ok(Vec::new()) };
-        if !is_light {
-            return image::screen(main, &plain);
-        }
-        // Tone mapping by the settings has the exposure already, and takes the place of the curve.
-        let developed = wanted.settings.get("tonemap").is_some_and(|tonemap| !tonemap.is_null());
         match wanted.look {
-            Look::FalseColour => Ok(false_colours(main, ev)),
-            Look::Light(_) if developed => image::screen(main, &plain),
+            _ if values == Values::Numbers => image::screen(main, &plain),
+            Look::FalseColour => Ok(false_colours(main, if values == Values::Radiance { ev } else { 0.0 })),
+            Look::Light(_) if values == Values::Screen => image::screen(main, &plain),
             Look::Light(None) => image::screen(main, &WriteOptions { exposure_ev: ev as f32, ..plain }),
             Look::Light(Some(curve)) => {
                 if self.screen.as_ref().is_none_or(|(by, _)| *by != curve) {
@@ -75,7 +93,7 @@ fn false_colours(layer: &Layer, ev: f64) -> Vec<[u8; 3]> {
         let luminance = (0.2126 * r + 0.7152 * g + 0.0722 * b) * scale;
         ((luminance / 8.0).max(1e-30).log10() + DECADES) / DECADES
     };
-    pixels.into_iter().map(|pixel| magma(share(pixel).clamp(0.0, 1.0))).collect()
+    pixels.into_iter().map(|pixel| magma(share(pixel))).collect()
 }
 
 /// The scale of false colours: luminance, with the exposure, at the dark and at the bright end.
@@ -83,21 +101,14 @@ pub fn false_colour_range() -> [f32; 2] {
     [8.0 * 10f32.powf(-DECADES), 8.0]
 }
 
-/// Codes of |A − B| of what both sides show, twice as bright as they are.
+/// 2 |A − B| of the codes of both sides, at most 255.
 pub fn difference(a: &[[u8; 3]], b: &[[u8; 3]]) -> Vec<[u8; 3]> {
     let twice = |(a, b): (&[u8; 3], &[u8; 3])| std::array::from_fn(|i| a[i].abs_diff(b[i]).saturating_mul(2));
     a.iter().zip(b).map(twice).collect()
 }
 
-/// A map of a measure, as codes.
+/// A map of a measure as codes of magma. The range has the values of the darkest and of the brightest colour.
 pub fn of_map(values: &[f32], [low, high]: [f32; 2]) -> Vec<[u8; 3]> {
     let span = if high > low { high - low } else { 1.0 };
     values.iter().map(|value| magma((value - low) / span)).collect()
-}
-
-/// Codes of a file's picture, as it is shown beside a rendered one.
-pub fn of_file(layers: &Layers, ev: f64) -> Vec<[u8; 3]> {
-    let scale = (ev as f32).exp2();
-    let pixels = layers.main().and_then(Layer::rgb_pixels).unwrap_or_default();
-    pixels.into_iter().map(|pixel| pixel.map(|value| srgb::encode_u8(value * scale))).collect()
 }

@@ -82,7 +82,7 @@ fn help(key: &Key, unmet: Option<&str>) -> String {
     }
     text += &format!("\nDefault: {}", shown(&key.default));
     if let Some(unmet) = unmet {
-        text += &format!("\n\nWithout effect: {unmet}");
+        text += &format!("\n\nNo effect, because {unmet}");
     }
     text
 }

@@ -1,17 +1,20 @@
 //! The picture in the window: both sides, lamps, and the mouse.
 
 use egui::{Color32, Context, CursorIcon, Pos2, Rect, Sense, Stroke, TextureHandle, TextureOptions, Ui};
-use glam::{Mat4, Vec2, Vec3};
-use lucerna::scene::{Pose, View};
+use glam::{Vec2, Vec3};
+use lucerna::scene::View;
 
 use super::{
-    app::{Compare, Viewer},
+    app::{Compare, Held, Viewer},
     fly,
     measured::MapOf,
     painted,
     side::image_of,
 };
-use crate::{args::Size, lamps::Put};
+use crate::{
+    args::Size,
+    lamps::{self, Put},
+};
 
 /// Radius in which a lamp is picked, points.
 const PICK: f32 = 12.0;
@@ -39,7 +42,7 @@ pub fn area(viewer: &mut Viewer, context: &Context) {
         }
         paint(viewer, ui, rect, scale);
         let view = seen(viewer);
-        lamps(viewer, ui, rect, view.as_ref());
+        rings(viewer, ui, rect, view.as_ref());
         mouse(viewer, ui, &response, rect, scale, view.as_ref());
     });
 }
@@ -63,9 +66,9 @@ fn empty(viewer: &Viewer, ui: &Ui, rect: Rect) {
 
 /// The view of the whole picture.
 fn seen(viewer: &Viewer) -> Option<View> {
-    let (stage, placed) = (viewer.stage.as_ref()?, viewer.placed()?);
+    let (pose, placed) = (viewer.pose.as_ref()?, viewer.placed()?);
     let size = viewer.size_of_side();
-    (size.width > 0 && size.height > 0).then(|| placed.view(&Pose::playing(&stage.scene, viewer.seconds as f32), size))
+    (size.width > 0 && size.height > 0).then(|| placed.view(pose, size))
 }
 
 /// Paints what the sides have.
@@ -73,7 +76,7 @@ fn paint(viewer: &mut Viewer, ui: &Ui, rect: Rect, scale: f32) {
     let ev = viewer.ev();
     let context = ui.ctx().clone();
     let [a, b] = &mut viewer.sides;
-    let (a, b) = (a.texture(&context, ev), b.texture(&context, ev));
+    let (a, b) = (a.texture(&context), b.texture(&context));
     let fit = |texture: &(TextureHandle, bool), space: Rect| -> Rect {
         let size = texture.0.size_vec2() / scale;
         // A picture of the size of the space lies pixel on pixel; others are fitted into it.
@@ -119,19 +122,23 @@ fn paint(viewer: &mut Viewer, ui: &Ui, rect: Rect, scale: f32) {
             tag(ui, right, "B");
         }
         Compare::Difference => {
-            if let (Some((size, a)), Some((other, b))) = (viewer.sides[0].codes(ev), viewer.sides[1].codes(ev))
-                && size == other
+            if let (Some(a), Some(b)) = (viewer.sides[0].shown(), viewer.sides[1].shown())
+                && a.size == b.size
             {
-                let key = (numbers(viewer), ev.to_bits(), "difference");
-                let texture = kept(&context, key, || image_of(size, &painted::difference(&a, &b)));
+                let key = ([a.number, b.number], ev.to_bits(), "difference");
+                let texture = kept(&context, key, || image_of(a.size, &painted::difference(&a.pixels, &b.pixels)));
                 image(&(texture, true), rect, rect);
                 tag(ui, rect, "2 |A − B|");
             } else {
-                tag(ui, rect, "A and B have other sizes, or one has no picture yet");
+                tag(ui, rect, "A and B have different sizes, or one side has no picture yet");
             }
         }
         Compare::Map(of) => {
-            let name = if of == MapOf::Flip { "FLIP of A beside B" } else { "relative error of A beside B" };
+            let name = if of == MapOf::Flip {
+                "FLIP of A against reference B"
+            } else {
+                "relative error of A against reference B"
+            };
             if let (Some(answer), _) = viewer.answer()
                 && let Some((found, [width, height], codes)) = &answer.map
                 && *found == of
@@ -141,7 +148,7 @@ fn paint(viewer: &mut Viewer, ui: &Ui, rect: Rect, scale: f32) {
                 image(&(texture, true), rect, rect);
                 tag(ui, rect, name);
             } else {
-                tag(ui, rect, "no map yet: A and B have other sizes, or one has no picture");
+                tag(ui, rect, "no map yet: A and B have different sizes, or one side has no picture");
             }
         }
     }
@@ -164,11 +171,6 @@ fn kept(context: &Context, of: MadeOf, image: impl FnOnce() -> egui::ColorImage)
     texture
 }
 
-/// Numbers of the pictures of both sides.
-fn numbers(viewer: &Viewer) -> [u64; 2] {
-    [0, 1].map(|side: usize| viewer.sides[side].light().map_or(0, |(_, number, _)| number))
-}
-
 fn tag(ui: &Ui, space: Rect, text: &str) {
     let at = space.left_top() + egui::vec2(8.0, 6.0);
     let font = egui::FontId::proportional(14.0);
@@ -189,25 +191,24 @@ fn space_of_a(viewer: &Viewer, rect: Rect) -> Rect {
     }
 }
 
-/// Lamps with a place: node, place on the screen, place in the world.
-fn placed_lamps(viewer: &Viewer, rect: Rect, view: Option<&View>) -> Vec<(usize, Pos2, Mat4)> {
-    let (Some(stage), Some(view)) = (&viewer.stage, view) else { return Vec::new() };
-    let Ok((pose, _)) = stage.at(viewer.seconds, viewer.size_of_side()) else { return Vec::new() };
+/// Lamps that can be moved: node, and place on the screen.
+fn placed_lamps(viewer: &Viewer, rect: Rect, view: Option<&View>) -> Vec<(usize, Pos2)> {
+    let (Some(stage), Some(pose), Some(view)) = (&viewer.stage, &viewer.pose, view) else { return Vec::new() };
     let space = space_of_a(viewer, rect);
     let lamp = |node: usize| {
-        let world = viewer.moved.get(&node).map_or(pose.world[node], |put| put.world(pose.world[node]));
-        let at = fly::project(view, world.w_axis.truncate())?;
+        let at = fly::project(view, pose.world[node].w_axis.truncate())?;
         let inside = (-0.1..1.1).contains(&at.x) && (-0.1..1.1).contains(&at.y);
-        inside.then(|| (node, on_screen(space, at), world))
+        inside.then(|| (node, on_screen(space, at)))
     };
-    let with_place = |node: &usize| !crate::lamps::is_sun(&stage.scene, *node);
-    crate::lamps::nodes(&stage.scene).into_iter().filter(with_place).filter_map(lamp).collect()
+    // Suns have no place, and no option moves a lamp that an animation moves.
+    let moves = |node: &usize| !lamps::is_sun(&stage.scene, *node) && !lamps::is_animated(&stage.scene, *node);
+    lamps::nodes(&stage.scene).into_iter().filter(moves).filter_map(lamp).collect()
 }
 
-fn lamps(viewer: &Viewer, ui: &Ui, rect: Rect, view: Option<&View>) {
+fn rings(viewer: &Viewer, ui: &Ui, rect: Rect, view: Option<&View>) {
     let pointer = ui.input(|input| input.pointer.hover_pos());
-    for (node, at, _) in placed_lamps(viewer, rect, view) {
-        let near = viewer.held == Some(node) || pointer.is_some_and(|pointer| pointer.distance(at) < PICK);
+    for (node, at) in placed_lamps(viewer, rect, view) {
+        let near = viewer.held == Some(Held::Lamp(node)) || pointer.is_some_and(|pointer| pointer.distance(at) < PICK);
         // Only near the mouse: marks all over the picture would hide it.
         if near {
             let painter = ui.painter().with_clip_rect(rect);
@@ -239,27 +240,23 @@ fn mouse(viewer: &mut Viewer, ui: &Ui, response: &egui::Response, rect: Rect, sc
         let lamps = placed_lamps(viewer, rect, view);
         let nearest = lamps
             .iter()
-            .filter(|(_, at, _)| at.distance(start) < PICK)
+            .filter(|(_, at)| at.distance(start) < PICK)
             .min_by(|a, b| a.1.distance(start).total_cmp(&b.1.distance(start)));
-        viewer.held = nearest.map(|(node, ..)| *node);
-        let line = on_line(start) && viewer.held.is_none();
-        ui.ctx().data_mut(|data| data.insert_temp(egui::Id::new("line"), line));
+        let lamp = nearest.map(|(node, _)| Held::Lamp(*node));
+        viewer.held = lamp.or_else(|| on_line(start).then_some(Held::Line));
     }
     if response.drag_stopped() {
         viewer.held = None;
     }
-    let holds_line = ui.ctx().data(|data| data.get_temp::<bool>(egui::Id::new("line"))).unwrap_or(false);
     if response.dragged() && drag != Vec2::ZERO {
         let button = |button| response.dragged_by(button);
-        if button(egui::PointerButton::Primary) && holds_line {
-            if let Some(at) = pointer {
+        match (viewer.held, pointer, view) {
+            (Some(Held::Line), Some(at), _) => {
                 viewer.divider = ((at.x - rect.left()) / rect.width()).clamp(0.0, 1.0);
+                return;
             }
-            return;
-        }
-        if let (Some(node), Some(at), Some(view)) = (viewer.held, pointer, view) {
-            drag_lamp(viewer, node, at, space, view);
-            return;
+            (Some(Held::Lamp(node)), Some(at), Some(view)) => return drag_lamp(viewer, node, at, space, view),
+            _ => (),
         }
         let (middle, alt, shift) = (button(egui::PointerButton::Middle), modifiers.alt, modifiers.shift);
         if let Some(fly) = viewer.flying() {
@@ -283,9 +280,7 @@ fn mouse(viewer: &mut Viewer, ui: &Ui, response: &egui::Response, rect: Rect, sc
 
 /// Moves a lamp in the plane through it that is parallel to the picture.
 fn drag_lamp(viewer: &mut Viewer, node: usize, at: Pos2, space: Rect, view: &View) {
-    let Some(stage) = viewer.stage.clone() else { return };
-    let Ok((pose, _)) = stage.at(viewer.seconds, viewer.size_of_side()) else { return };
-    let world = viewer.moved.get(&node).map_or(pose.world[node], |put| put.world(pose.world[node]));
+    let Some(world) = viewer.pose.as_ref().and_then(|pose| pose.world.get(node)) else { return };
     let depth = -view.view_from_world.transform_point3(world.w_axis.truncate()).z;
     let share = (at - space.min) / space.size();
     let place: Vec3 = fly::unproject(view, Vec2::new(share.x, share.y), depth);

@@ -18,6 +18,7 @@ use lucerna::{
 };
 
 use super::{
+    file,
     painted::Painter,
     still, truth,
     wanted::{Shown, Wanted},
@@ -198,13 +199,13 @@ impl Shared {
     }
 
     /// A request for another technique or scene waits, or the window closes.
-    pub fn is_other(&self, first: &Wanted) -> bool {
+    pub fn is_for_another(&self, first: &Wanted) -> bool {
         let state = self.lock();
         state.closing || state.wanted.as_ref().is_some_and(|wanted| !wanted.same_scene(first))
     }
 
     /// The request to render on a new device: the present one once more, or the next one.
-    fn again(&self) -> Option<Wanted> {
+    fn retry(&self) -> Option<Wanted> {
         let mut state = self.lock();
         if state.closing || state.resting || state.wanted.is_some() || state.tries > 0 {
             drop(state);
@@ -224,6 +225,7 @@ impl Shared {
         !state.closing && !state.resting && state.wanted.is_none()
     }
 
+    /// Says what the thread does.
     pub fn does(&self, doing: Doing) {
         let changed = {
             let mut state = self.lock();
@@ -234,10 +236,12 @@ impl Shared {
         }
     }
 
+    /// Names device and driver.
     pub fn is_on(&self, device: String) {
         self.lock().device = device;
     }
 
+    /// Gives a picture to the window, with a number that no other picture has.
     pub fn show(&self, shown: Shown) {
         let shown = Shown { number: NUMBERS.fetch_add(1, Ordering::Relaxed) + 1, ..shown };
         self.lock().shown = Some(Arc::new(shown));
@@ -277,7 +281,9 @@ impl Shared {
         let mut painter = Painter::new(gpu);
         let mut wanted = first;
         loop {
-            let result = if wanted.is_truth() {
+            let result = if wanted.file.is_some() {
+                file::work(self, &mut painter, wanted)
+            } else if wanted.is_truth() {
                 truth::work(self, gpu, &mut painter, wanted)
             } else {
                 still::work(self, gpu, &mut painter, wanted)
@@ -288,7 +294,7 @@ impl Shared {
                     self.fail(error);
                     // A device that was stopped within a long pass is lost, too.
                     if gpu.is_lost() {
-                        return self.again();
+                        return self.retry();
                     }
                     self.next()?
                 }
@@ -333,6 +339,7 @@ mod tests {
             camera: stage.placed.clone(),
             stage,
             technique: TRUTH,
+            file: None,
             mode: "total".into(),
             settings: Arc::new(live::about(TRUTH).unwrap().settings),
             bake: None,

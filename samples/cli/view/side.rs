@@ -3,27 +3,18 @@
 use std::{path::PathBuf, sync::Arc};
 
 use egui::{ColorImage, Context, TextureHandle, TextureOptions};
-use lucerna::{Result, gpu::GpuOptions, image::Layers};
+use lucerna::{Result, gpu::GpuOptions};
 use serde_json::Value;
 
 use super::{
     live::{self, About},
-    painted,
     session::{Session, Wake},
-    wanted::{Shown, Shows, TRUTH, Wanted},
+    wanted::{FilePicture, Shown, Shows, TRUTH, Wanted},
 };
 use crate::{args::Size, smooth};
 
 /// Paths a pixel after which the path tracer rests.
 pub const SAMPLES: u64 = 1024;
-
-/// A picture of a file beside rendered ones.
-#[derive(Clone, Debug)]
-pub struct FilePicture {
-    pub path: PathBuf,
-    pub layers: Arc<Layers>,
-    pub number: u64,
-}
 
 /// A side of the window.
 pub struct Side {
@@ -32,6 +23,8 @@ pub struct Side {
     pub about: About,
     pub mode: String,
     pub settings: Arc<Value>,
+    /// The settings with which this technique begins.
+    pub defaults: Arc<Value>,
     pub bake: Option<PathBuf>,
     pub pictures: u32,
     pub samples: u64,
@@ -65,7 +58,8 @@ impl Side {
             name,
             technique: known,
             mode: String::new(),
-            settings: Arc::new(about.settings.clone()),
+            settings: Arc::default(),
+            defaults: Arc::default(),
             about,
             bake: None,
             pictures: 1,
@@ -86,7 +80,9 @@ impl Side {
         self.technique = technique;
         self.mode = about.modes.first().map(|mode| mode.name.to_owned()).unwrap_or_default();
         self.bake = None;
-        self.settings = Arc::new(preview(technique, &about));
+        self.file = None;
+        self.defaults = Arc::new(preview(technique, &about));
+        self.settings = self.defaults.clone();
         // `render` takes the mean of several pictures where one takes about a second on a CPU driver.
         self.pictures = if about.cheap { smooth::STILL } else { 1 };
         self.shows = Shows::Picture;
@@ -96,12 +92,7 @@ impl Side {
     /// The settings of the paper, or the defaults.
     pub fn set_paper(&mut self, paper: bool) {
         let settings = self.about.paper.clone().filter(|_| paper);
-        self.settings = Arc::new(settings.unwrap_or_else(|| preview(self.technique, &self.about)));
-    }
-
-    /// The settings that a fresh side of this technique has.
-    pub fn defaults(&self) -> Value {
-        preview(self.technique, &self.about)
+        self.settings = settings.map_or_else(|| self.defaults.clone(), Arc::new);
     }
 
     /// Asks for a picture, unless it was asked for already.
@@ -112,7 +103,7 @@ impl Side {
         let known = |before: &Wanted| {
             before.same_light(&wanted) && before.exposure == wanted.exposure && before.look == wanted.look
         };
-        if self.file.is_some() || self.asked.as_ref().is_some_and(known) {
+        if self.asked.as_ref().is_some_and(known) {
             return Ok(());
         }
         let session = match &self.session {
@@ -126,6 +117,9 @@ impl Side {
 
     /// The picture of the mode is light, which has an exposure.
     pub fn is_light(&self) -> bool {
+        if let Some(file) = &self.file {
+            return !file.is_for_screens;
+        }
         let mode = self.about.modes.iter().find(|mode| mode.name == self.mode);
         self.shows == Shows::Picture && mode.is_none_or(|mode| mode.is_light)
     }
@@ -142,53 +136,27 @@ impl Side {
         self.session.as_ref()
     }
 
-    /// The newest rendered picture.
+    /// The newest picture.
     pub fn shown(&self) -> Option<Arc<Shown>> {
-        self.session.as_ref()?.shown().filter(|_| self.file.is_none())
-    }
-
-    /// The light that is shown, its number, and whether it is finished.
-    pub fn light(&self) -> Option<(Arc<Layers>, u64, bool)> {
-        match &self.file {
-            Some(file) => Some((file.layers.clone(), file.number, true)),
-            None => self.shown().map(|shown| (shown.layers.clone(), shown.number, shown.finished)),
-        }
-    }
-
-    /// The codes that are shown, with their size.
-    pub fn codes(&self, ev: f64) -> Option<(Size, Vec<[u8; 3]>)> {
-        match &self.file {
-            Some(FilePicture { layers, .. }) => {
-                Some((Size { width: layers.width, height: layers.height }, painted::of_file(layers, ev)))
-            }
-            None => self.shown().map(|shown| (shown.size, shown.pixels.clone())),
-        }
+        self.session.as_ref()?.shown()
     }
 
     /// The newest picture as a texture, and whether its pixels are those of the screen.
-    pub fn texture(&mut self, context: &Context, ev: f64) -> Option<(TextureHandle, bool)> {
-        let (number, size, whole) = match (&self.file, self.shown()) {
-            (Some(file), _) => {
-                // Another exposure is another texture.
-                (file.number ^ ev.to_bits(), Size { width: file.layers.width, height: file.layers.height }, true)
-            }
-            (None, Some(shown)) => (shown.number, shown.size, shown.whole),
-            (None, None) => return None,
-        };
-        let fresh = self.texture.as_ref().is_some_and(|(of, _)| *of == number);
+    pub fn texture(&mut self, context: &Context) -> Option<(TextureHandle, bool)> {
+        let shown = self.shown()?;
+        let fresh = self.texture.as_ref().is_some_and(|(of, _)| *of == shown.number);
         if !fresh {
-            let (_, codes) = self.codes(ev)?;
-            let image = image_of(size, &codes);
-            let options = if whole { TextureOptions::NEAREST } else { TextureOptions::LINEAR };
+            let image = image_of(shown.size, &shown.pixels);
+            let options = if shown.whole { TextureOptions::NEAREST } else { TextureOptions::LINEAR };
             match &mut self.texture {
                 Some((of, texture)) => {
                     texture.set(image, options);
-                    *of = number;
+                    *of = shown.number;
                 }
-                none => *none = Some((number, context.load_texture(self.name, image, options))),
+                none => *none = Some((shown.number, context.load_texture(self.name, image, options))),
             }
         }
-        self.texture.as_ref().map(|(_, texture)| (texture.clone(), whole))
+        self.texture.as_ref().map(|(_, texture)| (texture.clone(), shown.whole))
     }
 }
 

@@ -9,7 +9,7 @@ use lucerna::{Result, gpu::Gpu, graph::Report, image::Layers};
 
 use super::{
     live::{self, Live, Made, Take},
-    painted::Painter,
+    painted::{Painter, Values},
     session::{Doing, Shared},
     wanted::{PassTime, Shown, Shows, Wanted},
 };
@@ -99,7 +99,7 @@ impl Light {
             size,
             passes: Arc::new(times(&made.report)),
             images: Arc::new(made.images),
-            notes: made.notes.iter().map(|note| format!("{}: {}", note.place, note.text)).collect(),
+            notes: made.notes.iter().map(ToString::to_string).collect(),
             milliseconds: begun.elapsed().as_secs_f64() * 1e3,
             ev,
             layers: Arc::new(made.layers),
@@ -130,7 +130,7 @@ pub(super) fn work(shared: &Shared, gpu: &Gpu, painter: &mut Painter, first: Wan
     shared.does(preparing(None));
     let mut told = |done: u64, all: u64| {
         shared.does(preparing(Some((done, all))));
-        !shared.is_other(&first)
+        !shared.is_for_another(&first)
     };
     let mut live = live::of(gpu, &first, &mut told)?;
     let (mut rate, mut kept) = (Rate::default(), None::<Light>);
@@ -143,7 +143,7 @@ pub(super) fn work(shared: &Shared, gpu: &Gpu, painter: &mut Painter, first: Wan
             Some(mut light) => {
                 light.ev = chosen(live.as_ref(), &wanted).unwrap_or(light.ev);
                 light.of = wanted.clone();
-                paint(shared, painter, live.as_ref(), &light).map(|()| Some(light))
+                paint(shared, painter, live.as_ref(), &light, false).map(|()| Some(light))
             }
             None => picture(shared, painter, live.as_mut(), &wanted, &mut rate),
         };
@@ -180,7 +180,7 @@ fn picture(
         let by = rate.divisor(wanted.size);
         let quick = quick(wanted, by);
         let light = one(shared, live, &quick, (divided(wanted.size, by), false), rate)?;
-        paint(shared, painter, live, &Light { of: wanted.clone(), ..light })?;
+        paint(shared, painter, live, &Light { of: wanted.clone(), ..light }, true)?;
     }
     if wanted.moving || !shared.may_be_interrupted() {
         return Ok(None);
@@ -188,12 +188,12 @@ fn picture(
     if mean {
         // Sharp before it is smooth.
         let light = one(shared, live, wanted, (wanted.size, false), rate)?;
-        paint(shared, painter, live, &light)?;
+        paint(shared, painter, live, &light, true)?;
     }
     let light = if mean {
         let begun = Instant::now();
         let (pose, view) = wanted.placed(wanted.size)?;
-        let go_on = || !shared.is_other(wanted);
+        let go_on = || !shared.is_for_another(wanted);
         let take =
             Take { pose: &pose, view, layers: true, exposure: chosen(live, wanted).unwrap_or(0.0), go_on: &go_on };
         let made = live.mean(wanted, &take, &mut |share| shared.does(Doing::Rendering(share)))?;
@@ -202,7 +202,8 @@ fn picture(
         one(shared, live, wanted, (wanted.size, true), rate)?
     };
     let light = Light { finished: true, ..light };
-    paint(shared, painter, live, &light)?;
+    // A smooth picture is the mean of many, whose time is not that of one.
+    paint(shared, painter, live, &light, !mean)?;
     Ok(Some(light))
 }
 
@@ -217,7 +218,7 @@ fn one(
     let begun = Instant::now();
     let (pose, view) = wanted.placed(size)?;
     let layers = layers || matches!(wanted.shows, Shows::Layer(_));
-    let go_on = || !shared.is_other(wanted);
+    let go_on = || !shared.is_for_another(wanted);
     let take = Take { pose: &pose, view, layers, exposure: chosen(live, wanted).unwrap_or(0.0), go_on: &go_on };
     let made = live.single(wanted, &take)?;
     rate.took(begun.elapsed(), size);
@@ -225,8 +226,9 @@ fn one(
 }
 
 /// Shows light to the window.
-fn paint(shared: &Shared, painter: &mut Painter, live: &dyn Live, light: &Light) -> Result<()> {
-    let pixels = painter.codes(&light.of, &light.layers, live.is_light(&light.of), light.ev)?;
+fn paint(shared: &Shared, painter: &mut Painter, live: &dyn Live, light: &Light, fresh: bool) -> Result<()> {
+    let values = Values::of(&light.of, live.is_light(&light.of));
+    let pixels = painter.codes(&light.of, &light.layers, values, light.ev)?;
     let [width, height] = [light.layers.width, light.layers.height];
     shared.show(Shown {
         number: 0,
@@ -234,7 +236,7 @@ fn paint(shared: &Shared, painter: &mut Painter, live: &dyn Live, light: &Light)
         pixels,
         layers: light.layers.clone(),
         exposure: light.ev,
-        finished: light.finished,
+        fresh,
         whole: light.size == light.of.size,
         of: light.of.clone(),
         milliseconds: light.milliseconds,

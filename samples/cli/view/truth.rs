@@ -8,13 +8,13 @@ use std::{
 use lucerna::{
     Result,
     gpu::Gpu,
-    technique::Mode as _,
     techniques::tonemap,
-    tracer::{Mode, PictureSettings, Tracer},
+    tracer::{PictureSettings, Tracer},
 };
 
 use super::{
-    painted::Painter,
+    live,
+    painted::{Painter, Values},
     session::{Doing, Shared},
     wanted::{Shown, Shows, Wanted},
 };
@@ -100,7 +100,7 @@ impl Growing<'_, '_> {
             let done = progress.samples >= whole as f64;
             if shown.is_none_or(|shown| progress.samples > shown) {
                 shown = Some(progress.samples);
-                let state = (progress.samples, done && !wanted.moving, size == wanted.size);
+                let state = (progress.samples, size == wanted.size);
                 self.show(wanted, settings.tonemap.as_ref(), state, since_request)?;
             }
             if done || self.shared.is_old() {
@@ -117,33 +117,32 @@ impl Growing<'_, '_> {
         &mut self,
         wanted: &Wanted,
         tonemap: Option<&tonemap::Settings>,
-        (samples, finished, whole): (f64, bool, bool),
+        (samples, whole): (f64, bool),
         begun: Instant,
     ) -> Result<()> {
         let sums = self.tracer.sums()?;
         let mut layers = sums.layers();
-        let modes = <Mode as lucerna::technique::Mode>::ALL.iter().copied();
-        let mode = modes.into_iter().find(|mode| mode.name() == wanted.mode).unwrap_or_default();
-        reference::show(mode, &mut layers);
+        reference::show(live::mode(&wanted.mode), &mut layers);
         let ev = wanted.exposure.or_else(|| exposure::of_source(&wanted.stage.source));
         let ev = ev.unwrap_or_else(|| if tonemap.is_some() { 0.0 } else { exposure::fitting(&layers) });
         if let Some(tonemap) = tonemap {
             last_stage::still(self.gpu, tonemap, ev, &mut layers)?;
         }
-        let pixels = self.painter.codes(wanted, &layers, wanted.shows == Shows::Picture, ev)?;
+        let values = Values::of(wanted, wanted.shows == Shows::Picture);
+        let pixels = self.painter.codes(wanted, &layers, values, ev)?;
         self.shared.show(Shown {
             number: 0,
             size: Size { width: layers.width, height: layers.height },
             pixels,
             layers: Arc::new(layers),
             exposure: ev,
-            finished,
+            fresh: true,
             whole,
             of: wanted.clone(),
             milliseconds: begun.elapsed().as_secs_f64() * 1e3,
             passes: Arc::default(),
             images: Arc::default(),
-            notes: self.tracer.notes().iter().map(|note| format!("{}: {}", note.place, note.text)).collect(),
+            notes: self.tracer.notes().iter().map(ToString::to_string).collect(),
             samples,
             noise: Some(sums.relative_error()).filter(|error| error.is_finite()),
             at: Instant::now(),

@@ -11,7 +11,13 @@ use lucerna::{
 };
 use serde_json::Value;
 
-use crate::{args::Size, lamps::Put, placed::Placed, stage::Stage};
+use crate::{
+    args::Size,
+    lamps::{self, Put},
+    last_stage,
+    placed::Placed,
+    stage::Stage,
+};
 
 /// Name of the path tracer among the techniques; it makes a picture that grows.
 pub const TRUTH: &str = <tracer::Reference as lucerna::technique::Technique>::NAME;
@@ -37,12 +43,23 @@ pub enum Shows {
     Image(String),
 }
 
+/// A picture of a file.
+#[derive(Clone, Debug)]
+pub struct FilePicture {
+    pub path: PathBuf,
+    pub layers: Arc<Layers>,
+    /// The file holds codes of a screen, which have exposure and curve already.
+    pub is_for_screens: bool,
+}
+
 /// A request for a picture.
 #[derive(Clone, Debug)]
 pub struct Wanted {
     pub stage: Arc<Stage>,
     /// One of [`lucerna::techniques::NAMES`].
     pub technique: &'static str,
+    /// A picture in the place of one that is rendered.
+    pub file: Option<FilePicture>,
     /// Name of the mode of the technique.
     pub mode: String,
     /// Of the technique, and of the tone mapping after it.
@@ -51,7 +68,7 @@ pub struct Wanted {
     pub bake: Option<PathBuf>,
     pub camera: Placed,
     pub size: Size,
-    /// Time of an animated scene.
+    /// Time of an animated scene, seconds.
     pub seconds: f64,
     /// Lamps that were moved or turned, by their nodes.
     pub moved: BTreeMap<usize, Put>,
@@ -85,16 +102,25 @@ impl Wanted {
 
     /// Whether another request is for the same technique in the same scene.
     pub fn same_scene(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.stage, &other.stage) && self.technique == other.technique && self.bake == other.bake
+        let same_file = match (&self.file, &other.file) {
+            (None, None) => true,
+            (Some(a), Some(b)) => Arc::ptr_eq(&a.layers, &b.layers),
+            _ => false,
+        };
+        Arc::ptr_eq(&self.stage, &other.stage)
+            && self.technique == other.technique
+            && self.bake == other.bake
+            && same_file
     }
 
     /// The settings map the light to a screen.
     pub fn is_developed(&self) -> bool {
-        self.settings.get("tonemap").is_some_and(|tonemap| !tonemap.is_null())
+        last_stage::is_developed(&self.settings)
     }
 
+    /// The path tracer makes the picture.
     pub fn is_truth(&self) -> bool {
-        self.technique == TRUTH
+        self.technique == TRUTH && self.file.is_none()
     }
 
     /// The pose and the view, at a size of the picture.
@@ -103,11 +129,7 @@ impl Wanted {
     /// As [`Stage::at`].
     pub fn placed(&self, size: Size) -> Result<(Pose, View)> {
         let (mut pose, _) = self.stage.at(self.seconds, size)?;
-        for (node, place) in &self.moved {
-            if let Some(world) = pose.world.get_mut(*node) {
-                *world = place.world(*world);
-            }
-        }
+        lamps::apply(&mut pose, &self.moved);
         let view = self.camera.view(&pose, size);
         Ok((pose, view))
     }
@@ -126,17 +148,19 @@ pub struct Shown {
     /// Counts the pictures of a session.
     pub number: u64,
     pub size: Size,
-    /// Red, green and blue of each pixel on the screen.
+    /// Red, green and blue codes of each pixel on the screen, row by row from the upper left corner.
     pub pixels: Vec<[u8; 3]>,
     /// The light, and the layers of a still.
     pub layers: Arc<Layers>,
+    /// EV.
     pub exposure: f64,
-    /// The picture is finished: no better one follows for the same request.
-    pub finished: bool,
+    /// The light is new; otherwise known light is shown in another way.
+    pub fresh: bool,
     /// It was rendered in the size that was asked for.
     pub whole: bool,
     /// The request.
     pub of: Wanted,
+    /// Time from the request to the picture, on the clock of the host.
     pub milliseconds: f64,
     pub passes: Arc<Vec<PassTime>>,
     /// Names of the images of the render graph.
@@ -146,5 +170,6 @@ pub struct Shown {
     pub samples: f64,
     /// Estimated relative mean squared error of the path tracer.
     pub noise: Option<f64>,
+    /// When the picture was made.
     pub at: Instant,
 }

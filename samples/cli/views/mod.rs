@@ -25,7 +25,7 @@ use lucerna::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::{camera::CameraFile, config};
+use crate::{camera::CameraFile, config, placed};
 
 /// Views of one scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -141,7 +141,7 @@ pub fn recorded(scene: &Scene, pose: &Pose) -> Vec<NamedView> {
         let up = world.y_axis.truncate().normalize_or(Vec3::Y);
         // Omits the up vector of upright cameras, so that the file stays readable.
         let upright = forward.cross(Vec3::Y).normalize_or_zero().dot(up).abs() < 1e-4 && up.y > 0.0;
-        let mut name = if camera.name.is_empty() { format!("camera{index}") } else { camera.name.clone() };
+        let mut name = placed::name_of(camera, index);
         if found.iter().any(|view| view.name == name) {
             name = format!("{name}-{index}");
         }
