@@ -419,6 +419,30 @@ fn lamps_are_dragged_and_the_file_has_the_moved_lamp() {
 }
 
 #[test]
+fn a_picture_of_a_file_stands_beside_the_rendered_one() {
+    let Some(server) = ready() else { return };
+    let [width, height] = SIZE.map(usize::from);
+    let whole = by_command("render isr --builtin cornell --camera 0");
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("direct.png");
+    let size = format!("{width}x{height}");
+    let words = "render isr --builtin cornell --camera 0 --mode direct -q --size".split(' ');
+    lucerna(words.chain([size.as_str(), "-o", file.to_str().unwrap()])).expect(0, &[]);
+    let direct = codes(&file);
+    let viewer = Viewer::bare(&server, &format!("--technique isr --builtin cornell --against {}", file.display()));
+    // Left of the line A, right of the line the codes of the file; below the letters.
+    viewer.until("both sides", |picture| {
+        picture.len() == width * height
+            && (30..height).all(|y| {
+                let row = |of: &[[u8; 3]], x: std::ops::Range<usize>| of[y * width..][x].to_vec();
+                let (left, right) = (0..width / 2 - 4, width / 2 + 4..width);
+                row(picture, left.clone()) == row(&whole, left) && row(picture, right.clone()) == row(&direct, right)
+            })
+    });
+    viewer.close();
+}
+
+#[test]
 fn a_file_that_is_mended_is_read_again() {
     let Some(server) = ready() else { return };
     let folder = tempfile::tempdir().unwrap();

@@ -191,6 +191,9 @@ impl Viewer {
             let args = viewer.args.clone();
             viewer.read(args);
         }
+        if let Some(file) = args.against {
+            viewer.read_picture(file);
+        }
         Ok(viewer)
     }
 

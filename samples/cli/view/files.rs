@@ -59,7 +59,7 @@ impl Viewer {
     }
 
     /// Reads a picture on a thread of its own, for side B.
-    fn read_picture(&mut self, path: PathBuf) {
+    pub(super) fn read_picture(&mut self, path: PathBuf) {
         self.reading_picture = self.on_thread(move || file::read(&path));
     }
 

@@ -91,6 +91,10 @@ pub struct ViewArgs {
     #[arg(long, value_enum, default_value_t, value_name = "HOW", help_heading = "Window")]
     pub compare: Start,
 
+    /// Picture of a file for side B, in the place of the path tracer: .exr, .png, .hdr, .pfm, .jpg
+    #[arg(long, value_name = "FILE", help_heading = "Window")]
+    pub against: Option<PathBuf>,
+
     /// Size of the window in points
     #[arg(long, default_value = "1280x720", value_name = "WxH", help_heading = "Window")]
     pub window: Size,
