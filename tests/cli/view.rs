@@ -368,12 +368,20 @@ fn without_a_display_it_says_so() {
 }
 
 #[test]
+fn settings_are_printed_without_a_window() {
+    let printed =
+        lucerna(["view", "--technique", "isr", "-D", "isr.samples=24", "--print-config"]).expect(0, &[]).stdout;
+    assert!(printed.contains("samples = 24") && printed.contains("[shadow]"), "{printed}");
+}
+
+#[test]
 fn wrong_options_are_refused_before_a_window_opens() {
     for (words, parts) in [
         ("view --technique path", &["path"][..]),
         ("view --paper --builtin cornell", &["--technique"]),
         ("view --window 0x5", &["--window"]),
         ("view --spp 0", &["--spp"]),
+        ("view --print-config", &["--technique"]),
     ] {
         lucerna(words.split(' ')).expect(2, parts);
     }

@@ -12,7 +12,7 @@ const ORDER: [&str; 7] = ["Output", "Picture", "Technique", "Settings", "Device"
 /// Place of the parts that are not named, in [`ORDER`].
 const OTHERS: usize = 3;
 
-/// Options of `render` in the short help, with their short texts.
+/// Options of `render` and `view` in the short help, with their short texts.
 const SHORT: &[(&str, &str)] = &[
     ("scene", "Scene file: .gltf, .glb or .obj"),
     ("builtin", "A built-in scene (`lucerna list`)"),
@@ -32,6 +32,11 @@ const SHORT: &[(&str, &str)] = &[
     ("vectors", "File of `fiv precompute`"),
     ("full", "Compute all vectors"),
     ("clock", "Local time of the first frame"),
+    ("technique", "Technique of side A (default: the one that suits the scene)"),
+    ("compare", "How A and the path tracer are shown: one, split, …"),
+    ("against", "Picture file beside A"),
+    ("window", "Size of the window in points"),
+    ("spp", "Paths per pixel of the path tracer"),
     ("define", "Set one setting (`lucerna settings` lists all)"),
     ("print_config", "Print the settings in effect, then stop"),
     ("paper", "Use the paper's settings as defaults"),
@@ -69,15 +74,19 @@ fn part(command: Command, path: &str) -> Command {
     // The sort is stable: options of one part keep their order.
     sorted.sort_by_key(rank);
     let has = |id: &str| sorted.iter().any(|arg| arg.get_id() == id);
-    let (renders, needs_bake) = (has("scene") && has("list_passes"), has("bake"));
+    let (renders, views, needs_bake) = (has("scene") && has("list_passes"), has("against"), has("bake"));
     let mut sorted = sorted.into_iter();
     // As many go in as come out.
     let mut command = command.mut_args(|arg| sorted.next().unwrap_or(arg));
-    if renders {
+    if renders || views {
         command = command.mut_args(shortened);
     }
     if command.get_after_help().is_none() {
-        let examples = if renders { examples(path, needs_bake) } else { String::new() };
+        let examples = match (renders, views) {
+            (true, _) => examples(path, needs_bake),
+            (false, true) => format!("Examples:\n  {path} model.glb\n  {path} --builtin parlour --compare split\n\n"),
+            (false, false) => String::new(),
+        };
         command = command.after_help(format!("{examples}{EXIT_CODES}"));
     }
     let names: Vec<String> = command.get_subcommands().map(|sub| sub.get_name().to_owned()).collect();

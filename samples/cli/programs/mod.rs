@@ -41,6 +41,14 @@ mod tests {
     }
 
     #[test]
+    fn the_short_help_of_the_viewer_is_short() {
+        let mut program = all().into_iter().find(|program| program.get_name() == "lucerna").unwrap().term_width(100);
+        program.build();
+        let short = program.find_subcommand_mut("view").unwrap().render_help().to_string();
+        assert!(short.lines().count() <= 60 && short.contains("--against"), "{} lines\n{short}", short.lines().count());
+    }
+
+    #[test]
     fn the_short_help_of_a_render_is_short_and_its_parts_are_in_order() {
         for name in ["isr", "igi", "fiv", "daylight", "prt"] {
             let mut program = all().into_iter().find(|program| program.get_name() == name).unwrap().term_width(100);

@@ -178,7 +178,7 @@ fn state(side: &Side, name: &str, ui: &mut Ui) {
         (Doing::Preparing(what, None), _) => format!("{name}: preparing {what}"),
         (Doing::Preparing(what, Some((done, all))), _) => format!("{name}: preparing {what}, {done} of {all}"),
         (_, Some(shown)) if shown.samples > 0.0 => {
-            format!("{name}: {size}, {:.0} of {} paths a pixel", shown.samples, side.samples)
+            format!("{name}: {size}, {:.0} of {} paths per pixel", shown.samples, side.samples)
         }
         (_, Some(shown)) => format!("{name}: {size}, {:.0} ms", shown.milliseconds),
         (_, None) => format!("{name}: the first picture"),

@@ -280,10 +280,10 @@ fn technique(viewer: &mut Viewer, number: usize, ui: &mut Ui) {
     }
     ui.horizontal(|ui| {
         if side.technique == TRUTH {
-            ui.label("Paths a pixel");
+            ui.label("Paths per pixel");
             ui.add(egui::DragValue::new(&mut side.samples).speed(8.0).range(1..=1_048_576));
         } else {
-            ui.label("Samples of a pixel");
+            ui.label("Samples per pixel");
             ui.add(egui::DragValue::new(&mut side.pictures).speed(0.1).range(1..=1024))
                 .on_hover_text("Anti-aliasing at rest: --aa");
         }

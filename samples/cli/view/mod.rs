@@ -33,7 +33,8 @@ use serde_json::Value;
 
 use crate::{
     args::{DeviceArgs, Size, TalkArgs, finite},
-    config::SettingsArgs,
+    config::{self, SettingsArgs},
+    console, settings_list,
     stage::StageArgs,
 };
 use app::{Compare, Viewer};
@@ -91,7 +92,7 @@ pub struct ViewArgs {
     #[arg(long, value_enum, default_value_t, value_name = "HOW", help_heading = "Window")]
     pub compare: Start,
 
-    /// Picture of a file for side B, in the place of the path tracer: .exr, .png, .hdr, .pfm, .jpg
+    /// Picture file for side B, instead of the path tracer: .exr, .png, .hdr, .pfm, .jpg
     #[arg(long, value_name = "FILE", help_heading = "Window")]
     pub against: Option<PathBuf>,
 
@@ -103,7 +104,7 @@ pub struct ViewArgs {
     #[arg(long, help_heading = "Window")]
     pub bare: bool,
 
-    /// Paths a pixel after which the path tracer rests
+    /// Paths per pixel after which the path tracer stops
     #[arg(long, value_name = "N", default_value_t = side::SAMPLES, value_parser = clap::value_parser!(u64).range(1..=1 << 20), help_heading = "Picture")]
     pub spp: u64,
 
@@ -126,6 +127,21 @@ pub struct ViewArgs {
 }
 
 impl ViewArgs {
+    /// The settings with which side A begins.
+    ///
+    /// # Errors
+    /// As [`Self::settings`]; `Usage` without a technique.
+    fn begun(&self) -> Result<Value> {
+        let Some(technique) = &self.technique else {
+            return Err(Error::usage("settings are those of a technique")
+                .at("--print-config")
+                .help("Name it with --technique"));
+        };
+        let mut side = Side::new("A", technique);
+        side.set_paper(self.paper);
+        Ok(self.settings(&side)?.unwrap_or_else(|| (*side.settings).clone()))
+    }
+
     /// The settings of the command line over those of a side; `None` if there are none.
     ///
     /// # Errors
@@ -146,6 +162,10 @@ impl ViewArgs {
 /// # Errors
 /// `NoDevice` without a display or without a device that can present; `Usage` for wrong options.
 pub fn run(args: ViewArgs) -> Result<ExitCode> {
+    if args.settings.print_config {
+        console::print(settings_list::with_docs(&config::to_toml(&args.begun()?)?).trim_end())?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let device = args.device.device.clone();
     let options = window::Options {
         title: "lucerna".into(),
