@@ -107,14 +107,19 @@ fn row() -> Scene {
 fn the_colour_of_a_book_is_not_that_of_its_neighbour() {
     with_gpu(|gpu| {
         let scene = row();
-        let stored = baked(gpu, &scene, &Baking { samples: 3000, cluster: 600, rays: 512, ..small() });
-        let options = CheckOptions { lights: 8, samples: 3000, paths: 128, seed: 0 };
-        let found = check(gpu, &scene, &stored, &diffuse(3), options, &Stop::default()).unwrap();
-        let all: Vec<RelativeError> = found.iter().filter_map(|light| light.transferred).collect();
-        let mean = |of: fn(&RelativeError) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
-        // Samples that know only the material of their surface have 0.063 and 0.051.
-        let errors = [mean(|of| of.error), mean(|of| of.trimmed)];
-        assert!(errors.iter().all(|error| *error < 0.042), "{errors:?}");
+        let mut errors = Vec::new();
+        for seed in [0, 1] {
+            let stored = baked(gpu, &scene, &Baking { samples: 3000, cluster: 600, rays: 512, seed, ..small() });
+            let options = CheckOptions { lights: 16, samples: 3000, paths: 128, seed: 0 };
+            let found = check(gpu, &scene, &stored, &diffuse(3), options, &Stop::default()).unwrap();
+            // Light from beside a surface is hard for other reasons.
+            let far = found.iter().filter(|light| light.distance_to_surface > 0.2);
+            errors.extend(far.filter_map(|light| Some(light.transferred?.error)));
+        }
+        errors.sort_by(f64::total_cmp);
+        let median = errors[errors.len() / 2];
+        // Samples that know only the material of their surface have 0.040, and rays that do not know which book they meet 0.032.
+        assert!(errors.len() > 12 && median < 0.035, "{errors:?}");
     });
 }
 
@@ -124,10 +129,10 @@ fn light_goes_smoothly_from_sample_to_sample() {
     with_gpu(|gpu| {
         let few = Baking { samples: 600, cluster: 300, light: 64, receivers: 0, rays: 2048, gaps: 1.0, ..small() };
         let stored = baked(gpu, &closed(Vec3::splat(0.5)), &few);
-        let floor = |at: Vec3| if at.y < -0.999 { 1.0 + at.x } else { 0.0 };
+        let floor = |at: Vec3, up: f32| if up > 0.5 { 1.0 + at.x } else { 0.0 };
         let count = stored.samples.len();
-        let direct: Vec<[f32; 3]> =
-            stored.samples.iter().map(|sample| [floor(Vec3::from(sample.position)); 3]).collect();
+        let of = |sample: &PrtPoint| [floor(Vec3::from(sample.position), sample.normal[1]); 3];
+        let direct: Vec<[f32; 3]> = stored.samples.iter().map(of).collect();
         let settings = Settings { bounces: false, ..diffuse(1) };
         let found = solve::indirect(&stored, &vec![[1.0; 3]; count], &direct, &settings).unwrap();
         let (mut off, mut whole, mut low) = (0.0f32, 0.0f32, 0);
@@ -144,7 +149,7 @@ fn light_goes_smoothly_from_sample_to_sample() {
                 let [x, y] = [radius * angle.cos(), radius * angle.sin()];
                 let way = side * x + up * y + normal * (1.0 - radius * radius).sqrt();
                 let hit = at + way * (-(1.0 + at.y) / way.y);
-                if way.y < 0.0 && hit.abs().max_element() < 1.0001 { floor(hit) } else { 0.0 }
+                if way.y < 0.0 && hit.abs().max_element() < 1.0001 { floor(hit, 1.0) } else { 0.0 }
             });
             let truth = seen.sum::<f32>() / rays as f32;
             off += sample.area * (found[0] - truth).powi(2);

@@ -3,7 +3,7 @@
 use crate::scene_kit::*;
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 use lucerna::{
-    gpu::testing::with_gpu,
+    gpu::{Gpu, testing::with_gpu},
     graph::{Graph, Runner},
     passes::gbuffer::{self, Blended, GBuffer, Normals, Settings},
     scene::{AlphaMode, Camera, Material, Projection, Sampler, Scene, Texture, TextureRef, View},
@@ -338,7 +338,7 @@ fn unlit_surfaces_only_emit_and_vertex_colours_multiply() {
 
 #[test]
 fn alpha_cuts_dithers_or_hides() {
-    let coverage = |alpha: AlphaMode, opacity: f32, blended: Blended| {
+    let coverage = |gpu: &Gpu, alpha: AlphaMode, opacity: f32, blended: Blended| {
         let mut scene = Scene::default();
         let mut material = Material::diffuse("", Vec3::ONE);
         material.base_color.w = opacity;
@@ -346,21 +346,19 @@ fn alpha_cuts_dithers_or_hides() {
         let plane = mesh(&mut scene, square(), material);
         place(&mut scene, plane, Mat4::from_scale(Vec3::splat(9.0)));
         let view = view(Vec3::new(0.0, 2.0, 0.1), Vec3::ZERO, EXTENT);
-        let mut share = 0.0;
-        with_gpu(|gpu| {
-            let got = surfaces(gpu, &scene, &view, Settings { blended, ..Settings::default() });
-            share = got.depth.iter().filter(|d| **d < 1.0).count() as f32 / got.depth.len() as f32;
-        });
-        share
+        let got = surfaces(gpu, &scene, &view, Settings { blended, ..Settings::default() });
+        got.depth.iter().filter(|d| **d < 1.0).count() as f32 / got.depth.len() as f32
     };
-    assert_eq!(coverage(AlphaMode::Opaque, 0.1, Blended::Dithered), 1.0);
-    assert_eq!(coverage(AlphaMode::Mask { cutoff: 0.5 }, 0.49, Blended::Dithered), 0.0);
-    assert_eq!(coverage(AlphaMode::Mask { cutoff: 0.5 }, 0.51, Blended::Dithered), 1.0);
-    assert_eq!(coverage(AlphaMode::Blend, 0.3, Blended::Threshold), 0.0);
-    assert_eq!(coverage(AlphaMode::Blend, 0.9, Blended::Hidden), 0.0);
-    // 6144 pixels: three standard deviations are 0.018.
-    let dithered = coverage(AlphaMode::Blend, 0.3, Blended::Dithered);
-    assert!((dithered - 0.3).abs() < 0.02, "{dithered}");
+    with_gpu(|gpu| {
+        assert_eq!(coverage(gpu, AlphaMode::Opaque, 0.1, Blended::Dithered), 1.0);
+        assert_eq!(coverage(gpu, AlphaMode::Mask { cutoff: 0.5 }, 0.49, Blended::Dithered), 0.0);
+        assert_eq!(coverage(gpu, AlphaMode::Mask { cutoff: 0.5 }, 0.51, Blended::Dithered), 1.0);
+        assert_eq!(coverage(gpu, AlphaMode::Blend, 0.3, Blended::Threshold), 0.0);
+        assert_eq!(coverage(gpu, AlphaMode::Blend, 0.9, Blended::Hidden), 0.0);
+        // 6144 pixels: three standard deviations are 0.018.
+        let dithered = coverage(gpu, AlphaMode::Blend, 0.3, Blended::Dithered);
+        assert!((dithered - 0.3).abs() < 0.02, "{dithered}");
+    });
 }
 
 #[test]

@@ -1,6 +1,13 @@
 //! The Vulkan instance: loader, layers, messages; and clear errors when there is none.
 
-use std::{ffi::CString, fmt::Write as _, sync::Arc};
+use std::{
+    ffi::CString,
+    fmt::Write as _,
+    sync::{
+        Arc,
+        atomic::{AtomicU32, Ordering},
+    },
+};
 
 use ash::{ext, khr, vk};
 
@@ -177,7 +184,23 @@ impl Instance {
                 }
             }
         }
+        static MADE: AtomicU32 = AtomicU32::new(0);
+        if MADE.fetch_add(1, Ordering::Relaxed) == 1 {
+            keep_drivers(&instance.entry);
+        }
         Ok(Arc::new(instance))
+    }
+}
+
+/// Keeps the drivers in memory until the process ends, by an instance that is never destroyed. The loader unloads all drivers with the last instance, and
+/// a driver that is loaded anew takes storage of threads that the C library does not get back: NVIDIA's driver cannot be loaded a 26th time ("cannot
+/// allocate memory in static TLS block", driver 580). A process with one instance does not need this.
+fn keep_drivers(entry: &ash::Entry) {
+    let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
+    let info = vk::InstanceCreateInfo::default().application_info(&application);
+    // SAFETY: everything that `info` points to is alive; neither the instance nor the loader is ever unloaded.
+    if unsafe { entry.create_instance(&info, None) }.is_ok() {
+        std::mem::forget(entry.clone());
     }
 }
 
