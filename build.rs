@@ -100,6 +100,7 @@ fn run() -> Result<(), String> {
     }
     let generated = codegen::generate(&built, &exports)?;
     write_if_changed(&out.join("shaders.rs"), generated.rust.as_bytes())?;
+    write_if_changed(&out.join("library.rs"), library(&root)?.as_bytes())?;
     write_if_changed(&out.join("interfaces.txt"), generated.listing.as_bytes())
 }
 
@@ -171,6 +172,16 @@ fn exported(file: &Path) -> Result<Vec<Export>, String> {
         found.push((name.trim().to_owned(), ty, value));
     }
     Ok(found)
+}
+
+/// The includes that all shaders share, for shaders that are compiled at run time.
+fn library(root: &Path) -> Result<String, String> {
+    let mut out = String::from("&[\n");
+    for file in sorted(&root.join("lib"))? {
+        let text = fs::read_to_string(&file).map_err(|e| format!("{}: {e}", file.display()))?;
+        out += &format!("({:?}, {text:?}),\n", format!("lib/{}", file_name(&file)));
+    }
+    Ok(out + "]\n")
 }
 
 fn sorted(folder: &Path) -> Result<Vec<PathBuf>, String> {

@@ -49,6 +49,7 @@
 //! | [`image`](mod@image) | linear images in and out |
 //! | [`measure`] | how far an image is from a reference |
 //! | [`bake`] | long computations in units: stopped, continued, spread, joined |
+//! | `effects` | passes in text, compiled at run time (with the feature `effects`) |
 //!
 //! # Conventions
 //! Right-handed, +Y up, metres; cameras look down −Z. Linear Rec. 709. Radiance in W/(sr·m²), irradiance in W/m², intensity in
@@ -58,6 +59,8 @@
 #![warn(missing_debug_implementations)]
 
 pub mod bake;
+#[cfg(feature = "effects")]
+pub mod effects;
 pub mod error;
 pub mod gpu;
 pub mod graph;
@@ -80,6 +83,10 @@ pub mod tracer;
 pub mod shaders {
     #![allow(missing_docs, clippy::derivable_impls)]
     include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+
+    /// The includes that all shaders share, with their texts: for shaders that are compiled at run time.
+    #[cfg(feature = "effects")]
+    pub const LIBRARY: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/library.rs"));
 
     /// The compiler of all shaders.
     pub const COMPILER: &str = env!("LUCERNA_SHADER_COMPILER");

@@ -122,6 +122,11 @@ impl Description {
         schema::read::<S>()
     }
 
+    /// A description of keys that are known at run time alone. It has no schema.
+    pub fn of_keys(doc: String, keys: Vec<Key>) -> Self {
+        Self { doc, keys, schema: Value::Null }
+    }
+
     /// The key of this name.
     pub fn key(&self, name: &str) -> Option<&Key> {
         self.keys.iter().find(|key| key.name == name)

@@ -11,8 +11,9 @@ mod codegen;
 #[cfg(test)]
 #[allow(dead_code)]
 mod compile;
-#[cfg(test)]
-mod reflect;
+#[cfg(any(test, feature = "effects"))]
+#[allow(dead_code)]
+pub(crate) mod reflect;
 #[cfg(test)]
 mod variants;
 

@@ -169,6 +169,15 @@ impl Picture {
         Ok(())
     }
 
+    /// Lets `stage` change the total before anything develops it.
+    ///
+    /// # Errors
+    /// The errors of `stage`.
+    pub fn follow(&mut self, stage: impl FnOnce(Image) -> Result<Image>) -> Result<()> {
+        self.total = stage(self.total)?;
+        Ok(())
+    }
+
     /// Names of the layers.
     pub fn names(&self) -> Vec<&'static str> {
         self.layers.iter().map(|layer| layer.name).collect()

@@ -19,6 +19,11 @@ pub struct SettingsArgs {
     #[arg(long = "settings", value_name = "FILE.toml", help_heading = "Settings")]
     pub file: Option<PathBuf>,
 
+    /// Passes in text after the technique: a TOML file with shaders beside it (docs/effects.md); its constants are
+    /// settings: -D effects.NAME=VALUE
+    #[arg(long, value_name = "FILE.toml", help_heading = "Settings")]
+    pub effects: Option<PathBuf>,
+
     /// Print the settings in effect as TOML, then stop
     #[arg(long, help_heading = "Settings")]
     pub print_config: bool,

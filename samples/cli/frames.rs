@@ -16,6 +16,7 @@ use crate::{
     args::RenderArgs,
     bake::Rate,
     console,
+    effects::Effects,
     last_stage::{LastStage, Staged},
     program,
     progress::Frames,
@@ -68,13 +69,14 @@ pub fn frames<T: Technique>(
     run.smooth_on(&gpu);
     let opened = started.elapsed();
     let settings = staged.technique;
+    let effects = staged.effects.as_ref().map(Effects::new).transpose()?;
     let last = LastStage::new(&gpu, staged.tonemap.as_ref(), run.exposure())?;
     let Some(ready) = ready(&gpu, run, (given, &settings), args, interrupt)? else { return Ok(()) };
     let uploaded = started.elapsed();
     run.phases = vec![("load", loaded), ("device", opened - loaded), ("upload", uploaded - opened)];
 
     let screen = Screen::new(&gpu, run.curve());
-    let mut work = Work { args, settings, interrupt, ready, runner: Runner::new(&gpu), last, screen, gpu };
+    let mut work = Work { args, settings, interrupt, ready, runner: Runner::new(&gpu), effects, last, screen, gpu };
     let layers = run.outputs.wants_layers() || args.view.is_some() || args.dump.is_some() || args.list_passes;
     let mut progress = Frames::new(args.progress, console.is_quiet(), run.frames.len() as u64);
     for frame in run.frames.clone() {
@@ -115,6 +117,7 @@ struct Work<'a, T: Technique> {
     interrupt: &'a Interrupt,
     ready: Ready<T>,
     runner: Runner,
+    effects: Option<Effects>,
     last: LastStage,
     screen: Screen,
     gpu: Gpu,
@@ -147,7 +150,10 @@ impl<T: Technique> Work<'_, T> {
         let mut graph = Graph::new(T::NAME);
         (graph.frame, graph.seed) = (of.frame, seed);
         let view = of.view.shifted(place);
-        let picture = self.ready.frame(&mut graph, (&run.stage.scene, &of.pose), &view, of.shot, &self.settings)?;
+        let mut picture = self.ready.frame(&mut graph, (&run.stage.scene, &of.pose), &view, of.shot, &self.settings)?;
+        if let Some(effects) = &self.effects {
+            effects.follow(&mut graph, &mut picture, of.shot.seconds)?;
+        }
         Ok((graph, picture))
     }
 

@@ -13,15 +13,21 @@ use lucerna::{
     techniques::tonemap::{self, Operator, Still, Tonemap},
 };
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
-use serde_json::Value;
+use serde_json::{Map, Value};
 
-use crate::config::{self, SettingsArgs};
+use crate::{
+    config::{self, SettingsArgs},
+    effects,
+};
 
 /// Settings of a technique and, if any is set, of the tone mapping after it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Staged<S> {
     #[serde(flatten)]
     pub technique: S,
+    /// Passes in text between the technique and the tone mapping.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub effects: Option<effects::Settings>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tonemap: Option<tonemap::Settings>,
 }
@@ -57,7 +63,8 @@ impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
             return Err(wrong(Error::input("are no table")));
         };
         let tonemap = changes.contains_key(GROUP).then(tonemap::Settings::default);
-        let base = Self { technique: base.clone(), tonemap };
+        let effects = effects::recorded(&changes).map_err(wrong)?;
+        let base = Self { technique: base.clone(), effects, tonemap };
         let staged = config::with(&base, &changes).map_err(wrong)?;
         check(&staged.technique).map_err(wrong)?;
         if let Some(tonemap) = &staged.tonemap {
@@ -71,8 +78,28 @@ impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
         let in_file = |text: String| text.parse::<toml::Table>().is_ok_and(|table| table.contains_key(GROUP));
         // Errors of the file are reported below, with its name.
         let wanted = asked || args.file.as_deref().is_some_and(|file| config::read_text(file).is_ok_and(in_file));
+        let pipeline = args.effects.as_deref().map(effects::read).transpose()?;
+        let effects = pipeline.as_deref().map(effects::Settings::of);
+        // What the pipeline's file says of the technique is a default.
+        let own: Map<String, Value> = match &pipeline {
+            Some(pipeline) => serde_json::to_value(&pipeline.settings)
+                .ok()
+                .and_then(|value| value.as_object().cloned())
+                .unwrap_or_default(),
+            None => Map::new(),
+        };
+        let wanted = wanted || own.contains_key(GROUP);
         let over = |settings: tonemap::Settings| -> Result<Self> {
-            args.effective(&Self { technique: base.clone(), tonemap: wanted.then_some(settings) })
+            let base = Self { technique: base.clone(), effects: effects.clone(), tonemap: wanted.then_some(settings) };
+            let base = config::with(&base, &own).map_err(|error| match &pipeline {
+                Some(pipeline) => error.of_kind(ErrorKind::Input).at("settings").in_file(&pipeline.path),
+                None => error,
+            })?;
+            let made = args.effective(&base)?;
+            if let (Some(pipeline), Some(effects)) = (&pipeline, &made.effects) {
+                pipeline.check(&effects.values).map_err(|error| error.at(effects::GROUP))?;
+            }
+            Ok(made)
         };
         let plain = if paper { tonemap::Settings::paper() } else { tonemap::Settings::default() };
         let grey = tonemap::Settings { normalize: true, exposure: GREY.log2(), ..plain.clone() };

@@ -12,6 +12,7 @@ pub mod console;
 pub mod daylight;
 pub mod default_light;
 pub mod devices;
+pub mod effects;
 pub mod experiment;
 pub mod export_gltf;
 pub mod export_pov;

@@ -17,7 +17,10 @@ use crate::{
     export_gltf::{self, ExportGltfArgs},
     export_pov::{self, ExportPovArgs},
     info, inspect, listed, program,
-    programs::{help, pages, suited::AnyArgs},
+    programs::{
+        help, pages,
+        suited::{AnyArgs, RunArgs},
+    },
     reference::{self, ReferenceArgs},
     rerun::{self, RerunArgs},
     settings_list,
@@ -43,6 +46,9 @@ enum Command {
     /// Render a scene into images, by the technique that suits it or by a named one
     #[command(args_override_self = true)]
     Render(Box<AnyArgs>),
+    /// Render a scene by a pipeline in text: a TOML file with shaders beside it
+    #[command(args_override_self = true)]
+    Run(Box<RunArgs>),
     /// Open a window: every technique live, beside the path tracer
     #[command(args_override_self = true)]
     View(Box<ViewArgs>),
@@ -143,6 +149,7 @@ impl Command {
         match self {
             Self::Render(args) => args.talk().console(),
             Self::View(args) => args.talk.console(),
+            Self::Run(args) => args.common.talk.console(),
             Self::Completions { .. } => Console::new(false, 0),
             Self::Man { talk, .. } => talk.console(),
             Self::Views(args) => args.talk.console(),
@@ -177,6 +184,7 @@ fn run(command: Command, console: Console) -> Result<ExitCode> {
         // Commands that choose their exit code themselves.
         Command::Render(args) => return args.run(),
         Command::View(args) => return view::run(*args),
+        Command::Run(args) => return args.run(),
         Command::Reproduce(args) => return experiment::reproduce(&args, console),
         Command::Compare(mut args) => {
             args.tests = listed::expanded(&args.tests)?;

@@ -1,10 +1,10 @@
 //! `lucerna render`: a scene by a named technique, or by the one that suits it.
 
-use std::process::ExitCode;
+use std::{path::PathBuf, process::ExitCode};
 
 use clap::{Args, Subcommand};
 use lucerna::{
-    Result,
+    Error, Result,
     technique::{Mode, Technique},
     techniques::{fiv::Fiv, igi::Igi, isr::Isr},
 };
@@ -17,6 +17,7 @@ use super::{
 use crate::{
     args::{RenderArgs, TalkArgs},
     daylight::{self, DayArgs},
+    effects,
     fiv::{self, FivArgs},
     interior::is_room,
     prt::{self, PrtArgs},
@@ -93,6 +94,41 @@ impl AnyArgs {
             Some(By::Daylight(args)) => daylight::render(&args),
             Some(By::Prt(args)) => prt::render(&args),
             Some(By::Reference(args)) => reference::run(&args, console),
+        }
+    }
+}
+
+/// Options of `lucerna run`.
+#[derive(Args, Debug)]
+pub struct RunArgs {
+    /// The pipeline: a .toml file (docs/effects.md)
+    #[arg(value_name = "PIPELINE.toml")]
+    pipeline: PathBuf,
+
+    #[command(flatten)]
+    pub common: RenderArgs,
+}
+
+impl RunArgs {
+    /// Renders by the technique that the pipeline is made for.
+    ///
+    /// # Errors
+    /// Any error of the run. Its kind decides the exit code.
+    pub fn run(self) -> Result<ExitCode> {
+        let Self { pipeline, mut common } = self;
+        if common.settings.effects.is_some() {
+            return Err(Error::usage("the pipeline is named already").at("--effects"));
+        }
+        let found = effects::read(&pipeline)?;
+        common.settings.effects = Some(pipeline.clone());
+        match found.technique.as_deref() {
+            None => chosen(common),
+            Some(Isr::NAME) => render::render(&common, &Given::<Isr>::by(&common, Mode::ALL[0])?),
+            Some(Igi::NAME) => render::render(&common, &Given::<Igi>::by(&common, Mode::ALL[0])?),
+            Some(Fiv::NAME) => fiv::render(&FivArgs { common, vectors: None, full: false }, None),
+            Some(other) => Err(Error::usage(format!("a pipeline for {other} needs more options than `run` has"))
+                .in_file(&pipeline)
+                .help(format!("`lucerna render {other} --effects {}` has them", pipeline.display()))),
         }
     }
 }

@@ -121,11 +121,15 @@ pub fn again(asked: &Again<'_>) -> Result<Option<Fresh>> {
 /// Makes the picture. With `memory` it is kept as the bytes of a file of this format, and no file is written.
 fn picture(
     args: &ReferenceArgs,
-    Staged { technique: settings, tonemap }: Staged<Settings>,
+    Staged { technique: settings, effects, tonemap }: Staged<Settings>,
     console: Console,
     memory: Option<Format>,
     interrupt: &Interrupt,
 ) -> Result<(ExitCode, Option<Fresh>)> {
+    if effects.is_some() {
+        return Err(Error::usage("passes in text follow isr, igi, fiv, daylight and prt; the path tracer has none")
+            .at("--effects"));
+    }
     let begun = Instant::now();
     let curve = args.screen.curve(false, true, tonemap.is_some())?;
     let options = WriteOptions { overwrite: args.overwrite || args.resume, f32: true, ..WriteOptions::default() };
@@ -225,7 +229,7 @@ fn picture(
         }
         // The metadata are those of a run with exactly this number of samples.
         let made = Settings { samples: done.samples.floor() as u64, ..settings.clone() };
-        let made = Staged { technique: made, tonemap };
+        let made = Staged { technique: made, effects: None, tonemap };
         layers.metadata = metadata(args, &stage, &gpu, &tracer.view()?, &made, (ev, curve))?;
         let part = done.samples.fract();
         if part != 0.0 {

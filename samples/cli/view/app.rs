@@ -22,11 +22,13 @@ use super::{
     picture,
     session::Wake,
     side::Side,
+    text::{self, Followed},
     wanted::{FilePicture, Look, Shown, Wanted},
     watch::Watch,
 };
 use crate::{
     args::Size,
+    effects,
     lamps::{self, Put},
     placed::Placed,
     screen,
@@ -123,6 +125,8 @@ pub struct Viewer {
     pub(super) writing: Option<Writing>,
     last_move: Option<Instant>,
     pub(super) watch: Option<Watch>,
+    /// Passes in text after A.
+    pub(super) followed: Option<Followed>,
     times: bars::Times,
 }
 
@@ -136,7 +140,13 @@ impl Viewer {
     ///
     /// # Errors
     /// `Usage` for an unknown technique.
-    pub fn new(args: ViewArgs, wake: Wake) -> Result<Self> {
+    pub fn new(mut args: ViewArgs, wake: Wake) -> Result<Self> {
+        let pipeline = args.settings.effects.as_deref().map(effects::read).transpose()?;
+        if let Some(pipeline) = &pipeline
+            && args.technique.is_none()
+        {
+            args.technique.clone_from(&pipeline.technique);
+        }
         let technique = args.technique.clone();
         let mut sides = [Side::new("A", technique.as_deref().unwrap_or("isr")), Side::new("B", super::wanted::TRUTH)];
         sides[0].bake.clone_from(&args.bake);
@@ -183,9 +193,11 @@ impl Viewer {
             writing: None,
             last_move: None,
             watch: None,
+            followed: None,
             times: bars::Times::default(),
             args: args.stage,
         };
+        viewer.followed = pipeline.map(|pipeline| Followed::new(pipeline, &viewer.wake));
         let scene = &viewer.args.scene;
         if scene.scene.is_some() || scene.builtin.is_some() {
             let args = viewer.args.clone();
@@ -406,6 +418,7 @@ impl Viewer {
         }
         self.take();
         self.dropped(context);
+        text::keep(self);
         self.pose = self.posed();
         keys::pressed(self, context);
         self.advance(context);

@@ -136,6 +136,11 @@ fn status(viewer: &mut Viewer, ui: &mut Ui) {
             }
             return;
         }
+        // It stays until the files are mended; the picture is that of the last good ones.
+        if let Some(mistake) = viewer.followed.as_ref().and_then(|followed| followed.mistake.as_ref()) {
+            ui.colored_label(ui.visuals().error_fg_color, mistake.replace('\n', " "));
+            return;
+        }
         for (number, side) in viewer.sides.iter().enumerate() {
             if number == 1 && !viewer.shows_both() {
                 continue;

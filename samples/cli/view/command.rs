@@ -6,12 +6,14 @@ use lucerna::scene::Scene;
 
 use super::{
     fly::Fly,
-    panel,
+    live, panel,
     side::Side,
+    text,
     wanted::{Look, Shows, TRUTH},
 };
 use crate::{
     args::Size,
+    config::SettingsArgs,
     default_light::DefaultLight,
     lamps::{self, Lamp, Put},
     record::Source,
@@ -98,7 +100,17 @@ pub fn words(common: &Common<'_>, side: &Side) -> Option<Vec<String>> {
         // Its settings below are then those against the defaults.
         say(&["--full"]);
     }
-    for change in panel::changes(&side.settings, &side.about.settings) {
+    let passes = text::words(side);
+    passes.iter().for_each(|word| say(&[word]));
+    // What the file of the passes says of the technique is a default, too.
+    let begun = passes.get(1).and_then(|file| {
+        let args = SettingsArgs { effects: Some(file.into()), ..SettingsArgs::default() };
+        live::with(side.technique, &side.about.settings, &args).ok()
+    });
+    for change in panel::changes(&side.settings, begun.as_ref().unwrap_or(&side.about.settings)) {
+        if change.starts_with("effects.") {
+            continue;
+        }
         // The number of samples of a frame is for sequences of the path tracer.
         if !(truth && change.starts_with("samples=")) {
             say(&["-D", &change]);

@@ -2,7 +2,7 @@
 
 use std::{
     io::Read,
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{Arc, mpsc},
     time::Duration,
 };
@@ -14,16 +14,23 @@ use super::{
     app::{Compare, Viewer},
     controls, file,
     fly::Fly,
+    text,
     watch::Watch,
 };
 use crate::{
     args::Size,
-    lamps,
+    config, lamps,
     placed::Placed,
     programs::suited,
     record,
     stage::{Stage, StageArgs},
 };
+
+/// Whether a TOML file has passes; else it has cameras.
+fn is_pipeline(file: &Path) -> bool {
+    let table = config::read_text(file).ok().and_then(|text| text.parse::<toml::Table>().ok());
+    table.is_some_and(|table| table.contains_key("pass"))
+}
 
 /// A scene that a thread reads.
 pub(super) struct Reading {
@@ -187,6 +194,7 @@ impl Viewer {
                 self.sides[0].bake = Some(file);
                 self.named = true;
             }
+            "toml" if is_pipeline(&file) => text::follow(self, &file),
             "toml" => match self.cameras.read(&file) {
                 Ok(count) => self.say(format!("{count} cameras of {}", file.display())),
                 Err(error) => self.trouble = Some(error.to_string()),
@@ -199,7 +207,7 @@ impl Viewer {
             _ => {
                 let error = Error::new(ErrorKind::Input, "is no scene, bake, environment or picture that the viewer opens")
                     .in_file(&file)
-                    .help("Scenes: .gltf, .glb, .obj; bakes: .day, .prt, .fiv; cameras: .toml; environments: .hdr; pictures: .exr, .png, .pfm, .jpg");
+                    .help("Scenes: .gltf, .glb, .obj; bakes: .day, .prt, .fiv; cameras and passes in text: .toml; environments: .hdr; pictures: .exr, .png, .pfm, .jpg");
                 self.trouble = Some(error.to_string());
             }
         }

@@ -14,10 +14,11 @@ use super::{
     app::{Compare, Viewer, Writing},
     cameras,
     command::{self, Common},
+    text,
 };
 
 /// What keys and the mouse do.
-pub const HELP: [(&str, &str); 25] = [
+pub const HELP: [(&str, &str); 26] = [
     ("Drag", "look around; on a lamp: move the lamp; on the line: move the line"),
     ("Alt drag, middle drag", "orbit around the point in the middle of the picture"),
     ("Shift drag", "pan: move parallel to the picture"),
@@ -43,6 +44,7 @@ pub const HELP: [(&str, &str); 25] = [
     ("F4", "direct light, with exponential shadow maps"),
     ("F5", "direct light"),
     ("F10", "the path tracer"),
+    ("F6 … F9, F11, F12", "switches of passes in text, as their file names them (--effects)"),
 ];
 
 /// Seconds of a frame at most, for flying: after a pause the camera must not jump.
@@ -153,6 +155,15 @@ pub fn pressed(viewer: &mut Viewer, context: &Context) {
             settings["shadow"]["kind"] = json!(shadow);
             side.settings = Arc::new(settings);
             viewer.named = true;
+        }
+    }
+    for (key, name) in
+        [(Key::F6, "F6"), (Key::F7, "F7"), (Key::F8, "F8"), (Key::F9, "F9"), (Key::F11, "F11"), (Key::F12, "F12")]
+    {
+        if hit(key) && !text::switched(viewer, name) {
+            viewer.say(format!(
+                "{name} is for passes in text, and none has it: drop a pipeline on the window, or begin with --effects"
+            ));
         }
     }
     if hit(Key::F10) {

@@ -16,6 +16,7 @@ use serde_json::Value;
 
 use crate::{
     config::SettingsArgs,
+    effects::{self, Effects},
     exposure,
     last_stage::{LastStage, Staged},
     smooth::{Filter, Mean, Smooth},
@@ -103,6 +104,7 @@ impl Visitor for Making<'_> {
             ready,
             baked,
             runner: Runner::new(gpu),
+            effects: None,
             last: None,
         }))
     }
@@ -125,6 +127,8 @@ struct Living<T: Technique> {
     by: T::Settings,
     baked: Option<T::Baked>,
     runner: Runner,
+    /// Passes in text, with the settings that they are for.
+    effects: Option<(effects::Settings, Effects)>,
     /// Tone mapping, with the settings and the exposure that it is for.
     last: Option<(Value, f64, LastStage)>,
 }
@@ -132,13 +136,16 @@ struct Living<T: Technique> {
 impl<T: Technique> Living<T> {
     /// The settings of the request; what depends on them is prepared again.
     fn prepare(&mut self, wanted: &Wanted, take: &Take<'_>) -> Result<T::Settings> {
-        let Staged { technique: settings, tonemap } = staged::<T>(&wanted.settings)?;
+        let Staged { technique: settings, effects, tonemap } = staged::<T>(&wanted.settings)?;
         let by = T::prepared_by(&settings);
         if by != self.by {
             let stage: &Arc<Stage> = &wanted.stage;
             self.ready =
                 Ready::new(&self.gpu, &stage.scene, &settings, self.baked.as_ref(), &mut |_, _| (take.go_on)())?;
             self.by = by;
+        }
+        if self.effects.as_ref().map(|(by, _)| by) != effects.as_ref() {
+            self.effects = effects.map(|by| Ok((by.clone(), Effects::new(&by)?))).transpose()?;
         }
         let exposure = take.exposure;
         let shown = wanted.settings.get("tonemap").cloned().unwrap_or_default();
@@ -167,6 +174,9 @@ impl<T: Technique> Living<T> {
             temporal: None,
         };
         let mut picture = self.ready.frame(&mut graph, scene, &take.view.shifted(place), shot, settings)?;
+        if let Some((_, effects)) = &self.effects {
+            effects.follow(&mut graph, &mut picture, wanted.seconds)?;
+        }
         if develop && let Some((_, _, last)) = &mut self.last {
             picture.develop(|picture| last.frame(&mut graph, picture, STEP))?;
         }
@@ -257,7 +267,8 @@ pub fn about(name: &str) -> Option<About> {
 
         fn visit<T: Technique + 'static>(self) -> About {
             let plain = |settings: T::Settings| {
-                crate::config::to_value(&Staged { technique: settings, tonemap: None }).unwrap_or_default()
+                crate::config::to_value(&Staged { technique: settings, effects: None, tonemap: None })
+                    .unwrap_or_default()
             };
             About {
                 about: T::ABOUT,

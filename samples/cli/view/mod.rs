@@ -20,6 +20,7 @@ mod picture;
 mod session;
 mod side;
 mod still;
+mod text;
 mod truth;
 mod wanted;
 mod watch;
@@ -147,10 +148,11 @@ impl ViewArgs {
     /// # Errors
     /// `Usage` for settings without a technique, unknown keys and wrong values.
     fn settings(&self, side: &Side) -> Result<Option<Value>> {
-        if self.settings.define.is_empty() && self.settings.file.is_none() {
+        let given = !self.settings.define.is_empty() || self.settings.file.is_some();
+        if !given && self.settings.effects.is_none() {
             return Ok(None);
         }
-        if self.technique.is_none() {
+        if self.technique.is_none() && given {
             return Err(Error::usage("settings are those of a technique").at("-D").help("Name it with --technique"));
         }
         live::with(side.technique, &side.settings, &self.settings).map(Some)

@@ -4,18 +4,39 @@ use std::collections::BTreeMap;
 
 use egui::{Color32, RichText, Ui};
 use lucerna::{
+    effects::Pipeline,
     settings::{Allowed, Description, Key, Kind},
     techniques,
 };
 use serde_json::{Map, Value, json};
 
+use crate::effects;
+
 /// The descriptions of all groups of settings by their names.
 #[derive(Debug)]
-pub struct Descriptions(BTreeMap<&'static str, &'static Description>);
+pub struct Descriptions {
+    known: BTreeMap<&'static str, &'static Description>,
+    /// Of the constants of a pipeline, with its digest.
+    effects: Option<(String, Description)>,
+}
 
 impl Default for Descriptions {
     fn default() -> Self {
-        Self(techniques::descriptions().into_iter().collect())
+        Self { known: techniques::descriptions().into_iter().collect(), effects: None }
+    }
+}
+
+impl Descriptions {
+    /// Describes the constants of a pipeline.
+    pub fn of_effects(&mut self, pipeline: &Pipeline) {
+        if self.effects.as_ref().is_none_or(|(digest, _)| digest != pipeline.digest()) {
+            self.effects = Some((pipeline.digest().to_owned(), pipeline.description()));
+        }
+    }
+
+    fn of(&self, group: &str) -> Option<&Description> {
+        let effects = || self.effects.as_ref().filter(|_| group == effects::GROUP).map(|(_, description)| description);
+        self.known.get(group).copied().or_else(effects)
     }
 }
 
@@ -25,14 +46,14 @@ pub fn show(ui: &mut Ui, descriptions: &Descriptions, tree: &mut Value, defaults
     let mut changed = false;
     for (name, group) in groups.iter_mut() {
         let default = defaults.get(name).unwrap_or(&Value::Null);
-        match (group, descriptions.0.get(name.as_str())) {
+        match (group, descriptions.of(name)) {
             (Value::Object(values), Some(description)) => {
                 let differs =
                     values.iter().any(|(key, value)| default.get(key).is_some_and(|default| default != value));
                 let title = if differs { RichText::new(format!("{name} •")) } else { RichText::new(name.as_str()) };
                 egui::CollapsingHeader::new(title)
                     .id_salt(name)
-                    .default_open(techniques::NAMES.contains(&name.as_str()))
+                    .default_open(techniques::NAMES.contains(&name.as_str()) || name == effects::GROUP)
                     .show(ui, |ui| {
                         for key in &description.keys {
                             let unmet = description.missing(key, values);
@@ -106,6 +127,19 @@ fn edit(ui: &mut Ui, key: &Key, value: &mut Value) {
             ui.weak("open");
             return;
         }
+    }
+    if let Value::Array(numbers) = value {
+        let (least, most) = match &key.allowed {
+            Allowed::Range { least, most, .. } => (*least, *most),
+            _ => (f64::from(f32::MIN), f64::from(f32::MAX)),
+        };
+        for number in numbers.iter_mut().rev() {
+            let mut now = number.as_f64().unwrap_or_default();
+            if ui.add(egui::DragValue::new(&mut now).speed(0.01).range(least..=most)).changed() {
+                *number = (now as f32).to_string().parse().map_or(Value::Null, |n: f64| json!(n));
+            }
+        }
+        return;
     }
     match &key.kind {
         Kind::Switch => {
@@ -270,7 +304,7 @@ mod tests {
         for name in techniques::NAMES {
             let Value::Object(groups) = about(name).unwrap().settings else { panic!("{name}") };
             for (group, values) in groups.iter().filter(|(_, values)| values.is_object()) {
-                let known = descriptions.0.get(group.as_str()).unwrap_or_else(|| panic!("{name}: {group}"));
+                let known = descriptions.of(group.as_str()).unwrap_or_else(|| panic!("{name}: {group}"));
                 for key in values.as_object().unwrap().keys() {
                     assert!(known.key(key).is_some(), "{name}: {group}.{key}");
                 }

@@ -175,6 +175,7 @@ fn preview(technique: &str, about: &About) -> Value {
     let quick = Settings { method: Method::Online, size: 8, ..Settings::preview() };
     let staged = crate::last_stage::Staged {
         technique: PictureSettings { fiv: quick, ..PictureSettings::default() },
+        effects: None,
         tonemap: None,
     };
     crate::config::to_value(&staged).unwrap_or_else(|_| about.settings.clone())

@@ -1,0 +1,360 @@
+//! Shaders of pipelines: compiled from GLSL at run time, their interfaces read from the SPIR-V.
+
+use std::{
+    cell::RefCell,
+    collections::{BTreeMap, BTreeSet, HashMap},
+    path::{Component, Path, PathBuf},
+    sync::{Mutex, PoisonError},
+};
+
+use serde_json::Value;
+
+use super::{Constant, Source, Values, file};
+use crate::{
+    Error, Result,
+    shader::{
+        Access, Binding, BindingKind, Dim, Shader, SpecConstant, Stage, StageCode, Texel,
+        reflect::{self, Interface, Kind, Struct, Type},
+    },
+    shaders::{LIBRARY, types},
+};
+
+/// Push constants that every pass may have. `size`: of the target, pixels. `seconds`: time of the frame. `frame` and `seed`: those of the graph.
+pub(super) const BUILT_IN: [&str; 4] = ["size", "seconds", "frame", "seed"];
+
+/// Bytes of push constants that every device has.
+const MOST_PUSH: u32 = 128;
+/// Includes deeper than these are taken for a cycle.
+const DEEPEST: usize = 16;
+
+/// A shader with what a pass must give to it.
+#[derive(Clone, Debug)]
+pub(super) struct Program {
+    pub shader: &'static Shader,
+    pub push: Option<Struct>,
+    /// Values of the specialisation constants.
+    pub spec: Vec<u32>,
+}
+
+/// Shaders that were compiled, by the digest of their code. They stay for the whole program, because pipelines of devices refer to them.
+fn known() -> &'static Mutex<HashMap<[u8; 32], &'static Shader>> {
+    static KNOWN: Mutex<Option<&'static Mutex<HashMap<[u8; 32], &'static Shader>>>> = Mutex::new(None);
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    known.get_or_insert_with(|| Box::leak(Box::default()))
+}
+
+/// Compiles `folder/file`. Also returns the files that were read.
+pub(super) fn compile(
+    folder: &Path,
+    file: &str,
+    wrong: &dyn Fn(String) -> Error,
+) -> Result<(Program, BTreeSet<PathBuf>)> {
+    let (kind, stage) = match Path::new(file).extension().and_then(|extension| extension.to_str()) {
+        Some("frag") => (shaderc::ShaderKind::Fragment, Stage::Fragment),
+        Some("comp") => (shaderc::ShaderKind::Compute, Stage::Compute),
+        _ => return Err(wrong(format!("shader {file:?}; a name that ends in .frag or .comp is allowed"))),
+    };
+    if Path::new(file).components().any(|part| !matches!(part, Component::Normal(_))) {
+        return Err(wrong(format!("shader {file:?} must lie in the folder of the pipeline")));
+    }
+    let path = folder.join(file);
+    let source = file::text_of(&path)
+        .map_err(|error| if path.exists() { error } else { wrong(format!("shader {file:?} does not exist")) })?;
+    let files = RefCell::new(BTreeSet::from([path.clone()]));
+    let include =
+        |name: &str, _: shaderc::IncludeType, from: &str, depth: usize| included(folder, name, from, depth, &files);
+    let failed = |text: String| {
+        // The compiler names files as they were given to it: `path:line: error: …`.
+        let lines: Vec<&str> =
+            text.lines().filter(|line| !line.trim().is_empty() && !line.ends_with("generated.")).collect();
+        Error::input(lines.join("; ").replace(&format!("{}:", path.display()), "line ")).in_file(&path)
+    };
+    let compiler = shaderc::Compiler::new().map_err(|error| failed(format!("cannot start shaderc: {error}")))?;
+    let run = |ship: bool| {
+        let mut options = shaderc::CompileOptions::new()?;
+        options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
+        let level = if ship { shaderc::OptimizationLevel::Performance } else { shaderc::OptimizationLevel::Zero };
+        options.set_optimization_level(level);
+        if !ship {
+            options.set_generate_debug_info();
+        }
+        options.set_include_callback(include);
+        compiler.compile_into_spirv(&headed(&source), kind, &path.display().to_string(), "main", Some(&options))
+    };
+    let raw = run(false).map_err(|error| failed(message(&error)))?;
+    let code = run(true).map_err(|error| failed(message(&error)))?.as_binary_u8().to_vec();
+    let interface = reflect::reflect(raw.as_binary()).map_err(&failed)?;
+    let shader = shader(file, stage, code, &interface).map_err(failed)?;
+    let spec = interface.spec.iter().map(|spec| spec.default).collect();
+    Ok((Program { shader, push: interface.push, spec }, files.into_inner()))
+}
+
+fn message(error: &shaderc::Error) -> String {
+    match error {
+        shaderc::Error::CompilationError(_, text) | shaderc::Error::InternalError(text) => text.clone(),
+        other => other.to_string(),
+    }
+}
+
+/// The source with the lines that all shaders begin with, unless it has its own. Lines keep their numbers.
+fn headed(source: &str) -> String {
+    if source.contains("#version") {
+        return source.to_owned();
+    }
+    let head = "#version 460\n#extension GL_EXT_scalar_block_layout : require\n#extension GL_GOOGLE_include_directive : require\n#line 1\n";
+    format!("{head}{source}")
+}
+
+/// The text of an include: a file beside the pipeline, or one of the engine's `lib/`.
+fn included(
+    folder: &Path,
+    name: &str,
+    from: &str,
+    depth: usize,
+    files: &RefCell<BTreeSet<PathBuf>>,
+) -> std::result::Result<shaderc::ResolvedInclude, String> {
+    if depth > DEEPEST {
+        return Err(format!("#include \"{name}\": includes are nested over {DEEPEST} deep; a cycle?"));
+    }
+    if Path::new(name).components().any(|part| !matches!(part, Component::Normal(_))) {
+        return Err(format!("#include \"{name}\": the path must stay inside the folder of the pipeline"));
+    }
+    let of_engine = |name: &str| LIBRARY.iter().find(|(known, _)| *known == name);
+    let beside = folder.join(name);
+    if beside.is_file() && !from.starts_with("lib/") {
+        let content = file::text_of(&beside).map_err(|error| error.to_string())?;
+        files.borrow_mut().insert(beside.clone());
+        return Ok(shaderc::ResolvedInclude { resolved_name: beside.display().to_string(), content });
+    }
+    match of_engine(name) {
+        Some((known, text)) => {
+            Ok(shaderc::ResolvedInclude { resolved_name: (*known).to_owned(), content: (*text).to_owned() })
+        }
+        None => {
+            let known: Vec<&str> = LIBRARY.iter().map(|(name, _)| *name).collect();
+            Err(format!(
+                "#include \"{name}\": no such file beside the pipeline or in the engine; the engine has {}",
+                known.join(", ")
+            ))
+        }
+    }
+}
+
+/// What all programs keep: leaked, because it lives as long as the program.
+fn leaked(text: &str) -> &'static str {
+    Box::leak(text.to_owned().into_boxed_str())
+}
+
+fn shader(
+    file: &str,
+    stage: Stage,
+    code: Vec<u8>,
+    interface: &Interface,
+) -> std::result::Result<&'static Shader, String> {
+    let push_size = interface.push.as_ref().map_or(0, |push| reflect::struct_size(push, &interface.structs));
+    if push_size > MOST_PUSH {
+        return Err(format!("{push_size} bytes of push constants; {MOST_PUSH} is the most that every device has"));
+    }
+    if stage == Stage::Fragment && interface.color_outputs == 0 {
+        return Err("it writes no colour: layout(location = 0) out vec4 NAME".into());
+    }
+    let digest = *blake3::hash(&[code.as_slice(), format!("{file} {interface:?}").as_bytes()].concat()).as_bytes();
+    let mut known = known().lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(shader) = known.get(&digest) {
+        return Ok(shader);
+    }
+    let bindings =
+        interface.bindings.iter().map(|b| binding(b, stage, interface)).collect::<std::result::Result<Vec<_>, _>>()?;
+    let own =
+        StageCode { stage, file: leaked(&format!("effects.{file}.spv")), spirv: Box::leak(code.into_boxed_slice()) };
+    let stages = match stage {
+        Stage::Compute => vec![own],
+        _ => vec![fullscreen()?, own],
+    };
+    let spec: Vec<SpecConstant> =
+        interface.spec.iter().map(|spec| SpecConstant { name: leaked(&spec.name), id: spec.id }).collect();
+    let shader: &'static Shader = Box::leak(Box::new(Shader {
+        name: leaked(&format!("effects.{}", file.rsplit_once('.').map_or(file, |(stem, _)| stem))),
+        stages: stages.leak(),
+        bindings: bindings.leak(),
+        push_size,
+        workgroup: interface.workgroup,
+        spec: spec.leak(),
+        color_outputs: interface.color_outputs,
+        ray_query: false,
+        query: None,
+    }));
+    known.insert(digest, shader);
+    Ok(shader)
+}
+
+/// The vertex stage that covers the target: that of the engine's own passes.
+fn fullscreen() -> std::result::Result<StageCode, String> {
+    let stages = <crate::shaders::passes::skybox::Args as crate::graph::Args>::SHADER.stages;
+    let vertex = stages.iter().find(|code| code.stage == Stage::Vertex).ok_or("the engine lost its vertex stage")?;
+    Ok(StageCode { stage: Stage::Vertex, file: vertex.file, spirv: vertex.spirv })
+}
+
+fn binding(found: &reflect::Binding, stage: Stage, interface: &Interface) -> std::result::Result<Binding, String> {
+    let dim = |name: &str| match name {
+        "D1" => Dim::D1,
+        "D2" => Dim::D2,
+        "D2Array" => Dim::D2Array,
+        "D3" => Dim::D3,
+        "Cube" => Dim::Cube,
+        _ => Dim::CubeArray,
+    };
+    let allowed = "a pass may bind sampler2D, image2D and the uniform block of `View`";
+    let name = &found.name;
+    let kind = match &found.kind {
+        Kind::Sampled(of) if *of == "D2" || *of == "D2Array" => BindingKind::Sampled(dim(of)),
+        Kind::Storage("D2") => BindingKind::Storage(Dim::D2),
+        Kind::Uniform(of) if of == "View" => {
+            let size = interface
+                .structs
+                .iter()
+                .find(|s| s.name == *of)
+                .map_or(0, |s| reflect::struct_size(s, &interface.structs));
+            if size as usize != size_of::<types::View>() {
+                return Err(format!("{name}: View is that of \"lib/view.glsl\", in a block with scalar layout"));
+            }
+            BindingKind::Uniform { size }
+        }
+        Kind::Uniform(of) => {
+            return Err(format!("{name} is a uniform block of {of}; {allowed}. Constants are push constants"));
+        }
+        Kind::Buffer => return Err(format!("{name} is a storage buffer; {allowed}")),
+        Kind::AccelerationStructure => return Err(format!("{name} is an acceleration structure; {allowed}")),
+        Kind::Sampled(of) | Kind::Storage(of) => return Err(format!("{name} has the shape {of}; {allowed}")),
+    };
+    if found.count != 1 {
+        return Err(format!("{name} is an array of {} resources; {allowed}", found.count));
+    }
+    Ok(Binding {
+        name: leaked(name),
+        binding: found.binding,
+        kind,
+        access: match found.access {
+            reflect::Access::Read => Access::Read,
+            reflect::Access::Write => Access::Write,
+            reflect::Access::ReadWrite => Access::ReadWrite,
+        },
+        stages: if stage == Stage::Compute { &[Stage::Compute] } else { &[Stage::Fragment] },
+        count: 1,
+        texel: match found.texel {
+            "Uint" => Texel::Uint,
+            "Sint" => Texel::Sint,
+            "None" => Texel::None,
+            _ => Texel::Float,
+        },
+        format: found.format,
+    })
+}
+
+impl Program {
+    /// Checks what the file says of a pass against the interface of its shader.
+    pub fn check(
+        &self,
+        bind: &BTreeMap<String, Source>,
+        out: &[String],
+        values: &Values,
+        constants: &[Constant],
+        wrong: &dyn Fn(String) -> Error,
+    ) -> Result<()> {
+        let bindings: Vec<&str> = self.shader.bindings.iter().map(|binding| binding.name).collect();
+        if let Some(name) = bind.keys().find(|name| !bindings.contains(&name.as_str())) {
+            return Err(wrong(format!(
+                "bind.{name}: the shader has no such binding; it has {}",
+                file::listed(&bindings)
+            )));
+        }
+        let written = match self.shader.stages.last().map(|code| code.stage) {
+            Some(Stage::Fragment) => self.shader.color_outputs as usize,
+            _ => self.storage().count(),
+        };
+        if out.len() != written {
+            let what = format!("out names {} images; the shader writes {written}", out.len());
+            return Err(wrong(what));
+        }
+        let members: Vec<&str> =
+            self.push.iter().flat_map(|push| &push.members).map(|member| member.name.as_str()).collect();
+        if let Some(name) = values.keys().find(|name| !members.contains(&name.as_str())) {
+            return Err(wrong(format!(
+                "values.{name}: the shader has no such push constant; it has {}",
+                file::listed(&members)
+            )));
+        }
+        for member in self.push.iter().flat_map(|push| &push.members) {
+            let constant = constants.iter().find(|constant| constant.name == member.name);
+            let value = values.get(&member.name).or(constant.map(|constant| &constant.default));
+            match value {
+                Some(value) if bits(&member.ty, value).is_some() => (),
+                Some(value) => {
+                    let what = format!(
+                        "the push constant {} is {}, and {value} does not fit into it",
+                        member.name,
+                        spelled(&member.ty)
+                    );
+                    return Err(wrong(what));
+                }
+                None if built_in(&member.name, &member.ty) => (),
+                None => {
+                    let known: Vec<&str> = constants.iter().map(|constant| constant.name.as_str()).collect();
+                    let what = format!(
+                        "the push constant {} ({}) is no constant of the pipeline; there are {}, and the engine's vec2 size, float seconds, uint frame, uint seed",
+                        member.name,
+                        spelled(&member.ty),
+                        file::listed(&known)
+                    );
+                    return Err(wrong(what));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The storage images, which a compute shader writes.
+    pub fn storage(&self) -> impl Iterator<Item = &'static Binding> + '_ {
+        self.shader.bindings.iter().filter(|binding| matches!(binding.kind, BindingKind::Storage(_)))
+    }
+}
+
+fn built_in(name: &str, ty: &Type) -> bool {
+    match name {
+        "size" => *ty == Type::Vector(Box::new(Type::F32), 2),
+        "seconds" => *ty == Type::F32,
+        "frame" | "seed" => *ty == Type::U32,
+        _ => false,
+    }
+}
+
+fn spelled(ty: &Type) -> String {
+    match ty {
+        Type::F32 => "float".into(),
+        Type::I32 => "int".into(),
+        Type::U32 => "uint".into(),
+        Type::Vector(of, count) => match **of {
+            Type::F32 => format!("vec{count}"),
+            Type::I32 => format!("ivec{count}"),
+            _ => format!("uvec{count}"),
+        },
+        other => format!("{other:?}"),
+    }
+}
+
+/// The words of a push constant; `None` if the value does not fit into its type.
+pub(super) fn bits(ty: &Type, value: &Value) -> Option<Vec<u32>> {
+    match (ty, value) {
+        (Type::F32, Value::Number(n)) => Some(vec![(n.as_f64()? as f32).to_bits()]),
+        (Type::I32, Value::Number(n)) => Some(vec![i32::try_from(n.as_i64()?).ok()? as u32]),
+        (Type::U32, Value::Number(n)) => Some(vec![u32::try_from(n.as_i64()?).ok()?]),
+        (Type::U32, Value::Bool(on)) => Some(vec![u32::from(*on)]),
+        (Type::Vector(of, count), Value::Array(list)) if list.len() == *count as usize => {
+            let whole = |value: &Value| {
+                if **of == Type::F32 { value.clone() } else { Value::from(value.as_f64().unwrap_or_default() as i64) }
+            };
+            list.iter().map(|value| bits(of, &whole(value)).map(|words| words[0])).collect()
+        }
+        _ => None,
+    }
+}
