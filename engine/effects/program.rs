@@ -2,7 +2,7 @@
 
 use std::{
     cell::RefCell,
-    collections::{BTreeMap, BTreeSet, HashMap},
+    collections::{BTreeMap, BTreeSet},
     path::{Component, Path, PathBuf},
     sync::{Mutex, PoisonError},
 };
@@ -37,11 +37,7 @@ pub(super) struct Program {
 }
 
 /// Shaders that were compiled, by the digest of their code. They stay for the whole program, because pipelines of devices refer to them.
-fn known() -> &'static Mutex<HashMap<[u8; 32], &'static Shader>> {
-    static KNOWN: Mutex<Option<&'static Mutex<HashMap<[u8; 32], &'static Shader>>>> = Mutex::new(None);
-    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-    known.get_or_insert_with(|| Box::leak(Box::default()))
-}
+static KNOWN: Mutex<BTreeMap<[u8; 32], &'static Shader>> = Mutex::new(BTreeMap::new());
 
 /// Compiles `folder/file`. Also returns the files that were read.
 pub(super) fn compile(
@@ -159,7 +155,7 @@ fn shader(
         return Err("it writes no colour: layout(location = 0) out vec4 NAME".into());
     }
     let digest = *blake3::hash(&[code.as_slice(), format!("{file} {interface:?}").as_bytes()].concat()).as_bytes();
-    let mut known = known().lock().unwrap_or_else(PoisonError::into_inner);
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(shader) = known.get(&digest) {
         return Ok(shader);
     }

@@ -315,35 +315,6 @@ impl Graph {
         self.pass(A::SHADER.name, Work::Raster { bound: bound(&args), targets, state, draw })
     }
 
-    /// Draws one triangle over whole targets with a shader that is known at run time alone. `constants`: the bytes of its push constants, and its
-    /// specialisation constants.
-    #[cfg(feature = "effects")]
-    pub(crate) fn draw_over(
-        &mut self,
-        shader: &'static crate::shader::Shader,
-        targets: Targets,
-        resources: Vec<super::Bind>,
-        (push, spec): (Vec<u8>, Vec<u32>),
-    ) -> PassRef<'_> {
-        let bound = Bound { shader, resources, push, spec };
-        self.pass(shader.name, Work::Raster { bound, targets, state: Raster::new(), draw: Draw::fullscreen() })
-    }
-
-    /// As [`Self::draw_over`], for a compute shader with a thread for each pixel.
-    #[cfg(feature = "effects")]
-    pub(crate) fn dispatch(
-        &mut self,
-        shader: &'static crate::shader::Shader,
-        resources: Vec<super::Bind>,
-        (push, spec): (Vec<u8>, Vec<u32>),
-        threads: Extent,
-    ) -> PassRef<'_> {
-        let threads = Threads::from(threads).0;
-        let groups = [0, 1, 2].map(|i| threads[i].div_ceil(shader.workgroup[i].max(1)));
-        let bound = Bound { shader, resources, push, spec };
-        self.pass(shader.name, Work::Compute { bound, groups: Groups::Direct(groups), over: None })
-    }
-
     /// Sets every pixel. Integer formats take the value rounded; depth the first component, stencil the second.
     pub fn clear(&mut self, image: Image, value: [f32; 4]) -> PassRef<'_> {
         let name = format!("clear {}", self.short_name(image));

@@ -57,6 +57,8 @@ mod grid;
 mod handles;
 mod import;
 mod list;
+#[cfg(feature = "effects")]
+mod live;
 pub mod oracle;
 mod over;
 mod pass;

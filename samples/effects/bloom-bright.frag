@@ -1,4 +1,5 @@
 // The light above a threshold, at a quarter of the size: each pixel is the mean of the sixteen under it.
+#include "bloom-bright.glsl"
 layout(binding = 0) uniform sampler2D picture;
 layout(push_constant) uniform Push { float threshold; };
 layout(location = 0) in vec2 uv;
@@ -9,9 +10,7 @@ void main() {
     vec3 sum = vec3(0.0);
     for (int y = -1; y <= 1; y += 2) {
         for (int x = -1; x <= 1; x += 2) {
-            vec3 light = textureLod(picture, uv + vec2(x, y) * texel, 0.0).rgb;
-            float luminance = dot(light, vec3(0.2126, 0.7152, 0.0722));
-            sum += light * max(luminance - threshold, 0.0) / max(luminance, 1e-6);
+            sum += bright_part(textureLod(picture, uv + vec2(x, y) * texel, 0.0).rgb, threshold);
         }
     }
     color = vec4(min(sum / 4.0, vec3(60000.0)), 1.0);

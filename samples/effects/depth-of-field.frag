@@ -18,7 +18,7 @@ void main() {
     vec2 texel = 1.0 / vec2(textureSize(picture, 0));
     float own = textureLod(depth, uv, 0.0).r * view.far;
     float radius = circle(own);
-    vec4 sum = texture(picture, uv);
+    vec4 sum = texelFetch(picture, ivec2(gl_FragCoord.xy), 0);
     float weights = 1.0;
     for (int i = 0; i < SAMPLES; ++i) {
         // Even points of a disc, on a spiral of the golden angle.

@@ -66,6 +66,11 @@ impl Ran {
     }
 }
 
+/// A file of the project.
+pub fn of_project(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
+}
+
 /// A file of the test assets. Without them: fails if `CI` is set, else says that the test is skipped.
 pub fn asset(path: &str) -> Option<PathBuf> {
     let file = Path::new(&std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into()))

@@ -5,189 +5,12 @@
 #[path = "../../window/tests/window/desktop.rs"]
 mod desktop;
 mod support;
+mod window;
 
-use std::{
-    io::{BufRead, BufReader, Read},
-    path::{Path, PathBuf},
-    process::{Child, Command, Stdio},
-    time::{Duration, Instant},
-};
+use std::time::Duration;
 
-use desktop::Desktop;
-use lucerna::{
-    image::{self, srgb},
-    scene::Limits,
-};
-use support::{command, device, lucerna};
-
-/// Pictures come within seconds. This bound finds those that never come: a machine that does much else besides is slow.
-const BOUND: Duration = Duration::from_secs(120);
-const SIZE: [u16; 2] = [160, 120];
-
-const ESCAPE: u32 = 0xff1b;
-const TAB: u32 = 0xff09;
-const F1: u32 = 0xffbe;
-
-/// A letter as a symbol of X.
-fn letter(c: char) -> u32 {
-    u32::from(c)
-}
-
-/// An X server that ends with the test. `None`: Xvfb is not installed, which fails if `CI` is set.
-struct Server {
-    process: Child,
-    display: String,
-}
-
-impl Server {
-    fn start() -> Option<Self> {
-        let process = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1400x900x24", "-nolisten", "tcp"])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn();
-        let Ok(mut process) = process else {
-            assert!(std::env::var_os("CI").is_none(), "Xvfb is not installed and CI is set");
-            eprintln!("SKIPPED: Xvfb is not installed");
-            return None;
-        };
-        let mut number = String::new();
-        BufReader::new(process.stdout.take().unwrap()).read_line(&mut number).unwrap();
-        Some(Self { process, display: format!(":{}", number.trim()) })
-    }
-}
-
-impl Drop for Server {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
-
-/// A running viewer.
-struct Viewer {
-    child: Child,
-    desktop: Desktop,
-    folder: tempfile::TempDir,
-    size: [u16; 2],
-}
-
-impl Viewer {
-    /// Opens a window of some size without panels.
-    fn open(server: &Server, size: [u16; 2], words: &str) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let mut program = command(env!("CARGO_BIN_EXE_lucerna"));
-        program.arg("view").args(words.split_whitespace());
-        program.arg("--window").arg(format!("{}x{}", size[0], size[1])).current_dir(folder.path());
-        program.env("DISPLAY", &server.display).env_remove("WAYLAND_DISPLAY").env("LUCERNA_VALIDATION", "core");
-        let child = program.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-        let desktop = Desktop::find_on(Some(&server.display), "lucerna");
-        desktop.focus();
-        desktop.point(4, 4);
-        Self { child, desktop, folder, size }
-    }
-
-    fn bare(server: &Server, words: &str) -> Self {
-        Self::open(server, SIZE, &format!("--bare {words}"))
-    }
-
-    /// Processor time that it has used, seconds.
-    fn processor_seconds(&self) -> f64 {
-        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.child.id())).unwrap();
-        let fields: Vec<f64> =
-            stat.rsplit(')').next().unwrap().split_whitespace().map(|field| field.parse().unwrap_or(0.0)).collect();
-        // utime and stime, in hundredths.
-        (fields[11] + fields[12]) / 100.0
-    }
-
-    fn picture(&self) -> Vec<[u8; 3]> {
-        self.desktop.picture([0, 0], self.size).unwrap_or_default()
-    }
-
-    /// Waits until the picture is as asked, and returns it.
-    #[track_caller]
-    fn until(&self, what: &str, good: impl Fn(&[[u8; 3]]) -> bool) -> Vec<[u8; 3]> {
-        let begun = Instant::now();
-        loop {
-            let picture = self.picture();
-            if good(&picture) {
-                return picture;
-            }
-            assert!(begun.elapsed() < BOUND, "it never happened: {what}");
-            std::thread::sleep(Duration::from_millis(20));
-        }
-    }
-
-    /// Waits until the window shows exactly this.
-    #[track_caller]
-    fn shows(&self, what: &str, expected: &[[u8; 3]]) {
-        self.until(what, |picture| picture == expected);
-    }
-
-    /// Closes the window. It ends soon, without an error and without a message of the validation layer.
-    #[track_caller]
-    fn close(mut self) {
-        self.desktop.close();
-        let begun = Instant::now();
-        let status = loop {
-            if let Some(status) = self.child.try_wait().unwrap() {
-                break status;
-            }
-            if begun.elapsed() > BOUND {
-                self.child.kill().unwrap();
-                panic!("the window does not close");
-            }
-            std::thread::sleep(Duration::from_millis(10));
-        };
-        let mut said = String::new();
-        self.child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
-        assert!(status.success(), "{status}: {said}");
-        for word in ["validation", "VUID", "panicked", "internal error", "error:"] {
-            assert!(!said.contains(word), "{said}");
-        }
-    }
-}
-
-impl Drop for Viewer {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-/// The codes of a picture that a command writes.
-#[track_caller]
-fn by_command(words: &str) -> Vec<[u8; 3]> {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("a.png");
-    let size = format!("{}x{}", SIZE[0], SIZE[1]);
-    let words = words.split_whitespace().chain(["--size", &size, "-q", "-o"]).map(str::to_owned);
-    lucerna(words.chain([file.display().to_string()])).expect(0, &[]);
-    codes(&file)
-}
-
-fn codes(file: &Path) -> Vec<[u8; 3]> {
-    let layers = image::read(file, &Limits::default()).unwrap();
-    layers.layers[0].rgb_pixels().unwrap().into_iter().map(|pixel| pixel.map(srgb::encode_u8)).collect()
-}
-
-/// The first file with this ending, when it is complete.
-fn written(folder: &Path, ending: &str) -> PathBuf {
-    let begun = Instant::now();
-    loop {
-        let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-        let found: Vec<PathBuf> = files.filter(|file| file.to_string_lossy().ends_with(ending)).collect();
-        if let Some(file) = found.into_iter().next() {
-            return file;
-        }
-        assert!(begun.elapsed() < BOUND, "no file {ending}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
-}
-
-fn ready() -> Option<Server> {
-    if device() { Server::start() } else { None }
-}
+use support::{command, lucerna};
+use window::*;
 
 #[test]
 fn the_window_shows_what_render_writes_and_keys_change_it() {
@@ -464,5 +287,53 @@ fn a_file_that_is_mended_is_read_again() {
     viewer.until("the scene that the file has become", |picture| {
         picture.iter().filter(|pixel| pixel[0] > 60).count() > 2000
     });
+    viewer.close();
+}
+
+#[test]
+fn passes_in_text_are_switched_by_keys_and_change_with_their_files() {
+    let Some(server) = ready() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let here = |name: &str| folder.path().join(name);
+    for name in ["sepia.toml", "sepia.frag"] {
+        std::fs::copy(support::of_project("samples/effects").join(name), here(name)).unwrap();
+    }
+    let pipeline = here("sepia.toml").display().to_string();
+    let of = "render isr --builtin cornell --camera 0";
+    let plain = by_command(of);
+    let sepia = by_command(&format!("{of} --effects {pipeline}"));
+    assert_ne!(plain, sepia);
+    let viewer = Viewer::bare(&server, &format!("--technique isr --builtin cornell --effects {pipeline}"));
+    viewer.shows("brown tones", &sepia);
+    // F11 switches them off and on.
+    viewer.desktop.hit(F1 + 10);
+    viewer.shows("no brown tones", &plain);
+    viewer.desktop.hit(F1 + 10);
+    viewer.shows("brown tones again", &sepia);
+    // P writes what is seen.
+    viewer.desktop.hit(letter('p'));
+    assert_eq!(codes(&written(viewer.folder.path(), ".png")), sepia);
+
+    // Another shader is another picture, without a key.
+    let shader = std::fs::read_to_string(here("sepia.frag")).unwrap();
+    std::fs::write(here("sepia.frag"), shader.replace("1.18, 0.98, 0.70", "0.70, 0.98, 1.18")).unwrap();
+    let blue = by_command(&format!("{of} --effects {pipeline}"));
+    assert_ne!(blue, sepia);
+    viewer.shows("blue tones", &blue);
+    // A mistake leaves the picture as it was, and is gone when it is mended.
+    std::fs::write(here("sepia.frag"), shader.replace("luminance *", "lumimance *")).unwrap();
+    std::thread::sleep(Duration::from_secs(2));
+    viewer.shows("blue tones still", &blue);
+    viewer.desktop.hit(F1 + 10);
+    viewer.shows("no tones", &plain);
+    viewer.desktop.hit(F1 + 10);
+    std::fs::write(here("sepia.frag"), &shader).unwrap();
+    viewer.shows("brown tones at last", &sepia);
+    // A constant with another default in the file.
+    let toml = std::fs::read_to_string(here("sepia.toml")).unwrap();
+    std::fs::write(here("sepia.toml"), toml.replace("default = true", "default = false")).unwrap();
+    std::thread::sleep(Duration::from_secs(2));
+    // The value that was switched by hand stays.
+    viewer.shows("brown tones stay", &sepia);
     viewer.close();
 }

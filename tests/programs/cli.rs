@@ -25,6 +25,8 @@ mod daylight_export_more;
 mod daylight_pictures;
 #[path = "../cli/door.rs"]
 mod door;
+#[path = "../cli/effects.rs"]
+mod effects;
 #[path = "../cli/experiment.rs"]
 mod experiment;
 #[path = "../cli/export_gltf.rs"]
