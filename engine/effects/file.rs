@@ -1,8 +1,8 @@
 //! The TOML file of a pipeline, with the line of each mistake.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
-    path::Path,
+    collections::BTreeMap,
+    path::{Path, PathBuf},
 };
 
 use serde::Deserialize;
@@ -14,13 +14,16 @@ use crate::{
     Error, Result,
     graph::{Format, Sampler},
     image::read_file_checked,
-    techniques,
+    technique::Technique,
+    techniques, tracer,
 };
 
 /// Bytes of a file or shader at most.
 pub(super) const MOST: u64 = 1 << 20;
 /// Keys that the viewer leaves to pipelines.
 const KEYS: [&str; 6] = ["F6", "F7", "F8", "F9", "F11", "F12"];
+/// Files of a pipeline at most.
+const MOST_FILES: usize = 512;
 /// Passes of a pipeline at most.
 const MOST_PASSES: usize = 256;
 
@@ -109,7 +112,7 @@ struct FilePass {
 }
 
 #[derive(Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "a name, or a list of names")]
 enum OneOrMore {
     One(String),
     More(Vec<String>),
@@ -125,7 +128,7 @@ impl OneOrMore {
 }
 
 #[derive(Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "the name of an image, or a table of image, sampler and mip")]
 enum FileSource {
     Name(String),
     Full(FullSource),
@@ -195,8 +198,63 @@ pub(super) fn text_of(path: &Path) -> Result<String> {
     })
 }
 
+/// The texts of a pipeline by their files: its own, its shaders and what they include, as far as they are there.
+pub(super) type Texts = BTreeMap<PathBuf, String>;
+
+/// The folder of a pipeline.
+pub(super) fn folder_of(path: &Path) -> PathBuf {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned()
+}
+
+/// The files of a pipeline with their texts; `None` for one that is named, but is not there.
+pub(super) fn gathered(path: &Path) -> Result<BTreeMap<PathBuf, Option<String>>> {
+    let own = text_of(path)?;
+    let folder = folder_of(path);
+    // A file with mistakes has the shaders that its lines name.
+    let named = |text: &str, begins: &str| -> Vec<String> {
+        let lines = text.lines().filter_map(|line| line.trim_start().strip_prefix(begins).map(str::to_owned));
+        lines.filter_map(|rest| Some(rest.split('"').nth(1)?.to_owned())).collect()
+    };
+    let mut open = match own.parse::<toml::Table>() {
+        Ok(table) => {
+            let passes = table.get("pass").and_then(toml::Value::as_array).into_iter().flatten();
+            passes.filter_map(|pass| Some(pass.get("shader")?.as_str()?.to_owned())).collect()
+        }
+        Err(_) => named(&own, "shader"),
+    };
+    let mut all = BTreeMap::from([(path.to_owned(), Some(own))]);
+    while let Some(name) = open.pop() {
+        let inside = Path::new(&name).components().all(|part| matches!(part, std::path::Component::Normal(_)));
+        let file = folder.join(&name);
+        if !inside
+            || all.contains_key(&file)
+            || (program::is_of_engine(&name) && !file.is_file())
+            || all.len() > MOST_FILES
+        {
+            continue;
+        }
+        let text = if file.exists() { Some(text_of(&file)?) } else { None };
+        open.extend(text.iter().flat_map(|text| named(text, "#include")));
+        all.insert(file, text);
+    }
+    Ok(all)
+}
+
+fn digest_of(texts: &Texts) -> String {
+    let mut digest = blake3::Hasher::new();
+    for text in texts.values() {
+        digest.update(&(text.len() as u64).to_le_bytes()).update(text.as_bytes());
+    }
+    digest.finalize().to_hex()[..32].to_owned()
+}
+
+pub(super) fn digest(path: &Path) -> Result<String> {
+    Ok(digest_of(&gathered(path)?.into_iter().filter_map(|(file, text)| Some((file, text?))).collect()))
+}
+
 pub(super) fn read(path: &Path) -> Result<Pipeline> {
-    let text = text_of(path)?;
+    let texts: Texts = gathered(path)?.into_iter().filter_map(|(file, text)| Some((file, text?))).collect();
+    let text = texts.get(path).cloned().unwrap_or_default();
     let lines = Lines { path, text: &text };
     let file: File = toml::from_str(&text).map_err(|error| {
         let line = error.span().map_or(1, |span| lines.of(span.start));
@@ -204,8 +262,11 @@ pub(super) fn read(path: &Path) -> Result<Pipeline> {
     })?;
     let mut technique = None;
     if let Some(name) = file.technique {
-        if !techniques::NAMES.contains(&name.as_ref().as_str()) {
-            let what = format!("technique {:?}; there are {}", name.as_ref(), techniques::NAMES.join(", "));
+        // The path tracer has no passes after it.
+        let known: Vec<&str> =
+            techniques::NAMES.iter().copied().filter(|name| *name != tracer::Reference::NAME).collect();
+        if !known.contains(&name.as_ref().as_str()) {
+            let what = format!("technique {:?}; there are {}", name.as_ref(), known.join(", "));
             return Err(lines.wrong(lines.of(name.span().start), what));
         }
         technique = Some(name.into_inner());
@@ -216,6 +277,15 @@ pub(super) fn read(path: &Path) -> Result<Pipeline> {
         constants.push((start, self::constant(&lines, lines.of(start), name, constant.into_inner())?));
     }
     constants.sort_by_key(|(start, _)| *start);
+    for (at, (start, constant)) in constants.iter().enumerate() {
+        if let Some(key) = &constant.key
+            && constants[..at].iter().any(|(_, other)| other.key.as_ref() == Some(key))
+        {
+            return Err(
+                lines.wrong(lines.of(*start), format!("constants.{}: another switch has the key {key}", constant.name))
+            );
+        }
+    }
     let constants: Vec<Constant> = constants.into_iter().map(|(_, constant)| constant).collect();
     let mut images = BTreeMap::new();
     for (name, image) in file.images {
@@ -235,21 +305,15 @@ pub(super) fn read(path: &Path) -> Result<Pipeline> {
             .wrong(1, "there is no pass")
             .help("Add one: [[pass]] with shader = \"FILE.frag\" and out = \"picture\""));
     }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned();
-    let mut files = BTreeSet::from([path.to_owned()]);
+    let folder = folder_of(path);
     let mut passes = Vec::new();
     for found in file.passes {
         let line = lines.of(found.span().start);
-        passes.push(pass(&lines, line, (&folder, &mut files), (&constants, &images), found.into_inner())?);
+        passes.push(pass(&lines, line, (&folder, &texts), (&constants, &images), found.into_inner())?);
     }
     let stem = || path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-    let mut digest = blake3::Hasher::new();
-    for file in &files {
-        let text = text_of(file)?;
-        digest.update(&(text.len() as u64).to_le_bytes()).update(text.as_bytes());
-    }
     Ok(Pipeline {
-        digest: digest.finalize().to_hex()[..32].to_owned(),
+        digest: digest_of(&texts),
         path: path.to_owned(),
         title: file.title.unwrap_or_else(stem),
         doc: file.doc,
@@ -258,16 +322,17 @@ pub(super) fn read(path: &Path) -> Result<Pipeline> {
         constants,
         images,
         passes,
-        files: files.into_iter().collect(),
+        files: texts.into_keys().collect(),
     })
 }
 
 fn constant(lines: &Lines<'_>, line: usize, name: String, found: FileConstant) -> Result<Constant> {
-    if !is_name(&name) || program::BUILT_IN.contains(&name.as_str()) || name == "pipeline" {
+    if !is_name(&name) || program::BUILT_IN.contains(&name.as_str()) || ["pipeline", "digest"].contains(&name.as_str())
+    {
         let own = program::BUILT_IN.join(", ");
         return Err(lines.wrong(
             line,
-            format!("{name:?} cannot name a constant: letters, digits and _, and none of {own}, pipeline"),
+            format!("{name:?} cannot name a constant: letters, digits and _, and none of {own}, pipeline, digest"),
         ));
     }
     let Some(default) = json(&found.default) else {
@@ -314,7 +379,7 @@ fn own_image(lines: &Lines<'_>, line: usize, name: &str, found: FileImage) -> Re
             other => return Err(lines.wrong(line, format!("images.{name}.scale is {other}; 1/256 to 4 are allowed"))),
         },
     };
-    Ok(OwnImage { format, size, mips: found.mips, history: found.history, line })
+    Ok(OwnImage { format, size, mips: found.mips, history: found.history })
 }
 
 type Known<'a> = (&'a [Constant], &'a BTreeMap<String, OwnImage>);
@@ -322,7 +387,7 @@ type Known<'a> = (&'a [Constant], &'a BTreeMap<String, OwnImage>);
 fn pass(
     lines: &Lines<'_>,
     line: usize,
-    (folder, files): (&Path, &mut BTreeSet<std::path::PathBuf>),
+    (folder, texts): (&Path, &Texts),
     (constants, images): Known<'_>,
     found: FilePass,
 ) -> Result<Pass> {
@@ -334,6 +399,9 @@ fn pass(
             return Err(wrong(format!("out names {name:?}, which is not declared; there are {}", known.join(", ")))
                 .help(format!("Declare it: [images.{name}] with format = \"rgba16f\"")));
         }
+    }
+    if let Some(name) = out.iter().enumerate().find(|(at, name)| out[..*at].contains(name)).map(|(_, name)| name) {
+        return Err(wrong(format!("out names {name:?} twice")));
     }
     let mut bind = BTreeMap::new();
     for (binding, source) in found.bind {
@@ -378,8 +446,7 @@ fn pass(
     }
     let (name, work) = match (&found.shader, found.stage.as_deref()) {
         (Some(shader), None) => {
-            let (program, read) = program::compile(folder, shader, &wrong)?;
-            files.extend(read);
+            let program = program::compile(folder, shader, texts, &wrong)?;
             program.check(&bind, &out, &values, constants, &wrong)?;
             (
                 Path::new(shader)
@@ -389,6 +456,12 @@ fn pass(
             )
         }
         (None, Some(stage)) => {
+            if found.radius.is_some() && stage != "blur" {
+                return Err(wrong(format!("stage {stage:?} has no radius")));
+            }
+            if let Some(name) = out.iter().find(|name| *name != PICTURE && !is_name(name)) {
+                return Err(wrong(format!("{name:?} cannot name an image: letters, digits and _")));
+            }
             if !values.is_empty() || !bind.is_empty() {
                 return Err(wrong(format!(
                     "stage {stage:?} has neither bind nor values; it has image, out and radius"

@@ -10,10 +10,10 @@ use super::{
 };
 use crate::{
     Error, Result,
-    graph::{Bind, Extent, Graph, Image, ImageDesc, Load, Targets, Uniform},
+    graph::{Bind, Class, Extent, Format, Graph, Image, ImageDesc, Load, Targets, Uniform},
     passes::blur,
     scene::View,
-    shader::{BindingKind, Stage},
+    shader::{BindingKind, Stage, Texel},
     shaders::types,
 };
 
@@ -24,6 +24,8 @@ struct Images<'p> {
     own: BTreeMap<String, Image>,
     before: BTreeMap<String, Image>,
     written: BTreeSet<String>,
+    /// Those whose smaller levels are made.
+    levels: BTreeSet<String>,
     /// Those of the technique, which passes can read.
     graph: BTreeSet<String>,
 }
@@ -56,21 +58,15 @@ impl Pipeline {
             own: BTreeMap::new(),
             before: BTreeMap::new(),
             written: BTreeSet::new(),
+            levels: BTreeSet::new(),
             graph: graph.image_names().into_iter().map(str::to_owned).collect(),
         };
-        images.declare(graph);
+        images.declare(graph, &passes);
         let uniform = graph.uniform(&view.uniform());
         let moment = Moment { all: &all, seconds, view: uniform };
         let declared =
             graph.scope("effects", |graph| passes.iter().try_for_each(|pass| images.pass(graph, pass, &moment)));
         declared?;
-        for (name, image) in &self.images {
-            if image.history && !images.written.contains(name) {
-                return Err(
-                    self.wrong(image.line, format!("images.{name} keeps its history, but no pass that runs writes it"))
-                );
-            }
-        }
         Ok(images.picture)
     }
 
@@ -87,9 +83,11 @@ struct Moment<'a> {
 }
 
 impl Images<'_> {
-    fn declare(&mut self, graph: &mut Graph) {
+    /// Declares the images that a pass writes.
+    fn declare(&mut self, graph: &mut Graph, passes: &[&Pass]) {
         let whole = graph.extent(self.picture);
-        for (name, image) in &self.pipeline.images {
+        let used = |name: &String| passes.iter().any(|pass| pass.out.contains(name));
+        for (name, image) in self.pipeline.images.iter().filter(|(name, _)| used(name)) {
             let extent = extent(image, whole);
             let mips = if image.mips { extent.width.max(extent.height).ilog2() + 1 } else { 1 };
             let desc = ImageDesc::new(image.format, extent).mips(mips);
@@ -113,13 +111,18 @@ impl Images<'_> {
             self.picture
         } else if let Some(before) = self.before.get(name) {
             *before
+        } else if self.pipeline.images.contains_key(name.strip_suffix(".previous").unwrap_or(name))
+            && !self.own.contains_key(name)
+        {
+            let what = format!("pass {:?} reads the image {name:?}, but no pass that runs writes it", pass.name);
+            return Err(self.pipeline.wrong(pass.line, what));
         } else if let Some(own) = self.own.get(name) {
             if !self.written.contains(name) {
                 let what =
                     format!("pass {:?} reads the image {name:?}, but no pass before it that runs writes it", pass.name);
                 return Err(self.pipeline.wrong(pass.line, what));
             }
-            *own
+            if self.levels.contains(name) { *own } else { own.mip(0) }
         } else if let Some(found) = graph.find_image(name).filter(|_| self.graph.contains(name)) {
             found
         } else {
@@ -135,9 +138,13 @@ impl Images<'_> {
             );
             return Err(self.pipeline.wrong(pass.line, what));
         };
+        let all = graph.desc(image).mips;
         let image = match source.mip {
-            Some(mip) if mip >= graph.desc(image).mips => {
-                let what = format!("level {mip} of {name:?}, which has {} levels", graph.desc(image).mips);
+            // A small picture has fewer levels.
+            Some(mip) if self.levels.contains(name) => image.mip(mip.min(all - 1)),
+            Some(mip) if mip >= all => {
+                let what =
+                    format!("pass {:?} reads level {mip} of {name:?}, which has levels 0 to {}", pass.name, all - 1);
                 return Err(self.pipeline.wrong(pass.line, what));
             }
             Some(mip) => image.mip(mip),
@@ -174,13 +181,19 @@ impl Images<'_> {
         match &pass.work {
             Work::Shader(program) => return self.shader(graph, pass, program, moment),
             Work::Mips => {
-                let image = self.read(graph, pass, &source())?;
-                let image = graph.find_image(&format!("effects.{}", source().image)).unwrap_or(image);
-                if graph.desc(image).mips < 2 {
-                    let what = format!("{:?} has one level alone", source().image);
-                    return Err(self.pipeline.wrong(pass.line, what).help("Declare it with mips = true"));
-                }
-                graph.mips(image);
+                let name = source().image;
+                self.read(graph, pass, &source())?;
+                let Some(image) =
+                    self.own.get(&name).filter(|_| self.pipeline.images.get(&name).is_some_and(|of| of.mips))
+                else {
+                    let what = format!("pass {:?} makes levels of {name:?}, which has only one", pass.name);
+                    return Err(self
+                        .pipeline
+                        .wrong(pass.line, what)
+                        .help("Declare it: [images.NAME] with mips = true"));
+                };
+                graph.mips(*image);
+                self.levels.insert(name);
             }
             Work::Blur(radius) => {
                 let image = self.read(graph, pass, &source())?;
@@ -188,22 +201,27 @@ impl Images<'_> {
                     Number::Fixed(radius) => *radius,
                     Number::Constant(name) => moment.all.get(name).and_then(Value::as_f64).unwrap_or(1.0),
                 };
-                let blurred = blur::gaussian(graph, image, (radius as u32).clamp(1, 256));
-                if self.pipeline.images.contains_key(&pass.out[0]) {
-                    let out = self.written(graph, pass, &pass.out[0])?;
+                if graph.desc(image).format.class() != Class::Float {
+                    let what = format!("pass {:?} blurs {:?}, whose values are no floats", pass.name, source().image);
+                    return Err(self.pipeline.wrong(pass.line, what));
+                }
+                let blurred = graph.scope(pass.name.clone(), |graph| {
+                    blur::gaussian(graph, image.mip(0), (radius as u32).clamp(1, 256))
+                });
+                let name = &pass.out[0];
+                if name == PICTURE || self.pipeline.images.contains_key(name) {
+                    let out = self.written(graph, pass, name)?;
                     graph.blit(blurred, out);
-                    self.done(&pass.out[0], out);
+                    self.done(name, out);
                 } else {
-                    self.done(&pass.out[0], blurred);
-                    if pass.out[0] != PICTURE {
-                        self.own.insert(pass.out[0].clone(), blurred);
-                    }
+                    self.own.insert(name.clone(), blurred);
+                    self.written.insert(name.clone());
                 }
             }
             Work::Scale => {
                 let image = self.read(graph, pass, &source())?;
                 let out = self.written(graph, pass, &pass.out[0])?;
-                graph.blit(image, out).named(pass.name.clone());
+                graph.blit(image.mip(0), out).named(pass.name.clone());
                 self.done(&pass.out[0], out);
             }
         }
@@ -216,13 +234,28 @@ impl Images<'_> {
             out.push(self.written(graph, pass, name)?);
         }
         let size = out.first().map_or(Extent::square(1), |image| graph.extent(*image));
+        if let Some(at) = out.iter().position(|image| graph.extent(*image) != size) {
+            let what = format!(
+                "pass {:?} writes {:?} and {:?}, which have different sizes",
+                pass.name, pass.out[0], pass.out[at]
+            );
+            return Err(self.pipeline.wrong(pass.line, what));
+        }
         let mut storage = out.iter();
         let mut resources = Vec::new();
         for binding in program.shader.bindings {
             resources.push(match binding.kind {
                 BindingKind::Uniform { .. } => Bind::Uniform(moment.view.into()),
                 BindingKind::Storage(_) => match storage.next() {
-                    Some(image) => Bind::Image(*image),
+                    Some(image) => {
+                        let named = Format::from_spirv(binding.format);
+                        let found = graph.desc(*image).format;
+                        if named.is_some_and(|named| named != found) {
+                            let what = format!("pass {:?}: the shader writes {} as {named:?}, but the image is {found:?}", pass.name, binding.name);
+                            return Err(self.pipeline.wrong(pass.line, what));
+                        }
+                        Bind::Image(*image)
+                    }
                     None => return Err(self.pipeline.wrong(pass.line, format!("no out for {}", binding.name))),
                 },
                 _ => {
@@ -233,11 +266,20 @@ impl Images<'_> {
                         let help = "Write another image, or declare it with history = true and read the one of the frame before, NAME.previous";
                         return Err(self.pipeline.wrong(pass.line, what).help(help));
                     }
+                    let of = match graph.desc(image).format.class() {
+                        Class::Uint => Texel::Uint,
+                        Class::Sint => Texel::Sint,
+                        _ => Texel::Float,
+                    };
+                    if of != binding.texel {
+                        let what = format!("pass {:?}: {} reads {:?} by a sampler of {:?}, but its values are {of:?}", pass.name, binding.name, source.image, binding.texel);
+                        return Err(self.pipeline.wrong(pass.line, what).help("sampler2D is for floats, usampler2D and isampler2D for integers"));
+                    }
                     Bind::Image(image)
                 }
             });
         }
-        let push = push(graph, pass, program, moment, size);
+        let push = push(graph, pass, program, moment, size)?;
         let spec = program.spec.clone();
         let name = pass.name.clone();
         if program.shader.stages.last().is_some_and(|code| code.stage == Stage::Fragment) {
@@ -278,12 +320,15 @@ fn extent(image: &OwnImage, whole: Extent) -> Extent {
 }
 
 /// The bytes of the push constants of a pass.
-fn push(graph: &Graph, pass: &Pass, program: &Program, moment: &Moment<'_>, size: Extent) -> Vec<u8> {
+fn push(graph: &Graph, pass: &Pass, program: &Program, moment: &Moment<'_>, size: Extent) -> Result<Vec<u8>> {
     let mut bytes = vec![0u8; program.shader.push_size as usize];
     for member in program.push.iter().flat_map(|push| &push.members) {
         let value = pass.values.get(&member.name).or_else(|| moment.all.get(&member.name));
         let words = match value {
-            Some(value) => bits(&member.ty, value).unwrap_or_default(),
+            Some(value) => bits(&member.ty, value).ok_or_else(|| {
+                let what = format!("{value} does not fit into the push constant of pass {:?}", pass.name);
+                Error::usage(what).at(&member.name)
+            })?,
             None => match member.name.as_str() {
                 "size" => vec![(size.width as f32).to_bits(), (size.height as f32).to_bits()],
                 "seconds" => vec![(moment.seconds as f32).to_bits()],
@@ -298,5 +343,5 @@ fn push(graph: &Graph, pass: &Pass, program: &Program, moment: &Moment<'_>, size
             }
         }
     }
-    bytes
+    Ok(bytes)
 }

@@ -84,7 +84,6 @@ struct OwnImage {
     size: Size,
     mips: bool,
     history: bool,
-    line: usize,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -171,6 +170,19 @@ impl Pipeline {
         &self.digest
     }
 
+    /// The digest that the pipeline of a file would have. Nothing is compiled.
+    ///
+    /// # Errors
+    /// `Input` if a file cannot be read.
+    pub fn digest_of(path: &Path) -> Result<String> {
+        file::digest(path)
+    }
+
+    /// The files that a pipeline is made of, as far as its texts name them; also with mistakes in it, and also those that are not there.
+    pub fn files_of(path: &Path) -> Vec<PathBuf> {
+        file::gathered(path).map_or_else(|_| vec![path.to_owned()], |all| all.into_keys().collect())
+    }
+
     /// The defaults of all constants.
     pub fn defaults(&self) -> Values {
         self.constants.iter().map(|constant| (constant.name.clone(), constant.default.clone())).collect()
@@ -249,6 +261,7 @@ impl Constant {
     fn number(&self, value: &Value) -> Result<()> {
         let [least, most] = self.range;
         let inside = |n: f64| least.is_none_or(|least| n >= least) && most.is_none_or(|most| n <= most);
+        let whole = !(self.default.is_f64() || self.default.is_array());
         let fits = |n: f64| {
             n.abs() <= f64::from(f32::MAX)
                 && (self.default.is_f64() || self.default.is_array() || i32::try_from(n as i64).is_ok())
@@ -257,6 +270,7 @@ impl Constant {
             return Ok(());
         }
         let allowed = match (least, most) {
+            (None, None) if whole => "whole numbers of 32 bits".to_owned(),
             (None, None) => "numbers".to_owned(),
             (Some(least), None) => format!("numbers from {least}"),
             (None, Some(most)) => format!("numbers up to {most}"),

@@ -1,15 +1,17 @@
 //! Shaders of pipelines: compiled from GLSL at run time, their interfaces read from the SPIR-V.
 
 use std::{
-    cell::RefCell,
-    collections::{BTreeMap, BTreeSet},
-    path::{Component, Path, PathBuf},
+    collections::BTreeMap,
+    path::{Component, Path},
     sync::{Mutex, PoisonError},
 };
 
 use serde_json::Value;
 
-use super::{Constant, Source, Values, file};
+use super::{
+    Constant, Source, Values,
+    file::{self, Texts},
+};
 use crate::{
     Error, Result,
     shader::{
@@ -39,12 +41,13 @@ pub(super) struct Program {
 /// Shaders that were compiled, by the digest of their code. They stay for the whole program, because pipelines of devices refer to them.
 static KNOWN: Mutex<BTreeMap<[u8; 32], &'static Shader>> = Mutex::new(BTreeMap::new());
 
-/// Compiles `folder/file`. Also returns the files that were read.
-pub(super) fn compile(
-    folder: &Path,
-    file: &str,
-    wrong: &dyn Fn(String) -> Error,
-) -> Result<(Program, BTreeSet<PathBuf>)> {
+/// Whether the engine has an include of this name.
+pub(super) fn is_of_engine(name: &str) -> bool {
+    LIBRARY.iter().any(|(known, _)| *known == name)
+}
+
+/// Compiles `folder/file`.
+pub(super) fn compile(folder: &Path, file: &str, texts: &Texts, wrong: &dyn Fn(String) -> Error) -> Result<Program> {
     let (kind, stage) = match Path::new(file).extension().and_then(|extension| extension.to_str()) {
         Some("frag") => (shaderc::ShaderKind::Fragment, Stage::Fragment),
         Some("comp") => (shaderc::ShaderKind::Compute, Stage::Compute),
@@ -54,11 +57,9 @@ pub(super) fn compile(
         return Err(wrong(format!("shader {file:?} must lie in the folder of the pipeline")));
     }
     let path = folder.join(file);
-    let source = file::text_of(&path)
-        .map_err(|error| if path.exists() { error } else { wrong(format!("shader {file:?} does not exist")) })?;
-    let files = RefCell::new(BTreeSet::from([path.clone()]));
+    let Some(source) = texts.get(&path) else { return Err(wrong(format!("shader {file:?} does not exist"))) };
     let include =
-        |name: &str, _: shaderc::IncludeType, from: &str, depth: usize| included(folder, name, from, depth, &files);
+        |name: &str, _: shaderc::IncludeType, from: &str, depth: usize| included(folder, name, from, depth, texts);
     let failed = |text: String| {
         // The compiler names files as they were given to it: `path:line: error: …`.
         let lines: Vec<&str> =
@@ -75,14 +76,14 @@ pub(super) fn compile(
             options.set_generate_debug_info();
         }
         options.set_include_callback(include);
-        compiler.compile_into_spirv(&headed(&source), kind, &path.display().to_string(), "main", Some(&options))
+        compiler.compile_into_spirv(&headed(source), kind, &path.display().to_string(), "main", Some(&options))
     };
     let raw = run(false).map_err(|error| failed(message(&error)))?;
     let code = run(true).map_err(|error| failed(message(&error)))?.as_binary_u8().to_vec();
     let interface = reflect::reflect(raw.as_binary()).map_err(&failed)?;
     let shader = shader(file, stage, code, &interface).map_err(failed)?;
     let spec = interface.spec.iter().map(|spec| spec.default).collect();
-    Ok((Program { shader, push: interface.push, spec }, files.into_inner()))
+    Ok(Program { shader, push: interface.push, spec })
 }
 
 fn message(error: &shaderc::Error) -> String {
@@ -94,7 +95,7 @@ fn message(error: &shaderc::Error) -> String {
 
 /// The source with the lines that all shaders begin with, unless it has its own. Lines keep their numbers.
 fn headed(source: &str) -> String {
-    if source.contains("#version") {
+    if source.lines().any(|line| line.trim_start().starts_with("#version")) {
         return source.to_owned();
     }
     let head = "#version 460\n#extension GL_EXT_scalar_block_layout : require\n#extension GL_GOOGLE_include_directive : require\n#line 1\n";
@@ -107,7 +108,7 @@ fn included(
     name: &str,
     from: &str,
     depth: usize,
-    files: &RefCell<BTreeSet<PathBuf>>,
+    texts: &Texts,
 ) -> std::result::Result<shaderc::ResolvedInclude, String> {
     if depth > DEEPEST {
         return Err(format!("#include \"{name}\": includes are nested over {DEEPEST} deep; a cycle?"));
@@ -117,10 +118,8 @@ fn included(
     }
     let of_engine = |name: &str| LIBRARY.iter().find(|(known, _)| *known == name);
     let beside = folder.join(name);
-    if beside.is_file() && !from.starts_with("lib/") {
-        let content = file::text_of(&beside).map_err(|error| error.to_string())?;
-        files.borrow_mut().insert(beside.clone());
-        return Ok(shaderc::ResolvedInclude { resolved_name: beside.display().to_string(), content });
+    if let Some(content) = texts.get(&beside).filter(|_| !is_of_engine(from)) {
+        return Ok(shaderc::ResolvedInclude { resolved_name: beside.display().to_string(), content: content.clone() });
     }
     match of_engine(name) {
         Some((known, text)) => {
@@ -147,9 +146,15 @@ fn shader(
     code: Vec<u8>,
     interface: &Interface,
 ) -> std::result::Result<&'static Shader, String> {
-    let push_size = interface.push.as_ref().map_or(0, |push| reflect::struct_size(push, &interface.structs));
+    let members = interface.push.iter().flat_map(|push| &push.members);
+    // Offsets need not ascend.
+    let end = |member: &reflect::Member| u64::from(member.offset) + bytes_of(&member.ty);
+    let push_size = u32::try_from(members.map(end).max().unwrap_or(0)).unwrap_or(u32::MAX);
     if push_size > MOST_PUSH {
-        return Err(format!("{push_size} bytes of push constants; {MOST_PUSH} is the most that every device has"));
+        let allowed = "numbers and vectors within the first";
+        return Err(format!(
+            "push constants up to byte {push_size}, or of another type; allowed are {allowed} {MOST_PUSH} bytes"
+        ));
     }
     if stage == Stage::Fragment && interface.color_outputs == 0 {
         return Err("it writes no colour: layout(location = 0) out vec4 NAME".into());
@@ -184,6 +189,15 @@ fn shader(
     Ok(shader)
 }
 
+/// Bytes of a push constant; more than any device has for types that constants do not have.
+fn bytes_of(ty: &Type) -> u64 {
+    match ty {
+        Type::F32 | Type::I32 | Type::U32 => 4,
+        Type::Vector(_, count) => 4 * u64::from(*count),
+        _ => u64::from(MOST_PUSH) + 1,
+    }
+}
+
 /// The vertex stage that covers the target: that of the engine's own passes.
 fn fullscreen() -> std::result::Result<StageCode, String> {
     let stages = <crate::shaders::passes::skybox::Args as crate::graph::Args>::SHADER.stages;
@@ -204,6 +218,14 @@ fn binding(found: &reflect::Binding, stage: Stage, interface: &Interface) -> std
     let name = &found.name;
     let kind = match &found.kind {
         Kind::Sampled(of) if *of == "D2" || *of == "D2Array" => BindingKind::Sampled(dim(of)),
+        Kind::Storage("D2") if stage != Stage::Compute => {
+            return Err(format!("{name} is a storage image, which only a .comp may write"));
+        }
+        Kind::Storage("D2") if found.access != reflect::Access::Write => {
+            return Err(format!(
+                "{name} is read: a pass writes its storage images alone. Declare it writeonly, and read through a sampler2D"
+            ));
+        }
         Kind::Storage("D2") => BindingKind::Storage(Dim::D2),
         Kind::Uniform(of) if of == "View" => {
             let size = interface
@@ -257,10 +279,11 @@ impl Program {
         constants: &[Constant],
         wrong: &dyn Fn(String) -> Error,
     ) -> Result<()> {
-        let bindings: Vec<&str> = self.shader.bindings.iter().map(|binding| binding.name).collect();
+        let sampled = self.shader.bindings.iter().filter(|binding| matches!(binding.kind, BindingKind::Sampled(_)));
+        let bindings: Vec<&str> = sampled.map(|binding| binding.name).collect();
         if let Some(name) = bind.keys().find(|name| !bindings.contains(&name.as_str())) {
             return Err(wrong(format!(
-                "bind.{name}: the shader has no such binding; it has {}",
+                "bind.{name}: the shader has no such sampler; it has {}",
                 file::listed(&bindings)
             )));
         }
@@ -268,6 +291,11 @@ impl Program {
             Some(Stage::Fragment) => self.shader.color_outputs as usize,
             _ => self.storage().count(),
         };
+        if written == 0 {
+            return Err(wrong(
+                "the shader writes no image: layout(binding = N, FORMAT) uniform writeonly image2D NAME".into(),
+            ));
+        }
         if out.len() != written {
             let what = format!("out names {} images; the shader writes {written}", out.len());
             return Err(wrong(what));
@@ -346,8 +374,9 @@ pub(super) fn bits(ty: &Type, value: &Value) -> Option<Vec<u32>> {
         (Type::U32, Value::Number(n)) => Some(vec![u32::try_from(n.as_i64()?).ok()?]),
         (Type::U32, Value::Bool(on)) => Some(vec![u32::from(*on)]),
         (Type::Vector(of, count), Value::Array(list)) if list.len() == *count as usize => {
-            let whole = |value: &Value| {
-                if **of == Type::F32 { value.clone() } else { Value::from(value.as_f64().unwrap_or_default() as i64) }
+            let whole = |value: &Value| match value.as_f64() {
+                Some(n) if **of != Type::F32 && n.fract() == 0.0 => Value::from(n as i64),
+                _ => value.clone(),
             };
             list.iter().map(|value| bits(of, &whole(value)).map(|words| words[0])).collect()
         }

@@ -245,11 +245,11 @@ fn images_that_are_not_there_are_named() {
         ),
         (
             "[[pass]]\nshader = \"a.frag\"\nbind = { picture = \"x\" }\nout = \"picture\"\n",
-            &["line 9", "no pass before it"],
+            &["line 9", "no pass that runs writes it"],
         ),
         (
             "[[pass]]\nshader = \"a.frag\"\nout = \"x\"\nwhen = \"on\"\n[[pass]]\nshader = \"a.frag\"\nbind = { picture = \"x\" }\nout = \"picture\"\n",
-            &["line 13", "no pass before it that runs"],
+            &["line 13", "no pass that runs writes it"],
         ),
         (
             "[[pass]]\nshader = \"a.frag\"\nout = \"x\"\n[[pass]]\nshader = \"a.frag\"\nbind = { picture = \"x\" }\nout = \"x\"\n",
@@ -257,11 +257,11 @@ fn images_that_are_not_there_are_named() {
         ),
         (
             "[[pass]]\nshader = \"a.frag\"\nbind = { picture = { image = \"picture\", mip = 3 } }\nout = \"picture\"\n",
-            &["line 9", "level 3", "1 levels"],
+            &["line 9", "level 3", "levels 0 to 0"],
         ),
         (
             "[[pass]]\nshader = \"a.frag\"\nout = \"x\"\n[[pass]]\nstage = \"mips\"\nimage = \"x\"\n",
-            &["line 12", "one level", "mips = true"],
+            &["line 12", "only one", "mips = true"],
         ),
     ] {
         let folder = written(&[("p.toml", &format!("{own}{rest}")), ("a.frag", TWICE)]);

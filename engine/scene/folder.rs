@@ -1,4 +1,4 @@
-//! Which files a scene may read: those in its own folder and below, and no others.
+//! Which files a scene may read: those in its own folder and below, or in its archive, and no others.
 //!
 //! A scene file is data from elsewhere. It names its buffers and textures by relative reference, and a reference that
 //! leaves the folder (`../../etc/passwd`, `/dev/zero`, `file:///…`, a symbolic link) is refused instead of followed.
@@ -8,7 +8,10 @@ use std::{
     fs::File,
     io::Read,
     path::{Path, PathBuf},
+    rc::Rc,
 };
+
+use super::archive::Archive;
 
 const REMEDY: &str = "A scene may only refer to files in its own folder or below it; put the file there";
 
@@ -16,6 +19,8 @@ const REMEDY: &str = "A scene may only refer to files in its own folder or below
 #[derive(Clone, Debug)]
 pub struct Folder {
     root: PathBuf,
+    /// The archive in which the folder lies.
+    archive: Option<Rc<Archive>>,
 }
 
 impl Folder {
@@ -28,7 +33,20 @@ impl Folder {
         let root = parent
             .canonicalize()
             .map_err(|error| Error::input("the folder cannot be opened").caused_by(error).in_file(parent))?;
-        Ok(Self { root })
+        Ok(Self { root, archive: None })
+    }
+
+    /// The folder of a scene file in an archive.
+    pub fn in_archive(archive: Rc<Archive>, scene_file: &Path) -> Self {
+        Self { root: scene_file.parent().unwrap_or(Path::new("")).to_owned(), archive: Some(archive) }
+    }
+
+    /// Reads a file that this folder has resolved, at most `limit` bytes.
+    pub fn read(&self, path: &Path, limit: u64) -> Result<Vec<u8>> {
+        match &self.archive {
+            Some(archive) => archive.read(path, limit),
+            None => read_named(path, limit),
+        }
     }
 
     /// The real path of a file named by a URI reference (percent-encoded, as in glTF).
@@ -43,6 +61,12 @@ impl Folder {
 
     fn resolve(&self, relative: &Path) -> Result<PathBuf> {
         let joined = self.root.join(relative);
+        if let Some(archive) = &self.archive {
+            return match archive.has(&joined) {
+                true => Ok(joined),
+                false => Err(Error::input(format!("{relative:?} is not in the archive"))),
+            };
+        }
         let real = joined
             .canonicalize()
             .map_err(|error| Error::input(format!("{relative:?} cannot be opened")).caused_by(error))?;
@@ -92,7 +116,7 @@ pub fn read_head(path: &Path, length: u64) -> Result<Vec<u8>> {
 }
 
 /// As [`read_file`], for a file that a scene names.
-pub fn read_named(path: &Path, limit: u64) -> Result<Vec<u8>> {
+fn read_named(path: &Path, limit: u64) -> Result<Vec<u8>> {
     let name = path.file_name().unwrap_or_default();
     read_file(path, &format!("{name:?}"), limit)
 }
@@ -117,7 +141,7 @@ pub fn path_of_uri(uri: &str) -> Result<PathBuf> {
 }
 
 /// `text` as a path of normal components only.
-fn checked_path(text: &str) -> Result<PathBuf> {
+pub fn checked_path(text: &str) -> Result<PathBuf> {
     let refuse = |why: &str| Err(Error::input(format!("file name {:?} {why}", shorten(text))).help(REMEDY));
     if text.is_empty() {
         return refuse("is empty");

@@ -1,8 +1,8 @@
 //! From a file name to a scene.
 
-use super::{Limits, Scene, c_arrays, folder, gltf, obj};
+use super::{Limits, Scene, archive, c_arrays, folder, gltf, obj};
 use crate::{Error, Result};
-use std::path::Path;
+use std::{path::Path, rc::Rc};
 
 /// How scene files are read.
 #[derive(Clone, Debug, Default)]
@@ -14,8 +14,8 @@ pub struct LoadOptions {
     pub unit: Option<f32>,
 }
 
-/// Reads a scene file: glTF 2.0 (`.gltf`, `.glb`), OBJ (`.obj`) or two C arrays ([`c_arrays`]). The content decides,
-/// and where it leaves the format open, the extension.
+/// Reads a scene file: glTF 2.0 (`.gltf`, `.glb`), OBJ (`.obj`), two C arrays ([`c_arrays`]), or a `.zip` with one of them. The content
+/// decides, and where it leaves the format open, the extension.
 ///
 /// Only files in the scene's own folder and below it are read. Every index of the result is valid and every number
 /// finite ([`Scene::validate`]). What could not be read as the file means it stands in [`Scene::notes`].
@@ -39,16 +39,42 @@ fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
         }));
     }
     let head = folder::read_head(path, 4096)?;
+    if head.starts_with(archive::MAGIC) {
+        return read_packed(path, options);
+    }
     let format = format(path, &head)?;
     // Text is parsed as a whole in memory; the binary format may be larger.
     let limits = &options.limits;
     let limit = if gltf::is_glb(&head) { limits.max_file } else { limits.max_file.min(limits.max_alloc) };
     let bytes = folder::read_file(path, "the file", limit)?;
+    parsed(path, &folder::Folder::of(path)?, (format, &bytes), options)
+}
+
+/// Reads the scene in an archive.
+fn read_packed(path: &Path, options: &LoadOptions) -> Result<Scene> {
+    let archive = Rc::new(archive::Archive::open(path)?);
+    let inside = archive.scene(|path| extension(path).is_some())?;
+    let limits = &options.limits;
+    let bytes = archive.read(&inside, limits.max_file.min(limits.max_alloc))?;
+    let format = format(&inside, &bytes[..bytes.len().min(4096)])?;
+    let folder = folder::Folder::in_archive(archive, &inside);
+    parsed(&inside, &folder, (format, &bytes), options).map_err(|error| match error.file() {
+        Some(_) => error,
+        None => error.at(inside.display().to_string()),
+    })
+}
+
+fn parsed(
+    path: &Path,
+    folder: &folder::Folder,
+    (format, bytes): (Format, &[u8]),
+    options: &LoadOptions,
+) -> Result<Scene> {
     let scene = match format {
-        Format::Gltf => gltf::read(path, &bytes, &options.limits)?,
-        Format::Obj => obj::read(path, &bytes, options.unit.unwrap_or(1.0), &options.limits)?,
+        Format::Gltf => gltf::read(path, folder, bytes, &options.limits)?,
+        Format::Obj => obj::read(path, folder, bytes, options.unit.unwrap_or(1.0), &options.limits)?,
         Format::Arrays => {
-            c_arrays::read(&bytes, options.unit.unwrap_or_else(|| c_arrays::usual_unit(&bytes)), &options.limits)?
+            c_arrays::read(bytes, options.unit.unwrap_or_else(|| c_arrays::usual_unit(bytes)), &options.limits)?
         }
     };
     scene.validate()?;
@@ -84,7 +110,9 @@ fn format(path: &Path, head: &[u8]) -> Result<Format> {
     if c_arrays::recognise(head) {
         return Ok(Format::Arrays);
     }
-    let none = |what: &str| Err(Error::input(what).help("Scenes are .gltf and .glb (glTF 2.0) and .obj files"));
+    let none = |what: &str| {
+        Err(Error::input(what).help("Scenes are .gltf and .glb (glTF 2.0) and .obj files, also in a .zip"))
+    };
     let wide = head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff");
     match extension(path) {
         None => none("is no scene file that can be read"),

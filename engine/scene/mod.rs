@@ -4,6 +4,7 @@
 
 pub mod added;
 pub mod animate;
+mod archive;
 mod budget;
 pub mod bvh;
 pub mod c_arrays;

@@ -1,4 +1,4 @@
-//! Images for materials: PNG, JPEG, WebP and KTX2 (plain, block compressed, Basis Universal) to 8-bit RGBA.
+//! Images for materials: PNG, JPEG, WebP, BMP, TGA, DDS and KTX2 (plain, block compressed, Basis Universal) to 8-bit RGBA.
 //!
 //! Only the largest level is kept: mip levels are made on the device, where the use of the texture (sRGB or linear) is
 //! known. Colour profiles, gamma chunks and EXIF orientation are ignored, as glTF 2.0 asks (section 3.9.4).
@@ -6,6 +6,7 @@
 mod basis;
 mod bc7;
 mod blocks;
+mod dds;
 mod ktx;
 
 use std::{
@@ -32,11 +33,14 @@ pub fn decode(bytes: &[u8], mime_hint: Option<&str>, limits: &Limits) -> Result<
         Some(Format::Png) => guarded("PNG", || decode_plain(bytes, ImageFormat::Png, "PNG", limits)),
         Some(Format::Jpeg) => guarded("JPEG", || decode_plain(bytes, ImageFormat::Jpeg, "JPEG", limits)),
         Some(Format::WebP) => guarded("WebP", || decode_plain(bytes, ImageFormat::WebP, "WebP", limits)),
+        Some(Format::Bmp) => guarded("BMP", || decode_plain(bytes, ImageFormat::Bmp, "BMP", limits)),
+        Some(Format::Tga) => guarded("TGA", || decode_plain(bytes, ImageFormat::Tga, "TGA", limits)),
+        Some(Format::Dds) => guarded("DDS", || dds::decode(bytes, limits)),
         None => {
             let start: Vec<String> = bytes.iter().take(4).map(|byte| format!("{byte:02x}")).collect();
             let said = mime_hint.map(|mime| format!(", said to be {mime}")).unwrap_or_default();
             let what = format!("{} bytes that start with [{}]{said}", bytes.len(), start.join(" "));
-            Err(Error::input(what).help("Textures are PNG, JPEG, WebP or KTX2"))
+            Err(Error::input(what).help("Textures are PNG, JPEG, WebP, BMP, TGA, DDS or KTX2"))
         }
     }
 }
@@ -75,6 +79,9 @@ enum Format {
     Png,
     Jpeg,
     WebP,
+    Bmp,
+    Tga,
+    Dds,
     Ktx2,
 }
 
@@ -85,6 +92,15 @@ impl Format {
             [0xff, 0xd8, 0xff, ..] => Some(Self::Jpeg),
             [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Some(Self::WebP),
             _ if bytes.starts_with(&ktx2::MAGIC) => Some(Self::Ktx2),
+            _ if bytes.starts_with(dds::MAGIC) => Some(Self::Dds),
+            [b'B', b'M', ..] => Some(Self::Bmp),
+            // TGA has no magic number: a colour map or none, a type, no origin of the map without a map, a usual depth.
+            [_, map @ 0..=1, 1 | 2 | 3 | 9 | 10 | 11, a, b, ..]
+                if bytes.get(16).is_some_and(|depth| [8, 15, 16, 24, 32].contains(depth))
+                    && (*map == 1 || (*a, *b) == (0, 0)) =>
+            {
+                Some(Self::Tga)
+            }
             _ => None,
         }
     }

@@ -35,6 +35,18 @@ impl SettingsArgs {
     /// # Errors
     /// `Usage` or `Input`, naming the key.
     pub fn effective<S: Serialize + DeserializeOwned>(&self, base: &S) -> Result<S> {
+        if self.effects.is_some() {
+            let what = "passes in text follow a technique of `lucerna render`, `run` and `view`; this command has none";
+            return Err(Error::usage(what).at("--effects"));
+        }
+        self.with_effects(base)
+    }
+
+    /// As [`Self::effective`], for settings with passes in text.
+    ///
+    /// # Errors
+    /// As [`Self::effective`].
+    pub fn with_effects<S: Serialize + DeserializeOwned>(&self, base: &S) -> Result<S> {
         effective(base, self.file.as_deref(), &self.define)
     }
 

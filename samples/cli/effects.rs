@@ -67,12 +67,12 @@ pub fn pipeline(settings: &Settings) -> Result<Arc<Pipeline>> {
         return Ok(known);
     }
     let file = Path::new(&settings.pipeline);
-    let found = read(file)?;
-    if found.digest() != settings.digest {
+    // A picture of others names files. They are compiled only if they are those by which it was made.
+    if Pipeline::digest_of(file)? != settings.digest {
         let what = "the pipeline or one of its shaders has changed since the picture was made";
         return Err(Error::input(what).in_file(file).help("Take the files of that time, or render the picture anew"));
     }
-    Ok(found)
+    read(file)
 }
 
 /// The defaults of the pipeline that settings of a picture name; `None` if they name none.

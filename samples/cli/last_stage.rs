@@ -48,7 +48,19 @@ impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
             check(&settings.technique)?;
             settings.tonemap.as_ref().map_or(Ok(()), |tonemap| tonemap.validate().map_err(|error| error.at(GROUP)))
         };
+        for key in ["effects.pipeline", "effects.digest"] {
+            if args.define.iter().any(|define| define.split('=').next().is_some_and(|name| name.trim() == key)) {
+                return Err(Error::usage("is decided by --effects FILE.toml").at(key));
+            }
+        }
         let settings = Self::unchecked(args, base, paper)?;
+        if let (Some(file), Err(error)) = (&args.effects, checked(&settings)) {
+            let alone = SettingsArgs { effects: Some(file.clone()), ..SettingsArgs::default() };
+            let of_pipeline = Self::unchecked(&alone, base, paper).and_then(|settings| checked(&settings));
+            if of_pipeline.is_err_and(|own| own.to_string() == error.to_string()) {
+                return Err(error.of_kind(ErrorKind::Input).at("settings").in_file(file));
+            }
+        }
         args.blamed(checked(&settings), || checked(&Self::unchecked(&args.file_alone(), base, paper)?))?;
         Ok(settings)
     }
@@ -95,8 +107,11 @@ impl<S: Serialize + DeserializeOwned + Clone> Staged<S> {
                 Some(pipeline) => error.of_kind(ErrorKind::Input).at("settings").in_file(&pipeline.path),
                 None => error,
             })?;
-            let made = args.effective(&base)?;
-            if let (Some(pipeline), Some(effects)) = (&pipeline, &made.effects) {
+            let mut made = args.with_effects(&base)?;
+            if let (Some(pipeline), Some(effects)) = (&pipeline, &mut made.effects) {
+                // A settings file may be of another time.
+                let of = effects::Settings::of(pipeline);
+                (effects.pipeline, effects.digest) = (of.pipeline, of.digest);
                 pipeline.check(&effects.values).map_err(|error| error.at(effects::GROUP))?;
             }
             Ok(made)

@@ -13,6 +13,7 @@ use crate::{
     changed::Change,
     config::SettingsArgs,
     default_light::DefaultLight,
+    effects,
     ground::{GroundArgs, GroundOptions},
     lamps::Lamp,
     lights::{Point, Sun},
@@ -314,6 +315,8 @@ impl Record {
                 .filter_map(Added::file)
                 .map(|path| format!("{path:?}, and the files in its folder that it refers to")),
         );
+        let pipeline = self.settings.get(effects::GROUP).and_then(|group| group.get("pipeline")?.as_str());
+        list.extend(pipeline.map(|path| format!("{path:?}, and the shaders in its folder that it refers to")));
         let environment = self.environment.as_deref().map(Path::new);
         list.extend(self.bake.iter().map(|bake| format!("{:?}", bake.file)));
         list.extend(environment.filter(|path| !source::is_built_in_environment(path)).map(|path| format!("{path:?}")));

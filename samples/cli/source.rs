@@ -20,7 +20,7 @@ use crate::{
 /// The options `SCENE`, `--builtin NAME`, `--unit`, `--add`, `--set`, and those of `--ground`.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct SceneArgs {
-    /// Scene file: .gltf, .glb or .obj
+    /// Scene file: .gltf, .glb or .obj, also inside a .zip
     #[arg(value_name = "SCENE")]
     pub scene: Option<PathBuf>,
 

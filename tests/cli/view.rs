@@ -332,8 +332,13 @@ fn passes_in_text_are_switched_by_keys_and_change_with_their_files() {
     // A constant with another default in the file.
     let toml = std::fs::read_to_string(here("sepia.toml")).unwrap();
     std::fs::write(here("sepia.toml"), toml.replace("default = true", "default = false")).unwrap();
+    viewer.shows("the new default", &plain);
+    // A value that was changed by hand stays.
+    viewer.desktop.hit(F1 + 10);
+    viewer.shows("brown tones by hand", &sepia);
+    std::fs::write(here("sepia.toml"), toml.replace("default = true", "default = false") + "\n# another text\n")
+        .unwrap();
     std::thread::sleep(Duration::from_secs(2));
-    // The value that was switched by hand stays.
     viewer.shows("brown tones stay", &sepia);
     viewer.close();
 }

@@ -8,11 +8,7 @@ use super::{
 };
 use crate::{
     Error, ErrorKind, Result,
-    scene::{
-        Limits,
-        budget::Budget,
-        folder::{self, Folder},
-    },
+    scene::{Limits, budget::Budget, folder::Folder},
 };
 use std::{
     cell::OnceCell,
@@ -98,8 +94,8 @@ impl<'a> Buffers<'a> {
                     let found = match self.files.entry(path.clone()) {
                         Entry::Occupied(entry) => entry.get().len(),
                         Entry::Vacant(entry) => {
-                            let bytes = folder::read_named(&path, self.max_alloc.min(*left))
-                                .map_err(|error| error.at("uri"))?;
+                            let bytes =
+                                folder.read(&path, self.max_alloc.min(*left)).map_err(|error| error.at("uri"))?;
                             *left -= bytes.len() as u64;
                             self.budget.read(bytes.len());
                             entry.insert(bytes).len()

@@ -210,7 +210,7 @@ impl Materials<'_> {
                     None => {
                         let path = self.folder.resolve_uri(uri).map_err(at)?;
                         let limit = self.limits.max_file.min(self.limits.max_alloc);
-                        let bytes = folder::read_named(&path, limit).map_err(at)?;
+                        let bytes = self.folder.read(&path, limit).map_err(at)?;
                         self.budget.read(bytes.len());
                         name = name.or_else(|| Some(path.file_name()?.to_string_lossy().into_owned()));
                         bytes.into()

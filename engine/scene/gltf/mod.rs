@@ -37,15 +37,14 @@ pub const SUPPORTED: &[&str] = &[
 ];
 
 /// Reads the scene in `bytes`, the content of the file `path`.
-pub(crate) fn read(path: &Path, bytes: &[u8], limits: &Limits) -> Result<Scene> {
+pub(crate) fn read(path: &Path, folder: &Folder, bytes: &[u8], limits: &Limits) -> Result<Scene> {
     let budget = Budget::new(limits);
     budget.read(bytes.len());
     let parts = container::split(bytes)?;
     let document = Document::parse(parts.json, limits)?;
     let mut notes = Notes::default();
     check_extensions(&document, &mut notes)?;
-    let folder = Folder::of(path)?;
-    let buffers = buffers::Buffers::read(&document, parts.bin, &folder, limits, &budget)?;
+    let buffers = buffers::Buffers::read(&document, parts.bin, folder, limits, &budget)?;
     let accessors = accessors::Accessors { document: &document, buffers: &buffers, budget: &budget };
     buffers.check_views()?;
     accessors.check_all()?;
@@ -58,7 +57,7 @@ pub(crate) fn read(path: &Path, bytes: &[u8], limits: &Limits) -> Result<Scene> 
     let mut reader = materials::Materials {
         document: &document,
         buffers: &buffers,
-        folder: &folder,
+        folder,
         limits,
         budget: &budget,
         notes: &mut notes,

@@ -4,10 +4,7 @@ use super::mtl::{Map, Mtl};
 use crate::{
     Error, Result,
     scene::{
-        AlphaMode, Limits, Material, Sampler, Texture, TextureRef, Wrap,
-        budget::Budget,
-        folder::{self, Folder},
-        notes::Notes,
+        AlphaMode, Limits, Material, Sampler, Texture, TextureRef, Wrap, budget::Budget, folder::Folder, notes::Notes,
         texture,
     },
 };
@@ -162,7 +159,7 @@ impl Textures<'_> {
     }
 
     fn read(&mut self, path: &Path, bumps: Option<f32>) -> Result<Texture> {
-        let bytes = folder::read_named(path, self.limits.max_file.min(self.limits.max_alloc))?;
+        let bytes = self.folder.read(path, self.limits.max_file.min(self.limits.max_alloc))?;
         self.budget.read(bytes.len());
         let limits = Limits { max_image_pixels: self.budget.texels_left(), ..self.limits.clone() };
         let decode = || -> Result<Texture> {

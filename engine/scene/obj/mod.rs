@@ -16,7 +16,7 @@ mod solid;
 use super::{
     Limits, Material, Mesh, Node, Primitive, Scene, Transform,
     budget::Budget,
-    folder::{self, Folder, shorten},
+    folder::{Folder, shorten},
     normals,
     notes::Notes,
     surface,
@@ -35,7 +35,7 @@ use std::{
 const CREASE: f32 = std::f32::consts::FRAC_PI_4;
 
 /// Reads the scene in `bytes`, the content of the file `path`, whose unit is `unit` metres.
-pub(crate) fn read(path: &Path, bytes: &[u8], unit: f32, limits: &Limits) -> Result<Scene> {
+pub(crate) fn read(path: &Path, folder: &Folder, bytes: &[u8], unit: f32, limits: &Limits) -> Result<Scene> {
     let budget = Budget::new(limits);
     budget.read(bytes.len());
     let text = decode_text(bytes);
@@ -47,8 +47,7 @@ pub(crate) fn read(path: &Path, bytes: &[u8], unit: f32, limits: &Limits) -> Res
     for (keyword, count) in &obj.skipped {
         notes.ignored(keyword.as_str(), format!("{count} elements are not drawn; only faces are"));
     }
-    let folder = Folder::of(path)?;
-    let (mut materials, textures) = read_materials(&obj, &folder, limits, &budget, &mut notes)?;
+    let (mut materials, textures) = read_materials(&obj, folder, limits, &budget, &mut notes)?;
     let mut meshes = read_meshes(&obj, &materials, &budget, &mut notes)?;
     surface::drop_unused_default(&mut materials, &meshes);
     solid::tell_apart(&mut meshes, &mut materials, &mut notes);
@@ -105,7 +104,7 @@ fn read_materials(
         if !read.insert(path.clone()) {
             continue;
         }
-        let bytes = folder::read_named(&path, limits.max_file.min(limits.max_alloc))?;
+        let bytes = folder.read(&path, limits.max_file.min(limits.max_alloc))?;
         budget.read(bytes.len());
         budget.take(bytes.len() as u64, 16)?;
         let library = mtl::parse(&decode_text(&bytes)).map_err(|error| error.in_file(&path))?;

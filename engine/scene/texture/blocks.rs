@@ -1,4 +1,4 @@
-//! Block-compressed texels: BC1, BC3, BC4, BC5, BC7 (Khronos Data Format Specification 1.3, sections 18 and 19).
+//! Block-compressed texels: BC1, BC2, BC3, BC4, BC5, BC7 (Khronos Data Format Specification 1.3, sections 18 and 19).
 
 /// Sixteen RGBA texels, row by row.
 pub(super) type Block = [[u8; 4]; 16];
@@ -6,6 +6,7 @@ pub(super) type Block = [[u8; 4]; 16];
 #[derive(Clone, Copy)]
 pub(super) enum Codec {
     Bc1 { alpha: bool },
+    Bc2,
     Bc3,
     Bc4,
     Bc5,
@@ -16,7 +17,7 @@ impl Codec {
     pub(super) fn block_bytes(self) -> usize {
         match self {
             Self::Bc1 { .. } | Self::Bc4 => 8,
-            Self::Bc3 | Self::Bc5 | Self::Bc7 => 16,
+            Self::Bc2 | Self::Bc3 | Self::Bc5 | Self::Bc7 => 16,
         }
     }
 
@@ -28,6 +29,13 @@ impl Codec {
         }
         match (self, bytes.as_chunks::<8>().0) {
             (Self::Bc1 { alpha }, [colour]) => block = bc1(*colour, true, alpha),
+            (Self::Bc2, [alpha, colour]) => {
+                block = bc1(*colour, false, false);
+                let alphas = u64::from_le_bytes(*alpha);
+                for (k, texel) in block.iter_mut().enumerate() {
+                    texel[3] = (alphas >> (4 * k) & 15) as u8 * 17;
+                }
+            }
             (Self::Bc3, [alpha, colour]) => {
                 block = bc1(*colour, false, false);
                 channel(*alpha, 3, &mut block);

@@ -105,13 +105,13 @@ fn level_bytes<'a>(
 }
 
 /// How texels lie in memory. Values are taken as they are stored, sRGB or not: what they mean is for their use to say.
-enum Layout {
+pub(super) enum Layout {
     Plain { channels: usize, kind: Kind, bgr: bool },
     Blocks(blocks::Codec),
 }
 
 #[derive(Clone, Copy)]
-enum Kind {
+pub(super) enum Kind {
     U8,
     U16,
     F16,
@@ -176,7 +176,7 @@ impl Layout {
         })
     }
 
-    fn bytes(&self, width: u32, height: u32) -> u64 {
+    pub(super) fn bytes(&self, width: u32, height: u32) -> u64 {
         match self {
             Self::Plain { channels, kind, .. } => {
                 u64::from(width) * u64::from(height) * (channels * kind.bytes()) as u64
@@ -187,7 +187,7 @@ impl Layout {
         }
     }
 
-    fn decode(&self, width: u32, height: u32, data: &[u8]) -> Result<Vec<[u8; 4]>> {
+    pub(super) fn decode(&self, width: u32, height: u32, data: &[u8]) -> Result<Vec<[u8; 4]>> {
         let mut rgba = texels(width as usize * height as usize)?;
         match self {
             Self::Plain { channels, kind, bgr } => {

@@ -70,7 +70,7 @@ fn what_is_no_image_is_named() {
     let error = decode(b"GIF89a", Some("image/gif"), &Limits::default()).unwrap_err().to_string();
     assert_eq!(
         error,
-        "6 bytes that start with [47 49 46 38], said to be image/gif. Textures are PNG, JPEG, WebP or KTX2."
+        "6 bytes that start with [47 49 46 38], said to be image/gif. Textures are PNG, JPEG, WebP, BMP, TGA, DDS or KTX2."
     );
     assert!(decode(b"", None, &Limits::default()).is_err());
 }

@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// Endings of scene files.
-const SCENES: [&str; 3] = ["gltf", "glb", "obj"];
+const SCENES: [&str; 4] = ["gltf", "glb", "obj", "zip"];
 
 /// The words of a command line as they are meant, program first: with `render` where a scene or an option stands in the place of a command.
 ///

@@ -125,8 +125,10 @@ pub struct Viewer {
     pub(super) writing: Option<Writing>,
     last_move: Option<Instant>,
     pub(super) watch: Option<Watch>,
-    /// Passes in text after A.
+    /// Passes in text.
     pub(super) followed: Option<Followed>,
+    /// Number of the side that they follow.
+    pub(super) followed_side: usize,
     times: bars::Times,
 }
 
@@ -194,6 +196,7 @@ impl Viewer {
             last_move: None,
             watch: None,
             followed: None,
+            followed_side: 0,
             times: bars::Times::default(),
             args: args.stage,
         };

@@ -175,7 +175,7 @@ impl Viewer {
     pub(super) fn open_file(&mut self, file: PathBuf) {
         let extension = file.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
         match extension.as_str() {
-            "gltf" | "glb" | "obj" => {
+            "gltf" | "glb" | "obj" | "zip" => {
                 let mut args = StageArgs { camera: None, eye: None, ..self.newest_args() };
                 (args.scene.scene, args.scene.builtin, args.scene.unit) = (Some(file), None, None);
                 args.put = Vec::new();
@@ -207,7 +207,7 @@ impl Viewer {
             _ => {
                 let error = Error::new(ErrorKind::Input, "is no scene, bake, environment or picture that the viewer opens")
                     .in_file(&file)
-                    .help("Scenes: .gltf, .glb, .obj; bakes: .day, .prt, .fiv; cameras and passes in text: .toml; environments: .hdr; pictures: .exr, .png, .pfm, .jpg");
+                    .help("Scenes: .gltf, .glb, .obj, .zip; bakes: .day, .prt, .fiv; cameras and passes in text: .toml; environments: .hdr; pictures: .exr, .png, .pfm, .jpg");
                 self.trouble = Some(error.to_string());
             }
         }

@@ -102,6 +102,7 @@ pub fn pressed(viewer: &mut Viewer, context: &Context) {
     }
     if hit(Key::Z) {
         viewer.sides.swap(0, 1);
+        viewer.followed_side = 1 - viewer.followed_side;
     }
     if hit(Key::X) {
         viewer.false_colour = !viewer.false_colour;
@@ -162,7 +163,7 @@ pub fn pressed(viewer: &mut Viewer, context: &Context) {
     {
         if hit(key) && !text::switched(viewer, name) {
             viewer.say(format!(
-                "{name} is for passes in text, and none has it: drop a pipeline on the window, or begin with --effects"
+                "{name} switches passes in text, but no pipeline has this key: drop one on the window, or begin with --effects"
             ));
         }
     }

@@ -149,7 +149,8 @@ impl ViewArgs {
     /// `Usage` for settings without a technique, unknown keys and wrong values.
     fn settings(&self, side: &Side) -> Result<Option<Value>> {
         let given = !self.settings.define.is_empty() || self.settings.file.is_some();
-        if !given && self.settings.effects.is_none() {
+        if !given {
+            // Passes in text come later.
             return Ok(None);
         }
         if self.technique.is_none() && given {

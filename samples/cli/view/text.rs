@@ -2,24 +2,34 @@
 
 use std::{collections::BTreeMap, path::Path, sync::Arc};
 
-use lucerna::effects::Pipeline;
+use lucerna::effects::{Pipeline, Values};
 use serde_json::Value;
 
 use super::{app::Viewer, session::Wake, side::Side, wanted::TRUTH, watch::Watch};
 use crate::{config, effects};
 
-/// A pipeline that follows side A.
+/// A pipeline that follows a side.
 pub(super) struct Followed {
     pub pipeline: Arc<Pipeline>,
     watches: Vec<Watch>,
     /// The mistake in the files as they are now.
     pub mistake: Option<String>,
+    /// The defaults of the version before this one.
+    before: Option<Values>,
 }
 
 impl Followed {
+    /// A pipeline that is read now.
+    fn read(path: &Path, wake: &Wake) -> lucerna::Result<Self> {
+        // From before the reading, so that no change is missed.
+        let watches = watched(path, wake);
+        Ok(Self { pipeline: effects::read(path)?, watches, mistake: None, before: None })
+    }
+
+    /// A pipeline that was read already.
     pub fn new(pipeline: Arc<Pipeline>, wake: &Wake) -> Self {
-        let watches = pipeline.files().iter().map(|file| Watch::start(file.clone(), wake.clone())).collect();
-        Self { pipeline, watches, mistake: None }
+        let watches = watched(&pipeline.path, wake);
+        Self { pipeline, watches, mistake: None, before: None }
     }
 
     /// Reads the files again if one of them has changed.
@@ -28,30 +38,63 @@ impl Followed {
         if self.watches.iter().filter(|watch| watch.changed()).count() == 0 {
             return;
         }
-        match effects::read(&self.pipeline.path) {
-            Ok(pipeline) => *self = Self::new(pipeline, wake),
-            Err(error) => self.mistake = Some(error.to_string()),
+        let path = self.pipeline.path.clone();
+        match Self::read(&path, wake) {
+            Ok(read) => *self = Self { before: Some(self.pipeline.defaults()), ..read },
+            Err(error) => {
+                self.mistake = Some(error.to_string());
+                // A faulty version may name other files.
+                self.watches = watched(&path, wake);
+            }
         }
     }
 
-    /// The settings of a side with this pipeline in them. Values that the pipeline still has stay as they are.
+    /// The settings of a side with this pipeline in them; `None`: they have it already. Values that were changed by hand stay as they are.
     fn in_settings(&self, settings: &Value) -> Option<Value> {
         let mut all = settings.as_object()?.clone();
-        let before = all.get(effects::GROUP);
-        if before.is_some_and(|group| group.get("digest").and_then(Value::as_str) == Some(self.pipeline.digest())) {
+        let before = all.get(effects::GROUP).filter(|group| !group.is_null());
+        let text = |key: &str| before.and_then(|group| group.get(key)).and_then(Value::as_str).unwrap_or_default();
+        if text("digest") == self.pipeline.digest() {
             return None;
         }
         let mut own = effects::Settings::of(&self.pipeline);
-        for (name, value) in &mut own.values {
-            if let Some(before) = before.and_then(|group| group.get(name))
-                && self.pipeline.check(&BTreeMap::from([(name.clone(), before.clone())])).is_ok()
+        let same = text("pipeline") == own.pipeline;
+        for (name, value) in own.values.iter_mut().filter(|_| same) {
+            let old = self.before.as_ref().and_then(|before| before.get(name));
+            if let Some(found) = before.and_then(|group| group.get(name)).filter(|found| Some(*found) != old)
+                && self.pipeline.check(&BTreeMap::from([(name.clone(), found.clone())])).is_ok()
             {
-                *value = before.clone();
+                *value = found.clone();
+            }
+        }
+        if !same {
+            // What the file says of the technique is where it begins.
+            let begins = serde_json::to_value(&self.pipeline.settings).unwrap_or_default();
+            for (group, values) in begins.as_object().into_iter().flatten() {
+                match (all.get_mut(group), values) {
+                    (Some(Value::Object(known)), Value::Object(values)) => {
+                        known.extend(
+                            values
+                                .iter()
+                                .filter(|(key, _)| known.contains_key(*key))
+                                .map(|(k, v)| (k.clone(), v.clone()))
+                                .collect::<Vec<_>>(),
+                        );
+                    }
+                    (None | Some(Value::Null), values) if group == "tonemap" => {
+                        all.insert(group.clone(), values.clone());
+                    }
+                    _ => (),
+                }
             }
         }
         all.insert(effects::GROUP.to_owned(), config::to_value(&own).ok()?);
         Some(Value::Object(all))
     }
+}
+
+fn watched(path: &Path, wake: &Wake) -> Vec<Watch> {
+    Pipeline::files_of(path).into_iter().map(|file| Watch::start(file, wake.clone())).collect()
 }
 
 /// Whether passes may follow what a side shows.
@@ -61,16 +104,18 @@ fn has_passes(side: &Side) -> bool {
 
 /// Lets the passes of a file follow side A.
 pub(super) fn follow(viewer: &mut Viewer, file: &Path) {
-    match effects::read(file) {
-        Ok(pipeline) => {
-            viewer.say(format!("{} follows A", pipeline.title));
-            viewer.followed = Some(Followed::new(pipeline, &viewer.wake));
+    match Followed::read(file, &viewer.wake) {
+        Ok(followed) => {
+            let path = if has_passes(&viewer.sides[0]) { "A" } else { "A as soon as it shows a technique" };
+            viewer.say(format!("{} follows {path}", followed.pipeline.title));
+            viewer.followed = Some(followed);
+            viewer.followed_side = 0;
         }
         Err(error) => viewer.trouble = Some(error.to_string()),
     }
 }
 
-/// Puts the passes into the settings of A, in each frame of the window: another technique begins without them.
+/// Puts the passes into the settings of their side, in each frame of the window: another technique begins without them.
 pub(super) fn keep(viewer: &mut Viewer) {
     let Some(followed) = &mut viewer.followed else { return };
     let before = followed.pipeline.digest().to_owned();
@@ -80,14 +125,14 @@ pub(super) fn keep(viewer: &mut Viewer) {
         viewer.message =
             Some((format!("{} was read again", followed.pipeline.path.display()), std::time::Instant::now()));
     }
-    let side = &mut viewer.sides[0];
+    let side = &mut viewer.sides[viewer.followed_side];
     if has_passes(side) {
-        // What is not at its default is marked by the panel.
-        let defaults = serde_json::json!({ effects::GROUP: config::to_value(&effects::Settings::of(&followed.pipeline)).unwrap_or_default() });
-        for (settings, only) in [(&mut side.settings, None), (&mut side.defaults, Some(defaults))] {
+        for (settings, is_default) in [(&mut side.settings, false), (&mut side.defaults, true)] {
             if let Some(mut found) = followed.in_settings(settings) {
-                if let Some(only) = only {
-                    found[effects::GROUP] = only[effects::GROUP].clone();
+                if is_default {
+                    // What is not at its default is marked by the panel.
+                    let own = effects::Settings::of(&followed.pipeline);
+                    found[effects::GROUP] = config::to_value(&own).unwrap_or_default();
                 }
                 *settings = Arc::new(found);
             }
@@ -98,7 +143,7 @@ pub(super) fn keep(viewer: &mut Viewer) {
 /// Switches the constant of a key. False: no pipeline has this key.
 pub(super) fn switched(viewer: &mut Viewer, key: &str) -> bool {
     let Some(followed) = &viewer.followed else { return false };
-    let side = &mut viewer.sides[0];
+    let side = &mut viewer.sides[viewer.followed_side];
     let Some(constant) = followed.pipeline.constants.iter().find(|constant| constant.key.as_deref() == Some(key))
     else {
         return false;
@@ -109,6 +154,8 @@ pub(super) fn switched(viewer: &mut Viewer, key: &str) -> bool {
         let text = format!("{} {}", constant.name, if *value == true { "on" } else { "off" });
         side.settings = Arc::new(settings);
         viewer.say(text);
+    } else {
+        viewer.say(format!("{} switches passes, but this side has none", constant.name));
     }
     true
 }
