@@ -49,7 +49,7 @@
 //! | [`image`](mod@image) | linear images in and out |
 //! | [`measure`] | how far an image is from a reference |
 //! | [`bake`] | long computations in units: stopped, continued, spread, joined |
-//! | `effects` | passes in text, compiled at run time (with the feature `effects`) |
+//! | `effects` | post-processing pipelines in text, compiled at run time (with the feature `effects`) |
 //!
 //! # Conventions
 //! Right-handed, +Y up, metres; cameras look down −Z. Linear Rec. 709. Radiance in W/(sr·m²), irradiance in W/m², intensity in

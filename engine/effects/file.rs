@@ -13,13 +13,13 @@ use super::{Constant, Number, OwnImage, PICTURE, Pass, Pipeline, Size, Source, V
 use crate::{
     Error, Result,
     graph::{Format, Sampler},
-    image::read_file_checked,
+    image::read_text_checked,
     technique::Technique,
     techniques, tracer,
 };
 
 /// Bytes of a file or shader at most.
-pub(super) const MOST: u64 = 1 << 20;
+const MOST: u64 = 1 << 20;
 /// Keys that the viewer leaves to pipelines.
 const KEYS: [&str; 6] = ["F6", "F7", "F8", "F9", "F11", "F12"];
 /// Files of a pipeline at most.
@@ -190,14 +190,6 @@ fn json(value: &toml::Value) -> Option<Value> {
     }
 }
 
-pub(super) fn text_of(path: &Path) -> Result<String> {
-    let bytes = read_file_checked(path, MOST)?;
-    String::from_utf8(bytes).map_err(|error| {
-        let at = error.utf8_error().valid_up_to();
-        Error::input(format!("byte {at} is not UTF-8, which text files are made of")).in_file(path)
-    })
-}
-
 /// The texts of a pipeline by their files: its own, its shaders and what they include, as far as they are there.
 pub(super) type Texts = BTreeMap<PathBuf, String>;
 
@@ -208,7 +200,7 @@ pub(super) fn folder_of(path: &Path) -> PathBuf {
 
 /// The files of a pipeline with their texts; `None` for one that is named, but is not there.
 pub(super) fn gathered(path: &Path) -> Result<BTreeMap<PathBuf, Option<String>>> {
-    let own = text_of(path)?;
+    let own = read_text_checked(path, MOST)?;
     let folder = folder_of(path);
     // A file with mistakes has the shaders that its lines name.
     let named = |text: &str, begins: &str| -> Vec<String> {
@@ -233,7 +225,7 @@ pub(super) fn gathered(path: &Path) -> Result<BTreeMap<PathBuf, Option<String>>>
         {
             continue;
         }
-        let text = if file.exists() { Some(text_of(&file)?) } else { None };
+        let text = if file.exists() { Some(read_text_checked(&file, MOST)?) } else { None };
         open.extend(text.iter().flat_map(|text| named(text, "#include")));
         all.insert(file, text);
     }

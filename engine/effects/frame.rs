@@ -241,6 +241,16 @@ impl Images<'_> {
             );
             return Err(self.pipeline.wrong(pass.line, what));
         }
+        for ((image, name), written) in out.iter().zip(&pass.out).zip(&program.outputs) {
+            if texel(graph, *image) != *written {
+                let found = texel(graph, *image);
+                let what = format!("pass {:?} writes {written:?} to {name:?}, whose values are {found:?}", pass.name);
+                return Err(self
+                    .pipeline
+                    .wrong(pass.line, what)
+                    .help("vec4 is for floats, uvec4 and ivec4 for integers"));
+            }
+        }
         let mut storage = out.iter();
         let mut resources = Vec::new();
         for binding in program.shader.bindings {
@@ -266,11 +276,7 @@ impl Images<'_> {
                         let help = "Write another image, or declare it with history = true and read the one of the frame before, NAME.previous";
                         return Err(self.pipeline.wrong(pass.line, what).help(help));
                     }
-                    let of = match graph.desc(image).format.class() {
-                        Class::Uint => Texel::Uint,
-                        Class::Sint => Texel::Sint,
-                        _ => Texel::Float,
-                    };
+                    let of = texel(graph, image);
                     if of != binding.texel {
                         let what = format!("pass {:?}: {} reads {:?} by a sampler of {:?}, but its values are {of:?}", pass.name, binding.name, source.image, binding.texel);
                         return Err(self.pipeline.wrong(pass.line, what).help("sampler2D is for floats, usampler2D and isampler2D for integers"));
@@ -306,6 +312,15 @@ impl Images<'_> {
         let last = binding.rsplit_once('_').map(|(front, last)| format!("{front}.{last}"));
         let found = [Some(binding.to_owned()), last, Some(dotted)].into_iter().flatten().find(|name| known(name));
         Source::plain(&found.unwrap_or_else(|| binding.to_owned()))
+    }
+}
+
+/// What the values of an image are to a shader.
+fn texel(graph: &Graph, image: Image) -> Texel {
+    match graph.desc(image).format.class() {
+        Class::Uint => Texel::Uint,
+        Class::Sint => Texel::Sint,
+        _ => Texel::Float,
     }
 }
 

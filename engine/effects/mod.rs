@@ -1,4 +1,4 @@
-//! Effects in text: passes after a technique, described by a TOML file and shaders beside it, compiled while the program runs.
+//! Post-processing pipelines in text: passes after a technique, described by a TOML file and shaders beside it, compiled while the program runs.
 //!
 //! [`Pipeline::read`] reads the file, compiles the shaders with the compiler that built the engine's own, and reads their interfaces. [`Pipeline::frame`]
 //! declares the passes in a graph, so they get the same plan, barriers and checks as passes in Rust. A binding is found by its name: an image of the
@@ -150,16 +150,6 @@ impl Pipeline {
         file::read(path)
     }
 
-    /// The pipeline of a file that is known: shaders and constants are read again if a file has changed since, and a pipeline with mistakes leaves this
-    /// one as it is.
-    ///
-    /// # Errors
-    /// As [`Self::read`].
-    pub fn read_again(&mut self) -> Result<()> {
-        *self = file::read(&self.path)?;
-        Ok(())
-    }
-
     /// The file, the shaders and what they include.
     pub fn files(&self) -> &[PathBuf] {
         &self.files
@@ -243,7 +233,7 @@ impl Pipeline {
 }
 
 impl Constant {
-    /// The largest number of a switch, of a number, of a list: what a shader can read.
+    /// Checks that a value has the type of the constant and lies in its range.
     fn check(&self, value: &Value) -> Result<()> {
         let wrong = |allowed: &str| Error::usage(format!("{value} is not allowed; allowed: {allowed}"));
         match (&self.default, value) {

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     Error, Result,
     shader::{
-        Access, Binding, BindingKind, Dim, Shader, SpecConstant, Stage, StageCode, Texel,
+        Access, Binding, BindingKind, Dim, Shader, SpecConstant, Stage, StageCode, Texel, compile,
         reflect::{self, Interface, Kind, Struct, Type},
     },
     shaders::{LIBRARY, types},
@@ -26,8 +26,6 @@ pub(super) const BUILT_IN: [&str; 4] = ["size", "seconds", "frame", "seed"];
 
 /// Bytes of push constants that every device has.
 const MOST_PUSH: u32 = 128;
-/// Includes deeper than these are taken for a cycle.
-const DEEPEST: usize = 16;
 
 /// A shader with what a pass must give to it.
 #[derive(Clone, Debug)]
@@ -36,6 +34,8 @@ pub(super) struct Program {
     pub push: Option<Struct>,
     /// Values of the specialisation constants.
     pub spec: Vec<u32>,
+    /// What the shader writes to each colour target.
+    pub outputs: Vec<Texel>,
 }
 
 /// Shaders that were compiled, by the digest of their code. They stay for the whole program, because pipelines of devices refer to them.
@@ -58,39 +58,21 @@ pub(super) fn compile(folder: &Path, file: &str, texts: &Texts, wrong: &dyn Fn(S
     }
     let path = folder.join(file);
     let Some(source) = texts.get(&path) else { return Err(wrong(format!("shader {file:?} does not exist"))) };
-    let include =
-        |name: &str, _: shaderc::IncludeType, from: &str, depth: usize| included(folder, name, from, depth, texts);
     let failed = |text: String| {
         // The compiler names files as they were given to it: `path:line: error: …`.
         let lines: Vec<&str> =
             text.lines().filter(|line| !line.trim().is_empty() && !line.ends_with("generated.")).collect();
-        Error::input(lines.join("; ").replace(&format!("{}:", path.display()), "line ")).in_file(&path)
+        let text = lines.join("; ").replace(&format!("{}:", path.display()), "line ");
+        Error::input(text.strip_prefix("compilation error: ").unwrap_or(&text)).in_file(&path)
     };
-    let compiler = shaderc::Compiler::new().map_err(|error| failed(format!("cannot start shaderc: {error}")))?;
-    let run = |ship: bool| {
-        let mut options = shaderc::CompileOptions::new()?;
-        options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
-        let level = if ship { shaderc::OptimizationLevel::Performance } else { shaderc::OptimizationLevel::Zero };
-        options.set_optimization_level(level);
-        if !ship {
-            options.set_generate_debug_info();
-        }
-        options.set_include_callback(include);
-        compiler.compile_into_spirv(&headed(source), kind, &path.display().to_string(), "main", Some(&options))
-    };
-    let raw = run(false).map_err(|error| failed(message(&error)))?;
-    let code = run(true).map_err(|error| failed(message(&error)))?.as_binary_u8().to_vec();
-    let interface = reflect::reflect(raw.as_binary()).map_err(&failed)?;
-    let shader = shader(file, stage, code, &interface).map_err(failed)?;
+    let include = |name: &str, from: &str| included(folder, name, from, texts);
+    let named = path.display().to_string();
+    let compiled = compile::compile_text((&named, &headed(source)), kind, (None, false), &include).map_err(failed)?;
+    let interface = reflect::reflect(&compiled.reflect).map_err(failed)?;
+    let shader = shader(file, stage, compiled.ship, &interface).map_err(failed)?;
     let spec = interface.spec.iter().map(|spec| spec.default).collect();
-    Ok(Program { shader, push: interface.push, spec })
-}
-
-fn message(error: &shaderc::Error) -> String {
-    match error {
-        shaderc::Error::CompilationError(_, text) | shaderc::Error::InternalError(text) => text.clone(),
-        other => other.to_string(),
-    }
+    let outputs = interface.outputs.iter().map(|(_, texel)| texel_of(texel)).collect();
+    Ok(Program { shader, push: interface.push, spec, outputs })
 }
 
 /// The source with the lines that all shaders begin with, unless it has its own. Lines keep their numbers.
@@ -102,29 +84,17 @@ fn headed(source: &str) -> String {
     format!("{head}{source}")
 }
 
-/// The text of an include: a file beside the pipeline, or one of the engine's `lib/`.
-fn included(
-    folder: &Path,
-    name: &str,
-    from: &str,
-    depth: usize,
-    texts: &Texts,
-) -> std::result::Result<shaderc::ResolvedInclude, String> {
-    if depth > DEEPEST {
-        return Err(format!("#include \"{name}\": includes are nested over {DEEPEST} deep; a cycle?"));
-    }
+/// The name and the text of an include: a file beside the pipeline, or one of the engine's `lib/`.
+fn included(folder: &Path, name: &str, from: &str, texts: &Texts) -> std::result::Result<(String, String), String> {
     if Path::new(name).components().any(|part| !matches!(part, Component::Normal(_))) {
         return Err(format!("#include \"{name}\": the path must stay inside the folder of the pipeline"));
     }
-    let of_engine = |name: &str| LIBRARY.iter().find(|(known, _)| *known == name);
     let beside = folder.join(name);
-    if let Some(content) = texts.get(&beside).filter(|_| !is_of_engine(from)) {
-        return Ok(shaderc::ResolvedInclude { resolved_name: beside.display().to_string(), content: content.clone() });
+    if let Some(text) = texts.get(&beside).filter(|_| !is_of_engine(from)) {
+        return Ok((beside.display().to_string(), text.clone()));
     }
-    match of_engine(name) {
-        Some((known, text)) => {
-            Ok(shaderc::ResolvedInclude { resolved_name: (*known).to_owned(), content: (*text).to_owned() })
-        }
+    match LIBRARY.iter().find(|(known, _)| *known == name) {
+        Some((known, text)) => Ok(((*known).to_owned(), (*text).to_owned())),
         None => {
             let known: Vec<&str> = LIBRARY.iter().map(|(name, _)| *name).collect();
             Err(format!(
@@ -158,6 +128,11 @@ fn shader(
     }
     if stage == Stage::Fragment && interface.color_outputs == 0 {
         return Err("it writes no colour: layout(location = 0) out vec4 NAME".into());
+    }
+    let even =
+        interface.outputs.iter().zip(0..).all(|((location, texel), number)| *location == number && *texel != "None");
+    if stage == Stage::Fragment && !even {
+        return Err("its outputs must have the locations 0, 1, 2 … and be numbers or vectors of 32 bits".into());
     }
     let digest = *blake3::hash(&[code.as_slice(), format!("{file} {interface:?}").as_bytes()].concat()).as_bytes();
     let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -205,6 +180,15 @@ fn fullscreen() -> std::result::Result<StageCode, String> {
     Ok(StageCode { stage: Stage::Vertex, file: vertex.file, spirv: vertex.spirv })
 }
 
+fn texel_of(name: &str) -> Texel {
+    match name {
+        "Uint" => Texel::Uint,
+        "Sint" => Texel::Sint,
+        "None" => Texel::None,
+        _ => Texel::Float,
+    }
+}
+
 fn binding(found: &reflect::Binding, stage: Stage, interface: &Interface) -> std::result::Result<Binding, String> {
     let dim = |name: &str| match name {
         "D1" => Dim::D1,
@@ -245,6 +229,9 @@ fn binding(found: &reflect::Binding, stage: Stage, interface: &Interface) -> std
         Kind::AccelerationStructure => return Err(format!("{name} is an acceleration structure; {allowed}")),
         Kind::Sampled(of) | Kind::Storage(of) => return Err(format!("{name} has the shape {of}; {allowed}")),
     };
+    if found.compares {
+        return Err(format!("{name} compares depths, or reads single samples; {allowed}"));
+    }
     if found.count != 1 {
         return Err(format!("{name} is an array of {} resources; {allowed}", found.count));
     }
@@ -259,12 +246,7 @@ fn binding(found: &reflect::Binding, stage: Stage, interface: &Interface) -> std
         },
         stages: if stage == Stage::Compute { &[Stage::Compute] } else { &[Stage::Fragment] },
         count: 1,
-        texel: match found.texel {
-            "Uint" => Texel::Uint,
-            "Sint" => Texel::Sint,
-            "None" => Texel::None,
-            _ => Texel::Float,
-        },
+        texel: texel_of(found.texel),
         format: found.format,
     })
 }

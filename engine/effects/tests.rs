@@ -131,6 +131,22 @@ fn every_mistake_has_its_file_its_line_and_what_is_allowed() {
         (toml(pass), format!("#include \"lib/vew.glsl\"\n{good}"), &["a.frag", "line 1", "lib/view.glsl"]),
         (toml(pass), format!("#include \"../x.glsl\"\n{good}"), &["a.frag", "must stay inside"]),
         (toml(pass), format!("#include \"loop.glsl\"\n{good}"), &["a.frag", "cycle"]),
+        (
+            toml(pass),
+            good.replace("sampler2D picture", "sampler2DShadow picture")
+                .replace("texelFetch(picture, ivec2(gl_FragCoord.xy), 0)", "vec4(texture(picture, vec3(uv, 1)))"),
+            &["a.frag", "compares depths"],
+        ),
+        (
+            toml(pass),
+            good.replace("layout(location = 0) out", "layout(location = 1) out"),
+            &["a.frag", "locations 0, 1, 2"],
+        ),
+        (
+            toml(pass),
+            good.replace("out vec4 color", "out vec4 color[2]").replace("color =", "color[0] ="),
+            &["a.frag", "locations 0, 1, 2"],
+        ),
         (toml(pass), String::new(), &["a.frag"]),
     ];
     for (toml, shader, parts) in cases {
@@ -260,6 +276,10 @@ fn images_that_are_not_there_are_named() {
             &["line 9", "level 3", "levels 0 to 0"],
         ),
         (
+            "[images.n]\nformat = \"r32u\"\n[[pass]]\nshader = \"a.frag\"\nout = \"n\"\n",
+            &["line 11", "writes Float to \"n\"", "uvec4"],
+        ),
+        (
             "[[pass]]\nshader = \"a.frag\"\nout = \"x\"\n[[pass]]\nstage = \"mips\"\nimage = \"x\"\n",
             &["line 12", "only one", "mips = true"],
         ),
@@ -327,14 +347,15 @@ fn the_same_text_is_the_same_shader_and_a_change_is_another_digest() {
         ("a.frag", &format!("#include \"own.glsl\"\n{TWICE}")),
         ("own.glsl", "const int N = 1;\n"),
     ]);
-    let mut first = read(folder.path()).unwrap();
+    let first = read(folder.path()).unwrap();
     let again = read(folder.path()).unwrap();
     assert_eq!(first.digest(), again.digest());
     assert_eq!(first.files().len(), 3);
     fs::write(folder.path().join("own.glsl"), "const int N = 2;\n").unwrap();
     assert_ne!(read(folder.path()).unwrap().digest(), first.digest());
-    // A pipeline with a mistake leaves the one before as it is.
-    fs::write(folder.path().join("a.frag"), "void main() { mistake }\n").unwrap();
-    let digest = first.digest().to_owned();
-    assert!(first.read_again().is_err() && first.digest() == digest);
+    // The files of a pipeline with a mistake are known, too, for those who wait for its end.
+    fs::write(folder.path().join("p.toml"), format!("{text}[[pass]]\nshader = \"missing.frag\"\n")).unwrap();
+    assert!(read(folder.path()).is_err());
+    let files = Pipeline::files_of(&folder.path().join("p.toml"));
+    assert!(files.len() == 4 && files.contains(&folder.path().join("missing.frag")), "{files:?}");
 }

@@ -45,6 +45,18 @@ fn read_checked(path: &Path, max_bytes: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// Reads a whole text file of at most `max_bytes` bytes, as [`read_file_checked`].
+///
+/// # Errors
+/// As [`read_file_checked`]; `Input` if the text is not UTF-8.
+pub fn read_text_checked(path: impl AsRef<Path>, max_bytes: u64) -> Result<String> {
+    let path = path.as_ref();
+    String::from_utf8(read_file_checked(path, max_bytes)?).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        Error::input(format!("byte {at} is not UTF-8, which text files are made of")).in_file(path)
+    })
+}
+
 /// The first bytes of a regular file, at most `length`: what a large file says of itself. Folders, devices and pipes are refused as by
 /// [`read_file_checked`]. Errors name the file.
 pub fn read_head_checked(path: impl AsRef<Path>, length: u64) -> Result<Vec<u8>> {

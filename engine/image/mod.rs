@@ -38,8 +38,8 @@ pub use bc4::{decode_bc4, encode_bc4};
 pub use bc6h::{Bc6h, decode_bc6h, encode_bc6h};
 pub use color::{Chromaticities, REC_709};
 pub use file::{
-    is_temporary, leave_nothing_unfinished, probe_output, read_file_checked, read_head_checked, write_all_atomic,
-    write_atomic, write_pieces_atomic,
+    is_temporary, leave_nothing_unfinished, probe_output, read_file_checked, read_head_checked, read_text_checked,
+    write_all_atomic, write_atomic, write_pieces_atomic,
 };
 pub use ktx2_file::{Ktx2Format, encode_ktx2, encode_ktx2_cube, level_extent};
 pub use metadata::Metadata;

@@ -91,13 +91,35 @@ pub fn compile(root: &Path, file: &str, kind: shaderc::ShaderKind, query: bool) 
         let next = source[..at].lines().count() + 1;
         source.insert_str(at, &format!("\n#extension GL_EXT_ray_query : require\n#line {next}"));
     }
+    let include = |name: &str, requesting: &str| {
+        let requesting = Path::new(requesting).strip_prefix(root).unwrap_or(Path::new(requesting));
+        let (path, content) = resolve(root, &requesting.to_string_lossy(), name)?;
+        Ok((path.display().to_string(), content))
+    };
+    let define = if query { Some(QUERY_DEFINE) } else { None };
+    compile_text((&path.display().to_string(), &source), kind, (define, true), &include)
+}
+
+/// Compiles a text with the name that messages give it. `include`: the name and the text of an include, by its name and that of the file that
+/// includes it. `define`: a macro. `strict`: warnings are errors.
+///
+/// # Errors
+/// The compiler's message, each line as `name:line: error: …`.
+pub fn compile_text(
+    (name, source): (&str, &str),
+    kind: shaderc::ShaderKind,
+    (define, strict): (Option<&str>, bool),
+    include: &dyn Fn(&str, &str) -> Result<(String, String), String>,
+) -> Result<Compiled, String> {
     let compiler = shaderc::Compiler::new().map_err(|e| format!("cannot start shaderc: {e}"))?;
     let run = |ship: bool| -> Result<shaderc::CompilationArtifact, String> {
         let mut options = shaderc::CompileOptions::new().map_err(|e| format!("cannot start shaderc: {e}"))?;
         options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
-        options.set_warnings_as_errors();
-        if query {
-            options.add_macro_definition(QUERY_DEFINE, None);
+        if strict {
+            options.set_warnings_as_errors();
+        }
+        if let Some(define) = define {
+            options.add_macro_definition(define, None);
         }
         if ship {
             options.set_optimization_level(shaderc::OptimizationLevel::Performance);
@@ -111,13 +133,10 @@ pub fn compile(root: &Path, file: &str, kind: shaderc::ShaderKind, query: bool) 
                     "#include \"{name}\": includes are nested over {MAX_INCLUDE_DEPTH} deep; a cycle?"
                 ));
             }
-            let requesting = Path::new(requesting).strip_prefix(root).unwrap_or(Path::new(requesting));
-            let (path, content) = resolve(root, &requesting.to_string_lossy(), name)?;
-            Ok(shaderc::ResolvedInclude { resolved_name: path.display().to_string(), content })
+            let (resolved_name, content) = include(name, requesting)?;
+            Ok(shaderc::ResolvedInclude { resolved_name, content })
         });
-        compiler
-            .compile_into_spirv(&source, kind, &path.display().to_string(), "main", Some(&options))
-            .map_err(|e| e.to_string())
+        compiler.compile_into_spirv(source, kind, name, "main", Some(&options)).map_err(|e| e.to_string())
     };
     let reflect = run(false)?.as_binary().to_vec();
     let ship = run(true)?.as_binary_u8().to_vec();

@@ -8,9 +8,9 @@
 // Used by build.rs as well; in the library only their tests and the types below are needed.
 #[cfg(test)]
 mod codegen;
-#[cfg(test)]
+#[cfg(any(test, feature = "effects"))]
 #[allow(dead_code)]
-mod compile;
+pub(crate) mod compile;
 #[cfg(any(test, feature = "effects"))]
 #[allow(dead_code)]
 pub(crate) mod reflect;

@@ -63,6 +63,8 @@ pub struct Binding {
     pub texel: &'static str,
     /// Storage images: format as SPIR-V numbers it; else 0.
     pub format: u32,
+    /// Samplers: it compares depths, or reads single samples of a pixel.
+    pub compares: bool,
 }
 
 /// Scalar type and name of a specialisation constant, with its default as bits.
@@ -83,6 +85,8 @@ pub struct Interface {
     pub spec: Vec<Spec>,
     pub workgroup: [u32; 3],
     pub color_outputs: u32,
+    /// Colour outputs: location, and `Float`, `Uint` or `Sint`; `None` for arrays and other types.
+    pub outputs: Vec<(u32, &'static str)>,
     /// It declares that it traces by ray query, which not every device can.
     pub ray_query: bool,
 }
@@ -94,7 +98,7 @@ enum Raw {
     Int { width: u32, signed: bool },
     Vector(u32, u32),
     Matrix(u32, u32),
-    Image { texel: u32, dim: u32, arrayed: bool, sampled: u32, format: u32 },
+    Image { texel: u32, dim: u32, compares: bool, arrayed: bool, sampled: u32, format: u32 },
     SampledImage(u32),
     Array(u32, u32),
     RuntimeArray(u32),
@@ -156,12 +160,17 @@ fn walk(words: &[u32]) -> Result<Walk, String> {
             22 => drop(w.types.insert(a[0], Raw::Float(a[1]))),
             23 => drop(w.types.insert(a[0], Raw::Vector(a[1], a[2]))),
             24 => drop(w.types.insert(a[0], Raw::Matrix(a[1], a[2]))),
-            25 => {
-                drop(w.types.insert(
-                    a[0],
-                    Raw::Image { texel: a[1], dim: a[2], arrayed: a[4] == 1, sampled: a[6], format: a[7] },
-                ))
-            }
+            25 => drop(w.types.insert(
+                a[0],
+                Raw::Image {
+                    texel: a[1],
+                    dim: a[2],
+                    compares: a[3] == 1 || a[5] == 1,
+                    arrayed: a[4] == 1,
+                    sampled: a[6],
+                    format: a[7],
+                },
+            )),
             27 => drop(w.types.insert(a[0], Raw::SampledImage(a[1]))),
             28 => drop(w.types.insert(a[0], Raw::Array(a[1], a[2]))),
             29 => drop(w.types.insert(a[0], Raw::RuntimeArray(a[1]))),
@@ -368,7 +377,18 @@ pub fn reflect(words: &[u32]) -> Result<Interface, String> {
         match storage {
             3 => {
                 if let Some(location) = w.decoration(id, LOCATION) {
-                    interface.color_outputs = interface.color_outputs.max(location + 1);
+                    interface.color_outputs = interface.color_outputs.max(location.saturating_add(1));
+                    let of = match w.types.get(&pointee) {
+                        Some(Raw::Vector(of, _)) => w.types.get(of),
+                        other => other,
+                    };
+                    let texel = match of {
+                        Some(Raw::Float(32)) => "Float",
+                        Some(Raw::Int { width: 32, signed: false }) => "Uint",
+                        Some(Raw::Int { width: 32, signed: true }) => "Sint",
+                        _ => "None",
+                    };
+                    interface.outputs.push((location, texel));
                 }
             }
             9 => {
@@ -382,6 +402,7 @@ pub fn reflect(words: &[u32]) -> Result<Interface, String> {
             _ => {}
         }
     }
+    interface.outputs.sort_unstable();
     interface.bindings.sort_by_key(|b| b.binding);
     for pair in interface.bindings.windows(2) {
         if pair[0].binding == pair[1].binding {
@@ -445,6 +466,7 @@ fn resource(w: &Walk, id: u32, pointee: u32, storage: u32, structs: &mut Vec<Str
         Some(Raw::SampledImage(image)) => w.types.get(image),
         other => other,
     };
+    let compares = matches!(image, Some(Raw::Image { compares: true, .. }));
     let (texel, format) = match image {
         Some(Raw::Image { texel, format, .. }) => match w.types.get(texel) {
             Some(Raw::Int { signed: true, .. }) => ("Sint", *format),
@@ -453,5 +475,5 @@ fn resource(w: &Walk, id: u32, pointee: u32, storage: u32, structs: &mut Vec<Str
         },
         _ => ("None", 0),
     };
-    Ok(Binding { name, binding, kind, access, count, texel, format })
+    Ok(Binding { name, binding, kind, access, count, texel, format, compares })
 }

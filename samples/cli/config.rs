@@ -19,8 +19,8 @@ pub struct SettingsArgs {
     #[arg(long = "settings", value_name = "FILE.toml", help_heading = "Settings")]
     pub file: Option<PathBuf>,
 
-    /// Passes in text after the technique: a TOML file with shaders beside it (docs/effects.md); its constants are
-    /// settings: -D effects.NAME=VALUE
+    /// Post-processing pipeline after the technique: a TOML file with shaders beside it (docs/effects.md). Its
+    /// constants are settings: -D effects.NAME=VALUE
     #[arg(long, value_name = "FILE.toml", help_heading = "Settings")]
     pub effects: Option<PathBuf>,
 
@@ -36,13 +36,13 @@ impl SettingsArgs {
     /// `Usage` or `Input`, naming the key.
     pub fn effective<S: Serialize + DeserializeOwned>(&self, base: &S) -> Result<S> {
         if self.effects.is_some() {
-            let what = "passes in text follow a technique of `lucerna render`, `run` and `view`; this command has none";
+            let what = "a post-processing pipeline follows a technique of `lucerna render`, `run` and `view`; this command has none";
             return Err(Error::usage(what).at("--effects"));
         }
         self.with_effects(base)
     }
 
-    /// As [`Self::effective`], for settings with passes in text.
+    /// As [`Self::effective`], for settings with a post-processing pipeline.
     ///
     /// # Errors
     /// As [`Self::effective`].
@@ -127,11 +127,7 @@ pub fn to_value<S: Serialize>(settings: &S) -> Result<Value> {
 
 /// Reads a small text file. It must be a regular file of at most 1 MiB; the limit also holds if the file grows while it is read.
 pub(crate) fn read_text(path: &Path) -> Result<String> {
-    let bytes = image::read_file_checked(path, MAX_FILE)?;
-    String::from_utf8(bytes).map_err(|error| {
-        let at = error.utf8_error().valid_up_to();
-        Error::input(format!("byte {at} is not UTF-8, which text files are made of")).in_file(path)
-    })
+    image::read_text_checked(path, MAX_FILE)
 }
 
 /// An error message, and the key to which it refers.

@@ -1,6 +1,6 @@
-//! Passes in text after a technique: `--effects sepia.toml`, and the group `effects` of the settings.
+//! Post-processing pipelines after a technique: `--effects sepia.toml`, and the group `effects` of the settings.
 //!
-//! The settings name the pipeline's file with the digest of all that it consists of, so that a picture says by which shaders it was made.
+//! The settings name the pipeline's file and the digest of the file and its shaders, so that a picture says by which shaders it was made.
 
 use std::{
     collections::BTreeMap,

@@ -25,7 +25,7 @@ use crate::{
 pub struct Staged<S> {
     #[serde(flatten)]
     pub technique: S,
-    /// Passes in text between the technique and the tone mapping.
+    /// The post-processing pipeline between the technique and the tone mapping.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub effects: Option<effects::Settings>,
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -127,8 +127,10 @@ fn picture(
     interrupt: &Interrupt,
 ) -> Result<(ExitCode, Option<Fresh>)> {
     if effects.is_some() {
-        return Err(Error::usage("passes in text follow isr, igi, fiv, daylight and prt; the path tracer has none")
-            .at("--effects"));
+        return Err(Error::usage(
+            "a post-processing pipeline follows isr, igi, fiv, daylight and prt; the path tracer has none",
+        )
+        .at("--effects"));
     }
     let begun = Instant::now();
     let curve = args.screen.curve(false, true, tonemap.is_some())?;

@@ -125,7 +125,9 @@ pub struct Viewer {
     pub(super) writing: Option<Writing>,
     last_move: Option<Instant>,
     pub(super) watch: Option<Watch>,
-    /// Passes in text.
+    /// A pipeline that a thread compiles.
+    pub(super) compiling: Option<text::Compiling>,
+    /// A pipeline that follows a side.
     pub(super) followed: Option<Followed>,
     /// Number of the side that they follow.
     pub(super) followed_side: usize,
@@ -195,6 +197,7 @@ impl Viewer {
             writing: None,
             last_move: None,
             watch: None,
+            compiling: None,
             followed: None,
             followed_side: 0,
             times: bars::Times::default(),

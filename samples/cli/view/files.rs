@@ -40,7 +40,7 @@ pub(super) struct Reading {
 }
 
 /// The answer of a thread, if there is one; an error if the thread has ended without an answer.
-fn answered<T>(receiver: &mpsc::Receiver<Result<T>>) -> Option<Result<T>> {
+pub(super) fn answered<T>(receiver: &mpsc::Receiver<Result<T>>) -> Option<Result<T>> {
     match receiver.try_recv() {
         Ok(answer) => Some(answer),
         Err(mpsc::TryRecvError::Empty) => None,
@@ -71,7 +71,7 @@ impl Viewer {
     }
 
     /// Runs some work on a thread of its own, which wakes the window at its end.
-    fn on_thread<T: Send + 'static>(
+    pub(super) fn on_thread<T: Send + 'static>(
         &mut self,
         work: impl FnOnce() -> Result<T> + Send + 'static,
     ) -> Option<mpsc::Receiver<Result<T>>> {
@@ -194,7 +194,7 @@ impl Viewer {
                 self.sides[0].bake = Some(file);
                 self.named = true;
             }
-            "toml" if is_pipeline(&file) => text::follow(self, &file),
+            "toml" if is_pipeline(&file) => text::follow(self, file),
             "toml" => match self.cameras.read(&file) {
                 Ok(count) => self.say(format!("{count} cameras of {}", file.display())),
                 Err(error) => self.trouble = Some(error.to_string()),

@@ -44,7 +44,7 @@ pub const HELP: [(&str, &str); 26] = [
     ("F4", "direct light, with exponential shadow maps"),
     ("F5", "direct light"),
     ("F10", "the path tracer"),
-    ("F6 … F9, F11, F12", "switches of passes in text, as their file names them (--effects)"),
+    ("F6 … F9, F11, F12", "switches of the post-processing pipeline, as its file names them (--effects)"),
 ];
 
 /// Seconds of a frame at most, for flying: after a pause the camera must not jump.
@@ -163,7 +163,7 @@ pub fn pressed(viewer: &mut Viewer, context: &Context) {
     {
         if hit(key) && !text::switched(viewer, name) {
             viewer.say(format!(
-                "{name} switches passes in text, but no pipeline has this key: drop one on the window, or begin with --effects"
+                "{name} is a key of post-processing pipelines, but none has it: drop one on the window, or begin with --effects"
             ));
         }
     }

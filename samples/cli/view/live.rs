@@ -127,7 +127,7 @@ struct Living<T: Technique> {
     by: T::Settings,
     baked: Option<T::Baked>,
     runner: Runner,
-    /// Passes in text, with the settings that they are for.
+    /// The post-processing pipeline, with the settings that it is for.
     effects: Option<(effects::Settings, Effects)>,
     /// Tone mapping, with the settings and the exposure that it is for.
     last: Option<(Value, f64, LastStage)>,

@@ -150,7 +150,7 @@ impl ViewArgs {
     fn settings(&self, side: &Side) -> Result<Option<Value>> {
         let given = !self.settings.define.is_empty() || self.settings.file.is_some();
         if !given {
-            // Passes in text come later.
+            // The window applies a post-processing pipeline itself.
             return Ok(None);
         }
         if self.technique.is_none() && given {

@@ -1,11 +1,19 @@
-//! Passes in text in the window: they are read again when a file changes, their switches have keys, and a mistake leaves the last good ones.
+//! Pipelines in text in the window: a pipeline is read again when one of its files changes, its switches have keys, and a mistake leaves the last good
+//! version.
 
-use std::{collections::BTreeMap, path::Path, sync::Arc};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    sync::{Arc, mpsc},
+};
 
-use lucerna::effects::{Pipeline, Values};
+use lucerna::{
+    Result,
+    effects::{Pipeline, Values},
+};
 use serde_json::Value;
 
-use super::{app::Viewer, session::Wake, side::Side, wanted::TRUTH, watch::Watch};
+use super::{app::Viewer, files::answered, session::Wake, side::Side, wanted::TRUTH, watch::Watch};
 use crate::{config, effects};
 
 /// A pipeline that follows a side.
@@ -18,35 +26,25 @@ pub(super) struct Followed {
     before: Option<Values>,
 }
 
-impl Followed {
-    /// A pipeline that is read now.
-    fn read(path: &Path, wake: &Wake) -> lucerna::Result<Self> {
-        // From before the reading, so that no change is missed.
-        let watches = watched(path, wake);
-        Ok(Self { pipeline: effects::read(path)?, watches, mistake: None, before: None })
-    }
+/// A pipeline that a thread reads and compiles, which takes longer than a frame of the window.
+pub(super) struct Compiling {
+    path: PathBuf,
+    /// From before the reading, so that no change is missed.
+    watches: Vec<Watch>,
+    receiver: mpsc::Receiver<Result<Arc<Pipeline>>>,
+}
 
+impl Followed {
     /// A pipeline that was read already.
     pub fn new(pipeline: Arc<Pipeline>, wake: &Wake) -> Self {
         let watches = watched(&pipeline.path, wake);
         Self { pipeline, watches, mistake: None, before: None }
     }
 
-    /// Reads the files again if one of them has changed.
-    fn renew(&mut self, wake: &Wake) {
+    /// Whether a file has changed since the last question.
+    fn is_old(&self) -> bool {
         // All are asked: each forgets that it has changed.
-        if self.watches.iter().filter(|watch| watch.changed()).count() == 0 {
-            return;
-        }
-        let path = self.pipeline.path.clone();
-        match Self::read(&path, wake) {
-            Ok(read) => *self = Self { before: Some(self.pipeline.defaults()), ..read },
-            Err(error) => {
-                self.mistake = Some(error.to_string());
-                // A faulty version may name other files.
-                self.watches = watched(&path, wake);
-            }
-        }
+        self.watches.iter().filter(|watch| watch.changed()).count() > 0
     }
 
     /// The settings of a side with this pipeline in them; `None`: they have it already. Values that were changed by hand stay as they are.
@@ -73,13 +71,9 @@ impl Followed {
             for (group, values) in begins.as_object().into_iter().flatten() {
                 match (all.get_mut(group), values) {
                     (Some(Value::Object(known)), Value::Object(values)) => {
-                        known.extend(
-                            values
-                                .iter()
-                                .filter(|(key, _)| known.contains_key(*key))
-                                .map(|(k, v)| (k.clone(), v.clone()))
-                                .collect::<Vec<_>>(),
-                        );
+                        for (key, value) in values {
+                            known.get_mut(key).into_iter().for_each(|known| known.clone_from(value));
+                        }
                     }
                     (None | Some(Value::Null), values) if group == "tonemap" => {
                         all.insert(group.clone(), values.clone());
@@ -102,29 +96,49 @@ fn has_passes(side: &Side) -> bool {
     side.technique != TRUTH && side.file.is_none()
 }
 
-/// Lets the passes of a file follow side A.
-pub(super) fn follow(viewer: &mut Viewer, file: &Path) {
-    match Followed::read(file, &viewer.wake) {
-        Ok(followed) => {
-            let path = if has_passes(&viewer.sides[0]) { "A" } else { "A as soon as it shows a technique" };
-            viewer.say(format!("{} follows {path}", followed.pipeline.title));
-            viewer.followed = Some(followed);
+/// Lets the pipeline of a file follow side A as soon as it is compiled.
+pub(super) fn follow(viewer: &mut Viewer, path: PathBuf) {
+    let watches = watched(&path, &viewer.wake);
+    let of_thread = path.clone();
+    let compiled = viewer.on_thread(move || effects::read(&of_thread));
+    viewer.compiling = compiled.map(|receiver| Compiling { path, watches, receiver });
+}
+
+/// Takes a pipeline that was compiled. The same file again stays at its side.
+fn take(viewer: &mut Viewer) {
+    let Some(answer) = viewer.compiling.as_ref().and_then(|compiling| answered(&compiling.receiver)) else { return };
+    let Some(Compiling { path, watches, .. }) = viewer.compiling.take() else { return };
+    let known = viewer.followed.as_mut().filter(|followed| followed.pipeline.path == path);
+    match (answer, known) {
+        (Ok(pipeline), Some(followed)) => {
+            let before = Some(followed.pipeline.defaults());
+            *followed = Followed { pipeline, watches, mistake: None, before };
+            viewer.say(format!("{} was read again", path.display()));
+        }
+        (Ok(pipeline), None) => {
+            let side = if has_passes(&viewer.sides[0]) { "A" } else { "A as soon as A shows a technique" };
+            viewer.say(format!("{} follows {side}", pipeline.title));
+            viewer.followed = Some(Followed { pipeline, watches, mistake: None, before: None });
             viewer.followed_side = 0;
         }
-        Err(error) => viewer.trouble = Some(error.to_string()),
+        (Err(error), Some(followed)) => {
+            followed.mistake = Some(error.to_string());
+            // A faulty version may name other files.
+            followed.watches = watches;
+        }
+        (Err(error), None) => viewer.trouble = Some(error.to_string()),
     }
 }
 
 /// Puts the passes into the settings of their side, in each frame of the window: another technique begins without them.
 pub(super) fn keep(viewer: &mut Viewer) {
-    let Some(followed) = &mut viewer.followed else { return };
-    let before = followed.pipeline.digest().to_owned();
-    followed.renew(&viewer.wake);
-    viewer.descriptions.of_effects(&followed.pipeline);
-    if followed.pipeline.digest() != before {
-        viewer.message =
-            Some((format!("{} was read again", followed.pipeline.path.display()), std::time::Instant::now()));
+    take(viewer);
+    if let Some(followed) = viewer.followed.as_ref().filter(|followed| followed.is_old()) {
+        let path = followed.pipeline.path.clone();
+        follow(viewer, path);
     }
+    let Some(followed) = &viewer.followed else { return };
+    viewer.descriptions.of_effects(&followed.pipeline);
     let side = &mut viewer.sides[viewer.followed_side];
     if has_passes(side) {
         for (settings, is_default) in [(&mut side.settings, false), (&mut side.defaults, true)] {
