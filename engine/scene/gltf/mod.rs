@@ -94,7 +94,12 @@ fn check_extensions(document: &Document, notes: &mut Notes) -> Result<()> {
         if !SUPPORTED.contains(&name.as_str()) {
             return Err(Error::input(format!("the file requires the extension {name:?}, which is not supported"))
                 .at(format!("extensionsRequired[{i}]"))
-                .help("Export the file without it"));
+                .help(match name.as_str() {
+                    "KHR_draco_mesh_compression" => {
+                        "Export the file without it, or unpack it: npx @gltf-transform/cli copy in.glb out.glb"
+                    }
+                    _ => "Export the file without it",
+                }));
         }
     }
     for name in &document.extensions_used {
