@@ -143,6 +143,10 @@ fn bad_samples_are_counted_and_fall_under_the_policy() {
     let brightest =
         picture.layers[0].data.iter().skip(1).step_by(3).copied().filter(|v| v.is_finite()).fold(0.0, f32::max);
     assert_eq!(read(Path::new(&out)).layers[0].data[7], brightest);
+    let mut dark = ramp(16, 4, false);
+    dark.layers[0].data[30..36].fill(-0.5);
+    let dark = write(folder, "dark.exr", &dark);
+    tonemap(&[dark.as_str(), "-o", &out, "--overwrite"]).expect(0, &["dark.exr: 2 pixels have light below 0"]);
     fs::remove_file(&out).unwrap();
     let refused = tonemap(&[&common[..], &["--bad-values", "error"]].concat());
     refused.expect(3, &["bad.exr: pixel (0, 0)", "1 samples are not a number, 1 infinite, 1 negative"]);

@@ -9,6 +9,8 @@ pub struct BadCounts {
     pub nan: u64,
     pub infinite: u64,
     pub negative: u64,
+    /// Pixels whose three colours are all negative. Such a pixel is no colour outside of the gamut, and becomes black.
+    pub below_black: u64,
     /// Column and row of the first of them.
     pub first: Option<[u32; 2]>,
 }
@@ -29,6 +31,7 @@ impl BadCounts {
             counts.nan += pixel.iter().filter(|v| v.is_nan()).count() as u64;
             counts.infinite += pixel.iter().filter(|v| v.is_infinite()).count() as u64;
             counts.negative += pixel.iter().filter(|v| v.is_finite() && **v < 0.0).count() as u64;
+            counts.below_black += u64::from(pixel[..3].iter().all(|v| v.is_finite() && *v < 0.0));
             let width = width.max(1) as usize;
             counts.first.get_or_insert([(i % width) as u32, (i / width) as u32]);
         }
@@ -111,8 +114,14 @@ mod tests {
     }
 
     #[test]
+    fn light_below_zero_is_no_colour_outside_of_the_gamut() {
+        let counts = BadCounts::of(2, &[[-1.0, 2.0, -0.1, 1.0], [-1.0, -2.0, -0.1, 1.0], [0.0, 0.0, 0.0, -1.0]]);
+        assert_eq!((counts.below_black, counts.negative), (1, 6));
+    }
+
+    #[test]
     fn each_policy_does_what_it_says() {
-        let counts = BadCounts { nan: 1, infinite: 2, negative: 2, first: Some([1, 1]) };
+        let counts = BadCounts { nan: 1, infinite: 2, negative: 2, below_black: 0, first: Some([1, 1]) };
         for (policy, at4, at8) in [
             (BadValues::Zero, [0.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 1.0]),
             (BadValues::Clamp, [0.0, 4.0, 0.0, 1.0], [1.0, 0.0, 0.0, 1.0]),

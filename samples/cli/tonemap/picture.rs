@@ -261,6 +261,10 @@ impl Run {
             BadValues::Neighbour => "replaced by their neighbours, negative taken as 0",
             BadValues::Error => "refused",
         };
+        if bad.below_black > 0 {
+            let why = "light below 0, which is taken as 0 and looks black: often rings of resizing or compression in the file";
+            self.console.info(&format!("note: {}: {} pixels have {why}", input.name, bad.below_black));
+        }
         let text = format!("{}: samples: {}; {policy}; the first at ({x}, {y})", input.name, parts.join(", "));
         // Negative samples are usual for colours outside of the gamut, so they are no reason for a warning.
         if bad.nan + bad.infinite > 0 { self.console.warning(&text) } else { self.console.detail(&text) }
