@@ -100,8 +100,10 @@ pub fn compile(root: &Path, file: &str, kind: shaderc::ShaderKind, query: bool) 
     compile_text((&path.display().to_string(), &source), kind, (define, true), &include)
 }
 
-/// Compiles a text with the name that messages give it. `include`: the name and the text of an include, by its name and that of the file that
-/// includes it. `define`: a macro. `strict`: warnings are errors.
+/// The name and the text of an include, by its name and that of the file that includes it.
+pub type Include<'a> = dyn Fn(&str, &str) -> Result<(String, String), String> + 'a;
+
+/// Compiles a text with the name that messages give it. `define`: a macro. `strict`: warnings are errors.
 ///
 /// # Errors
 /// The compiler's message, each line as `name:line: error: …`.
@@ -109,7 +111,7 @@ pub fn compile_text(
     (name, source): (&str, &str),
     kind: shaderc::ShaderKind,
     (define, strict): (Option<&str>, bool),
-    include: &dyn Fn(&str, &str) -> Result<(String, String), String>,
+    include: &Include<'_>,
 ) -> Result<Compiled, String> {
     let compiler = shaderc::Compiler::new().map_err(|e| format!("cannot start shaderc: {e}"))?;
     let run = |ship: bool| -> Result<shaderc::CompilationArtifact, String> {
