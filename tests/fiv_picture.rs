@@ -57,6 +57,32 @@ fn without_occluders_light_is_the_table_and_brute_force_agrees() {
     });
 }
 
+/// Hidden occluders darken the ground as shown ones do, and ground behind them is seen.
+#[test]
+fn hidden_occluders_cast_shadows_and_hide_nothing() {
+    with_gpu(|gpu| {
+        let scene = stage(colourful(), &[vec3(0.0, 0.8, 0.0)]);
+        // From above the ball, so that it covers the middle of the picture.
+        let over = flat_view(vec3(0.0, 4.0, 0.0), Vec3::ZERO, 3.0, [24; 2]);
+        for method in [Method::Vectors, Method::BruteForce, Method::Online] {
+            let settings = by(method);
+            let hidden = Settings { hide_occluders: true, ..settings.clone() };
+            let mut studio = Studio::new(gpu, &scene, &settings, None);
+            let from_below = studio.irradiance(&under(24), &settings);
+            let shown = studio.irradiance(&over, &settings);
+            let bare = studio.irradiance(&over, &hidden);
+            let middle = 12 * 24 + 12;
+            assert!(
+                (shown[middle] - bare[middle]).length() > 0.05 * bare[middle].length(),
+                "{method:?}: the ball is hidden"
+            );
+            for (i, (ground, bare)) in from_below.iter().zip(&bare).enumerate() {
+                assert!((*ground - *bare).length() < 2e-3 * ground.length(), "{method:?}, pixel {i}: {ground} {bare}");
+            }
+        }
+    });
+}
+
 #[test]
 fn vectors_come_close_to_brute_force() {
     with_gpu(|gpu| {

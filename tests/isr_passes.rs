@@ -26,7 +26,17 @@ fn form_factor_occlusion_and_sample_places() {
                 (p, n, x, m, random.next(), random.next() * 0.1)
             })
             .collect();
-        for (samples, rings, jittered) in [(24, 1, 1), (48, 1, 0), (80, 1, 1), (24, 0, 0), (48, 0, 1), (80, 0, 0)] {
+        for (samples, rings, jittered) in [
+            (24, 1, 1),
+            (48, 1, 0),
+            (80, 1, 1),
+            (24, 0, 0),
+            (48, 0, 1),
+            (80, 0, 0),
+            (120, 1, 0),
+            (168, 0, 1),
+            (224, 1, 1),
+        ] {
             let mut graph = Graph::new("terms");
             let contents: Vec<_> = queries
                 .iter()

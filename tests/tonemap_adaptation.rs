@@ -124,6 +124,53 @@ fn twice_the_frames_of_half_the_time_are_the_same_picture() {
     });
 }
 
+/// A bright bar that moves: with [`Settings::adapt_local`] the places where it was keep a part of its adaptation.
+#[test]
+fn local_adaptation_goes_on_from_frame_to_frame() {
+    with_gpu(|gpu| {
+        let bar = |at: u32| -> Vec<[f32; 4]> {
+            let light = |i: u32| if (i % SIDE) / 4 == at { 50.0 } else { 1.0 };
+            (0..SIDE * SIDE).map(|i| [light(i), light(i), light(i), 1.0]).collect()
+        };
+        for operator in OPERATORS {
+            for mode in [Mode::Local, Mode::Selective] {
+                let at_once = in_mode(operator, mode);
+                let slow = Settings { adapt_local: 0.5, ..at_once.clone() };
+                let shown = |settings: &Settings, frames: &[(u32, f32)]| {
+                    let mut still = still(gpu, settings);
+                    frames
+                        .iter()
+                        .map(|(at, dt)| still.map(SIDE, SIDE, bar(*at), None, Some(*dt)).unwrap().pixels)
+                        .last()
+                        .unwrap()
+                };
+                let apart = |a: &[[f32; 4]], b: &[[f32; 4]]| {
+                    a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+                };
+                let name = format!("{operator:?} {mode:?}");
+                let goal = shown(&at_once, &[(2, 0.1)]);
+                // The first frame, and a frame that does not change, are those without the setting.
+                assert_eq!(shown(&slow, &[(2, 0.1)]), goal, "{name}");
+                assert_eq!(shown(&slow, &[(2, 0.1), (2, 0.1), (2, 0.1)]), goal, "{name}");
+                // After a move there is a trail, which fades by the time constant at any frame rate.
+                let trail = shown(&slow, &[(0, 0.1), (2, 0.25)]);
+                assert!(apart(&trail, &goal) > 1e-3, "{name}: no trail");
+                let twice = shown(&slow, &[(0, 0.1), (2, 0.125), (2, 0.125)]);
+                assert!(apart(&twice, &trail) < 1e-4, "{name}: {}", apart(&twice, &trail));
+                let late = shown(&slow, &[(0, 0.1), (2, 10.0)]);
+                assert!(apart(&late, &goal) < 1e-3 * apart(&trail, &goal).max(1.0), "{name}: {}", apart(&late, &goal));
+                assert_eq!(shown(&at_once, &[(0, 0.1), (2, 0.25)]), goal, "{name}: ours leaves no trail");
+            }
+        }
+        // A picture in tiles has no frame before.
+        let mut tiled =
+            still(gpu, &Settings { adapt_local: 0.5, ..in_mode(Operator::Ashikhmin, Mode::Local) }).tiles(8);
+        let error = tiled.map(SIDE, SIDE, bar(0), None, Some(0.1)).unwrap_err().to_string();
+        assert!(error.contains("adapt_local"), "{error}");
+        assert!(tiled.map(SIDE, SIDE, bar(0), None, None).is_ok());
+    });
+}
+
 #[test]
 fn a_still_picture_comes_to_rest_at_its_own_adaptation() {
     with_gpu(|gpu| {

@@ -58,7 +58,7 @@ const CAPACITIES: [(&str, Capacity); 2] =
 fn ours(operator: &str, luminance: &Plane, adaptation: Adaptation, capacity: Capacity) -> Plane {
     let (low, high) = luminance.range().unwrap();
     let curve = ashikhmin::Curve { low, high, display: 100.0, capacity };
-    let search = ashikhmin::Search { largest: 10, contrast: 0.5 };
+    let search = ashikhmin::Search { largest: 10, contrast: 0.5, windows: false };
     // The programs count black pixels too, as the paper.
     let logs: f64 = luminance.values.iter().map(|l| (1e-5 + l).ln()).sum();
     let average = (logs / luminance.values.len() as f64).exp();

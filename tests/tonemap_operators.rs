@@ -153,7 +153,7 @@ fn images_without_anything_to_adapt_to() {
             } else {
                 &[Local::Fast, Local::Literal, Local::Pyramid]
             };
-            for &local in ways {
+            for &local in ways.iter().chain((operator == Operator::Ashikhmin).then_some(&Local::Growing)) {
                 let settings = Settings { local, ..with(operator, mode) };
                 let name = format!("{operator:?} {mode:?} {local:?}");
                 for (width, height) in [(1, 1), (5, 3)] {

@@ -422,7 +422,10 @@ fn selective_is_local_where_marked_and_global_elsewhere() {
         let pixels: Vec<[f32; 4]> = grain.iter().map(|g| [g.exp2(), 2.0 * g, g * g, 1.0]).collect();
         let mask: Vec<f32> = noise(8, count).iter().map(|n| f32::from(u8::from(*n < 0.4))).collect();
         for operator in OPERATORS {
-            for local in [Local::Fast, Local::Pyramid, Local::Literal] {
+            for local in [Local::Fast, Local::Pyramid, Local::Growing, Local::Literal] {
+                if local == Local::Growing && operator != Operator::Ashikhmin {
+                    continue;
+                }
                 let with = |mode, mark, mask: &[f32]| {
                     // Nothing is important but the mask.
                     let settings = Settings {

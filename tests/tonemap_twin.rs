@@ -61,7 +61,7 @@ fn all() -> Vec<Settings> {
         [Settings::default(), Settings::paper()].iter().flat_map(|base| Operator::ALL.map(|o| (base, o)))
     {
         for mode in [Mode::Global, Mode::Local, Mode::Selective] {
-            for local in [Local::Fast, Local::Pyramid, Local::Literal] {
+            for local in [Local::Fast, Local::Pyramid, Local::Growing, Local::Literal] {
                 let settings = Settings { operator, mode: Some(mode), local, ..base.clone() };
                 let same = (mode == Mode::Global || operator.solves()) && local != Local::Fast;
                 let approximate = operator == Operator::Bilateral && mode != Mode::Global && local != Local::Literal;

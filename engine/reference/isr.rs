@@ -45,7 +45,7 @@ pub enum Pattern {
     Rings { spread: f64 },
 }
 
-/// Offset in texels and the area in texels² of each of `samples` (24, 48, 80) samples within `reach` texels.
+/// Offset in texels and the area in texels² of each of `samples` (24, 48, 80, 120, 168, 224) samples within `reach` texels.
 /// `jitter`: position within the cell, 0..1 each; `None`: the middle.
 pub fn samples(pattern: Pattern, samples: usize, reach: f64, jitter: Option<DVec2>) -> Vec<(DVec2, f64)> {
     let rings = ((((samples + 1) as f64).sqrt() - 1.0) / 2.0).round() as i32;

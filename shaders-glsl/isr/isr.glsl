@@ -30,16 +30,19 @@ float isr_occlusion(vec3 p, vec3 normal, vec3 x, float radius, float bias) {
     return (1.0 - sqrt(1.0 - s * s)) * max(dot(normal, to) / r - bias, 0.0);
 }
 
-// Samples to each side of the pixel: 24, 48, 80 are 5², 7², 9² without the centre.
+// Samples to each side of the pixel: 24, 48, 80, 120, 168, 224 are 5², 7², 9², 11², 13², 15² without the centre.
 uint isr_half_width(uint samples) {
-    return samples <= 24u ? 2u : samples <= 48u ? 3u : 4u;
+    uint n = 2u;
+    while (4u * n * (n + 1u) < samples) ++n;
+    return n;
 }
 
-// Samples of a pixel whose depth is `relative` to the mean of the picture: one step of 24, 48, 80 more or less than `samples`.
+// Samples of a pixel whose depth is `relative` to the mean of the picture: one step more (up to 80) or less (down to 24) than `samples`.
 uint isr_samples_at(float relative, uint samples) {
-    if (relative < 0.5) return samples <= 24u ? 48u : 80u;
-    if (relative > 1.5) return samples > 48u ? 48u : 24u;
-    return samples;
+    uint n = isr_half_width(samples);
+    if (relative < 0.5) n = n < 4u ? n + 1u : n;
+    if (relative > 1.5) n = max(n - 1u, 2u);
+    return 4u * n * (n + 1u);
 }
 
 // Point of the square [-1, 1]² rim at s in [0, 1), counter-clockwise from (1, -1).
@@ -70,7 +73,8 @@ vec3 isr_sample(uint i, uint samples, bool rings, float reach, float spread, vec
         vec2 at = vec2(float(cell % side), float(cell / side)) - float(n) + within - 0.5;
         return vec3(at * spacing, spacing * spacing);
     }
-    uint ring = i < 8u ? 1u : i < 24u ? 2u : i < 48u ? 3u : 4u;
+    uint ring = 1u;
+    while (i >= 4u * ring * (ring + 1u)) ++ring;
     float k = float(ring);
     float q = float(i - 4u * ring * (ring - 1u));
     float m = (k - 1.0 + within.y) / float(n);

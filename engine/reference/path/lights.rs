@@ -9,24 +9,47 @@ pub struct Placed<'a> {
     light: &'a Light,
     position: Vec3,
     direction: Vec3,
+    law: Law,
+    /// Brightest channel of all lights, W/sr or W/m².
+    brightest: f32,
+}
+
+/// How punctual lights fall off.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Law {
+    /// KHR_lights_punctual: W/sr over squared distance.
+    #[default]
+    Physical,
+    /// The law of the ISR dissertation: the colour relative to the brightest light, times `power`, times saturate(1 − (d/r)²) [ISR 16]. A surface
+    /// reflects it without 1/π, so the irradiance is π times this value. `radius`: r of lights without a range, metres.
+    Paper { radius: f32, power: f32 },
 }
 
 /// All punctual lights.
-pub fn placed<'a>(scene: &'a Scene, pose: &Pose) -> Vec<Placed<'a>> {
+pub fn placed<'a>(scene: &'a Scene, pose: &Pose, law: Law) -> Vec<Placed<'a>> {
+    let light = |node: &Node| Some(&scene.lights[node.light? as usize]);
+    let brightest = scene.nodes.iter().filter_map(light).map(|light| (light.color * light.intensity).max_element());
+    let brightest = brightest.fold(1e-20, f32::max);
     let place = |(node, world): (&Node, &Mat4)| {
         Some(Placed {
-            light: &scene.lights[node.light? as usize],
+            light: light(node)?,
             position: world.w_axis.truncate(),
             direction: world.transform_vector3(Vec3::NEG_Z).normalize_or(Vec3::NEG_Z),
+            law,
+            brightest,
         })
     };
     scene.nodes.iter().zip(&pose.world).filter_map(place).collect()
 }
 
 impl Placed<'_> {
-    /// Direction to the light, distance, irradiance on a facing plane (KHR_lights_punctual).
+    /// Direction to the light, distance, irradiance on a facing plane.
     pub fn at(&self, p: Vec3) -> (Vec3, f32, Vec3) {
         let power = self.light.color * self.light.intensity;
+        let power = match self.law {
+            Law::Physical => power,
+            Law::Paper { power: factor, .. } => power * (std::f32::consts::PI * factor / self.brightest),
+        };
         let (range, cone) = match self.light.kind {
             LightKind::Directional => return (-self.direction, f32::INFINITY, power),
             LightKind::Point { range } => (range, None),
@@ -35,12 +58,18 @@ impl Placed<'_> {
         let to = self.position - p;
         let distance = to.length().max(1e-4);
         let to = to / distance;
-        let window = range.map_or(1.0, |r| (1.0 - (distance / r).powi(4)).clamp(0.0, 1.0));
         let cone = cone.map_or(1.0, |(inner, outer)| {
             let (cos, inner, outer) = (-to.dot(self.direction), inner.cos(), outer.cos());
             ((cos - outer) / (inner - outer).max(1e-3)).clamp(0.0, 1.0).powi(2)
         });
-        (to, distance, power * (window * cone / (distance * distance)))
+        let falloff = match self.law {
+            Law::Physical => {
+                let window = range.map_or(1.0, |r| (1.0 - (distance / r).powi(4)).clamp(0.0, 1.0));
+                window / (distance * distance)
+            }
+            Law::Paper { radius, .. } => (1.0 - (distance / range.unwrap_or(radius)).powi(2)).clamp(0.0, 1.0),
+        };
+        (to, distance, power * (cone * falloff))
     }
 }
 

@@ -16,6 +16,7 @@ use crate::scene::{
     surfaces::{self, Face, Surfaces},
 };
 use glam::{Mat4, Vec3};
+pub use lights::Law;
 use lights::{Lamps, Placed};
 use random::{Random, hash_to_unit};
 use scatter::Event;
@@ -53,6 +54,8 @@ pub struct Settings {
     /// Whether rays go through random places of the pixel (box filter) or all through its centre, as a rasteriser's do.
     pub jitter: bool,
     pub sources: Sources,
+    /// How punctual lights fall off.
+    pub law: Law,
     /// Direct light of emissive surfaces from points on them instead of from scattered rays: less noise with small lamps.
     pub sample_lamps: bool,
     /// Surfaces that the camera does not see send nothing: as much as a method can know that has only the picture.
@@ -71,6 +74,7 @@ impl Default for Settings {
             diffuse_only: false,
             jitter: false,
             sources: Sources::ALL,
+            law: Law::Physical,
             sample_lamps: false,
             seen_senders_only: false,
             every: 1,
@@ -187,7 +191,7 @@ pub fn trace(scene: &Scene, pose: &Pose, bvh: &Bvh, view: &View, settings: &Sett
         last_ray_meets_nothing: diffuse_only && !seen_senders_only && !shining,
         lamps,
         surfaces,
-        lights: lights::placed(scene, pose),
+        lights: lights::placed(scene, pose, settings.law),
         world_from_view: view.view_from_world.inverse(),
         view,
         settings,

@@ -1,7 +1,7 @@
 //! Ashikhmin, "A tone mapping algorithm for high contrast images", 2002, as restated by Michael 2010, section 4.3.
 
 use super::plane::{Average, Plane, gaussian};
-use crate::techniques::tonemap::Settings;
+use crate::techniques::tonemap::{Local, Settings};
 
 /// Perceptual capacity C of luminance in cd/m²: how many just noticeable differences lie below it. The integral of
 /// 1 / TVI, with the four pieces of the paper's threshold against intensity. The paper gives what the pieces begin with by four digits,
@@ -85,12 +85,18 @@ pub struct Search {
     pub largest: usize,
     /// Largest contrast |G_s − G_2s| / G_s of a neighbourhood that counts as even.
     pub contrast: f64,
+    /// Windows of equal weights in place of Gaussians: [`Local::Growing`].
+    pub windows: bool,
 }
 
 impl Search {
     /// As the settings say.
     pub fn of(settings: &Settings) -> Self {
-        Self { largest: settings.radius as usize, contrast: f64::from(settings.contrast) }
+        Self {
+            largest: settings.radius as usize,
+            contrast: f64::from(settings.contrast),
+            windows: settings.local == Local::Growing,
+        }
     }
 
     /// G_s: σ = s/2, s pixels to each side.
@@ -98,10 +104,15 @@ impl Search {
         gaussian(radius as f64 / 2.0, radius)
     }
 
+    /// Weights of distances 0 to the radius along one axis.
+    fn own_weights(&self, radius: usize) -> Vec<f64> {
+        if self.windows { vec![1.0 / (2 * radius + 1) as f64; radius + 1] } else { Self::weights(radius) }
+    }
+
     /// Local adaptation of every pixel: the average over the largest neighbourhood that is still even. A pixel whose
     /// smallest neighbourhood is not even adapts to that smallest one. `average` computes the averages.
     pub fn adaptation(&self, luminance: &Plane, average: Average) -> Plane {
-        let of = |s| average(luminance, s as f64 / 2.0, &Self::weights(s));
+        let of = |s| average(luminance, s as f64 / 2.0, &self.own_weights(s));
         let averages: Vec<Plane> = (1..=2 * self.largest).map(of).collect();
         let at = |s: usize, x: usize, y: usize| averages[s - 1][(x, y)];
         Plane::from_fn(luminance.width, luminance.height, |x, y| {

@@ -140,7 +140,9 @@ impl<'a> Picture<'a> {
         }
         let average = match self.settings.local {
             Local::Pyramid => pyramid::averages,
-            Local::Fast | Local::Literal => |plane: &Plane, _: f64, weights: &[f64]| plane.averages(weights),
+            Local::Fast | Local::Literal | Local::Growing => {
+                |plane: &Plane, _: f64, weights: &[f64]| plane.averages(weights)
+            }
         };
         let local = match self.settings.operator {
             Operator::Ashikhmin => ashikhmin::Search::of(self.settings).adaptation(&own, average),

@@ -97,14 +97,15 @@ impl Fiv {
     ) -> Result<Picture> {
         let settings = &PictureSettings { fiv: self.prepared.picture(&settings.fiv)?, ..settings.clone() };
         self.follow(scene, &settings.fiv)?;
-        let gbuffer = gbuffer::draw(graph, handles, view, &settings.gbuffer);
+        let drawn = &if settings.fiv.hide_occluders { self.without_occluders(handles) } else { handles.clone() };
+        let gbuffer = gbuffer::draw(graph, drawn, view, &settings.gbuffer);
         let extent = graph.extent(gbuffer.depth);
         let outputs = graph.scope("fiv", |graph| {
             let (irradiance, shadows) = match (settings.fiv.method, &self.rays) {
                 (Method::BruteForce, Some(_)) => (self.truth(graph, handles, &gbuffer), None),
                 _ => {
                     let (irradiance, shadows) =
-                        self.irradiance(graph, (scene, pose, handles), view, &gbuffer, &settings.fiv)?;
+                        self.irradiance(graph, (scene, pose, (handles, drawn)), view, &gbuffer, &settings.fiv)?;
                     (irradiance, Some(shadows))
                 }
             };
@@ -145,11 +146,22 @@ impl Fiv {
         Ok(Picture { gbuffer, outputs, notes })
     }
 
-    /// Irradiance of the environment minus the irradiance that occluders hide ([FIV 12]).
+    /// The scene without the instances that are occluders, for passes that draw.
+    fn without_occluders(&self, handles: &Handles) -> Handles {
+        let mut drawn = handles.clone();
+        let hidden = |node: u32| self.occluders.placed.iter().any(|placed| placed.node == node);
+        for instance in Arc::make_mut(&mut drawn.moment).instances.iter_mut().filter(|i| hidden(i.node)) {
+            // The numbers of the instances stay those of the device's list.
+            instance.indices = 0;
+        }
+        drawn
+    }
+
+    /// Irradiance of the environment minus the irradiance that occluders hide ([FIV 12]). `drawn`: the scene as passes draw it.
     fn irradiance(
         &mut self,
         graph: &mut Graph,
-        (scene, pose, handles): (&Scene, &Pose, &Handles),
+        (scene, pose, (handles, drawn)): (&Scene, &Pose, (&Handles, &Handles)),
         view: &View,
         gbuffer: &GBuffer,
         settings: &Settings,
@@ -167,7 +179,7 @@ impl Fiv {
         let stored = graph.import_buffer(&self.fivs);
         let owners = self.owners((pose, &deforming), &in_frame.nodes, &handles.moment.instances, settings);
         let any = !in_frame.nodes.is_empty();
-        let (identity, own) = identity(graph, handles, view, gbuffer, (&owners, stored, any));
+        let (identity, own) = identity(graph, drawn, view, gbuffer, (&owners, stored, any));
         let mut list = in_frame.list.clone();
         if settings.extent == Reach::Sphere {
             list.iter_mut().for_each(|occluder| occluder.reach = NONE);

@@ -192,6 +192,8 @@ pub struct Settings {
     /// Where the vectors for an occluder's shadow on itself are taken.
     #[schemars(extend("x-decides" = "bake", "x-needs" = {"self_shadow": {"const": true}}))]
     pub self_samples: SelfSamples,
+    /// Occluders cast shadows and are not drawn, as in the thesis' measurements (section 5.4) and in figure 27.
+    pub hide_occluders: bool,
     /// Glossy reflection of the environment.
     pub specular: Specular,
     /// How irradiance is computed.
@@ -235,6 +237,7 @@ impl Default for Settings {
             shared: Shared::default(),
             self_shadow: true,
             self_samples: SelfSamples::default(),
+            hide_occluders: false,
             specular: Specular::default(),
             method: Method::Vectors,
             rotation: 0.0,

@@ -163,7 +163,7 @@ pub struct Settings {
     /// Where the samples lie around the pixel.
     pub pattern: Pattern,
     /// Samples of the gather around each pixel.
-    #[schemars(extend("enum" = [24, 48, 80]))]
+    #[schemars(extend("enum" = [24, 48, 80, 120, 168, 224]))]
     pub samples: u32,
     /// How far senders are looked for, in the full image; 0: three quarters of its longer side.
     #[schemars(range(min = 0, max = 16384), extend("x-unit" = "pixels", "x-needs" = {"indirect": {"const": true}}))]
@@ -187,7 +187,7 @@ pub struct Settings {
     /// from each other and from the picture: their surfaces send on what they got.
     #[schemars(range(min = 1, max = 4), extend("x-needs" = {"indirect": {"const": true}}))]
     pub bounces: u32,
-    /// A number of samples for each pixel by its depth: one step of 24, 48, 80 more where it is nearer than half the mean depth of the
+    /// A number of samples for each pixel by its depth: one step more (up to 80) where it is nearer than half the mean depth of the
     /// picture, one less where it is farther than one and a half of it.
     #[schemars(extend("x-needs" = {"indirect": {"const": true}}))]
     pub samples_by_depth: bool,
@@ -463,7 +463,7 @@ mod tests {
     fn an_error_names_key_value_and_what_is_allowed() {
         let message = |s: Settings| s.validate().unwrap_err().to_string();
         let error = message(Settings { samples: 50, ..Settings::default() });
-        assert_eq!(error, "samples: 50 is not allowed; allowed: 24, 48, 80");
+        assert_eq!(error, "samples: 50 is not allowed; allowed: 24, 48, 80, 120, 168, 224");
         let error = message(Settings { k_ssao: f32::NAN, ..Settings::default() });
         assert_eq!(error, "k_ssao: NaN or infinity is not allowed; allowed: 0 to 1");
         let error = message(Settings { bounces: 0, ..Settings::default() });

@@ -18,7 +18,7 @@ const BLOCK_SAMPLES: u32 = 64;
 /// Side in pixels of the blocks that stand for their pixels in the filter of a picture; 1 where each stands for itself.
 pub fn block_side(picture: Extent, settings: &Settings) -> u32 {
     match settings.local {
-        Local::Literal => 1,
+        Local::Literal | Local::Growing => 1,
         Local::Fast | Local::Pyramid => {
             (settings.bilateral(picture.width, picture.height).0 / 3.0).ceil().max(1.0) as u32
         }

@@ -28,9 +28,10 @@ pub fn adaptation(
     };
     let adaptation = graph.image("tonemap.adaptation", Format::R32F, graph.extent(luminance));
     match settings.local {
-        Local::Literal => {
+        Local::Literal | Local::Growing => {
             let Tables { search, weights } = search.tables(graph);
-            let args = literal::Args { luminance, search, weights, statistics, adaptation };
+            let spec = literal::Spec { growing: (settings.local == Local::Growing).into() };
+            let args = literal::Args { luminance, search, weights, statistics, adaptation, spec };
             graph.compute(args, graph.extent(luminance));
         }
         Local::Fast => fast(graph, luminance, importance, statistics, &search, adaptation),

@@ -175,6 +175,10 @@ fn prepare(
             local = consts::LOCAL_LITERAL;
             search.tables(graph)
         }
+        (Some(search), Local::Growing) => {
+            local = consts::LOCAL_GROWING;
+            search.tables(graph)
+        }
         (Some(_), Local::Fast | Local::Pyramid) => {
             adaptation = local::adaptation(graph, luminance, Some(importance), statistics, picture, settings)?;
             Tables::none(graph)

@@ -27,6 +27,7 @@ pub mod pyramid;
 pub mod receptor;
 pub mod search;
 mod settings;
+mod settle;
 pub mod solve;
 pub mod statistics;
 mod still;
@@ -84,6 +85,8 @@ pub struct Tonemap {
     settings: Settings,
     /// `types::TonemapStatistics` of the last frame.
     statistics: OwnedBuffer,
+    /// Local adaptation of the last frame.
+    last: settle::Last,
 }
 
 impl Tonemap {
@@ -93,7 +96,12 @@ impl Tonemap {
     /// `Usage` if a setting is out of its range, `OutOfMemory`.
     pub fn new(gpu: &Gpu, settings: &Settings) -> Result<Self> {
         settings.validate()?;
-        Ok(Self { gpu: gpu.clone(), settings: settings.clone(), statistics: no_statistics(gpu)? })
+        Ok(Self {
+            gpu: gpu.clone(),
+            settings: settings.clone(),
+            statistics: no_statistics(gpu)?,
+            last: settle::Last::default(),
+        })
     }
 
     pub fn settings(&self) -> &Settings {
@@ -116,6 +124,7 @@ impl Tonemap {
     /// `OutOfMemory`, `DeviceLost`.
     pub fn reset(&mut self) -> Result<()> {
         self.statistics = no_statistics(&self.gpu)?;
+        self.last = settle::Last::default();
         Ok(())
     }
 
@@ -126,6 +135,7 @@ impl Tonemap {
     pub fn frame(&mut self, graph: &mut Graph, input: impl Into<Input>, dt: Option<f32>) -> Result<Output> {
         let input = input.into();
         let statistics = graph.import_buffer(&self.statistics);
+        let known = self.last.known(&self.gpu, graph, graph.extent(input.color), dt, &self.settings)?;
         graph.scope("tonemap", |graph| {
             let (luminance, sums) = statistics::whole(graph, input.color, statistics, dt, &self.settings);
             let picture = graph.extent(input.color);
@@ -137,7 +147,7 @@ impl Tonemap {
                 receptor::range(graph, input.color, picture.into(), &known, &self.settings);
                 known
             });
-            map(graph, &input, &Light { luminance, statistics, receptor, picture }, &self.settings)
+            map(graph, &input, &Light { luminance, statistics, receptor, picture, last: known }, &self.settings)
         })
     }
 }
@@ -150,11 +160,13 @@ struct Light {
     receptor: Option<receptor::Known>,
     /// Extent of the whole picture, of which the input may be a part.
     picture: Extent,
+    /// Local adaptation of the last frame, if it goes on from it.
+    last: Option<settle::Known>,
 }
 
 /// Adaptation and curve.
 fn map(graph: &mut Graph, input: &Input, light: &Light, settings: &Settings) -> Result<Output> {
-    let Light { luminance, statistics, receptor, picture } = *light;
+    let Light { luminance, statistics, receptor, picture, last } = *light;
     let (mut important, mut solve) = (None, None);
     let adaptation = match settings.mode() {
         _ if settings.operator.solves() => {
@@ -169,6 +181,10 @@ fn map(graph: &mut Graph, input: &Input, light: &Light, settings: &Settings) -> 
             important = Some(importance);
             mark::adapt(graph, luminance, importance, statistics, picture, settings)?
         }
+    };
+    let adaptation = match last {
+        Some(last) if !settings.operator.solves() => settle::settle(graph, adaptation, last),
+        _ => adaptation,
     };
     let mapped = match receptor {
         Some(known) => receptor::mapped(graph, input.color, &known, settings),

@@ -2,7 +2,7 @@
 
 use super::{
     BadCounts, Input, Light, Local, Mode, Operator, Output, Settings, Tonemap, bilateral, clean, identify, map,
-    pyramid, receptor,
+    pyramid, receptor, settle,
     statistics::{self, Rectangle, Sums},
     whole,
 };
@@ -170,6 +170,12 @@ impl Still {
                 important: important.map(|map| marked(&frame.image(map), &tile)),
                 residual: solve.map(|state| left(&frame.buffer(state))),
             }
+        } else if settle::goes_on(&self.tonemap.settings, dt) {
+            let what = format!(
+                "adapt_local is {}, and a frame of {width}×{height} pixels is mapped in tiles",
+                self.tonemap.settings.adapt_local
+            );
+            return Err(Error::usage(what).help(format!("Use 0, or frames of at most {WHOLE} pixels")));
         } else {
             self.tiled(width, height, &source, dt)?
         };
@@ -259,7 +265,7 @@ impl Still {
             let luminance = statistics::luminance(&mut graph, input.color, tile.extent().into(), unused, &settings);
             let known = known(&mut graph);
             let receptor = has_receptors.then_some(known);
-            let light = Light { luminance, statistics: known.statistics, receptor, picture };
+            let light = Light { luminance, statistics: known.statistics, receptor, picture, last: None };
             let output: Output = map(&mut graph, &input, &light, &settings)?;
             let (mapped, found) = (graph.read_image(output.mapped), graph.read_buffer(output.statistics));
             let map = output.important.map(|map| graph.read_image(map));

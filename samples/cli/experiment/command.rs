@@ -6,11 +6,11 @@ use std::{
     time::Instant,
 };
 
-use lucerna::{Result, bake::Shard, gpu::Gpu};
+use lucerna::{Error, Result, bake::Shard, gpu::Gpu};
 use serde_json::json;
 
 use super::{
-    analysis,
+    analysis::{self, papers},
     cache::Cache,
     file::{self, BUILTIN},
     place::Folders,
@@ -24,14 +24,15 @@ use crate::{
     program::STOPPED_EARLY,
     progress::ProgressMode,
     reference::Span,
+    report::write_own,
     signals::Interrupt,
 };
 
 /// Options of `lucerna reproduce`.
 #[derive(clap::Args, Clone, Debug)]
 pub struct ReproduceArgs {
-    /// A built-in experiment (`--list` lists them), or a .toml file
-    #[arg(value_name = "NAME|FILE.toml", required_unless_present = "list")]
+    /// A built-in experiment (`--list` lists them), or a .toml file; `all`: the experiments of all papers, and a page with every number of the papers beside ours
+    #[arg(value_name = "NAME|all|FILE.toml", required_unless_present = "list")]
     pub experiment: Option<String>,
 
     /// Quick mode: fewer views, smaller pictures or fewer samples, as the experiment defines
@@ -82,7 +83,7 @@ pub struct ReproduceArgs {
 /// Options of `lucerna report`.
 #[derive(clap::Args, Clone, Debug)]
 pub struct ReportArgs {
-    /// A folder written by `lucerna reproduce`
+    /// A folder written by `lucerna reproduce`, also by `lucerna reproduce all`
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
 
@@ -103,6 +104,59 @@ pub fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCode> {
         list(args.json)?;
         return Ok(ExitCode::SUCCESS);
     };
+    if asked == ALL { all(args, console) } else { one(args, asked, console) }
+}
+
+/// Name of the experiments of all papers.
+const ALL: &str = "all";
+
+/// Runs the experiments of all papers, each into a folder of its name, and writes the page with every number of the papers.
+fn all(args: &ReproduceArgs, console: Console) -> Result<ExitCode> {
+    if args.json {
+        let help = "Run `lucerna reproduce NAME --json` for each experiment, or read report.json of the folder";
+        return Err(Error::usage("`reproduce all` prints no JSON document").help(help));
+    }
+    let begun = Instant::now();
+    let quick = if args.quick { "-quick" } else { "" };
+    let folder = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("papers{quick}-report")));
+    for name in papers::EXPERIMENTS {
+        let spent = begun.elapsed();
+        let of = ReproduceArgs {
+            experiment: Some((*name).to_owned()),
+            output: Some(folder.join(name)),
+            time_limit: args.time_limit.map(|limit| Span(limit.0.saturating_sub(spent))),
+            ..args.clone()
+        };
+        let code = one(&of, name, console)?;
+        if code != ExitCode::SUCCESS {
+            return Ok(code);
+        }
+    }
+    if args.dry_run || args.shard.is_some() {
+        return Ok(ExitCode::SUCCESS);
+    }
+    summary(&folder, console, false)?;
+    let seconds = begun.elapsed().as_secs();
+    console.info(&format!("all papers in {} min {} s", seconds / 60, seconds % 60));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes the page of all papers from the reports in the folders of `folder`.
+fn summary(folder: &Path, console: Console, as_json: bool) -> Result<()> {
+    let page = papers::summary(folder)?;
+    let mut files = page.write(folder)?;
+    let markdown = folder.join("reproduction.md");
+    write_own(&markdown, page.markdown().as_bytes())?;
+    files.push(markdown);
+    let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    if as_json {
+        return console::print_json(&json!({ "experiment": ALL, "files": names }));
+    }
+    console.info(&format!("wrote {}", names.join(", ")));
+    Ok(())
+}
+
+fn one(args: &ReproduceArgs, asked: &str, console: Console) -> Result<ExitCode> {
     let begun = Instant::now();
     let experiment = file::open(asked, args.quick)?;
     let interrupt = Interrupt::install();
@@ -185,6 +239,9 @@ fn of_shard(
 /// # Errors
 /// `Input` if there are no results.
 pub fn report(args: &ReportArgs, console: Console) -> Result<()> {
+    if !args.folder.join("manifest.json").exists() && papers::is_summary(&args.folder) {
+        return summary(&args.folder, console, args.json);
+    }
     write(&Results::open(&args.folder)?, &args.folder, console, args.json)
 }
 

@@ -16,7 +16,11 @@ use lucerna::{
     reference::path,
     scene::{Pose, Scene, View, bvh::Bvh},
     technique::Picture,
-    techniques::{fiv::Fiv, igi::Igi, isr::Isr},
+    techniques::{
+        fiv::Fiv,
+        igi::Igi,
+        isr::{Isr, LightLaw},
+    },
     tracer,
 };
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -248,6 +252,11 @@ pub const KINDS: &[Kind] = &[
         settings: |paper, changes| {
             no_paper("path", paper)?;
             let settings: PathSettings = config::with(&PathSettings::default(), changes)?;
+            for (name, value) in [("light_radius", settings.light_radius), ("light_power", settings.light_power)] {
+                if !(0.0..=1e9).contains(&value) {
+                    return Err(Error::usage(format!("{name} is {value}, allowed are 0 to 1e9")));
+                }
+            }
             match (settings.samples, settings.bounces) {
                 (1..=MOST_SAMPLES, 0..=MOST_BOUNCES) => config::to_value(&settings),
                 (1..=MOST_SAMPLES, other) => {
@@ -351,22 +360,36 @@ struct PathSettings {
     bounces: u32,
     specular: bool,
     jitter: bool,
+    /// How punctual lights fall off and how surfaces reflect them, as `isr.light_law`.
+    light_law: LightLaw,
+    /// Law of the dissertation: radius of lights without a range, metres; 0: the far distance of the camera.
+    light_radius: f32,
+    /// Law of the dissertation: brightness of the brightest light.
+    light_power: f32,
 }
 
 impl Default for PathSettings {
     fn default() -> Self {
         let path::Settings { samples, bounces, diffuse_only, jitter, .. } = path::Settings::default();
-        Self { samples, bounces, specular: !diffuse_only, jitter }
+        let (light_law, light_radius, light_power) = (LightLaw::Physical, 0.0, 1.0);
+        Self { samples, bounces, specular: !diffuse_only, jitter, light_law, light_radius, light_power }
     }
 }
 
 fn path_picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
-    let PathSettings { samples, bounces, specular, jitter } = read(job.settings)?;
+    let PathSettings { samples, bounces, specular, jitter, light_law, light_radius, light_power } = read(job.settings)?;
     let (scene, pose) = (warm.scene, warm.pose);
     let bvh: &mut Bvh = warm.keep("bvh", |_, scene, pose| Ok(Bvh::build(scene, pose)))?;
     let begun = Instant::now();
+    let law = match light_law {
+        LightLaw::Physical => path::Law::Physical,
+        LightLaw::Paper => {
+            let radius = if light_radius > 0.0 { light_radius } else { job.view.far };
+            path::Law::Paper { radius, power: light_power }
+        }
+    };
     let settings =
-        path::Settings { samples, bounces, diffuse_only: !specular, jitter, seed: job.seed, ..Default::default() };
+        path::Settings { samples, bounces, diffuse_only: !specular, jitter, law, seed: job.seed, ..Default::default() };
     let traced = path::trace(scene, pose, bvh, job.view, &settings);
     let [width, height] = job.view.extent;
     let rgb = |pixels: &[glam::Vec3]| pixels.iter().map(|v| v.to_array()).collect::<Vec<[f32; 3]>>();

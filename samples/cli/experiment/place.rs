@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use glam::Mat4;
+use glam::{Mat4, Vec3};
 use lucerna::{
     Error, ErrorKind, Result,
     image::{self, Layers},
@@ -132,6 +132,9 @@ fn read(experiment: &Experiment, entry: &Entry, folders: &Folders) -> Result<Loa
     if !entry.lights {
         scene.nodes.iter_mut().for_each(|node| node.light = None);
     }
+    if !entry.emission {
+        scene.materials.iter_mut().for_each(|material| material.emissive = Vec3::ZERO);
+    }
     lights::light(&mut scene, &entry.light, entry.sun.as_ref(), entry.default_light);
     if !entry.sky {
         scene.environment = None;
@@ -142,8 +145,9 @@ fn read(experiment: &Experiment, entry: &Entry, folders: &Folders) -> Result<Loa
     let pose = Pose::playing(&scene, 0.0);
     Extents::of(&scene).check(&scene, &pose)?;
     let views = sized(all_views(entry, &scene, &pose, folders)?, entry)?;
-    let triangles =
-        scene.meshes.iter().flat_map(|mesh| &mesh.primitives).map(|primitive| primitive.indices.len() / 3).sum();
+    // As drawn: a mesh counts once for each node that shows it.
+    let drawn = scene.nodes.iter().filter_map(|node| scene.meshes.get(node.mesh? as usize));
+    let triangles = drawn.flat_map(|mesh| &mesh.primitives).map(|primitive| primitive.indices.len() / 3).sum();
     let exposure = entry.exposure.or_else(|| entry.builtin.as_deref().and_then(builtin::exposure).map(f64::from));
     Ok(Loaded { fingerprint: fingerprint::scene(&scene), scene, pose, image: None, triangles, views, exposure })
 }
@@ -204,7 +208,9 @@ fn all_views(entry: &Entry, scene: &scene::Scene, pose: &Pose, folders: &Folders
         list.extend(views::recorded(scene, pose).iter().map(|v| View::from_file(&v.name, &v.camera())));
     }
     if entry.random > 0 {
-        let drawn = views::draw::views(scene, pose, &entry.name, entry.random, entry.seed)?;
+        let judge = views::draw::Judge::new(scene, pose)?;
+        let judge = if entry.dark_views { judge.without_lights() } else { judge };
+        let drawn = judge.views(&entry.name, entry.random, entry.seed)?;
         list.extend(drawn.iter().map(|view| View::from_file(&view.name, &view.camera())));
     }
     if let Some(twice) = list.iter().enumerate().find(|(i, view)| list[..*i].iter().any(|v| v.name == view.name)) {

@@ -10,7 +10,7 @@ use lucerna::{
 };
 
 use super::{
-    Export,
+    Export, Pov,
     text::{number, vector},
 };
 
@@ -27,16 +27,18 @@ pub struct Look {
     pub uv: Option<TextureRef>,
     /// The colour of an untextured matt material, which vertex colours can multiply.
     pub plain: Option<Vec4>,
+    /// Contents of `finish { … }` of a matt material.
+    pub finish: String,
     pub double_sided: bool,
 }
 
 /// Converts all materials; adds their images to `export`.
-pub fn looks(scene: &Scene, stem: &str, lamps: bool, export: &mut Export) -> Result<Vec<Look>> {
+pub fn looks(scene: &Scene, stem: &str, settings: &Pov, export: &mut Export) -> Result<Vec<Look>> {
     let used: Vec<u32> = scene.meshes.iter().flat_map(|mesh| &mesh.primitives).map(|p| p.material).collect();
     let mut looks = Vec::new();
     for (index, material) in scene.materials.iter().enumerate() {
         looks.push(match used.contains(&(index as u32)) {
-            true => look(scene, index, material, stem, lamps, export)?,
+            true => look(scene, index, material, stem, settings, export)?,
             false => Look::default(),
         });
     }
@@ -48,7 +50,7 @@ fn look(
     index: usize,
     material: &Material,
     stem: &str,
-    lamps: bool,
+    settings: &Pov,
     export: &mut Export,
 ) -> Result<Look> {
     let name = if material.name.is_empty() { format!("material {index}") } else { format!("{:?}", material.name) };
@@ -81,8 +83,12 @@ fn look(
         let _ = write!(out.interior, "interior {{ ior {} }}", number(ior.max(1.0)));
     } else {
         finish += " diffuse 1";
+        if settings.ambient > 0.0 && emits == Vec3::ZERO {
+            let _ = write!(finish, " emission {}", number(settings.ambient));
+        }
+        out.finish.clone_from(&finish);
     }
-    if emits != Vec3::ZERO && lamps {
+    if emits != Vec3::ZERO && settings.emissive_lights > 0 {
         // The surface is already exported as lights, and radiosity would count its light again.
         out.flags += " no_radiosity";
     }
@@ -102,7 +108,7 @@ fn look(
         let glow = Vec3::select(least, emits / pigment.max(Vec3::splat(1e-6)), Vec3::ZERO);
         if emits != Vec3::ZERO {
             let _ = write!(finish, " emission rgb {}", vector(glow));
-        } else if finish == "ambient 0 diffuse 1" && through == 0.0 {
+        } else if !out.finish.is_empty() && through == 0.0 {
             out.plain = Some(albedo.extend(alpha));
         }
         out.texture = plain(pigment, through, 1.0 - alpha, &finish);

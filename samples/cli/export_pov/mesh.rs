@@ -129,7 +129,7 @@ fn mesh2(
         list(out, "uv_vectors", used.iter().map(|&i| text(uv(i))));
     }
     if let Colors::List(colors, _) = colors {
-        let texture = |c: &Vec4| plain(c.truncate(), 0.0, 1.0 - c.w.clamp(0.0, 1.0), "ambient 0 diffuse 1");
+        let texture = |c: &Vec4| plain(c.truncate(), 0.0, 1.0 - c.w.clamp(0.0, 1.0), &look.finish);
         list(out, "texture_list", colors.iter().map(texture));
     }
     let face = |corners: &[u32; 3]| {

@@ -54,6 +54,10 @@ pub struct Pov {
     /// Number of point lights that replace emissive surfaces, distributed by power; 0: emissive surfaces light other surfaces by
     /// radiosity only.
     pub emissive_lights: u32,
+    /// Lights cast shadows. Those of the dissertation's listing 9 cast none.
+    pub shadows: bool,
+    /// Share of its colour that every surface shows without any light, and sends to other surfaces. POV-Ray 3.6 has 0.1 where a file names none.
+    pub ambient: f32,
 }
 
 impl Default for Pov {
@@ -67,6 +71,8 @@ impl Default for Pov {
             error_bound: 0.25,
             recursion_limit: 2,
             emissive_lights: 64,
+            shadows: true,
+            ambient: 0.0,
         }
     }
 }
@@ -98,7 +104,8 @@ impl Pov {
         range("count", self.count as f32, 1.0, 1600.0)?;
         range("error_bound", self.error_bound, 1e-3, 100.0)?;
         range("recursion_limit", self.recursion_limit as f32, 1.0, 20.0)?;
-        range("emissive_lights", self.emissive_lights as f32, 0.0, 65536.0)
+        range("emissive_lights", self.emissive_lights as f32, 0.0, 65536.0)?;
+        range("ambient", self.ambient, 0.0, 1e6)
     }
 }
 
@@ -129,13 +136,13 @@ pub fn export(scene: &Scene, pose: &Pose, view: &View, settings: &Pov, stem: &st
     stage::globals(&mut body, settings);
     stage::camera(&mut body, view, units);
     stage::sky(&mut body, scene, stem, &mut out)?;
-    stage::lights(&mut body, scene, pose, units, (low, high), &mut out.notes);
+    stage::lights(&mut body, scene, pose, units, ((low, high), settings.shadows), &mut out.notes);
     if settings.emissive_lights > 0 {
-        stage::emitters(&mut body, scene, pose, &bvh, units, settings.emissive_lights, &mut out.notes);
+        stage::emitters(&mut body, scene, pose, &bvh, units, settings, &mut out.notes);
     } else if scene.materials.iter().any(|m| m.emissive.max_element() > 0.0 && !m.unlit) {
         out.notes.push("emissive surfaces light other surfaces by radiosity only".into());
     }
-    let looks = material::looks(scene, stem, settings.emissive_lights > 0, &mut out)?;
+    let looks = material::looks(scene, stem, settings, &mut out)?;
     mesh::all(&mut body, scene, pose, view, units, &looks, &mut out.notes);
     let [width, height] = view.extent;
     let mut head = format!(

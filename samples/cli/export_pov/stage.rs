@@ -89,7 +89,15 @@ fn spherical(uv: glam::Vec2) -> Vec3 {
 }
 
 /// Point, spot and directional lights.
-pub fn lights(out: &mut String, scene: &Scene, pose: &Pose, units: f32, bounds: (Vec3, Vec3), notes: &mut Vec<String>) {
+pub fn lights(
+    out: &mut String,
+    scene: &Scene,
+    pose: &Pose,
+    units: f32,
+    (bounds, shadows): ((Vec3, Vec3), bool),
+    notes: &mut Vec<String>,
+) {
+    let shadowless = if shadows { "" } else { " shadowless" };
     let centre = 0.5 * (bounds.0 + bounds.1);
     let radius = (bounds.1 - bounds.0).length().max(1e-3);
     for (node, world) in scene.nodes.iter().zip(&pose.world) {
@@ -109,14 +117,18 @@ pub fn lights(out: &mut String, scene: &Scene, pose: &Pose, units: f32, bounds: 
                 let color = vector(parallel(power));
                 let _ = writeln!(
                     out,
-                    "light_source {{ {} color rgb {color} parallel point_at {} }}",
+                    "light_source {{ {} color rgb {color}{shadowless} parallel point_at {} }}",
                     vector(from),
                     vector(to)
                 );
             }
-            LightKind::Point { .. } => faded(out, at * units, fading(power, units), ""),
+            LightKind::Point { .. } => faded(out, at * units, fading(power, units), shadowless),
             LightKind::Spot { inner, outer, .. } => {
                 faded(out, at * units, fading(power, units), "");
+                // The cone is the shadow of a filter around the light.
+                if !shadows {
+                    notes.push(format!("light {name:?} casts shadows, because its cone is made by a shadow"));
+                }
                 cone(out, at * units, along, inner, outer);
             }
         }
@@ -152,17 +164,18 @@ pub fn emitters(
     pose: &Pose,
     bvh: &Bvh,
     units: f32,
-    count: u32,
+    settings: &Pov,
     notes: &mut Vec<String>,
 ) {
-    let patches = material::patches(scene, pose, bvh, count);
+    let patches = material::patches(scene, pose, bvh, settings.emissive_lights);
     if patches.is_empty() {
         return;
     }
+    let shadowless = if settings.shadows { "" } else { " shadowless" };
     for patch in &patches {
         let target = vector((patch.position + patch.normal) * units);
         // tightness 1: attenuation is the cosine, without the smooth edge that lies between radius and falloff.
-        let cosine = format!(" spotlight point_at {target} radius 89.99 falloff 90 tightness 1");
+        let cosine = format!(" spotlight point_at {target} radius 89.99 falloff 90 tightness 1{shadowless}");
         // Off the surface by more than the tolerance of shadow rays, so that the emitter does not shade itself.
         let at = patch.position * units + patch.normal * 2e-3;
         faded(out, at, fading(patch.radiance * patch.area, units), &cosine);

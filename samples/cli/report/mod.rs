@@ -21,6 +21,7 @@
 mod data;
 mod html;
 mod images;
+mod markdown;
 mod plot;
 mod svg;
 mod table;
@@ -117,6 +118,11 @@ impl Page {
     /// `Runtime` if an image cannot be packed.
     pub fn html(&self) -> Result<String> {
         html::page(self)
+    }
+
+    /// Texts and tables of the page as Markdown.
+    pub fn markdown(&self) -> String {
+        markdown::page(self)
     }
 
     /// Writes `report.html`, `report.json`, `report.csv` and, if anything was timed, `times.json` and `times.csv` into a folder.

@@ -134,6 +134,13 @@ impl<'a> Judge<'a> {
         Ok(Self { scene, bvh, lamps: lamps(scene, pose), min, max })
     }
 
+    /// Without the rule that light must arrive.
+    #[must_use]
+    pub fn without_lights(mut self) -> Self {
+        self.lamps.clear();
+        self
+    }
+
     fn diagonal(&self) -> f32 {
         (self.max - self.min).length().max(1e-6)
     }
@@ -258,39 +265,46 @@ impl<'a> Judge<'a> {
         let (name, up) = (String::new(), Vec3::Y);
         NamedView { name, origin: Origin::Random, position, target, up, yfov_degrees, znear, zfar: None }
     }
+
+    /// `count` views that pass [`Self::judge`], named `{name}-000` and so on. The same for the same arguments.
+    ///
+    /// # Errors
+    /// `Input` if too few places see enough of the scene.
+    pub fn views(&self, name: &str, count: usize, seed: u64) -> Result<Vec<NamedView>> {
+        let mut random = Random(seed.wrapping_mul(0xd134_2543_de82_ef95));
+        let mut found = Vec::new();
+        let mut refusals = [0u64; 5];
+        for _ in 0..PATIENCE * count as u64 {
+            if found.len() == count {
+                break;
+            }
+            let mut view = self.any(&mut random);
+            match self.judge(&view) {
+                Ok(()) => {
+                    view.name = format!("{name}-{:03}", found.len());
+                    found.push(view);
+                }
+                Err(why) => refusals[why as usize] += 1,
+            }
+        }
+        if found.len() < count {
+            let [inside, sky, behind, wall, dark] = refusals;
+            let tried = inside + sky + behind + wall + dark + found.len() as u64;
+            let found = found.len();
+            let text = format!(
+                "only {found} of {count} views were found in {tried} places tried: {inside} inside or too near to geometry, {sky} \
+                 mostly sky, {behind} behind single-sided surfaces, {wall} in front of a wall, {dark} in the dark"
+            );
+            return Err(Error::input(text).help("Ask for fewer, or record cameras by hand (--camera FILE.toml)"));
+        }
+        Ok(found)
+    }
 }
 
-/// `count` views that pass [`Judge::judge`], named `{name}-000` and so on. The same for the same arguments.
+/// [`Judge::views`] of a scene.
 ///
 /// # Errors
 /// `Input` if the scene has no surface, or too few places in it see enough of it.
 pub fn views(scene: &Scene, pose: &Pose, name: &str, count: usize, seed: u64) -> Result<Vec<NamedView>> {
-    let judge = Judge::new(scene, pose)?;
-    let mut random = Random(seed.wrapping_mul(0xd134_2543_de82_ef95));
-    let mut found = Vec::new();
-    let mut refusals = [0u64; 5];
-    for _ in 0..PATIENCE * count as u64 {
-        if found.len() == count {
-            break;
-        }
-        let mut view = judge.any(&mut random);
-        match judge.judge(&view) {
-            Ok(()) => {
-                view.name = format!("{name}-{:03}", found.len());
-                found.push(view);
-            }
-            Err(why) => refusals[why as usize] += 1,
-        }
-    }
-    if found.len() < count {
-        let [inside, sky, behind, wall, dark] = refusals;
-        let tried = inside + sky + behind + wall + dark + found.len() as u64;
-        let found = found.len();
-        let text = format!(
-            "only {found} of {count} views were found in {tried} places tried: {inside} inside or too near to geometry, {sky} \
-             mostly sky, {behind} behind single-sided surfaces, {wall} in front of a wall, {dark} in the dark"
-        );
-        return Err(Error::input(text).help("Ask for fewer, or record cameras by hand (--camera FILE.toml)"));
-    }
-    Ok(found)
+    Judge::new(scene, pose)?.views(name, count, seed)
 }

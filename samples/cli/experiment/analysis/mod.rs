@@ -5,6 +5,7 @@ mod daylight;
 mod fiv;
 mod igi;
 mod isr;
+pub mod papers;
 mod prt;
 mod tonemap;
 mod yardstick;
@@ -24,6 +25,7 @@ const ANALYSES: &[(&str, Analysis)] = &[
     ("fiv", fiv::analyse),
     ("igi", igi::analyse),
     ("isr", isr::analyse),
+    ("isr-pair", isr::pair::analyse),
     ("prt", prt::analyse),
     ("tonemap", tonemap::analyse),
     ("yardstick", yardstick::analyse),

@@ -1,9 +1,10 @@
 //! Tone mapping: the tables of Michael's thesis (section 5.3), and the gain of selection with faster local operators.
 //!
 //! The analysis finds techniques by their names: `gtm`, `ltm`, `stm` (global, local and selective tone mapping by the literal operator; `stm` with
-//! a matrix of `tonemap.mark`), `ltm-fast`, `stm-fast`, `ltm-pyramid`, `stm-pyramid`,
+//! a matrix of `tonemap.mark`), `ltm-growing` and `stm-growing` (matrices of `tonemap.radius` and `tonemap.mark`), `ltm-fast`, `stm-fast`, `ltm-pyramid`, `stm-pyramid`,
 //! `stm-threshold` (a matrix of `tonemap.threshold`), `stm-saliency`, `stm-half`; and the reference `cpu`. Scenes of the group `still` are pictures, all others frames.
 
+mod alike;
 mod tables;
 
 use lucerna::{
@@ -42,6 +43,7 @@ const SIDE: u32 = 768;
 
 pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
     let views: Vec<View<'_>> = results.views().into_iter().map(|of| View { results, of }).collect();
+    page.add(alike::section(&views)?);
     page.add(tables::payoff(&views)?);
     page.add(tables::agreement(&views)?);
     if views.iter().any(|view| !view.is_still()) {

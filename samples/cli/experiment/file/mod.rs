@@ -57,6 +57,7 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ("fiv", include_str!("../../../experiments/fiv.toml")),
     ("igi", include_str!("../../../experiments/igi.toml")),
     ("isr", include_str!("../../../experiments/isr.toml")),
+    ("isr-pair", include_str!("../../../experiments/isr-pair.toml")),
     ("prt", include_str!("../../../experiments/prt.toml")),
     ("smoke", include_str!("../../../experiments/smoke.toml")),
     ("tonemap", include_str!("../../../experiments/tonemap.toml")),
@@ -126,6 +127,12 @@ pub struct Scene {
     /// `false` removes the scene's own lights, before `light` and `sun` add others.
     #[serde(default = "yes")]
     pub lights: bool,
+    /// `false` makes emissive surfaces dark.
+    #[serde(default = "yes")]
+    pub emission: bool,
+    /// `true`: drawn views may show surfaces without direct light.
+    #[serde(default)]
+    pub dark_views: bool,
     #[serde(default)]
     pub light: Vec<Point>,
     pub sun: Option<Sun>,

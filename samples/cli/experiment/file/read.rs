@@ -171,7 +171,11 @@ fn what_it_is(scene: &Scene) -> Result<()> {
         return Err(Error::input(format!("scene '{name}' needs one of builtin, file and image")));
     }
     let views = !scene.cameras.is_empty() || scene.list.is_some() || scene.random > 0 || scene.recorded;
-    let lights = !scene.light.is_empty() || !scene.lights || scene.sun.is_some() || scene.environment.is_some();
+    let lights = !scene.light.is_empty()
+        || !scene.lights
+        || !scene.emission
+        || scene.sun.is_some()
+        || scene.environment.is_some();
     let changed = scene.unit.is_some() || scene.ground.is_some() || !scene.sizes.is_empty();
     if scene.image.is_some() && (views || lights || changed) {
         let what = format!("scene '{name}' is an image, which has its own light, view and size");

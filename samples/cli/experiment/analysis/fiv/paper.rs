@@ -43,6 +43,7 @@ pub(super) const CASES: &[Case] = &[
     case("20", "coloured lights, two occluders", "two, areas", DEFAULT, 0.019),
     case("21", "overlap, correction off", "queens, area", "no overlap", 0.027),
     case("21, 22", "overlap, correction on; one area light", "queens, area", DEFAULT, 0.019),
+    case("21", "closer together, grove, correction off", "queens, close", "no overlap", 0.027),
     case("21", "queens of a chess set, correction off", "chess queens, area", "no overlap", 0.027),
     case("21, 22", "queens of a chess set, correction on", "chess queens, area", DEFAULT, 0.019),
     case("21, 22", "all as in the thesis", "queens, area", "thesis", 0.019),

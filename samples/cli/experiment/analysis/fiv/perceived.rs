@@ -2,15 +2,15 @@
 
 use lucerna::{
     Result,
-    measure::{Display, Exposure, Measure, Options, Pair, Picture, ToneCurve},
+    measure::{Display, Exposure, Measure, Measured, Options, Pair, Picture, ToneCurve},
     reference::tonemap,
     techniques::tonemap::Settings,
 };
 
-use super::{GROUND, Lab, TRUTH, paper};
+use super::{GROUND, Lab, SETS, TRUTH, paper};
 use crate::{
     experiment::results::{Done, Layer},
-    report::{Section, Table},
+    report::{Cell, Comparison, Section, Table},
 };
 
 /// Screen value of a picture's 99th percentile.
@@ -18,60 +18,183 @@ const BRIGHT: f64 = 0.9;
 /// Luminance to which the log-average is scaled for an operator that works in cd/m².
 const GREY: f32 = 18.0;
 
+/// Longest side of an image in the page, pixels.
+const SIDE: u32 = 384;
+
 /// Five of the 255 steps from black to the screen's white.
 const CODES: f64 = 5.0 / 255.0;
 
+/// The tables: the thesis' views, and the ground alone.
 pub(super) fn tables(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("Tables 17 and 18: before and after tone mapping");
     section.text(
-        "Share of pixels with a visible difference from brute force (VDP for an inexperienced observer, p > 0.75), for the ground without the objects \
-         on it, as in the thesis. *Before* is before tone mapping, at an exposure at which the picture spans the screen's range. *After* is after \
-         Ashikhmin's local operator. The thesis names neither the program that computed its VDP nor its settings. *Differ* is the share of pixels that \
-         differ before tone mapping by more than 5/255 of the screen's white. VDP marks more pixels. For 32×17×15 samples in 96×96 under one point \
-         light VDP marks 44 % of the pixels, although only 6.6 % differ by 1/255; it marks 25 % if each pixel is shown as 5×5 pixels. Other settings \
-         of the VDP give 38 % (p > 0.95) to 72 % (masking of a practised observer); a white of 40 or 300 cd/m², or a fourth of the pixels per degree, \
-         changes the value by a tenth. For 64×33×30 samples under one area light VDP marks 5.8 %, or 3.9 % to 14 % with other settings, although only \
-         0.9 % differ. No setting gives the thesis' 0.2 %.",
+        "Share of pixels with a visible difference from brute force (VDP for an inexperienced observer, p > 0.75). The first two tables have the thesis' views: in perspective, with the \
+         environment behind, without the objects that cast the shadows, so that they hide no error (section 5.4). Pixels of the background cannot differ, and count. *Before* is before \
+         tone mapping, at an exposure at which the lit ground spans the screen's range. *After* is after \
+         Ashikhmin's local operator. The thesis names neither the program that computed its VDP nor its settings. *Background* is the share of pixels that show the environment. \
+         *Differ* is the share of pixels that differ before tone mapping by more than 5/255 of the screen's white. VDP marks more pixels: see the page of the method for its other settings.",
     );
-    let columns = ["samples", "before (thesis)", "before", "after (thesis)", "after", "differ"];
-    let mut table =
-        Table::new("table-17", lab.caption("Table 17: VDP (%) by samples, bunny under one area light"), columns);
-    for (samples, before, after) in paper::TABLE_17 {
-        if let Some([ours_before, ours_after, differ]) = seen(lab, "bunny, area", samples)? {
-            let ours = [ours_before.into(), after.into(), ours_after.into(), differ.into()];
-            table.push([samples.into(), before.into()].into_iter().chain(ours));
+    for (id, more, seen) in [("", "", SEEN), ("-ground", ", the ground alone from above", OVER)] {
+        let columns = [
+            "samples",
+            "before (thesis)",
+            "before",
+            "after (thesis)",
+            "after",
+            "after − before",
+            "differ",
+            "background",
+        ];
+        let caption = lab.caption(&format!("Table 17: VDP (%) by samples, bunny under one area light{more}"));
+        let mut table = Table::new(format!("table-17{id}"), caption, columns);
+        for (samples, before, after) in paper::TABLE_17 {
+            if let Some(ours) = seen.compare(lab, "bunny, area", samples)? {
+                table.push([samples.into(), before.into()].into_iter().chain(ours.cells(after)));
+            }
         }
-    }
-    section.add(table);
-    let columns = ["environment", "samples", "before (thesis)", "before", "after (thesis)", "after", "differ"];
-    let mut table = Table::new("table-18", lab.caption("Table 18: VDP (%) by environment, a bunny"), columns);
-    for (name, scene, before, after) in paper::TABLE_18 {
-        let samples = lab.nearest(scene, GROUND, paper::DENSEST);
-        if let Some([ours_before, ours_after, differ]) = seen(lab, scene, samples)? {
-            let ours = [ours_before.into(), after.into(), ours_after.into(), differ.into()];
-            table.push([name.into(), samples.into(), before.into()].into_iter().chain(ours));
+        section.add(table);
+        let columns = [
+            "environment",
+            "samples",
+            "before (thesis)",
+            "before",
+            "after (thesis)",
+            "after",
+            "after − before",
+            "differ",
+            "background",
+        ];
+        let caption = lab.caption(&format!("Table 18: VDP (%) by environment, a bunny{more}"));
+        let mut table = Table::new(format!("table-18{id}"), caption, columns);
+        for (name, scene, before, after) in paper::TABLE_18 {
+            let samples = seen.nearest(lab, scene);
+            if let Some(ours) = seen.compare(lab, scene, samples)? {
+                table.push([name.into(), samples.into(), before.into()].into_iter().chain(ours.cells(after)));
+            }
         }
+        section.add(table);
     }
-    section.add(table);
+    images(lab, &mut section)?;
     Ok(section)
 }
 
-/// Percent of pixels with a visible difference before and after tone mapping, and of pixels that differ by more than [`CODES`] before it.
-fn seen(lab: &Lab<'_>, scene: &str, technique: &str) -> Result<Option<[f64; 3]>> {
-    let Some((truth, run)) = lab.run(scene, GROUND, TRUTH).zip(lab.run(scene, GROUND, technique)) else {
-        return Ok(None);
-    };
-    let picture = |run: &Done| lab.results.picture(Layer(run, ""));
-    let open = lab.open(truth)?;
-    let (truth, mut test) = (picture(truth)?, picture(run)?);
-    // Pixels that are never visible do not count as different.
-    for (i, _) in open.iter().flatten().enumerate().filter(|(_, open)| !**open) {
-        test.pixels[i] = truth.pixels[i];
+/// The pictures in which differences are counted.
+#[derive(Clone, Copy)]
+struct Seen {
+    /// Ends of the names of scenes and of techniques.
+    scene: &'static str,
+    technique: &'static str,
+    view: &'static str,
+}
+
+/// The camera of the thesis' views, as the experiment's file names it: the environment fills a part of the picture.
+const HORIZON: &str = "0.4,0.75,3.6,0,0.6,0,48";
+/// The thesis' views.
+const SEEN: Seen = Seen { scene: ", seen", technique: ", hidden", view: HORIZON };
+/// The ground from above.
+const OVER: Seen = Seen { scene: "", technique: "", view: GROUND };
+
+/// Shares of pixels, percent.
+struct Shares {
+    before: f64,
+    after: f64,
+    differ: f64,
+    background: f64,
+}
+
+impl Shares {
+    fn cells(&self, thesis: f64) -> [Cell; 6] {
+        let Self { before, after, differ, background } = *self;
+        [before.into(), thesis.into(), after.into(), (after - before).into(), differ.into(), background.into()]
     }
-    let stops = exposure(&truth);
-    let before = vdp(&truth, &test, stops)?;
-    let after = vdp(&mapped(&truth)?, &mapped(&test)?, 0.0)?;
-    Ok(Some([before, after, differing(&truth, &test, stops)]))
+}
+
+/// A picture before and after tone mapping, and its reference.
+struct Both {
+    stops: f64,
+    background: f64,
+    truth: [Picture; 2],
+    test: [Picture; 2],
+}
+
+impl Seen {
+    fn run<'a>(self, lab: &Lab<'a>, scene: &str, technique: &str) -> Option<&'a Done> {
+        lab.run(&format!("{scene}{}", self.scene), self.view, &format!("{technique}{}", self.technique))
+    }
+
+    /// The densest set of samples with a picture.
+    fn nearest(self, lab: &Lab<'_>, scene: &str) -> &'static str {
+        SETS.into_iter().find(|set| self.run(lab, scene, set).is_some()).unwrap_or(paper::DENSEST)
+    }
+
+    fn both(self, lab: &Lab<'_>, scene: &str, technique: &str) -> Result<Option<Both>> {
+        let Some((truth, run)) = self.run(lab, scene, TRUTH).zip(self.run(lab, scene, technique)) else {
+            return Ok(None);
+        };
+        let picture = |run: &Done| lab.results.picture(Layer(run, ""));
+        // Pixels that are never visible do not count as different.
+        let open = lab.open(truth)?;
+        // Surfaces have irradiance, the background has none.
+        let lit = lab.results.picture(Layer(truth, "irradiance"))?;
+        let is_ground = |i: usize| lit.pixels[i].iter().any(|v| *v > 0.0);
+        let (truth, mut test) = (picture(truth)?, picture(run)?);
+        for (i, _) in open.iter().flatten().enumerate().filter(|(_, open)| !**open) {
+            test.pixels[i] = truth.pixels[i];
+        }
+        let ground: Vec<[f32; 3]> =
+            (0..truth.pixels.len()).filter(|i| is_ground(*i)).map(|i| truth.pixels[i]).collect();
+        let background = 100.0 * (1.0 - ground.len() as f64 / truth.pixels.len().max(1) as f64);
+        let stops = exposure(ground);
+        let (truth_after, test_after) = (mapped(&truth)?, mapped(&test)?);
+        Ok(Some(Both { stops, background, truth: [truth, truth_after], test: [test, test_after] }))
+    }
+
+    fn compare(self, lab: &Lab<'_>, scene: &str, technique: &str) -> Result<Option<Shares>> {
+        let Some(both) = self.both(lab, scene, technique)? else { return Ok(None) };
+        Ok(Some(Shares {
+            before: both.vdp(0)?.value,
+            after: both.vdp(1)?.value,
+            differ: differing(&both.truth[0], &both.test[0], both.stops),
+            background: both.background,
+        }))
+    }
+}
+
+impl Both {
+    /// Before (0) and after (1) tone mapping.
+    fn vdp(&self, at: usize) -> Result<Measured> {
+        let stops = [self.stops, 0.0][at];
+        let display = Display { exposure: Exposure::Stops(stops), curve: ToneCurve::Clip };
+        let options = Options { display, vdp_masking_slope: 1.0, ..Options::default() };
+        Measure::Vdp.of(&Pair::new(&self.truth[at], &self.test[at])?, &options)
+    }
+}
+
+/// Figures 39 to 42.
+fn images(lab: &Lab<'_>, section: &mut Section) -> Result<()> {
+    let of_17 = paper::TABLE_17.into_iter().map(|(set, ..)| ("Figures 39 and 40", "bunny, area", set));
+    let of_18 =
+        paper::TABLE_18.into_iter().map(|(_, scene, ..)| ("Figures 41 and 42", scene, SEEN.nearest(lab, scene)));
+    for (figures, scene, samples) in of_17.chain(of_18) {
+        let Some(both) = SEEN.both(lab, scene, samples)? else { continue };
+        let id = format!("perceived-{}-{scene}-{samples}", &figures[8..10]);
+        let [before, after] = [both.vdp(0)?, both.vdp(1)?];
+        let factor = both.stops.exp2() as f32;
+        let exposed = |picture: &Picture| picture.pixels.iter().map(|p| p.map(|v| v * factor)).collect::<Vec<_>>();
+        let map = |outcome: &Measured| outcome.map.values.iter().map(|v| [*v; 3]).collect::<Vec<_>>();
+        let set =
+            Comparison::new(id, format!("{figures}: {scene}, {samples}"), both.truth[0].width, both.truth[0].height)
+                .exposure(0.0)
+                .values("linear light of a screen, whose white is 1; maps: probability of detection")
+                .with("before, brute force", exposed(&both.truth[0]))
+                .with("before, vectors", exposed(&both.test[0]))
+                .with("VDP map before", map(&before))
+                .with("after, brute force", both.truth[1].pixels.clone())
+                .with("after, vectors", both.test[1].pixels.clone())
+                .with("VDP map after", map(&after));
+        section.add(set.at_most(SIDE));
+    }
+    Ok(())
 }
 
 /// Percent of pixels in which a channel differs by more than [`CODES`] of the screen's white.
@@ -81,15 +204,12 @@ fn differing(truth: &Picture, test: &Picture, stops: f64) -> f64 {
     100.0 * count as f64 / truth.pixels.len().max(1) as f64
 }
 
-fn vdp(truth: &Picture, test: &Picture, stops: f64) -> Result<f64> {
-    let display = Display { exposure: Exposure::Stops(stops), curve: ToneCurve::Clip };
-    let options = Options { display, vdp_masking_slope: 1.0, ..Options::default() };
-    Ok(Measure::Vdp.of(&Pair::new(truth, test)?, &options)?.value)
-}
-
-/// The exposure, in stops, at which a picture spans the screen's range.
-fn exposure(picture: &Picture) -> f64 {
-    let mut values: Vec<f32> = picture.pixels.iter().map(|p| p[0].max(p[1]).max(p[2])).collect();
+/// The exposure, in stops, at which pixels span the screen's range.
+fn exposure(pixels: Vec<[f32; 3]>) -> f64 {
+    let mut values: Vec<f32> = pixels.iter().map(|p| p[0].max(p[1]).max(p[2])).collect();
+    if values.is_empty() {
+        return 0.0;
+    }
     let at = values.len() * 99 / 100;
     let bright = f64::from(*values.select_nth_unstable_by(at, f32::total_cmp).1);
     if bright > 0.0 { (BRIGHT / bright).log2().clamp(-64.0, 64.0) } else { 0.0 }

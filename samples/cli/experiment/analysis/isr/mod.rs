@@ -1,6 +1,7 @@
 //! The experiment of the dissertation on image-space radiosity (chapter 5): table 2, figures 5.6 to 5.10, and settings beyond the dissertation.
 
 mod page;
+pub(super) mod pair;
 mod rows;
 #[cfg(test)]
 mod tests;

@@ -42,7 +42,7 @@ pub(super) fn section(results: &Results, cases: &[Case<'_>]) -> Result<Option<Se
         "Two bakes of the built-in `parlour`. *The paper's settings*: ten vectors of light around the mean of the examples, and the fifth of all coefficients \
          between vectors and samples that counts most. *The default bake*: 24 vectors of light around zero, and 48 vectors of the receivers in place of the \
          coefficients. The paper's room, program and GPU are other ones, so its figures stand here for their order of size alone. Its 4.47 MB of \
-         visibility are those of the means and coefficients; the vectors, which a picture needs too, are counted apart here. The paper's transfer of 21 MB \
+         visibility and 21 MB of transfer include the vectors (section 6: *with the basis functions*); its visibility is sparse, the visibility here is not. The paper's transfer \
          holds what it keeps of the coefficients for red, green and blue; the transfer here has no colour, because albedos are applied when a picture is made.",
     );
     if results.experiment.quick {
@@ -59,8 +59,15 @@ pub(super) fn section(results: &Results, cases: &[Case<'_>]) -> Result<Option<Se
     let fact = |name: &'static str, scale: f64| {
         both(&move |_, side| side.and_then(|times| times.fact(name)).map(|value| value * scale).into())
     };
+    let together = |names: &'static [&'static str]| {
+        both(&move |_, side| {
+            side.and_then(|times| names.iter().map(|name| times.fact(name)).sum::<Option<f64>>())
+                .map(|b| b * 1e-6)
+                .into()
+        })
+    };
     let setting = |path: &'static str| both(&move |side, _| asked(side, path));
-    let rows: [(&str, &str, Option<f64>, [Cell; 2]); 16] = [
+    let rows: [(&str, &str, Option<f64>, [Cell; 2]); 19] = [
         ("samples", "", Some(45_000.0), fact("samples", 1.0)),
         ("clusters", "", Some(48.0), fact("clusters", 1.0)),
         ("samples a cluster, asked for", "", Some(1000.0), setting("/bake/cluster")),
@@ -69,11 +76,19 @@ pub(super) fn section(results: &Results, cases: &[Case<'_>]) -> Result<Option<Se
         ("vectors of light, d₂", "", Some(10.0), setting("/bake/light")),
         ("vectors of light of all clusters, with means", "", None, fact("vectors", 1.0)),
         ("example lights", "", Some(1000.0), setting("/bake/examples")),
-        ("visibility: means and coefficients", "MB", Some(4.47), fact("bytes visibility", 1e-6)),
+        ("visibility with its vectors", "MB", Some(4.47), together(&["bytes visibility", "bytes visibility vectors"])),
+        ("visibility: means and coefficients", "MB", None, fact("bytes visibility", 1e-6)),
         ("visibility: vectors", "MB", None, fact("bytes visibility vectors", 1e-6)),
+        ("transfer with its bases", "MB", Some(21.0), together(&["bytes basis", "bytes transfer"])),
         ("bases", "MB", None, fact("bytes basis", 1e-6)),
-        ("transfer", "MB", Some(21.0), fact("bytes transfer", 1e-6)),
+        ("transfer", "MB", None, fact("bytes transfer", 1e-6)),
         ("links", "MB", None, fact("bytes links", 1e-6)),
+        (
+            "visibility and transfer together",
+            "MB",
+            Some(30.0),
+            together(&["bytes visibility", "bytes visibility vectors", "bytes basis", "bytes transfer"]),
+        ),
         ("coefficients kept, at most", "%", Some(20.0), fact("kept", 100.0)),
         ("error of a distance, root mean square", "m", None, fact("distance error", 1.0)),
         ("transferred light that is left out, root mean square", "%", None, fact("left", 100.0)),

@@ -1,0 +1,62 @@
+//! Local adaptation that goes on from frame to frame ([`Settings::adapt_local`]).
+
+use super::{Mode, Settings};
+use crate::{
+    Result,
+    gpu::{BufferDesc, Gpu, OwnedBuffer},
+    graph::{Buffer, Extent, Format, Graph, Image},
+    shaders::tonemap::settle,
+};
+
+/// The local adaptation of the last frame.
+#[derive(Debug, Default)]
+pub struct Last(Option<(OwnedBuffer, Extent)>);
+
+/// The last frame in a graph, and the share of the way that adaptation goes from it.
+#[derive(Clone, Copy, Debug)]
+pub struct Known {
+    last: Buffer,
+    share: f32,
+}
+
+/// Whether local adaptation goes on from frame to frame. `dt`: seconds since the last frame; `None`: the picture stands for itself.
+pub fn goes_on(settings: &Settings, dt: Option<f32>) -> bool {
+    settings.adapt_local > 0.0 && settings.mode() != Mode::Global && dt.is_some()
+}
+
+impl Last {
+    /// `None` if local adaptation follows each frame at once. A frame of another extent starts anew.
+    ///
+    /// # Errors
+    /// `OutOfMemory`.
+    pub fn known(
+        &mut self,
+        gpu: &Gpu,
+        graph: &mut Graph,
+        extent: Extent,
+        dt: Option<f32>,
+        settings: &Settings,
+    ) -> Result<Option<Known>> {
+        let Some(dt) = dt.filter(|_| goes_on(settings, dt)) else {
+            self.0 = None;
+            return Ok(None);
+        };
+        let dt = if dt.is_finite() { dt.max(0.0) } else { 0.0 };
+        if let Some((buffer, _)) = self.0.as_ref().filter(|(_, of)| *of == extent) {
+            let share = -(-dt / settings.adapt_local).exp_m1();
+            return Ok(Some(Known { last: graph.import_buffer(buffer), share: share.min(1.0) }));
+        }
+        let buffer = OwnedBuffer::new(gpu, "tonemap.last", BufferDesc::device(4 * extent.pixels()))?;
+        let known = Known { last: graph.import_buffer(&buffer), share: 1.0 };
+        self.0 = Some((buffer, extent));
+        Ok(Some(known))
+    }
+}
+
+/// The local adaptation of this frame between that of the last one and `adaptation`.
+pub fn settle(graph: &mut Graph, adaptation: Image, known: Known) -> Image {
+    let settled = graph.image("tonemap.settled", Format::R32F, graph.extent(adaptation));
+    let push = settle::Push { share: known.share };
+    graph.compute(settle::Args { adaptation, last: known.last, settled, push }, graph.extent(adaptation));
+    settled
+}
