@@ -49,7 +49,7 @@ fn form_factor_occlusion_and_sample_places() {
                     bias: *bias as f32,
                 })
                 .collect();
-            let threads = 16 * 80;
+            let threads = 16 * samples.max(80);
             let answers = graph.buffer("answers", 16 * queries.len() as u64);
             let places = graph.buffer("places", 16 * 16 * u64::from(samples));
             let args = shaders::test::isr_terms::Args {

@@ -162,6 +162,16 @@ fn local_adaptation_goes_on_from_frame_to_frame() {
                 assert_eq!(shown(&at_once, &[(0, 0.1), (2, 0.25)]), goal, "{name}: ours leaves no trail");
             }
         }
+        // A frame of another size, and the frame after a cut, start anew.
+        let slow = Settings { adapt_local: 0.5, ..in_mode(Operator::Ashikhmin, Mode::Local) };
+        let alone = still(gpu, &slow).map(SIDE, SIDE, bar(2), None, Some(0.1)).unwrap().pixels;
+        let mut on = still(gpu, &slow);
+        on.map(SIDE, SIDE, bar(0), None, Some(0.1)).unwrap();
+        on.map(SIDE / 2, 2 * SIDE, bar(1), None, Some(0.1)).unwrap();
+        assert_eq!(on.map(SIDE, SIDE, bar(2), None, Some(0.1)).unwrap().pixels, alone);
+        on.map(SIDE, SIDE, bar(0), None, Some(0.1)).unwrap();
+        on.tonemap().reset().unwrap();
+        assert_eq!(on.map(SIDE, SIDE, bar(2), None, Some(0.1)).unwrap().pixels, alone);
         // A picture in tiles has no frame before.
         let mut tiled =
             still(gpu, &Settings { adapt_local: 0.5, ..in_mode(Operator::Ashikhmin, Mode::Local) }).tiles(8);

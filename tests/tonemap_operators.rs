@@ -2,6 +2,7 @@
 
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
+    reference::tonemap as twin,
     techniques::tonemap::{Local, Mode, Operator, Settings, apply},
 };
 
@@ -137,6 +138,29 @@ fn the_bilateral_operator_never_raises_the_contrast_of_the_base() {
         for (shown, pixel) in shown.iter().zip(&pixels) {
             assert!((shown[1] / (pixel[1] / 2.0) - 1.0).abs() < 1e-4, "{} of {}", shown[1], pixel[1]);
         }
+    });
+}
+
+/// Windows that grow, against the twin on the CPU. A pixel whose contrast is at the limit to the last bits may fall on either side.
+#[test]
+fn growing_windows_are_those_of_the_twin() {
+    with_gpu(|gpu| {
+        for (radius, width, height) in [(1, 40, 1), (2, 1, 1), (5, 61, 43), (10, 37, 50), (16, 61, 43), (16, 9, 8)] {
+            let pixels: Vec<[f32; 4]> =
+                picture(width, height, radius).iter().map(|p| [p[0], p[1], p[2], 1.0]).collect();
+            let settings = Settings { radius, local: Local::Growing, ..with(Operator::Ashikhmin, Mode::Local) };
+            let found = run(gpu, width, height, &pixels, &settings);
+            let rgb: Vec<[f32; 3]> = pixels.iter().map(|p| [p[0], p[1], p[2]]).collect();
+            let twin = twin::tonemap(width, height, &rgb, &settings);
+            let far = |(a, b): &(&[f32; 4], &[f32; 3])| (0..3).any(|c| (a[c] - b[c]).abs() > 1e-4 * (1.0 + b[c].abs()));
+            let far = found.iter().zip(&twin).filter(far).count();
+            assert!(far * 500 <= twin.len(), "radius {radius}, {width}×{height}: {far} of {}", twin.len());
+            let fast = run(gpu, width, height, &pixels, &Settings { local: Local::Fast, ..settings.clone() });
+            assert!(twin.len() < 100 || fast != found, "windows are not Gaussians");
+        }
+        let other = Settings { local: Local::Growing, ..with(Operator::Reinhard, Mode::Local) };
+        let error = apply(gpu, 1, 1, &[[1.0; 4]], None, &other).unwrap_err().to_string();
+        assert!(error.contains("growing"), "{error}");
     });
 }
 

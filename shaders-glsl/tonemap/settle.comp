@@ -10,7 +10,7 @@ layout(binding = 1, scalar) buffer Last { float last[]; };  // of the frame befo
 layout(binding = 2, r32f) uniform writeonly image2D settled;
 
 layout(push_constant, scalar) uniform Push {
-    float share;  // of the way to the frame's adaptation; 1: there is no frame before
+    float share;  // of the way to the frame's adaptation
 };
 
 void main() {
@@ -19,10 +19,8 @@ void main() {
     if (any(greaterThanEqual(pixel, extent))) return;
     float now = texelFetch(adaptation, pixel, 0).r;
     uint index = uint(pixel.y) * uint(extent.x) + uint(pixel.x);
-    if (share < 1.0) {
-        // The same value stays the same value.
-        now = last[index] + share * (now - last[index]);
-    }
+    // Below zero: there is no frame before. The same value stays the same value.
+    if (last[index] >= 0.0) now = last[index] + share * (now - last[index]);
     last[index] = now;
     imageStore(settled, pixel, vec4(now));
 }

@@ -302,6 +302,7 @@ fn mistakes_name_the_line() {
         ),
         ("cameras = [\"0\"]", "cameras = [\"0\"]\nsizes = [\"4by3\"]", scene, "sizes: expected WIDTHxHEIGHT"),
         ("cameras = [\"0\"]", "cameras = [\"7\"]", scene, "7"),
+        ("cameras = [\"0\"]", "cameras = [\"0\"]\ndark_views = true", scene, "random is 0"),
         ("builtin = \"cornell\"", "builtin = \"cornel\"", scene, "cornell"),
         ("kind = \"isr\"", "kind = \"irs\"", technique, "there are isr"),
         ("isr.samples", "isr.sampels", technique, "isr.samples"),

@@ -168,6 +168,36 @@ fn lights_of_every_kind_give_the_same_light() {
     }
 }
 
+/// Listing 9: lights without shadows; and the ambient light of POV-Ray 3.6.
+#[test]
+fn shadows_and_ambient_light_are_settings() {
+    let spot = LightKind::Spot { range: None, inner: 0.3, outer: 0.8 };
+    let mut scene = plain(Vec3::new(0.8, 0.5, 0.3));
+    for kind in [LightKind::Point { range: None }, spot, LightKind::Directional] {
+        scene = lit(scene, kind, 1.0, Mat4::from_translation(Vec3::Y));
+    }
+    let shadowless = |pov: &Pov| exported(&scene, pov).text.matches(" shadowless").count();
+    assert_eq!(
+        (shadowless(&direct_only()), shadowless(&Pov { shadows: false, ..direct_only() })),
+        (0, 2),
+        "the cone of a spot light is a shadow"
+    );
+    let notes = exported(&scene, &Pov { shadows: false, ..direct_only() }).notes.join("\n");
+    assert!(notes.contains("its cone is made by a shadow"), "{notes}");
+    let error = Pov { ambient: -1.0, ..Pov::default() };
+    let scene = plain(Vec3::new(0.8, 0.5, 0.3));
+    let refused = export_pov::export(&scene, &Pose::rest(&scene), &view_of(&scene), &error, "test").unwrap_err();
+    assert!(refused.to_string().contains("pov.ambient"), "{refused}");
+    if !povray_is_there() {
+        return;
+    }
+    let dark = by_povray(&scene, &direct_only());
+    assert!(dark.iter().all(|pixel| *pixel == Vec3::ZERO));
+    let shown = by_povray(&scene, &Pov { ambient: 0.1, ..direct_only() });
+    let ground = shown[SIZE.width as usize * SIZE.height as usize / 2 + SIZE.width as usize / 2];
+    assert!((ground - Vec3::new(0.08, 0.05, 0.03)).abs().max_element() < 1e-3, "{ground}");
+}
+
 #[test]
 fn the_cornell_box_has_our_direct_light() {
     if !povray_is_there() {

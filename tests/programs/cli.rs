@@ -45,6 +45,8 @@ mod igi;
 mod igi_experiment;
 #[path = "../cli/lucerna.rs"]
 mod lucerna;
+#[path = "../cli/papers.rs"]
+mod papers;
 #[path = "../cli/prt.rs"]
 mod prt;
 #[path = "../cli/prt_bake.rs"]

@@ -160,6 +160,33 @@ fn the_three_kinds_of_lights_follow_their_laws() {
     assert_close(run(&scene, &aside, settings(1, 0)).direct[0], ALBEDO / PI * expected, 1e-3);
 }
 
+/// [ISR 16] and k_dl: the colour relative to the brightest light, no π, no inverse square.
+#[test]
+fn lights_follow_the_law_of_the_dissertation() {
+    let down = Mat4::from_rotation_x(-PI / 2.0);
+    let law = Law::Paper { radius: 10.0, power: 1.3 };
+    let height = Mat4::from_translation(Vec3::Y * 4.0);
+    let spot = LightKind::Spot { range: None, inner: 0.3, outer: 0.6 };
+    for (kind, expected) in [
+        (LightKind::Directional, 1.0),
+        (LightKind::Point { range: None }, 1.0 - 0.16),
+        (LightKind::Point { range: Some(8.0) }, 1.0 - 0.25),
+        (LightKind::Point { range: Some(3.0) }, 0.0),
+        (spot, 1.0 - 0.16),
+    ] {
+        let scene = with_light(scene(ground(20.0), Material::diffuse("", ALBEDO)), kind, 8.0, height * down);
+        let layers = run(&scene, &from_above(9), Settings { law, ..settings(1, 0) });
+        match expected {
+            0.0 => assert_eq!(layers.direct[40], Vec3::ZERO, "beyond the range"),
+            expected => assert_close(layers.direct[40], ALBEDO * 1.3 * expected, 1e-3),
+        }
+        // A second light of half the strength adds half of its colour.
+        let two = with_light(scene, LightKind::Directional, 4.0, down);
+        let layers = run(&two, &from_above(9), Settings { law, ..settings(1, 0) });
+        assert_close(layers.direct[40], ALBEDO * 1.3 * (expected + 0.5), 1e-3);
+    }
+}
+
 #[test]
 fn shadows_fall_where_rays_are_blocked() {
     let mut scene = scene(ground(20.0), Material::diffuse("", ALBEDO));

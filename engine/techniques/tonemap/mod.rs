@@ -183,8 +183,8 @@ fn map(graph: &mut Graph, input: &Input, light: &Light, settings: &Settings) -> 
         }
     };
     let adaptation = match last {
-        Some(last) if !settings.operator.solves() => settle::settle(graph, adaptation, last),
-        _ => adaptation,
+        Some(last) => settle::settle(graph, adaptation, last),
+        None => adaptation,
     };
     let mapped = match receptor {
         Some(known) => receptor::mapped(graph, input.color, &known, settings),

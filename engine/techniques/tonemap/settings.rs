@@ -288,7 +288,7 @@ pub struct Settings {
     /// Seconds in which the local adaptation of a pixel comes within 1/e of that of the frame, in sequences; 0: at once.
     ///
     /// The thesis interpolates it between frames (4.4.2.2), against flicker where the map of important pixels changes. Moving objects then leave trails.
-    #[schemars(range(min = 0, max = 3600), extend("x-unit" = "s", "x-needs" = {"mode": {"not": {"const": "global"}}}))]
+    #[schemars(range(min = 0, max = 3600), extend("x-unit" = "s", "x-needs" = {"operator": {"enum": ["ashikhmin", "reinhard", "bilateral"]}, "mode": {"not": {"const": "global"}}}))]
     pub adapt_local: f32,
 }
 

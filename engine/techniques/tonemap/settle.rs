@@ -3,7 +3,7 @@
 use super::{Mode, Settings};
 use crate::{
     Result,
-    gpu::{BufferDesc, Gpu, OwnedBuffer},
+    gpu::{Gpu, OwnedBuffer},
     graph::{Buffer, Extent, Format, Graph, Image},
     shaders::tonemap::settle,
 };
@@ -21,7 +21,7 @@ pub struct Known {
 
 /// Whether local adaptation goes on from frame to frame. `dt`: seconds since the last frame; `None`: the picture stands for itself.
 pub fn goes_on(settings: &Settings, dt: Option<f32>) -> bool {
-    settings.adapt_local > 0.0 && settings.mode() != Mode::Global && dt.is_some()
+    settings.adapt_local > 0.0 && settings.mode() != Mode::Global && !settings.operator.solves() && dt.is_some()
 }
 
 impl Last {
@@ -46,7 +46,9 @@ impl Last {
             let share = -(-dt / settings.adapt_local).exp_m1();
             return Ok(Some(Known { last: graph.import_buffer(buffer), share: share.min(1.0) }));
         }
-        let buffer = OwnedBuffer::new(gpu, "tonemap.last", BufferDesc::device(4 * extent.pixels()))?;
+        // Below zero: no adaptation yet, also if this graph never runs.
+        let none = vec![-1.0f32; extent.pixels() as usize];
+        let buffer = OwnedBuffer::with_contents(gpu, "tonemap.last", bytemuck::cast_slice(&none))?;
         let known = Known { last: graph.import_buffer(&buffer), share: 1.0 };
         self.0 = Some((buffer, extent));
         Ok(Some(known))

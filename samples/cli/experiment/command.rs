@@ -116,6 +116,7 @@ fn all(args: &ReproduceArgs, console: Console) -> Result<ExitCode> {
         let help = "Run `lucerna reproduce NAME --json` for each experiment, or read report.json of the folder";
         return Err(Error::usage("`reproduce all` prints no JSON document").help(help));
     }
+    papers::check()?;
     let begun = Instant::now();
     let quick = if args.quick { "-quick" } else { "" };
     let folder = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("papers{quick}-report")));
@@ -270,7 +271,8 @@ fn list(as_json: bool) -> Result<()> {
         return console::print_json(&json!(list));
     }
     let width = all.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-    let lines: Vec<String> = all.iter().map(|(name, title)| format!("{name:width$}  {title}")).collect();
+    let mut lines: Vec<String> = all.iter().map(|(name, title)| format!("{name:width$}  {title}")).collect();
+    lines.push(format!("{ALL:width$}  {}, and every number of the papers beside ours", papers::EXPERIMENTS.join(", ")));
     console::print(&lines.join("\n"))
 }
 

@@ -257,6 +257,11 @@ pub const KINDS: &[Kind] = &[
                     return Err(Error::usage(format!("{name} is {value}, allowed are 0 to 1e9")));
                 }
             }
+            let other = settings.light_radius != 0.0 || settings.light_power != 1.0;
+            if other && settings.light_law == LightLaw::Physical {
+                let error = Error::usage("light_radius and light_power have no effect with light_law = \"physical\"");
+                return Err(error.help("Set light_law = \"paper\", or leave them out"));
+            }
             match (settings.samples, settings.bounces) {
                 (1..=MOST_SAMPLES, 0..=MOST_BOUNCES) => config::to_value(&settings),
                 (1..=MOST_SAMPLES, other) => {

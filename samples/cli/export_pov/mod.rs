@@ -56,7 +56,7 @@ pub struct Pov {
     pub emissive_lights: u32,
     /// Lights cast shadows. Those of the dissertation's listing 9 cast none.
     pub shadows: bool,
-    /// Share of its colour that every surface shows without any light, and sends to other surfaces. POV-Ray 3.6 has 0.1 where a file names none.
+    /// Share of its colour that every matt surface without emission shows without any light, and sends to other surfaces. POV-Ray 3.6 has 0.1 where a file names none.
     pub ambient: f32,
 }
 

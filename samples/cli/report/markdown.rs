@@ -78,7 +78,7 @@ mod tests {
         page.warnings.push("Quick.".into());
         page.facts.push(("Device".into(), "one".into()));
         page.add(section);
-        let expected = "# Title\n\n> Quick.\n\n## Roots\n\nBy *hand*.\n\n**All**\n\n| x | √x |\n| --- | ---: |\n| a\\|b c | 2 |\n|  | 0.125 |\n\n\
+        let expected = "# Title\n\n> Quick.\n\n## Roots\n\nBy *hand*.\n\n**All**\n\n| x | √x |\n| --- | ---: |\n| a\\|b c | 2 |\n|  | 0.1250 |\n\n\
                         ## Measured by\n\n|  |  |\n| --- | --- |\n| Device | one |\n";
         assert_eq!(page.markdown(), expected);
     }

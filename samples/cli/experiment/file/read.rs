@@ -179,8 +179,13 @@ fn what_it_is(scene: &Scene) -> Result<()> {
     let changed = scene.unit.is_some() || scene.ground.is_some() || !scene.sizes.is_empty();
     if scene.image.is_some() && (views || lights || changed) {
         let what = format!("scene '{name}' is an image, which has its own light, view and size");
-        return Err(Error::input(what)
-            .help("Leave out unit, ground, cameras, list, recorded, random, light, sun, environment, sizes"));
+        return Err(Error::input(what).help(
+            "Leave out unit, ground, cameras, list, recorded, random, lights, emission, light, sun, environment, sizes",
+        ));
+    }
+    if scene.dark_views && scene.random == 0 {
+        let what = format!("scene '{name}': dark_views is about drawn views, and random is 0");
+        return Err(Error::input(what).help("Set random, or leave out dark_views"));
     }
     if scene.random > MOST_DRAWN {
         let what = format!("scene '{name}': random is {}, at most {MOST_DRAWN} views are drawn", scene.random);

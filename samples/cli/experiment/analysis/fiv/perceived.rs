@@ -29,10 +29,10 @@ pub(super) fn tables(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("Tables 17 and 18: before and after tone mapping");
     section.text(
         "Share of pixels with a visible difference from brute force (VDP for an inexperienced observer, p > 0.75). The first two tables have the thesis' views: in perspective, with the \
-         environment behind, without the objects that cast the shadows, so that they hide no error (section 5.4). Pixels of the background cannot differ, and count. *Before* is before \
+         environment behind, without the objects that cast the shadows, so that they hide no error (section 5.4). Before tone mapping, pixels of the background cannot differ; they count. *Before* is before \
          tone mapping, at an exposure at which the lit ground spans the screen's range. *After* is after \
          Ashikhmin's local operator. The thesis names neither the program that computed its VDP nor its settings. *Background* is the share of pixels that show the environment. \
-         *Differ* is the share of pixels that differ before tone mapping by more than 5/255 of the screen's white. VDP marks more pixels: see the page of the method for its other settings.",
+         *Differ* is the share of pixels that differ before tone mapping by more than 5/255 of the screen's white. VDP marks more pixels; `samples/fiv/README.md` has its values with other settings.",
     );
     for (id, more, seen) in [("", "", SEEN), ("-ground", ", the ground alone from above", OVER)] {
         let columns = [
@@ -134,9 +134,8 @@ impl Seen {
         let picture = |run: &Done| lab.results.picture(Layer(run, ""));
         // Pixels that are never visible do not count as different.
         let open = lab.open(truth)?;
-        // Surfaces have irradiance, the background has none.
-        let lit = lab.results.picture(Layer(truth, "irradiance"))?;
-        let is_ground = |i: usize| lit.pixels[i].iter().any(|v| *v > 0.0);
+        let lit = self.surfaces(lab, truth)?;
+        let is_ground = |i: usize| lit.get(i).copied().unwrap_or(true);
         let (truth, mut test) = (picture(truth)?, picture(run)?);
         for (i, _) in open.iter().flatten().enumerate().filter(|(_, open)| !**open) {
             test.pixels[i] = truth.pixels[i];
@@ -147,6 +146,17 @@ impl Seen {
         let stops = exposure(ground);
         let (truth_after, test_after) = (mapped(&truth)?, mapped(&test)?);
         Ok(Some(Both { stops, background, truth: [truth, truth_after], test: [test, test_after] }))
+    }
+
+    /// For each pixel, whether it shows a surface: surfaces have irradiance in at least one of the environments, the background has none.
+    fn surfaces(self, lab: &Lab<'_>, truth: &Done) -> Result<Vec<bool>> {
+        let mut lit = Vec::new();
+        for run in lab.results.of(&truth.method).filter(|run| run.view == truth.view) {
+            let pixels = lab.results.picture(Layer(run, "irradiance"))?.pixels;
+            lit.resize(pixels.len().max(lit.len()), false);
+            lit.iter_mut().zip(&pixels).for_each(|(lit, pixel)| *lit |= pixel.iter().any(|v| *v > 0.0));
+        }
+        Ok(lit)
     }
 
     fn compare(self, lab: &Lab<'_>, scene: &str, technique: &str) -> Result<Option<Shares>> {

@@ -1,6 +1,6 @@
 //! Decides whether our value meets that of a paper.
 
-/// The rule by which a value of ours meets that of a paper. Printed values are rounded, so a difference of [`ROUNDING`] counts as none.
+/// The rule by which a value of ours meets that of a paper. Printed values are rounded, so a relative difference of [`ROUNDING`] counts as none, but for `same`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rule {
     AtLeast,
@@ -44,7 +44,7 @@ impl Rule {
                 paper.signum() * ours.signum() > 0.0 && ours.abs() <= a + slack && paper.abs() <= b + slack
                     || paper == 0.0 && ours.abs() < 1e-9
             }
-            Self::Same => (ours - paper).abs() <= slack,
+            Self::Same => (ours - paper).abs() <= 1e-6 * paper.abs(),
             Self::Sign => (paper == 0.0 && ours == 0.0) || paper * ours > 0.0,
         }
     }
@@ -63,6 +63,8 @@ pub enum Verdict {
     FullModeOnly,
     /// A property of the paper's machine.
     Hardware,
+    /// There is no report of the experiment.
+    NoReport,
 }
 
 impl Verdict {
@@ -74,6 +76,7 @@ impl Verdict {
             Self::NoCounterpart => "no counterpart",
             Self::FullModeOnly => "full mode only",
             Self::Hardware => "paper's machine",
+            Self::NoReport => "no report",
         }
     }
 }

@@ -66,13 +66,16 @@ pub struct Figure {
     pub ours: Option<Several>,
     /// Reason why it has none.
     pub missing: Option<String>,
+    /// Cells, tests and pages that show what the figure shows in another way.
+    #[serde(default)]
+    pub shown: Vec<Reference>,
 }
 
 /// One reference or a list.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(untagged)]
 pub enum Several {
-    One(Reference),
+    One(Box<Reference>),
     List(Vec<Reference>),
 }
 
@@ -122,11 +125,7 @@ impl Ledger {
         }
         for figure in &ledger.figure {
             let at = format!("figure {}", figure.place);
-            let references = figure.ours.iter().flat_map(Several::list);
-            references
-                .map(Reference::check)
-                .collect::<Result<(), _>>()
-                .map_err(|what| fail(format!("{at}: {what}")))?;
+            figure.references().try_for_each(Reference::check).map_err(|what| fail(format!("{at}: {what}")))?;
             if figure.ours.is_some() == figure.missing.is_some() {
                 return Err(fail(format!("{at}: needs either `ours` or `missing`")));
             }
@@ -138,11 +137,23 @@ impl Ledger {
     #[cfg(test)]
     pub fn references(&self) -> impl Iterator<Item = &Reference> {
         let numbers = self.number.iter().flat_map(|number| number.ours.iter().chain(&number.shown));
-        numbers.chain(self.figure.iter().filter_map(|figure| figure.ours.as_ref()).flat_map(Several::list))
+        numbers.chain(self.figure.iter().flat_map(Figure::references))
+    }
+}
+
+impl Figure {
+    /// Counterparts, and what shows the figure in another way.
+    pub fn references(&self) -> impl Iterator<Item = &Reference> {
+        self.ours.iter().flat_map(Several::list).chain(&self.shown)
     }
 }
 
 impl Number {
+    /// A time or a rate: of the machine more than of the method.
+    pub fn is_time(&self) -> bool {
+        ["1/s", "frames/s", "ms", "s", "min", "h", "1/(s %)"].contains(&self.unit.as_str())
+    }
+
     fn check(&self) -> Result<(), String> {
         if !self.paper.is_finite() {
             return Err("`paper` is no finite number".into());
@@ -167,6 +178,9 @@ impl Reference {
         let kinds = [&self.table, &self.plot, &self.images, &self.file, &self.test];
         if kinds.iter().filter(|kind| kind.is_some()).count() != 1 {
             return Err(format!("a reference needs exactly one of table, plot, images, file and test: {self:?}"));
+        }
+        if self.test.as_deref().is_some_and(|test| !test.contains("::")) {
+            return Err(format!("a test is written as file_stem::name: {:?}", self.test));
         }
         if self.experiment.as_deref().is_some_and(|name| !super::EXPERIMENTS.contains(&name)) {
             return Err(format!("there is no experiment {:?}", self.experiment));

@@ -1,6 +1,6 @@
 //! The ledgers of the papers: every number and figure that a paper prints, beside the cell of a report that has ours.
 //!
-//! A ledger is a file of `samples/papers/`. It names cells of reports and holds no value of ours, so that a page with all papers ([`page::page`]) follows
+//! A ledger is a file of `samples/papers/`. It names cells of reports and holds no value of ours, so that the page of all papers ([`summary`]) follows
 //! from the reports of the experiments alone.
 
 mod judge;
@@ -44,9 +44,18 @@ pub fn summary(folder: &Path) -> Result<Page> {
         let what = format!("holds no report of an experiment ({})", EXPERIMENTS.join(", "));
         return Err(Error::input(what).in_file(folder).help("`lucerna reproduce all -o DIR` writes such a folder"));
     }
-    let mut ledgers = Vec::new();
-    for (name, text) in LEDGERS {
-        ledgers.push(ledger::Ledger::parse(name, text)?);
-    }
-    Ok(page::page(&ledgers, &reports))
+    Ok(page::page(&ledgers()?, &reports))
+}
+
+/// All ledgers.
+fn ledgers() -> Result<Vec<ledger::Ledger>> {
+    LEDGERS.iter().map(|(name, text)| ledger::Ledger::parse(name, text)).collect()
+}
+
+/// Checks the ledgers, before experiments of hours are run for them.
+///
+/// # Errors
+/// `Input` with the entry that has a mistake.
+pub fn check() -> Result<()> {
+    ledgers().map(|_| ())
 }

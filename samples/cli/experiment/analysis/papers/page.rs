@@ -18,17 +18,15 @@ pub struct Judged {
 
 /// Judges a number by the reports.
 pub fn judge(number: &Number, experiment: &str, reports: &Reports) -> Judged {
-    let quick = |reference: &Reference| {
-        let name = reference.experiment.as_deref().unwrap_or(experiment);
-        reports.get(name).is_none_or(|report| report.quick)
-    };
+    let report = |reference: &Reference| reports.get(reference.experiment.as_deref().unwrap_or(experiment));
+    let quick = |reference: &Reference| report(reference).is_some_and(|report| report.quick);
     let mut broken = Vec::new();
     // A reason counts only if everything that shows it exists.
     let mut shown = !number.shown.is_empty() && number.reason.is_some();
     for reference in &number.shown {
         if let Err(what) = reports.has(reference, experiment) {
             shown = false;
-            if !(reference.full && quick(reference)) {
+            if report(reference).is_some() && !(reference.full && quick(reference)) {
                 broken.push(what);
             }
         }
@@ -38,6 +36,9 @@ pub fn judge(number: &Number, experiment: &str, reports: &Reports) -> Judged {
         return verdict(Verdict::Hardware);
     }
     let Some(reference) = &number.ours else { return verdict(Verdict::NoCounterpart) };
+    if report(reference).is_none() {
+        return verdict(Verdict::NoReport);
+    }
     if reference.full && quick(reference) {
         return verdict(Verdict::FullModeOnly);
     }
@@ -64,20 +65,20 @@ pub fn judge(number: &Number, experiment: &str, reports: &Reports) -> Judged {
 
 /// Numbers by verdict.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Counts([usize; 6]);
+struct Counts {
+    verdicts: [usize; 7],
+    /// Numbers with a value of ours.
+    measured: usize,
+}
 
 impl Counts {
-    fn add(&mut self, verdict: Verdict) {
-        self.0[verdict as usize] += 1;
+    fn add(&mut self, judged: &Judged) {
+        self.verdicts[judged.verdict as usize] += 1;
+        self.measured += usize::from(judged.ours.is_some());
     }
 
     fn of(&self, verdict: Verdict) -> usize {
-        self.0[verdict as usize]
-    }
-
-    /// Numbers that have a counterpart in these reports.
-    fn measured(&self) -> usize {
-        [Verdict::Met, Verdict::Explained, Verdict::Open].into_iter().map(|verdict| self.of(verdict)).sum()
+        self.verdicts[verdict as usize]
     }
 }
 
@@ -94,27 +95,24 @@ pub fn page(ledgers: &[Ledger], reports: &Reports) -> Page {
             quick.join(", ")
         ));
     }
+    for (name, report) in reports.all() {
+        let own = report.warnings.iter().filter(|warning| !warning.starts_with("Quick mode"));
+        page.warnings.extend(own.map(|warning| format!("{name}: {warning}")));
+    }
+    let missing: Vec<&str> = super::EXPERIMENTS.iter().copied().filter(|name| reports.get(name).is_none()).collect();
+    if !missing.is_empty() {
+        page.warnings.push(format!("No report of {}.", missing.join(", ")));
+    }
     let mut sections = Vec::new();
-    let mut shares = Table::new(
-        "shares",
-        "Results of the papers",
-        [
-            "document",
-            "results",
-            "measured",
-            "met",
-            "explained",
-            "open",
-            "no counterpart",
-            "full mode only",
-            "met or explained (%)",
-        ],
-    )
-    .digits(3);
-    let mut whole = Counts::default();
+    let [mut shares, mut times] = [
+        ("shares", "Results of the papers, without times and rates"),
+        ("shares-times", "Times and rates, which depend on the machine more than on the method"),
+    ]
+    .map(|(id, caption)| Table::new(id, caption, SHARES).digits(3));
+    let mut whole = [Counts::default(); 2];
     let mut broken = Vec::new();
     for ledger in ledgers {
-        let mut counts = Counts::default();
+        let mut counts = [Counts::default(); 2];
         let mut section = Section::new(&ledger.document);
         let mut numbers = numbers(ledger);
         let mut settings = settings(ledger);
@@ -124,14 +122,17 @@ pub fn page(ledgers: &[Ledger], reports: &Reports) -> Page {
             let row = row(number, &judged);
             match number.kind {
                 Kind::Result => {
-                    counts.add(judged.verdict);
-                    whole.add(judged.verdict);
+                    let of = usize::from(number.is_time());
+                    counts[of].add(&judged);
+                    whole[of].add(&judged);
                     numbers.push(row);
                 }
                 Kind::Setting | Kind::Hardware => settings.push(row),
             }
         }
-        shares.push(shown(&ledger.document, &counts));
+        for (table, counts) in [&mut shares, &mut times].into_iter().zip(&counts) {
+            table.push(shown(&ledger.document, counts));
+        }
         section.add(numbers);
         if !settings.rows.is_empty() {
             section.add(settings);
@@ -139,15 +140,18 @@ pub fn page(ledgers: &[Ledger], reports: &Reports) -> Page {
         section.add(figures(ledger, reports, &mut broken));
         sections.push(section);
     }
-    shares.push(shown("all", &whole));
+    for (table, counts) in [&mut shares, &mut times].into_iter().zip(&whole) {
+        table.push(shown("all", counts));
+    }
     let mut first = Section::new("Shares");
     first.text(
-        "*Met*: our value meets the paper's by the rule in the column *rule* (`at least` and `at most` for qualities and costs, `within F`: a ratio between 1/F and F). \
-         *Explained*: it does not, and a table, a test or a page shows the reason. *Open*: it does not, and the reason is not shown. *No counterpart*: the experiment does \
-         not have this number. *Measured* is the number of results with a value here. Some of the papers' claims have no number; \
-         then the entry says which number stands for the claim. Settings of the experiments are listed apart and do not count.",
+        "*Met*: our value meets the paper's by the rule of its line: `at least` and `at most` for qualities and costs, `within F` for a ratio between 1/F and F, `sign` for the same side of zero; printed \
+         values are rounded, so a difference of 0.5 % counts as none. `same` allows no difference. *Explained*: our value does not meet the paper's, and a table, a test or a page shows the reason. *Open*: it does not, \
+         and the reason is not shown. *No counterpart*: the experiment does not have this number. *Measured*: results with a value here. Some of the papers' claims have no number; then the entry says which number stands \
+         for the claim. Times and rates have a table of their own, because a newer machine meets many of them. Settings of the experiments are listed apart and do not count.",
     );
     first.add(shares);
+    first.add(times);
     page.add(first);
     for section in sections {
         page.add(section);
@@ -171,10 +175,23 @@ pub fn page(ledgers: &[Ledger], reports: &Reports) -> Page {
     page
 }
 
+const SHARES: [&str; 10] = [
+    "document",
+    "results",
+    "measured",
+    "met",
+    "explained",
+    "open",
+    "no counterpart",
+    "full mode only",
+    "no report",
+    "met or explained (%)",
+];
+
 fn shown(name: &str, counts: &Counts) -> Vec<Cell> {
-    let measured = counts.measured();
+    let measured = counts.measured;
     let good = counts.of(Verdict::Met) + counts.of(Verdict::Explained);
-    let all: usize = counts.0.iter().sum();
+    let all: usize = counts.verdicts.iter().sum();
     let of = |verdict| Cell::from(counts.of(verdict));
     vec![
         name.into(),
@@ -185,6 +202,7 @@ fn shown(name: &str, counts: &Counts) -> Vec<Cell> {
         of(Verdict::Open),
         of(Verdict::NoCounterpart),
         of(Verdict::FullModeOnly),
+        of(Verdict::NoReport),
         (measured > 0).then(|| 100.0 * good as f64 / measured as f64).into(),
     ]
 }
@@ -222,22 +240,22 @@ fn figures(ledger: &Ledger, reports: &Reports, broken: &mut Vec<String>) -> Tabl
     let columns = ["figure", "content", "ours"];
     let mut table = Table::new(format!("figures-{}", ledger.experiment), format!("{}: figures", ledger.short), columns);
     for figure in &ledger.figure {
-        let text = match (&figure.ours, &figure.missing) {
-            (Some(ours), _) => {
-                let mut names = Vec::new();
-                for reference in ours.list() {
-                    let name = reference.experiment.as_deref().unwrap_or(&ledger.experiment);
-                    let quick = reports.get(name).is_none_or(|report| report.quick);
-                    if let Err(what) = reports.has(reference, &ledger.experiment)
-                        && !(reference.full && quick)
-                    {
-                        broken.push(format!("figure {}: {what}", figure.place));
-                    }
-                    names.push(place(reference, name));
-                }
-                names.join(", ")
+        for reference in figure.references() {
+            let report = reports.get(reference.experiment.as_deref().unwrap_or(&ledger.experiment));
+            let expected = report.is_some_and(|report| !(reference.full && report.quick));
+            if let Err(what) = reports.has(reference, &ledger.experiment)
+                && expected
+            {
+                broken.push(format!("figure {}: {what}", figure.place));
             }
-            (None, missing) => format!("none: {}", missing.as_deref().unwrap_or("")),
+        }
+        let named =
+            |reference: &Reference| place(reference, reference.experiment.as_deref().unwrap_or(&ledger.experiment));
+        let names = figure.references().map(named).collect::<Vec<_>>().join(", ");
+        let text = match &figure.missing {
+            Some(missing) if names.is_empty() => format!("none: {missing}"),
+            Some(missing) => format!("none: {missing} See {names}."),
+            None => names,
         };
         table.push([figure.place.as_str().into(), figure.what.as_str().into(), text.into()]);
     }

@@ -20,6 +20,8 @@ pub struct Report {
     data: Vec<Value>,
     page: String,
     pub quick: bool,
+    /// Reasons why the report is not complete.
+    pub warnings: Vec<String>,
     /// Name and value: device, driver, revision, command line.
     pub facts: Vec<(String, String)>,
 }
@@ -119,10 +121,17 @@ impl Reports {
         if reference.column.is_some() {
             return report.cell(reference).map(|_| ()).map_err(|what| format!("{name}: {what}"));
         }
-        let has = |part: &str, id: &str| report.data.iter().any(|data| data[part].get(id).is_some());
+        // A table without rows and a plot without points show nothing.
+        let has = |part: &str, id: &str| {
+            let full = |found: &Value| match part {
+                "tables" => found["rows"].as_array().is_some_and(|rows| !rows.is_empty()),
+                _ => found["series"].as_array().into_iter().flatten().any(|series| series["points"][0].is_array()),
+            };
+            report.data.iter().filter_map(|data| data[part].get(id)).any(full)
+        };
         for (part, id) in [("tables", &reference.table), ("plots", &reference.plot)] {
             if let Some(id) = id {
-                return if has(part, id) { Ok(()) } else { Err(format!("{name}: no {part} '{id}'")) };
+                return if has(part, id) { Ok(()) } else { Err(format!("{name}: no {part} '{id}', or nothing in it")) };
             }
         }
         let Some(id) = &reference.images else { return Ok(()) };
@@ -133,6 +142,8 @@ impl Reports {
 
 impl Report {
     fn read_facts(&mut self) {
+        let warnings = self.data.first().and_then(|data| data["warnings"].as_array());
+        self.warnings = warnings.into_iter().flatten().filter_map(Value::as_str).map(str::to_owned).collect();
         let Some(facts) = self.data.first().and_then(|data| data["facts"].as_object()) else { return };
         self.facts =
             facts.iter().filter_map(|(name, value)| Some((name.clone(), value.as_str()?.to_owned()))).collect();

@@ -156,12 +156,17 @@ pub fn weighted(rows: &[Judged], value: impl Fn(&Judged) -> f64) -> Option<Weigh
     list.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mean = list.iter().map(|(value, weight)| value * weight).sum();
     let positive = 100.0 * list.iter().filter(|(value, _)| *value > 0.0).map(|(_, weight)| weight).sum::<f64>();
-    let mut below = 0.0;
-    let median = list.iter().find(|(_, weight)| {
-        below += weight;
-        below >= 0.5 - 1e-9
-    });
-    Some(Weighted { mean, median: median.or(list.last())?.0, positive })
+    // The mean of two values if half of the weight is exactly between them.
+    let at = |share: f64| {
+        let mut below = 0.0;
+        let found = list.iter().find(|(_, weight)| {
+            below += weight;
+            below >= share
+        });
+        found.or(list.last()).map(|(value, _)| *value)
+    };
+    let median = 0.5 * (at(0.5 - 1e-9)? + at(0.5 + 1e-9)?);
+    Some(Weighted { mean, median, positive })
 }
 
 #[cfg(test)]
@@ -209,6 +214,9 @@ mod tests {
         assert!((all.mean - (50.0 * SIMPLE_SHARE + 25.0 * (1.0 - SIMPLE_SHARE))).abs() < 1e-3, "{all:?}");
         assert!((all.median - 25.0).abs() < 1e-3 && (all.positive - 100.0).abs() < 1e-9);
         assert!((weighted(&rows[..1], Judged::gain).unwrap().mean - 50.0).abs() < 1e-3);
+        // Two views of one kind: the mean of both is the median.
+        let two = weighted(&[judged(true, 0.4, 0.6), judged(true, 0.4, 0.5)], Judged::gain).unwrap();
+        assert!((two.median - 37.5).abs() < 1e-3, "{two:?}");
         assert_eq!(weighted(&[], Judged::gain), None);
     }
 }

@@ -68,10 +68,11 @@ fn at_strengths(
             return Err(Error::input(format!("{}/{}: the pictures differ in size", run.scene, run.view)));
         }
         let complex = run.group != "simple";
+        let added = if factors.iter().any(|factor| *factor != 1.0) { pixels(run, "indirect")? } else { Vec::new() };
         for (rows, factor) in all.iter_mut().zip(factors) {
             let shown = |i: usize| match *factor {
                 1.0 => total[i],
-                factor => [0, 1, 2].map(|c: usize| direct[i][c] + factor * (total[i][c] - direct[i][c])),
+                factor => [0, 1, 2].map(|c: usize| total[i][c] + (factor - 1.0) * added[i][c]),
             };
             rows.push(Judged::of((&run.scene, &run.view, complex), &model, &direct, shown));
         }

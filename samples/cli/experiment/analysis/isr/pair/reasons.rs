@@ -1,6 +1,6 @@
 //! Reasons for the differences: the model image, the strength of the added light, settings that the dissertation leaves open, the law of lights.
 
-use lucerna::Result;
+use lucerna::{Error, Result};
 
 use super::{
     MODEL, PAPER, against, at_strengths, is_large,
@@ -44,7 +44,7 @@ pub(super) fn models(results: &Results) -> Result<Section> {
     let mut section = Section::new("Which model image");
     section.text(
         "A pixel can improve only where the model image is brighter than direct light, because image-space radiosity adds light. *Model brighter* is the share \
-         of such pixels (by the sum of the channels): hardly more can improve. *Raised* is the share of the pixels that image-space radiosity makes brighter; the others stay, or \
+         of such pixels (by the sum of the channels): hardly more can improve. *Raised* is the share of the pixels that image-space radiosity makes brighter; the other pixels do not change, or \
          occlusion darkens them (equation 29 multiplies direct light by accessibility). POV-Ray's `brightness` of 2.4 multiplies gathered light at every \
          bounce; 1 conserves energy. *Ambient*: every surface also shows a tenth of its colour, which POV-Ray 3.6 adds where a file names no `ambient`.",
     );
@@ -59,14 +59,14 @@ pub(super) fn models(results: &Results) -> Result<Section> {
             if rows.is_empty() {
                 continue;
             }
-            let sum = |of: usize| rows.iter().map(|row| row.means[of]).sum::<f64>();
-            let missing = sum(0) - sum(1);
+            let mean = |of: usize| weighted(&rows, |row| row.means[of]).map_or(f64::NAN, |all| all.mean);
+            let missing = mean(0) - mean(1);
             let mut cells = vec![caption.into(), technique.into()];
             cells.extend(summary(&rows));
             cells.push(percent(&rows, |row| row.brighter).into());
             cells.push(percent(&rows, |row| row.raised).into());
-            cells.push((sum(0) / sum(1)).into());
-            cells.push(((sum(2) - sum(1)) / missing).into());
+            cells.push((mean(0) / mean(1)).into());
+            cells.push((missing > 0.0).then(|| (mean(2) - mean(1)) / missing).into());
             table.push(cells);
         }
     }
@@ -76,14 +76,14 @@ pub(super) fn models(results: &Results) -> Result<Section> {
 
 /// How strong the added light must be for the dissertation's figures.
 pub(super) fn needed(results: &Results) -> Result<Section> {
-    let mut section = Section::new("What would have to be true");
+    let mut section = Section::new("Strength that the dissertation's figures need");
     section.text(
-        "The light that image-space radiosity adds, multiplied by a factor, against the same model images. A gain of 7.18 % with 99.05 % of the pixels improved needs two \
+        "The gathered light, multiplied by a factor, against the same model images. A gain of 7.18 % with 99.05 % of the pixels improved needs two \
          things at once: the added light is about 7 % of the missing light, and it arrives in nearly every pixel, none of which may be background, overexposed or as bright \
          as the model image. `no occlusion` leaves out equation 26, which makes pixels darker.",
     );
     let columns = ["technique", "factor"].into_iter().chain(COLUMNS);
-    let mut table = Table::new("pair-needed", "Gain by the strength of the added light", columns).digits(3);
+    let mut table = Table::new("pair-needed", "Gain by the strength of the gathered light", columns).digits(3);
     let mut plot = Plot::new(
         "pair-needed-plot",
         "Gain by the strength of the added light",
@@ -236,8 +236,7 @@ pub(super) fn law(results: &Results) -> Result<Section> {
     let mut section = Section::new("The law of lights");
     section.text(
         "Scenes with their own lamps, which cast shadows on both sides. The path tracer (one diffuse bounce) has the law of equation 16 or the inverse square; the technique has the \
-         dissertation's choices with either law. Where the laws differ, one factor for each view gives direct light the reference's mean. What remains of the error of direct light with the same law \
-         is that of shadow maps.",
+         dissertation's choices with either law. Where the laws differ, one factor for each view gives direct light the reference's mean. What remains of the error of direct light with the same law is that of shadow maps, of normals of eight bits and of filtered textures.",
     );
     let columns =
         ["technique", "reference", "factor", "correlation, direct", "with isr", "error of direct over its mean"];
@@ -250,6 +249,9 @@ pub(super) fn law(results: &Results) -> Result<Section> {
                 let pixels = |run: &Done, layer: &str| results.picture(Layer(run, layer)).map(|picture| picture.pixels);
                 let (model, lit) = (pixels(truth, "")?, pixels(truth, "direct")?);
                 let (mut direct, mut total) = (pixels(run, "direct")?, pixels(run, "")?);
+                if [&lit, &direct, &total].iter().any(|pixels| pixels.len() != model.len()) {
+                    return Err(Error::input(format!("{}/{}: the pictures differ in size", run.scene, run.view)));
+                }
                 let sum = |list: &[[f32; 3]]| list.iter().flatten().map(|v| f64::from(*v)).sum::<f64>();
                 if technique != law && sum(&direct) > 0.0 {
                     let factor = (sum(&lit) / sum(&direct)) as f32;

@@ -29,7 +29,7 @@ pub(super) fn pair(results: &Results) -> Result<Section> {
          The model images are POV-Ray's with table 1. Both sides have the light of listing 9: parallel, without shadows and falloff, of colour 1.3. In \
          this light the law of equation 16 and that of POV-Ray are the same, and no factor is needed. *Linear*: values as computed. *8 bits*: \
          codes from 0 to 255 without a transfer curve, in which everything above 1 is white. Simple views weigh 80 of 227, as in the dissertation. \
-         Its model images are not available, and most of its views are from a commercial game; the views here are others.",
+         Its model images are not available, and most of its views are from a commercial game; we use other views.",
     );
     let rows = against(results, MODEL, |run| run.method == PAPER && !is_large(run))?;
     section.add(figures("pair", "Linear", &rows, Judged::gain, 0));
