@@ -182,6 +182,7 @@ fn pictures_may_choose_only_settings_that_preparation_leaves_open() {
             ("negligible", Settings { negligible: 0.1, ..made.clone() }),
             ("shared", Settings { shared: Shared::Discs, ..made.clone() }),
             ("self_shadow", Settings { self_shadow: false, ..made.clone() }),
+            ("hide_occluders", Settings { hide_occluders: true, ..made.clone() }),
         ];
         // The remaining keys belong to the environment, whose rotation the vectors have fixed.
         let known: Vec<&str> = [&fixed[..], &free[..]].concat().iter().map(|(key, _)| *key).collect();

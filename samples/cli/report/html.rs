@@ -117,9 +117,10 @@ pub(super) fn page(page: &Page) -> Result<String> {
 
 fn table(out: &mut String, table: &Table) {
     let (id, caption) = (escape(&table.id), prose(&table.caption));
+    let long = if table.long { " long" } else { "" };
     let _ = write!(
         out,
-        "<figure class=\"table\" id=\"table-{id}\"><figcaption id=\"caption-{id}\">{caption}</figcaption>\
+        "<figure class=\"table{long}\" id=\"table-{id}\"><figcaption id=\"caption-{id}\">{caption}</figcaption>\
          <div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-labelledby=\"caption-{id}\"><table aria-labelledby=\"caption-{id}\"><thead><tr>"
     );
     let numeric: Vec<bool> = (0..table.columns.len()).map(|column| table.is_numeric(column)).collect();
@@ -137,6 +138,7 @@ fn table(out: &mut String, table: &Table) {
             };
             let (data, text) = match cell {
                 Cell::Empty => (String::new(), String::new()),
+                Cell::Text(text) if table.long => (String::new(), prose(text)),
                 Cell::Text(text) => (String::new(), escape(text)),
                 Cell::Number(value) => (format!(" data-value=\"{value}\""), number(*value, table.digits)),
             };

@@ -57,6 +57,8 @@ pub struct Table {
     pub digits: usize,
     /// The numbers are measured times.
     pub timed: bool,
+    /// Has many words: the page shows it as wide as the window and as high as it is, with the markup of paragraphs in its cells.
+    pub long: bool,
 }
 
 impl Table {
@@ -66,7 +68,7 @@ impl Table {
         columns: impl IntoIterator<Item = C>,
     ) -> Self {
         let columns = columns.into_iter().map(Into::into).collect();
-        Self { id: id.into(), caption: caption.into(), columns, rows: Vec::new(), digits: 4, timed: false }
+        Self { id: id.into(), caption: caption.into(), columns, rows: Vec::new(), digits: 4, timed: false, long: false }
     }
 
     /// A table that compares figures of a paper with ours: quantity, unit, paper, ours, ratio of ours to the paper's. [`Table::figure`] adds rows.
@@ -112,6 +114,12 @@ impl Table {
     #[must_use]
     pub fn timed(self) -> Self {
         Self { timed: true, ..self }
+    }
+
+    /// Shows it as wide as the window and as high as it is, with the markup of paragraphs in its cells.
+    #[must_use]
+    pub fn long(self) -> Self {
+        Self { long: true, ..self }
     }
 
     /// Whether a column holds only numbers and empty cells.

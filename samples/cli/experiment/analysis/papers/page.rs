@@ -108,12 +108,12 @@ pub fn page(ledgers: &[Ledger], reports: &Reports) -> Page {
         ("shares", "Results of the papers, without times and rates"),
         ("shares-times", "Times and rates, which depend on the machine more than on the method"),
     ]
-    .map(|(id, caption)| Table::new(id, caption, SHARES).digits(3));
+    .map(|(id, caption)| Table::new(id, caption, SHARES).digits(3).long());
     let mut whole = [Counts::default(); 2];
     let mut broken = Vec::new();
     for ledger in ledgers {
         let mut counts = [Counts::default(); 2];
-        let mut section = Section::new(&ledger.document);
+        let mut section = Section::new(format!("{}: {}", ledger.short, ledger.document));
         let mut numbers = numbers(ledger);
         let mut settings = settings(ledger);
         for number in &ledger.number {
@@ -131,7 +131,7 @@ pub fn page(ledgers: &[Ledger], reports: &Reports) -> Page {
             }
         }
         for (table, counts) in [&mut shares, &mut times].into_iter().zip(&counts) {
-            table.push(shown(&ledger.document, counts));
+            table.push(shown(&format!("{} ({})", ledger.short, ledger.experiment), counts));
         }
         section.add(numbers);
         if !settings.rows.is_empty() {
@@ -210,11 +210,12 @@ fn shown(name: &str, counts: &Counts) -> Vec<Cell> {
 const COLUMNS: [&str; 9] = ["place", "quantity", "unit", "paper", "ours", "ours / paper", "rule", "verdict", "reason"];
 
 fn numbers(ledger: &Ledger) -> Table {
-    Table::new(format!("numbers-{}", ledger.experiment), format!("{}: results", ledger.short), COLUMNS)
+    Table::new(format!("numbers-{}", ledger.experiment), format!("{}: results", ledger.short), COLUMNS).long()
 }
 
 fn settings(ledger: &Ledger) -> Table {
     Table::new(format!("settings-{}", ledger.experiment), format!("{}: settings and machine", ledger.short), COLUMNS)
+        .long()
 }
 
 fn row(number: &Number, judged: &Judged) -> Vec<Cell> {
@@ -238,7 +239,8 @@ fn row(number: &Number, judged: &Judged) -> Vec<Cell> {
 
 fn figures(ledger: &Ledger, reports: &Reports, broken: &mut Vec<String>) -> Table {
     let columns = ["figure", "content", "ours"];
-    let mut table = Table::new(format!("figures-{}", ledger.experiment), format!("{}: figures", ledger.short), columns);
+    let mut table =
+        Table::new(format!("figures-{}", ledger.experiment), format!("{}: figures", ledger.short), columns).long();
     for figure in &ledger.figure {
         for reference in figure.references() {
             let report = reports.get(reference.experiment.as_deref().unwrap_or(&ledger.experiment));

@@ -214,7 +214,11 @@ pub(super) fn stills(views: &[View<'_>]) -> Result<Section> {
     section.text(format!(
         "Threshold {THRESHOLD}. STM/LTM is the speed of selective over local tone mapping, for each way to mark pixels."
     ));
-    let mut table = Table::new("table-11", "Table 11", ["picture", "pixels", "dynamic range (log₁₀)", "important (%)"]);
+    let mut table = Table::new(
+        "table-11",
+        "Table 11",
+        ["picture", "pixels", "dynamic range (log₁₀)", "of 99.9 % of the pixels (log₁₀)", "important (%)"],
+    );
     let heads = ["picture", "GTM (ms)", "LTM (ms)", "fast LTM (ms)", "pyramid LTM (ms)"].map(str::to_owned);
     let marks = MARKS.iter().map(|mark| (*mark).to_owned());
     let paper = ["thesis, 6600", "thesis, 8800"].map(str::to_owned);
@@ -223,16 +227,22 @@ pub(super) fn stills(views: &[View<'_>]) -> Result<Section> {
     for view in views.iter().filter(|view| view.is_still()) {
         let global = view.run("gtm", None);
         let mut size = Cell::Empty;
-        let mut range = None;
+        let (mut range, mut most) = (None, None);
         if let Some(run) = global {
             let luminance = view.results.picture(super::Layer(run, "luminance"))?;
             size = format!("{} × {}", luminance.width, luminance.height).into();
-            let lit = luminance.pixels.iter().map(|p| f64::from(p[0])).filter(|l| *l > 0.0);
-            let (low, high) = lit.fold((f64::INFINITY, 0.0f64), |(low, high), l| (low.min(l), high.max(l)));
-            range = Some((high / low).log10()).filter(|range| range.is_finite());
+            let mut lit: Vec<f64> = luminance.pixels.iter().map(|p| f64::from(p[0])).filter(|l| *l > 0.0).collect();
+            lit.sort_by(f64::total_cmp);
+            // The share of the pixels that is left out at each end.
+            let without = |share: f64| {
+                let out = (share * lit.len() as f64) as usize;
+                let (low, high) = (lit.get(out)?, lit.get(lit.len().checked_sub(1 + out)?)?);
+                Some((high / low).log10()).filter(|range| range.is_finite())
+            };
+            (range, most) = (without(0.0), without(5e-4));
         }
         let important = view.important(view.run("stm", None))?.map(|share| share * 100.0);
-        table.push([view.name().into(), size, range.into(), important.into()]);
+        table.push([view.name().into(), size, range.into(), most.into(), important.into()]);
         let local = view.ms("ltm")?;
         let mut cells = vec![view.name().into(), view.ms("gtm")?.into(), local.into()];
         cells.extend([view.ms("ltm-fast")?.into(), view.ms("ltm-pyramid")?.into()]);
