@@ -37,6 +37,8 @@ pub struct Label {
     pub radiance: bool,
     /// The exposure that suits a built-in scene does not suit the technique.
     pub own_light: bool,
+    /// [`Technique::LAMPS`].
+    pub lamps: bool,
     /// [`Technique::is_cheap`].
     pub cheap: bool,
 }
@@ -46,7 +48,14 @@ impl Label {
         let named = T::Mode::ALL.len() > 1;
         let mode_name = named.then(|| mode.name());
         let radiance = mode.is_radiance();
-        Self { name: T::NAME, mode: mode_name, radiance, own_light: T::OWN_LIGHT, cheap: T::is_cheap(settings) }
+        Self {
+            name: T::NAME,
+            mode: mode_name,
+            radiance,
+            own_light: T::OWN_LIGHT,
+            lamps: T::LAMPS,
+            cheap: T::is_cheap(settings),
+        }
     }
 }
 

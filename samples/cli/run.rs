@@ -102,7 +102,10 @@ impl<'a> Run<'a> {
             None => Outputs::new(&args.output, frames.len(), options),
         };
         outputs(options.clone())?;
-        let stage = stage.map_or_else(|| Stage::open(&args.stage), Ok)?;
+        let mut stage = stage.map_or_else(|| Stage::open(&args.stage), Ok)?;
+        if !technique.lamps {
+            stage.light_by_environment(technique.name);
+        }
         let suits = exposure::of_source(&stage.source).filter(|_| !technique.own_light);
         if settings.tonemap.is_some() && !technique.radiance {
             let what = format!(

@@ -180,6 +180,13 @@ impl Stage {
         Ok(Self { scene, source, fingerprint, placed, eye, turns, added_camera, put, default_light, extents })
     }
 
+    /// Puts an added sun into the environment, for the technique `name`, which takes light from the environment only.
+    pub fn light_by_environment(&mut self, name: &str) {
+        if self.default_light {
+            default_light::put_into_environment(&mut self.scene, name);
+        }
+    }
+
     /// Notes about the scene for the user.
     pub fn notes(&self) -> &[Note] {
         &self.scene.notes

@@ -32,9 +32,8 @@ float isr_occlusion(vec3 p, vec3 normal, vec3 x, float radius, float bias) {
 
 // Samples to each side of the pixel: 24, 48, 80, 120, 168, 224 are 5², 7², 9², 11², 13², 15² without the centre.
 uint isr_half_width(uint samples) {
-    uint n = 2u;
-    while (4u * n * (n + 1u) < samples) ++n;
-    return n;
+    // (2n + 1)² is samples + 1; half a sample more keeps the root off the whole number.
+    return uint((sqrt(float(samples) + 1.5) - 1.0) * 0.5);
 }
 
 // Samples of a pixel whose depth is `relative` to the mean of the picture: one step more (up to 80) or less (down to 24) than `samples`.
@@ -73,8 +72,8 @@ vec3 isr_sample(uint i, uint samples, bool rings, float reach, float spread, vec
         vec2 at = vec2(float(cell % side), float(cell / side)) - float(n) + within - 0.5;
         return vec3(at * spacing, spacing * spacing);
     }
-    uint ring = 1u;
-    while (i >= 4u * ring * (ring + 1u)) ++ring;
+    // The rings up to this one have (2 · ring + 1)² − 1 samples.
+    uint ring = uint((sqrt(float(i) + 1.5) + 1.0) * 0.5);
     float k = float(ring);
     float q = float(i - 4u * ring * (ring - 1u));
     float m = (k - 1.0 + within.y) / float(n);

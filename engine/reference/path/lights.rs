@@ -1,5 +1,6 @@
 //! What shines: punctual lights and emissive triangles.
 
+use crate::reference::isr::paper_attenuation;
 use crate::scene::surfaces::Surfaces;
 use crate::scene::{Light, LightKind, Node, Pose, Scene, bvh::Bvh};
 use glam::{Mat4, Vec3};
@@ -67,7 +68,7 @@ impl Placed<'_> {
                 let window = range.map_or(1.0, |r| (1.0 - (distance / r).powi(4)).clamp(0.0, 1.0));
                 window / (distance * distance)
             }
-            Law::Paper { radius, .. } => (1.0 - (distance / range.unwrap_or(radius)).powi(2)).clamp(0.0, 1.0),
+            Law::Paper { radius, .. } => paper_attenuation(distance.into(), range.unwrap_or(radius).into()) as f32,
         };
         (to, distance, power * (cone * falloff))
     }

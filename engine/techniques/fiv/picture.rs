@@ -74,8 +74,8 @@ struct Pixels<'a> {
 impl Fiv {
     /// Declares a frame: G-buffer, irradiance, reflected light and sky. `handles` belong to this graph and to `pose`.
     /// The settings that decide the vectors must be those of [`Fiv::new`]. Each picture may choose the parts of the
-    /// method (`trilinear`, `partial`, `cut`, `extent`, `overlap`, `shared`, `negligible`, `self_shadow`), the light
-    /// (`rotation`, `exposure`) and [`Method::Unshadowed`]. With precomputed vectors, pictures can switch `self_shadow`
+    /// method (`trilinear`, `partial`, `cut`, `extent`, `overlap`, `shared`, `negligible`, `self_shadow`), whether occluders are drawn
+    /// (`hide_occluders`), the light (`rotation`, `exposure`) and [`Method::Unshadowed`]. With precomputed vectors, pictures can switch `self_shadow`
     /// off but not on.
     ///
     /// Precomputed vectors are valid for the environment that [`Fiv::new`] was given. Other methods use the environment
@@ -97,7 +97,8 @@ impl Fiv {
     ) -> Result<Picture> {
         let settings = &PictureSettings { fiv: self.prepared.picture(&settings.fiv)?, ..settings.clone() };
         self.follow(scene, &settings.fiv)?;
-        let drawn = &if settings.fiv.hide_occluders { self.without_occluders(handles) } else { handles.clone() };
+        let receivers = settings.fiv.hide_occluders.then(|| self.without_occluders(handles));
+        let drawn = receivers.as_ref().unwrap_or(handles);
         let gbuffer = gbuffer::draw(graph, drawn, view, &settings.gbuffer);
         let extent = graph.extent(gbuffer.depth);
         let outputs = graph.scope("fiv", |graph| {

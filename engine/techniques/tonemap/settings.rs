@@ -63,8 +63,8 @@ pub enum Local {
     /// Ashikhmin: windows of equal weights that grow until one is uneven, a shader's search from pixel to pixel.
     ///
     /// The mean over 2s + 1 pixels to the side stands for the Gaussian average of radius s. Windows grow ring by ring, each sample is read once, and the
-    /// search ends at the first window that is not even, so that pixels beside edges take less time. The thesis' operator costs 2.7 to 6.2 times the global
-    /// one, which the definition's thousands of samples cannot; its text (4.3.1) asks for an average over *some neighbourhood*.
+    /// search ends at the first window that is not even, so that pixels beside edges take less time. The thesis' operator takes 2.7 to 6.2 times the time of the global
+    /// one, and thousands of samples take far more. Its text (4.3.1) asks for an average over *some neighbourhood*.
     Growing,
     /// The definition, far slower: every sample of every neighbourhood of every pixel.
     Literal,

@@ -37,19 +37,19 @@ impl Last {
         dt: Option<f32>,
         settings: &Settings,
     ) -> Result<Option<Known>> {
-        let Some(dt) = dt.filter(|_| goes_on(settings, dt)) else {
+        // As for the statistics, a frame without a known time starts anew.
+        let Some(dt) = dt.filter(|dt| dt.is_finite() && goes_on(settings, Some(*dt))) else {
             self.0 = None;
             return Ok(None);
         };
-        let dt = if dt.is_finite() { dt.max(0.0) } else { 0.0 };
+        let share = -(-dt.max(0.0) / settings.adapt_local).exp_m1();
         if let Some((buffer, _)) = self.0.as_ref().filter(|(_, of)| *of == extent) {
-            let share = -(-dt / settings.adapt_local).exp_m1();
-            return Ok(Some(Known { last: graph.import_buffer(buffer), share: share.min(1.0) }));
+            return Ok(Some(Known { last: graph.import_buffer(buffer), share }));
         }
         // Below zero: no adaptation yet, also if this graph never runs.
         let none = vec![-1.0f32; extent.pixels() as usize];
         let buffer = OwnedBuffer::with_contents(gpu, "tonemap.last", bytemuck::cast_slice(&none))?;
-        let known = Known { last: graph.import_buffer(&buffer), share: 1.0 };
+        let known = Known { last: graph.import_buffer(&buffer), share };
         self.0 = Some((buffer, extent));
         Ok(Some(known))
     }

@@ -123,7 +123,6 @@ fn all(args: &ReproduceArgs, console: Console) -> Result<ExitCode> {
     for name in papers::EXPERIMENTS {
         let spent = begun.elapsed();
         let of = ReproduceArgs {
-            experiment: Some((*name).to_owned()),
             output: Some(folder.join(name)),
             time_limit: args.time_limit.map(|limit| Span(limit.0.saturating_sub(spent))),
             ..args.clone()

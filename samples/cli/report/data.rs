@@ -27,7 +27,15 @@ fn plots(page: &Page, timed: bool) -> impl Iterator<Item = &Plot> {
     })
 }
 
-/// `{ title, facts, warnings, tables: { id: { caption, columns, rows } }, plots: { id: { caption, x, y, series } } }`.
+/// Identifiers of the comparisons of images.
+fn images(page: &Page) -> impl Iterator<Item = &str> {
+    page.blocks().filter_map(|block| match block {
+        Block::Images(set) => Some(set.id.as_str()),
+        _ => None,
+    })
+}
+
+/// `{ title, facts, warnings, tables: { id: { caption, columns, rows } }, plots: { id: { caption, x, y, series } }, images: [id] }`.
 pub(super) fn json(page: &Page, timed: bool) -> Result<String> {
     let cell = |cell: &Cell| match cell {
         Cell::Empty => Value::Null,
@@ -62,6 +70,7 @@ pub(super) fn json(page: &Page, timed: bool) -> Result<String> {
         "warnings": page.warnings,
         "tables": tables(page, timed).map(table).collect::<Map<_, _>>(),
         "plots": plots(page, timed).map(plot).collect::<Map<_, _>>(),
+        "images": if timed { Vec::new() } else { images(page).collect() },
     });
     serde_json::to_string_pretty(&document)
         .map(|text| text + "\n")

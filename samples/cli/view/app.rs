@@ -129,7 +129,7 @@ pub struct Viewer {
     pub(super) compiling: Option<text::Compiling>,
     /// A pipeline that follows a side.
     pub(super) followed: Option<Followed>,
-    /// Number of the side that they follow.
+    /// Number of the side that this pipeline follows.
     pub(super) followed_side: usize,
     times: bars::Times,
 }

@@ -207,7 +207,7 @@ impl Viewer {
             _ => {
                 let error = Error::new(ErrorKind::Input, "is no scene, bake, environment or picture that the viewer opens")
                     .in_file(&file)
-                    .help("Scenes: .gltf, .glb, .obj, .zip; bakes: .day, .prt, .fiv; cameras and passes in text: .toml; environments: .hdr; pictures: .exr, .png, .pfm, .jpg");
+                    .help("Scenes: .gltf, .glb, .obj, .zip; bakes: .day, .prt, .fiv; cameras and pipelines: .toml; environments: .hdr; pictures: .exr, .png, .pfm, .jpg");
                 self.trouble = Some(error.to_string());
             }
         }

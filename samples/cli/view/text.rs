@@ -133,7 +133,9 @@ fn take(viewer: &mut Viewer) {
 /// Puts the passes into the settings of their side, in each frame of the window: another technique begins without them.
 pub(super) fn keep(viewer: &mut Viewer) {
     take(viewer);
-    if let Some(followed) = viewer.followed.as_ref().filter(|followed| followed.is_old()) {
+    // One pipeline at a time: another one that was dropped is not replaced. The watches stay unread until then.
+    let idle = viewer.compiling.is_none();
+    if let Some(followed) = viewer.followed.as_ref().filter(|followed| idle && followed.is_old()) {
         let path = followed.pipeline.path.clone();
         follow(viewer, path);
     }

@@ -146,10 +146,10 @@ fn variants(results: &Results) -> Result<Section> {
          smoothing, upsampling. The paper has 1.5 to 2.0 for imperfect visibility, about 5 for downsampling, and 2.8 frames per second with all three. \
          Variants whose names end in `specular` show mirrors, glass and highlights, as all pictures of the paper: what mirrors show is gathered at full resolution, so \
          that imperfect visibility helps there and downsampling does not. All other variants, and all errors, are for diffuse surfaces \
-         only, like the reference. *Over the variant before*: the speed relative to the variant with one acceleration less: without imperfect visibility, without interleaved sampling, or exact.",
+         only, like the reference. *Speed over one acceleration less*: relative to the variant with one acceleration less: without imperfect visibility, without interleaved sampling, or exact.",
     ));
     let heads = ["scene", "variant", "frames/s"].into_iter().chain(STAGES);
-    let heads = heads.chain(["speed", "indirect, speed", "over the variant before"]);
+    let heads = heads.chain(["speed", "indirect, speed", "speed over one acceleration less"]);
     let mut table = Table::new("figure-5", "Time of the variants", heads).timed();
     let columns = [
         "scene",

@@ -34,49 +34,37 @@ pub(super) fn tables(lab: &Lab<'_>) -> Result<Section> {
          Ashikhmin's local operator. The thesis names neither the program that computed its VDP nor its settings. *Background* is the share of pixels that show the environment. \
          *Differ* is the share of pixels that differ before tone mapping by more than 5/255 of the screen's white. VDP marks more pixels; `samples/fiv/README.md` has its values with other settings.",
     );
+    let mut images = Vec::new();
     for (id, more, seen) in [("", "", SEEN), ("-ground", ", the ground alone from above", OVER)] {
-        let columns = [
-            "samples",
-            "before (thesis)",
-            "before",
-            "after (thesis)",
-            "after",
-            "after − before",
-            "differ",
-            "background",
-        ];
-        let caption = lab.caption(&format!("Table 17: VDP (%) by samples, bunny under one area light{more}"));
-        let mut table = Table::new(format!("table-17{id}"), caption, columns);
+        let caption = format!("Table 17: VDP (%) by samples, bunny under one area light{more}");
+        let mut table =
+            Table::new(format!("table-17{id}"), lab.caption(&caption), ["samples"].into_iter().chain(COLUMNS));
         for (samples, before, after) in paper::TABLE_17 {
-            if let Some(ours) = seen.compare(lab, "bunny, area", samples)? {
-                table.push([samples.into(), before.into()].into_iter().chain(ours.cells(after)));
+            if let Some(found) = seen.found(lab, "bunny, area", samples)? {
+                table.push([samples.into()].into_iter().chain(found.cells(before, after)));
+                images.extend((id.is_empty()).then(|| found.images("39", "Figures 39 and 40", "bunny, area", samples)));
             }
         }
         section.add(table);
-        let columns = [
-            "environment",
-            "samples",
-            "before (thesis)",
-            "before",
-            "after (thesis)",
-            "after",
-            "after − before",
-            "differ",
-            "background",
-        ];
         let caption = lab.caption(&format!("Table 18: VDP (%) by environment, a bunny{more}"));
+        let columns = ["environment", "samples"].into_iter().chain(COLUMNS);
         let mut table = Table::new(format!("table-18{id}"), caption, columns);
         for (name, scene, before, after) in paper::TABLE_18 {
             let samples = seen.nearest(lab, scene);
-            if let Some(ours) = seen.compare(lab, scene, samples)? {
-                table.push([name.into(), samples.into(), before.into()].into_iter().chain(ours.cells(after)));
+            if let Some(found) = seen.found(lab, scene, samples)? {
+                table.push([name.into(), samples.into()].into_iter().chain(found.cells(before, after)));
+                images.extend((id.is_empty()).then(|| found.images("41", "Figures 41 and 42", scene, samples)));
             }
         }
         section.add(table);
     }
-    images(lab, &mut section)?;
+    images.into_iter().for_each(|set| section.add(set));
     Ok(section)
 }
+
+/// Columns of both tables after the case.
+const COLUMNS: [&str; 7] =
+    ["before (thesis)", "before", "after (thesis)", "after", "after − before", "differ", "background"];
 
 /// The pictures in which differences are counted.
 #[derive(Clone, Copy)]
@@ -94,27 +82,15 @@ const SEEN: Seen = Seen { scene: ", seen", technique: ", hidden", view: HORIZON 
 /// The ground from above.
 const OVER: Seen = Seen { scene: "", technique: "", view: GROUND };
 
-/// Shares of pixels, percent.
-struct Shares {
-    before: f64,
-    after: f64,
-    differ: f64,
-    background: f64,
-}
-
-impl Shares {
-    fn cells(&self, thesis: f64) -> [Cell; 6] {
-        let Self { before, after, differ, background } = *self;
-        [before.into(), thesis.into(), after.into(), (after - before).into(), differ.into(), background.into()]
-    }
-}
-
-/// A picture before and after tone mapping, and its reference.
-struct Both {
+/// A picture and its reference, before (0) and after (1) tone mapping.
+struct Found {
+    /// Exposure before tone mapping.
     stops: f64,
+    /// Percentage of the pixels that show the environment.
     background: f64,
     truth: [Picture; 2],
     test: [Picture; 2],
+    vdp: [Measured; 2],
 }
 
 impl Seen {
@@ -127,7 +103,7 @@ impl Seen {
         SETS.into_iter().find(|set| self.run(lab, scene, set).is_some()).unwrap_or(paper::DENSEST)
     }
 
-    fn both(self, lab: &Lab<'_>, scene: &str, technique: &str) -> Result<Option<Both>> {
+    fn found(self, lab: &Lab<'_>, scene: &str, technique: &str) -> Result<Option<Found>> {
         let Some((truth, run)) = self.run(lab, scene, TRUTH).zip(self.run(lab, scene, technique)) else {
             return Ok(None);
         };
@@ -144,13 +120,18 @@ impl Seen {
             (0..truth.pixels.len()).filter(|i| is_ground(*i)).map(|i| truth.pixels[i]).collect();
         let background = 100.0 * (1.0 - ground.len() as f64 / truth.pixels.len().max(1) as f64);
         let stops = exposure(ground);
-        let (truth_after, test_after) = (mapped(&truth)?, mapped(&test)?);
-        Ok(Some(Both { stops, background, truth: [truth, truth_after], test: [test, test_after] }))
+        let [truth_after, test_after] = [mapped(&truth)?, mapped(&test)?];
+        let vdp = [vdp(&truth, &test, stops)?, vdp(&truth_after, &test_after, 0.0)?];
+        Ok(Some(Found { stops, background, truth: [truth, truth_after], test: [test, test_after], vdp }))
     }
 
-    /// For each pixel, whether it shows a surface: surfaces have irradiance in at least one of the environments, the background has none.
+    /// For each pixel, whether it shows a surface: surfaces have irradiance in at least one of the environments, the background has none. From above
+    /// every pixel shows the ground.
     fn surfaces(self, lab: &Lab<'_>, truth: &Done) -> Result<Vec<bool>> {
         let mut lit = Vec::new();
+        if self.view == GROUND {
+            return Ok(lit);
+        }
         for run in lab.results.of(&truth.method).filter(|run| run.view == truth.view) {
             let pixels = lab.results.picture(Layer(run, "irradiance"))?.pixels;
             lit.resize(pixels.len().max(lit.len()), false);
@@ -158,53 +139,44 @@ impl Seen {
         }
         Ok(lit)
     }
-
-    fn compare(self, lab: &Lab<'_>, scene: &str, technique: &str) -> Result<Option<Shares>> {
-        let Some(both) = self.both(lab, scene, technique)? else { return Ok(None) };
-        Ok(Some(Shares {
-            before: both.vdp(0)?.value,
-            after: both.vdp(1)?.value,
-            differ: differing(&both.truth[0], &both.test[0], both.stops),
-            background: both.background,
-        }))
-    }
 }
 
-impl Both {
-    /// Before (0) and after (1) tone mapping.
-    fn vdp(&self, at: usize) -> Result<Measured> {
-        let stops = [self.stops, 0.0][at];
-        let display = Display { exposure: Exposure::Stops(stops), curve: ToneCurve::Clip };
-        let options = Options { display, vdp_masking_slope: 1.0, ..Options::default() };
-        Measure::Vdp.of(&Pair::new(&self.truth[at], &self.test[at])?, &options)
+impl Found {
+    /// Cells of [`COLUMNS`], beside the thesis' values.
+    fn cells(&self, thesis_before: f64, thesis_after: f64) -> [Cell; 7] {
+        let [before, after] = [0, 1].map(|at: usize| self.vdp[at].value);
+        let differ = differing(&self.truth[0], &self.test[0], self.stops);
+        [thesis_before, before, thesis_after, after, after - before, differ, self.background].map(Cell::from)
     }
-}
 
-/// Figures 39 to 42.
-fn images(lab: &Lab<'_>, section: &mut Section) -> Result<()> {
-    let of_17 = paper::TABLE_17.into_iter().map(|(set, ..)| ("Figures 39 and 40", "bunny, area", set));
-    let of_18 =
-        paper::TABLE_18.into_iter().map(|(_, scene, ..)| ("Figures 41 and 42", scene, SEEN.nearest(lab, scene)));
-    for (figures, scene, samples) in of_17.chain(of_18) {
-        let Some(both) = SEEN.both(lab, scene, samples)? else { continue };
-        let id = format!("perceived-{}-{scene}-{samples}", &figures[8..10]);
-        let [before, after] = [both.vdp(0)?, both.vdp(1)?];
-        let factor = both.stops.exp2() as f32;
+    /// Pictures and maps of one case.
+    fn images(&self, id: &str, figures: &str, scene: &str, samples: &str) -> Comparison {
+        let factor = self.stops.exp2() as f32;
         let exposed = |picture: &Picture| picture.pixels.iter().map(|p| p.map(|v| v * factor)).collect::<Vec<_>>();
-        let map = |outcome: &Measured| outcome.map.values.iter().map(|v| [*v; 3]).collect::<Vec<_>>();
-        let set =
-            Comparison::new(id, format!("{figures}: {scene}, {samples}"), both.truth[0].width, both.truth[0].height)
-                .exposure(0.0)
-                .values("linear light of a screen, whose white is 1; maps: probability of detection")
-                .with("before, brute force", exposed(&both.truth[0]))
-                .with("before, vectors", exposed(&both.test[0]))
-                .with("VDP map before", map(&before))
-                .with("after, brute force", both.truth[1].pixels.clone())
-                .with("after, vectors", both.test[1].pixels.clone())
-                .with("VDP map after", map(&after));
-        section.add(set.at_most(SIDE));
+        let map = |at: usize| self.vdp[at].map.values.iter().map(|v| [*v; 3]).collect::<Vec<_>>();
+        let (width, height) = (self.truth[0].width, self.truth[0].height);
+        Comparison::new(
+            format!("perceived-{id}-{scene}-{samples}"),
+            format!("{figures}: {scene}, {samples}"),
+            width,
+            height,
+        )
+        .exposure(0.0)
+        .values("linear light of a screen, whose white is 1; maps: probability of detection")
+        .with("before, brute force", exposed(&self.truth[0]))
+        .with("before, vectors", exposed(&self.test[0]))
+        .with("VDP map before", map(0))
+        .with("after, brute force", self.truth[1].pixels.clone())
+        .with("after, vectors", self.test[1].pixels.clone())
+        .with("VDP map after", map(1))
+        .at_most(SIDE)
     }
-    Ok(())
+}
+
+fn vdp(truth: &Picture, test: &Picture, stops: f64) -> Result<Measured> {
+    let display = Display { exposure: Exposure::Stops(stops), curve: ToneCurve::Clip };
+    let options = Options { display, vdp_masking_slope: 1.0, ..Options::default() };
+    Measure::Vdp.of(&Pair::new(truth, test)?, &options)
 }
 
 /// Percent of pixels in which a channel differs by more than [`CODES`] of the screen's white.

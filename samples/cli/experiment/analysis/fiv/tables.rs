@@ -57,6 +57,7 @@ pub(super) fn errors(lab: &Lab<'_>) -> Result<Section> {
     }
     section.add(table);
     above.iter().for_each(|text| section.text(text));
+    section.add(corrections(lab)?);
     let mut all =
         Table::new("errors-all", lab.caption("NRMSE of every technique"), ["scene", "view", "technique", "NRMSE"]);
     for run in lab.results.runs.iter().filter(|run| run.method != TRUTH) {
@@ -66,6 +67,24 @@ pub(super) fn errors(lab: &Lab<'_>) -> Result<Section> {
     }
     section.add(all);
     Ok(section)
+}
+
+/// Errors with and without the corrections of figures 21 and 23.
+fn corrections(lab: &Lab<'_>) -> Result<Table> {
+    let columns = ["correction", "off", "on", "on minus off"];
+    let mut table = Table::new("corrections", lab.caption("NRMSE with and without a correction"), columns);
+    for (correction, without, scenes) in [
+        ("overlap", "no overlap", &["queens, area", "queens", "queens, close", "chess queens, area", "two, areas"][..]),
+        ("partial", "no partial", &["queen, sunk", "chess queen, sunk", "bunny"]),
+    ] {
+        for scene in scenes {
+            let with = lab.nearest(scene, GROUND, DEFAULT);
+            let (off, on) = (lab.nrmse(scene, GROUND, without)?, lab.nrmse(scene, GROUND, with)?);
+            let Some((off, on)) = off.zip(on) else { continue };
+            table.push([format!("{correction}, {scene}").into(), off.into(), on.into(), (on - off).into()]);
+        }
+    }
+    Ok(table)
 }
 
 /// Table 2.
@@ -125,7 +144,7 @@ pub(super) fn frames(lab: &Lab<'_>) -> Result<Section> {
     let mut table =
         Table::new("table-3", lab.caption(&format!("Table 3; the thesis has {DENSE} samples")), columns).timed();
     let (mut ours, mut thesis) = (Vec::new(), Vec::new());
-    for (name, things, _, megabytes, fps) in paper::TABLE_3 {
+    for (name, things, megabytes, fps) in paper::TABLE_3 {
         let samples = lab.nearest(name, FRONT, DENSE);
         let Some(times) = lab.times(lab.run(name, FRONT, samples))? else { continue };
         let milliseconds = own(&times);

@@ -1,6 +1,7 @@
 //! Decides whether our value meets that of a paper.
 
-/// The rule by which a value of ours meets that of a paper. Printed values are rounded, so a relative difference of [`ROUNDING`] counts as none, but for `same`.
+/// The rule by which a value of ours meets that of a paper. Printed values are rounded: half of their last digit, and at most [`ROUNDING`] of the value,
+/// counts as no difference, but for `same`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rule {
     AtLeast,
@@ -12,8 +13,15 @@ pub enum Rule {
     Sign,
 }
 
-/// Relative difference that rounding explains.
+/// Largest relative difference that rounding explains.
 const ROUNDING: f64 = 5e-3;
+
+/// Half of the last digit of a printed value, at most [`ROUNDING`] of the value.
+fn rounding(paper: f64) -> f64 {
+    let text = paper.to_string();
+    let digits = text.split_once('.').map_or(0, |(_, digits)| digits.len());
+    (0.5 * 0.1f64.powi(digits as i32)).min(ROUNDING * paper.abs())
+}
 
 impl Rule {
     /// `at least`, `at most`, `within F`, `same` or `sign`.
@@ -34,7 +42,7 @@ impl Rule {
     }
 
     pub fn holds(self, paper: f64, ours: f64) -> bool {
-        let slack = ROUNDING * paper.abs();
+        let slack = rounding(paper);
         match self {
             Self::AtLeast => ours >= paper - slack,
             Self::AtMost => ours <= paper + slack,

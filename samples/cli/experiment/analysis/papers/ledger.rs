@@ -166,7 +166,7 @@ impl Number {
             return if needs { Err("needs `ours` or `missing`".into()) } else { Ok(()) };
         };
         if ours.table.is_none() || ours.column.is_none() {
-            return Err("`ours` must name a table, a row and a column".into());
+            return Err("`ours` must name a table and a column".into());
         }
         let rule = self.met.as_deref().ok_or("needs `met`")?;
         super::judge::Rule::parse(rule).map(|_| ())

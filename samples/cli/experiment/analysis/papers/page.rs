@@ -96,7 +96,8 @@ pub fn page(ledgers: &[Ledger], reports: &Reports) -> Page {
         ));
     }
     for (name, report) in reports.all() {
-        let own = report.warnings.iter().filter(|warning| !warning.starts_with("Quick mode"));
+        // The quick mode is named above.
+        let own = report.warnings.iter().filter(|warning| !(report.quick && warning.starts_with("Quick mode")));
         page.warnings.extend(own.map(|warning| format!("{name}: {warning}")));
     }
     let missing: Vec<&str> = super::EXPERIMENTS.iter().copied().filter(|name| reports.get(name).is_none()).collect();
@@ -145,10 +146,11 @@ pub fn page(ledgers: &[Ledger], reports: &Reports) -> Page {
     }
     let mut first = Section::new("Shares");
     first.text(
-        "*Met*: our value meets the paper's by the rule of its line: `at least` and `at most` for qualities and costs, `within F` for a ratio between 1/F and F, `sign` for the same side of zero; printed \
-         values are rounded, so a difference of 0.5 % counts as none. `same` allows no difference. *Explained*: our value does not meet the paper's, and a table, a test or a page shows the reason. *Open*: it does not, \
-         and the reason is not shown. *No counterpart*: the experiment does not have this number. *Measured*: results with a value here. Some of the papers' claims have no number; then the entry says which number stands \
-         for the claim. Times and rates have a table of their own, because a newer machine meets many of them. Settings of the experiments are listed apart and do not count.",
+        "*Met*: our value meets the paper's by the rule of its line: `at least` and `at most` for qualities and costs, `within F` for a ratio between 1/F and F, `sign` for the same side of zero. Printed values are \
+         rounded: half of the last digit, and at most 0.5 %, counts as no difference. `same` allows none. *Explained*: our value does not meet the paper's, and the entry names a table, a test or a page that shows the reason. \
+         This page checks that the table, the test or the page exists; whether the reason is good, a reader decides. *Open*: our value does not meet the paper's, and no such place is named. *No counterpart*: the experiment does not have this \
+         number. *Measured*: results with a value here; the last column is a share of these. Some of the papers' claims have no number; then the entry says which number stands for the claim. Times and rates have a table of their own, \
+         because they depend on the machine. Settings of the experiments are listed apart and do not count.",
     );
     first.add(shares);
     first.add(times);

@@ -10,7 +10,7 @@ use super::{EXPERIMENTS, ledger::Reference};
 /// Maximum of bytes of a file of a report.
 const MOST: u64 = 1 << 30;
 
-/// `report.json`, `times.json` and the identifiers of pictures of each experiment.
+/// `report.json` and `times.json` of each experiment.
 #[derive(Debug, Default)]
 pub struct Reports(BTreeMap<&'static str, Report>);
 
@@ -18,7 +18,6 @@ pub struct Reports(BTreeMap<&'static str, Report>);
 #[derive(Debug, Default)]
 pub struct Report {
     data: Vec<Value>,
-    page: String,
     pub quick: bool,
     /// Reasons why the report is not complete.
     pub warnings: Vec<String>,
@@ -65,10 +64,6 @@ impl Reports {
                     report.data.push(value);
                 }
             }
-            let page = folder.join("report.html");
-            if page.is_file() {
-                report.page = String::from_utf8_lossy(&image::read_file_checked(&page, MOST)?).into_owned();
-            }
             report.read_facts();
             reports.insert(*name, report);
         }
@@ -76,8 +71,8 @@ impl Reports {
     }
 
     #[cfg(test)]
-    pub fn of(name: &'static str, data: Value, page: &str) -> Self {
-        let mut report = Report { data: vec![data], page: page.into(), ..Report::default() };
+    pub fn of(name: &'static str, data: Value) -> Self {
+        let mut report = Report { data: vec![data], ..Report::default() };
         report.read_facts();
         Self(BTreeMap::from([(name, report)]))
     }
@@ -135,7 +130,8 @@ impl Reports {
             }
         }
         let Some(id) = &reference.images else { return Ok(()) };
-        let there = report.page.contains(&format!("id=\"images-{id}\""));
+        let names = |data: &Value| data["images"].as_array().is_some_and(|ids| ids.iter().any(|known| known == id));
+        let there = report.data.iter().any(names);
         if there { Ok(()) } else { Err(format!("{name}: no pictures '{id}'")) }
     }
 }

@@ -32,6 +32,12 @@ const TABLES_12_13: [(&str, f64, f64); 2] = [("memorial", 3.28, 2.48), ("desk", 
 const TABLES_14_16: [(&str, f64, f64, f64, f64); 2] =
     [("memorial", 2.41, 3.62, 0.9876, 5.44), ("desk", 2.72, 2.05, 0.9925, 17.66)];
 
+/// Printed STM/LTM of a size of frames (tables 9, 10) or of a picture (table 12).
+pub(super) fn printed(name: &str) -> Option<f64> {
+    let stills = TABLES_12_13.iter().map(|(name, ratio, _)| (*name, *ratio));
+    TABLES_9_10.into_iter().chain(stills).find(|(known, _)| *known == name).map(|(_, ratio)| ratio)
+}
+
 /// The gain of selection, for each way of averaging.
 pub(super) fn payoff(views: &[View<'_>]) -> Result<Section> {
     let mut section = Section::new("Does selection still pay?");
@@ -217,7 +223,13 @@ pub(super) fn stills(views: &[View<'_>]) -> Result<Section> {
     let mut table = Table::new(
         "table-11",
         "Table 11",
-        ["picture", "pixels", "dynamic range (log₁₀)", "of 99.9 % of the pixels (log₁₀)", "important (%)"],
+        [
+            "picture",
+            "pixels",
+            "dynamic range (log₁₀)",
+            "dynamic range of 99.9 % of the pixels (log₁₀)",
+            "important (%)",
+        ],
     );
     let heads = ["picture", "GTM (ms)", "LTM (ms)", "fast LTM (ms)", "pyramid LTM (ms)"].map(str::to_owned);
     let marks = MARKS.iter().map(|mark| (*mark).to_owned());

@@ -1,7 +1,7 @@
 //! The dissertation's own pair (sections 5.2 and 5.3): its choices of settings against the model images of POV-Ray with the radiosity of table 1, in
 //! the light of listing 9, and the reasons for the differences to its figures.
 //!
-//! The analysis finds techniques and references by their names: `paper`, `sweep`, `occluders`, `samples`, `no occlusion`, `lit`; `povray` and its variants; `eq. 16`,
+//! The analysis finds techniques and references by their names: `paper`, `paper, large`, `sweep`, `occluders`, `samples`, `patterns`, `shadows`, `no occlusion`, `lit`; `povray` and its variants; `eq. 16`,
 //! `inverse square` and the path tracer with the same law, for the scenes with lamps.
 
 mod judged;
@@ -67,7 +67,7 @@ fn at_strengths(
         if model.len() != direct.len() || model.len() != total.len() {
             return Err(Error::input(format!("{}/{}: the pictures differ in size", run.scene, run.view)));
         }
-        let complex = run.group != "simple";
+        let complex = run.triangles > super::SIMPLE;
         let added = if factors.iter().any(|factor| *factor != 1.0) { pixels(run, "indirect")? } else { Vec::new() };
         for (rows, factor) in all.iter_mut().zip(factors) {
             let shown = |i: usize| match *factor {

@@ -183,6 +183,7 @@ fn weaker(found: &[Variant<'_>]) -> Table {
         "views",
         "correlation falls with 0.5",
         "of these, rises with 0.1",
+        "rises (%)",
         "of these, nearer to direct light's with 0.1",
     ];
     let columns = NAMES[..3].iter().copied().chain(columns);
@@ -198,8 +199,9 @@ fn weaker(found: &[Variant<'_>]) -> Table {
                 nearer += usize::from(weak.correlation_gain() > strong.correlation_gain());
             }
         }
-        let counts = [strong.rows.len(), falls, rises, nearer].map(Cell::from);
-        table.push(strong.names().into_iter().take(3).chain(counts));
+        let share = (falls > 0).then(|| 100.0 * rises as f64 / falls as f64);
+        let cells = [strong.rows.len().into(), falls.into(), rises.into(), share.into(), nearer.into()];
+        table.push(strong.names().into_iter().take(3).chain(cells));
     }
     table
 }
@@ -266,7 +268,7 @@ pub(super) fn law(results: &Results) -> Result<Section> {
                 continue;
             }
             let mean = |of: usize| weighted(&rows, |row| row.correlations[0][of]).map(|all| all.mean);
-            let factor = if technique == law { "none" } else { "one a view" };
+            let factor = if technique == law { "none" } else { "one for each view" };
             let cells = [
                 technique.into(),
                 law.into(),

@@ -91,6 +91,15 @@ fn figures(id: &str, caption: &str, rows: &[Judged], gain: impl Fn(&Judged) -> f
         .figure("gain, complex scenes, most", "%", 14.69, complex.map(|ends| ends[1]))
         .figure("gain, simple scenes, mean", "%", None, kind_mean(false))
         .figure("gain, complex scenes, mean", "%", None, kind_mean(true))
+        .figure(
+            "gain, complex over simple scenes, mean",
+            "",
+            None,
+            kind_mean(true)
+                .zip(kind_mean(false))
+                .filter(|(_, simple)| *simple > 0.0)
+                .map(|(complex, simple)| complex / simple),
+        )
         .figure("correlation of direct light, mean", "", 0.8867, mean(&|row| row.correlations[kind][0]))
         .figure("correlation with image-space radiosity, mean", "", 0.887, mean(&|row| row.correlations[kind][1]))
         .figure(
