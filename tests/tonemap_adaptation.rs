@@ -2,7 +2,7 @@
 
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
-    techniques::tonemap::{Mode, Operator, Settings, Still},
+    techniques::tonemap::{Identify, Mode, Operator, Settings, Still},
 };
 
 const SIDE: u32 = 16;
@@ -277,5 +277,98 @@ fn a_panning_view_does_not_jump() {
                 assert!(adapted <= bound + 1e-3 && alone > 5.0 * adapted, "{operator:?} {mode:?}: {adapted} {alone}");
             }
         }
+    });
+}
+
+/// A map of important pixels that serves several frames is that of the first of them; a mask is of its own frame.
+#[test]
+fn a_map_serves_as_many_frames_as_wanted() {
+    with_gpu(|gpu| {
+        let bar = |at: u32| -> Vec<[f32; 4]> {
+            let light = |i: u32| if i % SIDE == at { 50.0 } else { 1.0 };
+            (0..SIDE * SIDE).map(|i| [light(i), light(i), light(i), 1.0]).collect()
+        };
+        // A mask of so many pixels.
+        let mask = |count: usize| -> Vec<f32> {
+            (0..(SIDE * SIDE) as usize).map(|i| f32::from(u8::from(i < count))).collect()
+        };
+        for identify in [Identify::Sobel, Identify::Saliency] {
+            for (scale, keep_map) in [(1, 3), (2, 2)] {
+                let plain =
+                    Settings { identify, identify_scale: scale, ..in_mode(Operator::Ashikhmin, Mode::Selective) };
+                let kept = Settings { keep_map, ..plain.clone() };
+                // The number of important pixels, and the picture.
+                let shown = |still: &mut Still, at: u32, mask: Option<&[f32]>, dt: Option<f32>| {
+                    let mapped = still.map(SIDE, SIDE, bar(at), mask, dt).unwrap();
+                    (mapped.important.unwrap(), mapped.pixels)
+                };
+                // Without a bar (99) there is no detail.
+                let alone = [99, 8].map(|at| shown(&mut still(gpu, &plain), at, None, Some(0.1)));
+                assert!(alone[0].0 != alone[1].0, "{identify:?} {scale}: {} important pixels in both", alone[0].0);
+                let mut on = still(gpu, &kept);
+                assert!(shown(&mut on, 99, None, Some(0.1)) == alone[0], "the first frame has its own map");
+                for frame in 1..2 * keep_map {
+                    let found = shown(&mut on, 8, None, Some(0.1));
+                    let (age, name) = (frame % keep_map, format!("{identify:?} {scale} {frame}"));
+                    if age == 0 || frame > keep_map {
+                        assert_eq!(found.0, alone[1].0, "{name}");
+                    } else {
+                        assert_eq!(found.0, alone[0].0, "{name}");
+                        // The same frame again does not make the map older.
+                        assert_eq!(shown(&mut on, 8, None, Some(0.0)).0, alone[0].0, "{name}");
+                    }
+                }
+                // The map stays in its place: light moves from column 2 to column 12, but the important pixels do not. Local adaptation of the
+                // important pixels alone is what the mask of their own frame gives.
+                let mut on = still(gpu, &kept);
+                shown(&mut on, 2, None, Some(0.1));
+                let moved = shown(&mut on, 12, None, Some(0.1));
+                let global = Settings { threshold: Some(1e18), ..plain.clone() };
+                let [here, there] = [2, 12].map(|at| {
+                    let local = Settings { threshold: Some(0.0), ..plain.clone() };
+                    let of = |settings: &Settings, at: u32| shown(&mut still(gpu, settings), at, None, Some(0.1)).1;
+                    let (map, none, all) = (of(&plain, at), of(&global, at), of(&local, at));
+                    (map, none, all)
+                });
+                // Pixels whose global and local light differ tell which of the two they have.
+                let marked = |list: &[[f32; 4]], none: &[[f32; 4]], all: &[[f32; 4]]| -> Vec<Option<bool>> {
+                    (0..list.len()).map(|i| (none[i] != all[i]).then(|| list[i] == all[i])).collect()
+                };
+                let at_2 = marked(&here.0, &here.1, &here.2);
+                let at_12 = marked(&moved.1, &there.1, &there.2);
+                let known = at_2.iter().zip(&at_12).filter_map(|(a, b)| a.zip(*b)).collect::<Vec<_>>();
+                assert!(known.iter().all(|(a, b)| a == b), "{identify:?} {scale}");
+                // Saliency marks nearly all of so small a picture.
+                let differs = at_12 != marked(&there.0, &there.1, &there.2);
+                assert!(differs || identify == Identify::Saliency, "{identify:?} {scale}: the map has moved");
+                // A mask counts in its frame, over a map of this frame and over an older one, and does not stay.
+                let mut on = still(gpu, &kept);
+                let all = (SIDE * SIDE) as usize;
+                assert_eq!(shown(&mut on, 99, Some(&mask(all)), Some(0.1)).0 as usize, all);
+                assert_eq!(shown(&mut on, 99, None, Some(0.1)).0, alone[0].0);
+                let mut on = still(gpu, &kept);
+                shown(&mut on, 99, None, Some(0.1));
+                assert_eq!(shown(&mut on, 8, Some(&mask(all)), Some(0.1)).0 as usize, all);
+                // A frame without a time, a cut, and another extent have their own map.
+                let mut on = still(gpu, &kept);
+                shown(&mut on, 99, None, Some(0.1));
+                assert!(shown(&mut on, 8, None, None).0 == alone[1].0);
+                shown(&mut on, 99, None, Some(0.1));
+                on.tonemap().reset().unwrap();
+                assert!(shown(&mut on, 8, None, Some(0.1)) == alone[1]);
+                on.tonemap().reset().unwrap();
+                shown(&mut on, 99, None, Some(0.1));
+                on.map(SIDE / 2, 2 * SIDE, bar(1), None, Some(0.1)).unwrap();
+                assert_eq!(shown(&mut on, 8, None, Some(0.1)).0, alone[1].0);
+            }
+        }
+        let error = still(gpu, &Settings { keep_map: 2, ..in_mode(Operator::Ashikhmin, Mode::Selective) })
+            .tiles(8)
+            .map(SIDE, SIDE, bar(0), None, Some(0.1))
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("keep_map is 2"), "{error}");
+        let wrong = Settings { keep_map: 0, ..Settings::default() }.validate().unwrap_err().to_string();
+        assert!(wrong.contains("keep_map"), "{wrong}");
     });
 }

@@ -7,6 +7,7 @@ pub mod compose;
 pub mod direct;
 pub mod downsample;
 pub mod gbuffer;
+pub mod matte;
 pub mod motion;
 pub mod shadow;
 pub mod skybox;

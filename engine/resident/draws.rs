@@ -83,7 +83,8 @@ impl Batches {
         all
     }
 
-    fn filtered(moment: &Moment, keep: impl Fn(&Instance) -> bool, eye: Vec3) -> Self {
+    /// As [`Batches::new`], with the instances for which `keep` is true.
+    pub fn filtered(moment: &Moment, keep: impl Fn(&Instance) -> bool, eye: Vec3) -> Self {
         // State → mesh (by its indices) → instances with their distance.
         type Meshes = BTreeMap<(u32, u32), Vec<(f32, u32)>>;
         let mut groups: BTreeMap<(Cutout, Sided), Meshes> = BTreeMap::new();
@@ -144,6 +145,7 @@ mod tests {
         let bounds = Aabb::of([Vec3::new(at, 0.0, 0.0)]).grown(0.5);
         Instance {
             node: 0,
+            material: 0,
             bounds,
             first_index: 30 * mesh,
             indices: 30,

@@ -89,6 +89,8 @@ pub(crate) struct StreamShape {
 pub struct Instance {
     /// Index into [`Scene::nodes`].
     pub node: u32,
+    /// Index into [`Scene::materials`].
+    pub material: u32,
     /// World space.
     pub bounds: Aabb,
     pub first_index: u32,
@@ -357,6 +359,7 @@ impl Resident {
             });
             host.push(Instance {
                 node: item.node as u32,
+                material,
                 bounds: item.job.map_or_else(|| bounds.transformed(&world), |j| deformed[j]),
                 first_index,
                 indices,

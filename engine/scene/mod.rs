@@ -8,6 +8,7 @@ mod archive;
 mod budget;
 pub mod bvh;
 pub mod c_arrays;
+pub mod chosen;
 pub mod cull;
 pub mod deform;
 pub mod environment;

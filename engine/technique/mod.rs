@@ -19,10 +19,10 @@ use crate::{
     Error, Result,
     bake::Digest,
     gpu::Gpu,
-    graph::Graph,
-    passes::temporal,
+    graph::{Extent, Graph},
+    passes::{matte, temporal},
     resident::{Handles, Resident},
-    scene::{Note, Pose, Scene, View},
+    scene::{Note, Pose, Scene, View, chosen::Chosen},
     settings::Description,
 };
 
@@ -219,6 +219,8 @@ pub trait Technique: Sized {
 pub struct Ready<T> {
     resident: Resident,
     technique: T,
+    /// The objects whose matte each frame has.
+    chosen: Option<Chosen>,
 }
 
 impl<T: Technique> Ready<T> {
@@ -235,7 +237,7 @@ impl<T: Technique> Ready<T> {
     ) -> Result<Self> {
         let resident = T::upload(gpu, scene)?;
         let technique = T::ready(Making { gpu, scene, resident: &resident, baked, told }, settings)?;
-        Ok(Self { resident, technique })
+        Ok(Self { resident, technique, chosen: None })
     }
 
     /// The technique.
@@ -243,10 +245,16 @@ impl<T: Technique> Ready<T> {
         &self.technique
     }
 
+    /// From the next frame on, pictures have the matte of these objects ([`Picture::matte`]) and the layer `chosen`. `None`: no matte.
+    pub fn choose(&mut self, chosen: Option<Chosen>) {
+        self.chosen = chosen;
+    }
+
     /// Declares one frame of the scene. The far plane of `view` is fitted to the scene in `pose`.
     ///
     /// # Errors
-    /// As [`Technique::frame`]; `Usage` for temporal anti-aliasing of a picture that is not radiance or has no G-buffer.
+    /// As [`Technique::frame`]; `Usage` for temporal anti-aliasing of a picture that is not radiance or has no G-buffer, and for a matte of a
+    /// picture without G-buffer or of two eyes.
     pub fn frame(
         &mut self,
         graph: &mut Graph,
@@ -268,6 +276,18 @@ impl<T: Technique> Ready<T> {
             picture.total = temporal::accumulate(graph, &handles, (&gbuffer, &view), picture.total, settings)?;
             // The average stands at the middles of the pixels.
             shown = view.shifted(glam::Vec2::ZERO);
+        }
+        if let Some(chosen) = &self.chosen {
+            let of_view = |image| graph.extent(image) == Extent::from(view.extent);
+            let gbuffer = picture.gbuffer.filter(|g| of_view(g.depth) && of_view(picture.total));
+            let Some(gbuffer) = gbuffer else {
+                let what = format!("mode {} of {} has no G-buffer of its one view", shot.mode.name(), T::NAME);
+                let help = "Name no objects, or use a picture of one eye that shows all light";
+                return Err(Error::usage(what).at("objects by name").help(help));
+            };
+            let matte = matte::draw(graph, &handles, &gbuffer, &view, chosen);
+            picture = picture.values("chosen", &["Y"], matte);
+            picture.matte = Some(matte);
         }
         if let Some(gbuffer) = picture.gbuffer.take() {
             gbuffer_layers::add(&mut picture, &gbuffer, &view);

@@ -43,6 +43,8 @@ pub struct Picture {
     pub(super) numbers: Vec<(&'static str, Number)>,
     /// The surfaces that the picture shows. [`super::Ready::frame`] takes it and adds its layers.
     pub gbuffer: Option<GBuffer>,
+    /// R32F: the matte of the chosen objects ([`super::Ready::choose`]), which is also the layer `chosen`.
+    pub matte: Option<Image>,
     /// The view of the picture. [`super::Ready::frame`] sets it.
     pub view: Option<View>,
     /// Notes about this frame.
@@ -76,7 +78,7 @@ impl Picture {
     /// A picture without layers: the red, green and blue channels of an image are radiance.
     pub fn new(total: Image) -> Self {
         let (layers, sums, remarks, numbers, notes) = Default::default();
-        Self { total, grey: false, layers, sums, remarks, numbers, gbuffer: None, view: None, notes }
+        Self { total, grey: false, layers, sums, remarks, numbers, gbuffer: None, matte: None, view: None, notes }
     }
 
     /// A picture without layers: the first channel of an image, as grey.

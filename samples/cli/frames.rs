@@ -17,7 +17,7 @@ use crate::{
     bake::Rate,
     console,
     effects::Effects,
-    last_stage::{LastStage, Staged},
+    last_stage::{self, LastStage, Staged},
     program,
     progress::Frames,
     render::{Given, unless_stopped},
@@ -71,7 +71,9 @@ pub fn frames<T: Technique>(
     let settings = staged.technique;
     let effects = staged.effects.as_ref().map(Effects::new).transpose()?;
     let last = LastStage::new(&gpu, staged.tonemap.as_ref(), run.exposure())?;
-    let Some(ready) = ready(&gpu, run, (given, &settings), args, interrupt)? else { return Ok(()) };
+    let important = last_stage::important(&run.stage.scene, staged.tonemap.as_ref())?;
+    let Some(mut ready) = ready(&gpu, run, (given, &settings), args, interrupt)? else { return Ok(()) };
+    ready.choose(important);
     let uploaded = started.elapsed();
     run.phases = vec![("load", loaded), ("device", opened - loaded), ("upload", uploaded - opened)];
 
@@ -92,7 +94,7 @@ pub fn frames<T: Technique>(
         let of = OfFrame { frame, pose, view, shot };
         if args.list_passes {
             let (mut graph, mut picture) = work.declared(run, &of, run.smooth.place(frame), work.seed(run, frame))?;
-            picture.develop(|picture| work.last.frame(&mut graph, picture, work.step()))?;
+            work.last.frame(&mut graph, &mut picture, work.step())?;
             return console::print(graph.plan()?.list_passes().trim_end());
         }
         let done = if run.smooth.count == 1 {
@@ -176,7 +178,13 @@ impl<T: Technique> Work<'_, T> {
         let view = picture.view.unwrap_or(of.view);
         let reading = match &self.args.view {
             Some(name) => Readback::view(&mut graph, name).map_err(|error| error.at("--view"))?,
-            None => picture.read(&mut graph, run.outputs.wants_layers(), false),
+            // The mean of several pictures is developed afterwards, with the matte.
+            None => {
+                let wanted = run.outputs.wants_layers();
+                let matte = run.smooth.count > 1 && picture.matte.is_some();
+                let picture = if matte && !wanted { picture.only(&[last_stage::MATTE]) } else { picture };
+                picture.read(&mut graph, wanted || matte, false)
+            }
         };
         let dump = self.args.dump.as_ref().map(|folder| (folder, graph.dump()));
         let result = self.runner.run_with_progress(&graph, held, told);
@@ -198,7 +206,7 @@ impl<T: Technique> Work<'_, T> {
         let declared = self.declared(run, of, run.smooth.place(of.frame), self.seed(run, of.frame));
         let Some((mut graph, mut picture)) = unless_stopped(declared, self.interrupt)? else { return Ok(None) };
         let step = self.step();
-        picture.develop(|picture| self.last.frame(&mut graph, picture, step))?;
+        self.last.frame(&mut graph, &mut picture, step)?;
         // Repetitions must not advance the history: the next frame follows the first run of this frame.
         let held = self.args.repeat > 1;
         let mut told = |share: f64| progress.within(of.frame, share);
@@ -235,7 +243,7 @@ impl<T: Technique> Work<'_, T> {
             runs.push((begun.elapsed().as_secs_f64() * 1e3, rendered.frame.report.clone()));
         }
         let Some((mut layers, exact)) = mean.finish() else { return Ok(None) };
-        run.name_exact(exact);
+        run.name_exact(if run.outputs.wants_layers() { exact } else { Vec::new() });
         self.last.mean(&mut layers, self.step())?;
         self.write(run, of, (layers, view), begun, progress, |_| runs)
     }
@@ -277,7 +285,7 @@ impl<T: Technique> Work<'_, T> {
             let (mut graph, mut picture) =
                 self.declared(run, of, run.smooth.place(of.frame), self.seed(run, of.frame))?;
             // A time step of 0 leaves the adaptation unchanged.
-            picture.develop(|picture| self.last.frame(&mut graph, picture, 0.0))?;
+            self.last.frame(&mut graph, &mut picture, 0.0)?;
             let last = repeat + 1 == self.args.repeat;
             let result = if last { self.runner.run(&graph) } else { self.runner.run_held(&graph) };
             let Some(result) = unless_stopped(result, self.interrupt)? else { return Ok(None) };

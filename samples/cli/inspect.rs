@@ -3,10 +3,13 @@
 use std::fmt::Write;
 
 use glam::{Mat4, Vec3};
-use lucerna::scene::{Aabb, AlphaMode, LightKind, Material, Note, Pose, Projection, Scene};
+use lucerna::scene::{Aabb, AlphaMode, LightKind, Material, Node, Note, Pose, Projection, Scene};
 use serde::Serialize;
 
 use crate::scene_bounds;
+
+/// Nodes that the text lists at most.
+const NODES: usize = 100;
 
 /// The summary of a scene; its fields are those of the JSON output.
 #[derive(Debug, Serialize)]
@@ -18,6 +21,7 @@ pub struct Summary {
     pub memory: Memory,
     pub cameras: Vec<CameraInfo>,
     pub lights: Vec<LightInfo>,
+    pub nodes: Vec<NodeInfo>,
     pub materials: Vec<MaterialInfo>,
     pub textures: Vec<TextureInfo>,
     pub animations: Vec<AnimationInfo>,
@@ -82,6 +86,15 @@ pub struct LightInfo {
 }
 
 #[derive(Debug, Serialize)]
+pub struct NodeInfo {
+    pub name: String,
+    /// Number of the node above.
+    pub parent: Option<u32>,
+    /// Name of the mesh.
+    pub mesh: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
 pub struct MaterialInfo {
     pub name: String,
     pub base_color: [f32; 4],
@@ -124,6 +137,7 @@ pub fn summary(scene: &Scene) -> Summary {
         memory: memory(scene),
         cameras: (0..scene.cameras.len()).map(|i| camera(scene, i, place(i, |node| node.camera))).collect(),
         lights: lights(scene, world),
+        nodes: scene.nodes.iter().map(|n| node(scene, n)).collect(),
         materials: scene.materials.iter().map(material).collect(),
         textures: scene
             .textures
@@ -221,6 +235,11 @@ fn lights(scene: &Scene, world: &[Mat4]) -> Vec<LightInfo> {
     list
 }
 
+fn node(scene: &Scene, node: &Node) -> NodeInfo {
+    let mesh = node.mesh.and_then(|mesh| scene.meshes.get(mesh as usize));
+    NodeInfo { name: node.name.clone(), parent: node.parent, mesh: mesh.map(|mesh| mesh.name.clone()) }
+}
+
 fn position(world: Mat4) -> Vec3 {
     world.w_axis.truncate()
 }
@@ -306,6 +325,18 @@ impl Summary {
         if let Some(e) = &self.environment {
             writeln!(out, "environment\n  {:?} {}×{}", e.name, e.width, e.height)?;
         }
+        let named: Vec<&NodeInfo> = self.nodes.iter().filter(|node| !node.name.is_empty()).collect();
+        section(out, "nodes with a name", named.len())?;
+        for node in named.iter().take(NODES) {
+            let mesh = node.mesh.as_ref().map_or(String::new(), |mesh| format!(", mesh {mesh:?}"));
+            let parent = node.parent.and_then(|parent| self.nodes.get(parent as usize));
+            let parent = parent.filter(|parent| !parent.name.is_empty());
+            let under = parent.map_or(String::new(), |parent| format!(", child of {:?}", parent.name));
+            writeln!(out, "  {:?}{mesh}{under}", node.name)?;
+        }
+        if named.len() > NODES {
+            writeln!(out, "  and {} more (--json lists all)", named.len() - NODES)?;
+        }
         section(out, "materials", self.materials.len())?;
         for m in &self.materials {
             let [r, g, b, a] = m.base_color;
@@ -360,6 +391,7 @@ mod tests {
             ..Primitive::default()
         };
         let instance = || Node { mesh: Some(0), ..Node::default() };
+        let child = |number: usize| Node { name: format!("child {number}"), parent: Some(4), ..Node::default() };
         let projection = Projection::Perspective { yfov: 1.0, aspect: None, znear: 0.1, zfar: None };
         let scene = Scene {
             name: "test".into(),
@@ -369,7 +401,11 @@ mod tests {
                 instance(),
                 Node { light: Some(0), ..Node::default() },
                 Node { camera: Some(0), ..Node::default() },
-            ],
+                Node { name: "hero".into(), parent: Some(0), ..Node::default() },
+            ]
+            .into_iter()
+            .chain((0..NODES).map(child))
+            .collect(),
             materials: vec![Material::emitter("lamp", Vec3::ONE)],
             lights: vec![Light {
                 name: "spot one".into(),
@@ -384,13 +420,21 @@ mod tests {
         let summary = summary(&scene);
         assert_eq!((summary.counts.triangles, summary.counts.triangles_drawn), (2, 4));
         let text = summary.text();
-        for part in
-            ["2 triangles (4 drawn)", "\"front\" perspective 57.3°", "point", "lamp", "ignored: extensionsUsed: EXT_x"]
-        {
+        for part in [
+            "2 triangles (4 drawn)",
+            "\"front\" perspective 57.3°",
+            "point",
+            "lamp",
+            "ignored: extensionsUsed: EXT_x",
+            "  \"hero\"\n",
+            "  \"child 98\", child of \"hero\"\n  and 1 more",
+        ] {
             assert!(text.contains(part), "{part} is not in:\n{text}");
         }
         let json = serde_json::to_value(&summary).unwrap();
         assert_eq!(json["cameras"][0]["forward"], serde_json::json!([0.0, 0.0, -1.0]));
         assert_eq!(json["notes"][0]["kind"], "ignored");
+        assert_eq!(json["nodes"].as_array().unwrap().len(), 5 + NODES);
+        assert_eq!(json["nodes"][5], serde_json::json!({ "name": "child 0", "parent": 4, "mesh": null }));
     }
 }

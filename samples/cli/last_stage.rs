@@ -8,9 +8,13 @@
 use lucerna::{
     Error, ErrorKind, Result,
     gpu::Gpu,
-    graph::{Graph, Image},
+    graph::{Graph, Runner},
     image::{Layer, Layers},
-    techniques::tonemap::{self, Operator, Still, Tonemap},
+    passes::{self, gbuffer},
+    resident::Resident,
+    scene::{Pose, Scene, View, chosen::Chosen},
+    technique::Picture,
+    techniques::tonemap::{self, Input, Mode, Operator, Still, Tonemap},
 };
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value};
@@ -34,6 +38,9 @@ pub struct Staged<S> {
 
 /// Luminance to which the log-average is scaled for an operator that works in cd/m²: 18 % of a screen's white of 100.
 const GREY: f32 = 18.0;
+
+/// The layer that has the matte of the important objects.
+pub const MATTE: &str = "chosen";
 
 /// The group of settings.
 const GROUP: &str = "tonemap";
@@ -148,6 +155,45 @@ pub fn is_developed(settings: &Value) -> bool {
     settings.get(GROUP).is_some_and(|tonemap| !tonemap.is_null())
 }
 
+/// The objects whose pixels are important to the tone mapping; `None`: no objects are named.
+///
+/// # Errors
+/// `Usage` if the scene has no object of a name, or if the tone mapping is not selective.
+pub fn important(scene: &Scene, settings: Option<&tonemap::Settings>) -> Result<Option<Chosen>> {
+    let Some(settings) = settings.filter(|settings| !settings.important.trim().is_empty()) else { return Ok(None) };
+    let chosen = match settings.mode() {
+        Mode::Selective => Chosen::by_names(scene, &settings.important),
+        mode => {
+            let what = format!("'{}' is important, but tonemap.mode is {}", settings.important, mode.name());
+            Err(Error::usage(what).help("Use tonemap.mode=selective, or name no objects"))
+        }
+    };
+    chosen.map(Some).map_err(|error| error.at("tonemap.important"))
+}
+
+/// The layer with the matte of the important objects, for [`still`] of a picture whose renderer has no G-buffer. `None` as for [`important`].
+///
+/// # Errors
+/// As [`important`]; `OutOfMemory`, `DeviceLost`.
+pub fn matte(
+    gpu: &Gpu,
+    (scene, pose): (&Scene, &Pose),
+    view: &View,
+    settings: Option<&tonemap::Settings>,
+) -> Result<Option<Layer>> {
+    let Some(chosen) = important(scene, settings)? else { return Ok(None) };
+    let mut resident = Resident::new(gpu, scene)?;
+    let mut graph = Graph::new(MATTE);
+    let handles = resident.frame_in(&mut graph, scene, pose);
+    let view = view.fit_far(&handles.bounds());
+    let surfaces = gbuffer::draw(&mut graph, &handles, &view, &gbuffer::Settings::default());
+    let matte = passes::matte::draw(&mut graph, &handles, &surfaces, &view, &chosen);
+    let read = graph.read_image(matte);
+    let mut frame = Runner::new(gpu).run(&graph)?;
+    let values = frame.take_floats(read).into_iter().map(|[value, ..]| value).collect();
+    Ok(Some(Layer::new(MATTE, &["Y"], values)))
+}
+
 /// The tone mapping stage of a run over frames.
 #[derive(Debug)]
 pub struct LastStage {
@@ -170,15 +216,14 @@ impl LastStage {
         Ok(Self { gpu: gpu.clone(), settings, tonemap, still: None })
     }
 
-    /// The picture after the stage. `dt`: seconds since the previous frame.
+    /// Lets the stage develop the picture of a frame, whose matte has the important objects. `dt`: seconds since the previous frame.
     ///
     /// # Errors
     /// `Usage` if the picture cannot be tone mapped as the settings ask.
-    pub fn frame(&mut self, graph: &mut Graph, picture: Image, dt: f32) -> Result<Image> {
-        match &mut self.tonemap {
-            Some(tonemap) => Ok(tonemap.frame(graph, picture, Some(dt))?.mapped),
-            None => Ok(picture),
-        }
+    pub fn frame(&mut self, graph: &mut Graph, picture: &mut Picture, dt: f32) -> Result<()> {
+        let Some(tonemap) = &mut self.tonemap else { return Ok(()) };
+        let mask = picture.matte;
+        picture.develop(|color| Ok(tonemap.frame(graph, Input { color, mask }, Some(dt))?.mapped))
     }
 
     /// Applies the stage to a picture in host memory, as [`Self::frame`]. The picture before the stage becomes the layer `light`.
@@ -211,7 +256,8 @@ fn developed(still: &mut Still, layers: &mut Layers, dt: Option<f32>) -> Result<
     let Some(main) = layers.layers.iter().position(|layer| layer.name.is_empty()) else { return Ok(()) };
     let Some(pixels) = layers.layers[main].rgb_pixels() else { return Ok(()) };
     let pixels = pixels.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect();
-    let mapped = still.map(layers.width, layers.height, pixels, None, dt)?;
+    let matte = layers.layers.iter().find(|layer| layer.name == MATTE).map(|layer| layer.data.as_slice());
+    let mapped = still.map(layers.width, layers.height, pixels, matte, dt)?;
     let light = Layer { name: "light".into(), ..layers.layers[main].clone() };
     layers.layers[main] = Layer::rgb("", &mapped.pixels);
     layers.layers.push(light);

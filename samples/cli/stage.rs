@@ -61,7 +61,7 @@ pub struct StageArgs {
     #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
     pub time: f64,
 
-    /// Replace the scene's environment: .hdr, .exr, or a built-in environment (point, area, areas, grove)
+    /// Replace the scene's environment: .hdr, .exr, or a built-in environment (point, area, areas, grove, dome)
     #[arg(long, alias = "env", value_name = "FILE", help_heading = "Picture")]
     pub environment: Option<PathBuf>,
 

@@ -6,10 +6,10 @@ use lucerna::{Error, Result, scene::Environment};
 use std::f32::consts::{PI, TAU};
 
 /// Names of [`environment`].
-pub const ENVIRONMENTS: [&str; 4] = ["point", "area", "areas", "grove"];
+pub const ENVIRONMENTS: [&str; 5] = ["point", "area", "areas", "grove", "dome"];
 
 /// An environment made by code: `point`, one small light; `area`, a white area light; `areas`, a green and a red one; `grove`, sun and sky through leaves,
-/// with radiances of which the largest is more than 10,000 times the smallest.
+/// with radiances of which the largest is more than 10,000 times the smallest; `dome`, an even sky above the horizon.
 ///
 /// # Errors
 /// `Usage` if there is none of this name.
@@ -19,6 +19,7 @@ pub fn environment(name: &str) -> Result<Environment> {
         "area" => Ok(area()),
         "areas" => Ok(areas()),
         "grove" => Ok(grove()),
+        "dome" => Ok(dome()),
         _ => {
             let what = format!("there is no built-in environment {name:?}");
             Err(Error::usage(what).help(format!("Built-in environments: {}", ENVIRONMENTS.join(", "))))
@@ -68,6 +69,11 @@ fn areas() -> Environment {
     })
 }
 
+/// A sky of the same radiance everywhere, π W/m² on a plane that faces up.
+fn dome() -> Environment {
+    painted("dome", 512, |d| Vec3::splat(f32::from(d.y > 0.0)))
+}
+
 pub(super) fn grove() -> Environment {
     let sun = vec3(0.45, 0.72, -0.35).normalize();
     painted("grove", 1024, |d| {
@@ -105,7 +111,9 @@ mod tests {
             assert_eq!((env.name.as_str(), env.pixels.len() as u32), (name, env.width * env.height));
             assert!(env.pixels.iter().all(|p| p.is_finite() && p.min_element() >= 0.0), "{name}");
         }
-        assert!(environment("moon").unwrap_err().to_string().contains("point, area, areas, grove"));
+        // Half of all directions.
+        assert!((environment("dome").unwrap().mean() - 0.5).abs().max_element() < 1e-3);
+        assert!(environment("moon").unwrap_err().to_string().contains("point, area, areas, grove, dome"));
         // Irradiance of the small light, facing it: radiance times solid angle.
         let point = environment("point").unwrap();
         let power = point.mean().y * 4.0 * PI;

@@ -105,6 +105,15 @@ fn shards_and_one_run_give_the_same_bytes_and_a_finished_bake_renders() {
     assert_eq!(both.len(), 2 * 3 * 32 * 24);
     let mut rerun = command(env!("CARGO_BIN_EXE_lucerna"));
     ran(rerun.current_dir(lab.0.path()).args(["rerun", "eyes.exr"])).expect(0, &[]);
+    // The pixels of named objects are known for one eye only, whether the file has layers or not.
+    for file in ["two.exr", "two.png"] {
+        let of = ["render", "--bake", "room.prt", "--size", "32x24", "--aa", "1", "-o", file];
+        let named = ["tonemap.operator=ashikhmin", "tonemap.mode=selective", "tonemap.important=tall block"];
+        let named: Vec<&str> = named.iter().flat_map(|define| ["-D", define]).collect();
+        let eyes = ["-D", "prt.eyes=0.1"];
+        lab.run(&[&of[..], &SCENE, &named, &eyes].concat()).expect(2, &["one eye"]);
+        lab.run(&[&of[..], &SCENE, &named].concat()).expect(0, &[]);
+    }
 }
 
 #[test]

@@ -43,6 +43,8 @@ mod fiv;
 mod igi;
 #[path = "../cli/igi_experiment.rs"]
 mod igi_experiment;
+#[path = "../cli/important.rs"]
+mod important;
 #[path = "../cli/lucerna.rs"]
 mod lucerna;
 #[path = "../cli/papers.rs"]

@@ -33,6 +33,8 @@ mod scene_deform;
 mod scene_extremes;
 #[path = "../scene_gbuffer.rs"]
 mod scene_gbuffer;
+#[path = "../scene_matte.rs"]
+mod scene_matte;
 #[path = "../scene_plan.rs"]
 mod scene_plan;
 #[path = "../scene_shadows.rs"]

@@ -67,10 +67,20 @@ pub fn importance(
     let small = graph.image("tonemap.small", Format::R32F, size);
     graph.compute(shrink::Args { luminance, small, push: shrink::Push { factor } }, size);
     let found = found(graph, small, statistics, None, settings);
+    spread(graph, found, factor, extent, mask)
+}
+
+/// A map at full size, with the pixels of a mask.
+pub fn masked(graph: &mut Graph, map: Image, mask: Image) -> Image {
+    spread(graph, map, 1, graph.extent(map), Some(mask))
+}
+
+/// A map that was found at a size reduced by `factor`, at full size.
+fn spread(graph: &mut Graph, small: Image, factor: u32, extent: Extent, mask: Option<Image>) -> Image {
     let importance = graph.image("tonemap.importance", Format::R32F, extent);
     let args = spread::Args {
-        small: found,
-        mask: mask.unwrap_or(luminance),
+        small,
+        mask: mask.unwrap_or(small),
         importance,
         push: spread::Push { factor },
         spec: spread::Spec { has_mask: mask.is_some().into() },

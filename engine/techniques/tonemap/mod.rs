@@ -20,6 +20,7 @@
 pub mod bilateral;
 mod clean;
 pub mod identify;
+mod keep;
 pub mod local;
 pub mod mark;
 mod operator;
@@ -87,6 +88,8 @@ pub struct Tonemap {
     statistics: OwnedBuffer,
     /// Local adaptation of the last frame.
     last: settle::Last,
+    /// Important pixels of an earlier frame.
+    maps: keep::Maps,
 }
 
 impl Tonemap {
@@ -101,6 +104,7 @@ impl Tonemap {
             settings: settings.clone(),
             statistics: no_statistics(gpu)?,
             last: settle::Last::default(),
+            maps: keep::Maps::default(),
         })
     }
 
@@ -114,6 +118,10 @@ impl Tonemap {
     /// `Usage` if a setting is out of its range; then nothing has changed.
     pub fn set(&mut self, settings: &Settings) -> Result<()> {
         settings.validate()?;
+        // A map that other settings have found does not count. It hardly depends on the exposure, which programs change often.
+        if *settings != (Settings { exposure: settings.exposure, ..self.settings.clone() }) {
+            self.maps = keep::Maps::default();
+        }
         self.settings = settings.clone();
         Ok(())
     }
@@ -125,6 +133,7 @@ impl Tonemap {
     pub fn reset(&mut self) -> Result<()> {
         self.statistics = no_statistics(&self.gpu)?;
         self.last = settle::Last::default();
+        self.maps = keep::Maps::default();
         Ok(())
     }
 
@@ -136,6 +145,7 @@ impl Tonemap {
         let input = input.into();
         let statistics = graph.import_buffer(&self.statistics);
         let known = self.last.known(&self.gpu, graph, graph.extent(input.color), dt, &self.settings)?;
+        let map_of = self.maps.next(&self.gpu, graph, graph.extent(input.color), dt, &self.settings)?;
         graph.scope("tonemap", |graph| {
             let (luminance, sums) = statistics::whole(graph, input.color, statistics, dt, &self.settings);
             let picture = graph.extent(input.color);
@@ -147,7 +157,8 @@ impl Tonemap {
                 receptor::range(graph, input.color, picture.into(), &known, &self.settings);
                 known
             });
-            map(graph, &input, &Light { luminance, statistics, receptor, picture, last: known }, &self.settings)
+            let light = Light { luminance, statistics, receptor, picture, last: known, map: map_of };
+            map(graph, &input, &light, &self.settings)
         })
     }
 }
@@ -162,11 +173,13 @@ struct Light {
     picture: Extent,
     /// Local adaptation of the last frame, if it goes on from it.
     last: Option<settle::Known>,
+    /// Where the map of important pixels comes from.
+    map: keep::Map,
 }
 
 /// Adaptation and curve.
 fn map(graph: &mut Graph, input: &Input, light: &Light, settings: &Settings) -> Result<Output> {
-    let Light { luminance, statistics, receptor, picture, last } = *light;
+    let Light { luminance, statistics, receptor, picture, last, map } = *light;
     let (mut important, mut solve) = (None, None);
     let adaptation = match settings.mode() {
         _ if settings.operator.solves() => {
@@ -177,7 +190,7 @@ fn map(graph: &mut Graph, input: &Input, light: &Light, settings: &Settings) -> 
         Mode::Global => luminance,
         Mode::Local => local::adaptation(graph, luminance, None, statistics, picture, settings)?,
         Mode::Selective => {
-            let importance = identify::importance(graph, luminance, statistics, input.mask, settings);
+            let importance = map.importance(graph, luminance, statistics, input.mask, settings);
             important = Some(importance);
             mark::adapt(graph, luminance, importance, statistics, picture, settings)?
         }

@@ -272,6 +272,17 @@ pub struct Settings {
     #[schemars(extend("x-option" = "Local and selective operators"))]
     #[schemars(extend("x-needs" = {"mode": {"const": "selective"}}))]
     pub mark: Mark,
+    /// Selective: frames of a sequence for which a map of important pixels is used; with 1 each frame finds its own.
+    ///
+    /// The thesis proposes to use maps again in the next frames (6.3.2). Where something moves, an older map has its edges at their old place.
+    #[schemars(range(min = 1, max = 240), extend("x-unit" = "frames", "x-needs" = {"mode": {"const": "selective"}}))]
+    pub keep_map: u32,
+    /// Selective: names of nodes and materials of the scene, with commas between them, whose pixels are important whatever their luminance. The
+    /// children of a named node are important too. Only renderers of scenes use it; empty: none.
+    ///
+    /// The thesis proposes to let pixels be important by what they show, for instance the main character of a game (6.3.2).
+    #[schemars(extend("x-needs" = {"mode": {"const": "selective"}}))]
+    pub important: String,
     /// Treatment of NaN, infinite and negative samples, before anything else.
     #[schemars(extend("x-option" = "Input"))]
     pub bad_values: BadValues,
@@ -329,6 +340,8 @@ impl Default for Settings {
             threshold_unit: ThresholdUnit::LogAverage,
             identify_scale: 1,
             mark: Mark::EarlyZ,
+            keep_map: 1,
+            important: String::new(),
             bad_values: BadValues::Zero,
             adapt_up: 0.4,
             adapt_down: 1.2,

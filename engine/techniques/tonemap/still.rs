@@ -1,7 +1,7 @@
 //! Pictures in main memory, of any size.
 
 use super::{
-    BadCounts, Input, Light, Local, Mode, Operator, Output, Settings, Tonemap, bilateral, clean, identify, map,
+    BadCounts, Input, Light, Local, Mode, Operator, Output, Settings, Tonemap, bilateral, clean, identify, keep, map,
     pyramid, receptor, settle,
     statistics::{self, Rectangle, Sums},
     whole,
@@ -176,6 +176,11 @@ impl Still {
                 self.tonemap.settings.adapt_local
             );
             return Err(Error::usage(what).help(format!("Use 0, or frames of at most {WHOLE} pixels")));
+        } else if keep::goes_on(&self.tonemap.settings, dt) {
+            let keep = self.tonemap.settings.keep_map;
+            let what = format!("keep_map is {keep}, and a frame of {width}×{height} pixels is mapped in tiles");
+            let help = format!("Use 1, or frames of at most {WHOLE} pixels");
+            return Err(Error::usage(what).at("tonemap.keep_map").help(help));
         } else {
             self.tiled(width, height, &source, dt)?
         };
@@ -265,7 +270,8 @@ impl Still {
             let luminance = statistics::luminance(&mut graph, input.color, tile.extent().into(), unused, &settings);
             let known = known(&mut graph);
             let receptor = has_receptors.then_some(known);
-            let light = Light { luminance, statistics: known.statistics, receptor, picture, last: None };
+            let light =
+                Light { luminance, statistics: known.statistics, receptor, picture, last: None, map: keep::Map::Found };
             let output: Output = map(&mut graph, &input, &light, &settings)?;
             let (mapped, found) = (graph.read_image(output.mapped), graph.read_buffer(output.statistics));
             let map = output.important.map(|map| graph.read_image(map));

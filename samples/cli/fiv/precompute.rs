@@ -48,7 +48,7 @@ pub struct PrecomputeArgs {
     #[command(flatten)]
     pub ground: GroundArgs,
 
-    /// The .hdr or .exr environment, or a built-in one (point, area, areas, grove) [default: that of the first scene that has one]
+    /// The .hdr or .exr environment, or a built-in one (point, area, areas, grove, dome) [default: that of the first scene that has one]
     #[arg(long, alias = "env", value_name = "FILE")]
     pub environment: Option<PathBuf>,
 

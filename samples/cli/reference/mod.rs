@@ -168,6 +168,8 @@ fn picture(
     let gpu = Gpu::new(GpuOptions { stop: None, ..args.device.options()? })?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
     let (pose, view) = stage.at(args.stage.time, args.stage.size)?;
+    // Before the work, so that an error does not cost it.
+    let matte = last_stage::matte(&gpu, (&stage.scene, &pose), &view, tonemap.as_ref())?;
     let mut tracer = Tracer::new(&gpu, &stage.scene, &pose)?;
     tracer.start(&view, &settings.reference)?;
     let open = |folder: &PathBuf| Bands::open(args, folder, &tracer, &settings, &about, console);
@@ -225,6 +227,7 @@ fn picture(
         let normal = tonemap.as_ref().is_some_and(|tonemap| tonemap.normalize);
         let ev = args.exposure.unwrap_or_else(|| if normal { 0.0 } else { fitting() });
         // Tone mapping applies the exposure, so that the file must not apply it again.
+        layers.layers.extend(matte);
         match &tonemap {
             Some(tonemap) => last_stage::still(&gpu, tonemap, ev, &mut layers)?,
             None => outputs.expose(ev),

@@ -260,6 +260,11 @@ impl TonemapArgs {
         let check = |config: &Config| config.tonemap.validate().map_err(|error| error.at("tonemap"));
         let config = self.with(&self.settings.define)?;
         self.settings.blamed(check(&config), || check(&self.with(&[])?))?;
+        if !config.tonemap.important.trim().is_empty() {
+            let what = format!("'{}' names objects of a scene, but a picture file has none", config.tonemap.important);
+            let help = "Use --mask FILE, or set it where a scene is rendered (lucerna render)";
+            return Err(Error::usage(what).at("tonemap.important").help(help));
+        }
         if self.mask.is_some() && config.tonemap.mode() != Mode::Selective {
             return Err(Error::usage("--mask needs --mode selective"));
         }

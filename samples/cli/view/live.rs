@@ -10,6 +10,7 @@ use lucerna::{
     image::Layers,
     scene::{Note, Pose, View},
     technique::{Bake, Mode, Readback, Ready, Settings, Shot, Technique},
+    techniques::tonemap,
     techniques::{self, Visitor},
 };
 use serde_json::Value;
@@ -18,7 +19,7 @@ use crate::{
     config::SettingsArgs,
     effects::{self, Effects},
     exposure,
-    last_stage::{LastStage, Staged},
+    last_stage::{self, LastStage, Staged},
     smooth::{Filter, Mean, Smooth},
     stage::Stage,
     view::wanted::{Shows, Wanted},
@@ -137,6 +138,8 @@ impl<T: Technique> Living<T> {
     /// The settings of the request; what depends on them is prepared again.
     fn prepare(&mut self, wanted: &Wanted, take: &Take<'_>) -> Result<T::Settings> {
         let Staged { technique: settings, effects, tonemap } = staged::<T>(&wanted.settings)?;
+        // Each picture stands for itself, and has its own map of important pixels.
+        let tonemap = tonemap.map(|tonemap| tonemap::Settings { keep_map: 1, ..tonemap });
         let by = T::prepared_by(&settings);
         if by != self.by {
             let stage: &Arc<Stage> = &wanted.stage;
@@ -147,6 +150,7 @@ impl<T: Technique> Living<T> {
         if self.effects.as_ref().map(|(by, _)| by) != effects.as_ref() {
             self.effects = effects.map(|by| Ok((by.clone(), Effects::new(&by)?))).transpose()?;
         }
+        self.ready.choose(last_stage::important(&wanted.stage.scene, tonemap.as_ref())?);
         let exposure = take.exposure;
         let shown = wanted.settings.get("tonemap").cloned().unwrap_or_default();
         if self.last.as_ref().is_none_or(|(by, ev, _)| *by != shown || *ev != exposure) {
@@ -178,13 +182,18 @@ impl<T: Technique> Living<T> {
             effects.follow(&mut graph, &mut picture, wanted.seconds)?;
         }
         if develop && let Some((_, _, last)) = &mut self.last {
-            picture.develop(|picture| last.frame(&mut graph, picture, STEP))?;
+            last.frame(&mut graph, &mut picture, STEP)?;
         }
         let mut notes = std::mem::take(&mut picture.notes);
         let images = graph.image_names().into_iter().map(str::to_owned).collect();
         let reading = match &wanted.shows {
             Shows::Image(name) => Readback::view(&mut graph, name)?,
-            Shows::Picture | Shows::Layer(_) => picture.read(&mut graph, take.layers, false),
+            Shows::Picture | Shows::Layer(_) => {
+                // The mean of several pictures is developed afterwards, with the matte.
+                let matte = !develop && picture.matte.is_some();
+                let picture = if matte && !take.layers { picture.only(&[last_stage::MATTE]) } else { picture };
+                picture.read(&mut graph, take.layers || matte, false)
+            }
         };
         let frame = self.runner.run_with_progress(&graph, number > 0, &mut |_| {})?;
         notes.extend(reading.notes(&frame));

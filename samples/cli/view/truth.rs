@@ -8,6 +8,7 @@ use std::{
 use lucerna::{
     Result,
     gpu::Gpu,
+    image::Layer,
     techniques::tonemap,
     tracer::{PictureSettings, Tracer},
 };
@@ -44,8 +45,9 @@ pub(super) fn work(shared: &Shared, gpu: &Gpu, painter: &mut Painter, first: Wan
     let mut tracer = Tracer::new(gpu, &stage.scene, &pose)?;
     let mut wanted = first.clone();
     let mut begun: Begun = None;
+    let mut matte = None;
     loop {
-        let mut growing = Growing { shared, gpu, painter, tracer: &mut tracer };
+        let mut growing = Growing { shared, gpu, painter, tracer: &mut tracer, matte: &mut matte };
         let result = growing.grow(&wanted, &mut begun);
         if let Err(error) = result {
             begun = None;
@@ -68,12 +70,16 @@ fn same_paths(before: &Wanted, now: &Wanted) -> bool {
     before.same_light(&shown)
 }
 
+/// The matte of the important objects, with their names and the size that it is for.
+type Matte = Option<((String, u32, u32), Option<Layer>)>;
+
 /// A picture that grows.
 struct Growing<'a, 's> {
     shared: &'a Shared,
     gpu: &'a Gpu,
     painter: &'a mut Painter,
     tracer: &'a mut Tracer<'s>,
+    matte: &'a mut Matte,
 }
 
 impl Growing<'_, '_> {
@@ -86,6 +92,7 @@ impl Growing<'_, '_> {
         let size = Size { width: part(wanted.size.width), height: part(wanted.size.height) };
         if !begun.as_ref().is_some_and(|before| same_paths(before, wanted)) {
             *begun = None;
+            *self.matte = None;
             let (pose, view) = wanted.placed(size)?;
             self.tracer.set_pose(&pose);
             self.tracer.start(&view, &settings.technique.reference)?;
@@ -126,6 +133,13 @@ impl Growing<'_, '_> {
         let ev = wanted.exposure.or_else(|| exposure::of_source(&wanted.stage.source));
         let ev = ev.unwrap_or_else(|| if tonemap.is_some() { 0.0 } else { exposure::fitting(&layers) });
         if let Some(tonemap) = tonemap {
+            let of = (tonemap.important.clone(), layers.width, layers.height);
+            if self.matte.as_ref().is_none_or(|(by, _)| *by != of) {
+                let (pose, view) = wanted.placed(Size { width: layers.width, height: layers.height })?;
+                let matte = last_stage::matte(self.gpu, (&wanted.stage.scene, &pose), &view, Some(tonemap))?;
+                *self.matte = Some((of, matte));
+            }
+            layers.layers.extend(self.matte.as_ref().and_then(|(_, matte)| matte.clone()));
             last_stage::still(self.gpu, tonemap, ev, &mut layers)?;
         }
         let values = Values::of(wanted, wanted.shows == Shows::Picture);

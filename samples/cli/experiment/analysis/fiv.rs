@@ -112,6 +112,11 @@ impl<'a> Lab<'a> {
         format!("{}, {}", fact("Device").unwrap_or("unknown device"), fact("Driver").unwrap_or("unknown driver"))
     }
 
+    /// A caption for a table whose rows have sizes of their own.
+    fn caption_without_size(&self, text: &str) -> String {
+        format!("{text} ({})", self.device())
+    }
+
     fn caption(&self, text: &str) -> String {
         format!("{text} ({}; {})", self.results.experiment.size, self.device())
     }

@@ -9,7 +9,7 @@ mod tables;
 
 use lucerna::{
     Result,
-    measure::{Display, Exposure, Measure, Options, ToneCurve},
+    measure::{Display, Exposure, Measure, Options, Pair, ToneCurve},
 };
 
 use crate::{
@@ -178,6 +178,35 @@ fn images(results: &Results, views: &[View<'_>]) -> Result<Section> {
             set = set.with("important", results.picture(Layer(run, "important"))?.pixels);
         }
         section.add(set.at_most(SIDE));
+        if let Some(set) = thresholds(results, view)? {
+            section.add(set);
+        }
     }
     Ok(section)
+}
+
+/// Maps of important pixels with the visible differences from the local operator, and their pictures, by threshold; as figures 16, 17, 35, 37 and 38.
+fn thresholds(results: &Results, view: &View<'_>) -> Result<Option<Comparison>> {
+    let Some(truth) = view.run("ltm", None) else { return Ok(None) };
+    let local = results.picture(Layer(truth, ""))?;
+    let (scene, name) = view.of;
+    let (id, title) = (format!("thresholds-{scene}-{name}"), format!("{}: thresholds of the map", view.name()));
+    let values =
+        "linear light of a screen, whose white is 1; maps: grey is important, red is a visible difference from local";
+    let mut set = Comparison::new(id, title, local.width, local.height).exposure(0.0).values(values);
+    let mut any = false;
+    for run in results.at(view.of).filter(|run| run.method == "stm-threshold") {
+        let Some(threshold) = run.value("tonemap.threshold") else { continue };
+        let (test, map) = (results.picture(Layer(run, ""))?, results.picture(Layer(run, "important"))?);
+        let options = casual();
+        let seen = Measure::Vdp.of(&Pair::new(&local, &test)?, &options)?.map.values;
+        let marked = map.pixels.iter().zip(seen).map(|(important, seen)| {
+            let grey = 0.4 * important[0];
+            if f64::from(seen) > options.vdp_threshold { [1.0, 0.0, 0.0] } else { [grey; 3] }
+        });
+        let marked = marked.collect();
+        set = set.with(format!("map {threshold}"), marked).with(format!("selective {threshold}"), test.pixels);
+        any = true;
+    }
+    Ok(any.then(|| set.with("local", local.pixels).at_most(SIDE)))
 }

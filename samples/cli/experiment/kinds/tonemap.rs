@@ -33,6 +33,10 @@ pub(super) fn settings(paper: bool, changes: &Changes) -> Result<Value> {
     let base = Settings { tonemap: tonemap::Settings::paper() };
     let settings: Settings = config::with(&base, changes)?;
     settings.tonemap.validate()?;
+    if !settings.tonemap.important.trim().is_empty() || settings.tonemap.keep_map > 1 {
+        let what = "important and keep_map need a scene and a sequence, but this kind maps single pictures";
+        return Err(Error::usage(what).at("tonemap").help("Leave them out"));
+    }
     config::to_value(&settings)
 }
 

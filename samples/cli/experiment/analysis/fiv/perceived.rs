@@ -2,6 +2,7 @@
 
 use lucerna::{
     Result,
+    image::srgb,
     measure::{Display, Exposure, Measure, Measured, Options, Pair, Picture, ToneCurve},
     reference::tonemap,
     techniques::tonemap::Settings,
@@ -32,34 +33,77 @@ pub(super) fn tables(lab: &Lab<'_>) -> Result<Section> {
          environment behind, without the objects that cast the shadows, so that they hide no error (section 5.4). Before tone mapping, pixels of the background cannot differ; they count. *Before* is before \
          tone mapping, at an exposure at which the lit ground spans the screen's range. *After* is after \
          Ashikhmin's local operator. The thesis names neither the program that computed its VDP nor its settings. *Background* is the share of pixels that show the environment. \
-         *Differ* is the share of pixels that differ before tone mapping by more than 5/255 of the screen's white. VDP marks more pixels; `samples/fiv/README.md` has its values with other settings.",
+         *Differ* is the share of pixels that differ before tone mapping by more than 5/255 of the screen's white. VDP marks more pixels, most of all in small pictures, so rows of different sizes cannot be compared; `samples/fiv/README.md` has its values with other settings.",
     );
     let mut images = Vec::new();
     for (id, more, seen) in [("", "", SEEN), ("-ground", ", the ground alone from above", OVER)] {
         let caption = format!("Table 17: VDP (%) by samples, bunny under one area light{more}");
-        let mut table =
-            Table::new(format!("table-17{id}"), lab.caption(&caption), ["samples"].into_iter().chain(COLUMNS));
+        let mut table = Table::new(
+            format!("table-17{id}"),
+            lab.caption_without_size(&caption),
+            ["samples", "size"].into_iter().chain(COLUMNS),
+        );
         for (samples, before, after) in paper::TABLE_17 {
             if let Some(found) = seen.found(lab, "bunny, area", samples)? {
-                table.push([samples.into()].into_iter().chain(found.cells(before, after)));
+                table.push([samples.into(), found.size()].into_iter().chain(found.cells(before, after)));
                 images.extend((id.is_empty()).then(|| found.images("39", "Figures 39 and 40", "bunny, area", samples)));
             }
         }
         section.add(table);
-        let caption = lab.caption(&format!("Table 18: VDP (%) by environment, a bunny{more}"));
-        let columns = ["environment", "samples"].into_iter().chain(COLUMNS);
+        let caption = lab.caption_without_size(&format!("Table 18: VDP (%) by environment, a bunny{more}"));
+        let columns = ["environment", "samples", "size"].into_iter().chain(COLUMNS);
         let mut table = Table::new(format!("table-18{id}"), caption, columns);
         for (name, scene, before, after) in paper::TABLE_18 {
             let samples = seen.nearest(lab, scene);
             if let Some(found) = seen.found(lab, scene, samples)? {
-                table.push([name.into(), samples.into()].into_iter().chain(found.cells(before, after)));
+                table.push([name.into(), samples.into(), found.size()].into_iter().chain(found.cells(before, after)));
                 images.extend((id.is_empty()).then(|| found.images("41", "Figures 41 and 42", scene, samples)));
             }
         }
         section.add(table);
     }
+    section.text(
+        "The same pairs before tone mapping, with other settings of the VDP. *8 bits*: both pictures are rounded to the codes of an sRGB \
+         file first, as a program that reads such files sees them. *p > 0.95*: a difference must be detected with this probability. *Half the \
+         pixels per degree*: the screen is half as far away. *Practised*: the observer of Daly, whose masking has a slope of 0.7.",
+    );
+    section.add(observers(lab)?);
     images.into_iter().for_each(|set| section.add(set));
     Ok(section)
+}
+
+/// Shares of visible differences before tone mapping by the settings of the VDP.
+fn observers(lab: &Lab<'_>) -> Result<Table> {
+    let columns = ["environment", "samples", "size", "thesis", "as above", "8 bits", "p > 0.95", "8 bits, p > 0.95"];
+    let more = ["half the pixels per degree", "practised"];
+    let caption = lab.caption_without_size("VDP (%) before tone mapping by its settings");
+    let mut table = Table::new("vdp-settings", caption, columns.into_iter().chain(more));
+    let sets = paper::TABLE_17.map(|(samples, before, _)| ("one area light", "bunny, area", Some(samples), before));
+    let environments = paper::TABLE_18.map(|(name, scene, before, _)| (name, scene, None, before));
+    for (name, scene, samples, thesis) in sets.into_iter().chain(environments) {
+        let samples = samples.unwrap_or_else(|| SEEN.nearest(lab, scene));
+        let Some(found) = SEEN.found(lab, scene, samples)? else { continue };
+        let [float, codes] = [false, true].map(|codes| found.before(codes));
+        let (float, codes) = (float?, codes?);
+        let sure = Options { vdp_threshold: 0.95, ..options(0.0) };
+        let near = Options { pixels_per_degree: 0.5 * options(0.0).pixels_per_degree, ..options(0.0) };
+        let practised = Options { vdp_masking_slope: Options::default().vdp_masking_slope, ..options(0.0) };
+        let shares = [
+            found.vdp[0].value,
+            share(&codes, &options(0.0))?,
+            share(&float, &sure)?,
+            share(&codes, &sure)?,
+            share(&float, &near)?,
+            share(&float, &practised)?,
+        ];
+        let cells = [name.into(), samples.into(), found.size(), thesis.into()];
+        table.push(cells.into_iter().chain(shares.map(Cell::from)));
+    }
+    Ok(table)
+}
+
+fn share([truth, test]: &[Picture; 2], options: &Options) -> Result<f64> {
+    Ok(Measure::Vdp.of(&Pair::new(truth, test)?, options)?.value)
 }
 
 /// Columns of both tables after the case.
@@ -95,7 +139,10 @@ struct Found {
 
 impl Seen {
     fn run<'a>(self, lab: &Lab<'a>, scene: &str, technique: &str) -> Option<&'a Done> {
-        lab.run(&format!("{scene}{}", self.scene), self.view, &format!("{technique}{}", self.technique))
+        let (scene, technique) = (format!("{scene}{}", self.scene), format!("{technique}{}", self.technique));
+        let mut runs = lab.results.runs.iter().filter(|run| run.scene == scene && run.method == technique);
+        // A scene with sizes of its own has views with the size in their names.
+        runs.find(|run| run.view.strip_prefix(self.view).is_some_and(|rest| rest.is_empty() || rest.starts_with(' ')))
     }
 
     /// The densest set of samples with a picture.
@@ -142,11 +189,29 @@ impl Seen {
 }
 
 impl Found {
+    /// The size of the pictures, pixels.
+    fn size(&self) -> Cell {
+        format!("{}×{}", self.truth[0].width, self.truth[0].height).into()
+    }
+
     /// Cells of [`COLUMNS`], beside the thesis' values.
     fn cells(&self, thesis_before: f64, thesis_after: f64) -> [Cell; 7] {
         let [before, after] = [0, 1].map(|at: usize| self.vdp[at].value);
         let differ = differing(&self.truth[0], &self.test[0], self.stops);
         [thesis_before, before, thesis_after, after, after - before, differ, self.background].map(Cell::from)
+    }
+
+    /// The pair before tone mapping as light of a screen: reference and test. `codes`: rounded to the codes of an sRGB file.
+    fn before(&self, codes: bool) -> Result<[Picture; 2]> {
+        let factor = self.stops.exp2() as f32;
+        let of = |picture: &Picture| {
+            let shown = |value: f32| {
+                let light = (value * factor).clamp(0.0, 1.0);
+                if codes { srgb::decode_u8(srgb::encode_u8(light)) } else { light }
+            };
+            Picture::new(picture.width, picture.height, picture.pixels.iter().map(|p| p.map(shown)).collect())
+        };
+        Ok([of(&self.truth[0])?, of(&self.test[0])?])
     }
 
     /// Pictures and maps of one case.
@@ -174,9 +239,13 @@ impl Found {
 }
 
 fn vdp(truth: &Picture, test: &Picture, stops: f64) -> Result<Measured> {
+    Measure::Vdp.of(&Pair::new(truth, test)?, &options(stops))
+}
+
+/// The VDP of the tables.
+fn options(stops: f64) -> Options {
     let display = Display { exposure: Exposure::Stops(stops), curve: ToneCurve::Clip };
-    let options = Options { display, vdp_masking_slope: 1.0, ..Options::default() };
-    Measure::Vdp.of(&Pair::new(truth, test)?, &options)
+    Options { display, vdp_masking_slope: 1.0, ..Options::default() }
 }
 
 /// Percent of pixels in which a channel differs by more than [`CODES`] of the screen's white.

@@ -58,6 +58,7 @@ pub(super) fn errors(lab: &Lab<'_>) -> Result<Section> {
     section.add(table);
     above.iter().for_each(|text| section.text(text));
     section.add(corrections(lab)?);
+    section.add(contact(lab)?);
     let mut all =
         Table::new("errors-all", lab.caption("NRMSE of every technique"), ["scene", "view", "technique", "NRMSE"]);
     for run in lab.results.runs.iter().filter(|run| run.method != TRUTH) {
@@ -71,17 +72,50 @@ pub(super) fn errors(lab: &Lab<'_>) -> Result<Section> {
 
 /// Errors with and without the corrections of figures 21 and 23.
 fn corrections(lab: &Lab<'_>) -> Result<Table> {
-    let columns = ["correction", "off", "on", "on minus off"];
+    let columns = [
+        "correction",
+        "off",
+        "on",
+        "on minus off",
+        "all as in the thesis, off",
+        "all as in the thesis, on",
+        "all as in the thesis, on minus off",
+    ];
     let mut table = Table::new("corrections", lab.caption("NRMSE with and without a correction"), columns);
-    for (correction, without, scenes) in [
-        ("overlap", "no overlap", &["queens, area", "queens", "queens, close", "chess queens, area", "two, areas"][..]),
-        ("partial", "no partial", &["queen, sunk", "chess queen, sunk", "bunny"]),
-    ] {
+    let overlap =
+        ["queens, area", "queens", "queens, close", "queens, close, dome", "chess queens, area", "two, areas"];
+    let partial = ["queen, sunk", "queen, sunk, grove", "queen, sunk, forest", "chess queen, sunk", "bunny"];
+    for (correction, scenes) in [("overlap", &overlap[..]), ("partial", &partial)] {
         for scene in scenes {
-            let with = lab.nearest(scene, GROUND, DEFAULT);
-            let (off, on) = (lab.nrmse(scene, GROUND, without)?, lab.nrmse(scene, GROUND, with)?);
-            let Some((off, on)) = off.zip(on) else { continue };
-            table.push([format!("{correction}, {scene}").into(), off.into(), on.into(), (on - off).into()]);
+            let error = |technique: &str| lab.nrmse(scene, GROUND, technique);
+            let ours = (error(&format!("no {correction}"))?, error(lab.nearest(scene, GROUND, DEFAULT))?);
+            let thesis = (error(&format!("thesis, no {correction}"))?, error("thesis")?);
+            if ours.0.is_none() || ours.1.is_none() {
+                continue;
+            }
+            let cells = [ours, thesis]
+                .into_iter()
+                .flat_map(|(off, on)| [off.into(), on.into(), off.zip(on).map(|(off, on)| on - off).into()]);
+            table.push([format!("{correction}, {scene}").into()].into_iter().chain(cells));
+        }
+    }
+    Ok(table)
+}
+
+/// Errors of an object that stands on the ground, beside one that floats and one that is partly below it.
+fn contact(lab: &Lab<'_>) -> Result<Table> {
+    let columns = ["queen", "ours", "all as in the thesis", "unshadowed"];
+    let mut table =
+        Table::new("contact", lab.caption("NRMSE by the distance from the ground, one area light"), columns);
+    for (place, scene) in [
+        ("floats, a fifth of its height above the ground", "queen, floating"),
+        ("stands", "queen, area"),
+        ("a fifth of its height below the ground", "queen, sunk"),
+    ] {
+        let ours = lab.nrmse(scene, GROUND, lab.nearest(scene, GROUND, DEFAULT))?;
+        if ours.is_some() {
+            let [thesis, unshadowed] = ["thesis", UNSHADOWED].map(|technique| lab.nrmse(scene, GROUND, technique));
+            table.push([place.into(), ours.into(), thesis?.into(), unshadowed?.into()]);
         }
     }
     Ok(table)

@@ -92,7 +92,9 @@ pub(super) fn light(results: &Results, cases: &[Case<'_>]) -> Result<Option<Sect
     }
     for (at, (_, list)) in spread(&sets, Some(results.experiment.images)).into_iter().enumerate() {
         let Some((first, truth)) = list.first().and_then(|case| Some((case, case.truth?))) else { continue };
-        for (layer, what) in [("", "all light"), ("indirect", "indirect light"), ("shadow", "shadow")] {
+        for (layer, what) in
+            [("", "all light"), ("direct", "direct light"), ("indirect", "indirect light"), ("shadow", "shadow")]
+        {
             let reference = results.picture(Layer(truth, layer))?;
             // A share has a range of its own.
             let stops = if layer == "shadow" { 0.0 } else { Display::default().stops(&reference) };

@@ -5,7 +5,7 @@ use lucerna::{Error, Result};
 use super::{
     MODEL, PAPER, against, at_strengths, is_large,
     judged::{Judged, weighted},
-    tables::percent,
+    tables::{figures, percent},
 };
 use crate::{
     experiment::results::{Done, Layer, Results},
@@ -19,6 +19,8 @@ const IMPROVED: f64 = 99.05;
 /// k_ISR of the dissertation, and those of the table; the first one is its remedy for views that become worse.
 const STRENGTH: f32 = 0.5;
 const STRENGTHS: [f32; 7] = [0.1, 0.25, STRENGTH, 1.0, 2.0, 4.0, 8.0];
+/// The sender of light in equation 25.
+const SENDER: &str = "albedo";
 /// Factors on the added light.
 const FACTORS: [f32; 8] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
 /// Rows of the table of combinations.
@@ -174,6 +176,20 @@ pub(super) fn sweep(results: &Results) -> Result<Section> {
         table.push(names.chain(summary(&variant.rows)));
     }
     section.add(table);
+    if let Some(nearest) = found.iter().find(|variant| variant.run.value("isr.sender").as_deref() == Some(SENDER)) {
+        section.text(
+            "All quantities for the nearest combination with the dissertation's sender. It is fitted to the printed median and mean. The added light is \
+             proportional to k_ISR and to dA, so the same light comes from the printed k_ISR of 0.5 with an area that is larger by the factor between \
+             both values of k_ISR.",
+        );
+        let reach = nearest.run.value("isr.reach").unwrap_or_default();
+        let caption = format!(
+            "Sender {SENDER}, dA of a {}, reach {reach} pixels, k_ISR {} (printed: {STRENGTH})",
+            nearest.patch(),
+            nearest.strength
+        );
+        section.add(figures("pair-nearest", &caption, &nearest.rows, Judged::gain, 0));
+    }
     Ok(section)
 }
 

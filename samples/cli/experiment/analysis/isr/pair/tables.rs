@@ -68,7 +68,14 @@ pub(super) fn pair(results: &Results) -> Result<Section> {
     Ok(section)
 }
 
-fn figures(id: &str, caption: &str, rows: &[Judged], gain: impl Fn(&Judged) -> f64 + Copy, kind: usize) -> Table {
+/// The quantities that the dissertation prints.
+pub(super) fn figures(
+    id: &str,
+    caption: &str,
+    rows: &[Judged],
+    gain: impl Fn(&Judged) -> f64 + Copy,
+    kind: usize,
+) -> Table {
     let all = weighted(rows, gain);
     let (simple, complex) = (ends(rows, false, gain), ends(rows, true, gain));
     let mean = |value: &dyn Fn(&Judged) -> f64| weighted(rows, value).map(|all| all.mean);
