@@ -281,9 +281,12 @@ impl<T: Technique> Ready<T> {
             let of_view = |image| graph.extent(image) == Extent::from(view.extent);
             let gbuffer = picture.gbuffer.filter(|g| of_view(g.depth) && of_view(picture.total));
             let Some(gbuffer) = gbuffer else {
-                let what = format!("mode {} of {} has no G-buffer of its one view", shot.mode.name(), T::NAME);
-                let help = "Name no objects, or use a picture of one eye that shows all light";
-                return Err(Error::usage(what).at("objects by name").help(help));
+                let mode = shot.mode.name();
+                let what = format!(
+                    "the pixels of named objects are not known: mode {mode} of {} has no G-buffer, or shows two eyes",
+                    T::NAME
+                );
+                return Err(Error::usage(what).help("Name no objects, or render one eye with all light"));
             };
             let matte = matte::draw(graph, &handles, &gbuffer, &view, chosen);
             picture = picture.values("chosen", &["Y"], matte);

@@ -10,8 +10,7 @@ use lucerna::{
     image::Layers,
     scene::{Note, Pose, View},
     technique::{Bake, Mode, Readback, Ready, Settings, Shot, Technique},
-    techniques::tonemap,
-    techniques::{self, Visitor},
+    techniques::{self, Visitor, tonemap},
 };
 use serde_json::Value;
 

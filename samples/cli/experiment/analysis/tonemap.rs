@@ -194,11 +194,14 @@ fn thresholds(results: &Results, view: &View<'_>) -> Result<Option<Comparison>> 
     let values =
         "linear light of a screen, whose white is 1; maps: grey is important, red is a visible difference from local";
     let mut set = Comparison::new(id, title, local.width, local.height).exposure(0.0).values(values);
-    let mut any = false;
-    for run in results.at(view.of).filter(|run| run.method == "stm-threshold") {
+    let runs: Vec<&Done> = results.at(view.of).filter(|run| run.method == "stm-threshold").collect();
+    if runs.is_empty() {
+        return Ok(None);
+    }
+    let options = casual();
+    for run in runs {
         let Some(threshold) = run.value("tonemap.threshold") else { continue };
         let (test, map) = (results.picture(Layer(run, ""))?, results.picture(Layer(run, "important"))?);
-        let options = casual();
         let seen = Measure::Vdp.of(&Pair::new(&local, &test)?, &options)?.map.values;
         let marked = map.pixels.iter().zip(seen).map(|(important, seen)| {
             let grey = 0.4 * important[0];
@@ -206,7 +209,6 @@ fn thresholds(results: &Results, view: &View<'_>) -> Result<Option<Comparison>> 
         });
         let marked = marked.collect();
         set = set.with(format!("map {threshold}"), marked).with(format!("selective {threshold}"), test.pixels);
-        any = true;
     }
-    Ok(any.then(|| set.with("local", local.pixels).at_most(SIDE)))
+    Ok(Some(set.with("local", local.pixels).at_most(SIDE)))
 }
